@@ -1,0 +1,73 @@
+"""The camera: its size, its clock, and when each of its rows opens and closes.
+
+Frame n exposes its row i over ``[n * frame_period_s + row_offset_s[i], + exposure_s)``; the row offset grows by
+``row_time_s`` from row to row. A camera whose bottom row comes first has a negative row time, counted from its last
+row, so that time zero is always the moment at which the first frame's first row begins to expose.
+"""
+
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.errors import PsvideoError
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Encoding:
+    """How the camera's files encode light: transfer curve, code values of black and of saturation, colour filters."""
+
+    transfer: str = "linear"
+    black_level: float | None = None
+    white_level: float | None = None
+    cfa: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Camera:
+    """One camera in one mode. ``readout_s`` is None where it is unknown, 0 for a global shutter, negative bottom-up."""
+
+    width_px: int
+    height_px: int
+    fps: Fraction
+    exposure_s: float
+    readout_s: float | None
+    name: str = "camera"
+    encoding: Encoding = field(default_factory=Encoding)
+
+    @property
+    def frame_period_s(self) -> float:
+        """Seconds from one frame's first row to the next frame's first row."""
+        return float(1 / self.fps)
+
+    @property
+    def shutter_deg(self) -> float:
+        """The exposure as an angle: 360 degrees is the whole frame period."""
+        return 360.0 * self.exposure_s / self.frame_period_s
+
+    @property
+    def row_time_s(self) -> float:
+        """Seconds from one row's opening to the next one's; negative where the bottom row comes first.
+
+        Raises PsvideoError where the readout time is unknown.
+        """
+        if self.readout_s is None:
+            raise PsvideoError(
+                f"The readout time of {self.name!r} is not known (readout_s is \"unknown\" in the plan), and this step "
+                "needs it: write the measured readout time in seconds into the plan's [camera] table."
+            )
+        return self.readout_s / self.height_px
+
+    def row_offsets_s(self) -> FloatArray:
+        """When each row opens after its frame has begun, shape (row,); 0 for the row that comes first.
+
+        >>> up = Camera(width_px=2, height_px=3, fps=Fraction(100), exposure_s=0.01, readout_s=-0.003)
+        >>> [round(float(offset), 6) for offset in up.row_offsets_s()]
+        [0.002, 0.001, 0.0]
+        """
+        rows = np.arange(self.height_px, dtype=np.float64)
+        first = 0 if self.row_time_s >= 0 else self.height_px - 1
+        return (rows - first) * self.row_time_s + 0.0

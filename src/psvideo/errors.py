@@ -1,0 +1,34 @@
+"""What psvideo says when something is wrong: one paragraph, and the exit status that goes with it.
+
+The message names the file (or the option), says what was found, what was expected and what to do about it.
+"""
+
+import difflib
+from collections.abc import Iterable
+
+
+class PsvideoError(Exception):
+    """A fault of the footage, of a file, or of the run."""
+
+    exit_status = 1
+
+
+class UsageError(PsvideoError):
+    """A command that was called in a way it cannot be meant."""
+
+    exit_status = 2
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """Return the advice that ends a message about an unknown name: the nearest known one, else all of them.
+
+    >>> nearest("shutter", ["shutter_deg", "fps"])
+    "did you mean 'shutter_deg'?"
+    >>> nearest("zzz", ["fps", "name"])
+    'known are: fps, name.'
+    """
+    names = list(known)
+    close = difflib.get_close_matches(word, names, n=1, cutoff=0.5)
+    if close:
+        return f"did you mean {close[0]!r}?"
+    return f"known are: {', '.join(sorted(names))}."
