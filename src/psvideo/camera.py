@@ -56,7 +56,7 @@ class Camera:
         """
         if self.readout_s is None:
             raise PsvideoError(
-                f"The readout time of {self.name!r} is not known (readout_s is \"unknown\" in the plan), and this step "
+                f'The readout time of {self.name!r} is not known (readout_s is "unknown" in the plan), and this step '
                 "needs it: write the measured readout time in seconds into the plan's [camera] table."
             )
         return self.readout_s / self.height_px

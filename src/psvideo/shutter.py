@@ -21,7 +21,9 @@ def row_weights(camera: Camera, start_s: FloatArray, duration_s: FloatArray, *, 
     array([[0.5, 1. ],
            [0.5, 0. ]])
     """
-    opens_s = np.arange(frames.start, frames.stop, frames.step)[:, None] * camera.frame_period_s + camera.row_offsets_s()
+    opens_s = (
+        np.arange(frames.start, frames.stop, frames.step)[:, None] * camera.frame_period_s + camera.row_offsets_s()
+    )
     on_s = np.asarray(start_s, np.float64)[:, None, None]
     length_s = np.asarray(duration_s, np.float64)[:, None, None]
     overlap_s = np.minimum(opens_s + camera.exposure_s, on_s + length_s) - np.maximum(opens_s, on_s)

@@ -1,0 +1,75 @@
+"""What commands print: plain text or JSON on stdout; notes, warnings and progress on stderr."""
+
+import json
+import sys
+import time
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import TypeVar
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+Item = TypeVar("Item")
+PLAIN_PROGRESS_EVERY_S = 5.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Voice:
+    """How much a command says, and to whom."""
+
+    json: bool = False
+    verbose: bool = False
+    quiet: bool = False
+
+    def say(self, text: str) -> None:
+        """Print a line for people: on stdout, or nowhere where machines read stdout."""
+        if not (self.json or self.quiet):
+            print(text)
+
+    def detail(self, text: str) -> None:
+        """Print a line that only -v asks for."""
+        if self.verbose:
+            print(text, file=sys.stderr)
+
+    def warn(self, text: str) -> None:
+        """Print a warning on stderr; --json repeats warnings in its result."""
+        if not self.quiet:
+            print(f"psvideo: warning: {text}", file=sys.stderr)
+
+    def result(self, data: object) -> None:
+        """Print the machine-readable result, where --json asked for it."""
+        if self.json:
+            print(json.dumps(data, indent=1))
+
+    def track(self, items: Iterable[Item], *, total: int, what: str, unit: str = "frames") -> Iterator[Item]:
+        """Pass items through and show progress with rate and time left: a bar on a terminal, plain lines elsewhere."""
+        if self.quiet:
+            yield from items
+        elif sys.stderr.isatty():
+            yield from _bar(items, total, what, unit)
+        else:
+            yield from _lines(items, total, what, unit)
+
+
+def _bar(items: Iterable[Item], total: int, what: str, unit: str) -> Iterator[Item]:
+    rate = TextColumn("{task.fields[rate]} " + unit + "/s")
+    columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), rate, TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task(what, total=total, rate="…")
+        for item in items:
+            yield item
+            speed = progress.tasks[0].speed
+            progress.update(task, advance=1, rate=f"{speed:.1f}" if speed else "…")
+
+
+def _lines(items: Iterable[Item], total: int, what: str, unit: str) -> Iterator[Item]:
+    began = said = time.monotonic()
+    for count, item in enumerate(items, start=1):
+        yield item
+        now = time.monotonic()
+        if now - said >= PLAIN_PROGRESS_EVERY_S and count < total:
+            rate = count / (now - began)
+            left_s = (total - count) / rate
+            print(f"{what}: {count} of {total} {unit}, {rate:.1f} {unit}/s, {left_s:.0f} s left", file=sys.stderr)
+            said = now

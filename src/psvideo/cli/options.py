@@ -1,0 +1,19 @@
+"""Options that several commands share, each written once."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+ClipPath = Annotated[Path, typer.Argument(help="A clip: a folder of numbered frames with plan.toml, or a movie file.")]
+PlanPath = Annotated[Path | None, typer.Option("--plan", help="The plan, where it does not lie beside the footage.")]
+Frames = Annotated[str | None, typer.Option("--frames", help="File numbers to use, such as 1-100 or 1-100x2.")]
+FirstLight = Annotated[
+    str | None,
+    typer.Option("--first-light", help="The light of the clip's first complete flash, for plans without a marker."),
+]
+Force = Annotated[bool, typer.Option("--force", help="Replace outputs that exist.")]
+Resume = Annotated[bool, typer.Option("--resume", help="Go on where a run that was stopped left off.")]
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for machines.")]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Say more.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but errors.")]

@@ -1,0 +1,41 @@
+"""Files appear whole or not at all: written beside their final name, then renamed."""
+
+import contextlib
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from psvideo.errors import PsvideoError, UsageError
+
+
+@contextlib.contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """Give a temporary name beside ``path`` to write to; rename it when the block ends well, remove it when it does not.
+
+    A full disk or a folder that cannot be written becomes a PsvideoError that names the file.
+    """
+    beside = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        yield beside
+        beside.replace(path)
+    except OSError as fault:
+        raise PsvideoError(
+            f"{path}: cannot be written ({fault.strerror or fault}). Nothing was left under that name: make room or check "
+            "the folder's permissions, then run the command again."
+        ) from fault
+    finally:
+        with contextlib.suppress(OSError):
+            beside.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a small text file, whole or not at all."""
+    with whole_file(path) as beside:
+        beside.write_text(text, encoding="utf-8")
+
+
+def refuse_existing(path: Path, *, force: bool) -> None:
+    """Raise UsageError where an output exists already and ``force`` does not allow to replace it."""
+    if path.exists() and not force:
+        raise UsageError(f"{path}: exists already. Name another output, or give --force to replace it.")

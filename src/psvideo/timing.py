@@ -1,0 +1,141 @@
+"""When every flash fired, on the camera's clock, and how sure that is: what ``sync`` finds and ``split`` uses.
+
+As a file it is timing.json (schema ``psvideo-timing/1``).
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from pydantic import Field, ValidationError
+
+from psvideo.camera import FloatArray
+from psvideo.errors import PsvideoError
+from psvideo.tomlfile import Contract, check_schema, read_text
+
+SCHEMA = "psvideo-timing/1"
+Order = Literal["marker", "rig", "given", "guess"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Flash:
+    """One flash of the clip. ``slot`` is its place in the plan's list; ``complete`` False: the clip cuts it."""
+
+    index: int
+    slot: int
+    lights: Mapping[str, float]
+    start_s: float
+    duration_s: float
+    complete: bool
+    plate: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class DroppedFrames:
+    """A hole in the clip: ``count`` frames are missing after the file numbered ``after``."""
+
+    after: int
+    count: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Timing:
+    """The flashes of a clip in order. ``order`` says how the lights' names were found, ``guess`` where they were not."""
+
+    clip: str
+    frame_period_s: float
+    exposure_s: float
+    row_time_s: float
+    clock_offset_ppm: float
+    phase_error_rows: float
+    order: Order
+    flashes: tuple[Flash, ...]
+    dropped_frames: tuple[DroppedFrames, ...] = ()
+
+    @property
+    def start_s(self) -> FloatArray:
+        """When every flash starts, shape (flash,)."""
+        return np.array([flash.start_s for flash in self.flashes], np.float64)
+
+    @property
+    def duration_s(self) -> FloatArray:
+        """How long every flash lasts on the camera's clock, shape (flash,)."""
+        return np.array([flash.duration_s for flash in self.flashes], np.float64)
+
+
+class _FlashFile(Contract):
+    index: int
+    slot: int = Field(ge=0)
+    lights: dict[str, float]
+    start_s: float
+    duration_s: float = Field(gt=0)
+    complete: bool
+    plate: str | None = None
+
+
+class _DroppedFile(Contract):
+    after: int
+    count: int = Field(gt=0)
+
+
+class _TimingFile(Contract):
+    schema_: str = Field(alias="schema")
+    clip: str
+    frame_period_s: float = Field(gt=0)
+    exposure_s: float = Field(gt=0)
+    row_time_s: float
+    clock_offset_ppm: float
+    phase_error_rows: float = Field(ge=0)
+    order: Order
+    dropped_frames: list[_DroppedFile] = Field(default_factory=list)
+    flashes: list[_FlashFile]
+
+
+def read_timing(path: Path) -> Timing:
+    """Read timing.json. Raises PsvideoError that names the file, the key and what was expected."""
+    try:
+        data = json.loads(read_text(path))
+        check_schema(data.get("schema"), SCHEMA, source=str(path))
+        file = _TimingFile.model_validate(data)
+    except (json.JSONDecodeError, AttributeError) as fault:
+        raise PsvideoError(f"{path}: not a JSON object ({fault}). Make it again with psvideo sync.") from fault
+    except ValidationError as fault:
+        first = fault.errors()[0]
+        key = ".".join(map(str, first["loc"]))
+        raise PsvideoError(f"{path}: key '{key}': {first['msg']}. Make it again with psvideo sync.") from None
+    flashes = tuple(Flash(**flash.model_dump()) for flash in file.flashes)
+    dropped = tuple(DroppedFrames(after=hole.after, count=hole.count) for hole in file.dropped_frames)
+    scalars = file.model_dump(exclude={"schema_", "flashes", "dropped_frames"})
+    return Timing(flashes=flashes, dropped_frames=dropped, **scalars)
+
+
+def format_timing(timing: Timing) -> str:
+    """Return the timing as JSON text; reading it back gives an equal timing."""
+    head = {
+        "schema": SCHEMA,
+        "clip": timing.clip,
+        "frame_period_s": timing.frame_period_s,
+        "exposure_s": timing.exposure_s,
+        "row_time_s": timing.row_time_s,
+        "clock_offset_ppm": timing.clock_offset_ppm,
+        "phase_error_rows": timing.phase_error_rows,
+        "order": timing.order,
+        "dropped_frames": [{"after": hole.after, "count": hole.count} for hole in timing.dropped_frames],
+    }
+    rows = ",\n  ".join(json.dumps(_flash_row(flash)) for flash in timing.flashes)
+    return json.dumps(head, indent=1)[:-2] + f',\n "flashes": [\n  {rows}\n ]\n}}\n'
+
+
+def _flash_row(flash: Flash) -> dict[str, object]:
+    row: dict[str, object] = {
+        "index": flash.index,
+        "slot": flash.slot,
+        "lights": dict(flash.lights),
+        "start_s": flash.start_s,
+        "duration_s": flash.duration_s,
+        "complete": flash.complete,
+    }
+    return row if flash.plate is None else row | {"plate": flash.plate}

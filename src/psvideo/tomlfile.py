@@ -1,0 +1,120 @@
+"""TOML files under contract: strict, versioned, and with every mistake named at once.
+
+A file that breaks its contract gets one paragraph that names file, key, what was found and what was expected; an
+unknown key is answered with the nearest known one.
+"""
+
+import tomllib
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from psvideo.errors import PsvideoError, nearest
+
+
+class Contract(BaseModel):
+    """Base of the file models: no unknown keys, no silent conversion of text to numbers."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, populate_by_name=True, allow_inf_nan=False)
+
+
+Model = TypeVar("Model", bound=Contract)
+
+
+def read_toml(path: Path, model: type[Model], schema: str) -> Model:
+    """Read a TOML file whose ``schema`` key is e.g. ``psvideo-plan/1``. Raises PsvideoError for every kind of fault."""
+    return parse_toml(read_text(path), model, schema, source=str(path))
+
+
+def read_text(path: Path) -> str:
+    """Read a small text file; raises PsvideoError where it is missing or no text."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise PsvideoError(f"{path}: there is no such file. Check the name, or write the file first.") from None
+    except (OSError, UnicodeDecodeError) as fault:
+        raise PsvideoError(f"{path}: cannot be read as text ({fault}). Check the file and its permissions.") from fault
+
+
+def parse_toml(text: str, model: type[Model], schema: str, *, source: str) -> Model:
+    """Check TOML text against its model. ``source`` is the name that messages give it."""
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as fault:
+        raise PsvideoError(f"{source}: not a TOML file: {fault}. Mend that line (TOML 1.0).") from fault
+    check_schema(data.get("schema"), schema, source=source)
+    try:
+        return model.model_validate(data)
+    except ValidationError as fault:
+        raise PsvideoError(_sentence(source, model, fault)) from None
+
+
+def check_schema(found: object, expected: str, *, source: str) -> None:
+    """Refuse a file of another kind or of a newer major version (``name/major``)."""
+    kind, major = expected.split("/")
+    if found is None:
+        raise PsvideoError(
+            f"{source}: key 'schema' is missing; expected schema = \"{expected}\" as the file's first line."
+        )
+    name, _, version = str(found).partition("/")
+    if name != kind:
+        raise PsvideoError(f"{source}: schema is {found!r}, expected {expected!r}. This is another kind of file.")
+    if not version.isdigit() or int(version) != int(major):
+        raise PsvideoError(
+            f"{source}: schema is {found!r}; this psvideo reads {expected!r}. "
+            "A newer file needs a newer psvideo: upgrade, or write the file again with this version."
+        )
+
+
+def _sentence(source: str, model: type[BaseModel], fault: ValidationError) -> str:
+    """Put every mistake of a validation into one paragraph."""
+    return f"{source}: " + "; ".join(_mistake(model, error) for error in fault.errors()) + "."
+
+
+def _mistake(model: type[BaseModel], error: Any) -> str:
+    place = error["loc"]
+    key = _key_path(place)
+    if error["type"] == "extra_forbidden":
+        advice = nearest(str(place[-1]), _known_keys(model, place[:-1])).rstrip(".")
+        return f"unknown key '{key}': {advice}"
+    if error["type"] == "missing":
+        return f"key '{key}' is missing"
+    message = error["msg"].removeprefix("Value error, ")
+    message = message[:1].lower() + message[1:]
+    if isinstance(error["input"], dict | list) and error["type"] == "value_error":
+        return f"{message}" if not key else f"'{key}': {message}"
+    return f"key '{key}' is {error['input']!r}: {message}"
+
+
+def _key_path(place: tuple[str | int, ...]) -> str:
+    """Write a place the way a reader of the file counts: ``strobe.flash[2].duration_s`` is the second flash.
+
+    >>> _key_path(("strobe", "flash", 1, "duration_s"))
+    'strobe.flash[2].duration_s'
+    """
+    path = ""
+    for part in place:
+        if isinstance(part, int):
+            path += f"[{part + 1}]"
+        elif "[" not in part and part not in {"float", "int", "str", "literal"}:
+            path += f".{part}" if path else part
+    return path
+
+
+def _known_keys(model: type[BaseModel], place: tuple[str | int, ...]) -> list[str]:
+    """Return the keys that the table at ``place`` may hold."""
+    for part in place:
+        if isinstance(part, str):
+            field = next((f for n, f in model.model_fields.items() if part in (n, f.alias)), None)
+            inner = _model_in(field.annotation) if field else None
+            if inner is None:
+                return []
+            model = inner
+    return [field.alias or name for name, field in model.model_fields.items()]
+
+
+def _model_in(annotation: Any) -> type[BaseModel] | None:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    return next((m for m in map(_model_in, getattr(annotation, "__args__", ())) if m), None)
