@@ -1,0 +1,82 @@
+"""A strobed clip in memory, from plates that are already there: the short way to frames with known truth."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.plan import Plan
+from psvideo.synth.noise import NOISELESS, Noise, frame_rng
+from psvideo.synth.sensor import Flicker, Image, expose_frames, plates_by_slot
+from psvideo.synth.strobe import StrobeClock, TrueFlash, true_flashes
+
+
+@dataclass(frozen=True, kw_only=True)
+class Exposure:
+    """Frames and their truth. ``frames`` has shape (frame, row, col[, channel]), linear, 1.0 = saturation.
+
+    Frame indices are in ``indices``; the flashes' times are on the camera's clock, zero when the first row of frame 0
+    opens.
+    """
+
+    frames: NDArray[np.float32]
+    indices: tuple[int, ...]
+    flashes: tuple[TrueFlash, ...]
+
+
+def expose(
+    plates: Mapping[int, Image] | Sequence[Image | None],
+    plan: Plan,
+    *,
+    frames: int,
+    clock: StrobeClock | None = None,
+    ambient: Image | float = 0.0,
+    flicker: Flicker | None = None,
+    noise: Noise = NOISELESS,
+    bits: int = 0,
+    dropped: Sequence[int] = (),
+    seed: int = 0,
+) -> Exposure:
+    """Expose a scene that stands still under the plan's flashes and return frames as a clip would give them.
+
+    ``plates`` holds one image per slot of the plan's round (None or missing = dark), as one whole flash of that slot
+    lights the scene; ``ambient`` is what one whole exposure collects besides. Frames saturate at 1.0 and come in steps
+    of a converter where ``bits`` is given; below black they may be slightly negative through noise.
+
+    >>> from fractions import Fraction
+    >>> from psvideo.camera import Camera
+    >>> from psvideo.plan import PlannedFlash
+    >>> camera = Camera(width_px=1, height_px=4, fps=Fraction(100), exposure_s=0.01, readout_s=0.01)
+    >>> flash = PlannedFlash(lights={"key": 1.0}, duration_s=0.001)
+    >>> plan = Plan(camera=camera, flashes=(flash,), dark_s=1.0)
+    >>> shot = expose([np.full((4, 1), 0.8, np.float32)], plan, frames=3, clock=StrobeClock(phase_s=0.0145))
+    >>> shot.frames[:, :, 0].round(3)
+    array([[0. , 0. , 0.4, 0.8],
+           [0.8, 0.8, 0.4, 0. ],
+           [0. , 0. , 0. , 0. ]], dtype=float32)
+    """
+    by_slot = dict(plates) if isinstance(plates, Mapping) else {k: p for k, p in enumerate(plates) if p is not None}
+    shape = next(iter(by_slot.values())).shape
+    flashes = true_flashes(plan, clock or StrobeClock(), frames=frames, dropped=frozenset(dropped))
+    kept = tuple(n for n in range(frames) if n not in set(dropped))
+    steady = np.broadcast_to(np.asarray(ambient, np.float32), shape)
+    light = expose_frames(
+        plan,
+        flashes,
+        plates_by_slot(by_slot),
+        frames=kept,
+        ambient_of=(lambda _: steady) if np.any(steady) else None,
+        flicker=flicker,
+        channels=shape[2] if len(shape) == 3 else 0,
+    )
+    images = [_read(image, noise, bits, np_seed=(seed, n)) for n, image in zip(kept, light, strict=True)]
+    return Exposure(frames=np.stack(images), indices=kept, flashes=flashes)
+
+
+def _read(image: Image, noise: Noise, bits: int, *, np_seed: tuple[int, int]) -> Image:
+    read = np.minimum(noise.add(image, frame_rng(*np_seed)), np.float32(1.0))
+    if bits:
+        steps = np.float32(2**bits - 1)
+        read = np.round(read * steps) / steps
+    return read
