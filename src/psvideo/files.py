@@ -10,7 +10,7 @@ from psvideo.errors import PsvideoError, UsageError
 
 @contextlib.contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """Give a temporary name beside ``path`` to write to; rename it when the block ends well, remove it when it does not.
+    """Give a temporary name beside ``path`` to write to; rename it when the block ends well, else remove it.
 
     A full disk or a folder that cannot be written becomes a PsvideoError that names the file.
     """
@@ -21,8 +21,8 @@ def whole_file(path: Path) -> Iterator[Path]:
         beside.replace(path)
     except OSError as fault:
         raise PsvideoError(
-            f"{path}: cannot be written ({fault.strerror or fault}). Nothing was left under that name: make room or check "
-            "the folder's permissions, then run the command again."
+            f"{path}: cannot be written ({fault.strerror or fault}). Nothing was left under that name: make room or "
+            "check the folder's permissions, then run the command again."
         ) from fault
     finally:
         with contextlib.suppress(OSError):

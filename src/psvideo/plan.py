@@ -18,7 +18,7 @@ from psvideo.camera import Camera, FloatArray
 Mode = Literal["rolling", "half-rate", "synced"]
 
 UNKNOWN_CLOCK_PPM = 10_000.0
-"""How far apart clocks of unknown tolerance are taken to be at most (a resonator-driven board is off by 2,000-5,000)."""
+"""How far apart clocks of unknown tolerance are at most (a resonator-driven board is off by 2,000 to 5,000)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +36,7 @@ class PlannedFlash:
 
 @dataclass(frozen=True, kw_only=True)
 class FlashTrain:
-    """Consecutive flashes as arrays of shape (flash,): place in the round's list, start and length in strobe seconds."""
+    """Consecutive flashes as arrays of shape (flash,): slot in the round's list, start and length in strobe seconds."""
 
     slot: NDArray[np.intp]
     start_s: FloatArray

@@ -6,8 +6,11 @@ flash's start it is a trapezoid. This is the one model that finding the timing a
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from psvideo.camera import Camera, FloatArray
+
+IntArray = NDArray[np.int64]
 
 
 def row_weights(camera: Camera, start_s: FloatArray, duration_s: FloatArray, *, frames: range) -> FloatArray:
@@ -27,16 +30,24 @@ def row_weights(camera: Camera, start_s: FloatArray, duration_s: FloatArray, *, 
     on_s = np.asarray(start_s, np.float64)[:, None, None]
     length_s = np.asarray(duration_s, np.float64)[:, None, None]
     overlap_s = np.minimum(opens_s + camera.exposure_s, on_s + length_s) - np.maximum(opens_s, on_s)
-    return np.clip(overlap_s, 0.0, None) / length_s
+    weights: FloatArray = np.clip(overlap_s, 0.0, None) / length_s
+    return weights
 
 
-def frames_touched(camera: Camera, start_s: float, duration_s: float) -> range:
-    """Return the frames of which any row sees any of a flash: two or three at 360 degrees with a long readout (§3.3).
+def frames_touched(camera: Camera, start_s: FloatArray, duration_s: FloatArray) -> tuple[IntArray, IntArray]:
+    """Return the first and the last frame of which any row sees any of each flash, each of shape (flash,).
 
-    Frames before the clip's first have negative numbers here.
+    Two or three frames at 360 degrees with a long readout (§3.3), often one where the readout is short; frames before
+    the clip's first have negative numbers. Where the last comes before the first, the flash fell between exposures.
+
+    >>> from fractions import Fraction
+    >>> camera = Camera(width_px=1, height_px=100, fps=Fraction(100), exposure_s=0.01, readout_s=0.01)
+    >>> first, last = frames_touched(camera, np.array([0.0095]), np.array([0.0008]))
+    >>> int(first[0]), int(last[0])
+    (-1, 1)
     """
     offsets_s = camera.row_offsets_s()
     period_s = camera.frame_period_s
     first = np.floor((start_s - offsets_s.max() - camera.exposure_s) / period_s) + 1
     last = np.ceil((start_s + duration_s - offsets_s.min()) / period_s) - 1
-    return range(int(first), int(last) + 1)
+    return first.astype(np.int64), last.astype(np.int64)

@@ -43,7 +43,7 @@ class DroppedFrames:
 
 @dataclass(frozen=True, kw_only=True)
 class Timing:
-    """The flashes of a clip in order. ``order`` says how the lights' names were found, ``guess`` where they were not."""
+    """The flashes of a clip in order. ``order`` says how the lights' names were found: a guess is called ``guess``."""
 
     clip: str
     frame_period_s: float
