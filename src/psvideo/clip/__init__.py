@@ -1,0 +1,12 @@
+"""A clip on disk becomes linear float frames, lazily. The only room that knows decoders.
+
+``open_clip`` finds the footage and its plan and checks that they fit; ``read_frames`` decodes, takes the transfer curve
+off and gives one frame after the other; ``demosaic`` makes colour of a mosaic; ``describe`` says what a file is.
+"""
+
+from psvideo.clip.malvar2004 import demosaic
+from psvideo.clip.opening import open_clip
+from psvideo.clip.reading import parse_range, read_frames
+from psvideo.clip.record import Clip, Frame, holes
+
+__all__ = ["Clip", "Frame", "demosaic", "holes", "open_clip", "parse_range", "read_frames"]

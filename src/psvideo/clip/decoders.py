@@ -1,0 +1,46 @@
+"""The decoders by kind of file. Each is a module with ``header(path)`` and ``decode(path)``.
+
+Whatever goes wrong inside a decoder becomes a PsvideoError that names the file.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
+
+from psvideo.clip import exr, png
+from psvideo.clip.record import Header, Picture
+from psvideo.errors import PsvideoError
+
+DECODERS = {"png": png, "exr": exr}
+Read = TypeVar("Read")
+
+
+def read_header(kind: str, file: Path) -> Header:
+    """Read what a picture's file says about itself, without decoding its pixels."""
+    return _guarded(DECODERS[kind].header, file)
+
+
+def decode(kind: str, file: Path) -> Picture:
+    """Decode one picture."""
+    return _guarded(DECODERS[kind].decode, file)
+
+
+def _guarded(read: Callable[[Path], Read], file: Path) -> Read:
+    """Call a decoder; its library may raise anything over a damaged file, and all of it means the same."""
+    try:
+        if file.stat().st_size == 0:
+            raise PsvideoError(f"{file}: is empty (0 bytes). Copy it again from the camera's card.")
+        return read(file)
+    except PsvideoError:
+        raise
+    except FileNotFoundError:
+        raise PsvideoError(f"{file}: is not there any more. Put the file back, or open the clip again.") from None
+    except OSError as fault:
+        raise PsvideoError(
+            f"{file}: cannot be read ({fault.strerror or fault}). Check the file and its disk."
+        ) from fault
+    except Exception as fault:
+        raise PsvideoError(
+            f"{file}: cannot be decoded; it is truncated, damaged or of another kind than its name says ({fault}). "
+            "Copy it again from the camera's card."
+        ) from fault

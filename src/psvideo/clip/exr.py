@@ -1,0 +1,108 @@
+"""OpenEXR: half or float, grey (Y) or R, G, B, read as they are: EXR holds linear light.
+
+Channels may stand in a layer (``key.R``); an alpha channel is left out. A picture whose data window is narrower than
+its display window is put in its place with 0 around it.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenEXR
+from numpy.typing import NDArray
+
+from psvideo.clip.record import Header, Picture
+from psvideo.errors import PsvideoError
+
+GREY_NAMES = ("Y", "L", "V")
+
+
+def header(path: Path) -> Header:
+    """Read what the file says without decoding its pixels."""
+    with _open(path, header_only=True) as file:
+        return _header(file, _channel_names(path, file))
+
+
+def decode(path: Path) -> Picture:
+    """Decode a whole picture."""
+    with _open(path, header_only=False) as file:
+        names = _channel_names(path, file)
+        channels = file.channels()
+        planes = [np.asarray(channels[name].pixels, np.float32) for name in names]
+        head = _header(file, names)
+        codes = planes[0] if len(planes) == 1 else np.stack(planes, axis=-1)
+        return Picture(header=head, codes=_in_display_window(codes, file.header(), head))
+
+
+def _open(path: Path, *, header_only: bool) -> Any:
+    """Open a file; OpenEXR reports damage in several ways, which all end here."""
+    try:
+        file = OpenEXR.File(str(path), separate_channels=True, header_only=header_only)
+        file.header()
+    except (RuntimeError, ValueError, TypeError) as fault:
+        raise PsvideoError(
+            f"{path}: cannot be read as OpenEXR; it is truncated, damaged or of another kind ({fault}). Copy it again."
+        ) from fault
+    return file
+
+
+def _channel_names(path: Path, file: Any) -> tuple[str, ...]:
+    """Find the channels that hold the picture: Y alone, or R, G and B, at the top level or in one layer."""
+    found = [channel.name for channel in file.header()["channels"]]
+    layers = {name.rpartition(".")[0]: None for name in found}
+    pictures = [names for layer in layers if (names := _picture_in(layer, found))]
+    if len(pictures) != 1:
+        several = "more than one layer" if pictures else "neither Y nor R, G, B"
+        raise PsvideoError(
+            f"{path}: holds {several} (channels {', '.join(sorted(found))}); expected one picture, in the channels "
+            "R, G, B or in Y. Write such a file from the layer that is meant."
+        )
+    return pictures[0]
+
+
+def _picture_in(layer: str, found: list[str]) -> tuple[str, ...]:
+    prefix = f"{layer}." if layer else ""
+    colour = tuple(prefix + name for name in "RGB")
+    if all(name in found for name in colour):
+        return colour
+    return next(((prefix + name,) for name in GREY_NAMES if prefix + name in found), ())
+
+
+def _header(file: Any, names: tuple[str, ...]) -> Header:
+    attributes = file.header()
+    width_px, height_px = _size(attributes["displayWindow"])
+    notes = ()
+    if "A" in {channel.name.rpartition(".")[2] for channel in attributes["channels"]}:
+        notes = ("the EXR files' alpha channel is left out",)
+    return Header(
+        width_px=width_px,
+        height_px=height_px,
+        channels=len(names),
+        bits=None,
+        colour=attributes.get("colorInteropID"),
+        time_code=_time_code(attributes.get("timeCode")),
+        notes=notes,
+    )
+
+
+def _size(window: tuple[NDArray[np.int32], NDArray[np.int32]]) -> tuple[int, int]:
+    corner, far_corner = window
+    return int(far_corner[0] - corner[0] + 1), int(far_corner[1] - corner[1] + 1)
+
+
+def _time_code(code: Any) -> str | None:
+    if code is None:
+        return None
+    return f"{code.hours:02d}:{code.minutes:02d}:{code.seconds:02d}:{code.frame:02d}"
+
+
+def _in_display_window(codes: NDArray[np.float32], attributes: Any, head: Header) -> NDArray[np.float32]:
+    display, data = attributes["displayWindow"], attributes["dataWindow"]
+    if codes.shape[:2] == (head.height_px, head.width_px) and np.array_equal(display[0], data[0]):
+        return codes
+    canvas = np.zeros((head.height_px, head.width_px, *codes.shape[2:]), np.float32)
+    col, row = (int(data[0][axis] - display[0][axis]) for axis in (0, 1))
+    top, left = max(row, 0), max(col, 0)
+    part = codes[top - row : head.height_px - row, left - col : head.width_px - col]
+    canvas[top : top + part.shape[0], left : left + part.shape[1]] = part
+    return canvas

@@ -1,0 +1,104 @@
+"""Finding a clip's frames in a folder: numbered images of one kind, in the order of the number that ends the stem."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from psvideo.errors import PsvideoError
+
+KINDS = {
+    ".png": "png",
+    ".exr": "exr",
+    ".tif": "tiff",
+    ".tiff": "tiff",
+    ".dng": "dng",
+    ".dpx": "dpx",
+    ".jpg": "jpeg",
+    ".jpeg": "jpeg",
+}
+MOVIES = (".mov", ".mp4", ".mkv", ".mxf")
+NUMBERED = re.compile(r"(.*?)(\d+)", re.DOTALL)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sequence:
+    """Numbered images: their kind, files in ascending order, numbers, and the images that were passed over."""
+
+    kind: str
+    files: tuple[Path, ...]
+    numbers: tuple[int, ...]
+    passed_over: tuple[Path, ...] = ()
+
+
+def find_sequence(folder: Path) -> Sequence:
+    """Return the one sequence of numbered images in a folder or in its ``frames/``.
+
+    Raises PsvideoError where there is none, or where it is not clear which images are meant.
+    """
+    beside, within = _images(folder), _images(folder / "frames")
+    if _numbered(beside) and _numbered(within):
+        raise PsvideoError(
+            f"{folder}: numbered images lie in the folder ({_numbered(beside)[0].name}, …) and in its frames/ too "
+            f"({_numbered(within)[0].name}, …). Leave the clip's frames in one of the two places."
+        )
+    images = within if _numbered(within) else beside
+    frames = _numbered(images)
+    if not frames:
+        raise PsvideoError(f"{folder}: {_nothing(folder, images)}")
+    _refuse_mixture(frames)
+    numbers = tuple(_number(file) for file in frames)
+    passed_over = tuple(image for image in images if image not in set(frames))
+    return Sequence(kind=KINDS[frames[0].suffix.lower()], files=tuple(frames), numbers=numbers, passed_over=passed_over)
+
+
+def _images(folder: Path) -> list[Path]:
+    if not folder.is_dir():
+        return []
+    files = (entry for entry in folder.iterdir() if entry.suffix.lower() in KINDS and not entry.name.startswith("."))
+    return sorted(files)
+
+
+def _numbered(images: list[Path]) -> list[Path]:
+    return sorted(
+        (image for image in images if NUMBERED.fullmatch(image.stem)), key=lambda image: (_number(image), image)
+    )
+
+
+def _number(file: Path) -> int:
+    return int(_parts(file)[1])
+
+
+def _parts(file: Path) -> tuple[str, str]:
+    match = NUMBERED.fullmatch(file.stem)
+    return (match[1], match[2]) if match else (file.stem, "")
+
+
+def _nothing(folder: Path, images: list[Path]) -> str:
+    """Say why a folder holds no clip."""
+    movies = sorted(file.name for file in folder.iterdir() if file.suffix.lower() in MOVIES)
+    if movies:
+        return f"holds a movie and no numbered images. Name the movie itself: {folder / movies[0]}"
+    found = f"holds images without a number at the end of the name ({images[0].name})" if images else "holds no images"
+    return f"{found}; expected numbered frames such as name.0001.png (kinds: {', '.join(sorted(KINDS))}) here or in frames/."
+
+
+def _refuse_mixture(frames: list[Path]) -> None:
+    """Refuse two kinds of images, two sequences, or two files of one number."""
+    first = frames[0]
+    for file in frames:
+        if KINDS[file.suffix.lower()] != KINDS[first.suffix.lower()]:
+            what = "images of two kinds"
+        elif _parts(file)[0] != _parts(first)[0]:
+            what = "two sequences"
+        else:
+            continue
+        raise PsvideoError(
+            f"{first.parent}: holds {what}, {first.name} and {file.name}; expected the frames of one clip. "
+            "Move the others elsewhere."
+        )
+    for file, follower in zip(frames, frames[1:], strict=False):
+        if _number(file) == _number(follower):
+            raise PsvideoError(
+                f"{first.parent}: {file.name} and {follower.name} have the same number; expected one file per frame. "
+                "Move one of them elsewhere."
+            )

@@ -1,0 +1,46 @@
+"""PNG: 8 and 16 bits, grey or RGB.
+
+Decoded by imagecodecs, which raises on a truncated or damaged file, where others deliver the rest as black.
+"""
+
+import struct
+from pathlib import Path
+
+import imagecodecs
+
+from psvideo.clip.record import Header, Picture
+from psvideo.errors import PsvideoError
+
+SIGNATURE = b"\x89PNG\r\n\x1a\n"
+END = b"IEND\xaeB`\x82"
+COLOUR_TYPES = {0: 1, 2: 3, 4: 1, 6: 3}
+ALPHA_TYPES = (4, 6)
+
+
+def header(path: Path) -> Header:
+    """Read what the file's first chunk says."""
+    with path.open("rb") as file:
+        return _parse_header(path, file.read(33))
+
+
+def decode(path: Path) -> Picture:
+    """Decode a whole picture; an alpha channel is left out."""
+    data = path.read_bytes()
+    head = _parse_header(path, data)
+    if END not in data[-1024:]:
+        raise PsvideoError(f"{path}: ends before its last chunk (IEND): the file is truncated. Copy it again.")
+    codes = imagecodecs.png_decode(data)
+    if codes.ndim == 3:
+        codes = codes[..., : head.channels] if head.channels > 1 else codes[..., 0]
+    return Picture(header=head, codes=codes)
+
+
+def _parse_header(path: Path, data: bytes) -> Header:
+    if len(data) < 33 or not data.startswith(SIGNATURE) or data[12:16] != b"IHDR":
+        raise PsvideoError(f"{path}: does not begin like a PNG file. Copy it again, or give it the name of its kind.")
+    width_px, height_px, bits, colour_type = struct.unpack(">IIBB", data[16:26])
+    if colour_type not in COLOUR_TYPES or bits not in (8, 16):
+        kind = "a palette" if colour_type == 3 else f"{bits} bits per sample"
+        raise PsvideoError(f"{path}: has {kind}; expected grey or RGB of 8 or 16 bits. Export the frames as such.")
+    notes = ("the PNG files' alpha channel is left out",) if colour_type in ALPHA_TYPES else ()
+    return Header(width_px=width_px, height_px=height_px, channels=COLOUR_TYPES[colour_type], bits=bits, notes=notes)

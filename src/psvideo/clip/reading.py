@@ -1,0 +1,86 @@
+"""Reading a clip's frames: lazily, in order, decoded some frames ahead of the one that is worked on."""
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from functools import partial
+
+import fileseq
+
+from psvideo.clip.decoders import decode
+from psvideo.clip.linear import linear_light
+from psvideo.clip.record import Clip, Frame, Picture
+from psvideo.errors import PsvideoError, UsageError
+
+DECODING_THREADS = 2
+
+
+def read_frames(clip: Clip, numbers: Iterable[int] | None = None, *, ahead: int = 2) -> Iterator[Frame]:
+    """Give the clip's frames in linear light, in ascending order, each decoded once; ``numbers`` chooses some of them.
+
+    Up to ``ahead`` frames are decoded in advance by threads, so memory does not grow with the clip. The threads end
+    when the iterator is used up, closed, or ends in an error. Raises PsvideoError that names the file where a frame is
+    missing, damaged, or of another size or depth than the first.
+    """
+    chosen = clip.numbers if numbers is None else tuple(sorted(set(numbers)))
+    absent = set(chosen) - set(clip.numbers)
+    if absent:
+        raise UsageError(f"{clip.path}: has no frame number {min(absent)}; {_span(clip.numbers)}.")
+    jobs = (partial(_read_frame, clip, number) for number in chosen)
+    return _ahead(jobs, ahead=ahead, threads=DECODING_THREADS)
+
+
+def parse_range(text: str, numbers: Iterable[int]) -> tuple[int, ...]:
+    """Return those of a clip's frame numbers that a range such as ``1-100x2`` or ``1-20,40`` names.
+
+    Raises UsageError where the range cannot be read or names none of the frames.
+    """
+    present = tuple(numbers)
+    try:
+        wanted = set(fileseq.FrameSet(text))
+    except (fileseq.ParseException, ValueError) as fault:
+        raise UsageError(f"--frames {text}: is no frame range ({fault}). Write for example 1-100 or 1-100x2.") from None
+    chosen = tuple(number for number in present if number in wanted)
+    if not chosen:
+        raise UsageError(f"--frames {text}: names none of the clip's frames; {_span(present)}.")
+    return chosen
+
+
+def _span(numbers: tuple[int, ...]) -> str:
+    return f"its {len(numbers)} frames are numbered {numbers[0]} to {numbers[-1]}"
+
+
+def _read_frame(clip: Clip, number: int) -> Frame:
+    file = clip.file_of(number)
+    picture = decode(clip.kind, file)
+    _check_like_first(clip, picture, str(file))
+    return Frame(index=clip.index_of(number), number=number, image=linear_light(picture, clip.plan.camera.encoding))
+
+
+def _check_like_first(clip: Clip, picture: Picture, name: str) -> None:
+    """Refuse a frame that is not of the first one's size, channels and depth."""
+    found, first = picture.header, clip.header
+    looks = [
+        f"{head.width_px} x {head.height_px} pixels, {head.channels} channel(s), {f'{head.bits} bits' if head.bits else 'floating point'}"
+        for head in (found, first)
+    ]
+    if looks[0] != looks[1]:
+        raise PsvideoError(
+            f"{name}: is {looks[0]}; the clip's first frame, {clip.files[0].name}, is {looks[1]}. "
+            "All frames of a clip must be alike: export this one again, or move what does not belong here elsewhere."
+        )
+
+
+def _ahead(jobs: Iterator[Callable[[], Frame]], *, ahead: int, threads: int) -> Iterator[Frame]:
+    """Run jobs in threads, up to ``ahead`` of them before they are asked for, and give their results in order."""
+    pool = ThreadPoolExecutor(max_workers=min(threads, max(ahead, 1)), thread_name_prefix="decode")
+    waiting: deque[Future[Frame]] = deque()
+    try:
+        for job in jobs:
+            waiting.append(pool.submit(job))
+            if len(waiting) > max(ahead, 1):
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)

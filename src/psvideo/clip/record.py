@@ -1,0 +1,127 @@
+"""The records of this room: a clip, one of its frames, and what a decoder hands over before light is made of it."""
+
+from bisect import bisect_left
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.plan import Plan
+
+Levels = tuple[tuple[float, ...], ...]
+"""Black levels by position: the pattern that repeats over the picture's rows and columns, from its top left on."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Header:
+    """What a picture's file says about itself. ``bits`` None: floating point; None elsewhere: the file does not say.
+
+    ``width_px`` and ``height_px`` are those of the picture that is delivered, after the crop that the file asks for;
+    ``cfa`` is the filter pattern at that picture's top left pixel.
+    """
+
+    width_px: int
+    height_px: int
+    channels: int
+    bits: int | None
+    black: Levels | None = None
+    white: float | None = None
+    cfa: str | None = None
+    colour: str | None = None
+    time_code: str | None = None
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Picture:
+    """One decoded picture as the file codes it: (row, col) or (row, col, 3) in R, G, B order, uint8, uint16 or float."""
+
+    header: Header
+    codes: NDArray[Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Frame:
+    """One frame in linear light.
+
+    ``index`` is its place in time, counted from the clip's first frame, dropped frames included; ``number`` is its
+    file's number (a movie's: the index). ``image`` is (row, col) for grey or mosaiced footage, (row, col, 3) for
+    colour; 0 is the black level, 1.0 is saturation; noise below black is kept, so values may be slightly negative.
+    """
+
+    index: int
+    number: int
+    image: NDArray[np.float32]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Clip:
+    """A strobed clip on disk, checked against its plan; its frames are read by ``read_frames``.
+
+    ``files`` are the frames' files in order, or the one movie. ``numbers`` are the frames' numbers, with holes where
+    frames were dropped. ``cfa`` is the filter pattern at the picture's top left, None where it is not mosaiced.
+    ``colour`` is the colour interop id of plates and albedo made from this clip. ``notes`` say what was taken for
+    granted while opening it.
+    """
+
+    name: str
+    path: Path
+    plan: Plan
+    plan_path: Path
+    kind: str
+    files: tuple[Path, ...]
+    numbers: tuple[int, ...]
+    header: Header
+    colour: str
+    notes: tuple[str, ...] = ()
+
+    @property
+    def width_px(self) -> int:
+        """Columns of a frame."""
+        return self.header.width_px
+
+    @property
+    def height_px(self) -> int:
+        """Rows of a frame."""
+        return self.header.height_px
+
+    @property
+    def cfa(self) -> str | None:
+        """The filter pattern at the top left pixel, row by row; None where the frames are not mosaiced."""
+        return self.header.cfa
+
+    @property
+    def channels(self) -> int:
+        """Channels of a frame once it is demosaiced: 1 or 3."""
+        return 3 if self.cfa else self.header.channels
+
+    @property
+    def time_code(self) -> str | None:
+        """Time code of the first frame, ``HH:MM:SS:FF``, where the file gives one."""
+        return self.header.time_code
+
+    @property
+    def is_movie(self) -> bool:
+        """True where one file holds all frames."""
+        return self.kind == "movie"
+
+    def index_of(self, number: int) -> int:
+        """The place in time of the frame with this number; dropped frames count."""
+        return number - self.numbers[0]
+
+    def file_of(self, number: int) -> Path:
+        """The file that holds the frame with this number."""
+        return self.files[0] if self.is_movie else self.files[bisect_left(self.numbers, number)]
+
+
+def holes(numbers: Sequence[int]) -> tuple[tuple[int, int], ...]:
+    """Return the holes in ascending frame numbers as (number before the hole, count of missing frames).
+
+    >>> holes([7, 8, 11, 12, 14])
+    ((8, 2), (12, 1))
+    """
+    pairs = zip(numbers, numbers[1:], strict=False)
+    return tuple((before, after - before - 1) for before, after in pairs if after - before > 1)

@@ -1,0 +1,163 @@
+"""Transfer curves: from a file's code, as a fraction of its largest code, to linear light.
+
+The curves are OpenColorIO's, from its built-in studio config; only the curve is used, never a matrix between gamuts,
+because each channel of a picture is measured by itself. Names are OpenColorIO's own or the short ones of ``CURVES``.
+"""
+
+import functools
+import re
+from dataclasses import dataclass
+
+import numpy as np
+import PyOpenColorIO as ocio
+from numpy.typing import NDArray
+
+from psvideo.camera import FloatArray
+from psvideo.errors import PsvideoError, nearest
+
+STUDIO_CONFIG = "studio-config-v2.2.0_aces-v1.3_ocio-v2.4"
+UNKNOWN_COLOUR = "unknown"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Curve:
+    """One curve: its short name, OpenColorIO's name of it, and the colour interop id of its camera's linear gamut.
+
+    ``colour`` is ``unknown`` where the curve is used with several gamuts. ``on_codes``: its maker defines the curve
+    on recorded code values, and so for movies on codes before video range is expanded.
+    """
+
+    name: str
+    source: str
+    colour: str = UNKNOWN_COLOUR
+    on_codes: bool = False
+    also: tuple[str, ...] = ()
+
+
+CURVES = (
+    Curve(name="linear", source="", colour="lin_rec709_scene", also=("lin", "raw", "Linear Rec.709 (sRGB)")),
+    Curve(
+        name="srgb",
+        source="sRGB - Curve",
+        colour="lin_rec709_scene",
+        also=("sRGB Encoded Rec.709 (sRGB)", "sRGB - Texture", "sRGB - Display"),
+    ),
+    Curve(
+        name="rec709",
+        source="Rec.709 - Curve",
+        colour="lin_rec709_scene",
+        also=("bt709", "bt1886-oetf", "rec2020", "bt2020", "Camera Rec.709"),
+    ),
+    Curve(
+        name="gamma24",
+        source="Rec.1886 - Curve",
+        colour="lin_rec709_scene",
+        also=("rec1886", "bt1886", "Gamma 2.4 Encoded Rec.709", "Rec.1886 Rec.709 - Display"),
+    ),
+    Curve(name="gamma22", source="gamma 2.2", colour="lin_rec709_scene", also=("Gamma 2.2 Encoded Rec.709",)),
+    Curve(name="gamma18", source="gamma 1.8", colour="lin_rec709_scene", also=("Gamma 1.8 Encoded Rec.709",)),
+    Curve(name="slog3", source="S-Log3 - Curve", on_codes=True),
+    Curve(
+        name="slog3-sgamut3",
+        source="S-Log3 - Curve",
+        colour="ocio:lin_sgamut3_scene",
+        on_codes=True,
+        also=("S-Log3 S-Gamut3",),
+    ),
+    Curve(
+        name="slog3-sgamut3cine",
+        source="S-Log3 - Curve",
+        colour="ocio:lin_sgamut3cine_scene",
+        on_codes=True,
+        also=("S-Log3 S-Gamut3.Cine",),
+    ),
+    Curve(
+        name="logc3",
+        source="ARRI LogC3 - Curve (EI800)",
+        colour="ocio:lin_awg3_scene",
+        also=("logc", "logc3ei800", "arrilogc3", "ARRI LogC3 (EI800)"),
+    ),
+    Curve(name="logc4", source="ARRI LogC4 - Curve", colour="ocio:lin_awg4_scene", also=("ARRI LogC4",)),
+    Curve(name="vlog", source="V-Log - Curve", colour="ocio:lin_vgamut_scene", on_codes=True, also=("V-Log V-Gamut",)),
+    Curve(name="clog2", source="C-Log2 - Curve", on_codes=True, also=("canonlog2", "CanonLog2 CinemaGamut D55")),
+    Curve(name="clog3", source="C-Log3 - Curve", on_codes=True, also=("canonlog3", "CanonLog3 CinemaGamut D55")),
+    Curve(
+        name="log3g10",
+        source="Log3G10 - Curve",
+        colour="ocio:lin_rwg_scene",
+        also=("redlog3g10", "Log3G10 REDWideGamutRGB"),
+    ),
+    Curve(
+        name="bmdfilm5",
+        source="BMDFilm Gen5 Log - Curve",
+        colour="ocio:lin_bmdwg5_scene",
+        also=("bmdfilmgen5", "bmdfilmgen5log", "BMDFilm WideGamut Gen5"),
+    ),
+    Curve(
+        name="davinci",
+        source="DaVinci Intermediate Log - Curve",
+        colour="ocio:lin_dwg_scene",
+        also=("davinciintermediate", "davinciintermediatelog", "DaVinci Intermediate WideGamut"),
+    ),
+    Curve(name="applelog", source="Apple Log - Curve", colour="lin_rec2020_scene"),
+    Curve(name="acescct", source="CURVE - ACEScct-LOG_to_LINEAR", colour="lin_ap1_scene"),
+    Curve(name="st2084", source="ST-2084 - Curve", colour="lin_rec2020_scene", also=("pq", "smpte2084")),
+    Curve(name="hlg", source="CURVE - HLG-OETF-INVERSE", colour="lin_rec2020_scene", also=("aribstdb67",)),
+)
+
+
+def find_curve(name: str) -> Curve:
+    """Return the curve with this name; case, blanks and punctuation do not matter.
+
+    Raises PsvideoError that names the nearest known one and lists all.
+
+    >>> find_curve("S-Log3").source, find_curve("sRGB - Curve").name
+    ('S-Log3 - Curve', 'srgb')
+    """
+    found = _spellings().get(_letters(name))
+    if found is None:
+        known = [curve.name for curve in CURVES]
+        advice = nearest(_letters(name), _spellings())
+        listed = "" if advice.startswith("known are") else f" Known are: {', '.join(known)}."
+        advice = f"known are: {', '.join(known)}." if not listed else advice
+        raise PsvideoError(
+            f"transfer is {name!r}, which is no curve that this psvideo knows; {advice}{listed} Write the name of the "
+            "curve with which the camera encoded the files into the plan's [camera] table."
+        )
+    return found
+
+
+@functools.cache
+def _spellings() -> dict[str, Curve]:
+    spellings: dict[str, Curve] = {}
+    for curve in CURVES:
+        for spelling in (curve.name, curve.source, *curve.also):
+            spellings.setdefault(_letters(spelling), curve)
+    return spellings
+
+
+def _letters(name: str) -> str:
+    return re.sub(r"[^a-z0-9]", "", name.lower()).removesuffix("curve")
+
+
+def to_light(curve: Curve, signal: FloatArray | NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the linear light, on the curve's own scale, that a signal (fraction of the largest code) stands for."""
+    values = np.array(signal, np.float32).ravel()
+    if curve.source:
+        _processor(curve.source).applyRGB(padded := np.resize(values, (-(-values.size // 3), 3)))
+        values = padded.ravel()[: values.size]
+    return values.reshape(np.shape(signal))
+
+
+@functools.cache
+def _processor(source: str) -> ocio.CPUProcessor:
+    config = ocio.Config.CreateFromBuiltinConfig(STUDIO_CONFIG)
+    if source.startswith("gamma "):
+        exponent = float(source.removeprefix("gamma "))
+        transform = ocio.ExponentTransform(value=[exponent] * 3 + [1.0], negativeStyle=ocio.NEGATIVE_MIRROR)
+        processor = config.getProcessor(transform)
+    elif source in {named.getName() for named in config.getNamedTransforms()}:
+        processor = config.getProcessor(config.getNamedTransform(source), ocio.TRANSFORM_DIR_FORWARD)
+    else:
+        processor = config.getProcessor(ocio.BuiltinTransform(source))
+    return processor.getOptimizedCPUProcessor(ocio.OPTIMIZATION_LOSSLESS)
