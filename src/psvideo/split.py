@@ -1,0 +1,140 @@
+"""Rolling-flash reconstruction: frames and their Timing in, one plate for every flash out.
+
+Flash by flash, never frame by frame: the row weights say which frames saw which share of a flash in each row. Where
+one frame holds all of it, that frame is taken alone, because the others would add only noise. Where a row is split
+over two frames, they are summed (eq. 10) and divided by the share that both saw together, which is 1 at 360 degrees.
+The sum still holds the ambient light of every exposure in it; ``ambient.subtract`` takes it off.
+"""
+
+from collections import deque
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.camera import Camera, FloatArray
+from psvideo.profiles import LinearFrame
+from psvideo.shutter import frames_touched, row_weights
+from psvideo.timing import Flash, Timing
+
+FULL = 1.0 - 1e-9
+"""A row that saw this share of a flash saw all of it."""
+LEAST_SHARE = 0.05
+"""A row that saw less of a flash than this is taken as unseen: dividing by so little would bring up only noise."""
+MOST_FOREIGN = 0.01
+"""A row into which more of another flash was mixed than this (a dark time that is too short) is taken as unseen."""
+SATURATED = 0.998
+"""A sample from here on is clipped; its plate is held at 1.0 at least, so that later steps see it as saturated too."""
+
+Image = NDArray[np.float32]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plate:
+    """The scene as one flash showed it: linear light, 1.0 = sensor saturation, (row, col) or (row, col, channel).
+
+    ``exposures`` (row,) is how many exposures' worth of ambient light the image holds, and ``seen`` (row,) is False
+    where no frame saw enough of the flash (the image is 0 there).
+    """
+
+    flash: Flash
+    image: Image
+    exposures: FloatArray
+    seen: NDArray[np.bool_]
+
+    @property
+    def time_s(self) -> float:
+        """The instant that the plate shows: the middle of its flash, on the camera's clock."""
+        return self.flash.start_s + self.flash.duration_s / 2
+
+
+def split(frames: Iterable[LinearFrame], camera: Camera, timing: Timing) -> Iterator[Plate]:
+    """Yield one plate for every complete flash, in order, dark slots included.
+
+    ``frames`` come in order; a hole in their indices is a dropped frame. Only the two or three frames that the current
+    flash touches are held. The plates still hold ambient light, as ``Plate.exposures`` says.
+    """
+    stream = _Window(iter(frames))
+    first, last = frames_touched(camera, timing.start_s, timing.duration_s)
+    for flash in timing.flashes:
+        if flash.complete and first[flash.index] <= last[flash.index]:
+            touched = range(int(first[flash.index]), int(last[flash.index]) + 1)
+            yield _rebuild(camera, timing, flash, stream.between(touched), touched)
+
+
+class _Window:
+    """The few frames of a stream that the current flash needs."""
+
+    def __init__(self, frames: Iterator[LinearFrame]) -> None:
+        self._frames = frames
+        self._held: deque[LinearFrame] = deque()
+
+    def between(self, indices: range) -> dict[int, Image]:
+        """Return the frames with these indices, as far as the stream has them; frames before are let go."""
+        while self._held and self._held[0].index < indices.start:
+            self._held.popleft()
+        while not self._held or self._held[-1].index < indices.stop - 1:
+            frame = next(self._frames, None)
+            if frame is None:
+                break
+            if frame.index >= indices.start:
+                self._held.append(frame)
+        return {frame.index: frame.image for frame in self._held if frame.index in indices}
+
+
+def _rebuild(camera: Camera, timing: Timing, flash: Flash, images: dict[int, Image], touched: range) -> Plate:
+    """Combine the frames that saw one flash, each row with its own coefficients."""
+    weights = row_weights(camera, np.array([flash.start_s]), np.array([flash.duration_s]), frames=touched)[0]
+    weights[[index not in images for index in touched]] = 0.0
+    clean = weights * (_foreign_light(camera, timing, flash, touched) <= MOST_FOREIGN)
+    coefficients = _average_of(clean) if not any(flash.lights.values()) else _best_sum(clean)
+    seen = coefficients.sum(axis=0) > 0
+    shape = next(iter(images.values())).shape if images else (camera.height_px, camera.width_px)
+    plate = np.zeros(shape, np.float32)
+    flat = plate.reshape(shape[0], -1)
+    for index, coefficient in zip(touched, coefficients, strict=True):
+        if index in images and coefficient.any():
+            _add_rows(flat, images[index].reshape(shape[0], -1), coefficient.astype(np.float32), np.float32(SATURATED))
+    return Plate(flash=flash, image=plate, exposures=coefficients.sum(axis=0), seen=seen)
+
+
+def _best_sum(weights: FloatArray) -> FloatArray:
+    """Return the share of each frame's row in a plate, (frame, row): one whole frame alone, else all that saw any."""
+    whole = weights >= FULL
+    alone = whole & (np.cumsum(whole, axis=0) == 1)
+    used = np.where(whole.any(axis=0), alone, weights > 0)
+    share = (weights * used).sum(axis=0)
+    coefficients: FloatArray = used * np.where(share >= LEAST_SHARE, 1.0 / np.maximum(share, LEAST_SHARE), 0.0)
+    return coefficients
+
+
+def _average_of(weights: FloatArray) -> FloatArray:
+    """Return coefficients that average every exposure that fell into a dark slot, (frame, row)."""
+    used = weights > 0
+    coefficients: FloatArray = used / np.maximum(used.sum(axis=0), 1)
+    return coefficients
+
+
+def _foreign_light(camera: Camera, timing: Timing, flash: Flash, frames: range) -> FloatArray:
+    """Return how much of the neighbouring lit flashes each row of each frame saw, shape (frame, row)."""
+    near = timing.flashes[max(flash.index - 2, 0) : flash.index + 3]
+    others = [other for other in near if other.index != flash.index and any(other.lights.values())]
+    if not others:
+        return np.zeros((len(frames), camera.height_px))
+    start_s = np.array([other.start_s for other in others])
+    duration_s = np.array([other.duration_s for other in others])
+    return row_weights(camera, start_s, duration_s, frames=frames).sum(axis=0)
+
+
+@nb.njit(cache=True, nogil=True, parallel=True)
+def _add_rows(plate, frame, coefficient, saturated):  # type: ignore[no-untyped-def]
+    """Add a frame's rows, each times its coefficient; hold what is clipped at 1.0 at least."""
+    for row in nb.prange(plate.shape[0]):
+        share = coefficient[row]
+        if share > 0:
+            for col in range(plate.shape[1]):
+                value = frame[row, col]
+                total = plate[row, col] + share * value
+                plate[row, col] = max(total, np.float32(1.0)) if value >= saturated else total
