@@ -1,0 +1,228 @@
+"""What to think about before a shoot: pure functions from a plan and its figures to cautions, each a paragraph."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Literal
+
+from psvideo.capture.figures import LightFigures, ShootFigures, SlotFigures
+from psvideo.capture.quantities import NTSC, show_rate, show_seconds
+from psvideo.capture.request import Limits, ShootRequest
+from psvideo.plan import Plan
+
+FLICKER_HZ = (3.0, 65.0)
+"""Flashes at these rates can harm people with photosensitive epilepsy (about 3 to 70 Hz: IEEE 1789-2015)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Caution:
+    """One thing to know: ``warning`` where people, footage or lights suffer, ``note`` where it is good to know."""
+
+    kind: str
+    level: Literal["warning", "note"]
+    text: str
+
+
+def request_cautions(request: ShootRequest) -> tuple[Caution, ...]:
+    """Return what is to be said about the camera's figures and the marker."""
+    return (*_about_the_readout(request), *_about_the_rate(request), *_about_the_marker(request))
+
+
+def shoot_cautions(plan: Plan, figures: ShootFigures, *, limits: Limits | None = None) -> tuple[Caution, ...]:
+    """Return what is to be said about the plan itself, whoever wrote it."""
+    return (
+        *_about_flicker(figures),
+        *_about_the_margin(plan, figures),
+        *_about_blind_time(plan, figures),
+        *_about_three_frames(plan, figures),
+        *_about_the_leds(figures, limits or Limits()),
+        *_about_synced_rows(plan, figures),
+    )
+
+
+def _warning(kind: str, text: str) -> Caution:
+    return Caution(kind=kind, level="warning", text=text)
+
+
+def _note(kind: str, text: str) -> Caution:
+    return Caution(kind=kind, level="note", text=text)
+
+
+def _about_the_readout(request: ShootRequest) -> Iterator[Caution]:
+    preset = request.preset
+    if request.camera.readout_s is None:
+        yield _note("readout", "The readout time is unknown: what hangs on it is left out until it is measured.")
+    if preset is not None and preset.sure in ("single", "assumed"):
+        yield _warning(
+            "readout",
+            f"The readout of {show_seconds(abs(preset.readout_s))} for the {preset.name} rests on little "
+            f"({preset.source}). "
+            "Measure yours (calibration/README.md) and give it as --readout.",
+        )
+
+
+def _about_the_rate(request: ShootRequest) -> Iterator[Caution]:
+    fps, asked = request.camera.fps, request.asked_fps
+    if request.mode == "synced":
+        return
+    if asked is not None and asked != fps:
+        yield _note(
+            "fps",
+            f"{asked} fps is what this mode is called; the plan says {show_rate(fps)}, which it records. If yours "
+            "truly "
+            f"records {asked}, give --size and --readout with --fps.",
+        )
+    elif fps.denominator == 1 and fps % 6 == 0 and fps >= 24:
+        exact: Fraction = fps * NTSC
+        yield _note(
+            "fps",
+            f"Many cameras that say {fps} fps record {float(exact):.5g}, 999 ppm slower, which is more than a crystal "
+            f"clock is off. If yours does, write --fps {exact}.",
+        )
+
+
+def _about_the_marker(request: ShootRequest) -> Iterator[Caution]:
+    if request.marker == "none" and request.mode != "synced" and len(request.lights) > 1:
+        yield _warning(
+            "marker",
+            "Without a marker nothing in the footage tells which light is which: note the light of the first flash for "
+            "--first-light, or leave --marker dark.",
+        )
+    if request.marker != "dark":
+        yield _note("ambient", "Without a dark slot ambient light cannot be taken off: the room must be dark.")
+
+
+def _about_flicker(figures: ShootFigures) -> Iterator[Caution]:
+    low, high = FLICKER_HZ
+    care = "Warn everybody on the set, let no photosensitive person stay, and keep eyes off the lights."
+    if low <= figures.flash_rate_hz <= high:
+        yield _warning(
+            "flicker",
+            f"The whole scene flickers at {figures.flash_rate_hz:.1f} Hz, between {low:g} and {high:g} Hz. {care} A "
+            "frame "
+            f"rate of over {high:g} fps helps.",
+        )
+    slow = [light for light in figures.lights if low <= light.rate_hz <= high]
+    if slow:
+        names = "Each light" if len(slow) == len(figures.lights) else ", ".join(light.name for light in slow)
+        rates = sorted({f"{light.rate_hz:.1f}" for light in slow})
+        yield _warning(
+            "flicker",
+            f"{names} by itself flashes at {' to '.join(rates[:: max(len(rates) - 1, 1)])} Hz, between {low:g} and "
+            f"{high:g} Hz: "
+            f"whoever sees one light more than the others sees that, though the scene as a whole is lit "
+            f"{figures.flash_rate_hz:.1f} times a second. {care}",
+        )
+    if low <= figures.dark_slot_rate_hz <= high:
+        yield _warning(
+            "flicker",
+            f"Dark slots come {figures.dark_slot_rate_hz:.1f} times a second, a flicker of the whole scene between "
+            f"{low:g} and "
+            f"{high:g} Hz. {care} A larger --dark-every makes them rarer; two a second are enough.",
+        )
+
+
+def _about_the_margin(plan: Plan, figures: ShootFigures) -> Iterator[Caution]:
+    margin = figures.margin_ppm
+    if margin is None or margin >= plan.clock_range_ppm * (1 - 1e-6):
+        return
+    needed_s = plan.camera.exposure_s / (1 - plan.clock_range_ppm * 1e-6)
+    over_s = plan.camera.exposure_s - plan.dark_s * (1 - plan.clock_range_ppm * 1e-6)
+    rows = f" ({over_s / abs(plan.camera.row_time_s):.2g} rows of each frame)" if plan.camera.readout_s else ""
+    yield _warning(
+        "margin",
+        f"The dark time leaves a margin of {margin:.4g} ppm, and the clocks may be {plan.clock_range_ppm:g} ppm "
+        "apart: then two "
+        f"flashes mix near the dark row{rows}. Leave --dark out, or give at least {needed_s * 1e3:.6g}ms.",
+    )
+
+
+def _about_blind_time(plan: Plan, figures: ShootFigures) -> Iterator[Caution]:
+    if figures.missing_row_share > 0:
+        yield _warning(
+            "blind",
+            f"At a shutter of {plan.camera.shutter_deg:.4g} degrees {figures.missing_row_share:.0%} of the rows of "
+            "each plate "
+            "never see its flash, and stay holes. Set the shutter to 360 degrees.",
+        )
+
+
+def _about_three_frames(plan: Plan, figures: ShootFigures) -> Iterator[Caution]:
+    wide = [slot for slot in figures.slots if not slot.is_dark and slot.frames_max == 3]
+    if not wide or plan.mode != "rolling":
+        return
+    most = max(slot.most_frames_share or 0.0 for slot in wide)
+    yield _note(
+        "three-frames",
+        f"Up to {most:.0%} of the flashes reach into three frames; they are put together all the same. "
+        f"{_free_of_three(plan)}{_equation_11(plan, wide)}",
+    )
+
+
+def _free_of_three(plan: Plan) -> str:
+    camera = plan.camera
+    free_s = camera.frame_period_s - abs(camera.readout_s or 0.0) + abs(camera.row_time_s)
+    if abs(camera.exposure_s - camera.frame_period_s) > 1e-6 * camera.frame_period_s or free_s < 20e-6:
+        return ""
+    return f"Flashes of up to {show_seconds(free_s)} never do. "
+
+
+def _equation_11(plan: Plan, wide: list[SlotFigures]) -> str:
+    exposure_s = plan.camera.exposure_s
+    count = exposure_s / wide[0].duration_s
+    below, above = exposure_s / math.ceil(count + 1e-9), exposure_s / max(math.floor(count + 1e-9), 2)
+    choices = " or ".join(dict.fromkeys((show_seconds(above), show_seconds(below))))
+    return (
+        f"Eq. 11 avoids it with flashes that divide the exposure, here {choices} for every flash and dark slot, but "
+        "only if "
+        "a trigger starts the first one with a frame and one clock drives both."
+    )
+
+
+def _about_the_leds(figures: ShootFigures, limits: Limits) -> Iterator[Caution]:
+    too_long: dict[float, list[str]] = {}
+    too_often: dict[float, list[LightFigures]] = {}
+    for light in figures.lights:
+        if limits.max_pulse_s is not None and light.longest_pulse_s > limits.max_pulse_s * (1 + 1e-9):
+            too_long.setdefault(light.longest_pulse_s, []).append(light.name)
+        if limits.max_duty is not None and light.duty > limits.max_duty * (1 + 1e-9):
+            too_often.setdefault(light.duty, []).append(light)
+    for pulse_s, names in too_long.items():
+        limit = show_seconds(limits.max_pulse_s or 0.0)
+        text = f"{_and(names)}: flashes of {show_seconds(pulse_s)}, over the limit of {limit}. Give at most that."
+        yield _warning("pulse", text)
+    for duty, lights in too_often.items():
+        limit_share = limits.max_duty or 1.0
+        fits_s = _flash_for_duty_s(figures, lights[0], limit_share)
+        yield _warning(
+            "duty",
+            f"{_and([light.name for light in lights])}: on for {duty:.2%} of the time, over the limit of "
+            f"{limit_share:.2%}. "
+            f"Flashes of {show_seconds(fits_s)} for every light would fit; more lights in the round help too.",
+        )
+
+
+def _flash_for_duty_s(figures: ShootFigures, light: LightFigures, duty: float) -> float:
+    """Return the flash at which the light's duty is met if all lights take it and the dark times stay."""
+    dark_s = (1 - sum(other.duty for other in figures.lights)) / light.rate_hz
+    return duty * dark_s / (1 - duty * figures.flash_rate_hz / light.rate_hz)
+
+
+def _and(names: Sequence[str]) -> str:
+    return " and ".join((", ".join(names[:-1]), names[-1])) if len(names) > 1 else names[0]
+
+
+def _about_synced_rows(plan: Plan, figures: ShootFigures) -> Iterator[Caution]:
+    if plan.mode != "synced":
+        return
+    open_s = plan.camera.exposure_s - abs(plan.camera.readout_s or 0.0)
+    longest_s = max(slot.duration_s for slot in figures.slots)
+    if longest_s > open_s * (1 + 1e-9):
+        yield _warning(
+            "synced",
+            f"All rows are open together for only {show_seconds(max(open_s, 0.0))} of each frame, so a triggered "
+            "flash of "
+            f"{show_seconds(longest_s)} is cut in some rows. Use --mode rolling, a slower frame rate or a global "
+            "shutter.",
+        )

@@ -1,0 +1,96 @@
+"""From a request to the plan, with its figures and cautions: the one call behind ``psvideo capture-plan``."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from psvideo.capture.cautions import Caution, request_cautions, shoot_cautions
+from psvideo.capture.figures import ShootFigures, shoot_figures
+from psvideo.capture.quantities import show_seconds
+from psvideo.capture.request import ShootRequest
+from psvideo.capture.wish import LONG_MARKER, longest_flash
+from psvideo.errors import UsageError
+from psvideo.plan import UNKNOWN_CLOCK_PPM, Plan, PlannedFlash, default_dark_s
+
+DARK_SLOT_EVERY_S = 0.5
+"""Dark slots come about twice a second: often enough to follow ambient light, below any flicker that is felt."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shoot:
+    """A planned shoot. ``chosen`` says what decided the flash where the user left its duration open."""
+
+    plan: Plan
+    figures: ShootFigures
+    cautions: tuple[Caution, ...]
+    chosen: str | None
+
+
+def plan_shoot(request: ShootRequest) -> Shoot:
+    """Plan the shoot. Raises UsageError that names the option where what is asked for cannot be."""
+    chosen = None
+    flash_s = request.flash_s
+    if flash_s is None:
+        bound = longest_flash(request)
+        flash_s = dict.fromkeys(request.lights, bound.flash_s)
+        chosen = f"{show_seconds(bound.flash_s)}, decided by {bound.why}"
+    plan = make_plan(request, flash_s)
+    figures = shoot_figures(plan, speed_px_s=request.limits.speed_px_s)
+    cautions = request_cautions(request) + shoot_cautions(plan, figures, limits=request.limits)
+    return Shoot(plan=plan, figures=figures, cautions=cautions, chosen=chosen)
+
+
+def make_plan(request: ShootRequest, flash_s: Mapping[str, float]) -> Plan:
+    """Return the plan: one flash per light in the order of the lights, and the marker.
+
+    A long marker is the first light's flash; a dark slot ends the round and takes the shortest flash's duration.
+    """
+    camera = request.camera
+    lit = [_lit(request, name, flash_s[name], is_first=index == 0) for index, name in enumerate(request.lights)]
+    dark = []
+    if request.marker == "dark":
+        dark_slot_s = request.dark_slot_s or min(flash.duration_s for flash in lit)
+        dark = [PlannedFlash(lights={}, duration_s=dark_slot_s)]
+    flashes = (*lit, *dark)
+    dark_s = request.dark_s
+    if dark_s is None:
+        durations_s = [flash.duration_s for flash in flashes]
+        _refuse_overfull(request, max(durations_s))
+        dark_s = default_dark_s(camera, durations_s, mode=request.mode, clock_tolerance_ppm=request.clock_tolerance_ppm)
+    _refuse_short_dark(request, dark_s)
+    round_s = sum(flash.duration_s + dark_s for flash in lit)
+    return Plan(
+        camera=camera,
+        flashes=flashes,
+        dark_s=dark_s,
+        mode=request.mode,
+        clock_tolerance_ppm=request.clock_tolerance_ppm,
+        dark_every=(request.dark_every or max(1, math.ceil(DARK_SLOT_EVERY_S / round_s))) if dark else 1,
+    )
+
+
+def _lit(request: ShootRequest, name: str, duration_s: float, *, is_first: bool) -> PlannedFlash:
+    is_marker = is_first and request.marker == "long"
+    return PlannedFlash(lights={name: request.power[name]}, duration_s=duration_s * (LONG_MARKER if is_marker else 1.0))
+
+
+def _refuse_overfull(request: ShootRequest, longest_s: float) -> None:
+    exposure_s = request.camera.exposure_s
+    if longest_s > exposure_s:
+        raise UsageError(
+            f"A flash of {show_seconds(longest_s)} is longer than the exposure of {show_seconds(exposure_s)}, so no "
+            "row can "
+            "hold all of it. Give a shorter --flash, or a slower --fps."
+        )
+
+
+def _refuse_short_dark(request: ShootRequest, dark_s: float) -> None:
+    exposure_s = request.camera.exposure_s
+    if request.mode != "synced" and dark_s < exposure_s * (1 - 1e-9):
+        ppm = UNKNOWN_CLOCK_PPM if request.clock_tolerance_ppm is None else request.clock_tolerance_ppm
+        raise UsageError(
+            f"A dark time of {show_seconds(dark_s)} is shorter than the exposure of {show_seconds(exposure_s)}: some "
+            "rows "
+            f"would hold two flashes, which nothing can part again (eq. 1). Leave --dark out, or give at least "
+            f"{exposure_s / (1 - ppm * 1e-6) * 1e3:.5g}ms, the exposure and the clocks' margin."
+        )

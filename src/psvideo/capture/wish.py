@@ -1,0 +1,104 @@
+"""How long a flash may be, from what the user cares about: sharpness, the LEDs' limits, the rate, the light."""
+
+import math
+from dataclasses import dataclass
+
+from psvideo.capture.quantities import show_seconds
+from psvideo.capture.request import ShootRequest
+from psvideo.errors import UsageError
+from psvideo.plan import default_dark_s
+
+LONG_MARKER = 1.5
+"""The marker flash of ``--marker long`` is this much longer than the others: plainly so, and still cheap."""
+
+LONGEST_SHARE_OF_EXPOSURE = 0.25
+"""Unless the user says so, no flash is longer: a quarter of the exposure already costs a fifth of the rate (eq. 6)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bound:
+    """One reason why a flash may not be longer than ``flash_s``."""
+
+    flash_s: float
+    why: str
+
+
+def longest_flash(request: ShootRequest) -> Bound:
+    """Return the longest flash that every limit allows, and the limit that decided.
+
+    With a longer marker flash the limits hold for that one, and the others are shorter. Raises UsageError where
+    nothing limits the flash, or where sharpness and LEDs leave too little light.
+    """
+    limits = request.limits
+    if (limits.max_blur_px is None) != (limits.speed_px_s is None):
+        raise UsageError("--max-blur needs --speed, and the reverse: blur = speed x flash duration. Give both.")
+    if limits.max_blur_px is None and limits.max_duty is None and limits.max_pulse_s is None:
+        raise UsageError(
+            "Nothing says how long a flash should be. Give --flash 0.8ms, or what limits it: --max-blur 1 --speed 800 "
+            "(px/s), --max-duty 0.1, --max-pulse 1ms."
+        )
+    tightest = min(_bounds(request), key=lambda bound: bound.flash_s)
+    flash_s = _rounded_down(tightest.flash_s / (LONG_MARKER if request.marker == "long" else 1.0))
+    _refuse_too_dark(request, flash_s, tightest)
+    return Bound(flash_s=flash_s, why=tightest.why)
+
+
+def _bounds(request: ShootRequest) -> list[Bound]:
+    limits, exposure_s = request.limits, request.camera.exposure_s
+    bounds = [Bound(flash_s=LONGEST_SHARE_OF_EXPOSURE * exposure_s, why="longer would cost over a fifth of the rate")]
+    if limits.max_blur_px is not None and limits.speed_px_s is not None:
+        blur = f"{limits.max_blur_px:g} px of blur at {limits.speed_px_s:g} px/s"
+        bounds.append(Bound(flash_s=limits.max_blur_px / limits.speed_px_s, why=blur))
+    if limits.max_pulse_s is not None:
+        bounds.append(
+            Bound(flash_s=limits.max_pulse_s, why=f"the LEDs' longest pulse of {show_seconds(limits.max_pulse_s)}")
+        )
+    if limits.max_duty is not None:
+        bounds.append(
+            Bound(flash_s=flash_for_duty_s(request, limits.max_duty), why=f"the LEDs' duty of {limits.max_duty:.3g}")
+        )
+    if request.mode == "synced":
+        open_s = exposure_s - abs(request.camera.readout_s or 0.0)
+        if open_s > 0:
+            bounds.append(Bound(flash_s=open_s, why="the time in which all rows are open"))
+    return bounds
+
+
+def flash_for_duty_s(request: ShootRequest, max_duty: float) -> float:
+    """Return the flash at which each of the lights, flashing once a round, is on for ``max_duty`` of the time."""
+    period_s, share = request.camera.frame_period_s, max_duty * len(request.lights)
+    if request.mode != "rolling":
+        return share * period_s * (2 if request.mode == "half-rate" else 1)
+    dark_s = request.dark_s or default_dark_s(
+        request.camera, (), mode="rolling", clock_tolerance_ppm=request.clock_tolerance_ppm
+    )
+    return share * dark_s / (1 - share) if share < 1 else math.inf
+
+
+def _refuse_too_dark(request: ShootRequest, flash_s: float, tightest: Bound) -> None:
+    if request.limits.max_stops is None:
+        return
+    exposure_s, power = request.camera.exposure_s, min(request.power.values())
+    stops = math.log2(exposure_s / (flash_s * power))
+    if stops <= request.limits.max_stops:
+        return
+    needed_s = exposure_s / power / 2**request.limits.max_stops
+    speed = request.limits.speed_px_s
+    blur = "" if speed is None else f" and {needed_s * speed:.3g} px of blur at {speed:g} px/s"
+    raise UsageError(
+        f"These wishes exclude each other: {tightest.why} allows a flash of {show_seconds(flash_s)}, which is "
+        f"{stops:.1f} "
+        f"stops darker than the same light left on; --max-stops {request.limits.max_stops:g} needs "
+        f"{show_seconds(needed_s)}{blur}. Allow more blur or more stops, slow the subject down, or bring "
+        f"{2 ** (stops - request.limits.max_stops):.1f} times the light."
+    )
+
+
+def _rounded_down(seconds: float) -> float:
+    """Return the duration cut to three figures, so that the plan reads well and no limit is passed.
+
+    >>> _rounded_down(0.0012499)
+    0.00124
+    """
+    digits = 2 - math.floor(math.log10(seconds))
+    return math.floor(seconds * 10.0**digits * (1 + 1e-12)) / 10.0**digits
