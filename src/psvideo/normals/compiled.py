@@ -1,0 +1,57 @@
+"""How the hot loops are compiled: by numba, without the interpreter's lock, and kept on disk for the next run."""
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import numba
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic, overload
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+# Products may be fused and divisions shared; NaN and infinity keep their meaning, sums their order.
+_FAST_MATH = {"contract", "nsz", "arcp"}
+
+
+def compiled(function: Function) -> Function:
+    """Compile a function when it is first called; where no folder can be written, without keeping it for next time."""
+    options: dict[str, Any] = {"nogil": True, "fastmath": _FAST_MATH, "error_model": "numpy"}
+    try:
+        kept: Function = numba.njit(cache=True, **options)(function)
+    except RuntimeError:  # numba found neither a folder beside the module nor one of the user's to write to
+        kept = numba.njit(**options)(function)
+    return kept
+
+
+@intrinsic
+def pointer(typing_context: Any, address: Any, like: Any) -> Any:
+    """The address (an integer) as a pointer to elements of the array ``like``."""
+    target = types.CPointer(like.dtype)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.inttoptr(arguments[0], context.get_value_type(target))
+
+    return target(types.intp, like), generate
+
+
+@intrinsic
+def half_bits(typing_context: Any, value: Any) -> Any:
+    """A float32 rounded to half precision, as its 16 bits: one instruction per vector, where numpy takes a pass."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.bitcast(builder.fptrunc(arguments[0], ir.HalfType()), ir.IntType(16))
+
+    return types.uint16(types.float32), generate
+
+
+def encoded(value: Any, like: Any) -> Any:
+    """A float32 as the array ``like`` stores it: float32, or the bits of a half float where its type is uint16."""
+    raise NotImplementedError("runs in compiled code only")
+
+
+@overload(encoded)
+def _encoded(value: Any, like: Any) -> Any:
+    if like.dtype == types.uint16:
+        return lambda value, like: half_bits(value)
+    return lambda value, like: value

@@ -1,0 +1,40 @@
+"""The surface at one instant, as photometric stereo gives it: which way every pixel faces, and how much it reflects."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Pixels = NDArray[np.floating]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Surface:
+    """Normals, albedo and what to think of them, per pixel; all arrays are finite everywhere.
+
+    normals: shape (row, col, 3), unit vectors in the camera frame (x right, y up, z to the camera); (0, 0, 0) where
+        not valid.
+    albedo: shape (row, col) or (row, col, channel), linear light: a plate is albedo * intensity * max(0, n . l). One
+        fixed scale, never stretched to its own maximum; 0 where not valid.
+    valid: shape (row, col), True where the normal is to be trusted.
+    residual: shape (row, col), root mean square over the measurements used of what the fit does not explain, in units
+        of sensor saturation; 0 where not valid. None where it was not asked for. Three measurements of one channel
+        are always explained exactly, whatever they are.
+
+    Arrays are float32, or float16 where a solver was asked for half floats. Channels lie in separate planes in memory,
+    so ``normals[..., 0]`` is contiguous.
+    """
+
+    normals: Pixels
+    albedo: Pixels
+    valid: NDArray[np.bool_]
+    residual: Pixels | None = None
+
+    def __post_init__(self) -> None:
+        """Raise ValueError where the arrays' shapes do not belong together."""
+        size = self.valid.shape
+        shapes = [self.normals.shape[:2], self.albedo.shape[:2]]
+        if self.residual is not None:
+            shapes.append(self.residual.shape)
+        if len(size) != 2 or any(shape != size for shape in shapes) or self.normals.shape != (*size, 3):
+            raise ValueError(f"normals {self.normals.shape}, albedo {self.albedo.shape} and valid {size} do not match")
