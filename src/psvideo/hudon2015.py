@@ -18,24 +18,27 @@ REC709_LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 
 
 def split(frames: Iterable[LinearFrame], camera: Camera, timing: Timing) -> Iterator[Plate]:
-    """Yield one plate for every pair of frames, named by counting flashes on from the one that frame 0 ends with.
+    """Yield the plates that Algorithm 1 makes of every pair of frames, the first one where two show the same flash.
 
-    The timing gives names and durations only; the rows are Algorithm 1's own. One exposure's ambient light stays.
+    The timing gives durations (eq. 13) and names only: an image belongs to the flash that follows the gap in which the
+    dark row was taken to lie. The rows are Algorithm 1's own, and one exposure's ambient light stays in.
     """
-    flashes = _from_first_frame(camera, timing)
     dark_row: int | None = None
     adjust = 0.0
-    for (current, following), flash in zip(pairwise(frames), flashes, strict=False):
+    done = -1
+    for current, following in pairwise(frames):
         rows = current.image.shape[0]
         if dark_row is None:
             dark_row = int(np.argmin(luminance_energy(current.image)))
+        flash = _flash_after(timing, current.index * camera.frame_period_s + dark_row * camera.row_time_s)
         offset = flash.duration_s / camera.exposure_s * rows  # eq. 13
         expected = (dark_row + offset + adjust) % rows
         found = _darkest_around(luminance_energy(following.image), expected)
         adjust = found - expected
         image = _join(current.image, dark_row, following.image, found)
         dark_row = found
-        if flash.complete:
+        if flash.complete and flash.index != done:
+            done = flash.index
             yield Plate(flash=flash, image=image, exposures=np.ones(rows), seen=np.ones(rows, np.bool_))
 
 
@@ -62,8 +65,6 @@ def _join(current: Image, current_dark_row: int, following: Image, following_dar
     return total
 
 
-def _from_first_frame(camera: Camera, timing: Timing) -> tuple[Flash, ...]:
-    """Return the flashes from the first one that lights the last row of frame 0 wholly or in part."""
-    last_row_opens_s = float(camera.row_offsets_s().max())
-    begun = [flash.start_s + flash.duration_s > last_row_opens_s for flash in timing.flashes]
-    return timing.flashes[begun.index(True) :] if any(begun) else ()
+def _flash_after(timing: Timing, gap_s: float) -> Flash:
+    """Return the flash that starts nearest to one exposure after ``gap_s``, where the one before it ended (eq. 1)."""
+    return timing.flashes[int(np.argmin(np.abs(timing.start_s - gap_s - timing.exposure_s)))]

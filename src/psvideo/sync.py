@@ -25,6 +25,9 @@ ROBUST_STEEPNESS = 20.0
 """Of the coarse loss ``log(1 + 20 r^2)``, r being a residual over its row's own spread (physics.md)."""
 CAUCHY = 2.4
 """Residuals of this many standard deviations are trusted half as much (95 % efficiency for Gaussian noise)."""
+FIRST_SCALE, LAST_SCALE = 0.3, 2e-3
+"""The robust fit's residual scale as a share of each row's spread: it shrinks from step to step down to the noise, so
+that the few rows that a flash splits, which tell the time, are not taken for outliers before the fit is near."""
 MIN_EXPLAINED = 0.5
 """A fit that explains less of the rows' changes than this has not found a strobe."""
 CLEAR_MARKER = 1.3
@@ -189,8 +192,9 @@ def _refine(plan: Plan, rows: Profiles, clock: StrobeClock, *, steps: int) -> _F
     trust = np.ones_like(rows.value)
     rest = _unexplained(plan, rows, clock, trust)
     gradient = np.empty((2, *rest.shape))
-    for _ in range(steps):
-        scale = _row_noise(rest)
+    spread = _spread(rows)
+    for step in range(steps):
+        scale = np.maximum(_row_noise(rest), spread * max(FIRST_SCALE * 0.4**step, LAST_SCALE))
         trust = 1.0 / (1.0 + (rest / (CAUCHY * scale)) ** 2)
         rest = _unexplained(plan, rows, clock, trust)
         for number, (shift_s, ppm) in enumerate(probes):
@@ -202,9 +206,9 @@ def _refine(plan: Plan, rows: Profiles, clock: StrobeClock, *, steps: int) -> _F
         slope = np.einsum("anr,nr->a", gradient, weight * rest)
         move = -np.linalg.solve(hessian + 1e-12 * np.trace(hessian) * np.eye(2), slope)
         clock, rest, gained = _line_search(plan, rows, clock, move, probes, pivot_s, trust, weight, rest)
-        if not gained or np.abs(move).max() < 1e-4:
+        if step > 6 and (not gained or np.abs(move).max() < 1e-3):
             break
-    error = _shift_error(gradient, trust / _row_noise(rest) ** 2, rest)
+    error = _shift_error(gradient, weight, rest)
     return _Fit(clock=clock, shift_error_s=error * reach_s, explained=_explained(rows, rest))
 
 
