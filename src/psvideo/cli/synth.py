@@ -1,0 +1,34 @@
+"""psvideo synth: film a virtual scene."""
+
+import dataclasses
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from psvideo.cli.console import Voice
+from psvideo.cli.options import Force, Json, Quiet, Verbose
+from psvideo.synth.shoot import shoot
+
+
+def synth(
+    scene: Annotated[Path, typer.Argument(help="A scene file, such as data_synth/bust.toml.")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="The clip folder to write.")],
+    force: Force = False,
+    json: Json = False,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+) -> None:
+    """Film a virtual scene: a clip folder as a camera would leave it, and the exact truth beside it in truth/."""
+    voice = Voice(json=json, verbose=verbose, quiet=quiet)
+    shot = shoot(scene, out, force=force, track=lambda frames: voice.track(frames, total=len(frames), what="filming"))
+    for warning in shot.warnings:
+        voice.warn(warning)
+    clock = shot.clock
+    voice.detail(
+        f"a cycle began at {clock.phase_s * 1e3:.4f} ms; the strobe's clock is {clock.offset_ppm:+.1f} ppm off"
+    )
+    voice.say(
+        f"{out}: {shot.frames} frames; {shot.complete} of {shot.flashes} flashes complete; truth in {out / 'truth'}"
+    )
+    voice.result({**dataclasses.asdict(shot), "path": str(shot.path)})

@@ -1,0 +1,161 @@
+"""The virtual shoot: a scene goes in, a clip folder as a camera would leave it comes out, the truth beside it."""
+
+import shutil
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from psvideo.errors import PsvideoError
+from psvideo.files import refuse_existing
+from psvideo.planfile import format_plan
+from psvideo.rigfile import format_rig
+from psvideo.synth.encode import codes_of, mosaic, noise_of
+from psvideo.synth.frames import SUFFIX, write_frame
+from psvideo.synth.noise import frame_rng
+from psvideo.synth.scene import read_scene
+from psvideo.synth.sensor import Flicker, Image, expose_frames
+from psvideo.synth.shotplan import claimed_plan, true_clock
+from psvideo.synth.stage import Stage, set_stage
+from psvideo.synth.strobe import StrobeClock, TrueFlash, true_flashes
+from psvideo.synth.truth import write_picture, write_scene_truth, write_surface, write_timing
+
+CLIPPED_WARNING = 0.005
+"""A frame in which a larger share of the samples saturates is worth a word."""
+
+Track = Callable[[Sequence[int]], Iterable[int]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shot:
+    """What a virtual shoot left: the clip's folder, its frames and flashes, and what to know about them."""
+
+    path: Path
+    frames: int
+    flashes: int
+    complete: int
+    clock: StrobeClock
+    clipped_share: float
+    warnings: tuple[str, ...]
+
+
+def builtin_scene(name: str = "bust") -> Path:
+    """Return the file of a scene that comes with the package."""
+    path = Path(__file__).parent / "scenes" / f"{name}.toml"
+    if not path.is_file():
+        names = sorted(file.stem for file in path.parent.glob("*.toml"))
+        raise PsvideoError(f"There is no built-in scene {name!r}; known are: {', '.join(names)}.")
+    return path
+
+
+def shoot(scene: Path, out: Path, *, force: bool = False, track: Track = iter) -> Shot:
+    """Film a scene file and write the clip folder ``out``, whole or not at all.
+
+    The folder holds frames/, plan.toml and rig.toml as a camera and its crew would leave them, and truth/ with what
+    only the virtual shoot knows. ``track`` passes frame indices through, for showing progress. Raises UsageError where
+    ``out`` exists and ``force`` is not given, PsvideoError for a faulty scene or mesh or where writing fails.
+    """
+    refuse_existing(out, force=force)
+    stage = set_stage(read_scene(scene), scene.parent)
+    beside = out.with_name(f".{out.name}.partial")
+    try:
+        shutil.rmtree(beside, ignore_errors=True)
+        (beside / "frames").mkdir(parents=True)
+        shot = _film(stage, beside, out, track)
+        if out.exists():
+            shutil.rmtree(out)
+        beside.rename(out)
+    except OSError as fault:
+        raise PsvideoError(
+            f"{out}: the clip cannot be written ({fault.strerror or fault}). Nothing was left under that name: make "
+            "room or check the folder's permissions, then run the command again."
+        ) from fault
+    finally:
+        shutil.rmtree(beside, ignore_errors=True)
+    return shot
+
+
+def _film(stage: Stage, folder: Path, out: Path, track: Track) -> Shot:
+    """Expose and write frame by frame; only the plates that the current frame sees are held."""
+    scene, plan = stage.scene, stage.plan
+    clock = true_clock(scene)
+    flashes = true_flashes(plan, clock, frames=scene.frames, dropped=scene.dropped)
+    truth = _Truth(stage, folder / "truth")
+    kept = [n for n in range(scene.frames) if n not in scene.dropped]
+    light = expose_frames(
+        plan,
+        flashes,
+        truth.plate,
+        frames=track(kept),
+        ambient_of=stage.ambient(),
+        flicker=Flicker(hz=scene.ambient.flicker_hz, depth=scene.ambient.flicker_depth),
+        channels=scene.camera.channels,
+    )
+    clipped = [_record(stage, folder, n, image) for n, image in zip(kept, light, strict=True)]
+    (folder / "plan.toml").write_text(format_plan(claimed_plan(scene)), encoding="utf-8")
+    (folder / "rig.toml").write_text(format_rig(stage.rig), encoding="utf-8")
+    write_timing(folder / "truth", plan, flashes, truth.plates)
+    write_scene_truth(folder / "truth", scene, plan, clock, max(clipped))
+    return Shot(
+        path=out,
+        frames=len(kept),
+        flashes=len(flashes),
+        complete=sum(flash.complete for flash in flashes),
+        clock=clock,
+        clipped_share=max(clipped),
+        warnings=tuple(_warnings(max(clipped), len(flashes))),
+    )
+
+
+def _record(stage: Stage, folder: Path, n: int, image: Image) -> float:
+    """Write frame ``n`` as the camera records the collected light, and return the share of samples that saturate."""
+    scene = stage.scene
+    scale = codes_of(scene.camera, scene.output.kind)
+    sampled = image if scene.camera.cfa is None else mosaic(image, scene.camera.cfa)
+    codes = scale.from_light(noise_of(scene.camera).add(sampled, frame_rng(scene.seed, n)))
+    name = f"{scene.name}.{scene.output.first_number + n:04d}{SUFFIX[scene.output.kind]}"
+    write_frame(folder / "frames" / name, codes, kind=scene.output.kind, camera=scene.camera, scale=scale)
+    return float(np.mean(sampled >= 1.0))
+
+
+def _warnings(clipped: float, flashes: int) -> Iterator[str]:
+    if clipped > CLIPPED_WARNING:
+        yield (
+            f"up to {clipped:.1%} of a frame's samples saturate; lower the lights' intensity or the ambient level in "
+            "the scene if that is not meant."
+        )
+    if flashes == 0:
+        yield "no flash falls into the clip: it is shorter than the strobe's cycle. Give the scene more frames."
+
+
+class _Truth:
+    """Writes each flash's plate and surface as it is rendered; a scene at rest has one file per slot."""
+
+    def __init__(self, stage: Stage, folder: Path) -> None:
+        self._stage, self._folder = stage, folder
+        self._by_slot: dict[int, tuple[Image, str]] = {}
+        self.plates: dict[int, str] = {}
+        folder.mkdir()
+        if stage.still is not None:
+            write_surface(folder, stage.still.hits, stage.scene.camera.channels)
+
+    def plate(self, flash: TrueFlash) -> Image | None:
+        """Return a flash's plate, None for a dark slot; called once per flash, in order."""
+        if not any(flash.lights.values()):
+            return None
+        if self._stage.still is not None and flash.slot in self._by_slot:
+            image, name = self._by_slot[flash.slot]
+            self.plates[flash.index] = name
+            return image
+        view = self._stage.view(flash.middle_s)
+        image = self._stage.plate(flash, view)
+        if flash.complete:
+            name = f"flash_{flash.index:04d}"
+            write_picture(self._folder / "plates" / f"{name}.exr", image)
+            self.plates[flash.index] = f"plates/{name}.exr"
+            if self._stage.still is None:
+                write_surface(self._folder, view.hits, self._stage.scene.camera.channels, name)
+            else:
+                self._by_slot[flash.slot] = (image, self.plates[flash.index])
+        return image
