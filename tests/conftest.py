@@ -1,0 +1,62 @@
+"""What several tests share: where the real data lie, and small plans to try things on."""
+
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+from psvideo.camera import Camera
+from psvideo.plan import Plan, PlannedFlash, default_dark_s
+
+SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """The folder of real captures, which is not part of the project; tests that need it are skipped without it."""
+    if not SHARED_DATA.is_dir():
+        pytest.skip("the real captures (../shared/data) are not on this machine")
+    return SHARED_DATA
+
+
+@pytest.fixture(scope="session")
+def make_plan() -> Callable[..., Plan]:
+    """Make a small plan: three lights and a dark slot, full shutter, readout as long as the frame, unless told."""
+    return _make_plan
+
+
+def _make_plan(
+    *,
+    lights: tuple[str, ...] = ("key", "left", "right"),
+    dark: bool = True,
+    dark_every: int = 1,
+    duration_s: float = 0.0008,
+    width_px: int = 24,
+    height_px: int = 120,
+    fps: Fraction = Fraction(120_000, 1001),
+    shutter: float = 1.0,
+    readout: float = 1.0,
+    mode: str = "rolling",
+    clock_tolerance_ppm: float = 200.0,
+) -> Plan:
+    period_s = float(1 / fps)
+    camera = Camera(
+        width_px=width_px,
+        height_px=height_px,
+        fps=fps,
+        exposure_s=shutter * period_s,
+        readout_s=readout * period_s,
+    )
+    flashes = [PlannedFlash(lights={light: 1.0}, duration_s=duration_s) for light in lights]
+    if dark:
+        flashes.append(PlannedFlash(lights={}, duration_s=duration_s))
+    dark_s = default_dark_s(camera, [duration_s], mode=mode, clock_tolerance_ppm=clock_tolerance_ppm)  # type: ignore[arg-type]
+    return Plan(
+        camera=camera,
+        flashes=tuple(flashes),
+        dark_s=dark_s,
+        mode=mode,  # type: ignore[arg-type]
+        dark_every=dark_every,
+        clock_tolerance_ppm=clock_tolerance_ppm,
+    )

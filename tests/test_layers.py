@@ -1,0 +1,82 @@
+"""Imports go one way through the house, and nothing circular stands in it."""
+
+import ast
+from graphlib import TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).resolve().parents[1] / "src" / "psvideo"
+
+LAYERS = [
+    {"errors", "tomlfile", "files"},
+    {"camera", "rig", "rigfile", "surface"},
+    {"plan", "planfile", "timing"},
+    {"shutter", "clip", "strobe", "capture"},
+    {"rowfit", "profiles"},
+    {"sync", "split", "hudon2015", "ambient", "sequence", "calibrate", "normals"},
+    {"export", "view"},
+    {"synth"},
+    {"pipeline", "demo"},
+    {"cli"},
+]
+"""Rooms from the bottom up; a module may use its own layer (without circles) and those below."""
+
+SYNTH_NEVER_USES = {"shutter", "rowfit", "profiles", "sync", "split", "hudon2015", "ambient", "sequence", "normals"}
+
+
+def _imports(path: Path) -> set[str]:
+    """Return the dotted names inside psvideo that a file imports anywhere."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "psvideo":
+            found.add(node.module)
+            found.update(f"{node.module}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.Import):
+            found.update(alias.name for alias in node.names if alias.name.split(".")[0] == "psvideo")
+    return found
+
+
+def _rooms_used(path: Path) -> set[str]:
+    return {name.split(".")[1] for name in _imports(path) if "." in name} - {"__version__"}
+
+
+def _room(path: Path) -> str:
+    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
+MODULES = sorted(path for path in PACKAGE.rglob("*.py") if path != PACKAGE / "__init__.py")
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_a_module_imports_only_its_own_layer_and_those_below(path: Path) -> None:
+    floor = {room: height for height, rooms in enumerate(LAYERS) for room in rooms}
+    assert _room(path) in floor, "a new room: give it its place in LAYERS"
+    above = {room for room in _rooms_used(path) if floor[room] > floor[_room(path)]}
+    assert not above
+
+
+def test_no_module_imports_itself_by_a_detour() -> None:
+    known = {
+        ".".join(("psvideo", *path.relative_to(PACKAGE).with_suffix("").parts)).removesuffix(".__init__")
+        for path in MODULES
+    }
+    graph = {}
+    for path in MODULES:
+        name = ".".join(("psvideo", *path.relative_to(PACKAGE).with_suffix("").parts)).removesuffix(".__init__")
+        graph[name] = (_imports(path) & known) - {name, name.rpartition(".")[0]}
+    TopologicalSorter(graph).prepare()
+
+
+@pytest.mark.parametrize("path", sorted((PACKAGE / "synth").rglob("*.py")), ids=lambda path: path.name)
+def test_the_virtual_shoot_never_uses_what_it_is_there_to_test(path: Path) -> None:
+    assert not _rooms_used(path) & SYNTH_NEVER_USES
+
+
+def test_only_the_clip_room_knows_decoders_and_only_export_knows_writers() -> None:
+    decoders = {"rawpy", "av", "PyOpenColorIO"}
+    for path in MODULES:
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        names = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
+        if _room(path) not in {"clip", "export", "synth"}:
+            assert not names & (decoders | {"OpenEXR", "tifffile"}), path
