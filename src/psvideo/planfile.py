@@ -140,7 +140,7 @@ def _camera(file: _Camera) -> Camera:
     fps = parse_fps(file.fps)
     exposure_s = file.exposure_s
     if exposure_s is None:
-        exposure_s = (file.shutter_deg or 360.0) / 360.0 / float(fps)
+        exposure_s = (file.shutter_deg or 360.0) / 360.0 * float(1 / fps)
     readout_s = None if file.readout_s == "unknown" else file.readout_s or 0.0
     encoding = Encoding(
         transfer=file.transfer, black_level=file.black_level, white_level=file.white_level, cfa=file.cfa
