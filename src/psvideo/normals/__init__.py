@@ -1,1 +1,1 @@
-"""From plates, one per light, to the surface: every method is one module named by its paper, ``solve(...) -> Surface``."""
+"""From one plate per light to the surface. Every method is one module named by its paper: ``solve(...) -> Surface``."""

@@ -6,7 +6,9 @@ from typing import Any, TypeVar
 import numba
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic, overload
+from numba.extending import intrinsic
+
+_HALF_MAX = 65504.0
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -36,22 +38,19 @@ def pointer(typing_context: Any, address: Any, like: Any) -> Any:
 
 
 @intrinsic
-def half_bits(typing_context: Any, value: Any) -> Any:
-    """A float32 rounded to half precision, as its 16 bits: one instruction per vector, where numpy takes a pass."""
+def encoded(typing_context: Any, value: Any, like: Any) -> Any:
+    """A float32 as the array ``like`` stores it: as it is, or rounded to a half float's 16 bits where it is uint16.
+
+    Values beyond the largest half float become that one. A vector takes one instruction, where numpy takes a pass.
+    """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.bitcast(builder.fptrunc(arguments[0], ir.HalfType()), ir.IntType(16))
+        if like.dtype != types.uint16:
+            return arguments[0]
+        largest = ir.Constant(ir.FloatType(), _HALF_MAX)
+        fits = builder.fcmp_ordered("<", arguments[0], largest)
+        return builder.bitcast(
+            builder.fptrunc(builder.select(fits, arguments[0], largest), ir.HalfType()), ir.IntType(16)
+        )
 
-    return types.uint16(types.float32), generate
-
-
-def encoded(value: Any, like: Any) -> Any:
-    """A float32 as the array ``like`` stores it: float32, or the bits of a half float where its type is uint16."""
-    raise NotImplementedError("runs in compiled code only")
-
-
-@overload(encoded)
-def _encoded(value: Any, like: Any) -> Any:
-    if like.dtype == types.uint16:
-        return lambda value, like: half_bits(value)
-    return lambda value, like: value
+    return like.dtype(types.float32, like), generate
