@@ -89,7 +89,7 @@ def _rebuild(camera: Camera, timing: Timing, flash: Flash, images: dict[int, Ima
     weights = row_weights(camera, np.array([flash.start_s]), np.array([flash.duration_s]), frames=touched)[0]
     weights[[index not in images for index in touched]] = 0.0
     clean = weights * (_foreign_light(camera, timing, flash, touched) <= MOST_FOREIGN)
-    coefficients = _average_of(clean) if not any(flash.lights.values()) else _best_sum(clean)
+    coefficients = _best_sum(clean) if any(flash.lights.values()) else _average_of(clean)
     seen = coefficients.sum(axis=0) > 0
     shape = next(iter(images.values())).shape if images else (camera.height_px, camera.width_px)
     plate = np.zeros(shape, np.float32)

@@ -1,0 +1,226 @@
+"""The timing of a clip, found from its row profiles: against the virtual shoot's truth and another simulator's."""
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from psvideo.camera import FloatArray
+from psvideo.errors import PsvideoError, UsageError
+from psvideo.plan import Plan, PlannedFlash
+from psvideo.planfile import read_plan
+from psvideo.profiles import collect, row_profile
+from psvideo.rowfit import Profiles, residuals
+from psvideo.shutter import row_weights
+from psvideo.sync import find_timing
+from psvideo.synth import Exposure, Noise, StrobeClock, expose
+from psvideo.timing import Timing
+
+PlanMaker = Callable[..., Plan]
+CAMERA_NOISE = Noise(full_well_e=20_000, read_e=8)
+
+
+@dataclass(frozen=True)
+class MemoryFrame:
+    index: int
+    image: np.ndarray
+
+
+def textured_plates(plan: Plan, seed: int = 3) -> dict[int, np.ndarray]:
+    """Plates whose rows differ: noise under a gradient, with a black band that could pass for a dark row."""
+    rng = np.random.default_rng(seed)
+    camera = plan.camera
+    shape = (camera.height_px, camera.width_px)
+    plates = {slot: (0.1 + 0.6 * rng.random(shape)).astype(np.float32) for slot in plan.lit_slots}
+    for plate in plates.values():
+        plate[camera.height_px // 3 : camera.height_px // 3 + 6] *= 0.02
+    return plates
+
+
+def shoot(plan: Plan, *, frames: int = 60, phase_s: float = 0.0123, ppm: float = 30.0, **options: object) -> Exposure:
+    clock = StrobeClock(phase_s=phase_s, offset_ppm=ppm)
+    options = {"noise": CAMERA_NOISE, "bits": 12} | options
+    return expose(textured_plates(plan), plan, frames=frames, clock=clock, **options)  # type: ignore[arg-type]
+
+
+def timing_of(plan: Plan, shot: Exposure, **options: str) -> Timing:
+    indices, profiles = collect(MemoryFrame(n, image) for n, image in zip(shot.indices, shot.frames, strict=True))
+    return find_timing(plan, indices, profiles, **options)  # type: ignore[arg-type]
+
+
+def errors_rows(timing: Timing, shot: Exposure) -> FloatArray:
+    """Return by how many rows every flash found is off the true flash nearest to it."""
+    true_s = np.array([flash.start_s for flash in shot.flashes])
+    nearest = np.abs(true_s[:, None] - timing.start_s).argmin(axis=0)
+    return (timing.start_s - true_s[nearest]) / abs(timing.row_time_s)
+
+
+def names_right(timing: Timing, shot: Exposure) -> bool:
+    true_s = np.array([flash.start_s for flash in shot.flashes])
+    nearest = np.abs(true_s[:, None] - timing.start_s).argmin(axis=0)
+    return all(
+        set(flash.lights) == set(shot.flashes[n].lights) for flash, n in zip(timing.flashes, nearest, strict=True)
+    )
+
+
+CASES: dict[str, tuple[dict[str, object], dict[str, object]]] = {
+    "three lights and a dark slot": ({}, {}),
+    "clocks 200 ppm apart": ({}, {"ppm": 200.0}),
+    "the strobe slow by 200 ppm": ({}, {"ppm": -200.0}),
+    "a dark slot in every fifth round": ({"dark_every": 5}, {"frames": 90}),
+    "ambient light": ({}, {"ambient": 0.15}),
+    "short flashes of five rows": ({"duration_s": 0.00035}, {}),
+    "five lights": ({"lights": ("a", "b", "c", "d", "e")}, {"frames": 72}),
+    "a short readout": ({"readout": 0.5}, {}),
+    "bottom row first": ({"readout": -1.0}, {}),
+    "half-rate": ({"mode": "half-rate"}, {}),
+    "a dropped frame": ({}, {"dropped": (17, 18, 40)}),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_every_flash_is_found_to_a_twentieth_of_a_row_and_named(case: str, make_plan: PlanMaker) -> None:
+    plan_options, shot_options = CASES[case]
+    plan = make_plan(**plan_options)
+    shot = shoot(plan, **shot_options)  # type: ignore[arg-type]
+    timing = timing_of(plan, shot)
+    assert np.sqrt(np.mean(errors_rows(timing, shot) ** 2)) < 0.05
+    assert timing.order == "marker"
+    assert names_right(timing, shot)
+    assert timing.phase_error_rows < 0.05
+    assert abs(timing.clock_offset_ppm - shot_options.get("ppm", 30.0)) < 1.5  # type: ignore[operator]
+
+
+@pytest.mark.parametrize("phase", np.linspace(0.0, 1.0, 7, endpoint=False))
+def test_the_start_phase_does_not_matter(phase: float, make_plan: PlanMaker) -> None:
+    plan = make_plan()
+    shot = shoot(plan, frames=32, phase_s=phase * plan.cycle_s)
+    timing = timing_of(plan, shot)
+    assert np.abs(errors_rows(timing, shot)).max() < 0.05
+    assert names_right(timing, shot)
+
+
+def test_the_flashes_listed_are_those_that_the_clip_saw_and_the_cut_ones_are_marked(make_plan: PlanMaker) -> None:
+    plan = make_plan()
+    shot = shoot(plan, frames=24)
+    timing = timing_of(plan, shot)
+    weights = row_weights(plan.camera, timing.start_s, timing.duration_s, frames=range(24))
+    all_weights = row_weights(plan.camera, timing.start_s, timing.duration_s, frames=range(-3, 27))
+    assert (weights.sum(axis=(1, 2)) > 0).all()
+    whole = np.isclose(weights.sum(axis=1), all_weights.sum(axis=1), atol=1e-9).all(axis=1)
+    assert [flash.complete for flash in timing.flashes] == whole.tolist()
+    assert [flash.index for flash in timing.flashes] == list(range(len(timing.flashes)))
+
+
+@pytest.mark.parametrize("clip", ["plain", "ambient"])
+def test_the_clips_of_another_simulator_are_timed_and_named(clip: str, shared_data: Path) -> None:
+    folder = shared_data / "clips" / clip
+    plan = read_plan(folder / "plan.toml")
+    black, white = plan.camera.encoding.black_level, plan.camera.encoding.white_level
+    assert black is not None
+    assert white is not None
+    pictures = [cv2.imread(str(file), cv2.IMREAD_UNCHANGED) for file in sorted((folder / "frames").glob("*.png"))]
+    profiles = np.array(
+        [row_profile(((p.astype(np.float32) - black) / (white - black)).astype(np.float32)) for p in pictures]
+    )
+    timing = find_timing(plan, np.arange(len(pictures)), profiles, clip=clip)
+    truth = json.loads((folder / "truth" / "timing.json").read_text())["flashes"]
+    assert [next(iter(flash.lights), None) for flash in timing.flashes] == [flash["light"] for flash in truth]
+    assert [flash.complete for flash in timing.flashes] == [flash["complete"] for flash in truth]
+    true_s = np.array([flash["start_s"] for flash in truth])
+    assert np.sqrt(np.mean((timing.start_s - true_s) ** 2)) < 0.05 * timing.row_time_s
+    assert timing.order == "marker"
+
+
+def test_without_a_marker_the_names_are_called_a_guess_until_they_are_given(make_plan: PlanMaker) -> None:
+    plan = make_plan(dark=False)
+    shot = shoot(plan)
+    assert timing_of(plan, shot).order == "guess"
+    latest_row_s = plan.camera.row_offsets_s().max()
+    first = next(flash for flash in shot.flashes if flash.start_s >= latest_row_s)
+    given = timing_of(plan, shot, first_light=next(iter(first.lights)))
+    assert given.order == "given"
+    assert names_right(given, shot)
+    with pytest.raises(UsageError, match="no such light in the plan"):
+        timing_of(plan, shot, first_light="kee")
+
+
+def test_a_first_light_that_the_marker_contradicts_is_refused(make_plan: PlanMaker) -> None:
+    plan = make_plan()
+    shot = shoot(plan)
+    timing = timing_of(plan, shot)
+    first = next(flash for flash in timing.flashes if flash.complete and flash.lights)
+    wrong = next(light for light in plan.lights if light not in first.lights)
+    with pytest.raises(PsvideoError, match="does not fit the footage"):
+        timing_of(plan, shot, first_light=wrong)
+
+
+def test_a_marker_that_the_clip_is_too_short_to_show_is_not_claimed(make_plan: PlanMaker) -> None:
+    plan = make_plan(dark_every=20)
+    shot = shoot(plan, frames=14, phase_s=-0.15)
+    assert not any(not flash.lights for flash in shot.flashes if 0 < flash.start_s < 13 * plan.camera.frame_period_s)
+    assert timing_of(plan, shot).order == "guess"
+
+
+def test_one_longer_flash_is_a_marker_too(make_plan: PlanMaker) -> None:
+    plan = make_plan(dark=False)
+    longer = PlannedFlash(lights=plan.flashes[0].lights, duration_s=1.6 * plan.flashes[0].duration_s)
+    plan = replace(plan, flashes=(longer, *plan.flashes[1:]))
+    shot = shoot(plan)
+    timing = timing_of(plan, shot)
+    assert np.abs(errors_rows(timing, shot)).max() < 0.05
+    assert timing.order == "marker"
+    assert names_right(timing, shot)
+
+
+def test_footage_that_is_not_strobed_is_not_timed(make_plan: PlanMaker) -> None:
+    plan = make_plan()
+    rng = np.random.default_rng(5)
+    steady = 0.3 + 0.2 * rng.random(plan.camera.height_px) + 0.01 * rng.standard_normal((60, plan.camera.height_px))
+    with pytest.raises(PsvideoError, match="no strobe like the plan's was found"):
+        find_timing(plan, np.arange(60), steady)
+
+
+def test_another_plans_footage_is_not_timed(make_plan: PlanMaker) -> None:
+    shot = shoot(make_plan(duration_s=0.0008))
+    with pytest.raises(PsvideoError, match="no strobe like the plan's was found"):
+        timing_of(make_plan(duration_s=0.002), shot)
+
+
+def test_synced_footage_has_one_flash_a_frame_in_the_plans_order(make_plan: PlanMaker) -> None:
+    plan = make_plan(mode="synced", readout=0.0)
+    timing = find_timing(plan, np.arange(8), np.zeros((8, plan.camera.height_px)))
+    assert [flash.slot for flash in timing.flashes] == [0, 1, 2, 3, 0, 1, 2, 3]
+    weights = row_weights(plan.camera, timing.start_s, timing.duration_s, frames=range(8))
+    np.testing.assert_allclose(weights, np.broadcast_to(np.eye(8)[:, :, None], weights.shape), atol=1e-9)
+
+
+@pytest.mark.parametrize("readout", [-1.0, 0.0, 0.4, 1.0])
+@pytest.mark.parametrize("shutter", [0.5, 1.0])
+def test_the_fit_uses_exactly_the_row_weights(readout: float, shutter: float, make_plan: PlanMaker) -> None:
+    """What the fit leaves equals what plain least squares with the shared model's weights leaves, row by row."""
+    plan = make_plan(readout=readout, shutter=shutter, height_px=9)
+    camera = plan.camera
+    train = plan.train(-4, 40)
+    start_s = 0.3 * plan.cycle_s + train.start_s * (1 + 700e-6)
+    values = np.random.default_rng(1).random((24, camera.height_px))
+    rows = Profiles(
+        value=values,
+        frame_start_s=np.arange(24) * camera.frame_period_s,
+        row_offset_s=camera.row_offsets_s(),
+        exposure_s=camera.exposure_s,
+        window_start=np.array([0, 12]),
+    )
+    unknown = np.array([1, 2, 3, 0])[train.slot]
+    rest = residuals(rows, start_s, train.duration_s, unknown, np.ones_like(values))
+    weights = row_weights(camera, start_s, train.duration_s, frames=range(24))
+    for row in range(camera.height_px):
+        lit = [weights[unknown == number, :, row].sum(axis=0) for number in (1, 2, 3)]
+        design = np.stack([np.ones(24), *lit], axis=1)
+        for window in (slice(0, 12), slice(12, 24)):
+            plain = design[window] @ np.linalg.lstsq(design[window], values[window, row], rcond=None)[0]
+            np.testing.assert_allclose(rest[window, row], values[window, row] - plain, atol=1e-3)
