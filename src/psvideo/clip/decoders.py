@@ -4,14 +4,31 @@ Whatever goes wrong inside a decoder becomes a PsvideoError that names the file.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
-from psvideo.clip import exr, png
+from psvideo.clip import dng, dpx, exr, jpeg, png, tiff
 from psvideo.clip.record import Header, Picture
 from psvideo.errors import PsvideoError
 
-DECODERS = {"png": png, "exr": exr}
+
+@dataclass(frozen=True, kw_only=True)
+class Decoder:
+    """How one kind of file is read."""
+
+    header: Callable[[Path], Header]
+    decode: Callable[[Path], Picture]
+
+
+DECODERS = {
+    "dng": Decoder(header=dng.header, decode=dng.decode),
+    "dpx": Decoder(header=dpx.header, decode=dpx.decode),
+    "exr": Decoder(header=exr.header, decode=exr.decode),
+    "jpeg": Decoder(header=jpeg.header, decode=jpeg.decode),
+    "png": Decoder(header=png.header, decode=png.decode),
+    "tiff": Decoder(header=tiff.header, decode=tiff.decode),
+}
 Read = TypeVar("Read")
 
 

@@ -71,7 +71,7 @@ def _picture_in(layer: str, found: list[str]) -> tuple[str, ...]:
 def _header(file: Any, names: tuple[str, ...]) -> Header:
     attributes = file.header()
     width_px, height_px = _size(attributes["displayWindow"])
-    notes = ()
+    notes: tuple[str, ...] = ()
     if "A" in {channel.name.rpartition(".")[2] for channel in attributes["channels"]}:
         notes = ("the EXR files' alpha channel is left out",)
     return Header(

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 from psvideo.errors import PsvideoError
@@ -79,7 +80,8 @@ def _nothing(folder: Path, images: list[Path]) -> str:
     if movies:
         return f"holds a movie and no numbered images. Name the movie itself: {folder / movies[0]}"
     found = f"holds images without a number at the end of the name ({images[0].name})" if images else "holds no images"
-    return f"{found}; expected numbered frames such as name.0001.png (kinds: {', '.join(sorted(KINDS))}) here or in frames/."
+    kinds = ", ".join(sorted(KINDS))
+    return f"{found}; expected numbered frames such as name.0001.png ({kinds}) here or in frames/."
 
 
 def _refuse_mixture(frames: list[Path]) -> None:
@@ -96,7 +98,7 @@ def _refuse_mixture(frames: list[Path]) -> None:
             f"{first.parent}: holds {what}, {first.name} and {file.name}; expected the frames of one clip. "
             "Move the others elsewhere."
         )
-    for file, follower in zip(frames, frames[1:], strict=False):
+    for file, follower in pairwise(frames):
         if _number(file) == _number(follower):
             raise PsvideoError(
                 f"{first.parent}: {file.name} and {follower.name} have the same number; expected one file per frame. "

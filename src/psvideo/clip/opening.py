@@ -3,17 +3,23 @@
 from dataclasses import replace
 from pathlib import Path
 
+from psvideo.camera import Encoding
 from psvideo.clip.decoders import read_header
 from psvideo.clip.folder import MOVIES, find_sequence
+from psvideo.clip.movie import index_movie
 from psvideo.clip.record import Clip, Header
 from psvideo.clip.transfer import find_curve
+from psvideo.clip.yuv import signal_range
 from psvideo.errors import PsvideoError
 from psvideo.plan import Plan
 from psvideo.planfile import find_plan, read_plan
 
+RATE_TOLERANCE = 5e-4
+"""A movie's rate counts as the plan's within this share: tighter than 120 for 119.88, wider than rounded timestamps."""
+
 
 def open_clip(path: Path, *, plan: Path | None = None) -> Clip:
-    """Open a folder of numbered images or a movie as a clip; no pixel is decoded yet.
+    """Open a folder of numbered images or a movie as a clip; of a movie, the first frame is decoded.
 
     ``plan`` names the plan file where it does not lie beside the footage. Raises PsvideoError where the footage or its
     plan is missing, unclear, unreadable, or does not fit together.
@@ -22,6 +28,8 @@ def open_clip(path: Path, *, plan: Path | None = None) -> Clip:
         raise PsvideoError(f"{path}: there is no such clip. Name a folder of numbered frames, or a movie file.")
     if path.is_dir():
         return _open_folder(path, plan)
+    if path.suffix.lower() in MOVIES:
+        return _open_movie(path, plan)
     raise PsvideoError(
         f"{path}: is neither a folder nor a movie ({', '.join(MOVIES)}). Name the folder that holds the frames."
     )
@@ -31,9 +39,9 @@ def _open_folder(path: Path, plan_path: Path | None) -> Clip:
     sequence = find_sequence(path)
     plan_path = find_plan(path, given=plan_path)
     plan = read_plan(plan_path)
-    curve = find_curve(plan.camera.encoding.transfer)
     header = read_header(sequence.kind, sequence.files[0])
     check_fit(sequence.files[0], header, plan, plan_path)
+    encoding, notes = _encoding(sequence.kind, header, plan, plan_path)
     passed_over = f"left aside, having no number at the end: {', '.join(file.name for file in sequence.passed_over)}"
     return Clip(
         name=path.resolve().name,
@@ -43,9 +51,63 @@ def _open_folder(path: Path, plan_path: Path | None) -> Clip:
         kind=sequence.kind,
         files=sequence.files,
         numbers=sequence.numbers,
-        header=replace(header, cfa=header.cfa or plan.camera.encoding.cfa),
-        colour=header.colour or curve.colour,
-        notes=header.notes + ((passed_over,) if sequence.passed_over else ()),
+        header=replace(header, cfa=header.cfa or encoding.cfa),
+        colour=header.colour or find_curve(encoding.transfer).colour,
+        encoding=encoding,
+        notes=header.notes + notes + ((passed_over,) if sequence.passed_over else ()),
+    )
+
+
+def _open_movie(path: Path, plan_path: Path | None) -> Clip:
+    plan_path = find_plan(path, given=plan_path)
+    plan = read_plan(plan_path)
+    movie = index_movie(path)
+    check_fit(path, movie.header, plan, plan_path)
+    encoding, notes = _encoding("movie", movie.header, plan, plan_path)
+    return Clip(
+        name=path.stem,
+        path=path,
+        plan=plan,
+        plan_path=plan_path,
+        kind="movie",
+        files=(path,),
+        numbers=movie.places,
+        header=replace(movie.header, cfa=encoding.cfa),
+        colour=find_curve(encoding.transfer).colour,
+        encoding=encoding,
+        timestamps=movie.timestamps,
+        notes=movie.header.notes + notes + _rate_note(movie.rate_hz, plan),
+    )
+
+
+def _encoding(kind: str, header: Header, plan: Plan, plan_path: Path) -> tuple[Encoding, tuple[str, ...]]:
+    """Return how the files' codes are read, and what is to be said about it. Raises PsvideoError for unknown curves."""
+    encoding = plan.camera.encoding
+    try:
+        curve = find_curve(encoding.transfer)
+    except PsvideoError as fault:
+        raise PsvideoError(f"{plan_path}: {fault}") from None
+    if kind == "dng" and curve.name != "linear":
+        return replace(encoding, transfer="linear"), (
+            f"DNG files hold linear light, so the plan's transfer = {encoding.transfer!r} is not applied",
+        )
+    if header.video_range and (encoding.black_level, encoding.white_level) == signal_range(
+        header.bits or 8, video_range=True
+    ):
+        return replace(encoding, black_level=None, white_level=None), (
+            "the plan's levels are the ends of video range, which is expanded before the curve is taken off",
+        )
+    return encoding, ()
+
+
+def _rate_note(rate_hz: float | None, plan: Plan) -> tuple[str, ...]:
+    """Say where a movie plays at another rate than the plan's."""
+    fps = float(plan.camera.fps)
+    if rate_hz is None or abs(rate_hz / fps - 1) < RATE_TOLERANCE:
+        return ()
+    return (
+        f"the movie plays at {rate_hz:.6g} frames per second and the plan says {fps:.6g}; the plan's is taken, as for "
+        "high-speed footage that plays slowed down",
     )
 
 

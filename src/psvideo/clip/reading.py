@@ -1,15 +1,18 @@
 """Reading a clip's frames: lazily, in order, decoded some frames ahead of the one that is worked on."""
 
+from bisect import bisect_left
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 
-import fileseq
+from fileseq.exceptions import ParseException
+from fileseq.frameset import FrameSet
 
 from psvideo.clip.decoders import decode
 from psvideo.clip.linear import linear_light
-from psvideo.clip.record import Clip, Frame, Picture
+from psvideo.clip.movie import read_movie
+from psvideo.clip.record import Clip, Frame, Header, Picture
 from psvideo.errors import PsvideoError, UsageError
 
 DECODING_THREADS = 2
@@ -26,6 +29,11 @@ def read_frames(clip: Clip, numbers: Iterable[int] | None = None, *, ahead: int 
     absent = set(chosen) - set(clip.numbers)
     if absent:
         raise UsageError(f"{clip.path}: has no frame number {min(absent)}; {_span(clip.numbers)}.")
+    if not chosen:
+        return iter(())
+    if clip.is_movie:
+        pictures = read_movie(clip.path, [clip.timestamps[bisect_left(clip.numbers, number)] for number in chosen])
+        return _ahead((partial(_next_frame, clip, number, pictures) for number in chosen), ahead=ahead, threads=1)
     jobs = (partial(_read_frame, clip, number) for number in chosen)
     return _ahead(jobs, ahead=ahead, threads=DECODING_THREADS)
 
@@ -37,8 +45,8 @@ def parse_range(text: str, numbers: Iterable[int]) -> tuple[int, ...]:
     """
     present = tuple(numbers)
     try:
-        wanted = set(fileseq.FrameSet(text))
-    except (fileseq.ParseException, ValueError) as fault:
+        wanted = set(FrameSet(text))
+    except (ParseException, ValueError) as fault:
         raise UsageError(f"--frames {text}: is no frame range ({fault}). Write for example 1-100 or 1-100x2.") from None
     chosen = tuple(number for number in present if number in wanted)
     if not chosen:
@@ -52,23 +60,32 @@ def _span(numbers: tuple[int, ...]) -> str:
 
 def _read_frame(clip: Clip, number: int) -> Frame:
     file = clip.file_of(number)
-    picture = decode(clip.kind, file)
-    _check_like_first(clip, picture, str(file))
-    return Frame(index=clip.index_of(number), number=number, image=linear_light(picture, clip.plan.camera.encoding))
+    return _frame(clip, number, decode(clip.kind, file), str(file))
 
 
-def _check_like_first(clip: Clip, picture: Picture, name: str) -> None:
+def _next_frame(clip: Clip, number: int, pictures: Iterator[Picture]) -> Frame:
+    return _frame(clip, number, next(pictures), f"{clip.path}, frame {number}")
+
+
+def _frame(clip: Clip, number: int, picture: Picture, name: str) -> Frame:
+    _check_like_first(clip, picture.header, name)
+    return Frame(index=clip.index_of(number), number=number, image=linear_light(picture, clip.encoding))
+
+
+def _check_like_first(clip: Clip, found: Header, name: str) -> None:
     """Refuse a frame that is not of the first one's size, channels and depth."""
-    found, first = picture.header, clip.header
-    looks = [
-        f"{head.width_px} x {head.height_px} pixels, {head.channels} channel(s), {f'{head.bits} bits' if head.bits else 'floating point'}"
-        for head in (found, first)
-    ]
+    looks = [_looks(head) for head in (found, clip.header)]
     if looks[0] != looks[1]:
         raise PsvideoError(
             f"{name}: is {looks[0]}; the clip's first frame, {clip.files[0].name}, is {looks[1]}. "
             "All frames of a clip must be alike: export this one again, or move what does not belong here elsewhere."
         )
+
+
+def _looks(head: Header) -> str:
+    depth = f"{head.bits} bits" if head.bits else "floating point"
+    filters = f", filters {head.cfa}" if head.cfa else ""
+    return f"{head.width_px} x {head.height_px} pixels, {head.channels} channel(s), {depth}{filters}"
 
 
 def _ahead(jobs: Iterator[Callable[[], Frame]], *, ahead: int, threads: int) -> Iterator[Frame]:

@@ -3,16 +3,18 @@
 from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.camera import Encoding
 from psvideo.plan import Plan
 
 Levels = tuple[tuple[float, ...], ...]
-"""Black levels by position: the pattern that repeats over the picture's rows and columns, from its top left on."""
+"""Black levels by position, in a pattern that repeats over rows and columns from the picture's top left on."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,7 +22,9 @@ class Header:
     """What a picture's file says about itself. ``bits`` None: floating point; None elsewhere: the file does not say.
 
     ``width_px`` and ``height_px`` are those of the picture that is delivered, after the crop that the file asks for;
-    ``cfa`` is the filter pattern at that picture's top left pixel.
+    ``cfa`` is the filter pattern at that picture's top left pixel. Code 0 stands for the signal ``signal_at_0`` and each
+    further code adds ``signal_per_code``, where 0 to 1 is what the transfer curve is defined on; None: the largest code
+    is 1. ``video_range``: the file's codes of signal 0 and 1 were 16 and 235 (of 8 bits).
     """
 
     width_px: int
@@ -32,12 +36,15 @@ class Header:
     cfa: str | None = None
     colour: str | None = None
     time_code: str | None = None
+    signal_at_0: float = 0.0
+    signal_per_code: float | None = None
+    video_range: bool = False
     notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
 class Picture:
-    """One decoded picture as the file codes it: (row, col) or (row, col, 3) in R, G, B order, uint8, uint16 or float."""
+    """One decoded picture as the file codes it: (row, col) or (row, col, 3) as R, G, B; uint8, uint16 or float."""
 
     header: Header
     codes: NDArray[Any]
@@ -63,8 +70,8 @@ class Clip:
 
     ``files`` are the frames' files in order, or the one movie. ``numbers`` are the frames' numbers, with holes where
     frames were dropped. ``cfa`` is the filter pattern at the picture's top left, None where it is not mosaiced.
-    ``colour`` is the colour interop id of plates and albedo made from this clip. ``notes`` say what was taken for
-    granted while opening it.
+    ``colour`` is the colour interop id of plates and albedo made from this clip; ``encoding`` is how its codes are
+    read; a movie has the frames' ``timestamps``. ``notes`` say what was taken for granted while opening it.
     """
 
     name: str
@@ -76,6 +83,8 @@ class Clip:
     numbers: tuple[int, ...]
     header: Header
     colour: str
+    encoding: Encoding
+    timestamps: tuple[int, ...] = ()
     notes: tuple[str, ...] = ()
 
     @property
@@ -123,5 +132,4 @@ def holes(numbers: Sequence[int]) -> tuple[tuple[int, int], ...]:
     >>> holes([7, 8, 11, 12, 14])
     ((8, 2), (12, 1))
     """
-    pairs = zip(numbers, numbers[1:], strict=False)
-    return tuple((before, after - before - 1) for before, after in pairs if after - before > 1)
+    return tuple((before, after - before - 1) for before, after in pairwise(numbers) if after - before > 1)

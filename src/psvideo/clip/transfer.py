@@ -7,9 +7,10 @@ because each channel of a picture is measured by itself. Names are OpenColorIO's
 import functools
 import re
 from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
 
 import numpy as np
-import PyOpenColorIO as ocio
 from numpy.typing import NDArray
 
 from psvideo.camera import FloatArray
@@ -150,7 +151,8 @@ def to_light(curve: Curve, signal: FloatArray | NDArray[np.float32]) -> NDArray[
 
 
 @functools.cache
-def _processor(source: str) -> ocio.CPUProcessor:
+def _processor(source: str) -> Any:
+    ocio: Any = import_module("PyOpenColorIO")  # only where a curve is needed: it takes 0.1 s and has no types
     config = ocio.Config.CreateFromBuiltinConfig(STUDIO_CONFIG)
     if source.startswith("gamma "):
         exponent = float(source.removeprefix("gamma "))

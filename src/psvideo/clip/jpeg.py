@@ -1,0 +1,43 @@
+"""JPEG: 8 bits, lossy. Read with a warning: it moves normals by a degree or more."""
+
+from pathlib import Path
+
+import imagecodecs
+
+from psvideo.clip.record import Header, Picture
+from psvideo.errors import PsvideoError
+
+START, END = b"\xff\xd8", b"\xff\xd9"
+NO_LENGTH = {0x01, *range(0xD0, 0xD9)}
+FRAME_MARKERS = {*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC}
+LOSSY = "JPEG frames have 8 bits and are lossy, which costs accuracy; record PNG, TIFF, DPX, EXR or DNG"
+
+
+def header(path: Path) -> Header:
+    """Read the size and the channels from the file's markers."""
+    return _parse_header(path, path.read_bytes())
+
+
+def decode(path: Path) -> Picture:
+    """Decode a whole picture. A truncated file is refused, which decoders fill with grey."""
+    data = path.read_bytes()
+    head = _parse_header(path, data)
+    if END not in data[-1024:]:
+        raise PsvideoError(f"{path}: ends before its end marker: the file is truncated. Copy it again.")
+    return Picture(header=head, codes=imagecodecs.jpeg8_decode(data))
+
+
+def _parse_header(path: Path, data: bytes) -> Header:
+    place = 2
+    while data.startswith(START) and place + 9 < len(data):
+        marker = data[place + 1]
+        if marker in FRAME_MARKERS:
+            height_px, width_px = (int.from_bytes(data[place + at : place + at + 2]) for at in (5, 7))
+            channels = data[place + 9]
+            if data[place + 4] != 8 or channels not in (1, 3):
+                break
+            return Header(width_px=width_px, height_px=height_px, channels=channels, bits=8, notes=(LOSSY,))
+        place += 2 if marker in NO_LENGTH else 2 + int.from_bytes(data[place + 2 : place + 4])
+    raise PsvideoError(
+        f"{path}: is truncated or no JPEG of 8 bits with 1 or 3 channels. Copy it again, or export another kind."
+    )

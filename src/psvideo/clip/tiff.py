@@ -1,0 +1,85 @@
+"""TIFF: grey or RGB, 8 to 16 bits or half and single floats; compressed, tiled or plain."""
+
+from pathlib import Path
+
+import numpy as np
+import tifffile
+from numpy.typing import NDArray
+
+from psvideo.clip.record import Header, Picture
+from psvideo.errors import PsvideoError
+
+GREY, RGB, MOSAIC, LINEAR_RAW = 1, 2, 32803, 34892  # values of the tag PhotometricInterpretation
+
+
+def header(path: Path) -> Header:
+    """Read what the file says without decoding its pixels."""
+    with tifffile.TiffFile(path) as file:
+        return _header(path, _only_page(path, file))
+
+
+def decode(path: Path) -> Picture:
+    """Decode a whole picture; alpha and other extra channels are left out."""
+    with tifffile.TiffFile(path) as file:
+        page = _only_page(path, file)
+        head = _header(path, page)
+        codes = pixels(path, page)[..., : head.channels]
+    return Picture(header=head, codes=codes[..., 0] if head.channels == 1 else np.ascontiguousarray(codes))
+
+
+def pixels(path: Path, page: tifffile.TiffPage) -> NDArray[np.generic]:
+    """Decode a page to (row, col, sample). Raises PsvideoError where strips or tiles are missing from the file.
+
+    tifffile gives zeros for a strip of no bytes, so their places are checked first.
+    """
+    size = path.stat().st_size
+    places = list(zip(page.dataoffsets, page.databytecounts, strict=True))
+    lacking = [number for number, (offset, count) in enumerate(places) if count == 0 or offset + count > size]
+    if lacking or not places:
+        raise PsvideoError(
+            f"{path}: {len(lacking)} of its {len(places)} strips or tiles lie beyond the end of the file or are empty: "
+            "the file is truncated. Copy it again."
+        )
+    picture = np.asarray(page.asarray(maxworkers=1))
+    if picture.ndim == 2:
+        return picture[..., None]
+    return np.moveaxis(picture, 0, -1) if page.planarconfig == 2 else picture
+
+
+def sample_bits(path: Path, page: tifffile.TiffPage) -> int | None:
+    """Return the depth of a page's samples, None for floating point; raises PsvideoError for depths not read here."""
+    bits = page.bitspersample
+    if page.sampleformat == 3 and bits in (16, 32):
+        return None
+    if page.sampleformat != 1 or not 8 <= bits <= 16:
+        raise PsvideoError(
+            f"{path}: holds samples of {bits} bits, sample format {page.sampleformat}; expected unsigned integers of 8 "
+            "to 16 bits, or floats of 16 or 32. Export the frames as such."
+        )
+    return int(bits)
+
+
+def _only_page(path: Path, file: tifffile.TiffFile) -> tifffile.TiffPage:
+    """Return the page that holds the picture; reduced copies of it (thumbnails) do not count."""
+    pages = [page.aspage() for page in file.pages if not page.aspage().is_reduced]
+    if len(pages) != 1:
+        raise PsvideoError(f"{path}: holds {len(pages)} pictures; expected one per file. Export one file per frame.")
+    return pages[0]
+
+
+def _header(path: Path, page: tifffile.TiffPage) -> Header:
+    channels = {GREY: 1, RGB: 3, MOSAIC: 1}.get(int(page.photometric))
+    if channels is None or page.samplesperpixel < channels:
+        kind = tifffile.PHOTOMETRIC(page.photometric).name
+        raise PsvideoError(
+            f"{path}: its photometric interpretation is {kind}; expected grey (black is zero) or RGB. "
+            "Export the frames as such."
+        )
+    notes = ("the TIFF files' extra channels (alpha) are left out",) if page.samplesperpixel > channels else ()
+    return Header(
+        width_px=page.imagewidth,
+        height_px=page.imagelength,
+        channels=channels,
+        bits=sample_bits(path, page),
+        notes=notes,
+    )
