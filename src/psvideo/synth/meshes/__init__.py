@@ -6,9 +6,16 @@ Every mesh is in metres at a natural size, y up, facing +z.
 from collections.abc import Callable
 
 from psvideo.synth.meshes.basic import box, cylinder, plane, sphere
+from psvideo.synth.meshes.head import bust
 from psvideo.synth.shape import Shape
 
-_MAKERS: dict[str, Callable[[], Shape]] = {"sphere": sphere, "box": box, "plane": plane, "cylinder": cylinder}
+_MAKERS: dict[str, Callable[[], Shape]] = {
+    "sphere": sphere,
+    "box": box,
+    "plane": plane,
+    "cylinder": cylinder,
+    "bust": bust,
+}
 
 
 def builtin_names() -> tuple[str, ...]:
