@@ -7,6 +7,8 @@ frames, while the times are common to all. The weights here are the trapezoid of
 without building the (flash, frame, row) array; a test holds the two together.
 """
 
+import os
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numba as nb
@@ -17,6 +19,9 @@ from psvideo.camera import FloatArray
 
 IntArray = NDArray[np.int64]
 
+THREADS = min(os.cpu_count() or 1, 8)
+WORTH_THREADS = 40_000
+"""Samples from which on starting threads costs less than it saves."""
 RIDGE = 1e-6
 """Share of the normal matrix's diagonal that is added to it, so that a brightness nobody saw stays at zero."""
 
@@ -55,18 +60,32 @@ def residuals(
     """
     unknowns = int(unknown.max(initial=0)) + 1
     bounds = np.append(profiles.window_start, len(profiles.value))
-    rest: FloatArray = _residuals(
-        profiles.value,
-        profiles.frame_start_s,
-        profiles.row_offset_s,
-        profiles.exposure_s,
-        bounds,
-        start_s,
-        duration_s,
-        unknown,
-        unknowns,
-        weight,
-    )
+    rest = np.empty_like(profiles.value)
+
+    def fit(first: int, last: int) -> None:
+        _residuals(
+            profiles.value,
+            profiles.frame_start_s,
+            profiles.row_offset_s,
+            profiles.exposure_s,
+            bounds,
+            start_s,
+            duration_s,
+            unknown,
+            unknowns,
+            weight,
+            first,
+            last,
+            rest,
+        )
+
+    rows = profiles.value.shape[1]
+    if profiles.value.size < WORTH_THREADS:
+        fit(0, rows)
+    else:
+        edges = np.linspace(0, rows, THREADS + 1).astype(int).tolist()
+        with ThreadPoolExecutor(THREADS) as pool:
+            list(pool.map(fit, edges[:-1], edges[1:]))
     return rest
 
 
@@ -108,14 +127,26 @@ def _solve_spd(matrix, right, size):  # type: ignore[no-untyped-def]
         right[i] /= matrix[i, i]
 
 
-@nb.njit(cache=True, nogil=True, parallel=True)
+@nb.njit(cache=True, nogil=True)
 def _residuals(  # type: ignore[no-untyped-def]
-    value, frame_start_s, row_offset_s, exposure_s, bounds, start_s, duration_s, unknown, unknowns, weight
+    value,
+    frame_start_s,
+    row_offset_s,
+    exposure_s,
+    bounds,
+    start_s,
+    duration_s,
+    unknown,
+    unknowns,
+    weight,
+    first,
+    last,
+    rest,
 ):
-    frames, rows = value.shape
-    rest = np.empty((frames, rows))
-    for row in nb.prange(rows):
-        design = np.empty((frames, unknowns))
+    """Fill rows ``first`` to ``last - 1`` of ``rest``; threads share the rows (numba's own may not be nested)."""
+    frames = value.shape[0]
+    design = np.empty((frames, unknowns))
+    for row in range(first, last):
         k = 0
         for n in range(frames):
             open_s = frame_start_s[n] + row_offset_s[row]
@@ -136,4 +167,3 @@ def _residuals(  # type: ignore[no-untyped-def]
                 for i in range(unknowns):
                     explained += design[n, i] * right[i]
                 rest[n, row] = value[n, row] - explained
-    return rest

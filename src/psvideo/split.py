@@ -128,10 +128,10 @@ def _foreign_light(camera: Camera, timing: Timing, flash: Flash, frames: range) 
     return row_weights(camera, start_s, duration_s, frames=frames).sum(axis=0)
 
 
-@nb.njit(cache=True, nogil=True, parallel=True)
+@nb.njit(cache=True, nogil=True)
 def _add_rows(plate, frame, coefficient, saturated):  # type: ignore[no-untyped-def]
     """Add a frame's rows, each times its coefficient; hold what is clipped at 1.0 at least."""
-    for row in nb.prange(plate.shape[0]):
+    for row in range(plate.shape[0]):
         share = coefficient[row]
         if share > 0:
             for col in range(plate.shape[1]):

@@ -112,9 +112,9 @@ def read_timing(path: Path) -> Timing:
     return Timing(flashes=flashes, dropped_frames=dropped, **scalars)
 
 
-def format_timing(timing: Timing) -> str:
-    """Return the timing as JSON text; reading it back gives an equal timing."""
-    head = {
+def timing_record(timing: Timing) -> dict[str, object]:
+    """Return the timing as what timing.json holds."""
+    return {
         "schema": SCHEMA,
         "clip": timing.clip,
         "frame_period_s": timing.frame_period_s,
@@ -124,9 +124,16 @@ def format_timing(timing: Timing) -> str:
         "phase_error_rows": timing.phase_error_rows,
         "order": timing.order,
         "dropped_frames": [{"after": hole.after, "count": hole.count} for hole in timing.dropped_frames],
+        "flashes": [_flash_row(flash) for flash in timing.flashes],
     }
-    rows = ",\n  ".join(json.dumps(_flash_row(flash)) for flash in timing.flashes)
-    return json.dumps(head, indent=1)[:-2] + f',\n "flashes": [\n  {rows}\n ]\n}}\n'
+
+
+def format_timing(timing: Timing) -> str:
+    """Return the timing as JSON text, one flash a line; reading it back gives an equal timing."""
+    record = timing_record(timing)
+    rows = ",\n  ".join(json.dumps(row) for row in map(_flash_row, timing.flashes))
+    head = json.dumps(record | {"flashes": []}, indent=1)
+    return head.removesuffix("[]\n}") + f"[\n  {rows}\n ]\n}}\n"
 
 
 def _flash_row(flash: Flash) -> dict[str, object]:

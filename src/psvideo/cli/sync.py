@@ -1,0 +1,65 @@
+"""psvideo sync: find when every flash fired."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from psvideo.cli.console import Voice
+from psvideo.cli.options import ClipPath, FirstLight, Force, Frames, Json, PlanPath, Quiet, Verbose
+from psvideo.files import refuse_existing, write_text
+from psvideo.pipeline import find_clip_timing, open_take
+from psvideo.timing import Timing, format_timing, timing_record
+
+TimingOut = Annotated[
+    Path | None, typer.Option("-o", "--out", help="Where to write timing.json; left out: only a summary is printed.")
+]
+
+
+def sync(
+    clip: ClipPath,
+    out: TimingOut = None,
+    plan: PlanPath = None,
+    frames: Frames = None,
+    first_light: FirstLight = None,
+    force: Force = False,
+    json: Json = False,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+) -> None:
+    """Find phase, clock offset, light order and dropped frames of a strobed clip, from the picture alone."""
+    voice = Voice(json=json, verbose=verbose, quiet=quiet)
+    if out is not None:
+        refuse_existing(out, force=force)
+    take = open_take(clip, plan=plan, frames=frames)
+    for note in take.clip.notes:
+        voice.detail(note)
+    timing = find_clip_timing(take, first_light=first_light, watch=voice.track)
+    if out is not None:
+        write_text(out, format_timing(timing))
+    voice.result(timing_record(timing))
+    voice.say(describe_timing(timing))
+    if out is not None:
+        voice.say(f"{out}: written.")
+
+
+def describe_timing(timing: Timing) -> str:
+    """Return what was found and how sure it is, in a few lines for people."""
+    complete = sum(flash.complete for flash in timing.flashes)
+    lines = [
+        f"{len(timing.flashes)} flashes, {complete} of them complete; "
+        f"the strobe's clock is off by {timing.clock_offset_ppm:+.1f} ppm; "
+        f"flash times are sure to {timing.phase_error_rows:.3f} row.",
+        ORDER_SENTENCE[timing.order],
+    ]
+    lines += [f"{hole.count} frame(s) missing after number {hole.after}." for hole in timing.dropped_frames]
+    return "\n".join(lines)
+
+
+ORDER_SENTENCE = {
+    "marker": "Which light is which is known from the cycle's marker.",
+    "rig": "Which light is which was found from the rig's directions.",
+    "given": "Which light is which was given.",
+    "guess": "Which light is which is a GUESS: the picture shows no marker. Name the light of the clip's first "
+    "complete flash with --first-light NAME.",
+}

@@ -1,0 +1,167 @@
+"""The steps composed over a clip: decode, time, rebuild, take ambient off, gather into rounds, solve.
+
+Every step is a function or a generator; nothing here holds state, and a clip of any length streams through in
+constant memory.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal, Protocol, TypeVar
+
+import numpy as np
+
+from psvideo import hudon2015
+from psvideo.ambient import Ambient, subtract
+from psvideo.camera import Camera
+from psvideo.clip import Clip, demosaic, holes, open_clip, parse_range, read_frames
+from psvideo.plan import Plan
+from psvideo.profiles import collect
+from psvideo.rig import Light, Rig
+from psvideo.sequence import FIRST_NUMBER, Round, reference_duration_s, rounds
+from psvideo.shutter import frames_touched
+from psvideo.split import Plate, split
+from psvideo.sync import find_timing
+from psvideo.timing import DroppedFrames, Timing
+
+Method = Literal["weights", "hudon2015"]
+Item = TypeVar("Item")
+
+
+class Watch(Protocol):
+    """Passes items through and shows progress on the way."""
+
+    def __call__(self, items: Iterable[Item], *, total: int, what: str, unit: str = "frames") -> Iterator[Item]:
+        """Return the items as they come; ``what`` names the step."""
+
+
+def unwatched(items: Iterable[Item], *, total: int, what: str, unit: str = "frames") -> Iterator[Item]:
+    """Pass items through and show nothing."""
+    return iter(items)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Take:
+    """A clip that is open, and the numbers of its frames that are to be used."""
+
+    clip: Clip
+    numbers: tuple[int, ...]
+
+    @property
+    def plan(self) -> Plan:
+        """The plan that the strobe played."""
+        return self.clip.plan
+
+
+def open_take(path: Path, *, plan: Path | None = None, frames: str | None = None) -> Take:
+    """Open a clip; ``frames`` is a range of file numbers such as ``1-100``."""
+    clip = open_clip(path, plan=plan)
+    numbers = clip.numbers if frames is None else parse_range(frames, clip.numbers)
+    return Take(clip=clip, numbers=numbers)
+
+
+def find_clip_timing(take: Take, *, first_light: str | None = None, watch: Watch = unwatched) -> Timing:
+    """Decode a take once and return when every flash fired. Raises PsvideoError where no strobe is found."""
+    clip = take.clip
+    dropped = tuple(DroppedFrames(after=after, count=count) for after, count in holes(clip.numbers))
+    if clip.plan.mode == "synced":
+        indices = np.array([clip.index_of(number) for number in take.numbers], np.int64)
+        profiles = np.zeros((len(indices), clip.height_px))
+    else:
+        frames = read_frames(clip, take.numbers)
+        indices, profiles = collect(watch(frames, total=len(take.numbers), what="finding the flashes"))
+    return find_timing(clip.plan, indices, profiles, clip=clip.name, first_light=first_light, dropped=dropped)
+
+
+def clip_rounds(
+    take: Take,
+    timing: Timing,
+    *,
+    method: Method = "weights",
+    start_number: int = FIRST_NUMBER,
+    watch: Watch = unwatched,
+    each_flash: Callable[[Plate], None] | None = None,
+) -> Iterator[Round]:
+    """Decode a take once and yield its rounds: one plate per light at its full flash, ambient light taken off.
+
+    ``each_flash`` is shown every single plate on its way, demosaiced.
+    """
+    clip, camera = take.clip, _timed_camera(take.plan, timing)
+    used = _within(timing, camera, take)
+    frames = watch(read_frames(clip, take.numbers), total=len(take.numbers), what="rebuilding flashes")
+    rebuild = split if method == "weights" else hudon2015.split
+    plates = subtract(rebuild(frames, camera, used), first=_first_ambient(take, camera, used))
+    shown = _shown(map(_colour_of(clip), plates), each_flash)
+    return rounds(shown, clip.plan, timing.flashes, start=start_number)
+
+
+def _timed_camera(plan: Plan, timing: Timing) -> Camera:
+    """Return the plan's camera with the exposure and readout that the timing found."""
+    readout_s = timing.row_time_s * plan.camera.height_px
+    return replace(plan.camera, exposure_s=timing.exposure_s, readout_s=readout_s)
+
+
+def _within(timing: Timing, camera: Camera, take: Take) -> Timing:
+    """Take as complete only the flashes whose frames all lie between the take's first frame and its last."""
+    first, last = frames_touched(camera, timing.start_s, timing.duration_s)
+    begin, end = take.clip.index_of(take.numbers[0]), take.clip.index_of(take.numbers[-1])
+    flashes = tuple(
+        replace(flash, complete=flash.complete and bool(first[n] >= begin and last[n] <= end))
+        for n, flash in enumerate(timing.flashes)
+    )
+    return replace(timing, flashes=flashes)
+
+
+def _first_ambient(take: Take, camera: Camera, timing: Timing) -> Ambient | None:
+    """Look ahead to the first dark slot, so that the flashes before it lose their ambient light too."""
+    complete = [flash for flash in timing.flashes if flash.complete]
+    dark = next((flash for flash in complete if not any(flash.lights.values())), None)
+    if dark is None or dark is complete[0]:
+        return None
+    alone = replace(
+        timing, flashes=tuple(replace(flash, complete=flash.index == dark.index) for flash in timing.flashes)
+    )
+    first, last = frames_touched(camera, np.array([dark.start_s]), np.array([dark.duration_s]))
+    near = [n for n in take.numbers if first[0] <= take.clip.index_of(n) <= last[0]]
+    plate = next(split(read_frames(take.clip, near), camera, alone))
+    return Ambient(image=plate.image, slots=np.zeros(plate.image.shape[:2], np.float32))
+
+
+def _colour_of(clip: Clip) -> Callable[[Plate], Plate]:
+    """Return what makes colour of a clip's plates: demosaicing where its frames are mosaics, else nothing."""
+    if clip.cfa is None:
+        return lambda plate: plate
+    pattern = clip.cfa
+    return lambda plate: replace(plate, image=demosaic(plate.image, pattern))
+
+
+def _shown(plates: Iterable[Plate], show: Callable[[Plate], None] | None) -> Iterator[Plate]:
+    for plate in plates:
+        if show is not None:
+            show(plate)
+        yield plate
+
+
+def whole_rounds(gathered: Iterable[Round], lights: tuple[str, ...]) -> Iterator[Round]:
+    """Pass the rounds that have a plate of every light; the clip's start and end cut the others."""
+    return (one for one in gathered if one.lights == lights)
+
+
+def lights_as_planned(rig: Rig, plan: Plan) -> tuple[Light, ...]:
+    """Return the plan's lights from the rig, their intensities scaled to the plan's full flashes.
+
+    Raises PsvideoError where the rig lacks a light.
+    """
+    return tuple(_at_full_flash(light, reference_duration_s(plan, light.name)) for light in rig.select(plan.lights))
+
+
+def _at_full_flash(light: Light, duration_s: float) -> Light:
+    """A longer flash than the one a light was measured with gives proportionally more light."""
+    if light.reference_duration_s is None:
+        return light
+    factor = duration_s / light.reference_duration_s
+    return replace(
+        light,
+        intensity=tuple(strength * factor for strength in light.intensity),
+        reference_duration_s=duration_s,
+    )
