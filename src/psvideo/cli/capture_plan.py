@@ -1,0 +1,122 @@
+"""psvideo capture-plan: plan a shoot before a light is set.
+
+Without ``-o`` the plan goes to standard output and everything for people to standard error, so that
+``psvideo capture-plan ... > plan.toml`` is the same as ``-o plan.toml``.
+"""
+
+import dataclasses
+import sys
+from pathlib import Path
+
+import typer
+from rich.console import Console
+
+import psvideo.cli.capture_options as option
+from psvideo.capture.cameras import CameraMode, camera_modes
+from psvideo.capture.diagram import TERMINAL, check_diagram_name, diagram_text, write_diagram
+from psvideo.capture.planning import Shoot, plan_shoot
+from psvideo.capture.report import camera_table, shoot_report
+from psvideo.capture.words import ShootWords, parse_request
+from psvideo.cli.console import Voice
+from psvideo.cli.options import Force, Json, Quiet, Verbose
+from psvideo.files import refuse_existing, write_text
+from psvideo.planfile import format_plan
+
+PIPE_WIDTH = 120
+WIDEST_DIAGRAM = 120
+
+
+def capture_plan(
+    context: typer.Context,
+    camera: option.CameraName = None,
+    fps: option.Fps = None,
+    size: option.Size = None,
+    shutter: option.Shutter = None,
+    exposure: option.Exposure = None,
+    readout: option.Readout = None,
+    camera_clock_ppm: option.CameraClock = 50.0,
+    lights: option.Lights = "key,left,right",
+    power: option.Power = "1",
+    flash: option.Flash = None,
+    max_blur: option.MaxBlur = None,
+    speed: option.Speed = None,
+    field_width: option.FieldWidth = None,
+    max_duty: option.MaxDuty = None,
+    max_pulse: option.MaxPulse = None,
+    max_stops: option.MaxStops = None,
+    mode: option.Mode = "rolling",
+    marker: option.Marker = None,
+    dark_slot: option.DarkSlot = None,
+    dark_every: option.DarkEvery = None,
+    dark: option.Dark = None,
+    strobe_clock_ppm: option.StrobeClock = "50",
+    transfer: option.Transfer = "linear",
+    black: option.Black = None,
+    white: option.White = None,
+    cfa: option.Cfa = None,
+    out: option.PlanOut = None,
+    diagram: option.Diagram = None,
+    list_cameras: option.ListCameras = False,
+    force: Force = False,
+    json: Json = False,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+) -> None:
+    """Plan a shoot: write plan.toml, and print what decides the shoot and what to beware of."""
+    voice = Voice(json=json, verbose=verbose, quiet=quiet)
+    if list_cameras:
+        _list_cameras(voice)
+        return
+    picture = check_diagram_name(diagram)
+    outputs = [path for path in (out, picture) if path is not None]
+    for path in outputs:
+        refuse_existing(path, force=force)
+    words = {field.name: context.params[field.name] for field in dataclasses.fields(ShootWords)}
+    request = parse_request(ShootWords(**words))
+    shoot = plan_shoot(request)
+    if picture is not None:
+        write_diagram(shoot.plan, picture)
+    _deliver(shoot, out, voice)
+    if request.preset is not None:
+        voice.detail(f"readout of the {request.preset.name}: {request.preset.source}")
+    if not (json or quiet):
+        _report(shoot, request.preset, Console(stderr=out is None, highlight=False), diagram=diagram)
+    for path in outputs if out is not None else ():
+        voice.say(f"{path}: written.")
+    for caution in shoot.cautions:
+        if caution.level == "warning":
+            voice.warn(caution.text)
+
+
+def _list_cameras(voice: Voice) -> None:
+    if voice.json:
+        modes = [{**dataclasses.asdict(mode), "fps": str(mode.fps)} for mode in camera_modes()]
+        voice.result(modes)
+    else:
+        console = Console(highlight=False)
+        console.width = console.width if console.is_terminal else PIPE_WIDTH
+        console.print(camera_table(camera_modes()))
+
+
+def _deliver(shoot: Shoot, out: Path | None, voice: Voice) -> None:
+    """Write the plan where it was asked for, or to standard output, which --json takes for its own."""
+    text = format_plan(shoot.plan).rstrip("\n") + "\n"
+    if out is not None:
+        write_text(out, text)
+    elif not voice.json:
+        print(text, end="")
+        sys.stdout.flush()
+    result = {"figures": dataclasses.asdict(shoot.figures), "chosen": shoot.chosen}
+    cautions = [dataclasses.asdict(caution) for caution in shoot.cautions]
+    voice.result({"path": str(out) if out else None, "plan": text, **result, "cautions": cautions})
+
+
+def _report(shoot: Shoot, preset: CameraMode | None, console: Console, *, diagram: str | None) -> None:
+    if diagram == TERMINAL or (diagram is None and console.is_terminal):
+        console.print(diagram_text(shoot.plan, width=min(console.width, WIDEST_DIAGRAM)))
+    for part in shoot_report(shoot, preset=preset):
+        console.print(part)
+        console.print()
+    for caution in shoot.cautions:
+        if caution.level == "note":
+            console.print(f"note: {caution.text}", markup=False)
