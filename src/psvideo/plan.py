@@ -3,7 +3,7 @@
 A plan is frozen data that expands to arrays of flash times; it neither acts nor draws. A *round* is one pass through
 the list of flashes. Dark slots are kept in every ``dark_every``-th round only, so the *cycle*, which repeats exactly,
 is ``dark_every`` rounds: the first has its dark slots, the others skip them. Flash ``k + 1`` starts
-``duration_s[k] + dark_s`` after flash ``k`` starts, in seconds of the strobe's clock (eq. 1 and 14 of Hudon et al. 2015).
+``duration_s[k] + dark_s`` after flash ``k`` starts, in seconds of the strobe's clock (Hudon et al. 2015, eq. 1 and 14).
 """
 
 from collections.abc import Mapping, Sequence

@@ -21,6 +21,8 @@ from psvideo.timing import DroppedFrames, Flash, Order, Timing
 
 COARSE_ROWS = 72
 COARSE_FRAMES = 96
+MOST_SAMPLES = 2_000_000
+"""Row means that the last fit looks at; a clip that has more gets its rows averaged, which bounds memory and time."""
 ROBUST_STEEPNESS = 20.0
 """Of the coarse loss ``log(1 + 20 r^2)``, r being a residual over its row's own spread (physics.md)."""
 CAUCHY = 2.4
@@ -180,7 +182,7 @@ def _refine_growing(plan: Plan, rows: Profiles, clock: StrobeClock) -> _Fit:
     while count < frames:
         clock = _refine(plan, _binned(rows, 4 * COARSE_ROWS).take(slice(0, count)), clock, steps=6).clock
         count *= 2
-    return _refine(plan, rows, clock, steps=10)
+    return _refine(plan, _binned(rows, max(4 * COARSE_ROWS, MOST_SAMPLES // frames)), clock, steps=10)
 
 
 def _refine(plan: Plan, rows: Profiles, clock: StrobeClock, *, steps: int) -> _Fit:

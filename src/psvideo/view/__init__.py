@@ -1,0 +1,1 @@
+"""Looking at results: pictures for eyes, never data for programs."""

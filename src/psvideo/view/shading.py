@@ -1,0 +1,60 @@
+"""Relighting a surface, and how linear light, normals and masks become pixels that a screen shows."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.rig import Vector
+from psvideo.surface import Surface
+
+Image = NDArray[np.float32]
+Pixels = NDArray[np.uint8]
+
+
+def relit(
+    surface: Surface,
+    direction: Vector,
+    *,
+    strength: float = 1.0,
+    colour: Vector = (1.0, 1.0, 1.0),
+    gloss: float = 0.0,
+    shininess: float = 30.0,
+) -> Image:
+    """Return the surface under a new distant light, linear, shape (row, col, 3): albedo * strength * max(0, n . l).
+
+    ``gloss`` adds a highlight (Blinn 1977) of that strength; the camera looks along -z.
+    """
+    light = (np.asarray(direction) / np.linalg.norm(direction)).astype(np.float32)
+    normals = surface.normals.astype(np.float32)
+    facing = np.maximum(normals @ light, 0.0)[..., None]
+    shade = three_channels(surface.albedo.astype(np.float32)) * facing
+    if gloss:
+        half = (light + np.array([0, 0, 1])).astype(np.float32)
+        half /= np.float32(np.linalg.norm(half))
+        shade = shade + gloss * np.maximum(normals @ half, 0.0)[..., None] ** shininess * (facing > 0)
+    lit: Image = (np.float32(strength) * shade * np.asarray(colour, np.float32)).astype(np.float32)
+    return lit
+
+
+def three_channels(image: Image) -> Image:
+    """Return a grey picture as three equal channels; a colour picture as it is."""
+    return image if image.ndim == 3 else np.repeat(image[..., None], 3, axis=2)
+
+
+def srgb(linear: Image, *, exposure: float = 1.0) -> Pixels:
+    """Return linear light as 8-bit sRGB pixels (IEC 61966-2-1); what is above 1 after ``exposure`` is white."""
+    light = np.clip(three_channels(linear) * np.float32(exposure), 0.0, 1.0)
+    coded: Image = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+    pixels: Pixels = (255 * coded + 0.5).astype(np.uint8)
+    return pixels
+
+
+def normal_colours(surface: Surface) -> Pixels:
+    """Return normals in the usual colours, 128 + 127 n; grey where not valid."""
+    coded: Pixels = (127.5 * (surface.normals.astype(np.float32) + 1.0) + 0.5).clip(0, 255).astype(np.uint8)
+    return coded
+
+
+def exposure_for(image: Image, *, white: float = 0.8) -> float:
+    """Return the factor that puts the brightest hundredth of a picture's pixels at ``white``, for showing it only."""
+    bright = float(np.percentile(image, 99))
+    return white / bright if bright > 1e-6 else 1.0
