@@ -78,7 +78,7 @@ def parse_size_px(text: str, *, option: str = "--size") -> tuple[int, int]:
 
 
 def parse_rate(text: str, *, option: str = "--fps") -> Fraction:
-    """Return a frame rate; the usual roundings of broadcast rates (23.976, 59.94, 119.88) become the exact ratio.
+    """Return a frame rate; the usual roundings of broadcast rates (23.98, 59.94, 119.88) become the exact ratio.
 
     >>> parse_rate("119.88"), parse_rate("120"), parse_rate("60000/1001")
     (Fraction(120000, 1001), Fraction(120, 1), Fraction(60000, 1001))
@@ -89,7 +89,7 @@ def parse_rate(text: str, *, option: str = "--fps") -> Fraction:
         raise UsageError(f"{option} {text!r} is not a frame rate: {fault}.") from None
     whole = round(rate / NTSC)
     exact = whole * NTSC
-    is_rounded = "." in text and rate.denominator > 1 and abs(rate / exact - 1) < Fraction(50, 1_000_000)
+    is_rounded = "." in text and rate.denominator > 1 and abs(rate / exact - 1) < Fraction(200, 1_000_000)
     return exact if is_rounded and whole % 6 == 0 else rate
 
 

@@ -1,0 +1,292 @@
+"""Plans keep the rolling rule for both clocks at their worst, wishes become flashes, and dangers are named."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from psvideo.camera import Camera
+from psvideo.capture.cautions import shoot_cautions
+from psvideo.capture.figures import shoot_figures
+from psvideo.capture.planning import Shoot, make_plan, plan_shoot
+from psvideo.capture.request import CameraWish, Limits, ShootRequest, choose_camera
+from psvideo.capture.wish import LONG_MARKER, longest_flash
+from psvideo.capture.words import ShootWords, parse_request
+from psvideo.errors import UsageError
+from psvideo.plan import Plan
+from psvideo.planfile import format_plan, parse_plan
+from psvideo.shutter import row_weights
+
+
+def words(**given_words: object) -> ShootWords:
+    usual = {"fps": "100", "size": "64x48", "readout": "9ms", "lights": "key,left,right", "flash": "0.8ms"}
+    return ShootWords(**{**usual, **given_words})  # type: ignore[arg-type]
+
+
+def planned(**given_words: object) -> Shoot:
+    return plan_shoot(parse_request(words(**given_words)))
+
+
+def kinds(shoot: Shoot) -> set[str]:
+    return {caution.kind for caution in shoot.cautions}
+
+
+def text_of(shoot: Shoot, kind: str) -> str:
+    return " ".join(caution.text for caution in shoot.cautions if caution.kind == kind)
+
+
+ANY_REQUEST = st.builds(
+    words,
+    fps=st.sampled_from(["24", "23.976", "60", "119.88", "240", "77.7"]),
+    readout=st.sampled_from(["0", "1ms", "4ms", "-3.5ms", "unknown"]),
+    shutter=st.floats(20, 360),
+    lights=st.sampled_from(["key", "key,left", "key,left,right", "a,b,c,d,e,f,g,h"]),
+    flash=st.sampled_from(["20us", "150us", "1/5000s"]),
+    marker=st.sampled_from(["dark", "long", "none"]),
+    mode=st.sampled_from(["rolling", "half-rate"]),
+    power=st.sampled_from(["1", "0.25", "50%"]),
+    camera_clock_ppm=st.floats(0, 4000),
+    strobe_clock_ppm=st.one_of(st.floats(0, 4000).map(str), st.just("unknown")),
+    black=st.one_of(st.none(), st.floats(0, 255)),
+    white=st.one_of(st.none(), st.floats(256, 65535)),
+    cfa=st.sampled_from([None, "RGGB", "gbrg"]),
+)
+
+
+@given(ANY_REQUEST)
+@settings(max_examples=150, deadline=None)
+def test_a_plan_is_the_same_when_it_is_read_back(request_words: ShootWords) -> None:
+    plan = plan_shoot(parse_request(request_words)).plan
+    assert parse_plan(format_plan(plan)) == plan
+
+
+@given(ANY_REQUEST)
+@settings(max_examples=150, deadline=None)
+def test_no_row_can_hold_two_flashes_with_both_clocks_at_their_worst(request_words: ShootWords) -> None:
+    plan = plan_shoot(parse_request(request_words)).plan
+    camera_ppm = request_words.camera_clock_ppm
+    is_known = request_words.strobe_clock_ppm != "unknown"
+    strobe_ppm = float(request_words.strobe_clock_ppm) if is_known else 10_000 - camera_ppm
+    shortest_dark_s = plan.dark_s * (1 - strobe_ppm * 1e-6)
+    longest_exposure_s = plan.camera.exposure_s * (1 + camera_ppm * 1e-6)
+    assert shortest_dark_s >= longest_exposure_s * (1 - 1e-12)
+
+
+@pytest.mark.parametrize("clock_ppm", [-100.0, 0.0, 100.0])
+def test_row_weights_find_no_row_with_two_flashes_within_the_clocks_tolerance(clock_ppm: float) -> None:
+    plan = planned(readout="10ms").plan
+    train = plan.train(-2, 30)
+    rate = 1 + clock_ppm * 1e-6
+    weights = row_weights(plan.camera, train.start_s * rate + 1.7e-3, train.duration_s * rate, frames=range(0, 25))
+    assert np.count_nonzero(weights > 1e-12, axis=0).max() == 1
+
+
+def test_a_dark_slot_comes_about_twice_a_second_and_never_in_the_flicker_range() -> None:
+    for fps in ("24", "50", "119.88", "1000"):
+        figures = planned(fps=fps, readout="0.9ms", flash="0.1ms").figures
+        assert 1.3 < figures.dark_slot_rate_hz <= 2.0
+
+
+def test_the_marker_is_a_dark_slot_a_longer_first_flash_or_nothing() -> None:
+    dark = planned(dark_slot="0.1ms").plan
+    assert [flash.is_dark for flash in dark.flashes] == [False, False, False, True]
+    assert dark.flashes[3].duration_s == 1e-4
+    assert planned().plan.flashes[3].duration_s == 8e-4
+    long = planned(marker="long")
+    assert [flash.duration_s for flash in long.plan.flashes] == pytest.approx([LONG_MARKER * 8e-4, 8e-4, 8e-4])
+    assert (len(planned(marker="none").plan.flashes), long.plan.dark_every) == (3, 1)
+    assert "marker" in kinds(planned(marker="none"))
+    assert "ambient" in kinds(long)
+
+
+@given(st.floats(0.1, 10), st.floats(50, 50_000), st.sampled_from(["dark", "long"]))
+def test_the_largest_blur_becomes_the_longest_flash_that_keeps_it(blur_px: float, speed: float, marker: str) -> None:
+    shoot = planned(flash=None, max_blur=blur_px, speed=str(speed), marker=marker)
+    longest_px = max(slot.blur_px or 0 for slot in shoot.figures.slots)
+    assert longest_px <= blur_px * (1 + 1e-9)
+    if shoot.chosen and "blur" in shoot.chosen:
+        assert longest_px >= 0.98 * blur_px
+
+
+@given(st.floats(0.002, 0.2), st.integers(1, 8))
+def test_the_largest_duty_is_kept_and_used_up(duty: float, count: int) -> None:
+    lights = ",".join(f"l{index}" for index in range(count))
+    shoot = planned(flash=None, max_duty=str(duty), lights=lights, marker="none")
+    most = max(light.duty for light in shoot.figures.lights)
+    assert most <= duty * (1 + 1e-9)
+    if "duty" in (shoot.chosen or ""):
+        assert most >= 0.98 * duty
+    assert "duty" not in kinds(shoot)
+
+
+def test_the_longest_pulse_holds_for_the_long_marker_too() -> None:
+    shoot = planned(flash=None, max_pulse="1ms", marker="long")
+    assert max(slot.duration_s for slot in shoot.figures.slots) == pytest.approx(1e-3, rel=0.01)
+    assert max(slot.duration_s for slot in shoot.figures.slots) <= 1e-3
+    assert "longest pulse of 1 ms" in (shoot.chosen or "")
+
+
+def test_a_slow_subject_does_not_get_a_flash_that_ruins_the_rate() -> None:
+    shoot = planned(flash=None, max_blur=100, speed="1")
+    assert shoot.figures.flash_rate_hz > 78
+    assert "rate" in (shoot.chosen or "")
+
+
+def test_wishes_that_exclude_each_other_are_explained_with_the_numbers() -> None:
+    with pytest.raises(UsageError) as refusal:
+        planned(flash=None, max_blur=1, speed="20000", max_stops=5)
+    for figure in ("50 us", "7.6 stops", "--max-stops 5", "0.3125 ms", "6.25 px"):
+        assert figure in str(refusal.value)
+    assert planned(flash=None, max_blur=1, speed="20000", max_stops=8).chosen
+
+
+@pytest.mark.parametrize(
+    ("given_words", "named"),
+    [
+        ({"flash": None}, "--max-blur"),
+        ({"flash": None, "max_blur": 1}, "--speed"),
+        ({"max_blur": -1.0}, "--max-blur"),
+        ({"flash": "11ms"}, "longer than the exposure"),
+        ({"dark": "9.9ms"}, "two flashes"),
+        ({"mode": "half-rate", "dark": "9ms"}, "two flashes"),
+        ({"shutter": 400.0}, "--shutter"),
+        ({"shutter": 0.0}, "--shutter"),
+        ({"shutter": 180.0, "exposure": "5ms"}, "--exposure"),
+        ({"exposure": "11ms"}, "frame period"),
+        ({"readout": "11ms"}, "impossible"),
+        ({"readout": "-11ms"}, "impossible"),
+        ({"mode": "rolling-rate"}, "half-rate"),
+        ({"marker": "bright"}, "dark, long, none"),
+        ({"dark_every": 0}, "--dark-every"),
+        ({"marker": "none", "dark_slot": "1ms"}, "--dark-slot"),
+        ({"black": 512.0, "white": 512.0}, "--black"),
+        ({"cfa": "RGBG"}, "RGGB"),
+        ({"transfer": "slog33"}, "slog3"),
+        ({"strobe_clock_ppm": "-5"}, "--strobe-clock-ppm"),
+        ({"strobe_clock_ppm": "good"}, "unknown"),
+        ({"camera_clock_ppm": 9000.0, "strobe_clock_ppm": "2000"}, "10000"),
+        ({"camera_clock_ppm": float("nan")}, "--camera-clock-ppm"),
+        ({"fps": None}, "--fps"),
+        ({"size": None}, "--size"),
+        ({"readout": None}, "--readout"),
+    ],
+)
+def test_what_cannot_be_is_refused_by_name_with_exit_status_2(given_words: dict[str, object], named: str) -> None:
+    with pytest.raises(UsageError) as refusal:
+        planned(**given_words)
+    assert named in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+    assert refusal.value.exit_status == 2
+
+
+def test_a_preset_fills_in_what_was_left_out_and_an_own_readout_wins() -> None:
+    wish = CameraWish(name="f65", fps=Fraction(120))
+    camera, preset = choose_camera(wish, mode="rolling")
+    assert (camera.name, camera.width_px, camera.readout_s) == ("Sony F65", 1920, pytest.approx(1 / 120, rel=1e-4))
+    assert preset is not None
+    measured, none = choose_camera(CameraWish(name="f65", fps=Fraction(120), readout_s=0.0081), mode="rolling")
+    assert (measured.readout_s, none) == (0.0081, None)
+    unknown, _ = choose_camera(CameraWish(name="f65", fps=Fraction(120), readout_known=False), mode="rolling")
+    assert unknown.readout_s is None
+    own, _ = choose_camera(
+        CameraWish(name="My Camera", fps=Fraction(50), size_px=(640, 480), readout_s=0.0), mode="rolling"
+    )
+    assert (own.name, own.readout_s) == ("My Camera", 0.0)
+
+
+def test_a_plan_for_a_trigger_needs_no_readout_and_no_marker() -> None:
+    shoot = planned(mode="synced", readout=None)
+    assert [flash.is_dark for flash in shoot.plan.flashes] == [False] * 3
+    assert shoot.figures.flash_rate_hz == pytest.approx(100)
+    assert "marker" not in kinds(shoot)
+    assert "synced" in kinds(planned(mode="synced", readout="9.5ms"))
+    assert "synced" not in kinds(shoot)
+
+
+def test_half_rate_keeps_two_frames_between_flashes() -> None:
+    shoot = planned(mode="half-rate")
+    assert shoot.plan.dark_s + 8e-4 == pytest.approx(0.02)
+    assert planned(mode="half-rate", marker="none").figures.flash_rate_hz == pytest.approx(50)
+
+
+def test_flicker_is_named_for_what_flickers() -> None:
+    by_light = planned(fps="240", readout="4ms", flash="0.2ms", lights="a,b,c,d")
+    assert "Each light" in text_of(by_light, "flicker")
+    assert "whole scene" not in text_of(by_light, "flicker")
+    everything = planned(fps="50", flash="1ms")
+    assert "The whole scene flickers at 45.7" in text_of(everything, "flicker")
+    nothing = planned(fps="1000", readout="0.9ms", flash="50us")
+    assert "flicker" not in kinds(nothing)
+    often = planned(fps="1000", readout="0.9ms", flash="50us", dark_every=6)
+    assert "Dark slots come" in text_of(often, "flicker")
+
+
+def test_a_margin_thinner_than_the_clocks_is_warned_of_with_what_would_do() -> None:
+    assert "margin" not in kinds(planned())
+    thin = planned(dark="10.0005ms")
+    assert "50 ppm" in text_of(thin, "margin")
+    assert "10.001ms" in text_of(thin, "margin")
+    assert "margin" not in kinds(planned(dark="10.0011ms"))
+
+
+def test_limits_of_the_leds_that_a_given_flash_passes_are_named_with_what_would_fit() -> None:
+    shoot = planned(flash="2ms", max_pulse="1ms", max_duty="2%", marker="none")
+    assert "key, left and right" in text_of(shoot, "pulse")
+    fitting = planned(flash=None, max_duty="2%", marker="none").plan.flashes[0].duration_s
+    assert f"{fitting * 1e3:.3f}"[:4] in text_of(shoot, "duty")
+    assert not {"pulse", "duty"} & kinds(planned(flash="0.5ms", max_pulse="1ms", max_duty="2%"))
+
+
+def test_rows_that_no_frame_sees_are_warned_of() -> None:
+    shoot = planned(shutter=180.0)
+    assert shoot.figures.missing_row_share == pytest.approx(0.5 - 0.08)
+    assert "42%" in text_of(shoot, "blind")
+    assert "blind" not in kinds(planned())
+
+
+def test_three_frame_flashes_come_with_the_durations_of_equation_11() -> None:
+    text = text_of(planned(readout="10ms", flash="0.8ms"), "three-frames")
+    assert "0.8333 ms or 0.7692 ms" in text
+    assert "three-frames" not in kinds(planned(readout="5ms"))
+
+
+def test_a_misnamed_frame_rate_is_asked_about() -> None:
+    assert "120000/1001" in text_of(planned(fps="120", readout="8ms"), "fps")
+    assert "fps" not in kinds(planned(fps="119.88", readout="8ms"))
+    assert "fps" not in kinds(planned(fps="100"))
+    preset = plan_shoot(parse_request(ShootWords(camera="z9", fps="120", size="3840x2160", flash="0.8ms")))
+    assert preset.plan.camera.fps == Fraction(120_000, 1001)
+    assert "119.88" in text_of(preset, "fps")
+
+
+def test_figures_that_rest_on_little_are_called_so() -> None:
+    assumed = plan_shoot(parse_request(ShootWords(camera="Sony F65", fps="120", flash="0.8ms")))
+    assert "rests on little" in text_of(assumed, "readout")
+    measured = plan_shoot(parse_request(ShootWords(camera="z9", fps="120", size="3840x2160", flash="0.8ms")))
+    assert "readout" not in kinds(measured)
+
+
+def test_a_plan_of_somebody_else_can_be_judged_without_its_request() -> None:
+    plan = planned().plan
+    short = Plan(camera=plan.camera, flashes=plan.flashes, dark_s=0.0098, dark_every=plan.dark_every)
+    cautions = shoot_cautions(short, shoot_figures(short))
+    assert "margin" in {caution.kind for caution in cautions}
+
+
+@given(st.floats(1e-5, 1e-2), st.floats(0.01, 1))
+def test_the_chosen_flash_never_exceeds_any_bound(pulse_s: float, duty: float) -> None:
+    camera = Camera(width_px=4, height_px=4, fps=Fraction(60), exposure_s=1 / 60, readout_s=0.0)
+    request = ShootRequest(
+        camera=camera,
+        lights=("a", "b"),
+        power={"a": 1.0, "b": 1.0},
+        limits=Limits(max_pulse_s=pulse_s, max_duty=duty),
+        marker="none",
+    )
+    flash_s = longest_flash(request).flash_s
+    assume(flash_s > 0)
+    figures = shoot_figures(make_plan(request, {"a": flash_s, "b": flash_s}))
+    assert flash_s <= pulse_s * (1 + 1e-9)
+    assert figures.lights[0].duty <= duty * (1 + 1e-9)
