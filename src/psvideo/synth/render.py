@@ -51,8 +51,9 @@ def camera_rays(camera: CameraTable, far_m: float) -> tuple[FloatArray, FloatArr
     """Return origins and unit directions of all rays, each (ray, 3); orthographic rays start at z = ``far_m``."""
     rows, cols, rays = camera.height_px, camera.width_px, camera.rays
     offsets = (np.arange(rays) + 0.5) / rays - 0.5
-    y = -((np.arange(rows)[:, None] + offsets).ravel() - 0.5 * (rows - 1))
-    x = (np.arange(cols)[:, None] + offsets).ravel() - 0.5 * (cols - 1)
+    middle_x, middle_y = camera.principal
+    y = middle_y - (np.arange(rows)[:, None] + offsets).ravel()
+    x = (np.arange(cols)[:, None] + offsets).ravel() - middle_x
     plane = np.stack(np.broadcast_arrays(x[None, :], y[:, None]), axis=-1).reshape(-1, 2)
     if camera.view == "orthographic":
         pixel_m = camera.width_m / cols

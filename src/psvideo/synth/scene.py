@@ -37,6 +37,7 @@ class CameraTable(Contract):
     view: Literal["orthographic", "perspective"] = "orthographic"
     width_m: Positive = 1.0
     focal_px: Positive | None = None
+    principal_px: Annotated[list[float], Field(min_length=2, max_length=2)] | None = None
     rays: int = Field(default=1, ge=1, le=8)
     colour: Literal["rgb", "grey"] = "rgb"
     cfa: Literal["RGGB", "BGGR", "GRBG", "GBRG"] | None = None
@@ -51,6 +52,12 @@ class CameraTable(Contract):
     def rate(self) -> Fraction:
         """Frames per second as an exact ratio."""
         return parse_fps(self.fps)
+
+    @property
+    def principal(self) -> tuple[float, float]:
+        """Column and row of the pixel that the camera looks straight at; the picture's middle where not given."""
+        x, y = self.principal_px or [0.5 * (self.width_px - 1), 0.5 * (self.height_px - 1)]
+        return x, y
 
     @property
     def channels(self) -> int:

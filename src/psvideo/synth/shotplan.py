@@ -94,7 +94,7 @@ def true_rig(scene: Scene) -> Rig:
     return Rig(
         lights=tuple(_light(light, reference_s.get(light.name)) for light in scene.light),
         focal_px=(focal, focal) if perspective else None,
-        principal_px=(0.5 * (camera.width_px - 1), 0.5 * (camera.height_px - 1)) if perspective else None,
+        principal_px=camera.principal if perspective else None,
     )
 
 

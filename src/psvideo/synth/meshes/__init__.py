@@ -6,15 +6,14 @@ Every mesh is in metres at a natural size, y up, facing +z.
 from collections.abc import Callable
 
 from psvideo.synth.meshes.basic import box, cylinder, plane, sphere
+from psvideo.synth.meshes.fan import fan_blades, fan_cage
 from psvideo.synth.meshes.head import bust
+from psvideo.synth.meshes.still_life import apple, book, cloth, pear, vase
 from psvideo.synth.shape import Shape
 
 _MAKERS: dict[str, Callable[[], Shape]] = {
-    "sphere": sphere,
-    "box": box,
-    "plane": plane,
-    "cylinder": cylinder,
-    "bust": bust,
+    maker.__name__: maker
+    for maker in (sphere, box, plane, cylinder, bust, vase, apple, pear, book, cloth, fan_blades, fan_cage)
 }
 
 

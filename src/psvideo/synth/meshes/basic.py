@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from psvideo.camera import FloatArray
 from psvideo.synth.shape import Shape, join, make_shape
@@ -89,3 +89,22 @@ def _turned(points: FloatArray, columns: int) -> Shape:
 def painted(shape: Shape, paint: Paint) -> Shape:
     """Return a shape with one albedo all over."""
     return dataclasses.replace(shape, colours=np.tile(np.asarray(paint, np.float32), (len(shape.vertices), 1)))
+
+
+def tube(path: ArrayLike, radius: float, *, closed: bool = False, sides: int = 8) -> Shape:
+    """Sweep a circle along a path of points (point, 3), open at its ends or closed to a ring."""
+    points = np.asarray(path, np.float64)
+    ahead = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
+    if not closed:
+        ahead[0], ahead[-1] = points[1] - points[0], points[-1] - points[-2]
+    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
+    guide = np.where(np.abs(ahead[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[0.0, 1.0, 0.0]])
+    side = np.cross(ahead, guide)
+    side /= np.linalg.norm(side, axis=1, keepdims=True)
+    other = np.cross(side, ahead)
+    angle = 2 * np.pi * np.arange(sides) / sides
+    outwards = np.cos(angle)[:, None] * side[:, None] + np.sin(angle)[:, None] * other[:, None]
+    rings = points[:, None] + radius * outwards
+    if closed:
+        rings = np.concatenate([rings, rings[:1]])
+    return make_shape(rings.reshape(-1, 3), grid_faces(len(rings), sides, wrap=True)[:, ::-1])
