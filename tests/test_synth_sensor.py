@@ -1,0 +1,262 @@
+"""The virtual sensor against brute force, closed forms, and another simulator's clips."""
+
+import json
+from fractions import Fraction
+from pathlib import Path
+
+import cv2
+import numpy as np
+import OpenEXR
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from psvideo.camera import Camera
+from psvideo.errors import PsvideoError
+from psvideo.plan import Plan, PlannedFlash
+from psvideo.planfile import read_plan
+from psvideo.synth import Flicker, Noise, StrobeClock, expose
+from psvideo.synth.sensor import Emission, seen_share
+from psvideo.synth.strobe import TrueFlash, row_opens_s, true_flashes
+
+PERIOD_S = 0.01
+
+
+def camera(*, shutter: float = 1.0, readout: float = 1.0, height_px: int = 60, width_px: int = 3) -> Camera:
+    return Camera(
+        width_px=width_px,
+        height_px=height_px,
+        fps=Fraction(100),
+        exposure_s=shutter * PERIOD_S,
+        readout_s=readout * PERIOD_S,
+    )
+
+
+def plan_of(cam: Camera, durations_s: tuple[float, ...] = (0.001,), **more: object) -> Plan:
+    flashes = tuple(PlannedFlash(lights={f"L{k}": 1.0}, duration_s=d) for k, d in enumerate(durations_s))
+    return Plan(**{"camera": cam, "flashes": flashes, "dark_s": cam.exposure_s, **more})
+
+
+def ramp_plates(cam: Camera, count: int) -> list[np.ndarray]:
+    rng = np.random.default_rng(4)
+    return [rng.uniform(0.1, 0.9, (cam.height_px, cam.width_px)).astype(np.float32) for _ in range(count)]
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    readout=st.floats(-1, 1),
+    start_s=st.floats(0.03, 0.05),
+    duration_s=st.floats(1e-5, 0.008),
+    rise_s=st.sampled_from([0.0, 4e-5]),
+    fall_s=st.sampled_from([0.0, 9e-5]),
+)
+def test_at_360_degrees_a_rows_frames_share_every_flash_without_loss(readout, start_s, duration_s, rise_s, fall_s):
+    flash = TrueFlash(index=0, slot=0, lights={"a": 1.0}, start_s=start_s, duration_s=duration_s, complete=True)
+    emission = Emission(rise_s=rise_s, fall_s=fall_s)
+    shares = sum(seen_share(camera(readout=readout), emission, flash, n) for n in range(12))
+    np.testing.assert_allclose(shares, 1.0, atol=1e-6)
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    shutter=st.floats(0.2, 1.0),
+    readout=st.floats(-1, 1),
+    start_s=st.floats(0.02, 0.03),
+    duration_s=st.floats(2e-4, 0.004),
+    rise_s=st.sampled_from([0.0, 6e-5]),
+    fall_s=st.sampled_from([0.0, 2e-4]),
+)
+def test_a_rows_share_is_the_emission_summed_up_while_it_is_open(shutter, readout, start_s, duration_s, rise_s, fall_s):
+    cam = camera(shutter=shutter, readout=readout, height_px=7)
+    time_s = (np.arange(600_000) + 0.5) * 1e-7
+    light = np.where((time_s >= start_s) & (time_s < start_s + duration_s), 1.0, 0.0)
+    if rise_s:
+        light *= -np.expm1(-np.maximum(time_s - start_s, 0) / rise_s)
+    if fall_s:
+        reached = -np.expm1(-duration_s / rise_s) if rise_s else 1.0
+        after_s = time_s - start_s - duration_s
+        light += np.where(after_s >= 0, reached * np.exp(-np.maximum(after_s, 0) / fall_s), 0.0)
+    flash = TrueFlash(index=0, slot=0, lights={"a": 1.0}, start_s=start_s, duration_s=duration_s, complete=True)
+    for n in (1, 2, 3):
+        found = seen_share(cam, Emission(rise_s=rise_s, fall_s=fall_s), flash, n)
+        for row in range(cam.height_px):
+            place = row if readout >= 0 else cam.height_px - 1 - row
+            opens_s = n * PERIOD_S + place * abs(readout) * PERIOD_S / cam.height_px
+            seen = light[(time_s >= opens_s) & (time_s < opens_s + cam.exposure_s)].sum() / light.sum()
+            assert found[row] == pytest.approx(seen, abs=2e-3)
+
+
+def test_the_dark_row_lies_where_the_flash_ended_and_moves_by_the_next_flash():
+    """physics.md: behind flash k it is at row (s_k + d_k - n * Tc) / tr where the dark time is exactly the exposure."""
+    cam = camera(height_px=1000, width_px=1)
+    duration_s = 0.0004
+    shot = expose(
+        [np.ones((1000, 1), np.float32)], plan_of(cam, (duration_s,)), frames=8, clock=StrobeClock(phase_s=0.0032)
+    )
+    tr = PERIOD_S / 1000
+    rows = []
+    for flash in shot.flashes[1:6]:
+        n = int((flash.start_s + flash.duration_s) // PERIOD_S)
+        rows.append((flash.start_s + flash.duration_s - n * PERIOD_S) / tr)
+        assert np.argmin(shot.frames[n, :, 0]) == pytest.approx(rows[-1], abs=1)
+        half_lit = np.flatnonzero(np.abs(shot.frames[n, :, 0] - 0.5) < 0.02)
+        assert half_lit.min() == pytest.approx(rows[-1] - 0.5 * duration_s / tr, abs=2)
+        assert half_lit.max() == pytest.approx(rows[-1] + 0.5 * duration_s / tr, abs=2)
+    np.testing.assert_allclose(np.diff(rows), duration_s / tr, atol=1e-6)
+
+
+def test_no_row_sees_two_flashes_under_the_rolling_rule_and_some_do_when_it_is_broken():
+    cam = camera()
+    plates = [np.ones((60, 3), np.float32), np.ones((60, 3), np.float32)]
+    kept = expose(plates, plan_of(cam, (0.001, 0.002)), frames=12, clock=StrobeClock(phase_s=0.0021))
+    assert kept.frames.max() <= 1.0 + 1e-6
+    halves = [0.4 * plate for plate in plates]
+    broken = expose(halves, plan_of(cam, (0.001, 0.002), dark_s=0.006), frames=12, clock=StrobeClock(phase_s=0.0021))
+    assert broken.frames.max() == pytest.approx(0.8, abs=1e-6)
+
+
+def test_half_rate_flashes_are_whole_in_the_sum_of_two_frames():
+    cam = camera()
+    plates = ramp_plates(cam, 2)
+    plan = plan_of(cam, (0.001, 0.001), dark_s=2 * PERIOD_S - 0.001, mode="half-rate")
+    shot = expose(plates, plan, frames=12, clock=StrobeClock(phase_s=0.0044))
+    for flash in shot.flashes:
+        if flash.complete:
+            n = int(flash.start_s // PERIOD_S)
+            pair = shot.frames[n - 1 : n + 1].sum(axis=0)
+            np.testing.assert_allclose(pair, plates[flash.slot], atol=1e-5)
+    assert sum(flash.complete for flash in shot.flashes) >= 4
+
+
+def test_a_global_shutter_gives_every_row_the_same_share():
+    cam = camera(readout=0.0)
+    shot = expose([np.ones((60, 3), np.float32)], plan_of(cam), frames=6, clock=StrobeClock(phase_s=0.0096))
+    assert np.ptp(shot.frames, axis=(1, 2)).max() == 0.0
+    np.testing.assert_allclose(shot.frames[:2, 0, 0], [0.4, 0.6], atol=1e-6)
+
+
+def test_a_bottom_up_camera_is_a_top_down_one_upside_down():
+    plates = ramp_plates(camera(), 2)
+    clock = StrobeClock(phase_s=0.0043, offset_ppm=80)
+    down = expose(plates, plan_of(camera(readout=0.8), (0.001, 0.002)), frames=7, clock=clock)
+    flipped = [plate[::-1] for plate in plates]
+    up = expose(flipped, plan_of(camera(readout=-0.8), (0.001, 0.002)), frames=7, clock=clock)
+    np.testing.assert_array_equal(up.frames[:, ::-1], down.frames)
+    assert row_opens_s(camera(readout=-0.8)).argmin() == 59
+
+
+def test_a_synced_clip_holds_one_whole_flash_per_frame_in_order():
+    cam = camera(readout=0.3)
+    plates = ramp_plates(cam, 3)
+    plan = plan_of(cam, (0.001, 0.004, 0.002), dark_s=0.006, mode="synced")
+    shot = expose(plates, plan, frames=7, clock=StrobeClock(phase_s=0.004, offset_ppm=5000))
+    for n in range(7):
+        np.testing.assert_allclose(shot.frames[n], plates[n % 3], atol=1e-6)
+    with pytest.raises(PsvideoError, match=r"synced plan flashes for 1 ms, but all rows .* only 0\.1667 ms"):
+        expose(plates, plan_of(camera(), mode="synced"), frames=2)
+
+
+def test_below_360_degrees_a_flash_in_the_blind_time_is_lost():
+    cam = camera(shutter=0.5, readout=0.0)
+    shot = expose([np.ones((60, 3), np.float32)], plan_of(cam, dark_s=1.0), frames=3, clock=StrobeClock(phase_s=0.0147))
+    np.testing.assert_allclose(shot.frames[:, 0, 0], [0, 0.3, 0], atol=1e-6)
+
+
+@pytest.mark.parametrize("fall_s", [0.0, 1e-4])
+def test_a_flash_is_complete_exactly_when_the_recorded_frames_hold_all_its_light(fall_s):
+    cam = camera(readout=-0.7)
+    plan = plan_of(cam, (0.001, 0.003), fall_s=fall_s)
+    clock = StrobeClock(phase_s=-0.0004, offset_ppm=-300, drift_ppm_per_s=40, jitter_s=1e-5, seed=2)
+    lost = frozenset({7})
+    emission = Emission(fall_s=fall_s)
+    flashes = true_flashes(plan, clock, frames=20, dropped=lost)
+    for flash in flashes:
+        held = sum(seen_share(cam, emission, flash, n) for n in range(20) if n not in lost)
+        assert flash.complete == bool((held > 0.999 - 1e-9).all())
+    assert [flash.index for flash in flashes] == list(range(len(flashes)))
+    assert {False, True} == {flash.complete for flash in flashes[2:-2]}
+
+
+def test_drift_and_offset_stretch_the_strobes_seconds():
+    plan = plan_of(camera(), (0.001,), dark_s=0.099)
+    clock = StrobeClock(phase_s=0.02, offset_ppm=1000, drift_ppm_per_s=50)
+    flashes = true_flashes(plan, clock, frames=1000)
+    strobe_s = 0.1 * np.arange(len(flashes))
+    expected_s = 0.02 + strobe_s * 1.001 + 25e-6 * strobe_s**2
+    np.testing.assert_allclose([flash.start_s for flash in flashes], expected_s, atol=1e-12)
+    np.testing.assert_allclose(flashes[50].duration_s, 0.001 * (1.001 + 50e-6 * 5.0), rtol=1e-12)
+
+
+def test_jitter_has_the_given_spread_and_comes_from_the_seed():
+    plan = plan_of(camera(), (0.001,))
+    even, late, again = (
+        np.array([f.start_s for f in true_flashes(plan, StrobeClock(phase_s=0.004, jitter_s=j, seed=3), frames=3000)])
+        for j in (0.0, 2e-5, 2e-5)
+    )
+    assert np.std(late - even) == pytest.approx(2e-5, rel=0.06)
+    np.testing.assert_array_equal(late, again)
+
+
+def test_ambient_light_adds_to_every_row_and_flickers_as_its_mean_over_the_exposure():
+    cam = camera(shutter=0.4)
+    flicker = Flicker(hz=130.0, depth=0.6)
+    shot = expose({0: np.zeros((60, 3), np.float32)}, plan_of(cam), frames=3, ambient=0.2, flicker=flicker)
+    for n, row in ((0, 0), (1, 31), (2, 59)):
+        opens_s = (n + row / 60) * PERIOD_S
+        time_s = opens_s + (np.arange(20_000) + 0.5) / 20_000 * cam.exposure_s
+        mean = np.mean(0.2 * (1 + 0.6 * np.sin(2 * np.pi * 130.0 * time_s)))
+        assert shot.frames[n, row, 0] == pytest.approx(mean, abs=1e-6)
+
+
+def test_noise_has_the_variance_of_the_electrons_and_the_seed_decides_it():
+    cam = camera(readout=0.0, height_px=200, width_px=200)
+    plan = plan_of(cam, mode="synced")
+    noise = Noise(full_well_e=4000.0, read_e=12.0)
+    plate = [np.full((200, 200), 0.3, np.float32)]
+    shots = [expose(plate, plan, frames=3, noise=noise, seed=seed).frames for seed in (1, 1, 2)]
+    np.testing.assert_array_equal(shots[0], shots[1])
+    assert not np.array_equal(shots[0], shots[2])
+    assert not np.array_equal(shots[0][0], shots[0][1])
+    assert shots[0].mean() == pytest.approx(0.3, abs=3e-4)
+    assert shots[0].std() == pytest.approx(np.sqrt(0.3 * 4000 + 144) / 4000, rel=0.01)
+    later = expose(plate, plan, frames=3, noise=noise, seed=1, dropped=[0]).frames
+    np.testing.assert_array_equal(later, shots[0][1:])
+
+
+def test_frames_saturate_and_come_in_the_converters_steps():
+    cam = camera(readout=0.0)
+    plate = [np.linspace(0, 1.5, 180, dtype=np.float32).reshape(60, 3)]
+    shot = expose(plate, plan_of(cam, mode="synced"), frames=1, bits=8)
+    assert shot.frames.max() == 1.0
+    np.testing.assert_allclose(shot.frames * 255, np.round(shot.frames * 255), atol=1e-4)
+
+
+@pytest.mark.parametrize("clip", ["plain", "ambient"])
+def test_another_simulators_frames_come_out_of_its_plates_and_timing(shared_data, clip):
+    folder = shared_data / "clips" / clip
+    plan = read_plan(folder / "plan.toml")
+    truth = json.loads((folder / "truth" / "timing.json").read_text())["flashes"]
+    slots = {next(iter(flash.lights), None): slot for slot, flash in enumerate(plan.flashes)}
+    plates = {slots[row["light"]]: _exr(folder / "truth" / row["plate"]) for row in truth if "plate" in row}
+    first = truth[0]
+    planned = plan.flashes[slots[first["light"]]]
+    ppm = (first["duration_s"] / planned.duration_s - 1) * 1e6
+    strobe_s = float(plan.train(slots[first["light"]], 1).start_s[0])
+    clock = StrobeClock(phase_s=first["start_s"] - strobe_s * (1 + ppm * 1e-6), offset_ppm=ppm)
+    files = sorted((folder / "frames").iterdir())
+    codes = np.stack([cv2.imread(str(file), cv2.IMREAD_UNCHANGED)[..., ::-1] for file in files]).astype(np.float32)
+    light = (codes - 4097) / (65535 - 4097)
+    shot = expose(plates, plan, frames=len(files), clock=clock)
+    for flash, row in zip(shot.flashes, truth, strict=True):
+        assert flash.start_s == pytest.approx(row["start_s"], abs=1e-9)
+        assert flash.complete == row["complete"]
+    left = light - shot.frames
+    left -= np.median(left, axis=0)  # ambient light
+    saturated = light.max(axis=-1) > 0.99
+    rows = np.where(saturated[..., None], 0, left).mean(axis=(2, 3))
+    assert np.abs(rows).max() < 7e-4  # noise of 0.0037 over 960 samples is 1.2e-4
+    assert left[~saturated].std() < 0.004
+
+
+def _exr(path: Path) -> np.ndarray:
+    return np.asarray(OpenEXR.File(str(path)).channels()["RGB"].pixels, np.float32)
