@@ -60,7 +60,7 @@ def _number(text: str | None) -> float:
 
 def test_the_paper_s_camera_is_there_and_its_assumed_readout_is_called_assumed() -> None:
     mode = find_mode("Sony F65", fps=Fraction(120), size_px=None)
-    assert (mode.width_px, mode.height_px, mode.fps) == (1920, 1080, 120)
+    assert (mode.width_px, mode.height_px, float(mode.fps)) == (1920, 1080, 120.0)
     assert mode.sure == "assumed"
 
 

@@ -113,6 +113,6 @@ def test_bad_numbers_get_one_paragraph_that_names_option_and_value(arguments: li
 
 def test_a_readout_that_runs_upwards_can_be_typed(tmp_path: Path) -> None:
     out = tmp_path / "plan.toml"
-    upwards = ["--fps", "50", "--size", "640x480", "--readout", "-8.1ms", "--flash", "1ms", "-o", out]
-    assert run(*upwards).exit_code == 0
+    upwards = ["--fps", "50", "--size", "640x480", "--readout", "-8.1ms", "--flash", "1ms"]
+    assert run(*upwards, "-o", out).exit_code == 0
     assert read_plan(out).camera.readout_s == pytest.approx(-0.0081)

@@ -43,7 +43,7 @@ ANY_REQUEST = st.builds(
     readout=st.sampled_from(["0", "1ms", "4ms", "-3.5ms", "unknown"]),
     shutter=st.floats(20, 360),
     lights=st.sampled_from(["key", "key,left", "key,left,right", "a,b,c,d,e,f,g,h"]),
-    flash=st.sampled_from(["20us", "150us", "1/5000s"]),
+    flash=st.sampled_from(["20us", "150us", "1/9000s"]),
     marker=st.sampled_from(["dark", "long", "none"]),
     mode=st.sampled_from(["rolling", "half-rate"]),
     power=st.sampled_from(["1", "0.25", "50%"]),
@@ -184,7 +184,8 @@ def test_what_cannot_be_is_refused_by_name_with_exit_status_2(given_words: dict[
 def test_a_preset_fills_in_what_was_left_out_and_an_own_readout_wins() -> None:
     wish = CameraWish(name="f65", fps=Fraction(120))
     camera, preset = choose_camera(wish, mode="rolling")
-    assert (camera.name, camera.width_px, camera.readout_s) == ("Sony F65", 1920, pytest.approx(1 / 120, rel=1e-4))
+    assert (camera.name, camera.width_px) == ("Sony F65", 1920)
+    assert camera.readout_s == pytest.approx(1 / 120, rel=1e-4)
     assert preset is not None
     measured, none = choose_camera(CameraWish(name="f65", fps=Fraction(120), readout_s=0.0081), mode="rolling")
     assert (measured.readout_s, none) == (0.0081, None)
