@@ -107,8 +107,8 @@ def _decoded_by_libraw(path: Path, page: tifffile.TiffPage, fault: Exception) ->
         codes = np.array(raw.raw_image)
     if codes.shape[:2] != (page.imagelength, page.imagewidth) or not codes.any(axis=1).all():
         raise PsvideoError(
-            f"{path}: its compression ({page.compression}) is not decoded whole by tifffile ({fault}) nor by LibRaw. "
-            "Convert the footage to uncompressed DNG."
+            f"{path}: is truncated or damaged, or compressed in a way ({page.compression}) that neither tifffile "
+            f"({fault}) nor LibRaw decodes whole. Copy it again, or convert the footage to uncompressed DNG."
         ) from fault
     return codes.reshape(*codes.shape[:2], -1)
 

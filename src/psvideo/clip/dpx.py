@@ -46,8 +46,8 @@ def _parse_header(path: Path, data: bytes) -> tuple[Header, int]:
     packing, encoding = struct.unpack_from(order + "HH", data, 804)
     if descriptor not in CHANNELS or bits not in (8, 10, 12, 16) or encoding != 0 or (bits, packing) == (10, 0):
         raise PsvideoError(
-            f"{path}: holds image element {descriptor} of {bits} bits, packing {packing}, encoding {encoding}; expected "
-            "grey (6) or RGB (50, 51) of 8, 10 (filled), 12 or 16 bits, not run-length encoded. Export it as such."
+            f"{path}: holds image element {descriptor} of {bits} bits, packing {packing}, encoding {encoding}; "
+            "expected grey (6) or RGB (50, 51) of 8, 10 (filled), 12 or 16 bits, not run-length encoded. Export such."
         )
     samples = CHANNELS[descriptor] + (descriptor == 51)
     head = Header(

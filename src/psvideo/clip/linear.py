@@ -79,7 +79,7 @@ def light_table(
     """
     curve = find_curve(transfer)
     levels = np.array([0.0 if black is None else black, scale.largest if white is None else white])
-    level_light = to_light(curve, levels / scale.largest).astype(np.float64)
+    level_light = to_light(curve, levels / scale.largest)
     black_light = 0.0 if black is None else level_light[0]
     span = level_light[1] - black_light
     if span <= 0:
@@ -99,9 +99,9 @@ def _float_light(
 ) -> NDArray[np.float32]:
     """Floating point pictures hold light already: they are scaled only where levels are given."""
     curve = find_curve(transfer)
-    light = to_light(curve, codes) if curve.source else np.asarray(codes, np.float32)
+    light = np.asarray(to_light(curve, codes) if curve.source else codes, np.float32)
     if black is None and white is None:
         return light
     ends = to_light(curve, np.array([black[0][0] if black else 0.0, 1.0 if white is None else white]))
-    black_light = ends[0] if black else np.float32(0)
-    return np.asarray((light - black_light) / (ends[1] - black_light), np.float32)
+    black_light = ends[0] if black else 0.0
+    return np.asarray((light - np.float32(black_light)) / np.float32(ends[1] - black_light), np.float32)

@@ -30,13 +30,15 @@ class Movie:
     """A movie's first frame's header and, in the order of time, every frame's timestamp and place.
 
     ``places`` count frames from the first; a gap of whole frames between timestamps leaves places out. ``rate_hz`` is
-    the rate at which the file plays, None where a single frame tells none.
+    the rate at which the file plays, None where a single frame tells none; rounded timestamps leave it unsure by the
+    share ``rate_error``.
     """
 
     header: Header
     timestamps: tuple[int, ...]
     places: tuple[int, ...]
     rate_hz: float | None
+    rate_error: float = 0.0
 
 
 def index_movie(path: Path) -> Movie:
@@ -61,6 +63,7 @@ def index_movie(path: Path) -> Movie:
         timestamps=timestamps,
         places=places,
         rate_hz=1 / (period * time_base_s) if period else None,
+        rate_error=1 / (timestamps[-1] - timestamps[0]) if period else 0.0,
     )
 
 
@@ -123,6 +126,7 @@ def _places(path: Path, timestamps: Sequence[int]) -> tuple[tuple[int, ...], flo
     usual = float(np.median(steps))
     period = float(steps[np.abs(steps - usual) < 0.5 * usual].mean()) if usual > 0 else 0.0
     counts = np.rint(steps / period) if period else np.zeros_like(steps)
+    period = float(steps.sum() / max(counts.sum(), 1.0))
     uneven = np.abs(steps - counts * period) > max(UNEVEN * period, 1.0)
     if uneven.any() or (counts < 1).any():
         raise PsvideoError(

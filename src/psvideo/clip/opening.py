@@ -6,7 +6,7 @@ from pathlib import Path
 from psvideo.camera import Encoding
 from psvideo.clip.decoders import read_header
 from psvideo.clip.folder import MOVIES, find_sequence
-from psvideo.clip.movie import index_movie
+from psvideo.clip.movie import Movie, index_movie
 from psvideo.clip.record import Clip, Header
 from psvideo.clip.transfer import find_curve
 from psvideo.clip.yuv import signal_range
@@ -15,7 +15,7 @@ from psvideo.plan import Plan
 from psvideo.planfile import find_plan, read_plan
 
 RATE_TOLERANCE = 5e-4
-"""A movie's rate counts as the plan's within this share: tighter than 120 for 119.88, wider than rounded timestamps."""
+"""A movie's rate counts as the plan's within this share: tighter than 120 for 119.88."""
 
 
 def open_clip(path: Path, *, plan: Path | None = None) -> Clip:
@@ -51,7 +51,7 @@ def _open_folder(path: Path, plan_path: Path | None) -> Clip:
         kind=sequence.kind,
         files=sequence.files,
         numbers=sequence.numbers,
-        header=replace(header, cfa=header.cfa or encoding.cfa),
+        header=header,
         colour=header.colour or find_curve(encoding.transfer).colour,
         encoding=encoding,
         notes=header.notes + notes + ((passed_over,) if sequence.passed_over else ()),
@@ -72,11 +72,11 @@ def _open_movie(path: Path, plan_path: Path | None) -> Clip:
         kind="movie",
         files=(path,),
         numbers=movie.places,
-        header=replace(movie.header, cfa=encoding.cfa),
+        header=movie.header,
         colour=find_curve(encoding.transfer).colour,
         encoding=encoding,
         timestamps=movie.timestamps,
-        notes=movie.header.notes + notes + _rate_note(movie.rate_hz, plan),
+        notes=movie.header.notes + notes + _rate_note(movie, plan),
     )
 
 
@@ -100,14 +100,14 @@ def _encoding(kind: str, header: Header, plan: Plan, plan_path: Path) -> tuple[E
     return encoding, ()
 
 
-def _rate_note(rate_hz: float | None, plan: Plan) -> tuple[str, ...]:
+def _rate_note(movie: Movie, plan: Plan) -> tuple[str, ...]:
     """Say where a movie plays at another rate than the plan's."""
     fps = float(plan.camera.fps)
-    if rate_hz is None or abs(rate_hz / fps - 1) < RATE_TOLERANCE:
+    if movie.rate_hz is None or abs(movie.rate_hz / fps - 1) < RATE_TOLERANCE + movie.rate_error:
         return ()
     return (
-        f"the movie plays at {rate_hz:.6g} frames per second and the plan says {fps:.6g}; the plan's is taken, as for "
-        "high-speed footage that plays slowed down",
+        f"the movie plays at {movie.rate_hz:.6g} frames per second and the plan says {fps:.6g}; the plan's is taken, "
+        "as for high-speed footage that plays slowed down",
     )
 
 

@@ -14,7 +14,7 @@ from psvideo.camera import Encoding
 from psvideo.plan import Plan
 
 Levels = tuple[tuple[float, ...], ...]
-"""Black levels by position, in a pattern that repeats over rows and columns from the picture's top left on."""
+"""Black levels by position, a pattern that repeats over rows and columns from the picture's top left on."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,7 +22,7 @@ class Header:
     """What a picture's file says about itself. ``bits`` None: floating point; None elsewhere: the file does not say.
 
     ``width_px`` and ``height_px`` are those of the picture that is delivered, after the crop that the file asks for;
-    ``cfa`` is the filter pattern at that picture's top left pixel. Code 0 stands for the signal ``signal_at_0`` and each
+    ``cfa`` is the filter pattern at its top left pixel. Code 0 stands for the signal ``signal_at_0`` and each
     further code adds ``signal_per_code``, where 0 to 1 is what the transfer curve is defined on; None: the largest code
     is 1. ``video_range``: the file's codes of signal 0 and 1 were 16 and 235 (of 8 bits).
     """
@@ -100,7 +100,7 @@ class Clip:
     @property
     def cfa(self) -> str | None:
         """The filter pattern at the top left pixel, row by row; None where the frames are not mosaiced."""
-        return self.header.cfa
+        return self.header.cfa or self.encoding.cfa
 
     @property
     def channels(self) -> int:

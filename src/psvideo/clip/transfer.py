@@ -141,13 +141,13 @@ def _letters(name: str) -> str:
     return re.sub(r"[^a-z0-9]", "", name.lower()).removesuffix("curve")
 
 
-def to_light(curve: Curve, signal: FloatArray | NDArray[np.float32]) -> NDArray[np.float32]:
+def to_light(curve: Curve, signal: FloatArray | NDArray[np.float32]) -> FloatArray:
     """Return the linear light, on the curve's own scale, that a signal (fraction of the largest code) stands for."""
-    values = np.array(signal, np.float32).ravel()
-    if curve.source:
-        _processor(curve.source).applyRGB(padded := np.resize(values, (-(-values.size // 3), 3)))
-        values = padded.ravel()[: values.size]
-    return values.reshape(np.shape(signal))
+    if not curve.source:
+        return np.array(signal, np.float64)
+    values = np.resize(np.asarray(signal, np.float32), (-(-np.size(signal) // 3), 3))
+    _processor(curve.source).applyRGB(values)
+    return values.ravel()[: np.size(signal)].reshape(np.shape(signal)).astype(np.float64)
 
 
 @functools.cache

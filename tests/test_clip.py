@@ -1,0 +1,284 @@
+"""A clip: which files are its frames, whether they fit the plan, and reading them lazily, in order, with holes."""
+
+import dataclasses
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import imagecodecs
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from psvideo.camera import Encoding
+from psvideo.clip import holes, open_clip, parse_range, read_frames
+from psvideo.errors import PsvideoError, UsageError
+from psvideo.plan import Plan
+from psvideo.planfile import format_plan
+
+ROWS, COLS = 6, 8
+
+
+def write_png(file: Path, value: int = 0, *, rows: int = ROWS, cols: int = COLS, dtype: type = np.uint16) -> None:
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_bytes(imagecodecs.png_encode(np.full((rows, cols, 3), value, dtype)))
+
+
+@pytest.fixture
+def write_plan(make_plan: Callable[..., Plan]) -> Callable[..., None]:
+    def write(folder: Path, *, rows: int = ROWS, cols: int = COLS, **encoding: Any) -> None:
+        plan = make_plan(width_px=cols, height_px=rows)
+        camera = dataclasses.replace(plan.camera, encoding=Encoding(**encoding))
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "plan.toml").write_text(format_plan(dataclasses.replace(plan, camera=camera)))
+
+    return write
+
+
+@pytest.fixture
+def shot(tmp_path: Path, write_plan: Callable[..., None]) -> Path:
+    """A clip of frames 8 to 12 without 10, whose values are 100 times their numbers."""
+    write_plan(tmp_path / "shot", white_level=1000)
+    for number in (12, 8, 9, 11):
+        write_png(tmp_path / "shot" / "frames" / f"shot.{number}.png", 100 * number)
+    return tmp_path / "shot"
+
+
+def test_frames_come_in_the_order_of_their_numbers_and_holes_count_as_time(shot: Path) -> None:
+    clip = open_clip(shot)
+    frames = list(read_frames(clip))
+    assert (clip.name, clip.numbers) == ("shot", (8, 9, 11, 12))
+    assert [(frame.index, frame.number) for frame in frames] == [(0, 8), (1, 9), (3, 11), (4, 12)]
+    assert [float(frame.image[0, 0, 0]) for frame in frames] == pytest.approx([0.8, 0.9, 1.1, 1.2])
+    assert holes(clip.numbers) == ((9, 1),)
+    assert (frames[0].image.shape, frames[0].image.dtype) == ((ROWS, COLS, 3), np.float32)
+
+
+@pytest.mark.parametrize("ahead", [1, 2, 5])
+def test_chosen_frames_keep_their_place_in_time(shot: Path, ahead: int) -> None:
+    frames = read_frames(open_clip(shot), [12, 9], ahead=ahead)
+    assert [(frame.index, frame.number) for frame in frames] == [(1, 9), (4, 12)]
+
+
+def test_frames_may_lie_beside_the_plan_and_be_numbered_in_any_width(
+    tmp_path: Path, write_plan: Callable[..., None]
+) -> None:
+    write_plan(tmp_path)
+    for name in ("a9.PNG", "a10.png", "a100.png"):
+        write_png(tmp_path / name)
+    assert [file.name for file in open_clip(tmp_path).files] == ["a9.PNG", "a10.png", "a100.png"]
+
+
+def test_images_without_a_number_are_left_aside_and_named(shot: Path) -> None:
+    write_png(shot / "frames" / "shot.mask.png")
+    write_png(shot / "frames" / "._shot.13.png")
+    clip = open_clip(shot)
+    assert len(clip.numbers) == 4
+    assert clip.notes == ("left aside, having no number at the end: shot.mask.png",)
+
+
+def touch(*names: str) -> Callable[[Path], None]:
+    return lambda shot: [write_png(shot / name) for name in names] and None
+
+
+UNCLEAR = {
+    "two kinds": (touch("frames/shot.13.exr"), r"images of two kinds, shot\.8\.png and shot\.13\.exr"),
+    "two sequences": (touch("frames/other.13.png"), r"two sequences, shot\.8\.png and other\.13\.png"),
+    "one number twice": (touch("frames/shot.08.png"), r"shot\.08\.png and shot\.8\.png have the same number"),
+    "two places": (touch("beside.1.png"), r"in the folder \(beside\.1\.png, …\) and in its frames/"),
+    "no plan": (lambda shot: (shot / "plan.toml").unlink(), r"there is no plan\.toml"),
+    "no such clip": (lambda shot: shot.rename(shot.with_name("moved")), "there is no such clip"),
+    "wrong curve": (
+        lambda shot: (shot / "plan.toml").write_text((shot / "plan.toml").read_text().replace('"linear"', '"slog7"')),
+        r"plan\.toml: transfer is 'slog7'.*did you mean",
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", UNCLEAR)
+def test_a_folder_that_is_not_clear_is_refused_with_advice(shot: Path, fault: str) -> None:
+    spoil, message = UNCLEAR[fault]
+    spoil(shot)
+    with pytest.raises(PsvideoError, match=message) as raised:
+        open_clip(shot)
+    assert raised.value.exit_status == 1
+    assert "\n" not in str(raised.value)
+
+
+def test_a_folder_without_frames_says_what_it_holds(tmp_path: Path, write_plan: Callable[..., None]) -> None:
+    write_plan(tmp_path)
+    with pytest.raises(PsvideoError, match=r"holds no images; expected numbered frames such as name\.0001\.png"):
+        open_clip(tmp_path)
+    write_png(tmp_path / "mask.png")
+    with pytest.raises(PsvideoError, match=r"without a number at the end of the name \(mask\.png\)"):
+        open_clip(tmp_path)
+    (tmp_path / "A001.mov").touch()
+    with pytest.raises(PsvideoError, match=r"Name the movie itself: .*A001\.mov"):
+        open_clip(tmp_path)
+    with pytest.raises(PsvideoError, match=r"mask\.png: is neither a folder nor a movie"):
+        open_clip(tmp_path / "mask.png")
+
+
+def test_footage_of_another_size_than_the_plans_is_refused(shot: Path, write_plan: Callable[..., None]) -> None:
+    write_plan(shot, rows=1080, cols=1920)
+    with pytest.raises(PsvideoError, match=r"shot\.8\.png: is 8 x 6 pixels, and .*plan\.toml says 1920 x 1080"):
+        open_clip(shot)
+
+
+def test_a_mosaic_is_given_as_it_is_with_its_filters(tmp_path: Path, write_plan: Callable[..., None]) -> None:
+    write_plan(tmp_path, cfa="GBRG")
+    codes = np.arange(ROWS * COLS, dtype=np.uint16).reshape(ROWS, COLS)
+    (tmp_path / "a.1.png").write_bytes(imagecodecs.png_encode(codes))
+    clip = open_clip(tmp_path)
+    (frame,) = read_frames(clip)
+    assert (clip.cfa, clip.channels, clip.header.channels) == ("GBRG", 3, 1)
+    assert np.allclose(frame.image, codes / 65535)
+
+
+def test_filters_over_colour_pictures_are_refused(shot: Path, write_plan: Callable[..., None]) -> None:
+    write_plan(shot, cfa="RGGB")
+    with pytest.raises(PsvideoError, match=r"is a colour picture, and .*plan\.toml says cfa = 'RGGB'"):
+        open_clip(shot)
+
+
+def cut(file: Path) -> None:
+    file.write_bytes(file.read_bytes()[:-30])
+
+
+BROKEN_LATER = {
+    "missing": (Path.unlink, "is not there any more"),
+    "empty": (lambda file: file.write_bytes(b""), "empty"),
+    "truncated": (cut, "truncated"),
+    "another size": (lambda file: write_png(file, rows=7), r"is 8 x 7 pixels.*first frame, shot\.8\.png, is 8 x 6"),
+    "another depth": (
+        lambda file: write_png(file, dtype=np.uint8),
+        r"8 bits.*first frame, shot\.8\.png, is .* 16 bits",
+    ),
+    "a folder": (lambda file: (file.unlink(), file.mkdir()), "cannot be read"),
+}
+
+
+@pytest.mark.parametrize("fault", BROKEN_LATER)
+def test_a_broken_frame_is_named_after_the_good_ones_before_it(shot: Path, fault: str) -> None:
+    clip = open_clip(shot)
+    spoil, message = BROKEN_LATER[fault]
+    spoil(shot / "frames" / "shot.11.png")
+    seen = []
+    with pytest.raises(PsvideoError, match=rf"shot\.11\.png: .*{message}") as raised:
+        seen.extend(frame.number for frame in read_frames(clip))
+    assert seen == [8, 9]
+    assert "\n" not in str(raised.value)
+    assert not decoding_threads()
+
+
+def test_a_frame_that_the_clip_lacks_is_a_wrong_choice(shot: Path) -> None:
+    with pytest.raises(UsageError, match=r"has no frame number 10; its 4 frames are numbered 8 to 12"):
+        read_frames(open_clip(shot), [9, 10])
+
+
+def decoding_threads() -> list[str]:
+    return [thread.name for thread in threading.enumerate() if thread.name.startswith("decode")]
+
+
+def test_threads_end_when_reading_is_broken_off(shot: Path) -> None:
+    frames = read_frames(open_clip(shot))
+    next(frames)
+    frames.close()  # type: ignore[attr-defined]
+    assert not decoding_threads()
+
+
+def test_no_more_than_the_frames_asked_for_are_decoded_ahead(shot: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from psvideo.clip import reading
+
+    decoded = []
+    decode = reading.decode
+    monkeypatch.setattr(reading, "decode", lambda kind, file: (decoded.append(file.name), decode(kind, file))[1])
+    frames = read_frames(open_clip(shot), ahead=1)
+    assert decoded == []
+    next(frames)
+    assert len(decoded) <= 2
+    rest = list(frames)
+    assert (len(rest), sorted(decoded)) == (3, ["shot.11.png", "shot.12.png", "shot.8.png", "shot.9.png"])
+
+
+@pytest.mark.parametrize(
+    ("text", "numbers"),
+    [("8", (8,)), ("1-100", (8, 9, 11, 12)), ("8-12x2", (8, 12)), ("9,12-20", (9, 12)), ("8-12x1", (8, 9, 11, 12))],
+)
+def test_ranges_choose_among_the_frames_that_are_there(text: str, numbers: tuple[int, ...]) -> None:
+    assert parse_range(text, (8, 9, 11, 12)) == numbers
+
+
+@pytest.mark.parametrize(
+    ("text", "message"), [("", "no frame range"), ("a-b", "no frame range"), ("90-99", "names none")]
+)
+def test_ranges_that_say_nothing_are_wrong_usage(text: str, message: str) -> None:
+    with pytest.raises(UsageError, match=message):
+        parse_range(text, (8, 9))
+
+
+SYNCED = """schema = "psvideo-plan/1"
+[camera]
+width_px = {}
+height_px = {}
+fps = 1
+[strobe]
+mode = "synced"
+"""
+
+
+def synced_plan(file: Path, lights: int, cols: int, rows: int) -> Path:
+    flashes = "".join(f"[[strobe.flash]]\nlights = {{ L{light} = 1.0 }}\n" for light in range(lights))
+    file.write_text(SYNCED.format(cols, rows) + flashes)
+    return file
+
+
+@pytest.mark.parametrize("subject", ["cat", "horse", "gray"])
+def test_still_photographs_one_per_light_are_a_clip(shared_data: Path, tmp_path: Path, subject: str) -> None:
+    plan = synced_plan(tmp_path / "plan.toml", 12, 512, 340)
+    clip = open_clip(shared_data / "uw_psm" / subject, plan=plan)
+    frames = list(read_frames(clip))
+    assert [frame.number for frame in frames] == list(range(12))
+    assert clip.notes == (f"left aside, having no number at the end: {subject}.mask.png",)
+    assert all(frame.image.shape == (340, 512, 3) and 0.01 < frame.image.mean() < 0.5 for frame in frames)
+
+
+def test_sixteen_bit_photographs_come_out_whole(shared_data: Path, tmp_path: Path) -> None:
+    plan = synced_plan(tmp_path / "plan.toml", 48, 160, 160)
+    clip = open_clip(shared_data / "diligent_ball", plan=plan)
+    frames = list(read_frames(clip))
+    assert [frame.number for frame in frames] == list(range(1, 96, 2))
+    codes: NDArray[np.uint16] = imagecodecs.imread(str(shared_data / "diligent_ball" / "095.png"))
+    assert np.array_equal(np.rint(frames[-1].image * 65535), codes)
+
+
+@pytest.mark.parametrize(("name", "count"), [("plain", 24), ("ambient", 36)])
+def test_another_simulators_clips_are_clips(shared_data: Path, name: str, count: int) -> None:
+    clip = open_clip(shared_data / "clips" / name)
+    images = np.stack([frame.image for frame in read_frames(clip)])
+    assert images.shape == (count, 180, 320, 3)
+    assert clip.colour == "lin_rec709_scene"
+    assert -0.01 < images.min() < 0.01
+    assert 0.5 < images.max() <= 1.0
+
+
+def test_a_headerless_mosaic_is_a_clip_once_it_is_a_tiff(
+    shared_data: Path, tmp_path: Path, write_plan: Callable[..., None]
+) -> None:
+    import tifffile
+
+    codes = np.fromfile(shared_data / "raw" / "DSC_1339_768x512_rggb.raw", "<u2").reshape(512, 768)
+    write_plan(tmp_path, rows=512, cols=768, black_level=600, white_level=15520, cfa="RGGB")
+    tifffile.imwrite(tmp_path / "rose.0001.tif", codes)
+    (frame,) = read_frames(open_clip(tmp_path))
+    assert np.allclose(frame.image, (codes - 600.0) / 14920, atol=1e-6)
+
+
+def test_a_cameras_dng_is_a_clip(shared_data: Path, tmp_path: Path, write_plan: Callable[..., None]) -> None:
+    (tmp_path / "shot.0001.dng").symlink_to(shared_data / "raw" / "colorchart.dng")
+    write_plan(tmp_path, rows=1156, cols=1734, transfer="slog3")
+    clip = open_clip(tmp_path)
+    (frame,) = read_frames(clip)
+    assert (clip.cfa, clip.channels, clip.colour, frame.image.shape) == ("RGGB", 3, "unknown", (1156, 1734))
+    assert "DNG files hold linear light" in clip.notes[0]

@@ -1,0 +1,292 @@
+"""Movies: depth, matrix and range against BT.709's own arithmetic; timestamps, holes, seeking, damage."""
+
+import dataclasses
+from collections.abc import Callable, Iterable
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from psvideo.camera import Encoding
+from psvideo.clip import open_clip, read_frames
+from psvideo.clip.yuv import CODES, HIGHEST, LOWEST, to_rgb
+from psvideo.errors import PsvideoError
+from psvideo.plan import Plan
+from psvideo.planfile import format_plan
+
+RATE = Fraction(120000, 1001)
+BT709, BT601, BT2020 = (0.2126, 0.0722), (0.299, 0.114), (0.2627, 0.0593)
+MATRIX_TAGS = {BT709: 1, BT601: 6, BT2020: 9}
+
+
+def codes_of(rgb: NDArray[np.float64], weights: tuple[float, float], bits: int, video: bool) -> NDArray[np.float64]:
+    """Return Y', Cb, Cr codes of R'G'B' signals, from the definitions in BT.709, sections 3 and 4."""
+    red, green, blue = np.moveaxis(np.asarray(rgb, np.float64), -1, 0)
+    luma = weights[0] * red + (1 - sum(weights)) * green + weights[1] * blue
+    difference = [(blue - luma) / (2 - 2 * weights[1]), (red - luma) / (2 - 2 * weights[0])]
+    scale = 2.0 ** (bits - 8)
+    if video:
+        return np.stack([(219 * luma + 16) * scale, *((224 * part + 128) * scale for part in difference)], axis=-1)
+    largest = 2.0**bits - 1
+    return np.stack([luma * largest, *(part * largest + 2.0 ** (bits - 1) for part in difference)], axis=-1)
+
+
+def make_frame(planes: Iterable[NDArray[Any]], pix_fmt: str) -> av.VideoFrame:
+    planes = list(planes)
+    frame = av.VideoFrame(planes[0].shape[1], planes[0].shape[0], pix_fmt)
+    for target, plane in zip(frame.planes, planes, strict=True):
+        padded = np.zeros((target.height, target.line_size // plane.itemsize), plane.dtype)
+        padded[: plane.shape[0], : plane.shape[1]] = plane
+        target.update(padded)
+    return frame
+
+
+def write_movie(
+    path: Path,
+    frames: Iterable[av.VideoFrame],
+    *,
+    codec: str = "ffv1",
+    places: Iterable[int] | None = None,
+    matrix: int = 2,
+    color_range: int = 0,
+    options: dict[str, str] | None = None,
+    movflags: str = "",
+) -> None:
+    frames = list(frames)
+    with av.open(str(path), "w", options={"movflags": movflags} if movflags else {}) as container:
+        stream = container.add_stream(codec, rate=RATE, options=options or {})
+        stream.width, stream.height, stream.pix_fmt = frames[0].width, frames[0].height, frames[0].format.name
+        stream.codec_context.colorspace, stream.codec_context.color_range = matrix, color_range
+        stream.codec_context.time_base = 1 / RATE
+        for place, frame in zip(places or range(len(frames)), frames, strict=True):
+            frame.pts, frame.time_base = place, 1 / RATE
+            frame.colorspace, frame.color_range = matrix, color_range
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode(None))
+
+
+@pytest.fixture
+def plan_for(tmp_path: Path, make_plan: Callable[..., Plan]) -> Callable[..., Path]:
+    def write(*, rows: int, cols: int, fps: Fraction = RATE, **encoding: Any) -> Path:
+        plan = make_plan(width_px=cols, height_px=rows, fps=fps)
+        camera = dataclasses.replace(plan.camera, encoding=Encoding(**encoding))
+        (tmp_path / "plan.toml").write_text(format_plan(dataclasses.replace(plan, camera=camera)))
+        return tmp_path / "plan.toml"
+
+    return write
+
+
+def grey_ramp(count: int, *, rows: int = 32, cols: int = 48) -> list[av.VideoFrame]:
+    """Frames whose luma tells their place: code 40 + 8 * place in all pixels."""
+    chroma = np.full((rows // 2, cols // 2), 128, np.uint8)
+    return [
+        make_frame([np.full((rows, cols), 40 + 8 * place, np.uint8), chroma, chroma], "yuv420p")
+        for place in range(count)
+    ]
+
+
+@pytest.mark.parametrize("weights", [BT709, BT601, BT2020], ids=["709", "601", "2020"])
+@pytest.mark.parametrize("video", [True, False])
+@pytest.mark.parametrize("bits", [8, 10, 12, 16])
+def test_matrix_and_range_invert_the_standards_definitions(
+    weights: tuple[float, float], video: bool, bits: int
+) -> None:
+    rgb = np.random.default_rng(1).uniform(0, 1, (20, 30, 3))
+    dtype = np.uint8 if bits == 8 else np.uint16
+    luma, blue, red = np.moveaxis(np.rint(codes_of(rgb, weights, bits, video)), -1, 0).astype(dtype)
+    codes = to_rgb(luma, blue, red, bits=bits, matrix=MATRIX_TAGS[weights], video_range=video)
+    signal = LOWEST + codes.astype(np.float64) * (HIGHEST - LOWEST) / CODES
+    assert np.abs(signal - rgb).max() < 2.5 / 2**bits + 2e-5
+
+
+def test_noise_below_black_and_highlights_above_white_are_kept() -> None:
+    luma = np.array([[4, 16, 235, 254]], np.uint8)
+    chroma = np.full((1, 4), 128, np.uint8)
+    codes = to_rgb(luma, chroma, chroma, bits=8, matrix=1, video_range=True)[..., 1]
+    signal = LOWEST + codes[0] * (HIGHEST - LOWEST) / CODES
+    assert signal.tolist() == pytest.approx([-12 / 219, 0, 1, 238 / 219], abs=3e-5)
+
+
+def test_chroma_is_interpolated_where_it_stands() -> None:
+    """A colour difference that grows evenly over the picture does so after interpolation, to the inner pixels."""
+    rows, cols = 16, 24
+    luma = np.full((rows, cols), 500, np.uint16)
+    ramp = 400 + 4 * np.arange(cols)[None, :] + 6 * np.arange(rows)[:, None]
+    flat = np.full((rows // 2, cols // 2), 512, np.uint16)
+    halved = ramp[:, ::2].reshape(rows // 2, 2, cols // 2).mean(axis=1).astype(np.uint16)
+    subsampled = to_rgb(luma, halved, flat, bits=10, matrix=1, video_range=False)
+    full = to_rgb(
+        luma, ramp.astype(np.uint16), np.full((rows, cols), 512, np.uint16), bits=10, matrix=1, video_range=False
+    )
+    difference = np.abs(subsampled.astype(int) - full)[1:-1, :-1]
+    assert difference.max() <= 3
+
+
+@pytest.mark.parametrize(
+    ("pix_fmt", "bits", "down", "across"),
+    [
+        ("yuv444p", 8, 1, 1),
+        ("yuv420p10le", 10, 2, 2),
+        ("yuv422p10le", 10, 1, 2),
+        ("yuv444p12le", 12, 1, 1),
+        ("yuv444p16le", 16, 1, 1),
+    ],
+)
+def test_yuv_movies_keep_their_depth(
+    tmp_path: Path, plan_for: Callable[..., Path], pix_fmt: str, bits: int, down: int, across: int
+) -> None:
+    """One saturated colour, coded by the standard's arithmetic, comes back to the precision of its depth."""
+    colour = np.array([0.7, 0.3, 0.15])
+    y, cb, cr = np.rint(codes_of(colour, BT709, bits, True)).astype(np.uint8 if bits == 8 else np.uint16)
+    chroma_size = (32 // down, 48 // across)
+    write_movie(
+        tmp_path / "x.mkv",
+        [make_frame([np.full((32, 48), y), np.full(chroma_size, cb), np.full(chroma_size, cr)], pix_fmt)] * 2,
+        matrix=1,
+        color_range=1,
+    )
+    clip = open_clip(tmp_path / "x.mkv", plan=plan_for(rows=32, cols=48))
+    frame = next(iter(read_frames(clip)))
+    assert clip.notes == ()
+    assert np.abs(frame.image - colour).max() < 1.5 / 2**bits + 3e-5
+
+
+@pytest.mark.parametrize(("pix_fmt", "bits"), [("gray", 8), ("gray10le", 10), ("gray12le", 12), ("gray16le", 16)])
+def test_grey_movies_come_out_with_every_bit(
+    tmp_path: Path, plan_for: Callable[..., Path], pix_fmt: str, bits: int
+) -> None:
+    codes = np.random.default_rng(2).integers(0, 2**bits, (32, 48)).astype(np.uint8 if bits == 8 else np.uint16)
+    write_movie(tmp_path / "x.mkv", [make_frame([codes], pix_fmt)])
+    clip = open_clip(tmp_path / "x.mkv", plan=plan_for(rows=32, cols=48))
+    (frame,) = read_frames(clip)
+    assert np.array_equal(np.rint(frame.image * (2**bits - 1)), codes)
+
+
+@pytest.mark.parametrize(("pix_fmt", "bits"), [("gbrp10le", 10), ("gbrp12le", 12), ("gbrp16le", 16)])
+def test_rgb_movies_come_out_with_every_bit_in_the_right_channel(
+    tmp_path: Path, plan_for: Callable[..., Path], pix_fmt: str, bits: int
+) -> None:
+    codes = np.random.default_rng(2).integers(0, 2**bits, (32, 48, 3)).astype(np.uint8 if bits == 8 else np.uint16)
+    write_movie(tmp_path / "x.mkv", [make_frame([codes[..., 1], codes[..., 2], codes[..., 0]], pix_fmt)])
+    clip = open_clip(tmp_path / "x.mkv", plan=plan_for(rows=32, cols=48))
+    (frame,) = read_frames(clip)
+    assert np.array_equal(np.rint(frame.image * (2**bits - 1)), codes)
+
+
+@pytest.mark.parametrize(
+    ("name", "codec", "options"),
+    [
+        ("x.mp4", "libx264", {"bf": "3", "qp": "0"}),
+        ("x.mov", "libx264", {"bf": "0", "qp": "0"}),
+        ("x.mkv", "libx264", {"bf": "2", "qp": "0"}),
+        ("x.mkv", "ffv1", {}),
+    ],
+)
+def test_frames_come_in_the_order_of_time_and_are_found_by_number(
+    tmp_path: Path, plan_for: Callable[..., Path], name: str, codec: str, options: dict[str, str]
+) -> None:
+    write_movie(tmp_path / name, grey_ramp(24), codec=codec, options=options | {"g": "6"})
+    clip = open_clip(tmp_path / name, plan=plan_for(rows=32, cols=48))
+    assert clip.numbers == tuple(range(24))
+    for wanted in (clip.numbers, (0,), (7, 13), (22, 23)):
+        frames = list(read_frames(clip, wanted))
+        assert [frame.index for frame in frames] == list(wanted)
+        places = [round((float(frame.image[16, 24, 1]) * 219 + 16 - 40) / 8, 1) for frame in frames]
+        assert places == pytest.approx(list(wanted), abs=0.2)
+
+
+@pytest.mark.parametrize("name", ["x.mp4", "x.mkv", "x.mov"])
+def test_gaps_in_the_timestamps_are_dropped_frames(tmp_path: Path, plan_for: Callable[..., Path], name: str) -> None:
+    places = [0, 1, 2, 3, 5, 6, 9, 10, 11, 12]
+    codec = "ffv1" if name.endswith("mkv") else "libx264"
+    write_movie(tmp_path / name, grey_ramp(10), codec=codec, places=places)
+    clip = open_clip(tmp_path / name, plan=plan_for(rows=32, cols=48))
+    assert clip.numbers == tuple(places)
+    assert [frame.index for frame in read_frames(clip)] == places
+
+
+def test_uneven_timestamps_are_refused(tmp_path: Path, plan_for: Callable[..., Path]) -> None:
+    with av.open(str(tmp_path / "x.mp4"), "w") as container:
+        stream = container.add_stream("libx264", rate=120)
+        stream.width, stream.height, stream.pix_fmt = 48, 32, "yuv420p"
+        stream.codec_context.time_base = Fraction(1, 1200)
+        for place, frame in enumerate(grey_ramp(12)):
+            frame.pts, frame.time_base = 10 * place + (4 if place % 3 == 1 else 0), Fraction(1, 1200)
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode(None))
+    with pytest.raises(PsvideoError, match=r"x\.mp4: its frames do not come at an even rate"):
+        open_clip(tmp_path / "x.mp4", plan=plan_for(rows=32, cols=48))
+
+
+def test_untagged_matrix_is_guessed_from_the_height_and_said(tmp_path: Path, plan_for: Callable[..., Path]) -> None:
+    colour = np.array([0.7, 0.3, 0.15])
+    for rows, weights, name in ((32, BT601, "BT.601"), (720, BT709, "BT.709")):
+        y, cb, cr = np.rint(codes_of(colour, weights, 8, True)).astype(np.uint8)
+        write_movie(tmp_path / "x.mkv", [make_frame([np.full((rows, 48), c) for c in (y, cb, cr)], "yuv444p")] * 2)
+        clip = open_clip(tmp_path / "x.mkv", plan=plan_for(rows=rows, cols=48))
+        assert any(name in note for note in clip.notes)
+        assert np.abs(next(iter(read_frames(clip))).image - colour).max() < 1.5 / 256
+
+
+def test_a_movie_that_plays_at_another_rate_is_read_with_a_note(tmp_path: Path, plan_for: Callable[..., Path]) -> None:
+    write_movie(tmp_path / "x.mp4", grey_ramp(6), codec="libx264", matrix=1)
+    assert open_clip(tmp_path / "x.mp4", plan=plan_for(rows=32, cols=48)).notes == ()
+    misnamed = open_clip(tmp_path / "x.mp4", plan=plan_for(rows=32, cols=48, fps=Fraction(120)))
+    assert "plays at 119.88 frames per second and the plan says 120" in misnamed.notes[0]
+
+
+@pytest.mark.parametrize(("black", "white"), [(None, None), (16, 235)])
+def test_levels_at_the_ends_of_video_range_mean_what_leaving_them_out_means(
+    tmp_path: Path, plan_for: Callable[..., Path], black: float | None, white: float | None
+) -> None:
+    write_movie(tmp_path / "x.mkv", grey_ramp(2), matrix=1, color_range=1)
+    clip = open_clip(tmp_path / "x.mkv", plan=plan_for(rows=32, cols=48, black_level=black, white_level=white))
+    assert next(iter(read_frames(clip))).image[0, 0, 0] == pytest.approx((40 - 16) / 219, abs=5e-5)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.6, 0.95])
+@pytest.mark.parametrize(
+    ("name", "codec", "movflags"),
+    [
+        ("x.mkv", "ffv1", ""),
+        ("x.mp4", "libx264", ""),
+        ("x.mp4", "libx264", "faststart"),
+        ("x.mov", "prores_ks", "faststart"),
+    ],
+)
+def test_truncated_movies_are_refused_by_name(
+    tmp_path: Path, plan_for: Callable[..., Path], name: str, codec: str, movflags: str, share: float
+) -> None:
+    noise = np.random.default_rng(0).integers(200, 800, (20, 32, 48)).astype(np.uint16)
+    depth = "yuv422p10le" if codec == "prores_ks" else "yuv420p"
+    frames = [
+        make_frame([luma, luma[:, ::2], luma[:, ::2]], depth)
+        if depth == "yuv422p10le"
+        else make_frame([(p >> 2).astype(np.uint8) for p in (luma, luma[::2, ::2], luma[::2, ::2])], depth)
+        for luma in noise
+    ]
+    write_movie(tmp_path / name, frames, codec=codec, movflags=movflags)
+    plan = plan_for(rows=32, cols=48)
+    data = (tmp_path / name).read_bytes()
+    (tmp_path / name).write_bytes(data[: int(len(data) * share)])
+    with pytest.raises(PsvideoError, match=rf"{name}.*(truncated|holds)"):
+        list(read_frames(open_clip(tmp_path / name, plan=plan)))
+
+
+def test_damage_in_the_middle_of_a_movie_stops_there(tmp_path: Path, plan_for: Callable[..., Path]) -> None:
+    noise = np.random.default_rng(0).integers(0, 255, (12, 32, 48)).astype(np.uint8)
+    frames = [make_frame([luma, luma[::2, ::2], luma[::2, ::2]], "yuv420p") for luma in noise]
+    write_movie(tmp_path / "x.mp4", frames, codec="libx264", options={"qp": "5", "g": "1"})
+    data = bytearray((tmp_path / "x.mp4").read_bytes())
+    middle = len(data) // 2
+    data[middle : middle + 300] = bytes(byte ^ 0x5A for byte in data[middle : middle + 300])
+    (tmp_path / "x.mp4").write_bytes(data)
+    clip = open_clip(tmp_path / "x.mp4", plan=plan_for(rows=32, cols=48))
+    seen = []
+    with pytest.raises(PsvideoError, match=r"x\.mp4: .*(truncated|damaged)"):
+        seen.extend(frame.index for frame in read_frames(clip))
+    assert len(seen) < 12

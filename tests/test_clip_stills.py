@@ -1,0 +1,263 @@
+"""Still pictures: every kind comes out with the very values that went in, and damaged files are refused by name."""
+
+import struct
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import imagecodecs
+import numpy as np
+import OpenEXR
+import pytest
+import tifffile
+from numpy.typing import NDArray
+
+from psvideo.clip.decoders import decode, read_header
+from psvideo.errors import PsvideoError
+
+Write = Callable[[Path, NDArray], None]  # type: ignore[type-arg]
+RNG = np.random.default_rng(7)
+
+
+def random(bits: int, channels: int, *, rows: int = 11, cols: int = 17) -> NDArray:  # type: ignore[type-arg]
+    shape = (rows, cols) if channels == 1 else (rows, cols, channels)
+    return RNG.integers(0, 2**bits, shape).astype(np.uint8 if bits == 8 else np.uint16)
+
+
+def write_png(path: Path, codes: NDArray) -> None:  # type: ignore[type-arg]
+    swapped = codes if codes.ndim == 2 else codes[..., [2, 1, 0, 3][: codes.shape[2]]]
+    path.write_bytes(cv2.imencode(".png", swapped)[1].tobytes())
+
+
+def write_tiff(**options: object) -> Write:
+    def write(path: Path, codes: NDArray) -> None:  # type: ignore[type-arg]
+        planar = options.get("planarconfig") == "separate"
+        stored = np.moveaxis(codes, -1, 0) if planar else codes
+        tifffile.imwrite(path, stored, photometric="rgb" if codes.ndim == 3 else "minisblack", **options)
+
+    return write
+
+
+def write_exr(path: Path, codes: NDArray, names: str = "RGB", layer: str = "") -> None:  # type: ignore[type-arg]
+    channels = {f"{layer}{name}": np.ascontiguousarray(codes[..., place]) for place, name in enumerate(names)}
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    OpenEXR.File(header, channels if codes.ndim == 3 else {f"{layer}Y": codes}).write(str(path))
+
+
+def write_dpx(bits: int, *, order: str = ">", packing: int = 1) -> Write:
+    """Pack a DPX file byte by byte, as SMPTE 268M lays it out."""
+
+    def write(path: Path, codes: NDArray) -> None:  # type: ignore[type-arg]
+        rows, cols = codes.shape[:2]
+        head = bytearray(b"\xff" * 2048)
+        head[:4] = b"SDPX" if order == ">" else b"XPDS"
+        struct.pack_into(order + "I", head, 4, 2048)
+        head[8:16] = b"V1.0\0\0\0\0"
+        struct.pack_into(order + "HHII", head, 768, 0, 1, cols, rows)
+        head[800:804] = bytes([50 if codes.ndim == 3 else 6, 2, 2, bits])
+        struct.pack_into(order + "HHIII", head, 804, 0 if bits in (8, 16) else packing, 0, 2048, 0, 0)
+        struct.pack_into(order + "I", head, 1920, 0x01020304)
+        path.write_bytes(bytes(head) + _dpx_data(codes.reshape(rows, -1).astype(np.uint32), bits, order, packing))
+
+    return write
+
+
+def _dpx_data(samples: NDArray, bits: int, order: str, packing: int) -> bytes:  # type: ignore[type-arg]
+    if bits == 8:
+        return samples.astype("u1").tobytes()
+    if bits in (12, 16):
+        return (samples << (4 if bits == 12 and packing == 1 else 0)).astype(order + "u2").tobytes()
+    padded = np.pad(samples, ((0, 0), (0, -samples.shape[1] % 3))).reshape(len(samples), -1, 3)
+    words = padded[..., 0] << 20 | padded[..., 1] << 10 | padded[..., 2]
+    return (words << (2 if packing == 1 else 0)).astype(order + "u4").tobytes()
+
+
+EXACT = [
+    pytest.param("png", 8, 3, write_png, id="png-8-rgb"),
+    pytest.param("png", 16, 3, write_png, id="png-16-rgb"),
+    pytest.param("png", 8, 1, write_png, id="png-8-grey"),
+    pytest.param("png", 16, 1, write_png, id="png-16-grey"),
+    *(
+        pytest.param("tiff", bits, channels, write_tiff(**options), id=f"tiff-{bits}-{channels}-{name}")
+        for name, options in {
+            "plain": {},
+            "strips": {"rowsperstrip": 4},
+            "tiles": {"tile": (16, 16)},
+            "zip": {"compression": "zlib", "predictor": True},
+            "lzw": {"compression": "lzw"},
+            "planes": {"planarconfig": "separate"},
+            "big-endian": {"byteorder": ">"},
+        }.items()
+        for bits in (8, 16)
+        for channels in (1, 3)
+        if (name, channels) != ("planes", 1)
+    ),
+    *(
+        pytest.param(
+            "dpx",
+            bits,
+            channels,
+            write_dpx(bits, order=order, packing=packing),
+            id=f"dpx-{bits}-{channels}-{order}{packing}",
+        )
+        for bits in (8, 10, 12, 16)
+        for channels in (1, 3)
+        for order in "><"
+        for packing in (1, 2)
+        if (bits, channels) != (10, 1)  # FFmpeg fills words of one channel from the low end; held to that below
+    ),
+]
+
+
+@pytest.mark.parametrize(("kind", "bits", "channels", "write"), EXACT)
+def test_integer_pictures_come_out_with_every_bit(
+    tmp_path: Path, kind: str, bits: int, channels: int, write: Write
+) -> None:
+    codes = random(bits, channels)
+    file = tmp_path / "x.0001"
+    write(file.with_suffix(".img"), codes)
+    picture = decode(kind, file.with_suffix(".img"))
+    assert np.array_equal(picture.codes, codes)
+    head = picture.header
+    assert (head.width_px, head.height_px, head.channels, head.bits) == (17, 11, channels, bits)
+    assert read_header(kind, file.with_suffix(".img")) == head
+
+
+@pytest.mark.parametrize("kind", ["exr", "tiff"])
+@pytest.mark.parametrize("dtype", [np.float16, np.float32])
+@pytest.mark.parametrize("channels", [1, 3])
+def test_floating_point_pictures_come_out_as_they_are(tmp_path: Path, kind: str, dtype: type, channels: int) -> None:
+    codes = (random(16, channels) / 9000 - 0.1).astype(dtype)
+    (write_exr if kind == "exr" else write_tiff())(tmp_path / "x.1", codes)
+    picture = decode(kind, tmp_path / "x.1")
+    assert np.array_equal(picture.codes, codes)
+    assert picture.header.bits is None
+    assert read_header(kind, tmp_path / "x.1") == picture.header
+
+
+def test_exr_channels_are_found_in_a_layer_and_beside_alpha(tmp_path: Path) -> None:
+    codes = (random(16, 4) / 65535).astype(np.float32)
+    write_exr(tmp_path / "layer.exr", codes[..., :3], layer="beauty.")
+    assert np.array_equal(decode("exr", tmp_path / "layer.exr").codes, codes[..., :3])
+    write_exr(tmp_path / "alpha.exr", codes, names="RGBA")
+    alpha = decode("exr", tmp_path / "alpha.exr")
+    assert np.array_equal(alpha.codes, codes[..., :3])
+    assert alpha.header.notes == ("the EXR files' alpha channel is left out",)
+
+
+def test_exr_of_several_layers_or_none_is_refused(tmp_path: Path) -> None:
+    planes = {name: np.zeros((4, 5), np.float32) for name in ("a.Y", "b.Y")}
+    OpenEXR.File({}, planes).write(str(tmp_path / "two.exr"))
+    with pytest.raises(PsvideoError, match=r"two\.exr: holds more than one layer \(channels a\.Y, b\.Y\)"):
+        decode("exr", tmp_path / "two.exr")
+    OpenEXR.File({}, {"Z": planes["a.Y"]}).write(str(tmp_path / "depth.exr"))
+    with pytest.raises(PsvideoError, match="neither Y nor R, G, B"):
+        read_header("exr", tmp_path / "depth.exr")
+
+
+def test_exr_data_window_is_put_in_its_place_in_the_display_window(tmp_path: Path) -> None:
+    codes = np.arange(1, 7, dtype=np.float32).reshape(2, 3)
+    windows = {
+        "displayWindow": (np.array([10, 20], np.int32), np.array([15, 24], np.int32)),
+        "dataWindow": (np.array([11, 22], np.int32), np.array([13, 23], np.int32)),
+    }
+    OpenEXR.File({"type": OpenEXR.scanlineimage, **windows}, {"Y": codes}).write(str(tmp_path / "x.exr"))
+    expected = np.zeros((5, 6), np.float32)
+    expected[2:4, 1:4] = codes
+    assert np.array_equal(decode("exr", tmp_path / "x.exr").codes, expected)
+
+
+def test_png_alpha_is_left_out_with_a_note(tmp_path: Path) -> None:
+    codes = random(16, 4)
+    write_png(tmp_path / "x.png", codes)
+    picture = decode("png", tmp_path / "x.png")
+    assert np.array_equal(picture.codes, codes[..., :3])
+    assert picture.header.notes == ("the PNG files' alpha channel is left out",)
+
+
+def test_dpx_grey_of_ten_bits_is_filled_from_the_low_end(tmp_path: Path) -> None:
+    codes = random(10, 1, cols=18)
+    write_dpx(10)(tmp_path / "x.dpx", codes.reshape(11, 6, 3)[..., ::-1].reshape(11, 18))
+    assert np.array_equal(decode("dpx", tmp_path / "x.dpx").codes, codes)
+
+
+def test_dpx_tells_its_time_code(tmp_path: Path) -> None:
+    write_dpx(16)(tmp_path / "x.dpx", random(16, 3))
+    assert read_header("dpx", tmp_path / "x.dpx").time_code == "01:02:03:04"
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+def test_jpeg_is_read_with_a_warning(tmp_path: Path, channels: int) -> None:
+    smooth = np.tile(np.linspace(0, 250, 64).astype(np.uint8), (48, 1))
+    codes = smooth if channels == 1 else np.stack([smooth, smooth[:, ::-1], smooth // 2], axis=-1)
+    (tmp_path / "x.jpg").write_bytes(
+        imagecodecs.jpeg8_encode(codes, level=98, subsampling="444" if channels == 3 else None)
+    )
+    picture = decode("jpeg", tmp_path / "x.jpg")
+    assert np.abs(picture.codes.astype(int) - codes).max() <= 4
+    assert picture.header == read_header("jpeg", tmp_path / "x.jpg")
+    assert "lossy" in picture.header.notes[0]
+
+
+def write_jpeg(path: Path, codes: NDArray) -> None:  # type: ignore[type-arg]
+    path.write_bytes(imagecodecs.jpeg8_encode((codes >> 8).astype(np.uint8)))
+
+
+DAMAGED = {
+    "png": write_png,
+    "tiff": write_tiff(),
+    "tiff-zip": write_tiff(compression="zlib"),
+    "tiff-strips": write_tiff(rowsperstrip=3),
+    "exr": lambda path, codes: write_exr(path, codes.astype(np.float32)),
+    "dpx": write_dpx(16),
+    "jpeg": write_jpeg,
+}
+
+
+@pytest.mark.parametrize("kept", ["nothing", "a few bytes", "half", "all but the end"])
+@pytest.mark.parametrize("name", DAMAGED)
+def test_truncated_pictures_are_refused_by_name(tmp_path: Path, name: str, kept: str) -> None:
+    file = tmp_path / "shot.0007.img"
+    DAMAGED[name](file, random(16, 3, rows=60, cols=50))
+    whole = file.read_bytes()
+    size = {"nothing": 0, "a few bytes": 20, "half": len(whole) // 2, "all but the end": len(whole) - 60}[kept]
+    file.write_bytes(whole[:size])
+    with pytest.raises(PsvideoError, match=r"shot\.0007\.img: .*(empty|truncated|begin like)") as raised:
+        decode(name.split("-")[0], file)
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize("name", ["png", "exr", "tiff-zip"])
+def test_damage_inside_a_picture_is_refused_where_the_kind_can_tell(tmp_path: Path, name: str) -> None:
+    file = tmp_path / "shot.0007.img"
+    DAMAGED[name](file, (np.add.outer(np.arange(60), np.arange(50))[..., None] * [300, 200, 100]).astype(np.uint16))
+    data = bytearray(file.read_bytes())
+    middle = len(data) // 2
+    data[middle : middle + 40] = bytes(byte ^ 0x5A for byte in data[middle : middle + 40])
+    file.write_bytes(data)
+    with pytest.raises(PsvideoError, match=r"shot\.0007\.img"):
+        decode(name.split("-")[0], file)
+
+
+def test_a_strip_of_no_bytes_is_not_taken_for_black(tmp_path: Path) -> None:
+    write_tiff(rowsperstrip=5)(tmp_path / "x.tif", random(16, 1, rows=20))
+    with tifffile.TiffFile(tmp_path / "x.tif", mode="r+") as file:
+        counts = file.pages[0].tags["StripByteCounts"]
+        counts.overwrite([*counts.value[:2], 0, counts.value[3]])
+    with pytest.raises(PsvideoError, match="1 of its 4 strips"):
+        decode("tiff", tmp_path / "x.tif")
+
+
+def test_kinds_of_content_that_are_not_read_say_what_is(tmp_path: Path) -> None:
+    tifffile.imwrite(tmp_path / "deep.tif", np.zeros((4, 4), np.uint32))
+    with pytest.raises(PsvideoError, match="samples of 32 bits"):
+        decode("tiff", tmp_path / "deep.tif")
+    tifffile.imwrite(tmp_path / "stack.tif", np.zeros((3, 8, 8), np.uint16), photometric="minisblack")
+    with pytest.raises(PsvideoError, match="holds 3 pictures"):
+        decode("tiff", tmp_path / "stack.tif")
+    tifffile.imwrite(tmp_path / "white.tif", np.zeros((8, 8), np.uint16), photometric="miniswhite")
+    with pytest.raises(PsvideoError, match="MINISWHITE"):
+        decode("tiff", tmp_path / "white.tif")
+    (tmp_path / "x.png").write_bytes(imagecodecs.jpeg8_encode(np.zeros((8, 8), np.uint8)))
+    with pytest.raises(PsvideoError, match="does not begin like a PNG"):
+        decode("png", tmp_path / "x.png")
