@@ -8,8 +8,10 @@ without building the (flash, frame, row) array; a test holds the two together.
 """
 
 import os
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numba as nb
 import numpy as np
@@ -50,6 +52,30 @@ class Profiles:
         )
 
 
+class _Rows(NamedTuple):
+    """Profiles as compiled code takes them."""
+
+    value: FloatArray
+    frame_start_s: FloatArray
+    row_offset_s: FloatArray
+    exposure_s: float
+    bounds: IntArray
+
+
+class _Flashes(NamedTuple):
+    """A train of flashes as compiled code takes it; ``unknowns`` counts the ambient light too."""
+
+    start_s: FloatArray
+    duration_s: FloatArray
+    unknown: IntArray
+    unknowns: int
+
+
+def _rows(profiles: Profiles) -> _Rows:
+    bounds = np.append(profiles.window_start, len(profiles.value))
+    return _Rows(profiles.value, profiles.frame_start_s, profiles.row_offset_s, profiles.exposure_s, bounds)
+
+
 def residuals(
     profiles: Profiles, start_s: FloatArray, duration_s: FloatArray, unknown: IntArray, weight: FloatArray
 ) -> FloatArray:
@@ -58,35 +84,52 @@ def residuals(
     ``unknown`` is the number (from 1) of each flash's brightness, 0 for a dark slot. ``weight`` (frame, row) is the
     trust in each sample while brightnesses are fitted; the residuals themselves come unweighted.
     """
-    unknowns = int(unknown.max(initial=0)) + 1
-    bounds = np.append(profiles.window_start, len(profiles.value))
+    rows = _rows(profiles)
+    flashes = _Flashes(start_s, duration_s, unknown, int(unknown.max(initial=0)) + 1)
     rest = np.empty_like(profiles.value)
-
-    def fit(first: int, last: int) -> None:
-        _residuals(
-            profiles.value,
-            profiles.frame_start_s,
-            profiles.row_offset_s,
-            profiles.exposure_s,
-            bounds,
-            start_s,
-            duration_s,
-            unknown,
-            unknowns,
-            weight,
-            first,
-            last,
-            rest,
-        )
-
-    rows = profiles.value.shape[1]
-    if profiles.value.size < WORTH_THREADS:
-        fit(0, rows)
-    else:
-        edges = np.linspace(0, rows, THREADS + 1).astype(int).tolist()
-        with ThreadPoolExecutor(THREADS) as pool:
-            list(pool.map(fit, edges[:-1], edges[1:]))
+    _share(
+        lambda first, last: _residuals(rows, flashes, weight, first, last, rest),
+        profiles.value.shape[1],
+        work=profiles.value.size,
+    )
     return rest
+
+
+def losses(
+    profiles: Profiles,
+    start_s: FloatArray,
+    duration_s: FloatArray,
+    unknown: IntArray,
+    *,
+    phase_s: FloatArray,
+    rate: FloatArray,
+    spread: FloatArray,
+    steepness: float,
+) -> FloatArray:
+    """Return how badly each of many clocks explains the profiles, shape (clock,).
+
+    The train is given in strobe seconds; clock c turns it into ``phase_s[c] + rate[c] * start_s``. The loss is the sum
+    of ``log(1 + steepness * r^2)``, r being a residual over its row's ``spread`` (row,).
+    """
+    rows = _rows(profiles)
+    flashes = _Flashes(start_s, duration_s, unknown, int(unknown.max(initial=0)) + 1)
+    found = np.empty(len(phase_s))
+    _share(
+        lambda first, last: _losses(rows, flashes, phase_s, rate, spread, steepness, first, last, found),
+        len(phase_s),
+        work=len(phase_s) * profiles.value.size,
+    )
+    return found
+
+
+def _share(run: Callable[[int, int], None], count: int, *, work: int) -> None:
+    """Share ``count`` rows or clocks between threads (numba's own may not be nested), if that is worth the start."""
+    if work < WORTH_THREADS:
+        run(0, count)
+        return
+    edges = np.linspace(0, count, THREADS + 1).astype(int).tolist()
+    with ThreadPoolExecutor(THREADS) as pool:
+        list(pool.map(run, edges[:-1], edges[1:]))
 
 
 @nb.njit(cache=True, nogil=True)
@@ -128,42 +171,50 @@ def _solve_spd(matrix, right, size):  # type: ignore[no-untyped-def]
 
 
 @nb.njit(cache=True, nogil=True)
-def _residuals(  # type: ignore[no-untyped-def]
-    value,
-    frame_start_s,
-    row_offset_s,
-    exposure_s,
-    bounds,
-    start_s,
-    duration_s,
-    unknown,
-    unknowns,
-    weight,
-    first,
-    last,
-    rest,
-):
-    """Fill rows ``first`` to ``last - 1`` of ``rest``; threads share the rows (numba's own may not be nested)."""
-    frames = value.shape[0]
-    design = np.empty((frames, unknowns))
+def _row_residuals(rows, flashes, weight, row, design, rest):  # type: ignore[no-untyped-def]
+    """Fill ``rest`` (frame,) with what one row's own brightnesses, fitted window by window, leave unexplained."""
+    unknowns = flashes.unknowns
+    k = 0
+    for n in range(len(rows.value)):
+        open_s = rows.frame_start_s[n] + rows.row_offset_s[row]
+        k = _flash_weights(open_s, rows.exposure_s, k, flashes.start_s, flashes.duration_s, flashes.unknown, design[n])
+    for window in range(len(rows.bounds) - 1):
+        normal = np.zeros((unknowns, unknowns))
+        right = np.zeros(unknowns)
+        for n in range(rows.bounds[window], rows.bounds[window + 1]):
+            for i in range(unknowns):
+                scaled = weight[n, row] * design[n, i]
+                if scaled != 0.0:
+                    right[i] += scaled * rows.value[n, row]
+                    for j in range(i + 1):
+                        normal[i, j] += scaled * design[n, j]
+        _solve_spd(normal, right, unknowns)
+        for n in range(rows.bounds[window], rows.bounds[window + 1]):
+            explained = 0.0
+            for i in range(unknowns):
+                explained += design[n, i] * right[i]
+            rest[n] = rows.value[n, row] - explained
+
+
+@nb.njit(cache=True, nogil=True)
+def _residuals(rows, flashes, weight, first, last, rest):  # type: ignore[no-untyped-def]
+    design = np.empty((len(rows.value), flashes.unknowns))
     for row in range(first, last):
-        k = 0
-        for n in range(frames):
-            open_s = frame_start_s[n] + row_offset_s[row]
-            k = _flash_weights(open_s, exposure_s, k, start_s, duration_s, unknown, design[n])
-        for window in range(len(bounds) - 1):
-            normal = np.zeros((unknowns, unknowns))
-            right = np.zeros(unknowns)
-            for n in range(bounds[window], bounds[window + 1]):
-                for i in range(unknowns):
-                    scaled = weight[n, row] * design[n, i]
-                    if scaled != 0.0:
-                        right[i] += scaled * value[n, row]
-                        for j in range(i + 1):
-                            normal[i, j] += scaled * design[n, j]
-            _solve_spd(normal, right, unknowns)
-            for n in range(bounds[window], bounds[window + 1]):
-                explained = 0.0
-                for i in range(unknowns):
-                    explained += design[n, i] * right[i]
-                rest[n, row] = value[n, row] - explained
+        _row_residuals(rows, flashes, weight, row, design, rest[:, row])
+
+
+@nb.njit(cache=True, nogil=True)
+def _losses(rows, flashes, phase_s, rate, spread, steepness, first, last, found):  # type: ignore[no-untyped-def]
+    frames, height = rows.value.shape
+    design = np.empty((frames, flashes.unknowns))
+    rest = np.empty(frames)
+    weight = np.ones((frames, height))
+    for clock in range(first, last):
+        start_s = phase_s[clock] + rate[clock] * flashes.start_s
+        moved = _Flashes(start_s, rate[clock] * flashes.duration_s, flashes.unknown, flashes.unknowns)
+        total = 0.0
+        for row in range(height):
+            _row_residuals(rows, moved, weight, row, design, rest)
+            for n in range(frames):
+                total += np.log1p(steepness * (rest[n] / spread[row]) ** 2)
+        found[clock] = total

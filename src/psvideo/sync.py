@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from psvideo.camera import FloatArray
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.plan import FlashTrain, Plan
-from psvideo.rowfit import Profiles, residuals
+from psvideo.rowfit import Profiles, losses, residuals
 from psvideo.shutter import frames_touched
 from psvideo.timing import DroppedFrames, Flash, Order, Timing
 
@@ -162,17 +162,27 @@ def _search(plan: Plan, rows: Profiles) -> StrobeClock:
     span_s = float(rows.frame_start_s[-1] - rows.frame_start_s[0]) + plan.camera.frame_period_s
     slips = int(np.ceil(plan.clock_range_ppm * 1e-6 * span_s / (0.5 * shortest_s)))
     phases_s = np.arange(0.0, plan.cycle_s, shortest_s / 3)
-    ones, spread = np.ones_like(rows.value), _spread(rows)
-    middle_s = float(rows.frame_start_s.mean())
-    best, best_loss = StrobeClock(phase_s=0.0, offset_ppm=0.0), np.inf
-    for ppm in np.linspace(-1, 1, 2 * slips + 1) * plan.clock_range_ppm if slips else [0.0]:
-        for phase_s in phases_s:
-            clock = StrobeClock(phase_s=phase_s, offset_ppm=0.0).shifted(0.0, ppm, pivot_s=middle_s)
-            rest = _unexplained(plan, rows, clock, ones) / spread
-            loss = float(np.log1p(ROBUST_STEEPNESS * rest**2).sum())
-            if loss < best_loss:
-                best, best_loss = clock, loss
-    return best
+    ppm = np.linspace(-1, 1, 2 * slips + 1) * plan.clock_range_ppm if slips else np.zeros(1)
+    clocks = [
+        StrobeClock(phase_s=phase_s, offset_ppm=0.0).shifted(0.0, offset_ppm, pivot_s=float(rows.frame_start_s.mean()))
+        for offset_ppm in ppm
+        for phase_s in phases_s
+    ]
+    before = 1 + int(np.ceil(max(clock.phase_s for clock in clocks) / plan.cycle_s))
+    after = 2 + int(np.ceil((span_s + plan.camera.frame_period_s) / plan.cycle_s))
+    cycle = len(plan.cycle_slots)
+    train = plan.train(-before * cycle, (before + after) * cycle)
+    found = losses(
+        rows,
+        train.start_s,
+        train.duration_s,
+        _unknowns(plan)[train.slot],
+        phase_s=np.array([clock.phase_s for clock in clocks]),
+        rate=np.array([clock.rate for clock in clocks]),
+        spread=_spread(rows),
+        steepness=ROBUST_STEEPNESS,
+    )
+    return clocks[int(np.argmin(found))]
 
 
 def _refine_growing(plan: Plan, rows: Profiles, clock: StrobeClock) -> _Fit:
