@@ -260,6 +260,9 @@ def test_a_misnamed_frame_rate_is_asked_about() -> None:
     preset = plan_shoot(parse_request(ShootWords(camera="z9", fps="120", size="3840x2160", flash="0.8ms")))
     assert preset.plan.camera.fps == Fraction(120_000, 1001)
     assert "119.88" in text_of(preset, "fps")
+    exact = plan_shoot(parse_request(ShootWords(camera="Sony F65", fps="120000/1001", flash="0.8ms")))
+    assert exact.plan.camera.fps == Fraction(120_000, 1001)
+    assert "fps" not in kinds(exact)
 
 
 def test_figures_that_rest_on_little_are_called_so() -> None:

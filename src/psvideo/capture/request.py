@@ -78,7 +78,7 @@ def choose_camera(wish: CameraWish, *, mode: Mode) -> tuple[Camera, CameraMode |
     preset = None
     if needs_table or (wish.name and find_model(wish.name) and not readout_given):
         preset = _preset(wish, mode)
-    fps = preset.fps if preset else wish.fps
+    fps = _truest_rate(wish.fps, preset)
     size_px = (preset.width_px, preset.height_px) if preset else wish.size_px
     if fps is None or size_px is None:
         raise UsageError("The camera needs its frame rate and size: add --fps and --size, or --camera NAME.")
@@ -95,6 +95,13 @@ def choose_camera(wish: CameraWish, *, mode: Mode) -> tuple[Camera, CameraMode |
     )
     _refuse_impossible_readout(camera)
     return camera, None if readout_given else preset
+
+
+def _truest_rate(asked: Fraction | None, preset: CameraMode | None) -> Fraction | None:
+    """Return the rate to plan for: a whole number may be what a mode is called (120), and not what it records."""
+    if preset is None or (asked is not None and asked.denominator > 1):
+        return asked
+    return preset.fps
 
 
 def _preset(wish: CameraWish, mode: Mode) -> CameraMode:
