@@ -7,9 +7,9 @@ from psvideo.capture.picture import Label, Picture, Polygon
 FONT = "DejaVu Sans, Helvetica, Arial, sans-serif"
 
 
-def svg(picture: Picture) -> str:
-    """Return the picture as an SVG file's text."""
-    size = f'width="{picture.width:g}" height="{picture.height:g}" viewBox="0 0 {picture.width:g} {picture.height:g}"'
+def svg(picture: Picture, *, unit: str = "") -> str:
+    """Return the picture as an SVG file's text; ``unit`` is what one unit of the picture is on paper, such as mm."""
+    size = f'width="{picture.width:g}{unit}" height="{picture.height:g}{unit}" viewBox="0 0 {picture.width:g} {picture.height:g}"'
     shapes = "\n".join(_text(shape) if isinstance(shape, Label) else _path(shape) for shape in picture.shapes)
     return f'<svg xmlns="http://www.w3.org/2000/svg" {size} font-family="{FONT}">\n{shapes}\n</svg>\n'
 
