@@ -281,4 +281,4 @@ def test_a_cameras_dng_is_a_clip(shared_data: Path, tmp_path: Path, write_plan: 
     clip = open_clip(tmp_path)
     (frame,) = read_frames(clip)
     assert (clip.cfa, clip.channels, clip.colour, frame.image.shape) == ("RGGB", 3, "unknown", (1156, 1734))
-    assert "DNG files hold linear light" in clip.notes[0]
+    assert "DNG files hold linear light" in clip.warnings[0]

@@ -151,7 +151,7 @@ def test_yuv_movies_keep_their_depth(
     )
     clip = open_clip(tmp_path / "x.mkv", plan=plan_for(rows=32, cols=48))
     frame = next(iter(read_frames(clip)))
-    assert clip.notes == ()
+    assert clip.warnings == ()
     assert np.abs(frame.image - colour).max() < 1.5 / 2**bits + 3e-5
 
 
@@ -228,15 +228,15 @@ def test_untagged_matrix_is_guessed_from_the_height_and_said(tmp_path: Path, pla
         y, cb, cr = np.rint(codes_of(colour, weights, 8, True)).astype(np.uint8)
         write_movie(tmp_path / "x.mkv", [make_frame([np.full((rows, 48), c) for c in (y, cb, cr)], "yuv444p")] * 2)
         clip = open_clip(tmp_path / "x.mkv", plan=plan_for(rows=rows, cols=48))
-        assert any(name in note for note in clip.notes)
+        assert any(name in note for note in clip.warnings)
         assert np.abs(next(iter(read_frames(clip))).image - colour).max() < 1.5 / 256
 
 
 def test_a_movie_that_plays_at_another_rate_is_read_with_a_note(tmp_path: Path, plan_for: Callable[..., Path]) -> None:
     write_movie(tmp_path / "x.mp4", grey_ramp(6), codec="libx264", matrix=1)
-    assert open_clip(tmp_path / "x.mp4", plan=plan_for(rows=32, cols=48)).notes == ()
+    assert open_clip(tmp_path / "x.mp4", plan=plan_for(rows=32, cols=48)).warnings == ()
     misnamed = open_clip(tmp_path / "x.mp4", plan=plan_for(rows=32, cols=48, fps=Fraction(120)))
-    assert "plays at 119.88 frames per second and the plan says 120" in misnamed.notes[0]
+    assert "plays at 119.88 frames per second and the plan says 120" in misnamed.warnings[0]
 
 
 @pytest.mark.parametrize(("black", "white"), [(None, None), (16, 235)])

@@ -142,7 +142,7 @@ def test_exr_channels_are_found_in_a_layer_and_beside_alpha(tmp_path: Path) -> N
     write_exr(tmp_path / "alpha.exr", codes, names="RGBA")
     alpha = decode("exr", tmp_path / "alpha.exr")
     assert np.array_equal(alpha.codes, codes[..., :3])
-    assert alpha.header.notes == ("the EXR files' alpha channel is left out",)
+    assert alpha.header.warnings == ("the EXR files' alpha channel is left out",)
 
 
 def test_exr_of_several_layers_or_none_is_refused(tmp_path: Path) -> None:
@@ -172,7 +172,7 @@ def test_png_alpha_is_left_out_with_a_note(tmp_path: Path) -> None:
     write_png(tmp_path / "x.png", codes)
     picture = decode("png", tmp_path / "x.png")
     assert np.array_equal(picture.codes, codes[..., :3])
-    assert picture.header.notes == ("the PNG files' alpha channel is left out",)
+    assert picture.header.warnings == ("the PNG files' alpha channel is left out",)
 
 
 def test_dpx_grey_of_ten_bits_is_filled_from_the_low_end(tmp_path: Path) -> None:
@@ -196,7 +196,7 @@ def test_jpeg_is_read_with_a_warning(tmp_path: Path, channels: int) -> None:
     picture = decode("jpeg", tmp_path / "x.jpg")
     assert np.abs(picture.codes.astype(int) - codes).max() <= 4
     assert picture.header == read_header("jpeg", tmp_path / "x.jpg")
-    assert "lossy" in picture.header.notes[0]
+    assert "lossy" in picture.header.warnings[0]
 
 
 def write_jpeg(path: Path, codes: NDArray) -> None:  # type: ignore[type-arg]

@@ -17,7 +17,7 @@ import tifffile
 from numpy.typing import NDArray
 
 from psvideo.clip.record import Header, Levels, Picture
-from psvideo.clip.tiff import LINEAR_RAW, MOSAIC, pixels, sample_bits
+from psvideo.clip.tiff import LINEAR_RAW, MOSAIC, check_places, pixels, sample_bits
 from psvideo.errors import PsvideoError
 
 FILTERS = "RGB"  # CFAPattern counts red, green, blue as 0, 1, 2
@@ -25,6 +25,7 @@ LINEARIZATION, BLACK_REPEAT, BLACK, BLACK_BY_COL, BLACK_BY_ROW, WHITE = range(50
 CROP_ORIGIN, CROP_SIZE, ACTIVE_AREA = 50719, 50720, 50829
 CFA_SIZE, CFA_PATTERN = 33421, 33422
 TIME_CODES = 51043
+DECODED_BY_TIFFFILE = {1, 7, 8, 34892, 52546}  # not compressed; JPEG, lossless too; Deflate; lossy JPEG; JPEG XL
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,10 +91,9 @@ def _header(path: Path, file: tifffile.TiffFile, page: tifffile.TiffPage) -> Hea
 
 def _codes(path: Path, page: tifffile.TiffPage) -> NDArray[Any]:
     """Decode to linearized values of shape (row, col, sample)."""
-    try:
-        codes: NDArray[Any] = pixels(path, page)
-    except (ValueError, KeyError, NotImplementedError, tifffile.TiffFileError) as fault:
-        return _decoded_by_libraw(path, page, fault)
+    if int(page.compression) not in DECODED_BY_TIFFFILE:
+        return _decoded_by_libraw(path, page)
+    codes: NDArray[Any] = pixels(path, page)
     table = _tag(page, LINEARIZATION)
     if table is None:
         return codes
@@ -101,15 +101,16 @@ def _codes(path: Path, page: tifffile.TiffPage) -> NDArray[Any]:
     return np.asarray(values[np.minimum(codes, len(values) - 1)])
 
 
-def _decoded_by_libraw(path: Path, page: tifffile.TiffPage, fault: Exception) -> NDArray[Any]:
-    """Decode what tifffile cannot; LibRaw linearizes by itself. Rows of nothing but 0 are a failure."""
+def _decoded_by_libraw(path: Path, page: tifffile.TiffPage) -> NDArray[Any]:
+    """Decode by LibRaw, which linearizes by itself. Rows of nothing but 0 are a failure that it does not report."""
+    check_places(path, page)
     with rawpy.imread(str(path)) as raw:
         codes = np.array(raw.raw_image)
     if codes.shape[:2] != (page.imagelength, page.imagewidth) or not codes.any(axis=1).all():
         raise PsvideoError(
-            f"{path}: is truncated or damaged, or compressed in a way ({page.compression}) that neither tifffile "
-            f"({fault}) nor LibRaw decodes whole. Copy it again, or convert the footage to uncompressed DNG."
-        ) from fault
+            f"{path}: is damaged, or compressed in a way ({int(page.compression)}) that LibRaw does not decode whole. "
+            "Copy it again, or convert the footage to uncompressed DNG."
+        )
     return codes.reshape(*codes.shape[:2], -1)
 
 

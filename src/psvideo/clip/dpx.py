@@ -56,7 +56,7 @@ def _parse_header(path: Path, data: bytes) -> tuple[Header, int]:
         channels=CHANNELS[descriptor],
         bits=bits,
         time_code=_time_code(struct.unpack_from(order + "I", data, 1920)[0]),
-        notes=("the DPX files' alpha channel is left out",) if descriptor == 51 else (),
+        warnings=("the DPX files' alpha channel is left out",) if descriptor == 51 else (),
     )
     return head, offset + height_px * _bytes_per_row(width_px * samples, bits, packing)
 

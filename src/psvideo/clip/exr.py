@@ -28,9 +28,9 @@ def decode(path: Path) -> Picture:
     with _open(path, header_only=False) as file:
         names = _channel_names(path, file)
         channels = file.channels()
-        planes = [np.asarray(channels[name].pixels, np.float32) for name in names]
+        planes = [channels[name].pixels for name in names]
         head = _header(file, names)
-        codes = planes[0] if len(planes) == 1 else np.stack(planes, axis=-1)
+        codes = np.asarray(planes[0], np.float32) if len(planes) == 1 else np.stack(planes, axis=-1, dtype=np.float32)
         return Picture(header=head, codes=_in_display_window(codes, file.header(), head))
 
 
@@ -71,9 +71,9 @@ def _picture_in(layer: str, found: list[str]) -> tuple[str, ...]:
 def _header(file: Any, names: tuple[str, ...]) -> Header:
     attributes = file.header()
     width_px, height_px = _size(attributes["displayWindow"])
-    notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
     if "A" in {channel.name.rpartition(".")[2] for channel in attributes["channels"]}:
-        notes = ("the EXR files' alpha channel is left out",)
+        warnings = ("the EXR files' alpha channel is left out",)
     return Header(
         width_px=width_px,
         height_px=height_px,
@@ -81,7 +81,7 @@ def _header(file: Any, names: tuple[str, ...]) -> Header:
         bits=None,
         colour=attributes.get("colorInteropID"),
         time_code=_time_code(attributes.get("timeCode")),
-        notes=notes,
+        warnings=warnings,
     )
 
 

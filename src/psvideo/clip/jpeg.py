@@ -36,7 +36,7 @@ def _parse_header(path: Path, data: bytes) -> Header:
             channels = data[place + 9]
             if data[place + 4] != 8 or channels not in (1, 3):
                 break
-            return Header(width_px=width_px, height_px=height_px, channels=channels, bits=8, notes=(LOSSY,))
+            return Header(width_px=width_px, height_px=height_px, channels=channels, bits=8, warnings=(LOSSY,))
         place += 2 if marker in NO_LENGTH else 2 + int.from_bytes(data[place + 2 : place + 4])
     raise PsvideoError(
         f"{path}: is truncated or no JPEG of 8 bits with 1 or 3 channels. Copy it again, or export another kind."

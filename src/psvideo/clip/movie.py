@@ -154,14 +154,14 @@ def _picture(path: Path, frame: av.VideoFrame) -> Picture:
         signal_at_0=-zero / (one - zero),
         signal_per_code=1 / (one - zero),
         video_range=video_range,
-        notes=("the movie's alpha channel is left out",) if len(found) in (2, 4) else (),
+        warnings=("the movie's alpha channel is left out",) if len(found) in (2, 4) else (),
     )
     if not is_yuv:
         return Picture(header=header, codes=found[0] if len(found) < 3 else np.stack(found[:3], axis=-1))
-    matrix, notes = _matrix(path, frame)
+    matrix, warnings = _matrix(path, frame)
     codes = to_rgb(found[0], found[1], found[2], bits=bits, matrix=matrix, video_range=video_range)
     span = (HIGHEST - LOWEST) / CODES
-    header = replace(header, signal_at_0=LOWEST, signal_per_code=span, notes=header.notes + notes)
+    header = replace(header, signal_at_0=LOWEST, signal_per_code=span, warnings=header.warnings + warnings)
     return Picture(header=header, codes=codes)
 
 

@@ -41,7 +41,7 @@ def _open_folder(path: Path, plan_path: Path | None) -> Clip:
     plan = read_plan(plan_path)
     header = read_header(sequence.kind, sequence.files[0])
     check_fit(sequence.files[0], header, plan, plan_path)
-    encoding, notes = _encoding(sequence.kind, header, plan, plan_path)
+    encoding = _encoding(sequence.kind, plan, plan_path)
     passed_over = f"left aside, having no number at the end: {', '.join(file.name for file in sequence.passed_over)}"
     return Clip(
         name=path.resolve().name,
@@ -54,7 +54,8 @@ def _open_folder(path: Path, plan_path: Path | None) -> Clip:
         header=header,
         colour=header.colour or find_curve(encoding.transfer).colour,
         encoding=encoding,
-        notes=header.notes + notes + ((passed_over,) if sequence.passed_over else ()),
+        warnings=header.warnings + _curve_warning(sequence.kind, plan),
+        notes=(passed_over,) if sequence.passed_over else (),
     )
 
 
@@ -63,7 +64,7 @@ def _open_movie(path: Path, plan_path: Path | None) -> Clip:
     plan = read_plan(plan_path)
     movie = index_movie(path)
     check_fit(path, movie.header, plan, plan_path)
-    encoding, notes = _encoding("movie", movie.header, plan, plan_path)
+    encoding, notes = _expanded(_encoding("movie", plan, plan_path), movie.header)
     return Clip(
         name=path.stem,
         path=path,
@@ -76,31 +77,40 @@ def _open_movie(path: Path, plan_path: Path | None) -> Clip:
         colour=find_curve(encoding.transfer).colour,
         encoding=encoding,
         timestamps=movie.timestamps,
-        notes=movie.header.notes + notes + _rate_note(movie, plan),
+        warnings=movie.header.warnings + _rate_warning(movie, plan),
+        notes=notes,
     )
 
 
-def _encoding(kind: str, header: Header, plan: Plan, plan_path: Path) -> tuple[Encoding, tuple[str, ...]]:
-    """Return how the files' codes are read, and what is to be said about it. Raises PsvideoError for unknown curves."""
+def _encoding(kind: str, plan: Plan, plan_path: Path) -> Encoding:
+    """Return how the codes are read: as the plan says, but DNG is linear. Raises PsvideoError for unknown curves."""
     encoding = plan.camera.encoding
     try:
-        curve = find_curve(encoding.transfer)
+        find_curve(encoding.transfer)
     except PsvideoError as fault:
         raise PsvideoError(f"{plan_path}: {fault}") from None
-    if kind == "dng" and curve.name != "linear":
-        return replace(encoding, transfer="linear"), (
-            f"DNG files hold linear light, so the plan's transfer = {encoding.transfer!r} is not applied",
-        )
-    if header.video_range and (encoding.black_level, encoding.white_level) == signal_range(
-        header.bits or 8, video_range=True
-    ):
-        return replace(encoding, black_level=None, white_level=None), (
-            "the plan's levels are the ends of video range, which is expanded before the curve is taken off",
-        )
-    return encoding, ()
+    return replace(encoding, transfer="linear") if kind == "dng" else encoding
 
 
-def _rate_note(movie: Movie, plan: Plan) -> tuple[str, ...]:
+def _expanded(encoding: Encoding, header: Header) -> tuple[Encoding, tuple[str, ...]]:
+    """Leave out levels that are the ends of video range: they are 0 and 1 already where the range is expanded."""
+    ends = signal_range(header.bits or 8, video_range=True)
+    if not header.video_range or (encoding.black_level, encoding.white_level) != ends:
+        return encoding, ()
+    return replace(encoding, black_level=None, white_level=None), (
+        "the plan's levels are the ends of video range, which is expanded before the curve is taken off",
+    )
+
+
+def _curve_warning(kind: str, plan: Plan) -> tuple[str, ...]:
+    """Say where the plan names a curve for files that hold linear light."""
+    transfer = plan.camera.encoding.transfer
+    if kind != "dng" or find_curve(transfer).name == "linear":
+        return ()
+    return (f"DNG files hold linear light, so the plan's transfer = {transfer!r} is not applied",)
+
+
+def _rate_warning(movie: Movie, plan: Plan) -> tuple[str, ...]:
     """Say where a movie plays at another rate than the plan's."""
     fps = float(plan.camera.fps)
     if movie.rate_hz is None or abs(movie.rate_hz / fps - 1) < RATE_TOLERANCE + movie.rate_error:

@@ -42,5 +42,7 @@ def _parse_header(path: Path, data: bytes) -> Header:
     if colour_type not in COLOUR_TYPES or bits not in (8, 16):
         kind = "a palette" if colour_type == 3 else f"{bits} bits per sample"
         raise PsvideoError(f"{path}: has {kind}; expected grey or RGB of 8 or 16 bits. Export the frames as such.")
-    notes = ("the PNG files' alpha channel is left out",) if colour_type in ALPHA_TYPES else ()
-    return Header(width_px=width_px, height_px=height_px, channels=COLOUR_TYPES[colour_type], bits=bits, notes=notes)
+    warnings = ("the PNG files' alpha channel is left out",) if colour_type in ALPHA_TYPES else ()
+    return Header(
+        width_px=width_px, height_px=height_px, channels=COLOUR_TYPES[colour_type], bits=bits, warnings=warnings
+    )

@@ -39,7 +39,7 @@ class Header:
     signal_at_0: float = 0.0
     signal_per_code: float | None = None
     video_range: bool = False
-    notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,7 +71,8 @@ class Clip:
     ``files`` are the frames' files in order, or the one movie. ``numbers`` are the frames' numbers, with holes where
     frames were dropped. ``cfa`` is the filter pattern at the picture's top left, None where it is not mosaiced.
     ``colour`` is the colour interop id of plates and albedo made from this clip; ``encoding`` is how its codes are
-    read; a movie has the frames' ``timestamps``. ``notes`` say what was taken for granted while opening it.
+    read; a movie has the frames' ``timestamps``. ``warnings`` say what may cost accuracy or was guessed, ``notes`` what
+    else was found on opening.
     """
 
     name: str
@@ -85,6 +86,7 @@ class Clip:
     colour: str
     encoding: Encoding
     timestamps: tuple[int, ...] = ()
+    warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
     @property

@@ -1,5 +1,6 @@
 """TIFF: grey or RGB, 8 to 16 bits or half and single floats; compressed, tiled or plain."""
 
+import logging
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,9 @@ from numpy.typing import NDArray
 
 from psvideo.clip.record import Header, Picture
 from psvideo.errors import PsvideoError
+
+# tifffile tells its own log what it thinks of odd tags; what matters of it is raised here.
+logging.getLogger("tifffile").addHandler(logging.NullHandler())
 
 GREY, RGB, MOSAIC, LINEAR_RAW = 1, 2, 32803, 34892  # values of the tag PhotometricInterpretation
 
@@ -28,22 +32,25 @@ def decode(path: Path) -> Picture:
 
 
 def pixels(path: Path, page: tifffile.TiffPage) -> NDArray[np.generic]:
-    """Decode a page to (row, col, sample). Raises PsvideoError where strips or tiles are missing from the file.
-
-    tifffile gives zeros for a strip of no bytes, so their places are checked first.
-    """
-    size = path.stat().st_size
-    places = list(zip(page.dataoffsets, page.databytecounts, strict=True))
-    lacking = [number for number, (offset, count) in enumerate(places) if count == 0 or offset + count > size]
-    if lacking or not places:
-        raise PsvideoError(
-            f"{path}: {len(lacking)} of its {len(places)} strips or tiles lie beyond the end of the file or are empty: "
-            "the file is truncated. Copy it again."
-        )
+    """Decode a page to (row, col, sample). Raises PsvideoError where strips or tiles are missing from the file."""
+    check_places(path, page)
     picture = np.asarray(page.asarray(maxworkers=1))
     if picture.ndim == 2:
         return picture[..., None]
     return np.moveaxis(picture, 0, -1) if page.planarconfig == 2 else picture
+
+
+def check_places(path: Path, page: tifffile.TiffPage) -> None:
+    """Refuse a file that does not hold every strip or tile: decoders give zeros for those that are not there."""
+    size = path.stat().st_size
+    offsets, counts = page.dataoffsets, page.databytecounts
+    held = sum(count > 0 and offset + count <= size for offset, count in zip(offsets, counts, strict=False))
+    expected = max(len(offsets), len(counts), 1)
+    if held < expected:
+        raise PsvideoError(
+            f"{path}: {expected - held} of its {expected} strips or tiles are empty or lie beyond the end of the file: "
+            "it is truncated. Copy it again."
+        )
 
 
 def sample_bits(path: Path, page: tifffile.TiffPage) -> int | None:
@@ -75,11 +82,11 @@ def _header(path: Path, page: tifffile.TiffPage) -> Header:
             f"{path}: its photometric interpretation is {kind}; expected grey (black is zero) or RGB. "
             "Export the frames as such."
         )
-    notes = ("the TIFF files' extra channels (alpha) are left out",) if page.samplesperpixel > channels else ()
+    warnings = ("the TIFF files' extra channels (alpha) are left out",) if page.samplesperpixel > channels else ()
     return Header(
         width_px=page.imagewidth,
         height_px=page.imagelength,
         channels=channels,
         bits=sample_bits(path, page),
-        notes=notes,
+        warnings=warnings,
     )
