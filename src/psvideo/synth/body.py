@@ -7,6 +7,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from psvideo.camera import FloatArray
+from psvideo.errors import PsvideoError
 from psvideo.synth.material import PLAIN, Colours, colour, pattern_albedo, sample_texture
 from psvideo.synth.meshes import builtin_names, builtin_shape
 from psvideo.synth.scene import AlbedoTable, ObjectTable
@@ -64,8 +65,10 @@ def make_body(table: ObjectTable, folder: Path) -> Body:
     normals = shape.normals / stretch
     texture = shape.texture
     if isinstance(table.albedo, AlbedoTable):
-        own = table.albedo.pattern == "own"
-        texture = load_texture(folder / table.albedo.texture) if table.albedo.texture else texture if own else None
+        if table.albedo.texture is not None:
+            texture = _texture(table.mesh, shape, folder / table.albedo.texture)
+        elif table.albedo.pattern != "own":
+            texture = None
     return Body(
         table=table,
         shape=shape,
@@ -73,3 +76,12 @@ def make_body(table: ObjectTable, folder: Path) -> Body:
         rest_normals=normals / np.linalg.norm(normals, axis=1, keepdims=True),
         texture=texture,
     )
+
+
+def _texture(mesh: str, shape: Shape, path: Path) -> Colours:
+    if shape.uv is None:
+        raise PsvideoError(
+            f"{path}: cannot be laid on the mesh {mesh!r}, which has no texture coordinates. Unwrap the mesh, or "
+            "give it a procedural albedo instead of a texture."
+        )
+    return load_texture(path)

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -13,6 +14,9 @@ from psvideo.errors import PsvideoError
 from psvideo.synth.curves import CURVES
 
 SUFFIXES = (".obj", ".ply", ".stl", ".glb", ".gltf", ".off")
+
+UNPAINTED_PX = 4
+"""trimesh gives files with texture coordinates and no picture a grey one of two by two pixels: that is no texture."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,8 +111,8 @@ def _own_colours(
     if uv is None:
         return None, None, None
     image = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
-    if image is None:
-        return None, None, None
+    if image is None or image.width * image.height <= UNPAINTED_PX:
+        return None, np.asarray(uv, np.float64), None
     return None, np.asarray(uv, np.float64), linear_from_srgb(np.asarray(image.convert("RGB")))
 
 
@@ -118,11 +122,10 @@ def load_texture(path: Path) -> NDArray[np.float32]:
     if picture is None or picture.dtype not in (np.uint8, np.uint16):
         raise PsvideoError(f"{path}: cannot be read as a texture; expected an 8- or 16-bit PNG, JPEG or TIFF picture.")
     if picture.ndim == 2:
-        picture = cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR)
-    colours: NDArray[np.integer] = picture[..., 2::-1].astype(np.uint16, copy=False)
-    return linear_from_srgb(colours) if picture.dtype == np.uint16 else linear_from_srgb(colours.astype(np.uint8))
+        picture = np.repeat(picture[..., None], 3, axis=2)
+    return linear_from_srgb(np.asarray(picture[..., 2::-1], dtype=picture.dtype))
 
 
-def linear_from_srgb(codes: NDArray[np.integer]) -> NDArray[np.float32]:
+def linear_from_srgb(codes: NDArray[Any]) -> NDArray[np.float32]:
     """Return sRGB codes, the whole range of their type, as linear light."""
     return np.asarray(CURVES["srgb"].decode(codes / np.iinfo(codes.dtype).max), np.float32)

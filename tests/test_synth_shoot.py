@@ -1,0 +1,334 @@
+"""Whole virtual shoots: what they write is read back as a camera's footage, and the truth beside it fits."""
+
+import ast
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import pytest
+import tomlkit
+
+from psvideo.camera import Camera
+from psvideo.cli.app import main
+from psvideo.clip import open_clip, read_frames
+from psvideo.errors import PsvideoError, UsageError
+from psvideo.planfile import read_plan
+from psvideo.rigfile import read_rig
+from psvideo.synth import builtin_scene, expose, read_scene, shoot
+from psvideo.synth.curves import CURVES
+from psvideo.synth.shotplan import true_clock, true_plan, true_rig
+
+ROOT = Path(__file__).resolve().parents[1]
+SCENES = sorted((ROOT / "data_synth").glob("*.toml"))
+
+SCENE = """
+schema = "psvideo-scene/1"
+name = "ball"
+frames = 8
+seed = 5
+[camera]
+width_px = 48
+height_px = 36
+fps = 100
+shutter_deg = 360.0
+readout_s = 0.008
+width_m = 1.4
+[strobe]
+flash_s = 0.001
+clock_offset_ppm = 60.0
+[[light]]
+name = "key"
+direction = [0.3, 0.3, 0.9]
+[[light]]
+name = "left"
+direction = [-0.4, 0.1, 0.9]
+[[object]]
+mesh = "sphere"
+albedo = [0.8, 0.5, 0.3]
+[[object]]
+mesh = "plane"
+scale = 4.0
+position_m = [0.0, 0.0, -1.0]
+albedo = { pattern = "checker", colour = 0.6, second = 0.3, size_m = 0.2 }
+"""
+
+
+def write_scene(folder: Path, **changes: object) -> Path:
+    """Write the small scene with keys changed: ``camera__bits=8`` sets bits in [camera]."""
+    document = tomlkit.parse(SCENE)
+    for place, value in changes.items():
+        *tables, key = place.split("__")
+        table = document
+        for name in tables:
+            table = table.setdefault(name, tomlkit.table())
+        table[key] = value
+    path = folder / "scene.toml"
+    path.write_text(tomlkit.dumps(document))
+    return path
+
+
+def film(folder: Path, **changes: object) -> Path:
+    return shoot(write_scene(folder, **changes), folder / "clip").path
+
+
+def exr(path: Path) -> np.ndarray:
+    channels = OpenEXR.File(str(path)).channels()
+    return np.asarray(next(iter(channels.values())).pixels, np.float32)
+
+
+def expected_frames(clip: Path) -> np.ndarray:
+    """Expose the written plates again, from the truth files alone."""
+    truth = json.loads((clip / "truth" / "timing.json").read_text())
+    scene = read_scene(clip.parent / "scene.toml")
+    plates = {row["slot"]: exr(clip / "truth" / row["plate"]) for row in truth["flashes"] if "plate" in row}
+    return expose(plates, true_plan(scene), frames=scene.frames, clock=true_clock(scene)).frames
+
+
+@pytest.mark.parametrize(
+    ("kind", "camera", "step"),
+    [
+        ("png16", {}, 1 / 3800),
+        ("png16", {"bits": 16, "black_level": 0.0}, 1 / 60_000),
+        ("png8", {"bits": 8}, 1 / 200),
+        ("png16", {"colour": "grey"}, 1 / 3800),
+        ("tif", {"bits": 14}, 1 / 15_000),
+        ("exr", {"bits": 14}, 1 / 3_000),
+        ("dng", {"cfa": "GBRG", "bits": 14, "white_level": 15_000.0}, 1 / 13_000),
+        ("png16", {"cfa": "BGGR"}, 1 / 3800),
+        ("dpx", {"bits": 10}, 1 / 900),
+        ("dpx", {"bits": 16}, 1 / 60_000),
+        ("png16", {"transfer": "srgb", "bits": 16}, 1 / 20_000),
+        ("tif", {"transfer": "rec709", "bits": 14}, 1 / 4_000),
+        ("png16", {"transfer": "slog3", "bits": 16}, 1 / 5_000),
+        ("png16", {"transfer": "logc3", "bits": 16}, 1 / 5_000),
+    ],
+)
+def test_footage_of_every_kind_reads_back_as_the_light_that_fell(tmp_path, kind, camera, step):
+    clip = film(tmp_path, output__kind=kind, **{f"camera__{key}": value for key, value in camera.items()})
+    opened = open_clip(clip)
+    light = expected_frames(clip)
+    cfa = camera.get("cfa")
+    assert opened.cfa == cfa
+    frames = [frame.image for frame in read_frames(opened)]
+    assert len(frames) == 8
+    for n, image in enumerate(frames):
+        expected = light[n]
+        if cfa:
+            places = np.arange(36)[:, None] % 2 * 2 + np.arange(48)[None, :] % 2
+            channel = np.array(["RGB".index(name) for name in cfa])[places]
+            expected = np.take_along_axis(expected, channel[..., None], axis=2)[..., 0]
+        assert image.shape == expected.shape
+        np.testing.assert_allclose(image, expected, atol=step)
+
+
+def test_a_clip_lies_as_a_camera_would_leave_it_and_the_truth_fits(tmp_path):
+    clip = film(tmp_path, output__dropped=[3], output__first_number=118)
+    scene = read_scene(tmp_path / "scene.toml")
+    assert sorted(path.name for path in clip.iterdir()) == ["frames", "plan.toml", "rig.toml", "truth"]
+    numbers = [118, 119, 120, 122, 123, 124, 125]
+    assert sorted(path.name for path in (clip / "frames").iterdir()) == [f"ball.{n:04d}.png" for n in numbers]
+    plan, rig = read_plan(clip / "plan.toml"), read_rig(clip / "rig.toml")
+    assert dataclasses.replace(plan, camera=true_plan(scene).camera) == true_plan(scene)
+    assert rig == true_rig(scene)
+    truth = json.loads((clip / "truth" / "timing.json").read_text())
+    assert truth["row_time_s"] == pytest.approx(0.008 / 36)
+    assert {row["light"] for row in truth["flashes"]} == {"key", "left", None}
+    assert all((clip / "truth" / row["plate"]).is_file() for row in truth["flashes"] if "plate" in row)
+    assert all("plate" in row for row in truth["flashes"] if row["complete"] and row["light"])
+    told = json.loads((clip / "truth" / "scene.json").read_text())
+    assert told["clock_offset_ppm"] == 60.0
+    assert told["phase_s"] == true_clock(scene).phase_s
+    assert told["dropped_frames"] == [3]
+
+
+def test_true_plates_are_albedo_times_intensity_times_the_cosine(tmp_path):
+    clip = film(tmp_path)
+    normals, albedo = exr(clip / "truth" / "normals.exr"), exr(clip / "truth" / "albedo.exr")
+    assert exr(clip / "truth" / "mask.exr").min() == 1.0
+    rig = {light.name: light for light in read_rig(clip / "rig.toml").lights}
+    for row in json.loads((clip / "truth" / "timing.json").read_text())["flashes"]:
+        if "plate" in row:
+            light = rig[row["light"]]
+            cosine = np.maximum(normals.astype(float) @ np.array(light.direction), 0.0)[..., None]
+            plate = exr(clip / "truth" / row["plate"])
+            lit = plate.any(axis=-1)
+            np.testing.assert_allclose(plate[lit], (albedo * cosine * light.intensity)[lit], atol=2e-6)
+            assert lit.mean() > 0.75
+
+
+def test_a_moving_scene_has_its_surface_at_every_flash(tmp_path):
+    text = SCENE.replace("albedo = [0.8, 0.5, 0.3]", "albedo = 0.8\nmotion = { velocity_m_per_s = [3.0, 0.0, 0.0] }")
+    (tmp_path / "scene.toml").write_text(text)
+    clip = shoot(tmp_path / "scene.toml", tmp_path / "clip").path
+    rows = [row for row in json.loads((clip / "truth" / "timing.json").read_text())["flashes"] if "plate" in row]
+    middles = []
+    for row in rows:
+        name = Path(row["plate"]).name
+        mask = np.abs(exr(clip / "truth" / "albedo" / name)[..., 0] - 0.8) < 1e-6
+        assert (exr(clip / "truth" / "mask" / name) == 1).all()
+        middles.append(np.argwhere(mask)[:, 1].mean())
+        normal = exr(clip / "truth" / "normals" / name)[18, round(middles[-1])]
+        assert normal[2] > 0.99
+    time_s = [row["start_s"] + 0.5 * row["duration_s"] for row in rows]
+    np.testing.assert_allclose(middles, 23.5 + np.multiply(time_s, 3.0) / (1.4 / 48), atol=0.5)
+
+
+def test_motion_inside_a_flash_blurs_it_only_when_asked(tmp_path):
+    text = SCENE.replace("albedo = [0.8, 0.5, 0.3]", "albedo = 0.8\nmotion = { velocity_m_per_s = [90.0, 0.0, 0.0] }")
+    edges = []
+    for samples in (1, 8):
+        path = tmp_path / f"scene{samples}.toml"
+        path.write_text(
+            text.replace("frames = 8", f"frames = 3\nmotion_samples = {samples}").replace("seed = 5", "seed = 9")
+        )
+        clip = shoot(path, tmp_path / f"clip{samples}").path
+        edges.append(sum(len(np.unique(exr(file)[0])) for file in sorted((clip / "truth" / "plates").iterdir())))
+    assert edges[1] >= edges[0]
+
+
+def test_the_seed_decides_every_byte(tmp_path):
+    keys = {"camera__full_well_e": 5000.0, "camera__read_e": 4.0, "strobe__jitter_s": 1e-6, "strobe__phase_s": 0.002}
+    contents = []
+    for k, seed in enumerate((5, 5, 6)):
+        folder = tmp_path / str(k)
+        folder.mkdir()
+        clip = film(folder, seed=seed, **keys)
+        files = sorted(path for path in clip.rglob("*") if path.is_file())
+        contents.append({path.relative_to(clip): path.read_bytes() for path in files})
+    assert contents[0] == contents[1]
+    assert contents[0].keys() == contents[2].keys()
+    assert contents[0] != contents[2]
+
+
+def test_the_plan_may_claim_other_than_the_truth(tmp_path):
+    keys = {"plan__fps": 101, "plan__readout_s": "unknown", "plan__tails": False, "strobe__fall_s": 5e-5}
+    clip = film(tmp_path, **keys)
+    plan = read_plan(clip / "plan.toml")
+    assert (plan.camera.fps, plan.camera.readout_s, plan.fall_s) == (101, None, 0.0)
+    assert plan.camera.shutter_deg == pytest.approx(360.0)
+    told = json.loads((clip / "truth" / "scene.json").read_text())
+    assert (told["fps"], told["readout_s"], told["fall_s"]) == ("100", 0.008, 5e-5)
+
+
+def test_too_bright_a_scene_is_warned_of(tmp_path, capsys):
+    path = write_scene(tmp_path, ambient={"level": 1.5})
+    assert main(["synth", str(path), "-o", str(tmp_path / "clip")]) == 0
+    assert "samples saturate" in capsys.readouterr().err
+
+
+def test_an_existing_clip_is_replaced_only_by_force(tmp_path, capsys):
+    clip = film(tmp_path)
+    (clip / "mine.txt").write_text("precious")
+    with pytest.raises(UsageError, match="exists already"):
+        shoot(tmp_path / "scene.toml", clip)
+    assert main(["synth", str(tmp_path / "scene.toml"), "-o", str(clip)]) == 2
+    assert (clip / "mine.txt").read_text() == "precious"
+    assert main(["synth", str(tmp_path / "scene.toml"), "-o", str(clip), "--force", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["frames"], told["path"]) == (8, str(clip))
+    assert not (clip / "mine.txt").exists()
+
+
+def test_a_shoot_that_fails_leaves_nothing_behind(tmp_path):
+    path = write_scene(tmp_path, strobe__mode="synced", strobe__flash_s=0.005)
+    with pytest.raises(PsvideoError, match="all rows of 'virtual camera' are open together"):
+        shoot(path, tmp_path / "clip")
+    assert sorted(entry.name for entry in tmp_path.iterdir()) == ["scene.toml"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('name = "ball"', 'naem = "ball"', "unknown key 'naem': did you mean 'name'"),
+        ("flash_s = 0.001", "flesh_s = 0.001", "unknown key 'strobe.flesh_s': did you mean 'flash_s'"),
+        ("albedo = [0.8, 0.5, 0.3]", "albedo = { patern = 1 }", "patern"),
+        ("fps = 100", "fps = 0", "rate above 0"),
+        ("readout_s = 0.008", "readout_s = 0.02", "longer than the frame period of 0.01 s"),
+        ("width_px = 48", 'width_px = "48"', "camera.width_px"),
+        ("shutter_deg = 360.0", "shutter_deg = 400.0", "less than or equal to 360"),
+        ("direction = [0.3, 0.3, 0.9]", "direction = [0.3, 0.3]", r"light\[1\].direction"),
+        ("direction = [0.3, 0.3, 0.9]", "", "needs direction .distant. or position_m"),
+        ('name = "left"', 'name = "key"', "two lights have the name 'key'"),
+        ('mesh = "sphere"', 'mesh = "spere"', "spere"),
+        ("width_m = 1.4", 'view = "perspective"', "a perspective view needs focal_px"),
+        ("width_m = 1.4", 'cfa = "RGBG"', "camera.cfa"),
+        ('schema = "psvideo-scene/1"', 'schema = "psvideo-scene/2"', "newer"),
+        ('schema = "psvideo-scene/1"', "", "'schema' is missing"),
+        ("frames = 8", "frames = 0", "frames"),
+        ("frames = 8", "frames = 8\n[output]\ndropped = [9]", "output.dropped names frame 9"),
+        ("frames = 8", 'frames = 8\n[output]\nkind = "dng"', "expected camera.cfa"),
+        ("frames = 8", 'frames = 8\n[output]\nkind = "jpg"', "output.kind"),
+        ("[strobe]", "[strobe]\nflash = [{ lights = { kee = 1.0 }, duration_s = 0.001 }]", "strobe.flash lights 'kee'"),
+        ("seed = 5", "seed = five", "not a TOML file"),
+    ],
+)
+def test_a_faulty_scene_is_one_paragraph_that_names_the_key(tmp_path, capsys, old, new, message):
+    assert old in SCENE
+    path = tmp_path / "bad.toml"
+    text = SCENE.replace(old, new, 1)
+    if "[output]" in new:  # a table in the middle would swallow the keys that follow
+        text = SCENE.replace(old, new.split("\n")[0], 1) + "\n".join(new.split("\n")[1:])
+    path.write_text(text)
+    with pytest.raises(PsvideoError, match=message) as fault:
+        shoot(path, tmp_path / "clip")
+    assert "\n" not in str(fault.value)
+    assert main(["synth", str(path), "-o", str(tmp_path / "clip")]) == 1
+    assert "Traceback" not in capsys.readouterr().err
+    assert not (tmp_path / "clip").exists()
+
+
+@pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
+def test_shipped_scenes_are_sound(path):
+    scene = read_scene(path)
+    plan, rig = true_plan(scene), true_rig(scene)
+    assert plan.lights == rig.names
+    assert scene.frames * plan.camera.frame_period_s > plan.cycle_s
+    directions = np.array([light.direction for light in rig.lights])
+    assert np.linalg.cond(directions) < 4
+
+
+def test_the_built_in_scene_is_the_shipped_one():
+    assert builtin_scene().resolve() == (ROOT / "data_synth" / "bust.toml").resolve()
+    with pytest.raises(PsvideoError, match="known are: bust"):
+        builtin_scene("bist")
+
+
+@pytest.mark.parametrize("name", sorted(CURVES))
+def test_transfer_curves_are_undone_by_their_inverse(name):
+    curve = CURVES[name]
+    light = np.linspace(-0.005, 1.0, 4001)
+    np.testing.assert_allclose(curve.decode(curve.encode(light)), light, atol=2e-6)
+    assert (np.diff(curve.encode(light)) > 0).all()
+
+
+def test_transfer_curves_meet_their_makers_figures():
+    code = {name: float(curve.encode(np.array(0.18))) for name, curve in CURVES.items()}
+    assert code["slog3"] * 1023 == pytest.approx(420, abs=0.01)
+    assert code["logc3"] == pytest.approx(0.391, abs=5e-4)
+    assert code["srgb"] == pytest.approx(0.4613561, abs=1e-6)
+    assert code["rec709"] == pytest.approx(0.4090077, abs=1e-6)
+    assert CURVES["slog3"].zero * 1023 == pytest.approx(95, abs=0.01)
+
+
+def test_the_virtual_shoot_shares_no_model_with_what_it_tests():
+    forbidden = {
+        "shutter",
+        "sync",
+        "split",
+        "sequence",
+        "normals",
+        "pipeline",
+        "rowfit",
+        "profiles",
+        "hudon2015",
+        "clip",
+    }
+    for path in sorted((ROOT / "src" / "psvideo" / "synth").rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text())):
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            used = {part for name in names if name.startswith("psvideo") for part in name.split(".")[1:2]}
+            assert not used & forbidden, path
+    assert isinstance(true_plan(read_scene(SCENES[0])).camera, Camera)
