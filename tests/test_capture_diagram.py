@@ -1,6 +1,7 @@
 """The timing diagram shows the rows that each frame saw, in every format and every kind of shoot."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree
@@ -139,3 +140,14 @@ def test_a_diagram_is_written_by_the_name_that_is_given(make_plan: MakePlan, tmp
     for name in ("a.pdf", "a", ""):
         with pytest.raises(UsageError, match="--diagram"):
             check_diagram_name(name)
+
+
+def test_a_triggered_flash_lies_in_its_frame_however_long_the_others_are(make_plan: MakePlan) -> None:
+    plan = make_plan(mode="synced", readout=0.0, dark=False)
+    unequal = tuple(
+        replace(flash, duration_s=length_s) for flash, length_s in zip(plan.flashes, (1e-3, 4e-3, 2e-3), strict=True)
+    )
+    line = timeline(replace(plan, flashes=unequal))
+    for frame in line.frames:
+        assert len(frame.spans) == 1
+        assert frame.spans[0].from_share == pytest.approx(1)

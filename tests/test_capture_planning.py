@@ -149,7 +149,9 @@ def test_wishes_that_exclude_each_other_are_explained_with_the_numbers() -> None
         ({"flash": None, "max_blur": 1}, "--speed"),
         ({"max_blur": -1.0}, "--max-blur"),
         ({"flash": "11ms"}, "longer than the exposure"),
+        ({"flash": "11ms", "dark": "12ms"}, "longer than the exposure"),
         ({"dark": "9.9ms"}, "two flashes"),
+        ({"mode": "synced", "dark": "12ms"}, "--dark"),
         ({"mode": "half-rate", "dark": "9ms"}, "two flashes"),
         ({"shutter": 400.0}, "--shutter"),
         ({"shutter": 0.0}, "--shutter"),
@@ -202,6 +204,9 @@ def test_a_plan_for_a_trigger_needs_no_readout_and_no_marker() -> None:
     assert [flash.is_dark for flash in shoot.plan.flashes] == [False] * 3
     assert shoot.figures.flash_rate_hz == pytest.approx(100)
     assert "marker" not in kinds(shoot)
+    unequal = planned(mode="synced", readout=None, flash="key=1ms,left=2ms,right=3ms").figures
+    assert unequal.flash_rate_hz == pytest.approx(100)
+    assert [light.duty for light in unequal.lights] == pytest.approx([0.1 / 3, 0.2 / 3, 0.3 / 3])
     assert "synced" in kinds(planned(mode="synced", readout="9.5ms"))
     assert "synced" not in kinds(shoot)
 

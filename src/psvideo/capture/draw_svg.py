@@ -9,7 +9,8 @@ FONT = "DejaVu Sans, Helvetica, Arial, sans-serif"
 
 def svg(picture: Picture, *, unit: str = "") -> str:
     """Return the picture as an SVG file's text; ``unit`` is what one unit of the picture is on paper, such as mm."""
-    size = f'width="{picture.width:g}{unit}" height="{picture.height:g}{unit}" viewBox="0 0 {picture.width:g} {picture.height:g}"'
+    width, height = f"{picture.width:g}", f"{picture.height:g}"
+    size = f'width="{width}{unit}" height="{height}{unit}" viewBox="0 0 {width} {height}"'
     shapes = "\n".join(_text(shape) if isinstance(shape, Label) else _path(shape) for shape in picture.shapes)
     return f'<svg xmlns="http://www.w3.org/2000/svg" {size} font-family="{FONT}">\n{shapes}\n</svg>\n'
 

@@ -77,7 +77,7 @@ def shoot_figures(plan: Plan, *, speed_px_s: float | None = None) -> ShootFigure
     times = Counter(plan.cycle_slots)
     lit = sum(times[slot] for slot in plan.lit_slots)
     slots = tuple(_slot_figures(plan, slot, speed_px_s) for slot in range(len(plan.flashes)))
-    cycle_s = plan.cycle_s
+    cycle_s = cycle_length_s(plan)
 
     def mean(share: str) -> float:
         return float(sum(times[slot] * getattr(slots[slot], share) for slot in plan.lit_slots) / lit)
@@ -97,6 +97,11 @@ def shoot_figures(plan: Plan, *, speed_px_s: float | None = None) -> ShootFigure
         slots=slots,
         lights=tuple(_light_figures(plan, name, times) for name in plan.lights),
     )
+
+
+def cycle_length_s(plan: Plan) -> float:
+    """Return how long a cycle takes: what the strobe plays by itself, or one frame per flash where it is triggered."""
+    return len(plan.cycle_slots) * plan.camera.frame_period_s if plan.mode == "synced" else plan.cycle_s
 
 
 def slot_label(flash: PlannedFlash) -> str:
@@ -127,11 +132,12 @@ def _slot_figures(plan: Plan, slot: int, speed_px_s: float | None) -> SlotFigure
 
 
 def _light_figures(plan: Plan, name: str, times: Counter[int]) -> LightFigures:
+    cycle_s = cycle_length_s(plan)
     own = [slot for slot, flash in enumerate(plan.flashes) if flash.lights.get(name, 0.0) > 0]
     return LightFigures(
         name=name,
-        rate_hz=sum(times[slot] for slot in own) / plan.cycle_s,
-        duty=sum(times[slot] * plan.flashes[slot].duration_s for slot in own) / plan.cycle_s,
+        rate_hz=sum(times[slot] for slot in own) / cycle_s,
+        duty=sum(times[slot] * plan.flashes[slot].duration_s for slot in own) / cycle_s,
         longest_pulse_s=max(plan.flashes[slot].duration_s for slot in own),
     )
 

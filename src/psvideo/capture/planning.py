@@ -52,10 +52,10 @@ def make_plan(request: ShootRequest, flash_s: Mapping[str, float]) -> Plan:
         dark_slot_s = request.dark_slot_s or min(flash.duration_s for flash in lit)
         dark = [PlannedFlash(lights={}, duration_s=dark_slot_s)]
     flashes = (*lit, *dark)
+    durations_s = [flash.duration_s for flash in flashes]
+    _refuse_overfull(request, max(durations_s))
     dark_s = request.dark_s
     if dark_s is None:
-        durations_s = [flash.duration_s for flash in flashes]
-        _refuse_overfull(request, max(durations_s))
         dark_s = default_dark_s(camera, durations_s, mode=request.mode, clock_tolerance_ppm=request.clock_tolerance_ppm)
     _refuse_short_dark(request, dark_s)
     round_s = sum(flash.duration_s + dark_s for flash in lit)

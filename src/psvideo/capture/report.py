@@ -76,7 +76,7 @@ def _deciding_rows(plan: Plan, figures: ShootFigures) -> Iterator[tuple[str, str
 
 
 def _margin(plan: Plan, figures: ShootFigures) -> str:
-    if figures.margin_ppm is None:
+    if figures.margin_ppm is None or plan.mode != "rolling":
         return ""
     known = "unknown" if plan.clock_tolerance_ppm is None else f"{plan.clock_tolerance_ppm:g} ppm"
     return f", the exposure and a margin of {figures.margin_ppm:.4g} ppm (clocks: {known})"

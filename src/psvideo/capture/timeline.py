@@ -111,10 +111,14 @@ def _kinds(plan: Plan) -> tuple[str, ...]:
 def _flashes(plan: Plan, phase_s: float, end_s: float) -> tuple[FlashSpan, ...]:
     shortest_s = min(flash.duration_s for flash in plan.flashes) + plan.dark_s
     before = 2 + int(max(phase_s, 0.0) / shortest_s)
-    train = plan.train(-before, before + 2 + int(end_s / shortest_s) + int(abs(phase_s) / shortest_s))
+    count = before + 2 + int(end_s / shortest_s) + int(abs(phase_s) / shortest_s)
+    train = plan.train(-before, count)
+    starts_s = train.start_s + phase_s
+    if plan.mode == "synced":
+        starts_s = np.arange(-before, count - before, dtype=np.float64) * plan.camera.frame_period_s + phase_s
     kinds = _kinds(plan)
     spans = []
-    for slot, start_s, duration_s in zip(train.slot, train.start_s + phase_s, train.duration_s, strict=True):
+    for slot, start_s, duration_s in zip(train.slot, starts_s, train.duration_s, strict=True):
         flash = plan.flashes[slot]
         label = slot_label(flash)
         place = -1 if flash.is_dark else kinds.index(label)

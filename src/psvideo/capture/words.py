@@ -70,6 +70,10 @@ def parse_request(words: ShootWords) -> ShootRequest:
     marker = _choice(words.marker or _usual_marker(mode), markers, option="--marker")
     if words.dark_every is not None and words.dark_every < 1:
         raise UsageError(f"--dark-every {words.dark_every} is not a count of rounds. Give a whole number from 1 up.")
+    if mode == "synced" and words.dark is not None:
+        raise UsageError(
+            "--dark has no meaning with --mode synced: the trigger says when each flash comes. Leave it out."
+        )
     if marker != "dark" and (words.dark_slot or words.dark_every):
         raise UsageError(f"--dark-slot and --dark-every belong to a dark slot, and --marker {marker} has none.")
     return ShootRequest(
