@@ -10,17 +10,21 @@ from pathlib import Path
 from typing import Literal, Protocol, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from psvideo import hudon2015
 from psvideo.ambient import Ambient, subtract
 from psvideo.camera import Camera
 from psvideo.clip import Clip, demosaic, holes, open_clip, parse_range, read_frames
+from psvideo.normals.illumination import Illumination, illumination
+from psvideo.normals.woodham1980 import solve
 from psvideo.plan import Plan
 from psvideo.profiles import collect
 from psvideo.rig import Light, Rig
 from psvideo.sequence import FIRST_NUMBER, Round, reference_duration_s, rounds
 from psvideo.shutter import frames_touched
 from psvideo.split import Plate, split
+from psvideo.surface import Surface
 from psvideo.sync import find_timing
 from psvideo.timing import DroppedFrames, Timing
 
@@ -142,11 +146,6 @@ def _shown(plates: Iterable[Plate], show: Callable[[Plate], None] | None) -> Ite
         yield plate
 
 
-def whole_rounds(gathered: Iterable[Round], lights: tuple[str, ...]) -> Iterator[Round]:
-    """Pass the rounds that have a plate of every light; the clip's start and end cut the others."""
-    return (one for one in gathered if one.lights == lights)
-
-
 def lights_as_planned(rig: Rig, plan: Plan) -> tuple[Light, ...]:
     """Return the plan's lights from the rig, their intensities scaled to the plan's full flashes.
 
@@ -165,3 +164,41 @@ def _at_full_flash(light: Light, duration_s: float) -> Light:
         intensity=tuple(strength * factor for strength in light.intensity),
         reference_duration_s=duration_s,
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Instant:
+    """The surface at one instant, solved from one round."""
+
+    number: int
+    time_s: float
+    surface: Surface
+
+
+def surfaces(
+    gathered: Iterable[Round],
+    plan: Plan,
+    rig: Rig,
+    *,
+    mask: NDArray[np.bool_] | None = None,
+    residual: bool = False,
+) -> Iterator[Instant]:
+    """Solve every round that has a plate of each of the plan's lights; the clip's start and end cut the others.
+
+    Raises PsvideoError where the rig lacks a light, or its lights give no normals.
+    """
+    lights = lights_as_planned(rig, plan)
+    lit: Illumination | None = None
+    for one in gathered:
+        if one.lights != plan.lights:
+            continue
+        lit = lit or illumination(lights, channels=one.plates[0].image.shape[2] if one.plates[0].image.ndim == 3 else 1)
+        seen = np.stack([plate.seen for plate in one.plates])
+        surface = solve(
+            [plate.image for plate in one.plates],
+            lit,
+            seen=None if seen.all() else seen,
+            mask=mask,
+            residual=residual,
+        )
+        yield Instant(number=one.number, time_s=one.time_s, surface=surface)

@@ -19,6 +19,7 @@ from psvideo.rowfit import Profiles, losses, residuals
 from psvideo.shutter import frames_touched
 from psvideo.timing import DroppedFrames, Flash, Order, Timing
 
+SEARCH_ROWS = 36
 COARSE_ROWS = 72
 COARSE_FRAMES = 96
 MOST_SAMPLES = 2_000_000
@@ -80,7 +81,7 @@ def find_timing(
     if len(indices) < 4:
         raise PsvideoError(f"{clip}: holds {len(indices)} frame(s); finding the strobe's timing needs at least 4.")
     rows = _as_profiles(plan, indices, profiles)
-    start = _search(plan, _binned(rows, COARSE_ROWS).take(slice(0, _coarse_frames(plan, len(indices)))))
+    start = _search(plan, _binned(rows, SEARCH_ROWS).take(slice(0, _coarse_frames(plan, len(indices)))))
     fit = _refine_growing(plan, rows, start)
     if fit.explained < MIN_EXPLAINED:
         raise PsvideoError(
