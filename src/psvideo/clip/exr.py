@@ -4,6 +4,7 @@ Channels may stand in a layer (``key.R``); an alpha channel is left out. A pictu
 its display window is put in its place with 0 around it.
 """
 
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,23 @@ def decode(path: Path) -> Picture:
         head = _header(file, names)
         codes = np.asarray(planes[0], np.float32) if len(planes) == 1 else np.stack(planes, axis=-1, dtype=np.float32)
         return Picture(header=head, codes=_in_display_window(codes, file.header(), head))
+
+
+def contents(path: Path) -> tuple[list[str], dict[str, str | int | float | None]]:
+    """Return the names of all channels, and the attributes that can be written in a line, with the picture's size."""
+    with _open(path, header_only=True) as file:
+        attributes = dict(file.header())
+    names = sorted(channel.name for channel in attributes["channels"])
+    width_px, height_px = _size(attributes["displayWindow"])
+    found: dict[str, str | int | float | None] = {"width_px": width_px, "height_px": height_px}
+    for name, value in attributes.items():
+        if name == "timeCode":
+            found[name] = _time_code(value)
+        elif isinstance(value, str | int | float) and name not in ("type", "pixelAspectRatio", "screenWindowWidth"):
+            found[name] = value
+        elif isinstance(value, Fraction):
+            found[name] = str(value)
+    return names, found
 
 
 def _open(path: Path, *, header_only: bool) -> Any:

@@ -69,6 +69,12 @@ def _number(file: Path) -> int:
     return int(_parts(file)[1])
 
 
+def number_of(file: Path) -> int | None:
+    """Return the number that ends a file's stem, None where there is none."""
+    digits = _parts(file)[1]
+    return int(digits) if digits else None
+
+
 def _parts(file: Path) -> tuple[str, str]:
     match = NUMBERED.fullmatch(file.stem)
     return (match[1], match[2]) if match else (file.stem, "")

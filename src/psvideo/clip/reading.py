@@ -74,7 +74,7 @@ def _frame(clip: Clip, number: int, picture: Picture, name: str) -> Frame:
 
 def _check_like_first(clip: Clip, found: Header, name: str) -> None:
     """Refuse a frame that is not of the first one's size, channels and depth."""
-    looks = [_looks(head) for head in (found, clip.header)]
+    looks = [looks(head) for head in (found, clip.header)]
     if looks[0] != looks[1]:
         raise PsvideoError(
             f"{name}: is {looks[0]}; the clip's first frame, {clip.files[0].name}, is {looks[1]}. "
@@ -82,7 +82,8 @@ def _check_like_first(clip: Clip, found: Header, name: str) -> None:
         )
 
 
-def _looks(head: Header) -> str:
+def looks(head: Header) -> str:
+    """Say a picture's size, channels and depth: what all frames of a clip have in common."""
     depth = f"{head.bits} bits" if head.bits else "floating point"
     filters = f", filters {head.cfa}" if head.cfa else ""
     return f"{head.width_px} x {head.height_px} pixels, {head.channels} channel(s), {depth}{filters}"

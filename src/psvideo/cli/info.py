@@ -1,0 +1,34 @@
+"""psvideo info: say what a file or folder is and whether it fits together."""
+
+import dataclasses
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from psvideo.cli.console import Voice
+from psvideo.cli.options import Json, PlanPath, Quiet, Verbose
+from psvideo.clip import describe
+
+
+def info(
+    path: Annotated[Path, typer.Argument(help="A clip, a movie, an output folder, an image, or a psvideo file.")],
+    plan: PlanPath = None,
+    json: Json = False,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+) -> None:
+    """Say what a file or folder is, and whether it fits together: exit status 1 where it does not."""
+    voice = Voice(json=json, verbose=verbose, quiet=quiet)
+    found = describe(path, plan=plan)
+    voice.say(f"{path}: {found.kind}")
+    for finding in found.findings:
+        voice.say(f"  {finding.level:5} {finding.text}")
+    for name, value in found.facts.items():
+        voice.detail(f"  {name} = {value}")
+    findings = [dataclasses.asdict(finding) for finding in found.findings]
+    voice.result(
+        {"path": str(path), "kind": found.kind, "fits": found.fits, "facts": found.facts, "findings": findings}
+    )
+    if not found.fits:
+        raise typer.Exit(1)
