@@ -1,0 +1,195 @@
+"""What a run found and what to distrust: report.json for machines, report.html for people.
+
+The first sentence says whether the take is usable, and if not, what to change on set.
+"""
+
+import base64
+import html
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.sequence import Round
+from psvideo.surface import Surface
+from psvideo.timing import Timing
+
+SURE_ENOUGH_ROWS = 0.3
+MOST_CLIPPED = 0.02
+LEAST_VALID = 0.3
+
+
+@dataclass(frozen=True, kw_only=True)
+class InstantFacts:
+    """What one round gave: shares of the solved picture that are valid, and of the plates that are saturated."""
+
+    number: int
+    time_s: float
+    valid_share: float
+    clipped_share: float
+    unseen_share: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunReport:
+    """One run over one clip. ``warnings`` are whole sentences, the gravest first."""
+
+    clip: str
+    version: str
+    timing: Timing
+    lights: tuple[str, ...]
+    condition: float
+    instants: tuple[InstantFacts, ...]
+    warnings: tuple[str, ...] = ()
+
+
+def instant_facts(one: Round, surface: Surface, mask: NDArray[np.bool_] | None) -> InstantFacts:
+    """Return what to remember of one solved round."""
+    solved = np.ones(surface.valid.shape, np.bool_) if mask is None else mask
+    clipped = np.mean([_share(_saturated(plate.image), solved) for plate in one.plates])
+    return InstantFacts(
+        number=one.number,
+        time_s=one.time_s,
+        valid_share=_share(surface.valid, solved),
+        clipped_share=float(clipped),
+        unseen_share=float(np.mean([1 - plate.seen.mean() for plate in one.plates])),
+    )
+
+
+def _saturated(image: NDArray[np.float32]) -> NDArray[np.bool_]:
+    brightest = image if image.ndim == 2 else image.max(axis=2)
+    high: NDArray[np.bool_] = brightest >= 1.0
+    return high
+
+
+def _share(flags: NDArray[np.bool_], within: NDArray[np.bool_]) -> float:
+    return float((flags & within).sum() / max(int(within.sum()), 1))
+
+
+def findings(report: RunReport) -> tuple[str, ...]:
+    """Return what to distrust and what to change on set, the gravest first; empty where nothing is wrong."""
+    found = []
+    timing, instants = report.timing, report.instants
+    if timing.order == "guess":
+        found.append(
+            "Which light is which is a guess, so normals may be wrong everywhere: shoot with a dark slot as marker, or "
+            "name the first light with --first-light."
+        )
+    if timing.phase_error_rows > SURE_ENOUGH_ROWS:
+        found.append(
+            f"Flash times are sure to {timing.phase_error_rows:.2f} row only: plates may be torn near the dark row. "
+            "Fix the exposure, switch stabilisation off, and check that plan.toml is what the strobe played."
+        )
+    clipped = max((facts.clipped_share for facts in instants), default=0.0)
+    if clipped > MOST_CLIPPED:
+        found.append(f"{100 * clipped:.1f} % of a plate is saturated: lower power, flash duration, gain or aperture.")
+    valid = min((facts.valid_share for facts in instants), default=0.0)
+    if instants and valid < LEAST_VALID:
+        found.append(
+            f"Only {100 * valid:.0f} % of the picture has a normal to be trusted: give the subject more light, place "
+            "the lights nearer to the camera's axis, or use more of them, so that three reach every part."
+        )
+    found += [
+        f"{hole.count} frame(s) are missing after number {hole.after}; rows that they held are not valid."
+        for hole in timing.dropped_frames
+    ]
+    return (*found, *report.warnings)
+
+
+def verdict(report: RunReport) -> str:
+    """Return in one sentence whether the take is usable."""
+    if not report.instants:
+        return "This take gave no normals: it holds no round in which every light is complete."
+    if report.timing.order == "guess" or report.timing.phase_error_rows > SURE_ENOUGH_ROWS:
+        return "This take is doubtful: see below before using it."
+    return "This take is usable." if not findings(report) else "This take is usable, with reservations."
+
+
+def report_record(report: RunReport) -> dict[str, object]:
+    """Return the report as what report.json holds."""
+    timing = report.timing
+    return {
+        "schema": "psvideo-report/1",
+        "clip": report.clip,
+        "version": report.version,
+        "verdict": verdict(report),
+        "findings": list(findings(report)),
+        "flashes": len(timing.flashes),
+        "complete_flashes": sum(flash.complete for flash in timing.flashes),
+        "clock_offset_ppm": timing.clock_offset_ppm,
+        "phase_error_rows": timing.phase_error_rows,
+        "order": timing.order,
+        "lights": list(report.lights),
+        "condition": report.condition,
+        "instants": [asdict(facts) for facts in report.instants],
+    }
+
+
+def report_page(report: RunReport, pictures: Sequence[tuple[str, NDArray[np.uint8]]]) -> str:
+    """Return the report as one self-contained HTML page; ``pictures`` are (caption, 8-bit sRGB pixels)."""
+    found = "".join(f"<li>{html.escape(sentence)}</li>" for sentence in findings(report)) or "<li>Nothing.</li>"
+    facts = "".join(
+        f"<tr><th>{html.escape(name)}</th><td>{html.escape(value)}</td></tr>" for name, value in _facts(report)
+    )
+    rounds = "".join(
+        f"<tr><td>{one.number}</td><td>{one.time_s:.4f}</td><td>{100 * one.valid_share:.1f} %</td>"
+        f"<td>{100 * one.clipped_share:.2f} %</td><td>{100 * one.unseen_share:.2f} %</td></tr>"
+        for one in report.instants
+    )
+    figures = "".join(_figure(caption, picture) for caption, picture in pictures)
+    return PAGE.format(
+        title=html.escape(report.clip),
+        verdict=html.escape(verdict(report)),
+        found=found,
+        facts=facts,
+        rounds=rounds,
+        figures=figures,
+    )
+
+
+def _facts(report: RunReport) -> list[tuple[str, str]]:
+    timing = report.timing
+    complete = sum(flash.complete for flash in timing.flashes)
+    return [
+        ("Flashes", f"{len(timing.flashes)}, of which {complete} complete"),
+        ("Rounds solved", str(len(report.instants))),
+        ("Strobe's clock", f"{timing.clock_offset_ppm:+.1f} ppm"),
+        ("Flash times sure to", f"{timing.phase_error_rows:.3f} row"),
+        ("Order of the lights", timing.order),
+        ("Lights", ", ".join(report.lights)),
+        ("Condition of the lights", f"{report.condition:.2f}"),
+        ("Made with", f"psvideo {report.version}"),
+    ]
+
+
+def _figure(caption: str, picture: NDArray[np.uint8]) -> str:
+    done, data = cv2.imencode(".png", picture[..., ::-1])
+    if not done:
+        raise ValueError(f"a picture of shape {picture.shape} cannot be encoded")
+    text = base64.b64encode(data.tobytes()).decode("ascii")
+    escaped = html.escape(caption)
+    return (
+        f'<figure><img alt="{escaped}" src="data:image/png;base64,{text}"><figcaption>{escaped}</figcaption></figure>'
+    )
+
+
+PAGE = """<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">
+<title>{title}: psvideo report</title>
+<style>
+body {{ font: 16px/1.5 system-ui, sans-serif; max-width: 70rem; margin: 2rem auto; padding: 0 1rem; color: #222 }}
+h1 {{ font-size: 1.5rem }} table {{ border-collapse: collapse }} th {{ text-align: left }}
+th, td {{ padding: .2rem .8rem .2rem 0; border-bottom: 1px solid #ddd }}
+img {{ max-width: 100% }} figure {{ margin: 1rem 0 }} figcaption {{ color: #666 }}
+</style></head><body>
+<h1>{title}</h1>
+<p><strong>{verdict}</strong></p>
+<h2>What to distrust</h2><ul>{found}</ul>
+{figures}
+<h2>What was found</h2><table>{facts}</table>
+<h2>Rounds</h2>
+<table><tr><th>number</th><th>time, s</th><th>valid</th><th>saturated</th><th>rows unseen</th></tr>{rounds}</table>
+</body></html>
+"""
