@@ -74,10 +74,9 @@ def _frame(clip: Clip, number: int, picture: Picture, name: str) -> Frame:
 
 def _check_like_first(clip: Clip, found: Header, name: str) -> None:
     """Refuse a frame that is not of the first one's size, channels and depth."""
-    looks = [looks(head) for head in (found, clip.header)]
-    if looks[0] != looks[1]:
+    if looks(found) != looks(clip.header):
         raise PsvideoError(
-            f"{name}: is {looks[0]}; the clip's first frame, {clip.files[0].name}, is {looks[1]}. "
+            f"{name}: is {looks(found)}; the clip's first frame, {clip.files[0].name}, is {looks(clip.header)}. "
             "All frames of a clip must be alike: export this one again, or move what does not belong here elsewhere."
         )
 
