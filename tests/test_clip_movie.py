@@ -290,3 +290,16 @@ def test_damage_in_the_middle_of_a_movie_stops_there(tmp_path: Path, plan_for: C
     with pytest.raises(PsvideoError, match=r"x\.mp4: .*(truncated|damaged)"):
         seen.extend(frame.index for frame in read_frames(clip))
     assert len(seen) < 12
+
+
+def test_a_pixel_format_that_is_not_read_is_named_with_its_file(tmp_path: Path, plan_for: Callable[..., Path]) -> None:
+    frame = av.VideoFrame(48, 32, "rgb565le")
+    write_movie(tmp_path / "x.mov", [frame, frame], codec="rawvideo")
+    with pytest.raises(PsvideoError, match=r"x\.mov: its pixel format, rgb5\w+, is not read"):
+        open_clip(tmp_path / "x.mov", plan=plan_for(rows=32, cols=48))
+
+
+def test_a_file_that_holds_no_movie_says_so(tmp_path: Path, plan_for: Callable[..., Path]) -> None:
+    (tmp_path / "x.mp4").write_bytes(b"x" * 5000)
+    with pytest.raises(PsvideoError, match=r"x\.mp4: cannot be decoded"):
+        open_clip(tmp_path / "x.mp4", plan=plan_for(rows=32, cols=48))

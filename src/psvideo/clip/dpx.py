@@ -29,7 +29,7 @@ def decode(path: Path) -> Picture:
         raise PsvideoError(f"{path}: is {path.stat().st_size} bytes, expected {end}: it is truncated. Copy it again.")
     try:
         with av.open(str(path), format="dpx_pipe") as container:
-            found = planes(next(container.decode(video=0)))
+            found = planes(path, next(container.decode(video=0)))
     except av.FFmpegError as fault:
         raise PsvideoError(f"{path}: cannot be decoded ({fault.strerror}). Copy it again.") from fault
     codes = found[0] if head.channels == 1 else np.stack(found[:3], axis=-1)
