@@ -17,7 +17,9 @@ LAYERS = [
     {"sync", "split", "hudon2015", "ambient", "sequence", "calibrate", "normals"},
     {"export", "view"},
     {"synth"},
-    {"pipeline", "demo"},
+    {"pipeline"},
+    {"runs"},
+    {"demo"},
     {"cli"},
 ]
 """Rooms from the bottom up; a module may use its own layer (without circles) and those below."""

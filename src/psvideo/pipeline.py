@@ -168,10 +168,9 @@ def _at_full_flash(light: Light, duration_s: float) -> Light:
 
 @dataclass(frozen=True, kw_only=True)
 class Instant:
-    """The surface at one instant, solved from one round."""
+    """The surface at one instant, and the round of plates that it was solved from."""
 
-    number: int
-    time_s: float
+    round: Round
     surface: Surface
 
 
@@ -181,6 +180,7 @@ def surfaces(
     rig: Rig,
     *,
     mask: NDArray[np.bool_] | None = None,
+    half: bool = False,
     residual: bool = False,
 ) -> Iterator[Instant]:
     """Solve every round that has a plate of each of the plan's lights; the clip's start and end cut the others.
@@ -192,13 +192,14 @@ def surfaces(
     for one in gathered:
         if one.lights != plan.lights:
             continue
-        lit = lit or illumination(lights, channels=one.plates[0].image.shape[2] if one.plates[0].image.ndim == 3 else 1)
+        lit = lit or illumination(lights, channels=1 if one.plates[0].image.ndim == 2 else 3)
         seen = np.stack([plate.seen for plate in one.plates])
         surface = solve(
             [plate.image for plate in one.plates],
             lit,
             seen=None if seen.all() else seen,
             mask=mask,
+            half=half,
             residual=residual,
         )
-        yield Instant(number=one.number, time_s=one.time_s, surface=surface)
+        yield Instant(round=one, surface=surface)
