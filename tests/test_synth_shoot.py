@@ -2,6 +2,8 @@
 
 import dataclasses
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -259,6 +261,28 @@ def test_an_existing_clip_is_replaced_only_by_force(tmp_path, capsys):
     told = json.loads(capsys.readouterr().out)
     assert (told["frames"], told["path"]) == (8, str(clip))
     assert not (clip / "mine.txt").exists()
+
+
+def test_footage_is_never_replaced_by_a_virtual_clip(tmp_path):
+    clip = film(tmp_path)
+    (clip / "truth" / "scene.json").unlink()
+    with pytest.raises(UsageError, match="was not written by psvideo synth"):
+        shoot(tmp_path / "scene.toml", clip, force=True)
+    assert len(list((clip / "frames").iterdir())) == 8
+
+
+def test_a_full_disk_is_one_paragraph_and_leaves_nothing(tmp_path):
+    path = write_scene(tmp_path, camera__width_px=400, camera__height_px=300)
+    limited = (
+        "import resource, signal, sys; signal.signal(signal.SIGXFSZ, signal.SIG_IGN); "
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000)); "
+        f"from psvideo.cli.app import main; sys.exit(main(['synth', {str(path)!r}, '-o', {str(tmp_path / 'clip')!r}]))"
+    )
+    run = subprocess.run([sys.executable, "-c", limited], capture_output=True, text=True, check=False)
+    assert run.returncode == 1
+    assert "cannot be written" in run.stderr
+    assert "Traceback" not in run.stderr
+    assert sorted(entry.name for entry in tmp_path.iterdir()) == ["scene.toml"]
 
 
 def test_a_shoot_that_fails_leaves_nothing_behind(tmp_path):
