@@ -3,6 +3,7 @@
 import struct
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import cv2
 import imagecodecs
@@ -29,7 +30,7 @@ def write_png(path: Path, codes: NDArray) -> None:  # type: ignore[type-arg]
     path.write_bytes(cv2.imencode(".png", swapped)[1].tobytes())
 
 
-def write_tiff(**options: object) -> Write:
+def write_tiff(**options: Any) -> Write:
     def write(path: Path, codes: NDArray) -> None:  # type: ignore[type-arg]
         planar = options.get("planarconfig") == "separate"
         stored = np.moveaxis(codes, -1, 0) if planar else codes
