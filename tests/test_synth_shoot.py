@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -18,6 +19,7 @@ from psvideo.planfile import read_plan
 from psvideo.rigfile import read_rig
 from psvideo.synth import builtin_scene, expose, read_scene, shoot
 from psvideo.synth.curves import CURVES
+from psvideo.synth.scene import Scene
 from psvideo.synth.shotplan import true_clock, true_plan, true_rig
 from psvideo.synth.stage import set_stage
 
@@ -364,3 +366,14 @@ def test_transfer_curves_meet_their_makers_figures():
     assert code["srgb"] == pytest.approx(0.4613561, abs=1e-6)
     assert code["rec709"] == pytest.approx(0.4090077, abs=1e-6)
     assert CURVES["slog3"].zero * 1023 == pytest.approx(95, abs=0.01)
+
+
+def test_every_key_of_the_scene_file_is_documented():
+    text = (ROOT / "docs" / "synth.md").read_text()
+    tables = [Scene]
+    while tables:
+        table = tables.pop()
+        for key, field in table.model_fields.items():
+            assert re.search(rf"[`\[{{ ,]{field.alias or key}[`\] =]", text), key
+            inner = [field.annotation, *getattr(field.annotation, "__args__", ())]
+            tables += [kind for kind in inner if isinstance(kind, type) and issubclass(kind, Scene.__base__)]
