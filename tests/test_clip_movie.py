@@ -210,6 +210,24 @@ def test_gaps_in_the_timestamps_are_dropped_frames(tmp_path: Path, plan_for: Cal
     assert [frame.index for frame in read_frames(clip)] == places
 
 
+@pytest.mark.parametrize("reordered", ["0", "2"])
+def test_frames_that_an_edit_list_hides_are_frames(
+    tmp_path: Path, plan_for: Callable[..., Path], reordered: str
+) -> None:
+    """Frames before time zero are hidden by an edit list, and players begin at the fifth; the camera did not."""
+    with av.open(str(tmp_path / "x.mp4"), "w", options={"avoid_negative_ts": "disabled"}) as container:
+        stream: Any = container.add_stream("libx264", rate=RATE, options={"bf": reordered, "qp": "0"})
+        stream.width, stream.height, stream.pix_fmt = 48, 32, "yuv420p"
+        stream.codec_context.time_base = 1 / RATE
+        for place, frame in enumerate(grey_ramp(12)):
+            frame.pts, frame.time_base = place - 4, 1 / RATE
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode(None))
+    frames = list(read_frames(open_clip(tmp_path / "x.mp4", plan=plan_for(rows=32, cols=48))))
+    assert [frame.index for frame in frames] == list(range(12))
+    assert frames[0].image[0, 0, 1] == pytest.approx((40 - 16) / 219, abs=2e-3)
+
+
 def test_uneven_timestamps_are_refused(tmp_path: Path, plan_for: Callable[..., Path]) -> None:
     with av.open(str(tmp_path / "x.mp4"), "w") as container:
         stream: Any = container.add_stream("libx264", rate=120)
