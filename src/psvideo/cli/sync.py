@@ -32,6 +32,8 @@ def sync(
     if out is not None:
         refuse_existing(out, force=force)
     take = open_take(clip, plan=plan, frames=frames)
+    for warning in take.clip.warnings:
+        voice.warn(warning)
     for note in take.clip.notes:
         voice.detail(note)
     timing = find_clip_timing(take, first_light=first_light, watch=voice.track)
