@@ -12,6 +12,7 @@ import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
 
+from psvideo.clip.exr_chunks import is_cut_short
 from psvideo.clip.record import Header, Picture
 from psvideo.errors import PsvideoError
 
@@ -69,6 +70,8 @@ def _usual_order(channel: Any) -> tuple[str, int, str]:
 
 def _open(path: Path, *, header_only: bool) -> Any:
     """Open a file; OpenEXR reports damage in several ways, which all end here."""
+    if is_cut_short(path):
+        raise PsvideoError(f"{path}: ends before its last rows: it is truncated. Copy it again.")
     try:
         file = OpenEXR.File(str(path), separate_channels=True, header_only=header_only)
         file.header()
