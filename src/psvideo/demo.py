@@ -1,6 +1,5 @@
 """The whole chain on a virtual shoot, and one picture that shows it: frames, plates, normals, albedo, relit."""
 
-from itertools import islice
 from pathlib import Path
 
 import cv2
@@ -19,7 +18,7 @@ from psvideo.synth.shoot import builtin_scene, shoot
 from psvideo.view.contact import Strip, Tile, sheet
 from psvideo.view.shading import exposure_for, normal_colours, relit, srgb
 
-SHOWN_FRAMES = 4
+SHOWN_FRAMES = slice(3, 7)
 RELIT_FROM: tuple[Vector, ...] = ((0.85, 0.2, 0.5), (-0.6, 0.75, 0.35))
 WARM, COOL = (1.0, 0.82, 0.6), (0.62, 0.8, 1.0)
 
@@ -50,7 +49,7 @@ def demo_sheet(clip: Clip, sample: Instant) -> NDArray[np.uint8]:
     exposure = exposure_for(sample.round.plates[0].image)
     frames = [
         Tile(f"frame {frame.number}", srgb(frame.image, exposure=exposure))
-        for frame in islice(read_frames(clip, clip.numbers[:SHOWN_FRAMES]), SHOWN_FRAMES)
+        for frame in read_frames(clip, clip.numbers[SHOWN_FRAMES])
     ]
     plates = [Tile(plate.light, srgb(plate.image, exposure=exposure)) for plate in sample.round.plates]
     return sheet(
