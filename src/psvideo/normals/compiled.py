@@ -62,7 +62,7 @@ encoded: Any = intrinsic(_encoded)
 
 @compiled
 def lent(array: Any) -> Any:
-    """The same array without its reference count, which every slice and every call would count up and down.
+    """The same (C-contiguous) array without its reference count, which every slice and call would count up and down.
 
     Threads that do so with one array wait for each other. The caller's own reference keeps the array alive.
     """

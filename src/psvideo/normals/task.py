@@ -8,12 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.camera import FloatArray
-from psvideo.normals.illumination import MAX_CONDITION, Illumination
+from psvideo.normals.illumination import Illumination
 
 Floats = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
 Samples = NDArray[Any]  # of float32 or uint16
 Mask = NDArray[np.bool_]
+
+PIXEL_CONDITION = 12.0  # beyond it, with the lights that shadow leaves, albedo begins to burst in real creases
 
 _NO_LIMIT = -1e9
 
@@ -110,7 +112,7 @@ def task(
         counts=_filled(np.ones(len(plates)), copies),
         dark=np.float32(max(usable.dark_level, _NO_LIMIT)),
         ratio=np.float32(max(usable.shadow_ratio, _NO_LIMIT)),
-        condition_squared=np.float32(max(MAX_CONDITION**2, 1.001 * frobenius)),
+        condition_squared=np.float32(max(PIXEL_CONDITION**2, 1.001 * frobenius)),
         albedo_scale=np.float32(1 / unit),
         seen=np.empty((0, 0, 0), np.uint8) if seen is None else _bytes(seen).reshape(len(plates), rows, -1),
         mask=np.empty((0, 0), np.uint8) if mask is None else _bytes(mask),
@@ -129,7 +131,8 @@ def empty_result(pixels: int, channels: int, *, half: bool, residual: bool) -> R
 
 
 def _filled(values: FloatArray, copies: int, *, mode: Literal["constant", "edge"] = "constant") -> Floats:
-    return np.pad(values, ((0, copies), *[(0, 0)] * (values.ndim - 1)), mode=mode).astype(np.float32)
+    filled = np.pad(values, ((0, copies), *[(0, 0)] * (values.ndim - 1)), mode=mode)
+    return np.ascontiguousarray(filled, np.float32)
 
 
 def _bytes(flags: Mask) -> Bytes:
