@@ -67,9 +67,10 @@ def _solve_block(
             _gather_one(task, values, start, n)
         else:
             _gather_three(task, values, start, n)
+        _hide_unseen(task, values, row, col, n)
+        if channels > 1:
             _combine(task, w, values, m, n)
     if not done:
-        _hide_unseen(task.seen, m, row, col, n)
         _solve_usable(task, w, m, n)
     if task.mask.size:
         for i in range(n):
@@ -194,14 +195,15 @@ def _all_seen(seen: Bytes, row: int, col: int, n: int) -> bool:
 
 
 @compiled
-def _hide_unseen(seen: Bytes, m: Floats, row: int, col: int, n: int) -> None:
-    for light in range(seen.shape[0]):
-        if seen.shape[2] == 1:
-            if not seen[light, row, 0]:
-                m[light, :n] = MISSING
-        else:
+def _hide_unseen(task: Task, values: Floats, row: int, col: int, n: int) -> None:
+    channels, seen = task.tone.shape[1], task.seen
+    for plane in range(channels * seen.shape[0]):
+        light = plane // channels
+        if seen.shape[2] > 1:
             for i in range(n):
-                m[light, i] = m[light, i] if seen[light, row, col + i] else MISSING
+                values[plane, i] = values[plane, i] if seen[light, row, col + i] else MISSING
+        elif not seen[light, row, 0]:
+            values[plane, :n] = MISSING
 
 
 @compiled
@@ -288,11 +290,10 @@ def _store_block(task: Task, result: Result, w: Floats, values: Floats, m: Float
             _albedo_given_normal(task, w, values, m, channel, n, result.albedo[channel, start:end])
         if result.residual.size:
             _add_residual(task, w, values, m, channel, n)
-    if result.residual.size:
-        residual = result.residual[start:end]
-        for i in range(n):
-            error = np.sqrt(w[XX + i] / max(w[XY + i], ONE))
-            residual[i] = encoded(error if w[Z + i] > ZERO else ZERO, residual)
+    residual = result.residual[start:end]
+    for i in range(len(residual)):
+        error = np.sqrt(w[XX + i] / max(w[XY + i], ONE))
+        residual[i] = encoded(error if w[Z + i] > ZERO else ZERO, residual)
 
 
 @compiled
