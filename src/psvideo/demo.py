@@ -1,5 +1,6 @@
 """The whole chain on a virtual shoot, and one picture that shows it: frames, plates, normals, albedo, relit."""
 
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -38,10 +39,11 @@ def run_demo(folder: Path, *, force: bool = False, watch: Watch = unwatched) -> 
     timing = timing_of(take, None, first_light=None, watch=watch)
     delivery = Delivery(space=Space())
     output = Output(folder=out, force=force)
-    result = normals_run(take, timing, clip_path / "rig.toml", output, delivery=delivery, watch=watch)
-    picture = folder / "demo.png"
-    _write_png(picture, demo_sheet(take.clip, result.sample))
-    return picture
+    rig = clip_path / "rig.toml"
+    sheet_of = partial(demo_sheet, take.clip)
+    result = normals_run(take, timing, rig, output, delivery=delivery, watch=watch, picture_of=sheet_of)
+    _write_png(folder / "demo.png", result.picture)
+    return folder / "demo.png"
 
 
 def demo_sheet(clip: Clip, sample: Instant) -> NDArray[np.uint8]:

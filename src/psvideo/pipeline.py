@@ -16,7 +16,7 @@ from psvideo import hudon2015
 from psvideo.ambient import Ambient, subtract
 from psvideo.camera import Camera
 from psvideo.clip import Clip, demosaic, holes, open_clip, parse_range, read_frames
-from psvideo.normals.illumination import Illumination, illumination
+from psvideo.normals.illumination import illumination
 from psvideo.normals.woodham1980 import solve
 from psvideo.plan import Plan
 from psvideo.profiles import collect
@@ -188,18 +188,14 @@ def surfaces(
     Raises PsvideoError where the rig lacks a light, or its lights give no normals.
     """
     lights = lights_as_planned(rig, plan)
-    lit: Illumination | None = None
-    for one in gathered:
-        if one.lights != plan.lights:
-            continue
-        lit = lit or illumination(lights, channels=1 if one.plates[0].image.ndim == 2 else 3)
+
+    def solved(one: Round) -> Instant:
+        lit = illumination(lights, channels=1 if one.plates[0].image.ndim == 2 else 3)
         seen = np.stack([plate.seen for plate in one.plates])
-        surface = solve(
-            [plate.image for plate in one.plates],
-            lit,
-            seen=None if seen.all() else seen,
-            mask=mask,
-            half=half,
-            residual=residual,
-        )
-        yield Instant(round=one, surface=surface)
+        plates = [plate.image for plate in one.plates]
+        shown = None if seen.all() else seen
+        surface = solve(plates, lit, seen=shown, mask=mask, half=half, residual=residual)
+        return Instant(round=one, surface=surface)
+
+    # map and filter hold no round while the next one gathers, as a loop's variable would
+    return map(solved, filter(lambda one: one.lights == plan.lights, gathered))
