@@ -40,7 +40,7 @@ def solve_rows(task: Task, result: Result, work: Work, first: int, last: int) ->
     """Solve the rows from ``first`` up to ``last``; no two calls may share rows, and any number may run at once."""
     t = Task(
         lent(task.plates), lent(task.like), task.lights, task.cols, lent(task.tone), lent(task.matrix),
-        lent(task.inverse), lent(task.per_strength), lent(task.counts), task.dark, task.ratio,
+        lent(task.inverse), lent(task.per_strength), task.dark, task.ratio,
         task.condition_squared, task.albedo_scale, lent(task.seen), lent(task.mask),
     )  # fmt: skip
     out = Result(lent(result.normals), lent(result.albedo), lent(result.valid), lent(result.residual))
@@ -92,10 +92,10 @@ def _solve_all_usable(task: Task, w: Floats, start: int, n: int) -> bool:
     for k in range(0, len(task.plates), 3):
         a, b, c = _plate(task, k, start, n), _plate(task, k + 1, start, n), _plate(task, k + 2, start, n)
         if k == 0:
-            _add_three(w, n, a, b, c, task.inverse, task.tone, task.per_strength, task.counts, 0, False)
+            _add_three(w, n, a, b, c, task.inverse, task.tone, task.per_strength, 0, False)
         else:
-            _add_three(w, n, a, b, c, task.inverse, task.tone, task.per_strength, task.counts, k, True)
-    dark, share = task.dark, task.ratio / np.float32(task.lights)
+            _add_three(w, n, a, b, c, task.inverse, task.tone, task.per_strength, k, True)
+    dark, share = task.dark, task.ratio / np.float32(task.lights)  # copies of a light make the test stricter only
     unusable = 0
     for i in range(n):
         unusable += w[LOW + i] <= max(dark, share * w[SUM + i])
@@ -105,14 +105,14 @@ def _solve_all_usable(task: Task, w: Floats, start: int, n: int) -> bool:
 @compiled
 def _add_three(
     w: Floats, n: int, a: Samples, b: Samples, c: Samples, inverse: Floats, tone: Floats, per_strength: Floats,
-    counts: Floats, k: int, begun: bool,
+    k: int, begun: bool,
 ) -> None:  # fmt: skip
     """Add three lights, from light k, to g; beside it lowest and sum of the measurements in shares of intensity."""
-    (gain_p, offset_p, ceiling_p, _), (xp, yp, zp), per_p, count_p = tone[k, 0], inverse[k], per_strength[k], counts[k]
+    (gain_p, offset_p, ceiling_p, _), (xp, yp, zp), per_p = tone[k, 0], inverse[k], per_strength[k]
     k += 1
-    (gain_q, offset_q, ceiling_q, _), (xq, yq, zq), per_q, count_q = tone[k, 0], inverse[k], per_strength[k], counts[k]
+    (gain_q, offset_q, ceiling_q, _), (xq, yq, zq), per_q = tone[k, 0], inverse[k], per_strength[k]
     k += 1
-    (gain_r, offset_r, ceiling_r, _), (xr, yr, zr), per_r, count_r = tone[k, 0], inverse[k], per_strength[k], counts[k]
+    (gain_r, offset_r, ceiling_r, _), (xr, yr, zr), per_r = tone[k, 0], inverse[k], per_strength[k]
     for i in range(n):
         p = np.float32(a[i]) * gain_p + offset_p
         q = np.float32(b[i]) * gain_q + offset_q
@@ -129,8 +129,7 @@ def _add_three(
         w[Y + i] = w[Y + i] + y if begun else y
         w[Z + i] = w[Z + i] + z if begun else z
         w[LOW + i] = min(w[LOW + i], low) if begun else low
-        total = p * count_p + q * count_q + r * count_r
-        w[SUM + i] = w[SUM + i] + total if begun else total
+        w[SUM + i] = w[SUM + i] + (p + q + r) if begun else p + q + r
 
 
 @compiled
@@ -307,7 +306,7 @@ def _store_normals(
         trusted = gz > ZERO
         scale = ONE / np.sqrt(square) if trusted else ZERO
         size = square * scale if trusted else ZERO
-        gx, gy, gz = gx * scale, gy * scale, gz * scale if trusted else ZERO
+        gx, gy, gz = gx * scale, gy * scale, gz * scale
         w[X + i], w[Y + i], w[Z + i], w[ALBEDO + i] = gx, gy, gz, size
         x[i] = encoded(gx, x)
         y[i] = encoded(gy, y)

@@ -53,7 +53,6 @@ class Task(NamedTuple):
     matrix: Floats  # (light, 3): intensity * direction, one for all channels; 0 for a copy
     inverse: Floats  # (light, 3): its transposed pseudo-inverse; 0 for a copy
     per_strength: Floats  # (light,): 1 / intensity
-    counts: Floats  # (light,): 1, or 0 for a copy
     dark: np.float32  # a measurement counts where it is above this, relative to the intensity,
     ratio: np.float32  # and above this times the pixel's mean
     condition_squared: np.float32  # largest trace(A) * trace(A^-1) of the usable lights' normal equations
@@ -109,7 +108,6 @@ def task(
         matrix=_filled(matrix, copies),
         inverse=_filled(inverse.T, copies),
         per_strength=_filled(unit / strength, copies, mode="edge"),
-        counts=_filled(np.ones(len(plates)), copies),
         dark=np.float32(max(usable.dark_level, _NO_LIMIT)),
         ratio=np.float32(max(usable.shadow_ratio, _NO_LIMIT)),
         condition_squared=np.float32(max(PIXEL_CONDITION**2, 1.001 * frobenius)),
