@@ -71,7 +71,7 @@ def _surface_tiles(surface: Surface) -> list[Tile]:
     warm = relit(surface, RELIT_FROM[0], colour=WARM, gloss=0.06)
     cool = relit(surface, RELIT_FROM[1], colour=COOL, gloss=0.06)
     return [
-        Tile("normals", normal_colours(surface)),
+        Tile("normals", normal_colours(surface.normals)),
         Tile("albedo", srgb(albedo, exposure=exposure)),
         Tile("relit, warm from the right", srgb(warm, exposure=exposure)),
         Tile("relit, warm and cool together", srgb(0.7 * warm + 0.6 * cool, exposure=exposure)),

@@ -30,6 +30,8 @@ from psvideo.timing import DroppedFrames, Timing
 
 Method = Literal["weights", "hudon2015"]
 Item = TypeVar("Item")
+AHEAD = 1
+"""Frames that are decoded in advance while plates are rebuilt; each costs memory."""
 
 
 class Watch(Protocol):
@@ -92,7 +94,8 @@ def clip_rounds(
     """
     clip, camera = take.clip, _timed_camera(take.plan, timing)
     used = _within(timing, camera, take)
-    frames = watch(read_frames(clip, take.numbers), total=len(take.numbers), what="rebuilding flashes")
+    decoded = read_frames(clip, take.numbers, ahead=AHEAD)
+    frames = watch(decoded, total=len(take.numbers), what="rebuilding flashes")
     rebuild = split if method == "weights" else hudon2015.split
     plates = subtract(rebuild(frames, camera, used), first=_first_ambient(take, camera, used))
     shown = _shown(map(_colour_of(clip), plates), each_flash)

@@ -37,9 +37,10 @@ from psvideo.sequence import FIRST_NUMBER, round_numbers
 from psvideo.timing import Timing, format_timing, read_timing
 from psvideo.view.contact import Strip, Tile, sheet
 from psvideo.view.report import InstantFacts, RunReport, instant_facts, report_page, report_record
-from psvideo.view.shading import exposure_for, normal_colours, srgb
+from psvideo.view.shading import exposure_for, normal_colours, smaller, srgb
 
 Pixels = NDArray[np.uint8]
+SHOWN_WIDTH_PX = 600
 SAMPLE_ROUND = 3
 """The round that the report shows, counted from 1; the first where there are fewer."""
 
@@ -204,11 +205,10 @@ def _write_instant(folder: Path, clip: str, instant: Instant, delivery: Delivery
 
 def look(instant: Instant) -> Pixels:
     """Return a picture of one instant for eyes: its plates, its normals and its albedo."""
-    exposure = exposure_for(instant.round.plates[0].image)
-    plates = [Tile(plate.light, srgb(plate.image, exposure=exposure)) for plate in instant.round.plates]
-    albedo = instant.surface.albedo.astype(np.float32)
-    surface = [
-        Tile("normals", normal_colours(instant.surface)),
-        Tile("albedo", srgb(albedo, exposure=exposure_for(albedo))),
-    ]
+    shown = [(plate.light, smaller(plate.image, SHOWN_WIDTH_PX)) for plate in instant.round.plates]
+    exposure = exposure_for(shown[0][1])
+    albedo = smaller(instant.surface.albedo, SHOWN_WIDTH_PX)
+    normals = smaller(instant.surface.normals, SHOWN_WIDTH_PX)
+    surface = [Tile("normals", normal_colours(normals)), Tile("albedo", srgb(albedo, exposure=exposure_for(albedo)))]
+    plates = [Tile(light, srgb(picture, exposure=exposure)) for light, picture in shown]
     return sheet([Strip("Plates, one per light", plates), Strip("Surface", surface)], width_px=1200)
