@@ -20,11 +20,12 @@ BLOCK = 480
 MISSING = np.float32(-1e30)
 ABSENT = np.float32(-1e29)  # what is below this is MISSING
 ZERO, ONE, THREE, TINY = np.float32(0), np.float32(1), np.float32(3), np.float32(1e-9)
+SLIGHTLY_MORE = np.float32(1.000001)
 
 # The planes of the working array: g, later the normal; what deciding on measurements needs; the normal equations.
-X, Y, Z, ALBEDO, LIMIT, LOW, SUM, COUNT = (BLOCK * plane for plane in range(8))
-XX, XY, XZ, YY, YZ, ZZ = (BLOCK * plane for plane in range(8, 14))
-PLANES = 14
+X, Y, Z, ALBEDO, LIMIT, LOW, HIGH, SUM, COUNT = (BLOCK * plane for plane in range(9))
+XX, XY, XZ, YY, YZ, ZZ = (BLOCK * plane for plane in range(9, 15))
+PLANES = 15
 
 
 def working_memory(task: Task) -> Work:
@@ -40,8 +41,8 @@ def solve_rows(task: Task, result: Result, work: Work, first: int, last: int) ->
     """Solve the rows from ``first`` up to ``last``; no two calls may share rows, and any number may run at once."""
     t = Task(
         lent(task.plates), lent(task.like), task.lights, task.cols, lent(task.tone), lent(task.matrix),
-        lent(task.inverse), lent(task.per_strength), task.dark, task.ratio,
-        task.condition_squared, task.albedo_scale, lent(task.seen), lent(task.mask),
+        lent(task.per_strength), lent(task.inverse), lent(task.origin), lent(task.share), task.ceiling, task.dark,
+        task.ratio, task.condition_squared, task.albedo_scale, lent(task.seen), lent(task.mask),
     )  # fmt: skip
     out = Result(lent(result.normals), lent(result.albedo), lent(result.valid), lent(result.residual))
     w, values, m = lent(work.planes), lent(work.values), lent(work.measurements)
@@ -88,48 +89,48 @@ def _plate(task: Task, light: int, start: int, n: int) -> Samples:
 
 @compiled
 def _solve_all_usable(task: Task, w: Floats, start: int, n: int) -> bool:
-    """Solve a block of one channel as if all measurements were usable; False where one is not after all."""
+    """Solve a block of one channel as if all measurements were usable; False where one is not, or hardly is.
+
+    The test is stricter than the rule for single pixels: the shadow limit from the largest measurement rather than
+    their mean, the ceiling from the strongest light. Whoever fails it is solved by the rule.
+    """
     for k in range(0, len(task.plates), 3):
         a, b, c = _plate(task, k, start, n), _plate(task, k + 1, start, n), _plate(task, k + 2, start, n)
         if k == 0:
-            _add_three(w, n, a, b, c, task.inverse, task.tone, task.per_strength, 0, False)
+            _add_three(w, n, a, b, c, task.inverse, task.share, 0, False)
         else:
-            _add_three(w, n, a, b, c, task.inverse, task.tone, task.per_strength, k, True)
-    dark, share = task.dark, task.ratio / np.float32(task.lights)  # copies of a light make the test stricter only
+            _add_three(w, n, a, b, c, task.inverse, task.share, k, True)
+    origin_x, origin_y, origin_z = task.origin
+    dark, ratio, ceiling = task.dark, task.ratio, task.ceiling
     unusable = 0
     for i in range(n):
-        unusable += w[LOW + i] <= max(dark, share * w[SUM + i])
+        x, y, z = w[X + i] + origin_x, w[Y + i] + origin_y, w[Z + i] + origin_z
+        w[X + i], w[Y + i], w[Z + i] = x, y, z
+        limit = max(dark, ratio * w[HIGH + i]) * SLIGHTLY_MORE
+        unusable += (w[LOW + i] <= limit) | (w[HIGH + i] >= ceiling) | (not x + y + z < -MISSING)
     return bool(unusable == 0)
 
 
 @compiled
 def _add_three(
-    w: Floats, n: int, a: Samples, b: Samples, c: Samples, inverse: Floats, tone: Floats, per_strength: Floats,
-    k: int, begun: bool,
-) -> None:  # fmt: skip
-    """Add three lights, from light k, to g; beside it lowest and sum of the measurements in shares of intensity."""
-    (gain_p, offset_p, ceiling_p, _), (xp, yp, zp), per_p = tone[k, 0], inverse[k], per_strength[k]
-    k += 1
-    (gain_q, offset_q, ceiling_q, _), (xq, yq, zq), per_q = tone[k, 0], inverse[k], per_strength[k]
-    k += 1
-    (gain_r, offset_r, ceiling_r, _), (xr, yr, zr), per_r = tone[k, 0], inverse[k], per_strength[k]
+    w: Floats, n: int, a: Samples, b: Samples, c: Samples, inverse: Floats, share: Floats, k: int, begun: bool
+) -> None:
+    """Add three lights' codes, from light k, to g; beside it the lowest and highest share of the intensity."""
+    (xp, yp, zp), gain_p, offset_p = inverse[k], share[k, 0], share[k, 1]
+    (xq, yq, zq), gain_q, offset_q = inverse[k + 1], share[k + 1, 0], share[k + 1, 1]
+    (xr, yr, zr), gain_r, offset_r = inverse[k + 2], share[k + 2, 0], share[k + 2, 1]
     for i in range(n):
-        p = np.float32(a[i]) * gain_p + offset_p
-        q = np.float32(b[i]) * gain_q + offset_q
-        r = np.float32(c[i]) * gain_r + offset_r
-        p = p if p < ceiling_p else MISSING
-        q = q if q < ceiling_q else MISSING
-        r = r if r < ceiling_r else MISSING
+        p, q, r = np.float32(a[i]), np.float32(b[i]), np.float32(c[i])
         x = xp * p + xq * q + xr * r
         y = yp * p + yq * q + yr * r
         z = zp * p + zq * q + zr * r
-        p, q, r = p * per_p, q * per_q, r * per_r
-        low = min(p, min(q, r))
+        p, q, r = p * gain_p + offset_p, q * gain_q + offset_q, r * gain_r + offset_r
+        low, high = min(p, min(q, r)), max(p, max(q, r))
         w[X + i] = w[X + i] + x if begun else x
         w[Y + i] = w[Y + i] + y if begun else y
         w[Z + i] = w[Z + i] + z if begun else z
         w[LOW + i] = min(w[LOW + i], low) if begun else low
-        w[SUM + i] = w[SUM + i] + (p + q + r) if begun else p + q + r
+        w[HIGH + i] = max(w[HIGH + i], high) if begun else high
 
 
 @compiled
