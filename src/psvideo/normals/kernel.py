@@ -41,7 +41,7 @@ def solve_rows(task: Task, result: Result, work: Work, first: int, last: int) ->
     """Solve the rows from ``first`` up to ``last``; no two calls may share rows, and any number may run at once."""
     t = Task(
         lent(task.plates), lent(task.like), task.lights, task.cols, lent(task.tone), lent(task.matrix),
-        lent(task.per_strength), lent(task.inverse), lent(task.origin), lent(task.share), task.ceiling, task.dark,
+        lent(task.per_strength), lent(task.inverse), lent(task.origin), task.least, task.most, task.dark,
         task.ratio, task.condition_squared, task.albedo_scale, lent(task.seen), lent(task.mask),
     )  # fmt: skip
     out = Result(lent(result.normals), lent(result.albedo), lent(result.valid), lent(result.residual))
@@ -91,41 +91,37 @@ def _plate(task: Task, light: int, start: int, n: int) -> Samples:
 def _solve_all_usable(task: Task, w: Floats, start: int, n: int) -> bool:
     """Solve a block of one channel as if all measurements were usable; False where one is not, or hardly is.
 
-    The test is stricter than the rule for single pixels: the shadow limit from the largest measurement rather than
-    their mean, the ceiling from the strongest light. Whoever fails it is solved by the rule.
+    The test is stricter than the rule for single pixels: every measurement is taken as if its light were the strongest
+    or the weakest, and the shadow limit follows the largest instead of the mean. Who fails it is solved by the rule.
     """
     for k in range(0, len(task.plates), 3):
         a, b, c = _plate(task, k, start, n), _plate(task, k + 1, start, n), _plate(task, k + 2, start, n)
         if k == 0:
-            _add_three(w, n, a, b, c, task.inverse, task.share, 0, False)
+            _add_three(w, n, a, b, c, task.inverse, 0, False)
         else:
-            _add_three(w, n, a, b, c, task.inverse, task.share, k, True)
-    origin_x, origin_y, origin_z = task.origin
-    dark, ratio, ceiling = task.dark, task.ratio, task.ceiling
+            _add_three(w, n, a, b, c, task.inverse, k, True)
+    (origin_x, origin_y, origin_z), (gain, offset, ceiling, _) = task.origin, task.tone[0, 0]
+    dark, least, most = task.dark, task.least, task.ratio * task.most
     unusable = 0
     for i in range(n):
         x, y, z = w[X + i] + origin_x, w[Y + i] + origin_y, w[Z + i] + origin_z
         w[X + i], w[Y + i], w[Z + i] = x, y, z
-        limit = max(dark, ratio * w[HIGH + i]) * SLIGHTLY_MORE
-        unusable += (w[LOW + i] <= limit) | (w[HIGH + i] >= ceiling) | (not x + y + z < -MISSING)
+        low, high = w[LOW + i] * gain + offset, w[HIGH + i] * gain + offset
+        in_shadow = low * least <= max(dark, high * most) * SLIGHTLY_MORE
+        unusable += in_shadow | (high >= ceiling) | (not x + y + z < -MISSING)
     return bool(unusable == 0)
 
 
 @compiled
-def _add_three(
-    w: Floats, n: int, a: Samples, b: Samples, c: Samples, inverse: Floats, share: Floats, k: int, begun: bool
-) -> None:
-    """Add three lights' codes, from light k, to g; beside it the lowest and highest share of the intensity."""
-    (xp, yp, zp), gain_p, offset_p = inverse[k], share[k, 0], share[k, 1]
-    (xq, yq, zq), gain_q, offset_q = inverse[k + 1], share[k + 1, 0], share[k + 1, 1]
-    (xr, yr, zr), gain_r, offset_r = inverse[k + 2], share[k + 2, 0], share[k + 2, 1]
+def _add_three(w: Floats, n: int, a: Samples, b: Samples, c: Samples, inverse: Floats, k: int, begun: bool) -> None:
+    """Add three lights' samples, from light k, to g; beside it the lowest and the highest sample."""
+    (xp, yp, zp), (xq, yq, zq), (xr, yr, zr) = inverse[k], inverse[k + 1], inverse[k + 2]
     for i in range(n):
+        low, high = np.float32(min(a[i], min(b[i], c[i]))), np.float32(max(a[i], max(b[i], c[i])))
         p, q, r = np.float32(a[i]), np.float32(b[i]), np.float32(c[i])
         x = xp * p + xq * q + xr * r
         y = yp * p + yq * q + yr * r
         z = zp * p + zq * q + zr * r
-        p, q, r = p * gain_p + offset_p, q * gain_q + offset_q, r * gain_r + offset_r
-        low, high = min(p, min(q, r)), max(p, max(q, r))
         w[X + i] = w[X + i] + x if begun else x
         w[Y + i] = w[Y + i] + y if begun else y
         w[Z + i] = w[Z + i] + z if begun else z

@@ -54,8 +54,8 @@ class Task(NamedTuple):
     per_strength: Floats  # (light,): 1 / intensity
     inverse: Floats  # (light, 3): the matrix's transposed pseudo-inverse, for samples as they are; 0 for a copy
     origin: Floats  # (3,): what black samples would give with it, to be added
-    share: Floats  # (light, 2): gain and offset from samples to shares of the intensity
-    ceiling: np.float32  # a share above this may be saturated
+    least: np.float32  # the smallest 1 / intensity
+    most: np.float32  # the largest
     dark: np.float32  # a measurement counts where it is above this, relative to the intensity,
     ratio: np.float32  # and above this times the pixel's mean
     condition_squared: np.float32  # largest trace(A) * trace(A^-1) of the usable lights' normal equations
@@ -112,8 +112,8 @@ def task(
         per_strength=_filled(unit / strength, copies, mode="edge"),
         inverse=_filled(gain[:, :1] * inverse.T, copies),
         origin=_filled(inverse @ tone[:, 0, 1], 0),
-        share=_filled(tone[:, 0, :2] * (unit / strength)[:, None], copies, mode="edge"),
-        ceiling=np.float32((ceiling[:, 0] * unit / strength).min() * (1 - 1e-6)),
+        least=np.float32((unit / strength).min()),
+        most=np.float32((unit / strength).max()),
         dark=np.float32(max(usable.dark_level, _NO_LIMIT)),
         ratio=np.float32(max(usable.shadow_ratio, _NO_LIMIT)),
         condition_squared=np.float32(max(PIXEL_CONDITION**2, 1.001 * frobenius)),
