@@ -15,17 +15,22 @@ _ir: Any = llvmlite.ir
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 # Products may be fused and divisions shared; NaN and infinity keep their meaning, sums their order.
-_FAST_MATH = {"contract", "nsz", "arcp"}
+_OPTIONS: dict[str, Any] = {"nogil": True, "fastmath": {"contract", "nsz", "arcp"}, "error_model": "numpy"}
 
 
 def compiled(function: Function) -> Function:
     """Compile a function when it is first called; where no folder can be written, without keeping it for next time."""
-    options: dict[str, Any] = {"nogil": True, "fastmath": _FAST_MATH, "error_model": "numpy", "forceinline": True}
     try:
-        kept: Function = numba.njit(cache=True, **options)(function)
+        kept: Function = numba.njit(cache=True, **_OPTIONS)(function)
     except RuntimeError:  # numba found neither a folder beside the module nor one of the user's to write to
-        kept = numba.njit(**options)(function)
+        kept = numba.njit(**_OPTIONS)(function)
     return kept
+
+
+def inlined(function: Function) -> Function:
+    """Compile a function into the compiled functions that call it, and for nobody else."""
+    part: Function = numba.njit(forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)(function)
+    return part
 
 
 def _pointer(typing_context: Any, address: Any, like: Any) -> Any:
@@ -60,7 +65,7 @@ pointer: Any = intrinsic(_pointer)
 encoded: Any = intrinsic(_encoded)
 
 
-@compiled
+@inlined
 def lent(array: Any) -> Any:
     """The same (C-contiguous) array without its reference count, which every slice and call would count up and down.
 
