@@ -20,6 +20,8 @@ BLOCK = 480
 MISSING = np.float32(-1e30)
 ABSENT = np.float32(-1e29)  # what is below this is MISSING
 ZERO, ONE, THREE, TINY = np.float32(0), np.float32(1), np.float32(3), np.float32(1e-9)
+# In perspective what is seen may turn from the camera's axis by more than 90 degrees: by half the view (here 20).
+LEAST_Z = np.float32(-0.342)
 SLIGHTLY_MORE = np.float32(1.000001)
 
 # The planes of the working array: g, later the normal; what deciding on measurements needs; the normal equations.
@@ -60,7 +62,7 @@ def solve_rows(task: Task, result: Result, work: Work, first: int, last: int) ->
 def _solve_block(
     task: Task, w: Floats, values: Floats, m: Floats, row: int, col: int, n: int, keep_measurements: bool
 ) -> None:
-    """Leave g in the planes X, Y, Z, with z <= 0 where the pixel has no solution to be trusted."""
+    """Leave g in the planes X, Y, Z, all 0 where the pixel has no solution to be trusted."""
     start, channels = row * task.cols + col, task.tone.shape[1]
     done = channels == 1 and _all_seen(task.seen, row, col, n) and _solve_all_usable(task, w, start, n)
     if not done or keep_measurements:
@@ -75,7 +77,8 @@ def _solve_block(
         _solve_usable(task, w, m, n)
     if task.mask.size:
         for i in range(n):
-            w[Z + i] = w[Z + i] if task.mask[row, col + i] else ZERO
+            kept = ONE if task.mask[row, col + i] else ZERO
+            w[X + i], w[Y + i], w[Z + i] = w[X + i] * kept, w[Y + i] * kept, w[Z + i] * kept
 
 
 @inlined
@@ -289,19 +292,20 @@ def _store_block(task: Task, result: Result, w: Floats, values: Floats, m: Float
     residual = result.residual[start:end]
     for i in range(len(residual)):
         error = np.sqrt(w[XX + i] / max(w[XY + i], ONE))
-        residual[i] = encoded(error if w[Z + i] > ZERO else ZERO, residual)
+        residual[i] = encoded(error if abs(w[X + i]) + abs(w[Y + i]) + abs(w[Z + i]) > ZERO else ZERO, residual)
 
 
 @inlined
 def _store_normals(
     w: Floats, n: int, x: Samples, y: Samples, z: Samples, albedo: Samples, valid: Bytes, albedo_scale: np.float32
 ) -> None:
-    """From g to the stored normal, albedo and validity, and to the planes X, Y, Z: all 0 where z <= 0."""
+    """From g to the stored normal, albedo and validity, and to the planes X, Y, Z: all 0 where it faces away."""
     for i in range(n):
         gx, gy, gz = w[X + i], w[Y + i], w[Z + i]
         square = gx * gx + gy * gy + gz * gz
-        trusted = gz > ZERO
-        scale = ONE / np.sqrt(square) if trusted else ZERO
+        length = np.sqrt(square)
+        trusted = gz > LEAST_Z * length
+        scale = ONE / length if trusted else ZERO
         size = square * scale if trusted else ZERO
         gx, gy, gz = gx * scale, gy * scale, gz * scale
         w[X + i], w[Y + i], w[Z + i], w[ALBEDO + i] = gx, gy, gz, size
