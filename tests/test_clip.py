@@ -2,6 +2,8 @@
 
 import dataclasses
 import threading
+import time
+import weakref
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,7 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 from psvideo.camera import Encoding
-from psvideo.clip import holes, open_clip, parse_range, read_frames
+from psvideo.clip import holes, open_clip, parse_range, read_frames, reading
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.plan import Plan
 from psvideo.planfile import format_plan
@@ -172,6 +174,18 @@ def test_a_broken_frame_is_named_after_the_good_ones_before_it(shot: Path, fault
     assert not decoding_threads()
 
 
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_pixels_that_are_no_numbers_are_refused(tmp_path: Path, write_plan: Callable[..., None], value: float) -> None:
+    import OpenEXR
+
+    write_plan(tmp_path)
+    pixels = np.zeros((ROWS, COLS, 3), np.float16)
+    pixels[2, 3, 1] = value
+    OpenEXR.File({"type": OpenEXR.scanlineimage}, {"RGB": pixels}).write(str(tmp_path / "a.1.exr"))
+    with pytest.raises(PsvideoError, match=r"a\.1\.exr: holds 1 values that are no numbers"):
+        list(read_frames(open_clip(tmp_path)))
+
+
 def test_a_frame_that_the_clip_lacks_is_a_wrong_choice(shot: Path) -> None:
     with pytest.raises(UsageError, match=r"has no frame number 10; its 4 frames are numbered 8 to 12"):
         read_frames(open_clip(shot), [9, 10])
@@ -189,17 +203,29 @@ def test_threads_end_when_reading_is_broken_off(shot: Path) -> None:
 
 
 def test_no_more_than_the_frames_asked_for_are_decoded_ahead(shot: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from psvideo.clip import reading
-
     decoded = []
     decode = reading.decode
     monkeypatch.setattr(reading, "decode", lambda kind, file: (decoded.append(file.name), decode(kind, file))[1])
-    frames = read_frames(open_clip(shot), ahead=1)
+    for number in range(13, 33):
+        write_png(shot / "frames" / f"shot.{number}.png")
+    frames = read_frames(open_clip(shot), ahead=2)
     assert decoded == []
     next(frames)
-    assert len(decoded) <= 2
-    rest = list(frames)
-    assert (len(rest), sorted(decoded)) == (3, ["shot.11.png", "shot.12.png", "shot.8.png", "shot.9.png"])
+    time.sleep(0.1)
+    assert len(decoded) == 3
+    assert len(list(frames)) == 23
+    assert len(decoded) == len(set(decoded)) == 24
+
+
+def test_frames_that_were_used_are_let_go(shot: Path) -> None:
+    """Memory does not grow with the clip: apart from the frame at hand, only those decoded ahead are alive."""
+    for number in range(13, 43):
+        write_png(shot / "frames" / f"shot.{number}.png")
+    given: list[weakref.ref[Any]] = []
+    for frame in read_frames(open_clip(shot), ahead=2):
+        given.append(weakref.ref(frame.image))
+        assert sum(image() is not None for image in given) <= 2
+    assert len(given) == 34
 
 
 @pytest.mark.parametrize(

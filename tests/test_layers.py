@@ -17,12 +17,18 @@ LAYERS = [
     {"sync", "split", "hudon2015", "ambient", "sequence", "calibrate", "normals"},
     {"export", "view"},
     {"synth"},
-    {"pipeline", "demo"},
+    {"pipeline"},
+    {"runs"},
+    {"demo"},
     {"cli"},
 ]
 """Rooms from the bottom up; a module may use its own layer (without circles) and those below."""
 
-SYNTH_NEVER_USES = {"shutter", "rowfit", "profiles", "sync", "split", "hudon2015", "ambient", "sequence", "normals"}
+SYNTH_NEVER_USES = {"shutter", "rowfit", "profiles", "sync", "split", "hudon2015", "ambient", "sequence", "normals"} | {
+    "clip",
+    "pipeline",
+    "runs",
+}
 
 
 def _imports(path: Path) -> set[str]:

@@ -3,6 +3,7 @@
 from fractions import Fraction
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 import trimesh
@@ -10,13 +11,13 @@ import trimesh
 from psvideo.errors import PsvideoError
 from psvideo.rig import Light
 from psvideo.synth.body import make_body
+from psvideo.synth.emission import Emission
 from psvideo.synth.material import layered_noise, pattern_albedo
 from psvideo.synth.meshes import builtin_names, builtin_shape
 from psvideo.synth.meshes.fields import ball, common, cut, ellipsoid, join
 from psvideo.synth.meshes.surface_nets import surface_of
 from psvideo.synth.render import View, look
 from psvideo.synth.scene import AlbedoTable, AmbientTable, CameraTable, ObjectTable
-from psvideo.synth.sensor import Emission
 from psvideo.synth.shading import ambient_plate, flash_plate, irradiance, light_collected
 from psvideo.synth.shape import load_shape
 from psvideo.synth.truth import true_albedo, true_mask, true_normals
@@ -113,10 +114,9 @@ def test_a_near_light_falls_off_with_distance_and_beyond_it_nothing_shadows():
     y, x = np.mgrid[:48, :64].astype(float)
     squared = ((x - 31.5) * 0.025) ** 2 + ((y - 23.5) * 0.025) ** 2 + 0.25
     np.testing.assert_allclose(plate(view, light)[..., 0], 0.4 * 0.5 / squared**1.5, rtol=1e-5)
-    shade = {"mesh": "box", "scale": 0.4, "position_m": [0.0, 0.0, 1.5], "casts_shadow": True}
-    behind = see({"mesh": "plane", "scale": 4.0, "albedo": 1.0}, shade)
-    covered = np.hypot(x - 31.5, y - 23.5) > 14
-    np.testing.assert_allclose(plate(behind, light)[covered], plate(view, light)[covered], rtol=1e-6)
+    beyond = {"mesh": "box", "scale": 0.4, "position_m": [0.6, 0.0, 1.5]}  # its shadow would fall about x = -0.3
+    behind = see({"mesh": "plane", "scale": 4.0, "albedo": 1.0}, beyond)
+    np.testing.assert_allclose(plate(behind, light)[:, :40], plate(view, light)[:, :40], rtol=1e-5)
 
 
 def test_an_led_shines_along_its_axis_by_the_power_of_its_cosine():
@@ -160,6 +160,24 @@ def test_a_spin_turns_an_object_about_its_own_axis_through_its_position():
     np.testing.assert_array_equal(flat.any(axis=0).sum(), 32)
     np.testing.assert_array_equal(upright.any(axis=1).sum(), 32)
     np.testing.assert_allclose(np.argwhere(flat).mean(axis=0), np.argwhere(upright).mean(axis=0), atol=0.5)
+
+
+def test_a_turned_object_spins_about_the_axis_that_turned_with_it():
+    bar = {"mesh": "box", "stretch": [0.1, 0.8, 0.1], "rotate_deg": [0.0, 90.0, 0.0]}
+    bar["motion"] = {"axis": [0.0, 0.0, 1.0], "spin_deg_per_s": 900.0}
+    upright, end_on = (true_mask(see(bar, time_s=t).hits) for t in (0.0, 0.1))
+    assert (upright.any(axis=1).sum(), upright.any(axis=0).sum()) == (32, 4)
+    assert (end_on.any(axis=1).sum(), end_on.any(axis=0).sum()) == (4, 4)
+
+
+def test_a_stretched_spheres_normals_are_an_ellipsoids():
+    view = see({"mesh": "sphere", "stretch": [1.0, 0.5, 1.0]})
+    y, x = np.mgrid[:48, :64].astype(float)
+    x, y = (x - 31.5) * 0.025 / 0.5, -(y - 23.5) * 0.025 / 0.25
+    inside = x**2 + y**2 < 0.9
+    normal = np.stack([x / 0.5, y / 0.25, np.sqrt(np.maximum(1 - x**2 - y**2, 0)) / 0.5], axis=-1)
+    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    np.testing.assert_allclose(true_normals(view.hits)[inside], normal[inside], atol=4e-3)
 
 
 def test_travel_and_sway_move_an_object_as_the_clock_says():
@@ -265,6 +283,19 @@ def test_a_texture_needs_coordinates_and_a_picture(tmp_path):
         table = ObjectTable.model_validate({"mesh": mesh, "albedo": {"texture": name}})
         with pytest.raises(PsvideoError, match=message):
             make_body(table, tmp_path)
+
+
+def test_a_texture_lies_upright_and_its_codes_are_taken_for_srgb(tmp_path):
+    corners = ((0, 0), (1, 0), (1, 1), (0, 1))
+    lines = [f"v {u - 0.5} {v - 0.5} 0\nvt {u} {v}" for u, v in corners] + ["f 1/1 2/2 3/3", "f 1/1 3/3 4/4"]
+    (tmp_path / "square.obj").write_text("\n".join(lines))
+    picture = np.zeros((64, 64, 3), np.uint8)
+    picture[:32, :, 2], picture[32:, :32, 0] = 188, 255  # red above, blue below on the left (OpenCV's order)
+    cv2.imwrite(str(tmp_path / "flag.png"), picture)
+    body = make_body(ObjectTable.model_validate({"mesh": "square.obj", "albedo": {"texture": "flag.png"}}), tmp_path)
+    albedo = true_albedo(look([body], camera(), 0.0).hits, 3)
+    np.testing.assert_allclose(albedo[14, 22], [0.503, 0, 0], atol=1e-3)
+    np.testing.assert_allclose([albedo[34, 22], albedo[34, 42]], [[0, 0, 1], [0, 0, 0]], atol=1e-6)
 
 
 @pytest.mark.parametrize("suffix", [".ply", ".stl", ".obj", ".glb"])

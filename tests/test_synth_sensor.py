@@ -16,7 +16,8 @@ from psvideo.errors import PsvideoError
 from psvideo.plan import Plan, PlannedFlash
 from psvideo.planfile import read_plan
 from psvideo.synth import Flicker, Noise, StrobeClock, expose
-from psvideo.synth.sensor import Emission, seen_share
+from psvideo.synth.emission import Emission
+from psvideo.synth.sensor import seen_share
 from psvideo.synth.strobe import TrueFlash, row_opens_s, true_flashes
 
 PERIOD_S = 0.01
@@ -166,15 +167,24 @@ def test_below_360_degrees_a_flash_in_the_blind_time_is_lost():
 def test_a_flash_is_complete_exactly_when_the_recorded_frames_hold_all_its_light(fall_s):
     cam = camera(readout=-0.7)
     plan = plan_of(cam, (0.001, 0.003), fall_s=fall_s)
-    clock = StrobeClock(phase_s=-0.0004, offset_ppm=-300, drift_ppm_per_s=40, jitter_s=1e-5, seed=2)
     lost = frozenset({7})
-    emission = Emission(fall_s=fall_s)
-    flashes = true_flashes(plan, clock, frames=20, dropped=lost)
-    for flash in flashes:
-        held = sum(seen_share(cam, emission, flash, n) for n in range(20) if n not in lost)
-        assert flash.complete == bool((held > 0.999 - 1e-9).all())
-    assert [flash.index for flash in flashes] == list(range(len(flashes)))
-    assert {False, True} == {flash.complete for flash in flashes[2:-2]}
+    emission, kept = Emission(fall_s=fall_s), 1 - (1e-3 if fall_s else 1e-9)
+    for phase_s in np.linspace(-0.012, 0.012, 60):
+        clock = StrobeClock(phase_s=float(phase_s), offset_ppm=-300, drift_ppm_per_s=40, jitter_s=1e-5, seed=2)
+        flashes = true_flashes(plan, clock, frames=12, dropped=lost)
+        held = [sum(seen_share(cam, emission, flash, n) for n in range(12) if n not in lost) for flash in flashes]
+        assert [flash.complete for flash in flashes] == [bool((share >= kept).all()) for share in held]
+        assert [flash.index for flash in flashes] == list(range(len(flashes)))
+        assert {False, True} == {flash.complete for flash in flashes[1:-1]}
+
+
+def test_an_leds_tail_reaches_into_the_next_frame_and_nothing_of_it_is_lost():
+    """The flash ends with frame 0; with equal rise and fall an LED gives off as much as a square pulse."""
+    cam = camera(readout=0.0)
+    plan = plan_of(cam, (0.0005,), dark_s=1.0, rise_s=2e-4, fall_s=2e-4)
+    shot = expose([np.ones((60, 3), np.float32)], plan, frames=3, clock=StrobeClock(phase_s=0.0095))
+    late = 2e-4 * -np.expm1(-2.5) / 0.0005
+    np.testing.assert_allclose(shot.frames[:, 0, 0], [1 - late, late, 0.0], atol=1e-6)
 
 
 def test_drift_and_offset_stretch_the_strobes_seconds():

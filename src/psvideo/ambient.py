@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import cv2
+import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
@@ -65,7 +66,18 @@ def subtract(plates: Iterable[Plate], *, first: Ambient | None = None) -> Iterat
 
 
 def _without(plate: Plate, ambient: Image) -> Image:
-    """Take the ambient light of every exposure off; what is saturated stays at 1.0 or above, what is unseen at 0."""
-    exposures = plate.exposures.astype(np.float32).reshape((-1,) + (1,) * (plate.image.ndim - 1))
-    lit = plate.image - exposures * ambient
-    return np.where(plate.image >= 1.0, plate.image, lit)
+    """Take the ambient light of every exposure off; what is saturated stays at 1.0 or above."""
+    rows = plate.image.shape[0]
+    lit = np.empty_like(plate.image)
+    exposures = plate.exposures.astype(np.float32)
+    _subtract_rows(plate.image.reshape(rows, -1), ambient.reshape(rows, -1), exposures, lit.reshape(rows, -1))
+    return lit
+
+
+@nb.njit(cache=True, nogil=True)
+def _subtract_rows(image, ambient, exposures, lit):  # type: ignore[no-untyped-def]
+    for row in range(image.shape[0]):
+        count = exposures[row]
+        for col in range(image.shape[1]):
+            value = image[row, col]
+            lit[row, col] = value if value >= np.float32(1.0) else value - count * ambient[row, col]

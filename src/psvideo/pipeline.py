@@ -16,7 +16,7 @@ from psvideo import hudon2015
 from psvideo.ambient import Ambient, subtract
 from psvideo.camera import Camera
 from psvideo.clip import Clip, demosaic, holes, open_clip, parse_range, read_frames
-from psvideo.normals.illumination import Illumination, illumination
+from psvideo.normals.illumination import illumination
 from psvideo.normals.woodham1980 import solve
 from psvideo.plan import Plan
 from psvideo.profiles import collect
@@ -168,10 +168,9 @@ def _at_full_flash(light: Light, duration_s: float) -> Light:
 
 @dataclass(frozen=True, kw_only=True)
 class Instant:
-    """The surface at one instant, solved from one round."""
+    """The surface at one instant, and the round of plates that it was solved from."""
 
-    number: int
-    time_s: float
+    round: Round
     surface: Surface
 
 
@@ -181,6 +180,7 @@ def surfaces(
     rig: Rig,
     *,
     mask: NDArray[np.bool_] | None = None,
+    half: bool = False,
     residual: bool = False,
 ) -> Iterator[Instant]:
     """Solve every round that has a plate of each of the plan's lights; the clip's start and end cut the others.
@@ -188,17 +188,14 @@ def surfaces(
     Raises PsvideoError where the rig lacks a light, or its lights give no normals.
     """
     lights = lights_as_planned(rig, plan)
-    lit: Illumination | None = None
-    for one in gathered:
-        if one.lights != plan.lights:
-            continue
-        lit = lit or illumination(lights, channels=one.plates[0].image.shape[2] if one.plates[0].image.ndim == 3 else 1)
+
+    def solved(one: Round) -> Instant:
+        lit = illumination(lights, channels=1 if one.plates[0].image.ndim == 2 else 3)
         seen = np.stack([plate.seen for plate in one.plates])
-        surface = solve(
-            [plate.image for plate in one.plates],
-            lit,
-            seen=None if seen.all() else seen,
-            mask=mask,
-            residual=residual,
-        )
-        yield Instant(number=one.number, time_s=one.time_s, surface=surface)
+        plates = [plate.image for plate in one.plates]
+        shown = None if seen.all() else seen
+        surface = solve(plates, lit, seen=shown, mask=mask, half=half, residual=residual)
+        return Instant(round=one, surface=surface)
+
+    # map and filter hold no round while the next one gathers, as a loop's variable would
+    return map(solved, filter(lambda one: one.lights == plan.lights, gathered))

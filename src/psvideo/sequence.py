@@ -57,7 +57,8 @@ def mixing_matrix(plan: Plan) -> FloatArray:
     """Return how much of each light's full flash every lit slot holds, shape (lit slot, light)."""
     reference_s = np.array([reference_duration_s(plan, light) for light in plan.lights])
     duration_s = np.array([plan.flashes[slot].duration_s for slot in plan.lit_slots])
-    return plan.power * duration_s[:, None] / reference_s
+    matrix: FloatArray = plan.power * duration_s[:, None] / reference_s
+    return matrix
 
 
 def round_numbers(flashes: tuple[Flash, ...], *, start: int = FIRST_NUMBER) -> tuple[int, ...]:

@@ -125,7 +125,8 @@ def _foreign_light(camera: Camera, timing: Timing, flash: Flash, frames: range) 
         return np.zeros((len(frames), camera.height_px))
     start_s = np.array([other.start_s for other in others])
     duration_s = np.array([other.duration_s for other in others])
-    return row_weights(camera, start_s, duration_s, frames=frames).sum(axis=0)
+    foreign: FloatArray = row_weights(camera, start_s, duration_s, frames=frames).sum(axis=0)
+    return foreign
 
 
 @nb.njit(cache=True, nogil=True)

@@ -12,6 +12,10 @@ FirstLight = Annotated[
     str | None,
     typer.Option("--first-light", help="The light of the clip's first complete flash, for plans without a marker."),
 ]
+TimingPath = Annotated[
+    Path | None, typer.Option("--timing", help="timing.json of this clip; left out: found from the picture.")
+]
+StartNumber = Annotated[int, typer.Option("--start-number", min=0, help="The number of the first round's files.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace outputs that exist.")]
 Resume = Annotated[bool, typer.Option("--resume", help="Go on where a run that was stopped left off.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for machines.")]

@@ -6,8 +6,9 @@ off and gives one frame after the other; ``demosaic`` makes colour of a mosaic; 
 
 from psvideo.clip.describe import describe
 from psvideo.clip.malvar2004 import demosaic
+from psvideo.clip.mask import read_mask
 from psvideo.clip.opening import open_clip
 from psvideo.clip.reading import parse_range, read_frames
 from psvideo.clip.record import Clip, Frame, holes
 
-__all__ = ["Clip", "Frame", "demosaic", "describe", "holes", "open_clip", "parse_range", "read_frames"]
+__all__ = ["Clip", "Frame", "demosaic", "describe", "holes", "open_clip", "parse_range", "read_frames", "read_mask"]

@@ -99,8 +99,9 @@ def _likeness_findings(clip: Clip) -> Iterator[Finding]:
 
 def _level_findings(clip: Clip) -> Iterator[Finding]:
     """Decode a few frames and hold their light against the levels: 0 is black, 1 saturation."""
-    chosen = {clip.numbers[0], clip.numbers[len(clip.numbers) // 2], clip.numbers[-1]}
-    light = np.concatenate([frame.image.ravel() for frame in read_frames(clip, chosen)])
+    chosen = sorted({clip.numbers[0], clip.numbers[len(clip.numbers) // 2], clip.numbers[-1]})
+    frames = (frame for number in chosen for frame in read_frames(clip, [number]))  # one by one: a movie seeks
+    light = np.concatenate([frame.image.ravel() for frame in frames])
     low, high = (float(value) for value in np.percentile(light, (1, 99.9)))
     saturated = float(np.mean(light >= 1.0))
     levels = f"light from {low:.3g} to {high:.3g} (1st and 99.9th percentile; 0 is black, 1 saturation)"

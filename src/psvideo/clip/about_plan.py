@@ -36,7 +36,7 @@ def plan_findings(plan: Plan) -> Iterator[Finding]:
 def has_marker(plan: Plan) -> bool:
     """True where no shift of the cycle looks like the cycle itself, so that timing alone tells the flashes apart."""
     looks = [(plan.flashes[slot].is_dark, plan.flashes[slot].duration_s) for slot in plan.cycle_slots]
-    return all(looks[shift:] + looks[:shift] != looks for shift in range(1, len(looks))) and len(looks) > 1
+    return all(looks[shift:] + looks[:shift] != looks for shift in range(1, len(looks)))
 
 
 def length_finding(plan: Plan, numbers: tuple[int, ...]) -> Finding:

@@ -23,6 +23,7 @@ VIDEO_RANGE, FULL_RANGE = 1, 2  # FFmpeg's AVCOL_RANGE_MPEG and AVCOL_RANGE_JPEG
 UNTAGGED = 2  # matrix coefficients "unspecified" (H.273)
 HD_HEIGHT_PX = 720
 UNEVEN = 0.25
+AS_RECORDED = {"ignore_editlist": "1"}  # all frames that the camera wrote, whatever an edit list would show
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,7 +80,7 @@ def read_movie(path: Path, timestamps: Sequence[int]) -> Iterator[Picture]:
         for frame in container.decode(stream):
             if frame.pts is None or frame.pts < wanted[0]:
                 continue
-            if frame.pts > wanted[0] or frame.is_corrupt:
+            if frame.pts > wanted[0] or frame.is_corrupt:  # a damaged frame is painted over, and flagged
                 break
             yield _picture(path, frame)
             wanted.popleft()
@@ -93,18 +94,17 @@ def read_movie(path: Path, timestamps: Sequence[int]) -> Iterator[Picture]:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[tuple[InputContainer, VideoStream]]:
-    """Open a movie with a decoder that stops at damage rather than painting over it."""
+    """Open a movie and its first video stream."""
     try:
-        with av.open(str(path)) as container:
+        with av.open(str(path), options=AS_RECORDED) as container:
             if not container.streams.video:
                 raise PsvideoError(f"{path}: holds no video. Name the movie that the camera recorded.")
             stream = container.streams.video[0]
             stream.thread_type = "AUTO"
-            stream.codec_context.options = {"err_detect": "+crccheck+bitstream+buffer+explode"}
             yield container, stream
-    except av.FFmpegError as fault:
+    except (av.FFmpegError, UnicodeDecodeError) as fault:
         raise PsvideoError(
-            f"{path}: cannot be decoded; it is truncated, damaged or of a kind that is not read ({fault.strerror}). "
+            f"{path}: cannot be decoded; it is truncated, damaged or of a kind that is not read ({fault}). "
             "Copy it again from the camera's card."
         ) from fault
 
@@ -140,7 +140,7 @@ def _picture(path: Path, frame: av.VideoFrame) -> Picture:
     """Take a decoded frame's planes and make R'G'B' codes of them."""
     if frame.interlaced_frame:
         raise PsvideoError(f"{path}: is interlaced; expected whole frames. Record progressive footage.")
-    found = planes(frame)
+    found = planes(path, frame)
     bits = frame.format.components[0].bits
     is_yuv = frame.format.name.startswith("yuv") or (not frame.format.is_rgb and len(found) > 1)
     full_by_name = frame.format.name.startswith("yuvj") or not is_yuv

@@ -1,5 +1,6 @@
 """The planes of a frame that FFmpeg decoded, at full depth, with no conversion of colours on the way."""
 
+from pathlib import Path
 from typing import Any
 
 import av
@@ -33,7 +34,7 @@ REPACKED = {
 PLANAR = ("gray", "yuv", "gbr")
 
 
-def planes(frame: av.VideoFrame) -> list[NDArray[Any]]:
+def planes(path: Path, frame: av.VideoFrame) -> list[NDArray[Any]]:
     """Return a frame's components as 2D arrays: R, G, B or Y, U, V (or Y alone), alpha last.
 
     Raises PsvideoError for a layout that is not read here.
@@ -43,7 +44,9 @@ def planes(frame: av.VideoFrame) -> list[NDArray[Any]]:
         frame = frame.reformat(format=REPACKED[name])
     parts = frame.format.components
     if (not name.startswith(PLANAR) and name not in REPACKED) or len({part.plane for part in parts}) != len(parts):
-        raise PsvideoError(f"pixel format {name} is not read; expected planar or packed YUV, RGB or grey")
+        raise PsvideoError(
+            f"{path}: its pixel format, {name}, is not read; expected YUV, RGB or grey. Export it as such."
+        )
     return [_plane(frame, part) for part in parts]
 
 

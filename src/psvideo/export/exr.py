@@ -5,7 +5,7 @@ swallows what goes wrong while it closes a file, and leaves a truncated one.
 """
 
 import io
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -124,10 +124,32 @@ def _time_code(text: str) -> "OpenEXR.TimeCode":
     return code
 
 
+def write_exr_parts(
+    path: Path,
+    parts: Mapping[str, Channels],
+    *,
+    half: bool = True,
+    attributes: Mapping[str, Mapping[str, Attribute]],
+    fps: Fraction | None = None,
+) -> None:
+    """Write one file with a part per name; each has its own channels and ``attributes``, else as ``write_exr``."""
+    built = []
+    for name, channels in parts.items():
+        planes = {channel: _plane(channel, values, half) for channel, values in channels.items()}
+        header = dict(attributes[name]) | _header(next(iter(planes.values())).shape, fps, None, None)
+        built.append(OpenEXR.Part(header, planes, name))
+    with whole_file(path) as beside:
+        beside.write_bytes(_bytes_of(path, lambda: OpenEXR.File(built)))
+
+
 def _encoded(path: Path, header: dict[str, object], planes: dict[str, NDArray[np.floating]]) -> memoryview:
+    return _bytes_of(path, lambda: OpenEXR.File(header, planes))
+
+
+def _bytes_of(path: Path, build: Callable[[], "OpenEXR.File"]) -> memoryview:
     stream = io.BytesIO()
     try:
-        OpenEXR.File(header, planes).write(stream)
+        build().write(stream)
     except RuntimeError as fault:  # what OpenEXR raises for all its faults
         raise PsvideoError(f"{path}: OpenEXR cannot encode this picture: {fault}") from fault
     return stream.getbuffer()

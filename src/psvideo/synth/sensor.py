@@ -1,8 +1,7 @@
 """The virtual sensor: what each row of each frame integrates of each flash.
 
-Every flash has an emission curve: a square pulse whose edges follow the LED's 1/e rise and fall times. Its running
-integral says how much of the flash's energy has been given off at any moment, so a row records the integral at its
-closing minus the integral at its opening. Nothing else of the project computes light in this way.
+The running integral of a flash's emission says how much of its energy has been given off at any moment, so a row
+records the integral at its closing minus the integral at its opening. Nothing else of the project computes light so.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -13,42 +12,10 @@ from numpy.typing import NDArray
 
 from psvideo.camera import Camera, FloatArray
 from psvideo.plan import Plan
-from psvideo.synth.strobe import TAILS, TrueFlash, row_opens_s
+from psvideo.synth.emission import Emission
+from psvideo.synth.strobe import TrueFlash, row_opens_s
 
 Image = NDArray[np.float32]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Emission:
-    """How an LED answers its drive: 1/e rise and fall times in seconds, 0 for a perfect square."""
-
-    rise_s: float = 0.0
-    fall_s: float = 0.0
-
-    def energy(self, since_s: FloatArray, duration_s: float) -> FloatArray:
-        """Return the energy given off up to ``since_s`` seconds after the drive's start, in seconds of full light.
-
-        >>> float(Emission().energy(np.array(0.5), 2.0)), float(Emission().energy(np.array(9.0), 2.0))
-        (0.5, 2.0)
-        """
-        lit_s = np.clip(since_s, 0.0, duration_s)
-        reached = 1.0
-        given = lit_s
-        if self.rise_s > 0:
-            given = lit_s + self.rise_s * np.expm1(-lit_s / self.rise_s)
-            reached = -np.expm1(-duration_s / self.rise_s)
-        if self.fall_s > 0:
-            after_s = np.clip(since_s - duration_s, 0.0, None)
-            given = given - reached * self.fall_s * np.expm1(-after_s / self.fall_s)
-        return given
-
-    def whole(self, duration_s: float) -> float:
-        """Return the energy of the whole flash, tail included, in seconds of full light."""
-        return float(self.energy(np.array(np.inf), duration_s))
-
-    def share(self, since_s: FloatArray, duration_s: float) -> FloatArray:
-        """Return the energy given off so far as a fraction of the whole flash's, 0 to 1."""
-        return self.energy(since_s, duration_s) / self.whole(duration_s)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,11 +68,11 @@ def expose_frames(
     for frame in frames:
         begin_s = frame * camera.frame_period_s
         while ahead is not None and ahead.start_s < begin_s + spread_s:
-            plate = plate_of(ahead) if _ends_s(ahead, emission) > begin_s else None
+            plate = plate_of(ahead) if ahead.start_s + emission.lasts_s(ahead.duration_s) > begin_s else None
             if plate is not None:
                 live.append((ahead, plate))
             ahead = next(coming, None)
-        live = [(flash, plate) for flash, plate in live if _ends_s(flash, emission) > begin_s]
+        live = [(flash, plate) for flash, plate in live if flash.start_s + emission.lasts_s(flash.duration_s) > begin_s]
         image = np.zeros(shape, np.float32)
         if ambient_of is not None:
             level = (flicker or Flicker()).mean(begin_s + opens_s, camera.exposure_s)
@@ -113,10 +80,6 @@ def expose_frames(
         for flash, plate in live:
             _collect(image, plate, seen_share(camera, emission, flash, frame))
         yield image
-
-
-def _ends_s(flash: TrueFlash, emission: Emission) -> float:
-    return flash.start_s + flash.duration_s + TAILS * emission.fall_s
 
 
 def _collect(image: Image, plate: Image, share: FloatArray) -> None:

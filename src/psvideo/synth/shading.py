@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from psvideo.camera import FloatArray
 from psvideo.rig import Light, Rig
+from psvideo.synth.emission import Emission
 from psvideo.synth.material import Colours, colour
 from psvideo.synth.render import Hits, View
 from psvideo.synth.scene import AmbientTable
-from psvideo.synth.sensor import Emission
 
 LIFT = 1e-5
 """Shadow rays start this fraction of the scene's size above the surface, so that no triangle shadows itself."""

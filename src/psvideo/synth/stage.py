@@ -13,9 +13,10 @@ import numpy as np
 from psvideo.plan import Plan
 from psvideo.rig import Rig
 from psvideo.synth.body import Body, make_body
+from psvideo.synth.emission import Emission
 from psvideo.synth.render import View, look
 from psvideo.synth.scene import Scene
-from psvideo.synth.sensor import Emission, Image
+from psvideo.synth.sensor import Image
 from psvideo.synth.shading import ambient_plate, flash_plate
 from psvideo.synth.shotplan import true_plan, true_rig
 from psvideo.synth.strobe import TrueFlash, row_opens_s

@@ -8,16 +8,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from psvideo.camera import Camera, FloatArray
 from psvideo.errors import PsvideoError
 from psvideo.plan import FlashTrain, Plan
+from psvideo.synth.emission import Emission
 
-TAILS = 16.0
-"""After so many fall times an LED's tail has given off all but 1e-7 of its light."""
-
-COMPLETE_TAILS = 7.0
-"""A flash is complete when all but a thousandth of its tail was recorded: so many fall times."""
+TAIL_LOST = 1e-3
+"""A flash with a tail is complete when no row lost more of its light; the last of a tail never ends."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,9 +86,9 @@ def true_flashes(
     camera = plan.camera
     end_s = (frames - 1) * camera.frame_period_s + float(row_opens_s(camera).max()) + camera.exposure_s
     train, start_s, duration_s = _synced(plan, frames) if plan.mode == "synced" else _free(plan, clock, end_s)
-    seen = (start_s + duration_s + TAILS * plan.fall_s > 0.0) & (start_s < end_s)
-    lit_s = duration_s + COMPLETE_TAILS * plan.fall_s
-    recorded = np.array([n for n in range(frames) if n not in dropped])
+    emission = Emission(rise_s=plan.rise_s, fall_s=plan.fall_s)
+    seen = (start_s + duration_s + emission.lasts_s(0.0) > 0.0) & (start_s < end_s)
+    recorded = np.array([n for n in range(frames) if n not in dropped], np.intp)
     return tuple(
         TrueFlash(
             index=index,
@@ -97,7 +96,7 @@ def true_flashes(
             lights=plan.flashes[train.slot[k]].lights,
             start_s=float(start_s[k]),
             duration_s=float(duration_s[k]),
-            complete=_is_complete(camera, float(start_s[k]), float(lit_s[k]), recorded),
+            complete=_is_complete(camera, emission, float(start_s[k]), float(duration_s[k]), recorded),
         )
         for index, k in enumerate(np.flatnonzero(seen))
     )
@@ -129,14 +128,16 @@ def _synced(plan: Plan, frames: int) -> tuple[FlashTrain, FloatArray, FloatArray
     return train, start_s, train.duration_s
 
 
-def _is_complete(camera: Camera, start_s: float, duration_s: float, recorded: FloatArray) -> bool:
-    """Tell whether no frame that was not recorded had a row open during the flash."""
+def _is_complete(
+    camera: Camera, emission: Emission, start_s: float, duration_s: float, recorded: NDArray[np.intp]
+) -> bool:
+    """Tell whether no light of the flash fell into frames that were not recorded."""
     opens_s = row_opens_s(camera)
     reach = int(np.ceil((opens_s.max() + camera.exposure_s) / camera.frame_period_s)) + 1
     now = int(np.floor(start_s / camera.frame_period_s))
-    ahead = int(np.ceil(duration_s / camera.frame_period_s)) + 1
+    ahead = int(np.ceil(emission.lasts_s(duration_s) / camera.frame_period_s)) + 1
     frames = np.arange(now - reach, now + ahead + 1)
     lost = frames[~np.isin(frames, recorded)]
-    open_s = lost[:, None] * camera.frame_period_s + opens_s
-    overlap_s = np.minimum(open_s + camera.exposure_s, start_s + duration_s) - np.maximum(open_s, start_s)
-    return bool((overlap_s <= 1e-9 * duration_s).all())
+    since_s = lost[:, None] * camera.frame_period_s + opens_s - start_s
+    shares = emission.share(since_s + camera.exposure_s, duration_s) - emission.share(since_s, duration_s)
+    return bool(shares.sum(axis=0).max(initial=0.0) <= (TAIL_LOST if emission.fall_s > 0 else 1e-9))

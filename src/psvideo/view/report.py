@@ -19,11 +19,13 @@ from psvideo.timing import Timing
 SURE_ENOUGH_ROWS = 0.3
 MOST_CLIPPED = 0.02
 LEAST_VALID = 0.3
+LIT = 0.01
+"""A pixel brighter than this share of saturation under any light is part of the scene."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class InstantFacts:
-    """What one round gave: shares of the solved picture that are valid, and of the plates that are saturated."""
+    """What one round gave: which shares of what is lit (or masked) are valid and are saturated, and of rows unseen."""
 
     number: int
     time_s: float
@@ -47,7 +49,7 @@ class RunReport:
 
 def instant_facts(one: Round, surface: Surface, mask: NDArray[np.bool_] | None) -> InstantFacts:
     """Return what to remember of one solved round."""
-    solved = np.ones(surface.valid.shape, np.bool_) if mask is None else mask
+    solved = lit_pixels(one) if mask is None else mask
     clipped = np.mean([_share(_saturated(plate.image), solved) for plate in one.plates])
     return InstantFacts(
         number=one.number,
@@ -58,9 +60,18 @@ def instant_facts(one: Round, surface: Surface, mask: NDArray[np.bool_] | None) 
     )
 
 
+def lit_pixels(one: Round) -> NDArray[np.bool_]:
+    """Return where any light of a round reaches anything, shape (row, col): a void background is not counted."""
+    lit: NDArray[np.bool_] = np.any([_brightest(plate.image) > LIT for plate in one.plates], axis=0)
+    return lit
+
+
+def _brightest(image: NDArray[np.float32]) -> NDArray[np.float32]:
+    return image if image.ndim == 2 else image.max(axis=2)
+
+
 def _saturated(image: NDArray[np.float32]) -> NDArray[np.bool_]:
-    brightest = image if image.ndim == 2 else image.max(axis=2)
-    high: NDArray[np.bool_] = brightest >= 1.0
+    high: NDArray[np.bool_] = _brightest(image) >= 1.0
     return high
 
 
@@ -88,7 +99,7 @@ def findings(report: RunReport) -> tuple[str, ...]:
     valid = min((facts.valid_share for facts in instants), default=0.0)
     if instants and valid < LEAST_VALID:
         found.append(
-            f"Only {100 * valid:.0f} % of the picture has a normal to be trusted: give the subject more light, place "
+            f"Only {100 * valid:.0f} % of what is lit has a normal to be trusted: give the subject more light, place "
             "the lights nearer to the camera's axis, or use more of them, so that three reach every part."
         )
     found += [

@@ -1,0 +1,25 @@
+"""psvideo demo: the whole chain, no camera, no arguments."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from psvideo.cli.console import Voice
+from psvideo.cli.options import Force, Json, Quiet, Verbose
+from psvideo.demo import run_demo
+
+
+def demo(
+    out: Annotated[Path, typer.Option("-o", "--out", help="The folder to write.")] = Path("psvideo-demo"),
+    force: Force = False,
+    json: Json = False,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+) -> None:
+    """Film a virtual bust, find the flashes, solve for normals, and end with the path of a picture of it all."""
+    voice = Voice(json=json, verbose=verbose, quiet=quiet)
+    picture = run_demo(out, force=force, watch=voice.track)
+    voice.result({"picture": str(picture)})
+    voice.say(f"Results in {out / 'out'}; the clip and its truth in {out / 'clip'}. The picture:")
+    voice.say(str(picture))

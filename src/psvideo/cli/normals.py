@@ -1,0 +1,111 @@
+"""psvideo normals: normal maps and albedo for every round of flashes."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from psvideo.cli.console import Voice
+from psvideo.cli.options import (
+    ClipPath,
+    FirstLight,
+    Force,
+    Frames,
+    Json,
+    PlanPath,
+    Quiet,
+    Resume,
+    StartNumber,
+    TimingPath,
+    Verbose,
+)
+from psvideo.cli.sync import describe_timing
+from psvideo.export.results import Delivery
+from psvideo.export.space import choose_space
+from psvideo.pipeline import open_take
+from psvideo.runs import Output, normals_run, timing_of
+from psvideo.view.report import findings, report_record, verdict
+
+
+class SpaceName(StrEnum):
+    """The frame of the delivered normals."""
+
+    camera = "camera"
+    world = "world"
+    tangent = "tangent"
+
+
+class YDirection(StrEnum):
+    """Which way the green channel points."""
+
+    up = "up"
+    down = "down"
+
+
+class Aov(StrEnum):
+    """What may be written besides."""
+
+    residual = "residual"
+
+
+class Encoding(StrEnum):
+    """Other encodings of the same maps."""
+
+    png16 = "png16"
+
+
+def normals(
+    clip: ClipPath,
+    rig: Annotated[Path, typer.Option("--rig", help="Where the lights are: rig.toml, .lp, DiLiGenT or UW list.")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="The folder to write.")],
+    plan: PlanPath = None,
+    timing: TimingPath = None,
+    mask: Annotated[Path | None, typer.Option("--mask", help="A picture, white where to solve.")] = None,
+    frames: Frames = None,
+    first_light: FirstLight = None,
+    space: Annotated[SpaceName, typer.Option(help="Camera axes, the world's, or a flat card's.")] = SpaceName.camera,
+    camera_to_world: Annotated[
+        Path | None, typer.Option("--camera-to-world", help="For --space world: a text file, 3 x 3 or 4 x 4 matrix.")
+    ] = None,
+    y: Annotated[YDirection, typer.Option("--y", help="up as in OpenGL, down as in DirectX.")] = YDirection.up,
+    float32: Annotated[bool, typer.Option("--float", help="Store normals as 32-bit floats.")] = False,
+    aov: Annotated[list[Aov] | None, typer.Option("--aov", help="Write this besides.")] = None,
+    encode: Annotated[
+        Encoding | None, typer.Option("--encode", help="Write 16-bit PNG maps of 0 to 1 besides.")
+    ] = None,
+    separate: Annotated[
+        bool, typer.Option("--separate", help="One sequence per quantity; this is the default.")
+    ] = True,
+    multipart: Annotated[bool, typer.Option("--multipart", help="Write one EXR with all quantities besides.")] = False,
+    start_number: StartNumber = 1001,
+    force: Force = False,
+    resume: Resume = False,
+    json: Json = False,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+) -> None:
+    """Write normals, albedo and validity for every round of flashes; does sync and split by itself."""
+    voice = Voice(json=json, verbose=verbose, quiet=quiet)
+    output = Output(folder=out, force=force, resume=resume, start_number=start_number)
+    output.check()
+    delivery = Delivery(
+        space=choose_space(space.value, y.value, camera_to_world),
+        half=not float32,
+        aovs=tuple(name.value for name in aov or ()),
+        png16=encode is Encoding.png16,
+        multipart=multipart,
+    )
+    take = open_take(clip, plan=plan, frames=frames)
+    for warning in take.clip.warnings:
+        voice.warn(warning)
+    for note in take.clip.notes:
+        voice.detail(note)
+    found = timing_of(take, timing, first_light=first_light, watch=voice.track)
+    report = normals_run(take, found, rig, output, delivery=delivery, mask_path=mask, watch=voice.track).report
+    voice.result(report_record(report))
+    voice.say(describe_timing(found))
+    voice.say(verdict(report))
+    for sentence in findings(report):
+        voice.warn(sentence)
+    voice.say(f"{out}: {len(report.instants)} instants written; see {out / 'report.html'}.")

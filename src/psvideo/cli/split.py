@@ -1,0 +1,67 @@
+"""psvideo split: one clean sequence per light."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from psvideo.cli.console import Voice
+from psvideo.cli.options import (
+    ClipPath,
+    FirstLight,
+    Force,
+    Frames,
+    Json,
+    PlanPath,
+    Quiet,
+    Resume,
+    StartNumber,
+    TimingPath,
+    Verbose,
+)
+from psvideo.cli.sync import describe_timing
+from psvideo.pipeline import open_take
+from psvideo.runs import Output, split_run, timing_of
+from psvideo.timing import timing_record
+
+
+class Method(StrEnum):
+    """How plates are rebuilt."""
+
+    weights = "weights"
+    hudon2015 = "hudon2015"
+
+
+def split(
+    clip: ClipPath,
+    out: Annotated[Path, typer.Option("-o", "--out", help="The folder of plates to write.")],
+    plan: PlanPath = None,
+    timing: TimingPath = None,
+    frames: Frames = None,
+    first_light: FirstLight = None,
+    method: Annotated[
+        Method, typer.Option(help="By the rows' weights, or Algorithm 1 of Hudon et al. 2015, to compare with.")
+    ] = Method.weights,
+    flashes: Annotated[bool, typer.Option("--flashes", help="Write every flash by itself besides.")] = False,
+    start_number: StartNumber = 1001,
+    force: Force = False,
+    resume: Resume = False,
+    json: Json = False,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+) -> None:
+    """Rebuild one plate per flash and write one EXR sequence per light, ambient light taken off."""
+    voice = Voice(json=json, verbose=verbose, quiet=quiet)
+    output = Output(folder=out, force=force, resume=resume, start_number=start_number)
+    output.check()
+    take = open_take(clip, plan=plan, frames=frames)
+    for warning in take.clip.warnings:
+        voice.warn(warning)
+    for note in take.clip.notes:
+        voice.detail(note)
+    found = timing_of(take, timing, first_light=first_light, watch=voice.track)
+    written = split_run(take, found, output, method=method.value, flashes=flashes, watch=voice.track)
+    voice.result(timing_record(written))
+    voice.say(describe_timing(written))
+    voice.say(f"{out}: {sum(flash.plate is not None for flash in written.flashes)} plates written.")

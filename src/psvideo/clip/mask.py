@@ -1,0 +1,33 @@
+"""A mask that a user painted: white where to solve."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.clip.decoders import decode
+from psvideo.clip.folder import KINDS
+from psvideo.errors import PsvideoError
+
+
+def read_mask(path: Path, *, width_px: int, height_px: int) -> NDArray[np.bool_]:
+    """Return where a mask is white (brighter than half of its range), shape (row, col).
+
+    Raises PsvideoError where the file cannot be read, has another size than the frames, or is black everywhere.
+    """
+    kind = KINDS.get(path.suffix.lower())
+    if kind is None:
+        raise PsvideoError(f"{path}: is no picture that can be a mask; expected one of {', '.join(KINDS)}.")
+    codes = decode(kind, path).codes
+    brightest = codes if codes.ndim == 2 else codes.max(axis=2)
+    if brightest.shape != (height_px, width_px):
+        rows, cols = brightest.shape
+        raise PsvideoError(
+            f"{path}: the mask is {cols} x {rows} pixels, and the frames are {width_px} x {height_px}. "
+            "Paint it over a frame or a plate of this clip."
+        )
+    white = np.iinfo(codes.dtype).max if np.issubdtype(codes.dtype, np.integer) else 1.0
+    mask: NDArray[np.bool_] = brightest > 0.5 * white
+    if not mask.any():
+        raise PsvideoError(f"{path}: the mask is black everywhere; paint white where normals are wanted.")
+    return mask

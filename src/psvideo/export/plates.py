@@ -1,0 +1,49 @@
+"""Plates as files: ``<light>/<clip>_<light>.<number>.exr``, half float, one sequence per light."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.export.exr import write_exr
+from psvideo.export.tags import Tags
+from psvideo.sequence import LightPlate
+from psvideo.split import Plate
+
+
+def plate_name(clip: str, light: str, number: int) -> str:
+    """Return a plate's path below the plates' folder.
+
+    >>> plate_name("take3", "key", 1001)
+    'key/take3_key.1001.exr'
+    """
+    return f"{light}/{clip}_{light}.{number:04d}.exr"
+
+
+def write_plate(folder: Path, clip: str, plate: LightPlate, tags: Tags) -> None:
+    """Write one plate: channels R, G, B or Y, and ``valid`` where rows are missing."""
+    path = folder / plate_name(clip, plate.light, plate.number)
+    channels = _with_validity(plate.image, plate.seen)
+    write_exr(path, channels, attributes=tags.attributes(time_s=plate.time_s, data=False), fps=tags.fps)
+
+
+def write_flash(folder: Path, clip: str, plate: Plate, tags: Tags) -> None:
+    """Write what one flash showed by itself, whatever lights it held: ``flashes/<clip>_flash.<index>.exr``."""
+    path = folder / "flashes" / f"{clip}_flash.{plate.flash.index:04d}.exr"
+    lights = " ".join(f"{name}={power:g}" for name, power in plate.flash.lights.items()) or "dark"
+    attributes = tags.attributes(time_s=plate.time_s, data=False) | {"psvideo:lights": lights}
+    write_exr(path, _with_validity(plate.image, plate.seen), attributes=attributes, fps=tags.fps)
+
+
+def _with_validity(image: NDArray[np.float32], seen: NDArray[np.bool_]) -> dict[str, NDArray[np.floating]]:
+    channels = image_channels(image)
+    if not seen.all():
+        channels["valid"] = np.broadcast_to(seen[:, None], image.shape[:2]).astype(np.float32)
+    return channels
+
+
+def image_channels(image: NDArray[np.floating]) -> dict[str, NDArray[np.floating]]:
+    """Return a picture's channels by their names in a file: R, G, B, or Y for grey."""
+    if image.ndim == 2:
+        return {"Y": image}
+    return {name: image[..., channel] for channel, name in enumerate("RGB")}

@@ -1,0 +1,115 @@
+"""Results as files: one EXR sequence per quantity, ``normals/<clip>_normals.<number>.exr`` and so on."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.errors import PsvideoError
+from psvideo.export.exr import write_exr, write_exr_parts
+from psvideo.export.plates import image_channels
+from psvideo.export.space import Space, placed
+from psvideo.export.tags import Tags
+from psvideo.files import whole_file
+from psvideo.surface import Surface
+
+PNG_MAX = 65535
+
+
+@dataclass(frozen=True, kw_only=True)
+class Delivery:
+    """How results are written. ``half`` False stores normals as 32-bit floats; ``aovs`` may add "residual"."""
+
+    space: Space
+    half: bool = True
+    aovs: tuple[str, ...] = ()
+    png16: bool = False
+    multipart: bool = False
+
+
+def result_name(clip: str, quantity: str, number: int, *, suffix: str = "exr") -> str:
+    """Return a result's path below the output folder.
+
+    >>> result_name("take3", "normals", 1001)
+    'normals/take3_normals.1001.exr'
+    """
+    folder = quantity if suffix == "exr" else f"{quantity}_{suffix}16"
+    return f"{folder}/{clip}_{quantity}.{number:04d}.{suffix}"
+
+
+def bundle_name(clip: str, number: int) -> str:
+    """Return the path of one instant's multipart file below the output folder."""
+    return f"{clip}.{number:04d}.exr"
+
+
+def is_written(folder: Path, clip: str, number: int, delivery: Delivery) -> bool:
+    """Return whether all files of one instant are there (each appears whole)."""
+    names = [result_name(clip, quantity, number) for quantity in ("normals", "albedo", "valid", *delivery.aovs)]
+    if delivery.multipart:
+        names.append(bundle_name(clip, number))
+    if delivery.png16:
+        names += [result_name(clip, quantity, number, suffix="png") for quantity in ("normals", "valid")]
+    return all((folder / name).is_file() for name in names)
+
+
+def write_surface(
+    folder: Path, clip: str, number: int, time_s: float, surface: Surface, *, delivery: Delivery, tags: Tags
+) -> None:
+    """Write one instant: normals as signed unit vectors, linear albedo, validity, and the AOVs asked for."""
+    normals = placed(surface.normals, delivery.space)
+    planes: dict[str, dict[str, NDArray[np.floating]]] = {
+        "normals": image_channels(normals),
+        "albedo": image_channels(_three_channels(surface.albedo)),
+        "valid": {"Y": surface.valid.astype(np.float32)},
+    }
+    if "residual" in delivery.aovs:
+        if surface.residual is None:
+            raise ValueError("the residual is to be written and was not solved for")
+        planes["residual"] = {"Y": surface.residual}
+    for quantity, channels in planes.items():
+        write_exr(
+            folder / result_name(clip, quantity, number),
+            channels,
+            half=delivery.half or quantity != "normals",
+            attributes=tags.attributes(time_s=time_s, data=quantity != "albedo"),
+            fps=tags.fps,
+        )
+    if delivery.multipart:
+        attributes = {name: tags.attributes(time_s=time_s, data=name != "albedo") for name in planes}
+        write_exr_parts(
+            folder / bundle_name(clip, number), planes, half=delivery.half, attributes=attributes, fps=tags.fps
+        )
+    if delivery.png16:
+        write_png16(folder / result_name(clip, "normals", number, suffix="png"), encode_normals(normals))
+        mask = np.where(surface.valid, np.uint16(PNG_MAX), np.uint16(0))
+        write_png16(folder / result_name(clip, "valid", number, suffix="png"), mask)
+
+
+def _three_channels(albedo: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Return the albedo with three channels: grey footage gives three alike."""
+    return albedo if albedo.ndim == 3 else np.broadcast_to(albedo[..., None], (*albedo.shape, 3))
+
+
+def encode_normals(normals: NDArray[np.floating]) -> NDArray[np.uint16]:
+    """Return unit normals as 16-bit codes, 0.5 + 0.5 n over 0 to 65535; (0, 0, 0) becomes the middle."""
+    codes = np.clip(0.5 + 0.5 * normals.astype(np.float64), 0, 1) * PNG_MAX + 0.5
+    return codes.astype(np.uint16)
+
+
+def decode_normals(codes: NDArray[np.uint16]) -> NDArray[np.float32]:
+    """Return normals from their 16-bit codes, made unit again; what lies about the middle is (0, 0, 0)."""
+    normals = codes.astype(np.float64) / PNG_MAX * 2 - 1
+    length = np.linalg.norm(normals, axis=-1, keepdims=True)
+    unit = np.where(length > 0.5, normals / np.maximum(length, 1e-9), 0.0)
+    return unit.astype(np.float32)
+
+
+def write_png16(path: Path, codes: NDArray[np.uint16]) -> None:
+    """Write a 16-bit PNG, grey or R, G, B, whole or not at all."""
+    done, data = cv2.imencode(".png", codes if codes.ndim == 2 else codes[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 1])
+    if not done:
+        raise PsvideoError(f"{path}: the picture of shape {codes.shape} cannot be encoded as PNG.")
+    with whole_file(path) as beside:
+        beside.write_bytes(data.tobytes())

@@ -1,0 +1,311 @@
+"""psvideo info: every kind of file is known for what it is, and what does not fit is said with exit status 1."""
+
+import dataclasses
+import json
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import imagecodecs
+import numpy as np
+import OpenEXR
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from psvideo.camera import Encoding
+from psvideo.cli.info import info
+from psvideo.clip import describe
+from psvideo.clip.about_plan import has_marker
+from psvideo.clip.findings import Description
+from psvideo.errors import PsvideoError
+from psvideo.plan import Plan, PlannedFlash
+from psvideo.planfile import format_plan
+from psvideo.rig import Light, Rig
+from psvideo.rigfile import format_rig
+from psvideo.timing import DroppedFrames, Flash, Timing, format_timing
+
+ROWS, COLS = 12, 16
+LIGHTS = ("key", "left", "right")
+
+
+@pytest.fixture
+def plan(make_plan: Callable[..., Plan]) -> Plan:
+    return make_plan(width_px=COLS, height_px=ROWS, lights=LIGHTS)
+
+
+def put_frames(folder: Path, numbers: range, *, rows: int = ROWS, dtype: Any = np.uint16, share: float = 0.5) -> None:
+    codes = np.full((rows, COLS, 3), share * np.iinfo(dtype).max, dtype)
+    folder.mkdir(parents=True, exist_ok=True)
+    for number in numbers:
+        (folder / f"shot.{number:04d}.png").write_bytes(imagecodecs.png_encode(codes))
+
+
+def put_plan(folder: Path, plan: Plan, **encoding: Any) -> Path:
+    camera = dataclasses.replace(plan.camera, encoding=Encoding(**encoding))
+    (folder / "plan.toml").write_text(format_plan(dataclasses.replace(plan, camera=camera)))
+    return folder / "plan.toml"
+
+
+def put_rig(folder: Path, names: tuple[str, ...]) -> Path:
+    lights = tuple(Light(name=name, direction=(0.0, 0.6, 0.8)) for name in names)
+    (folder / "rig.toml").write_text(format_rig(Rig(lights=lights)))
+    return folder / "rig.toml"
+
+
+@pytest.fixture
+def shot(tmp_path: Path, plan: Plan) -> Path:
+    put_frames(tmp_path / "shot" / "frames", range(1, 41))
+    put_plan(tmp_path / "shot", plan)
+    put_rig(tmp_path / "shot", LIGHTS)
+    return tmp_path / "shot"
+
+
+def lines(found: Description, level: str) -> str:
+    return "\n".join(finding.text for finding in found.findings if finding.level == level)
+
+
+def test_a_clip_that_fits_says_so(shot: Path) -> None:
+    found = describe(shot)
+    assert (found.kind, found.fits) == ("clip folder", True)
+    assert {finding.level for finding in found.findings} == {"ok"}
+    said = lines(found, "ok")
+    for part in ("40 frames, numbered 1 to 40: png, 16 x 12 pixels", "9 whole round(s)", "has the plan's 3 light(s)"):
+        assert part in said
+    assert found.facts["frames"] == 40
+
+
+def test_the_rounds_of_a_clip_are_counted_by_its_plan(shot: Path, plan: Plan) -> None:
+    """40 frames of 1001/120000 s, and four flashes a round, each with its dark time."""
+    round_s = sum(flash.duration_s + plan.dark_s for flash in plan.flashes)
+    expected = int(40 * 1001 / 120000 / round_s)
+    assert f"{expected} whole round(s)" in lines(describe(shot), "ok")
+
+
+def no_change(shot: Path, plan: Plan) -> None:
+    pass
+
+
+FAULTS: dict[str, tuple[Callable[[Path, Plan], Any], str]] = {
+    "size": (lambda shot, plan: put_frames(shot / "frames", range(1, 41), rows=9), "is 16 x 9 pixels, and"),
+    "one frame's size": (
+        lambda shot, plan: put_frames(shot / "frames", range(7, 8), rows=9),
+        r"shot.0007.png: is 16 x 9",
+    ),
+    "one frame's depth": (lambda shot, plan: put_frames(shot / "frames", range(7, 8), dtype=np.uint8), "8 bits"),
+    "an empty frame": (lambda shot, plan: (shot / "frames/shot.0009.png").write_bytes(b""), "shot.0009.png: is empty"),
+    "too short": (lambda shot, plan: [(shot / f"frames/shot.{n:04d}.png").unlink() for n in range(3, 41)], "too short"),
+    "no plan": (lambda shot, plan: (shot / "plan.toml").unlink(), "there is no plan.toml"),
+    "a bad plan": (lambda shot, plan: (shot / "plan.toml").write_text("schema ="), "not a TOML file"),
+    "a light not in the rig": (
+        lambda shot, plan: put_rig(shot, ("key", "left")),
+        "rig.toml: The rig has no light named 'right'",
+    ),
+    "levels": (lambda shot, plan: put_plan(shot, plan, transfer="logc3", white_level=4095), "no brighter than"),
+    "colour filters": (lambda shot, plan: put_plan(shot, plan, cfa="RGGB"), "is a colour picture"),
+    "curve": (lambda shot, plan: put_plan(shot, plan, transfer="filmlook"), "no curve that this psvideo knows"),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_what_does_not_fit_is_a_fault(shot: Path, plan: Plan, name: str) -> None:
+    spoil, message = FAULTS[name]
+    spoil(shot, plan)
+    found = describe(shot)
+    assert not found.fits
+    assert message in lines(found, "FAULT")
+
+
+WARNINGS: dict[str, tuple[Callable[[Path, Plan], Any], str]] = {
+    "dropped frames": (lambda shot, plan: (shot / "frames/shot.0017.png").unlink(), "1 frame(s) dropped: 1 after 16"),
+    "saturation": (
+        lambda shot, plan: put_frames(shot / "frames", range(1, 41), share=1.0),
+        "100.0% of the pixels are saturated",
+    ),
+    "12 bits read as 16": (
+        lambda shot, plan: put_frames(shot / "frames", range(1, 41), share=0.03),
+        "white_level is not counted",
+    ),
+    "white level too low": (lambda shot, plan: put_plan(shot, plan, white_level=4095), "does not fit the files' codes"),
+    "no marker": (
+        lambda shot, plan: put_plan(shot, dataclasses.replace(plan, flashes=plan.flashes[:3])),
+        "their names are a guess: give --first-light",
+    ),
+    "short dark time": (
+        lambda shot, plan: put_plan(shot, dataclasses.replace(plan, dark_s=0.9 * plan.dark_s)),
+        "is shorter than the exposure",
+    ),
+    "a light that is never lit": (lambda shot, plan: put_rig(shot, (*LIGHTS, "rim")), "does not flash: rim"),
+}
+
+
+@pytest.mark.parametrize("name", WARNINGS)
+def test_what_may_cost_accuracy_is_a_warning(shot: Path, plan: Plan, name: str) -> None:
+    spoil, message = WARNINGS[name]
+    spoil(shot, plan)
+    found = describe(shot)
+    assert found.fits
+    assert message in lines(found, "warn")
+
+
+@pytest.mark.parametrize(
+    ("frames", "level", "message"), [(8, "ok", "2 round(s)"), (9, "warn", "1 frame(s)"), (3, "FAULT", "1 are")]
+)
+def test_a_synced_clip_has_one_frame_per_flash(
+    tmp_path: Path, plan: Plan, frames: int, level: str, message: str
+) -> None:
+    put_frames(tmp_path, range(frames))
+    put_plan(tmp_path, dataclasses.replace(plan, mode="synced"))
+    assert message in lines(describe(tmp_path), level)
+
+
+@pytest.mark.parametrize(
+    ("flashes", "dark_every", "tells"),
+    [
+        ("abc", 1, False),
+        ("abc-", 1, True),
+        ("abc-", 5, True),
+        ("a-b-", 1, False),
+        ("aB", 1, True),
+        ("abAB", 1, True),
+        ("aBcB", 1, False),
+        ("a", 1, True),
+    ],
+)
+def test_a_cycle_has_a_marker_where_no_shift_looks_like_it(
+    plan: Plan, flashes: str, dark_every: int, tells: bool
+) -> None:
+    """Letters are lights, capitals flash twice as long, dashes are dark slots."""
+    slots = tuple(
+        PlannedFlash(lights={} if light == "-" else {light.lower(): 1.0}, duration_s=2e-3 if light.isupper() else 1e-3)
+        for light in flashes
+    )
+    assert has_marker(dataclasses.replace(plan, flashes=slots, dark_every=dark_every)) is tells
+
+
+def test_plan_and_rig_files_are_known_by_their_schema(shot: Path) -> None:
+    assert describe(shot / "plan.toml").kind == "plan"
+    assert "lights key, left, right" in lines(describe(shot / "plan.toml"), "ok")
+    assert describe(shot / "rig.toml").kind == "rig"
+    assert "3 lights: key, left, right" in lines(describe(shot / "rig.toml"), "ok")
+    renamed = (shot / "plan.toml").rename(shot / "monday.toml")
+    assert describe(renamed).kind == "plan"
+
+
+def make_timing(**changes: Any) -> Timing:
+    flash = Flash(
+        index=0, slot=0, lights={"key": 1.0}, start_s=0.0, duration_s=8e-4, complete=True, plate="key/a.1001.exr"
+    )
+    timing = Timing(
+        clip="shot",
+        frame_period_s=0.01,
+        exposure_s=0.01,
+        row_time_s=1e-5,
+        clock_offset_ppm=12.0,
+        phase_error_rows=0.01,
+        order="marker",
+        flashes=(flash, dataclasses.replace(flash, index=1, complete=False, plate=None)),
+    )
+    return dataclasses.replace(timing, **changes)
+
+
+def test_a_timing_says_how_sure_it_is(tmp_path: Path) -> None:
+    (tmp_path / "timing.json").write_text(format_timing(make_timing()))
+    found = describe(tmp_path / "timing.json")
+    assert (found.kind, found.facts["flashes"], found.facts["complete"]) == ("timing", 2, 1)
+    assert "found by marker" in lines(found, "ok")
+    doubtful = make_timing(order="guess", clock_offset_ppm=-1003.0, dropped_frames=(DroppedFrames(after=16, count=2),))
+    (tmp_path / "timing.json").write_text(format_timing(doubtful))
+    said = lines(describe(tmp_path / "timing.json"), "warn")
+    for part in ("is a guess", "misnamed by 1000/1001", "2 frame(s) dropped, after 16"):
+        assert part in said
+
+
+def put_exr(file: Path, names: str = "RGB") -> None:
+    file.parent.mkdir(parents=True, exist_ok=True)
+    header = {
+        "type": OpenEXR.scanlineimage,
+        "psvideo:space": "camera",
+        "psvideo:time_s": 1.25,
+        "framesPerSecond": Fraction(30000, 1001),
+    }
+    OpenEXR.File(header, {name: np.zeros((ROWS, COLS), np.float16) for name in names}).write(str(file))
+
+
+def test_an_exr_tells_its_attributes(tmp_path: Path) -> None:
+    put_exr(tmp_path / "a.1001.exr")
+    found = describe(tmp_path / "a.1001.exr")
+    assert (found.facts["psvideo:space"], found.facts["psvideo:time_s"]) == ("camera", 1.25)
+    assert found.facts["framesPerSecond"] == "30000/1001"
+    assert "16 x 12 pixels, channels R, G, B" in lines(found, "ok")
+
+
+def test_plates_are_held_against_their_timing(tmp_path: Path) -> None:
+    put_exr(tmp_path / "key" / "a.1001.exr")
+    (tmp_path / "timing.json").write_text(format_timing(make_timing()))
+    assert (describe(tmp_path).kind, describe(tmp_path).fits) == ("plates folder", True)
+    (tmp_path / "key" / "a.1001.exr").rename(tmp_path / "key" / "a.1002.exr")
+    assert "lists key/a.1001.exr" in lines(describe(tmp_path), "FAULT")
+
+
+def test_results_hold_the_same_numbers(tmp_path: Path) -> None:
+    for number in (1001, 1002):
+        for name, channels in (("normals", "RGB"), ("albedo", "RGB"), ("valid", "Y")):
+            put_exr(tmp_path / name / f"shot_{name}.{number}.exr", channels)
+    found = describe(tmp_path)
+    assert (found.kind, found.fits) == ("results folder", True)
+    assert "normals: 2 file(s), numbered 1001 to 1002, 16 x 12, channels R, G, B" in lines(found, "ok")
+    (tmp_path / "albedo" / "shot_albedo.1002.exr").unlink()
+    assert "albedo/ and normals/ do not hold the same numbers (1 differ)" in lines(describe(tmp_path), "FAULT")
+
+
+def test_what_psvideo_does_not_know_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "notes.pdf").write_text("x")
+    (tmp_path / "pyproject.toml").write_text("[project]")
+    for name in ("notes.pdf", "pyproject.toml"):
+        with pytest.raises(PsvideoError, match=f"{name}: is nothing that psvideo writes or reads"):
+            describe(tmp_path / name)
+    with pytest.raises(PsvideoError, match="there is no such file or folder"):
+        describe(tmp_path / "gone")
+
+
+@pytest.fixture
+def run() -> Callable[..., Any]:
+    app = typer.Typer()
+    app.command()(info)
+    return lambda *arguments: CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def test_the_command_prints_a_line_per_finding_and_fails_where_it_does_not_fit(
+    shot: Path, run: Callable[..., Any]
+) -> None:
+    good = run(shot)
+    assert good.exit_code == 0
+    assert good.stdout.startswith(f"{shot}: clip folder\n  ok    40 frames")
+    put_rig(shot, ("key",))
+    bad = run(shot)
+    assert bad.exit_code == 1
+    assert "\n  FAULT " in bad.stdout
+
+
+def test_the_command_speaks_json(shot: Path, run: Callable[..., Any]) -> None:
+    record = json.loads(run(shot, "--json").stdout)
+    assert (record["kind"], record["fits"], record["facts"]["lights"]) == ("clip folder", True, list(LIGHTS))
+    assert {"level", "text"} == set(record["findings"][0])
+
+
+@pytest.mark.parametrize("name", ["plain", "ambient"])
+def test_another_simulators_clips_fit(shared_data: Path, name: str) -> None:
+    found = describe(shared_data / "clips" / name)
+    assert {finding.level for finding in found.findings} == {"ok"}
+
+
+def test_photographs_with_a_plan_of_their_own_fit(shared_data: Path, tmp_path: Path, plan: Plan) -> None:
+    lights = tuple(PlannedFlash(lights={f"L{light}": 1.0}, duration_s=1e-3) for light in range(12))
+    camera = dataclasses.replace(plan.camera, width_px=512, height_px=340)
+    still = dataclasses.replace(plan, mode="synced", flashes=lights, camera=camera)
+    found = describe(shared_data / "uw_psm" / "cat", plan=put_plan(tmp_path, still))
+    assert found.fits
+    assert "12 frames, 12 flashes a round: 1 round(s)" in lines(found, "ok")
+    assert "cat.mask.png" in lines(found, "ok")
