@@ -136,11 +136,11 @@ def _profiles(pictures: Iterator[tuple[str, Picture]], columns: tuple[int, int] 
         begin, end = columns or (0, width_px)
         if end > width_px:
             raise UsageError(f"--columns {begin}-{end}: {name} has columns 0-{width_px} only.")
-        found.append(_blocks(_in_colours(picture), begin, end))
+        found.append(_blocks(in_colours(picture), begin, end))
     return np.array(found), width_px
 
 
-def _in_colours(picture: Picture) -> NDArray[Any]:
+def in_colours(picture: Picture) -> NDArray[Any]:
     """Return codes (row, col, channel): of a mosaic the green ones, which every row has in every second column."""
     codes, cfa = picture.codes, picture.header.cfa
     if cfa is None:

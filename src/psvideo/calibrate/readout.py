@@ -12,7 +12,8 @@ import numpy as np
 
 from psvideo.calibrate.led_pictures import LedPictures
 from psvideo.calibrate.stripe_fit import StripeFit, fit_stripes
-from psvideo.calibrate.stripe_search import Reading, check_stripes, find_stripes
+from psvideo.calibrate.stripe_search import check_stripes, find_stripes
+from psvideo.calibrate.stripe_spectrum import find_fainter
 from psvideo.calibrate.stripe_steps import Direction, find_direction
 from psvideo.camera import FloatArray
 from psvideo.errors import PsvideoError
@@ -76,11 +77,12 @@ def measure_readout(
     row_hz = led.rate_hz / zoom  # rows of the picture, as if each were opened by itself
     expected = None if near_s is None else near_s * row_hz / full
     try:
-        profiles, fit = _find(pictures.profiles, expected)
+        profiles, fit, fainter = _find(pictures.profiles, expected)
     except PsvideoError as fault:
         raise PsvideoError(f"{pictures.name}: {fault}") from None
     to_s = full / row_hz
     stripes_error, warnings = _over_halves(profiles, fit)
+    warnings += _about_fainter(fainter, to_s)
     readout_s = to_s * fit.frequency
     clock_error_s = readout_s * led.tolerance_ppm * 1e-6 / np.sqrt(3)
     _refuse_impossible(pictures, readout_s, fps)
@@ -105,8 +107,8 @@ def measure_readout(
     )
 
 
-def _find(profiles: FloatArray, expected: float | None) -> tuple[FloatArray, StripeFit]:
-    """Return the profiles (frame, block, row) in which stripes were found, and their fit.
+def _find(profiles: FloatArray, expected: float | None) -> tuple[FloatArray, StripeFit, float | None]:
+    """Return the profiles (frame, block, row) in which stripes were found, their fit, and fainter ones' frequency.
 
     What stands still from frame to frame is the scene: where the stripes move, they are found in what is left without
     it. Where they stand still too, or there are too few frames, in the frames as they are.
@@ -119,12 +121,12 @@ def _find(profiles: FloatArray, expected: float | None) -> tuple[FloatArray, Str
     return _fit(profiles, expected)
 
 
-def _fit(profiles: FloatArray, expected: float | None) -> tuple[FloatArray, StripeFit]:
-    reading: Reading = find_stripes(profiles, expected=expected)
+def _fit(profiles: FloatArray, expected: float | None) -> tuple[FloatArray, StripeFit, float | None]:
+    reading = find_stripes(profiles, expected=expected)
     coloured = profiles[:, reading.channel]
     fit = fit_stripes(coloured, reading.frequency)
-    check_stripes(fit, reading)
-    return coloured, fit
+    check_stripes(fit, reading, profiles.shape[3])
+    return coloured, fit, find_fainter(coloured.mean(axis=1, keepdims=True), reading.frequency)
 
 
 def _over_halves(profiles: FloatArray, fit: StripeFit) -> tuple[float, tuple[str, ...]]:
@@ -141,6 +143,16 @@ def _over_halves(profiles: FloatArray, fit: StripeFit) -> tuple[float, tuple[str
         f"one period takes {1 / upper.frequency:.3f} rows in the upper half of the picture and "
         f"{1 / lower.frequency:.3f} in the lower one, so the rows do not open evenly in this picture (lens correction, "
         "stabilisation or scaling moved them, or the LED's rate drifted); the error allows for that",
+    )
+
+
+def _about_fainter(frequency: float | None, to_s: float) -> tuple[str, ...]:
+    if frequency is None:
+        return ()
+    return (
+        f"fainter stripes lie over those that were measured, one period in {1 / frequency:.2f} rows: a second light "
+        f"flickers, or the LED itself. If it is these that blink at the LED's rate, the readout is about "
+        f"{to_s * frequency * 1e3:.1f} ms: film again with the LED alone",
     )
 
 

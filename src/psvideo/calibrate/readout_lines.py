@@ -51,7 +51,7 @@ def _frames(count: int) -> str:
 
 
 def _ms(seconds: float, readout: Readout) -> str:
-    """Return milliseconds with the digits that are worth writing: three, four where the error is below a microsecond."""
+    """Return milliseconds with the digits that are worth writing."""
     return f"{seconds * 1e3:.{3 if readout.error_s > 1e-6 else 4}f}"
 
 

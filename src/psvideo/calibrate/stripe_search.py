@@ -12,16 +12,15 @@ import numpy as np
 
 from psvideo.calibrate.stripe_fit import StripeFit, fit_stripes
 from psvideo.calibrate.stripe_model import spline_basis
+from psvideo.calibrate.stripe_spectrum import find_peaks, flattened, without
 from psvideo.camera import FloatArray
 from psvideo.errors import PsvideoError
 
 FEWEST_PERIODS = 2.0
 SHORTEST_PERIOD_ROWS = 2.5
-MOST_SEARCHED_FRAMES = 6
-PEAKS = 5
+MOST_SEARCHED_FRAMES = 4
 SUBHARMONICS = (1, 2, 3)
 HARMONICS = 8
-OVERSAMPLING = 8
 SAME_CYCLES = 0.4
 """Frequencies that differ by less than this many periods over the picture are the same candidate."""
 NEAR = 0.25
@@ -32,9 +31,15 @@ FAINT_GAIN = 0.01
 much more of the stripes altogether."""
 HALF_TOLD = 0.8
 """Where a shorter period explains this share of what the longer one does, only every second stripe differs a little."""
-MOST_RIVAL = 0.6
+MOST_RIVAL = 0.75
 """Other stripes that explain more than this share of what the chosen ones do: a scene, or two lamps."""
+WIDE_LEFT = 0.5
+"""Stripes of too few periods are what is there where they leave less than this share of what any others do."""
+LEAST_CHANGE = 1e-6
+"""Change over the rows, as a share of the level, below which there is nothing to read."""
 LEAST_EXPLAINED = 0.5
+MANY_PERIODS = 5.0
+LEAST_EXPLAINED_BY_FEW = 0.95
 LEAST_IN_STEP = 0.9
 FEWEST_BLOCKS = 4
 MOST_ERROR = 0.005
@@ -62,8 +67,11 @@ def find_stripes(profiles: FloatArray, *, expected: float | None = None) -> Read
     """
     whole = profiles[:MOST_SEARCHED_FRAMES].mean(axis=2)
     rows = whole.shape[2]
-    readings = [_read(whole, frequency) for frequency in _candidates(whole, expected)]
-    readings = [reading for reading in readings if reading.frequency * rows >= FEWEST_PERIODS]
+    if flattened(whole).std() <= LEAST_CHANGE * np.abs(whole).max():
+        raise PsvideoError(NO_STRIPES)
+    found = [_read(whole, frequency) for frequency in _candidates(whole, expected)]
+    readings = [reading for reading in found if reading.frequency * rows >= FEWEST_PERIODS]
+    _refuse_wide(found, readings, rows)
     if expected is not None:
         readings = [reading for reading in readings if abs(reading.frequency / expected - 1) < NEAR]
     if not readings:
@@ -74,16 +82,18 @@ def find_stripes(profiles: FloatArray, *, expected: float | None = None) -> Read
     return chosen
 
 
-def check_stripes(fit: StripeFit, reading: Reading) -> None:
+def check_stripes(fit: StripeFit, reading: Reading, rows: int) -> None:
     """Raise PsvideoError where fitted stripes are no stripes: faint, out of step across the picture, or irregular.
 
-    Blocks of columns are compared up to half a period, since two lamps may take turns.
+    Blocks of columns are compared up to half a period, since two lamps may take turns. A few periods are soon found in
+    a scene, so that these have to explain nearly all.
     """
     amplitude = fit.fundamental
     in_step = np.abs((amplitude**2).sum(axis=1)).sum() / (np.abs(amplitude) ** 2).sum()
     too_few_blocks = amplitude.shape[1] < FEWEST_BLOCKS
     is_regular = fit.frequency_error / fit.frequency <= MOST_ERROR
-    if reading.explained < LEAST_EXPLAINED or not is_regular or not (too_few_blocks or in_step >= LEAST_IN_STEP):
+    least = LEAST_EXPLAINED if fit.frequency * rows >= MANY_PERIODS else LEAST_EXPLAINED_BY_FEW
+    if reading.explained < least or not is_regular or not (too_few_blocks or in_step >= LEAST_IN_STEP):
         raise PsvideoError(NO_STRIPES)
 
 
@@ -98,7 +108,7 @@ NO_STRIPES = (
 
 def _candidates(whole: FloatArray, expected: float | None) -> list[float]:
     """Return the frequencies that are worth a fit, each once."""
-    peaks = _peaks(whole)
+    peaks = find_peaks(whole)
     found = [] if expected is None else [expected]
     distinct: list[float] = []
     rows = whole.shape[2]
@@ -109,57 +119,34 @@ def _candidates(whole: FloatArray, expected: float | None) -> list[float]:
     return distinct
 
 
-def _peaks(whole: FloatArray) -> list[float]:
-    """Return where spectrum and likeness, over all frames and channels, peak; in periods per row."""
-    rows = whole.shape[2]
-    windowed = _flattened(whole) * np.hanning(rows)
-    power = (np.abs(np.fft.rfft(windowed, OVERSAMPLING * rows, axis=2)) ** 2).sum(axis=(0, 1))
-    likeness = np.fft.irfft(power)[: rows // 2]
-    strongest = [top / (OVERSAMPLING * rows) for top in _tops(power, OVERSAMPLING)]
-    return strongest + [_comb_top(power, rows, lag) for lag in _tops(likeness, 2)]
-
-
-def _tops(curve: FloatArray, lowest: int) -> list[int]:
-    """Return the places of the highest local maxima from ``lowest`` on, the highest first."""
-    tops = 1 + np.flatnonzero((curve[1:-1] > curve[:-2]) & (curve[1:-1] >= curve[2:]))
-    tops = tops[tops >= lowest]
-    return [int(top) for top in tops[np.argsort(-curve[tops])][:PEAKS]]
-
-
-def _comb_top(power: FloatArray, rows: int, lag: int) -> float:
-    """Return the frequency near 1 / lag whose harmonics are strongest together."""
-    steps = np.arange(OVERSAMPLING * rows / (lag + 0.6), OVERSAMPLING * rows / (lag - 0.6), 0.25)
-    places = np.rint(steps[:, None] * np.arange(1, HARMONICS + 1)).astype(np.int64)
-    comb = np.where(places < power.size, power[np.minimum(places, power.size - 1)], 0.0).sum(axis=1)
-    return float(steps[np.argmax(comb)]) / (OVERSAMPLING * rows)
-
-
-def _flattened(profiles: FloatArray) -> FloatArray:
-    """Take a cubic off every profile: the scene's own fall of light."""
-    return _without(profiles, np.vander(np.linspace(-1, 1, profiles.shape[-1]), 4))
-
-
-def _without(profiles: FloatArray, smooth: FloatArray) -> FloatArray:
-    basis = np.linalg.qr(smooth)[0]
-    rest: FloatArray = profiles - (profiles @ basis) @ basis.T
-    return rest
-
-
 def _read(whole: FloatArray, frequency: float) -> Reading:
     """Fit one candidate in the channel where it is strongest."""
     rows = whole.shape[2]
     wave = np.exp(-2j * np.pi * frequency * np.arange(rows)) * np.hanning(rows)
-    channel = int(np.argmax(np.abs(_flattened(whole) @ wave).sum(axis=0)))
+    channel = int(np.argmax(np.abs(flattened(whole) @ wave).sum(axis=0)))
     profiles = whole[:, [channel]]
     fit = fit_stripes(profiles, frequency, most_harmonics=HARMONICS)
-    uneven = float((_without(profiles, spline_basis(rows, frequency)) ** 2).sum())
-    change = float((_flattened(profiles) ** 2).sum())
+    uneven = float((without(profiles, spline_basis(rows, frequency)) ** 2).sum())
+    change = float((flattened(profiles) ** 2).sum())
     return Reading(
         frequency=fit.frequency,
         explained=1 - fit.unexplained / max(uneven, 1e-12),
         left=fit.unexplained / max(change, 1e-12),
         channel=channel,
     )
+
+
+def _refuse_wide(found: Sequence[Reading], readings: Sequence[Reading], rows: int) -> None:
+    """Raise PsvideoError where stripes too wide to be measured explain far more than any narrower ones."""
+    if not found:
+        return
+    best = min(found, key=lambda reading: reading.left)
+    if best.explained > LEAST_EXPLAINED and all(best.left < WIDE_LEFT * reading.left for reading in readings):
+        raise PsvideoError(
+            f"shows about {best.frequency * rows:.1f} periods of stripes over its {rows} rows, and fewer than "
+            f"{FEWEST_PERIODS:g} cannot be told from the scene. Let the LED blink faster, so that 5 to 40 stripes fit "
+            "into the height, and see that it is the only light."
+        )
 
 
 def _shortest(readings: Sequence[Reading]) -> Reading:

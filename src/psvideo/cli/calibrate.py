@@ -14,7 +14,7 @@ from psvideo.capture.quantities import parse_positive_seconds, parse_rate
 from psvideo.cli.console import Voice
 from psvideo.cli.options import Frames, Json, Quiet, Verbose
 
-calibrate = typer.Typer(name="calibrate", help="Measure cameras and lights before a shoot.", no_args_is_help=True)
+calibrate = typer.Typer(help="Measure cameras and lights before a shoot.", no_args_is_help=True)
 
 
 @calibrate.callback()
