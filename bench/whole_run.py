@@ -1,6 +1,7 @@
 """A whole `normals` run against the larger of decoding alone and encoding alone, and its memory over clip length.
 
-The clip is 1080p colour in 16-bit PNG, three lights. Every command is a process of its own, and all of them in turn.
+The clip is 1080p colour in 16-bit PNG, three lights, noise and all. Decoding and encoding alone use the same functions
+with the same threads as the run does. Every command is a process of its own, and all of them in turn.
 """
 
 import os
@@ -9,7 +10,6 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -23,16 +23,17 @@ from psvideo.rig import Light, Rig
 from psvideo.rigfile import format_rig
 from psvideo.synth import Noise, StrobeClock, expose
 
-SHORT, LONG = 30, 90
+SHORT, LONG = 80, 200
 REPEATS = 3
-SCALE = 8
+REPEATED = 8
 DIRECTIONS = {"key": (0.5, 0.4, 0.768), "left": (-0.6, 0.2, 0.775), "right": (0.1, -0.5, 0.86)}
 
 DECODE = """
 import sys
 from pathlib import Path
 from psvideo.clip import open_clip, read_frames
-print(sum(1 for _ in read_frames(open_clip(Path(sys.argv[1])))))
+from psvideo.pipeline import AHEAD
+print(sum(1 for _ in read_frames(open_clip(Path(sys.argv[1])), ahead=AHEAD)))
 """
 ENCODE = """
 import sys
@@ -142,29 +143,28 @@ def _psvideo(*arguments: object) -> None:
 
 
 def _film(folder: Path, frames: int) -> None:
-    """Write a 1080p clip of a smooth relief; it is exposed small and set side by side to the full width."""
+    """Write a 1080p clip of a smooth relief, repeated to the full width, with a camera's noise."""
     fps = parse_fps("120000/1001")
     period_s = float(1 / fps)
     camera = Camera(width_px=1920, height_px=1080, fps=fps, exposure_s=period_s, readout_s=0.97 * period_s)
     flashes = [PlannedFlash(lights={name: 1.0}, duration_s=0.0008) for name in DIRECTIONS]
     flashes.append(PlannedFlash(lights={}, duration_s=0.0008))
     plan = Plan(camera=camera, flashes=tuple(flashes), dark_s=1.0002 * period_s)
-    narrow = replace(plan, camera=replace(camera, width_px=camera.width_px // SCALE))
     y, x = np.mgrid[0:1080, 0:240].astype(np.float32) / 240
     normals = np.stack([0.4 * np.sin(9 * x), 0.4 * np.cos(7 * y), np.ones_like(x)], -1)
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
     shades = [0.7 * np.maximum(normals @ np.array(d, np.float32), 0) for d in DIRECTIONS.values()]
-    plates = [np.repeat(shade[..., None], 3, axis=2).astype(np.float32) for shade in shades]
+    plates = [np.tile(np.repeat(shade[..., None], 3, axis=2), (1, REPEATED, 1)).astype(np.float32) for shade in shades]
     clock = StrobeClock(phase_s=0.0123, offset_ppm=20.0)
     (folder / "frames").mkdir(parents=True)
     for first in range(0, frames, 10):
         shot = expose(
-            plates, narrow, frames=min(first + 10, frames), clock=clock, dropped=tuple(range(first)),
+            plates, plan, frames=min(first + 10, frames), clock=clock, dropped=tuple(range(first)),
             noise=Noise(full_well_e=20_000, read_e=6),
         )  # fmt: skip
         for number, image in zip(shot.indices, shot.frames, strict=True):
-            wide = np.tile((np.clip(image, 0, 1) * 65535).astype(np.uint16), (1, SCALE, 1))
-            cv2.imwrite(str(folder / "frames" / f"relief.{number:05d}.png"), wide, [cv2.IMWRITE_PNG_COMPRESSION, 1])
+            codes = (np.clip(image, 0, 1) * 65535).astype(np.uint16)
+            cv2.imwrite(str(folder / "frames" / f"relief.{number:05d}.png"), codes, [cv2.IMWRITE_PNG_COMPRESSION, 1])
     (folder / "plan.toml").write_text(format_plan(plan))
     (folder / "rig.toml").write_text(format_rig(_rig()))
 
