@@ -30,7 +30,7 @@ from psvideo.timing import DroppedFrames, Timing
 
 Method = Literal["weights", "hudon2015"]
 Item = TypeVar("Item")
-AHEAD = 1
+AHEAD = 2
 """Frames that are decoded in advance while plates are rebuilt; each costs memory."""
 
 
