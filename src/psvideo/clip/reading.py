@@ -1,7 +1,7 @@
 """Reading a clip's frames: lazily, in order, decoded some frames ahead of the one that is worked on."""
 
-from bisect import bisect_left
 import os
+from bisect import bisect_left
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
