@@ -5,7 +5,7 @@ As a file it is timing.json (schema ``psvideo-timing/1``).
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
@@ -43,7 +43,11 @@ class DroppedFrames:
 
 @dataclass(frozen=True, kw_only=True)
 class Timing:
-    """The flashes of a clip in order. ``order`` says how the lights' names were found: a guess is called ``guess``."""
+    """The flashes of a clip in order. ``order`` says how the lights' names were found: a guess is called ``guess``.
+
+    ``repeated_frames`` are the numbers of frames that show the same moment as the frame before them. ``notes`` are
+    sentences for people on what to distrust; they do not go into the file.
+    """
 
     clip: str
     frame_period_s: float
@@ -54,6 +58,8 @@ class Timing:
     order: Order
     flashes: tuple[Flash, ...]
     dropped_frames: tuple[DroppedFrames, ...] = ()
+    repeated_frames: tuple[int, ...] = ()
+    notes: tuple[str, ...] = field(default=(), compare=False)
 
     @property
     def start_s(self) -> FloatArray:
@@ -91,6 +97,7 @@ class _TimingFile(Contract):
     phase_error_rows: float = Field(ge=0)
     order: Order
     dropped_frames: list[_DroppedFile] = Field(default_factory=list)
+    repeated_frames: list[int] = Field(default_factory=list)
     flashes: list[_FlashFile]
 
 
@@ -108,12 +115,14 @@ def read_timing(path: Path) -> Timing:
         raise PsvideoError(f"{path}: key '{key}': {first['msg']}. Make it again with psvideo sync.") from None
     flashes = tuple(Flash(**flash.model_dump()) for flash in file.flashes)
     dropped = tuple(DroppedFrames(after=hole.after, count=hole.count) for hole in file.dropped_frames)
-    scalars = file.model_dump(exclude={"schema_", "flashes", "dropped_frames"})
-    return Timing(flashes=flashes, dropped_frames=dropped, **scalars)
+    scalars = file.model_dump(exclude={"schema_", "flashes", "dropped_frames", "repeated_frames"})
+    repeated = tuple(file.repeated_frames)
+    return Timing(flashes=flashes, dropped_frames=dropped, repeated_frames=repeated, **scalars)
 
 
 def timing_record(timing: Timing) -> dict[str, object]:
     """Return the timing as what timing.json holds."""
+    repeated = {"repeated_frames": list(timing.repeated_frames)} if timing.repeated_frames else {}
     return {
         "schema": SCHEMA,
         "clip": timing.clip,
@@ -124,6 +133,7 @@ def timing_record(timing: Timing) -> dict[str, object]:
         "phase_error_rows": timing.phase_error_rows,
         "order": timing.order,
         "dropped_frames": [{"after": hole.after, "count": hole.count} for hole in timing.dropped_frames],
+        **repeated,
         "flashes": [_flash_row(flash) for flash in timing.flashes],
     }
 
