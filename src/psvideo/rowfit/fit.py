@@ -10,7 +10,7 @@ from psvideo.plan import UNKNOWN_CLOCK_PPM, Plan
 from psvideo.rowfit.beat import Beat, StrobeClock
 from psvideo.rowfit.bend import LEAST_WINDOWS, bend
 from psvideo.rowfit.profiles import Profiles, unexplained
-from psvideo.rowfit.refine import Fit, explained, refine, scaled
+from psvideo.rowfit.refine import Fit, explained, refine, robust_loss, scaled
 from psvideo.rowfit.search import search
 from psvideo.rowfit.track import Track, frame_losses, track
 
@@ -27,6 +27,9 @@ GOOD_SEED, FAIR_SEED = 0.7, 0.3
 search."""
 CLEAR = 4.0
 """A time leaves the plan's value only when it is off by so many standard errors."""
+BETTER = 0.997
+"""And only where that leaves less than this share of the robust loss: a subject that moves in step with the dark row
+bends errors and estimates alike."""
 MAINS_HZ = (100.0, 120.0)
 FLICKERS = 0.8
 """Flicker is believed where it leaves less than this share of the squares that are left without it."""
@@ -160,7 +163,7 @@ def _settled(plan: Plan, rows: Profiles, beat: Beat) -> Fit:
     more = tuple(dict.fromkeys((*free, *_may_differ(plan))))
     freed = _fit(plan, rows, fit.beat, more)
     kept = tuple(name for name in more if name in free or _clearly_off(fit.beat, freed, name))
-    if kept == free:
+    if kept == free or robust_loss(rows, freed.rest, fit.rest) > BETTER * robust_loss(rows, fit.rest, fit.rest):
         return fit
     return _fit(plan, rows, _only(fit.beat, freed.beat, kept), kept)
 

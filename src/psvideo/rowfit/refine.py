@@ -193,6 +193,11 @@ def row_noise(rest: FloatArray) -> FloatArray:
     return noise
 
 
+def robust_loss(rows: Profiles, rest: FloatArray, reference: FloatArray) -> float:
+    """Return Cauchy's loss of residuals against the noise that ``reference`` residuals tell of."""
+    return float(np.log1p((rest / (CAUCHY * scaled(rows, reference, 0.0))) ** 2).sum())
+
+
 def explained(rows: Profiles, rest: FloatArray) -> float:
     """Return which share of the rows' changes from frame to frame a fit explains."""
     change = rows.value - rows.value.mean(axis=0)

@@ -29,6 +29,8 @@ TWIN = 0.02
 """Share of the rows' spreads by which two frames of the same moment differ at most."""
 SUSPICIOUS = 0.25
 """A frame's loss by which it must exceed what is usual before other places in time are tried for it."""
+BELIEVED = 0.4
+"""A step is believed where frames behind it then exceed the usual loss by less than this share of what they did."""
 LEAST_ANCHOR = 12
 
 
@@ -63,18 +65,18 @@ def track(plan: Plan, rows: Profiles, beat: Beat, seed: slice, *, memory: int) -
     while high < len(index):
         block = slice(high, min(high + BLOCK, len(index)))
         extra = _course(plan, replace(rows, index=index), now, slice(max(low, high - memory), high), block, twins, 1)
-        index[block] += extra
-        index[block.stop :] += extra[-1]
-        high = block.stop
+        index[high : high + len(extra)] += extra
+        index[high + len(extra) :] += extra[-1]
+        high += len(extra)
         now, point = _sharpened(plan, replace(rows, index=index), now, beat, slice(max(low, high - memory), high))
         late.append(point)
     now = beat
     while low > 0:
         block = slice(max(low - BLOCK, 0), low)
         extra = _course(plan, replace(rows, index=index), now, slice(low, min(low + memory, high)), block, twins, -1)
-        index[block] -= extra
-        index[: block.start] -= extra[0]
-        low = block.start
+        index[low - len(extra) : low] -= extra
+        index[: low - len(extra)] -= extra[0]
+        low -= len(extra)
         now, point = _sharpened(plan, replace(rows, index=index), now, beat, slice(low, min(low + memory, high)))
         late.append(point)
     return _from_first_frame(rows, index, beat, late)
@@ -119,28 +121,32 @@ def _twins(rows: Profiles) -> NDArray[np.bool_]:
 def _course(
     plan: Plan, rows: Profiles, beat: Beat, known: slice, block: slice, twins: NDArray[np.bool_], sign: int
 ) -> IntArray:
-    """Return by how many frames more than the numbering tells each frame of a block lies away, shape (frame,)."""
+    """Return by how many frames more than the numbering tells the next frames lie away, shape (frame,).
+
+    Where all is as usual, this is for the whole block; where not, for its nearer half, so that the other half is looked
+    at again with more known.
+    """
     learnt = rows.take(known)
-    light = brightnesses(plan, learnt, beat)
-    spread_rows = replace(learnt, value=rows.value[known])
-    usual = float(np.median(_losses(plan, spread_rows, learnt, beat, light)))
+    nearness = np.linspace(0.1, 1.0, len(learnt.value))[:: 1 if sign > 0 else -1, None]
+    light = brightnesses(plan, learnt, beat, np.ascontiguousarray(np.broadcast_to(nearness, learnt.value.shape)))
+    usual = float(np.median(_losses(plan, learnt, learnt, beat, light)))
     ahead = rows.take(block)
-    loss = _losses(plan, spread_rows, ahead, beat, light)
+    loss = _losses(plan, learnt, ahead, beat, light)
+    same = twins[block] if sign > 0 else np.append(twins[block][1:], twins[block.stop])
     odd = np.convolve(loss, [0.5, 0.5], mode="same") if len(loss) > 1 else loss
-    if odd.max() < usual + SUSPICIOUS and not twins[block].any():
+    if odd.max() < usual + SUSPICIOUS and not same.any():
         return np.zeros(len(loss), np.int64)
     extras = np.arange(LEAST, MOST + 1)
-    table = np.stack(
-        [
-            _losses(plan, spread_rows, replace(ahead, index=ahead.index + sign * int(extra)), beat, light)
-            for extra in extras
-        ],
-        axis=1,
-    )
-    same = twins[block] if sign > 0 else np.append(twins[block][1:], twins[block.stop])
-    if sign < 0:
-        return _cheapest(table[::-1], same[::-1])[::-1]
-    return _cheapest(table, same)
+    shifted = [replace(ahead, index=ahead.index + sign * int(extra)) for extra in extras]
+    table = np.stack([_losses(plan, learnt, one, beat, light) for one in shifted], axis=1)
+    course = _cheapest(table, same) if sign > 0 else _cheapest(table[::-1], same[::-1])[::-1]
+    gone = course != 0
+    if gone.any():
+        after = float(table[gone, course[gone] - LEAST].mean())
+        if after > usual + BELIEVED * (float(loss[gone].mean()) - usual):
+            course = np.zeros(len(loss), np.int64)
+    nearer = max(len(loss) // 2, min(len(loss), 4))
+    return course[:nearer] if sign > 0 else course[-nearer:]
 
 
 def _losses(plan: Plan, reference: Profiles, rows: Profiles, beat: Beat, light: FloatArray) -> FloatArray:
@@ -155,7 +161,7 @@ def _cheapest(table: FloatArray, twin: NDArray[np.bool_]) -> IntArray:
     """Return the course of least cost through a table (frame, extra); no frame comes before the one before it."""
     extras = np.arange(LEAST, MOST + 1)
     step = extras[None, :] - extras[:, None]  # from the row's state to the column's
-    usual = np.where(step == 0, 0.0, np.where(step < -1, np.inf, JUMP_COST + 0.02 * np.abs(step)))
+    usual = np.where(step == 0, 0.0, np.where(step < -1, np.inf, JUMP_COST + 0.05 * np.abs(step)))
     after_twin = np.where(step == 1, TWIN_COST, usual)
     to_twin = np.where(step == -1, 0.0, usual + TWIN_COST)
     cost = np.where(extras == 0, 0.0, np.inf)
