@@ -30,6 +30,11 @@ CLEAR = 4.0
 BETTER = 0.997
 """And only where that leaves less than this share of the robust loss: a subject that moves in step with the dark row
 bends errors and estimates alike."""
+TAILS = ("rise_s", "fall_s")
+TREND_FRAMES = 4
+"""Frames per brightness that a clip must have before its brightnesses may change within a window."""
+SURER = 0.8
+"""Share of the standard error that must be left before brightnesses may change within a window."""
 MAINS_HZ = (100.0, 120.0)
 FLICKERS = 0.8
 """Flicker is believed where it leaves less than this share of the squares that are left without it."""
@@ -61,7 +66,11 @@ def find(plan: Plan, rows: Profiles) -> Found:
         doubt=None if rows.doubt is None else np.ascontiguousarray(rows.doubt[keep]),
     ).windowed(window)
     fine = rows.binned(max(COARSE_ROWS, MOST_SAMPLES // len(rows.value)))
-    fit = _settled(plan, fine, replace(tracked.beat, clock=_clock_of(plan, tracked)))
+    beat = replace(tracked.beat, clock=_clock_of(plan, tracked))
+    free: tuple[str, ...] = () if plan.camera.readout_s is not None else ("row_time_s",)
+    fit = _with_flicker(plan, fine, _fit(plan, fine, beat, free), free)
+    fine, fit = _with_trends(plan, fine, fit, free)
+    fit = _freed(plan, fine, fit, free)
     return Found(fit=fit, rows=fine, track=tracked, errors_s=fit.errors_s)
 
 
@@ -155,17 +164,31 @@ def _clock_of(plan: Plan, tracked: Track) -> StrobeClock:
     return straight.bent(tracked.at_s, stray_s)
 
 
-def _settled(plan: Plan, rows: Profiles, beat: Beat) -> Fit:
-    """Sharpen over the whole clip; let go of the plan's values where the picture clearly tells otherwise."""
-    free: tuple[str, ...] = () if plan.camera.readout_s is not None else ("row_time_s",)
-    fit = _fit(plan, rows, beat, free)
-    fit = _with_flicker(plan, rows, fit, free)
+def _with_trends(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> tuple[Profiles, Fit]:
+    """Let brightnesses change within a window where the subject moves so much that this makes the times surer."""
+    if len(rows.value) < TREND_FRAMES * (len(plan.lit_slots) + 1):
+        return rows, fit
+    moving = replace(rows, trend=True)
+    other = _fit(plan, moving, fit.beat, free)
+    return (moving, other) if other.shift_error_s < SURER * fit.shift_error_s else (rows, fit)
+
+
+def _freed(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> Fit:
+    """Let go of the plan's values where the picture clearly tells otherwise."""
     more = tuple(dict.fromkeys((*free, *_may_differ(plan))))
     freed = _fit(plan, rows, fit.beat, more)
-    kept = tuple(name for name in more if name in free or _clearly_off(fit.beat, freed, name))
-    if kept == free or robust_loss(rows, freed.rest, fit.rest) > BETTER * robust_loss(rows, fit.rest, fit.rest):
-        return fit
-    return _fit(plan, rows, _only(fit.beat, freed.beat, kept), kept)
+    off = tuple(name for name in more if name not in free and _clearly_off(fit.beat, freed, name))
+    tails = tuple(name for name in off if name in TAILS)
+    for kept in dict.fromkeys((tuple(name for name in off if name not in TAILS), off, tails)):
+        if not kept:
+            continue
+        names = (*free, *kept)
+        tried = _fit(plan, rows, _only(fit.beat, freed.beat, names), names)
+        if robust_loss(rows, tried.rest, fit.rest) < BETTER * robust_loss(rows, fit.rest, fit.rest):
+            fit, free = tried, names
+            if robust_loss(rows, freed.rest, fit.rest) > BETTER * robust_loss(rows, fit.rest, fit.rest):
+                break
+    return fit
 
 
 def _fit(plan: Plan, rows: Profiles, beat: Beat, free: tuple[str, ...]) -> Fit:

@@ -40,6 +40,8 @@ class Rows(NamedTuple):
     """Where each window begins and the last one ends, on the camera's clock: the shift is linear in between."""
     beat_hz: FloatArray
     """Frequencies at which ambient light may flicker."""
+    trend: bool
+    """Whether brightnesses may rise or fall within a window, as those of a subject that moves do."""
 
 
 class Flashes(NamedTuple):
@@ -72,6 +74,24 @@ def given_off(since_s, duration_s, rise_s, fall_s):  # type: ignore[no-untyped-d
         return 1.0, 0.0
     left = reached * np.exp(-(since_s - duration_s) / fall_s)
     return 1.0 - fall_s * left / whole, left / whole
+
+
+@nb.njit(cache=True, nogil=True)
+def width(rows, flashes):  # type: ignore[no-untyped-def]
+    """Return how many numbers a row has in a window: brightnesses, flicker's two phases, and brightnesses' trends."""
+    return flashes.unknowns * (2 if rows.trend else 1) + 2 * len(rows.beat_hz)
+
+
+@nb.njit(cache=True, nogil=True)
+def add_trend(rows, flashes, first, last, design):  # type: ignore[no-untyped-def]
+    """Fill the columns of a window's trends: what was seen, times the place within the window."""
+    if not rows.trend:
+        return
+    base = flashes.unknowns + 2 * len(rows.beat_hz)
+    for n in range(first, last):
+        along = (n - first + 0.5) / (last - first) - 0.5
+        for u in range(flashes.unknowns):
+            design[n, base + u] = design[n, u] * along
 
 
 @nb.njit(cache=True, nogil=True)
@@ -190,6 +210,7 @@ def row_rest(rows, flashes, weight, row, design, rest):  # type: ignore[no-untyp
         k = see(rows, flashes, n, row, k, design[n])
     for window in range(len(rows.bounds) - 1):
         first, last = rows.bounds[window], rows.bounds[window + 1]
+        add_trend(rows, flashes, first, last, design)
         _fit_window(rows.value[:, row], weight[:, row], design, first, last, normal, right)
         for n in range(first, last):
             explained = 0.0
@@ -201,7 +222,7 @@ def row_rest(rows, flashes, weight, row, design, rest):  # type: ignore[no-untyp
 @nb.njit(cache=True, nogil=True)
 def rests(rows, flashes, weight, first, last, rest):  # type: ignore[no-untyped-def]
     """Fill the columns ``first`` to ``last`` of ``rest`` (frame, row)."""
-    design = np.empty((len(rows.value), flashes.unknowns + 2 * len(rows.beat_hz)))
+    design = np.empty((len(rows.value), width(rows, flashes)))
     for row in range(first, last):
         row_rest(rows, flashes, weight, row, design, rest[:, row])
 
@@ -211,8 +232,10 @@ def equations(rows, flashes, weight, tails, first, last, rest, hessian, score): 
     """Fill ``rest``; add the rows' normal matrices to ``hessian`` (window, SIGNALS, SIGNALS), their ``weight * signal *
     rest`` to ``score`` (frame, SIGNALS), which keeps the frames apart."""
     frames = len(rows.value)
-    size = flashes.unknowns + 2 * len(rows.beat_hz)
+    size = width(rows, flashes)
     design = np.empty((frames, size))
+    base = flashes.unknowns + 2 * len(rows.beat_hz)
+    light = np.empty(flashes.unknowns)
     first_flash = np.empty(frames, np.int64)
     normal, right = np.empty((size, size)), np.empty(size)
     signals = np.empty((frames, SIGNALS))
@@ -224,11 +247,16 @@ def equations(rows, flashes, weight, tails, first, last, rest, hessian, score): 
             first_flash[n] = k
         for window in range(len(rows.bounds) - 1):
             begin, end = rows.bounds[window], rows.bounds[window + 1]
+            add_trend(rows, flashes, begin, end, design)
             _fit_window(rows.value[:, row], weight[:, row], design, begin, end, normal, right)
             cross[:] = 0.0
             span_s = rows.ends_s[window + 1] - rows.ends_s[window]
             for n in range(begin, end):
-                shift = _slopes(rows, flashes, n, row, first_flash[n], right, tails, signals[n])
+                for u in range(flashes.unknowns):
+                    light[u] = right[u]
+                    if rows.trend:
+                        light[u] += right[base + u] * ((n - begin + 0.5) / (end - begin) - 0.5)
+                shift = _slopes(rows, flashes, n, row, first_flash[n], light, tails, signals[n])
                 along = (rows.frame_start_s[n] + rows.row_place[row] * rows.row_time_s - rows.ends_s[window]) / span_s
                 signals[n, LEFT] = shift * (1.0 - along)
                 signals[n, RIGHT] = shift * along
@@ -257,7 +285,7 @@ def equations(rows, flashes, weight, tails, first, last, rest, hessian, score): 
 def losses_by_row(rows, flashes, phase_s, rate, spread, steepness, first, last, found):  # type: ignore[no-untyped-def]
     """Fill ``found`` (clock, row) with the robust loss of every clock in every row."""
     frames, height = rows.value.shape
-    design = np.empty((frames, flashes.unknowns + 2 * len(rows.beat_hz)))
+    design = np.empty((frames, width(rows, flashes)))
     rest = np.empty(frames)
     weight = np.ones((frames, height))
     for clock in range(first, last):
