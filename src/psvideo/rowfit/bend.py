@@ -29,7 +29,7 @@ class _Knots:
     penalty: FloatArray
 
 
-def bend(plan: Plan, rows: Profiles, fit: Fit, *, free: tuple[str, ...] = (), steps: int = 4) -> Fit:
+def bend(plan: Plan, rows: Profiles, fit: Fit, *, free: tuple[str, ...] = (), steps: int = 6) -> Fit:
     """Return the fit with the clock's drift in it; unchanged where nothing tells of any."""
     if len(rows.window_start) < LEAST_WINDOWS:
         return fit

@@ -10,7 +10,7 @@ from psvideo.plan import UNKNOWN_CLOCK_PPM, Plan
 from psvideo.rowfit.beat import Beat, StrobeClock
 from psvideo.rowfit.bend import LEAST_WINDOWS, bend
 from psvideo.rowfit.profiles import Profiles, unexplained
-from psvideo.rowfit.refine import Fit, explained, refine, robust_loss, scaled
+from psvideo.rowfit.refine import Fit, clearest, explained, refine, robust_loss, scaled
 from psvideo.rowfit.search import search
 from psvideo.rowfit.track import Track, frame_losses, track
 
@@ -25,12 +25,11 @@ MOST_SAMPLES = 2_000_000
 GOOD_SEED, FAIR_SEED = 0.7, 0.3
 """A seed that takes away this share of the robust loss is taken at once; one that takes away less calls for a wider
 search."""
-CLEAR = 4.0
+CLEAR = 5.0
 """A time leaves the plan's value only when it is off by so many standard errors."""
-BETTER = 0.997
-"""And only where that leaves less than this share of the robust loss: a subject that moves in step with the dark row
-bends errors and estimates alike."""
-TAILS = ("rise_s", "fall_s")
+BETTER, LEAST_GAIN = 1e-3, 30.0
+"""And only where that takes away such a share of the robust loss, and so much of it: a subject that moves in step with
+the dark row bends errors and estimates alike."""
 TREND_FRAMES = 4
 """Frames per brightness that a clip must have before its brightnesses may change within a window."""
 SURER = 0.8
@@ -174,21 +173,21 @@ def _with_trends(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) ->
 
 
 def _freed(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> Fit:
-    """Let go of the plan's values where the picture clearly tells otherwise."""
-    more = tuple(dict.fromkeys((*free, *_may_differ(plan))))
-    freed = _fit(plan, rows, fit.beat, more)
-    off = tuple(name for name in more if name not in free and _clearly_off(fit.beat, freed, name))
-    tails = tuple(name for name in off if name in TAILS)
-    for kept in dict.fromkeys((tuple(name for name in off if name not in TAILS), off, tails)):
-        if not kept:
-            continue
-        names = (*free, *kept)
-        tried = _fit(plan, rows, _only(fit.beat, freed.beat, names), names)
-        if robust_loss(rows, tried.rest, fit.rest) < BETTER * robust_loss(rows, fit.rest, fit.rest):
-            fit, free = tried, names
-            if robust_loss(rows, freed.rest, fit.rest) > BETTER * robust_loss(rows, fit.rest, fit.rest):
-                break
-    return fit
+    """Let go of the plan's values where the picture clearly tells otherwise, one after another, the clearest first."""
+    refused: set[str] = set()
+    while True:
+        names = tuple(name for name in _may_differ(plan) if name not in free and name not in refused)
+        name = clearest(plan, rows, fit, free, names, at_least=LEAST_GAIN)
+        if name is None:
+            return fit
+        tried = _fit(plan, rows, fit.beat, (*free, name))
+        before = robust_loss(rows, fit.rest, fit.rest)
+        gain = before - robust_loss(rows, tried.rest, fit.rest)
+        off_s = abs(getattr(tried.beat, name) - getattr(fit.beat, name))
+        if gain > max(BETTER * before, LEAST_GAIN) and off_s > CLEAR * tried.errors_s[name]:
+            fit, free = tried, (*free, name)
+        else:
+            refused.add(name)
 
 
 def _fit(plan: Plan, rows: Profiles, beat: Beat, free: tuple[str, ...]) -> Fit:
@@ -210,17 +209,6 @@ def _fit(plan: Plan, rows: Profiles, beat: Beat, free: tuple[str, ...]) -> Fit:
 def _may_differ(plan: Plan) -> tuple[str, ...]:
     names = ("exposure_s", "row_time_s", "rise_s", "fall_s")
     return names if plan.camera.readout_s != 0 else tuple(name for name in names if name != "row_time_s")
-
-
-def _clearly_off(beat: Beat, freed: Fit, name: str) -> bool:
-    off_s = abs(getattr(freed.beat, name) - getattr(beat, name))
-    return bool(off_s > CLEAR * freed.errors_s[name])
-
-
-def _only(beat: Beat, freed: Beat, names: tuple[str, ...]) -> Beat:
-    """Return the freed beat with all times but the named ones put back."""
-    back = {name: getattr(beat, name) for name in ("exposure_s", "row_time_s", "rise_s", "fall_s") if name not in names}
-    return replace(freed, **back)
 
 
 def _with_flicker(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> Fit:

@@ -15,6 +15,8 @@ CAUCHY = 2.4
 FIRST_SCALE, LAST_SCALE = 0.3, 2e-3
 """The robust fit's residual scale as a share of each row's spread: it shrinks from step to step down to the noise, so
 that the few rows that a flash splits, which tell the time, are not taken for outliers before the fit is near."""
+WIDE_SCALE = 0.05
+"""The scale at which a time that is off is looked for: rows that it spoils must not count as outliers then."""
 LAG = 3
 """Residuals of frames so far apart may still err together (a subject that moves): Newey and West 1987."""
 GLOBALS = {"exposure_s": EXPOSURE, "row_time_s": ROW_TIME, "rise_s": RISE, "fall_s": FALL}
@@ -70,6 +72,51 @@ def refine(
         errors_s={name: float(np.sqrt(covariance[2 + n, 2 + n])) for n, name in enumerate(free)},
         explained=explained(rows, rest),
     )
+
+
+def clearest(
+    plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...], names: tuple[str, ...], *, at_least: float
+) -> str | None:
+    """Return the time that would explain most if it were free (a score test), or None where none explains enough."""
+    for share in (WIDE_SCALE, 0.0) if names else ():
+        gains = _gains(plan, rows, fit, free, names, share=share, at_least=at_least)
+        if gains:
+            return max(gains, key=lambda name: gains[name])
+    return None
+
+
+def _gains(
+    plan: Plan,
+    rows: Profiles,
+    fit: Fit,
+    free: tuple[str, ...],
+    names: tuple[str, ...],
+    *,
+    share: float,
+    at_least: float,
+) -> dict[str, float]:
+    """Return what the times would explain that explain enough; residuals count up to a share of their row's spread."""
+    every = (*free, *names)
+    scale = scaled(rows, fit.rest, share)
+    weight = 1.0 / (1.0 + (fit.rest / (CAUCHY * scale)) ** 2) / scale**2
+    _, hessian, scores = projected(plan, rows, fit.beat, weight, _straight(rows, every), tails=True)
+    gains: dict[str, float] = {}
+    for name in names:
+        kept = [*range(2 + len(free)), 2 + every.index(name)]
+        part, pulls = hessian[np.ix_(kept, kept)], scores[:, kept]
+        known = prior(plan, rows, _units(plan, rows, fit.beat, (*free, name)), (*free, name))
+        move = np.linalg.solve(part + known, pulls.sum(axis=0))
+        gain = float(move @ part @ move)
+        if gain > at_least and _may_move(rows, fit.beat, name, float(move[-1])):
+            gains[name] = gain
+    return gains
+
+
+def _may_move(rows: Profiles, beat: Beat, name: str, move: float) -> bool:
+    """Tell whether a time has room to move: tails are not negative, exposures not longer than the frame."""
+    if move < 0:
+        return bool(getattr(beat, name) > 0)
+    return name != "exposure_s" or beat.exposure_s < rows.period_s * (1 - 1e-9)
 
 
 def _straight(rows: Profiles, free: tuple[str, ...]) -> FloatArray:
