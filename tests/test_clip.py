@@ -174,6 +174,18 @@ def test_a_broken_frame_is_named_after_the_good_ones_before_it(shot: Path, fault
     assert not decoding_threads()
 
 
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_pixels_that_are_no_numbers_are_refused(tmp_path: Path, write_plan: Callable[..., None], value: float) -> None:
+    import OpenEXR
+
+    write_plan(tmp_path)
+    pixels = np.zeros((ROWS, COLS, 3), np.float16)
+    pixels[2, 3, 1] = value
+    OpenEXR.File({"type": OpenEXR.scanlineimage}, {"RGB": pixels}).write(str(tmp_path / "a.1.exr"))
+    with pytest.raises(PsvideoError, match=r"a\.1\.exr: holds 1 values that are no numbers"):
+        list(read_frames(open_clip(tmp_path)))
+
+
 def test_a_frame_that_the_clip_lacks_is_a_wrong_choice(shot: Path) -> None:
     with pytest.raises(UsageError, match=r"has no frame number 10; its 4 frames are numbered 8 to 12"):
         read_frames(open_clip(shot), [9, 10])

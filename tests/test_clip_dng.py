@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,9 +20,7 @@ Tag = tuple[int, str, int, object, bool]
 RGGB = bytes([0, 1, 1, 2])
 
 
-def write_dng(
-    path: Path, codes: NDArray[np.uint16], tags: Sequence[Tag] = (), cfa: bytes = RGGB, **layout: object
-) -> None:
+def write_dng(path: Path, codes: NDArray[Any], tags: Sequence[Tag] = (), cfa: bytes = RGGB, **layout: Any) -> None:
     mosaic = [(33421, "H", 2, (2, 2), True), (33422, "B", 4, tuple(cfa), True)]
     always = [(50706, "B", 4, (1, 4, 0, 0), True), (50708, "s", 0, "Test Camera", True)]
     photometric = 32803 if codes.ndim == 2 else 34892
@@ -42,10 +41,11 @@ def mosaic(rows: int = 64, cols: int = 96) -> NDArray[np.uint16]:
         LOSSLESS_JPEG | {"rowsperstrip": 64},
         LOSSLESS_JPEG | {"rowsperstrip": 16},
         LOSSLESS_JPEG | {"tile": (32, 32)},
+        {"compression": "zlib", "tile": (32, 32)},
     ],
-    ids=["plain", "strips", "tiles", "jpeg-one-strip", "jpeg-strips", "jpeg-tiles"],
+    ids=["plain", "strips", "tiles", "jpeg-one-strip", "jpeg-strips", "jpeg-tiles", "deflate"],
 )
-def test_every_layout_gives_the_same_pixels(tmp_path: Path, layout: dict[str, object]) -> None:
+def test_every_layout_gives_the_same_pixels(tmp_path: Path, layout: dict[str, Any]) -> None:
     codes = mosaic()
     write_dng(tmp_path / "x.dng", codes, **layout)
     picture = decode("dng", tmp_path / "x.dng")
@@ -90,12 +90,14 @@ def test_crop_keeps_the_phase_of_filters_and_black_levels(tmp_path: Path, row: i
 
 
 def test_linearization_table_is_applied(tmp_path: Path) -> None:
-    table = (np.arange(256) ** 2).astype(np.uint16)
-    codes = (mosaic() % 300).astype(np.uint16)
-    tags = [(50712, "H", 256, tuple(int(value) for value in table), True), (50717, "I", 1, 65025, True)]
+    """A file of 8 bits holds 16 behind its table; codes beyond the table's end stand for its last value."""
+    table = (np.arange(200) ** 2).astype(np.uint16)
+    codes = (mosaic() % 256).astype(np.uint8)
+    tags = [(50712, "H", 200, tuple(int(value) for value in table), True), (50717, "I", 1, 199**2, True)]
     write_dng(tmp_path / "x.dng", codes, tags)
     picture = decode("dng", tmp_path / "x.dng")
-    assert np.array_equal(picture.codes, table[np.minimum(codes, 255)])
+    assert np.array_equal(picture.codes, table[np.minimum(codes, 199)])
+    assert picture.header == read_header("dng", tmp_path / "x.dng")
     assert linear_light(picture, Encoding()).max() == pytest.approx(1.0)
 
 
@@ -133,7 +135,7 @@ def test_cinema_dng_tells_its_time_code(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("layout", [{}, {"tile": (32, 32)}, LOSSLESS_JPEG | {"rowsperstrip": 16}])
 @pytest.mark.parametrize("share", [0.0, 0.02, 0.5, 0.98])
-def test_truncated_dng_is_refused_by_name(tmp_path: Path, layout: dict[str, object], share: float) -> None:
+def test_truncated_dng_is_refused_by_name(tmp_path: Path, layout: dict[str, Any], share: float) -> None:
     write_dng(tmp_path / "A001_0042.dng", mosaic(), **layout)
     data = (tmp_path / "A001_0042.dng").read_bytes()
     (tmp_path / "A001_0042.dng").write_bytes(data[: int(len(data) * share)])

@@ -38,6 +38,7 @@ def codes_of(rgb: NDArray[np.float64], weights: tuple[float, float], bits: int, 
 def make_frame(planes: Iterable[NDArray[Any]], pix_fmt: str) -> av.VideoFrame:
     planes = list(planes)
     frame = av.VideoFrame(planes[0].shape[1], planes[0].shape[0], pix_fmt)
+    target: Any
     for target, plane in zip(frame.planes, planes, strict=True):
         padded = np.zeros((target.height, target.line_size // plane.itemsize), plane.dtype)
         padded[: plane.shape[0], : plane.shape[1]] = plane
@@ -58,7 +59,7 @@ def write_movie(
 ) -> None:
     frames = list(frames)
     with av.open(str(path), "w", options={"movflags": movflags} if movflags else {}) as container:
-        stream = container.add_stream(codec, rate=RATE, options=options or {})
+        stream: Any = container.add_stream(codec, rate=RATE, options=options or {})
         stream.width, stream.height, stream.pix_fmt = frames[0].width, frames[0].height, frames[0].format.name
         stream.codec_context.colorspace, stream.codec_context.color_range = matrix, color_range
         stream.codec_context.time_base = 1 / RATE
@@ -209,9 +210,27 @@ def test_gaps_in_the_timestamps_are_dropped_frames(tmp_path: Path, plan_for: Cal
     assert [frame.index for frame in read_frames(clip)] == places
 
 
+@pytest.mark.parametrize("reordered", ["0", "2"])
+def test_frames_that_an_edit_list_hides_are_frames(
+    tmp_path: Path, plan_for: Callable[..., Path], reordered: str
+) -> None:
+    """Frames before time zero are hidden by an edit list, and players begin at the fifth; the camera did not."""
+    with av.open(str(tmp_path / "x.mp4"), "w", options={"avoid_negative_ts": "disabled"}) as container:
+        stream: Any = container.add_stream("libx264", rate=RATE, options={"bf": reordered, "qp": "0"})
+        stream.width, stream.height, stream.pix_fmt = 48, 32, "yuv420p"
+        stream.codec_context.time_base = 1 / RATE
+        for place, frame in enumerate(grey_ramp(12)):
+            frame.pts, frame.time_base = place - 4, 1 / RATE
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode(None))
+    frames = list(read_frames(open_clip(tmp_path / "x.mp4", plan=plan_for(rows=32, cols=48))))
+    assert [frame.index for frame in frames] == list(range(12))
+    assert frames[0].image[0, 0, 1] == pytest.approx((40 - 16) / 219, abs=2e-3)
+
+
 def test_uneven_timestamps_are_refused(tmp_path: Path, plan_for: Callable[..., Path]) -> None:
     with av.open(str(tmp_path / "x.mp4"), "w") as container:
-        stream = container.add_stream("libx264", rate=120)
+        stream: Any = container.add_stream("libx264", rate=120)
         stream.width, stream.height, stream.pix_fmt = 48, 32, "yuv420p"
         stream.codec_context.time_base = Fraction(1, 1200)
         for place, frame in enumerate(grey_ramp(12)):
@@ -286,7 +305,7 @@ def test_damage_in_the_middle_of_a_movie_stops_there(tmp_path: Path, plan_for: C
     data[middle : middle + 300] = bytes(byte ^ 0x5A for byte in data[middle : middle + 300])
     (tmp_path / "x.mp4").write_bytes(data)
     clip = open_clip(tmp_path / "x.mp4", plan=plan_for(rows=32, cols=48))
-    seen = []
+    seen: list[int] = []
     with pytest.raises(PsvideoError, match=r"x\.mp4: .*(truncated|damaged)"):
         seen.extend(frame.index for frame in read_frames(clip))
     assert len(seen) < 12

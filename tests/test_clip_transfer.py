@@ -1,5 +1,7 @@
 """The transfer curves against their makers' published points, and the way from codes to light."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -75,7 +77,7 @@ def test_colour_is_named_only_where_the_curve_tells_the_gamut() -> None:
     assert find_curve("slog3").colour == "unknown"
 
 
-def picture(codes: list[int] | np.ndarray, *, bits: int = 16, **header: object) -> Picture:  # type: ignore[type-arg]
+def picture(codes: list[int] | np.ndarray, *, bits: int = 16, **header: Any) -> Picture:  # type: ignore[type-arg]
     values = np.array([codes], np.uint8 if bits == 8 else np.uint16)
     return Picture(header=Header(width_px=values.shape[1], height_px=1, channels=1, bits=bits, **header), codes=values)  # type: ignore[arg-type]
 

@@ -238,7 +238,7 @@ def test_an_exr_tells_its_attributes(tmp_path: Path) -> None:
     found = describe(tmp_path / "a.1001.exr")
     assert (found.facts["psvideo:space"], found.facts["psvideo:time_s"]) == ("camera", 1.25)
     assert found.facts["framesPerSecond"] == "30000/1001"
-    assert "channels B, G, R" in lines(found, "ok")
+    assert "16 x 12 pixels, channels R, G, B" in lines(found, "ok")
 
 
 def test_plates_are_held_against_their_timing(tmp_path: Path) -> None:
@@ -255,7 +255,7 @@ def test_results_hold_the_same_numbers(tmp_path: Path) -> None:
             put_exr(tmp_path / name / f"shot_{name}.{number}.exr", channels)
     found = describe(tmp_path)
     assert (found.kind, found.fits) == ("results folder", True)
-    assert "normals: 2 file(s), numbered 1001 to 1002, 16 x 12, channels B, G, R" in lines(found, "ok")
+    assert "normals: 2 file(s), numbered 1001 to 1002, 16 x 12, channels R, G, B" in lines(found, "ok")
     (tmp_path / "albedo" / "shot_albedo.1002.exr").unlink()
     assert "albedo/ and normals/ do not hold the same numbers (1 differ)" in lines(describe(tmp_path), "FAULT")
 

@@ -24,7 +24,11 @@ LAYERS = [
 ]
 """Rooms from the bottom up; a module may use its own layer (without circles) and those below."""
 
-SYNTH_NEVER_USES = {"shutter", "rowfit", "profiles", "sync", "split", "hudon2015", "ambient", "sequence", "normals"}
+SYNTH_NEVER_USES = {"shutter", "rowfit", "profiles", "sync", "split", "hudon2015", "ambient", "sequence", "normals"} | {
+    "clip",
+    "pipeline",
+    "runs",
+}
 
 
 def _imports(path: Path) -> set[str]:

@@ -2,6 +2,9 @@
 
 import dataclasses
 import json
+import re
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +19,7 @@ from psvideo.planfile import read_plan
 from psvideo.rigfile import read_rig
 from psvideo.synth import builtin_scene, expose, read_scene, shoot
 from psvideo.synth.curves import CURVES
+from psvideo.synth.scene import Scene
 from psvideo.synth.shotplan import true_clock, true_plan, true_rig
 from psvideo.synth.stage import set_stage
 
@@ -261,6 +265,28 @@ def test_an_existing_clip_is_replaced_only_by_force(tmp_path, capsys):
     assert not (clip / "mine.txt").exists()
 
 
+def test_footage_is_never_replaced_by_a_virtual_clip(tmp_path):
+    clip = film(tmp_path)
+    (clip / "truth" / "scene.json").unlink()
+    with pytest.raises(UsageError, match="was not written by psvideo synth"):
+        shoot(tmp_path / "scene.toml", clip, force=True)
+    assert len(list((clip / "frames").iterdir())) == 8
+
+
+def test_a_full_disk_is_one_paragraph_and_leaves_nothing(tmp_path):
+    path = write_scene(tmp_path, camera__width_px=400, camera__height_px=300)
+    limited = (
+        "import resource, signal, sys; signal.signal(signal.SIGXFSZ, signal.SIG_IGN); "
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000)); "
+        f"from psvideo.cli.app import main; sys.exit(main(['synth', {str(path)!r}, '-o', {str(tmp_path / 'clip')!r}]))"
+    )
+    run = subprocess.run([sys.executable, "-c", limited], capture_output=True, text=True, check=False)
+    assert run.returncode == 1
+    assert "cannot be written" in run.stderr
+    assert "Traceback" not in run.stderr
+    assert sorted(entry.name for entry in tmp_path.iterdir()) == ["scene.toml"]
+
+
 def test_a_shoot_that_fails_leaves_nothing_behind(tmp_path):
     path = write_scene(tmp_path, strobe__mode="synced", strobe__flash_s=0.005)
     with pytest.raises(PsvideoError, match="all rows of 'virtual camera' are open together"):
@@ -340,3 +366,14 @@ def test_transfer_curves_meet_their_makers_figures():
     assert code["srgb"] == pytest.approx(0.4613561, abs=1e-6)
     assert code["rec709"] == pytest.approx(0.4090077, abs=1e-6)
     assert CURVES["slog3"].zero * 1023 == pytest.approx(95, abs=0.01)
+
+
+def test_every_key_of_the_scene_file_is_documented():
+    text = (ROOT / "docs" / "synth.md").read_text()
+    tables = [Scene]
+    while tables:
+        table = tables.pop()
+        for key, field in table.model_fields.items():
+            assert re.search(rf"[`\[{{ ,]{field.alias or key}[`\] =]", text), key
+            inner = [field.annotation, *getattr(field.annotation, "__args__", ())]
+            tables += [kind for kind in inner if isinstance(kind, type) and issubclass(kind, Scene.__base__)]

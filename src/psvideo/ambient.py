@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import cv2
+import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
@@ -33,19 +34,46 @@ def update(ambient: Ambient | None, dark: Image) -> Ambient:
     """Return the average with one more dark slot in it."""
     if ambient is None:
         return Ambient(image=dark, slots=np.ones(dark.shape[:2], np.float32))
-    changed = _changed(dark - ambient.image)
-    slots = np.where(changed, np.float32(1), np.minimum(ambient.slots + 1, np.float32(LONGEST_MEMORY)))
-    share = 1 / slots if dark.ndim == 2 else (1 / slots)[..., None]
-    return Ambient(image=ambient.image + share * (dark - ambient.image), slots=slots)
+    rows, cols = dark.shape[:2]
+    image, slots = np.empty_like(dark), np.empty((rows, cols), np.float32)
+    old, new, blended = (picture.reshape(rows, cols, -1) for picture in (ambient.image, dark, image))
+    _blend(old, new, ambient.slots, _changed(old, new), blended, slots)
+    return Ambient(image=image, slots=slots)
 
 
-def _changed(difference: Image) -> NDArray[np.bool_]:
+def _changed(old: Image, new: Image) -> NDArray[np.bool_]:
     """Return where two dark slots differ by more than their noise, shape (row, col)."""
-    change = difference if difference.ndim == 2 else difference.mean(axis=2)
-    noise = 1.4826 * float(np.median(np.abs(change))) + 1e-6
+    change = np.empty(old.shape[:2], np.float32)
+    _mean_change(old, new, change)
+    noise = 1.4826 * float(np.median(np.abs(change[::4, ::4]))) + 1e-6
     local = cv2.blur(change, (NEIGHBOURHOOD_PX, NEIGHBOURHOOD_PX))
-    changed: NDArray[np.bool_] = np.abs(local) > CHANGED * noise / NEIGHBOURHOOD_PX
+    changed: NDArray[np.bool_] = np.abs(local, out=local) > CHANGED * noise / NEIGHBOURHOOD_PX
     return changed
+
+
+@nb.njit(cache=True, nogil=True)
+def _mean_change(old, new, change):  # type: ignore[no-untyped-def]
+    rows, cols, channels = old.shape
+    for row in range(rows):
+        for col in range(cols):
+            total = np.float32(0)
+            for channel in range(channels):
+                total += new[row, col, channel] - old[row, col, channel]
+            change[row, col] = total / np.float32(channels)
+
+
+@nb.njit(cache=True, nogil=True)
+def _blend(old, new, old_slots, changed, blended, slots):  # type: ignore[no-untyped-def]
+    """Average where nothing changed, begin anew where something did."""
+    rows, cols, channels = old.shape
+    for row in range(rows):
+        for col in range(cols):
+            spanned = min(old_slots[row, col] + np.float32(1), np.float32(LONGEST_MEMORY))
+            count = np.float32(1) if changed[row, col] else spanned
+            slots[row, col] = count
+            for channel in range(channels):
+                before = old[row, col, channel]
+                blended[row, col, channel] = before + (new[row, col, channel] - before) / count
 
 
 def subtract(plates: Iterable[Plate], *, first: Ambient | None = None) -> Iterator[Plate]:
@@ -65,7 +93,18 @@ def subtract(plates: Iterable[Plate], *, first: Ambient | None = None) -> Iterat
 
 
 def _without(plate: Plate, ambient: Image) -> Image:
-    """Take the ambient light of every exposure off; what is saturated stays at 1.0 or above, what is unseen at 0."""
-    exposures = plate.exposures.astype(np.float32).reshape((-1,) + (1,) * (plate.image.ndim - 1))
-    lit = plate.image - exposures * ambient
-    return np.where(plate.image >= 1.0, plate.image, lit)
+    """Take the ambient light of every exposure off; what is saturated stays at 1.0 or above."""
+    rows = plate.image.shape[0]
+    lit = np.empty_like(plate.image)
+    exposures = plate.exposures.astype(np.float32)
+    _subtract_rows(plate.image.reshape(rows, -1), ambient.reshape(rows, -1), exposures, lit.reshape(rows, -1))
+    return lit
+
+
+@nb.njit(cache=True, nogil=True)
+def _subtract_rows(image, ambient, exposures, lit):  # type: ignore[no-untyped-def]
+    for row in range(image.shape[0]):
+        count = exposures[row]
+        for col in range(image.shape[1]):
+            value = image[row, col]
+            lit[row, col] = value if value >= np.float32(1.0) else value - count * ambient[row, col]

@@ -1,6 +1,6 @@
 """The whole chain on a virtual shoot, and one picture that shows it: frames, plates, normals, albedo, relit."""
 
-from itertools import islice
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -19,7 +19,7 @@ from psvideo.synth.shoot import builtin_scene, shoot
 from psvideo.view.contact import Strip, Tile, sheet
 from psvideo.view.shading import exposure_for, normal_colours, relit, srgb
 
-SHOWN_FRAMES = 4
+SHOWN_FRAMES = slice(3, 7)
 RELIT_FROM: tuple[Vector, ...] = ((0.85, 0.2, 0.5), (-0.6, 0.75, 0.35))
 WARM, COOL = (1.0, 0.82, 0.6), (0.62, 0.8, 1.0)
 
@@ -39,10 +39,11 @@ def run_demo(folder: Path, *, force: bool = False, watch: Watch = unwatched) -> 
     timing = timing_of(take, None, first_light=None, watch=watch)
     delivery = Delivery(space=Space())
     output = Output(folder=out, force=force)
-    result = normals_run(take, timing, clip_path / "rig.toml", output, delivery=delivery, watch=watch)
-    picture = folder / "demo.png"
-    _write_png(picture, demo_sheet(take.clip, result.sample))
-    return picture
+    rig = clip_path / "rig.toml"
+    sheet_of = partial(demo_sheet, take.clip)
+    result = normals_run(take, timing, rig, output, delivery=delivery, watch=watch, picture_of=sheet_of)
+    _write_png(folder / "demo.png", result.picture)
+    return folder / "demo.png"
 
 
 def demo_sheet(clip: Clip, sample: Instant) -> NDArray[np.uint8]:
@@ -50,7 +51,7 @@ def demo_sheet(clip: Clip, sample: Instant) -> NDArray[np.uint8]:
     exposure = exposure_for(sample.round.plates[0].image)
     frames = [
         Tile(f"frame {frame.number}", srgb(frame.image, exposure=exposure))
-        for frame in islice(read_frames(clip, clip.numbers[:SHOWN_FRAMES]), SHOWN_FRAMES)
+        for frame in read_frames(clip, clip.numbers[SHOWN_FRAMES])
     ]
     plates = [Tile(plate.light, srgb(plate.image, exposure=exposure)) for plate in sample.round.plates]
     return sheet(
@@ -70,7 +71,7 @@ def _surface_tiles(surface: Surface) -> list[Tile]:
     warm = relit(surface, RELIT_FROM[0], colour=WARM, gloss=0.06)
     cool = relit(surface, RELIT_FROM[1], colour=COOL, gloss=0.06)
     return [
-        Tile("normals", normal_colours(surface)),
+        Tile("normals", normal_colours(surface.normals)),
         Tile("albedo", srgb(albedo, exposure=exposure)),
         Tile("relit, warm from the right", srgb(warm, exposure=exposure)),
         Tile("relit, warm and cool together", srgb(0.7 * warm + 0.6 * cool, exposure=exposure)),

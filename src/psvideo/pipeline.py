@@ -16,7 +16,7 @@ from psvideo import hudon2015
 from psvideo.ambient import Ambient, subtract
 from psvideo.camera import Camera
 from psvideo.clip import Clip, demosaic, holes, open_clip, parse_range, read_frames
-from psvideo.normals.illumination import Illumination, illumination
+from psvideo.normals.illumination import illumination
 from psvideo.normals.woodham1980 import solve
 from psvideo.plan import Plan
 from psvideo.profiles import collect
@@ -30,6 +30,8 @@ from psvideo.timing import DroppedFrames, Timing
 
 Method = Literal["weights", "hudon2015"]
 Item = TypeVar("Item")
+AHEAD = 1
+"""Frames that are decoded in advance while plates are rebuilt; each costs memory."""
 
 
 class Watch(Protocol):
@@ -92,7 +94,8 @@ def clip_rounds(
     """
     clip, camera = take.clip, _timed_camera(take.plan, timing)
     used = _within(timing, camera, take)
-    frames = watch(read_frames(clip, take.numbers), total=len(take.numbers), what="rebuilding flashes")
+    decoded = read_frames(clip, take.numbers, ahead=AHEAD)
+    frames = watch(decoded, total=len(take.numbers), what="rebuilding flashes")
     rebuild = split if method == "weights" else hudon2015.split
     plates = subtract(rebuild(frames, camera, used), first=_first_ambient(take, camera, used))
     shown = _shown(map(_colour_of(clip), plates), each_flash)
@@ -188,18 +191,14 @@ def surfaces(
     Raises PsvideoError where the rig lacks a light, or its lights give no normals.
     """
     lights = lights_as_planned(rig, plan)
-    lit: Illumination | None = None
-    for one in gathered:
-        if one.lights != plan.lights:
-            continue
-        lit = lit or illumination(lights, channels=1 if one.plates[0].image.ndim == 2 else 3)
+
+    def solved(one: Round) -> Instant:
+        lit = illumination(lights, channels=1 if one.plates[0].image.ndim == 2 else 3)
         seen = np.stack([plate.seen for plate in one.plates])
-        surface = solve(
-            [plate.image for plate in one.plates],
-            lit,
-            seen=None if seen.all() else seen,
-            mask=mask,
-            half=half,
-            residual=residual,
-        )
-        yield Instant(round=one, surface=surface)
+        plates = [plate.image for plate in one.plates]
+        shown = None if seen.all() else seen
+        surface = solve(plates, lit, seen=shown, mask=mask, half=half, residual=residual)
+        return Instant(round=one, surface=surface)
+
+    # map and filter hold no round while the next one gathers, as a loop's variable would
+    return map(solved, filter(lambda one: one.lights == plan.lights, gathered))

@@ -1,6 +1,7 @@
 """Whole runs: a clip in, a folder of files out, with decoding, computing and writing side by side."""
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
@@ -36,8 +37,10 @@ from psvideo.sequence import FIRST_NUMBER, round_numbers
 from psvideo.timing import Timing, format_timing, read_timing
 from psvideo.view.contact import Strip, Tile, sheet
 from psvideo.view.report import InstantFacts, RunReport, instant_facts, report_page, report_record
-from psvideo.view.shading import exposure_for, normal_colours, srgb
+from psvideo.view.shading import exposure_for, normal_colours, smaller, srgb
 
+Pixels = NDArray[np.uint8]
+SHOWN_WIDTH_PX = 600
 SAMPLE_ROUND = 3
 """The round that the report shows, counted from 1; the first where there are fewer."""
 
@@ -130,10 +133,10 @@ def _with_plates(timing: Timing, clip: str, written: set[str], *, start_number: 
 
 @dataclass(frozen=True, kw_only=True)
 class NormalsResult:
-    """What a normals run gave: the report, and one instant to look at."""
+    """What a normals run gave: the report, and a picture of one round."""
 
     report: RunReport
-    sample: Instant
+    picture: Pixels
 
 
 def normals_run(
@@ -145,15 +148,19 @@ def normals_run(
     delivery: Delivery,
     mask_path: Path | None = None,
     watch: Watch = unwatched,
+    picture_of: Callable[[Instant], Pixels] | None = None,
 ) -> NormalsResult:
-    """Write normals, albedo and validity of every round, timing.json and the report; return what is to be reported."""
+    """Write normals, albedo and validity of every round, timing.json and the report; return what is to be reported.
+
+    ``picture_of`` makes the picture of one round; left out, it shows plates and surface.
+    """
     clip = take.clip
     rig = read_rig(rig_path, plan_lights=clip.plan.lights)
     mask = None if mask_path is None else read_mask(mask_path, width_px=clip.width_px, height_px=clip.height_px)
     lit = illumination(lights_as_planned(rig, clip.plan), channels=clip.channels)
     tags = _tags(clip, rig_path, delivery)
     facts: list[InstantFacts] = []
-    sample: Instant | None = None
+    picture: Pixels | None = None
     with whole_folder(output.folder, force=output.force, resume=output.resume) as folder, writing() as write:
         rounds = clip_rounds(take, timing, start_number=output.start_number, watch=watch)
         residual = "residual" in delivery.aovs
@@ -161,8 +168,10 @@ def normals_run(
             if not (output.resume and is_written(folder, clip.name, instant.round.number, delivery)):
                 write(partial(_write_instant, folder, clip.name, instant, delivery, tags))
             facts.append(instant_facts(instant.round, instant.surface, mask))
-            sample = instant if sample is None or len(facts) == SAMPLE_ROUND else sample
-        if sample is None:
+            if len(facts) in (1, SAMPLE_ROUND):
+                picture = (picture_of or look)(instant)
+            del instant  # its plates would be held while the next round gathers
+        if picture is None:
             raise PsvideoError(_nothing_complete(clip, timing))
         report = RunReport(
             clip=clip.name,
@@ -174,8 +183,8 @@ def normals_run(
         )
         write_text(folder / "timing.json", format_timing(timing))
         write_text(folder / "report.json", json.dumps(report_record(report), indent=1) + "\n")
-        write_text(folder / "report.html", report_page(report, [("One round", look(sample))]))
-    return NormalsResult(report=report, sample=sample)
+        write_text(folder / "report.html", report_page(report, [("One round", picture)]))
+    return NormalsResult(report=report, picture=picture)
 
 
 def _tags(clip: Clip, rig_path: Path, delivery: Delivery) -> Tags:
@@ -194,13 +203,12 @@ def _write_instant(folder: Path, clip: str, instant: Instant, delivery: Delivery
     write_surface(folder, clip, one.number, one.time_s, instant.surface, delivery=delivery, tags=tags)
 
 
-def look(instant: Instant) -> NDArray[np.uint8]:
+def look(instant: Instant) -> Pixels:
     """Return a picture of one instant for eyes: its plates, its normals and its albedo."""
-    exposure = exposure_for(instant.round.plates[0].image)
-    plates = [Tile(plate.light, srgb(plate.image, exposure=exposure)) for plate in instant.round.plates]
-    albedo = instant.surface.albedo.astype(np.float32)
-    surface = [
-        Tile("normals", normal_colours(instant.surface)),
-        Tile("albedo", srgb(albedo, exposure=exposure_for(albedo))),
-    ]
+    shown = [(plate.light, smaller(plate.image, SHOWN_WIDTH_PX)) for plate in instant.round.plates]
+    exposure = exposure_for(shown[0][1])
+    albedo = smaller(instant.surface.albedo, SHOWN_WIDTH_PX)
+    normals = smaller(instant.surface.normals, SHOWN_WIDTH_PX)
+    surface = [Tile("normals", normal_colours(normals)), Tile("albedo", srgb(albedo, exposure=exposure_for(albedo)))]
+    plates = [Tile(light, srgb(picture, exposure=exposure)) for light, picture in shown]
     return sheet([Strip("Plates, one per light", plates), Strip("Surface", surface)], width_px=1200)

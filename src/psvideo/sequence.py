@@ -77,12 +77,18 @@ def rounds(
 ) -> Iterator[Round]:
     """Yield one set of light plates per round in which any light is complete; ``start`` numbers the first."""
     numbers = round_numbers(flashes, start=start)
+    last = {numbers[flash.index]: flash.index for flash in flashes if flash.complete}
     held: list[Plate] = []
     for plate in plates:
-        if held and numbers[held[0].flash.index] != numbers[plate.flash.index]:
+        number = numbers[plate.flash.index]
+        if held and numbers[held[0].flash.index] != number:
             yield from _gathered(held, plan, numbers[held[0].flash.index])
             held = []
         held.append(plate)
+        del plate  # nothing but the list holds it now, so that a round is gone once it is used
+        if held[-1].flash.index == last[number]:
+            yield from _gathered(held, plan, number)
+            held = []
     if held:
         yield from _gathered(held, plan, numbers[held[0].flash.index])
 

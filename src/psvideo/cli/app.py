@@ -1,32 +1,33 @@
 """psvideo: the commands, assembled, and how faults become one paragraph and an exit status."""
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from importlib import import_module
 from typing import Annotated
 
 import typer
 
 from psvideo import __version__
-from psvideo.cli.capture_plan import capture_plan
-from psvideo.cli.demo import demo
-from psvideo.cli.info import info
-from psvideo.cli.normals import normals
-from psvideo.cli.split import split
-from psvideo.cli.sync import sync
-from psvideo.cli.synth import synth
 from psvideo.errors import PsvideoError
 
-COMMANDS: tuple[Callable[..., None], ...] = (capture_plan, synth, sync, split, normals, info, demo)
+COMMANDS = ("capture-plan", "synth", "sync", "split", "normals", "info", "demo")
 
-app = typer.Typer(
-    name="psvideo",
-    help="Normals and albedo for every instant, from strobed rolling-shutter video.",
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
-)
-for command in COMMANDS:
-    app.command()(command)
+
+def application(arguments: Sequence[str]) -> typer.Typer:
+    """Return the commands as one program; only the one that is called is imported, all of them for the help."""
+    app = typer.Typer(
+        name="psvideo",
+        help="Normals and albedo for every instant, from strobed rolling-shutter video.",
+        no_args_is_help=True,
+        pretty_exceptions_enable=False,
+        context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+    )
+    app.callback()(psvideo)
+    called = arguments[0] if arguments else ""
+    for name in (called,) if called in COMMANDS else COMMANDS:
+        function = name.replace("-", "_")
+        app.command(name)(getattr(import_module(f"psvideo.cli.{function}"), function))
+    return app
 
 
 def _print_version(wanted: bool) -> None:
@@ -35,7 +36,6 @@ def _print_version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
 def psvideo(
     version: Annotated[
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Say which version this is.")
@@ -49,8 +49,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     A fault is printed as one paragraph on stderr.
     """
+    words = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        app(args=arguments)
+        application(words)(args=words)
     except PsvideoError as fault:
         print(f"psvideo: {fault}", file=sys.stderr)
         return fault.exit_status

@@ -97,6 +97,8 @@ def normals(
         multipart=multipart,
     )
     take = open_take(clip, plan=plan, frames=frames)
+    for warning in take.clip.warnings:
+        voice.warn(warning)
     for note in take.clip.notes:
         voice.detail(note)
     found = timing_of(take, timing, first_light=first_light, watch=voice.track)

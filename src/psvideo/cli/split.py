@@ -56,6 +56,8 @@ def split(
     output = Output(folder=out, force=force, resume=resume, start_number=start_number)
     output.check()
     take = open_take(clip, plan=plan, frames=frames)
+    for warning in take.clip.warnings:
+        voice.warn(warning)
     for note in take.clip.notes:
         voice.detail(note)
     found = timing_of(take, timing, first_light=first_light, watch=voice.track)

@@ -32,6 +32,8 @@ def sync(
     if out is not None:
         refuse_existing(out, force=force)
     take = open_take(clip, plan=plan, frames=frames)
+    for warning in take.clip.warnings:
+        voice.warn(warning)
     for note in take.clip.notes:
         voice.detail(note)
     timing = find_clip_timing(take, first_light=first_light, watch=voice.track)
@@ -46,12 +48,13 @@ def sync(
 def describe_timing(timing: Timing) -> str:
     """Return what was found and how sure it is, in a few lines for people."""
     complete = sum(flash.complete for flash in timing.flashes)
-    lines = [
-        f"{len(timing.flashes)} flashes, {complete} of them complete; "
-        f"the strobe's clock is off by {timing.clock_offset_ppm:+.1f} ppm; "
-        f"flash times are sure to {timing.phase_error_rows:.3f} row.",
-        ORDER_SENTENCE[timing.order],
-    ]
+    lines = [f"{len(timing.flashes)} flashes, {complete} of them complete."]
+    if timing.row_time_s:
+        lines.append(
+            f"The strobe's clock is off by {timing.clock_offset_ppm:+.1f} ppm; flash times are sure to "
+            f"{timing.phase_error_rows:.2g} row."
+        )
+    lines.append(ORDER_SENTENCE[timing.order])
     lines += [f"{hole.count} frame(s) missing after number {hole.after}." for hole in timing.dropped_frames]
     return "\n".join(lines)
 

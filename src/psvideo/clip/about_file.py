@@ -2,13 +2,13 @@
 
 import json
 import tomllib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from psvideo.clip import exr
 from psvideo.clip.about_plan import plan_findings, rig_findings
-from psvideo.clip.decoders import decode, read_header
+from psvideo.clip.decoders import decode
 from psvideo.clip.findings import Description, Fact, Finding, fault, ok, warn
 from psvideo.clip.folder import KINDS
 from psvideo.clip.reading import looks
@@ -120,13 +120,8 @@ def _describe_image(path: Path, kind: str) -> Description:
     """Describe an image; an EXR may hold any channels, and its attributes say where it comes from."""
     try:
         if kind == "exr":
-            channels, attributes = exr.contents(path)
-            size = [ok(f"channels {', '.join(channels)}")]
-            return Description(
-                path=path, kind="exr image", facts=attributes, findings=(*size, *_attribute_lines(attributes))
-            )
+            return _describe_exr(path)
         header = decode(kind, path).header
-        read_header(kind, path)
     except PsvideoError as error:
         return Description(path=path, kind=f"{kind} image", findings=(fault(error),))
     facts: dict[str, Fact] = {
@@ -141,5 +136,8 @@ def _describe_image(path: Path, kind: str) -> Description:
     return Description(path=path, kind=f"{kind} image", facts=facts, findings=tuple(findings))
 
 
-def _attribute_lines(attributes: Mapping[str, Fact]) -> Iterator[Finding]:
-    yield from (ok(f"{name} = {value}") for name, value in attributes.items())
+def _describe_exr(path: Path) -> Description:
+    channels, facts = exr.contents(path, header_only=False)
+    size = ok(f"{facts['width_px']} x {facts['height_px']} pixels, channels {', '.join(channels)}")
+    shown = [ok(f"{name} = {value}") for name, value in facts.items() if name not in ("width_px", "height_px")]
+    return Description(path=path, kind="exr image", facts={"channels": channels, **facts}, findings=(size, *shown))

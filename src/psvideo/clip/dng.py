@@ -66,6 +66,7 @@ def _raw_page(path: Path, file: tifffile.TiffFile) -> tifffile.TiffPage:
 
 
 def _header(path: Path, file: tifffile.TiffFile, page: tifffile.TiffPage) -> Header:
+    check_places(path, page)
     cut = _cut(path, page)
     bits = sample_bits(path, page)
     table = _tag(page, LINEARIZATION)
@@ -93,7 +94,7 @@ def _codes(path: Path, page: tifffile.TiffPage) -> NDArray[Any]:
     """Decode to linearized values of shape (row, col, sample)."""
     if int(page.compression) not in DECODED_BY_TIFFFILE:
         return _decoded_by_libraw(path, page)
-    codes: NDArray[Any] = pixels(path, page)
+    codes: NDArray[Any] = pixels(page)
     table = _tag(page, LINEARIZATION)
     if table is None:
         return codes
@@ -103,7 +104,6 @@ def _codes(path: Path, page: tifffile.TiffPage) -> NDArray[Any]:
 
 def _decoded_by_libraw(path: Path, page: tifffile.TiffPage) -> NDArray[Any]:
     """Decode by LibRaw, which linearizes by itself. Rows of nothing but 0 are a failure that it does not report."""
-    check_places(path, page)
     with rawpy.imread(str(path)) as raw:
         codes = np.array(raw.raw_image)
     if codes.shape[:2] != (page.imagelength, page.imagewidth) or not codes.any(axis=1).all():

@@ -16,17 +16,17 @@ UNSET = 0xFFFFFFFF
 
 
 def header(path: Path) -> Header:
-    """Read the generic header (SMPTE 268M)."""
-    with path.open("rb") as file:
-        return _parse_header(path, file.read(2048))[0]
-
-
-def decode(path: Path) -> Picture:
-    """Decode a whole picture."""
+    """Read the generic header (SMPTE 268M), and see that the file is as long as it says."""
     with path.open("rb") as file:
         head, end = _parse_header(path, file.read(2048))
     if path.stat().st_size < end:
         raise PsvideoError(f"{path}: is {path.stat().st_size} bytes, expected {end}: it is truncated. Copy it again.")
+    return head
+
+
+def decode(path: Path) -> Picture:
+    """Decode a whole picture."""
+    head = header(path)
     try:
         with av.open(str(path), format="dpx_pipe") as container:
             found = planes(path, next(container.decode(video=0)))

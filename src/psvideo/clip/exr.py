@@ -12,10 +12,12 @@ import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
 
+from psvideo.clip.exr_chunks import is_cut_short
 from psvideo.clip.record import Header, Picture
 from psvideo.errors import PsvideoError
 
 GREY_NAMES = ("Y", "L", "V")
+OF_THE_CONTAINER = ("type", "name", "chunkCount", "pixelAspectRatio", "screenWindowWidth")
 
 
 def header(path: Path) -> Header:
@@ -35,25 +37,41 @@ def decode(path: Path) -> Picture:
         return Picture(header=head, codes=_in_display_window(codes, file.header(), head))
 
 
-def contents(path: Path) -> tuple[list[str], dict[str, str | int | float | None]]:
-    """Return the names of all channels, and the attributes that can be written in a line, with the picture's size."""
-    with _open(path, header_only=True) as file:
-        attributes = dict(file.header())
-    names = sorted(channel.name for channel in attributes["channels"])
-    width_px, height_px = _size(attributes["displayWindow"])
+def contents(path: Path, *, header_only: bool = True) -> tuple[list[str], dict[str, str | int | float | None]]:
+    """Return the names of all channels, and the attributes that can be written in a line, with the picture's size.
+
+    The channels of a file of several parts are named ``part.channel``; attributes are the first part's. Without
+    ``header_only`` the pixels are decoded too, which shows whether the file is whole.
+    """
+    with _open(path, header_only=header_only) as file:
+        parts = [dict(part.header) for part in file.parts]
+    names = [
+        f"{part['name']}.{channel.name}" if len(parts) > 1 else channel.name
+        for part in parts
+        for channel in sorted(part["channels"], key=_usual_order)
+    ]
+    width_px, height_px = _size(parts[0]["displayWindow"])
     found: dict[str, str | int | float | None] = {"width_px": width_px, "height_px": height_px}
-    for name, value in attributes.items():
+    for name, value in parts[0].items():
         if name == "timeCode":
             found[name] = _time_code(value)
-        elif isinstance(value, str | int | float) and name not in ("type", "pixelAspectRatio", "screenWindowWidth"):
+        elif isinstance(value, str | int | float) and name not in OF_THE_CONTAINER:
             found[name] = value
         elif isinstance(value, Fraction):
             found[name] = str(value)
     return names, found
 
 
+def _usual_order(channel: Any) -> tuple[str, int, str]:
+    """R, G, B, A of one layer stay together in this order; EXR itself sorts by name."""
+    layer, _, name = channel.name.rpartition(".")
+    return layer, "RGBA".find(name) if name in "RGBA" else 4, name
+
+
 def _open(path: Path, *, header_only: bool) -> Any:
     """Open a file; OpenEXR reports damage in several ways, which all end here."""
+    if is_cut_short(path):
+        raise PsvideoError(f"{path}: ends before its last rows: it is truncated. Copy it again.")
     try:
         file = OpenEXR.File(str(path), separate_channels=True, header_only=header_only)
         file.header()

@@ -8,6 +8,7 @@ from psvideo.clip.record import Header, Picture
 from psvideo.errors import PsvideoError
 
 START, END = b"\xff\xd8", b"\xff\xd9"
+TAIL = 1024
 NO_LENGTH = {0x01, *range(0xD0, 0xD9)}
 FRAME_MARKERS = {*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC}
 LOSSY = "JPEG frames have 8 bits and are lossy, which costs accuracy; record PNG, TIFF, DPX, EXR or DNG"
@@ -21,13 +22,12 @@ def header(path: Path) -> Header:
 def decode(path: Path) -> Picture:
     """Decode a whole picture. A truncated file is refused, which decoders fill with grey."""
     data = path.read_bytes()
-    head = _parse_header(path, data)
-    if END not in data[-1024:]:
-        raise PsvideoError(f"{path}: ends before its end marker: the file is truncated. Copy it again.")
-    return Picture(header=head, codes=imagecodecs.jpeg8_decode(data))
+    return Picture(header=_parse_header(path, data), codes=imagecodecs.jpeg8_decode(data))
 
 
 def _parse_header(path: Path, data: bytes) -> Header:
+    if data.startswith(START) and END not in data[-TAIL:]:
+        raise PsvideoError(f"{path}: ends before its end marker: it is truncated. Copy it again.")
     place = 2
     while data.startswith(START) and place + 9 < len(data):
         marker = data[place + 1]

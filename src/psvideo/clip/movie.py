@@ -23,6 +23,7 @@ VIDEO_RANGE, FULL_RANGE = 1, 2  # FFmpeg's AVCOL_RANGE_MPEG and AVCOL_RANGE_JPEG
 UNTAGGED = 2  # matrix coefficients "unspecified" (H.273)
 HD_HEIGHT_PX = 720
 UNEVEN = 0.25
+AS_RECORDED = {"ignore_editlist": "1"}  # all frames that the camera wrote, whatever an edit list would show
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,7 +96,7 @@ def read_movie(path: Path, timestamps: Sequence[int]) -> Iterator[Picture]:
 def _opened(path: Path) -> Iterator[tuple[InputContainer, VideoStream]]:
     """Open a movie and its first video stream."""
     try:
-        with av.open(str(path)) as container:
+        with av.open(str(path), options=AS_RECORDED) as container:
             if not container.streams.video:
                 raise PsvideoError(f"{path}: holds no video. Name the movie that the camera recorded.")
             stream = container.streams.video[0]

@@ -12,29 +12,35 @@ from psvideo.clip.record import Header, Picture
 from psvideo.errors import PsvideoError
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
+END = b"IEND\xaeB`\x82"
+TAIL = 1024
 COLOUR_TYPES = {0: 1, 2: 3, 4: 1, 6: 3}
 ALPHA_TYPES = (4, 6)
 
 
 def header(path: Path) -> Header:
-    """Read what the file's first chunk says."""
+    """Read what the file's first chunk says, and see that the last one is there."""
     with path.open("rb") as file:
-        return _parse_header(path, file.read(33))
+        first = file.read(33)
+        file.seek(max(path.stat().st_size - TAIL, 0))
+        return _parse_header(path, first, file.read())
 
 
 def decode(path: Path) -> Picture:
     """Decode a whole picture; an alpha channel is left out."""
     data = path.read_bytes()
-    head = _parse_header(path, data)
+    head = _parse_header(path, data, data[-TAIL:])
     codes = imagecodecs.png_decode(data)
     if codes.ndim == 3:
         codes = codes[..., : head.channels] if head.channels > 1 else codes[..., 0]
     return Picture(header=head, codes=codes)
 
 
-def _parse_header(path: Path, data: bytes) -> Header:
+def _parse_header(path: Path, data: bytes, tail: bytes) -> Header:
     if len(data) < 33 or not data.startswith(SIGNATURE) or data[12:16] != b"IHDR":
         raise PsvideoError(f"{path}: does not begin like a PNG file. Copy it again, or give it the name of its kind.")
+    if END not in tail:
+        raise PsvideoError(f"{path}: ends before its last chunk (IEND): it is truncated. Copy it again.")
     width_px, height_px, bits, colour_type = struct.unpack(">IIBB", data[16:26])
     if colour_type not in COLOUR_TYPES or bits not in (8, 16):
         kind = "a palette" if colour_type == 3 else f"{bits} bits per sample"

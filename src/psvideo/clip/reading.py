@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 
+import numpy as np
 from fileseq.exceptions import ParseException
 from fileseq.frameset import FrameSet
 
@@ -69,7 +70,13 @@ def _next_frame(clip: Clip, number: int, pictures: Iterator[Picture]) -> Frame:
 
 def _frame(clip: Clip, number: int, picture: Picture, name: str) -> Frame:
     _check_like_first(clip, picture.header, name)
-    return Frame(index=clip.index_of(number), number=number, image=linear_light(picture, clip.encoding))
+    image = linear_light(picture, clip.encoding)
+    if picture.header.bits is None and not np.isfinite(image.sum(dtype=np.float64)):
+        raise PsvideoError(
+            f"{name}: holds {int((~np.isfinite(image)).sum())} values that are no numbers (NaN or infinity). Write the "
+            "frame again with finite pixels."
+        )
+    return Frame(index=clip.index_of(number), number=number, image=image)
 
 
 def _check_like_first(clip: Clip, found: Header, name: str) -> None:

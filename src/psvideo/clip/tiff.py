@@ -27,13 +27,12 @@ def decode(path: Path) -> Picture:
     with tifffile.TiffFile(path) as file:
         page = _only_page(path, file)
         head = _header(path, page)
-        codes = pixels(path, page)[..., : head.channels]
+        codes = pixels(page)[..., : head.channels]
     return Picture(header=head, codes=codes[..., 0] if head.channels == 1 else np.ascontiguousarray(codes))
 
 
-def pixels(path: Path, page: tifffile.TiffPage) -> NDArray[np.generic]:
-    """Decode a page to (row, col, sample). Raises PsvideoError where strips or tiles are missing from the file."""
-    check_places(path, page)
+def pixels(page: tifffile.TiffPage) -> NDArray[np.generic]:
+    """Decode a page to (row, col, sample); ``check_places`` comes first."""
     picture = np.asarray(page.asarray(maxworkers=1))
     if picture.ndim == 2:
         return picture[..., None]
@@ -75,6 +74,7 @@ def _only_page(path: Path, file: tifffile.TiffFile) -> tifffile.TiffPage:
 
 
 def _header(path: Path, page: tifffile.TiffPage) -> Header:
+    check_places(path, page)
     channels = {GREY: 1, RGB: 3, MOSAIC: 1}.get(int(page.photometric))
     if channels is None or page.samplesperpixel < channels:
         kind = tifffile.PHOTOMETRIC(page.photometric).name

@@ -132,7 +132,7 @@ def write_exr_parts(
     attributes: Mapping[str, Mapping[str, Attribute]],
     fps: Fraction | None = None,
 ) -> None:
-    """Write one file with a part per name; every part has its own channels and ``attributes``, else as ``write_exr``."""
+    """Write one file with a part per name; each has its own channels and ``attributes``, else as ``write_exr``."""
     built = []
     for name, channels in parts.items():
         planes = {channel: _plane(channel, values, half) for channel, values in channels.items()}

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 
 WRITING_THREADS = 2
-MOST_WAITING = 3
+MOST_WAITING = 2
 """Files that may wait to be written: what bounds memory."""
 
 Write = Callable[[Callable[[], None]], None]

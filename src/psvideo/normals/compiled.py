@@ -3,12 +3,14 @@
 from collections.abc import Callable
 from typing import Any, TypeVar
 
+import llvmlite.ir
 import numba
-from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
+from numba.np.numpy_support import carray
 
 _HALF_MAX = 65504.0
+_ir: Any = llvmlite.ir
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -18,7 +20,7 @@ _FAST_MATH = {"contract", "nsz", "arcp"}
 
 def compiled(function: Function) -> Function:
     """Compile a function when it is first called; where no folder can be written, without keeping it for next time."""
-    options: dict[str, Any] = {"nogil": True, "fastmath": _FAST_MATH, "error_model": "numpy"}
+    options: dict[str, Any] = {"nogil": True, "fastmath": _FAST_MATH, "error_model": "numpy", "forceinline": True}
     try:
         kept: Function = numba.njit(cache=True, **options)(function)
     except RuntimeError:  # numba found neither a folder beside the module nor one of the user's to write to
@@ -26,10 +28,9 @@ def compiled(function: Function) -> Function:
     return kept
 
 
-@intrinsic
-def pointer(typing_context: Any, address: Any, like: Any) -> Any:
+def _pointer(typing_context: Any, address: Any, like: Any) -> Any:
     """The address (an integer) as a pointer to elements of the array ``like``."""
-    target = types.CPointer(like.dtype)
+    target: Any = types.CPointer(like.dtype)  # type: ignore[no-untyped-call]
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return builder.inttoptr(arguments[0], context.get_value_type(target))
@@ -37,8 +38,7 @@ def pointer(typing_context: Any, address: Any, like: Any) -> Any:
     return target(types.intp, like), generate
 
 
-@intrinsic
-def encoded(typing_context: Any, value: Any, like: Any) -> Any:
+def _encoded(typing_context: Any, value: Any, like: Any) -> Any:
     """A float32 as the array ``like`` stores it: as it is, or rounded to a half float's 16 bits where it is uint16.
 
     Values beyond the largest half float become that one. A vector takes one instruction, where numpy takes a pass.
@@ -47,10 +47,23 @@ def encoded(typing_context: Any, value: Any, like: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         if like.dtype != types.uint16:
             return arguments[0]
-        largest = ir.Constant(ir.FloatType(), _HALF_MAX)
+        largest = _ir.Constant(_ir.FloatType(), _HALF_MAX)
         fits = builder.fcmp_ordered("<", arguments[0], largest)
         return builder.bitcast(
-            builder.fptrunc(builder.select(fits, arguments[0], largest), ir.HalfType()), ir.IntType(16)
+            builder.fptrunc(builder.select(fits, arguments[0], largest), _ir.HalfType()), _ir.IntType(16)
         )
 
     return like.dtype(types.float32, like), generate
+
+
+pointer: Any = intrinsic(_pointer)
+encoded: Any = intrinsic(_encoded)
+
+
+@compiled
+def lent(array: Any) -> Any:
+    """The same (C-contiguous) array without its reference count, which every slice and call would count up and down.
+
+    Threads that do so with one array wait for each other. The caller's own reference keeps the array alive.
+    """
+    return carray(pointer(array.ctypes.data, array), array.shape)

@@ -24,11 +24,12 @@ class Illumination:
     @property
     def singular_values(self) -> FloatArray:
         """The three singular values of the directions, largest first; the last is 0 where all lie in one plane."""
-        return np.linalg.svd(self.directions, compute_uv=False)
+        values: FloatArray = np.linalg.svd(self.directions, compute_uv=False).astype(np.float64)
+        return values
 
     @property
     def condition(self) -> float:
-        """The directions' condition number: 1.0 at best, infinite where all lights lie in one plane with the surface."""
+        """The directions' condition number: 1.0 at best, infinite where all lights lie in one plane."""
         largest, _, smallest = self.singular_values
         return float(largest / smallest) if smallest > 1e-12 * largest else float("inf")
 

@@ -9,89 +9,73 @@ Symbols: m = L g per pixel, with the measurements m, L = intensity * direction (
 All loops are in this one file because numba's cache notices a change only in the file of the function that is called.
 """
 
-from typing import NamedTuple
-
-import numba
 import numpy as np
-from numpy.typing import NDArray
+from numba.np.numpy_support import carray
 
-from psvideo.normals.compiled import compiled, encoded, pointer
+from psvideo.normals.compiled import compiled, encoded, lent, pointer
+from psvideo.normals.task import Bytes, Floats, Result, Samples, Task, Work
 
-Floats = NDArray[np.float32]
-Bytes = NDArray[np.uint8]
-Samples = NDArray[np.float32] | NDArray[np.uint16]
-
-BLOCK = 1024
+# Pixels of one block; not a power of two, whose planes would all fall on the same lines of the processor's cache.
+BLOCK = 480
 MISSING = np.float32(-1e30)
 ABSENT = np.float32(-1e29)  # what is below this is MISSING
-ZERO, ONE, THREE, BIG = np.float32(0), np.float32(1), np.float32(3), np.float32(1e30)
+ZERO, ONE, THREE, TINY = np.float32(0), np.float32(1), np.float32(3), np.float32(1e-9)
+SLIGHTLY_MORE = np.float32(1.000001)
 
-# The planes of the working array: the solution, then what deciding on the measurements needs.
-X, Y, Z, ALBEDO, TRUSTED, LIMIT, LOW, LOW_SHARE, SUM, COUNT = (BLOCK * plane for plane in range(10))
-XX, XY, XZ, YY, YZ, ZZ = (BLOCK * plane for plane in range(10, 16))
-PLANES = 16
-
-
-class Task(NamedTuple):
-    """What to solve. A plate's samples lie in memory pixel by pixel, channels side by side."""
-
-    plates: NDArray[np.intp]  # (light,) addresses of the plates' first samples
-    like: Samples  # any array of the samples' type
-    cols: int
-    tone: Floats  # (light, channel, 4): gain, offset and ceiling of the samples; factor from measurement to plate
-    matrix: Floats  # (light, 3): L, one for all channels
-    inverse: Floats  # (light, 3): its transposed pseudo-inverse
-    per_strength: Floats  # (light,): 1 / intensity
-    dark: np.float32  # a measurement must be above this,
-    ratio: np.float32  # and in shares of the intensities above this times the pixel's mean
-    condition_squared: np.float32  # largest trace(A) * trace(A^-1) of the usable lights' normal equations
-    albedo_scale: np.float32
-    seen: Bytes  # (light, row, col or 1), or empty
-    mask: Bytes  # (row, col), or empty
+# The planes of the working array: g, later the normal; what deciding on measurements needs; the normal equations.
+X, Y, Z, ALBEDO, LIMIT, LOW, HIGH, SUM, COUNT = (BLOCK * plane for plane in range(9))
+XX, XY, XZ, YY, YZ, ZZ = (BLOCK * plane for plane in range(9, 15))
+PLANES = 15
 
 
-class Result(NamedTuple):
-    """Where the solution goes: planes of float32, or of half floats as the bits of uint16."""
-
-    normals: Samples  # (3, pixel)
-    albedo: Samples  # (channel, pixel)
-    valid: Bytes  # (pixel,)
-    residual: Samples  # (pixel,), or empty
+def working_memory(task: Task) -> Work:
+    """What one call of ``solve_rows`` works in; no two calls at a time may share it."""
+    lights, channels = task.tone.shape[:2]
+    values = np.full((lights * channels, BLOCK), MISSING, np.float32)
+    combined = values if channels == 1 else np.full((lights, BLOCK), MISSING, np.float32)
+    return Work(planes=np.empty(PLANES * BLOCK, np.float32), values=values, measurements=combined)
 
 
 @compiled
-def solve_rows(task: Task, result: Result, first: int, last: int) -> None:
+def solve_rows(task: Task, result: Result, work: Work, first: int, last: int) -> None:
     """Solve the rows from ``first`` up to ``last``; no two calls may share rows, and any number may run at once."""
-    lights, channels = task.tone.shape[:2]
-    w = np.empty(PLANES * BLOCK, np.float32)
-    values = np.empty((lights * channels, BLOCK), np.float32)
-    m = values if channels == 1 else np.empty((lights, BLOCK), np.float32)
+    t = Task(
+        lent(task.plates), lent(task.like), task.lights, task.cols, lent(task.tone), lent(task.matrix),
+        lent(task.per_strength), lent(task.inverse), lent(task.origin), task.least, task.most, task.dark,
+        task.ratio, task.condition_squared, task.albedo_scale, lent(task.seen), lent(task.mask),
+    )  # fmt: skip
+    out = Result(lent(result.normals), lent(result.albedo), lent(result.valid), lent(result.residual))
+    w, values, m = lent(work.planes), lent(work.values), lent(work.measurements)
     for row in range(first, last):
-        for col in range(0, task.cols, BLOCK):
-            n = min(BLOCK, task.cols - col)
-            if task.mask.size and not task.mask[row, col : col + n].any():
-                w[TRUSTED : TRUSTED + n] = ZERO
+        for col in range(0, t.cols, BLOCK):
+            n = min(BLOCK, t.cols - col)
+            if t.mask.size and not t.mask[row, col : col + n].any():
+                w[X : X + n], w[Y : Y + n], w[Z : Z + n] = ZERO, ZERO, ZERO
             else:
-                _solve_block(task, w, values, m, row, col, n, result.residual.size > 0)
-            _store_block(task, result, w, values, m, row * task.cols + col, n)
+                _solve_block(t, w, values, m, row, col, n, out.residual.size > 0)
+            _store_block(t, out, w, values, m, row * t.cols + col, n)
 
 
 @compiled
 def _solve_block(
     task: Task, w: Floats, values: Floats, m: Floats, row: int, col: int, n: int, keep_measurements: bool
 ) -> None:
+    """Leave g in the planes X, Y, Z, with z <= 0 where the pixel has no solution to be trusted."""
     start, channels = row * task.cols + col, task.tone.shape[1]
     done = channels == 1 and _all_seen(task.seen, row, col, n) and _solve_all_usable(task, w, start, n)
     if not done or keep_measurements:
-        _gather(task, values, start, n)
+        if channels == 1:
+            _gather_one(task, values, start, n)
+        else:
+            _gather_three(task, values, start, n)
+        _hide_unseen(task, values, row, col, n)
         if channels > 1:
-            _combine(w, values, m, n)
+            _combine(task, w, values, m, n)
     if not done:
-        _hide_unseen(task.seen, m, row, col, n)
         _solve_usable(task, w, m, n)
     if task.mask.size:
         for i in range(n):
-            w[TRUSTED + i] *= ONE if task.mask[row, col + i] else ZERO
+            w[Z + i] = w[Z + i] if task.mask[row, col + i] else ZERO
 
 
 @compiled
@@ -99,188 +83,183 @@ def _plate(task: Task, light: int, start: int, n: int) -> Samples:
     """The samples of n pixels of one light's plate."""
     channels = task.tone.shape[1]
     end = (start + n) * channels
-    plate: Samples = numba.carray(pointer(task.plates[light], task.like), end)
+    plate: Samples = carray(pointer(task.plates[light], task.like), end)
     return plate[start * channels : end]
 
 
 @compiled
 def _solve_all_usable(task: Task, w: Floats, start: int, n: int) -> bool:
-    """Solve a block of one channel as if all measurements were usable; False where one is not after all."""
-    lights = task.matrix.shape[0]
-    light = 0
-    while light + 3 <= lights:
-        a, b, c = (_plate(task, light, start, n), _plate(task, light + 1, start, n), _plate(task, light + 2, start, n))
-        _add_three(w, n, a, b, c, task.inverse, task.tone, task.per_strength, light)
-        light += 3
-    while light < lights:
-        _add_one(w, n, _plate(task, light, start, n), task.inverse, task.tone, task.per_strength, light)
-        light += 1
-    share = task.ratio / np.float32(lights)
+    """Solve a block of one channel as if all measurements were usable; False where one is not, or hardly is.
+
+    The test is stricter than the rule for single pixels: every measurement is taken as if its light were the strongest
+    or the weakest, and the shadow limit follows the largest instead of the mean. Who fails it is solved by the rule.
+    """
+    for k in range(0, len(task.plates), 3):
+        a, b, c = _plate(task, k, start, n), _plate(task, k + 1, start, n), _plate(task, k + 2, start, n)
+        if k == 0:
+            _add_three(w, n, a, b, c, task.inverse, 0, False)
+        else:
+            _add_three(w, n, a, b, c, task.inverse, k, True)
+    (origin_x, origin_y, origin_z), (gain, offset, ceiling, _) = task.origin, task.tone[0, 0]
+    dark, least, most = task.dark, task.least, task.ratio * task.most
     unusable = 0
     for i in range(n):
-        unusable += (w[LOW + i] <= task.dark) | (w[LOW_SHARE + i] <= share * w[SUM + i])
-    if unusable > 0:
-        return False
-    for i in range(n):
-        x, y, z = w[X + i], w[Y + i], w[Z + i]
-        square = x * x + y * y + z * z
-        trusted = z > ZERO
-        scale = ONE / np.sqrt(square) if trusted else ZERO
-        w[X + i], w[Y + i], w[Z + i] = x * scale, y * scale, z * scale
-        w[ALBEDO + i] = square * scale
-        w[TRUSTED + i] = ONE if trusted else ZERO
-    return True
+        x, y, z = w[X + i] + origin_x, w[Y + i] + origin_y, w[Z + i] + origin_z
+        w[X + i], w[Y + i], w[Z + i] = x, y, z
+        low, high = w[LOW + i] * gain + offset, w[HIGH + i] * gain + offset
+        in_shadow = low * least <= max(dark, high * most) * SLIGHTLY_MORE
+        unusable += in_shadow | (high >= ceiling) | (not x + y + z < -MISSING)
+    return bool(unusable == 0)
 
 
 @compiled
-def _add_three(
-    w: Floats,
-    n: int,
-    a: Samples,
-    b: Samples,
-    c: Samples,
-    inverse: Floats,
-    tone: Floats,
-    per_strength: Floats,
-    k: int,
-) -> None:
-    """Add three lights, from light k, to g; beside it the lowest measurement, and lowest and sum as shares."""
-    begun = k > 0
+def _add_three(w: Floats, n: int, a: Samples, b: Samples, c: Samples, inverse: Floats, k: int, begun: bool) -> None:
+    """Add three lights' samples, from light k, to g; beside it the lowest and the highest sample."""
+    (xp, yp, zp), (xq, yq, zq), (xr, yr, zr) = inverse[k], inverse[k + 1], inverse[k + 2]
     for i in range(n):
-        p = np.float32(a[i]) * tone[k, 0, 0] + tone[k, 0, 1]
-        q = np.float32(b[i]) * tone[k + 1, 0, 0] + tone[k + 1, 0, 1]
-        r = np.float32(c[i]) * tone[k + 2, 0, 0] + tone[k + 2, 0, 1]
-        p = p if p < tone[k, 0, 2] else MISSING
-        q = q if q < tone[k + 1, 0, 2] else MISSING
-        r = r if r < tone[k + 2, 0, 2] else MISSING
-        x = inverse[k, 0] * p + inverse[k + 1, 0] * q + inverse[k + 2, 0] * r
-        y = inverse[k, 1] * p + inverse[k + 1, 1] * q + inverse[k + 2, 1] * r
-        z = inverse[k, 2] * p + inverse[k + 1, 2] * q + inverse[k + 2, 2] * r
+        low, high = np.float32(min(a[i], min(b[i], c[i]))), np.float32(max(a[i], max(b[i], c[i])))
+        p, q, r = np.float32(a[i]), np.float32(b[i]), np.float32(c[i])
+        x = xp * p + xq * q + xr * r
+        y = yp * p + yq * q + yr * r
+        z = zp * p + zq * q + zr * r
         w[X + i] = w[X + i] + x if begun else x
         w[Y + i] = w[Y + i] + y if begun else y
         w[Z + i] = w[Z + i] + z if begun else z
-        low = min(p, min(q, r))
         w[LOW + i] = min(w[LOW + i], low) if begun else low
-        p, q, r = p * per_strength[k], q * per_strength[k + 1], r * per_strength[k + 2]
-        low = min(p, min(q, r))
-        w[LOW_SHARE + i] = min(w[LOW_SHARE + i], low) if begun else low
-        w[SUM + i] = w[SUM + i] + (p + q + r) if begun else p + q + r
+        w[HIGH + i] = max(w[HIGH + i], high) if begun else high
 
 
 @compiled
-def _add_one(w: Floats, n: int, a: Samples, inverse: Floats, tone: Floats, per_strength: Floats, k: int) -> None:
-    """Go on with one light, number k."""
-    for i in range(n):
-        p = np.float32(a[i]) * tone[k, 0, 0] + tone[k, 0, 1]
-        p = p if p < tone[k, 0, 2] else MISSING
-        w[X + i] += inverse[k, 0] * p
-        w[Y + i] += inverse[k, 1] * p
-        w[Z + i] += inverse[k, 2] * p
-        w[LOW + i] = min(w[LOW + i], p)
-        p = p * per_strength[k]
-        w[LOW_SHARE + i] = min(w[LOW_SHARE + i], p)
-        w[SUM + i] += p
+def _gather_one(task: Task, values: Floats, start: int, n: int) -> None:
+    """Raw samples of one channel to measurements, a plane per light."""
+    for light in range(task.lights):
+        samples, plane = _plate(task, light, start, n), values[light]
+        gain, offset, ceiling, _ = task.tone[light, 0]
+        for i in range(n):
+            value = np.float32(samples[i]) * gain + offset
+            plane[i] = value if (value < ceiling) & (value > ABSENT) else MISSING
 
 
 @compiled
-def _gather(task: Task, values: Floats, start: int, n: int) -> None:
-    """Raw samples to measurements, a plane per light and channel."""
-    lights, channels = task.tone.shape[:2]
-    for light in range(lights):
+def _gather_three(task: Task, values: Floats, start: int, n: int) -> None:
+    """Raw samples of three channels to measurements, a plane per light and channel; a light counts whole or not."""
+    for light in range(task.lights):
         samples = _plate(task, light, start, n)
-        for channel in range(channels):
-            gain, offset, ceiling, _ = task.tone[light, channel]
-            plane = values[light * channels + channel]
-            for i in range(n):
-                value = np.float32(samples[i * channels + channel]) * gain + offset
-                plane[i] = value if value < ceiling else MISSING
+        red, green, blue = values[3 * light], values[3 * light + 1], values[3 * light + 2]
+        gain_r, offset_r, ceiling_r, _ = task.tone[light, 0]
+        gain_g, offset_g, ceiling_g, _ = task.tone[light, 1]
+        gain_b, offset_b, ceiling_b, _ = task.tone[light, 2]
+        for i in range(n):
+            r = np.float32(samples[3 * i]) * gain_r + offset_r
+            g = np.float32(samples[3 * i + 1]) * gain_g + offset_g
+            b = np.float32(samples[3 * i + 2]) * gain_b + offset_b
+            here = (r < ceiling_r) & (g < ceiling_g) & (b < ceiling_b) & (min(r, min(g, b)) > ABSENT)
+            red[i] = r if here else MISSING
+            green[i] = g if here else MISSING
+            blue[i] = b if here else MISSING
 
 
 @compiled
-def _combine(w: Floats, values: Floats, m: Floats, n: int) -> None:
+def _combine(task: Task, w: Floats, values: Floats, m: Floats, n: int) -> None:
     """One measurement per light from three channels, each weighted by its own brightness over the lights.
 
     That is the matched filter for noise alike in all channels: a channel in which the surface is black adds nothing.
     """
     for plane in (XX, YY, ZZ):
         w[plane : plane + n] = ZERO
-    for light in range(m.shape[0]):
+    for light in range(task.lights):
         red, green, blue = values[3 * light], values[3 * light + 1], values[3 * light + 2]
         for i in range(n):
-            here = min(red[i], min(green[i], blue[i])) > ABSENT
-            w[XX + i] += max(red[i], ZERO) if here else ZERO
-            w[YY + i] += max(green[i], ZERO) if here else ZERO
-            w[ZZ + i] += max(blue[i], ZERO) if here else ZERO
+            w[XX + i] += max(red[i], ZERO)
+            w[YY + i] += max(green[i], ZERO)
+            w[ZZ + i] += max(blue[i], ZERO)
     for i in range(n):
         total = w[XX + i] + w[YY + i] + w[ZZ + i]
-        scale = ONE / total if total > ZERO else ZERO
-        w[XX + i], w[YY + i], w[ZZ + i] = w[XX + i] * scale, w[YY + i] * scale, w[ZZ + i] * scale
-    for light in range(m.shape[0]):
+        w[SUM + i] = ONE / total if total > ZERO else ZERO
+    for light in range(task.lights):
         red, green, blue = values[3 * light], values[3 * light + 1], values[3 * light + 2]
         for i in range(n):
-            here = min(red[i], min(green[i], blue[i])) > ABSENT
-            value = w[XX + i] * red[i] + w[YY + i] * green[i] + w[ZZ + i] * blue[i]
-            m[light, i] = value if here else MISSING
+            value = (w[XX + i] * red[i] + w[YY + i] * green[i] + w[ZZ + i] * blue[i]) * w[SUM + i]
+            m[light, i] = value if red[i] > ABSENT else MISSING
 
 
 @compiled
 def _all_seen(seen: Bytes, row: int, col: int, n: int) -> bool:
-    if not seen.size:
-        return True
-    if seen.shape[2] == 1:
-        return seen[:, row, 0].all()
-    return seen[:, row, col : col + n].all()
+    """Whether every light was seen in n pixels; one entry may stand for the whole row."""
+    first, last = (0, 1) if seen.shape[2] == 1 else (col, col + n)
+    return not seen.size or bool(seen[:, row, first:last].all())
 
 
 @compiled
-def _hide_unseen(seen: Bytes, m: Floats, row: int, col: int, n: int) -> None:
-    for light in range(seen.shape[0]):
-        if seen.shape[2] == 1:
-            if not seen[light, row, 0]:
-                m[light, :n] = MISSING
-        else:
+def _hide_unseen(task: Task, values: Floats, row: int, col: int, n: int) -> None:
+    channels, seen = task.tone.shape[1], task.seen
+    for plane in range(channels * seen.shape[0]):
+        light = plane // channels
+        if seen.shape[2] > 1:
             for i in range(n):
-                m[light, i] = m[light, i] if seen[light, row, col + i] else MISSING
+                values[plane, i] = values[plane, i] if seen[light, row, col + i] else MISSING
+        elif not seen[light, row, 0]:
+            values[plane, :n] = MISSING
 
 
 @compiled
 def _solve_usable(task: Task, w: Floats, m: Floats, n: int) -> None:
     """Solve every pixel from its own usable measurements; those in shadow become MISSING too."""
-    w[SUM : SUM + n] = ZERO
-    w[COUNT : COUNT + n] = ZERO
-    for light in range(m.shape[0]):
+    w[SUM : SUM + n], w[COUNT : COUNT + n] = ZERO, ZERO
+    for light in range(task.lights):
+        plane, per = m[light], task.per_strength[light]
         for i in range(n):
-            here = m[light, i] > ABSENT
-            w[SUM + i] += m[light, i] * task.per_strength[light] if here else ZERO
-            w[COUNT + i] += ONE if here else ZERO
+            w[SUM + i] += plane[i] * per if plane[i] > ABSENT else ZERO
+            w[COUNT + i] += ONE if plane[i] > ABSENT else ZERO
+    dark, ratio = task.dark, task.ratio
     for i in range(n):
-        w[LIMIT + i] = task.ratio * w[SUM + i] / max(w[COUNT + i], ONE)
-    for plane in (X, Y, Z, COUNT, XX, XY, XZ, YY, YZ, ZZ):
-        w[plane : plane + n] = ZERO
-    for light in range(m.shape[0]):
-        x, y, z = task.matrix[light]
-        for i in range(n):
-            v = m[light, i]
-            usable = (v > ABSENT) & (v > task.dark) & (v * task.per_strength[light] > w[LIMIT + i])
-            m[light, i] = v if usable else MISSING
-            v = v if usable else ZERO
-            one = ONE if usable else ZERO
-            w[X + i] += x * v
-            w[Y + i] += y * v
-            w[Z + i] += z * v
-            w[COUNT + i] += one
-            w[XX + i] += one * (x * x)
-            w[XY + i] += one * (x * y)
-            w[XZ + i] += one * (x * z)
-            w[YY + i] += one * (y * y)
-            w[YZ + i] += one * (y * z)
-            w[ZZ + i] += one * (z * z)
+        w[LIMIT + i] = max(dark, ratio * w[SUM + i] / (w[COUNT + i] + TINY))
+    _add_equations(w, n, m[0], m[1], m[2], task.matrix, task.per_strength, 0, False)
+    for k in range(3, m.shape[0], 3):
+        _add_equations(w, n, m[k], m[k + 1], m[k + 2], task.matrix, task.per_strength, k, True)
     _solve_normal_equations(w, n, task.condition_squared)
 
 
 @compiled
+def _add_equations(
+    w: Floats, n: int, a: Floats, b: Floats, c: Floats, matrix: Floats, per_strength: Floats, k: int, begun: bool
+) -> None:
+    """Add three lights, from light k, to the normal equations of every pixel where they are usable."""
+    (xa, ya, za), per_a = matrix[k], per_strength[k]
+    (xb, yb, zb), per_b = matrix[k + 1], per_strength[k + 1]
+    (xc, yc, zc), per_c = matrix[k + 2], per_strength[k + 2]
+    for i in range(n):
+        p, q, r, limit = a[i], b[i], c[i], w[LIMIT + i]
+        one_p = ONE if p * per_a > limit else ZERO
+        one_q = ONE if q * per_b > limit else ZERO
+        one_r = ONE if r * per_c > limit else ZERO
+        a[i] = p if one_p > ZERO else MISSING
+        b[i] = q if one_q > ZERO else MISSING
+        c[i] = r if one_r > ZERO else MISSING
+        p, q, r = p * one_p, q * one_q, r * one_r
+        x, y, z = xa * p + xb * q + xc * r, ya * p + yb * q + yc * r, za * p + zb * q + zc * r
+        w[X + i] = w[X + i] + x if begun else x
+        w[Y + i] = w[Y + i] + y if begun else y
+        w[Z + i] = w[Z + i] + z if begun else z
+        count = one_p + one_q + one_r
+        w[COUNT + i] = w[COUNT + i] + count if begun else count
+        xx = xa * xa * one_p + xb * xb * one_q + xc * xc * one_r
+        xy = xa * ya * one_p + xb * yb * one_q + xc * yc * one_r
+        xz = xa * za * one_p + xb * zb * one_q + xc * zc * one_r
+        yy = ya * ya * one_p + yb * yb * one_q + yc * yc * one_r
+        yz = ya * za * one_p + yb * zb * one_q + yc * zc * one_r
+        zz = za * za * one_p + zb * zb * one_q + zc * zc * one_r
+        w[XX + i] = w[XX + i] + xx if begun else xx
+        w[XY + i] = w[XY + i] + xy if begun else xy
+        w[XZ + i] = w[XZ + i] + xz if begun else xz
+        w[YY + i] = w[YY + i] + yy if begun else yy
+        w[YZ + i] = w[YZ + i] + yz if begun else yz
+        w[ZZ + i] = w[ZZ + i] + zz if begun else zz
+
+
+@compiled
 def _solve_normal_equations(w: Floats, n: int, condition_squared: np.float32) -> None:
-    """g = adj(A) b / det(A); trusted where three or more lights remain and A is well enough conditioned."""
+    """g = adj(A) b / det(A), or 0 where A is badly conditioned or of fewer than three lights."""
     for i in range(n):
         a, b, c, d, e, f = w[XX + i], w[XY + i], w[XZ + i], w[YY + i], w[YZ + i], w[ZZ + i]
         xx, xy, xz = d * f - e * e, c * e - b * f, b * e - c * d
@@ -290,69 +269,78 @@ def _solve_normal_equations(w: Floats, n: int, condition_squared: np.float32) ->
         y = xy * w[X + i] + yy * w[Y + i] + yz * w[Z + i]
         z = xz * w[X + i] + yz * w[Y + i] + zz * w[Z + i]
         sound = (a + d + f) * (xx + yy + zz) <= condition_squared * determinant
-        trusted = sound & (determinant > ZERO) & (w[COUNT + i] >= THREE) & (z > ZERO)
-        square = x * x + y * y + z * z
-        scale = ONE / np.sqrt(square) if trusted else ZERO
+        trusted = sound & (determinant > ZERO) & (w[COUNT + i] >= THREE)  # the latter as roundings may seem sound
+        scale = ONE / determinant if trusted else ZERO
         w[X + i], w[Y + i], w[Z + i] = x * scale, y * scale, z * scale
-        w[ALBEDO + i] = square * scale / determinant if trusted else ZERO
-        w[TRUSTED + i] = ONE if trusted else ZERO
 
 
 @compiled
 def _store_block(task: Task, result: Result, w: Floats, values: Floats, m: Floats, start: int, n: int) -> None:
-    end, channels = start + n, task.tone.shape[1]
-    _store(w, n, X, ONE, result.normals[0, start:end])
-    _store(w, n, Y, ONE, result.normals[1, start:end])
-    _store(w, n, Z, ONE, result.normals[2, start:end])
-    for i in range(n):
-        result.valid[start + i] = w[TRUSTED + i] > ZERO
+    end = start + n
+    x, y, z = result.normals[0, start:end], result.normals[1, start:end], result.normals[2, start:end]
+    _store_normals(w, n, x, y, z, result.albedo[0, start:end], result.valid[start:end], task.albedo_scale)
     if result.residual.size:
-        w[XX : XX + n] = ZERO
-        w[XY : XY + n] = ZERO
-    for channel in range(channels):
-        if channels > 1:
-            _albedo_given_normal(task, w, values, m, channel, n)
-        _store(w, n, ALBEDO, task.albedo_scale, result.albedo[channel, start:end])
+        w[XX : XX + n], w[XY : XY + n] = ZERO, ZERO
+    for channel in range(task.tone.shape[1]):
+        if task.tone.shape[1] > 1:
+            _albedo_given_normal(task, w, values, m, channel, n, result.albedo[channel, start:end])
         if result.residual.size:
             _add_residual(task, w, values, m, channel, n)
-    if result.residual.size:
-        for i in range(n):
-            w[ALBEDO + i] = np.sqrt(w[XX + i] / max(w[XY + i], ONE))
-        _store(w, n, ALBEDO, ONE, result.residual[start:end])
+    residual = result.residual[start:end]
+    for i in range(len(residual)):
+        error = np.sqrt(w[XX + i] / max(w[XY + i], ONE))
+        residual[i] = encoded(error if w[Z + i] > ZERO else ZERO, residual)
 
 
 @compiled
-def _albedo_given_normal(task: Task, w: Floats, values: Floats, m: Floats, channel: int, n: int) -> None:
+def _store_normals(
+    w: Floats, n: int, x: Samples, y: Samples, z: Samples, albedo: Samples, valid: Bytes, albedo_scale: np.float32
+) -> None:
+    """From g to the stored normal, albedo and validity, and to the planes X, Y, Z: all 0 where z <= 0."""
+    for i in range(n):
+        gx, gy, gz = w[X + i], w[Y + i], w[Z + i]
+        square = gx * gx + gy * gy + gz * gz
+        trusted = gz > ZERO
+        scale = ONE / np.sqrt(square) if trusted else ZERO
+        size = square * scale if trusted else ZERO
+        gx, gy, gz = gx * scale, gy * scale, gz * scale
+        w[X + i], w[Y + i], w[Z + i], w[ALBEDO + i] = gx, gy, gz, size
+        x[i] = encoded(gx, x)
+        y[i] = encoded(gy, y)
+        z[i] = encoded(gz, z)
+        albedo[i] = encoded(size * albedo_scale, albedo)
+        valid[i] = trusted
+
+
+@compiled
+def _albedo_given_normal(task: Task, w: Floats, values: Floats, m: Floats, channel: int, n: int, out: Samples) -> None:
     """One channel's least squares albedo over the usable measurements, the normal being known."""
-    w[SUM : SUM + n] = ZERO
-    w[COUNT : COUNT + n] = ZERO
-    for light in range(m.shape[0]):
+    w[SUM : SUM + n], w[COUNT : COUNT + n] = ZERO, ZERO
+    for light in range(task.lights):
         x, y, z = task.matrix[light]
+        plane = values[light * task.tone.shape[1] + channel]
         for i in range(n):
             here = m[light, i] > ABSENT
-            shade = x * w[X + i] + y * w[Y + i] + z * w[Z + i] if here else ZERO
-            w[SUM + i] += shade * values[light * task.tone.shape[1] + channel, i] if here else ZERO
+            shade = x * w[X + i] + y * w[Y + i] + z * w[Z + i]
+            shade = shade if here else ZERO
+            w[SUM + i] += shade * plane[i] if here else ZERO
             w[COUNT + i] += shade * shade
+    scale = task.albedo_scale
     for i in range(n):
-        w[ALBEDO + i] = max(w[SUM + i] / w[COUNT + i], ZERO) if w[COUNT + i] > ZERO else ZERO
+        albedo = w[SUM + i] / w[COUNT + i] if w[COUNT + i] > ZERO else ZERO
+        w[ALBEDO + i] = max(albedo, ZERO)
+        out[i] = encoded(max(albedo, ZERO) * scale, out)
 
 
 @compiled
 def _add_residual(task: Task, w: Floats, values: Floats, m: Floats, channel: int, n: int) -> None:
     """Add one channel's squared residuals in plate units to the plane XX, and their count to XY."""
-    for light in range(m.shape[0]):
+    for light in range(task.lights):
         x, y, z = task.matrix[light]
-        to_plate = task.tone[light, channel, 3]
+        plane, to_plate = values[light * task.tone.shape[1] + channel], task.tone[light, channel, 3]
         for i in range(n):
             here = m[light, i] > ABSENT
             shade = x * w[X + i] + y * w[Y + i] + z * w[Z + i]
-            error = (values[light * task.tone.shape[1] + channel, i] - w[ALBEDO + i] * shade) * to_plate
+            error = (plane[i] - w[ALBEDO + i] * shade) * to_plate
             w[XX + i] += error * error if here else ZERO
             w[XY + i] += ONE if here else ZERO
-
-
-@compiled
-def _store(w: Floats, n: int, plane: int, scale: np.float32, out: Samples) -> None:
-    """Write one plane into the result, as float32 or as half floats; 0 where the pixel is not to be trusted."""
-    for i in range(n):
-        out[i] = encoded(w[plane + i] * scale if w[TRUSTED + i] > ZERO else ZERO, out)

@@ -1,5 +1,6 @@
 """The virtual shoot: a scene goes in, a clip folder as a camera would leave it comes out, the truth beside it."""
 
+import contextlib
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -7,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from psvideo.errors import PsvideoError
+from psvideo.errors import PsvideoError, UsageError
+from psvideo.export.publish import whole_folder
 from psvideo.files import refuse_existing
 from psvideo.planfile import format_plan
 from psvideo.rigfile import format_rig
@@ -56,24 +58,37 @@ def shoot(scene: Path, out: Path, *, force: bool = False, track: Track = iter) -
     only the virtual shoot knows. ``track`` passes frame indices through, for showing progress. Raises UsageError where
     ``out`` exists and ``force`` is not given, PsvideoError for a faulty scene or mesh or where writing fails.
     """
-    refuse_existing(out, force=force)
+    _refuse_footage(out, force=force)
     stage = set_stage(read_scene(scene), scene.parent)
-    beside = out.with_name(f".{out.name}.partial")
+    with whole_folder(out, force=force) as folder, _nothing_left(folder, out):
+        (folder / "frames").mkdir()
+        return _film(stage, folder, out, track)
+
+
+def _refuse_footage(out: Path, *, force: bool) -> None:
+    """Refuse to replace anything but an earlier virtual clip, even by force: footage cannot be made again."""
+    refuse_existing(out, force=force)
+    if out.exists() and not (out / "truth" / "scene.json").is_file():
+        raise UsageError(
+            f"{out}: exists and was not written by psvideo synth (it holds no truth/scene.json), so --force does not "
+            "replace it. Name another folder with -o, or remove this one yourself."
+        )
+
+
+@contextlib.contextmanager
+def _nothing_left(folder: Path, out: Path) -> Iterator[None]:
+    """Remove an unfinished clip where the shoot fails: it is filmed anew, never resumed."""
     try:
-        shutil.rmtree(beside, ignore_errors=True)
-        (beside / "frames").mkdir(parents=True)
-        shot = _film(stage, beside, out, track)
-        if out.exists():
-            shutil.rmtree(out)
-        beside.rename(out)
+        yield
     except OSError as fault:
+        shutil.rmtree(folder, ignore_errors=True)
         raise PsvideoError(
             f"{out}: the clip cannot be written ({fault.strerror or fault}). Nothing was left under that name: make "
             "room or check the folder's permissions, then run the command again."
         ) from fault
-    finally:
-        shutil.rmtree(beside, ignore_errors=True)
-    return shot
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
 
 
 def _film(stage: Stage, folder: Path, out: Path, track: Track) -> Shot:

@@ -1,5 +1,6 @@
 """Relighting a surface, and how linear light, normals and masks become pixels that a screen shows."""
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -35,6 +36,17 @@ def relit(
     return lit
 
 
+def smaller(image: NDArray[np.floating], width_px: int) -> Image:
+    """Return a picture at most this wide, averaged down, for showing it."""
+    rows, cols = image.shape[:2]
+    if cols <= width_px:
+        return image.astype(np.float32)
+    stride = max(cols // (2 * width_px), 1)  # resizing takes whole pictures in float32; twice the width is plenty
+    coarse = np.ascontiguousarray(image[::stride, ::stride]).astype(np.float32)
+    size = (width_px, max(round(rows * width_px / cols), 1))
+    return cv2.resize(coarse, size, interpolation=cv2.INTER_AREA).astype(np.float32)
+
+
 def three_channels(image: Image) -> Image:
     """Return a grey picture as three equal channels; a colour picture as it is."""
     return image if image.ndim == 3 else np.repeat(image[..., None], 3, axis=2)
@@ -48,9 +60,9 @@ def srgb(linear: Image, *, exposure: float = 1.0) -> Pixels:
     return pixels
 
 
-def normal_colours(surface: Surface) -> Pixels:
-    """Return normals in the usual colours, 128 + 127 n; grey where not valid."""
-    coded: Pixels = (127.5 * (surface.normals.astype(np.float32) + 1.0) + 0.5).clip(0, 255).astype(np.uint8)
+def normal_colours(normals: NDArray[np.floating]) -> Pixels:
+    """Return normals (row, col, 3) in the usual colours, 128 + 127 n; grey where there are none."""
+    coded: Pixels = (127.5 * (normals.astype(np.float32) + 1.0) + 0.5).clip(0, 255).astype(np.uint8)
     return coded
 
 

@@ -33,8 +33,11 @@ def _paint(m: FloatArray) -> FloatArray:
     cheek = np.exp(-(((m - [0.040, -0.040, 0.065]) / 0.020) ** 2).sum(axis=1))[:, None]
     albedo *= 1.0 - cheek * [0.0, 0.22, 0.24]
     albedo[_lips(m) < 0.0014] = (0.56, 0.27, 0.24)
-    brow = (_brow(m) < 0.0030) & (m[:, 1] > 0.0185)
+    along = np.clip(1.0 - ((m[:, 0] - 0.0315) / 0.0215) ** 2, 0.0, None)
+    brow = (np.abs(m[:, 1] - 0.0205 - 0.0060 * along) < 0.0024 * along**0.6) & (m[:, 2] > 0.04)
     albedo[brow | (_hair(m) < 0.0012)] = (0.22, 0.13, 0.07)
+    strands = 1.0 + 0.45 * layered_noise(m / np.array([0.004, 0.012, 0.030]))[:, None]
+    albedo = np.where(_hair(m)[:, None] < 0.0012, albedo * strands, albedo)
     looking = np.hypot(m[:, 0] - EYE[0], m[:, 1] - EYE[1] - 0.0008)
     white = (np.linalg.norm(m - EYE, axis=1) < GLOBE_M + 0.0008) & (m[:, 2] > EYE[2])
     albedo[white] = (0.80, 0.77, 0.72)

@@ -1,0 +1,255 @@
+"""What is delivered: files that read back as they were meant, whole or not at all."""
+
+import contextlib
+import resource
+import subprocess
+import sys
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from psvideo import __version__
+from psvideo.errors import PsvideoError, UsageError
+from psvideo.export.exr import Crop, write_exr
+from psvideo.export.plates import write_flash, write_plate
+from psvideo.export.publish import whole_folder
+from psvideo.export.results import Delivery, decode_normals, encode_normals, is_written, write_surface
+from psvideo.export.space import Space, choose_space, placed, read_rotation
+from psvideo.export.tags import Tags
+from psvideo.export.writer import writing
+from psvideo.sequence import LightPlate
+from psvideo.split import Plate
+from psvideo.surface import Surface
+from psvideo.timing import Flash
+
+TAGS = Tags(fps=Fraction(30000, 1001), colour="lin_rec709_scene", plan_sha256="ab" * 32, rig_sha256="cd" * 32)
+
+
+def unit_normals(seed: int = 0, shape: tuple[int, int] = (9, 7)) -> np.ndarray:
+    vectors = np.random.default_rng(seed).standard_normal((*shape, 3))
+    vectors[..., 2] = np.abs(vectors[..., 2])
+    return (vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)).astype(np.float32)
+
+
+def surface() -> Surface:
+    normals = unit_normals()
+    valid = np.ones((9, 7), np.bool_)
+    valid[2:4, 1:3] = False
+    normals[~valid] = 0
+    albedo = np.random.default_rng(1).random((9, 7, 3)).astype(np.float32) * valid[..., None]
+    return Surface(normals=normals, albedo=albedo, valid=valid, residual=np.full((9, 7), 0.01, np.float32))
+
+
+def read(path: Path) -> tuple[dict[str, object], dict[str, np.ndarray]]:
+    """Return a file's header and its planes by channel name."""
+    file = OpenEXR.File(str(path), separate_channels=True)
+    return file.header(), {name: channel.pixels for name, channel in file.channels().items()}
+
+
+def test_a_surface_is_delivered_as_one_sequence_per_quantity(tmp_path: Path) -> None:
+    solved = surface()
+    write_surface(tmp_path, "take", 1001, 0.125, solved, delivery=Delivery(space=Space()), tags=TAGS)
+    header, normals = read(tmp_path / "normals" / "take_normals.1001.exr")
+    assert set(normals) == {"R", "G", "B"}
+    assert all(plane.dtype == np.float16 for plane in normals.values())
+    np.testing.assert_allclose(np.stack([normals[c] for c in "RGB"], -1), solved.normals, atol=5e-4)
+    assert header["framesPerSecond"] == Fraction(30000, 1001)
+    assert header["compression"] == OpenEXR.ZIP_COMPRESSION
+    assert header["colorInteropID"] == "data"
+    assert header["psvideo:time_s"] == 0.125
+    assert header["psvideo:space"] == "camera"
+    assert header["psvideo:y"] == "up"
+    assert header["psvideo:version"] == __version__
+    assert header["psvideo:plan_sha256"] == "ab" * 32
+    assert header["psvideo:rig_sha256"] == "cd" * 32
+    header, albedo = read(tmp_path / "albedo" / "take_albedo.1001.exr")
+    assert header["colorInteropID"] == "lin_rec709_scene"
+    np.testing.assert_allclose(np.stack([albedo[c] for c in "RGB"], -1), solved.albedo, atol=5e-4)
+    header, valid = read(tmp_path / "valid" / "take_valid.1001.exr")
+    assert header["colorInteropID"] == "data"
+    assert (valid["Y"] == solved.valid).all()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["albedo", "normals", "valid"]
+
+
+def test_what_is_asked_for_besides_is_written_besides(tmp_path: Path) -> None:
+    delivery = Delivery(space=Space(y="down"), half=False, aovs=("residual",), png16=True, multipart=True)
+    solved = surface()
+    assert not is_written(tmp_path, "take", 1001, delivery)
+    write_surface(tmp_path, "take", 1001, 0.0, solved, delivery=delivery, tags=TAGS)
+    assert is_written(tmp_path, "take", 1001, delivery)
+    _, normals = read(tmp_path / "normals" / "take_normals.1001.exr")
+    assert normals["R"].dtype == np.float32
+    np.testing.assert_array_equal(normals["G"], -solved.normals[..., 1])
+    bundle = OpenEXR.File(str(tmp_path / "take.1001.exr"), separate_channels=True)
+    assert {part.name() for part in bundle.parts} == {"normals", "albedo", "valid", "residual"}
+    assert (tmp_path / "residual" / "take_residual.1001.exr").is_file()
+    assert (tmp_path / "normals_png16" / "take_normals.1001.png").is_file()
+
+
+def test_grey_albedo_is_delivered_as_three_channels_alike(tmp_path: Path) -> None:
+    solved = surface()
+    grey = Surface(normals=solved.normals, albedo=solved.albedo[..., 0], valid=solved.valid)
+    write_surface(tmp_path, "take", 1, 0.0, grey, delivery=Delivery(space=Space()), tags=TAGS)
+    _, albedo = read(tmp_path / "albedo" / "take_albedo.0001.exr")
+    assert (albedo["R"] == albedo["B"]).all()
+
+
+unit = hnp.arrays(np.float64, (5, 3), elements=st.floats(-1, 1)).filter(
+    lambda v: bool((np.linalg.norm(v, axis=1) > 0.1).all())
+)
+
+
+@given(unit)
+def test_sixteen_bit_normals_decode_to_what_was_encoded(vectors: np.ndarray) -> None:
+    normals = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    decoded = decode_normals(encode_normals(normals))
+    degrees = np.degrees(np.arccos(np.clip((decoded * normals).sum(axis=1), -1, 1)))
+    assert degrees.max() < 0.03
+    assert not decode_normals(encode_normals(np.zeros((2, 3)))).any()
+
+
+def test_a_missing_row_is_zero_in_the_plates_own_channel(tmp_path: Path) -> None:
+    seen = np.array([True, True, False, True])
+    image = np.full((4, 5, 3), 0.25, np.float32) * seen[:, None, None]
+    plate = LightPlate(light="key", number=1001, time_s=0.5, image=image, seen=seen)
+    write_plate(tmp_path, "take", plate, TAGS)
+    _, planes = read(tmp_path / "key" / "take_key.1001.exr")
+    assert set(planes) == {"R", "G", "B", "valid"}
+    assert planes["valid"][:, 0].tolist() == [1, 1, 0, 1]
+    whole = LightPlate(light="key", number=1002, time_s=0.5, image=image[..., 0], seen=np.ones(4, np.bool_))
+    write_plate(tmp_path, "take", whole, TAGS)
+    _, planes = read(tmp_path / "key" / "take_key.1002.exr")
+    assert set(planes) == {"Y"}
+
+
+def test_a_flash_by_itself_says_which_lights_it_held(tmp_path: Path) -> None:
+    flash = Flash(index=7, slot=0, lights={"a": 1.0, "b": 0.5}, start_s=1.0, duration_s=0.5, complete=True)
+    rows = np.ones(4, np.bool_)
+    write_flash(
+        tmp_path, "take", Plate(flash=flash, image=np.zeros((4, 3), np.float32), exposures=rows * 1.0, seen=rows), TAGS
+    )
+    header, _ = read(tmp_path / "flashes" / "take_flash.0007.exr")
+    assert header["psvideo:lights"] == "a=1 b=0.5"
+    assert header["psvideo:time_s"] == 1.25
+
+
+def test_a_crop_keeps_the_display_window(tmp_path: Path) -> None:
+    part = Crop(row=2, col=3, full_height_px=20, full_width_px=30)
+    write_exr(tmp_path / "a.exr", {"Y": np.ones((4, 5), np.float32)}, crop=part)
+    header, _ = read(tmp_path / "a.exr")
+    assert [corner.tolist() for corner in header["dataWindow"]] == [[3, 2], [7, 5]]  # type: ignore[attr-defined]
+    assert [corner.tolist() for corner in header["displayWindow"]] == [[0, 0], [29, 19]]  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_what_is_not_a_number_is_never_written(bad: float, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="NaN or infinity"):
+        write_exr(tmp_path / "a.exr", {"Y": np.full((2, 2), bad, np.float32)})
+    assert not list(tmp_path.iterdir())
+
+
+def test_strided_planes_are_stored_as_they_look(tmp_path: Path) -> None:
+    image = np.random.default_rng(0).random((6, 8, 3)).astype(np.float32)
+    write_exr(tmp_path / "a.exr", {"Y": image[::2, ::-1, 1]}, half=False)
+    _, planes = read(tmp_path / "a.exr")
+    np.testing.assert_array_equal(planes["Y"], image[::2, ::-1, 1])
+
+
+def test_world_normals_are_turned_by_the_camera_and_unturned_by_its_inverse(tmp_path: Path) -> None:
+    quarter = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])
+    matrix = np.eye(4)
+    matrix[:3, :3] = 2 * quarter
+    path = tmp_path / "camera.txt"
+    np.savetxt(path, matrix)
+    rotation = read_rotation(path)
+    np.testing.assert_allclose(rotation, quarter, atol=1e-12)
+    normals = unit_normals()
+    world = placed(normals, Space(name="world", camera_to_world=rotation))
+    np.testing.assert_allclose(world[..., 0], normals[..., 2], atol=1e-6)
+    back = placed(world, Space(name="world", camera_to_world=rotation.T))
+    np.testing.assert_allclose(back, normals, atol=1e-6)
+
+
+@pytest.mark.parametrize("text", ["1 2 3", "a b c", "1 0 0 0 1 0 0 0 -1", "1 0 0 0 2 0 0 0 1"])
+def test_what_is_no_rotation_is_refused(text: str, tmp_path: Path) -> None:
+    path = tmp_path / "camera.txt"
+    path.write_text(text)
+    with pytest.raises(PsvideoError, match=r"camera\.txt"):
+        read_rotation(path)
+
+
+def test_spaces_that_do_not_fit_their_options_are_refused() -> None:
+    with pytest.raises(UsageError, match="needs the camera's rotation"):
+        choose_space("world", "up", None)
+    with pytest.raises(UsageError, match="belongs to --space world"):
+        choose_space("camera", "up", Path("camera.txt"))
+
+
+def test_a_folder_appears_whole_or_not_at_all(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    with contextlib.suppress(RuntimeError), whole_folder(out) as folder:
+        (folder / "half.txt").write_text("x")
+        raise RuntimeError
+    assert not out.exists()
+    with whole_folder(out, resume=True) as folder:
+        assert (folder / "half.txt").is_file()
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+    with pytest.raises(UsageError, match="exists already"), whole_folder(out):
+        pass
+    with whole_folder(out, force=True) as folder:
+        (folder / "new.txt").write_text("y")
+    assert [path.name for path in out.iterdir()] == ["new.txt"]
+    with pytest.raises(UsageError, match="no stopped run"), whole_folder(tmp_path / "other", resume=True):
+        pass
+
+
+def test_a_failed_run_leaves_the_output_that_it_was_to_replace(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "old.txt").write_text("keep me")
+    with pytest.raises(RuntimeError), whole_folder(out, force=True):
+        raise RuntimeError
+    assert (out / "old.txt").read_text() == "keep me"
+
+
+def test_a_fault_in_a_writing_thread_reaches_the_run() -> None:
+    def fail() -> None:
+        raise PsvideoError("disk full")
+
+    with pytest.raises(PsvideoError, match="disk full"), writing() as write:
+        write(fail)
+    done: list[int] = []
+    with writing(most_waiting=2) as write:
+        for number in range(20):
+            write(lambda number=number: done.append(number))  # type: ignore[misc]
+    assert sorted(done) == list(range(20))
+
+
+FULL_DISK = """
+import resource, sys, numpy as np
+from pathlib import Path
+from psvideo.errors import PsvideoError
+from psvideo.export.exr import write_exr
+resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
+try:
+    write_exr(Path(sys.argv[1]), {"Y": np.random.default_rng(0).random((200, 200)).astype(np.float32)})
+except PsvideoError as fault:
+    print(fault)
+"""
+
+
+def test_a_full_disk_is_told_and_leaves_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "plate.exr"
+    told = subprocess.run(
+        [sys.executable, "-c", FULL_DISK, str(path)], capture_output=True, text=True, check=True
+    ).stdout
+    assert str(path) in told
+    assert "cannot be written" in told
+    assert not list(tmp_path.iterdir())
+    assert resource.getrlimit(resource.RLIMIT_FSIZE)[0] != 4096
