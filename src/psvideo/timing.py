@@ -4,7 +4,7 @@ As a file it is timing.json (schema ``psvideo-timing/1``).
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -70,6 +70,29 @@ class Timing:
     def duration_s(self) -> FloatArray:
         """How long every flash lasts on the camera's clock, shape (flash,)."""
         return np.array([flash.duration_s for flash in self.flashes], np.float64)
+
+
+def places_in_time(timing: Timing, numbers: Sequence[int]) -> dict[int, int]:
+    """Return the true index of every frame of a clip, by number; repeated frames, which add nothing, are left out.
+
+    ``numbers`` are all the clip's frame numbers, ascending. Holes that the numbering does not show count too.
+
+    >>> timing = Timing(clip="", frame_period_s=1, exposure_s=1, row_time_s=0, clock_offset_ppm=0, phase_error_rows=0,
+    ...     order="given", flashes=(), dropped_frames=(DroppedFrames(after=2, count=3),), repeated_frames=(5,))
+    >>> places_in_time(timing, [1, 2, 4, 5, 6])
+    {1: 0, 2: 1, 4: 5, 6: 6}
+    """
+    missing = {hole.after: hole.count for hole in timing.dropped_frames}
+    repeated = set(timing.repeated_frames)
+    places: dict[int, int] = {}
+    index = 0
+    for number, following in zip(numbers, (*numbers[1:], None), strict=True):
+        if number not in repeated:
+            places[number] = index
+        if following is not None:
+            told = following - number - 1
+            index += 1 + max(missing.get(number, 0), told) - (following in repeated)
+    return places
 
 
 class _FlashFile(Contract):

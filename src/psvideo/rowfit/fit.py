@@ -20,8 +20,10 @@ COARSE_ROWS = 288
 SEED_FRAMES = 48
 MISNAMED_PPM = 1100.0
 """The search reaches this far at least, so that a frame rate misnamed by 1.001 is found."""
-MOST_SAMPLES = 2_000_000
-"""Row means that the last fit looks at; a clip that has more gets its rows averaged, which bounds memory and time."""
+ENOUGH_SAMPLES = 250_000
+"""Row means that the last fit needs; a clip that has more gets its rows averaged, which bounds memory and time."""
+FLASH_ROWS = 8
+"""Rows that a flash must still span after that."""
 GOOD_SEED, FAIR_SEED = 0.7, 0.3
 """A seed that takes away this share of the robust loss is taken at once; one that takes away less calls for a wider
 search."""
@@ -64,13 +66,20 @@ def find(plan: Plan, rows: Profiles) -> Found:
         index=tracked.index[keep],
         doubt=None if rows.doubt is None else np.ascontiguousarray(rows.doubt[keep]),
     ).windowed(window)
-    fine = rows.binned(max(COARSE_ROWS, MOST_SAMPLES // len(rows.value)))
+    fine = rows.binned(_rows_needed(plan, rows, seed))
     beat = replace(tracked.beat, clock=_clock_of(plan, tracked))
     free: tuple[str, ...] = () if plan.camera.readout_s is not None else ("row_time_s",)
     fit = _with_flicker(plan, fine, _fit(plan, fine, beat, free), free)
     fine, fit = _with_trends(plan, fine, fit, free)
     fit = _freed(plan, fine, fit, free)
     return Found(fit=fit, rows=fine, track=tracked, errors_s=fit.errors_s)
+
+
+def _rows_needed(plan: Plan, rows: Profiles, beat: Beat) -> int:
+    """Return to how many rows a clip may be averaged without blurring its flashes."""
+    shortest_s = min(plan.flashes[slot].duration_s for slot in plan.lit_slots)
+    sharp = int(FLASH_ROWS * beat.row_time_s * len(rows.place) / shortest_s)
+    return max(COARSE_ROWS, ENOUGH_SAMPLES // len(rows.value), sharp)
 
 
 def window_frames(plan: Plan) -> int:
