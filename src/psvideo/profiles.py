@@ -43,19 +43,21 @@ def collect(frames: Iterable[LinearFrame]) -> tuple[NDArray[np.int64], FloatArra
     return np.array(indices, np.int64), np.array(profiles, np.float64)
 
 
-def collect_with_doubt(frames: Iterable[LinearFrame]) -> tuple[NDArray[np.int64], FloatArray, FloatArray | None]:
+def collect_with_doubt(
+    frames: Iterable[LinearFrame],
+) -> tuple[NDArray[np.int64], FloatArray, NDArray[np.float32] | None]:
     """Return the frames' indices and profiles, and by how much every row mean (frame, row) may be wrong.
 
     Pixels that saturate lose light that nobody can tell; the doubt is None where none did.
     """
     indices: list[int] = []
     profiles: list[FloatArray] = []
-    doubts: list[FloatArray] = []
+    doubts: list[NDArray[np.float32]] = []
     for frame in frames:
         indices.append(frame.index)
         profiles.append(row_profile(frame.image))
-        doubts.append(LOST * clipped_share(frame.image))
-    doubt = np.array(doubts, np.float64)
+        doubts.append((LOST * clipped_share(frame.image)).astype(np.float32))
+    doubt = np.array(doubts)
     return np.array(indices, np.int64), np.array(profiles, np.float64), doubt if doubt.any() else None
 
 

@@ -18,13 +18,11 @@ from psvideo.errors import PsvideoError, UsageError
 from psvideo.plan import Plan
 from psvideo.rowfit.beat import Beat, train_until
 from psvideo.rowfit.fit import Found, find, window_frames
+from psvideo.rowfit.judge import convincing, notes, why_not
 from psvideo.rowfit.order import turns
 from psvideo.rowfit.profiles import Profiles
 from psvideo.shutter import frames_touched
 from psvideo.timing import DroppedFrames, Flash, Order, Timing
-
-MIN_EXPLAINED = 0.5
-"""A fit that explains less of the rows' changes than this has not found a strobe."""
 
 
 def find_timing(
@@ -36,7 +34,7 @@ def find_timing(
     first_light: str | None = None,
     dropped: Sequence[DroppedFrames] = (),
     numbers: Sequence[int] | None = None,
-    doubt: FloatArray | None = None,
+    doubt: NDArray[np.floating] | None = None,
 ) -> Timing:
     """Return when every flash of a clip fired.
 
@@ -49,14 +47,10 @@ def find_timing(
         return _synced_timing(plan, indices, clip=clip, dropped=dropped)
     if len(indices) < 4:
         raise PsvideoError(f"{clip}: holds {len(indices)} frame(s); finding the strobe's timing needs at least 4.")
-    found = find(plan, _as_profiles(plan, indices, profiles, doubt))
-    if found.fit.explained < MIN_EXPLAINED:
-        raise PsvideoError(
-            f"{clip}: no strobe like the plan's was found in the picture: the best fit explains "
-            f"{100 * max(found.fit.explained, 0):.0f} % of the rows' changes from frame to frame, expected at least "
-            f"{100 * MIN_EXPLAINED:.0f} %. Check that plan.toml is the plan that the strobe played (frame rate, flash "
-            "durations, dark time), that the lights flashed, and that the exposure was fixed."
-        )
+    rows = _as_profiles(plan, indices, profiles, doubt)
+    found = find(plan, rows)
+    if not convincing(found):
+        raise PsvideoError(_not_found(plan, rows, found, clip))
     beat, order = _order_of_lights(plan, found, first_light)
     numbered = np.asarray(indices if numbers is None else numbers, np.int64)
     return _assemble(
@@ -66,10 +60,24 @@ def find_timing(
         clip=clip,
         dropped=_all_dropped(dropped, numbered, np.asarray(indices), found.track.index),
         repeated=tuple(int(number) for number in numbered[found.track.repeated]),
+        notes=notes(plan, found),
     )
 
 
-def _as_profiles(plan: Plan, indices: NDArray[np.int64], values: FloatArray, doubt: FloatArray | None) -> Profiles:
+def _not_found(plan: Plan, rows: Profiles, found: Found, clip: str) -> str:
+    reason = why_not(plan, rows)
+    return (
+        f"{clip}: no strobe like the plan's was found in the picture: the best fit explains "
+        f"{100 * max(found.fit.explained, 0):.0f} % of the rows' changes from frame to frame"
+        f"{' only by taking many frames for missing' if found.steps else ''}. {reason + ' ' if reason else ''}"
+        "Check that plan.toml is the plan that the strobe played (frame rate, flash durations, dark time), that the "
+        "lights flashed, and that the exposure was fixed."
+    )
+
+
+def _as_profiles(
+    plan: Plan, indices: NDArray[np.int64], values: FloatArray, doubt: NDArray[np.floating] | None
+) -> Profiles:
     """Lay out the profiles for fitting, rows in the order in which they open as far as that is known."""
     height = values.shape[1]
     rows = Profiles(
@@ -144,6 +152,7 @@ def _assemble(
     clip: str,
     dropped: tuple[DroppedFrames, ...],
     repeated: tuple[int, ...],
+    notes: tuple[str, ...],
 ) -> Timing:
     """List every flash that the clip saw any of, and mark those that its start or end cuts."""
     beat, index = found.fit.beat, found.rows.index
@@ -174,6 +183,7 @@ def _assemble(
         order=order,
         dropped_frames=dropped,
         repeated_frames=repeated,
+        notes=notes,
         flashes=flashes,
     )
 

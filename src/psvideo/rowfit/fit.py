@@ -43,12 +43,16 @@ FLICKERS = 0.8
 
 @dataclass(frozen=True, kw_only=True)
 class Found:
-    """The fit of a whole clip: its rows with the times that their frames truly have, and which frames are repeats."""
+    """The fit of a whole clip: its rows with the times that their frames truly have, and which frames are repeats.
+
+    ``steps`` counts the places where frames follow otherwise than the numbering tells.
+    """
 
     fit: Fit
     rows: Profiles
     track: Track
     errors_s: dict[str, float]
+    steps: int
 
 
 def find(plan: Plan, rows: Profiles) -> Found:
@@ -59,7 +63,7 @@ def find(plan: Plan, rows: Profiles) -> Found:
     window = window_frames(plan)
     memory = max(window, int(1.2 * plan.cycle_s / rows.period_s))
     tracked = track(plan, rows.binned(TRACK_ROWS), seed, frames, memory=memory)
-    keep = ~tracked.repeated
+    keep, told = ~tracked.repeated, np.diff(rows.index)
     rows = replace(
         rows,
         value=np.ascontiguousarray(rows.value[keep]),
@@ -72,7 +76,8 @@ def find(plan: Plan, rows: Profiles) -> Found:
     fit = _with_flicker(plan, fine, _fit(plan, fine, beat, free), free)
     fine, fit = _with_trends(plan, fine, fit, free)
     fit = _freed(plan, fine, fit, free)
-    return Found(fit=fit, rows=fine, track=tracked, errors_s=fit.errors_s)
+    steps = int((np.diff(tracked.index) != told).sum())
+    return Found(fit=fit, rows=fine, track=tracked, errors_s=fit.errors_s, steps=steps)
 
 
 def _rows_needed(plan: Plan, rows: Profiles, beat: Beat) -> int:
@@ -87,7 +92,7 @@ def window_frames(plan: Plan) -> int:
     return max(24, 6 * (len(plan.lit_slots) + 1))
 
 
-def _first_guess(plan: Plan) -> Beat:
+def first_guess(plan: Plan) -> Beat:
     camera = plan.camera
     readout_s = camera.readout_s or 0.0
     return Beat(
@@ -102,7 +107,7 @@ def _first_guess(plan: Plan) -> Beat:
 
 def find_seed(plan: Plan, rows: Profiles) -> tuple[Beat, slice]:
     """Search some stretches of the clip and return the beat that explains one of them best, and that stretch."""
-    guess = _first_guess(plan)
+    guess = first_guess(plan)
     range_ppm = max(plan.clock_range_ppm, MISNAMED_PPM)
     best: tuple[float, Beat, slice] | None = None
     for frames in _stretches(plan, rows):
@@ -142,12 +147,12 @@ def _seeded(plan: Plan, rows: Profiles, guess: Beat, range_ppm: float) -> tuple[
         part = rows.turned() if place.beat.upward else rows
         part = part.binned(COARSE_ROWS // 2)
         fit = refine(plan, part, place.beat, free=free, steps=6)
-        tried.append((_gain(part, unexplained(plan, part, fit.beat)), fit.beat))
+        tried.append((gain_of(part, unexplained(plan, part, fit.beat)), fit.beat))
     share, beat = max(tried, key=lambda pair: pair[0])
     return beat, share
 
 
-def _gain(rows: Profiles, rest: FloatArray) -> float:
+def gain_of(rows: Profiles, rest: FloatArray) -> float:
     """Return which share of the robust loss that each row's mean leaves in every window a fit takes away."""
     bounds = np.append(rows.window_start, len(rows.value))
     means = np.repeat(
