@@ -14,7 +14,9 @@ from psvideo.errors import PsvideoError, UsageError
 from psvideo.plan import Plan, PlannedFlash
 from psvideo.planfile import read_plan
 from psvideo.profiles import collect, row_profile
-from psvideo.rowfit import Profiles, residuals
+from psvideo.rowfit.beat import Beat, train_until
+from psvideo.rowfit.beat import StrobeClock as FoundClock
+from psvideo.rowfit.profiles import Profiles, unexplained
 from psvideo.shutter import row_weights
 from psvideo.sync import find_timing
 from psvideo.synth import Exposure, Noise, StrobeClock, expose
@@ -205,19 +207,19 @@ def test_the_fit_uses_exactly_the_row_weights(readout: float, shutter: float, ma
     """What the fit leaves equals what plain least squares with the shared model's weights leaves, row by row."""
     plan = make_plan(readout=readout, shutter=shutter, height_px=9)
     camera = plan.camera
-    train = plan.train(-4, 40)
-    start_s = 0.3 * plan.cycle_s + train.start_s * (1 + 700e-6)
+    clock = FoundClock(phase_s=0.3 * plan.cycle_s, offset_ppm=700.0)
     values = np.random.default_rng(1).random((24, camera.height_px))
     rows = Profiles(
         value=values,
-        frame_start_s=np.arange(24) * camera.frame_period_s,
-        row_offset_s=camera.row_offsets_s(),
-        exposure_s=camera.exposure_s,
+        index=np.arange(24),
+        period_s=camera.frame_period_s,
+        place=np.arange(9.0) if readout >= 0 else 8.0 - np.arange(9.0),
         window_start=np.array([0, 12]),
     )
+    rest = unexplained(plan, rows, Beat(clock=clock, row_time_s=abs(camera.row_time_s), exposure_s=camera.exposure_s))
+    train = train_until(plan, clock, 26 * camera.frame_period_s)
     unknown = np.array([1, 2, 3, 0])[train.slot]
-    rest = residuals(rows, start_s, train.duration_s, unknown, np.ones_like(values))
-    weights = row_weights(camera, start_s, train.duration_s, frames=range(24))
+    weights = row_weights(camera, train.start_s, train.duration_s, frames=range(24))
     for row in range(camera.height_px):
         lit = [weights[unknown == number, :, row].sum(axis=0) for number in (1, 2, 3)]
         design = np.stack([np.ones(24), *lit], axis=1)

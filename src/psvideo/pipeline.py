@@ -4,7 +4,7 @@ Every step is a function or a generator; nothing here holds state, and a clip of
 constant memory.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, Protocol, TypeVar
@@ -15,18 +15,18 @@ from numpy.typing import NDArray
 from psvideo import hudon2015
 from psvideo.ambient import Ambient, subtract
 from psvideo.camera import Camera
-from psvideo.clip import Clip, demosaic, holes, open_clip, parse_range, read_frames
+from psvideo.clip import Clip, Frame, demosaic, holes, open_clip, parse_range, read_frames
 from psvideo.normals.illumination import illumination
 from psvideo.normals.woodham1980 import solve
 from psvideo.plan import Plan
-from psvideo.profiles import collect
+from psvideo.profiles import collect_with_doubt
 from psvideo.rig import Light, Rig
 from psvideo.sequence import FIRST_NUMBER, Round, reference_duration_s, rounds
 from psvideo.shutter import frames_touched
 from psvideo.split import Plate, split
 from psvideo.surface import Surface
 from psvideo.sync import find_timing
-from psvideo.timing import DroppedFrames, Timing
+from psvideo.timing import DroppedFrames, Timing, places_in_time
 
 Method = Literal["weights", "hudon2015"]
 Item = TypeVar("Item")
@@ -72,11 +72,21 @@ def find_clip_timing(take: Take, *, first_light: str | None = None, watch: Watch
     dropped = tuple(DroppedFrames(after=after, count=count) for after, count in holes(clip.numbers))
     if clip.plan.mode == "synced":
         indices = np.array([clip.index_of(number) for number in take.numbers], np.int64)
-        profiles = np.zeros((len(indices), clip.height_px))
+        profiles, doubt = np.zeros((len(indices), clip.height_px)), None
     else:
         frames = read_frames(clip, take.numbers)
-        indices, profiles = collect(watch(frames, total=len(take.numbers), what="finding the flashes"))
-    return find_timing(clip.plan, indices, profiles, clip=clip.name, first_light=first_light, dropped=dropped)
+        watched = watch(frames, total=len(take.numbers), what="finding the flashes")
+        indices, profiles, doubt = collect_with_doubt(watched)
+    return find_timing(
+        clip.plan,
+        indices,
+        profiles,
+        clip=clip.name,
+        first_light=first_light,
+        dropped=dropped,
+        numbers=take.numbers,
+        doubt=doubt,
+    )
 
 
 def clip_rounds(
@@ -93,11 +103,12 @@ def clip_rounds(
     ``each_flash`` is shown every single plate on its way, demosaiced.
     """
     clip, camera = take.clip, _timed_camera(take.plan, timing)
-    used = _within(timing, camera, take)
+    places = places_in_time(timing, clip.numbers)
+    used = _within(timing, camera, take, places)
     decoded = read_frames(clip, take.numbers, ahead=AHEAD)
-    frames = watch(decoded, total=len(take.numbers), what="rebuilding flashes")
+    frames = _placed(watch(decoded, total=len(take.numbers), what="rebuilding flashes"), places)
     rebuild = split if method == "weights" else hudon2015.split
-    plates = subtract(rebuild(frames, camera, used), first=_first_ambient(take, camera, used))
+    plates = subtract(rebuild(frames, camera, used), first=_first_ambient(take, camera, used, places))
     shown = _shown(map(_colour_of(clip), plates), each_flash)
     return rounds(shown, clip.plan, timing.flashes, start=start_number)
 
@@ -108,10 +119,18 @@ def _timed_camera(plan: Plan, timing: Timing) -> Camera:
     return replace(plan.camera, exposure_s=timing.exposure_s, readout_s=readout_s)
 
 
-def _within(timing: Timing, camera: Camera, take: Take) -> Timing:
+def _placed(frames: Iterable[Frame], places: Mapping[int, int]) -> Iterator[Frame]:
+    """Put frames where they truly are in time; repeated ones, which are nowhere, are left out."""
+    for frame in frames:
+        if frame.number in places:
+            yield frame if frame.index == places[frame.number] else replace(frame, index=places[frame.number])
+
+
+def _within(timing: Timing, camera: Camera, take: Take, places: Mapping[int, int]) -> Timing:
     """Take as complete only the flashes whose frames all lie between the take's first frame and its last."""
     first, last = frames_touched(camera, timing.start_s, timing.duration_s)
-    begin, end = take.clip.index_of(take.numbers[0]), take.clip.index_of(take.numbers[-1])
+    used = [places[number] for number in take.numbers if number in places]
+    begin, end = used[0], used[-1]
     flashes = tuple(
         replace(flash, complete=flash.complete and bool(first[n] >= begin and last[n] <= end))
         for n, flash in enumerate(timing.flashes)
@@ -119,7 +138,7 @@ def _within(timing: Timing, camera: Camera, take: Take) -> Timing:
     return replace(timing, flashes=flashes)
 
 
-def _first_ambient(take: Take, camera: Camera, timing: Timing) -> Ambient | None:
+def _first_ambient(take: Take, camera: Camera, timing: Timing, places: Mapping[int, int]) -> Ambient | None:
     """Look ahead to the first dark slot, so that the flashes before it lose their ambient light too."""
     complete = [flash for flash in timing.flashes if flash.complete]
     dark = next((flash for flash in complete if not any(flash.lights.values())), None)
@@ -129,8 +148,8 @@ def _first_ambient(take: Take, camera: Camera, timing: Timing) -> Ambient | None
         timing, flashes=tuple(replace(flash, complete=flash.index == dark.index) for flash in timing.flashes)
     )
     first, last = frames_touched(camera, np.array([dark.start_s]), np.array([dark.duration_s]))
-    near = [n for n in take.numbers if first[0] <= take.clip.index_of(n) <= last[0]]
-    plate = next(split(read_frames(take.clip, near), camera, alone))
+    near = [n for n in take.numbers if n in places and first[0] <= places[n] <= last[0]]
+    plate = next(split(_placed(read_frames(take.clip, near), places), camera, alone))
     return Ambient(image=plate.image, slots=np.zeros(plate.image.shape[:2], np.float32))
 
 

@@ -4,8 +4,8 @@ As a file it is timing.json (schema ``psvideo-timing/1``).
 """
 
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
@@ -43,7 +43,11 @@ class DroppedFrames:
 
 @dataclass(frozen=True, kw_only=True)
 class Timing:
-    """The flashes of a clip in order. ``order`` says how the lights' names were found: a guess is called ``guess``."""
+    """The flashes of a clip in order. ``order`` says how the lights' names were found: a guess is called ``guess``.
+
+    ``repeated_frames`` are the numbers of frames that show the same moment as the frame before them. ``notes`` are
+    sentences for people on what to distrust; they do not go into the file.
+    """
 
     clip: str
     frame_period_s: float
@@ -54,6 +58,8 @@ class Timing:
     order: Order
     flashes: tuple[Flash, ...]
     dropped_frames: tuple[DroppedFrames, ...] = ()
+    repeated_frames: tuple[int, ...] = ()
+    notes: tuple[str, ...] = field(default=(), compare=False)
 
     @property
     def start_s(self) -> FloatArray:
@@ -64,6 +70,29 @@ class Timing:
     def duration_s(self) -> FloatArray:
         """How long every flash lasts on the camera's clock, shape (flash,)."""
         return np.array([flash.duration_s for flash in self.flashes], np.float64)
+
+
+def places_in_time(timing: Timing, numbers: Sequence[int]) -> dict[int, int]:
+    """Return the true index of every frame of a clip, by number; repeated frames, which add nothing, are left out.
+
+    ``numbers`` are all the clip's frame numbers, ascending. Holes that the numbering does not show count too.
+
+    >>> timing = Timing(clip="", frame_period_s=1, exposure_s=1, row_time_s=0, clock_offset_ppm=0, phase_error_rows=0,
+    ...     order="given", flashes=(), dropped_frames=(DroppedFrames(after=2, count=3),), repeated_frames=(5,))
+    >>> places_in_time(timing, [1, 2, 4, 5, 6])
+    {1: 0, 2: 1, 4: 5, 6: 6}
+    """
+    missing = {hole.after: hole.count for hole in timing.dropped_frames}
+    repeated = set(timing.repeated_frames)
+    places: dict[int, int] = {}
+    index = 0
+    for number, following in zip(numbers, (*numbers[1:], None), strict=True):
+        if number not in repeated:
+            places[number] = index
+        if following is not None:
+            told = following - number - 1
+            index += 1 + max(missing.get(number, 0), told) - (following in repeated)
+    return places
 
 
 class _FlashFile(Contract):
@@ -91,6 +120,7 @@ class _TimingFile(Contract):
     phase_error_rows: float = Field(ge=0)
     order: Order
     dropped_frames: list[_DroppedFile] = Field(default_factory=list)
+    repeated_frames: list[int] = Field(default_factory=list)
     flashes: list[_FlashFile]
 
 
@@ -108,12 +138,14 @@ def read_timing(path: Path) -> Timing:
         raise PsvideoError(f"{path}: key '{key}': {first['msg']}. Make it again with psvideo sync.") from None
     flashes = tuple(Flash(**flash.model_dump()) for flash in file.flashes)
     dropped = tuple(DroppedFrames(after=hole.after, count=hole.count) for hole in file.dropped_frames)
-    scalars = file.model_dump(exclude={"schema_", "flashes", "dropped_frames"})
-    return Timing(flashes=flashes, dropped_frames=dropped, **scalars)
+    scalars = file.model_dump(exclude={"schema_", "flashes", "dropped_frames", "repeated_frames"})
+    repeated = tuple(file.repeated_frames)
+    return Timing(flashes=flashes, dropped_frames=dropped, repeated_frames=repeated, **scalars)
 
 
 def timing_record(timing: Timing) -> dict[str, object]:
     """Return the timing as what timing.json holds."""
+    repeated = {"repeated_frames": list(timing.repeated_frames)} if timing.repeated_frames else {}
     return {
         "schema": SCHEMA,
         "clip": timing.clip,
@@ -124,6 +156,7 @@ def timing_record(timing: Timing) -> dict[str, object]:
         "phase_error_rows": timing.phase_error_rows,
         "order": timing.order,
         "dropped_frames": [{"after": hole.after, "count": hole.count} for hole in timing.dropped_frames],
+        **repeated,
         "flashes": [_flash_row(flash) for flash in timing.flashes],
     }
 

@@ -37,6 +37,8 @@ def sync(
     for note in take.clip.notes:
         voice.detail(note)
     timing = find_clip_timing(take, first_light=first_light, watch=voice.track)
+    for note in timing.notes:
+        voice.warn(note)
     if out is not None:
         write_text(out, format_timing(timing))
     voice.result(timing_record(timing))
@@ -56,6 +58,7 @@ def describe_timing(timing: Timing) -> str:
         )
     lines.append(ORDER_SENTENCE[timing.order])
     lines += [f"{hole.count} frame(s) missing after number {hole.after}." for hole in timing.dropped_frames]
+    lines += [f"Frame {number} repeats the one before it." for number in timing.repeated_frames]
     return "\n".join(lines)
 
 

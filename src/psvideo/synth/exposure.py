@@ -1,6 +1,6 @@
 """A strobed clip in memory, from plates that are already there: the short way to frames with known truth."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,8 +25,11 @@ class Exposure:
     flashes: tuple[TrueFlash, ...]
 
 
+Plates = Mapping[int, Image] | Sequence[Image | None] | Callable[[TrueFlash], Image]
+
+
 def expose(
-    plates: Mapping[int, Image] | Sequence[Image | None],
+    plates: Plates,
     plan: Plan,
     *,
     frames: int,
@@ -36,13 +39,16 @@ def expose(
     noise: Noise = NOISELESS,
     bits: int = 0,
     dropped: Sequence[int] = (),
+    gain: Sequence[float] | None = None,
     seed: int = 0,
 ) -> Exposure:
-    """Expose a scene that stands still under the plan's flashes and return frames as a clip would give them.
+    """Expose a scene under the plan's flashes and return frames as a clip would give them.
 
     ``plates`` holds one image per slot of the plan's round (None or missing = dark), as one whole flash of that slot
-    lights the scene; ``ambient`` is what one whole exposure collects besides. Frames saturate at 1.0 and come in steps
-    of a converter where ``bits`` is given; below black they may be slightly negative through noise.
+    lights the scene; for a scene that moves it is a function that gives the image of any one flash. ``ambient`` is what
+    one whole exposure collects besides. ``gain`` is what the camera multiplies each frame by before it saturates, as an
+    automatic exposure does. Frames saturate at 1.0 and come in steps of a converter where ``bits`` is given; below
+    black they may be slightly negative through noise.
 
     >>> from fractions import Fraction
     >>> from psvideo.camera import Camera
@@ -56,22 +62,32 @@ def expose(
            [0.8, 0.8, 0.4, 0. ],
            [0. , 0. , 0. , 0. ]], dtype=float32)
     """
-    by_slot = dict(plates) if isinstance(plates, Mapping) else {k: p for k, p in enumerate(plates) if p is not None}
-    shape = next(iter(by_slot.values())).shape
     flashes = true_flashes(plan, clock or StrobeClock(), frames=frames, dropped=frozenset(dropped))
     kept = tuple(n for n in range(frames) if n not in set(dropped))
+    plate_of = plates if callable(plates) else plates_by_slot(_by_slot(plates))
+    shape = next(plate.shape for plate in map(plate_of, flashes) if plate is not None)
     steady = np.broadcast_to(np.asarray(ambient, np.float32), shape)
     light = expose_frames(
         plan,
         flashes,
-        plates_by_slot(by_slot),
+        plate_of,
         frames=kept,
         ambient_of=(lambda _: steady) if np.any(steady) else None,
         flicker=flicker,
         channels=shape[2] if len(shape) == 3 else 0,
     )
-    images = [_read(image, noise, bits, np_seed=(seed, n)) for n, image in zip(kept, light, strict=True)]
+    gains = np.ones(frames) if gain is None else np.asarray(gain, np.float64)
+    images = [
+        _read(image * np.float32(gains[n]), noise, bits, np_seed=(seed, n))
+        for n, image in zip(kept, light, strict=True)
+    ]
     return Exposure(frames=np.stack(images), indices=kept, flashes=flashes)
+
+
+def _by_slot(plates: Mapping[int, Image] | Sequence[Image | None]) -> dict[int, Image]:
+    if isinstance(plates, Mapping):
+        return dict(plates)
+    return {slot: plate for slot, plate in enumerate(plates) if plate is not None}
 
 
 def _read(image: Image, noise: Noise, bits: int, *, np_seed: tuple[int, int]) -> Image:

@@ -1,0 +1,191 @@
+"""Tracking: from frames whose times are known to all others, across dropped and repeated frames and a drifting clock.
+
+Block by block away from frames that fit, the brightnesses found so far foretell the next frames at every place in time
+that they may have; a Viterbi search picks the cheapest course, in which a step between frames other than the one that
+the numbering tells costs something. Then the clock is sharpened on the latest frames and the next block follows.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.camera import FloatArray
+from psvideo.plan import Plan
+from psvideo.rowfit.beat import Beat
+from psvideo.rowfit.kernel import IntArray
+from psvideo.rowfit.profiles import Profiles, brightnesses, predictions, unexplained
+from psvideo.rowfit.refine import refine
+from psvideo.rowfit.search import ROBUST_STEEPNESS
+
+BLOCK = 16
+LEAST, MOST = -6, 24
+"""Frames that may be repeated (less than none) or missing at one place without a hole in the numbering."""
+JUMP_COST = 2.0
+"""What an unexpected step costs, in mean losses of a frame (a frame at a wrong time costs 1 to 3)."""
+TWIN_COST = 0.2
+"""What it costs to take a frame that looks exactly like the one before it for the same moment."""
+TWIN = 0.02
+"""Share of the rows' spreads by which two frames of the same moment differ at most."""
+SUSPICIOUS = 0.25
+"""A frame's loss by which it must exceed what is usual before other places in time are tried for it."""
+BELIEVED = 0.4
+"""A step is believed where frames behind it then exceed the usual loss by less than this share of what they did."""
+LEAST_ANCHOR = 12
+
+
+@dataclass(frozen=True, kw_only=True)
+class Track:
+    """Where a clip's frames are in time, ``index`` (frame,), and by how much flashes come later than ``beat`` says.
+
+    ``late_s`` (anchor,) stands at the times ``at_s`` (anchor,) on the camera's clock.
+    """
+
+    index: IntArray
+    beat: Beat
+    at_s: FloatArray
+    late_s: FloatArray
+
+    @property
+    def repeated(self) -> NDArray[np.bool_]:
+        """Frames that show the same moment as the one before them, shape (frame,)."""
+        return np.append(False, np.diff(self.index) == 0)
+
+
+def track(plan: Plan, rows: Profiles, beat: Beat, seed: slice, *, memory: int) -> Track:
+    """Follow the strobe through the whole clip from the frames ``seed``, most of which ``beat`` fits.
+
+    The latest ``memory`` frames foretell the next ones.
+    """
+    low, high = _anchor(plan, rows, beat, seed)
+    index = rows.index.copy()
+    twins = _twins(rows)
+    late = [_lateness(beat, beat, float(rows.frame_start_s[low:high].mean()))]
+    now = beat
+    while high < len(index):
+        block = slice(high, min(high + BLOCK, len(index)))
+        extra = _course(plan, replace(rows, index=index), now, slice(max(low, high - memory), high), block, twins, 1)
+        index[high : high + len(extra)] += extra
+        index[high + len(extra) :] += extra[-1]
+        high += len(extra)
+        now, point = _sharpened(plan, replace(rows, index=index), now, beat, slice(max(low, high - memory), high))
+        late.append(point)
+    now = beat
+    while low > 0:
+        block = slice(max(low - BLOCK, 0), low)
+        extra = _course(plan, replace(rows, index=index), now, slice(low, min(low + memory, high)), block, twins, -1)
+        index[low - len(extra) : low] -= extra
+        index[: low - len(extra)] -= extra[0]
+        low -= len(extra)
+        now, point = _sharpened(plan, replace(rows, index=index), now, beat, slice(low, min(low + memory, high)))
+        late.append(point)
+    return _from_first_frame(rows, index, beat, late)
+
+
+def _from_first_frame(rows: Profiles, index: IntArray, beat: Beat, late: list[tuple[float, float]]) -> Track:
+    """Count time from the clip's first frame again, wherever frames before the anchor turned out to be missing."""
+    shift = int(index[0] - rows.index[0])
+    points = np.array(sorted(late), np.float64)
+    moved = replace(beat, clock=replace(beat.clock, phase_s=beat.clock.phase_s - shift * rows.period_s))
+    return Track(index=index - shift, beat=moved, at_s=points[:, 0] - shift * rows.period_s, late_s=points[:, 1])
+
+
+def _anchor(plan: Plan, rows: Profiles, beat: Beat, seed: slice) -> tuple[int, int]:
+    """Return the longest run of frames in the seed that fit as well as most."""
+    part = rows.take(seed)
+    loss = frame_losses(part, unexplained(plan, part, beat))
+    good = loss < np.median(loss) + SUSPICIOUS
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], good.astype(np.int64), [0]])))
+    runs = [(int(b - a), int(a)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    length, first = max(runs)
+    if length < min(LEAST_ANCHOR, len(loss)):
+        return seed.start, seed.stop
+    return seed.start + first, seed.start + first + length
+
+
+def frame_losses(rows: Profiles, rest: FloatArray) -> FloatArray:
+    """Return every frame's mean robust loss over the rows that change, shape (frame,)."""
+    spread = rows.spread
+    lit = spread > 0.03 * spread.max()
+    losses: FloatArray = np.log1p(ROBUST_STEEPNESS * (rest[:, lit] / spread[lit]) ** 2).mean(axis=1)
+    return losses
+
+
+def _twins(rows: Profiles) -> NDArray[np.bool_]:
+    """Return the frames that look exactly like the one before them, shape (frame,)."""
+    change = np.abs(np.diff(rows.value, axis=0)) / rows.spread
+    lit = rows.spread > 0.03 * rows.spread.max()
+    return np.append(False, change[:, lit].mean(axis=1) < TWIN)
+
+
+def _course(
+    plan: Plan, rows: Profiles, beat: Beat, known: slice, block: slice, twins: NDArray[np.bool_], sign: int
+) -> IntArray:
+    """Return by how many frames more than the numbering tells the next frames lie away, shape (frame,).
+
+    Where all is as usual, this is for the whole block; where not, for its nearer half, so that the other half is looked
+    at again with more known.
+    """
+    learnt = rows.take(known)
+    nearness = np.linspace(0.1, 1.0, len(learnt.value))[:: 1 if sign > 0 else -1, None]
+    light = brightnesses(plan, learnt, beat, np.ascontiguousarray(np.broadcast_to(nearness, learnt.value.shape)))
+    usual = float(np.median(_losses(plan, learnt, learnt, beat, light)))
+    ahead = rows.take(block)
+    loss = _losses(plan, learnt, ahead, beat, light)
+    same = twins[block] if sign > 0 else np.append(twins[block][1:], twins[block.stop])
+    odd = np.convolve(loss, [0.5, 0.5], mode="same") if len(loss) > 1 else loss
+    if odd.max() < usual + SUSPICIOUS and not same.any():
+        return np.zeros(len(loss), np.int64)
+    extras = np.arange(LEAST, MOST + 1)
+    shifted = [replace(ahead, index=ahead.index + sign * int(extra)) for extra in extras]
+    table = np.stack([_losses(plan, learnt, one, beat, light) for one in shifted], axis=1)
+    course = _cheapest(table, same) if sign > 0 else _cheapest(table[::-1], same[::-1])[::-1]
+    gone = course != 0
+    if gone.any():
+        after = float(table[gone, course[gone] - LEAST].mean())
+        if after > usual + BELIEVED * (float(loss[gone].mean()) - usual):
+            course = np.zeros(len(loss), np.int64)
+    nearer = max(len(loss) // 2, min(len(loss), 4))
+    return course[:nearer] if sign > 0 else course[-nearer:]
+
+
+def _losses(plan: Plan, reference: Profiles, rows: Profiles, beat: Beat, light: FloatArray) -> FloatArray:
+    rest = rows.value - predictions(plan, rows, beat, light)
+    spread = reference.spread
+    lit = spread > 0.03 * spread.max()
+    losses: FloatArray = np.log1p(ROBUST_STEEPNESS * (rest[:, lit] / spread[lit]) ** 2).mean(axis=1)
+    return losses
+
+
+def _cheapest(table: FloatArray, twin: NDArray[np.bool_]) -> IntArray:
+    """Return the course of least cost through a table (frame, extra); no frame comes before the one before it."""
+    extras = np.arange(LEAST, MOST + 1)
+    step = extras[None, :] - extras[:, None]  # from the row's state to the column's
+    usual = np.where(step == 0, 0.0, np.where(step < -1, np.inf, JUMP_COST + 0.05 * np.abs(step)))
+    after_twin = np.where(step == 1, TWIN_COST, usual)
+    to_twin = np.where(step == -1, 0.0, usual + TWIN_COST)
+    cost = np.where(extras == 0, 0.0, np.inf)
+    back = np.zeros(table.shape, np.int64)
+    for n in range(len(table)):
+        price = to_twin if twin[n] else after_twin if n and twin[n - 1] else usual
+        whole = cost[:, None] + price
+        back[n] = whole.argmin(axis=0)
+        cost = whole.min(axis=0) + table[n]
+    state = int(cost.argmin())
+    course = np.empty(len(table), np.int64)
+    for n in range(len(table) - 1, -1, -1):
+        course[n] = extras[state]
+        state = int(back[n, state])
+    return course
+
+
+def _sharpened(plan: Plan, rows: Profiles, now: Beat, base: Beat, frames: slice) -> tuple[Beat, tuple[float, float]]:
+    """Fit the clock anew to the latest frames, and return how late it is there against the base's clock."""
+    part = rows.take(frames).one_window()
+    now = refine(plan, part, now, steps=2, first_scale=0.03).beat
+    return now, _lateness(base, now, float(part.frame_start_s.mean()))
+
+
+def _lateness(base: Beat, now: Beat, at_s: float) -> tuple[float, float]:
+    strobe_s = (at_s - base.clock.phase_s) / base.clock.rate
+    return at_s, now.clock.phase_s + strobe_s * now.clock.rate - at_s
