@@ -61,11 +61,12 @@ def test_a_diagram_is_printed_where_it_is_asked_for(tmp_path: Path) -> None:
 
 def test_what_exists_is_replaced_only_by_force(tmp_path: Path) -> None:
     out = tmp_path / "plan.toml"
-    out.write_text("mine")
+    mine = 'schema = "psvideo-plan/1"'
+    out.write_text(mine)
     refusal = run(*README, "-o", out)
     assert isinstance(refusal.exception, UsageError)
     assert "--force" in str(refusal.exception)
-    assert out.read_text() == "mine"
+    assert out.read_text() == mine
     assert run(*README, "-o", out, "--force").exit_code == 0
     assert read_plan(out).camera.name == "Sony F65"
 

@@ -204,29 +204,32 @@ def test_spaces_that_do_not_fit_their_options_are_refused() -> None:
 
 def test_a_folder_appears_whole_or_not_at_all(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    with contextlib.suppress(RuntimeError), whole_folder(out) as folder:
-        (folder / "half.txt").write_text("x")
+    with contextlib.suppress(RuntimeError), whole_folder(out, mark="timing.json") as folder:
+        (folder / "timing.json").write_text("x")
         raise RuntimeError
     assert not out.exists()
-    with whole_folder(out, resume=True) as folder:
-        assert (folder / "half.txt").is_file()
+    with whole_folder(out, mark="timing.json", resume=True) as folder:
+        assert (folder / "timing.json").is_file()
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
-    with pytest.raises(UsageError, match="exists already"), whole_folder(out):
+    with pytest.raises(UsageError, match="exists already"), whole_folder(out, mark="timing.json"):
         pass
-    with whole_folder(out, force=True) as folder:
+    with whole_folder(out, mark="timing.json", force=True) as folder:
         (folder / "new.txt").write_text("y")
     assert [path.name for path in out.iterdir()] == ["new.txt"]
-    with pytest.raises(UsageError, match="no stopped run"), whole_folder(tmp_path / "other", resume=True):
+    with (
+        pytest.raises(UsageError, match="no stopped run"),
+        whole_folder(tmp_path / "other", mark="timing.json", resume=True),
+    ):
         pass
 
 
 def test_a_failed_run_leaves_the_output_that_it_was_to_replace(tmp_path: Path) -> None:
     out = tmp_path / "out"
     out.mkdir()
-    (out / "old.txt").write_text("keep me")
-    with pytest.raises(RuntimeError), whole_folder(out, force=True):
+    (out / "timing.json").write_text("keep me")
+    with pytest.raises(RuntimeError), whole_folder(out, mark="timing.json", force=True):
         raise RuntimeError
-    assert (out / "old.txt").read_text() == "keep me"
+    assert (out / "timing.json").read_text() == "keep me"
 
 
 def test_a_fault_in_a_writing_thread_reaches_the_run() -> None:

@@ -20,7 +20,7 @@ from psvideo.rig import Light, Rig, directions, intensities
 from psvideo.rigfile import format_rig, parse_rig, read_rig
 from psvideo.timing import DroppedFrames, Flash, Timing, format_timing, read_timing
 
-names = st.text("abcdefgh_-. é", min_size=1, max_size=8)
+names = st.text("abcdefgh_-é", min_size=1, max_size=8)
 positive = st.floats(1e-6, 1e-2)
 
 plans = st.builds(
@@ -182,6 +182,7 @@ BROKEN_RIGS = {
         "two lights have the name 'a'",
     ),
     "unknown key": ('name = "a"\ndirektion = [0.0, 0.0, 1.0]', "did you mean 'direction'?"),
+    "a name that is taken": ('name = "ambient"\ndirection = [0.0, 0.0, 1.0]', "cannot be a light's name"),
     "no strength": ('name = "a"\ndirection = [0.0, 0.0, 1.0]\nintensity = 0.0', "greater than 0"),
 }
 

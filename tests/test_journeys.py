@@ -11,6 +11,7 @@ import OpenEXR
 import pytest
 
 from psvideo.cli.app import main
+from psvideo.errors import PsvideoError
 
 SCENES = Path(__file__).resolve().parents[1] / "data_synth"
 
@@ -106,15 +107,47 @@ def test_a_part_of_a_clip_gives_the_same_plates_under_the_same_numbers(clip: Pat
         assert np.abs(planes(path) - whole).max() < 0.01
 
 
-def test_a_stopped_run_goes_on_where_it_stopped(clip: Path, tmp_path: Path) -> None:
+def test_a_stopped_run_goes_on_where_it_stopped_and_only_as_it_began(
+    clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     whole, out = tmp_path / "whole", tmp_path / "out"
-    assert run("normals", clip, "--rig", clip / "rig.toml", "-o", whole, "-q") == 0
-    partial = tmp_path / ".out.partial"
-    shutil.copytree(whole, partial)
-    (partial / "report.json").unlink()
-    shutil.rmtree(partial / "albedo")
-    assert run("normals", clip, "--rig", clip / "rig.toml", "-o", out, "--resume", "-q") == 0
+    command = ("normals", clip, "--rig", clip / "rig.toml", "-q", "-o")
+    assert run(*command, whole) == 0
+
+    def stop(*_: object) -> None:
+        raise PsvideoError("the power went off")
+
+    with monkeypatch.context() as patched:
+        patched.setattr("psvideo.runs.write_text", stop)
+        assert run(*command, out) == 1
+    assert not out.exists()
+    kept = sorted((tmp_path / ".out.partial" / "albedo").iterdir())
+    kept[0].unlink()
+    before = kept[1].stat().st_mtime_ns
+    assert run(*command, out, "--resume", "--y", "down") == 2
+    assert "had other settings" in capsys.readouterr().err
+    assert run(*command, out, "--resume") == 0
     assert digest(out) == digest(whole)
+    assert (out / "albedo" / kept[1].name).stat().st_mtime_ns == before, "what was whole is not written again"
+
+
+def test_force_replaces_results_and_never_footage(
+    clip: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    copy = spoilt(clip, tmp_path)
+    before = digest(copy)
+    rig = ("--rig", copy / "rig.toml", "-q", "--force")
+    assert run("normals", copy, *rig, "-o", copy) == 2
+    assert run("normals", copy, *rig, "-o", copy / "frames") == 2
+    assert run("split", copy, "-q", "--force", "-o", copy / "frames") == 2
+    assert run("sync", copy, "-q", "--force", "-o", a_frame(copy)) == 2
+    assert run("sync", copy, "-q", "--force", "-o", copy / "plan.toml") == 2
+    assert run("capture-plan", "--camera", "Sony F65", "--flash", "1ms", "-q", "--force", "-o", a_frame(copy)) == 2
+    assert capsys.readouterr().err.count("not replaced, not even with --force") == 6
+    assert digest(copy) == before
+    out = tmp_path / "out"
+    assert run("normals", copy, *rig, "-o", out) == 0
+    assert run("normals", copy, *rig, "-o", out) == 0
 
 
 def test_still_photographs_one_per_light_are_a_synced_clip(tmp_path: Path) -> None:
@@ -267,3 +300,35 @@ def test_nearly_coplanar_lights_are_refused_with_their_condition(
     assert run("normals", clip, "--rig", tmp_path / "rig.toml", "-o", tmp_path / "out") == 1
     assert "condition" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_lights_that_always_flash_together_are_refused(
+    clip: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    copy = spoilt(clip, tmp_path)
+    plan = (copy / "plan.toml").read_text().replace("{left = 1.0}", "{left = 1.0, key = 1.0}")
+    (copy / "plan.toml").write_text(plan.replace("{key = 1.0}", "{key = 1.0, left = 1.0}"))
+    assert run("normals", copy, "--rig", copy / "rig.toml", "-o", tmp_path / "out") == 1
+    told = capsys.readouterr().err
+    assert "cannot tell the lights key, left apart" in told
+
+
+def test_a_timing_of_other_footage_is_refused(clip: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    timing = tmp_path / "timing.json"
+    assert run("sync", clip, "-o", timing, "-q") == 0
+    record = json.loads(timing.read_text())
+    for change in ({"clip": "other"}, {"frame_period_s": 0.02}, {"flashes": record["flashes"][1:]}):
+        timing.write_text(json.dumps(record | change))
+        assert run("split", clip, "--timing", timing, "-o", tmp_path / "out", "-q") == 1
+        assert str(timing) in capsys.readouterr().err
+
+
+def test_frames_taken_in_steps_are_called_what_they_are(
+    clip: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("sync", clip, "-o", tmp_path / "timing.json", "-q") == 0
+    given = ("--timing", tmp_path / "timing.json", "--frames", "1-12x2")
+    assert run("normals", clip, "--rig", clip / "rig.toml", "-o", tmp_path / "out", *given) == 0
+    told = capsys.readouterr()
+    assert "usable." not in told.out.replace("not usable", "")
+    assert "seen by no frame" in told.err

@@ -218,6 +218,23 @@ def test_the_average_of_dark_slots_begins_anew_only_where_the_scene_changed() ->
     assert np.std(average.image[40:, 40:] - 0.1) < 0.006
 
 
+def test_rows_of_a_dark_slot_that_no_frame_saw_do_not_pass_for_darkness(make_plan: PlanMaker) -> None:
+    plan = make_plan()
+    truth = plates_for(plan)
+    shot, timing = shoot(plan, truth, ambient=0.2, dropped=(11, 12, 13))
+    for plate in ambient.subtract(split(frames_of(shot), plan.camera, timing)):
+        if plate.flash.lights and plate.flash.index > 4:
+            assert np.abs(plate.image - truth[plate.flash.slot])[plate.seen].max(initial=0) < 2e-2
+
+
+def test_a_flash_that_no_frame_saw_gives_no_plate(make_plan: PlanMaker) -> None:
+    plan = make_plan(readout=0.0)
+    shot, timing = shoot(plan, plates_for(plan, colour=True), dropped=(10, 11))
+    plates = list(split(frames_of(shot), plan.camera, timing))
+    assert len(plates) < sum(flash.complete for flash in timing.flashes)
+    assert {plate.image.ndim for plate in plates} == {3}
+
+
 def test_algorithm_1_is_exact_on_a_clean_clip_until_its_dark_row_leaves_the_picture(make_plan: PlanMaker) -> None:
     plan = make_plan(dark=False)
     plan = replace(plan, dark_s=plan.camera.exposure_s)
@@ -321,7 +338,8 @@ def test_hdr_flashes_of_one_light_are_merged_without_what_is_clipped(make_plan: 
     scene = (0.02 + 3.0 * rng.random(shape)).astype(np.float32)
     other = np.full(shape, 0.3, np.float32)
     shot, timing = shoot(plan, {0: scene, 1: scene / 8, 2: other, 3: other})
-    one = list(sequence.rounds(split(frames_of(shot), plan.camera, timing), plan, timing.flashes))[2]
+    plates = ambient.subtract(split(frames_of(shot), plan.camera, timing))
+    one = list(sequence.rounds(plates, plan, timing.flashes))[2]
     merged = one.plates[0]
     assert merged.light == "a"
     assert merged.saturation == pytest.approx(8.0)
@@ -346,5 +364,6 @@ def test_what_is_clipped_in_every_exposure_is_held_at_the_weakest_ones_limit(mak
     shape = (plan.camera.height_px, plan.camera.width_px)
     bright, other = np.full(shape, 20.0, np.float32), np.full(shape, 0.3, np.float32)
     shot, timing = shoot(plan, {0: bright, 1: bright / 8, 2: other, 3: other})
-    one = list(sequence.rounds(split(frames_of(shot), plan.camera, timing), plan, timing.flashes))[2]
+    plates = ambient.subtract(split(frames_of(shot), plan.camera, timing))
+    one = list(sequence.rounds(plates, plan, timing.flashes))[2]
     assert (one.plates[0].image[5:-5] >= one.plates[0].saturation).mean() > 0.8

@@ -194,10 +194,11 @@ def test_another_plans_footage_is_not_timed(make_plan: PlanMaker) -> None:
 
 
 def test_synced_footage_has_one_flash_a_frame_in_the_plans_order(make_plan: PlanMaker) -> None:
-    plan = make_plan(mode="synced", readout=0.0)
+    plan = make_plan(mode="synced", readout=0.7)
     timing = find_timing(plan, np.arange(8), np.zeros((8, plan.camera.height_px)))
     assert [flash.slot for flash in timing.flashes] == [0, 1, 2, 3, 0, 1, 2, 3]
-    weights = row_weights(plan.camera, timing.start_s, timing.duration_s, frames=range(8))
+    camera = replace(plan.camera, readout_s=timing.row_time_s * plan.camera.height_px)
+    weights = row_weights(camera, timing.start_s, timing.duration_s, frames=range(8))
     np.testing.assert_allclose(weights, np.broadcast_to(np.eye(8)[:, :, None], weights.shape), atol=1e-9)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compiled import compiled
-from psvideo.split import Image, Plate
+from psvideo.split import CLIPPED, Image, Plate
 
 LONGEST_MEMORY = 16
 """Dark slots that the running average spans at most."""
@@ -24,21 +24,28 @@ CHANGED = 4.0
 
 @dataclass(frozen=True, kw_only=True)
 class Ambient:
-    """The running average of the dark slots: its image, and how many slots it spans at each pixel."""
+    """The running average of the dark slots: its image, and how many slots it spans at each pixel.
+
+    ``known`` (row,) is False where no dark slot was seen yet: nothing can be taken off there.
+    """
 
     image: Image
     slots: Image
+    known: NDArray[np.bool_]
 
 
-def update(ambient: Ambient | None, dark: Image) -> Ambient:
-    """Return the average with one more dark slot in it."""
-    if ambient is None:
-        return Ambient(image=dark, slots=np.ones(dark.shape[:2], np.float32))
+def update(ambient: Ambient | None, dark: Image, seen: NDArray[np.bool_] | None = None) -> Ambient:
+    """Return the average with one more dark slot in it; ``seen`` (row,) says which of its rows count."""
     rows, cols = dark.shape[:2]
+    shown = np.ones(rows, np.bool_) if seen is None else seen
+    if ambient is None:
+        slots = np.broadcast_to(shown[:, None], (rows, cols)).astype(np.float32)
+        return Ambient(image=dark, slots=slots, known=shown)
     image, slots = np.empty_like(dark), np.empty((rows, cols), np.float32)
     old, new, blended = (picture.reshape(rows, cols, -1) for picture in (ambient.image, dark, image))
-    _blend(old, new, ambient.slots, _changed(old, new), blended, slots)
-    return Ambient(image=image, slots=slots)
+    changed = _changed(old, new) | ~ambient.known[:, None]
+    _blend(old, new, ambient.slots, changed, shown, blended, slots)
+    return Ambient(image=image, slots=slots, known=ambient.known | shown)
 
 
 def _changed(old: Image, new: Image) -> NDArray[np.bool_]:
@@ -63,42 +70,63 @@ def _mean_change(old: Image, new: Image, change: Image) -> None:
 
 
 @compiled
-def _blend(old: Image, new: Image, old_slots: Image, changed: NDArray[np.bool_], blended: Image, slots: Image) -> None:
-    """Average where nothing changed, begin anew where something did."""
+def _blend(
+    old: Image,
+    new: Image,
+    old_slots: Image,
+    changed: NDArray[np.bool_],
+    seen: NDArray[np.bool_],
+    blended: Image,
+    slots: Image,
+) -> None:
+    """Average where nothing changed, begin anew where something did, and keep what was where nothing was seen."""
     rows, cols, channels = old.shape
     for row in range(rows):
         for col in range(cols):
             spanned = min(old_slots[row, col] + np.float32(1), np.float32(LONGEST_MEMORY))
             count = np.float32(1) if changed[row, col] else spanned
-            slots[row, col] = count
+            slots[row, col] = count if seen[row] else old_slots[row, col]
+            share = np.float32(1) / count if seen[row] else np.float32(0)
             for channel in range(channels):
                 before = old[row, col, channel]
-                blended[row, col, channel] = before + (new[row, col, channel] - before) / count
+                blended[row, col, channel] = before + (new[row, col, channel] - before) * share
 
 
 def subtract(plates: Iterable[Plate], *, first: Ambient | None = None) -> Iterator[Plate]:
     """Yield the plates with ambient light taken off the lit ones; dark slots pass as the average that was used.
 
-    ``first`` is the ambient light before the first dark slot comes by. Without any, plates pass unchanged.
+    ``first`` is the ambient light before the first dark slot comes by. Without any, plates keep theirs. What is clipped
+    comes out as 1.0.
     """
     ambient = first
     for plate in plates:
         if not any(plate.flash.lights.values()):
-            ambient = update(ambient, plate.image)
-            yield replace(plate, image=ambient.image, exposures=np.ones_like(plate.exposures))
+            ambient = update(ambient, held(plate.image), plate.seen)
+            yield replace(plate, image=ambient.image, exposures=np.ones_like(plate.exposures), seen=ambient.known)
         elif ambient is None:
-            yield plate
+            yield replace(plate, image=held(plate.image))
         else:
-            yield replace(plate, image=_without(plate, ambient.image), exposures=np.zeros_like(plate.exposures))
+            yield _without(plate, ambient)
 
 
-def _without(plate: Plate, ambient: Image) -> Image:
-    """Take the ambient light of every exposure off; what is saturated stays at 1.0 or above."""
+def held(image: Image) -> Image:
+    """Return a picture with 1.0 where samples were clipped."""
+    held: Image = np.where(image >= CLIPPED / 2, np.float32(1), image)
+    return held
+
+
+def _without(plate: Plate, ambient: Ambient) -> Plate:
+    """Take the ambient light of every exposure off; what is clipped becomes 1.0.
+
+    Rows in which the ambient light is not known are no longer seen.
+    """
     rows = plate.image.shape[0]
     lit = np.empty_like(plate.image)
     exposures = plate.exposures.astype(np.float32)
-    _subtract_rows(plate.image.reshape(rows, -1), ambient.reshape(rows, -1), exposures, lit.reshape(rows, -1))
-    return lit
+    _subtract_rows(plate.image.reshape(rows, -1), ambient.image.reshape(rows, -1), exposures, lit.reshape(rows, -1))
+    seen = plate.seen & ambient.known
+    lit[~seen] = 0
+    return replace(plate, image=lit, exposures=np.zeros_like(plate.exposures), seen=seen)
 
 
 @compiled
@@ -107,4 +135,5 @@ def _subtract_rows(image: Image, ambient: Image, exposures: Image, lit: Image) -
         count = exposures[row]
         for col in range(image.shape[1]):
             value = image[row, col]
-            lit[row, col] = value if value >= np.float32(1.0) else value - count * ambient[row, col]
+            clipped = value >= np.float32(CLIPPED / 2)
+            lit[row, col] = np.float32(1.0) if clipped else value - count * ambient[row, col]

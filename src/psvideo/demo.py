@@ -13,7 +13,7 @@ from psvideo.export.space import Space
 from psvideo.files import refuse_existing, whole_file
 from psvideo.pipeline import Instant, Watch, open_take, unwatched
 from psvideo.rig import Vector
-from psvideo.runs import Output, normals_run, timing_of
+from psvideo.runs import Output, normals_run, read_lighting, timing_of
 from psvideo.surface import Surface
 from psvideo.synth.shoot import builtin_scene, shoot
 from psvideo.view.contact import Strip, Tile, sheet
@@ -39,9 +39,9 @@ def run_demo(folder: Path, *, force: bool = False, watch: Watch = unwatched) -> 
     timing = timing_of(take, None, first_light=None, watch=watch)
     delivery = Delivery(space=Space())
     output = Output(folder=out, force=force)
-    rig = clip_path / "rig.toml"
+    lighting = read_lighting(take, clip_path / "rig.toml")
     sheet_of = partial(demo_sheet, take.clip)
-    result = normals_run(take, timing, rig, output, delivery=delivery, watch=watch, picture_of=sheet_of)
+    result = normals_run(take, timing, lighting, output, delivery=delivery, watch=watch, picture_of=sheet_of)
     _write_png(folder / "demo.png", result.picture)
     return folder / "demo.png"
 

@@ -35,7 +35,17 @@ def write_text(path: Path, text: str) -> None:
         beside.write_text(text, encoding="utf-8")
 
 
-def refuse_existing(path: Path, *, force: bool) -> None:
-    """Raise UsageError where an output exists already and ``force`` does not allow to replace it."""
-    if path.exists() and not force:
+def refuse_existing(path: Path, *, force: bool, mark: str | None = None) -> None:
+    """Raise UsageError where an output exists already and ``force`` does not allow to replace it.
+
+    ``mark`` is a word that a file of this kind holds: what does not is not replaced, whatever ``force`` says.
+    """
+    if not path.exists():
+        return
+    if not force:
         raise UsageError(f"{path}: exists already. Name another output, or give --force to replace it.")
+    if mark is not None and not (path.is_file() and mark.encode() in path.read_bytes()[:4096]):
+        raise UsageError(
+            f"{path}: exists and is nothing that this command wrote (no {mark!r} in it), so it is not replaced, not "
+            "even with --force. Name another output."
+        )

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo import hudon2015
-from psvideo.ambient import Ambient, subtract
+from psvideo.ambient import Ambient, held, subtract
 from psvideo.camera import Camera
 from psvideo.clip import Clip, Frame, demosaic, holes, open_clip, parse_range, read_frames
 from psvideo.normals.illumination import illumination
@@ -21,7 +21,7 @@ from psvideo.normals.woodham1980 import solve
 from psvideo.plan import Plan
 from psvideo.profiles import collect_with_doubt
 from psvideo.rig import Light, Rig
-from psvideo.sequence import FIRST_NUMBER, LightPlate, Round, reference_duration_s, rounds
+from psvideo.sequence import FIRST_NUMBER, LightPlate, Round, check_separable, reference_duration_s, rounds
 from psvideo.shutter import frames_touched
 from psvideo.split import Image, Plate, split
 from psvideo.surface import Surface
@@ -102,6 +102,7 @@ def clip_rounds(
 
     ``each_flash`` is shown every single plate on its way, demosaiced.
     """
+    check_separable(take.plan)
     clip, camera = take.clip, _timed_camera(take.plan, timing)
     places = places_in_time(timing, clip.numbers)
     used = _within(timing, camera, take, places)
@@ -139,18 +140,19 @@ def _within(timing: Timing, camera: Camera, take: Take, places: Mapping[int, int
 
 
 def _first_ambient(take: Take, camera: Camera, timing: Timing, places: Mapping[int, int]) -> Ambient | None:
-    """Look ahead to the first dark slot, so that the flashes before it lose their ambient light too."""
+    """Look ahead to the first dark slot that was seen, so that the flashes before it lose their ambient light too."""
     complete = [flash for flash in timing.flashes if flash.complete]
-    dark = next((flash for flash in complete if not any(flash.lights.values())), None)
-    if dark is None or dark is complete[0]:
-        return None
-    alone = replace(
-        timing, flashes=tuple(replace(flash, complete=flash.index == dark.index) for flash in timing.flashes)
-    )
-    first, last = frames_touched(camera, np.array([dark.start_s]), np.array([dark.duration_s]))
-    near = [n for n in take.numbers if n in places and first[0] <= places[n] <= last[0]]
-    plate = next(split(_placed(read_frames(take.clip, near), places), camera, alone))
-    return Ambient(image=plate.image, slots=np.zeros(plate.image.shape[:2], np.float32))
+    first, last = frames_touched(camera, timing.start_s, timing.duration_s)
+    for dark in (flash for flash in complete if not any(flash.lights.values())):
+        if dark is complete[0]:
+            return None
+        near = [n for n in take.numbers if n in places and first[dark.index] <= places[n] <= last[dark.index]]
+        only = tuple(replace(flash, complete=flash.index == dark.index) for flash in timing.flashes)
+        frames = _placed(read_frames(take.clip, near), places) if near else iter(())
+        plate = next(split(frames, camera, replace(timing, flashes=only)), None)
+        if plate is not None:
+            return Ambient(image=held(plate.image), slots=np.zeros(plate.image.shape[:2], np.float32), known=plate.seen)
+    return None
 
 
 def _colour_of(clip: Clip) -> Callable[[Plate], Plate]:

@@ -10,7 +10,7 @@ from pydantic import Field, field_validator, model_validator
 from psvideo.camera import Camera, Encoding
 from psvideo.errors import PsvideoError
 from psvideo.plan import Plan, PlannedFlash, default_dark_s
-from psvideo.tomlfile import Contract, parse_toml, read_text
+from psvideo.tomlfile import Contract, check_light_name, parse_toml, read_text
 
 SCHEMA = "psvideo-plan/1"
 CFA_PATTERNS = ("RGGB", "BGGR", "GRBG", "GBRG")
@@ -55,6 +55,13 @@ class _Camera(Contract):
 class _Flash(Contract):
     lights: dict[str, Power]
     duration_s: float | None = Field(default=None, gt=0)
+
+    @field_validator("lights")
+    @classmethod
+    def _names_can_name_files(cls, lights: dict[str, Power]) -> dict[str, Power]:
+        for name in lights:
+            check_light_name(name)
+        return lights
 
 
 class _Strobe(Contract):

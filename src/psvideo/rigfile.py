@@ -11,11 +11,11 @@ from typing import Annotated, Self
 
 import numpy as np
 import tomlkit
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from psvideo.errors import PsvideoError
 from psvideo.rig import Light, Rig, Vector
-from psvideo.tomlfile import Contract, parse_toml, read_text
+from psvideo.tomlfile import Contract, check_light_name, parse_toml, read_text
 
 SCHEMA = "psvideo-rig/1"
 UNIT_LENGTH_TOLERANCE = 0.01
@@ -34,6 +34,11 @@ class _Light(Contract):
     reference_duration_s: float | None = Field(default=None, gt=0)
     anisotropy: float | None = Field(default=None, ge=0)
     axis: Triple | None = None
+
+    @field_validator("name")
+    @classmethod
+    def _name_can_name_files(cls, name: str) -> str:
+        return check_light_name(name)
 
     @model_validator(mode="after")
     def _is_somewhere(self) -> Self:

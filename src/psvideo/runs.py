@@ -1,7 +1,9 @@
 """Whole runs: a clip in, a folder of files out, with decoding, computing and writing side by side."""
 
+import hashlib
 import json
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
@@ -14,12 +16,12 @@ from psvideo import __version__
 from psvideo.clip import Clip, read_mask
 from psvideo.errors import PsvideoError
 from psvideo.export.plates import plate_name, write_flash, write_plate
-from psvideo.export.publish import whole_folder
+from psvideo.export.publish import refuse_folder, whole_folder
 from psvideo.export.results import Delivery, is_written, write_surface
 from psvideo.export.space import CAMERA_SPACE, Space
 from psvideo.export.tags import Tags, sha256_of
 from psvideo.export.writer import writing
-from psvideo.files import refuse_existing, write_text
+from psvideo.files import write_text
 from psvideo.normals.illumination import illumination
 from psvideo.pipeline import (
     Instant,
@@ -33,14 +35,17 @@ from psvideo.pipeline import (
     unwatched,
 )
 from psvideo.plan import Plan
+from psvideo.rig import Rig
 from psvideo.rigfile import read_rig
-from psvideo.sequence import FIRST_NUMBER, round_numbers
+from psvideo.sequence import FIRST_NUMBER, check_separable, round_numbers
 from psvideo.timing import Timing, format_timing, read_timing
 from psvideo.view.contact import Strip, Tile, sheet
 from psvideo.view.report import InstantFacts, RunReport, instant_facts, report_page, report_record
 from psvideo.view.shading import exposure_for, normal_colours, smaller, srgb
 
 Pixels = NDArray[np.uint8]
+MARK = "timing.json"
+"""The file by which a folder of plates or results is known."""
 SHOWN_WIDTH_PX = 600
 SAMPLE_ROUND = 3
 """The round that the report shows, counted from 1; the first where there are fewer."""
@@ -57,7 +62,7 @@ class Output:
 
     def check(self) -> None:
         """Raise UsageError where the folder exists and may not be replaced, before any work is done."""
-        refuse_existing(self.folder, force=self.force)
+        refuse_folder(self.folder, mark=MARK, force=self.force)
 
 
 def timing_of(take: Take, given: Path | None, *, first_light: str | None, watch: Watch = unwatched) -> Timing:
@@ -68,12 +73,33 @@ def timing_of(take: Take, given: Path | None, *, first_light: str | None, watch:
     if given is None:
         return find_clip_timing(take, first_light=first_light, watch=watch)
     timing = read_timing(given)
-    if timing.clip != take.clip.name:
-        raise PsvideoError(
-            f"{given}: is the timing of the clip {timing.clip!r}, and this clip is {take.clip.name!r}. "
-            "Leave --timing out, or make it again with psvideo sync."
-        )
+    wrong = _misfit(timing, take)
+    if wrong:
+        raise PsvideoError(f"{given}: {wrong}. Leave --timing out, or make it again with psvideo sync.")
     return timing
+
+
+def _misfit(timing: Timing, take: Take) -> str | None:
+    """Return why a timing cannot be this clip's, None where it can."""
+    plan = take.plan
+    if timing.clip != take.clip.name:
+        return f"is the timing of the clip {timing.clip!r}, and this clip is {take.clip.name!r}"
+    if abs(timing.frame_period_s / plan.camera.frame_period_s - 1) > 1e-6:
+        return f"has frames of {timing.frame_period_s:.6g} s, and the plan {plan.camera.frame_period_s:.6g} s"
+    if [flash.index for flash in timing.flashes] != list(range(len(timing.flashes))):
+        return "its flashes are not numbered 0, 1, 2 and so on without a hole"
+    for flash in timing.flashes:
+        if flash.slot >= len(plan.flashes) or dict(flash.lights) != dict(plan.flashes[flash.slot].lights):
+            return f"its flash {flash.index} (slot {flash.slot}, {dict(flash.lights)}) is not in the plan's list"
+    return None
+
+
+def _settings(take: Take, timing: Timing, output: Output, *what: object) -> str:
+    """Return what a run depends on as a digest; a stopped run is resumed only under the same."""
+    numbers = f"{take.numbers[0]}-{take.numbers[-1]} ({len(take.numbers)})"
+    plan = sha256_of(take.clip.plan_path)
+    parts = [__version__, take.clip.path.resolve(), numbers, plan, format_timing(timing), output.start_number, *what]
+    return hashlib.sha256("\n".join(map(str, parts)).encode()).hexdigest()
 
 
 def sequence_fps(plan: Plan) -> Fraction:
@@ -96,7 +122,8 @@ def split_run(
     clip = take.clip
     tags = _tags(clip)
     written: set[str] = set()
-    with whole_folder(output.folder, force=output.force, resume=output.resume) as folder, writing() as write:
+    settings = _settings(take, timing, output, method, flashes)
+    with _folder(output, settings) as folder, writing() as write:
         each = (lambda plate: write(partial(write_flash, folder, clip.name, plate, tags))) if flashes else None
         for one in clip_rounds(
             take, timing, method=method, start_number=output.start_number, watch=watch, each_flash=each
@@ -111,6 +138,10 @@ def split_run(
         timing = _with_plates(timing, clip.name, written, start_number=output.start_number)
         write_text(folder / "timing.json", format_timing(timing))
     return timing
+
+
+def _folder(output: Output, settings: str) -> AbstractContextManager[Path]:
+    return whole_folder(output.folder, mark=MARK, force=output.force, resume=output.resume, settings=settings)
 
 
 def _nothing_complete(clip: Clip, timing: Timing) -> str:
@@ -140,14 +171,38 @@ class NormalsResult:
     picture: Pixels
 
 
+@dataclass(frozen=True, kw_only=True)
+class Lighting:
+    """What is solved with, read and checked before a long run begins: the rig, and where to solve."""
+
+    rig_path: Path
+    rig: Rig
+    condition: float
+    mask: NDArray[np.bool_] | None = None
+
+    @property
+    def mask_sha256(self) -> str | None:
+        """The digest of the mask, None where there is none."""
+        return None if self.mask is None else hashlib.sha256(self.mask.tobytes()).hexdigest()
+
+
+def read_lighting(take: Take, rig_path: Path, mask_path: Path | None = None) -> Lighting:
+    """Read rig and mask of a take. Raises PsvideoError where they do not fit the plan, or give no normals."""
+    clip = take.clip
+    check_separable(clip.plan)
+    rig = read_rig(rig_path, plan_lights=clip.plan.lights)
+    lit = illumination(lights_as_planned(rig, clip.plan), channels=clip.channels)
+    mask = None if mask_path is None else read_mask(mask_path, width_px=clip.width_px, height_px=clip.height_px)
+    return Lighting(rig_path=rig_path, rig=rig, condition=lit.condition, mask=mask)
+
+
 def normals_run(
     take: Take,
     timing: Timing,
-    rig_path: Path,
+    lighting: Lighting,
     output: Output,
     *,
     delivery: Delivery,
-    mask_path: Path | None = None,
     watch: Watch = unwatched,
     picture_of: Callable[[Instant], Pixels] | None = None,
 ) -> NormalsResult:
@@ -155,17 +210,15 @@ def normals_run(
 
     ``picture_of`` makes the picture of one round; left out, it shows plates and surface.
     """
-    clip = take.clip
-    rig = read_rig(rig_path, plan_lights=clip.plan.lights)
-    mask = None if mask_path is None else read_mask(mask_path, width_px=clip.width_px, height_px=clip.height_px)
-    lit = illumination(lights_as_planned(rig, clip.plan), channels=clip.channels)
-    tags = _tags(clip, rig_path, delivery.space)
+    clip, mask = take.clip, lighting.mask
+    tags = _tags(clip, lighting.rig_path, delivery.space)
     facts: list[InstantFacts] = []
     picture: Pixels | None = None
-    with whole_folder(output.folder, force=output.force, resume=output.resume) as folder, writing() as write:
+    settings = _settings(take, timing, output, tags, delivery, lighting.mask_sha256)
+    with _folder(output, settings) as folder, writing() as write:
         rounds = clip_rounds(take, timing, start_number=output.start_number, watch=watch)
         residual = "residual" in delivery.aovs
-        for instant in surfaces(rounds, clip.plan, rig, mask=mask, half=delivery.half, residual=residual):
+        for instant in surfaces(rounds, clip.plan, lighting.rig, mask=mask, half=delivery.half, residual=residual):
             if not (output.resume and is_written(folder, clip.name, instant.round.number, delivery)):
                 write(partial(_write_instant, folder, clip.name, instant, delivery, tags))
             facts.append(instant_facts(instant.round, instant.surface, mask))
@@ -179,7 +232,7 @@ def normals_run(
             version=__version__,
             timing=timing,
             lights=clip.plan.lights,
-            condition=lit.condition,
+            condition=lighting.condition,
             instants=tuple(facts),
         )
         write_text(folder / "timing.json", format_timing(timing))

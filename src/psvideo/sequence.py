@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.camera import FloatArray
+from psvideo.errors import PsvideoError
 from psvideo.plan import Plan
 from psvideo.split import Image, Plate
 from psvideo.timing import Flash
@@ -65,6 +66,20 @@ def mixing_matrix(plan: Plan) -> FloatArray:
     duration_s = np.array([plan.flashes[slot].duration_s for slot in plan.lit_slots])
     matrix: FloatArray = plan.power * duration_s[:, None] / reference_s
     return matrix
+
+
+def check_separable(plan: Plan) -> None:
+    """Raise PsvideoError where the plan's flashes cannot tell its lights apart, whatever the pictures."""
+    matrix = mixing_matrix(plan)
+    if np.linalg.matrix_rank(matrix, tol=1e-6) == len(plan.lights):
+        return
+    reach = np.abs(np.linalg.svd(matrix)[2][np.linalg.matrix_rank(matrix, tol=1e-6) :]).max(axis=0)
+    mixed = [light for light, share in zip(plan.lights, reach, strict=True) if share > 1e-6]
+    raise PsvideoError(
+        f"The plan's flashes cannot tell the lights {', '.join(mixed)} apart: they flash together in the same "
+        "mixture, or there are fewer different flashes than lights. Flash each by itself, use as many patterns as "
+        "lights, or give lights that always flash together one name."
+    )
 
 
 def round_numbers(flashes: tuple[Flash, ...], *, start: int = FIRST_NUMBER) -> tuple[int, ...]:

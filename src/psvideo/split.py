@@ -26,7 +26,10 @@ LEAST_SHARE = 0.05
 MOST_FOREIGN = 0.01
 """A row into which more of another flash was mixed than this (a dark time that is too short) is taken as unseen."""
 SATURATED = 0.998
-"""A sample from here on is clipped; its plate is held at 1.0 at least, so that later steps see it as saturated too."""
+"""A sample from here on is clipped."""
+CLIPPED = 1e6
+"""Where any sample of a plate's pixel was clipped, this is added: no sum of light reaches it, and ``ambient.subtract``
+makes 1.0 of it, by which every later step knows saturation."""
 
 Image = NDArray[np.float32]
 
@@ -35,6 +38,7 @@ Image = NDArray[np.float32]
 class Plate:
     """The scene as one flash showed it: linear light, 1.0 = sensor saturation, (row, col) or (row, col, channel).
 
+    Pixels of which a sample was clipped are ``CLIPPED`` or more until ambient light is taken off, 1.0 from then on.
     ``exposures`` (row,) is how many exposures' worth of ambient light the image holds, and ``seen`` (row,) is False
     where no frame saw enough of the flash (the image is 0 there).
     """
@@ -51,7 +55,7 @@ class Plate:
 
 
 def split(frames: Iterable[LinearFrame], camera: Camera, timing: Timing) -> Iterator[Plate]:
-    """Yield one plate for every complete flash, in order, dark slots included.
+    """Yield one plate for every complete flash that any frame saw, in order, dark slots included.
 
     ``frames`` come in order; a hole in their indices is a dropped frame. Only the two or three frames that the current
     flash touches are held. The plates still hold ambient light, as ``Plate.exposures`` says.
@@ -61,7 +65,9 @@ def split(frames: Iterable[LinearFrame], camera: Camera, timing: Timing) -> Iter
     for flash in timing.flashes:
         if flash.complete and first[flash.index] <= last[flash.index]:
             touched = range(int(first[flash.index]), int(last[flash.index]) + 1)
-            yield _rebuild(camera, timing, flash, stream.between(touched), touched)
+            images = stream.between(touched)
+            if images:
+                yield _rebuild(camera, timing, flash, images, touched)
 
 
 class _Window:
@@ -91,7 +97,7 @@ def _rebuild(camera: Camera, timing: Timing, flash: Flash, images: dict[int, Ima
     clean = weights * (_foreign_light(camera, timing, flash, touched) <= MOST_FOREIGN)
     coefficients = _best_sum(clean) if any(flash.lights.values()) else _average_of(clean)
     seen = coefficients.sum(axis=0) > 0
-    shape = next(iter(images.values())).shape if images else (camera.height_px, camera.width_px)
+    shape = next(iter(images.values())).shape
     plate = np.zeros(shape, np.float32)
     flat = plate.reshape(shape[0], -1)
     for index, coefficient in zip(touched, coefficients, strict=True):
@@ -131,11 +137,10 @@ def _foreign_light(camera: Camera, timing: Timing, flash: Flash, frames: range) 
 
 @compiled
 def _add_rows(plate: Image, frame: Image, coefficient: Image, saturated: np.float32) -> None:
-    """Add a frame's rows, each times its coefficient; hold what is clipped at 1.0 at least."""
+    """Add a frame's rows, each times its coefficient, and CLIPPED where a sample was clipped."""
     for row in range(plate.shape[0]):
         share = coefficient[row]
         if share > 0:
             for col in range(plate.shape[1]):
                 value = frame[row, col]
-                total = plate[row, col] + share * value
-                plate[row, col] = max(total, np.float32(1.0)) if value >= saturated else total
+                plate[row, col] += np.float32(CLIPPED) if value >= saturated else share * value

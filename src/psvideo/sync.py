@@ -43,6 +43,10 @@ def find_timing(
     ``numbers`` (frame,) are the frames' own numbers, by which dropped and repeated ones are reported (left out: the
     indices). Raises PsvideoError where the profiles do not look like the plan's strobe.
     """
+    if first_light is not None and first_light not in plan.lights:
+        raise UsageError(
+            f"--first-light {first_light}: no such light in the plan; its lights are {', '.join(plan.lights)}."
+        )
     if plan.mode == "synced":
         return _synced_timing(plan, indices, clip=clip, dropped=dropped)
     if len(indices) < 4:
@@ -102,10 +106,6 @@ def _order_of_lights(plan: Plan, found: Found, first_light: str | None) -> tuple
 
 
 def _given_order(plan: Plan, rows: Profiles, alike: Sequence[Beat], first_light: str) -> Beat:
-    if first_light not in plan.lights:
-        raise UsageError(
-            f"--first-light {first_light}: no such light in the plan; its lights are {', '.join(plan.lights)}."
-        )
     for beat in alike:
         if first_light == _first_complete_light(plan, rows, beat):
             return beat
@@ -189,7 +189,7 @@ def _assemble(
 
 
 def _synced_timing(plan: Plan, indices: NDArray[np.int64], *, clip: str, dropped: Sequence[DroppedFrames]) -> Timing:
-    """One flash a frame, in the plan's order: nothing is left to find."""
+    """One flash a frame, in the plan's order: nothing is left to find, and when its rows open does not matter."""
     period_s = plan.camera.frame_period_s
     train = plan.train(0, int(indices[-1]) + 1)
     flashes = tuple(
@@ -207,7 +207,7 @@ def _synced_timing(plan: Plan, indices: NDArray[np.int64], *, clip: str, dropped
         clip=clip,
         frame_period_s=period_s,
         exposure_s=plan.camera.exposure_s,
-        row_time_s=plan.camera.row_time_s,
+        row_time_s=0.0,
         clock_offset_ppm=0.0,
         phase_error_rows=0.0,
         order="given",

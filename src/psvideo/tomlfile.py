@@ -19,6 +19,21 @@ class Contract(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, populate_by_name=True, allow_inf_nan=False)
 
 
+TAKEN_NAMES = ("ambient", "flashes")
+UNFIT_FOR_FILES = set('/\\:*?"<>|')
+
+
+def check_light_name(name: str) -> str:
+    """Return a light's name; raises ValueError where it cannot name folders and files, which it does for plates."""
+    unfit = any(letter in UNFIT_FOR_FILES or ord(letter) < 32 for letter in name)
+    if not name or unfit or name[0] in ". " or name[-1] in ". " or name.lower() in TAKEN_NAMES:
+        raise ValueError(
+            f"{name!r} cannot be a light's name, because it names folders and files: expected letters, digits, - or _, "
+            f"and not {' or '.join(TAKEN_NAMES)}"
+        )
+    return name
+
+
 Model = TypeVar("Model", bound=Contract)
 
 
@@ -69,7 +84,8 @@ def check_schema(found: object, expected: str, *, source: str) -> None:
 
 def _sentence(source: str, model: type[BaseModel], fault: ValidationError) -> str:
     """Put every mistake of a validation into one paragraph."""
-    return f"{source}: " + "; ".join(_mistake(model, error) for error in fault.errors()) + "."
+    told = f"{source}: " + "; ".join(_mistake(model, error) for error in fault.errors())
+    return told if told.endswith("?") else told + "."
 
 
 def _mistake(model: type[BaseModel], error: Any) -> str:

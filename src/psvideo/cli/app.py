@@ -10,6 +10,8 @@ import typer
 from psvideo import __version__
 from psvideo.errors import PsvideoError
 
+STOPPED = 130
+"""What the command line library ends with when the user interrupts."""
 COMMANDS = ("capture-plan", "calibrate", "synth", "sync", "split", "normals", "info", "demo")
 
 
@@ -60,6 +62,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"psvideo: {fault}", file=sys.stderr)
         return fault.exit_status
     except SystemExit as end:
+        if end.code == STOPPED:
+            print(
+                "psvideo: stopped. What was finished is kept; split and normals go on with --resume.", file=sys.stderr
+            )
+            return 1
         return end.code if isinstance(end.code, int) else 0
     return 0
 

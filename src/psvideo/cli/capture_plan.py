@@ -70,7 +70,7 @@ def capture_plan(
     picture = check_diagram_name(diagram)
     outputs = [path for path in (out, picture) if path is not None]
     for path in outputs:
-        refuse_existing(path, force=force)
+        refuse_existing(path, force=force, mark="psvideo-plan/" if path == out else None)
     words = {field.name: context.params[field.name] for field in dataclasses.fields(ShootWords)}
     request = parse_request(ShootWords(**words))
     shoot = plan_shoot(request)

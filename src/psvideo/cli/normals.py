@@ -24,7 +24,7 @@ from psvideo.cli.sync import describe_timing
 from psvideo.export.results import Delivery
 from psvideo.export.space import choose_space
 from psvideo.pipeline import open_take
-from psvideo.runs import Output, normals_run, timing_of
+from psvideo.runs import Output, normals_run, read_lighting, timing_of
 from psvideo.view.report import findings, report_record, verdict
 
 
@@ -101,8 +101,9 @@ def normals(
         voice.warn(warning)
     for note in take.clip.notes:
         voice.detail(note)
+    lighting = read_lighting(take, rig, mask)
     found = timing_of(take, timing, first_light=first_light, watch=voice.track)
-    report = normals_run(take, found, rig, output, delivery=delivery, mask_path=mask, watch=voice.track).report
+    report = normals_run(take, found, lighting, output, delivery=delivery, watch=voice.track).report
     voice.result(report_record(report))
     voice.say(describe_timing(found))
     voice.say(verdict(report))

@@ -30,7 +30,7 @@ def sync(
     """Find phase, clock offset, light order and dropped frames of a strobed clip, from the picture alone."""
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     if out is not None:
-        refuse_existing(out, force=force)
+        refuse_existing(out, force=force, mark="psvideo-timing/")
     take = open_take(clip, plan=plan, frames=frames)
     for warning in take.clip.warnings:
         voice.warn(warning)

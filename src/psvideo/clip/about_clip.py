@@ -72,7 +72,7 @@ def _hole_findings(clip: Clip) -> Iterator[Finding]:
     shown = ", ".join(f"{count} after {after}" for after, count in found[:MANY])
     more = f" and {len(found) - MANY} more places" if len(found) > MANY else ""
     if clip.plan.mode == "synced":
-        yield ok(f"the numbers have holes ({shown}{more}); a synced clip's frames are taken in order")
+        yield ok(f"the numbers have holes ({shown}{more}): these frames, and the flashes in them, are missing")
     else:
         yield warn(f"{sum(count for _, count in found)} frame(s) dropped: {shown}{more}")
 

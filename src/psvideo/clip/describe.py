@@ -16,8 +16,12 @@ def describe(path: Path, *, plan: Path | None = None) -> Description:
     ``plan`` names the plan of a clip where it does not lie beside it. What does not fit is among the findings; raises
     PsvideoError only where the path is nothing that psvideo knows.
     """
-    if not path.exists():
-        raise PsvideoError(f"{path}: there is no such file or folder. Check the name.")
+    try:
+        path.stat()
+    except FileNotFoundError:
+        raise PsvideoError(f"{path}: there is no such file or folder. Check the name.") from None
+    except OSError as fault:
+        raise PsvideoError(f"{path}: cannot be looked at ({fault.strerror}). Check its permissions.") from fault
     if path.suffix.lower() in MOVIES and path.is_file():
         return describe_clip(path, plan)
     if not path.is_dir():

@@ -53,9 +53,11 @@ def find_sequence(folder: Path) -> Sequence:
 
 
 def _images(folder: Path) -> list[Path]:
-    if not folder.is_dir():
-        return []
-    files = (entry for entry in folder.iterdir() if entry.suffix.lower() in KINDS and not entry.name.startswith("."))
+    try:
+        entries = list(folder.iterdir()) if folder.is_dir() else []
+    except OSError as fault:
+        raise PsvideoError(f"{folder}: cannot be read ({fault.strerror}). Check the folder's permissions.") from fault
+    files = (entry for entry in entries if entry.suffix.lower() in KINDS and not entry.name.startswith("."))
     return sorted(files)
 
 

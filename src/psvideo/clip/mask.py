@@ -18,6 +18,8 @@ def read_mask(path: Path, *, width_px: int, height_px: int) -> NDArray[np.bool_]
     kind = KINDS.get(path.suffix.lower())
     if kind is None:
         raise PsvideoError(f"{path}: is no picture that can be a mask; expected one of {', '.join(KINDS)}.")
+    if not path.is_file():
+        raise PsvideoError(f"{path}: there is no such mask. Check the name.")
     codes = decode(kind, path).codes
     brightest = codes if codes.ndim == 2 else codes.max(axis=2)
     if brightest.shape != (height_px, width_px):

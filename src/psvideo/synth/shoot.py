@@ -60,7 +60,7 @@ def shoot(scene: Path, out: Path, *, force: bool = False, track: Track = iter) -
     """
     _refuse_footage(out, force=force)
     stage = set_stage(read_scene(scene), scene.parent)
-    with whole_folder(out, force=force) as folder, _nothing_left(folder, out):
+    with whole_folder(out, mark="truth/scene.json", force=force) as folder, _nothing_left(folder, out):
         (folder / "frames").mkdir()
         return _film(stage, folder, out, track)
 

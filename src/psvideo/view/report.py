@@ -19,6 +19,8 @@ from psvideo.timing import Timing
 SURE_ENOUGH_ROWS = 0.3
 MOST_CLIPPED = 0.02
 LEAST_VALID = 0.3
+MOST_UNSEEN = 0.02
+HARDLY_VALID = 0.05
 LIT = 0.01
 """A pixel brighter than this share of saturation under any light is part of the scene."""
 
@@ -93,8 +95,14 @@ def findings(report: RunReport) -> tuple[str, ...]:
     clipped = max((facts.clipped_share for facts in instants), default=0.0)
     if clipped > MOST_CLIPPED:
         found.append(f"{100 * clipped:.1f} % of a plate is saturated: lower power, flash duration, gain or aperture.")
+    unseen = max((facts.unseen_share for facts in instants), default=0.0)
+    if unseen > MOST_UNSEEN:
+        found.append(
+            f"Up to {100 * unseen:.0f} % of a round's rows were seen by no frame: frames are missing, or the shutter "
+            "is open for less than the frame. Use all frames (no steps in --frames), and shoot at 360 degrees."
+        )
     valid = min((facts.valid_share for facts in instants), default=0.0)
-    if instants and valid < LEAST_VALID:
+    if instants and valid < LEAST_VALID and unseen <= MOST_UNSEEN:
         found.append(
             f"Only {100 * valid:.0f} % of what is lit has a normal to be trusted: give the subject more light, place "
             "the lights nearer to the camera's axis, or use more of them, so that three reach every part."
@@ -110,6 +118,8 @@ def verdict(report: RunReport) -> str:
     """Return in one sentence whether the take is usable."""
     if not report.instants:
         return "This take gave no normals: it holds no round in which every light is complete."
+    if max(facts.valid_share for facts in report.instants) < HARDLY_VALID:
+        return "This take is not usable: hardly a pixel has a normal to be trusted."
     if report.timing.order == "guess" or report.timing.phase_error_rows > SURE_ENOUGH_ROWS:
         return "This take is doubtful: see below before using it."
     return "This take is usable." if not findings(report) else "This take is usable, with reservations."
