@@ -1,8 +1,8 @@
 """Finding stripes in row profiles: which period, in which colour, and whether they are stripes at all.
 
-Candidates are the spectrum's peaks, their subharmonics, and the shifts at which the profiles are most like themselves
-(short flashes have many harmonics as strong as the fundamental). Each is fitted. The shortest period that explains the
-profiles as well as any is taken; what could be meant in two ways, or is no more regular than a scene, is refused.
+Candidates are the spectrum's peaks and their subharmonics (short flashes have harmonics as strong as the fundamental).
+Each is fitted. The shortest period that explains the profiles as well as any is taken; what could be meant in two ways,
+or is no more regular than a scene, is refused.
 """
 
 from collections.abc import Sequence
@@ -20,7 +20,8 @@ FEWEST_PERIODS = 2.0
 SHORTEST_PERIOD_ROWS = 2.5
 MOST_SEARCHED_FRAMES = 4
 SUBHARMONICS = (1, 2, 3)
-HARMONICS = 8
+HARMONICS = 16
+"""Fewer would leave flashes of a few per cent to be mistaken for something else."""
 SAME_CYCLES = 0.4
 """Frequencies that differ by less than this many periods over the picture are the same candidate."""
 NEAR = 0.25
@@ -29,6 +30,8 @@ CLEAR_GAIN = 0.15
 FAINT_GAIN = 0.01
 """A longer period is a better reading where it takes this share off what the shorter one leaves over, and explains this
 much more of the stripes altogether."""
+THIN_ROWS = 8.0
+MOST_TIMES = 3
 HALF_TOLD = 0.8
 """Where a shorter period explains this share of what the longer one does, only every second stripe differs a little."""
 MOST_RIVAL = 0.75
@@ -72,6 +75,7 @@ def find_stripes(profiles: FloatArray, *, expected: float | None = None) -> Read
     found = [_read(whole, frequency) for frequency in _candidates(whole, expected)]
     readings = [reading for reading in found if reading.frequency * rows >= FEWEST_PERIODS]
     _refuse_wide(found, readings, rows)
+    readings = [reading for reading in readings if not _is_echo(reading, readings)]
     if expected is not None:
         readings = [reading for reading in readings if abs(reading.frequency / expected - 1) < NEAR]
     if not readings:
@@ -147,6 +151,20 @@ def _refuse_wide(found: Sequence[Reading], readings: Sequence[Reading], rows: in
             f"{FEWEST_PERIODS:g} cannot be told from the scene. Let the LED blink faster, so that 5 to 40 stripes fit "
             "into the height, and see that it is the only light."
         )
+
+
+def _is_echo(reading: Reading, readings: Sequence[Reading]) -> bool:
+    """Tell whether a reading only repeats a shorter period several times.
+
+    Many periods in one are no light's doing, and thin stripes with sharp edges repeat exactly after several periods
+    only, because their edges fall between rows.
+    """
+    for other in readings:
+        times = _times(other, reading)
+        is_thin = other.frequency > 1 / THIN_ROWS
+        if times >= 2 and other.explained > HALF_TOLD * reading.explained and (is_thin or times > MOST_TIMES):
+            return True
+    return False
 
 
 def _shortest(readings: Sequence[Reading]) -> Reading:

@@ -1,11 +1,10 @@
-"""Where row profiles (frame, channel, row) repeat: the peaks of their spectrum and of their likeness to themselves."""
+"""The spectrum of row profiles (frame, channel, row): where it peaks, and what peaks beside the stripes found."""
 
 import numpy as np
 
 from psvideo.camera import FloatArray
 
 PEAKS = 5
-HARMONICS = 8
 OVERSAMPLING = 8
 LEAST_FAINT = 0.003
 OUTSTANDING = 20.0
@@ -16,12 +15,10 @@ its neighbourhood, more than the window's width from the harmonics (so many) of 
 
 
 def find_peaks(whole: FloatArray) -> list[float]:
-    """Return where spectrum and likeness, over all frames and channels, peak; in periods per row."""
+    """Return where the spectrum over all frames and channels peaks, the highest first, in periods per row."""
     rows = whole.shape[2]
     power = _power(whole)
-    likeness = np.fft.irfft(power)[: rows // 2]
-    strongest = [top / (OVERSAMPLING * rows) for top in _tops(power, OVERSAMPLING)]
-    return strongest + [_comb_top(power, rows, lag) for lag in _tops(likeness, 2)]
+    return [top / (OVERSAMPLING * rows) for top in _tops(power, OVERSAMPLING)]
 
 
 def find_fainter(whole: FloatArray, frequency: float) -> float | None:
@@ -55,14 +52,6 @@ def _tops(curve: FloatArray, lowest: int) -> list[int]:
     tops = 1 + np.flatnonzero((curve[1:-1] > curve[:-2]) & (curve[1:-1] >= curve[2:]))
     tops = tops[tops >= lowest]
     return [int(top) for top in tops[np.argsort(-curve[tops])][:PEAKS]]
-
-
-def _comb_top(power: FloatArray, rows: int, lag: int) -> float:
-    """Return the frequency near 1 / lag whose harmonics are strongest together."""
-    steps = np.arange(OVERSAMPLING * rows / (lag + 0.6), OVERSAMPLING * rows / (lag - 0.6), 0.25)
-    places = np.rint(steps[:, None] * np.arange(1, HARMONICS + 1)).astype(np.int64)
-    comb = np.where(places < power.size, power[np.minimum(places, power.size - 1)], 0.0).sum(axis=1)
-    return float(steps[np.argmax(comb)]) / (OVERSAMPLING * rows)
 
 
 def flattened(profiles: FloatArray) -> FloatArray:
