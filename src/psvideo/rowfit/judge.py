@@ -102,7 +102,8 @@ def _exposure(plan: Plan, found: Found) -> str:
 def frame_gains(plan: Plan, found: Found) -> tuple[FloatArray, float]:
     """Return every frame's gain (frame,) against the whole clip's brightnesses, and what gains explain of the rest."""
     rows = replace(found.rows, doubt=None)
-    expected = predictions(plan, rows, found.fit.beat, brightnesses(plan, rows.one_window(), found.fit.beat))
+    beat = replace(found.fit.beat, beat_hz=())
+    expected = predictions(plan, rows, beat, brightnesses(plan, rows.one_window(), beat))
     trust = found.fit.weight / found.fit.weight.max(axis=0)
     width = min(9, len(rows.value))
     around = [

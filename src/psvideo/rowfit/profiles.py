@@ -54,6 +54,15 @@ class Profiles:
             doubt=None if self.doubt is None else self.doubt[frames],
         )
 
+    def only_rows(self, rows: slice) -> "Profiles":
+        """Return some neighbouring rows of all frames."""
+        return replace(
+            self,
+            value=np.ascontiguousarray(self.value[:, rows]),
+            place=self.place[rows],
+            doubt=None if self.doubt is None else self.doubt[:, rows],
+        )
+
     def one_window(self) -> "Profiles":
         """Return the same profiles with brightnesses that hold for all frames."""
         return replace(self, window_start=np.zeros(1, np.int64))
