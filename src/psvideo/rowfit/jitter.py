@@ -14,7 +14,7 @@ from psvideo.camera import FloatArray
 from psvideo.plan import Plan
 from psvideo.rowfit import kernel
 from psvideo.rowfit.profiles import Profiles, compiled_flashes, compiled_rows, equations
-from psvideo.rowfit.refine import Fit
+from psvideo.rowfit.refine import CAUCHY, WIDE_SCALE, Fit, scaled
 
 LEAST_FLASHES = 12
 SURE = 5.0
@@ -48,7 +48,9 @@ def jitter(plan: Plan, rows: Profiles, fit: Fit) -> Jitter:
     """Return how single flashes stray from the clock; none at all where openings and closings do not agree on it."""
     seen, flashes = compiled_rows(rows, fit.beat), compiled_flashes(plan, rows, fit.beat)
     pull, stiff = np.zeros((len(flashes.start_s), 2)), np.zeros((len(flashes.start_s), 2))
-    kernel.edges(seen, flashes, fit.weight, 0, rows.value.shape[1], pull, stiff)
+    scale = scaled(rows, fit.rest, WIDE_SCALE)
+    weight = 1.0 / (1.0 + (fit.rest / (CAUCHY * scale)) ** 2) / scale**2
+    kernel.edges(seen, flashes, weight, 0, rows.value.shape[1], pull, stiff)
     seen_at_all = stiff[stiff > 0]
     enough = 0.1 * float(np.median(seen_at_all)) if len(seen_at_all) else 1.0
     told = np.logical_and(stiff[:, 0] > enough, stiff[:, 1] > enough)
