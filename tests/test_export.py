@@ -4,6 +4,7 @@ import contextlib
 import resource
 import subprocess
 import sys
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -137,6 +138,16 @@ def test_a_flash_by_itself_says_which_lights_it_held(tmp_path: Path) -> None:
     header, _ = read(tmp_path / "flashes" / "take_flash.0007.exr")
     assert header["psvideo:lights"] == "a=1 b=0.5"
     assert header["psvideo:time_s"] == 1.25
+
+
+def test_a_time_code_is_counted_on_to_the_instant_where_it_can_be(tmp_path: Path) -> None:
+    coded = replace(TAGS, camera_fps=Fraction(24000, 1001), first_time_code="10:59:59:22")
+    write_surface(tmp_path, "take", 1, 3 * 1001 / 24000, surface(), delivery=Delivery(space=Space()), tags=coded)
+    header, _ = read(tmp_path / "normals" / "take_normals.0001.exr")
+    code = header["timeCode"]
+    assert (code.hours, code.minutes, code.seconds, code.frame) == (11, 0, 0, 1)  # type: ignore[attr-defined]
+    assert replace(coded, first_time_code="10:59:59;22").time_code(1.0) is None
+    assert TAGS.time_code(1.0) is None
 
 
 def test_a_crop_keeps_the_display_window(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import pytest
 PACKAGE = Path(__file__).resolve().parents[1] / "src" / "psvideo"
 
 LAYERS = [
-    {"errors", "tomlfile", "files"},
+    {"errors", "tomlfile", "files", "compiled"},
     {"camera", "rig", "rigfile", "surface"},
     {"plan", "planfile", "timing"},
     {"shutter", "clip", "strobe", "capture"},

@@ -265,9 +265,9 @@ def _reference(samples: Array, lit: Illumination, seen: NDArray[np.bool_]) -> tu
         return nothing
     scaled, *_ = np.linalg.lstsq(matrix[used], together[used])
     normal = scaled / np.linalg.norm(scaled)
-    if abs(normal[2]) < 1e-3:
+    if abs(normal[2] + 0.342) < 1e-3:
         return None
-    if normal[2] < 0:
+    if normal[2] < -0.342:
         return nothing
     shade = matrix[used] @ normal
     albedo = np.maximum(shade @ values[used] / (shade @ shade), 0)
@@ -378,3 +378,17 @@ def test_arrays_that_do_not_belong_together_are_a_mistake_of_the_program(change:
     plates = arguments.pop("plates")
     with pytest.raises(ValueError, match=r"plates|seen|mask"):
         solve(plates, lit_by(ring(3, 40)), **arguments)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("tilt_deg", "kept"), [(-80.0, True), (-95.0, True), (-105.0, True), (-120.0, False)])
+def test_a_table_top_seen_in_perspective_may_turn_a_little_away_from_the_axis(tilt_deg: float, kept: bool) -> None:
+    """Seen from above, a level surface below the camera's axis is visible though its normal has z <= 0."""
+    tilt = np.radians(tilt_deg)
+    normal = np.array([0.0, -np.sin(tilt), np.cos(tilt)])
+    lights = np.array([[0.3, 0.95, 0.1], [-0.3, 0.95, 0.1], [0.0, 0.8, 0.6], [0.0, 0.9, -0.3]])
+    lights /= np.linalg.norm(lights, axis=1, keepdims=True)
+    lit = Illumination(directions=lights, intensities=np.ones((4, 1)))
+    solved = solve([np.full((2, 2), 0.7 * max(normal @ light, 0), np.float32) for light in lights], lit)
+    assert solved.valid.all() == kept
+    if kept:
+        np.testing.assert_allclose(solved.normals[0, 0], normal, atol=1e-5)

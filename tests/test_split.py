@@ -305,3 +305,46 @@ def test_a_light_flashed_at_half_power_is_delivered_at_full_power(make_plan: Pla
     shot, timing = shoot(plan, truth)
     gathered = list(sequence.rounds(split(frames_of(shot), plan.camera, timing), plan, timing.flashes))
     np.testing.assert_allclose(gathered[2].plates[0].image, 2 * truth[0], atol=1e-4)
+
+
+def hdr(plan: Plan) -> Plan:
+    """Light a at full power and, four times as short, at half of it: an eighth of the light; then b and c."""
+    long_s, short_s = 0.0008, 0.0002
+    lights = [({"a": 1.0}, long_s), ({"a": 0.5}, short_s), ({"b": 1.0}, long_s), ({"c": 1.0}, long_s), ({}, long_s)]
+    return replace(plan, flashes=tuple(PlannedFlash(lights=names, duration_s=s) for names, s in lights))
+
+
+def test_hdr_flashes_of_one_light_are_merged_without_what_is_clipped(make_plan: PlanMaker) -> None:
+    plan = hdr(make_plan())
+    rng = np.random.default_rng(4)
+    shape = (plan.camera.height_px, plan.camera.width_px)
+    scene = (0.02 + 3.0 * rng.random(shape)).astype(np.float32)
+    other = np.full(shape, 0.3, np.float32)
+    shot, timing = shoot(plan, {0: scene, 1: scene / 8, 2: other, 3: other})
+    one = list(sequence.rounds(split(frames_of(shot), plan.camera, timing), plan, timing.flashes))[2]
+    merged = one.plates[0]
+    assert merged.light == "a"
+    assert merged.saturation == pytest.approx(8.0)
+    assert np.abs(merged.image / scene - 1).max() < 1e-3
+    assert (merged.image > 1.5).any()
+
+
+def test_merging_is_as_good_as_the_best_of_the_exposures(make_plan: PlanMaker) -> None:
+    plan = hdr(make_plan())
+    shape = (plan.camera.height_px, plan.camera.width_px)
+    scene = np.full(shape, 0.6, np.float32)
+    other = np.full(shape, 0.3, np.float32)
+    noise = Noise(full_well_e=20_000, read_e=0)
+    shot, timing = shoot(plan, {0: scene, 1: scene / 8, 2: other, 3: other}, noise=noise)
+    rounds = list(sequence.rounds(split(frames_of(shot), plan.camera, timing), plan, timing.flashes))[1:-1]
+    error = np.std([one.plates[0].image - scene for one in rounds])
+    assert error < 1.02 * np.sqrt(0.6 / 20_000 / (1 + 1 / 8))
+
+
+def test_what_is_clipped_in_every_exposure_is_held_at_the_weakest_ones_limit(make_plan: PlanMaker) -> None:
+    plan = hdr(make_plan())
+    shape = (plan.camera.height_px, plan.camera.width_px)
+    bright, other = np.full(shape, 20.0, np.float32), np.full(shape, 0.3, np.float32)
+    shot, timing = shoot(plan, {0: bright, 1: bright / 8, 2: other, 3: other})
+    one = list(sequence.rounds(split(frames_of(shot), plan.camera, timing), plan, timing.flashes))[2]
+    assert (one.plates[0].image[5:-5] >= one.plates[0].saturation).mean() > 0.8

@@ -8,10 +8,10 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import cv2
-import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compiled import compiled
 from psvideo.split import Image, Plate
 
 LONGEST_MEMORY = 16
@@ -51,8 +51,8 @@ def _changed(old: Image, new: Image) -> NDArray[np.bool_]:
     return changed
 
 
-@nb.njit(cache=True, nogil=True)
-def _mean_change(old, new, change):  # type: ignore[no-untyped-def]
+@compiled
+def _mean_change(old: Image, new: Image, change: Image) -> None:
     rows, cols, channels = old.shape
     for row in range(rows):
         for col in range(cols):
@@ -62,8 +62,8 @@ def _mean_change(old, new, change):  # type: ignore[no-untyped-def]
             change[row, col] = total / np.float32(channels)
 
 
-@nb.njit(cache=True, nogil=True)
-def _blend(old, new, old_slots, changed, blended, slots):  # type: ignore[no-untyped-def]
+@compiled
+def _blend(old: Image, new: Image, old_slots: Image, changed: NDArray[np.bool_], blended: Image, slots: Image) -> None:
     """Average where nothing changed, begin anew where something did."""
     rows, cols, channels = old.shape
     for row in range(rows):
@@ -101,8 +101,8 @@ def _without(plate: Plate, ambient: Image) -> Image:
     return lit
 
 
-@nb.njit(cache=True, nogil=True)
-def _subtract_rows(image, ambient, exposures, lit):  # type: ignore[no-untyped-def]
+@compiled
+def _subtract_rows(image: Image, ambient: Image, exposures: Image, lit: Image) -> None:
     for row in range(image.shape[0]):
         count = exposures[row]
         for col in range(image.shape[1]):

@@ -21,16 +21,16 @@ from psvideo.normals.woodham1980 import solve
 from psvideo.plan import Plan
 from psvideo.profiles import collect_with_doubt
 from psvideo.rig import Light, Rig
-from psvideo.sequence import FIRST_NUMBER, Round, reference_duration_s, rounds
+from psvideo.sequence import FIRST_NUMBER, LightPlate, Round, reference_duration_s, rounds
 from psvideo.shutter import frames_touched
-from psvideo.split import Plate, split
+from psvideo.split import Image, Plate, split
 from psvideo.surface import Surface
 from psvideo.sync import find_timing
 from psvideo.timing import DroppedFrames, Timing, places_in_time
 
 Method = Literal["weights", "hudon2015"]
 Item = TypeVar("Item")
-AHEAD = 1
+AHEAD = 2
 """Frames that are decoded in advance while plates are rebuilt; each costs memory."""
 
 
@@ -212,12 +212,23 @@ def surfaces(
     lights = lights_as_planned(rig, plan)
 
     def solved(one: Round) -> Instant:
-        lit = illumination(lights, channels=1 if one.plates[0].image.ndim == 2 else 3)
+        scaled = [_weaker(light, plate.saturation) for light, plate in zip(lights, one.plates, strict=True)]
+        lit = illumination(scaled, channels=1 if one.plates[0].image.ndim == 2 else 3)
         seen = np.stack([plate.seen for plate in one.plates])
-        plates = [plate.image for plate in one.plates]
+        plates = [_until_saturation(plate) for plate in one.plates]
         shown = None if seen.all() else seen
         surface = solve(plates, lit, seen=shown, mask=mask, half=half, residual=residual)
         return Instant(round=one, surface=surface)
 
     # map and filter hold no round while the next one gathers, as a loop's variable would
     return map(solved, filter(lambda one: one.lights == plan.lights, gathered))
+
+
+def _weaker(light: Light, saturation: float) -> Light:
+    """Return a light as the solver is to see it, whose plates are clipped at 1.0."""
+    return replace(light, intensity=tuple(strength / saturation for strength in light.intensity))
+
+
+def _until_saturation(plate: LightPlate) -> Image:
+    """Return a plate on a scale on which it is clipped at 1.0."""
+    return plate.image if plate.saturation == 1.0 else plate.image / np.float32(plate.saturation)

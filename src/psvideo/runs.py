@@ -16,6 +16,7 @@ from psvideo.errors import PsvideoError
 from psvideo.export.plates import plate_name, write_flash, write_plate
 from psvideo.export.publish import whole_folder
 from psvideo.export.results import Delivery, is_written, write_surface
+from psvideo.export.space import CAMERA_SPACE, Space
 from psvideo.export.tags import Tags, sha256_of
 from psvideo.export.writer import writing
 from psvideo.files import refuse_existing, write_text
@@ -93,7 +94,7 @@ def split_run(
 ) -> Timing:
     """Write one sequence per light, ambient where there are dark slots, and timing.json; return what that holds."""
     clip = take.clip
-    tags = Tags(fps=sequence_fps(clip.plan), colour=clip.colour, plan_sha256=sha256_of(clip.plan_path))
+    tags = _tags(clip)
     written: set[str] = set()
     with whole_folder(output.folder, force=output.force, resume=output.resume) as folder, writing() as write:
         each = (lambda plate: write(partial(write_flash, folder, clip.name, plate, tags))) if flashes else None
@@ -158,7 +159,7 @@ def normals_run(
     rig = read_rig(rig_path, plan_lights=clip.plan.lights)
     mask = None if mask_path is None else read_mask(mask_path, width_px=clip.width_px, height_px=clip.height_px)
     lit = illumination(lights_as_planned(rig, clip.plan), channels=clip.channels)
-    tags = _tags(clip, rig_path, delivery)
+    tags = _tags(clip, rig_path, delivery.space)
     facts: list[InstantFacts] = []
     picture: Pixels | None = None
     with whole_folder(output.folder, force=output.force, resume=output.resume) as folder, writing() as write:
@@ -187,14 +188,16 @@ def normals_run(
     return NormalsResult(report=report, picture=picture)
 
 
-def _tags(clip: Clip, rig_path: Path, delivery: Delivery) -> Tags:
+def _tags(clip: Clip, rig_path: Path | None = None, space: Space = CAMERA_SPACE) -> Tags:
     return Tags(
         fps=sequence_fps(clip.plan),
         colour=clip.colour,
         plan_sha256=sha256_of(clip.plan_path),
-        rig_sha256=sha256_of(rig_path),
-        space=delivery.space.name,
-        y=delivery.space.y,
+        rig_sha256=None if rig_path is None else sha256_of(rig_path),
+        space=space.name,
+        y=space.y,
+        camera_fps=clip.plan.camera.fps,
+        first_time_code=clip.time_code,
     )
 
 

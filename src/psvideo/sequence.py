@@ -1,7 +1,9 @@
 """Plates in the order of flashes, gathered into one set per round: each light once, at its full flash.
 
 Every flash is a sum of lights, ``plate[k] = sum_l power[k, l] * light[l]``. One light per flash is the identity; other
-patterns are demultiplexed by the pseudo-inverse. A light's full flash is power 1 for its longest planned duration.
+patterns are demultiplexed by the pseudo-inverse. A light that flashes alone several times a round, at different powers
+or durations (HDR), is merged: what is saturated is left out and the rest is summed, which weights it by photon noise. A
+light's full flash is power 1 for its longest planned duration.
 """
 
 from collections.abc import Iterable, Iterator
@@ -20,13 +22,17 @@ FIRST_NUMBER = 1001
 
 @dataclass(frozen=True, kw_only=True)
 class LightPlate:
-    """The scene under one light at its full flash, at one instant. ``seen`` (row,) as in a Plate."""
+    """The scene under one light at its full flash, at one instant. ``seen`` (row,) as in a Plate.
+
+    ``saturation`` is the value from which on a pixel is clipped: 1.0, or more where the flash was weaker than full.
+    """
 
     light: str
     number: int
     time_s: float
     image: Image
     seen: NDArray[np.bool_]
+    saturation: float = 1.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,32 +113,56 @@ def _gathered(held: list[Plate], plan: Plan, number: int) -> Iterator[Round]:
     yield Round(number=number, plates=tuple(plates), ambient=ambient)
 
 
-def _demultiplexed(lit: dict[int, Plate], plan: Plan, number: int) -> Iterator[LightPlate] | list[LightPlate]:
+def _demultiplexed(lit: dict[int, Plate], plan: Plan, number: int) -> list[LightPlate]:
     """Solve the round's mixture for the lights; a light is there once every flash that it depends on is."""
     matrix = mixing_matrix(plan)
     inverse = np.linalg.pinv(matrix)
     inverse[np.abs(inverse) < 1e-12] = 0.0
     plates = []
-    for light, shares in zip(plan.lights, inverse, strict=True):
-        needed = [(slot, share) for slot, share in zip(plan.lit_slots, shares, strict=True) if share]
-        if all(slot in lit for slot, _ in needed):
-            plates.append(_combined([(lit[slot], share) for slot, share in needed], light, number))
+    for light, column, shares in zip(plan.lights, matrix.T, inverse, strict=True):
+        needed = [row for row, share in enumerate(shares) if share]
+        if any(plan.lit_slots[row] not in lit for row in needed):
+            continue
+        parts = [lit[plan.lit_slots[row]] for row in needed]
+        if all(np.count_nonzero(matrix[row]) == 1 for row in needed):
+            plates.append(_merged(parts, column[needed], light, number))
+        else:
+            plates.append(_mixed(parts, shares[needed], light, number))
     return plates
 
 
-def _combined(parts: list[tuple[Plate, float]], light: str, number: int) -> LightPlate:
-    """Return a light's plate from the flashes that hold it, each times its share."""
-    if len(parts) == 1 and parts[0][1] == 1.0:
-        image = parts[0][0].image
+def _merged(parts: list[Plate], exposures: FloatArray, light: str, number: int) -> LightPlate:
+    """Merge flashes of one light alone; ``exposures`` (part,) are their shares of its full flash.
+
+    The sum of what is not clipped over the sum of its exposures is the best estimate under photon noise. Where all is
+    clipped, the weakest flash says how bright it is at least.
+    """
+    if len(parts) == 1 and exposures[0] == 1.0:
+        image = parts[0].image
     else:
-        image = np.sum([np.float32(share) * plate.image for plate, share in parts], axis=0, dtype=np.float32)
-        image[np.any([plate.image >= 1.0 for plate, _ in parts], axis=0)] = np.float32(1.0)
-    total = sum(abs(share) for _, share in parts)
-    time_s = sum(abs(share) * plate.time_s for plate, share in parts) / total
-    return LightPlate(
-        light=light,
-        number=number,
-        time_s=time_s,
-        image=image,
-        seen=np.all([plate.seen for plate, _ in parts], axis=0),
-    )
+        light_sum, exposure_sum = np.zeros_like(parts[0].image), np.zeros_like(parts[0].image)
+        for part, exposure in zip(parts, exposures, strict=True):
+            good = part.image < 1.0
+            light_sum += np.where(good, part.image, 0)
+            exposure_sum += np.where(good, np.float32(exposure), 0)
+        least = np.float32(1 / exposures.min())
+        image = np.where(exposure_sum > 0, light_sum / np.maximum(exposure_sum, 1e-6), least).astype(np.float32)
+    return _light_plate(parts, exposures, image, light, number, saturation=float(1 / exposures.min()))
+
+
+def _mixed(parts: list[Plate], shares: FloatArray, light: str, number: int) -> LightPlate:
+    """Take a light out of patterns of several; ``shares`` (part,) are what of each pattern makes up the light."""
+    saturation = max(float(shares[shares > 0].sum()), 1.0)
+    image = np.zeros_like(parts[0].image)
+    for part, share in zip(parts, shares, strict=True):
+        image += np.float32(share) * part.image
+    image[np.any([part.image >= 1.0 for part in parts], axis=0)] = np.float32(saturation)
+    return _light_plate(parts, shares, image, light, number, saturation=saturation)
+
+
+def _light_plate(
+    parts: list[Plate], shares: FloatArray, image: Image, light: str, number: int, *, saturation: float
+) -> LightPlate:
+    time_s = float(np.average([plate.time_s for plate in parts], weights=np.abs(shares)))
+    seen = np.all([plate.seen for plate in parts], axis=0)
+    return LightPlate(light=light, number=number, time_s=time_s, image=image, seen=seen, saturation=saturation)

@@ -10,11 +10,11 @@ from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.camera import Camera, FloatArray
+from psvideo.compiled import compiled
 from psvideo.profiles import LinearFrame
 from psvideo.shutter import frames_touched, row_weights
 from psvideo.timing import Flash, Timing
@@ -129,8 +129,8 @@ def _foreign_light(camera: Camera, timing: Timing, flash: Flash, frames: range) 
     return foreign
 
 
-@nb.njit(cache=True, nogil=True)
-def _add_rows(plate, frame, coefficient, saturated):  # type: ignore[no-untyped-def]
+@compiled
+def _add_rows(plate: Image, frame: Image, coefficient: Image, saturated: np.float32) -> None:
     """Add a frame's rows, each times its coefficient; hold what is clipped at 1.0 at least."""
     for row in range(plate.shape[0]):
         share = coefficient[row]

@@ -10,7 +10,7 @@ import typer
 from psvideo import __version__
 from psvideo.errors import PsvideoError
 
-COMMANDS = ("capture-plan", "synth", "sync", "split", "normals", "info", "demo")
+COMMANDS = ("capture-plan", "calibrate", "synth", "sync", "split", "normals", "info", "demo")
 
 
 def application(arguments: Sequence[str]) -> typer.Typer:
@@ -26,7 +26,11 @@ def application(arguments: Sequence[str]) -> typer.Typer:
     called = arguments[0] if arguments else ""
     for name in (called,) if called in COMMANDS else COMMANDS:
         function = name.replace("-", "_")
-        app.command(name)(getattr(import_module(f"psvideo.cli.{function}"), function))
+        command = getattr(import_module(f"psvideo.cli.{function}"), function)
+        if isinstance(command, typer.Typer):
+            app.add_typer(command, name=name)
+        else:
+            app.command(name)(command)
     return app
 
 

@@ -1,5 +1,6 @@
 """Reading a clip's frames: lazily, in order, decoded some frames ahead of the one that is worked on."""
 
+import os
 from bisect import bisect_left
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
@@ -16,7 +17,8 @@ from psvideo.clip.movie import read_movie
 from psvideo.clip.record import Clip, Frame, Header, Picture
 from psvideo.errors import PsvideoError, UsageError
 
-DECODING_THREADS = 2
+DECODING_THREADS = max((os.cpu_count() or 1) // 2, 1)
+"""Half of the cores: rebuilding, solving and encoding want the others."""
 
 
 def read_frames(clip: Clip, numbers: Iterable[int] | None = None, *, ahead: int = 2) -> Iterator[Frame]:

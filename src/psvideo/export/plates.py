@@ -24,7 +24,13 @@ def write_plate(folder: Path, clip: str, plate: LightPlate, tags: Tags) -> None:
     """Write one plate: channels R, G, B or Y, and ``valid`` where rows are missing."""
     path = folder / plate_name(clip, plate.light, plate.number)
     channels = _with_validity(plate.image, plate.seen)
-    write_exr(path, channels, attributes=tags.attributes(time_s=plate.time_s, data=False), fps=tags.fps)
+    write_exr(
+        path,
+        channels,
+        attributes=tags.attributes(time_s=plate.time_s, data=False),
+        fps=tags.fps,
+        time_code=tags.time_code(plate.time_s),
+    )
 
 
 def write_flash(folder: Path, clip: str, plate: Plate, tags: Tags) -> None:
@@ -32,7 +38,13 @@ def write_flash(folder: Path, clip: str, plate: Plate, tags: Tags) -> None:
     path = folder / "flashes" / f"{clip}_flash.{plate.flash.index:04d}.exr"
     lights = " ".join(f"{name}={power:g}" for name, power in plate.flash.lights.items()) or "dark"
     attributes = tags.attributes(time_s=plate.time_s, data=False) | {"psvideo:lights": lights}
-    write_exr(path, _with_validity(plate.image, plate.seen), attributes=attributes, fps=tags.fps)
+    write_exr(
+        path,
+        _with_validity(plate.image, plate.seen),
+        attributes=attributes,
+        fps=tags.fps,
+        time_code=tags.time_code(plate.time_s),
+    )
 
 
 def _with_validity(image: NDArray[np.float32], seen: NDArray[np.bool_]) -> dict[str, NDArray[np.floating]]:

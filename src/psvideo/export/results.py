@@ -75,6 +75,7 @@ def write_surface(
             half=delivery.half or quantity != "normals",
             attributes=tags.attributes(time_s=time_s, data=quantity != "albedo"),
             fps=tags.fps,
+            time_code=tags.time_code(time_s),
         )
     if delivery.multipart:
         attributes = {name: tags.attributes(time_s=time_s, data=name != "albedo") for name in planes}

@@ -31,6 +31,9 @@ class Space:
     camera_to_world: FloatArray | None = None
 
 
+CAMERA_SPACE = Space()
+
+
 def choose_space(name: SpaceName, y: YDirection, camera_to_world: Path | None) -> Space:
     """Return the space that a command's options ask for. Raises UsageError where they do not fit together."""
     if name == "world" and camera_to_world is None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from psvideo import __version__
 from psvideo.errors import PsvideoError
+from psvideo.export.timecode import advanced
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,6 +20,14 @@ class Tags:
     rig_sha256: str | None = None
     space: str = "camera"
     y: str = "up"
+    camera_fps: Fraction | None = None
+    first_time_code: str | None = None
+
+    def time_code(self, time_s: float) -> str | None:
+        """Return the time code of an instant, where the clip has one that goes on to it."""
+        if self.first_time_code is None or self.camera_fps is None:
+            return None
+        return advanced(self.first_time_code, time_s, self.camera_fps)
 
     def attributes(self, *, time_s: float, data: bool) -> dict[str, str | float]:
         """Return the header attributes of one picture; ``data`` marks what is no colour (normals, masks)."""

@@ -1,4 +1,4 @@
-"""How the hot loops are compiled: by numba, without the interpreter's lock, and kept on disk for the next run."""
+"""How the solver's loops are compiled: inlined into one function, with pointers to plates and half-float results."""
 
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -9,23 +9,27 @@ from numba import types
 from numba.extending import intrinsic
 from numba.np.numpy_support import carray
 
+from psvideo.compiled import compiled as keep_compiled
+
 _HALF_MAX = 65504.0
 _ir: Any = llvmlite.ir
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 # Products may be fused and divisions shared; NaN and infinity keep their meaning, sums their order.
-_FAST_MATH = {"contract", "nsz", "arcp"}
+_OPTIONS: dict[str, Any] = {"fastmath": {"contract", "nsz", "arcp"}, "error_model": "numpy"}
+_PART = _OPTIONS | {"nogil": True, "forceinline": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
 def compiled(function: Function) -> Function:
-    """Compile a function when it is first called; where no folder can be written, without keeping it for next time."""
-    options: dict[str, Any] = {"nogil": True, "fastmath": _FAST_MATH, "error_model": "numpy", "forceinline": True}
-    try:
-        kept: Function = numba.njit(cache=True, **options)(function)
-    except RuntimeError:  # numba found neither a folder beside the module nor one of the user's to write to
-        kept = numba.njit(**options)(function)
-    return kept
+    """Compile a function that Python calls, and keep it on disk."""
+    return keep_compiled(function, **_OPTIONS)
+
+
+def inlined(function: Function) -> Function:
+    """Compile a function into the compiled functions that call it, and for nobody else."""
+    part: Function = numba.njit(**_PART)(function)
+    return part
 
 
 def _pointer(typing_context: Any, address: Any, like: Any) -> Any:
@@ -60,7 +64,7 @@ pointer: Any = intrinsic(_pointer)
 encoded: Any = intrinsic(_encoded)
 
 
-@compiled
+@inlined
 def lent(array: Any) -> Any:
     """The same (C-contiguous) array without its reference count, which every slice and call would count up and down.
 

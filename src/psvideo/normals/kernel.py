@@ -12,7 +12,7 @@ All loops are in this one file because numba's cache notices a change only in th
 import numpy as np
 from numba.np.numpy_support import carray
 
-from psvideo.normals.compiled import compiled, encoded, lent, pointer
+from psvideo.normals.compiled import compiled, encoded, inlined, lent, pointer
 from psvideo.normals.task import Bytes, Floats, Result, Samples, Task, Work
 
 # Pixels of one block; not a power of two, whose planes would all fall on the same lines of the processor's cache.
@@ -20,6 +20,8 @@ BLOCK = 480
 MISSING = np.float32(-1e30)
 ABSENT = np.float32(-1e29)  # what is below this is MISSING
 ZERO, ONE, THREE, TINY = np.float32(0), np.float32(1), np.float32(3), np.float32(1e-9)
+# In perspective what is seen may turn from the camera's axis by more than 90 degrees: by half the view (here 20).
+LEAST_Z = np.float32(-0.342)
 SLIGHTLY_MORE = np.float32(1.000001)
 
 # The planes of the working array: g, later the normal; what deciding on measurements needs; the normal equations.
@@ -56,11 +58,11 @@ def solve_rows(task: Task, result: Result, work: Work, first: int, last: int) ->
             _store_block(t, out, w, values, m, row * t.cols + col, n)
 
 
-@compiled
+@inlined
 def _solve_block(
     task: Task, w: Floats, values: Floats, m: Floats, row: int, col: int, n: int, keep_measurements: bool
 ) -> None:
-    """Leave g in the planes X, Y, Z, with z <= 0 where the pixel has no solution to be trusted."""
+    """Leave g in the planes X, Y, Z, all 0 where the pixel has no solution to be trusted."""
     start, channels = row * task.cols + col, task.tone.shape[1]
     done = channels == 1 and _all_seen(task.seen, row, col, n) and _solve_all_usable(task, w, start, n)
     if not done or keep_measurements:
@@ -75,10 +77,11 @@ def _solve_block(
         _solve_usable(task, w, m, n)
     if task.mask.size:
         for i in range(n):
-            w[Z + i] = w[Z + i] if task.mask[row, col + i] else ZERO
+            kept = ONE if task.mask[row, col + i] else ZERO
+            w[X + i], w[Y + i], w[Z + i] = w[X + i] * kept, w[Y + i] * kept, w[Z + i] * kept
 
 
-@compiled
+@inlined
 def _plate(task: Task, light: int, start: int, n: int) -> Samples:
     """The samples of n pixels of one light's plate."""
     channels = task.tone.shape[1]
@@ -87,7 +90,7 @@ def _plate(task: Task, light: int, start: int, n: int) -> Samples:
     return plate[start * channels : end]
 
 
-@compiled
+@inlined
 def _solve_all_usable(task: Task, w: Floats, start: int, n: int) -> bool:
     """Solve a block of one channel as if all measurements were usable; False where one is not, or hardly is.
 
@@ -112,7 +115,7 @@ def _solve_all_usable(task: Task, w: Floats, start: int, n: int) -> bool:
     return bool(unusable == 0)
 
 
-@compiled
+@inlined
 def _add_three(w: Floats, n: int, a: Samples, b: Samples, c: Samples, inverse: Floats, k: int, begun: bool) -> None:
     """Add three lights' samples, from light k, to g; beside it the lowest and the highest sample."""
     (xp, yp, zp), (xq, yq, zq), (xr, yr, zr) = inverse[k], inverse[k + 1], inverse[k + 2]
@@ -129,7 +132,7 @@ def _add_three(w: Floats, n: int, a: Samples, b: Samples, c: Samples, inverse: F
         w[HIGH + i] = max(w[HIGH + i], high) if begun else high
 
 
-@compiled
+@inlined
 def _gather_one(task: Task, values: Floats, start: int, n: int) -> None:
     """Raw samples of one channel to measurements, a plane per light."""
     for light in range(task.lights):
@@ -140,7 +143,7 @@ def _gather_one(task: Task, values: Floats, start: int, n: int) -> None:
             plane[i] = value if (value < ceiling) & (value > ABSENT) else MISSING
 
 
-@compiled
+@inlined
 def _gather_three(task: Task, values: Floats, start: int, n: int) -> None:
     """Raw samples of three channels to measurements, a plane per light and channel; a light counts whole or not."""
     for light in range(task.lights):
@@ -159,7 +162,7 @@ def _gather_three(task: Task, values: Floats, start: int, n: int) -> None:
             blue[i] = b if here else MISSING
 
 
-@compiled
+@inlined
 def _combine(task: Task, w: Floats, values: Floats, m: Floats, n: int) -> None:
     """One measurement per light from three channels, each weighted by its own brightness over the lights.
 
@@ -183,14 +186,14 @@ def _combine(task: Task, w: Floats, values: Floats, m: Floats, n: int) -> None:
             m[light, i] = value if red[i] > ABSENT else MISSING
 
 
-@compiled
+@inlined
 def _all_seen(seen: Bytes, row: int, col: int, n: int) -> bool:
     """Whether every light was seen in n pixels; one entry may stand for the whole row."""
     first, last = (0, 1) if seen.shape[2] == 1 else (col, col + n)
     return not seen.size or bool(seen[:, row, first:last].all())
 
 
-@compiled
+@inlined
 def _hide_unseen(task: Task, values: Floats, row: int, col: int, n: int) -> None:
     channels, seen = task.tone.shape[1], task.seen
     for plane in range(channels * seen.shape[0]):
@@ -202,7 +205,7 @@ def _hide_unseen(task: Task, values: Floats, row: int, col: int, n: int) -> None
             values[plane, :n] = MISSING
 
 
-@compiled
+@inlined
 def _solve_usable(task: Task, w: Floats, m: Floats, n: int) -> None:
     """Solve every pixel from its own usable measurements; those in shadow become MISSING too."""
     w[SUM : SUM + n], w[COUNT : COUNT + n] = ZERO, ZERO
@@ -220,7 +223,7 @@ def _solve_usable(task: Task, w: Floats, m: Floats, n: int) -> None:
     _solve_normal_equations(w, n, task.condition_squared)
 
 
-@compiled
+@inlined
 def _add_equations(
     w: Floats, n: int, a: Floats, b: Floats, c: Floats, matrix: Floats, per_strength: Floats, k: int, begun: bool
 ) -> None:
@@ -257,7 +260,7 @@ def _add_equations(
         w[ZZ + i] = w[ZZ + i] + zz if begun else zz
 
 
-@compiled
+@inlined
 def _solve_normal_equations(w: Floats, n: int, condition_squared: np.float32) -> None:
     """g = adj(A) b / det(A), or 0 where A is badly conditioned or of fewer than three lights."""
     for i in range(n):
@@ -274,7 +277,7 @@ def _solve_normal_equations(w: Floats, n: int, condition_squared: np.float32) ->
         w[X + i], w[Y + i], w[Z + i] = x * scale, y * scale, z * scale
 
 
-@compiled
+@inlined
 def _store_block(task: Task, result: Result, w: Floats, values: Floats, m: Floats, start: int, n: int) -> None:
     end = start + n
     x, y, z = result.normals[0, start:end], result.normals[1, start:end], result.normals[2, start:end]
@@ -289,19 +292,20 @@ def _store_block(task: Task, result: Result, w: Floats, values: Floats, m: Float
     residual = result.residual[start:end]
     for i in range(len(residual)):
         error = np.sqrt(w[XX + i] / max(w[XY + i], ONE))
-        residual[i] = encoded(error if w[Z + i] > ZERO else ZERO, residual)
+        residual[i] = encoded(error if abs(w[X + i]) + abs(w[Y + i]) + abs(w[Z + i]) > ZERO else ZERO, residual)
 
 
-@compiled
+@inlined
 def _store_normals(
     w: Floats, n: int, x: Samples, y: Samples, z: Samples, albedo: Samples, valid: Bytes, albedo_scale: np.float32
 ) -> None:
-    """From g to the stored normal, albedo and validity, and to the planes X, Y, Z: all 0 where z <= 0."""
+    """From g to the stored normal, albedo and validity, and to the planes X, Y, Z: all 0 where it faces away."""
     for i in range(n):
         gx, gy, gz = w[X + i], w[Y + i], w[Z + i]
         square = gx * gx + gy * gy + gz * gz
-        trusted = gz > ZERO
-        scale = ONE / np.sqrt(square) if trusted else ZERO
+        length = np.sqrt(square)
+        trusted = gz > LEAST_Z * length
+        scale = ONE / length if trusted else ZERO
         size = square * scale if trusted else ZERO
         gx, gy, gz = gx * scale, gy * scale, gz * scale
         w[X + i], w[Y + i], w[Z + i], w[ALBEDO + i] = gx, gy, gz, size
@@ -312,7 +316,7 @@ def _store_normals(
         valid[i] = trusted
 
 
-@compiled
+@inlined
 def _albedo_given_normal(task: Task, w: Floats, values: Floats, m: Floats, channel: int, n: int, out: Samples) -> None:
     """One channel's least squares albedo over the usable measurements, the normal being known."""
     w[SUM : SUM + n], w[COUNT : COUNT + n] = ZERO, ZERO
@@ -332,7 +336,7 @@ def _albedo_given_normal(task: Task, w: Floats, values: Floats, m: Floats, chann
         out[i] = encoded(max(albedo, ZERO) * scale, out)
 
 
-@compiled
+@inlined
 def _add_residual(task: Task, w: Floats, values: Floats, m: Floats, channel: int, n: int) -> None:
     """Add one channel's squared residuals in plate units to the plane XX, and their count to XY."""
     for light in range(task.lights):

@@ -56,7 +56,9 @@ def instant_facts(one: Round, surface: Surface, mask: NDArray[np.bool_] | None) 
     """Return what to remember of one solved round."""
     bright = [_brightest(plate.image[::STRIDE, ::STRIDE]) for plate in one.plates]
     solved = np.any([picture > LIT for picture in bright], axis=0) if mask is None else mask[::STRIDE, ::STRIDE]
-    clipped = np.mean([_share(picture >= 1.0, solved) for picture in bright])
+    clipped = np.mean(
+        [_share(picture >= plate.saturation, solved) for picture, plate in zip(bright, one.plates, strict=True)]
+    )
     return InstantFacts(
         number=one.number,
         time_s=one.time_s,
