@@ -10,7 +10,7 @@ import numpy as np
 from bench.table import Row, table
 from bench.timing_scenes import Case, cases
 from psvideo.errors import PsvideoError
-from psvideo.profiles import collect
+from psvideo.profiles import collect_with_doubt
 from psvideo.sync import find_timing
 from psvideo.synth import Exposure
 from psvideo.timing import Timing
@@ -65,9 +65,10 @@ def _row(name: str, case: Case, seeds: int) -> Row:
 def outcome(case: Case, seed: int) -> Outcome:
     """Shoot a case, find its timing, and hold it against the truth."""
     shot, indices, frames = case.shoot(seed)
-    profiles = collect(HeldFrame(int(n), image) for n, image in zip(indices, frames, strict=True))
+    held = (HeldFrame(int(n), image) for n, image in zip(indices, frames, strict=True))
+    index, profiles, doubt = collect_with_doubt(held)
     began = time.process_time()
-    timing = find_timing(case.claimed or case.plan, *profiles)
+    timing = find_timing(case.claimed or case.plan, index, profiles, doubt=doubt)
     cpu_s = time.process_time() - began
     error_s, right = against_truth(timing, shot, scale=_scale(case))
     row_time_s = (case.plan.camera.readout_s or case.plan.camera.frame_period_s) / case.plan.camera.height_px

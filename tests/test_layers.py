@@ -14,7 +14,7 @@ LAYERS = [
     {"plan", "planfile", "timing"},
     {"shutter", "clip", "strobe", "capture"},
     {"rowfit", "profiles"},
-    {"sync", "split", "hudon2015", "ambient", "sequence", "calibrate", "normals"},
+    {"sync", "order", "split", "hudon2015", "ambient", "sequence", "calibrate", "normals"},
     {"export", "view"},
     {"synth"},
     {"pipeline"},

@@ -27,6 +27,7 @@ from psvideo.split import Image, Plate, split
 from psvideo.surface import Surface
 from psvideo.sync import find_timing
 from psvideo.timing import DroppedFrames, Timing, places_in_time
+from psvideo.view.timing_picture import timing_picture, write_sheet
 
 Method = Literal["weights", "hudon2015"]
 Item = TypeVar("Item")
@@ -66,8 +67,13 @@ def open_take(path: Path, *, plan: Path | None = None, frames: str | None = None
     return Take(clip=clip, numbers=numbers)
 
 
-def find_clip_timing(take: Take, *, first_light: str | None = None, watch: Watch = unwatched) -> Timing:
-    """Decode a take once and return when every flash fired. Raises PsvideoError where no strobe is found."""
+def find_clip_timing(
+    take: Take, *, first_light: str | None = None, watch: Watch = unwatched, picture: Path | None = None
+) -> Timing:
+    """Decode a take once and return when every flash fired. Raises PsvideoError where no strobe is found.
+
+    ``picture`` is a PNG file to write that shows how well the flashes were found.
+    """
     clip = take.clip
     dropped = tuple(DroppedFrames(after=after, count=count) for after, count in holes(clip.numbers))
     if clip.plan.mode == "synced":
@@ -77,7 +83,7 @@ def find_clip_timing(take: Take, *, first_light: str | None = None, watch: Watch
         frames = read_frames(clip, take.numbers)
         watched = watch(frames, total=len(take.numbers), what="finding the flashes")
         indices, profiles, doubt = collect_with_doubt(watched)
-    return find_timing(
+    timing = find_timing(
         clip.plan,
         indices,
         profiles,
@@ -87,6 +93,12 @@ def find_clip_timing(take: Take, *, first_light: str | None = None, watch: Watch
         numbers=take.numbers,
         doubt=doubt,
     )
+    if picture is not None and clip.plan.mode != "synced":
+        places = places_in_time(timing, clip.numbers)
+        shown = [n for n, number in enumerate(take.numbers) if number in places]
+        index = np.array([places[take.numbers[n]] for n in shown], np.int64)
+        write_sheet(picture, timing_picture(clip.plan, timing, index, profiles[shown]))
+    return timing
 
 
 def clip_rounds(

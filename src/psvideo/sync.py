@@ -158,7 +158,8 @@ def _assemble(
     beat, index = found.fit.beat, found.rows.index
     camera = _fitted_camera(plan, beat)
     train = train_until(plan, beat.clock, (int(index[-1]) + 2) * camera.frame_period_s)
-    first, last = frames_touched(camera, train.start_s, train.duration_s)
+    start_s = train.start_s + found.jitter.of(train.start_s)
+    first, last = frames_touched(camera, start_s, train.duration_s)
     seen = (last >= index[0]) & (first <= index[-1])
     complete = (first >= index[0]) & (last <= index[-1])
     flashes = tuple(
@@ -166,7 +167,7 @@ def _assemble(
             index=number,
             slot=int(train.slot[k]),
             lights=plan.flashes[train.slot[k]].lights,
-            start_s=float(train.start_s[k]),
+            start_s=float(start_s[k]),
             duration_s=float(train.duration_s[k]),
             complete=bool(complete[k]),
         )

@@ -14,6 +14,9 @@ from psvideo.timing import Timing, format_timing, timing_record
 TimingOut = Annotated[
     Path | None, typer.Option("-o", "--out", help="Where to write timing.json; left out: only a summary is printed.")
 ]
+PictureOut = Annotated[
+    Path | None, typer.Option("--picture", help="PNG to write that shows how well the flashes were found.")
+]
 
 
 def sync(
@@ -22,6 +25,7 @@ def sync(
     plan: PlanPath = None,
     frames: Frames = None,
     first_light: FirstLight = None,
+    picture: PictureOut = None,
     force: Force = False,
     json: Json = False,
     verbose: Verbose = False,
@@ -31,20 +35,23 @@ def sync(
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     if out is not None:
         refuse_existing(out, force=force, mark="psvideo-timing/")
+    if picture is not None:
+        refuse_existing(picture, force=force)
     take = open_take(clip, plan=plan, frames=frames)
     for warning in take.clip.warnings:
         voice.warn(warning)
     for note in take.clip.notes:
         voice.detail(note)
-    timing = find_clip_timing(take, first_light=first_light, watch=voice.track)
+    timing = find_clip_timing(take, first_light=first_light, watch=voice.track, picture=picture)
     for note in timing.notes:
         voice.warn(note)
     if out is not None:
         write_text(out, format_timing(timing))
     voice.result(timing_record(timing))
     voice.say(describe_timing(timing))
-    if out is not None:
-        voice.say(f"{out}: written.")
+    for written in (out, picture):
+        if written is not None:
+            voice.say(f"{written}: written.")
 
 
 def describe_timing(timing: Timing) -> str:

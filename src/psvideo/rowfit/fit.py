@@ -3,12 +3,12 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from psvideo.camera import FloatArray
 from psvideo.plan import UNKNOWN_CLOCK_PPM, Plan
 from psvideo.rowfit.beat import Beat, StrobeClock
 from psvideo.rowfit.bend import LEAST_WINDOWS, bend
+from psvideo.rowfit.jitter import Jitter, jitter, shift_error_s
 from psvideo.rowfit.profiles import Profiles, unexplained
 from psvideo.rowfit.refine import Fit, clearest, explained, refine, robust_loss, scaled
 from psvideo.rowfit.search import search
@@ -51,7 +51,7 @@ class Found:
     fit: Fit
     rows: Profiles
     track: Track
-    errors_s: dict[str, float]
+    jitter: Jitter
     steps: int
 
 
@@ -74,10 +74,14 @@ def find(plan: Plan, rows: Profiles) -> Found:
     beat = replace(tracked.beat, clock=_clock_of(plan, tracked))
     free: tuple[str, ...] = () if plan.camera.readout_s is not None else ("row_time_s",)
     fit = _with_flicker(plan, fine, _fit(plan, fine, beat, free), free)
-    fine, fit = _with_trends(plan, fine, fit, free)
+    fine, fit, apart_s = _with_trends(plan, fine, fit, free)
     fit = _freed(plan, fine, fit, free)
     steps = int((np.diff(tracked.index) != told).sum())
-    return Found(fit=fit, rows=fine, track=tracked, errors_s=fit.errors_s, steps=steps)
+    stray = jitter(plan, fine, fit)
+    known_s = max(fit.shift_error_s, shift_error_s(plan, fine, fit))
+    error_s = float(np.sqrt(known_s**2 + stray.error_s**2 + apart_s**2))
+    fit = replace(fit, shift_error_s=error_s)
+    return Found(fit=fit, rows=fine, track=tracked, jitter=stray, steps=steps)
 
 
 def _rows_needed(plan: Plan, rows: Profiles, beat: Beat) -> int:
@@ -177,13 +181,26 @@ def _clock_of(plan: Plan, tracked: Track) -> StrobeClock:
     return straight.bent(tracked.at_s, stray_s)
 
 
-def _with_trends(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> tuple[Profiles, Fit]:
-    """Let brightnesses change within a window where the subject moves so much that this makes the times surer."""
+def _with_trends(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> tuple[Profiles, Fit, float]:
+    """Let brightnesses change within a window where the subject moves so much that this makes the times surer.
+
+    Return too how far apart the times are with and without: an error that neither of the two fits can know of.
+    """
     if len(rows.value) < TREND_FRAMES * (len(plan.lit_slots) + 1):
-        return rows, fit
+        return rows, fit, 0.0
     moving = replace(rows, trend=True)
     other = _fit(plan, moving, fit.beat, free)
-    return (moving, other) if other.shift_error_s < SURER * fit.shift_error_s else (rows, fit)
+    apart_s = float(np.sqrt(np.mean(_apart_s(rows, fit.beat, other.beat) ** 2)))
+    taken, better = (moving, other) if other.shift_error_s < SURER * fit.shift_error_s else (rows, fit)
+    return taken, better, apart_s
+
+
+def _apart_s(rows: Profiles, one: Beat, other: Beat) -> FloatArray:
+    """Return how far two clocks are apart at the windows' ends, shape (window + 1,)."""
+    strobe_s = (rows.ends_s - one.clock.phase_s) / one.clock.rate
+    straight_s = other.clock.phase_s + strobe_s * other.clock.rate
+    apart_s: FloatArray = straight_s + other.clock.bend(straight_s) - rows.ends_s - one.clock.bend(rows.ends_s)
+    return apart_s
 
 
 def _freed(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> Fit:
@@ -234,8 +251,3 @@ def _with_flicker(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -
         if loss < best_loss:
             best, best_loss = beat, loss
     return fit if best is fit.beat else _fit(plan, rows, best, free)
-
-
-def repeated(found: Found) -> NDArray[np.int64]:
-    """Return the places, in the clip, of frames that show the same moment as the one before."""
-    return np.flatnonzero(found.track.repeated)

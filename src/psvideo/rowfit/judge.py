@@ -23,7 +23,7 @@ STEADY = 0.02
 GAIN_RANGE, GAIN_EXPLAINS = 0.06, 0.6
 """Exposure is called automatic where frames' gains differ by so much and explain such a share of what is left."""
 WRONG_PERIOD_GAIN = 0.35
-PERIOD_FRAMES, PERIOD_ROWS = 20, 12
+PERIOD_FRAMES, PERIOD_ROWS = 14, 8
 MIXED_ROWS = 0.02
 """Share of the rows that may hold two flashes before it is worth a word."""
 
@@ -85,6 +85,13 @@ def _shutter(plan: Plan, found: Found) -> str:
             parts.append(f"the readout takes {readout_s * 1e3:.5g} ms (plan: {abs(camera.readout_s) * 1e3:.5g})")
     if beat.fall_s > plan.fall_s + 1e-6 or beat.rise_s > plan.rise_s + 1e-6:
         parts.append(f"the LEDs rise in {beat.rise_s * 1e6:.1f} us and fall in {beat.fall_s * 1e6:.1f} us")
+    if camera.readout_s is None:
+        height, error_s = camera.height_px, found.fit.errors_s.get("row_time_s", 0.0)
+        direction = "bottom" if beat.upward else "top"
+        return (
+            f"The readout was found to take {beat.row_time_s * height * 1e3:.5g} ms, give or take "
+            f"{error_s * height * 1e3:.1g} ms, {direction} row first."
+        )
     return f"The picture tells otherwise than the plan: {'; '.join(parts)}." if parts else ""
 
 
@@ -102,7 +109,8 @@ def _exposure(plan: Plan, found: Found) -> str:
 def frame_gains(plan: Plan, found: Found) -> tuple[FloatArray, float]:
     """Return every frame's gain (frame,) against the whole clip's brightnesses, and what gains explain of the rest."""
     rows = replace(found.rows, doubt=None)
-    expected = predictions(plan, rows, found.fit.beat, brightnesses(plan, rows.one_window(), found.fit.beat))
+    beat = replace(found.fit.beat, beat_hz=())
+    expected = predictions(plan, rows, beat, brightnesses(plan, rows.one_window(), beat))
     trust = found.fit.weight / found.fit.weight.max(axis=0)
     width = min(9, len(rows.value))
     around = [

@@ -332,3 +332,43 @@ def predictions(rows, flashes, brightness, first, last, found):  # type: ignore[
             for i in range(size):
                 total += design[i] * brightness[row, i]
             found[n, row] = total
+
+
+@nb.njit(cache=True, nogil=True)
+def edges(rows, flashes, weight, first, last, pull, stiff):  # type: ignore[no-untyped-def]
+    """Add to ``pull`` and ``stiff`` (flash, 2) how strongly rows that open (0) or close (1) during a flash shift it."""
+    frames = len(rows.value)
+    design = np.empty((frames, width(rows, flashes)))
+    size = design.shape[1]
+    base = flashes.unknowns + 2 * len(rows.beat_hz)
+    first_flash = np.empty(frames, np.int64)
+    normal, right = np.empty((size, size)), np.empty(size)
+    for row in range(first, last):
+        k = 0
+        for n in range(frames):
+            k = see(rows, flashes, n, row, k, design[n])
+            first_flash[n] = k
+        for window in range(len(rows.bounds) - 1):
+            begin, end = rows.bounds[window], rows.bounds[window + 1]
+            add_trend(rows, flashes, begin, end, design)
+            _fit_window(rows.value[:, row], weight[:, row], design, begin, end, normal, right)
+            for n in range(begin, end):
+                rest = rows.value[n, row]
+                for i in range(size):
+                    rest -= design[n, i] * right[i]
+                open_s = rows.frame_start_s[n] + rows.row_place[row] * rows.row_time_s
+                for j in range(first_flash[n], len(flashes.start_s)):
+                    if flashes.start_s[j] >= open_s + rows.exposure_s:
+                        break
+                    u = flashes.unknown[j]
+                    if u > 0:
+                        light = right[u]
+                        if rows.trend:
+                            light += right[base + u] * ((n - begin + 0.5) / (end - begin) - 0.5)
+                        since_s, d = open_s - flashes.start_s[j], flashes.duration_s[j]
+                        _, opening = given_off(since_s, d, flashes.rise_s, flashes.fall_s)
+                        _, closing = given_off(since_s + rows.exposure_s, d, flashes.rise_s, flashes.fall_s)
+                        pull[j, 0] += weight[n, row] * light * opening * rest
+                        pull[j, 1] -= weight[n, row] * light * closing * rest
+                        stiff[j, 0] += weight[n, row] * (light * opening) ** 2
+                        stiff[j, 1] += weight[n, row] * (light * closing) ** 2

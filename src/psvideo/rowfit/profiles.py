@@ -12,6 +12,7 @@ from psvideo.plan import Plan
 from psvideo.rowfit import kernel
 from psvideo.rowfit.beat import Beat, train_between
 from psvideo.rowfit.kernel import IntArray
+from psvideo.timing import Timing
 
 THREADS = min(os.cpu_count() or 1, 8)
 WORTH_THREADS = 40_000
@@ -52,6 +53,15 @@ class Profiles:
             index=self.index[frames],
             window_start=np.concatenate([[0], inside]).astype(np.int64),
             doubt=None if self.doubt is None else self.doubt[frames],
+        )
+
+    def only_rows(self, rows: slice) -> "Profiles":
+        """Return some neighbouring rows of all frames."""
+        return replace(
+            self,
+            value=np.ascontiguousarray(self.value[:, rows]),
+            place=self.place[rows],
+            doubt=None if self.doubt is None else self.doubt[:, rows],
         )
 
     def one_window(self) -> "Profiles":
@@ -180,6 +190,32 @@ def predictions(plan: Plan, rows: Profiles, beat: Beat, brightness: FloatArray) 
     seen, flashes = compiled_rows(rows, beat), compiled_flashes(plan, rows, beat)
     kernel.predictions(seen, flashes, brightness, 0, rows.value.shape[1], found)
     return found
+
+
+def residuals_of(plan: Plan, timing: Timing, index: IntArray, value: FloatArray) -> FloatArray:
+    """Return what a timing that was found leaves of profiles (frame, row), with brightnesses that hold throughout."""
+    height = value.shape[1]
+    upward = timing.row_time_s < 0
+    place = np.arange(height, dtype=np.float64)
+    rows = kernel.Rows(
+        np.ascontiguousarray(value, np.float64),
+        np.asarray(index, np.float64) * timing.frame_period_s,
+        height - 1 - place if upward else place,
+        abs(timing.row_time_s),
+        timing.exposure_s,
+        np.array([0, len(value)]),
+        np.zeros(2),
+        np.zeros(0),
+        False,
+    )
+    unknown = slot_unknowns(plan)
+    slots = [flash.slot for flash in timing.flashes]
+    flashes = kernel.Flashes(
+        timing.start_s, timing.duration_s, unknown[slots], int(unknown.max()) + 1, plan.rise_s, plan.fall_s
+    )
+    rest = np.empty(value.shape)
+    kernel.rests(rows, flashes, np.ones(value.shape), 0, height, rest)
+    return rest
 
 
 def share(run: Callable[[int, int], None], count: int, *, work: int) -> None:

@@ -19,6 +19,8 @@ WIDE_SCALE = 0.05
 """The scale at which a time that is off is looked for: rows that it spoils must not count as outliers then."""
 LAG = 3
 """Residuals of frames so far apart may still err together (a subject that moves): Newey and West 1987."""
+CLUSTER, LEAST_CLUSTERS = 12, 8
+"""Or whole stretches of frames err together; that needs so many of them to tell."""
 GLOBALS = {"exposure_s": EXPOSURE, "row_time_s": ROW_TIME, "rise_s": RISE, "fall_s": FALL}
 """The times besides the clock's that can be set free, and the signal of each."""
 
@@ -168,17 +170,21 @@ def projected(
 
 
 def sandwich(hessian: FloatArray, scores: FloatArray, known: FloatArray) -> FloatArray:
-    """Return the covariance of the unknowns, true also where neighbouring frames err together."""
+    """Return the covariance of the unknowns, true also where frames near one another err together.
+
+    Of several estimates, each right under other correlations, the one that claims least certainty is taken.
+    """
     bread = np.linalg.inv(hessian + known)
     filling = scores.T @ scores
     for lag in range(1, min(LAG, len(scores) - 1) + 1):
         cross = scores[lag:].T @ scores[:-lag]
         filling = filling + (1 - lag / (LAG + 1)) * (cross + cross.T)
-    covariance: FloatArray = bread @ filling @ bread
-    floor = 0.25 * bread @ np.diag(np.diag(scores.T @ scores)) @ bread
-    low = np.diag(covariance) < np.diag(floor)
-    covariance[low, low] = np.diag(floor)[low]
-    return covariance
+    fillings = [filling, scores.T @ scores]
+    if len(scores) >= LEAST_CLUSTERS * CLUSTER:
+        apart = np.add.reduceat(scores, np.arange(0, len(scores), CLUSTER), axis=0)
+        fillings.append(apart.T @ apart * len(apart) / max(len(apart) - 2, 1))
+    errors = [bread @ one @ bread for one in fillings]
+    return max(errors, key=lambda covariance: float(covariance[0, 0]))
 
 
 def mean_error(knots: FloatArray, covariance: FloatArray) -> float:

@@ -57,7 +57,9 @@ def track(plan: Plan, rows: Profiles, beat: Beat, seed: slice, *, memory: int) -
 
     The latest ``memory`` frames foretell the next ones.
     """
-    low, high = _anchor(plan, rows, beat, seed)
+    for _ in range(2):
+        low, high = _anchor(plan, rows, beat, seed)
+        beat = refine(plan, rows.take(slice(low, high)), beat, steps=6, first_scale=0.1).beat
     index = rows.index.copy()
     twins = _twins(rows)
     late = [_lateness(beat, beat, float(rows.frame_start_s[low:high].mean()))]
@@ -94,7 +96,9 @@ def _anchor(plan: Plan, rows: Profiles, beat: Beat, seed: slice) -> tuple[int, i
     """Return the longest run of frames in the seed that fit as well as most."""
     part = rows.take(seed)
     loss = frame_losses(part, unexplained(plan, part, beat))
-    good = loss < np.median(loss) + SUSPICIOUS
+    calm = np.array([np.median(loss[max(n - 1, 0) : n + 2]) for n in range(len(loss))])
+    good = calm < np.median(loss) + max(SUSPICIOUS, float(np.median(loss)))
+    good &= ~_twins(rows)[seed]
     edges = np.flatnonzero(np.diff(np.concatenate([[0], good.astype(np.int64), [0]])))
     runs = [(int(b - a), int(a)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
     length, first = max(runs)

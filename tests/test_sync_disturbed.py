@@ -1,0 +1,313 @@
+"""Timing found where something is wrong with the clip: every disturbance that the fit knows, one at a time."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from psvideo.errors import PsvideoError
+from psvideo.plan import Plan, PlannedFlash
+from psvideo.rowfit.beat import StrobeClock as FoundClock
+from psvideo.sync import find_timing
+from psvideo.synth import Exposure, Flicker, Noise, StrobeClock, TrueFlash, expose
+from psvideo.timing import DroppedFrames, Timing, format_timing, places_in_time, read_timing
+
+PlanMaker = Callable[..., Plan]
+NOISE = Noise(full_well_e=20_000, read_e=8)
+ROWS, COLUMNS = 160, 12
+
+
+def plates(plan: Plan, seed: int = 3, bright: float = 1.0) -> dict[int, np.ndarray]:
+    """One picture a slot: noise under a gradient, in proportion to the flash's length and powers."""
+    rng = np.random.default_rng(seed)
+    shape = (plan.camera.height_px, plan.camera.width_px)
+    pictures = {name: bright * (0.2 + 0.5 * rng.random(shape)) for name in plan.lights}
+    longest_s = max(flash.duration_s for flash in plan.flashes)
+    return {
+        slot: np.asarray(
+            sum(power * pictures[name] for name, power in plan.flashes[slot].lights.items())
+            * (plan.flashes[slot].duration_s / longest_s),
+            np.float32,
+        )
+        for slot in plan.lit_slots
+    }
+
+
+def shoot(plan: Plan, *, frames: int = 72, ppm: float = 30.0, drift: float = 0.0, **options: object) -> Exposure:
+    clock = StrobeClock(
+        phase_s=0.0123, offset_ppm=ppm, drift_ppm_per_s=drift, jitter_s=float(options.pop("jitter_s", 0.0))
+    )
+    scene = options.pop("scene", None) or plates(plan)
+    options = {"noise": NOISE, "bits": 12} | options
+    return expose(scene, plan, frames=frames, clock=clock, **options)  # type: ignore[arg-type]
+
+
+def timing_of(plan: Plan, shot: Exposure, *, indices: object = None, **options: object) -> Timing:
+    """Time the shot by its frames' true indices, unless others are told."""
+    told = np.arange(len(shot.frames)) if indices is None else np.asarray(indices)
+    return find_timing(plan, told, shot.frames.mean(axis=2, dtype=np.float64), **options)  # type: ignore[arg-type]
+
+
+def rms_rows(timing: Timing, shot: Exposure, plan: Plan, scale: float = 1.0) -> float:
+    """Return the RMS distance of every flash found from the nearest true flash with the same lights, in true rows."""
+    error_s = []
+    for flash in timing.flashes:
+        alike = [true.start_s * scale for true in shot.flashes if dict(true.lights) == dict(flash.lights)]
+        error_s.append(np.abs(np.array(alike) - flash.start_s).min())
+    row_s = abs(plan.camera.row_time_s) or plan.camera.frame_period_s / plan.camera.height_px
+    return float(np.sqrt(np.mean(np.square(error_s)))) / row_s
+
+
+@pytest.fixture
+def plan(make_plan: PlanMaker) -> Plan:
+    return make_plan(height_px=ROWS, width_px=COLUMNS)
+
+
+def unknown_readout(plan: Plan) -> Plan:
+    return replace(plan, camera=replace(plan.camera, readout_s=None))
+
+
+@pytest.mark.parametrize("readout", [1.0, 0.35, 0.0, -0.7])
+def test_an_unknown_readout_is_found_with_its_direction(readout: float, make_plan: PlanMaker) -> None:
+    plan = make_plan(height_px=ROWS, width_px=COLUMNS, readout=readout)
+    shot = shoot(plan)
+    timing = timing_of(unknown_readout(plan), shot)
+    assert rms_rows(timing, shot, plan) < 0.05
+    assert timing.row_time_s * ROWS == pytest.approx(plan.camera.readout_s, abs=1e-3 * plan.camera.frame_period_s)
+    assert timing.order == "marker"
+
+
+@pytest.mark.parametrize("error", [0.97, 1.002])
+def test_an_exposure_that_is_only_nominal_is_refined(error: float, make_plan: PlanMaker) -> None:
+    plan = make_plan(height_px=ROWS, width_px=COLUMNS, shutter=0.5, readout=0.6)
+    shot = shoot(plan)
+    nominal = replace(plan, camera=replace(plan.camera, exposure_s=error * plan.camera.exposure_s))
+    timing = timing_of(nominal, shot)
+    assert rms_rows(timing, shot, plan) < 0.05
+    assert timing.exposure_s == pytest.approx(plan.camera.exposure_s, rel=1e-4)
+
+
+def test_a_published_readout_that_is_slightly_wrong_is_corrected(plan: Plan) -> None:
+    shot = shoot(plan)
+    published = replace(plan, camera=replace(plan.camera, readout_s=0.99 * (plan.camera.readout_s or 0.0)))
+    timing = timing_of(published, shot)
+    assert rms_rows(timing, shot, plan) < 0.05
+    assert timing.row_time_s == pytest.approx(plan.camera.row_time_s, rel=1e-3)
+
+
+@pytest.mark.parametrize("ppm", [9900.0, -9900.0])
+def test_clocks_of_unknown_tolerance_are_found(ppm: float, make_plan: PlanMaker) -> None:
+    plan = replace(make_plan(height_px=ROWS, width_px=COLUMNS, clock_tolerance_ppm=10_000), clock_tolerance_ppm=None)
+    shot = shoot(plan, ppm=ppm)
+    timing = timing_of(plan, shot)
+    assert rms_rows(timing, shot, plan) < 0.05
+    assert timing.clock_offset_ppm == pytest.approx(ppm, abs=1.0)
+
+
+def test_a_clock_that_drifts_is_followed(plan: Plan) -> None:
+    shot = shoot(plan, frames=400, ppm=100.0, drift=20.0)
+    timing = timing_of(plan, shot)
+    assert rms_rows(timing, shot, plan) < 0.1
+    assert timing.phase_error_rows < 0.1
+
+
+def test_a_clock_that_runs_straight_stays_straight(plan: Plan) -> None:
+    timing = timing_of(plan, shoot(plan, frames=150))
+    gaps_s = np.diff([flash.start_s for flash in timing.flashes])
+    assert np.ptp(gaps_s) < 1e-12
+
+
+def test_a_misnamed_frame_rate_is_found_and_said(plan: Plan) -> None:
+    shot = shoot(plan)
+    misnamed = replace(plan, camera=replace(plan.camera, fps=Fraction(120)))
+    timing = timing_of(misnamed, shot)
+    assert rms_rows(timing, shot, plan, scale=1 / 1.001) < 0.05
+    assert timing.frame_period_s == 1 / 120
+    assert any("misnamed by 1.001" in note for note in timing.notes)
+    assert not timing_of(plan, shot).notes
+
+
+@pytest.mark.parametrize("hz", [100.0, 120.0])
+def test_flickering_ambient_light_is_told_from_the_strobe(hz: float, make_plan: PlanMaker) -> None:
+    plan = make_plan(height_px=ROWS, width_px=COLUMNS, shutter=0.5, readout=0.6, fps=Fraction(90))
+    shot = shoot(plan, ambient=0.15, flicker=Flicker(hz=hz, depth=0.8))
+    timing = timing_of(plan, shot)
+    assert rms_rows(timing, shot, plan) < 0.02
+
+
+def test_tails_that_the_plan_does_not_give_are_found(plan: Plan) -> None:
+    slow = replace(plan, rise_s=2e-5, fall_s=8e-5)
+    shot = shoot(slow)
+    assert rms_rows(timing_of(slow, shot), shot, plan) < 0.05
+    timing = timing_of(plan, shot)
+    assert rms_rows(timing, shot, plan) < 0.3
+    assert any("LEDs" in note for note in timing.notes)
+
+
+def test_flashes_that_stray_are_followed_one_by_one(make_plan: PlanMaker) -> None:
+    plan = make_plan(height_px=ROWS, width_px=COLUMNS, dark=False)
+    shot = shoot(plan, jitter_s=1e-5)
+    timing = timing_of(plan, shot)
+    inside = [f for f in timing.flashes if f.complete]
+    true_s = np.array([flash.start_s for flash in shot.flashes])
+    error_s = np.array([np.abs(true_s - flash.start_s).min() for flash in inside])
+    assert np.sqrt(np.mean(error_s**2)) < 0.4e-5
+    assert timing.phase_error_rows * timing.row_time_s < 1e-5
+
+
+def test_frames_missing_without_a_hole_are_found_numbered_and_bridged(plan: Plan) -> None:
+    shot = shoot(plan, dropped=(20, 21, 50))
+    timing = timing_of(plan, shot, numbers=range(101, 101 + len(shot.frames)))
+    assert timing.dropped_frames == (DroppedFrames(after=120, count=2), DroppedFrames(after=148, count=1))
+    assert rms_rows(timing, shot, plan) < 0.05
+    places = places_in_time(timing, range(101, 101 + len(shot.frames)))
+    assert tuple(places.values()) == shot.indices
+
+
+def test_frames_missing_near_either_end_are_found(plan: Plan) -> None:
+    shot = shoot(plan, dropped=(4, 66))
+    timing = timing_of(plan, shot)
+    assert timing.dropped_frames == (DroppedFrames(after=3, count=1), DroppedFrames(after=64, count=1))
+    assert rms_rows(timing, shot, plan) < 0.05
+
+
+def test_a_hole_that_the_numbering_shows_is_reported_once(plan: Plan) -> None:
+    shot = shoot(plan, dropped=(30,))
+    told = (DroppedFrames(after=29, count=1),)
+    timing = timing_of(plan, shot, indices=shot.indices, dropped=told)
+    assert timing.dropped_frames == told
+    assert rms_rows(timing, shot, plan) < 0.05
+
+
+def test_a_repeated_frame_takes_no_time(plan: Plan, tmp_path: object) -> None:
+    shot = shoot(plan)
+    frames = np.insert(shot.frames, 41, shot.frames[40], axis=0)
+    timing = find_timing(plan, np.arange(len(frames)), frames.mean(axis=2, dtype=np.float64))
+    assert timing.repeated_frames == (41,)
+    assert timing.dropped_frames == ()
+    assert rms_rows(timing, shot, plan) < 0.05
+    path = tmp_path / "timing.json"  # type: ignore[operator]
+    path.write_text(format_timing(timing))
+    assert read_timing(path) == timing
+
+
+def test_a_frame_that_another_stands_in_for_is_repeated_and_missing(plan: Plan) -> None:
+    shot = shoot(plan)
+    frames = shot.frames.copy()
+    frames[41] = frames[40]
+    timing = find_timing(plan, np.arange(len(frames)), frames.mean(axis=2, dtype=np.float64))
+    assert timing.repeated_frames == (41,)
+    assert timing.dropped_frames == (DroppedFrames(after=41, count=1),)
+    assert places_in_time(timing, range(72))[42] == 42
+    assert rms_rows(timing, shot, plan) < 0.05
+
+
+def tumbling(plan: Plan) -> Callable[[TrueFlash], np.ndarray]:
+    """A subject that moves fast in a void."""
+    rows = np.arange(plan.camera.height_px) / plan.camera.height_px
+
+    def plate(flash: TrueFlash) -> np.ndarray:
+        turn = 7.0 * flash.middle_s
+        body = np.clip(1 - ((rows - 0.5 - 0.15 * np.sin(turn)) / (0.28 + 0.08 * np.sin(1.7 * turn))) ** 2, 0, 1) ** 0.5
+        light = sum(flash.lights.values())
+        return np.asarray(0.5 * light * body[:, None] * np.ones(plan.camera.width_px), np.float32)
+
+    return plate
+
+
+def rolling_stripes(plan: Plan) -> Callable[[TrueFlash], np.ndarray]:
+    """Black stripes that travel as fast as the dark row."""
+    still, camera = plates(plan), plan.camera
+    pitch_s = plan.flashes[0].duration_s + plan.dark_s
+    speed = (pitch_s - camera.frame_period_s) / camera.row_time_s / pitch_s
+    rows = np.arange(camera.height_px)
+
+    def plate(flash: TrueFlash) -> np.ndarray:
+        dark = (rows - speed * flash.middle_s) % (camera.height_px / 2) < 16
+        picture = still.get(flash.slot, np.zeros((camera.height_px, camera.width_px)))
+        return np.asarray(picture * np.where(dark, 0.15, 1.0)[:, None], np.float32)
+
+    return plate
+
+
+@pytest.mark.parametrize("scene", [tumbling, rolling_stripes])
+def test_moving_subjects_do_not_mislead(scene: Callable[[Plan], Callable], plan: Plan) -> None:
+    shot = shoot(plan, frames=96, scene=scene(plan))
+    timing = timing_of(plan, shot)
+    assert rms_rows(timing, shot, plan) < 0.05
+    assert timing.order == "marker"
+    assert timing.dropped_frames == ()
+
+
+def test_rows_that_saturate_count_for_less(plan: Plan) -> None:
+    shot = shoot(plan, scene=plates(plan, bright=2.2), frames=96)
+    share = (shot.frames >= 0.998).mean(axis=2)
+    assert share.max() > 0.4
+    timing = timing_of(plan, shot, doubt=0.3 * share)
+    assert rms_rows(timing, shot, plan) < 0.05
+
+
+def test_light_that_flashes_hold_in_known_powers_marks_the_cycle(plan: Plan) -> None:
+    powers = [{"key": 1.0}, {"key": 0.25}, {"left": 1.0}, {"right": 1.0}]
+    plan = replace(plan, flashes=tuple(PlannedFlash(lights=one, duration_s=0.0008) for one in powers))
+    shot = shoot(plan)
+    timing = timing_of(plan, shot)
+    assert timing.order == "marker"
+    assert rms_rows(timing, shot, plan) < 0.05
+
+
+def test_patterns_that_are_all_alike_are_no_marker(plan: Plan) -> None:
+    patterns = [{"a": 1.0, "b": 1.0}, {"b": 1.0, "c": 1.0}, {"a": 1.0, "c": 1.0}]
+    plan = replace(plan, flashes=tuple(PlannedFlash(lights=one, duration_s=0.0008) for one in patterns))
+    assert timing_of(plan, shoot(plan)).order == "guess"
+
+
+def test_a_light_that_shows_nothing_could_be_the_dark_slot(plan: Plan) -> None:
+    shot = shoot(plan, scene={slot: picture for slot, picture in plates(plan).items() if slot != 2})
+    assert timing_of(plan, shot).order == "guess"
+
+
+def test_automatic_exposure_is_said(plan: Plan) -> None:
+    shot = shoot(plan, gain=1 + 0.25 * np.sin(np.arange(72) / 20), ambient=0.03)
+    assert any("gain by itself" in note for note in timing_of(plan, shot).notes)
+
+
+def test_a_dark_time_shorter_than_the_exposure_is_said(plan: Plan) -> None:
+    mixed = replace(plan, dark_s=0.8 * plan.dark_s)
+    timing = timing_of(mixed, shoot(mixed))
+    assert any("hold two flashes" in note for note in timing.notes)
+
+
+@pytest.mark.parametrize(("factor", "words"), [(0.55, "flashes mixed"), (1.4, "and not every")])
+def test_a_strobe_that_flashes_at_another_rate_is_not_timed_but_told(factor: float, words: str, plan: Plan) -> None:
+    shot = shoot(replace(plan, dark_s=factor * plan.dark_s), frames=96)
+    with pytest.raises(PsvideoError, match=words):
+        timing_of(plan, shot)
+
+
+def test_flicker_alone_is_no_strobe(plan: Plan) -> None:
+    rng = np.random.default_rng(5)
+    rows = (0.3 + 0.2 * rng.random(ROWS)) * (1 + 0.3 * np.sin(np.arange(60) / 3))[:, None]
+    with pytest.raises(PsvideoError, match="All rows change together"):
+        find_timing(plan, np.arange(60), rows + 1e-3 * rng.standard_normal(rows.shape))
+
+
+@pytest.mark.parametrize("kind", ["clean", "readout unknown"])
+def test_the_standard_errors_claimed_are_true(kind: str, make_plan: PlanMaker) -> None:
+    plan = make_plan(height_px=80, width_px=4)
+    errors, claims = [], []
+    for seed in range(12):
+        shot = shoot(plan, frames=48, seed=seed, scene=plates(plan, seed=seed))
+        timing = timing_of(unknown_readout(plan) if kind == "readout unknown" else plan, shot)
+        errors.append(rms_rows(timing, shot, plan))
+        claims.append(timing.phase_error_rows)
+    assert 0.4 < np.sqrt(np.mean(np.square(errors)) / np.mean(np.square(claims))) < 1.8
+
+
+def test_bends_add_up_and_run_straight_on_beyond_the_last_knot() -> None:
+    clock = FoundClock(phase_s=0.0, offset_ppm=0.0).bent(np.array([0.0, 1.0, 2.0]), np.array([0.0, 1e-6, 3e-6]))
+    np.testing.assert_allclose(clock.bend(np.array([-1.0, 0.5, 3.0])), [-1e-6, 0.5e-6, 5e-6])
+    twice = clock.bent(np.array([0.0, 1.0, 2.0]), np.array([0.0, 1e-6, 3e-6]))
+    np.testing.assert_allclose(twice.bend(np.array([0.5])), [1e-6])
