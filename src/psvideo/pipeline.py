@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from psvideo import hudon2015
 from psvideo.ambient import Ambient, held, subtract
+from psvideo.calibrate.strobed_readout import StrobedReadout, readout_of
 from psvideo.camera import Camera
 from psvideo.clip import Clip, Frame, demosaic, holes, open_clip, parse_range, read_frames
 from psvideo.normals.illumination import illumination
@@ -99,6 +100,16 @@ def find_clip_timing(
         index = np.array([places[take.numbers[n]] for n in shown], np.int64)
         write_sheet(picture, timing_picture(clip.plan, timing, index, profiles[shown]))
     return timing
+
+
+def measure_take_readout(take: Take, *, watch: Watch = unwatched) -> StrobedReadout:
+    """Measure a camera's readout time from a strobed take, whatever its plan says of it.
+
+    Raises PsvideoError where no strobe is found.
+    """
+    unknown = replace(take.plan, camera=replace(take.plan.camera, readout_s=None))
+    timing = find_clip_timing(replace(take, clip=replace(take.clip, plan=unknown)), watch=watch)
+    return readout_of(unknown, timing, frames=len(take.numbers))
 
 
 def clip_rounds(

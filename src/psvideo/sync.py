@@ -185,6 +185,7 @@ def _assemble(
         dropped_frames=dropped,
         repeated_frames=repeated,
         notes=notes,
+        row_time_error_s=found.fit.errors_s.get("row_time_s"),
         flashes=flashes,
     )
 

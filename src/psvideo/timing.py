@@ -46,7 +46,8 @@ class Timing:
     """The flashes of a clip in order. ``order`` says how the lights' names were found: a guess is called ``guess``.
 
     ``repeated_frames`` are the numbers of frames that show the same moment as the frame before them. ``notes`` are
-    sentences for people on what to distrust; they do not go into the file.
+    sentences for people on what to distrust; ``row_time_error_s`` is the row time's standard error where the picture
+    told it, None where the plan did. Neither goes into the file.
     """
 
     clip: str
@@ -60,6 +61,7 @@ class Timing:
     dropped_frames: tuple[DroppedFrames, ...] = ()
     repeated_frames: tuple[int, ...] = ()
     notes: tuple[str, ...] = field(default=(), compare=False)
+    row_time_error_s: float | None = field(default=None, compare=False)
 
     @property
     def start_s(self) -> FloatArray:

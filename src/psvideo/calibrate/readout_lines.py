@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from psvideo.calibrate.readout import Led, Readout
+from psvideo.calibrate.strobed_readout import StrobedReadout
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,7 +20,7 @@ class MeasuredMode:
     width_px: int | None = None
     fps: Fraction | None = None
 
-    def fields(self, readout: Readout) -> list[str]:
+    def fields(self, readout: Readout | StrobedReadout) -> list[str]:
         """Return the columns with which both files begin."""
         width = "WIDTH" if self.width_px is None else str(self.width_px)
         fps = "FPS" if self.fps is None else str(self.fps)
@@ -42,7 +43,24 @@ def record_line(readout: Readout, mode: MeasuredMode, led: Led, *, date: str) ->
     return _line([*mode.fields(readout), *found, spread, _direction(readout), date, "psvideo calibrate readout"])
 
 
-def _direction(readout: Readout) -> str:
+def strobed_camera_line(readout: StrobedReadout, mode: MeasuredMode) -> str:
+    """Return the line for the table of cameras of a readout measured from a strobed clip."""
+    amount_s = abs(readout.readout_s)
+    source = (
+        f"{_frames(readout.frames)} of a strobed clip: {_ms(amount_s, readout)} +- {_ms(readout.error_s, readout)} ms "
+        "(psvideo calibrate readout)"
+    )
+    return _line([*mode.fields(readout), _ms(amount_s, readout), _direction(readout), "measured", source])
+
+
+def strobed_record_line(readout: StrobedReadout, mode: MeasuredMode, *, date: str) -> str:
+    """Return the line for ``calibration/records/readout.csv``: no LED's rate, no stripes, no single frames' spread."""
+    found = ["", "", str(readout.frames), _ms(abs(readout.readout_s), readout), ""]
+    source = "psvideo calibrate readout from a strobed clip"
+    return _line([*mode.fields(readout), *found, _direction(readout), date, source])
+
+
+def _direction(readout: Readout | StrobedReadout) -> str:
     return "DIRECTION" if readout.direction == "unknown" else readout.direction
 
 
@@ -50,7 +68,7 @@ def _frames(count: int) -> str:
     return "one frame" if count == 1 else f"{count} frames"
 
 
-def _ms(seconds: float, readout: Readout) -> str:
+def _ms(seconds: float, readout: Readout | StrobedReadout) -> str:
     """Return milliseconds with the digits that are worth writing."""
     return f"{seconds * 1e3:.{3 if readout.error_s > 1e-6 else 4}f}"
 
