@@ -106,11 +106,12 @@ def test_clocks_of_unknown_tolerance_are_found(ppm: float, make_plan: PlanMaker)
     assert timing.clock_offset_ppm == pytest.approx(ppm, abs=1.0)
 
 
-def test_a_clock_that_drifts_is_followed(plan: Plan) -> None:
-    shot = shoot(plan, frames=400, ppm=100.0, drift=20.0)
+@pytest.mark.parametrize(("drift", "bar"), [(20.0, 0.05), (4.0, 0.01)])
+def test_a_clock_that_drifts_is_followed(drift: float, bar: float, plan: Plan) -> None:
+    shot = shoot(plan, frames=400, ppm=100.0, drift=drift)
     timing = timing_of(plan, shot)
-    assert rms_rows(timing, shot, plan) < 0.1
-    assert timing.phase_error_rows < 0.1
+    assert rms_rows(timing, shot, plan) < bar
+    assert timing.phase_error_rows < bar
 
 
 def test_a_clock_that_runs_straight_stays_straight(plan: Plan) -> None:
@@ -119,7 +120,8 @@ def test_a_clock_that_runs_straight_stays_straight(plan: Plan) -> None:
     assert np.ptp(gaps_s) < 1e-12
 
 
-def test_a_misnamed_frame_rate_is_found_and_said(plan: Plan) -> None:
+def test_a_misnamed_frame_rate_is_found_and_said(make_plan: PlanMaker) -> None:
+    plan = make_plan(height_px=ROWS, width_px=COLUMNS, duration_s=0.00025, clock_tolerance_ppm=50)
     shot = shoot(plan)
     misnamed = replace(plan, camera=replace(plan.camera, fps=Fraction(120)))
     timing = timing_of(misnamed, shot)
@@ -205,14 +207,18 @@ def test_a_frame_that_another_stands_in_for_is_repeated_and_missing(plan: Plan) 
 
 
 def tumbling(plan: Plan) -> Callable[[TrueFlash], np.ndarray]:
-    """A subject that moves fast in a void."""
+    """A lumpy subject that tumbles fast in a void: its rows brighten and darken from flash to flash."""
     rows = np.arange(plan.camera.height_px) / plan.camera.height_px
+    lumps = np.random.default_rng(1).uniform(0, 2 * np.pi, (6, 2))
 
     def plate(flash: TrueFlash) -> np.ndarray:
-        turn = 7.0 * flash.middle_s
-        body = np.clip(1 - ((rows - 0.5 - 0.15 * np.sin(turn)) / (0.28 + 0.08 * np.sin(1.7 * turn))) ** 2, 0, 1) ** 0.5
-        light = sum(flash.lights.values())
-        return np.asarray(0.5 * light * body[:, None] * np.ones(plan.camera.width_px), np.float32)
+        turn = 6.9 * flash.middle_s
+        across = (rows - 0.5 - 0.15 * np.sin(0.9 * turn)) / (0.25 + 0.08 * np.sin(1.7 * turn + 1))
+        body = np.clip(1 - across**2, 0, 1) ** 0.5
+        for k, (a, b) in enumerate(lumps):
+            body = body * (1 + 0.12 * np.sin((k + 1) * across * 2 + turn + a) * np.sin(turn + b))
+        light = sum(power * (0.6 + 0.1 * len(name)) for name, power in flash.lights.items())
+        return np.asarray(0.4 * light * body[:, None] * np.ones(plan.camera.width_px), np.float32)
 
     return plate
 
@@ -239,6 +245,25 @@ def test_moving_subjects_do_not_mislead(scene: Callable[[Plan], Callable], plan:
     assert rms_rows(timing, shot, plan) < 0.05
     assert timing.order == "marker"
     assert timing.dropped_frames == ()
+
+
+def test_everything_at_once_is_borne(make_plan: PlanMaker) -> None:
+    plan = make_plan(height_px=ROWS, width_px=COLUMNS, readout=0.7, clock_tolerance_ppm=10_000)
+    slow = replace(plan, fall_s=5e-5)
+    shot = shoot(
+        slow,
+        frames=300,
+        ppm=3000.0,
+        drift=2.0,
+        scene=tumbling(plan),
+        ambient=0.05,
+        flicker=Flicker(hz=100, depth=0.4),
+        dropped=(120,),
+    )
+    timing = timing_of(unknown_readout(replace(plan, clock_tolerance_ppm=None)), shot)
+    assert rms_rows(timing, shot, plan) < 0.3
+    assert timing.order == "marker"
+    assert timing.dropped_frames == (DroppedFrames(after=119, count=1),)
 
 
 def test_rows_that_saturate_count_for_less(plan: Plan) -> None:
@@ -280,7 +305,9 @@ def test_a_dark_time_shorter_than_the_exposure_is_said(plan: Plan) -> None:
     assert any("hold two flashes" in note for note in timing.notes)
 
 
-@pytest.mark.parametrize(("factor", "words"), [(0.55, "flashes mixed"), (1.4, "and not every")])
+@pytest.mark.parametrize(
+    ("factor", "words"), [(0.55, "flashes mixed"), (0.9, "taking many frames for missing"), (1.4, "and not every")]
+)
 def test_a_strobe_that_flashes_at_another_rate_is_not_timed_but_told(factor: float, words: str, plan: Plan) -> None:
     shot = shoot(replace(plan, dark_s=factor * plan.dark_s), frames=96)
     with pytest.raises(PsvideoError, match=words):

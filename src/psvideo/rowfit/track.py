@@ -29,8 +29,8 @@ TWIN = 0.02
 """Share of the rows' spreads by which two frames of the same moment differ at most."""
 SUSPICIOUS = 0.25
 """A frame's loss by which it must exceed what is usual before other places in time are tried for it."""
-BELIEVED = 0.4
-"""A step is believed where frames behind it then exceed the usual loss by less than this share of what they did."""
+HOLDS = 1.0
+"""A step is believed where it takes away so much of the frames' losses once brightnesses are fitted anew."""
 LEAST_ANCHOR = 12
 
 
@@ -144,13 +144,32 @@ def _course(
     shifted = [replace(ahead, index=ahead.index + sign * int(extra)) for extra in extras]
     table = np.stack([_losses(plan, learnt, one, beat, light) for one in shifted], axis=1)
     course = _cheapest(table, same) if sign > 0 else _cheapest(table[::-1], same[::-1])[::-1]
-    gone = course != 0
-    if gone.any():
-        after = float(table[gone, course[gone] - LEAST].mean())
-        if after > usual + BELIEVED * (float(loss[gone].mean()) - usual):
-            course = np.zeros(len(loss), np.int64)
+    if course.any() and not _holds(plan, rows, beat, known, block, course, sign):
+        course = np.zeros(len(loss), np.int64)
     nearer = max(len(loss) // 2, min(len(loss), 4))
     return course[:nearer] if sign > 0 else course[-nearer:]
+
+
+def _holds(plan: Plan, rows: Profiles, beat: Beat, known: slice, block: slice, course: IntArray, sign: int) -> bool:
+    """Tell whether a course still wins when brightnesses are fitted anew to all frames from the known ones on.
+
+    Frames that move are foretold badly; fitted along a wrong course they stay bad, along the right one they do not.
+    """
+    count = len(rows.value)
+    span = (
+        slice(known.start, min(block.stop + BLOCK, count))
+        if sign > 0
+        else slice(max(block.start - BLOCK, 0), known.stop)
+    )
+    index = rows.index.copy()
+    index[block] += sign * course
+    if sign > 0:
+        index[block.stop :] += course[-1]
+    else:
+        index[: block.start] -= course[0]
+    stayed, went = rows.take(span), replace(rows, index=index).take(span)
+    gain = frame_losses(stayed, unexplained(plan, stayed, beat)) - frame_losses(went, unexplained(plan, went, beat))
+    return float(gain.sum()) > HOLDS
 
 
 def _losses(plan: Plan, reference: Profiles, rows: Profiles, beat: Beat, light: FloatArray) -> FloatArray:
