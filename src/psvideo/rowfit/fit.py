@@ -32,10 +32,9 @@ CLEAR = 5.0
 BETTER, LEAST_GAIN = 1e-3, 30.0
 """And only where that takes away such a share of the robust loss, and so much of it: a subject that moves in step with
 the dark row bends errors and estimates alike."""
-TREND_FRAMES = 4
-"""Frames per brightness that a clip must have before its brightnesses may change within a window."""
 SURER = 0.8
-"""Share of the standard error that must be left before brightnesses may change within a window."""
+"""Share of the standard error that must be left before brightnesses are fitted anew in windows half as long."""
+MOST_WINDOWS = 400
 MAINS_HZ = (100.0, 120.0)
 FLICKERS = 0.8
 """Flicker is believed where it leaves less than this share of the squares that are left without it."""
@@ -74,7 +73,7 @@ def find(plan: Plan, rows: Profiles) -> Found:
     beat = replace(tracked.beat, clock=_clock_of(plan, tracked))
     free: tuple[str, ...] = () if plan.camera.readout_s is not None else ("row_time_s",)
     fit = _with_flicker(plan, fine, _fit(plan, fine, beat, free), free)
-    fine, fit, apart_s = _with_trends(plan, fine, fit, free)
+    fine, fit, apart_s = _in_short_windows(plan, fine, fit, free)
     fit = _freed(plan, fine, fit, free)
     steps = int((np.diff(tracked.index) != told).sum())
     stray = jitter(plan, fine, fit)
@@ -181,17 +180,15 @@ def _clock_of(plan: Plan, tracked: Track) -> StrobeClock:
     return straight.bent(tracked.at_s, stray_s)
 
 
-def _with_trends(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> tuple[Profiles, Fit, float]:
-    """Let brightnesses change within a window where the subject moves so much that this makes the times surer.
+def _in_short_windows(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> tuple[Profiles, Fit, float]:
+    """Fit brightnesses anew more often where the subject moves so much that this makes the times surer.
 
     Return too how far apart the times are with and without: an error that neither of the two fits can know of.
     """
-    if len(rows.value) < TREND_FRAMES * (len(plan.lit_slots) + 1):
-        return rows, fit, 0.0
-    moving = replace(rows, trend=True)
-    other = _fit(plan, moving, fit.beat, free)
+    short = rows.windowed(max(window_frames(plan) // 2, len(rows.value) // MOST_WINDOWS))
+    other = _fit(plan, short, fit.beat, free)
     apart_s = float(np.sqrt(np.mean(_apart_s(rows, fit.beat, other.beat) ** 2)))
-    taken, better = (moving, other) if other.shift_error_s < SURER * fit.shift_error_s else (rows, fit)
+    taken, better = (short, other) if other.shift_error_s < SURER * fit.shift_error_s else (rows, fit)
     return taken, better, apart_s
 
 
