@@ -12,7 +12,7 @@ from psvideo.rowfit.jitter import Jitter, jitter, shift_error_s
 from psvideo.rowfit.profiles import Profiles, unexplained
 from psvideo.rowfit.refine import Fit, clearest, explained, refine, robust_loss, scaled
 from psvideo.rowfit.search import search
-from psvideo.rowfit.track import Track, frame_losses, track
+from psvideo.rowfit.track import Track, frame_losses, settled, track
 
 SEARCH_ROWS = 36
 TRACK_ROWS = 60
@@ -62,7 +62,10 @@ def find(plan: Plan, rows: Profiles) -> Found:
     window = window_frames(plan)
     memory = max(window, int(1.2 * plan.cycle_s / rows.period_s))
     tracked = track(plan, rows.binned(TRACK_ROWS), seed, frames, memory=memory)
-    keep, told = ~tracked.repeated, np.diff(rows.index)
+    told = np.diff(rows.index)
+    tracked = replace(tracked, beat=replace(tracked.beat, clock=_clock_of(plan, tracked)))
+    tracked = replace(tracked, index=settled(plan, rows.binned(TRACK_ROWS), tracked.index, tracked.beat))
+    keep = ~tracked.repeated
     rows = replace(
         rows,
         value=np.ascontiguousarray(rows.value[keep]),
@@ -70,9 +73,8 @@ def find(plan: Plan, rows: Profiles) -> Found:
         doubt=None if rows.doubt is None else np.ascontiguousarray(rows.doubt[keep]),
     ).windowed(window)
     fine = rows.binned(_rows_needed(plan, rows, seed))
-    beat = replace(tracked.beat, clock=_clock_of(plan, tracked))
     free: tuple[str, ...] = () if plan.camera.readout_s is not None else ("row_time_s",)
-    fit = _with_flicker(plan, fine, _fit(plan, fine, beat, free), free)
+    fit = _with_flicker(plan, fine, _fit(plan, fine, tracked.beat, free), free)
     fine, fit, apart_s = _in_short_windows(plan, fine, fit, free)
     fit = _freed(plan, fine, fit, free)
     steps = int((np.diff(tracked.index) != told).sum())
