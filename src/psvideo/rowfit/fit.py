@@ -76,7 +76,10 @@ def find(plan: Plan, rows: Profiles) -> Found:
     free: tuple[str, ...] = () if plan.camera.readout_s is not None else ("row_time_s",)
     fit = _with_flicker(plan, fine, _fit(plan, fine, tracked.beat, free), free)
     fine, fit, apart_s = _in_short_windows(plan, fine, fit, free)
-    fit = _freed(plan, fine, fit, free)
+    freed = _freed(plan, fine, fit, free)
+    if freed is not fit:
+        apart_s = _window_error_s(plan, fine, freed)
+    fit = freed
     steps = int((np.diff(tracked.index) != told).sum())
     stray = jitter(plan, fine, fit)
     known_s = max(fit.shift_error_s, shift_error_s(plan, fine, fit))
@@ -192,6 +195,13 @@ def _in_short_windows(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...
     apart_s = float(np.sqrt(np.mean(_apart_s(rows, fit.beat, other.beat) ** 2)))
     taken, better = (short, other) if other.shift_error_s < SURER * fit.shift_error_s else (rows, fit)
     return taken, better, apart_s
+
+
+def _window_error_s(plan: Plan, rows: Profiles, fit: Fit) -> float:
+    """Return how far apart the times are when brightnesses are fitted anew twice as often."""
+    twice = rows.windowed(max(len(rows.value) // (2 * len(rows.window_start)), 1))
+    other = _fit(plan, twice, fit.beat, tuple(fit.errors_s))
+    return float(np.sqrt(np.mean(_apart_s(rows, fit.beat, other.beat) ** 2)))
 
 
 def _apart_s(rows: Profiles, one: Beat, other: Beat) -> FloatArray:
