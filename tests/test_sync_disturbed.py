@@ -3,12 +3,16 @@
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from psvideo.errors import PsvideoError
+from psvideo.export.exr import write_exr
+from psvideo.pipeline import clip_rounds, find_clip_timing, open_take
 from psvideo.plan import Plan, PlannedFlash
+from psvideo.planfile import format_plan
 from psvideo.rowfit.beat import StrobeClock as FoundClock
 from psvideo.sync import find_timing
 from psvideo.synth import Exposure, Flicker, Noise, StrobeClock, TrueFlash, expose
@@ -183,14 +187,14 @@ def test_a_hole_that_the_numbering_shows_is_reported_once(plan: Plan) -> None:
     assert rms_rows(timing, shot, plan) < 0.05
 
 
-def test_a_repeated_frame_takes_no_time(plan: Plan, tmp_path: object) -> None:
+def test_a_repeated_frame_takes_no_time(plan: Plan, tmp_path: Path) -> None:
     shot = shoot(plan)
     frames = np.insert(shot.frames, 41, shot.frames[40], axis=0)
     timing = find_timing(plan, np.arange(len(frames)), frames.mean(axis=2, dtype=np.float64))
     assert timing.repeated_frames == (41,)
     assert timing.dropped_frames == ()
     assert rms_rows(timing, shot, plan) < 0.05
-    path = tmp_path / "timing.json"  # type: ignore[operator]
+    path = tmp_path / "timing.json"
     path.write_text(format_timing(timing))
     assert read_timing(path) == timing
 
@@ -338,3 +342,17 @@ def test_bends_add_up_and_run_straight_on_beyond_the_last_knot() -> None:
     np.testing.assert_allclose(clock.bend(np.array([-1.0, 0.5, 3.0])), [-1e-6, 0.5e-6, 5e-6])
     twice = clock.bent(np.array([0.0, 1.0, 2.0]), np.array([0.0, 1e-6, 3e-6]))
     np.testing.assert_allclose(twice.bend(np.array([0.5])), [1e-6])
+
+
+def test_plates_of_a_clip_with_frames_missing_unseen_are_those_of_the_whole_clip(plan: Plan, tmp_path: Path) -> None:
+    """Files numbered as if nothing were missing give the plates that the scene has, after the hole too."""
+    shot = shoot(plan, frames=48, dropped=(20,), noise=Noise(), bits=0)
+    (tmp_path / "plan.toml").write_text(format_plan(plan))
+    for number, frame in enumerate(shot.frames, start=1):
+        write_exr(tmp_path / f"frame.{number:04d}.exr", {"Y": frame}, half=False)
+    take = open_take(tmp_path)
+    timing = find_clip_timing(take)
+    assert timing.dropped_frames == (DroppedFrames(after=20, count=1),)
+    last = list(clip_rounds(take, timing))[-1]
+    for plate, slot in zip(last.plates, plan.lit_slots, strict=True):
+        np.testing.assert_allclose(plate.image, plates(plan)[slot], atol=5e-3)

@@ -7,6 +7,7 @@ marginal likelihood of the fit, and a clock that runs straight stays straight.
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from psvideo.camera import FloatArray
 from psvideo.plan import Plan
@@ -110,14 +111,22 @@ def _wandering(hessian: FloatArray, pull: FloatArray, beat: Beat, knots: _Knots)
     size = len(knots.at_s)
     h = hessian[:size, :size]
     b = pull[:size] + h @ beat.clock.bend(knots.at_s)
+    data, stiff = _bands(h + 1e-12 * np.diag(np.diag(h) + 1e-30)), _bands(knots.penalty)
     likelihood = []
     for strength in WANDERING:
-        whole = h + knots.penalty / strength + 1e-12 * np.diag(np.diag(h) + 1e-30)
-        factor = np.linalg.cholesky(whole)
-        half = np.linalg.solve(factor, b)
-        likelihood.append(0.5 * half @ half - np.log(np.diag(factor)).sum() - 0.5 * (size - 2) * np.log(strength))
+        factor = cholesky_banded(data + stiff / strength, lower=True)
+        gain = 0.5 * b @ cho_solve_banded((factor, True), b)  # type: ignore[no-untyped-call]
+        likelihood.append(gain - np.log(factor[0]).sum() - 0.5 * (size - 2) * np.log(strength))
     best = int(np.argmax(likelihood))
     return float(WANDERING[best]), float(likelihood[best] - likelihood[0])
+
+
+def _bands(matrix: FloatArray) -> FloatArray:
+    """Return the diagonal and the two below it, one a row: knots act on their neighbours only."""
+    bands = np.zeros((3, len(matrix)))
+    for below in range(3):
+        bands[below, : len(matrix) - below] = np.diag(matrix, -below)
+    return bands
 
 
 def _moved(rows: Profiles, beat: Beat, knots: _Knots, free: tuple[str, ...], move: FloatArray) -> Beat:

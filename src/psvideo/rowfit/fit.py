@@ -12,7 +12,7 @@ from psvideo.rowfit.jitter import Jitter, jitter, shift_error_s
 from psvideo.rowfit.profiles import Profiles, unexplained
 from psvideo.rowfit.refine import Fit, clearest, explained, refine, robust_loss, scaled
 from psvideo.rowfit.search import search
-from psvideo.rowfit.track import Track, frame_losses, track
+from psvideo.rowfit.track import Track, frame_losses, settled, track
 
 SEARCH_ROWS = 36
 TRACK_ROWS = 60
@@ -32,10 +32,9 @@ CLEAR = 5.0
 BETTER, LEAST_GAIN = 1e-3, 30.0
 """And only where that takes away such a share of the robust loss, and so much of it: a subject that moves in step with
 the dark row bends errors and estimates alike."""
-TREND_FRAMES = 4
-"""Frames per brightness that a clip must have before its brightnesses may change within a window."""
 SURER = 0.8
-"""Share of the standard error that must be left before brightnesses may change within a window."""
+"""Share of the standard error that must be left before brightnesses are fitted anew in windows half as long."""
+MOST_WINDOWS = 400
 MAINS_HZ = (100.0, 120.0)
 FLICKERS = 0.8
 """Flicker is believed where it leaves less than this share of the squares that are left without it."""
@@ -63,7 +62,10 @@ def find(plan: Plan, rows: Profiles) -> Found:
     window = window_frames(plan)
     memory = max(window, int(1.2 * plan.cycle_s / rows.period_s))
     tracked = track(plan, rows.binned(TRACK_ROWS), seed, frames, memory=memory)
-    keep, told = ~tracked.repeated, np.diff(rows.index)
+    told = np.diff(rows.index)
+    tracked = replace(tracked, beat=replace(tracked.beat, clock=_clock_of(plan, tracked)))
+    tracked = replace(tracked, index=settled(plan, rows.binned(TRACK_ROWS), tracked.index, tracked.beat))
+    keep = ~tracked.repeated
     rows = replace(
         rows,
         value=np.ascontiguousarray(rows.value[keep]),
@@ -71,11 +73,13 @@ def find(plan: Plan, rows: Profiles) -> Found:
         doubt=None if rows.doubt is None else np.ascontiguousarray(rows.doubt[keep]),
     ).windowed(window)
     fine = rows.binned(_rows_needed(plan, rows, seed))
-    beat = replace(tracked.beat, clock=_clock_of(plan, tracked))
     free: tuple[str, ...] = () if plan.camera.readout_s is not None else ("row_time_s",)
-    fit = _with_flicker(plan, fine, _fit(plan, fine, beat, free), free)
-    fine, fit, apart_s = _with_trends(plan, fine, fit, free)
-    fit = _freed(plan, fine, fit, free)
+    fit = _with_flicker(plan, fine, _fit(plan, fine, tracked.beat, free), free)
+    fine, fit, apart_s = _in_short_windows(plan, fine, fit, free)
+    freed = _freed(plan, fine, fit, free)
+    if freed is not fit:
+        apart_s = _window_error_s(plan, fine, freed)
+    fit = freed
     steps = int((np.diff(tracked.index) != told).sum())
     stray = jitter(plan, fine, fit)
     known_s = max(fit.shift_error_s, shift_error_s(plan, fine, fit))
@@ -181,18 +185,23 @@ def _clock_of(plan: Plan, tracked: Track) -> StrobeClock:
     return straight.bent(tracked.at_s, stray_s)
 
 
-def _with_trends(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> tuple[Profiles, Fit, float]:
-    """Let brightnesses change within a window where the subject moves so much that this makes the times surer.
+def _in_short_windows(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> tuple[Profiles, Fit, float]:
+    """Fit brightnesses anew more often where the subject moves so much that this makes the times surer.
 
     Return too how far apart the times are with and without: an error that neither of the two fits can know of.
     """
-    if len(rows.value) < TREND_FRAMES * (len(plan.lit_slots) + 1):
-        return rows, fit, 0.0
-    moving = replace(rows, trend=True)
-    other = _fit(plan, moving, fit.beat, free)
+    short = rows.windowed(max(window_frames(plan) // 2, len(rows.value) // MOST_WINDOWS))
+    other = _fit(plan, short, fit.beat, free)
     apart_s = float(np.sqrt(np.mean(_apart_s(rows, fit.beat, other.beat) ** 2)))
-    taken, better = (moving, other) if other.shift_error_s < SURER * fit.shift_error_s else (rows, fit)
+    taken, better = (short, other) if other.shift_error_s < SURER * fit.shift_error_s else (rows, fit)
     return taken, better, apart_s
+
+
+def _window_error_s(plan: Plan, rows: Profiles, fit: Fit) -> float:
+    """Return how far apart the times are when brightnesses are fitted anew twice as often."""
+    twice = rows.windowed(max(len(rows.value) // (2 * len(rows.window_start)), 1))
+    other = _fit(plan, twice, fit.beat, tuple(fit.errors_s))
+    return float(np.sqrt(np.mean(_apart_s(rows, fit.beat, other.beat) ** 2)))
 
 
 def _apart_s(rows: Profiles, one: Beat, other: Beat) -> FloatArray:

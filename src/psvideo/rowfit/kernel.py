@@ -40,8 +40,6 @@ class Rows(NamedTuple):
     """Where each window begins and the last one ends, on the camera's clock: the shift is linear in between."""
     beat_hz: FloatArray
     """Frequencies at which ambient light may flicker."""
-    trend: bool
-    """Whether brightnesses may rise or fall within a window, as those of a subject that moves do."""
 
 
 class Flashes(NamedTuple):
@@ -78,20 +76,8 @@ def given_off(since_s, duration_s, rise_s, fall_s):  # type: ignore[no-untyped-d
 
 @nb.njit(cache=True, nogil=True)
 def width(rows, flashes):  # type: ignore[no-untyped-def]
-    """Return how many numbers a row has in a window: brightnesses, flicker's two phases, and brightnesses' trends."""
-    return flashes.unknowns * (2 if rows.trend else 1) + 2 * len(rows.beat_hz)
-
-
-@nb.njit(cache=True, nogil=True)
-def add_trend(rows, flashes, first, last, design):  # type: ignore[no-untyped-def]
-    """Fill the columns of a window's trends: what was seen, times the place within the window."""
-    if not rows.trend:
-        return
-    base = flashes.unknowns + 2 * len(rows.beat_hz)
-    for n in range(first, last):
-        along = (n - first + 0.5) / (last - first) - 0.5
-        for u in range(flashes.unknowns):
-            design[n, base + u] = design[n, u] * along
+    """Return how many numbers a row has in a window: brightnesses, and flicker's two phases."""
+    return flashes.unknowns + 2 * len(rows.beat_hz)
 
 
 @nb.njit(cache=True, nogil=True)
@@ -210,7 +196,6 @@ def row_rest(rows, flashes, weight, row, design, rest):  # type: ignore[no-untyp
         k = see(rows, flashes, n, row, k, design[n])
     for window in range(len(rows.bounds) - 1):
         first, last = rows.bounds[window], rows.bounds[window + 1]
-        add_trend(rows, flashes, first, last, design)
         _fit_window(rows.value[:, row], weight[:, row], design, first, last, normal, right)
         for n in range(first, last):
             explained = 0.0
@@ -234,8 +219,6 @@ def equations(rows, flashes, weight, tails, first, last, rest, hessian, score): 
     frames = len(rows.value)
     size = width(rows, flashes)
     design = np.empty((frames, size))
-    base = flashes.unknowns + 2 * len(rows.beat_hz)
-    light = np.empty(flashes.unknowns)
     first_flash = np.empty(frames, np.int64)
     normal, right = np.empty((size, size)), np.empty(size)
     signals = np.empty((frames, SIGNALS))
@@ -247,16 +230,11 @@ def equations(rows, flashes, weight, tails, first, last, rest, hessian, score): 
             first_flash[n] = k
         for window in range(len(rows.bounds) - 1):
             begin, end = rows.bounds[window], rows.bounds[window + 1]
-            add_trend(rows, flashes, begin, end, design)
             _fit_window(rows.value[:, row], weight[:, row], design, begin, end, normal, right)
             cross[:] = 0.0
             span_s = rows.ends_s[window + 1] - rows.ends_s[window]
             for n in range(begin, end):
-                for u in range(flashes.unknowns):
-                    light[u] = right[u]
-                    if rows.trend:
-                        light[u] += right[base + u] * ((n - begin + 0.5) / (end - begin) - 0.5)
-                shift = _slopes(rows, flashes, n, row, first_flash[n], light, tails, signals[n])
+                shift = _slopes(rows, flashes, n, row, first_flash[n], right, tails, signals[n])
                 along = (rows.frame_start_s[n] + rows.row_place[row] * rows.row_time_s - rows.ends_s[window]) / span_s
                 signals[n, LEFT] = shift * (1.0 - along)
                 signals[n, RIGHT] = shift * along
@@ -340,7 +318,6 @@ def edges(rows, flashes, weight, first, last, pull, stiff):  # type: ignore[no-u
     frames = len(rows.value)
     design = np.empty((frames, width(rows, flashes)))
     size = design.shape[1]
-    base = flashes.unknowns + 2 * len(rows.beat_hz)
     first_flash = np.empty(frames, np.int64)
     normal, right = np.empty((size, size)), np.empty(size)
     for row in range(first, last):
@@ -350,7 +327,6 @@ def edges(rows, flashes, weight, first, last, pull, stiff):  # type: ignore[no-u
             first_flash[n] = k
         for window in range(len(rows.bounds) - 1):
             begin, end = rows.bounds[window], rows.bounds[window + 1]
-            add_trend(rows, flashes, begin, end, design)
             _fit_window(rows.value[:, row], weight[:, row], design, begin, end, normal, right)
             for n in range(begin, end):
                 rest = rows.value[n, row]
@@ -363,8 +339,6 @@ def edges(rows, flashes, weight, first, last, pull, stiff):  # type: ignore[no-u
                     u = flashes.unknown[j]
                     if u > 0:
                         light = right[u]
-                        if rows.trend:
-                            light += right[base + u] * ((n - begin + 0.5) / (end - begin) - 0.5)
                         since_s, d = open_s - flashes.start_s[j], flashes.duration_s[j]
                         _, opening = given_off(since_s, d, flashes.rise_s, flashes.fall_s)
                         _, closing = given_off(since_s + rows.exposure_s, d, flashes.rise_s, flashes.fall_s)

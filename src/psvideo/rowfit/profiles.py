@@ -25,7 +25,7 @@ class Profiles:
 
     ``place`` (row,) counts sensor rows from the one that opens first; ``window_start`` (window,) are the frames at
     which windows begin, in each of which a row has brightnesses of its own. ``doubt`` (frame, row) is by how much a
-    value may be wrong besides noise, as where pixels saturate; ``trend`` lets brightnesses change within a window.
+    value may be wrong besides noise, as where pixels saturate.
     """
 
     value: FloatArray
@@ -34,7 +34,6 @@ class Profiles:
     place: FloatArray
     window_start: IntArray
     doubt: FloatArray | None = None
-    trend: bool = False
 
     @property
     def frame_start_s(self) -> FloatArray:
@@ -129,7 +128,6 @@ def compiled_rows(rows: Profiles, beat: Beat) -> kernel.Rows:
         np.append(rows.window_start, len(rows.value)),
         rows.ends_s,
         np.array(beat.beat_hz, np.float64),
-        rows.trend,
     )
 
 
@@ -175,7 +173,6 @@ def equations(
 
 def brightnesses(plan: Plan, rows: Profiles, beat: Beat, weight: FloatArray | None = None) -> FloatArray:
     """Return every row's brightnesses, fitted over all frames together, shape (row, unknown)."""
-    rows = replace(rows, trend=False)
     seen, flashes = compiled_rows(rows, beat), compiled_flashes(plan, rows, beat)
     trust = np.ones_like(rows.value) if weight is None else weight
     found = np.zeros((rows.value.shape[1], flashes.unknowns + 2 * len(beat.beat_hz)))
@@ -186,7 +183,6 @@ def brightnesses(plan: Plan, rows: Profiles, beat: Beat, weight: FloatArray | No
 def predictions(plan: Plan, rows: Profiles, beat: Beat, brightness: FloatArray) -> FloatArray:
     """Return the profiles (frame, row) that known brightnesses (row, unknown) give at the times of ``rows``."""
     found = np.empty_like(rows.value)
-    rows = replace(rows, trend=False)
     seen, flashes = compiled_rows(rows, beat), compiled_flashes(plan, rows, beat)
     kernel.predictions(seen, flashes, brightness, 0, rows.value.shape[1], found)
     return found
@@ -206,7 +202,6 @@ def residuals_of(plan: Plan, timing: Timing, index: IntArray, value: FloatArray)
         np.array([0, len(value)]),
         np.zeros(2),
         np.zeros(0),
-        False,
     )
     unknown = slot_unknowns(plan)
     slots = [flash.slot for flash in timing.flashes]

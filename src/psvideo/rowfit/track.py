@@ -32,6 +32,8 @@ SUSPICIOUS = 0.25
 HOLDS = 1.0
 """A step is believed where it takes away so much of the frames' losses once brightnesses are fitted anew."""
 LEAST_ANCHOR = 12
+MEMORY, NEAR = 24, 10
+"""Frames on either side of a hole that tell where it is, and how far from where it was found it may be."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -212,3 +214,25 @@ def _sharpened(plan: Plan, rows: Profiles, now: Beat, base: Beat, frames: slice)
 def _lateness(base: Beat, now: Beat, at_s: float) -> tuple[float, float]:
     strobe_s = (at_s - base.clock.phase_s) / base.clock.rate
     return at_s, now.clock.phase_s + strobe_s * now.clock.rate - at_s
+
+
+def settled(plan: Plan, rows: Profiles, index: IntArray, beat: Beat) -> IntArray:
+    """Return the frames' places with every hole moved to where it explains the frames around it best.
+
+    While tracking, frames beside a hole are judged by brightnesses from one side only; here from both.
+    """
+    index = index.copy()
+    told = np.diff(rows.index)
+    for place in np.flatnonzero(np.diff(index) > told).tolist():
+        extra = int(index[place + 1] - index[place] - told[place])
+        first, last = max(place + 1 - MEMORY, 0), min(place + 1 + MEMORY, len(index))
+        tried = {}
+        for start in range(max(place + 1 - NEAR, first + 1), min(place + 1 + NEAR, last - 1) + 1):
+            moved = index.copy()
+            moved[min(start, place + 1) : max(start, place + 1)] += extra * int(np.sign(place + 1 - start))
+            if (np.diff(moved) < 0).any():
+                continue
+            part = replace(rows, index=moved).take(slice(first, last)).one_window()
+            tried[start] = (float(frame_losses(part, unexplained(plan, part, beat)).sum()), moved)
+        index = min(tried.values(), key=lambda pair: pair[0])[1]
+    return index

@@ -1,0 +1,33 @@
+"""The picture of a timing shows what fits and what does not."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from psvideo.plan import Plan
+from psvideo.rowfit.profiles import residuals_of
+from psvideo.sync import find_timing
+from psvideo.synth import StrobeClock, expose
+from psvideo.view.timing_picture import timing_picture, write_sheet
+
+
+def test_right_times_leave_nothing_and_wrong_ones_leave_red_and_blue(
+    make_plan: Callable[..., Plan], tmp_path: Path
+) -> None:
+    plan = make_plan(height_px=60, width_px=2)
+    rng = np.random.default_rng(0)
+    scene = {slot: (0.2 + 0.5 * rng.random((60, 2))).astype(np.float32) for slot in plan.lit_slots}
+    shot = expose(scene, plan, frames=40, clock=StrobeClock(phase_s=0.004))
+    profiles, places = shot.frames.mean(axis=2, dtype=np.float64), np.arange(40)
+    timing = find_timing(plan, places, profiles)
+    late = replace(timing, flashes=tuple(replace(flash, start_s=flash.start_s + 4e-4) for flash in timing.flashes))
+    assert np.abs(residuals_of(plan, timing, places, profiles)).max() < 1e-3
+    assert np.abs(residuals_of(plan, late, places, profiles)).max() > 0.05
+    right, wrong = (timing_picture(plan, one, places, profiles).astype(int) for one in (timing, late))
+    coloured = [(np.ptp(picture, axis=2) > 60).mean() for picture in (right, wrong)]
+    assert coloured[1] > coloured[0] + 0.01
+    write_sheet(tmp_path / "timing.png", right.astype(np.uint8))
+    np.testing.assert_array_equal(cv2.imread(str(tmp_path / "timing.png"))[..., ::-1], right)
