@@ -23,8 +23,8 @@ from psvideo.rig import Light, Rig
 from psvideo.rigfile import format_rig
 from psvideo.synth import Noise, StrobeClock, expose
 
-SHORT, LONG = 80, 200
-REPEATS = 3
+SHORT, LONG = 40, 100
+REPEATS = 1
 REPEATED = 8
 DIRECTIONS = {"key": (0.5, 0.4, 0.768), "left": (-0.6, 0.2, 0.775), "right": (0.1, -0.5, 0.86)}
 
