@@ -104,13 +104,6 @@ static void answer_NEW(const char *keys) {
     reply_ok(keys);
 }
 
-/* `line:on` */
-static bool refuse_pair(char *word, uint32_t *line, uint32_t *on) {
-    char *colon = strchr(word, ':');
-    if (colon) *colon = 0;
-    return refuse_number(word, line) || refuse_number(colon ? colon + 1 : "", on);
-}
-
 static bool refuse_upload(upload_t *upload, uint8_t lines) {
     uint32_t line, on;
     if (refuse_number(words_next(), &upload->place) || refuse_number(words_next(), &upload->duration) ||
@@ -120,7 +113,10 @@ static bool refuse_upload(upload_t *upload, uint8_t lines) {
     upload->count = 0;
     upload->too_many = lines > MOST_LIT;
     for (; lines; lines--) {
-        if (refuse_pair(words_next(), &line, &on)) return true;
+        if (!words_pair(words_next(), &line, &on)) {
+            reply_error(ERROR_NUMBER, PSTR("line:on"));
+            return true;
+        }
         if (upload->count == MOST_LIT) continue;
         upload->line[upload->count] = line;
         upload->on[upload->count++] = on;

@@ -18,7 +18,7 @@
 #define SEGMENT 0x4000  /* long waits are cut into such pieces, the first one and a bit */
 #define NEAR 0x7FFFUL   /* the longest wait that edges.S arms by itself */
 #define OCR(output) ((volatile uint16_t *)&OCR1A)[output]
-#define RISE_BIT(output) (uint8_t)(1 << COM1A0 >> 2 * (output)) /* with it a match sets the pin, without it clears */
+#define RISE_BIT(output) (uint8_t)(1 << COM1A0 >> 2 * (output))   /* with it a match sets the pin, without it clears */
 #define MATCH_BITS(output) (uint8_t)(1 << COM1A1 >> 2 * (output)) /* the unit drives the pin */
 #define INTERRUPT_BIT(output) (uint8_t)(1 << OCIE1A << (output))
 #define SHORT_FLAG(output) (uint8_t)(FLAG_SHORT_A << 2 * (output))
@@ -89,22 +89,24 @@ ISR(__vector_late) {
     player_stop();
 }
 
+/* What follows is compiled once for every output, with its number known: a third of the time. */
+#define PER_OUTPUT static inline __attribute__((always_inline))
+
 /* The flags for the edge that is being armed: may edges.S serve it, and only it? */
-static uint8_t flags_of(uint8_t n) {
+PER_OUTPUT uint8_t flags_of(uint8_t n) {
     output_t *output = &outputs[n];
     uint16_t more = short_way[n].more;
-    if (!output->lit) return 0;
     uint32_t on = more ? output->on : output->last;
-    if (output->rises) {
-        if (on > NEAR) return 0;
-        short_way[n].on = on;
-        return SHORT_FLAG(n) | (more && output->off <= NEAR ? 0 : ONCE_FLAG(n));
-    }
-    return more && output->off <= NEAR ? SHORT_FLAG(n) | ONCE_FLAG(n) : 0;
+    uint8_t behind = more && output->off <= NEAR ? SHORT_FLAG(n) : 0; /* the edge behind it can go the short way */
+    if (!output->lit) return 0;
+    if (!output->rises) return behind ? SHORT_FLAG(n) | ONCE_FLAG(n) : 0;
+    if (on > NEAR) return 0;
+    short_way[n].on = on;
+    return behind ? SHORT_FLAG(n) : SHORT_FLAG(n) | ONCE_FLAG(n);
 }
 
 /* Arm the next match of an output. Until the last piece of a wait, it does to the pin what was done already. */
-static void arm(uint8_t n, uint16_t ticks) {
+PER_OUTPUT void arm(uint8_t n, uint16_t ticks) {
     output_t *output = &outputs[n];
     uint8_t flags = output->waits ? 0 : flags_of(n);
     ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
@@ -120,19 +122,17 @@ static void arm(uint8_t n, uint16_t ticks) {
     }
 }
 
-static void wait(uint8_t n, uint32_t ticks, bool rises) {
-    outputs[n].rises = rises;
-    outputs[n].waits = ticks / SEGMENT;
+/* Cut a wait into pieces. Returns the first, which is the longest. */
+PER_OUTPUT uint16_t cut(output_t *output, uint32_t ticks) {
+    output->waits = ticks / SEGMENT;
     ticks %= SEGMENT;
-    if (outputs[n].waits) {
-        outputs[n].waits--;
-        ticks += SEGMENT;
-    }
-    arm(n, ticks);
+    if (!output->waits) return ticks;
+    output->waits--;
+    return ticks + SEGMENT;
 }
 
 /* Read what an output does in the step that comes. */
-static void load(uint8_t n) {
+PER_OUTPUT void load(uint8_t n) {
     output_t *output = &outputs[n];
     const slot_t *slot = &program_slots[program_steps[output->step]];
     uint32_t on = slot->on[n];
@@ -143,13 +143,14 @@ static void load(uint8_t n) {
     output->off = slot->period - on;
     output->last = full || on > room ? room : on;
     output->rest = slot->dark + (on ? room - output->last : slot->duration);
+    output->rises = on;
     short_way[n].more = full ? 0 : slot->bursts - 1;
     short_way[n].off = output->off;
     short_way[n].last = output->last > NEAR ? 0xFFFF : output->last;
     if (n == 0) select(slot->lit);
 }
 
-static void finish(uint8_t n) {
+PER_OUTPUT void finish(uint8_t n) {
     outputs[n].done = true;
     ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
         TIMSK1 &= ~INTERRUPT_BIT(n);
@@ -157,36 +158,38 @@ static void finish(uint8_t n) {
     if (n == 0) select(0);
 }
 
-static void next_step(uint8_t n) {
-    output_t *output = &outputs[n];
-    uint32_t ticks = output->rest;
-    if (++output->step == program_step_count) {
-        output->step = 0;
-        if (output->counts && !output->cycles--) {
-            finish(n);
-            return;
-        }
-    }
-    load(n);
-    wait(n, ticks, output->lit);
+/* Go on to the next step. Returns false where the last cycle is over. */
+PER_OUTPUT bool next_step(output_t *output) {
+    if (++output->step < program_step_count) return true;
+    output->step = 0;
+    return !output->counts || output->cycles--;
 }
 
-static void serve(uint8_t n) {
+PER_OUTPUT void serve(uint8_t n) {
     output_t *output = &outputs[n];
+    uint32_t ticks;
     output->served = true;
     if (output->waits) {
         output->waits--;
         arm(n, SEGMENT);
-    } else if (!output->lit) {
-        next_step(n);
-    } else if (TCCR1A & RISE_BIT(n)) { /* a burst has begun */
-        wait(n, short_way[n].more ? output->on : output->last, false);
-    } else if (short_way[n].more) {
-        short_way[n].more--;
-        wait(n, output->off, true);
-    } else {
-        next_step(n);
+        return;
     }
+    if (output->lit && TCCR1A & RISE_BIT(n)) { /* a burst has begun */
+        ticks = short_way[n].more ? output->on : output->last;
+        output->rises = false;
+    } else if (output->lit && short_way[n].more) { /* one of several is over */
+        ticks = output->off;
+        short_way[n].more--;
+        output->rises = true;
+    } else {
+        ticks = output->rest;
+        if (!next_step(output)) {
+            finish(n);
+            return;
+        }
+        load(n);
+    }
+    arm(n, cut(output, ticks));
 }
 
 ISR(__vector_long_a, ISR_NOBLOCK) {
@@ -203,7 +206,7 @@ ISR(__vector_long_c, ISR_NOBLOCK) {
 }
 #endif
 
-static void start_output(uint8_t n, uint16_t from, uint32_t ticks, uint32_t cycles) {
+PER_OUTPUT void start_output(uint8_t n, uint16_t from, uint32_t ticks, uint32_t cycles) {
     output_t *output = &outputs[n];
     output->step = 0;
     output->counts = cycles;
@@ -214,15 +217,18 @@ static void start_output(uint8_t n, uint16_t from, uint32_t ticks, uint32_t cycl
     OCR(n) = from - 1; /* a pin changes one tick after its match */
     TCCR1A |= MATCH_BITS(n);
     TIFR1 = INTERRUPT_BIT(n);
-    wait(n, ticks, output->lit);
+    arm(n, cut(output, ticks));
     TIMSK1 |= INTERRUPT_BIT(n);
 }
 
 void player_start(uint64_t from, uint32_t ticks, uint32_t cycles) {
     gated = program_wiring == WIRING_GATED;
     late = false;
-    for (uint8_t n = 0; n < EXACT_OUTPUTS; n++) {
-        outputs[n].done = true;
-        if (n == 0 || !gated) start_output(n, from, ticks, cycles);
-    }
+    for (uint8_t n = 0; n < EXACT_OUTPUTS; n++) outputs[n].done = true;
+    start_output(0, from, ticks, cycles);
+    if (gated) return;
+    start_output(1, from, ticks, cycles);
+#if EXACT_OUTPUTS > 2
+    start_output(2, from, ticks, cycles);
+#endif
 }

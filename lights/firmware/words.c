@@ -23,17 +23,27 @@ char *words_next(void) {
     return word;
 }
 
-bool words_number(const char *digits, uint32_t *value) {
+/* Read digits up to `end`. Returns what stands behind it, 0 where there is no such number. */
+static const char *read_digits(const char *digits, char end, uint32_t *value) {
     *value = 0;
-    if (!*digits) return false;
-    for (; *digits; digits++) {
+    if (*digits == end) return 0;
+    for (; *digits != end; digits++) {
         uint8_t digit = *digits - '0';
-        if (digit > 9 || *value > UINT32_MAX / 10) return false;
+        if (digit > 9 || *value > UINT32_MAX / 10) return 0;
         *value *= 10;
-        if (digit > UINT32_MAX - *value) return false;
+        if (digit > UINT32_MAX - *value) return 0;
         *value += digit;
     }
-    return true;
+    return digits + 1;
+}
+
+bool words_number(const char *digits, uint32_t *value) {
+    return read_digits(digits, 0, value);
+}
+
+bool words_pair(const char *pair, uint32_t *first, uint32_t *second) {
+    pair = read_digits(pair, ':', first);
+    return pair && read_digits(pair, 0, second);
 }
 
 int8_t words_find(const char *sought, const char *words) {

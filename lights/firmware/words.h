@@ -14,6 +14,9 @@ char *words_next(void);
 /* Decimal digits, at most 4294967295. */
 bool words_number(const char *word, uint32_t *value);
 
+/* Two such numbers with a colon between them. */
+bool words_pair(const char *word, uint32_t *first, uint32_t *second);
+
 /* The number of a word in a list of words, -1 where it is none of them. */
 int8_t words_find(const char *word, const char *words_in_flash);
 
