@@ -3,9 +3,9 @@
 #include <avr/io.h>
 
 void uart_start(void) {
-    UBRR0 = 16; /* 115200 baud at 16 MHz with U2X: 2.1 % fast, as on every Arduino */
     UCSR0A = 1 << U2X0;
     UCSR0C = 1 << UCSZ01 | 1 << UCSZ00;
+    UBRR0 = 16; /* 115200 baud at 16 MHz with U2X: 2.1 % fast, as on every Arduino */
     UCSR0B = 1 << RXEN0 | 1 << TXEN0;
 }
 
