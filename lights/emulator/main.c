@@ -49,7 +49,7 @@ static int64_t virtual_ns(void) { return (int64_t)(board_cycle() * (1000000000ul
 static void keep_pace(int64_t *ahead_ns) {
     int64_t early = virtual_ns() + *ahead_ns - wall_ns();
     if (early < -FORGIVE_NS) *ahead_ns -= early;
-    if (early < 500000) return; /* the system's sleep is not worth less than half a millisecond */
+    if (early < 20000) return; /* the system cannot sleep for less */
     struct timespec pause = {.tv_sec = early / 1000000000, .tv_nsec = early % 1000000000};
     nanosleep(&pause, NULL);
 }
