@@ -43,8 +43,8 @@ class Emission:
     def share(self, since_s: FloatArray, duration_s: float, bursts_s: Bursts = ()) -> FloatArray:
         """Return the energy given off so far as a fraction of the whole flash's, 0 to 1.
 
-        ``bursts_s`` are starts (after the flash's) and lengths where the drive is not on throughout. Their tails add up,
-        which is exact where rise and fall are alike.
+        ``bursts_s`` are starts (after the flash's) and lengths where the drive is not on throughout. Their tails add
+        up, which is exact where rise and fall are alike.
 
         >>> float(Emission().share(np.array(0.5), 1.0, ((0.0, 0.1), (0.9, 0.1))))
         0.5

@@ -60,8 +60,8 @@ def shoot(
     """Film a scene file and write the clip folder ``out``, whole or not at all.
 
     The folder holds frames/, plan.toml and rig.toml as a camera and its crew would leave them, and truth/ with what
-    only the virtual shoot knows. ``track`` passes frame indices through, for showing progress; ``trace`` lets the traced
-    edges of a strobe controller light the scene instead of the plan's ideal train. Raises UsageError where
+    only the virtual shoot knows. ``track`` passes frame indices through, for showing progress; ``trace`` lets the
+    traced edges of a strobe controller light the scene instead of the plan's ideal train. Raises UsageError where
     ``out`` exists and ``force`` is not given, PsvideoError for a faulty scene or mesh or where writing fails.
     """
     _refuse_footage(out, force=force)

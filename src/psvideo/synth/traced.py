@@ -59,8 +59,9 @@ def wired_lines(plan: Plan, given: Mapping[str, int]) -> dict[int, str]:
 def traced_light(scene: Scene, plan: Plan, clock: StrobeClock, options: TraceOptions) -> TracedLight:
     """Return the light of a clip from a trace, in camera time.
 
-    The first edge falls on the scene's ``phase_s``; where the scene leaves it open, on a moment drawn from its seed such
-    that the clip lies within the run, if the run is long enough. Raises PsvideoError where trace and plan do not fit.
+    The first edge falls on the scene's ``phase_s``; where the scene leaves it open, on a moment drawn from its seed
+    such that the clip lies within the run, if the run is long enough. Raises PsvideoError where trace and plan do not
+    fit.
     """
     _refuse_unfit(scene, plan)
     trace = read_trace(options.path)
