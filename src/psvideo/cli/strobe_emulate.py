@@ -20,7 +20,7 @@ from psvideo.strobe.emulated import EmulatedController
 from psvideo.strobe.emulated_port import TRACE_HZ, open_port, serve
 from psvideo.strobe.messages import WiringName
 from psvideo.strobe.simulated import Simulation, simulated_board
-from psvideo.strobe.toolchain import why_not
+from psvideo.strobe.toolchain import AvrBoard, why_not
 from psvideo.tracefile import SCHEMA, TraceWriter
 
 LOOK_EVERY_S = 0.2

@@ -91,7 +91,7 @@ def build(board: AvrBoard) -> Built:
             _make(folder)
     return Built(
         emulator=lights / "emulator" / "build" / "emulator",
-        firmware=lights / "firmware" / "build" / board / "firmware.elf",
+        firmware=lights / "firmware" / "build" / f"{board}.elf",
     )
 
 
