@@ -28,8 +28,7 @@ def lit_ticks(slot: Slot, line: int) -> int:
 
 def slot_refusal(slot: Slot, caps: Capabilities) -> Refusal | None:
     """Return why a controller does not take a slot, None where it does."""
-    refusals = (_number_refusal(slot, caps), _time_refusal(slot, caps), _burst_refusal(slot, caps))
-    return next((refusal for refusal in refusals if refusal is not None), None)
+    return _number_refusal(slot, caps) or _time_refusal(slot, caps) or _burst_refusal(slot, caps)
 
 
 def _number_refusal(slot: Slot, caps: Capabilities) -> Refusal | None:
