@@ -10,7 +10,7 @@ PACKAGE = Path(__file__).resolve().parents[1] / "src" / "psvideo"
 
 LAYERS = [
     {"errors", "tomlfile", "files", "compiled"},
-    {"camera", "rig", "rigfile", "surface"},
+    {"camera", "rig", "rigfile", "surface", "tracefile"},
     {"plan", "planfile", "timing"},
     {"shutter", "clip", "strobe", "capture"},
     {"rowfit", "profiles"},
@@ -26,6 +26,7 @@ LAYERS = [
 
 SYNTH_NEVER_USES = {"shutter", "rowfit", "profiles", "sync", "split", "hudon2015", "ambient", "sequence", "normals"} | {
     "clip",
+    "strobe",
     "pipeline",
     "runs",
 }
