@@ -1,5 +1,6 @@
 #include "board.h"
 
+#include <simavr/avr_extint.h>
 #include <simavr/avr_ioport.h>
 #include <simavr/avr_timer.h>
 #include <simavr/avr_uart.h>
@@ -42,8 +43,6 @@ static const layout LAYOUTS[] = {
 #define EXTRF 0x02
 #define BORF 0x04
 #define WDRF 0x08
-#define ACSR 0x50 /* the analogue comparator's, with ACD: off */
-#define ACD 0x80
 
 static avr_t *avr;
 static const layout *at;
@@ -107,17 +106,9 @@ static void set_interlock(void) {
     *pins = interlock_open ? *pins | mask : *pins & ~mask;
 }
 
-/* The library samples the ATmega328P's analogue comparator in every cycle, which takes three quarters of all time. The
- * firmware does not use it: switch it off. */
-static void switch_comparator_off(void) {
-    avr_io_addr_t io = AVR_DATA_TO_IO(ACSR);
-    if (avr->io[io].w.c) avr->io[io].w.c(avr, ACSR, ACD, avr->io[io].w.param);
-}
-
 /* Every reset puts all of the chip's modules back; tie them to the board again. */
 static void after_reset(void) {
     was_reset = false;
-    switch_comparator_off();
     match_after_reset();
     serial_after_reset();
     set_interlock();
@@ -157,6 +148,9 @@ bool board_open(const char *mcu, const char *elf, bool gated, byte_sink sent, re
     is_gated = gated;
     on_reset = reset;
     match_open(avr, at->exact_count, look_at_pins);
+    /* The library would look in every cycle whether INT0 and INT1 (S0 and S1 of the ATmega328P) are low: nobody asks,
+     * and it takes three quarters of all time. */
+    for (uint8_t number = 0; number < 2; number++) avr_extint_set_strict_lvl_trig(avr, number, 0);
     serial_open(avr, sent);
     after_reset();
     avr->data[at->mcusr] = PORF;
