@@ -17,7 +17,7 @@ from psvideo.errors import UsageError
 from psvideo.files import refuse_existing, whole_file
 from psvideo.strobe.boards import BOARDS
 from psvideo.strobe.emulated import EmulatedController
-from psvideo.strobe.emulated_port import TRACE_HZ, open_port, serve
+from psvideo.strobe.imitation import TRACE_HZ, open_port, serve
 from psvideo.strobe.messages import WiringName
 from psvideo.strobe.simulated import Simulation, simulated_board
 from psvideo.strobe.toolchain import AvrBoard, why_not
