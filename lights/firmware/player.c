@@ -15,8 +15,8 @@
 #include "player_flags.h"
 #include "program.h"
 
-#define SEGMENT 0x4000  /* long waits are cut into such pieces, the first one and a bit */
-#define NEAR 0x7FFFUL   /* the longest wait that edges.S arms by itself */
+#define SEGMENT 0x8000 /* long waits are cut into such pieces, the first one and a bit */
+#define NEAR 0x7FFFUL  /* the longest wait that edges.S arms by itself */
 #define OCR(output) ((volatile uint16_t *)&OCR1A)[output]
 #define RISE_BIT(output) (uint8_t)(1 << COM1A0 >> 2 * (output))   /* with it a match sets the pin, without it clears */
 #define MATCH_BITS(output) (uint8_t)(1 << COM1A1 >> 2 * (output)) /* the unit drives the pin */
@@ -31,12 +31,11 @@ volatile struct {
 } short_way[EXACT_OUTPUTS];
 
 typedef struct {
-    uint32_t on, off, last; /* of the flash that comes or goes on */
-    uint32_t rest;          /* from its last fall, or its start where this output is dark in it, to the next step */
-    uint32_t cycles;        /* that are still to begin behind this one; 0 where it goes on until told */
-    uint16_t waits;         /* whole segments that are left of a long wait */
+    const part_t *part; /* of the flash that comes or goes on */
+    uint32_t cycles;    /* that are still to begin behind this one */
+    uint16_t waits;     /* whole segments that are left of a long wait */
     uint8_t step;
-    bool lit, rises, counts; /* is it lit in this step; does the edge that it waits for rise; are cycles counted */
+    bool counts, rises; /* are cycles counted; does the edge that it waits for rise */
     volatile bool done, served;
 } output_t;
 
@@ -94,28 +93,28 @@ ISR(__vector_late) {
 
 /* The flags for the edge that is being armed: may edges.S serve it, and only it? */
 PER_OUTPUT uint8_t flags_of(uint8_t n) {
-    output_t *output = &outputs[n];
+    const part_t *part = outputs[n].part;
     uint16_t more = short_way[n].more;
-    uint32_t on = more ? output->on : output->last;
-    uint8_t behind = more && output->off <= NEAR ? SHORT_FLAG(n) : 0; /* the edge behind it can go the short way */
-    if (!output->lit) return 0;
-    if (!output->rises) return behind ? SHORT_FLAG(n) | ONCE_FLAG(n) : 0;
+    uint32_t on = more ? part->on : part->last;
+    if (!part->bursts) return 0;
+    if (!outputs[n].rises) return more && part->off <= NEAR ? SHORT_FLAG(n) | ONCE_FLAG(n) : 0;
     if (on > NEAR) return 0;
     short_way[n].on = on;
-    return behind ? SHORT_FLAG(n) : SHORT_FLAG(n) | ONCE_FLAG(n);
+    return more && part->off <= NEAR ? SHORT_FLAG(n) : SHORT_FLAG(n) | ONCE_FLAG(n);
 }
 
 /* Arm the next match of an output. Until the last piece of a wait, it does to the pin what was done already. */
 PER_OUTPUT void arm(uint8_t n, uint16_t ticks) {
     output_t *output = &outputs[n];
-    uint8_t flags = output->waits ? 0 : flags_of(n);
+    bool last = !output->waits;
+    uint8_t flags = last ? flags_of(n) : 0;
     ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
         if (late) return; /* another output was, meanwhile: stay dark */
-        uint16_t target = OCR(n) + ticks;
-        OCR(n) = target;
+        uint16_t now = OCR(n);
+        OCR(n) = now + ticks;
         GPIOR0 = (GPIOR0 & ~(SHORT_FLAG(n) | ONCE_FLAG(n))) | flags;
-        if (!output->waits) TCCR1A = output->rises ? TCCR1A | RISE_BIT(n) : TCCR1A & ~RISE_BIT(n);
-        if ((int16_t)(TCNT1 - target) >= 0) {
+        if (last) TCCR1A = output->rises ? TCCR1A | RISE_BIT(n) : TCCR1A & ~RISE_BIT(n);
+        if (TCNT1 - now >= ticks) {
             late = true;
             player_stop();
         }
@@ -124,29 +123,22 @@ PER_OUTPUT void arm(uint8_t n, uint16_t ticks) {
 
 /* Cut a wait into pieces. Returns the first, which is the longest. */
 PER_OUTPUT uint16_t cut(output_t *output, uint32_t ticks) {
-    output->waits = ticks / SEGMENT;
-    ticks %= SEGMENT;
-    if (!output->waits) return ticks;
-    output->waits--;
-    return ticks + SEGMENT;
+    uint16_t piece = ticks;
+    output->waits = (uint16_t)(ticks >> 16) << 1; /* whole segments; a shift by 15 in one piece takes ten times as long */
+    if (!output->waits) return piece;
+    if (!(piece & SEGMENT)) output->waits--;
+    return piece | SEGMENT;
 }
 
 /* Read what an output does in the step that comes. */
 PER_OUTPUT void load(uint8_t n) {
-    output_t *output = &outputs[n];
-    const slot_t *slot = &program_slots[program_steps[output->step]];
-    uint32_t on = slot->on[n];
-    bool full = on == slot->period;
-    uint32_t room = full ? slot->duration : slot->last_room;
-    output->lit = on;
-    output->on = on;
-    output->off = slot->period - on;
-    output->last = full || on > room ? room : on;
-    output->rest = slot->dark + (on ? room - output->last : slot->duration);
-    output->rises = on;
-    short_way[n].more = full ? 0 : slot->bursts - 1;
-    short_way[n].off = output->off;
-    short_way[n].last = output->last > NEAR ? 0xFFFF : output->last;
+    const slot_t *slot = &program_slots[program_steps[outputs[n].step]];
+    const part_t *part = &slot->part[n];
+    outputs[n].part = part;
+    outputs[n].rises = part->bursts;
+    short_way[n].more = part->bursts - 1;
+    short_way[n].off = part->off;
+    short_way[n].last = part->last > NEAR ? 0xFFFF : part->last;
     if (n == 0) select(slot->lit);
 }
 
@@ -174,15 +166,15 @@ PER_OUTPUT void serve(uint8_t n) {
         arm(n, SEGMENT);
         return;
     }
-    if (output->lit && TCCR1A & RISE_BIT(n)) { /* a burst has begun */
-        ticks = short_way[n].more ? output->on : output->last;
+    if (output->part->bursts && TCCR1A & RISE_BIT(n)) { /* a burst has begun */
+        ticks = short_way[n].more ? output->part->on : output->part->last;
         output->rises = false;
-    } else if (output->lit && short_way[n].more) { /* one of several is over */
-        ticks = output->off;
+    } else if (output->part->bursts && short_way[n].more) { /* one of several is over */
+        ticks = output->part->off;
         short_way[n].more--;
         output->rises = true;
     } else {
-        ticks = output->rest;
+        ticks = output->part->rest;
         if (!next_step(output)) {
             finish(n);
             return;

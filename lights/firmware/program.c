@@ -30,8 +30,9 @@ static const slot_t *slot_of(uint8_t step) {
     return &program_slots[program_steps[step]];
 }
 
-static uint32_t on_of(const slot_t *slot, uint8_t line) {
-    return slot->lit >> line & 1 ? slot->on[program_wiring == WIRING_GATED ? 0 : line] : 0;
+/* What a line does in a slot, 0 where it is not lit. */
+static const part_t *part_of(const slot_t *slot, uint8_t line) {
+    return slot->lit >> line & 1 ? &slot->part[program_wiring == WIRING_GATED ? 0 : line] : 0;
 }
 
 static uint32_t smaller(uint32_t a, uint32_t b) {
@@ -77,18 +78,27 @@ static uint8_t refuse_bursts(const upload_t *upload, const char **reason) {
     return 0;
 }
 
+static part_t make_part(const slot_t *slot, uint32_t on) {
+    part_t part = {.on = on, .off = slot->period - on, .bursts = 1, .last = slot->duration, .rest = slot->dark};
+    if (on == slot->period) return part; /* full power: one long burst */
+    part.bursts = (slot->duration - 1) / slot->period + 1;
+    uint32_t room = slot->duration - (part.bursts - 1) * slot->period;
+    part.last = smaller(on, room);
+    part.rest += room - part.last;
+    return part;
+}
+
 static void store(const upload_t *upload) {
     slot_t *slot = &program_slots[upload->place];
     memset(slot, 0, sizeof *slot);
     slot->duration = upload->duration;
     slot->dark = upload->dark;
     slot->period = upload->period;
+    for (uint8_t output = 0; output < EXACT_OUTPUTS; output++) slot->part[output].rest = slot->duration + slot->dark;
     for (uint8_t i = 0; i < upload->count; i++) {
         slot->lit |= 1 << upload->line[i];
-        slot->on[program_wiring == WIRING_GATED ? 0 : upload->line[i]] = upload->on[i];
+        slot->part[program_wiring == WIRING_GATED ? 0 : upload->line[i]] = make_part(slot, upload->on[i]);
     }
-    slot->bursts = slot->lit ? (slot->duration - 1) / slot->period + 1 : 1;
-    slot->last_room = slot->duration - (slot->bursts - 1) * slot->period;
 }
 
 uint8_t program_set_slot(const upload_t *upload, const char **reason) {
@@ -100,9 +110,8 @@ uint8_t program_set_slot(const upload_t *upload, const char **reason) {
     return 0;
 }
 
-uint32_t program_lit_ticks(const slot_t *slot, uint32_t on) {
-    if (on == slot->period) return slot->duration;
-    return on ? (slot->bursts - 1) * on + smaller(on, slot->last_room) : 0;
+static uint32_t lit_ticks(const part_t *part) {
+    return part ? (part->bursts - 1) * part->on + part->last : 0;
 }
 
 static uint16_t add_number(uint16_t crc, uint32_t number) {
@@ -114,7 +123,10 @@ static uint16_t add_slot(uint16_t crc, const slot_t *slot) {
     crc = add_number(crc, slot->duration);
     crc = add_number(crc, slot->dark);
     crc = add_number(crc, slot->period);
-    for (uint8_t line = 0; line < CHECKED_LINES; line++) crc = add_number(crc, on_of(slot, line));
+    for (uint8_t line = 0; line < CHECKED_LINES; line++) {
+        const part_t *part = part_of(slot, line);
+        crc = add_number(crc, part ? part->on : 0);
+    }
     return crc;
 }
 
@@ -137,7 +149,7 @@ static uint8_t refuse_shares(uint64_t cycle, const char **reason) {
     for (uint8_t line = 0; line < program_lines(); line++) {
         uint32_t lit = 0;
         for (uint8_t step = 0; step < program_step_count; step++) {
-            lit += program_lit_ticks(slot_of(step), on_of(slot_of(step), line));
+            lit += lit_ticks(part_of(slot_of(step), line));
         }
         if (is_share_above(lit, cycle, MAX_LINE_PPM)) REFUSE(ERROR_LIMIT, "a line's share > max_line_ppm");
         total += lit;
@@ -152,7 +164,7 @@ uint8_t program_check(uint32_t check, uint32_t *cycle, const char **reason) {
     uint8_t code;
     if (!program_step_count) REFUSE(ERROR_INCOMPLETE, "no steps");
     for (uint8_t step = 0; step < program_step_count; step++) {
-        if (!slot_of(step)->bursts) REFUSE(ERROR_INCOMPLETE, "a step names an empty slot");
+        if (!slot_of(step)->duration) REFUSE(ERROR_INCOMPLETE, "a step names an empty slot");
         ticks += slot_of(step)->duration;
         ticks += slot_of(step)->dark;
     }

@@ -14,12 +14,18 @@
 #define MIN_OFF (MIN_OFF_US * TICKS_PER_US)
 #define MAX_CYCLE (MAX_CYCLE_S * 1000 * TICKS_PER_MS)
 
+/* What one exact output does in a flash, worked out at the upload so that the player need not. */
 typedef struct {
-    uint32_t duration, dark, period;
-    uint32_t on[EXACT_OUTPUTS]; /* 0 where not lit; with gated wiring the first stands for all that are lit */
-    uint8_t lit;                /* a bit per line */
-    uint16_t bursts;            /* how many begin in a flash; 0: nothing was uploaded here */
-    uint32_t last_room;         /* from the last one's begin to the flash's end */
+    uint32_t on, off;  /* of every burst but the last; 0 and unused where the output stays dark */
+    uint32_t last;     /* the last burst's on, which the flash's end may cut */
+    uint32_t rest;     /* from the last burst's end, or the flash's start where dark, to the next step */
+    uint16_t bursts;   /* 0: stays dark */
+} part_t;
+
+typedef struct {
+    uint32_t duration, dark, period; /* duration 0: nothing was uploaded here */
+    part_t part[EXACT_OUTPUTS];      /* with gated wiring only the first, for all lines that are lit */
+    uint8_t lit;                     /* a bit per line */
 } slot_t;
 
 /* Which wiring, and what was uploaded; only commands.c writes through the functions below. */
@@ -50,8 +56,5 @@ uint8_t program_check(uint32_t check, uint32_t *cycle, const char **reason_in_fl
 
 /* In which step a time within the cycle lies. */
 uint8_t program_step_at(uint32_t ticks);
-
-/* For how many ticks of one flash a burst length is on. */
-uint32_t program_lit_ticks(const slot_t *slot, uint32_t on);
 
 #endif

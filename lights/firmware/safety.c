@@ -8,7 +8,8 @@
 #include "player.h"
 
 #define KEEP_AFTER_RESET_MS 1000
-#define ALIVE_TICKS (100 * TICKS_PER_MS) /* the player's longest way between two visits is a flash of 50 ms and a wait of 16 */
+/* Between two visits to the player's long way lie at most a flash of 50 ms in bursts and a piece of 33 ms. */
+#define ALIVE_TICKS (100 * TICKS_PER_MS)
 
 uint16_t safety_keep_ms = KEEP_AFTER_RESET_MS;
 
