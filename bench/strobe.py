@@ -27,7 +27,6 @@ CYCLES_PER_TICK = 8
 LOADS = {
     "a STAT a second": lambda ms: [line for _ in range(ms // 1000 + 1) for line in ("wait 1000", "send STAT")],
     "requests without a pause": lambda ms: [f"poll {ms} CLK 0123abcd"],
-    "a line never quiet": lambda ms: [f"flood {ms} STAT"],
 }
 """What the host sends while lights run for some milliseconds, as a script (lights/emulator/script.h)."""
 
