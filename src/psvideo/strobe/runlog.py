@@ -21,8 +21,8 @@ from psvideo.tomlfile import Contract, check_schema, read_text
 
 SCHEMA = "psvideo-strobe/1"
 LOG_NAME = "strobe.json"
-HOST_CLOCK_PPM = 100.0
-"""How far the clocks of host and camera, both crystals, may be apart."""
+CAMERA_CLOCK_PPM = 100.0
+"""How far a camera's clock, a crystal, may be off."""
 
 
 class PlayedFlash(Contract):
@@ -138,7 +138,7 @@ def read_log(path: Path) -> RunLog:
 
 @dataclass(frozen=True, kw_only=True)
 class AsPlayed:
-    """A plan with what its log knows better. ``warning`` says where the log is another plan's and not used, or broke."""
+    """A plan with what its log knows better. ``warning`` says that the log is another plan's, or that the run broke."""
 
     plan: Plan
     warning: str | None = None
@@ -184,12 +184,11 @@ def _played(plan: Plan, log: RunLog) -> Plan:
 
 
 def clock_range_ppm(plan: Plan, log: RunLog) -> float:
-    """Return how far the strobe's clock may be from the camera's: as the board was measured, else as it is rated.
+    """Return how far the strobe's clock may be from the camera's: what the board is rated for and what the plan says.
 
-    Never less than the plan says: the camera's clock is unknown to the log.
+    What was measured against the host does not narrow it: the host's clock is not the camera's.
     """
-    known = log.tolerance_ppm if log.clock is None else abs(log.clock.offset_ppm) + log.clock.error_ppm
-    return min(max(known + HOST_CLOCK_PPM, plan.clock_range_ppm), UNKNOWN_CLOCK_PPM)
+    return min(max(log.tolerance_ppm + CAMERA_CLOCK_PPM, plan.clock_range_ppm), UNKNOWN_CLOCK_PPM)
 
 
 def _clock_words(log: RunLog) -> str:
