@@ -75,12 +75,11 @@ bool player_was_late(void) {
 }
 
 bool player_is_alive(void) {
-    bool alive = true;
-    for (uint8_t output = 0; output < EXACT_OUTPUTS; output++) {
-        if (!outputs[output].done && !outputs[output].served) alive = false;
-        outputs[output].served = false;
+    for (uint8_t n = 0; n < EXACT_OUTPUTS; n++) {
+        if (!outputs[n].done && !outputs[n].served) return false;
     }
-    return alive;
+    for (uint8_t n = 0; n < EXACT_OUTPUTS; n++) outputs[n].served = false;
+    return true;
 }
 
 ISR(__vector_late) {

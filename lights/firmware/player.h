@@ -17,7 +17,7 @@ void player_stop(void);
 /* True where an edge could not be armed in time; the player has darkened by then. */
 bool player_was_late(void);
 
-/* Have all outputs been served since the question before (or are they through)? */
+/* Have all outputs that still play been served since this was last true? */
 bool player_is_alive(void);
 
 #endif
