@@ -5,7 +5,7 @@ to build it are missing these tests fail and name the packages: they are never s
 """
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from pathlib import Path
 
@@ -409,7 +409,8 @@ def test_a_line_that_is_never_quiet_moves_no_edge_and_ends_in_the_dark(board: Av
     """A host that does not wait for replies spoils its own lines; it is as good as silent, and it shifts no light."""
     program = program_of(THREE, board=board)
     said = play_script(
-        f"wait 20\n{upload(program)}\nsend KEEP 500\nsend RUN 0\nflood 1000 STAT\nwait 100\nbytes 0a\nwait 20\nsend STAT\n",
+        f"wait 20\n{upload(program)}\nsend KEEP 500\nsend RUN 0\nflood 1000 STAT\n"
+        "wait 100\nbytes 0a\nwait 20\nsend STAT\n",
         board=board,
         trace=tmp_path / "trace.csv",
     )
