@@ -14,7 +14,6 @@ import pytest
 from numpy.typing import NDArray
 
 from psvideo.camera import Camera
-from psvideo.errors import PsvideoError
 from psvideo.plan import Plan, PlannedFlash
 from psvideo.strobe import toolchain
 from psvideo.strobe.boards import BOARDS, capabilities
@@ -432,32 +431,3 @@ def test_the_trace_names_pins_and_lights(tmp_path: Path) -> None:
     for light, pin in (("0", "S0"), ("1", "S1")):
         assert trace.edges[pin][0] < trace.edges["X0"][0] == trace.edges[light][0], "selected in the dark"
         assert trace.edges[pin][-1] > trace.edges["X0"][-1] == trace.edges[light][-1]
-
-
-@pytest.fixture
-def damaged(tmp_path: Path) -> Callable[[str], Path]:
-    def write(text: str) -> Path:
-        (tmp_path / "trace.csv").write_text(text)
-        return tmp_path / "trace.csv"
-
-    return write
-
-
-HEAD = "# psvideo-trace/1 board=b hz=1000 wiring=gated\ncycle,line,level\n"
-
-
-@pytest.mark.parametrize(
-    ("text", "named"),
-    [
-        ("", "not the trace"),
-        ("cycle,line,level\n1,0,1\n", "not the trace"),
-        (HEAD.replace("/1", "/2"), "psvideo-trace/2"),
-        (HEAD + "1,0,1\n2,0\n", "line 4: found '2,0'"),
-        (HEAD + "1,0,1\n2,0,1\n", "is 1 already"),
-        (HEAD + "1,0,0\n", "is 0 already"),
-        (HEAD + "5,0,1\n4,0,0\n", "cycle 4 comes after 5"),
-    ],
-)
-def test_a_damaged_trace_is_named_with_its_line(damaged: Callable[[str], Path], text: str, named: str) -> None:
-    with pytest.raises(PsvideoError, match=re.escape(named)):
-        read_trace(damaged(text))

@@ -47,6 +47,8 @@ bool board_step(void);
 
 uint64_t board_cycle(void);
 
+/* True where the firmware has switched its receiver on. */
+bool board_listens(void);
 /* Queue bytes for the board's receiver; they arrive at the line's speed. Returns how many were taken. */
 size_t board_receive(const uint8_t *bytes, size_t count);
 /* How many queued bytes are still on their way. */

@@ -17,6 +17,7 @@
 #include "trace.h"
 
 #define LOOK_EVERY 1400        /* cycles between looks at the port: about a byte */
+#define BOOTS_WITHIN 8000000   /* cycles until the port is told even if the firmware does not listen */
 #define FORGIVE_NS 20000000ll  /* virtual time that lags further behind is not made up for */
 
 static const char USAGE[] =
@@ -78,6 +79,7 @@ static bool serve(bool fast) {
         fprintf(stderr, "emulator: no pseudo-terminal to be had (%s).\n", strerror(errno));
         return false;
     }
+    while (!board_listens() && board_cycle() < BOOTS_WITHIN && board_step()) continue;
     printf("%s\n", name);
     fflush(stdout);
     fcntl(STDIN_FILENO, F_SETFL, fcntl(STDIN_FILENO, F_GETFL) | O_NONBLOCK);

@@ -57,6 +57,8 @@ size_t board_receive(const uint8_t *bytes, size_t many) {
     return taken;
 }
 
+bool board_listens(void) { return avr_regbit_get(avr, uart->rxen); }
+
 size_t board_on_their_way(void) { return count; }
 
 unsigned long board_lost_bytes(void) { return lost; }
