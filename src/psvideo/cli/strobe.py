@@ -28,6 +28,9 @@ from psvideo.strobe.program import Program, make_program
 from psvideo.strobe.runlog import format_log, log_record, plan_sha256, run_log
 from psvideo.strobe.session import Outcome, cycles_for, prepare, run_program
 
+TELLING_PPM = 1000.0
+"""A clock that was measured less exactly is not worth a line: the run was short."""
+
 strobe = typer.Typer(no_args_is_help=True, help="Make lights flash as planned: on a board, or on an emulated one.")
 if find_spec("psvideo.cli.strobe_emulate") is not None:
     strobe.command("emulate")(import_module("psvideo.cli.strobe_emulate").emulate)
@@ -204,8 +207,8 @@ def _lines(program: Program) -> str:
 
 def _tell_outcome(voice: Voice, plan: Plan, outcome: Outcome, log: Path | None) -> None:
     how = {"done": "Played", "stopped": "Stopped after"}.get(outcome.ended, "Broken off after")
-    voice.say(f"{how} {outcome.cycles} cycles ({outcome.cycles * plan.dark_every} rounds).")
-    if outcome.clock is not None:
+    voice.say(f"{how} {outcome.cycles} whole cycles of {plan.dark_every} round(s) each.")
+    if outcome.clock is not None and outcome.clock.gain_error_ppm <= TELLING_PPM:
         clock = outcome.clock
         voice.say(
             f"The board's seconds are {clock.offset_ppm:+.0f} ppm long by this machine's clock, "
