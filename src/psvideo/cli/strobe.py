@@ -71,8 +71,8 @@ def check(
         return
     caps = _caps_at(port, known, wanted) if port else _caps_of(known or BOARDS["atmega328p"], wanted)
     program = make_program(planned, caps, lines=lines, source=str(plan))
-    _tell_program(voice, planned, program, caps)
-    voice.result(program_record(program, caps))
+    warnings = _tell_program(voice, planned, program, caps)
+    voice.result({**program_record(program, caps), "warnings": warnings})
 
 
 def _caps_at(port: str, board: Board | None, wiring: WiringName | None) -> Capabilities:
@@ -110,14 +110,15 @@ def _check_table(voice: Voice, plan: Plan, path: Path, wanted: WiringName | None
         raise PsvideoError(f"{path}: no board of the table can play it (--board NAME says more).")
 
 
-def _tell_program(voice: Voice, plan: Plan, program: Program, caps: Capabilities) -> None:
+def _tell_program(voice: Voice, plan: Plan, program: Program, caps: Capabilities) -> list[str]:
+    """Describe a program, and return what to beware of."""
     for line in describe_program(program, caps):
         voice.say(line)
-    for caution in program_cautions(plan, program, caps):
-        voice.warn(caution)
-    warning = flicker_warning(program.played)
-    if warning is not None:
+    flicker = flicker_warning(program.played)
+    warnings = [*program_cautions(plan, program, caps), *([flicker] if flicker else [])]
+    for warning in warnings:
         voice.warn(warning)
+    return warnings
 
 
 @strobe.command()
@@ -148,10 +149,9 @@ def run(
     try:
         link = Link(opened)
         ready = prepare(link, wiring=wanted)
-        for note in ready.notes:
-            voice.warn(note)
         program = make_program(planned, ready.caps, lines=lines, source=str(plan))
-        for text in program_cautions(planned, program, ready.caps):
+        warnings = [*ready.notes, *program_cautions(planned, program, ready.caps)]
+        for text in warnings:
             voice.warn(text)
         for text in describe_program(program, ready.caps):
             voice.detail(text)
@@ -164,7 +164,7 @@ def run(
     record = run_log(plan, ready, program, outcome)
     if log is not None:
         write_text(log, format_log(record))
-    voice.result(log_record(record))
+    voice.result({**log_record(record), "warnings": warnings})
     _tell_outcome(voice, planned, outcome, log)
     if outcome.message is not None:
         raise PsvideoError(outcome.message)
