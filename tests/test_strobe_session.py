@@ -211,7 +211,7 @@ def test_a_board_that_restarts_in_the_middle_is_noticed(board: Board, program: P
 
 
 def test_a_board_that_is_silent_while_it_restarts_is_waited_for() -> None:
-    with plugged((slow := Board(silent_first=3)).device):
+    with plugged((slow := Board(silent_first=2)).device):
         assert greet(opened(slow.device)).board == "atmega328p"
 
 

@@ -27,6 +27,9 @@ from psvideo.strobe.program import Program, make_program
 from psvideo.strobe.runlog import format_log, log_record, plan_sha256, run_log
 from psvideo.strobe.session import Outcome, cycles_for, prepare, run_program
 
+TELLING_PPM = 1000.0
+"""A clock that was measured less exactly is not worth a line: the run was short."""
+
 strobe = typer.Typer(no_args_is_help=True, help="Make lights flash as planned: on a board, or on an emulated one.")
 strobe.command()(emulate)
 
@@ -66,8 +69,8 @@ def check(
         return
     caps = _caps_at(port, known, wanted) if port else _caps_of(known or BOARDS["atmega328p"], wanted)
     program = make_program(planned, caps, lines=lines, source=str(plan))
-    _tell_program(voice, planned, program, caps)
-    voice.result(program_record(program, caps))
+    warnings = _tell_program(voice, planned, program, caps)
+    voice.result({**program_record(program, caps), "warnings": warnings})
 
 
 def _caps_at(port: str, board: Board | None, wiring: WiringName | None) -> Capabilities:
@@ -105,14 +108,15 @@ def _check_table(voice: Voice, plan: Plan, path: Path, wanted: WiringName | None
         raise PsvideoError(f"{path}: no board of the table can play it (--board NAME says more).")
 
 
-def _tell_program(voice: Voice, plan: Plan, program: Program, caps: Capabilities) -> None:
+def _tell_program(voice: Voice, plan: Plan, program: Program, caps: Capabilities) -> list[str]:
+    """Describe a program, and return what to beware of."""
     for line in describe_program(program, caps):
         voice.say(line)
-    for caution in program_cautions(plan, program, caps):
-        voice.warn(caution)
-    warning = flicker_warning(program.played)
-    if warning is not None:
+    flicker = flicker_warning(program.played)
+    warnings = [*program_cautions(plan, program, caps), *([flicker] if flicker else [])]
+    for warning in warnings:
         voice.warn(warning)
+    return warnings
 
 
 @strobe.command()
@@ -143,10 +147,9 @@ def run(
     try:
         link = Link(opened)
         ready = prepare(link, wiring=wanted)
-        for note in ready.notes:
-            voice.warn(note)
         program = make_program(planned, ready.caps, lines=lines, source=str(plan))
-        for text in program_cautions(planned, program, ready.caps):
+        warnings = [*ready.notes, *program_cautions(planned, program, ready.caps)]
+        for text in warnings:
             voice.warn(text)
         for text in describe_program(program, ready.caps):
             voice.detail(text)
@@ -159,7 +162,7 @@ def run(
     record = run_log(plan, ready, program, outcome)
     if log is not None:
         write_text(log, format_log(record))
-    voice.result(log_record(record))
+    voice.result({**log_record(record), "warnings": warnings})
     _tell_outcome(voice, planned, outcome, log)
     if outcome.message is not None:
         raise PsvideoError(outcome.message)
@@ -202,8 +205,8 @@ def _lines(program: Program) -> str:
 
 def _tell_outcome(voice: Voice, plan: Plan, outcome: Outcome, log: Path | None) -> None:
     how = {"done": "Played", "stopped": "Stopped after"}.get(outcome.ended, "Broken off after")
-    voice.say(f"{how} {outcome.cycles} cycles ({outcome.cycles * plan.dark_every} rounds).")
-    if outcome.clock is not None:
+    voice.say(f"{how} {outcome.cycles} whole cycles of {plan.dark_every} round(s) each.")
+    if outcome.clock is not None and outcome.clock.gain_error_ppm <= TELLING_PPM:
         clock = outcome.clock
         voice.say(
             f"The board's seconds are {clock.offset_ppm:+.0f} ppm long by this machine's clock, "

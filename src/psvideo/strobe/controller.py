@@ -82,8 +82,8 @@ class OpenPort:
 def _cannot_open(device: str, fault: Exception) -> str:
     told = str(fault)
     if "exclusively lock" in told or "Resource busy" in told or "in use" in told:
-        why = "is in use by another program; end that one first (another psvideo, a serial monitor)"
-    elif "Permission" in told or "Access is denied" in told:
+        return f"{device}: is in use by another program. End that one first (another psvideo, a serial monitor)."
+    if "Permission" in told or "Access is denied" in told:
         why = "may not be opened by this user; on Linux join the group that owns it (dialout), then log in again"
     elif "No such file" in told or "FileNotFound" in told or "could not open port" in told:
         why = "there is no such port, or it cannot be opened; psvideo strobe list shows what there is"

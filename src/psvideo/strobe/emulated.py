@@ -1,74 +1,23 @@
 """A strobe controller in plain Python: bytes in, bytes out, edges as a list. Keeps no time of its own.
 
 Whoever owns it says what tick it is: ``feed`` bytes when they arrive, ``advance`` in between. It has the limits,
-errors, states and faults of lights/protocol.md, for any board of the table, and serves where there is no board.
+errors, states and faults of lights/protocol.md (``rules``), for any board of the table, and serves where there is no
+board.
 """
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import replace
 
-from psvideo.strobe.boards import KEEP_AFTER_RESET_MS, KEEP_MS, Board, capabilities
-from psvideo.strobe.limits import cycle_check, cycle_refusal, cycle_ticks, slot_refusal
+from psvideo.strobe.boards import Board
 from psvideo.strobe.lines import LONGEST_REQUEST, Error, Line, LineError, LineReader, unseal
-from psvideo.strobe.messages import (
-    PROTOCOL,
-    Arm,
-    Armed,
-    Capabilities,
-    Caps,
-    Clear,
-    Cleared,
-    Clk,
-    ClockReading,
-    Fault,
-    Id,
-    Identity,
-    Interlock,
-    Keep,
-    KeepSet,
-    New,
-    Refusal,
-    Renewed,
-    Reply,
-    Request,
-    Reset,
-    Run,
-    Slot,
-    SlotSet,
-    Started,
-    Stat,
-    State,
-    Status,
-    Steps,
-    StepsSet,
-    Stop,
-    Stopped,
-    Wiring,
-    WiringName,
-    WiringSet,
-)
+from psvideo.strobe.messages import Fault, Interlock, Refusal, Reply, Reset, Run, State, Stop
 from psvideo.strobe.playing import Edge, Moment, moments
 from psvideo.strobe.protocol import find_command, format_reply, parse_words
+from psvideo.strobe.rules import after_reset, answer
 
-FIRMWARE = "emulated-1"
 START_DELAY_MS = 10
 PS_PER_MS = 10**9
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Memory:
-    """What a reset clears."""
-
-    wiring: WiringName
-    keep_ms: int = KEEP_AFTER_RESET_MS
-    state: State = "idle"
-    fault: Fault = "none"
-    reset: Reset = "power"
-    slots: tuple[Slot | None, ...] = ()
-    steps: tuple[int, ...] = ()
-    cycle: int = 0
-    step: int = 0
-    cycles: int = 0
+SPOILED = {Error.BYTES: "bytes that are not printable", Error.LONG: f"line of more than {LONGEST_REQUEST} bytes"}
 
 
 class EmulatedController:
@@ -76,9 +25,7 @@ class EmulatedController:
 
     def __init__(self, board: Board, *, unit: str = "emulated") -> None:
         self.board = board
-        self.unit = unit
         self.edges: list[Edge] = []
-        self._interlock: Interlock = "closed"
         self._now = 0
         self._born = 0
         self._heard = 0
@@ -86,7 +33,7 @@ class EmulatedController:
         self._moments: Iterator[Moment] = iter(())
         self._next: Moment | None = None
         self._reader = LineReader(LONGEST_REQUEST)
-        self._memory = self._fresh("power")
+        self._memory = after_reset(board, unit, cause="power")
 
     @property
     def state(self) -> State:
@@ -123,7 +70,7 @@ class EmulatedController:
     def set_interlock(self, interlock: Interlock, now: int) -> None:
         """Open or close the interlock; opened while armed or running, it latches a fault."""
         self.advance(now)
-        self._interlock = interlock
+        self._memory = replace(self._memory, interlock=interlock)
         if interlock == "open" and self.state in ("armed", "running"):
             self._fail("interlock")
 
@@ -134,22 +81,19 @@ class EmulatedController:
             self._fail("late")
 
     def restart(self, cause: Reset, now: int) -> None:
-        """Reset: dark, idle, nothing uploaded; after a watchdog reset in fault. Its ticks begin again at 0."""
+        """Reset: dark, nothing uploaded, idle, or in fault after a watchdog reset. Its ticks begin again at 0."""
         self.advance(now)
         self._darken()
-        self._born = self._heard = now
+        self._born = self._heard = self._now
         self._reader = LineReader(LONGEST_REQUEST)
-        self._memory = self._fresh(cause)
-
-    def _fresh(self, cause: Reset) -> _Memory:
-        memory = _Memory(wiring=self.board.first_wiring, reset=cause, slots=(None,) * self.board.slots)
-        return replace(memory, state="fault", fault="watchdog") if cause == "watchdog" else memory
+        memory = self._memory
+        self._memory = after_reset(self.board, memory.unit, cause=cause, interlock=memory.interlock)
 
     def _happens(self, until: int) -> bool:
         """Let the next thing happen that is due; False where nothing is left to do until then."""
         if self.state not in ("armed", "running"):
             return False
-        silent = self._heard + self._memory.keep_ms * PS_PER_MS // self.board.tick_ps
+        silent = self._heard + self._ticks(self._memory.keep_ms)
         moment = self._next if self.state == "running" else None
         if moment is not None and moment.tick <= min(silent, until):
             self._now = moment.tick
@@ -187,152 +131,31 @@ class EmulatedController:
         self._memory = replace(self._memory, state="fault", fault=fault)
 
     def _answer(self, line: Line) -> bytes:
-        sealed = False
+        if line.fault is not None:
+            return format_reply(Refusal(code=line.fault, text=SPOILED[line.fault]), sealed=False)
         try:
-            if line.fault is not None:
-                raise LineError(line.fault, {Error.BYTES: "bytes", Error.LONG: "line too long"}[line.fault])
-            sealed = "*" in line.text
-            body, sealed = unseal(line.text)
-            reply = self._act(body)
+            reply = self._act(unseal(line.text)[0])
         except LineError as fault:
-            return format_reply(Refusal(code=fault.code, text=str(fault)), sealed=sealed)
-        return format_reply(reply, sealed=sealed)
+            reply = Refusal(code=fault.code, text=str(fault))
+        return format_reply(reply, sealed="*" in line.text)
 
     def _act(self, body: str) -> Reply | Refusal:
         kind, words = find_command(body)
+        if self.state == "fault" and self.state not in kind.states:
+            return Refusal(code=Error.FAULT, text=self.fault)
         if self.state not in kind.states:
-            stuck = self.state == "fault"
-            return _refuse(Error.FAULT if stuck else Error.STATE, self.fault if stuck else self.state)
+            return Refusal(code=Error.STATE, text=self.state)
+        start = self._now + self._ticks(START_DELAY_MS)
         request = parse_words(kind, words)
-        reply = _ACTIONS[kind](self, request)
+        self._memory, reply = answer(self._memory, request, ticks=self._now - self._born, start=start - self._born)
+        if isinstance(request, Stop):
+            self._darken()
+        if isinstance(request, Run):
+            self._moments = moments(self._memory.sequence or (), start=start, cycles=request.cycles)
+            self._next = next(self._moments)
         if isinstance(reply, Reply):
             self._heard = self._now
         return reply
 
-    @property
-    def _caps(self) -> Capabilities:
-        return capabilities(self.board, self._memory.wiring, keep_ms=self._memory.keep_ms)
-
-    def _id(self, request: Id) -> Reply:
-        return Identity(proto=PROTOCOL, board=self.board.name, firmware=FIRMWARE, unit=self.unit)
-
-    def _tell_caps(self, request: Caps) -> Reply:
-        return self._caps
-
-    def _wire(self, request: Wiring) -> Reply | Refusal:
-        if request.wiring not in self.board.lines:
-            return _refuse(Error.RANGE, f"wiring {request.wiring}, this board has {' '.join(self.board.lines)}")
-        self._forget()
-        self._memory = replace(self._memory, wiring=request.wiring)
-        return WiringSet(wiring=request.wiring)
-
-    def _keep(self, request: Keep) -> Reply | Refusal:
-        if not KEEP_MS[0] <= request.ms <= KEEP_MS[1]:
-            return _refuse(Error.RANGE, f"ms {request.ms}, from {KEEP_MS[0]} to {KEEP_MS[1]}")
-        self._memory = replace(self._memory, keep_ms=request.ms)
-        return KeepSet(keep_ms=request.ms)
-
-    def _new(self, request: New) -> Reply:
-        self._forget()
-        self._memory = replace(self._memory, state="idle")
-        return Renewed()
-
-    def _forget(self) -> None:
-        self._memory = replace(self._memory, slots=(None,) * self.board.slots, steps=())
-
-    def _slot(self, request: Slot) -> Reply | Refusal:
-        refusal = slot_refusal(request, self._caps)
-        if refusal is not None:
-            return refusal
-        slots = self._memory.slots
-        self._memory = replace(self._memory, slots=(*slots[: request.slot], request, *slots[request.slot + 1 :]))
-        return SlotSet(slot=request.slot)
-
-    def _steps(self, request: Steps) -> Reply | Refusal:
-        steps = self._memory.steps
-        if request.first > len(steps):
-            return _refuse(Error.RANGE, f"first {request.first}, there are {len(steps)} steps")
-        if request.first + len(request.slots) > self.board.steps:
-            return _refuse(
-                Error.RANGE, f"steps {request.first + len(request.slots)}, this board has {self.board.steps}"
-            )
-        if max(request.slots) >= self.board.slots:
-            return _refuse(Error.RANGE, f"slot {max(request.slots)}, this board has {self.board.slots}")
-        self._memory = replace(self._memory, steps=steps[: request.first] + request.slots)
-        return StepsSet(steps=len(self._memory.steps))
-
-    def _cycle(self) -> list[Slot] | None:
-        """Return the slots in order, None where the upload is incomplete."""
-        slots = [self._memory.slots[step] for step in self._memory.steps]
-        known = [slot for slot in slots if slot is not None]
-        return known if known and len(known) == len(slots) else None
-
-    def _arm(self, request: Arm) -> Reply | Refusal:
-        steps = self._cycle()
-        if steps is None:
-            return _refuse(Error.INCOMPLETE, f"{len(self._memory.steps)} steps, or one names an empty slot")
-        check = cycle_check(steps)
-        if check != request.check:
-            return _refuse(Error.CHECK, f"check {request.check}, expected {check}")
-        refusal = cycle_refusal(steps, self._caps)
-        if refusal is not None:
-            return refusal
-        if self._interlock == "open":
-            return _refuse(Error.INTERLOCK, "interlock open")
-        self._memory = replace(self._memory, state="armed")
-        return Armed(check=check, cycle=cycle_ticks(steps))
-
-    def _run(self, request: Run) -> Reply:
-        start = self._now + START_DELAY_MS * PS_PER_MS // self.board.tick_ps
-        self._moments = moments(self._cycle() or [], start=start, cycles=request.cycles)
-        self._next = next(self._moments)
-        self._memory = replace(self._memory, state="running", cycle=0, step=0, cycles=0)
-        return Started(start=start - self._born)
-
-    def _stop(self, request: Stop) -> Reply:
-        self._darken()
-        if self.state in ("armed", "running"):
-            self._memory = replace(self._memory, state="idle")
-        return Stopped(state=self.state, cycles=self._memory.cycles)
-
-    def _stat(self, request: Stat) -> Reply:
-        memory = self._memory
-        return Status(
-            state=memory.state,
-            fault=memory.fault,
-            reset=memory.reset,
-            interlock=self._interlock,
-            cycle=memory.cycle,
-            step=memory.step,
-            cycles=memory.cycles,
-        )
-
-    def _clk(self, request: Clk) -> Reply:
-        return ClockReading(nonce=request.nonce, cycle=self._memory.cycle, ticks=self._now - self._born)
-
-    def _clear(self, request: Clear) -> Reply | Refusal:
-        if self._interlock == "open":
-            return _refuse(Error.INTERLOCK, "interlock open")
-        self._memory = replace(self._memory, state="idle", fault="none")
-        return Cleared(state="idle")
-
-
-def _refuse(code: Error, text: str) -> Refusal:
-    return Refusal(code=code, text=text)
-
-
-_ACTIONS: dict[type[Request], Callable[..., Reply | Refusal]] = {
-    Id: EmulatedController._id,
-    Caps: EmulatedController._tell_caps,
-    Wiring: EmulatedController._wire,
-    Keep: EmulatedController._keep,
-    New: EmulatedController._new,
-    Slot: EmulatedController._slot,
-    Steps: EmulatedController._steps,
-    Arm: EmulatedController._arm,
-    Run: EmulatedController._run,
-    Stop: EmulatedController._stop,
-    Stat: EmulatedController._stat,
-    Clk: EmulatedController._clk,
-    Clear: EmulatedController._clear,
-}
+    def _ticks(self, time_ms: int) -> int:
+        return time_ms * PS_PER_MS // self.board.tick_ps

@@ -1,15 +1,17 @@
 """The first words with whatever is at a port: wait for a board that restarts, and tell it from other things."""
 
 import time
+from itertools import chain, repeat
 
 from psvideo.errors import PsvideoError
 from psvideo.strobe.link import Link
 from psvideo.strobe.messages import PROTOCOL, Id, Identity
 from psvideo.strobe.protocol import format_request
 
-START_WITHIN_S = 6.0
+START_WITHIN_S = 7.0
 """A board that restarts when its port is opened is in its boot loader for one to two seconds."""
-ASK_EVERY_S = 0.3
+PAUSES_S = (0.3, 0.3, 2.2)
+"""How long to wait for an answer the first times, and then: some boot loaders stay as long as anybody talks to them."""
 
 
 def greet(link: Link, *, within_s: float = START_WITHIN_S) -> Identity:
@@ -17,9 +19,11 @@ def greet(link: Link, *, within_s: float = START_WITHIN_S) -> Identity:
     link.heard = b""
     until_s = time.monotonic() + within_s
     identity = None
-    while identity is None and time.monotonic() < until_s:
+    for pause_s in chain(PAUSES_S, repeat(PAUSES_S[-1])):
         link.port.write(b"\n" + format_request(Id()))
-        identity = link.listen(Identity, within_s=ASK_EVERY_S)
+        identity = link.listen(Identity, within_s=min(pause_s, max(until_s - time.monotonic(), 0.0)))
+        if identity is not None or time.monotonic() >= until_s:
+            break
     if identity is None or not link.find_the_way_back():
         raise PsvideoError(_other(link.port.name, link.heard))
     if identity.proto != PROTOCOL:
