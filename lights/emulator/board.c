@@ -195,6 +195,12 @@ void board_hang(void) {
     avr->pc = end;
 }
 
+void board_power_off(void) {
+    note(avr->cycle, 'X', &exact_levels, 0, at->exact_count);
+    note(avr->cycle, 'S', &selection_levels, 0, LINES);
+    note(avr->cycle, 0, &line_levels, 0, LINES);
+}
+
 void board_reset(void) {
     avr_reset(avr);
     after_reset();

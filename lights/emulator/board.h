@@ -59,6 +59,8 @@ unsigned long board_lost_bytes(void);
 void board_interlock(bool open);
 /* Let the program hang, so that the watchdog bites. */
 void board_hang(void);
+/* Take the power away: everything goes dark, for the trace's sake. */
+void board_power_off(void);
 /* Pull the reset pin. */
 void board_reset(void);
 

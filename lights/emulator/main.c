@@ -143,6 +143,7 @@ int main(int count, char **words) {
                     wish.script ? script_reset : say_reset))
         return 1;
     bool done = wish.script ? play(wish.script) : serve(wish.fast);
+    board_power_off();
     if (!trace_close()) {
         fprintf(stderr, "emulator: %s could not be written whole.\n", wish.trace);
         return 1;
