@@ -7,6 +7,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+import OpenEXR
 import pytest
 import tomlkit
 from hypothesis import given, settings
@@ -18,7 +19,8 @@ from psvideo.plan import Plan
 from psvideo.synth import read_scene, shoot
 from psvideo.synth.emission import Emission
 from psvideo.synth.shotplan import true_plan
-from psvideo.synth.traced import TraceOptions, wired_lines
+from psvideo.synth.traced import TraceOptions
+from psvideo.synth.traced_slots import wired_lines
 from psvideo.tracefile import TraceWriter, read_trace
 
 SPHERE = Path(__file__).resolve().parents[1] / "data_synth" / "sphere.toml"
@@ -66,6 +68,14 @@ def film(folder: Path, scene: Path, name: str, edges: Sequence[Edge] | None, **l
     footage = open_clip(clip)
     frames = np.stack([frame.image for frame in read_frames(footage, footage.numbers)])
     return frames, json.loads((clip / "truth" / "timing.json").read_text())
+
+
+def first_plate(clip: Path) -> np.ndarray:
+    """Return the true plate of a clip's first complete flash."""
+    flashes = json.loads((clip / "truth" / "timing.json").read_text())["flashes"]
+    plate = next(flash["plate"] for flash in flashes if "plate" in flash)
+    pixels: np.ndarray = next(iter(OpenEXR.File(str(clip / "truth" / plate)).channels().values())).pixels
+    return pixels
 
 
 def test_a_perfect_trace_gives_the_clip_of_the_ideal_train(tmp_path: Path) -> None:
@@ -123,6 +133,9 @@ def test_lights_of_one_flash_may_burst_differently(tmp_path: Path) -> None:
         )
         alone.append(film(tmp_path, only, name, edges(*picked), **({"left": 1} if name == "left" else {}))[0])
     np.testing.assert_allclose(both, alone[0] + alone[1], atol=1e-3)
+    plates = [first_plate(tmp_path / name) for name in ("both", "key", "left")]
+    np.testing.assert_allclose(plates[0], plates[1] + plates[2], atol=1e-6)
+    assert plates[1].max() > 0.1
 
 
 def test_a_clip_lies_within_the_run_where_the_scene_leaves_the_phase_open(tmp_path: Path) -> None:

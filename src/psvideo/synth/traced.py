@@ -1,25 +1,22 @@
 """Light from the traced edges of a strobe controller, instead of a plan's ideal train: what was really switched.
 
-The edges come in cycles of the controller's clock. A flash is what lies closer together than half the plan's dark time;
-its bursts are kept as they are. The trace says when lights were on and nothing else: which slot of the plan a flash is
-follows from counting, and the lights that are lit must be those of the plan.
+The edges come in cycles of the controller's clock; ``traced_slots`` tells which belong to which flash of the plan. Here
+they become flashes in camera time, with their bursts as they are.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from psvideo.errors import PsvideoError, UsageError, nearest
+from psvideo.errors import PsvideoError, UsageError
 from psvideo.plan import Plan
 from psvideo.synth.emission import Emission
 from psvideo.synth.scene import Scene
 from psvideo.synth.strobe import StrobeClock, TrueFlash, clip_end_s, is_complete
+from psvideo.synth.traced_slots import Pulse, check_lines, flash_pulses, wired_lines
 from psvideo.tracefile import Trace, merged_pulses, read_trace
-
-Pulse = tuple[int, int, int]
-"""On cycle, off cycle, line."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,18 +41,6 @@ class TracedLight:
     parts: tuple[TrueFlash, ...]
 
 
-def wired_lines(plan: Plan, given: Mapping[str, int]) -> dict[int, str]:
-    """Return which light hangs on which line: the plan's order, but for those that are given."""
-    for name in given:
-        if name not in plan.lights:
-            raise UsageError(f"--line {name}={given[name]}: the plan has no such light; {nearest(name, plan.lights)}")
-    free = iter(n for n in range(len(plan.lights) + max(given.values(), default=0) + 1) if n not in given.values())
-    wired = {given[name] if name in given else next(free): name for name in plan.lights}
-    if len(wired) < len(plan.lights):
-        raise UsageError("--line: two lights have the same line. Give every light a line of its own.")
-    return wired
-
-
 def traced_light(scene: Scene, plan: Plan, clock: StrobeClock, options: TraceOptions) -> TracedLight:
     """Return the light of a clip from a trace, in camera time.
 
@@ -67,15 +52,14 @@ def traced_light(scene: Scene, plan: Plan, clock: StrobeClock, options: TraceOpt
     trace = read_trace(options.path)
     wired = wired_lines(plan, options.lines)
     pulses = list(merged_pulses(trace, trace.lights))
-    _check_lines(options.path, trace, wired)
+    check_lines(options.path, trace, wired)
     if not pulses:
         raise PsvideoError(f"{options.path}: no light was ever on in this run. Emulate a run with flashes.")
     first = pulses[0][0]
     if scene.strobe.phase_s is None:
         clock = replace(clock, phase_s=_drawn_phase_s(scene, plan, clock, (pulses[-1][1] - first) / trace.hz))
-    groups = [(slot, group) for slot, group in _slots(options.path, plan, trace, wired, pulses)]
     maker = _Maker(plan=plan, trace=trace, clock=clock, first=first, wired=wired)
-    made = [maker.flash(slot, group) for slot, group in groups]
+    made = [maker.flash(slot, group) for slot, group in flash_pulses(options.path, plan, trace, wired, pulses)]
     flashes = _seen(plan, scene, _with_dark_slots(plan, clock, [whole for whole, _ in made]))
     parts_of = {whole.start_s: parts for whole, parts in made}
     return TracedLight(
@@ -101,56 +85,11 @@ def _refuse_unfit(scene: Scene, plan: Plan) -> None:
         )
 
 
-def _check_lines(path: Path, trace: Trace, wired: Mapping[int, str]) -> None:
-    unknown = [line for line in trace.lights if line not in wired]
-    if unknown:
-        shown = ", ".join(f"{name} on line {line}" for line, name in sorted(wired.items()))
-        raise PsvideoError(
-            f"{path}: line {unknown[0]} is lit, and no light of the plan hangs on it ({shown}). Name the lines with "
-            "--line NAME=NUMBER, or take the trace of this plan."
-        )
-
-
 def _drawn_phase_s(scene: Scene, plan: Plan, clock: StrobeClock, run_s: float) -> float:
     spare_s = run_s - clip_end_s(plan.camera, scene.frames)
     if spare_s > 0:
         return float(-np.random.default_rng([scene.seed, 3]).uniform(0.0, spare_s))
     return clock.phase_s
-
-
-def _slots(
-    path: Path, plan: Plan, trace: Trace, wired: Mapping[int, str], pulses: Sequence[Pulse]
-) -> Iterator[tuple[int, list[Pulse]]]:
-    """Yield each flash's slot and pulses. A pause longer than any within a cycle begins a new run at its start."""
-    lit = [slot for slot in plan.cycle_slots if not plan.flashes[slot].is_dark]
-    new_flash = 0.5 * plan.dark_s * trace.hz
-    new_run = (plan.cycle_s + plan.dark_s) * trace.hz
-    count, end = 0, None
-    for number, group in enumerate(_groups(pulses, new_flash), start=1):
-        count = 0 if end is not None and group[0][0] - end > new_run else count
-        slot = lit[count % len(lit)]
-        names = {wired[line] for _, _, line in group}
-        meant = {name for name, power in plan.flashes[slot].lights.items() if power > 0}
-        if names != meant:
-            raise PsvideoError(
-                f"{path}: flash {number} of the trace lights {' and '.join(sorted(names))}, where the plan's round "
-                f"lights {' and '.join(sorted(meant))}. Take the trace of this plan, or name the lines with "
-                "--line NAME=NUMBER."
-            )
-        yield slot, group
-        count, end = count + 1, max(off for _, off, _ in group)
-
-
-def _groups(pulses: Sequence[Pulse], gap: float) -> Iterator[list[Pulse]]:
-    group: list[Pulse] = []
-    end = 0
-    for pulse in pulses:
-        if group and pulse[0] - end > gap:
-            yield group
-            group = []
-        group.append(pulse)
-        end = max(end, pulse[1])
-    yield group
 
 
 @dataclass(frozen=True, kw_only=True)
