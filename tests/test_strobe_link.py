@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from psvideo.strobe import boards, limits, lines, messages
@@ -43,6 +43,8 @@ TABLE: dict[str, Any] = tomllib.loads(
     (Path(__file__).resolve().parents[1] / "lights" / "protocol.toml").read_text(encoding="utf-8")
 )
 
+BUSY = [HealthCheck.too_slow]
+"""A machine that is busy is no reason to fail."""
 REPLIES: list[Reply] = [
     Identity(proto=1, board="atmega328p", firmware="psvideo-1", unit="a3"),
     boards.capabilities(BOARDS["rp2040"], "direct"),
@@ -105,6 +107,7 @@ def test_boards_and_limits_are_those_of_the_table() -> None:
         assert {key: getattr(board, key) for key in TABLE["board"][name]} == TABLE["board"][name]
 
 
+@settings(deadline=None, suppress_health_check=BUSY)
 @given(request=REQUEST, sealed=st.booleans())
 def test_a_request_survives_the_way_there(request: Request, sealed: bool) -> None:
     (line,) = LineReader(1000).feed(format_request(request, sealed=sealed))
@@ -167,6 +170,7 @@ def _taken(line: Line, kind: type[Reply]) -> bool:
         return False
 
 
+@settings(deadline=None, suppress_health_check=BUSY)
 @given(data=st.binary(max_size=400), cuts=st.lists(st.integers(0, 400), max_size=6))
 def test_the_reader_gives_the_same_lines_however_the_bytes_are_cut(data: bytes, cuts: list[int]) -> None:
     whole = list(LineReader(40).feed(data))

@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from psvideo.camera import Camera
@@ -26,6 +26,8 @@ MakePlan = Callable[..., Plan]
 UNO = capabilities(BOARDS["atmega328p"], "gated")
 DIRECT = capabilities(BOARDS["atmega2560"], "direct")
 PICO = capabilities(BOARDS["rp2040"], "direct")
+BUSY = [HealthCheck.too_slow]
+"""A machine that is busy is no reason to fail."""
 WIRED: list[tuple[str, WiringName]] = [(name, wiring) for name, board in BOARDS.items() for wiring in board.lines]
 
 
@@ -69,6 +71,7 @@ def plans(draw: st.DrawFn, *, most_lights: int = 8) -> Plan:
     )
 
 
+@settings(deadline=None, suppress_health_check=BUSY)
 @given(plan=plans(most_lights=2), wired=st.sampled_from(WIRED), cycles=st.integers(1, 3))
 def test_the_edges_are_those_of_the_plan_in_ticks(plan: Plan, wired: tuple[str, WiringName], cycles: int) -> None:
     board, wiring = wired
@@ -108,6 +111,7 @@ def test_a_plan_in_whole_ticks_is_played_exactly_and_nothing_accumulates(make_pl
     assert np.abs(ends_s - (train.start_s + train.duration_s)[lit]).max() < 0.25e-6
 
 
+@settings(deadline=None, suppress_health_check=BUSY)
 @given(plan=plans(), wired=st.sampled_from(WIRED))
 def test_what_the_host_lets_pass_the_limits_let_pass(plan: Plan, wired: tuple[str, WiringName]) -> None:
     caps = capabilities(BOARDS[wired[0]], wired[1])
@@ -120,6 +124,7 @@ def test_what_the_host_lets_pass_the_limits_let_pass(plan: Plan, wired: tuple[st
     assert all(len(format_request(request)) <= LONGEST_REQUEST + 1 for request in program.upload())
 
 
+@settings(deadline=None, suppress_health_check=BUSY)
 @given(power=st.floats(0.01, 1), other=st.floats(0.01, 1), duration=st.integers(40, 20_000))
 def test_bursts_give_the_light_that_was_asked_for(power: float, other: float, duration: int) -> None:
     bursts = find_bursts((power, other), duration, UNO)
