@@ -282,6 +282,10 @@ def test_an_edge_that_comes_too_late_is_a_fault_and_dark(
     assert "state=fault fault=late" in replies(out)[-1]
     assert not is_on
     assert edge < cycle_of(out, "start=") + 24 * MS
+    again = [script[3], "send RUN 1", "wait 50", "send STAT"]
+    assert (
+        "state=running fault=none" in replies(emulate([*script, "send CLEAR", *again], board=board, breakable=True))[-1]
+    )
 
 
 @pytest.mark.parametrize("board", BOTH)

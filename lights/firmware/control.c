@@ -1,5 +1,7 @@
 #include "control.h"
 
+#include <stdbool.h>
+
 #include "board.h"
 #include "clock.h"
 #include "player.h"
@@ -15,22 +17,23 @@ static uint32_t cycle_ticks, cycles_wanted;
 static uint32_t cycle_start; /* the time's low half: a cycle is shorter than half its range */
 static uint32_t last_poll;
 
-static void show(void) {
+void control_show(uint64_t now) {
 #ifdef LED_MASK
-    /* On where light may come, so that nobody looks into it unwarned. Never while lights run: it shares their port. */
-    if (control_state == STATE_ARMED || control_state == STATE_FAULT) LED_PORT |= LED_MASK;
-    if (control_state == STATE_IDLE) LED_PORT &= ~LED_MASK;
+    bool blink = (uint32_t)now >> 19 & 1; /* a quarter of a second each */
+    if (control_state == STATE_RUNNING) return; /* still on from being armed; and it shares the lights' port */
+    if (control_state == STATE_ARMED || (control_state == STATE_FAULT && blink)) {
+        LED_PORT |= LED_MASK;
+    } else {
+        LED_PORT &= ~LED_MASK;
+    }
+#else
+    (void)now;
 #endif
-}
-
-static void enter(uint8_t state) {
-    control_state = state;
-    show();
 }
 
 void control_arm(uint32_t ticks) {
     cycle_ticks = ticks;
-    enter(STATE_ARMED);
+    control_state = STATE_ARMED;
 }
 
 uint64_t control_run(uint32_t cycles) {
@@ -39,7 +42,7 @@ uint64_t control_run(uint32_t cycles) {
     cycles_wanted = cycles;
     last_poll = now;
     cycle_start = now + START_DELAY;
-    enter(STATE_RUNNING);
+    control_state = STATE_RUNNING;
     player_start(now, START_DELAY, cycles);
     return now + START_DELAY;
 }
@@ -58,7 +61,7 @@ void control_poll(uint64_t now) {
         if (position.cycle == cycles_wanted) {
             player_stop();
             position.step = 0;
-            enter(STATE_IDLE);
+            control_state = STATE_IDLE;
             return;
         }
     }
@@ -71,18 +74,18 @@ static void darken(void) {
 
 void control_stop(void) {
     darken();
-    if (control_state != STATE_FAULT) enter(STATE_IDLE);
+    if (control_state != STATE_FAULT) control_state = STATE_IDLE;
 }
 
 void control_fail(uint8_t fault) {
     darken();
     control_fault = fault;
-    enter(STATE_FAULT);
+    control_state = STATE_FAULT;
 }
 
 void control_clear(void) {
     control_fault = FAULT_NONE;
-    enter(STATE_IDLE);
+    control_state = STATE_IDLE;
 }
 
 position_t control_position(void) {

@@ -24,6 +24,9 @@ void control_clear(void);
 /* Follow the run; it ends here when its last cycle is over. */
 void control_poll(uint64_t now);
 
+/* The LED: on while armed or running, so that nobody looks into the lights unwarned; it blinks in fault. */
+void control_show(uint64_t now);
+
 position_t control_position(void);
 
 #endif

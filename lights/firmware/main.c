@@ -3,10 +3,10 @@
 
 #include "clock.h"
 #include "commands.h"
+#include "control.h"
 #include "player.h"
 #include "reply.h"
 #include "safety.h"
-#include "control.h"
 #include "uart.h"
 
 static void poll_line(uint64_t now) {
@@ -28,6 +28,7 @@ int main(void) {
         uint64_t now = clock_now();
         safety_poll(now);
         control_poll(now);
+        control_show(now);
         poll_line(now);
     }
 }

@@ -48,7 +48,7 @@ void safety_heard_host(uint64_t now) {
 }
 
 static void watch_lights(uint32_t now) {
-    if (player_was_late()) {
+    if (control_state == STATE_RUNNING && player_was_late()) {
         control_fail(FAULT_LATE);
     } else if (safety_is_interlock_open()) {
         control_fail(FAULT_INTERLOCK);
