@@ -12,6 +12,7 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from threading import Thread
 
 import numpy as np
 import OpenEXR
@@ -23,6 +24,9 @@ from psvideo.errors import PsvideoError
 from psvideo.planfile import format_plan, read_plan
 from psvideo.strobe import imitation, toolchain
 from psvideo.strobe.boards import BOARDS, capabilities
+from psvideo.strobe.emulated import EmulatedController
+from psvideo.strobe.limits import cycle_check
+from psvideo.strobe.messages import Lit, Slot
 from psvideo.strobe.program import make_program
 from psvideo.strobe.protocol import format_request
 from psvideo.strobe.simulated import play_script
@@ -32,6 +36,9 @@ from psvideo.tracefile import read_trace
 
 STARTS_WITHIN_S = 60.0
 CAMERA_SECOND_PPM = 137.0
+
+CHECK = cycle_check([Slot(slot=0, duration=2000, dark=4000, period=2000, lit=(Lit(line=0, on=2000),))])
+"""Of a cycle that lights line 0 for 1 ms every 3 ms."""
 
 SCENE = f"""
 schema = "psvideo-scene/1"
@@ -142,12 +149,9 @@ def ask(line: serial.SerialBase, request: str) -> str:
 def flash_on(port: str, flashes: int) -> None:
     with serial.serial_for_url(port, 115200, timeout=10) as line:
         assert ask(line, "ID").startswith("OK proto=1 board=atmega")
-        for request in ("SLOT 0 2000 4000 2000 0:2000", "STEPS 0 0"):
+        for request in ("KEEP 2000", "SLOT 0 2000 4000 2000 0:2000", "STEPS 0 0"):
             assert ask(line, request).startswith("OK ")
-        refusal = ask(line, "ARM 0")
-        assert refusal.startswith("E 11"), refusal
-        check = make_check()
-        assert ask(line, f"ARM {check}").startswith("OK ")
+        assert ask(line, f"ARM {CHECK}").startswith("OK ")
         assert ask(line, f"RUN {flashes}").startswith("OK start=")
         deadline = time.monotonic() + 30
         while "state=idle" not in ask(line, "STAT"):
@@ -155,15 +159,8 @@ def flash_on(port: str, flashes: int) -> None:
             time.sleep(0.02)
 
 
-def make_check() -> int:
-    from psvideo.strobe.limits import cycle_check
-    from psvideo.strobe.messages import Lit, Slot
-
-    return cycle_check([Slot(slot=0, duration=2000, dark=4000, period=2000, lit=(Lit(line=0, on=2000),))])
-
-
 @pytest.mark.parametrize("stop", [signal.SIGTERM, signal.SIGINT], ids=["SIGTERM", "Ctrl-C"])
-@pytest.mark.parametrize("words", [["--board", "atmega2560", "--fast"], ["--board", "python"]], ids=["chip", "python"])
+@pytest.mark.parametrize("words", [["--board", "atmega2560"], ["--board", "python"]], ids=["chip", "python"])
 def test_the_port_comes_first_and_the_trace_is_whole_when_it_is_stopped(
     words: Sequence[str], stop: signal.Signals, tmp_path: Path
 ) -> None:
@@ -183,28 +180,29 @@ def test_the_port_comes_first_and_the_trace_is_whole_when_it_is_stopped(
     assert [path.name for path in tmp_path.iterdir()] == ["trace.csv"]
 
 
+def test_the_real_firmware_answers_where_nothing_is_said() -> None:
+    with emulation("--fast") as (_, port), serial.serial_for_url(port, 115200, timeout=10) as line:
+        assert ask(line, "ID").startswith("OK proto=1 board=atmega328p firmware=1")
+
+
 def test_a_host_that_goes_away_in_the_middle_leaves_it_dark(tmp_path: Path) -> None:
     trace = tmp_path / "trace.csv"
     with emulation("--board", "python", "--trace", str(trace)) as (process, port):
         with serial.serial_for_url(port, 115200, timeout=10) as line:
-            for request in ("KEEP 100", "SLOT 0 2000 4000 2000 0:2000", "STEPS 0 0", f"ARM {make_check()}", "RUN 0"):
+            for request in ("KEEP 500", "SLOT 0 2000 4000 2000 0:2000", "STEPS 0 0", f"ARM {CHECK}", "RUN 0"):
                 assert ask(line, request).startswith("OK")
-        time.sleep(0.5)
+        time.sleep(1.2)
         with serial.serial_for_url(port, 115200, timeout=10) as line:
             assert "state=fault fault=silent" in ask(line, "STAT")
         process.send_signal(signal.SIGTERM)
         assert process.wait(STARTS_WITHIN_S) == 0
     edges = read_trace(trace).edges["0"]
     assert edges.size % 2 == 0
-    assert edges[-1] - edges[0] <= 0.101 * 16_000_000
+    assert edges[-1] - edges[0] <= 0.51 * 16_000_000
 
 
 def test_systems_without_pseudo_terminals_get_a_socket(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delattr(os, "openpty")
-    from threading import Thread
-
-    from psvideo.strobe.emulated import EmulatedController
-
     with contextlib.closing(imitation.open_port()) as port:
         over: list[bool] = []
         server = Thread(
