@@ -126,18 +126,23 @@ def clip_rounds(
     ``each_flash`` is shown every single plate on its way, demosaiced.
     """
     check_separable(take.plan)
-    clip, camera = take.clip, _timed_camera(take.plan, timing)
+    shown = _shown(clip_plates(take, timing, method=method, watch=watch), each_flash)
+    return rounds(shown, take.plan, timing.flashes, start=start_number)
+
+
+def clip_plates(take: Take, timing: Timing, *, method: Method = "weights", watch: Watch = unwatched) -> Iterator[Plate]:
+    """Decode a take once and yield the plate of every flash that it holds, ambient light taken off, demosaiced."""
+    clip, camera = take.clip, timed_camera(take.plan, timing)
     places = places_in_time(timing, clip.numbers)
     used = _within(timing, camera, take, places)
     decoded = read_frames(clip, take.numbers, ahead=AHEAD)
     frames = _placed(watch(decoded, total=len(take.numbers), what="rebuilding flashes"), places)
     rebuild = split if method == "weights" else hudon2015.split
     plates = subtract(rebuild(frames, camera, used), first=_first_ambient(take, camera, used, places))
-    shown = _shown(map(_colour_of(clip), plates), each_flash)
-    return rounds(shown, clip.plan, timing.flashes, start=start_number)
+    return map(_colour_of(clip), plates)
 
 
-def _timed_camera(plan: Plan, timing: Timing) -> Camera:
+def timed_camera(plan: Plan, timing: Timing) -> Camera:
     """Return the plan's camera with the exposure and readout that the timing found."""
     readout_s = timing.row_time_s * plan.camera.height_px
     return replace(plan.camera, exposure_s=timing.exposure_s, readout_s=readout_s)
