@@ -14,7 +14,7 @@ LAYERS = [
     {"plan", "planfile", "timing"},
     {"shutter", "clip", "strobe", "capture"},
     {"rowfit", "profiles"},
-    {"sync", "rigfield", "order", "split", "hudon2015", "ambient", "sequence", "calibrate", "normals"},
+    {"sync", "rigfield", "order", "split", "hudon2015", "flicker", "ambient", "sequence", "calibrate", "normals"},
     {"export", "view"},
     {"synth"},
     {"pipeline"},
@@ -25,7 +25,18 @@ LAYERS = [
 ]
 """Rooms from the bottom up; a module may use its own layer (without circles) and those below."""
 
-SYNTH_NEVER_USES = {"shutter", "rowfit", "profiles", "sync", "split", "hudon2015", "ambient", "sequence", "normals"} | {
+SYNTH_NEVER_USES = {
+    "shutter",
+    "rowfit",
+    "profiles",
+    "sync",
+    "split",
+    "hudon2015",
+    "flicker",
+    "ambient",
+    "sequence",
+    "normals",
+} | {
     "clip",
     "pipeline",
     "runs",

@@ -203,21 +203,6 @@ def test_ambient_light_is_taken_off_before_rows_are_summed(make_plan: PlanMaker)
     assert np.abs(plates[first_dark].image - 0.1).max() < 1e-4
 
 
-def test_the_average_of_dark_slots_begins_anew_only_where_the_scene_changed() -> None:
-    rng = np.random.default_rng(0)
-    scene = np.full((64, 64), 0.1)
-    average = None
-    for _ in range(12):
-        average = ambient.update(average, (scene + 0.01 * rng.standard_normal(scene.shape)).astype(np.float32))
-    assert average is not None
-    assert np.std(average.image - scene) < 0.006
-    moved = scene.copy()
-    moved[:32, :32] = 0.3
-    average = ambient.update(average, (moved + 0.01 * rng.standard_normal(scene.shape)).astype(np.float32))
-    assert np.abs(average.image[4:28, 4:28].mean() - 0.3) < 0.005
-    assert np.std(average.image[40:, 40:] - 0.1) < 0.006
-
-
 def test_rows_of_a_dark_slot_that_no_frame_saw_do_not_pass_for_darkness(make_plan: PlanMaker) -> None:
     plan = make_plan()
     truth = plates_for(plan)
@@ -269,7 +254,7 @@ def test_the_clips_of_another_simulator_give_its_true_plates(clip: str, shared_d
     timing = find_timing(plan, *collect(frames))
     plates = list(split(iter(frames), plan.camera, timing))
     dark = next(plate for plate in plates if not plate.flash.lights)
-    plates = list(ambient.subtract(plates, first=ambient.update(None, dark.image)))
+    plates = list(ambient.subtract(plates, first=ambient.before_first(dark)))
     truth = json.loads((folder / "truth" / "timing.json").read_text())["flashes"]
     compared = 0
     for plate in plates:

@@ -39,7 +39,8 @@ def named_first(take: Take, timing: Timing, first_light: str) -> Timing:
             return replace(named, order="given", order_note="")
     raise PsvideoError(
         f"--first-light {first_light} does not fit the timing: its first complete flash is {_first_lights(timing)}'s, "
-        f"and no turn of the cycle by which flashes stay alike makes it {first_light}'s. Leave the option out, or leave --timing out to find the flashes anew."
+        f"and no turn of the cycle by which flashes stay alike makes it {first_light}'s. "
+        "Leave the option out, or leave --timing out to find the flashes anew."
     )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo import hudon2015
-from psvideo.ambient import Ambient, held, subtract
+from psvideo.ambient import LOOK_AHEAD_BYTES, Ambient, before_first, subtract
 from psvideo.calibrate.strobed_readout import StrobedReadout, readout_of
 from psvideo.camera import Camera
 from psvideo.clip import Clip, Frame, demosaic, holes, open_clip, parse_range, read_frames
@@ -138,7 +138,10 @@ def clip_plates(take: Take, timing: Timing, *, method: Method = "weights", watch
     decoded = read_frames(clip, take.numbers, ahead=AHEAD)
     frames = _placed(watch(decoded, total=len(take.numbers), what="rebuilding flashes"), places)
     rebuild = split if method == "weights" else hudon2015.split
-    plates = subtract(rebuild(frames, camera, used), first=_first_ambient(take, camera, used, places))
+    rebuilt = rebuild(frames, camera, used)
+    first = _first_ambient(take, camera, used, places)
+    waits = len(clip.plan.lit_slots) < len(clip.plan.flashes)
+    plates = subtract(rebuilt, first=first, look_ahead_bytes=LOOK_AHEAD_BYTES if waits else 0)
     return map(_colour_of(clip), plates)
 
 
@@ -179,7 +182,7 @@ def _first_ambient(take: Take, camera: Camera, timing: Timing, places: Mapping[i
         frames = _placed(read_frames(take.clip, near), places) if near else iter(())
         plate = next(split(frames, camera, replace(timing, flashes=only)), None)
         if plate is not None:
-            return Ambient(image=held(plate.image), slots=np.zeros(plate.image.shape[:2], np.float32), known=plate.seen)
+            return before_first(plate)
     return None
 
 
