@@ -22,7 +22,7 @@ EXPLAINED = 0.8
 LEAST_TURN = 0.3
 """Dark slots must differ at least so much in phase (of 2 at most, RMS) to tell a ripple."""
 LEAST_ROWS = 16
-MOST_SWING = 0.9
+LEAST_SWING, MOST_SWING = 1e-3, 0.9
 AGREES = 0.3
 """Two findings agree that differ by no more than this share of themselves, which is 0.3 in phase as well."""
 LONGEST_UNSEEN = 4
@@ -107,7 +107,8 @@ def find_ripple(before: RowLight, after: RowLight) -> Ripple | None:
     weight = weight / weight.max()
     tried = [_fitted(before, after, hz, good, change, weight) for hz in PULSES_HZ]
     best = max((one for one in tried if one is not None), key=lambda one: one[0], default=None)
-    return best[1] if best is not None and best[0] > EXPLAINED else None
+    clear = best is not None and best[0] > EXPLAINED and abs(best[1].amplitude) > LEAST_SWING
+    return best[1] if best is not None and clear else None
 
 
 def _fitted(
