@@ -26,6 +26,8 @@ COARSE, LEVEL_PX = 4, 7
 """Levels are compared over squares of 7 pixels of pictures a quarter as large: the factor adds hardly any noise."""
 LEAST_GAIN, MOST_GAIN = 0.5, 2.0
 """Where light changed by more than these factors between dark slots, the average begins anew."""
+SPARSE = 5
+"""Noise is judged from every fifth pixel of every fifth row, which is plenty."""
 NEIGHBOURHOOD_PX = 9
 """What the level does not explain is judged over a square of this width, which averages noise away."""
 CHANGED = 4.0
@@ -105,12 +107,13 @@ class _Change:
         before, now, factor = (picture.reshape(*old.shape[:2], -1) for picture in (old, new, gain))
         rest, level = np.empty(old.shape[:2], np.float32), np.empty(old.shape[:2], np.float32)
         _rest(before, now, factor, both, rest, level)
-        local = cv2.blur(rest, (NEIGHBOURHOOD_PX, NEIGHBOURHOOD_PX))
-        most = CHANGED / NEIGHBOURHOOD_PX
-        variance, per_level = _noise(rest[both].ravel(), level[both].ravel())
-        beyond = local**2 > np.float32(most**2) * (variance + per_level * np.maximum(level, 0))
-        limits = (factor.min(axis=2) <= LEAST_GAIN) | (factor.max(axis=2) >= MOST_GAIN)
-        return cls(gain=gain, anew=beyond | limits)
+        local = np.asarray(cv2.blur(rest, (NEIGHBOURHOOD_PX, NEIGHBOURHOOD_PX)), np.float32)
+        some = np.flatnonzero(both[::SPARSE]) * SPARSE
+        variance, per_level = _noise(rest[some, ::SPARSE].ravel(), level[some, ::SPARSE].ravel())
+        anew = np.empty(rest.shape, np.bool_)
+        most = np.float32((CHANGED / NEIGHBOURHOOD_PX) ** 2)
+        _beyond(local, level, factor, most * variance, most * per_level, anew)
+        return cls(gain=gain, anew=anew)
 
 
 def _gain(old: Image, new: Image, both: NDArray[np.bool_]) -> Image:
@@ -122,9 +125,8 @@ def _gain(old: Image, new: Image, both: NDArray[np.bool_]) -> Image:
         cv2.blur(_coarse(picture if both.all() else _times_rows(picture, shown), shrink), (LEVEL_PX, LEVEL_PX))
         for picture in (old, new)
     ]
-    across = (new - old)[:: 2 * COARSE, ::COARSE].reshape(-1, old[0, ::COARSE].size)
-    noise = float(np.median(np.abs(np.diff(across, axis=1)))) if across.shape[1] > 1 else 0.0
-    floor = np.float32(2 * noise + 1e-5)
+    across = np.diff(new[::SPARSE, ::SPARSE] - old[::SPARSE, ::SPARSE], axis=1)
+    floor = np.float32(2 * float(np.median(np.abs(across))) + 1e-5) if across.size else np.float32(1e-5)
     gain = (np.maximum(small[1], 0) + floor) / (np.maximum(small[0], 0) + floor)
     gain = np.clip(gain, LEAST_GAIN, MOST_GAIN)
     full = cv2.resize(gain, (cols, rows), interpolation=cv2.INTER_LINEAR) if shrink > 1 else gain
@@ -138,7 +140,6 @@ def _coarse(image: Image, shrink: int) -> Image:
 
 def _noise(rest: Image, level: Image) -> tuple[np.float32, np.float32]:
     """Return the variance of what is left without light, and per unit of light: read noise and photon noise."""
-    rest, level = rest[::7], level[::7]
     if len(rest) < 64:
         return np.float32(1e-12), np.float32(0)
     order = np.array_split(np.argsort(level), 8)
@@ -161,6 +162,27 @@ def _rest(old: Image, new: Image, gain: Image, both: NDArray[np.bool_], rest: Im
                     light += new[row, col, channel]
             rest[row, col] = total / np.float32(channels)
             level[row, col] = light / np.float32(channels)
+
+
+@compiled
+def _beyond(
+    local: Image,
+    level: Image,
+    gain: Image,
+    variance: np.float32,
+    per_level: np.float32,
+    anew: NDArray[np.bool_],
+) -> None:
+    """Mark where a neighbourhood changed by more than noise, or by a factor beyond its limits."""
+    rows, cols, channels = gain.shape
+    for row in range(rows):
+        for col in range(cols):
+            light = max(level[row, col], np.float32(0))
+            far = local[row, col] * local[row, col] > variance + per_level * light
+            for channel in range(channels):
+                factor = gain[row, col, channel]
+                far = far or factor <= np.float32(LEAST_GAIN) or factor >= np.float32(MOST_GAIN)
+            anew[row, col] = far
 
 
 @compiled
