@@ -43,13 +43,16 @@ class Take:
     plates: list[Plate]
     truth: dict[int, np.ndarray]
 
-    def errors(self, **options: object) -> np.ndarray:
+    def without_ambient(self) -> Iterator[Plate]:
+        return ambient.subtract(self.plates, darks=[plate for plate in self.plates if not plate.flash.lights])
+
+    def errors(self) -> np.ndarray:
         """Return the errors of whole plates between two dark slots once ambient light is off, (plate, row, col)."""
-        dark = [plate.flash.index for plate in self.plates if not plate.flash.lights] or [-1, 10_000]
+        dark = [plate.flash.index for plate in self.plates if not plate.flash.lights]
         return np.array(
             [
                 plate.image - self.truth[plate.flash.slot]
-                for plate in ambient.subtract(iter(self.plates), **options)  # type: ignore[arg-type]
+                for plate in self.without_ambient()
                 if plate.flash.lights and plate.seen.all() and dark[0] < plate.flash.index < dark[-1]
             ]
         )
@@ -141,7 +144,7 @@ def plan(make_plan: PlanMaker) -> Plan:
 def test_light_that_does_not_change_costs_hardly_any_noise(plan: Plan) -> None:
     unlit = shoot(plan, lambda n, scene: 0 * scene, noise=NOISE)
     photons = np.mean([LEVEL * texture(plan) / NOISE.full_well_e])  # of the ambient light itself, which nothing removes
-    alone = np.sqrt(rms(unlit.errors(first=None)[40:]) ** 2 + 1.3 * photons)
+    alone = np.sqrt(rms(unlit.errors()[40:]) ** 2 + 1.3 * photons)
     assert rms(shoot(plan, held, noise=NOISE).errors()[40:]) < 1.06 * alone
 
 
@@ -164,7 +167,7 @@ def test_where_someone_moves_the_average_begins_anew_and_elsewhere_it_goes_on(pl
         return light
 
     take = shoot(plan, walking, noise=NOISE, frames=100)
-    last = [plate for plate in ambient.subtract(iter(take.plates)) if not plate.flash.lights][-1]
+    last = [plate for plate in take.without_ambient() if not plate.flash.lights][-1]
     frame = last.flash.start_s / plan.camera.frame_period_s
     middle = slice(int(10 + frame) + 6, int(34 + frame) - 6)
     assert abs(float(last.image[44:76, middle].mean()) - 0.3) < 0.003
@@ -221,26 +224,21 @@ def test_a_ripple_is_found_with_its_phase() -> None:
     assert find_ripple(seen(0.0), seen(0.025)) is None, "the same phase tells nothing"
 
 
-def test_plates_wait_for_the_next_dark_slot_and_no_longer_than_memory_lasts(plan: Plan) -> None:
+def test_dark_slots_are_read_no_further_ahead_than_the_next(plan: Plan) -> None:
     take = shoot(plan, dimmed, frames=60)
-    waiting, most, served = 0, 0, 0
+    read: list[int] = []
 
-    def counted() -> Iterator[Plate]:
-        nonlocal waiting, most, served
+    def darks() -> Iterator[Plate]:
         for plate in take.plates:
-            waiting += 1
-            most = max(most, waiting)
-            yield plate
+            if not plate.flash.lights:
+                read.append(plate.flash.index)
+                yield plate
 
-    size = take.plates[0].image.nbytes
-    for _ in ambient.subtract(counted(), look_ahead_bytes=2 * size):
-        waiting -= 1
+    served = 0
+    for plate in ambient.subtract(take.plates, darks=darks()):
         served += 1
+        assert sum(index >= plate.flash.index for index in read) <= 1
     assert served == len(take.plates)
-    assert most <= 3
-    assert rms(take.errors(look_ahead_bytes=2 * size)[8:]) < 0.02 * LEVEL
-    in_order = [plate.flash.index for plate in ambient.subtract(iter(take.plates))]
-    assert in_order == sorted(in_order)
 
 
 def test_dark_slots_that_are_torn_or_seen_in_part_do_no_harm(make_plan: PlanMaker) -> None:
@@ -249,7 +247,7 @@ def test_dark_slots_that_are_torn_or_seen_in_part_do_no_harm(make_plan: PlanMake
     for plan, light, dropped in ((whole, dimmed, (13, 14, 37)), (narrow, held, ()), (narrow, held, (21,))):
         take = shoot(plan, light, dropped=dropped)
         compared = 0
-        for plate in ambient.subtract(iter(take.plates)):
+        for plate in take.without_ambient():
             if plate.flash.lights and plate.flash.index > 8:
                 error = np.abs(plate.image - take.truth[plate.flash.slot])[plate.seen]
                 compared += error.size
@@ -261,6 +259,6 @@ def test_colour_and_mosaics_are_followed_alike(plan: Plan) -> None:
     take = shoot(plan, dimmed)
     tint = np.array([1.0, 0.6, 0.3], np.float32)
     coloured = [replace(plate, image=plate.image[..., None] * tint) for plate in take.plates]
-    grey = {plate.flash.index: plate.image for plate in ambient.subtract(iter(take.plates))}
-    for plate in ambient.subtract(iter(coloured)):
+    grey = {plate.flash.index: plate.image for plate in take.without_ambient()}
+    for plate in replace(take, plates=coloured).without_ambient():
         assert np.abs(plate.image - grey[plate.flash.index][..., None] * tint).max() < 2e-4

@@ -90,7 +90,8 @@ def gathered(plan: Plan, shot: Exposure, timing: Timing) -> list[Round]:
         for n, image in zip(shot.indices, shot.frames, strict=True):
             yield MemoryFrame(n, image)
 
-    plates = ambient.subtract(split(frames(), plan.camera, timing))
+    held = list(split(frames(), plan.camera, timing))
+    plates = ambient.subtract(held, darks=[plate for plate in held if not plate.flash.lights])
     return list(rounds(plates, plan, timing.flashes))
 
 

@@ -7,7 +7,6 @@ noise. Where the picture still differs by more than noise (someone moved, a shad
 light, which swings from exposure to exposure, is told apart row by row (``flicker``) and put back for each plate.
 """
 
-from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
@@ -32,8 +31,6 @@ NEIGHBOURHOOD_PX = 9
 """What the level does not explain is judged over a square of this width, which averages noise away."""
 CHANGED = 4.0
 """A neighbourhood's mean change of this many standard deviations of noise means that the scene has changed there."""
-LOOK_AHEAD_BYTES = 256 * 2**20
-"""Plates that wait for the next dark slot take no more memory than this; the oldest go on with the last one's light."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,6 +47,7 @@ class Ambient:
     middle_s: FloatArray
     known: NDArray[np.bool_]
     mains: Mains
+    index: int
 
 
 def update(ambient: Ambient | None, dark: Plate) -> Ambient:
@@ -57,7 +55,14 @@ def update(ambient: Ambient | None, dark: Plate) -> Ambient:
     rows, image = RowLight.of(dark), held(dark.image)
     if ambient is None:
         slots = np.broadcast_to(dark.seen[:, None], image.shape[:2]).astype(np.float32)
-        return Ambient(image=image, slots=slots, middle_s=rows.middle_s, known=dark.seen, mains=Mains(rows=rows))
+        return Ambient(
+            image=image,
+            slots=slots,
+            middle_s=rows.middle_s,
+            known=dark.seen,
+            mains=Mains(rows=rows),
+            index=dark.flash.index,
+        )
     mains = ambient.mains.next(rows)
     new = image if mains.ripple is None else _times_rows(image, 1 / mains.ripple.swing(rows))
     blended, slots = np.empty_like(new), np.empty_like(ambient.slots)
@@ -73,18 +78,13 @@ def update(ambient: Ambient | None, dark: Plate) -> Ambient:
         middle_s=np.where(dark.seen, rows.middle_s, ambient.middle_s),
         known=ambient.known | dark.seen,
         mains=mains,
+        index=dark.flash.index,
     )
 
 
 def _first_ripple(before: Mains, after: Mains) -> bool:
     """Tell whether a ripple is known that is still in the earlier picture."""
     return before.ripple is None and after.ripple is not None
-
-
-def before_first(dark: Plate) -> Ambient:
-    """Return the ambient light for the plates before the first dark slot, which will come by itself later on."""
-    ambient = update(None, dark)
-    return replace(ambient, slots=np.zeros_like(ambient.slots))
 
 
 def _times_rows(image: Image, factor: NDArray[np.floating]) -> Image:
@@ -211,33 +211,30 @@ def _blend(
                 blended[row, col, channel] = before
 
 
-def subtract(
-    plates: Iterable[Plate], *, first: Ambient | None = None, look_ahead_bytes: int = LOOK_AHEAD_BYTES
-) -> Iterator[Plate]:
+def subtract(plates: Iterable[Plate], *, darks: Iterable[Plate] = ()) -> Iterator[Plate]:
     """Yield the plates with ambient light taken off the lit ones; dark slots pass as the average at their moment.
 
-    Plates wait for the next dark slot, as far as they take no more memory than ``look_ahead_bytes``. ``first`` is the
-    ambient light before the first dark slot comes by. Without any, plates keep theirs. What is clipped comes out as
-    1.0.
+    ``darks`` are the clip's dark slots, read ahead of the plates: no further than the one after the current plate.
+    Before the first and after the last, its light is taken as it is. Without any, plates keep theirs. What is clipped
+    comes out as 1.0.
     """
-    before = first
-    waiting: deque[Plate] = deque()
+    coming = iter(darks)
+    before = after = None
     for plate in plates:
-        if any(plate.flash.lights.values()):
-            waiting.append(plate)
-            while waiting and len(waiting) * waiting[0].image.nbytes > look_ahead_bytes:
-                yield _without(waiting.popleft(), before, before)
-        else:
-            after = update(before, plate)
-            if before is None or _first_ripple(before.mains, after.mains):
+        while after is None or after.index < plate.flash.index:
+            dark = next(coming, None)
+            if dark is None:
                 before = after
-            while waiting:
-                yield _without(waiting.popleft(), before, after)
-            before = after
+                break
+            later = update(after, dark)
+            before = later if after is None or _first_ripple(after.mains, later.mains) else after
+            after = later
+        if after is None:
+            yield replace(plate, image=held(plate.image))
+        elif any(plate.flash.lights.values()):
+            yield _without(plate, before or after, after)
+        else:
             yield replace(plate, image=after.image, seen=after.known)
-        del plate  # held by nobody while the next one is rebuilt
-    while waiting:
-        yield _without(waiting.popleft(), before, before)
 
 
 def held(image: Image) -> Image:
@@ -246,13 +243,11 @@ def held(image: Image) -> Image:
     return held
 
 
-def _without(plate: Plate, before: Ambient | None, after: Ambient | None) -> Plate:
+def _without(plate: Plate, before: Ambient, after: Ambient) -> Plate:
     """Take the ambient light of every exposure off, interpolated in time; what is clipped becomes 1.0.
 
     Rows in which the ambient light is not known are no longer seen.
     """
-    if before is None or after is None:
-        return replace(plate, image=held(plate.image))
     rows = RowLight.of(plate)
     gap_s = after.middle_s - before.middle_s
     late = np.clip((rows.middle_s - before.middle_s) / np.where(gap_s > 0, gap_s, np.inf), 0, 1)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo import hudon2015
-from psvideo.ambient import LOOK_AHEAD_BYTES, Ambient, before_first, subtract
+from psvideo.ambient import subtract
 from psvideo.calibrate.strobed_readout import StrobedReadout, readout_of
 from psvideo.camera import Camera
 from psvideo.clip import Clip, Frame, demosaic, holes, open_clip, parse_range, read_frames
@@ -138,10 +138,7 @@ def clip_plates(take: Take, timing: Timing, *, method: Method = "weights", watch
     decoded = read_frames(clip, take.numbers, ahead=AHEAD)
     frames = _placed(watch(decoded, total=len(take.numbers), what="rebuilding flashes"), places)
     rebuild = split if method == "weights" else hudon2015.split
-    rebuilt = rebuild(frames, camera, used)
-    first = _first_ambient(take, camera, used, places)
-    waits = len(clip.plan.lit_slots) < len(clip.plan.flashes)
-    plates = subtract(rebuilt, first=first, look_ahead_bytes=LOOK_AHEAD_BYTES if waits else 0)
+    plates = subtract(rebuild(frames, camera, used), darks=_dark_plates(take, camera, used, places))
     return map(_colour_of(clip), plates)
 
 
@@ -170,20 +167,15 @@ def _within(timing: Timing, camera: Camera, take: Take, places: Mapping[int, int
     return replace(timing, flashes=flashes)
 
 
-def _first_ambient(take: Take, camera: Camera, timing: Timing, places: Mapping[int, int]) -> Ambient | None:
-    """Look ahead to the first dark slot that was seen, so that the flashes before it lose their ambient light too."""
-    complete = [flash for flash in timing.flashes if flash.complete]
+def _dark_plates(take: Take, camera: Camera, timing: Timing, places: Mapping[int, int]) -> Iterator[Plate]:
+    """Read ahead, from the few frames that they touch, the dark slots, between which ambient light is interpolated."""
     first, last = frames_touched(camera, timing.start_s, timing.duration_s)
-    for dark in (flash for flash in complete if not any(flash.lights.values())):
-        if dark is complete[0]:
-            return None
-        near = [n for n in take.numbers if n in places and first[dark.index] <= places[n] <= last[dark.index]]
-        only = tuple(replace(flash, complete=flash.index == dark.index) for flash in timing.flashes)
-        frames = _placed(read_frames(take.clip, near), places) if near else iter(())
-        plate = next(split(frames, camera, replace(timing, flashes=only)), None)
-        if plate is not None:
-            return before_first(plate)
-    return None
+    flashes = tuple(
+        replace(flash, complete=flash.complete and not any(flash.lights.values())) for flash in timing.flashes
+    )
+    touched = {n for dark in flashes if dark.complete for n in range(first[dark.index], last[dark.index] + 1)}
+    near = tuple(number for number in take.numbers if places.get(number) in touched)
+    return split(_placed(read_frames(take.clip, near), places), camera, replace(timing, flashes=flashes))
 
 
 def _colour_of(clip: Clip) -> Callable[[Plate], Plate]:
