@@ -226,15 +226,19 @@ def subtract(plates: Iterable[Plate], *, darks: Iterable[Plate] = ()) -> Iterato
             if dark is None:
                 before = after
                 break
+            before = None
             later = update(after, dark)
             before = later if after is None or _first_ripple(after.mains, later.mains) else after
             after = later
+            del dark, later  # pictures are held only as long as they are needed
         if after is None:
-            yield replace(plate, image=held(plate.image))
+            plate = replace(plate, image=held(plate.image))
         elif any(plate.flash.lights.values()):
-            yield _without(plate, before or after, after)
+            plate = _without(plate, before or after, after)
         else:
-            yield replace(plate, image=after.image, seen=after.known)
+            plate = replace(plate, image=after.image, seen=after.known)
+        yield plate
+        del plate
 
 
 def held(image: Image) -> Image:

@@ -24,7 +24,7 @@ from psvideo.profiles import collect_with_doubt
 from psvideo.rig import Light, Rig
 from psvideo.sequence import FIRST_NUMBER, LightPlate, Round, check_separable, reference_duration_s, rounds
 from psvideo.shutter import frames_touched
-from psvideo.split import Image, Plate, split
+from psvideo.split import Image, Plate, plate_of, split
 from psvideo.surface import Surface
 from psvideo.sync import find_timing
 from psvideo.timing import DroppedFrames, Timing, places_in_time
@@ -170,12 +170,15 @@ def _within(timing: Timing, camera: Camera, take: Take, places: Mapping[int, int
 def _dark_plates(take: Take, camera: Camera, timing: Timing, places: Mapping[int, int]) -> Iterator[Plate]:
     """Read ahead, from the few frames that they touch, the dark slots, between which ambient light is interpolated."""
     first, last = frames_touched(camera, timing.start_s, timing.duration_s)
-    flashes = tuple(
-        replace(flash, complete=flash.complete and not any(flash.lights.values())) for flash in timing.flashes
-    )
-    touched = {n for dark in flashes if dark.complete for n in range(first[dark.index], last[dark.index] + 1)}
-    near = tuple(number for number in take.numbers if places.get(number) in touched)
-    return split(_placed(read_frames(take.clip, near), places), camera, replace(timing, flashes=flashes))
+    number_at = {places[number]: number for number in take.numbers if number in places}
+    for dark in timing.flashes:
+        if dark.complete and not any(dark.lights.values()):
+            touched = range(first[dark.index], last[dark.index] + 1)
+            near = tuple(number_at[place] for place in touched if place in number_at)
+            plate = plate_of(dark, _placed(read_frames(take.clip, near), places), camera, timing) if near else None
+            if plate is not None:
+                yield plate
+            del plate
 
 
 def _colour_of(clip: Clip) -> Callable[[Plate], Plate]:

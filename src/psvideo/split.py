@@ -78,6 +78,14 @@ def split(frames: Iterable[LinearFrame], camera: Camera, timing: Timing) -> Iter
                 yield _rebuild(camera, timing, flash, images, touched)
 
 
+def plate_of(flash: Flash, frames: Iterable[LinearFrame], camera: Camera, timing: Timing) -> Plate | None:
+    """Return the plate of one flash of the timing from the frames that it touches, None where there is none of them."""
+    first, last = frames_touched(camera, np.array([flash.start_s]), np.array([flash.duration_s]))
+    touched = range(int(first[0]), int(last[0]) + 1)
+    images = {frame.index: frame.image for frame in frames if frame.index in touched}
+    return _rebuild(camera, timing, flash, images, touched) if images else None
+
+
 class _Window:
     """The few frames of a stream that the current flash needs."""
 
