@@ -18,25 +18,27 @@ static const layout LAYOUTS[] = {
     {
         .mcu = "atmega328p",
         .exact_count = 2,
+        .timer = '1',
         .exact = {{'B', 1}, {'B', 2}},
         .selection = {{'D', 2}, {'D', 3}, {'D', 4}, {'D', 5}, {'D', 6}, {'D', 7}, {'C', 0}, {'C', 1}},
         .interlock = {'C', 2},
-        .ports = 0x24, /* DDRB to PORTD */
+        .ports = {0x24, 0x28}, /* DDRB to PORTD */
         .mcusr = 0x54,
     },
     {
         .mcu = "atmega2560",
         .exact_count = 3,
-        .exact = {{'B', 5}, {'B', 6}, {'B', 7}},
+        .timer = '4',
+        .exact = {{'H', 3}, {'H', 4}, {'H', 5}},
         .selection = {{'A', 0}, {'A', 1}, {'A', 2}, {'A', 3}, {'A', 4}, {'A', 5}, {'A', 6}, {'A', 7}},
         .interlock = {'C', 7},
-        .ports = 0x20, /* PINA to DDRC */
+        .ports = {0x20, 0x100}, /* PINA to PINB, PINH to PINJ */
         .mcusr = 0x54,
     },
 };
 
-/* PINA is at 0x20 on both chips, then DDRA, PORTA, PINB, ... */
-#define PIN_OF(port) (0x20 + 3 * ((port) - 'A'))
+/* PINA is at 0x20 on both chips, then DDRA, PORTA, PINB, ...; PINH begins a second row. */
+#define PIN_OF(port) ((port) < 'H' ? 0x20 + 3 * ((port) - 'A') : 0x100 + 3 * ((port) - 'H'))
 #define DDR_OF(port) (PIN_OF(port) + 1)
 #define PORT_OF(port) (PIN_OF(port) + 2)
 #define PORF 0x01
@@ -51,7 +53,7 @@ static reset_sink on_reset;
 static bool interlock_open;
 static bool was_reset;
 static void (*chip_reset)(avr_t *);
-static uint64_t seen_ports;
+static uint32_t seen_ports[2];
 static uint32_t exact_levels, selection_levels, line_levels; /* a bit each */
 
 static void quiet(struct avr_t *chip, const int level, const char *format, va_list words) {
@@ -147,7 +149,7 @@ bool board_open(const char *mcu, const char *elf, bool gated, byte_sink sent, re
     avr->reset = chip_is_reset;
     is_gated = gated;
     on_reset = reset;
-    match_open(avr, at->exact_count, look_at_pins);
+    match_open(avr, at->timer, at->exact_count, look_at_pins);
     /* The library would look in every cycle whether INT0 and INT1 (S0 and S1 of the ATmega328P) are low: nobody asks,
      * and it takes three quarters of all time. */
     for (uint8_t number = 0; number < 2; number++) avr_extint_set_strict_lvl_trig(avr, number, 0);
@@ -162,6 +164,14 @@ static const char *reset_cause(void) {
     return flags & WDRF ? "watchdog" : flags & EXTRF ? "external" : flags & BORF ? "brownout" : "power";
 }
 
+static bool ports_changed(void) {
+    uint32_t ports[2];
+    for (int n = 0; n < 2; n++) memcpy(&ports[n], &avr->data[at->ports[n]], sizeof ports[n]);
+    if (ports[0] == seen_ports[0] && ports[1] == seen_ports[1]) return false;
+    memcpy(seen_ports, ports, sizeof ports);
+    return true;
+}
+
 bool board_step(void) {
     int state = avr_run(avr);
     if (state == cpu_Done || state == cpu_Crashed) return false;
@@ -170,12 +180,7 @@ bool board_step(void) {
         on_reset(reset_cause());
     }
     serial_step();
-    uint64_t ports;
-    memcpy(&ports, &avr->data[at->ports], sizeof ports);
-    if (ports != seen_ports || match_connection_changed()) {
-        seen_ports = ports;
-        look_at_pins(avr->cycle);
-    }
+    if (ports_changed() || match_connection_changed()) look_at_pins(avr->cycle);
     return true;
 }
 

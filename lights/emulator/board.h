@@ -26,11 +26,12 @@ typedef struct {
 /* Where a board's pins are (../protocol.md, "Pins"); data addresses of the AVR. */
 typedef struct {
     const char *mcu;
+    char timer;          /* the 16-bit timer that makes the exact outputs */
     int exact_count;
     pin exact[EXACT_PINS];
     pin selection[LINES];
     pin interlock;
-    uint16_t ports;      /* the first of eight addresses that hold every PORT and DDR of the pins above */
+    uint16_t ports[2];   /* twice the first of four addresses: together they hold every PORT and DDR of the outputs */
     uint16_t mcusr;
 } layout;
 

@@ -7,8 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define TCCR1A 0x80
-#define TCCR1C 0x82
+#define MODE (timer->name == '4' ? 0xA0 : 0x80)  /* TCCRnA */
+#define FORCE (MODE + 2)                         /* TCCRnC */
 #define LONGEST_INSTRUCTION 32 /* cycles; with an interrupt's entry */
 
 enum { DISCONNECTED, TOGGLE, CLEAR, SET };
@@ -20,15 +20,15 @@ static int output_count;
 static int latch[AVR_TIMER_COMP_COUNT];
 static uint8_t seen_modes;
 
-static int mode_of(int n) { return avr->data[TCCR1A] >> (6 - 2 * n) & 3; }
+static int mode_of(int n) { return avr->data[MODE] >> (6 - 2 * n) & 3; }
 
 bool match_connected(int n) { return mode_of(n) != DISCONNECTED; }
 
 int match_latch(int n) { return latch[n]; }
 
 bool match_connection_changed(void) {
-    if (avr->data[TCCR1A] == seen_modes) return false;
-    seen_modes = avr->data[TCCR1A];
+    if (avr->data[MODE] == seen_modes) return false;
+    seen_modes = avr->data[MODE];
     return true;
 }
 
@@ -70,12 +70,12 @@ static avr_timer_t *find_timer(char name) {
     exit(1);
 }
 
-void match_open(avr_t *chip, int outputs, pins_changed changed) {
+void match_open(avr_t *chip, char timer_name, int outputs, pins_changed changed) {
     avr = chip;
-    timer = find_timer('1');
+    timer = find_timer(timer_name);
     output_count = outputs;
     on_change = changed;
-    avr_register_io_write(avr, TCCR1C, force, NULL);
+    avr_register_io_write(avr, FORCE, force, NULL);
     for (int n = 0; n < outputs; n++)
         avr_irq_register_notify(timer->io.irq + TIMER_IRQ_OUT_COMP + n, matched, (void *)(intptr_t)n);
 }

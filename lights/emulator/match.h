@@ -1,4 +1,4 @@
-/* Timer 1's compare outputs as the silicon has them; see board.h for what is put right. */
+/* A 16-bit timer's compare outputs as the silicon has them; see board.h for what is put right. */
 #ifndef MATCH_H
 #define MATCH_H
 
@@ -8,7 +8,7 @@
 
 typedef void (*pins_changed)(uint64_t cycle);
 
-void match_open(avr_t *chip, int outputs, pins_changed changed);
+void match_open(avr_t *chip, char timer_name, int outputs, pins_changed changed);
 void match_after_reset(void);
 /* True where the timer, not PORT, drives output n. */
 bool match_connected(int n);

@@ -14,7 +14,7 @@
 #error "This firmware knows the ATmega328P (Uno, Nano) and the ATmega2560 (Mega)."
 #endif
 
-#define TICKS_PER_MS 2000UL /* Timer1 at 16 MHz / 8 */
+#define TICKS_PER_MS 2000UL /* the timer's, at 16 MHz / 8 */
 #define TICKS_PER_US 2UL
 
 #endif

@@ -7,6 +7,21 @@
 #define EXACT_DDR DDRB
 #define EXACT_MASK (1 << 1 | 1 << 2) /* PB1 is OC1A, PB2 is OC1B */
 
+/* The exact outputs' timer. Its bits lie as in every other 16-bit timer. */
+#define TIMER_MODE TCCR1A
+#define TIMER_SPEED TCCR1B
+#define TIMER_FORCE TCCR1C
+#define TIMER_COUNT TCNT1
+#define TIMER_COUNT_LOW TCNT1L
+#define TIMER_COUNT_HIGH TCNT1H
+#define TIMER_INTERRUPTS TIMSK1
+#define TIMER_FLAGS TIFR1
+#define TIMER_MATCH_A OCR1A
+#define TIMER_MATCH_A_LOW OCR1AL
+#define TIMER_MATCH_B_LOW OCR1BL
+#define MATCH_A_vect TIMER1_COMPA_vect
+#define MATCH_B_vect TIMER1_COMPB_vect
+
 #define INTERLOCK_PORT PORTC
 #define INTERLOCK_PIN PINC
 #define INTERLOCK_MASK (1 << 2)

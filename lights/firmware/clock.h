@@ -1,4 +1,4 @@
-/* The controller's time: Timer1's ticks of 0.5 us, counted in 64 bits from the reset. */
+/* The controller's time: the timer's ticks of 0.5 us, counted in 64 bits from the reset. */
 #ifndef CLOCK_H
 #define CLOCK_H
 

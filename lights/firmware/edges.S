@@ -34,18 +34,18 @@
     push r23
     sbic _SFR_IO_ADDR(GPIOR0), once
     cbi  _SFR_IO_ADDR(GPIOR0), short
-    lds  r22, TCCR1A
+    lds  r22, TIMER_MODE
     sbrs r22, \rise_bit
     rjmp 1f
     ; a burst has begun: the next match clears, `on` later
     andi r22, 0xFF - (1 << \rise_bit)
-    sts  TCCR1A, r22
+    sts  TIMER_MODE, r22
     lds  r22, short_way + data + ON
     lds  r23, short_way + data + ON + 1
     rjmp 3f
 1:  ; a burst is over: the next match sets, `off` later
     ori  r22, 1 << \rise_bit
-    sts  TCCR1A, r22
+    sts  TIMER_MODE, r22
     lds  r24, short_way + data + MORE
     lds  r25, short_way + data + MORE + 1
     sbiw r24, 1
@@ -68,8 +68,8 @@
     adc  r25, r23
     sts  \compare + 1, r25
     sts  \compare, r24
-    lds  r22, TCNT1L
-    lds  r23, TCNT1H
+    lds  r22, TIMER_COUNT_LOW
+    lds  r23, TIMER_COUNT_HIGH
     sub  r22, r24
     sbc  r23, r25
     brpl 4f
@@ -80,8 +80,8 @@
 .endm
 
 .text
-edge TIMER1_COMPA_vect, __vector_long_a, 0, COM1A0, OCR1AL
-edge TIMER1_COMPB_vect, __vector_long_b, 1, COM1B0, OCR1BL
+edge MATCH_A_vect, __vector_long_a, 0, COM1A0, TIMER_MATCH_A_LOW
+edge MATCH_B_vect, __vector_long_b, 1, COM1B0, TIMER_MATCH_B_LOW
 #if EXACT_OUTPUTS > 2
-edge TIMER1_COMPC_vect, __vector_long_c, 2, COM1C0, OCR1CL
+edge MATCH_C_vect, __vector_long_c, 2, COM1C0, TIMER_MATCH_C_LOW
 #endif

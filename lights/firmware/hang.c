@@ -7,9 +7,11 @@
 #define F_CPU 16000000UL
 #include <util/delay.h>
 
+#include "board.h"
+
 void hang(const char *how) {
     bool deaf = strcmp(how, "deaf") == 0;
-    if (strcmp(how, "blind") == 0) TIMSK1 = 0;
+    if (strcmp(how, "blind") == 0) TIMER_INTERRUPTS = 0;
     if (deaf || strcmp(how, "late") == 0) cli();
     if (strcmp(how, "late") == 0) _delay_ms(1);
     while (deaf || strcmp(how, "loop") == 0) {

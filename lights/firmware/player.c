@@ -1,4 +1,4 @@
-/* Every exact output has one compare unit of Timer1, and walks through the cycle by itself.
+/* Every exact output has one compare unit of the timer, and walks through the cycle by itself.
  *
  * An event is a compare match that has just set, cleared or kept the pin. Its interrupt adds whole ticks to that compare
  * register, so that nothing accumulates, and says what the next match does. Two ways lead there. The short way
@@ -17,7 +17,7 @@
 
 #define SEGMENT 0x8000 /* long waits are cut into such pieces, the first one and a bit */
 #define NEAR 0x7FFFUL  /* the longest wait that edges.S arms by itself */
-#define OCR(output) ((volatile uint16_t *)&OCR1A)[output]
+#define OCR(output) ((volatile uint16_t *)&TIMER_MATCH_A)[output]
 #define RISE_BIT(output) (uint8_t)(1 << COM1A0 >> 2 * (output))   /* with it a match sets the pin, without it clears */
 #define MATCH_BITS(output) (uint8_t)(1 << COM1A1 >> 2 * (output)) /* the unit drives the pin */
 #define INTERRUPT_BIT(output) (uint8_t)(1 << OCIE1A << (output))
@@ -49,16 +49,16 @@ static void select(uint8_t lines) {
 
 void player_stop(void) {
     ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
-        TIMSK1 = 0;
-        TCCR1A = 0;                  /* the compare units let go of the pins: */
+        TIMER_INTERRUPTS = 0;
+        TIMER_MODE = 0;                  /* the compare units let go of the pins: */
         EXACT_PORT &= ~EXACT_MASK;   /* low */
         board_select(0);
         GPIOR0 = 0;
         /* A unit that was stopped in a flash still remembers high. Let it forget that with the pins as inputs. */
         EXACT_DDR &= ~EXACT_MASK;
-        for (uint8_t output = 0; output < EXACT_OUTPUTS; output++) TCCR1A |= MATCH_BITS(output);
-        TCCR1C = 0xE0; /* force a match, which clears */
-        TCCR1A = 0;
+        for (uint8_t output = 0; output < EXACT_OUTPUTS; output++) TIMER_MODE |= MATCH_BITS(output);
+        TIMER_FORCE = 0xE0; /* force a match, which clears */
+        TIMER_MODE = 0;
         EXACT_DDR |= EXACT_MASK;
     }
 }
@@ -112,8 +112,8 @@ PER_OUTPUT void arm(uint8_t n, uint16_t ticks) {
         uint16_t now = OCR(n);
         OCR(n) = now + ticks;
         GPIOR0 = (GPIOR0 & ~(SHORT_FLAG(n) | ONCE_FLAG(n))) | flags;
-        if (last) TCCR1A = output->rises ? TCCR1A | RISE_BIT(n) : TCCR1A & ~RISE_BIT(n);
-        if (TCNT1 - now >= ticks) {
+        if (last) TIMER_MODE = output->rises ? TIMER_MODE | RISE_BIT(n) : TIMER_MODE & ~RISE_BIT(n);
+        if (TIMER_COUNT - now >= ticks) {
             late = true;
             player_stop();
         }
@@ -144,7 +144,7 @@ PER_OUTPUT void load(uint8_t n) {
 PER_OUTPUT void finish(uint8_t n) {
     outputs[n].done = true;
     ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
-        TIMSK1 &= ~INTERRUPT_BIT(n);
+        TIMER_INTERRUPTS &= ~INTERRUPT_BIT(n);
     }
     if (n == 0) select(0);
 }
@@ -165,7 +165,7 @@ PER_OUTPUT void serve(uint8_t n) {
         arm(n, SEGMENT);
         return;
     }
-    if (output->part->bursts && TCCR1A & RISE_BIT(n)) { /* a burst has begun */
+    if (output->part->bursts && TIMER_MODE & RISE_BIT(n)) { /* a burst has begun */
         ticks = short_way[n].more ? output->part->on : output->part->last;
         output->rises = false;
     } else if (output->part->bursts && short_way[n].more) { /* one of several is over */
@@ -206,10 +206,10 @@ PER_OUTPUT void start_output(uint8_t n, uint16_t from, uint32_t ticks, uint32_t 
     output->served = true;
     load(n);
     OCR(n) = from - 1; /* a pin changes one tick after its match */
-    TCCR1A |= MATCH_BITS(n);
-    TIFR1 = INTERRUPT_BIT(n);
+    TIMER_MODE |= MATCH_BITS(n);
+    TIMER_FLAGS = INTERRUPT_BIT(n);
     arm(n, cut(output, ticks));
-    TIMSK1 |= INTERRUPT_BIT(n);
+    TIMER_INTERRUPTS |= INTERRUPT_BIT(n);
 }
 
 void player_start(uint64_t from, uint32_t ticks, uint32_t cycles) {
