@@ -1,0 +1,753 @@
+"""Strobe controller for a Raspberry Pi Pico (RP2040) in MicroPython: copy this file onto the board.
+
+Made by make_main.py from the files in parts/: change those. README.md beside this file says how it works.
+"""
+
+import machine
+import micropython
+import rp2
+import select
+import struct
+import sys
+import time
+import uctypes
+from array import array
+
+
+# link -----------------------------------------------------------------------------------------------------------------
+# What lights/protocol.toml says of the link and of this board; times in ticks of 8 ns.
+
+
+ERRORS = {
+    "bytes": 1,
+    "long": 2,
+    "crc": 3,
+    "command": 4,
+    "words": 5,
+    "number": 6,
+    "range": 7,
+    "state": 8,
+    "limit": 9,
+    "incomplete": 10,
+    "check": 11,
+    "fault": 12,
+    "interlock": 13,
+    "powers": 14,
+}
+EVERY = ("idle", "armed", "running", "fault")
+ANY = 99
+COMMANDS = {  # fewest and most words, states, the reply's keys
+    "ID": (0, 0, EVERY, "proto board firmware unit"),
+    "CAPS": (
+        0,
+        0,
+        EVERY,
+        "tick_ps wiring lines powers slots steps min_on min_off min_dark max_flash max_period max_line_ppm "
+        "max_total_ppm tolerance_ppm keep_ms",
+    ),
+    "WIRING": (1, 1, ("idle",), "wiring"),
+    "KEEP": (1, 1, ("idle", "armed", "running"), "keep_ms"),
+    "NEW": (0, 0, ("idle", "armed"), ""),
+    "SLOT": (4, ANY, ("idle",), "slot"),
+    "STEPS": (2, ANY, ("idle",), "steps"),
+    "ARM": (1, 1, ("idle",), "check cycle"),
+    "RUN": (1, 1, ("armed",), "start"),
+    "STOP": (0, 0, EVERY, "state cycles"),
+    "STAT": (0, 0, EVERY, "state fault reset interlock cycle step cycles"),
+    "CLK": (1, 1, EVERY, "nonce cycle ticks"),
+    "CLEAR": (0, 0, ("idle", "fault"), "state"),
+}
+LONGEST_REQUEST = 96
+LONGEST_NONCE = 8
+LARGEST_NUMBER = 4294967295
+LONGEST_DARK = 2147483647
+KEEP_MS = (100, 2000)
+TICKS_PER_US = 125
+TICKS_PER_MS = 1000 * TICKS_PER_US
+LINES, SLOTS, STEPS = 8, 32, 240
+MIN_ON = MIN_OFF = TICKS_PER_US
+MIN_DARK = 100 * TICKS_PER_US
+MAX_FLASH = 50 * TICKS_PER_MS
+MAX_LINE_PPM, MAX_TOTAL_PPM = 500000, 2000000
+MAX_CYCLE = 60000 * TICKS_PER_MS
+START_DELAY = 10 * TICKS_PER_MS
+
+
+class RefusedError(Exception):
+    """Why a line is refused: a name of ERRORS, and words for people."""
+
+    def __init__(self, error, text):
+        super().__init__(text)
+        self.error = error
+        self.text = text
+
+
+# lines ----------------------------------------------------------------------------------------------------------------
+# Bytes into lines, checksums, words.
+
+
+def _crc_of_byte(byte):
+    crc = byte << 8
+    for _ in range(8):
+        crc = crc << 1 ^ (0x1021 if crc & 0x8000 else 0)
+    return crc & 0xFFFF
+
+
+CRC_TABLE = array("H", [_crc_of_byte(byte) for byte in range(256)])
+
+
+def crc16(data, crc=0xFFFF):
+    """CRC-16/CCITT-FALSE, going on from ``crc``."""
+    for byte in data:
+        crc = (crc << 8 & 0xFFFF) ^ CRC_TABLE[crc >> 8 ^ byte]
+    return crc
+
+
+def seal(text):
+    return f"{text}*{crc16(text.encode()):04X}"
+
+
+def unseal(text):
+    """The line without its checksum, which must be right where there is a ``*``."""
+    if "*" in text and ("*" in text[:-5] or text != seal(text[:-5])):
+        raise RefusedError("crc", "checksum")
+    return text[:-5] if "*" in text else text
+
+
+def number(word):
+    if not word.isdigit() or int(word) > LARGEST_NUMBER:
+        raise RefusedError("number", f"number {word[:20]}")
+    return int(word)
+
+
+def lit_word(word):
+    line, _, on = word.partition(":")
+    return number(line), number(on)
+
+
+class LineReader:
+    """Bytes into lines, one byte at a time; never holds more than a line that is just too long."""
+
+    def __init__(self):
+        self._forget()
+
+    def _forget(self):
+        self.held = bytearray()
+        self.bad = self.long = False
+
+    def take(self, byte):
+        """Take a byte. Returns None, or where a line ends (error or None, text)."""
+        if byte == 10:
+            return self._end()
+        self.bad = self.bad or not (32 <= byte <= 126 or byte == 13)
+        if len(self.held) > LONGEST_REQUEST:
+            self.long = True
+        else:
+            self.held.append(byte)
+        return None
+
+    def _end(self):
+        held, bad, long = bytes(self.held), self.bad, self.long
+        self._forget()
+        if held.endswith(b"\r"):
+            held = held[:-1]
+        if bad or b"\r" in held:
+            return "bytes", ""
+        if long or len(held) > LONGEST_REQUEST:
+            return "long", ""
+        return (None, held.decode()) if held else None
+
+
+# flashes --------------------------------------------------------------------------------------------------------------
+# What may be played. A slot is (duration, dark, period, [(line, on), ...]), as lights/protocol.md says.
+
+
+def check_slot(duration, dark, period, lit):
+    """Refuse what the board does not play, in the order of lights/protocol.md."""
+    if duration > MAX_FLASH:
+        raise RefusedError("limit", f"duration {duration} > max_flash {MAX_FLASH}")
+    if duration == 0:
+        raise RefusedError("range", "duration 0")
+    if dark < MIN_DARK:
+        raise RefusedError("limit", f"dark {dark} < min_dark {MIN_DARK}")
+    if dark > LONGEST_DARK:
+        raise RefusedError("range", f"dark {dark} > {LONGEST_DARK}")
+    if not 0 < period <= duration:
+        raise RefusedError("range", f"period {period}, duration {duration}")
+    _check_lit(period, lit)
+    rest = duration % period
+    for _, on in lit:
+        shortest = min(on, rest) if rest else on
+        if shortest < MIN_ON:
+            raise RefusedError("limit", f"on {shortest} < min_on {MIN_ON}")
+        if 0 < period - on < MIN_OFF:
+            raise RefusedError("limit", f"off {period - on} < min_off {MIN_OFF}")
+
+
+def _check_lit(period, lit):
+    seen = []
+    for line, on in lit:
+        if not 0 < on <= period:
+            raise RefusedError("range", f"on {on}, period {period}")
+        if line in seen or line >= LINES:
+            raise RefusedError("range", f"line {line} twice, or this board has not")
+        seen.append(line)
+
+
+def lit_ticks(slot):
+    """For how many ticks of one flash each line is on."""
+    duration, _, period, lit = slot
+    ticks = [0] * LINES
+    for line, on in lit:
+        ticks[line] = duration // period * on + min(on, duration % period)
+    return ticks
+
+
+def check_cycle(slots):
+    """Refuse a cycle that is lit too much or lasts too long; returns its length."""
+    cycle = sum([slot[0] + slot[1] for slot in slots])
+    each = [lit_ticks(slot) for slot in slots]
+    lines = [sum([ticks[line] for ticks in each]) for line in range(LINES)]
+    for line, ticks in enumerate(lines):
+        if ticks * 1000000 // cycle > MAX_LINE_PPM:
+            raise RefusedError("limit", f"line {line} {ticks * 1000000 // cycle} ppm > max_line_ppm {MAX_LINE_PPM}")
+    if sum(lines) * 1000000 // cycle > MAX_TOTAL_PPM:
+        raise RefusedError("limit", f"total {sum(lines) * 1000000 // cycle} ppm > max_total_ppm {MAX_TOTAL_PPM}")
+    if cycle > MAX_CYCLE:
+        raise RefusedError("limit", f"cycle {cycle} > {MAX_CYCLE}")
+    return cycle
+
+
+def check_of(slots):
+    """The checksum by which host and board know that they mean the same cycle."""
+    crc = 0xFFFF
+    for duration, dark, period, lit in slots:
+        on = [0] * LINES
+        for line, ticks in lit:
+            on[line] = ticks
+        crc = crc16(struct.pack("<11I", duration, dark, period, *on), crc)
+    return crc
+
+
+# table ----------------------------------------------------------------------------------------------------------------
+# What PIO and DMA play: a cycle as entries in memory, and the control blocks by which the DMA walks through them.
+#
+# Two state machines run in step, four lines each. An entry is two words: eight states of four lines, a tick each, and
+# how much longer the last one lasts. So it lasts ten ticks or more (eight states, the delay's fetch, a pass of its loop),
+# but edges of different lines may be a single tick apart: entries are laid such that every edge falls into the eight.
+
+
+GROUPS, GROUP_LINES = 2, 4  # two state machines in step, four lines each
+STATES = 8  # an entry is a word of eight states, a tick each, and a word that says how much longer the last one lasts
+SHORTEST = 10  # ticks of an entry: eight states, the delay's fetch, one pass of its loop
+STEADY = 0x11111111  # times a state: that state eight times
+TABLE_WORDS = 3300  # the longest table: 32 slots of bursts and 240 steps
+TURNS = 1024  # whole cycles that the DMA counts by itself
+
+
+def window_starts(ticks):
+    """When entries start so that every one of at most four (rising) ticks lies in the eight states of one.
+
+    Ticks that are near each other share a row of entries back to back. In its ten ticks an entry cannot switch in two,
+    so each tick rules out two of the row's phases, and at most six of eight are ruled out.
+    """
+    starts = []
+    while ticks:
+        near = [ticks[0]]
+        for tick in ticks[1:]:
+            if tick - near[-1] > 2 * SHORTEST:
+                break
+            near.append(tick)
+        ticks = ticks[len(near) :]
+        fits = [lead for lead in range(STATES) if max([(tick - near[0] + lead) % SHORTEST for tick in near]) < STATES]
+        first = near[0] - fits[0]
+        for tick in near:
+            start = tick - (tick - first) % SHORTEST
+            if start not in starts:
+                starts.append(start)
+    return starts
+
+
+def entries(on, length):
+    """``length`` ticks in which each (bit, ticks) of ``on`` is high from the start, as [(states, wait), ...]."""
+    starts = [0] + window_starts(sorted({ticks for _, ticks in on if ticks < length}))
+    made = []
+    for place, start in enumerate(starts):
+        end = starts[place + 1] if place + 1 < len(starts) else length
+        word = 0
+        for tick in range(STATES):
+            state = sum([bit for bit, ticks in on if start + tick < ticks])
+            word |= state << GROUP_LINES * tick
+        made.append((word, end - start - SHORTEST))
+    return made
+
+
+def padded(made):
+    """The same with a power of two of entries, by parting the last wait."""
+    made = list(made)
+    while len(made) & (len(made) - 1):
+        word, wait = made.pop()
+        first = (wait + SHORTEST) // 2
+        made.append((word, first - SHORTEST))
+        made.append(((word >> 28) * STEADY, wait - first))
+    return made
+
+
+def parts(slot, group):
+    """What a group of lines does in a flash: how many bursts, one burst, and the last burst with the dark time."""
+    duration, dark, period, lit = slot
+    on = [(1 << line % GROUP_LINES, ticks) for line, ticks in lit if line // GROUP_LINES == group]
+    if not [ticks for _, ticks in on if ticks < period]:
+        on = [(bit, duration) for bit, _ in on]
+        period = duration
+    bursts = (duration - 1) // period
+    last = duration - bursts * period
+    burst = padded(entries(on, period)) if bursts else []
+    return bursts, burst, entries([(bit, min(ticks, last)) for bit, ticks in on], last + dark)
+
+
+def control_word(treq, chain_to, inc_write=0, ring_bits=0, ring_write=0):
+    """A DMA channel's CTRL: enabled, high priority, words, the read address rising, quiet."""
+    rings = ring_bits << 6 | ring_write << 10
+    return 1 << 21 | treq << 15 | chain_to << 11 | rings | inc_write << 5 | 1 << 4 | 2 << 2 | 2 | 1
+
+
+class Table:
+    """One group's cycle in memory: entries, and the control blocks by which the DMA walks through them for ever.
+
+    ``turns`` are what the DMA reads behind every cycle: the address of the next one's blocks, or 0 to stop.
+    """
+
+    def __init__(self, group, link):
+        """``link`` has fifo, treq (of the state machine), control, turn (channels), memory and turns (aligned)."""
+        self.group = group
+        self.link = link
+        self.used = 0
+        self.cycle_address = self.lead_address = 0
+
+    def _put(self, *words):
+        words_of, first, address = self.link.memory
+        place = address + 4 * self.used
+        for word in words:
+            words_of[first + self.used] = word
+            self.used += 1
+        return place
+
+    def _put_entries(self, made, align_words=1):
+        while self.used % align_words:
+            self.used += 1
+        return self._put(*[word for entry in made for word in entry]), 2 * len(made)
+
+    def _put_block(self, address, count, chain_to, ring_bits=0):
+        return self._put(address, self.link.fifo, count, control_word(self.link.treq, chain_to, 0, ring_bits))
+
+    def lay_out(self, slots, steps):
+        """Write the cycle; slots' entries are there once, however often the steps name them."""
+        self.used = 0
+        lead = self._put_entries([(0, START_DELAY - SHORTEST)])
+        placed = {}
+        for step in steps:
+            if step not in placed:
+                bursts, burst, tail = parts(slots[step], self.group)
+                ring = self._put_entries(burst, 2 * len(burst)) if bursts else (0, 0)
+                placed[step] = (bursts, ring, self._put_entries(tail))
+        self.lead_address = self._put_block(lead[0], lead[1], self.link.control)
+        self.cycle_address = self.lead_address + 16
+        for place, step in enumerate(steps):
+            bursts, ring, tail = placed[step]
+            if bursts:
+                bits = [1 << bit for bit in range(8)].index(4 * ring[1])
+                self._put_block(ring[0], bursts * ring[1], self.link.control, bits)
+            self._put_block(tail[0], tail[1], self.link.turn if place + 1 == len(steps) else self.link.control)
+
+    def wind(self, cycles):
+        """Have it play for ever, or that many cycles if they are not more than TURNS."""
+        words, first, _ = self.link.turns
+        for turn in range(TURNS):
+            words[first + turn] = self.cycle_address
+        if 0 < cycles <= TURNS:
+            self.end_after(cycles)
+
+    def end_after(self, cycles):
+        """Have it stop behind the cycle of that number, which must be one of the next TURNS."""
+        words, first, _ = self.link.turns
+        words[first + (cycles - 1) % TURNS] = 0
+
+
+# controller -----------------------------------------------------------------------------------------------------------
+# Answers lines, and watches what is played.
+
+
+class Controller:
+    """Answers lines, and watches what is played. ``hardware`` is a Pico, or a test's stand-in."""
+
+    def __init__(self, hardware, unit, reset):
+        self.hardware = hardware
+        self.unit = unit
+        self.reset = reset
+        self.tables = [Table(group, link) for group, link in enumerate(hardware.links)]
+        self.reader = LineReader()
+        self.keep_ms = 1000
+        self.state, self.fault = ("fault", "watchdog") if reset == "watchdog" else ("idle", "none")
+        self.cycle = self.step = 0
+        self.heard = self.now = hardware.ticks()
+        self._forget()
+
+    def _forget(self):
+        self.slots = [None] * SLOTS
+        self.steps = []
+
+    def feed(self, data):
+        """Take bytes and return what is to be answered."""
+        answers = b""
+        for byte in data:
+            line = self.reader.take(byte)
+            if line:
+                answers += self._answer(*line)
+        return answers
+
+    def poll(self):
+        """Let happen what is due."""
+        self.now = self.hardware.ticks()
+        silent = self.heard + self.keep_ms * TICKS_PER_MS
+        if self.state == "running":
+            self._watch_run(silent)
+        if self.state in ("armed", "running"):
+            if self.hardware.interlock_open():
+                self._fail("interlock")
+            elif self.now >= silent:
+                self._fail("silent")
+
+    def _watch_run(self, silent):
+        end = self.start + self.cycles * self.cycle_ticks
+        if self.cycles and end <= min(self.now, silent):
+            self._darken("idle")
+            self.cycle, self.step = self.cycles, 0
+        elif self.hardware.starved() and not (self.cycles and self.now > end - MIN_DARK):
+            self._fail("late")
+        elif self.cycles > TURNS and not self.end_is_set:
+            self._set_end((self.now - self.start) // self.cycle_ticks)
+
+    def _set_end(self, played):
+        """Tell the tables where the run ends, once the DMA has passed that place for the last time but one."""
+        if played <= self.cycles - TURNS:
+            return
+        for table in self.tables:
+            table.end_after(self.cycles)
+        self.end_is_set = True
+        if played > self.cycles - TURNS // 8:
+            self._fail("late")
+
+    def _find_position(self):
+        """Where the run is: by time, which has the same crystal as the state machines."""
+        if self.state != "running" or self.now < self.start:
+            return
+        self.cycle, left = divmod(self.now - self.start, self.cycle_ticks)
+        self.step = 0
+        for step in self.steps:
+            left -= self.slots[step][0] + self.slots[step][1]
+            if left < 0:
+                break
+            self.step += 1
+
+    def _darken(self, state):
+        self.hardware.darken()
+        self._find_position()
+        self.state = state
+
+    def _fail(self, fault):
+        self._darken("fault")
+        self.fault = fault
+
+    def _answer(self, error, text):
+        try:
+            if error:
+                raise RefusedError(error, error)
+            said = self._act(*unseal(text).split(" "))
+            self.heard = self.now
+        except RefusedError as refused:
+            said = f"E {ERRORS[refused.error]} {refused.text}"
+        return ((seal(said) if "*" in text else said) + "\n").encode()
+
+    def _act(self, name, *words):
+        self.poll()
+        if name not in COMMANDS:
+            raise RefusedError("command", f"command {name[:20]}")
+        fewest, most, states, keys = COMMANDS[name]
+        if self.state not in states:
+            raise RefusedError("fault", self.fault) if self.state == "fault" else RefusedError("state", self.state)
+        if "" in words or not fewest <= len(words) <= most:
+            raise RefusedError("words", f"words: {len(words)}")
+        values = getattr(self, "_answer_" + name.lower())(*words)
+        return " ".join(["OK"] + [f"{key}={values[place]}" for place, key in enumerate(keys.split())])
+
+    def _answer_id(self):
+        return 1, "rp2040", "pico-1.0", self.unit
+
+    def _answer_caps(self):
+        limits = (MIN_ON, MIN_OFF, MIN_DARK, MAX_FLASH, MAX_FLASH, MAX_LINE_PPM, MAX_TOTAL_PPM)
+        return (8000, "direct", LINES, LINES, SLOTS, STEPS) + limits + (100, self.keep_ms)
+
+    def _answer_wiring(self, wiring):
+        if wiring not in ("gated", "direct"):
+            raise RefusedError("number", f"wiring {wiring[:20]}")
+        if wiring == "gated":
+            raise RefusedError("range", "wiring gated, this board has direct")
+        self._forget()
+        return (wiring,)
+
+    def _answer_keep(self, word):
+        ms = number(word)
+        if not KEEP_MS[0] <= ms <= KEEP_MS[1]:
+            raise RefusedError("range", f"ms {ms}, from {KEEP_MS[0]} to {KEEP_MS[1]}")
+        self.keep_ms = ms
+        return (ms,)
+
+    def _answer_new(self):
+        self._forget()
+        self.state = "idle"
+        return ()
+
+    def _answer_slot(self, *words):
+        place, duration, dark, period = [number(word) for word in words[:4]]
+        lit = [lit_word(word) for word in words[4:]]
+        if place >= SLOTS:
+            raise RefusedError("range", f"slot {place}, this board has {SLOTS}")
+        check_slot(duration, dark, period, lit)
+        self.slots[place] = (duration, dark, period, lit)
+        return (place,)
+
+    def _answer_steps(self, *words):
+        first, *slots = [number(word) for word in words]
+        if first > len(self.steps) or first + len(slots) > STEPS:
+            raise RefusedError("range", f"first {first}, {len(self.steps)} steps of at most {STEPS}")
+        if max(slots) >= SLOTS:
+            raise RefusedError("range", f"slot {max(slots)}, this board has {SLOTS}")
+        self.steps = self.steps[:first] + slots
+        return (len(self.steps),)
+
+    def _answer_arm(self, word):
+        told = number(word)
+        cycle = [self.slots[step] for step in self.steps]
+        if not cycle or None in cycle:
+            raise RefusedError("incomplete", f"{len(cycle)} steps, or one names an empty slot")
+        check = check_of(cycle)
+        if check != told:
+            raise RefusedError("check", f"check {told}, expected {check}")
+        self.cycle_ticks = check_cycle(cycle)
+        if self.hardware.interlock_open():
+            raise RefusedError("interlock", "interlock open")
+        for table in self.tables:
+            table.lay_out(self.slots, self.steps)
+        self.state = "armed"
+        return check, self.cycle_ticks
+
+    def _answer_run(self, word):
+        self.cycles = number(word)
+        self.cycle = self.step = 0
+        self.end_is_set = False
+        for table in self.tables:
+            table.wind(self.cycles)
+        self.start = self.hardware.start([table.lead_address for table in self.tables])
+        self.state = "running"
+        return (self.start,)
+
+    def _answer_stop(self):
+        self._darken("fault" if self.state == "fault" else "idle")
+        return self.state, self.cycle
+
+    def _answer_stat(self):
+        self._find_position()
+        interlock = "open" if self.hardware.interlock_open() else "closed"
+        return self.state, self.fault, self.reset, interlock, self.cycle, self.step, self.cycle
+
+    def _answer_clk(self, nonce):
+        if len(nonce) > LONGEST_NONCE or [c for c in nonce if not ("0" <= c <= "9" or "a" <= c.lower() <= "z")]:
+            raise RefusedError("number", f"nonce {nonce[:20]}")
+        self._find_position()
+        return nonce, self.cycle, self.now
+
+    def _answer_clear(self):
+        if self.hardware.interlock_open():
+            raise RefusedError("interlock", "interlock open")
+        self.state, self.fault = "idle", "none"
+        return (self.state,)
+
+
+# board ----------------------------------------------------------------------------------------------------------------
+# The only part that touches hardware: pins, timer, watchdog, PIO and DMA of the RP2040, and the USB port.
+#
+# Registers are written through machine.mem32, because the control blocks hold them as words anyway; rp2.DMA is there to
+# claim channels, so that nothing else on the board takes them.
+
+
+FIRST_PIN, INTERLOCK_PIN, SERVICE_PIN = 2, 10, 11
+WATCHDOG_MS = 500
+TIMER_HIGH, TIMER_LOW = 0x40054024, 0x40054028
+CHIP_RESET, WATCHDOG_REASON, WATCHDOG_SCRATCH = 0x40064008, 0x40058008, 0x4005801C
+WATCHDOG_ENABLED = 0x6AB73121  # what the SDK leaves in the scratch register where the watchdog was switched on
+PIO, PIO_FDEBUG, PIO_FIFO, PIO_INSTRUCTION = 0x50200000, 0x50200008, 0x50200010, 0x502000D8
+PIO_NEXT_INSTRUCTION = 0x18
+PINS_LOW = 0xA003  # mov pins, null
+STALLED = 3 << 24
+DMA, DMA_ABORT = 0x50000000, 0x50000444
+UNPACED = 0x3F
+
+
+def reset_cause(chip, reason, scratch):
+    """Why the chip started, of the table's names, from three registers."""
+    if reason:
+        return "watchdog" if reason & 1 and scratch == WATCHDOG_ENABLED else "other"
+    return "external" if chip & 1 << 16 else "power" if chip & 1 << 8 else "other"
+
+
+def play():
+    """The PIO program of both state machines."""
+    wrap_target()
+    out(pins, 4)
+    out(pins, 4)
+    out(pins, 4)
+    out(pins, 4)
+    out(pins, 4)
+    out(pins, 4)
+    out(pins, 4)
+    out(pins, 4)
+    out(x, 32)
+    label("longer")
+    jmp(x_dec, "longer")
+    wrap()
+
+
+class Link:
+    """What one group's table has to know of the hardware."""
+
+    def __init__(self, group, channels, memory, turns):
+        self.fifo = PIO_FIFO + 4 * group
+        self.treq = group
+        self.data, self.control, self.turn = channels[:3]
+        self.memory, self.turns = memory, turns
+
+
+class Pico:
+    """The board: time, interlock, and a state machine with three DMA channels for each group of lines."""
+
+    def __init__(self):
+        machine.freq(1000000 * TICKS_PER_US)
+        for pin in range(FIRST_PIN, FIRST_PIN + LINES):
+            machine.Pin(pin, machine.Pin.OUT, value=0)
+        self.interlock = machine.Pin(INTERLOCK_PIN, machine.Pin.IN, machine.Pin.PULL_UP)
+        self.program = rp2.asm_pio(
+            out_init=(rp2.PIO.OUT_LOW,) * GROUP_LINES,
+            out_shiftdir=rp2.PIO.SHIFT_RIGHT,
+            autopull=True,
+            pull_thresh=32,
+            fifo_join=rp2.PIO.JOIN_TX,
+        )(play)
+        self.machines = [rp2.StateMachine(group) for group in range(GROUPS)]
+        self.claimed = [rp2.DMA() for _ in range(3 * GROUPS)]
+        numbers = [claim.channel for claim in self.claimed]
+        self.links = [
+            Link(group, numbers[3 * group :], self._memory(TABLE_WORDS, 64), self._memory(TURNS, 4 * TURNS))
+            for group in range(GROUPS)
+        ]
+        self._load()
+        self.darken()
+
+    def _memory(self, words, align):
+        buffer = array("I", bytes(4 * words + align))
+        address = uctypes.addressof(buffer)
+        skipped = -address % align
+        return buffer, skipped // 4, address + skipped
+
+    def _load(self):
+        for group, state_machine in enumerate(self.machines):
+            pin = machine.Pin(FIRST_PIN + GROUP_LINES * group)
+            state_machine.init(self.program, freq=1000000 * TICKS_PER_US, out_base=pin)
+
+    def _now_us(self):
+        while True:
+            high = machine.mem32[TIMER_HIGH]
+            low = machine.mem32[TIMER_LOW]
+            if high == machine.mem32[TIMER_HIGH]:
+                return (high << 32) + low
+
+    def ticks(self):
+        return self._now_us() * TICKS_PER_US
+
+    def interlock_open(self):
+        return bool(self.interlock.value())
+
+    def starved(self):
+        """Has a state machine run out of words since the start?"""
+        return bool(machine.mem32[PIO_FDEBUG] & STALLED)
+
+    def _set_channel(self, channel, read, write, count, control):
+        for place, word in ((0, read), (4, write), (8, count), (16, control)):  # 16: CTRL without a trigger
+            machine.mem32[DMA + 64 * channel + place] = word
+
+    def start(self, lead_addresses):
+        """Begin with the lead and return the tick in which the first flash starts behind it."""
+        self._load()
+        for group, link in enumerate(self.links):
+            lead = lead_addresses[group]
+            ring = control_word(UNPACED, link.turn, 0, 12)
+            self._set_channel(link.turn, link.turns[2], DMA + 64 * link.control + 0x3C, 1, ring)
+            ring = control_word(UNPACED, link.control, 1, 4, 1)
+            self._set_channel(link.control, lead, DMA + 64 * link.data, 4, ring)
+            machine.mem32[DMA + 64 * link.control + 0x3C] = lead  # and go
+        time.sleep_us(100)
+        memory = machine.mem32
+        interrupts = machine.disable_irq()
+        before = memory[TIMER_LOW]
+        memory[PIO] = 0x303  # both in the same cycle
+        after = memory[TIMER_LOW]
+        machine.enable_irq(interrupts)
+        memory[PIO_FDEBUG] = STALLED
+        now_us = self._now_us()
+        since_us = (now_us - before - ((after - before & 0xFFFFFFFF) >> 1)) & 0xFFFFFFFF
+        return (now_us - since_us) * TICKS_PER_US + START_DELAY
+
+    def darken(self):
+        machine.mem32[PIO] = 0
+        for group in range(GROUPS):
+            machine.mem32[PIO_INSTRUCTION + PIO_NEXT_INSTRUCTION * group] = PINS_LOW
+        channels = [number for link in self.links for number in (link.turn, link.control, link.data)]
+        for channel in channels:
+            machine.mem32[DMA + 64 * channel + 16] = 0
+        machine.mem32[DMA_ABORT] = sum([1 << channel for channel in channels])
+        while machine.mem32[DMA_ABORT]:
+            pass
+
+
+def main():
+    """Serve for ever. An error ends in the dark, and in a reset by the watchdog."""
+    pico = Pico()
+    cause = reset_cause(*[machine.mem32[register] for register in (CHIP_RESET, WATCHDOG_REASON, WATCHDOG_SCRATCH)])
+    watchdog = machine.WDT(timeout=WATCHDOG_MS)
+    micropython.kbd_intr(-1)  # a byte 3 is garbage like any other
+    unit = "".join([f"{byte:02x}" for byte in machine.unique_id()])[-8:]
+    controller = Controller(pico, unit, cause)
+    ready = select.poll()
+    ready.register(sys.stdin, select.POLLIN)
+    try:
+        while True:
+            watchdog.feed()
+            controller.poll()
+            if ready.poll(0):
+                answer = controller.feed(sys.stdin.buffer.read(1))
+                if answer:
+                    sys.stdout.buffer.write(answer)
+    finally:
+        pico.darken()
+
+
+def run():
+    """Begin, unless this is another chip, or the service jumper is set."""
+    if "RP2040" not in sys.implementation._machine:
+        raise RuntimeError("this program is for the RP2040: its registers are elsewhere on other chips")
+    if machine.Pin(SERVICE_PIN, machine.Pin.IN, machine.Pin.PULL_UP).value():
+        main()
+
+
+if __name__ == "__main__":
+    run()

@@ -1,0 +1,133 @@
+"""The Pico's PIO program, assembled and emulated, makes every edge in the clock cycle that the plan says."""
+
+from collections import deque
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+from types import FunctionType, ModuleType
+from typing import Any
+
+import adafruit_pioasm
+import pytest
+from pioemu import State, emulate
+from rp2040 import MOV_PINS_NULL, Chip, board_of, load_program
+
+from psvideo.strobe.messages import Lit, Slot
+from psvideo.strobe.playing import moments
+
+MAIN = Path(__file__).resolve().parents[1] / "lights" / "pico" / "main.py"
+LEAD = 1_250_000
+ROUNDS = 3
+
+
+@pytest.fixture(scope="module")
+def program() -> ModuleType:
+    """main.py, with stand-ins for the modules of a board."""
+    return load_program(MAIN)
+
+
+def assembled(play: FunctionType) -> adafruit_pioasm.Program:
+    """Return the PIO program that stands in main.py in MicroPython's words."""
+    text = [".program play"]
+    words: dict[str, Any] = {name: name for name in ("pins", "x")} | {"x_dec": "x--"}
+    words["out"] = lambda where, bits: text.append(f"out {where}, {bits}")
+    words["jmp"] = lambda when, where: text.append(f"jmp {when} {where}")
+    words["label"] = lambda name: text.append(f"{name}:")
+    words["wrap_target"] = lambda: text.append(".wrap_target")
+    words["wrap"] = lambda: text.append(".wrap")
+    FunctionType(play.__code__, words)()
+    return adafruit_pioasm.Program("\n".join(text))
+
+
+def words_of(program: ModuleType, cycle: Sequence[Slot], rounds: int) -> list[list[int]]:
+    """Return what the DMA brings to each state machine behind the lead, as the table makes it."""
+    chip = Chip()
+    board = board_of(program, chip)
+    slots = [(slot.duration, slot.dark, slot.period, [(lit.line, lit.on) for lit in slot.lit]) for slot in cycle]
+    tables = [program.Table(group, link) for group, link in enumerate(board.links)]
+    for table in tables:
+        table.lay_out(slots, range(len(slots)))
+        table.wind(rounds)
+    board.start([table.lead_address for table in tables])
+    words = [list(iter(lambda group=group: chip.take_word(group), None)) for group in (0, 1)]
+    assert all(of_group[:2] == [0, LEAD - 10] for of_group in words)
+    return [of_group[2:] for of_group in words]
+
+
+def play(opcodes: Sequence[int], words: Sequence[int], until: int) -> list[tuple[int, int]]:
+    """Return (cycle, pins) of every change that the state machine makes, from its first output on."""
+    start = State(transmit_fifo=deque(words), pin_directions=0xF)
+    changes, first, pins = [], None, 0
+    run = emulate(
+        list(opcodes),
+        stop_when=lambda _, state: state.clock > until or (not state.transmit_fifo and state.x_register == 0),
+        initial_state=start,
+        auto_pull=True,
+        out_base=0,
+        out_count=4,
+    )
+    for before, after in run:
+        if first is None and after.program_counter == 1:
+            first = before.clock
+        if after.pin_values != pins and first is not None:
+            pins = after.pin_values
+            changes.append((before.clock - first, pins))
+    return changes
+
+
+def expected(cycle: Sequence[Slot], rounds: int, group: int) -> list[tuple[int, int]]:
+    """Return the same from the cycle's edges."""
+    pins, changes = 0, {}
+    for moment in moments(cycle, start=0, cycles=rounds):
+        if moment.edge is not None and moment.edge.line // 4 == group:
+            pins ^= 1 << moment.edge.line % 4
+            changes[moment.tick] = pins
+    levels = [(0, 0), *sorted(changes.items())]
+    return [after for before, after in pairwise(levels) if before[1] != after[1]]
+
+
+def flash(duration: int, period: int, on: dict[int, int]) -> Slot:
+    """Return a flash with the shortest dark time behind it."""
+    lit = tuple(Lit(line=line, on=ticks) for line, ticks in on.items())
+    return Slot(slot=0, duration=duration, dark=12_500, period=period, lit=lit)
+
+
+CYCLES = {
+    "one flash": [flash(1000, 1000, {0: 1000, 5: 1000})],
+    "the shortest flash": [flash(125, 125, dict.fromkeys(range(8), 125))],
+    "one line after the other": [flash(500, 500, {0: 500}), flash(501, 501, {3: 501}), flash(502, 502, {7: 502})],
+    "bursts as dense as they may be": [flash(5000, 250, dict.fromkeys(range(8), 125))],
+    "ends a tick apart": [flash(2000, 400, {0: 125, 1: 126, 2: 127, 3: 128, 4: 200, 5: 201, 6: 203, 7: 275})],
+    "ends as far apart as an entry": [
+        flash(2000, 400, {0: 130, 1: 138, 2: 148, 3: 158, 4: 130, 5: 139, 6: 149, 7: 150})
+    ],
+    "full power beside bursts": [flash(1500, 500, {0: 500, 1: 200, 4: 500})],
+    "a last burst that is cut": [flash(1130, 500, {0: 130, 1: 129, 2: 125, 3: 375, 6: 300})],
+    "a dark slot": [flash(300, 300, {2: 300}), flash(1, 1, {}), flash(301, 301, {2: 301})],
+}
+
+
+@pytest.mark.parametrize("name", CYCLES)
+def test_every_edge_is_in_its_clock_cycle_over_back_to_back_cycles(program: ModuleType, name: str) -> None:
+    made = assembled(program.play)
+    for group, words in enumerate(words_of(program, CYCLES[name], ROUNDS)):
+        length = ROUNDS * sum(slot.duration + slot.dark for slot in CYCLES[name])
+        assert play(made.assembled, words, length) == expected(CYCLES[name], ROUNDS, group)
+
+
+def test_the_program_wraps_around_and_fits(program: ModuleType) -> None:
+    made = assembled(program.play)
+    assert made.pio_kwargs["wrap_target"] == 0
+    assert made.pio_kwargs.get("wrap", len(made.assembled) - 1) == len(made.assembled) - 1 == program.STATES + 1
+    assert len(made.assembled) == program.SHORTEST
+
+
+def test_what_darkens_is_one_instruction() -> None:
+    assert adafruit_pioasm.assemble("mov pins, null")[0] == MOV_PINS_NULL
+
+
+@pytest.mark.parametrize("delay", [0, 1, 1000])
+def test_an_entry_lasts_ten_cycles_and_its_wait(program: ModuleType, delay: int) -> None:
+    words = [0x0000_0F0F, delay, 0x1111_1111, 0]
+    changes = play(assembled(program.play).assembled, words, delay + 100)
+    assert changes == [(0, 15), (1, 0), (2, 15), (3, 0), (10 + delay, 1)]
