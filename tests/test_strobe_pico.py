@@ -1,12 +1,7 @@
 """The Pico's program keeps the page and the table of the link, and lights as the controller in Python does."""
 
-import ast
-import importlib.util
 import random
-import shutil
-import subprocess
 import tomllib
-from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -14,66 +9,24 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from rp2040 import BOARD_MODULES, Chip, board_of, load_program
+from pico import ARM, LOADED, MS, PROGRAM, US, Pico, upload
+from rp2040 import Chip, board_of
 
 from psvideo.strobe.boards import BOARDS, capabilities
 from psvideo.strobe.emulated import EmulatedController
 from psvideo.strobe.limits import cycle_check
 from psvideo.strobe.lines import LONGEST_REPLY, LONGEST_REQUEST, Error, LineReader, seal
-from psvideo.strobe.messages import Arm, Lit, Slot, Steps
+from psvideo.strobe.messages import Lit, Slot
 from psvideo.strobe.playing import Edge
-from psvideo.strobe.protocol import format_reply, format_request
+from psvideo.strobe.protocol import format_reply
 
 LIGHTS = Path(__file__).resolve().parents[1] / "lights"
-MS = 125_000
-"""Ticks in a millisecond."""
-US = 125
 BUSY = [HealthCheck.too_slow]
-
-
-PROGRAM = load_program(LIGHTS / "pico" / "main.py")
-
-
-class Pico:
-    """The program on a chip, under the same handle as EmulatedController."""
-
-    def __init__(self, reset: str = "power") -> None:
-        self.chip = Chip()
-        self.controller = PROGRAM.Controller(board_of(PROGRAM, self.chip), "emulated", reset)
-
-    def advance(self, now: int) -> None:
-        """Let time pass, polling when something is due and at least every 20 ms."""
-        while self.chip.cycle < now:
-            self.chip.advance(min(now, *self._due()))
-            self.controller.poll()
-
-    def _due(self) -> Iterator[int]:
-        control, at = self.controller, self.chip.cycle
-        due = [at + 20 * MS, control.heard + control.keep_ms * MS]
-        if control.state == "running":
-            due.append(control.start + control.cycles * control.cycle_ticks)
-        return (tick for tick in due if tick > at)
-
-    def feed(self, data: bytes, now: int) -> bytes:
-        """Let bytes arrive."""
-        self.advance(now)
-        answer: bytes = self.controller.feed(data)
-        return answer
-
-    @property
-    def edges(self) -> list[Edge]:
-        """All edges so far."""
-        return [Edge(tick=tick, line=line, level=level) for tick, line, level in sorted(self.chip.edges)]
 
 
 def in_order(edges: list[Edge]) -> list[Edge]:
     """Return edges by time and line; edges of a line that are in the same tick stay as they are."""
     return sorted(edges, key=lambda edge: (edge.tick, edge.line))
-
-
-FLASH = Slot(slot=0, duration=100_000, dark=1_000_000, period=100_000, lit=(Lit(line=2, on=100_000),))
-LOADED = b"SLOT 0 100000 1000000 100000 2:100000\nSTEPS 0 0 0\n"
-ARM = f"ARM {cycle_check([FLASH, FLASH])}\n".encode()
 
 
 def running(cycles: int = 0) -> Pico:
@@ -82,15 +35,6 @@ def running(cycles: int = 0) -> Pico:
     assert pico.feed(LOADED + ARM, 0).splitlines()[-1].startswith(b"OK check=")
     assert pico.feed(b"RUN %d\n" % cycles, 0) == b"OK start=1250000\n"
     return pico
-
-
-def test_the_one_file_is_what_its_parts_make() -> None:
-    spec = importlib.util.spec_from_file_location("make_main", LIGHTS / "pico" / "make_main.py")
-    assert spec is not None
-    assert spec.loader is not None
-    make_main = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(make_main)
-    assert (LIGHTS / "pico" / "main.py").read_text(encoding="utf-8") == make_main.joined()
 
 
 def test_it_has_the_commands_errors_and_limits_of_the_table() -> None:
@@ -335,29 +279,6 @@ def test_whatever_comes_it_answers_and_lights_as_the_controller_in_python(
     assert not pico.chip.lit
 
 
-def random_slot(dice: random.Random, place: int) -> Slot:
-    """Return a flash that the board plays, full power or bursts, with edges a tick apart now and then."""
-    if dice.random() < 0.15:
-        return Slot(slot=place, duration=dice.randint(1, 5000), dark=12_500 + dice.randint(0, 900), period=1)
-    period = dice.choice([250, 251, 300, dice.randint(250, 2000)])
-    rest = dice.choice([0, 125, dice.randint(125, period - 1)])
-    base = dice.randint(125, period - 125)
-    near = [base, base, min(base + dice.randint(0, 12), period - 125), dice.randint(125, period - 125), period]
-    lit = tuple(Lit(line=line, on=dice.choice(near)) for line in sorted(dice.sample(range(8), dice.randint(1, 8))))
-    duration = period * dice.randint(1, 9) + rest
-    return Slot(
-        slot=place, duration=duration, dark=12_500 + dice.randint(0, 20_000) + 9 * duration, period=period, lit=lit
-    )
-
-
-def upload(dice: random.Random) -> list[str]:
-    """Return requests that upload and arm some cycle."""
-    slots = [random_slot(dice, place) for place in range(dice.randint(1, 6))]
-    steps = [dice.randrange(len(slots)) for _ in range(dice.randint(1, 12))]
-    requests = [*slots, Steps(first=0, slots=tuple(steps)), Arm(check=cycle_check([slots[step] for step in steps]))]
-    return [format_request(request, sealed=False).decode().strip() for request in requests]
-
-
 @pytest.mark.parametrize("seed", range(60))
 def test_random_cycles_are_played_to_the_tick(seed: int) -> None:
     lines = upload(random.Random(seed))
@@ -415,79 +336,3 @@ def test_an_error_ends_in_the_dark_and_in_the_watchdogs_hands(monkeypatch: pytes
     with pytest.raises(MemoryError):
         PROGRAM.main()
     assert not chip.lit
-
-
-FORBIDDEN = (
-    ast.Match,
-    ast.NamedExpr,
-    ast.AnnAssign,
-    ast.AsyncFunctionDef,
-    ast.TypeIgnore,
-    ast.Nonlocal,
-)
-KNOWN = {"array", "machine", "micropython", "rp2", "select", "struct", "sys", "time", "uctypes"}
-MISSING = {"isalnum", "removesuffix", "removeprefix", "bit_length", "bit_count", "isascii", "title", "zfill"}
-
-
-def test_it_uses_only_what_micropython_has() -> None:
-    tree = ast.parse((LIGHTS / "pico" / "main.py").read_text(encoding="utf-8"))
-    for node in ast.walk(tree):
-        assert not isinstance(node, FORBIDDEN), ast.dump(node)
-        if isinstance(node, ast.List | ast.Tuple) and isinstance(node.ctx, ast.Load):
-            assert not any(isinstance(item, ast.Starred) for item in node.elts)
-        if isinstance(node, ast.Import):
-            assert {name.name for name in node.names} <= KNOWN
-        if isinstance(node, ast.ImportFrom):
-            assert node.module in KNOWN
-        if isinstance(node, ast.Attribute):
-            assert node.attr not in MISSING
-        if isinstance(node, ast.FormattedValue):
-            assert node.conversion == -1
-        if isinstance(node, ast.FunctionDef | ast.Lambda):
-            assert not node.args.posonlyargs
-            assert not (isinstance(node, ast.FunctionDef) and (node.returns or node.decorator_list))
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-            assert node.func.id not in ("zip", "super") or not node.keywords
-
-
-def test_it_answers_and_lays_out_the_same_under_micropython(tmp_path: Path) -> None:
-    """Runs where ``micropython`` is on the PATH; Debian has no such package."""
-    if shutil.which("micropython") is None:
-        pytest.skip("micropython is not on the PATH")
-    lines = [*LOADED.decode().splitlines(), ARM.decode().strip(), "RUN 2", "CLK a", "STOP", "ID*A21C", "KEEP 1", "CAPS"]
-    lines += ["STEPS 0 x", "SLOT 0 1000 16000 250 0:124", "ARM 1", "WHAT", "STAT", "NEW", *upload(random.Random(5))]
-    script = tmp_path / "asked.py"
-    script.write_text(_under_micropython(lines), encoding="utf-8")
-    said = subprocess.run(["micropython", str(script)], capture_output=True, text=True, check=True).stdout.splitlines()
-    here: dict[str, Any] = {"printed": []}
-    exec(script.read_text(encoding="utf-8").replace("print(", "printed.append("), here)
-    assert said == [str(line) for line in here["printed"]]
-    assert sum(line.startswith("OK") for line in said) > 12
-
-
-def _under_micropython(lines: list[str]) -> str:
-    text = (LIGHTS / "pico" / "main.py").read_text(encoding="utf-8")
-    for name in BOARD_MODULES:
-        text = text.replace(f"import {name}\n", "")
-    text = text.split('if __name__ == "__main__":')[0]
-    return f"""{text}
-class Still:
-    def __init__(self):
-        memory = lambda words: (array("I", bytes(4 * words)), 0, 0x20000000)
-        self.links = [Link(group, [1, 2, 3], memory(TABLE_WORDS), memory(TURNS)) for group in range(GROUPS)]
-    def ticks(self):
-        return 0
-    def interlock_open(self):
-        return False
-    def starved(self):
-        return False
-    def darken(self):
-        pass
-    def start(self, leads):
-        return START_DELAY
-controller = Controller(Still(), "emulated", "power")
-for line in {lines!r}:
-    print(controller.feed((line + chr(10)).encode()).decode().strip())
-for table in controller.tables:
-    print(crc16(bytes(table.link.memory[0])))
-"""
