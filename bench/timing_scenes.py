@@ -184,7 +184,8 @@ class Case:
         return shot, indices, frames
 
 
-def _unknown(plan: Plan) -> Plan:
+def unknown_readout(plan: Plan) -> Plan:
+    """Return the plan as one says it whose camera nobody measured."""
     return replace(plan, camera=replace(plan.camera, readout_s=None))
 
 
@@ -216,11 +217,11 @@ def cases() -> dict[str, Case]:
         "global shutter": Case(plan=plan_of(readout=0.0)),
         "readout 0.6": Case(plan=plan_of(readout=0.6)),
         "bottom-up": Case(plan=plan_of(readout=-1.0)),
-        "readout unknown (1.0)": Case(plan=plain, claimed=_unknown(plain)),
-        "readout unknown (0.3)": Case(plan=plan_of(readout=0.3), claimed=_unknown(plain)),
-        "readout unknown (-0.8)": Case(plan=plan_of(readout=-0.8), claimed=_unknown(plain)),
-        "readout unknown (0)": Case(plan=plan_of(readout=0.0), claimed=_unknown(plain)),
-        "readout unknown, 180, 0.6": Case(plan=half, claimed=_unknown(half)),
+        "readout unknown (1.0)": Case(plan=plain, claimed=unknown_readout(plain)),
+        "readout unknown (0.3)": Case(plan=plan_of(readout=0.3), claimed=unknown_readout(plain)),
+        "readout unknown (-0.8)": Case(plan=plan_of(readout=-0.8), claimed=unknown_readout(plain)),
+        "readout unknown (0)": Case(plan=plan_of(readout=0.0), claimed=unknown_readout(plain)),
+        "readout unknown, 180, 0.6": Case(plan=half, claimed=unknown_readout(half)),
         "exposure 3 % off": Case(plan=half, claimed=_off(half, exposure=1.03)),
         "10,000 ppm": Case(plan=wide, clock=clock(9900)),
         "-10,000 ppm": Case(plan=wide, clock=clock(-9900)),
@@ -230,7 +231,7 @@ def cases() -> dict[str, Case]:
         "fps 120 for 119.88": Case(plan=plain, claimed=misnamed),
         "bands": Case(plan=plain, scene=banded),
         "void": Case(plan=plain, scene=void),
-        "void, readout unknown": Case(plan=plain, claimed=_unknown(plain), scene=void),
+        "void, readout unknown": Case(plan=plain, claimed=unknown_readout(plain), scene=void),
         "rolling stripes": Case(plan=plain, scene=rolling_stripes),
         "tumbling in a void": Case(plan=plain, scene=tumbling),
         "tumbling, 3000 ppm, drift": Case(plan=wide, scene=tumbling, clock=drift, frames=300, bar_rows=0.1),
@@ -259,7 +260,7 @@ def cases() -> dict[str, Case]:
         ),
         "everything at once": Case(
             plan=hard,
-            claimed=_unknown(replace(hard, fall_s=0.0)),
+            claimed=unknown_readout(replace(hard, fall_s=0.0)),
             scene=tumbling,
             clock=drift,
             ambient=0.05,
