@@ -9,6 +9,7 @@ from psvideo.plan import UNKNOWN_CLOCK_PPM, Plan
 from psvideo.rowfit.beat import Beat, StrobeClock
 from psvideo.rowfit.bend import LEAST_WINDOWS, bend
 from psvideo.rowfit.jitter import Jitter, jitter, shift_error_s
+from psvideo.rowfit.plateau import centred
 from psvideo.rowfit.profiles import Profiles, unexplained
 from psvideo.rowfit.refine import Fit, clearest, explained, refine, robust_loss, scaled
 from psvideo.rowfit.search import search
@@ -32,6 +33,9 @@ CLEAR = 5.0
 BETTER, LEAST_GAIN = 1e-3, 30.0
 """And only where that takes away such a share of the robust loss, and so much of it: a subject that moves in step with
 the dark row bends errors and estimates alike."""
+STILL, PLAIN = 0.95, 0.3
+"""Where a fit takes away less of the robust loss than the first (a subject that moves), a time that leaves the plan's
+value must take away this share of what is left; else it is as likely that the subject feigns it."""
 SURER = 0.8
 """Share of the standard error that must be left before brightnesses are fitted anew in windows half as long."""
 MOST_WINDOWS = 400
@@ -44,7 +48,8 @@ FLICKERS = 0.8
 class Found:
     """The fit of a whole clip: its rows with the times that their frames truly have, and which frames are repeats.
 
-    ``steps`` counts the places where frames follow otherwise than the numbering tells.
+    ``steps`` counts the places where frames follow otherwise than the numbering tells; ``slack_s`` is by how much all
+    flashes could come earlier or later and the picture be the same, 0 where it tells their times.
     """
 
     fit: Fit
@@ -52,10 +57,14 @@ class Found:
     track: Track
     jitter: Jitter
     steps: int
+    slack_s: float
 
 
-def find(plan: Plan, rows: Profiles) -> Found:
-    """Return the times of a clip; ``Fit.explained`` tells how well they explain it."""
+def find(plan: Plan, rows: Profiles, *, measured: tuple[str, ...] = ()) -> Found:
+    """Return the times of a clip; ``Fit.explained`` tells how well they explain it.
+
+    ``measured`` names times that are fitted whatever the plan says of them, as the readout is where it is unknown.
+    """
     seed, frames = find_seed(plan, rows)
     if seed.upward:
         rows = rows.turned()
@@ -73,19 +82,20 @@ def find(plan: Plan, rows: Profiles) -> Found:
         doubt=None if rows.doubt is None else np.ascontiguousarray(rows.doubt[keep]),
     ).windowed(window)
     fine = rows.binned(_rows_needed(plan, rows, seed))
-    free: tuple[str, ...] = () if plan.camera.readout_s is not None else ("row_time_s",)
+    free = measured if plan.camera.readout_s is not None else ("row_time_s", *measured)
     fit = _with_flicker(plan, fine, _fit(plan, fine, tracked.beat, free), free)
     fine, fit, apart_s = _in_short_windows(plan, fine, fit, free)
-    freed = _freed(plan, fine, fit, free)
-    if freed is not fit:
-        apart_s = _window_error_s(plan, fine, freed)
-    fit = freed
+    freed, unsure_s = _freed(plan, fine, fit, free)
+    if freed is not fit or measured:
+        freed, apart_s = _with_window_errors(plan, fine, freed)
+        apart_s = float(np.hypot(unsure_s, apart_s))
+    fit, slack_s = centred(plan, fine, freed)
     steps = int((np.diff(tracked.index) != told).sum())
     stray = jitter(plan, fine, fit)
-    known_s = max(fit.shift_error_s, shift_error_s(plan, fine, fit))
+    known_s = max(fit.shift_error_s, shift_error_s(plan, fine, fit), slack_s)
     error_s = float(np.sqrt(known_s**2 + stray.error_s**2 + apart_s**2))
     fit = replace(fit, shift_error_s=error_s)
-    return Found(fit=fit, rows=fine, track=tracked, jitter=stray, steps=steps)
+    return Found(fit=fit, rows=fine, track=tracked, jitter=stray, steps=steps, slack_s=slack_s)
 
 
 def _rows_needed(plan: Plan, rows: Profiles, beat: Beat) -> int:
@@ -120,7 +130,7 @@ def find_seed(plan: Plan, rows: Profiles) -> tuple[Beat, slice]:
     best: tuple[float, Beat, slice] | None = None
     for frames in _stretches(plan, rows):
         for reach in dict.fromkeys((range_ppm, UNKNOWN_CLOCK_PPM)):
-            beat, share = _seeded(plan, rows.take(frames), guess, reach)
+            beat, share = seeded(plan, rows.take(frames), guess, reach)
             if best is None or share > best[0]:
                 best = share, beat, frames
             if best[0] > FAIR_SEED:
@@ -142,7 +152,7 @@ def _stretches(plan: Plan, rows: Profiles) -> list[slice]:
     return [slice(start, start + count) for start, count in dict.fromkeys(spans)]
 
 
-def _seeded(plan: Plan, rows: Profiles, guess: Beat, range_ppm: float) -> tuple[Beat, float]:
+def seeded(plan: Plan, rows: Profiles, guess: Beat, range_ppm: float) -> tuple[Beat, float]:
     """Search one stretch and sharpen the best places found; return the best and what it explains."""
     known = plan.camera.readout_s is not None
     turned = rows.turned() if guess.upward else rows
@@ -197,11 +207,18 @@ def _in_short_windows(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...
     return taken, better, apart_s
 
 
-def _window_error_s(plan: Plan, rows: Profiles, fit: Fit) -> float:
-    """Return how far apart the times are when brightnesses are fitted anew twice as often."""
+def _with_window_errors(plan: Plan, rows: Profiles, fit: Fit) -> tuple[Fit, float]:
+    """Add to the errors of what is free how far it moves when brightnesses are fitted anew twice as often.
+
+    Return too how far apart the flashes' times are then.
+    """
     twice = rows.windowed(max(len(rows.value) // (2 * len(rows.window_start)), 1))
     other = _fit(plan, twice, fit.beat, tuple(fit.errors_s))
-    return float(np.sqrt(np.mean(_apart_s(rows, fit.beat, other.beat) ** 2)))
+    errors_s = {
+        name: float(np.hypot(error_s, getattr(other.beat, name) - getattr(fit.beat, name)))
+        for name, error_s in fit.errors_s.items()
+    }
+    return replace(fit, errors_s=errors_s), float(np.sqrt(np.mean(_apart_s(rows, fit.beat, other.beat) ** 2)))
 
 
 def _apart_s(rows: Profiles, one: Beat, other: Beat) -> FloatArray:
@@ -212,22 +229,38 @@ def _apart_s(rows: Profiles, one: Beat, other: Beat) -> FloatArray:
     return apart_s
 
 
-def _freed(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> Fit:
-    """Let go of the plan's values where the picture clearly tells otherwise, one after another, the clearest first."""
+def _freed(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> tuple[Fit, float]:
+    """Let go of the plan's values where the picture clearly tells otherwise, one after another, the clearest first.
+
+    Return too how unsure the times are where the subject moves so much that with and without both may be right.
+    """
     refused: set[str] = set()
+    unsure_s, wider_s = 0.0, dict[str, float]()
     while True:
         names = tuple(name for name in _may_differ(plan) if name not in free and name not in refused)
         name = clearest(plan, rows, fit, free, names, at_least=LEAST_GAIN)
         if name is None:
-            return fit
+            errors_s = {n: float(np.hypot(error_s, wider_s.get(n, 0.0))) for n, error_s in fit.errors_s.items()}
+            return (replace(fit, errors_s=errors_s) if wider_s else fit), unsure_s
         tried = _fit(plan, rows, fit.beat, (*free, name))
         before = robust_loss(rows, fit.rest, fit.rest)
         gain = before - robust_loss(rows, tried.rest, fit.rest)
         off_s = abs(getattr(tried.beat, name) - getattr(fit.beat, name))
-        if gain > max(BETTER * before, LEAST_GAIN) and off_s > CLEAR * tried.errors_s[name]:
-            fit, free = tried, (*free, name)
-        else:
+        clear = gain > max(BETTER * before, LEAST_GAIN) and off_s > CLEAR * tried.errors_s[name]
+        if not clear or not _plausible(plan, tried.beat):
             refused.add(name)
+            continue
+        if gain < PLAIN * before and gain_of(rows, tried.rest) < STILL:
+            apart_s = float(np.sqrt(np.mean(_apart_s(rows, fit.beat, tried.beat) ** 2)))
+            unsure_s = float(np.hypot(unsure_s, apart_s / np.sqrt(2)))
+            wider_s[name] = off_s / np.sqrt(2)
+        fit, free = tried, (*free, name)
+
+
+def _plausible(plan: Plan, beat: Beat) -> bool:
+    """Tell whether a beat's tails are tails: no longer than the shortest flash, unless the plan says so."""
+    longest_s = max(min(plan.flashes[slot].duration_s for slot in plan.lit_slots), plan.rise_s, plan.fall_s)
+    return max(beat.rise_s, beat.fall_s) <= longest_s
 
 
 def _fit(plan: Plan, rows: Profiles, beat: Beat, free: tuple[str, ...]) -> Fit:

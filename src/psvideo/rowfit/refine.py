@@ -65,7 +65,7 @@ def refine(
         beat, rest, gained = _step(plan, rows, beat, free, _held(plan, move, free), weight, rest)
         if step > 6 and (not gained or (np.abs(move) < 1e-5 * unit_s).all()):
             break
-    covariance = sandwich(hessian, scores, prior(plan, rows, unit_s, free))
+    covariance = sandwich(hessian, scores / np.sqrt(freedom(plan, rows, beat)), prior(plan, rows, unit_s, free))
     return Fit(
         beat=beat,
         rest=rest,
@@ -167,6 +167,16 @@ def projected(
     window = np.searchsorted(rows.window_start, np.arange(len(rows.value)), side="right") - 1
     scores = score[:, :1] * basis[window] + score[:, 1:2] * basis[window + 1] + score[:, 2:] @ common
     return rest, hessian, scores
+
+
+def freedom(plan: Plan, rows: Profiles, beat: Beat) -> float:
+    """Return which share of the residuals' squares brightnesses that are fitted to them leave (MacKinnon, White 1985).
+
+    Not less than one frame's share, which a clip that has as many brightnesses as frames does not even have.
+    """
+    frames = len(rows.value)
+    fitted = len(rows.window_start) * (len(plan.lit_slots) + 1 + 2 * len(beat.beat_hz))
+    return max(frames - fitted, 1) / frames
 
 
 def sandwich(hessian: FloatArray, scores: FloatArray, known: FloatArray) -> FloatArray:
