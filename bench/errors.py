@@ -1,4 +1,4 @@
-"""Standard errors that `sync` claims against the errors that it makes, over many seeds: their ratio's RMS should be 1."""
+"""Errors that `sync` makes over the standard errors that it claims, over many seeds: the ratio's RMS should be 1."""
 
 import sys
 from collections.abc import Iterator

@@ -51,9 +51,8 @@ def bend(plan: Plan, rows: Profiles, fit: Fit, *, free: tuple[str, ...] = (), st
         move = np.linalg.solve(hessian + known, scores.sum(axis=0) - known @ now)
         beat = _moved(rows, beat, knots, free, move)
     rest = unexplained(plan, rows, beat, weight)
-    covariance = sandwich(hessian, scores / np.sqrt(freedom(plan, rows, beat)), known) + np.linalg.inv(
-        hessian + known
-    ) @ known @ np.linalg.inv(hessian + known)
+    bread = np.linalg.inv(hessian + known)
+    covariance = sandwich(hessian, scores / np.sqrt(freedom(plan, rows, beat)), known) + bread @ known @ bread
     size = len(knots.at_s)
     return replace(
         fit,

@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from psvideo.plan import UNKNOWN_CLOCK_PPM, Plan
 from psvideo.rowfit.fit import Found, find, gain_of
 from psvideo.rowfit.profiles import Profiles, unexplained
@@ -12,6 +10,8 @@ from psvideo.rowfit.rivals import BETTER, CLEARLY, FAIR, camera_rivals, double_r
 
 MIN_EXPLAINED, MIN_GAIN = 0.5, 0.3
 """A fit that explains less of the rows' changes, or takes less of the robust loss away, has not found a strobe."""
+LUCK = 0.25
+"""Share of noise that the best place of a search explains besides what brightnesses do anywhere."""
 MOST_STEPS, MOST_STEPS_SHARE = 3, 0.04
 """Frames before which others may be missing (or a share of all frames) until only an excellent fit is believed."""
 MOST_PPM = 1.5 * UNKNOWN_CLOCK_PPM
@@ -19,7 +19,7 @@ MOST_PPM = 1.5 * UNKNOWN_CLOCK_PPM
 LOST = 0.5
 """Times whose standard error is more than this share of the shortest flash are not found."""
 UNSURE_GAIN, UNSURE = 0.7, 0.1
-"""A fit that takes less of the robust loss away, or is less sure than such a share of a flash, is worth a second look."""
+"""A fit that takes less of the robust loss away, or is unsure by such a share of a flash, is worth a second look."""
 MOVED = 0.05
 """So is one that had to move the exposure or the readout by more than this share."""
 OTHER_LENGTHS = (0.5, 0.7, 1.4, 2.0)
@@ -70,16 +70,15 @@ def _as_meant(plan: Plan, rows: Profiles, found: Found) -> tuple[Plan, Found]:
 def convincing(plan: Plan, found: Found) -> bool:
     """Tell whether a fit has found a strobe, and not merely the least bad place for one.
 
-    What brightnesses alone would explain of noise is taken off, which counts in short clips.
+    Brightnesses alone explain some of mere noise, which counts in short clips.
     """
     rows, fit = found.rows, found.fit
-    left = freedom(plan, rows, fit.beat)
-    share = gain_of(rows, fit.rest / np.sqrt(left))
-    explained = 1 - (1 - fit.explained) / left
+    by_chance = 1 - freedom(plan, rows, fit.beat)
+    share, explained = gain_of(rows, fit.rest), fit.explained
     often = found.steps > max(MOST_STEPS, MOST_STEPS_SHARE * len(rows.value))
     return (
-        explained > MIN_EXPLAINED
-        and share > MIN_GAIN
+        explained > max(MIN_EXPLAINED, by_chance + LUCK * (1 - by_chance))
+        and share > max(MIN_GAIN, by_chance)
         and (not often or min(share, explained) > 0.9)
         and abs(fit.beat.clock.mean_offset_ppm()) < MOST_PPM
         and (found.slack_s > 0 or fit.shift_error_s < LOST * _shortest_s(plan))

@@ -1,7 +1,8 @@
 """Times that the picture leaves open: how far all flashes could move before any row would look otherwise.
 
-A flash that lies wholly inside the exposure of every row that saw it shows no edge, so that its time can be read only to
-within the exposure. There the fit's curvature is nil and its standard error means nothing; what is known is an interval.
+A flash that lies wholly inside the exposure of every row that saw it shows no edge, so that its time can be read only
+to within the exposure. The fit's curvature is nil there and its standard error means nothing; what is known is an
+interval.
 """
 
 from collections.abc import Callable

@@ -152,9 +152,12 @@ def unexplained(plan: Plan, rows: Profiles, beat: Beat, weight: FloatArray | Non
 
 
 def equations(
-    plan: Plan, rows: Profiles, beat: Beat, weight: FloatArray, *, tails: bool
+    plan: Plan, rows: Profiles, beat: Beat, weight: FloatArray, *, tails: bool, honest: bool = False
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return residuals (frame, row), normal matrices (window, signal, signal) and scores (frame, signal)."""
+    """Return residuals (frame, row), normal matrices (window, signal, signal) and scores (frame, signal).
+
+    ``honest`` scores tell of errors, and not which way to step: residuals count as if no brightness were fitted to them.
+    """
     seen, flashes = compiled_rows(rows, beat), compiled_flashes(plan, rows, beat)
     rest = np.empty_like(rows.value)
     parts: list[tuple[FloatArray, FloatArray]] = []
@@ -162,7 +165,7 @@ def equations(
     def run(first: int, last: int) -> None:
         hessian = np.zeros((len(rows.window_start), kernel.SIGNALS, kernel.SIGNALS))
         score = np.zeros((len(rows.value), kernel.SIGNALS))
-        kernel.equations(seen, flashes, weight, tails, first, last, rest, hessian, score)
+        kernel.equations(seen, flashes, weight, tails, honest, first, last, rest, hessian, score)
         parts.append((hessian, score))
 
     share(run, rows.value.shape[1], work=rows.value.size)

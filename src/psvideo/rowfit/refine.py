@@ -169,14 +169,13 @@ def projected(
     return rest, hessian, scores
 
 
-def freedom(plan: Plan, rows: Profiles, beat: Beat) -> float:
-    """Return which share of the residuals' squares brightnesses that are fitted to them leave (MacKinnon, White 1985).
-
-    Not less than one frame's share, which a clip that has as many brightnesses as frames does not even have.
-    """
-    frames = len(rows.value)
-    fitted = len(rows.window_start) * (len(plan.lit_slots) + 1 + 2 * len(beat.beat_hz))
-    return max(frames - fitted, 1) / frames
+def believable(plan: Plan, rows: Profiles, fitted: "Fitted", basis: FloatArray, known: FloatArray) -> FloatArray:
+    """Return the covariance of the unknowns at the end of a robust fit."""
+    beat, rest, weight = fitted
+    trust = weight * scaled(rows, rest, 0.0) ** 2
+    robust = float(trust.mean()) / max(float((trust * (2 * trust - 1)).mean()), LEAST_PULL)
+    _, hessian, scores = projected(plan, rows, beat, weight, basis, tails=True, honest=True)
+    return sandwich(hessian, scores * robust, known)
 
 
 def sandwich(hessian: FloatArray, scores: FloatArray, known: FloatArray) -> FloatArray:
