@@ -102,14 +102,15 @@ def find_clip_timing(
     return timing
 
 
-def measure_take_readout(take: Take, *, watch: Watch = unwatched) -> StrobedReadout:
+def measure_take_readout(take: Take, *, tolerance_ppm: float | None = None, watch: Watch = unwatched) -> StrobedReadout:
     """Measure a camera's readout time from a strobed take, whatever its plan says of it.
 
+    ``tolerance_ppm`` is how far the strobe's clock may be from true seconds (left out: what the plan says of it).
     Raises PsvideoError where no strobe is found.
     """
     unknown = replace(take.plan, camera=replace(take.plan.camera, readout_s=None))
     timing = find_clip_timing(replace(take, clip=replace(take.clip, plan=unknown)), watch=watch)
-    return readout_of(unknown, timing, frames=len(take.numbers))
+    return readout_of(unknown, timing, frames=len(take.numbers), tolerance_ppm=tolerance_ppm)
 
 
 def clip_rounds(

@@ -196,6 +196,7 @@ def _assemble(
         dropped_frames=dropped,
         repeated_frames=repeated,
         notes=notes,
+        phase_error_s=found.fit.shift_error_s,
         row_time_error_s=found.fit.errors_s.get("row_time_s"),
         flashes=flashes,
     )

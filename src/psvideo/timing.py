@@ -47,7 +47,8 @@ class Timing:
 
     ``repeated_frames`` are the numbers of frames that show the same moment as the frame before them. ``notes`` are
     sentences for people on what to distrust; ``row_time_error_s`` is the row time's standard error where the picture
-    told it, None where the plan did. Neither goes into the file.
+    told it, None where the plan did; ``phase_error_s`` is ``phase_error_rows`` in seconds. None of them goes into the
+    file. A global shutter's rows open together: its ``phase_error_rows`` are of ``frame_period_s`` / height each.
     """
 
     clip: str
@@ -62,6 +63,18 @@ class Timing:
     repeated_frames: tuple[int, ...] = ()
     notes: tuple[str, ...] = field(default=(), compare=False)
     row_time_error_s: float | None = field(default=None, compare=False)
+    phase_error_s: float | None = field(default=None, compare=False)
+
+    @property
+    def how_sure(self) -> str:
+        """One sentence on how sure the flashes' times are; empty where nothing was fitted."""
+        rows = f"{self.phase_error_rows:.2g} row"
+        if self.phase_error_s is None:
+            return f"Flash times are sure to {rows}." if self.phase_error_rows else ""
+        times = (
+            f"{self.phase_error_s * 1e6:.2g} us" if self.phase_error_s < 1e-3 else f"{self.phase_error_s * 1e3:.2g} ms"
+        )
+        return f"Flash times are sure to {times}, {rows}." if self.row_time_s else f"Flash times are sure to {times}."
 
     @property
     def start_s(self) -> FloatArray:

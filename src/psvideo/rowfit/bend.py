@@ -13,7 +13,7 @@ from psvideo.camera import FloatArray
 from psvideo.plan import Plan
 from psvideo.rowfit.beat import Beat
 from psvideo.rowfit.profiles import Profiles, unexplained
-from psvideo.rowfit.refine import CAUCHY, GLOBALS, Fit, explained, freedom, mean_error, projected, sandwich, scaled
+from psvideo.rowfit.refine import CAUCHY, GLOBALS, Fit, believable, explained, mean_error, projected, scaled
 
 LEAST_WINDOWS = 4
 CLEARLY = 5.0
@@ -40,7 +40,8 @@ def bend(plan: Plan, rows: Profiles, fit: Fit, *, free: tuple[str, ...] = (), st
     basis = _basis(len(knots.at_s), free)
     for step in range(steps):
         scale = scaled(rows, rest, 0.02 if step == 0 and fit.beat.clock.knot_s else 0.0)
-        weight = 1.0 / (1.0 + (rest / (CAUCHY * scale)) ** 2) / scale**2
+        trust = 1.0 / (1.0 + (rest / (CAUCHY * scale)) ** 2)
+        weight = trust / scale**2
         rest, hessian, scores = projected(plan, rows, beat, weight, basis, tails=bool({"rise_s", "fall_s"} & set(free)))
         inflation = _inflation(hessian, scores, rows)
         strength, gain = _wandering(hessian / inflation, scores.sum(axis=0) / inflation, beat, knots)
@@ -52,7 +53,7 @@ def bend(plan: Plan, rows: Profiles, fit: Fit, *, free: tuple[str, ...] = (), st
         beat = _moved(rows, beat, knots, free, move)
     rest = unexplained(plan, rows, beat, weight)
     bread = np.linalg.inv(hessian + known)
-    covariance = sandwich(hessian, scores / np.sqrt(freedom(plan, rows, beat)), known) + bread @ known @ bread
+    covariance = believable(plan, rows, beat, weight, trust, basis, known) + bread @ known @ bread
     size = len(knots.at_s)
     return replace(
         fit,

@@ -86,7 +86,7 @@ def find(plan: Plan, rows: Profiles, *, measured: tuple[str, ...] = ()) -> Found
     fit = _with_flicker(plan, fine, _fit(plan, fine, tracked.beat, free), free)
     fine, fit, apart_s = _in_short_windows(plan, fine, fit, free)
     freed, unsure_s = _freed(plan, fine, fit, free)
-    if freed is not fit or measured:
+    if freed.errors_s:
         freed, apart_s = _with_window_errors(plan, fine, freed)
         apart_s = float(np.hypot(unsure_s, apart_s))
     fit, slack_s = centred(plan, fine, freed)

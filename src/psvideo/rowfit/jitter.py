@@ -83,7 +83,7 @@ def shift_error_s(plan: Plan, rows: Profiles, fit: Fit) -> float:
     for first, last in pairwise(edges.tolist()):
         block = rows.only_rows(slice(first, last))
         weight = np.ascontiguousarray(fit.weight[:, first:last])
-        _, hessian, score = equations(plan, block, fit.beat, weight, tails=False)
+        _, hessian, score = equations(plan, block, fit.beat, weight, tails=False, steepness=weight)
         pulls.append(score[:, :2].sum())
         stiff.append(hessian[:, :2, :2].sum())
     pull, whole = np.array(pulls), float(np.sum(stiff))

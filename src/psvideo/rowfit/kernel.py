@@ -228,10 +228,11 @@ def leverage(normal, design, weight, size, solved):  # type: ignore[no-untyped-d
 
 
 @nb.njit(cache=True, nogil=True)
-def equations(rows, flashes, weight, tails, honest, first, last, rest, hessian, score):  # type: ignore[no-untyped-def]
+def equations(rows, flashes, weight, steepness, tails, honest, first, last, rest, hessian, score):  # type: ignore[no-untyped-def]
     """Fill ``rest``; add the rows' normal matrices to ``hessian`` (window, SIGNALS, SIGNALS), their ``weight * signal *
-    rest`` to ``score`` (frame, SIGNALS), which keeps the frames apart. Where ``honest``, residuals count in the scores
-    as large as they would be had no brightness been fitted to them (MacKinnon and White 1985, HC2)."""
+    rest`` to ``score`` (frame, SIGNALS), which keeps the frames apart. The normal matrices hold ``steepness`` (frame,
+    row): how fast a residual's pull grows with it, which is its weight but in robust fits. Where ``honest``, residuals
+    count in the scores as large as if no brightness had been fitted to them (MacKinnon and White 1985, HC2)."""
     frames = len(rows.value)
     size = width(rows, flashes)
     design = np.empty((frames, size))
@@ -276,7 +277,7 @@ def equations(rows, flashes, weight, tails, honest, first, last, rest, hessian, 
                     pull = weight[n, row] * signals[n, p]
                     score[n, p] += pull * error
                     for q in range(p + 1):
-                        hessian[window, p, q] += pull * signals[n, q]
+                        hessian[window, p, q] += steepness[n, row] * signals[n, p] * signals[n, q]
 
 
 @nb.njit(cache=True, nogil=True)

@@ -35,14 +35,14 @@ def nothing_to_find(plan: Plan, rows: Profiles) -> str:
     changes = _changes(rows)
     if float(np.abs(changes).max()) < 1e-9:
         return (
-            "no strobe like the plan's was found in the picture: its rows do not change at all from frame to frame. Check that the "
-            "lights flashed, that the lens was open, and that this is the right clip."
+            "no strobe like the plan's was found in the picture: its rows do not change at all from frame to frame. "
+            "Check that the lights flashed, that the lens was open, and that this is the right clip."
         )
     if _likeness(changes) < NOISE:
         return (
             "no strobe like the plan's was found in the picture: what changes from frame to frame is noise, which "
-            f"neighbouring rows do not share (mean level {float(rows.value.mean()):.2g} of saturation). Check that the lights flashed and are "
-            "bright enough; open the lens or raise the gain."
+            f"neighbouring rows do not share (mean level {float(rows.value.mean()):.2g} of saturation). Check that the "
+            "lights flashed and are bright enough; open the lens or raise the gain."
         )
     return ""
 
@@ -66,7 +66,7 @@ def _likeness(changes: np.ndarray) -> float:
 
 
 def why_not(plan: Plan, rows: Profiles) -> str:
-    """Return what the picture looks like where no strobe like the plan's was found in it, and what to do; or nothing."""
+    """Return what the picture looks like where no strobe like the plan's was found, and what to do; or nothing."""
     change = np.abs(np.diff(rows.value, axis=0))
     level = float(np.abs(rows.value).mean())
     if float(change.mean()) < STEADY * level:
