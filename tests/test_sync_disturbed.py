@@ -325,18 +325,6 @@ def test_flicker_alone_is_no_strobe(plan: Plan) -> None:
         find_timing(plan, np.arange(60), rows + 1e-3 * rng.standard_normal(rows.shape))
 
 
-@pytest.mark.parametrize("kind", ["clean", "readout unknown"])
-def test_the_standard_errors_claimed_are_true(kind: str, make_plan: PlanMaker) -> None:
-    plan = make_plan(height_px=80, width_px=4)
-    errors, claims = [], []
-    for seed in range(12):
-        shot = shoot(plan, frames=48, seed=seed, scene=plates(plan, seed=seed))
-        timing = timing_of(unknown_readout(plan) if kind == "readout unknown" else plan, shot)
-        errors.append(rms_rows(timing, shot, plan))
-        claims.append(timing.phase_error_rows)
-    assert 0.4 < np.sqrt(np.mean(np.square(errors)) / np.mean(np.square(claims))) < 1.8
-
-
 def test_bends_add_up_and_run_straight_on_beyond_the_last_knot() -> None:
     clock = FoundClock(phase_s=0.0, offset_ppm=0.0).bent(np.array([0.0, 1.0, 2.0]), np.array([0.0, 1e-6, 3e-6]))
     np.testing.assert_allclose(clock.bend(np.array([-1.0, 0.5, 3.0])), [-1e-6, 0.5e-6, 5e-6])

@@ -1,4 +1,4 @@
-"""Plans that are wrong by far, clips without a strobe, and times that the picture leaves open: each is found or said."""
+"""Plans that are wrong by far, clips without a strobe, times that the picture leaves open: each is found or said."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -80,11 +80,11 @@ def test_shutter_and_direction_both_wrong_are_found(plan: Plan) -> None:
 def test_durations_halved_or_doubled_are_named(factor: float, plan: Plan) -> None:
     flashes = tuple(replace(flash, duration_s=factor * flash.duration_s) for flash in plan.flashes)
     kept_s = plan.dark_s - (factor - 1) * plan.flashes[0].duration_s
-    with pytest.raises(PsvideoError, match="fits flashes of 0.8 ms"):
+    with pytest.raises(PsvideoError, match=r"fits flashes of 0\.8 ms"):
         timing_of(replace(plan, flashes=flashes, dark_s=kept_s), filmed(plan))
 
 
-@pytest.mark.parametrize(("true", "told"), [(24, 25), (30, 24), (60, 120)])
+@pytest.mark.parametrize(("true", "told"), [(24, 25), (60, 120)])
 def test_a_frame_rate_mixed_up_is_named(true: int, told: int, make_plan: PlanMaker) -> None:
     film = make_plan(height_px=ROWS, width_px=COLUMNS, fps=Fraction(true), duration_s=0.003)
     angle = film.camera.exposure_s * true / told
@@ -122,17 +122,11 @@ def test_a_good_clip_draws_no_remarks(plan: Plan) -> None:
     assert timing_of(plan, filmed(plan, frames=10)).notes == ()
 
 
-def test_a_very_noisy_clip_is_timed_within_its_error_or_refused(plan: Plan) -> None:
+def test_a_very_noisy_clip_is_timed_within_its_error(plan: Plan) -> None:
     clean = filmed(plan)
-    for sigma in (0.05, 0.3):
-        noisy = clean + sigma * np.random.default_rng(1).standard_normal(clean.shape)
-        try:
-            timing = timing_of(plan, noisy)
-        except PsvideoError:
-            assert sigma == 0.3
-            continue
-        sure = timing_of(plan, clean)
-        assert abs(timing.start_s[5] - sure.start_s[5]) < 4 * timing.phase_error_rows * abs(timing.row_time_s)
+    noisy = timing_of(plan, clean + 0.05 * np.random.default_rng(1).standard_normal(clean.shape))
+    off_s = abs(noisy.start_s[5] - timing_of(plan, clean).start_s[5])
+    assert off_s < 4 * noisy.phase_error_rows * noisy.row_time_s
 
 
 def test_a_light_that_did_not_fire_is_named(make_plan: PlanMaker) -> None:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from psvideo.plan import UNKNOWN_CLOCK_PPM, Plan
 from psvideo.rowfit.fit import Found, find, gain_of
 from psvideo.rowfit.profiles import Profiles, unexplained
-from psvideo.rowfit.refine import freedom, robust_loss
+from psvideo.rowfit.refine import freedom, refine, robust_loss
 from psvideo.rowfit.rivals import BETTER, CLEARLY, FAIR, camera_rivals, double_rivals, likeliest, strobe_rivals
 
 MIN_EXPLAINED, MIN_GAIN = 0.5, 0.3
@@ -23,6 +23,7 @@ UNSURE_GAIN, UNSURE = 0.7, 0.1
 MOVED = 0.05
 """So is one that had to move the exposure or the readout by more than this share."""
 OTHER_LENGTHS = (0.5, 0.7, 1.4, 2.0)
+LENGTH_FRAMES = 200
 FLASHES_DIFFER = 0.7
 """Flashes of other lengths are likely where they leave less than this share of the robust loss."""
 
@@ -47,8 +48,8 @@ def judged(plan: Plan, rows: Profiles) -> Verdict:
         return Verdict(plan=plan, found=found, believed=True)
     meant, found = _as_meant(plan, rows, found)
     believed = convincing(meant, found)
-    if believed and flashes_differ(meant, found):
-        believed = likeliest(plan, rows, list(strobe_rivals(plan))) is None
+    if believed and (_unsure(meant, found) or flashes_differ(meant, found)):
+        believed = likeliest(meant, rows, list(strobe_rivals(plan))) is None
     return Verdict(plan=meant, found=found, believed=believed)
 
 
@@ -94,24 +95,34 @@ def doubtful(plan: Plan, found: Found) -> bool:
     return (
         moved
         or gain_of(found.rows, found.fit.rest) < UNSURE_GAIN
-        or (found.slack_s == 0 and found.fit.shift_error_s > UNSURE * _shortest_s(plan))
+        or _unsure(plan, found)
         or not convincing(plan, found)
         or flashes_differ(plan, found)
     )
 
 
+def _unsure(plan: Plan, found: Found) -> bool:
+    return found.slack_s == 0 and found.fit.shift_error_s > UNSURE * _shortest_s(plan)
+
+
 def flashes_differ(plan: Plan, found: Found) -> bool:
-    """Tell whether flashes much longer or shorter than the plan's, at the same times, fit far better."""
-    rows, beat = found.rows.binned(48), found.fit.beat
+    """Tell whether flashes much longer or shorter than the plan's, in the same places and without tails, fit better."""
+    rows, beat = found.rows.take(slice(0, LENGTH_FRAMES)).binned(48), found.fit.beat
     rest = unexplained(plan, rows, beat)
     limit = FLASHES_DIFFER * robust_loss(rows, rest, rest)
     shortest_s = _shortest_s(plan)
+    tails_s = beat.rise_s + beat.fall_s - plan.rise_s - plan.fall_s
     for factor in OTHER_LENGTHS:
         longer_s = (factor - 1) * shortest_s
         flashes = tuple(replace(flash, duration_s=flash.duration_s + longer_s) for flash in plan.flashes)
         other = replace(plan, flashes=flashes, dark_s=plan.dark_s - longer_s)
-        moved = beat.with_phase(beat.clock.phase_s - 0.5 * longer_s)
-        if other.dark_s > 0 and robust_loss(rows, unexplained(other, rows, moved), rest) < limit:
+        moved = beat.with_phase(beat.clock.phase_s - 0.5 * longer_s + tails_s)
+        moved = replace(moved, rise_s=plan.rise_s, fall_s=plan.fall_s)
+        if other.dark_s <= 0:
+            continue
+        if tails_s > 0:  # which stood for some of the other length, and moved the flashes with them
+            moved = refine(other, rows, moved, steps=4, first_scale=0.1).beat
+        if robust_loss(rows, unexplained(other, rows, moved), rest) < limit:
             return True
     return False
 

@@ -15,8 +15,8 @@ from psvideo.rowfit.beat import Beat
 from psvideo.rowfit.profiles import Profiles, unexplained
 from psvideo.rowfit.refine import Fit
 
-WORSE = 12.0
-"""By how much the weighted sum of squares may grow: what noise may feign at a plateau's edge, 3.5 standard errors."""
+WORSE = 30.0
+"""By how much the weighted sum of squares may grow: noise feigns as much at the best of all edges of a plateau."""
 PROBE = 6.0
 """Standard errors from the fit at which the picture must look otherwise if it tells the time."""
 FIRST_STEP, LONGEST_STEP = 1e-3, 0.5
