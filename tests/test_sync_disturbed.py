@@ -1,7 +1,7 @@
 """Timing found where something is wrong with the clip: every disturbance that the fit knows, one at a time."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -13,12 +13,21 @@ from psvideo.export.exr import write_exr
 from psvideo.pipeline import clip_rounds, find_clip_timing, open_take
 from psvideo.plan import Plan, PlannedFlash
 from psvideo.planfile import format_plan
+from psvideo.profiles import collect_with_doubt
 from psvideo.rowfit.beat import StrobeClock as FoundClock
 from psvideo.sync import find_timing
 from psvideo.synth import Exposure, Flicker, Noise, StrobeClock, TrueFlash, expose
 from psvideo.timing import DroppedFrames, Timing, format_timing, places_in_time, read_timing
 
 PlanMaker = Callable[..., Plan]
+
+
+@dataclass(frozen=True)
+class MemoryFrame:
+    index: int
+    image: np.ndarray
+
+
 NOISE = Noise(full_well_e=20_000, read_e=8)
 ROWS, COLUMNS = 160, 12
 
@@ -276,6 +285,21 @@ def test_rows_that_saturate_count_for_less(plan: Plan) -> None:
     assert share.max() > 0.4
     timing = timing_of(plan, shot, doubt=0.3 * share)
     assert rms_rows(timing, shot, plan) < 0.05
+
+
+def test_flashes_of_two_lights_that_clip_together_are_neither_flicker_nor_tails(plan: Plan) -> None:
+    """Rows that split such a flash are the only ones that do not clip: what they say must not be outvoted."""
+    patterns = [{"a": 1.0, "b": 1.0}, {"b": 1.0, "c": 1.0}, {"a": 1.0, "c": 1.0}]
+    plan = replace(plan, flashes=tuple(PlannedFlash(lights=one, duration_s=0.0008) for one in patterns))
+    shot = shoot(plan, scene=plates(plan, bright=1.2), frames=96)
+    frames = (MemoryFrame(n, image) for n, image in enumerate(shot.frames))
+    index, profiles, doubt = collect_with_doubt(frames)
+    assert (shot.frames >= 0.998).mean() > 0.4
+    timing = find_timing(plan, index, profiles, doubt=doubt)
+    true_s = np.array([flash.start_s for flash in shot.flashes])
+    error_s = np.array([np.abs(true_s - flash.start_s).min() for flash in timing.flashes])
+    assert np.sqrt(np.mean(error_s**2)) < 0.01 * plan.camera.row_time_s
+    assert timing.notes == ()
 
 
 def test_light_that_flashes_hold_in_known_powers_marks_the_cycle(plan: Plan) -> None:

@@ -37,7 +37,10 @@ SURER = 0.8
 MOST_WINDOWS = 400
 MAINS_HZ = (100.0, 120.0)
 FLICKERS = 0.8
-"""Flicker is believed where it leaves less than this share of the squares that are left without it."""
+"""Flicker is believed where it leaves less than this share of the squares that are left without it, and less than this
+share of what frequencies that mains do not have leave: where many rows saturate, anything that swings explains much."""
+OTHER_SWINGS = (-2.5, -1.5, 1.5, 2.5)
+"""Frequencies tried instead, as swings more or fewer in a window: near enough to be alike, far enough to be told."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -253,10 +256,16 @@ def _may_differ(plan: Plan) -> tuple[str, ...]:
 
 def _with_flicker(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> Fit:
     """Try ambient light that flickers with the mains, and keep it where it explains much of what is left."""
-    best, best_loss = fit.beat, FLICKERS * fit.loss
-    for hz in MAINS_HZ:
+
+    def left(hz: float) -> float:
         beat = replace(fit.beat, beat_hz=(hz,))
-        loss = float((fit.weight * unexplained(plan, rows, beat, fit.weight) ** 2).sum())
-        if loss < best_loss:
-            best, best_loss = beat, loss
-    return fit if best is fit.beat else _fit(plan, rows, best, free)
+        return float((fit.weight * unexplained(plan, rows, beat, fit.weight) ** 2).sum())
+
+    hz = min(MAINS_HZ, key=left)
+    least = left(hz)
+    if least > FLICKERS * fit.loss:
+        return fit
+    window_s = float(np.median(np.diff(rows.ends_s)))
+    if least > FLICKERS * float(np.median([left(hz + swings / window_s) for swings in OTHER_SWINGS])):
+        return fit
+    return _fit(plan, rows, replace(fit.beat, beat_hz=(hz,)), free)
