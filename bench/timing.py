@@ -4,6 +4,7 @@ import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -107,7 +108,7 @@ def _percent(share: float) -> str:
 def summary(lines: list[Line]) -> Iterator[Short]:
     """Return every group's span from its best case to its worst."""
     starts = [n for n, line in enumerate(lines) if line.disturbance.startswith("**")] + [len(lines)]
-    for start, stop in zip(starts, starts[1:], strict=False):
+    for start, stop in pairwise(starts):
         told = [line for line in lines[start + 1 : stop] if line.over_oracle]
         met = sum(line.met == "yes" for line in lines[start + 1 : stop])
         yield Short(

@@ -60,9 +60,7 @@ def plate_errors(
 
     ``plan`` is the true one and ``claimed`` the camera as plan.toml has it, whose seconds are ``scale`` times as long.
     """
-    camera = replace(
-        claimed, exposure_s=timing.exposure_s, readout_s=timing.row_time_s * plan.camera.height_px
-    )
+    camera = replace(claimed, exposure_s=timing.exposure_s, readout_s=timing.row_time_s * plan.camera.height_px)
     ours = _without_ambient(list(split(iter(frames), camera, timing)))
     published = {plate.flash.index: plate for plate in _without_ambient(list(hudon2015.split(frames, camera, timing)))}
     shares, solved = oracle(plan, flashes, true_frames)
@@ -99,9 +97,7 @@ def _without_ambient(plates: list[Plate]) -> list[Plate]:
     return list(subtract(plates, first=first))
 
 
-def oracle(
-    plan: Plan, flashes: Sequence[TrueFlash], frames: Mapping[int, Picture]
-) -> tuple[np.ndarray, np.ndarray]:
+def oracle(plan: Plan, flashes: Sequence[TrueFlash], frames: Mapping[int, Picture]) -> tuple[np.ndarray, np.ndarray]:
     """Solve all plates of a clip by least squares with the true timing, one constant ambient picture where dark slots
     tell it; return what share of each flash each row saw, (flash, row), and the plates, (flash, row, col)."""
     weights, first = _true_weights(plan, flashes, frames)
@@ -117,9 +113,7 @@ def oracle(
     return weights.sum(axis=1), solved
 
 
-def _true_weights(
-    plan: Plan, flashes: Sequence[TrueFlash], frames: Iterable[int]
-) -> tuple[np.ndarray, np.ndarray]:
+def _true_weights(plan: Plan, flashes: Sequence[TrueFlash], frames: Iterable[int]) -> tuple[np.ndarray, np.ndarray]:
     """Return what every row saw of every flash, (flash, TOUCHED, row), and the frames from which on, (flash,)."""
     camera, emission = plan.camera, Emission(rise_s=plan.rise_s, fall_s=plan.fall_s)
     spread_s = float(row_opens_s(camera).max()) + camera.exposure_s
@@ -153,4 +147,4 @@ def _solve_row(
     both = solveh_banded(bands, np.column_stack([right, border]), lower=True)
     rest = len(values) - border @ both[:, cols]
     ambient = (values.sum(axis=0) - border @ both[:, :cols]) / rest
-    return both[:, :cols] - both[:, cols :] * ambient
+    return both[:, :cols] - both[:, cols:] * ambient
