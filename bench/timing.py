@@ -24,7 +24,7 @@ class Line(NamedTuple):
     """One kind of shoot, the worst of its seeds: phase and its claim in rows, plates as shares of their RMS."""
 
     disturbance: str
-    phase_error: str
+    phase_error_in_rows: str
     bar: str
     claimed: str
     clock: str
@@ -32,19 +32,19 @@ class Line(NamedTuple):
     order: str
     plates: str
     over_oracle: str
-    algorithm_1: str
+    by_algorithm_1: str
     fit: str
     met: str
 
 
 class Short(NamedTuple):
-    """A group of disturbances, at its worst."""
+    """A group of disturbances, from its best shoot to its worst."""
 
     disturbances: str
-    shoots: str
+    shoots_within_all_bars: str
     phase_error_in_rows: str
     plates_over_oracle: str
-    algorithm_1: str
+    plates_by_algorithm_1: str
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,10 +113,10 @@ def summary(lines: list[Line]) -> Iterator[Short]:
         met = sum(line.met == "yes" for line in lines[start + 1 : stop])
         yield Short(
             lines[start].disturbance.strip("*"),
-            f"{met} of {stop - start - 1} within all bars",
-            _span([line.phase_error for line in told]),
+            f"{met} of {stop - start - 1}",
+            _span([line.phase_error_in_rows for line in told]),
             _span([line.over_oracle for line in told]),
-            _span([line.algorithm_1 for line in told]),
+            _span([line.by_algorithm_1 for line in told]),
         )
 
 
