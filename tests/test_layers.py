@@ -98,3 +98,12 @@ def test_only_the_clip_room_knows_decoders_and_only_export_knows_writers() -> No
         names = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
         if _room(path) not in {"clip", "export", "synth"}:
             assert not names & (decoders | {"OpenEXR", "tifffile"}), path
+
+
+def test_only_one_module_knows_serial_ports() -> None:
+    for path in MODULES:
+        nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+        names = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
+        names |= {node.module for node in nodes if isinstance(node, ast.ImportFrom) and node.module}
+        knows = any(name.split(".")[0] == "serial" for name in names)
+        assert knows == (path == PACKAGE / "strobe" / "controller.py"), path

@@ -25,6 +25,7 @@ from psvideo.rig import Light, Rig
 from psvideo.sequence import FIRST_NUMBER, LightPlate, Round, check_separable, reference_duration_s, rounds
 from psvideo.shutter import frames_touched
 from psvideo.split import Image, Plate, plate_of, split
+from psvideo.strobe.runlog import as_played
 from psvideo.surface import Surface
 from psvideo.sync import find_timing
 from psvideo.timing import DroppedFrames, Timing, places_in_time
@@ -62,10 +63,20 @@ class Take:
 
 
 def open_take(path: Path, *, plan: Path | None = None, frames: str | None = None) -> Take:
-    """Open a clip; ``frames`` is a range of file numbers such as ``1-100``."""
-    clip = open_clip(path, plan=plan)
+    """Open a clip; ``frames`` is a range of file numbers such as ``1-100``.
+
+    Where the strobe's log (strobe.json) lies beside the plan, the plan takes the times and powers that were played.
+    """
+    clip = _as_played(open_clip(path, plan=plan))
     numbers = clip.numbers if frames is None else parse_range(frames, clip.numbers)
     return Take(clip=clip, numbers=numbers)
+
+
+def _as_played(clip: Clip) -> Clip:
+    played = as_played(clip.plan, clip.plan_path)
+    warnings = clip.warnings if played.warning is None else (*clip.warnings, played.warning)
+    notes = clip.notes if played.note is None else (*clip.notes, played.note)
+    return replace(clip, plan=played.plan, warnings=warnings, notes=notes)
 
 
 def find_clip_timing(
