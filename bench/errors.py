@@ -7,9 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench.table import Row, table
-from bench.timing import outcome
-from bench.timing_scenes import Case, banded, plan_of, rolling_stripes, tumbling, unknown_readout, void
+from bench.timing import against_truth
+from bench.timing_cases import Case
+from bench.timing_scenes import banded, plan_of, rolling_stripes, tumbling, void
 from psvideo.errors import PsvideoError
+from psvideo.profiles import collect_with_doubt
+from psvideo.sync import find_timing
 from psvideo.synth import StrobeClock
 
 SEEDS = 100
@@ -33,13 +36,14 @@ class Ratios:
 def cases() -> dict[str, Case]:
     """Return the shoots whose errors are counted."""
     plain = plan_of()
+    unknown = replace(plain, camera=replace(plain.camera, readout_s=None))
     half = plan_of(shutter=0.5, readout=0.6)
     wide = plan_of(tolerance_ppm=None)
     hundred = StrobeClock(phase_s=0.0, offset_ppm=100.0)
     return {
         "clean": Case(plan=plain, frames=60),
         "clean, shutter 180": Case(plan=half, frames=60),
-        "readout unknown": Case(plan=plain, claimed=unknown_readout(plain), frames=60),
+        "readout unknown": Case(plan=plain, claimed=unknown, frames=60),
         "drift 5 ppm/s": Case(plan=wide, clock=replace(hundred, drift_ppm_per_s=5.0), frames=300),
         "bands": Case(plan=plain, scene=banded, frames=60),
         "void": Case(plan=plain, scene=void, frames=60),
@@ -59,16 +63,27 @@ def rows(only: str = "", seeds: int = SEEDS) -> Iterator[Row]:
 
 def ratios(case: Case, seeds: range) -> Ratios:
     """Shoot a case with every seed and hold its errors against the claims."""
+    camera = case.plan.camera
+    row_time_s = abs(camera.row_time_s) or camera.frame_period_s / camera.height_px
     made, claimed, refused = [], [], 0
     for seed in seeds:
         try:
-            found = outcome(case, seed)
+            made_s, claimed_s = _errors_s(case, seed)
         except PsvideoError:
             refused += 1
             continue
-        made.append(found.rms_rows)
-        claimed.append(found.claimed_rows)
+        made.append(made_s / row_time_s)
+        claimed.append(claimed_s / row_time_s)
     return Ratios(np.array(made), np.array(claimed), refused)
+
+
+def _errors_s(case: Case, seed: int) -> tuple[float, float]:
+    """Return the RMS error over a clip's flashes, and the standard error that was claimed, in seconds."""
+    filmed = case.film(seed)
+    index, profiles, doubt = collect_with_doubt(filmed.frames)
+    timing = find_timing(case.claimed or case.plan, index, profiles, doubt=doubt)
+    off_s, _ = against_truth(timing, filmed, scale=1.0)
+    return float(np.sqrt(np.mean(off_s**2))), timing.phase_error_s or 0.0
 
 
 def _row(name: str, found: Ratios) -> Row:

@@ -14,17 +14,29 @@ LAYERS = [
     {"plan", "planfile", "timing"},
     {"shutter", "clip", "strobe", "capture"},
     {"rowfit", "profiles"},
-    {"sync", "order", "split", "hudon2015", "ambient", "sequence", "calibrate", "normals"},
+    {"sync", "rigfield", "order", "split", "hudon2015", "flicker", "ambient", "sequence", "calibrate", "normals"},
     {"export", "view"},
     {"synth"},
     {"pipeline"},
+    {"naming"},
     {"runs"},
     {"demo"},
     {"cli"},
 ]
 """Rooms from the bottom up; a module may use its own layer (without circles) and those below."""
 
-SYNTH_NEVER_USES = {"shutter", "rowfit", "profiles", "sync", "split", "hudon2015", "ambient", "sequence", "normals"} | {
+SYNTH_NEVER_USES = {
+    "shutter",
+    "rowfit",
+    "profiles",
+    "sync",
+    "split",
+    "hudon2015",
+    "flicker",
+    "ambient",
+    "sequence",
+    "normals",
+} | {
     "clip",
     "pipeline",
     "runs",
@@ -86,3 +98,12 @@ def test_only_the_clip_room_knows_decoders_and_only_export_knows_writers() -> No
         names = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
         if _room(path) not in {"clip", "export", "synth"}:
             assert not names & (decoders | {"OpenEXR", "tifffile"}), path
+
+
+def test_only_one_module_knows_serial_ports() -> None:
+    for path in MODULES:
+        nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+        names = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
+        names |= {node.module for node in nodes if isinstance(node, ast.ImportFrom) and node.module}
+        knows = any(name.split(".")[0] == "serial" for name in names)
+        assert knows == (path == PACKAGE / "strobe" / "controller.py"), path

@@ -12,7 +12,7 @@ from psvideo.errors import PsvideoError
 
 STOPPED = 130
 """What the command line library ends with when the user interrupts."""
-COMMANDS = ("capture-plan", "calibrate", "synth", "sync", "split", "normals", "info", "demo")
+COMMANDS = ("capture-plan", "strobe", "calibrate", "synth", "sync", "split", "normals", "info", "demo")
 
 
 def application(arguments: Sequence[str]) -> typer.Typer:

@@ -15,6 +15,7 @@ from psvideo.clip.reading import looks
 from psvideo.errors import PsvideoError
 from psvideo.planfile import read_plan
 from psvideo.rigfile import read_rig
+from psvideo.strobe.runlog import as_played, read_log
 from psvideo.timing import read_timing
 from psvideo.tomlfile import read_text
 
@@ -30,7 +31,12 @@ def describe_file(path: Path) -> Description:
     if suffix in LIGHT_LISTS:
         return _described(path, "rig", _rig)
     schema = _schema(path)
-    readers = {"psvideo-plan": ("plan", _plan), "psvideo-rig": ("rig", _rig), "psvideo-timing": ("timing", _timing)}
+    readers = {
+        "psvideo-plan": ("plan", _plan),
+        "psvideo-rig": ("rig", _rig),
+        "psvideo-timing": ("timing", _timing),
+        "psvideo-strobe": ("strobe log", _strobe_log),
+    }
     if schema not in readers:
         kinds = ", ".join(readers)
         raise PsvideoError(
@@ -112,6 +118,28 @@ def _timing(path: Path) -> tuple[dict[str, Fact], list[Finding]]:
         "order": timing.order,
         "clock_offset_ppm": timing.clock_offset_ppm,
         "phase_error_rows": timing.phase_error_rows,
+    }
+    return facts, findings
+
+
+def _strobe_log(path: Path) -> tuple[dict[str, Fact], list[Finding]]:
+    log = read_log(path)
+    findings = [ok(f"{log.cycles} cycles played from {log.started_utc} on, by {log.board} {log.unit} ({log.firmware})")]
+    if log.fault is not None:
+        findings.append(warn(f"the run broke off: {log.fault}"))
+    if log.clock is not None:
+        findings.append(ok(f"the board's clock: {log.clock.offset_ppm:+.0f} ± {log.clock.error_ppm:.0f} ppm"))
+    plan = path.with_name("plan.toml")
+    if plan.is_file():
+        played = as_played(read_plan(plan), plan)
+        findings.append(warn(played.warning) if played.warning else ok("it is the log of the plan.toml beside it"))
+    facts: dict[str, Fact] = {
+        "board": log.board,
+        "unit": log.unit,
+        "plan_sha256": log.plan_sha256,
+        "cycles": log.cycles,
+        "ended": log.ended,
+        "started_utc": log.started_utc,
     }
     return facts, findings
 

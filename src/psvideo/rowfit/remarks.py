@@ -44,6 +44,7 @@ def remarks(plan: Plan, found: Found) -> tuple[str, ...]:
         _mixed(plan, beat),
         *_camera(plan, found),
         _exposure(plan, found),
+        _soft(found),
         _sureness(plan, found),
     ]
     return tuple(sentence for sentence in said if sentence)
@@ -164,6 +165,16 @@ def frame_gains(plan: Plan, found: Found, *, frames_each: int) -> tuple[FloatArr
     before = float((trust * (rows.value - expected) ** 2).sum())
     after = float((trust * (rows.value - smooth[:, None] * expected) ** 2).sum())
     return smooth, 1 - after / max(before, 1e-30)
+
+
+def _soft(found: Found) -> str:
+    if found.soft_s == 0.0:
+        return ""
+    return (
+        f"The flashes' edges in the picture are soft, as when compression or scaling blurs rows, which moves no flash. "
+        f"If the LEDs themselves take {found.soft_s * 1e6:.0f} us to rise and to fall, all flashes start earlier by as "
+        "much: then give rise_s and fall_s in the plan."
+    )
 
 
 def _sureness(plan: Plan, found: Found) -> str:

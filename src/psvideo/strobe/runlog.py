@@ -1,0 +1,197 @@
+"""strobe.json: what a board played, kept beside the footage for ``sync`` to start from.
+
+Its schema is ``psvideo-strobe/1``; docs/formats.md says what its keys mean.
+"""
+
+import hashlib
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from pydantic import Field, ValidationError
+
+from psvideo.errors import PsvideoError
+from psvideo.plan import UNKNOWN_CLOCK_PPM, Plan, PlannedFlash
+from psvideo.strobe.clock import ClockFit
+from psvideo.strobe.limits import lit_ticks
+from psvideo.strobe.messages import WiringName
+from psvideo.strobe.program import PS_PER_S, Program
+from psvideo.strobe.session import Ended, Outcome, Ready
+from psvideo.tomlfile import Contract, check_schema, read_text
+
+SCHEMA = "psvideo-strobe/1"
+LOG_NAME = "strobe.json"
+CAMERA_CLOCK_PPM = 100.0
+"""How far a camera's clock, a crystal, may be off."""
+
+
+class PlayedFlash(Contract):
+    """A flash of the plan's round as it was played: ``lit_ticks`` is how long each light was on, bursts summed."""
+
+    duration_ticks: int = Field(gt=0)
+    period_ticks: int = Field(gt=0)
+    lit_ticks: dict[str, int]
+
+
+class Clock(Contract):
+    """The board's clock on the host's: a strobe second lasts ``1 + offset_ppm * 1e-6`` host seconds."""
+
+    offset_ppm: float
+    error_ppm: float = Field(ge=0)
+    readings: int = Field(ge=0)
+
+
+class RunLog(Contract):
+    """What strobe.json holds."""
+
+    schema_: str = Field(alias="schema", default=SCHEMA)
+    plan: str
+    plan_sha256: str
+    board: str
+    unit: str
+    firmware: str
+    wiring: WiringName
+    lines: dict[str, int]
+    tick_ps: int = Field(gt=0)
+    tolerance_ppm: float = Field(ge=0)
+    flashes: list[PlayedFlash] = Field(min_length=1)
+    dark_ticks: int = Field(ge=0)
+    cycle_ticks: int = Field(gt=0)
+    check: int
+    started_utc: str
+    stopped_utc: str
+    start_tick: int
+    cycles: int = Field(ge=0)
+    ended: Ended
+    fault: str | None = None
+    clock: Clock | None = None
+
+
+def run_log(plan_path: Path, ready: Ready, program: Program, outcome: Outcome) -> RunLog:
+    """Return the log of a run."""
+    flashes = [
+        PlayedFlash(
+            duration_ticks=slot.duration,
+            period_ticks=slot.period,
+            lit_ticks={name: lit_ticks(slot, program.lines[name]) for name, power in flash.lights.items() if power > 0},
+        )
+        for flash, slot in zip(program.played.flashes, (program.slots[n] for n in program.of_flash), strict=True)
+    ]
+    return RunLog(
+        plan=plan_path.name,
+        plan_sha256=plan_sha256(plan_path),
+        board=ready.identity.board,
+        unit=ready.identity.unit,
+        firmware=ready.identity.firmware,
+        wiring=ready.caps.wiring,
+        lines=dict(program.lines),
+        tick_ps=program.tick_ps,
+        tolerance_ppm=ready.caps.tolerance_ppm,
+        flashes=flashes,
+        dark_ticks=program.slots[0].dark,
+        cycle_ticks=program.cycle_ticks,
+        check=program.check,
+        started_utc=outcome.started_utc,
+        stopped_utc=outcome.stopped_utc,
+        start_tick=outcome.start_tick,
+        cycles=outcome.cycles,
+        ended=outcome.ended,
+        fault=outcome.fault,
+        clock=_clock(outcome.clock),
+    )
+
+
+def _clock(fit: ClockFit | None) -> Clock | None:
+    if fit is None:
+        return None
+    return Clock(offset_ppm=fit.offset_ppm, error_ppm=fit.gain_error_ppm, readings=fit.readings)
+
+
+def plan_sha256(path: Path) -> str:
+    """Return the checksum by which a plan is known; line ends do not count, which some systems change in copying."""
+    return hashlib.sha256(path.read_bytes().replace(b"\r\n", b"\n")).hexdigest()
+
+
+def log_record(log: RunLog) -> dict[str, object]:
+    """Return the log as what strobe.json holds."""
+    return log.model_dump(by_alias=True)
+
+
+def format_log(log: RunLog) -> str:
+    """Return the log as JSON text; reading it back gives an equal log."""
+    return json.dumps(log_record(log), indent=1) + "\n"
+
+
+def read_log(path: Path) -> RunLog:
+    """Read strobe.json. Raises PsvideoError that names the file, the key and what was expected."""
+    try:
+        data = json.loads(read_text(path))
+        check_schema(data.get("schema"), SCHEMA, source=str(path))
+        return RunLog.model_validate(data)
+    except (json.JSONDecodeError, AttributeError) as fault:
+        raise PsvideoError(f"{path}: not a JSON object ({fault}). Take it away, or write it again.") from fault
+    except ValidationError as fault:
+        first = fault.errors()[0]
+        key = ".".join(map(str, first["loc"]))
+        raise PsvideoError(f"{path}: key '{key}': {first['msg']}. Take it away, or write it again.") from None
+
+
+@dataclass(frozen=True, kw_only=True)
+class AsPlayed:
+    """A plan with what its log knows better. ``warning`` says that the log is another plan's, or that the run broke."""
+
+    plan: Plan
+    warning: str | None = None
+    note: str | None = None
+
+
+def as_played(plan: Plan, plan_path: Path) -> AsPlayed:
+    """Return a plan with the times and powers that the log beside it says were played, where there is a log."""
+    path = plan_path.with_name(LOG_NAME)
+    if plan.mode == "synced" or not path.is_file():
+        return AsPlayed(plan=plan)
+    log = read_log(path)
+    if log.plan_sha256 != plan_sha256(plan_path) or not _fits(plan, log):
+        return AsPlayed(
+            plan=plan,
+            warning=f"{path.name} is the log of another plan than {plan_path.name} beside it, and is not used; put the "
+            "plan that the strobe played beside the footage, or take the log away",
+        )
+    broke = f"the strobe's run broke off ({log.fault}), says {path.name}" if log.fault is not None else None
+    return AsPlayed(
+        plan=_played(plan, log),
+        warning=broke,
+        note=f"{path.name}: times as {log.board} played them, {_clock_words(log)}",
+    )
+
+
+def _fits(plan: Plan, log: RunLog) -> bool:
+    lit = [{name for name, power in flash.lights.items() if power > 0} for flash in plan.flashes]
+    return lit == [set(flash.lit_ticks) for flash in log.flashes]
+
+
+def _played(plan: Plan, log: RunLog) -> Plan:
+    tick_s = log.tick_ps / PS_PER_S
+    flashes = tuple(
+        PlannedFlash(
+            lights={name: flash.lit_ticks.get(name, 0) / flash.duration_ticks for name in planned.lights},
+            duration_s=flash.duration_ticks * tick_s,
+        )
+        for planned, flash in zip(plan.flashes, log.flashes, strict=True)
+    )
+    tolerance = None if plan.clock_tolerance_ppm is None else clock_range_ppm(plan, log)
+    return replace(plan, flashes=flashes, dark_s=log.dark_ticks * tick_s, clock_tolerance_ppm=tolerance)
+
+
+def clock_range_ppm(plan: Plan, log: RunLog) -> float:
+    """Return how far the strobe's clock may be from the camera's: what the board is rated for and what the plan says.
+
+    What was measured against the host does not narrow it: the host's clock is not the camera's.
+    """
+    return min(max(log.tolerance_ppm + CAMERA_CLOCK_PPM, plan.clock_range_ppm), UNKNOWN_CLOCK_PPM)
+
+
+def _clock_words(log: RunLog) -> str:
+    if log.clock is None:
+        return f"its clock within {log.tolerance_ppm:g} ppm"
+    return f"its clock measured at {log.clock.offset_ppm:+.0f} ± {log.clock.error_ppm:.0f} ppm"

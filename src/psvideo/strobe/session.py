@@ -1,0 +1,204 @@
+"""A run from the first word to the last: prepare the board, upload, arm, run, watch, and always stop.
+
+Link -> prepare -> Ready (its capabilities make the Program) -> run_program -> Outcome, with Beats on the way
+"""
+
+import contextlib
+import math
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from datetime import UTC, datetime, timedelta
+from typing import Literal
+
+from psvideo.errors import PsvideoError
+from psvideo.plan import Plan
+from psvideo.strobe.clock import ClockFit, Reading, fit_clock
+from psvideo.strobe.greeting import START_WITHIN_S, greet
+from psvideo.strobe.link import Link
+from psvideo.strobe.messages import (
+    Capabilities,
+    Caps,
+    Clear,
+    Cleared,
+    Identity,
+    Run,
+    Started,
+    Stat,
+    Status,
+    Stop,
+    Stopped,
+    Wiring,
+    WiringName,
+    WiringSet,
+)
+from psvideo.strobe.program import Program
+
+Ended = Literal["done", "stopped", "fault", "lost"]
+ASK_EVERY_S = 0.2
+"""How often the host asks for status and clock while lights run: several times within any keep-alive."""
+FAULTS: Mapping[str, str] = {
+    "silent": "it heard nothing from the host for the keep-alive time",
+    "interlock": "its interlock was opened",
+    "late": "it could not make an edge in time",
+    "watchdog": "its watchdog restarted it",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ready:
+    """A board that is known and dark. ``notes`` say what was found and put right."""
+
+    identity: Identity
+    caps: Capabilities
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Beat:
+    """How a run goes: seconds since it began, and whole cycles played."""
+
+    elapsed_s: float
+    cycles: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """What was played. ``fault`` says what ended a run that did not end well, and ``message`` tells people of it."""
+
+    started_utc: str
+    stopped_utc: str
+    start_tick: int
+    cycles: int
+    ended: Ended
+    fault: str | None
+    message: str | None
+    clock: ClockFit | None
+
+
+def prepare(link: Link, *, wiring: WiringName | None = None, within_s: float = START_WITHIN_S) -> Ready:
+    """Greet the board, make it dark and idle, clear what was latched, and set its wiring."""
+    identity = greet(link, within_s=within_s)
+    link.ask(Stop(), Stopped)
+    notes = tuple(_clear(link))
+    caps = link.ask(Caps(), Capabilities)
+    if wiring is not None and wiring != caps.wiring:
+        link.ask(Wiring(wiring=wiring), WiringSet)
+        caps = link.ask(Caps(), Capabilities)
+    return Ready(identity=identity, caps=caps, notes=notes)
+
+
+def _clear(link: Link) -> list[str]:
+    status = link.ask(Stat(), Status)
+    if status.interlock == "open":
+        raise PsvideoError(
+            f"{link.port.name}: the interlock is open, so the board lights nothing. Close the door or the switch "
+            "that it watches (or mend its wire), then run the command again."
+        )
+    if status.state != "fault":
+        return []
+    link.ask(Clear(), Cleared)
+    return [f"the board was dark because of a fault, {status.fault}: {FAULTS[status.fault]}. It is cleared now."]
+
+
+def cycles_for(plan: Plan, *, seconds: float | None, rounds: int | None) -> int | None:
+    """Return how many whole cycles hold so many seconds, or rounds; None for a run until told."""
+    if rounds is not None:
+        return math.ceil(rounds / plan.dark_every)
+    if seconds is not None:
+        return max(1, math.ceil(seconds / plan.cycle_s))
+    return None
+
+
+def run_program(
+    link: Link, program: Program, *, cycles: int | None, seconds: float | None, watch: Callable[[Beat], None]
+) -> Outcome:
+    """Upload a program and play it for ``cycles`` cycles (None: until told), at most for ``seconds``.
+
+    Whatever happens, the board is told to stop. Ctrl-C ends a run well. Raises PsvideoError where nothing was played;
+    what goes wrong after the first flash is told by the outcome, so that it can be logged.
+    """
+    record = _Record()
+    try:
+        for request in program.upload():
+            link.ask(request, request.reply)
+        record.start_tick = link.ask(Run(cycles=cycles or 0), Started).start
+        record.began_s = time.monotonic()
+        record.fault = _follow(link, record, cycles=cycles, seconds=seconds, watch=watch)
+        if record.fault is not None:
+            record.ended, record.message = "fault", _went_dark(link.port.name, record)
+    except KeyboardInterrupt:
+        if record.began_s is None:
+            raise
+        record.ended = "stopped"
+    except PsvideoError as fault:
+        if record.began_s is None:
+            raise
+        record.ended, record.fault, record.message = "lost", "the connection to the board broke", str(fault)
+    finally:
+        with contextlib.suppress(PsvideoError):
+            record.cycles = max(record.cycles, link.ask(Stop(), Stopped).cycles)
+    return _outcome(record, program)
+
+
+@dataclass(kw_only=True)
+class _Record:
+    """What is gathered while a run goes on."""
+
+    began_utc: datetime = field(default_factory=lambda: datetime.now(UTC))
+    made_s: float = field(default_factory=time.monotonic)
+    began_s: float | None = None
+    start_tick: int = 0
+    cycles: int = 0
+    readings: list[Reading] = field(default_factory=list)
+    ended: Ended = "done"
+    fault: str | None = None
+    message: str | None = None
+
+    def utc(self, host_s: float) -> str:
+        """Return a moment of the host's clock as people write it."""
+        return (self.began_utc + timedelta(seconds=host_s - self.made_s)).isoformat(timespec="milliseconds")
+
+
+def _follow(
+    link: Link, record: _Record, *, cycles: int | None, seconds: float | None, watch: Callable[[Beat], None]
+) -> str | None:
+    """Ask for clock and status again and again until the run is over; return what fault ended it, if one did."""
+    began_s = time.monotonic()
+    while True:
+        clock, asked_s, answered_s = link.read_clock()
+        record.readings.append(Reading(ticks=clock.ticks, asked_s=asked_s, answered_s=answered_s))
+        status = link.ask(Stat(), Status)
+        if status.state == "fault":
+            return f"{status.fault}: {FAULTS[status.fault]}"
+        if status.state == "idle" and (cycles is None or status.cycles < cycles):
+            return f"restarted: the board started anew in the middle of the run (reset: {status.reset})"
+        record.cycles = status.cycles
+        elapsed_s = time.monotonic() - began_s
+        watch(Beat(elapsed_s=elapsed_s, cycles=status.cycles))
+        if status.state == "idle" or (seconds is not None and elapsed_s >= seconds):
+            return None
+        left_s = ASK_EVERY_S if seconds is None else min(ASK_EVERY_S, seconds - elapsed_s)
+        time.sleep(max(left_s, 0.0))
+
+
+def _went_dark(name: str, record: _Record) -> str:
+    return (
+        f"{name}: the board went dark by itself in the middle of the run ({record.fault}), after {record.cycles} whole "
+        "cycles. Find the cause, then run the command again, which clears the fault."
+    )
+
+
+def _outcome(record: _Record, program: Program) -> Outcome:
+    clock = fit_clock(record.readings, tick_ps=program.tick_ps)
+    first_s = clock.host_s(record.start_tick) if clock else record.began_s or record.made_s
+    return Outcome(
+        started_utc=record.utc(first_s),
+        stopped_utc=record.utc(time.monotonic()),
+        start_tick=record.start_tick,
+        cycles=record.cycles,
+        ended=record.ended,
+        fault=record.fault,
+        message=record.message,
+        clock=clock,
+    )
