@@ -428,7 +428,7 @@ def test_a_line_that_is_never_quiet_moves_no_edge_and_ends_in_the_dark(board: Av
 
 @pytest.mark.parametrize("board", AVR_BOARDS)
 def test_a_request_that_comes_into_a_reply_is_lost_and_said_to_be(board: AvrBoard) -> None:
-    """The receiver holds three bytes, as the silicon's does: here the next line feed ends what is left of the second."""
+    """The receiver holds three bytes, as the silicon's does: here a line feed ends what is left of the second."""
     two = (b"STAT\n" * 2).hex()
     said = play_script(f"wait 20\nbytes {two}\nwait 50\nbytes 0a\nwait 20\nsend STAT\n", board=board)
     assert [line.split()[2] + line.split()[3][:1] for line in said] == ["OKs", "E1", "OKs"]
