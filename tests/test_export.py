@@ -133,7 +133,16 @@ def test_a_flash_by_itself_says_which_lights_it_held(tmp_path: Path) -> None:
     flash = Flash(index=7, slot=0, lights={"a": 1.0, "b": 0.5}, start_s=1.0, duration_s=0.5, complete=True)
     rows = np.ones(4, np.bool_)
     write_flash(
-        tmp_path, "take", Plate(flash=flash, image=np.zeros((4, 3), np.float32), exposures=rows * 1.0, seen=rows), TAGS
+        tmp_path,
+        "take",
+        Plate(
+            flash=flash,
+            image=np.zeros((4, 3), np.float32),
+            shares=rows[None] * 1.0,
+            middles_s=rows[None] * 0.0,
+            seen=rows,
+        ),
+        TAGS,
     )
     header, _ = read(tmp_path / "flashes" / "take_flash.0007.exr")
     assert header["psvideo:lights"] == "a=1 b=0.5"

@@ -14,17 +14,29 @@ LAYERS = [
     {"plan", "planfile", "timing"},
     {"shutter", "clip", "strobe", "capture"},
     {"rowfit", "profiles"},
-    {"sync", "order", "split", "hudon2015", "ambient", "sequence", "calibrate", "normals"},
+    {"sync", "rigfield", "order", "split", "hudon2015", "flicker", "ambient", "sequence", "calibrate", "normals"},
     {"export", "view"},
     {"synth"},
     {"pipeline"},
+    {"naming"},
     {"runs"},
     {"demo"},
     {"cli"},
 ]
 """Rooms from the bottom up; a module may use its own layer (without circles) and those below."""
 
-SYNTH_NEVER_USES = {"shutter", "rowfit", "profiles", "sync", "split", "hudon2015", "ambient", "sequence", "normals"} | {
+SYNTH_NEVER_USES = {
+    "shutter",
+    "rowfit",
+    "profiles",
+    "sync",
+    "split",
+    "hudon2015",
+    "flicker",
+    "ambient",
+    "sequence",
+    "normals",
+} | {
     "clip",
     "strobe",
     "pipeline",

@@ -1,7 +1,7 @@
 """Rolling-flash reconstruction: plates against the virtual shoot's truth and a least-squares oracle."""
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -31,6 +31,11 @@ class MemoryFrame:
 
 def frames_of(shot: Exposure) -> Iterator[MemoryFrame]:
     return (MemoryFrame(n, image) for n, image in zip(shot.indices, shot.frames, strict=True))
+
+
+def without_ambient(plates: Iterable[Plate]) -> Iterator[Plate]:
+    held = list(plates)
+    return ambient.subtract(held, darks=[plate for plate in held if not plate.flash.lights])
 
 
 def plates_for(plan: Plan, *, colour: bool = False, seed: int = 3) -> dict[int, np.ndarray]:
@@ -184,7 +189,7 @@ def test_what_is_clipped_in_a_frame_stays_at_one_in_the_plate(make_plan: PlanMak
     for plate in truth.values():
         plate[:, :5] = 1.7
     shot, timing = shoot(plan, truth, ambient=0.05)
-    plates = ambient.subtract(split(frames_of(shot), plan.camera, timing))
+    plates = without_ambient(split(frames_of(shot), plan.camera, timing))
     for plate in plates:
         if plate.flash.lights:
             whole = row_weights(
@@ -197,32 +202,17 @@ def test_ambient_light_is_taken_off_before_rows_are_summed(make_plan: PlanMaker)
     plan = make_plan()
     truth = plates_for(plan)
     shot, timing = shoot(plan, truth, ambient=0.1)
-    plates = list(ambient.subtract(split(frames_of(shot), plan.camera, timing)))
+    plates = list(without_ambient(split(frames_of(shot), plan.camera, timing)))
     first_dark = next(n for n, plate in enumerate(plates) if not plate.flash.lights)
     assert relative_rms(plates[first_dark:], truth) < 1e-3
     assert np.abs(plates[first_dark].image - 0.1).max() < 1e-4
-
-
-def test_the_average_of_dark_slots_begins_anew_only_where_the_scene_changed() -> None:
-    rng = np.random.default_rng(0)
-    scene = np.full((64, 64), 0.1)
-    average = None
-    for _ in range(12):
-        average = ambient.update(average, (scene + 0.01 * rng.standard_normal(scene.shape)).astype(np.float32))
-    assert average is not None
-    assert np.std(average.image - scene) < 0.006
-    moved = scene.copy()
-    moved[:32, :32] = 0.3
-    average = ambient.update(average, (moved + 0.01 * rng.standard_normal(scene.shape)).astype(np.float32))
-    assert np.abs(average.image[4:28, 4:28].mean() - 0.3) < 0.005
-    assert np.std(average.image[40:, 40:] - 0.1) < 0.006
 
 
 def test_rows_of_a_dark_slot_that_no_frame_saw_do_not_pass_for_darkness(make_plan: PlanMaker) -> None:
     plan = make_plan()
     truth = plates_for(plan)
     shot, timing = shoot(plan, truth, ambient=0.2, dropped=(13, 14))
-    for plate in ambient.subtract(split(frames_of(shot), plan.camera, timing)):
+    for plate in without_ambient(split(frames_of(shot), plan.camera, timing)):
         if plate.flash.lights and plate.flash.index > 4:
             assert np.abs(plate.image - truth[plate.flash.slot])[plate.seen].max(initial=0) < 2e-2
 
@@ -268,8 +258,7 @@ def test_the_clips_of_another_simulator_give_its_true_plates(clip: str, shared_d
     frames = [MemoryFrame(n, np.ascontiguousarray((code - black) / (white - black))) for n, code in enumerate(codes)]
     timing = find_timing(plan, *collect(frames))
     plates = list(split(iter(frames), plan.camera, timing))
-    dark = next(plate for plate in plates if not plate.flash.lights)
-    plates = list(ambient.subtract(plates, first=ambient.update(None, dark.image)))
+    plates = list(without_ambient(plates))
     truth = json.loads((folder / "truth" / "timing.json").read_text())["flashes"]
     compared = 0
     for plate in plates:
@@ -338,7 +327,7 @@ def test_hdr_flashes_of_one_light_are_merged_without_what_is_clipped(make_plan: 
     scene = (0.02 + 3.0 * rng.random(shape)).astype(np.float32)
     other = np.full(shape, 0.3, np.float32)
     shot, timing = shoot(plan, {0: scene, 1: scene / 8, 2: other, 3: other})
-    plates = ambient.subtract(split(frames_of(shot), plan.camera, timing))
+    plates = without_ambient(split(frames_of(shot), plan.camera, timing))
     one = list(sequence.rounds(plates, plan, timing.flashes))[2]
     merged = one.plates[0]
     assert merged.light == "a"
@@ -364,6 +353,6 @@ def test_what_is_clipped_in_every_exposure_is_held_at_the_weakest_ones_limit(mak
     shape = (plan.camera.height_px, plan.camera.width_px)
     bright, other = np.full(shape, 20.0, np.float32), np.full(shape, 0.3, np.float32)
     shot, timing = shoot(plan, {0: bright, 1: bright / 8, 2: other, 3: other})
-    plates = ambient.subtract(split(frames_of(shot), plan.camera, timing))
+    plates = without_ambient(split(frames_of(shot), plan.camera, timing))
     one = list(sequence.rounds(plates, plan, timing.flashes))[2]
     assert (one.plates[0].image[5:-5] >= one.plates[0].saturation).mean() > 0.8

@@ -1,13 +1,15 @@
 """The edges that the firmware makes in emulation are the plan's ticks, whatever the host says meanwhile."""
 
+import random
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from psvideo.strobe.limits import cycle_ticks
-from psvideo.strobe.messages import Lit, Slot, WiringName
+from psvideo.strobe.boards import BOARDS, capabilities
+from psvideo.strobe.limits import cycle_refusal, cycle_ticks, slot_refusal
+from psvideo.strobe.messages import Capabilities, Lit, Slot, WiringName
 from psvideo.strobe.playing import moments
 from psvideo.strobe.toolchain import AvrBoard
 from psvideo.tracefile import Trace, read_trace
@@ -139,3 +141,46 @@ def test_a_dark_time_of_seconds_is_counted_to_the_tick(
     assert "state=running" in emulate(script, board="atmega2560", trace=tmp_path / "t.csv")[-1]
     rises = read_trace(tmp_path / "t.csv").edges["0"][::2]
     assert abs(np.diff(rises)[0] - TICK_CYCLES * 6_001_601) <= BAR_CYCLES
+
+
+def random_slot(dice: random.Random, number: int, caps: Capabilities) -> Slot:
+    """Return a slot that the board takes, often with times at the timer's or a limit's edge."""
+    while True:
+        period = dice.choice([80, 81, 100, 1000, 32_767, 32_768, 40_000, 65_535, 65_536, dice.randint(80, 100_000)])
+        rests = [0, 40, period, 2 * period + 41, 4 * period + dice.randint(40, 80), dice.randint(0, 50_000)]
+        dark = dice.choice([200, 201, 32_767, 32_768, 65_535, 65_536, 65_537, dice.randint(200, 200_000)])
+        powers = [40, 41, period, period - 40, period // 2, 32_767, 32_768, dice.randint(40, period)]
+        on = [dice.choice(powers) for _ in range(caps.powers)]
+        lines = dice.sample(range(caps.lines), dice.randint(0, min(3, caps.lines)))
+        lit = tuple(Lit(line=line, on=on[line % caps.powers]) for line in lines)
+        made = Slot(slot=number, duration=period + dice.choice(rests), dark=dark, period=period, lit=lit)
+        if slot_refusal(made, caps) is None:
+            return made
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_any_cycle_that_is_taken_is_played_to_the_tick(
+    emulate: Callable[..., list[str]], upload: Callable[..., list[str]], tmp_path: Path, seed: int
+) -> None:
+    dice = random.Random(seed)
+    board, wiring = dice.choice(BOTH), dice.choice(["gated", "direct"])
+    caps = capabilities(BOARDS[board], wiring)
+    slots: list[Slot] = []
+    while not slots or cycle_refusal(slots, caps) or not any(each.lit for each in slots):
+        slots = [random_slot(dice, number, caps) for number in range(dice.randint(1, 6))]
+    cycles = max(1, 600_000 // cycle_ticks(slots))
+    script = [
+        *upload(slots, wiring=wiring),
+        f"send RUN {cycles}",
+        "flood 400 STAT",
+        "bytes 0a",
+        "wait 550",
+        "send STAT",
+    ]
+    assert f"cycles={cycles}" in emulate(script, board=board, wiring=wiring, trace=tmp_path / "t.csv")[-1]
+    trace = read_trace(tmp_path / "t.csv")
+    expected = ideal(slots, cycles)
+    assert trace.lights == tuple(sorted(map(int, expected)))
+    begin = min(trace.edges[line][0] - edges[0] for line, edges in expected.items())
+    for line, edges in expected.items():
+        assert np.abs(trace.edges[line] - begin - edges).max() <= BAR_CYCLES

@@ -39,7 +39,9 @@ def split(frames: Iterable[LinearFrame], camera: Camera, timing: Timing) -> Iter
         dark_row = found
         if flash.complete and flash.index != done:
             done = flash.index
-            yield Plate(flash=flash, image=image, exposures=np.ones(rows), seen=np.ones(rows, np.bool_))
+            middles_s = current.index * camera.frame_period_s + camera.row_offsets_s() + camera.exposure_s / 2
+            shares, seen = np.ones((1, rows)), np.ones(rows, np.bool_)
+            yield Plate(flash=flash, image=image, shares=shares, middles_s=middles_s[None], seen=seen)
 
 
 def luminance_energy(image: Image) -> FloatArray:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo import hudon2015
-from psvideo.ambient import Ambient, held, subtract
+from psvideo.ambient import subtract
 from psvideo.calibrate.strobed_readout import StrobedReadout, readout_of
 from psvideo.camera import Camera
 from psvideo.clip import Clip, Frame, demosaic, holes, open_clip, parse_range, read_frames
@@ -24,7 +24,7 @@ from psvideo.profiles import collect_with_doubt
 from psvideo.rig import Light, Rig
 from psvideo.sequence import FIRST_NUMBER, LightPlate, Round, check_separable, reference_duration_s, rounds
 from psvideo.shutter import frames_touched
-from psvideo.split import Image, Plate, split
+from psvideo.split import Image, Plate, plate_of, split
 from psvideo.strobe.runlog import as_played
 from psvideo.surface import Surface
 from psvideo.sync import find_timing
@@ -137,18 +137,23 @@ def clip_rounds(
     ``each_flash`` is shown every single plate on its way, demosaiced.
     """
     check_separable(take.plan)
-    clip, camera = take.clip, _timed_camera(take.plan, timing)
+    shown = _shown(clip_plates(take, timing, method=method, watch=watch), each_flash)
+    return rounds(shown, take.plan, timing.flashes, start=start_number)
+
+
+def clip_plates(take: Take, timing: Timing, *, method: Method = "weights", watch: Watch = unwatched) -> Iterator[Plate]:
+    """Decode a take once and yield the plate of every flash that it holds, ambient light taken off, demosaiced."""
+    clip, camera = take.clip, timed_camera(take.plan, timing)
     places = places_in_time(timing, clip.numbers)
     used = _within(timing, camera, take, places)
     decoded = read_frames(clip, take.numbers, ahead=AHEAD)
     frames = _placed(watch(decoded, total=len(take.numbers), what="rebuilding flashes"), places)
     rebuild = split if method == "weights" else hudon2015.split
-    plates = subtract(rebuild(frames, camera, used), first=_first_ambient(take, camera, used, places))
-    shown = _shown(map(_colour_of(clip), plates), each_flash)
-    return rounds(shown, clip.plan, timing.flashes, start=start_number)
+    plates = subtract(rebuild(frames, camera, used), darks=_dark_plates(take, camera, used, places))
+    return map(_colour_of(clip), plates)
 
 
-def _timed_camera(plan: Plan, timing: Timing) -> Camera:
+def timed_camera(plan: Plan, timing: Timing) -> Camera:
     """Return the plan's camera with the exposure and readout that the timing found."""
     readout_s = timing.row_time_s * plan.camera.height_px
     return replace(plan.camera, exposure_s=timing.exposure_s, readout_s=readout_s)
@@ -173,20 +178,18 @@ def _within(timing: Timing, camera: Camera, take: Take, places: Mapping[int, int
     return replace(timing, flashes=flashes)
 
 
-def _first_ambient(take: Take, camera: Camera, timing: Timing, places: Mapping[int, int]) -> Ambient | None:
-    """Look ahead to the first dark slot that was seen, so that the flashes before it lose their ambient light too."""
-    complete = [flash for flash in timing.flashes if flash.complete]
+def _dark_plates(take: Take, camera: Camera, timing: Timing, places: Mapping[int, int]) -> Iterator[Plate]:
+    """Read ahead, from the few frames that they touch, the dark slots, between which ambient light is interpolated."""
     first, last = frames_touched(camera, timing.start_s, timing.duration_s)
-    for dark in (flash for flash in complete if not any(flash.lights.values())):
-        if dark is complete[0]:
-            return None
-        near = [n for n in take.numbers if n in places and first[dark.index] <= places[n] <= last[dark.index]]
-        only = tuple(replace(flash, complete=flash.index == dark.index) for flash in timing.flashes)
-        frames = _placed(read_frames(take.clip, near), places) if near else iter(())
-        plate = next(split(frames, camera, replace(timing, flashes=only)), None)
-        if plate is not None:
-            return Ambient(image=held(plate.image), slots=np.zeros(plate.image.shape[:2], np.float32), known=plate.seen)
-    return None
+    number_at = {places[number]: number for number in take.numbers if number in places}
+    for dark in timing.flashes:
+        if dark.complete and not any(dark.lights.values()):
+            touched = range(first[dark.index], last[dark.index] + 1)
+            near = tuple(number_at[place] for place in touched if place in number_at)
+            plate = plate_of(dark, _placed(read_frames(take.clip, near), places), camera, timing) if near else None
+            if plate is not None:
+                yield plate
+            del plate
 
 
 def _colour_of(clip: Clip) -> Callable[[Plate], Plate]:

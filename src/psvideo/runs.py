@@ -22,6 +22,7 @@ from psvideo.export.space import CAMERA_SPACE, Space
 from psvideo.export.tags import Tags, sha256_of
 from psvideo.export.writer import writing
 from psvideo.files import write_text
+from psvideo.naming import named_by_rig, named_first
 from psvideo.normals.illumination import illumination
 from psvideo.pipeline import (
     Instant,
@@ -65,18 +66,24 @@ class Output:
         refuse_folder(self.folder, mark=MARK, force=self.force)
 
 
-def timing_of(take: Take, given: Path | None, *, first_light: str | None, watch: Watch = unwatched) -> Timing:
+def timing_of(
+    take: Take, given: Path | None, *, first_light: str | None, rig: Rig | None = None, watch: Watch = unwatched
+) -> Timing:
     """Return a take's timing: the file that is given, else found from the picture.
 
-    Raises PsvideoError where the file belongs to another clip.
+    ``first_light`` names the light of the first complete flash. Left out, and with no marker in the plan, the lights'
+    order is told by the ``rig`` where it can be. Raises PsvideoError where the file belongs to another clip.
     """
     if given is None:
-        return find_clip_timing(take, first_light=first_light, watch=watch)
-    timing = read_timing(given)
-    wrong = _misfit(timing, take)
-    if wrong:
-        raise PsvideoError(f"{given}: {wrong}. Leave --timing out, or make it again with psvideo sync.")
-    return timing
+        timing = find_clip_timing(take, first_light=first_light, watch=watch)
+    else:
+        timing = read_timing(given)
+        wrong = _misfit(timing, take)
+        if wrong:
+            raise PsvideoError(f"{given}: {wrong}. Leave --timing out, or make it again with psvideo sync.")
+        if first_light is not None:
+            timing = named_first(take, timing, first_light)
+    return timing if rig is None else named_by_rig(take, timing, rig)
 
 
 def _misfit(timing: Timing, take: Take) -> str | None:

@@ -150,19 +150,25 @@ def _merged(parts: list[Plate], exposures: FloatArray, light: str, number: int) 
     """Merge flashes of one light alone; ``exposures`` (part,) are their shares of its full flash.
 
     The sum of what is not clipped over the sum of its exposures is the best estimate under photon noise. Where all is
-    clipped, the weakest flash says how bright it is at least.
+    clipped, the weakest flash says how bright it is at least. A row that some of the flashes did not show is taken from
+    the others.
     """
+    seen = np.any([part.seen for part in parts], axis=0)
     if len(parts) == 1 and exposures[0] == 1.0:
         image = parts[0].image
     else:
         light_sum, exposure_sum = np.zeros_like(parts[0].image), np.zeros_like(parts[0].image)
         for part, exposure in zip(parts, exposures, strict=True):
-            good = part.image < 1.0
+            good = (part.image < 1.0) & part.seen.reshape(-1, *[1] * (part.image.ndim - 1))
             light_sum += np.where(good, part.image, 0)
             exposure_sum += np.where(good, np.float32(exposure), 0)
         least = np.float32(1 / exposures.min())
         image = np.where(exposure_sum > 0, light_sum / np.maximum(exposure_sum, 1e-6), least).astype(np.float32)
-    return _light_plate(parts, exposures, image, light, number, saturation=float(1 / exposures.min()))
+        image[~seen] = 0
+    time_s = _time_s(parts, exposures)
+    return LightPlate(
+        light=light, number=number, time_s=time_s, image=image, seen=seen, saturation=float(1 / exposures.min())
+    )
 
 
 def _mixed(parts: list[Plate], shares: FloatArray, light: str, number: int) -> LightPlate:
@@ -172,12 +178,12 @@ def _mixed(parts: list[Plate], shares: FloatArray, light: str, number: int) -> L
     for part, share in zip(parts, shares, strict=True):
         image += np.float32(share) * part.image
     image[np.any([part.image >= 1.0 for part in parts], axis=0)] = np.float32(saturation)
-    return _light_plate(parts, shares, image, light, number, saturation=saturation)
-
-
-def _light_plate(
-    parts: list[Plate], shares: FloatArray, image: Image, light: str, number: int, *, saturation: float
-) -> LightPlate:
-    time_s = float(np.average([plate.time_s for plate in parts], weights=np.abs(shares)))
-    seen = np.all([plate.seen for plate in parts], axis=0)
+    seen = np.all([part.seen for part in parts], axis=0)
+    image[~seen] = 0
+    time_s = _time_s(parts, shares)
     return LightPlate(light=light, number=number, time_s=time_s, image=image, seen=seen, saturation=saturation)
+
+
+def _time_s(parts: list[Plate], shares: FloatArray) -> float:
+    """Return the instant that a light's plate shows: the mean of its flashes', by how much each counts."""
+    return float(np.average([plate.time_s for plate in parts], weights=np.abs(shares)))

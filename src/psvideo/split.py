@@ -39,13 +39,15 @@ class Plate:
     """The scene as one flash showed it: linear light, 1.0 = sensor saturation, (row, col) or (row, col, channel).
 
     Pixels of which a sample was clipped are ``CLIPPED`` or more until ambient light is taken off, 1.0 from then on.
-    ``exposures`` (row,) is how many exposures' worth of ambient light the image holds, and ``seen`` (row,) is False
-    where no frame saw enough of the flash (the image is 0 there).
+    ``shares`` (frame, row) is what the image holds of the rows of every frame that the flash touched, and with it of
+    the ambient light of their exposures, whose middles are ``middles_s`` (frame, row). ``seen`` (row,) is False where
+    no frame saw enough of the flash (the image is 0 there).
     """
 
     flash: Flash
     image: Image
-    exposures: FloatArray
+    shares: FloatArray
+    middles_s: FloatArray
     seen: NDArray[np.bool_]
 
     @property
@@ -53,12 +55,18 @@ class Plate:
         """The instant that the plate shows: the middle of its flash, on the camera's clock."""
         return self.flash.start_s + self.flash.duration_s / 2
 
+    @property
+    def exposures(self) -> FloatArray:
+        """How many exposures' worth of ambient light the image holds, shape (row,)."""
+        total: FloatArray = self.shares.sum(axis=0)
+        return total
+
 
 def split(frames: Iterable[LinearFrame], camera: Camera, timing: Timing) -> Iterator[Plate]:
     """Yield one plate for every complete flash that any frame saw, in order, dark slots included.
 
     ``frames`` come in order; a hole in their indices is a dropped frame. Only the two or three frames that the current
-    flash touches are held. The plates still hold ambient light, as ``Plate.exposures`` says.
+    flash touches are held. The plates still hold ambient light, as ``Plate.shares`` says.
     """
     stream = _Window(iter(frames))
     first, last = frames_touched(camera, timing.start_s, timing.duration_s)
@@ -68,6 +76,14 @@ def split(frames: Iterable[LinearFrame], camera: Camera, timing: Timing) -> Iter
             images = stream.between(touched)
             if images:
                 yield _rebuild(camera, timing, flash, images, touched)
+
+
+def plate_of(flash: Flash, frames: Iterable[LinearFrame], camera: Camera, timing: Timing) -> Plate | None:
+    """Return the plate of one flash of the timing from the frames that it touches, None where there is none of them."""
+    first, last = frames_touched(camera, np.array([flash.start_s]), np.array([flash.duration_s]))
+    touched = range(int(first[0]), int(last[0]) + 1)
+    images = {frame.index: frame.image for frame in frames if frame.index in touched}
+    return _rebuild(camera, timing, flash, images, touched) if images else None
 
 
 class _Window:
@@ -103,7 +119,14 @@ def _rebuild(camera: Camera, timing: Timing, flash: Flash, images: dict[int, Ima
     for index, coefficient in zip(touched, coefficients, strict=True):
         if index in images and coefficient.any():
             _add_rows(flat, images[index].reshape(shape[0], -1), coefficient.astype(np.float32), np.float32(SATURATED))
-    return Plate(flash=flash, image=plate, exposures=coefficients.sum(axis=0), seen=seen)
+    middles_s = _opens_s(camera, touched) + camera.exposure_s / 2
+    return Plate(flash=flash, image=plate, shares=coefficients, middles_s=middles_s, seen=seen)
+
+
+def _opens_s(camera: Camera, frames: range) -> FloatArray:
+    """Return when each row of each frame begins to expose, shape (frame, row)."""
+    opens_s: FloatArray = np.array(frames)[:, None] * camera.frame_period_s + camera.row_offsets_s()
+    return opens_s
 
 
 def _best_sum(weights: FloatArray) -> FloatArray:

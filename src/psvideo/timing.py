@@ -45,9 +45,10 @@ class DroppedFrames:
 class Timing:
     """The flashes of a clip in order. ``order`` says how the lights' names were found: a guess is called ``guess``.
 
-    ``repeated_frames`` are the numbers of frames that show the same moment as the frame before them. ``notes`` are
-    sentences for people on what to distrust; ``row_time_error_s`` is the row time's standard error where the picture
-    told it, None where the plan did. Neither goes into the file.
+    ``order_note`` is a sentence on how a rig's directions decided the order, or why they did not; empty where none were
+    asked. ``repeated_frames`` are the numbers of frames that show the same moment as the frame before them. ``notes``
+    are sentences for people on what to distrust; ``row_time_error_s`` is the row time's standard error where the
+    picture told it, None where the plan did. Neither of these two goes into the file.
     """
 
     clip: str
@@ -60,6 +61,7 @@ class Timing:
     flashes: tuple[Flash, ...]
     dropped_frames: tuple[DroppedFrames, ...] = ()
     repeated_frames: tuple[int, ...] = ()
+    order_note: str = ""
     notes: tuple[str, ...] = field(default=(), compare=False)
     row_time_error_s: float | None = field(default=None, compare=False)
 
@@ -121,6 +123,7 @@ class _TimingFile(Contract):
     clock_offset_ppm: float
     phase_error_rows: float = Field(ge=0)
     order: Order
+    order_note: str = ""
     dropped_frames: list[_DroppedFile] = Field(default_factory=list)
     repeated_frames: list[int] = Field(default_factory=list)
     flashes: list[_FlashFile]
@@ -147,6 +150,7 @@ def read_timing(path: Path) -> Timing:
 
 def timing_record(timing: Timing) -> dict[str, object]:
     """Return the timing as what timing.json holds."""
+    order_note = {"order_note": timing.order_note} if timing.order_note else {}
     repeated = {"repeated_frames": list(timing.repeated_frames)} if timing.repeated_frames else {}
     return {
         "schema": SCHEMA,
@@ -157,6 +161,7 @@ def timing_record(timing: Timing) -> dict[str, object]:
         "clock_offset_ppm": timing.clock_offset_ppm,
         "phase_error_rows": timing.phase_error_rows,
         "order": timing.order,
+        **order_note,
         "dropped_frames": [{"after": hole.after, "count": hole.count} for hole in timing.dropped_frames],
         **repeated,
         "flashes": [_flash_row(flash) for flash in timing.flashes],

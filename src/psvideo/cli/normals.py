@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from psvideo.cli.console import Voice
+from psvideo.cli.opening import open_and_tell
 from psvideo.cli.options import (
     ClipPath,
     FirstLight,
@@ -23,7 +24,6 @@ from psvideo.cli.options import (
 from psvideo.cli.sync import describe_timing
 from psvideo.export.results import Delivery
 from psvideo.export.space import choose_space
-from psvideo.pipeline import open_take
 from psvideo.runs import Output, normals_run, read_lighting, timing_of
 from psvideo.view.report import findings, report_record, verdict
 
@@ -96,13 +96,9 @@ def normals(
         png16=encode is Encoding.png16,
         multipart=multipart,
     )
-    take = open_take(clip, plan=plan, frames=frames)
-    for warning in take.clip.warnings:
-        voice.warn(warning)
-    for note in take.clip.notes:
-        voice.detail(note)
+    take = open_and_tell(clip, voice, plan=plan, frames=frames)
     lighting = read_lighting(take, rig, mask)
-    found = timing_of(take, timing, first_light=first_light, watch=voice.track)
+    found = timing_of(take, timing, first_light=first_light, rig=lighting.rig, watch=voice.track)
     report = normals_run(take, found, lighting, output, delivery=delivery, watch=voice.track).report
     voice.result(report_record(report))
     voice.say(describe_timing(found))

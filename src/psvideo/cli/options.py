@@ -12,6 +12,10 @@ FirstLight = Annotated[
     str | None,
     typer.Option("--first-light", help="The light of the clip's first complete flash, for plans without a marker."),
 ]
+OrderRig = Annotated[
+    Path | None,
+    typer.Option("--rig", help="Where the lights are, to tell their order by where no marker does."),
+]
 TimingPath = Annotated[
     Path | None, typer.Option("--timing", help="timing.json of this clip; left out: found from the picture.")
 ]

@@ -7,12 +7,14 @@ from typing import Annotated
 import typer
 
 from psvideo.cli.console import Voice
+from psvideo.cli.opening import open_and_tell
 from psvideo.cli.options import (
     ClipPath,
     FirstLight,
     Force,
     Frames,
     Json,
+    OrderRig,
     PlanPath,
     Quiet,
     Resume,
@@ -21,7 +23,7 @@ from psvideo.cli.options import (
     Verbose,
 )
 from psvideo.cli.sync import describe_timing
-from psvideo.pipeline import open_take
+from psvideo.rigfile import read_rig
 from psvideo.runs import Output, split_run, timing_of
 from psvideo.timing import timing_record
 
@@ -40,6 +42,7 @@ def split(
     timing: TimingPath = None,
     frames: Frames = None,
     first_light: FirstLight = None,
+    rig: OrderRig = None,
     method: Annotated[
         Method, typer.Option(help="By the rows' weights, or Algorithm 1 of Hudon et al. 2015, to compare with.")
     ] = Method.weights,
@@ -55,12 +58,9 @@ def split(
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     output = Output(folder=out, force=force, resume=resume, start_number=start_number)
     output.check()
-    take = open_take(clip, plan=plan, frames=frames)
-    for warning in take.clip.warnings:
-        voice.warn(warning)
-    for note in take.clip.notes:
-        voice.detail(note)
-    found = timing_of(take, timing, first_light=first_light, watch=voice.track)
+    take = open_and_tell(clip, voice, plan=plan, frames=frames)
+    known = None if rig is None else read_rig(rig, plan_lights=take.plan.lights)
+    found = timing_of(take, timing, first_light=first_light, rig=known, watch=voice.track)
     written = split_run(take, found, output, method=method.value, flashes=flashes, watch=voice.track)
     voice.result(timing_record(written))
     voice.say(describe_timing(written))

@@ -6,9 +6,12 @@ from typing import Annotated
 import typer
 
 from psvideo.cli.console import Voice
-from psvideo.cli.options import ClipPath, FirstLight, Force, Frames, Json, PlanPath, Quiet, Verbose
+from psvideo.cli.opening import open_and_tell
+from psvideo.cli.options import ClipPath, FirstLight, Force, Frames, Json, OrderRig, PlanPath, Quiet, Verbose
 from psvideo.files import refuse_existing, write_text
-from psvideo.pipeline import find_clip_timing, open_take
+from psvideo.naming import named_by_rig
+from psvideo.pipeline import find_clip_timing
+from psvideo.rigfile import read_rig
 from psvideo.timing import Timing, format_timing, timing_record
 
 TimingOut = Annotated[
@@ -25,6 +28,7 @@ def sync(
     plan: PlanPath = None,
     frames: Frames = None,
     first_light: FirstLight = None,
+    rig: OrderRig = None,
     picture: PictureOut = None,
     force: Force = False,
     json: Json = False,
@@ -37,12 +41,10 @@ def sync(
         refuse_existing(out, force=force, mark="psvideo-timing/")
     if picture is not None:
         refuse_existing(picture, force=force)
-    take = open_take(clip, plan=plan, frames=frames)
-    for warning in take.clip.warnings:
-        voice.warn(warning)
-    for note in take.clip.notes:
-        voice.detail(note)
+    take = open_and_tell(clip, voice, plan=plan, frames=frames)
+    known = None if rig is None else read_rig(rig, plan_lights=take.plan.lights)
     timing = find_clip_timing(take, first_light=first_light, watch=voice.track, picture=picture)
+    timing = timing if known is None else named_by_rig(take, timing, known)
     for note in timing.notes:
         voice.warn(note)
     if out is not None:
@@ -64,6 +66,7 @@ def describe_timing(timing: Timing) -> str:
             f"{timing.phase_error_rows:.2g} row."
         )
     lines.append(ORDER_SENTENCE[timing.order])
+    lines += [timing.order_note] if timing.order_note else []
     lines += [f"{hole.count} frame(s) missing after number {hole.after}." for hole in timing.dropped_frames]
     lines += [f"Frame {number} repeats the one before it." for number in timing.repeated_frames]
     return "\n".join(lines)

@@ -85,7 +85,7 @@ def findings(report: RunReport) -> tuple[str, ...]:
     if timing.order == "guess":
         found.append(
             "Which light is which is a guess, so normals may be wrong everywhere: shoot with a dark slot as marker, or "
-            "name the first light with --first-light."
+            "name the first light with --first-light." + (f" {timing.order_note}" if timing.order_note else "")
         )
     if timing.phase_error_rows > SURE_ENOUGH_ROWS:
         found.append(
@@ -139,6 +139,7 @@ def report_record(report: RunReport) -> dict[str, object]:
         "clock_offset_ppm": timing.clock_offset_ppm,
         "phase_error_rows": timing.phase_error_rows,
         "order": timing.order,
+        "order_note": timing.order_note,
         "lights": list(report.lights),
         "condition": report.condition,
         "instants": [asdict(facts) for facts in report.instants],
@@ -175,7 +176,7 @@ def _facts(report: RunReport) -> list[tuple[str, str]]:
         ("Rounds solved", str(len(report.instants))),
         ("Strobe's clock", f"{timing.clock_offset_ppm:+.1f} ppm"),
         ("Flash times sure to", f"{timing.phase_error_rows:.3f} row"),
-        ("Order of the lights", timing.order),
+        ("Order of the lights", f"{timing.order}. {timing.order_note}" if timing.order_note else timing.order),
         ("Lights", ", ".join(report.lights)),
         ("Condition of the lights", f"{report.condition:.2f}"),
         ("Made with", f"psvideo {report.version}"),

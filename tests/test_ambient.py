@@ -1,0 +1,264 @@
+"""Ambient light between dark slots: what static, changing and flickering light costs a plate, against the truth."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from psvideo import ambient
+from psvideo.flicker import Mains, Ripple, RowLight, find_ripple
+from psvideo.plan import Plan
+from psvideo.shutter import frames_touched
+from psvideo.split import Plate, split
+from psvideo.synth import Noise, StrobeClock
+from psvideo.synth.noise import NOISELESS, frame_rng
+from psvideo.synth.sensor import Flicker, expose_frames
+from psvideo.synth.strobe import true_flashes
+from psvideo.timing import Flash, Timing
+
+PlanMaker = Callable[..., Plan]
+AmbientOf = Callable[[int, np.ndarray], np.ndarray]
+LEVEL = 0.1
+NOISE = Noise(full_well_e=20_000, read_e=12)
+
+
+@dataclass(frozen=True)
+class MemoryFrame:
+    index: int
+    image: np.ndarray
+
+
+def texture(plan: Plan) -> np.ndarray:
+    blocks = np.random.default_rng(5).uniform(0.3, 1, (plan.camera.height_px // 8, plan.camera.width_px // 8))
+    return np.kron(blocks, np.ones((8, 8))).astype(np.float32)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Take:
+    """Plates with their ambient light still in them, and the plates as they are without it."""
+
+    plates: list[Plate]
+    truth: dict[int, np.ndarray]
+
+    def without_ambient(self) -> Iterator[Plate]:
+        return ambient.subtract(self.plates, darks=[plate for plate in self.plates if not plate.flash.lights])
+
+    def errors(self) -> np.ndarray:
+        """Return the errors of whole plates between two dark slots once ambient light is off, (plate, row, col)."""
+        dark = [plate.flash.index for plate in self.plates if not plate.flash.lights]
+        return np.array(
+            [
+                plate.image - self.truth[plate.flash.slot]
+                for plate in self.without_ambient()
+                if plate.flash.lights and plate.seen.all() and dark[0] < plate.flash.index < dark[-1]
+            ]
+        )
+
+
+def shoot(
+    plan: Plan,
+    ambient_of: AmbientOf,
+    *,
+    noise: Noise = NOISELESS,
+    flicker: Flicker | None = None,
+    frames: int = 120,
+    dropped: tuple[int, ...] = (),
+) -> Take:
+    scene = texture(plan)
+    truth = {slot: (0.15 * scene * (1 + 0.5 * n)).astype(np.float32) for n, slot in enumerate(plan.lit_slots)}
+    clock = StrobeClock(phase_s=0.0123, offset_ppm=30.0)
+    flashes = true_flashes(plan, clock, frames=frames, dropped=frozenset(dropped))
+    kept = [n for n in range(frames) if n not in dropped]
+    images = expose_frames(
+        plan,
+        flashes,
+        lambda flash: truth.get(flash.slot),
+        frames=kept,
+        ambient_of=lambda n: ambient_of(n, scene).astype(np.float32),
+        flicker=flicker,
+    )
+
+    def read() -> Iterator[MemoryFrame]:
+        for n, image in zip(kept, images, strict=True):
+            yield MemoryFrame(n, np.minimum(noise.add(image, frame_rng(1, n)), 1.0).astype(np.float32))
+
+    starts_s = np.array([flash.start_s for flash in flashes])
+    durations_s = np.array([flash.duration_s for flash in flashes])
+    first, last = frames_touched(plan.camera, starts_s, durations_s)
+    timing = Timing(
+        clip="clip",
+        frame_period_s=plan.camera.frame_period_s,
+        exposure_s=plan.camera.exposure_s,
+        row_time_s=plan.camera.row_time_s,
+        clock_offset_ppm=30.0,
+        phase_error_rows=0.0,
+        order="marker",
+        flashes=tuple(
+            Flash(
+                index=n,
+                slot=flash.slot,
+                lights=plan.flashes[flash.slot].lights,
+                start_s=flash.start_s,
+                duration_s=flash.duration_s,
+                complete=bool(first[n] >= 0 and last[n] < frames),
+            )
+            for n, flash in enumerate(flashes)
+        ),
+    )
+    return Take(plates=list(split(read(), plan.camera, timing)), truth=truth)
+
+
+def rms(errors: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(errors**2)))
+
+
+def held(_: int, scene: np.ndarray) -> np.ndarray:
+    return LEVEL * scene
+
+
+def dimmed(n: int, scene: np.ndarray) -> np.ndarray:
+    return LEVEL * scene * (1 + 0.4 * n / 120)
+
+
+def clouded(n: int, scene: np.ndarray) -> np.ndarray:
+    return LEVEL * scene * (1 + 0.3 * np.sin(2 * np.pi * n / 120) * np.linspace(0, 1, scene.shape[1]))
+
+
+def shadow_down_the_rows(n: int, scene: np.ndarray) -> np.ndarray:
+    rows = np.arange(scene.shape[0])
+    return LEVEL * scene * (1 - 0.5 / (1 + np.exp(-(1.5 * n - rows) / 15)))[:, None]
+
+
+def lamp_on(n: int, scene: np.ndarray) -> np.ndarray:
+    return LEVEL * scene * (1.0 if n > 60 else 0.01)
+
+
+@pytest.fixture(scope="module")
+def plan(make_plan: PlanMaker) -> Plan:
+    return make_plan(width_px=160, height_px=120)
+
+
+def test_light_that_does_not_change_costs_hardly_any_noise(plan: Plan) -> None:
+    unlit = shoot(plan, lambda n, scene: 0 * scene, noise=NOISE)
+    photons = np.mean([LEVEL * texture(plan) / NOISE.full_well_e])  # of the ambient light itself, which nothing removes
+    alone = np.sqrt(rms(unlit.errors()[40:]) ** 2 + 1.3 * photons)
+    assert rms(shoot(plan, held, noise=NOISE).errors()[40:]) < 1.06 * alone
+
+
+@pytest.mark.parametrize("change", [dimmed, clouded, shadow_down_the_rows])
+def test_light_that_changes_steadily_is_followed(change: AmbientOf, plan: Plan) -> None:
+    assert rms(shoot(plan, change).errors()) < 1e-4
+    still, moving = shoot(plan, held, noise=NOISE).errors()[20:], shoot(plan, change, noise=NOISE).errors()[20:]
+    assert rms(moving) < 1.06 * rms(still)
+
+
+def test_a_lamp_switched_on_costs_the_plates_around_it_only(plan: Plan) -> None:
+    wrong = np.sqrt(np.mean(shoot(plan, lamp_on).errors() ** 2, axis=(1, 2))) > 1e-3
+    assert 1 <= wrong.sum() <= 6, "two rounds: the lamp may go on in the middle of a dark slot"
+
+
+def test_where_someone_moves_the_average_begins_anew_and_elsewhere_it_goes_on(plan: Plan) -> None:
+    def walking(n: int, scene: np.ndarray) -> np.ndarray:
+        light = LEVEL * scene
+        light[40:80, 10 + n : 34 + n] = 0.3
+        return light
+
+    take = shoot(plan, walking, noise=NOISE, frames=100)
+    last = [plate for plate in take.without_ambient() if not plate.flash.lights][-1]
+    frame = last.flash.start_s / plan.camera.frame_period_s
+    middle = slice(int(10 + frame) + 6, int(34 + frame) - 6)
+    assert abs(float(last.image[44:76, middle].mean()) - 0.3) < 0.003
+    away = (last.image - LEVEL * texture(plan))[:30]
+    assert np.std(away) < 0.35 * np.std((take.plates[-1].image - take.truth.get(take.plates[-1].flash.slot, 0))[:30])
+
+
+@pytest.mark.parametrize("hz", [100.0, 120.0, 100.2])
+@pytest.mark.parametrize("depth", [0.3, 1.0])
+def test_mains_light_is_told_apart_row_by_row(hz: float, depth: float, make_plan: PlanMaker) -> None:
+    plan = make_plan(width_px=160, height_px=120, fps=Fraction(110))
+    take = shoot(plan, dimmed, flicker=Flicker(hz=hz, depth=depth))
+    assert rms(shoot(plan, held).errors()) < 1e-5
+    assert rms(take.errors()[8:]) < 1e-4 + (2e-3 if hz == 100.2 else 0) * depth
+
+
+def test_exposures_of_whole_pulses_show_none(make_plan: PlanMaker) -> None:
+    even = make_plan(width_px=160, height_px=120, fps=Fraction(100))
+    assert rms(shoot(even, held, flicker=Flicker(hz=100, depth=1.0)).errors()) < 1e-5
+
+
+def test_a_change_that_looks_like_a_ripple_once_is_not_believed() -> None:
+    rows = np.arange(200)
+    light = [
+        RowLight(
+            mean=0.1 * (1 + 0.1 * n * rows / 200),
+            shares=np.ones((1, 200)),
+            middles_s=(0.0334 * n + 4e-5 * rows)[None],
+            good=np.ones(200, np.bool_),
+        )
+        for n in range(8)
+    ]
+    assert any(find_ripple(one, other) is not None for one, other in pairwise(light))
+    mains = Mains(rows=light[0])
+    for one in light[1:]:
+        mains = mains.next(one)
+        assert mains.ripple is None
+
+
+def test_a_ripple_is_found_with_its_phase() -> None:
+    rng = np.random.default_rng(0)
+    rows, true = np.arange(300), Ripple(hz=120.0, amplitude=0.2 * np.exp(0.7j))
+    surface = rng.uniform(0.05, 0.4, 300)
+
+    def seen(time_s: float) -> RowLight:
+        middles_s = (time_s + 2e-5 * rows)[None]
+        light = RowLight(mean=surface, shares=np.ones((1, 300)), middles_s=middles_s, good=np.ones(300, np.bool_))
+        return replace(light, mean=surface * true.swing(light))
+
+    found = find_ripple(seen(0.0), seen(0.0303))
+    assert found is not None
+    assert found.hz == 120.0
+    assert abs(found.amplitude - true.amplitude) < 1e-6
+    assert find_ripple(seen(0.0), seen(0.025)) is None, "the same phase tells nothing"
+
+
+def test_dark_slots_are_read_no_further_ahead_than_the_next(plan: Plan) -> None:
+    take = shoot(plan, dimmed, frames=60)
+    read: list[int] = []
+
+    def darks() -> Iterator[Plate]:
+        for plate in take.plates:
+            if not plate.flash.lights:
+                read.append(plate.flash.index)
+                yield plate
+
+    served = 0
+    for plate in ambient.subtract(take.plates, darks=darks()):
+        served += 1
+        assert sum(index >= plate.flash.index for index in read) <= 1
+    assert served == len(take.plates)
+
+
+def test_dark_slots_that_are_torn_or_seen_in_part_do_no_harm(make_plan: PlanMaker) -> None:
+    narrow = make_plan(width_px=160, height_px=120, shutter=0.5)
+    whole = make_plan(width_px=160, height_px=120)
+    for plan, light, dropped in ((whole, dimmed, (13, 14, 37)), (narrow, held, ()), (narrow, held, (21,))):
+        take = shoot(plan, light, dropped=dropped)
+        compared = 0
+        for plate in take.without_ambient():
+            if plate.flash.lights and plate.flash.index > 8:
+                error = np.abs(plate.image - take.truth[plate.flash.slot])[plate.seen]
+                compared += error.size
+                assert error.max(initial=0) < 0.003
+        assert compared > 100_000
+
+
+def test_colour_and_mosaics_are_followed_alike(plan: Plan) -> None:
+    take = shoot(plan, dimmed)
+    tint = np.array([1.0, 0.6, 0.3], np.float32)
+    coloured = [replace(plate, image=plate.image[..., None] * tint) for plate in take.plates]
+    grey = {plate.flash.index: plate.image for plate in take.without_ambient()}
+    for plate in replace(take, plates=coloured).without_ambient():
+        assert np.abs(plate.image - grey[plate.flash.index][..., None] * tint).max() < 2e-4

@@ -1,0 +1,209 @@
+"""Rounds of plates against references by brute force: any power matrix, saturation, partial rounds, rare dark slots."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from psvideo import ambient
+from psvideo.plan import Plan, PlannedFlash
+from psvideo.sequence import Round, mixing_matrix, reference_duration_s, rounds
+from psvideo.shutter import frames_touched, row_weights
+from psvideo.split import split
+from psvideo.synth import Exposure, Noise, StrobeClock, expose
+from psvideo.synth.noise import NOISELESS
+from psvideo.timing import Flash, Timing
+
+PlanMaker = Callable[..., Plan]
+AMBIENT = 0.05
+
+
+@dataclass(frozen=True)
+class MemoryFrame:
+    index: int
+    image: np.ndarray
+
+
+def patterned(plan: Plan, flashes: list[tuple[dict[str, float], float]]) -> Plan:
+    return replace(plan, flashes=tuple(PlannedFlash(lights=lights, duration_s=s) for lights, s in flashes))
+
+
+def light_pictures(plan: Plan, *, brightest: float = 0.3) -> dict[str, np.ndarray]:
+    """What each light's full flash shows."""
+    rng = np.random.default_rng(2)
+    shape = (plan.camera.height_px, plan.camera.width_px)
+    return {name: (brightest * rng.uniform(0.05, 1, shape)).astype(np.float32) for name in plan.lights}
+
+
+def plates_under(plan: Plan, lights: dict[str, np.ndarray]) -> dict[int, np.ndarray]:
+    """What every lit slot shows: written out from the plan, light by light."""
+    shown = {}
+    for slot in plan.lit_slots:
+        flash = plan.flashes[slot]
+        shown[slot] = np.sum(
+            [
+                power * flash.duration_s / reference_duration_s(plan, name) * lights[name]
+                for name, power in flash.lights.items()
+            ],
+            axis=0,
+        ).astype(np.float32)
+    return shown
+
+
+def shoot(
+    plan: Plan, lights: dict[str, np.ndarray], *, frames: int = 36, noise: Noise = NOISELESS
+) -> tuple[Exposure, Timing]:
+    clock = StrobeClock(phase_s=0.0123, offset_ppm=30.0)
+    shot = expose(plates_under(plan, lights), plan, frames=frames, clock=clock, ambient=AMBIENT, noise=noise)
+    start_s = np.array([flash.start_s for flash in shot.flashes])
+    duration_s = np.array([flash.duration_s for flash in shot.flashes])
+    first, last = frames_touched(plan.camera, start_s, duration_s)
+    flashes = tuple(
+        Flash(
+            index=n,
+            slot=flash.slot,
+            lights=plan.flashes[flash.slot].lights,
+            start_s=flash.start_s,
+            duration_s=flash.duration_s,
+            complete=bool(first[n] >= 0 and last[n] < frames),
+        )
+        for n, flash in enumerate(shot.flashes)
+    )
+    timing = Timing(
+        clip="clip",
+        frame_period_s=plan.camera.frame_period_s,
+        exposure_s=plan.camera.exposure_s,
+        row_time_s=plan.camera.row_time_s,
+        clock_offset_ppm=30.0,
+        phase_error_rows=0.0,
+        order="marker",
+        flashes=flashes,
+    )
+    return shot, timing
+
+
+def gathered(plan: Plan, shot: Exposure, timing: Timing) -> list[Round]:
+    def frames() -> Iterator[MemoryFrame]:
+        for n, image in zip(shot.indices, shot.frames, strict=True):
+            yield MemoryFrame(n, image)
+
+    held = list(split(frames(), plan.camera, timing))
+    plates = ambient.subtract(held, darks=[plate for plate in held if not plate.flash.lights])
+    return list(rounds(plates, plan, timing.flashes))
+
+
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    powers=st.lists(
+        st.lists(st.sampled_from([0.0, 0.0, 0.25, 0.5, 1.0]), min_size=3, max_size=3), min_size=3, max_size=5
+    ),
+    durations=st.lists(st.sampled_from([0.0004, 0.0008, 0.0012]), min_size=5, max_size=5),
+    dark_every=st.integers(1, 3),
+    shutter=st.sampled_from([1.0, 0.7]),
+)
+def test_any_mixture_is_taken_apart(
+    powers: list[list[float]], durations: list[float], dark_every: int, shutter: float, make_plan: PlanMaker
+) -> None:
+    flashes = [
+        ({name: power for name, power in zip("abc", row, strict=True) if power}, duration_s)
+        for row, duration_s in zip(powers, durations, strict=False)
+    ]
+    base = make_plan(duration_s=0.0012, dark_every=dark_every, shutter=shutter, height_px=60, width_px=6)
+    plan = patterned(base, [*(flash for flash in flashes if flash[0]), ({}, 0.0012)])
+    matrix = mixing_matrix(plan)
+    if len(plan.lights) < 3 or np.linalg.matrix_rank(matrix) < 3 or np.linalg.cond(matrix) > 50:
+        return
+    lights = light_pictures(plan)
+    shot, timing = shoot(plan, lights)
+    compared = 0
+    for one in gathered(plan, shot, timing):
+        for plate in one.plates:
+            error = np.abs(plate.image - lights[plate.light])[plate.seen]
+            assert error.max(initial=0) < 1e-3
+            assert not plate.image[~plate.seen].any()
+            compared += error.size
+    assert compared > 1000 or shutter < 1, "below 360 degrees, rows may miss one flash of every round"
+
+
+HDR = [({"a": 1.0}, 0.0012), ({"a": 1.0}, 0.0003), ({"b": 1.0}, 0.0012), ({"a": 0.25}, 0.0003), ({}, 0.0012)]
+
+
+def brute_force_merge(plan: Plan, shot: Exposure, timing: Timing, flashes: list[int]) -> tuple[np.ndarray, np.ndarray]:
+    """Merge one round's flashes of light a sample by sample: clipped flashes are left out, the rest is summed.
+
+    Returns the picture, and where every flash was clipped.
+    """
+    rows, cols = shot.frames.shape[1:3]
+    weights = row_weights(plan.camera, timing.start_s, timing.duration_s, frames=range(len(shot.frames)))
+    light, exposure = np.zeros((rows, cols)), np.zeros((rows, cols))
+    for index in flashes:
+        flash = timing.flashes[index]
+        share = flash.lights["a"] * plan.flashes[flash.slot].duration_s / 0.0012
+        for row in range(rows):
+            saw = [n for n in range(len(shot.frames)) if weights[index, n, row] > 1e-9]
+            whole = [n for n in saw if weights[index, n, row] > 1 - 1e-9]
+            used = whole[:1] or saw
+            for col in range(cols):
+                samples = [float(shot.frames[n, row, col]) for n in used]
+                if max(samples) < 0.998 and sum(samples) - AMBIENT * len(samples) < 1.0:
+                    light[row, col] += sum(samples) - AMBIENT * len(samples)
+                    exposure[row, col] += share
+    return light / np.maximum(exposure, 1e-9), exposure == 0
+
+
+@pytest.mark.parametrize("noise", [NOISELESS, Noise(full_well_e=20_000, read_e=5)], ids=["clean", "noisy"])
+@pytest.mark.parametrize("dark_every", [1, 3])
+def test_hdr_merges_as_sample_by_sample(dark_every: int, noise: Noise, make_plan: PlanMaker) -> None:
+    plan = patterned(make_plan(duration_s=0.0012, dark_every=dark_every, height_px=80, width_px=10), HDR)
+    lights = light_pictures(plan) | {"a": light_pictures(plan, brightest=25.0)["a"]}
+    shot, timing = shoot(plan, lights, frames=60, noise=noise)
+    whole = [one for one in gathered(plan, shot, timing) if one.lights == ("a", "b")]
+    assert len(whole) >= 5
+    slots = [flash.slot for flash in timing.flashes]
+    held = 0
+    for one in whole[1:]:
+        merged = one.plates[0]
+        near = int(np.argmin([abs(flash.start_s - merged.time_s) for flash in timing.flashes]))
+        begin = max(n for n in range(near + 1) if slots[n] == 0)
+        group = [n for n in range(begin, begin + 4) if "a" in timing.flashes[n].lights]
+        want, clipped = brute_force_merge(plan, shot, timing, group)
+        tolerance = 1e-3 if noise is NOISELESS else 0.06  # the dark slots' own noise, 16 times as much for the weakest
+        np.testing.assert_allclose(merged.image[~clipped], want[~clipped], rtol=tolerance, atol=tolerance)
+        assert (merged.image[clipped] >= merged.saturation * 0.999).all()
+        assert (merged.image[~clipped] < merged.saturation).all()
+        held += int(clipped.sum())
+        true = lights["a"]
+        certain = ~clipped & (true > 1.2)  # beyond what the longest flash can show
+        assert certain.sum() > 300
+        assert abs(float(np.median(merged.image[certain] / true[certain])) - 1) < 0.01
+    assert held > 0
+
+
+def test_a_row_that_only_one_of_the_hdr_flashes_showed_is_taken_from_it(make_plan: PlanMaker) -> None:
+    plan = patterned(make_plan(duration_s=0.0012, shutter=0.6, height_px=80, width_px=10), HDR)
+    lights = light_pictures(plan)
+    shot, timing = shoot(plan, lights, frames=60)
+    seen = {"a": 0.0, "b": 0.0}
+    whole = [one for one in gathered(plan, shot, timing) if one.lights == ("a", "b")]
+    for one in whole:
+        for plate in one.plates:
+            seen[plate.light] += float(plate.seen.mean()) / len(whole)
+            assert np.abs(plate.image - lights[plate.light])[plate.seen].max(initial=0) < 2e-3
+    assert seen["a"] > 0.95 > 0.8 > seen["b"]
+
+
+def test_the_clip_s_ends_give_the_lights_that_are_complete_there_and_no_others(make_plan: PlanMaker) -> None:
+    plan = make_plan(height_px=60, width_px=6, dark_every=2)
+    lights = light_pictures(plan)
+    for frames in range(20, 28):
+        shot, timing = shoot(plan, lights, frames=frames)
+        found = [(plate.light, plate.time_s) for one in gathered(plan, shot, timing) for plate in one.plates]
+        want = [
+            (next(iter(flash.lights)), flash.start_s + flash.duration_s / 2)
+            for flash in timing.flashes
+            if flash.complete and flash.lights
+        ]
+        assert sorted(found, key=lambda pair: pair[1]) == want
