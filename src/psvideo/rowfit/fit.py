@@ -34,17 +34,25 @@ BETTER, LEAST_GAIN = 1e-3, 30.0
 the dark row bends errors and estimates alike."""
 SURER = 0.8
 """Share of the standard error that must be left before brightnesses are fitted anew in windows half as long."""
+SOFT_ROWS, ALIKE, SOFT_GAIN = 1.5, 1.5, 0.08
+"""Edges soft by less than so many rows, alike (within a factor) at a flash's start and end, may as well be rows that
+compression or scaling has blurred: flashes are moved for it only where that takes away such a share of the robust loss
+(H.264 makes up 0.02 to 0.05 of it, tails of a row 0.1 to 0.5)."""
 MOST_WINDOWS = 400
 MAINS_HZ = (100.0, 120.0)
 FLICKERS = 0.8
-"""Flicker is believed where it leaves less than this share of the squares that are left without it."""
+"""Flicker is believed where it leaves less than this share of the squares that are left without it, and less than this
+share of what frequencies that mains do not have leave: where many rows saturate, anything that swings explains much."""
+OTHER_SWINGS = (-2.5, -1.5, 1.5, 2.5)
+"""Frequencies tried instead, as swings more or fewer in a window: near enough to be alike, far enough to be told."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Found:
     """The fit of a whole clip: its rows with the times that their frames truly have, and which frames are repeats.
 
-    ``steps`` counts the places where frames follow otherwise than the numbering tells.
+    ``steps`` counts the places where frames follow otherwise than the numbering tells; ``soft_s`` is how soft the edges
+    are where that was not taken for LEDs' tails, else 0.
     """
 
     fit: Fit
@@ -52,6 +60,7 @@ class Found:
     track: Track
     jitter: Jitter
     steps: int
+    soft_s: float = 0.0
 
 
 def find(plan: Plan, rows: Profiles) -> Found:
@@ -76,7 +85,7 @@ def find(plan: Plan, rows: Profiles) -> Found:
     free: tuple[str, ...] = () if plan.camera.readout_s is not None else ("row_time_s",)
     fit = _with_flicker(plan, fine, _fit(plan, fine, tracked.beat, free), free)
     fine, fit, apart_s = _in_short_windows(plan, fine, fit, free)
-    freed = _freed(plan, fine, fit, free)
+    freed, soft_s = _believed(plan, fine, fit, free)
     if freed is not fit:
         apart_s = _window_error_s(plan, fine, freed)
     fit = freed
@@ -85,7 +94,7 @@ def find(plan: Plan, rows: Profiles) -> Found:
     known_s = max(fit.shift_error_s, shift_error_s(plan, fine, fit))
     error_s = float(np.sqrt(known_s**2 + stray.error_s**2 + apart_s**2))
     fit = replace(fit, shift_error_s=error_s)
-    return Found(fit=fit, rows=fine, track=tracked, jitter=stray, steps=steps)
+    return Found(fit=fit, rows=fine, track=tracked, jitter=stray, steps=steps, soft_s=soft_s)
 
 
 def _rows_needed(plan: Plan, rows: Profiles, beat: Beat) -> int:
@@ -212,11 +221,30 @@ def _apart_s(rows: Profiles, one: Beat, other: Beat) -> FloatArray:
     return apart_s
 
 
-def _freed(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> Fit:
+def _believed(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> tuple[Fit, float]:
+    """Let go of what the picture tells otherwise, but of tails only where blurred rows do not look the same.
+
+    Return too how soft the edges are where that was not taken for tails. A tail moves the start of its flash by as much
+    as it is long, a blur does not: where both would do, a wrong tail is worse.
+    """
+    names = _may_differ(plan)
+    freed = _freed(plan, rows, fit, free, names)
+    short_s, long_s = sorted((freed.beat.rise_s, freed.beat.fall_s))
+    given = plan.rise_s > 0 or plan.fall_s > 0
+    if given or short_s == 0 or long_s > min(ALIKE * short_s, SOFT_ROWS * freed.beat.row_time_s):
+        return freed, 0.0
+    before = robust_loss(rows, fit.rest, fit.rest)
+    if before - robust_loss(rows, freed.rest, fit.rest) > SOFT_GAIN * before:
+        return freed, 0.0
+    others = tuple(name for name in names if name not in ("rise_s", "fall_s"))
+    return _freed(plan, rows, fit, free, others), long_s
+
+
+def _freed(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...], may_differ: tuple[str, ...]) -> Fit:
     """Let go of the plan's values where the picture clearly tells otherwise, one after another, the clearest first."""
     refused: set[str] = set()
     while True:
-        names = tuple(name for name in _may_differ(plan) if name not in free and name not in refused)
+        names = tuple(name for name in may_differ if name not in free and name not in refused)
         name = clearest(plan, rows, fit, free, names, at_least=LEAST_GAIN)
         if name is None:
             return fit
@@ -253,10 +281,16 @@ def _may_differ(plan: Plan) -> tuple[str, ...]:
 
 def _with_flicker(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> Fit:
     """Try ambient light that flickers with the mains, and keep it where it explains much of what is left."""
-    best, best_loss = fit.beat, FLICKERS * fit.loss
-    for hz in MAINS_HZ:
+
+    def left(hz: float) -> float:
         beat = replace(fit.beat, beat_hz=(hz,))
-        loss = float((fit.weight * unexplained(plan, rows, beat, fit.weight) ** 2).sum())
-        if loss < best_loss:
-            best, best_loss = beat, loss
-    return fit if best is fit.beat else _fit(plan, rows, best, free)
+        return float((fit.weight * unexplained(plan, rows, beat, fit.weight) ** 2).sum())
+
+    hz = min(MAINS_HZ, key=left)
+    least = left(hz)
+    if least > FLICKERS * fit.loss:
+        return fit
+    window_s = float(np.median(np.diff(rows.ends_s)))
+    if least > FLICKERS * float(np.median([left(hz + swings / window_s) for swings in OTHER_SWINGS])):
+        return fit
+    return _fit(plan, rows, replace(fit.beat, beat_hz=(hz,)), free)

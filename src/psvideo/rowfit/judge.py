@@ -42,7 +42,7 @@ def convincing(found: Found) -> bool:
 def notes(plan: Plan, found: Found) -> tuple[str, ...]:
     """Return sentences on what to distrust, or to put right, although the strobe was found."""
     beat = found.fit.beat
-    said = [_clock(plan, beat), _mixed(plan, beat), _shutter(plan, found), _exposure(plan, found)]
+    said = [_clock(plan, beat), _mixed(plan, beat), _shutter(plan, found), _exposure(plan, found), _soft(found)]
     return tuple(sentence for sentence in said if sentence)
 
 
@@ -103,6 +103,16 @@ def _exposure(plan: Plan, found: Found) -> str:
     return (
         f"Whole frames grow brighter and darker by {100 * (high / low - 1):.0f} %: the camera seems to have set its "
         "exposure or gain by itself. Plates of different moments cannot be compared; film with everything fixed."
+    )
+
+
+def _soft(found: Found) -> str:
+    if found.soft_s == 0.0:
+        return ""
+    return (
+        f"The flashes' edges in the picture are soft, as when compression or scaling blurs rows, which moves no flash. "
+        f"If the LEDs themselves take {found.soft_s * 1e6:.0f} us to rise and to fall, all flashes start earlier by as "
+        "much: then give rise_s and fall_s in the plan."
     )
 
 
