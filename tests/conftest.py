@@ -1,6 +1,7 @@
 """What several tests share: where the real data lie, and small plans to try things on."""
 
-from collections.abc import Callable
+import subprocess
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from pathlib import Path
 
@@ -8,6 +9,10 @@ import pytest
 
 from psvideo.camera import Camera
 from psvideo.plan import Plan, PlannedFlash, default_dark_s
+from psvideo.strobe.limits import cycle_check
+from psvideo.strobe.messages import Arm, Slot, Steps, WiringName
+from psvideo.strobe.protocol import format_request
+from psvideo.strobe.toolchain import AVR_BOARDS, AvrBoard, build
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
@@ -60,3 +65,42 @@ def _make_plan(
         dark_every=dark_every,
         clock_tolerance_ppm=clock_tolerance_ppm,
     )
+
+
+@pytest.fixture(scope="session")
+def emulate() -> Callable[..., list[str]]:
+    """Play a script (lights/emulator/script.h) on a board fresh from power-on and return what it printed.
+
+    Where the tools are missing, tests fail with the names of the Debian packages.
+    """
+    built = {board: build(board) for board in AVR_BOARDS}
+
+    def play(
+        script: Sequence[str],
+        *,
+        board: AvrBoard = "atmega328p",
+        wiring: WiringName = "gated",
+        trace: Path | None = None,
+        breakable: bool = False,
+    ) -> list[str]:
+        """``breakable``: the build that knows HANG (lights/firmware/hang.h)."""
+        firmware = built[board].firmware
+        words = [built[board].emulator, "--board", board, "--wiring", wiring, "--script", "-"]
+        words += ["--trace", trace] if trace else []
+        words.append(firmware.with_name(f"{board}-hang.elf") if breakable else firmware)
+        text = "\n".join(["wait 5", *script, ""])
+        return subprocess.run(words, input=text, capture_output=True, text=True, check=True).stdout.splitlines()
+
+    return play
+
+
+@pytest.fixture(scope="session")
+def upload() -> Callable[..., list[str]]:
+    """Turn slots that are played once each into a script that uploads and arms them."""
+
+    def lines(slots: Sequence[Slot], *, wiring: WiringName = "gated") -> list[str]:
+        requests = [*slots, Steps(first=0, slots=tuple(range(len(slots)))), Arm(check=cycle_check(slots))]
+        sent = [format_request(request).decode().strip() for request in requests]
+        return [f"send WIRING {wiring}", *(f"send {text}" for text in sent)]
+
+    return lines

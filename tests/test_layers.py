@@ -10,7 +10,7 @@ PACKAGE = Path(__file__).resolve().parents[1] / "src" / "psvideo"
 
 LAYERS = [
     {"errors", "tomlfile", "files", "compiled"},
-    {"camera", "rig", "rigfile", "surface"},
+    {"camera", "rig", "rigfile", "surface", "tracefile"},
     {"plan", "planfile", "timing"},
     {"shutter", "clip", "strobe", "capture"},
     {"rowfit", "profiles"},
@@ -38,6 +38,7 @@ SYNTH_NEVER_USES = {
     "normals",
 } | {
     "clip",
+    "strobe",
     "pipeline",
     "runs",
 }

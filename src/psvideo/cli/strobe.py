@@ -2,8 +2,6 @@
 
 import sys
 from dataclasses import asdict
-from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 
 import typer
@@ -11,6 +9,7 @@ import typer
 import psvideo.cli.strobe_options as option
 from psvideo.cli.console import Voice
 from psvideo.cli.options import Force, Json, Quiet, Verbose
+from psvideo.cli.strobe_emulate import emulate
 from psvideo.cli.strobe_progress import watching
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.files import refuse_existing, write_text
@@ -32,8 +31,7 @@ TELLING_PPM = 1000.0
 """A clock that was measured less exactly is not worth a line: the run was short."""
 
 strobe = typer.Typer(no_args_is_help=True, help="Make lights flash as planned: on a board, or on an emulated one.")
-if find_spec("psvideo.cli.strobe_emulate") is not None:
-    strobe.command("emulate")(import_module("psvideo.cli.strobe_emulate").emulate)
+strobe.command()(emulate)
 
 
 @strobe.command("list")

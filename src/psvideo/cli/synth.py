@@ -8,12 +8,21 @@ import typer
 
 from psvideo.cli.console import Voice
 from psvideo.cli.options import Force, Json, Quiet, Verbose
+from psvideo.errors import UsageError
 from psvideo.synth.shoot import shoot
+from psvideo.synth.traced import TraceOptions
 
 
 def synth(
     scene: Annotated[Path, typer.Argument(help="A scene file, such as data_synth/bust.toml.")],
     out: Annotated[Path, typer.Option("-o", "--out", help="The clip folder to write.")],
+    trace: Annotated[
+        Path | None,
+        typer.Option("--trace", help="Light the scene by the edges of psvideo strobe emulate --trace FILE."),
+    ] = None,
+    line: Annotated[
+        list[str] | None, typer.Option("--line", metavar="NAME=NUMBER", help="The line that a light hangs on.")
+    ] = None,
     force: Force = False,
     json: Json = False,
     verbose: Verbose = False,
@@ -21,7 +30,13 @@ def synth(
 ) -> None:
     """Film a virtual scene: a clip folder as a camera would leave it, and the exact truth beside it in truth/."""
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
-    shot = shoot(scene, out, force=force, track=lambda frames: voice.track(frames, total=len(frames), what="filming"))
+    shot = shoot(
+        scene,
+        out,
+        force=force,
+        track=lambda frames: voice.track(frames, total=len(frames), what="filming"),
+        trace=_trace_options(trace, line or []),
+    )
     for warning in shot.warnings:
         voice.warn(warning)
     clock = shot.clock
@@ -32,3 +47,18 @@ def synth(
         f"{out}: {shot.frames} frames; {shot.complete} of {shot.flashes} flashes complete; truth in {out / 'truth'}"
     )
     voice.result({**dataclasses.asdict(shot), "path": str(shot.path)})
+
+
+def _trace_options(trace: Path | None, lines: list[str]) -> TraceOptions | None:
+    if trace is None:
+        if lines:
+            raise UsageError("--line: says which line of a trace a light hangs on; give --trace FILE with it.")
+        return None
+    return TraceOptions(path=trace, lines=dict(map(_line, lines)))
+
+
+def _line(text: str) -> tuple[str, int]:
+    name, equals, number = text.rpartition("=")
+    if not (equals and name and number.isdecimal()):
+        raise UsageError(f"--line {text}: expected a light's name and its line, such as --line key=0.")
+    return name, int(number)

@@ -6,6 +6,8 @@ import numpy as np
 
 from psvideo.camera import FloatArray
 
+Bursts = tuple[tuple[float, float], ...]
+
 TAILS = 16.0
 """After so many fall times a tail has given off all but 1e-7 of its light."""
 
@@ -38,9 +40,21 @@ class Emission:
         """Return the energy of the whole flash, tail included, in seconds of full light."""
         return float(self.energy(np.array(np.inf), duration_s))
 
-    def share(self, since_s: FloatArray, duration_s: float) -> FloatArray:
-        """Return the energy given off so far as a fraction of the whole flash's, 0 to 1."""
-        return self.energy(since_s, duration_s) / self.whole(duration_s)
+    def share(self, since_s: FloatArray, duration_s: float, bursts_s: Bursts = ()) -> FloatArray:
+        """Return the energy given off so far as a fraction of the whole flash's, 0 to 1.
+
+        ``bursts_s`` are starts (after the flash's) and lengths where the drive is not on throughout. Their tails add
+        up, which is exact where rise and fall are alike.
+
+        >>> float(Emission().share(np.array(0.5), 1.0, ((0.0, 0.1), (0.9, 0.1))))
+        0.5
+        """
+        if not bursts_s:
+            return self.energy(since_s, duration_s) / self.whole(duration_s)
+        given = sum(
+            (self.energy(since_s - start_s, length_s) for start_s, length_s in bursts_s), np.zeros_like(since_s)
+        )
+        return given / sum(self.whole(length_s) for _, length_s in bursts_s)
 
     def lasts_s(self, duration_s: float) -> float:
         """Return how long after the drive's start there is light, but for 1e-7 of the tail."""

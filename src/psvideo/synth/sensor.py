@@ -36,8 +36,8 @@ class Flicker:
 def seen_share(camera: Camera, emission: Emission, flash: TrueFlash, frame: int) -> FloatArray:
     """Return which fraction of a flash each row of one frame records, shape (row,)."""
     since_s = frame * camera.frame_period_s + row_opens_s(camera) - flash.start_s
-    closed = emission.share(since_s + camera.exposure_s, flash.duration_s)
-    return closed - emission.share(since_s, flash.duration_s)
+    closed = emission.share(since_s + camera.exposure_s, flash.duration_s, flash.bursts_s)
+    return closed - emission.share(since_s, flash.duration_s, flash.bursts_s)
 
 
 def expose_frames(

@@ -2,6 +2,7 @@
 
 import contextlib
 import shutil
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,11 +17,13 @@ from psvideo.rigfile import format_rig
 from psvideo.synth.encode import codes_of, mosaic, noise_of
 from psvideo.synth.frames import SUFFIX, write_frame
 from psvideo.synth.noise import frame_rng
+from psvideo.synth.render import View
 from psvideo.synth.scene import read_scene
 from psvideo.synth.sensor import Flicker, Image, expose_frames
 from psvideo.synth.shotplan import claimed_plan, true_clock
 from psvideo.synth.stage import Stage, set_stage
 from psvideo.synth.strobe import StrobeClock, TrueFlash, true_flashes
+from psvideo.synth.traced import TraceOptions, traced_light
 from psvideo.synth.truth import write_picture, write_scene_truth, write_surface, write_timing
 
 CLIPPED_WARNING = 0.005
@@ -51,18 +54,21 @@ def builtin_scene(name: str = "bust") -> Path:
     return path
 
 
-def shoot(scene: Path, out: Path, *, force: bool = False, track: Track = iter) -> Shot:
+def shoot(
+    scene: Path, out: Path, *, force: bool = False, track: Track = iter, trace: TraceOptions | None = None
+) -> Shot:
     """Film a scene file and write the clip folder ``out``, whole or not at all.
 
     The folder holds frames/, plan.toml and rig.toml as a camera and its crew would leave them, and truth/ with what
-    only the virtual shoot knows. ``track`` passes frame indices through, for showing progress. Raises UsageError where
+    only the virtual shoot knows. ``track`` passes frame indices through, for showing progress; ``trace`` lets the
+    traced edges of a strobe controller light the scene instead of the plan's ideal train. Raises UsageError where
     ``out`` exists and ``force`` is not given, PsvideoError for a faulty scene or mesh or where writing fails.
     """
     _refuse_footage(out, force=force)
     stage = set_stage(read_scene(scene), scene.parent)
     with whole_folder(out, mark="truth/scene.json", force=force) as folder, _nothing_left(folder, out):
         (folder / "frames").mkdir()
-        return _film(stage, folder, out, track)
+        return _film(stage, folder, out, track, trace)
 
 
 def _refuse_footage(out: Path, *, force: bool) -> None:
@@ -91,16 +97,20 @@ def _nothing_left(folder: Path, out: Path) -> Iterator[None]:
         raise
 
 
-def _film(stage: Stage, folder: Path, out: Path, track: Track) -> Shot:
+def _film(stage: Stage, folder: Path, out: Path, track: Track, trace: TraceOptions | None) -> Shot:
     """Expose and write frame by frame; only the plates that the current frame sees are held."""
     scene, plan = stage.scene, stage.plan
     clock = true_clock(scene)
-    flashes = true_flashes(plan, clock, frames=scene.frames, dropped=scene.dropped)
-    truth = _Truth(stage, folder / "truth")
+    traced = None if trace is None else traced_light(scene, plan, clock, trace)
+    if traced is None:
+        flashes = parts = true_flashes(plan, clock, frames=scene.frames, dropped=scene.dropped)
+    else:
+        clock, flashes, parts = traced.clock, traced.flashes, traced.parts
+    truth = _Truth(stage, folder / "truth", Counter(part.index for part in parts))
     kept = [n for n in range(scene.frames) if n not in scene.dropped]
     light = expose_frames(
         plan,
-        flashes,
+        parts,
         truth.plate,
         frames=track(kept),
         ambient_of=stage.ambient(),
@@ -111,7 +121,7 @@ def _film(stage: Stage, folder: Path, out: Path, track: Track) -> Shot:
     (folder / "plan.toml").write_text(format_plan(claimed_plan(scene)), encoding="utf-8")
     (folder / "rig.toml").write_text(format_rig(stage.rig), encoding="utf-8")
     write_timing(folder / "truth", plan, flashes, truth.plates)
-    write_scene_truth(folder / "truth", scene, plan, clock, max(clipped))
+    write_scene_truth(folder / "truth", scene, plan, clock, max(clipped), traced)
     return Shot(
         path=out,
         frames=len(kept),
@@ -145,32 +155,49 @@ def _warnings(clipped: float, flashes: int) -> Iterator[str]:
 
 
 class _Truth:
-    """Writes each flash's plate and surface as it is rendered; a scene at rest has one file per slot."""
+    """Writes each flash's plate and surface as it is rendered; a scene at rest has one file per slot and powers.
 
-    def __init__(self, stage: Stage, folder: Path) -> None:
-        self._stage, self._folder = stage, folder
-        self._by_slot: dict[int, tuple[Image, str]] = {}
+    ``parts`` counts the parts of each flash: lights that burst differently are exposed apart, and add up to its plate.
+    """
+
+    def __init__(self, stage: Stage, folder: Path, parts: Counter[int]) -> None:
+        self._stage, self._folder, self._parts = stage, folder, parts
+        self._still: dict[object, Image] = {}
+        self._names: dict[object, str] = {}
+        self._sums: dict[int, tuple[tuple[object, ...], Image]] = {}
         self.plates: dict[int, str] = {}
         folder.mkdir()
         if stage.still is not None:
             write_surface(folder, stage.still.hits, stage.scene.camera.channels)
 
     def plate(self, flash: TrueFlash) -> Image | None:
-        """Return a flash's plate, None for a dark slot; called once per flash, in order."""
+        """Return the plate of a flash or a part of one, None for a dark slot; called once for each, in order."""
         if not any(flash.lights.values()):
             return None
-        if self._stage.still is not None and flash.slot in self._by_slot:
-            image, name = self._by_slot[flash.slot]
-            self.plates[flash.index] = name
-            return image
         view = self._stage.view(flash.middle_s)
-        image = self._stage.plate(flash, view)
-        if flash.complete:
+        look = (flash.slot, *sorted(flash.lights.items()))
+        image = self._still.get(look)
+        if image is None:
+            image = self._stage.plate(flash, view)
+            if self._stage.still is not None:
+                self._still[look] = image
+        before, sum_before = self._sums.pop(flash.index, ((), None))
+        looks, whole = (*before, look), image if sum_before is None else sum_before + image
+        self._parts[flash.index] -= 1
+        if self._parts[flash.index]:
+            self._sums[flash.index] = looks, whole
+        elif flash.complete:
+            self._write(flash, looks, whole, view)
+        return image
+
+    def _write(self, flash: TrueFlash, looks: tuple[object, ...], plate: Image, view: View) -> None:
+        """Write a complete flash's plate and surface, unless a scene at rest has the same already."""
+        if looks not in self._names:
             name = f"flash_{flash.index:04d}"
-            write_picture(self._folder / "plates" / f"{name}.exr", image)
+            write_picture(self._folder / "plates" / f"{name}.exr", plate)
             self.plates[flash.index] = f"plates/{name}.exr"
             if self._stage.still is None:
                 write_surface(self._folder, view.hits, self._stage.scene.camera.channels, name)
-            else:
-                self._by_slot[flash.slot] = (image, self.plates[flash.index])
-        return image
+                return
+            self._names[looks] = self.plates[flash.index]
+        self.plates[flash.index] = self._names[looks]

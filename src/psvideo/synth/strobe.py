@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from psvideo.camera import Camera, FloatArray
 from psvideo.errors import PsvideoError
 from psvideo.plan import FlashTrain, Plan
-from psvideo.synth.emission import Emission
+from psvideo.synth.emission import Bursts, Emission
 
 TAIL_LOST = 1e-3
 """A flash with a tail is complete when no row lost more of its light; the last of a tail never ends."""
@@ -49,6 +49,7 @@ class TrueFlash:
     """One flash as it happened: ``index`` from 0 for the clip's first, times on the camera's clock.
 
     ``complete`` tells that no light of it was lost before the clip's first frame, after its last, or in a dropped one.
+    ``bursts_s`` are starts (after the flash's) and lengths where the light is not on throughout.
     """
 
     index: int
@@ -57,6 +58,7 @@ class TrueFlash:
     start_s: float
     duration_s: float
     complete: bool
+    bursts_s: Bursts = ()
 
     @property
     def middle_s(self) -> float:
@@ -75,6 +77,11 @@ def row_opens_s(camera: Camera) -> FloatArray:
     return step_s * (order if camera.row_time_s >= 0 else order[::-1])
 
 
+def clip_end_s(camera: Camera, frames: int) -> float:
+    """Return when the last row of a clip's last frame closes."""
+    return (frames - 1) * camera.frame_period_s + float(row_opens_s(camera).max()) + camera.exposure_s
+
+
 def true_flashes(
     plan: Plan, clock: StrobeClock, *, frames: int, dropped: frozenset[int] = frozenset()
 ) -> tuple[TrueFlash, ...]:
@@ -84,7 +91,7 @@ def true_flashes(
     synced flash does not fit into the time in which all rows are open.
     """
     camera = plan.camera
-    end_s = (frames - 1) * camera.frame_period_s + float(row_opens_s(camera).max()) + camera.exposure_s
+    end_s = clip_end_s(camera, frames)
     train, start_s, duration_s = _synced(plan, frames) if plan.mode == "synced" else _free(plan, clock, end_s)
     emission = Emission(rise_s=plan.rise_s, fall_s=plan.fall_s)
     seen = (start_s + duration_s + emission.lasts_s(0.0) > 0.0) & (start_s < end_s)
@@ -96,7 +103,7 @@ def true_flashes(
             lights=plan.flashes[train.slot[k]].lights,
             start_s=float(start_s[k]),
             duration_s=float(duration_s[k]),
-            complete=_is_complete(camera, emission, float(start_s[k]), float(duration_s[k]), recorded),
+            complete=is_complete(camera, emission, float(start_s[k]), float(duration_s[k]), recorded),
         )
         for index, k in enumerate(np.flatnonzero(seen))
     )
@@ -128,7 +135,7 @@ def _synced(plan: Plan, frames: int) -> tuple[FlashTrain, FloatArray, FloatArray
     return train, start_s, train.duration_s
 
 
-def _is_complete(
+def is_complete(
     camera: Camera, emission: Emission, start_s: float, duration_s: float, recorded: NDArray[np.intp]
 ) -> bool:
     """Tell whether no light of the flash fell into frames that were not recorded."""

@@ -12,6 +12,7 @@ from psvideo.plan import Plan
 from psvideo.synth.render import Hits
 from psvideo.synth.scene import Scene
 from psvideo.synth.strobe import StrobeClock, TrueFlash
+from psvideo.synth.traced import TracedLight
 
 Plane = NDArray[np.float32]
 
@@ -65,14 +66,18 @@ def write_timing(folder: Path, plan: Plan, flashes: tuple[TrueFlash, ...], plate
             "duration_s": flash.duration_s,
             "complete": flash.complete,
         }
+        if flash.bursts_s:
+            row["bursts"] = len(flash.bursts_s)
         rows.append(row | ({"plate": plates[flash.index]} if flash.index in plates else {}))
     data = {"row_time_s": plan.camera.row_time_s, "flashes": rows}
     (folder / "timing.json").write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
 
 
-def write_scene_truth(folder: Path, scene: Scene, plan: Plan, clock: StrobeClock, clipped: float) -> None:
+def write_scene_truth(
+    folder: Path, scene: Scene, plan: Plan, clock: StrobeClock, clipped: float, traced: TracedLight | None
+) -> None:
     """Write scene.json: what the plan beside the footage does not tell."""
-    data = {
+    data: dict[str, object] = {
         "phase_s": clock.phase_s,
         "clock_offset_ppm": clock.offset_ppm,
         "drift_ppm_per_s": clock.drift_ppm_per_s,
@@ -86,4 +91,7 @@ def write_scene_truth(folder: Path, scene: Scene, plan: Plan, clock: StrobeClock
         "clipped_share": clipped,
         "scene": scene.model_dump(by_alias=True),
     }
+    if traced is not None:
+        trace = traced.trace
+        data["trace"] = {"board": trace.board, "hz": trace.hz, "wiring": trace.wiring, "cycle": traced.first_cycle}
     (folder / "scene.json").write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")

@@ -1,0 +1,108 @@
+"""psvideo strobe emulate: a strobe controller without a board."""
+
+import contextlib
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from types import FrameType
+from typing import Annotated, Literal
+
+import typer
+
+from psvideo.cli.console import Voice
+from psvideo.cli.options import Force, Quiet
+from psvideo.errors import UsageError
+from psvideo.files import refuse_existing, whole_file
+from psvideo.strobe.boards import BOARDS
+from psvideo.strobe.emulated import EmulatedController
+from psvideo.strobe.imitation import TRACE_HZ, open_port, serve
+from psvideo.strobe.messages import WiringName
+from psvideo.strobe.simulated import Simulation, simulated_board
+from psvideo.strobe.toolchain import AvrBoard, why_not
+from psvideo.tracefile import SCHEMA, TraceWriter
+
+LOOK_EVERY_S = 0.2
+IMITATED: AvrBoard = "atmega328p"
+"""The board whose limits the Python emulation has."""
+
+BoardChoice = Literal["atmega328p", "atmega2560", "python"]
+
+
+def emulate(
+    board: Annotated[
+        BoardChoice | None,
+        typer.Option(
+            help="The chip that runs the real firmware, or python, which imitates it. Left out: atmega328p where it "
+            "can be built, else python."
+        ),
+    ] = None,
+    wiring: Annotated[
+        WiringName, typer.Option(help="How the lights hang on the board (lights/protocol.md).")
+    ] = "gated",
+    trace: Annotated[
+        Path | None, typer.Option("--trace", help="Write every edge to this file, for psvideo synth --trace.")
+    ] = None,
+    fast: Annotated[
+        bool, typer.Option("--fast", help="As fast as it goes; then only virtual time counts, keep-alive included.")
+    ] = False,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Emulate a strobe controller: print its port, run until stopped (Ctrl-C). Other commands take it with --port."""
+    voice = Voice(quiet=quiet)
+    if trace is not None:
+        refuse_existing(trace, force=force, mark=SCHEMA)
+    reason = None if board is not None else why_not()
+    if reason is not None:
+        voice.warn(f"{reason}; the Python emulation answers instead.")
+    chosen: BoardChoice = board or (IMITATED if reason is None else "python")
+    if chosen == "python":
+        if fast:
+            raise UsageError("--fast: the Python emulation keeps the wall's time; --fast is for the real firmware.")
+        _imitate(voice, wiring, trace)
+    else:
+        _run_firmware(voice, Simulation(board=chosen, wiring=wiring, trace=trace, fast=fast))
+
+
+def _run_firmware(voice: Voice, wish: Simulation) -> None:
+    with _until_stopped() as stopped, simulated_board(wish) as simulated:
+        _introduce(voice, simulated.port, f"the real firmware on an emulated {wish.board}", wish.trace)
+        while simulated.is_running and not stopped.wait(LOOK_EVERY_S):
+            pass
+
+
+def _imitate(voice: Voice, wiring: WiringName, trace: Path | None) -> None:
+    with _until_stopped() as stopped, contextlib.ExitStack() as stack:
+        writer = None
+        if trace is not None:
+            file = stack.enter_context(stack.enter_context(whole_file(trace)).open("w", encoding="ascii"))
+            writer = TraceWriter(file, board=IMITATED, hz=TRACE_HZ, wiring=wiring)
+        port = stack.enter_context(contextlib.closing(open_port()))
+        _introduce(voice, port.name, f"a Python emulation of an {IMITATED}", trace)
+        serve(EmulatedController(BOARDS[IMITATED]), port, stopped=stopped.is_set, trace=writer)
+
+
+def _introduce(voice: Voice, port: str, what: str, trace: Path | None) -> None:
+    print(port, flush=True)
+    voice.say(f"{what}; psvideo strobe run plan.toml --port {port} plays a plan on it. Ctrl-C ends it.")
+    if trace is not None:
+        voice.say(f"Every edge goes to {trace}, which is there when this ends.")
+    sys.stdout.flush()
+
+
+@contextlib.contextmanager
+def _until_stopped() -> Iterator[threading.Event]:
+    """Give an event that Ctrl-C and SIGTERM set, so that everything is closed in order."""
+    stopped = threading.Event()
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        stopped.set()
+
+    before = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield stopped
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
