@@ -7,7 +7,7 @@ import numpy as np
 from scipy.linalg import solveh_banded
 
 from psvideo import hudon2015
-from psvideo.ambient import Ambient, held, subtract
+from psvideo.ambient import subtract
 from psvideo.camera import Camera
 from psvideo.plan import Plan
 from psvideo.split import Plate, split
@@ -88,13 +88,9 @@ def plate_errors(
 
 
 def _without_ambient(plates: list[Plate]) -> list[Plate]:
-    """Take the ambient light off, the first dark slot's before it, as the pipeline does."""
-    dark = next((plate for plate in plates if not any(plate.flash.lights.values())), None)
-    first = None
-    if dark is not None:
-        slots = np.zeros(dark.image.shape[:2], np.float32)
-        first = Ambient(image=held(dark.image), slots=slots, known=dark.seen)
-    return list(subtract(plates, first=first))
+    """Take the ambient light off between the dark slots before and after, as the pipeline does."""
+    darks = [plate for plate in plates if not any(plate.flash.lights.values())]
+    return list(subtract(plates, darks=darks))
 
 
 def oracle(plan: Plan, flashes: Sequence[TrueFlash], frames: Mapping[int, Picture]) -> tuple[np.ndarray, np.ndarray]:
