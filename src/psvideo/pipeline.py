@@ -209,7 +209,11 @@ def _dark_plates(take: Take, camera: Camera, timing: Timing, places: Mapping[int
         if dark.complete and not any(dark.lights.values()):
             touched = range(first[dark.index], last[dark.index] + 1)
             near = tuple(number_at[place] for place in touched if place in number_at)
-            plate = plate_of(dark, _placed(read_frames(take.clip, near, kept=take.kept), places), camera, timing) if near else None
+            plate = (
+                plate_of(dark, _placed(read_frames(take.clip, near, kept=take.kept), places), camera, timing)
+                if near
+                else None
+            )
             if plate is not None:
                 yield plate
             del plate

@@ -16,7 +16,6 @@ from fileseq.frameset import FrameSet
 from psvideo.clip.decoders import decode
 from psvideo.clip.kept import Kept
 from psvideo.clip.linear import linear_light
-from psvideo.clip.movie import read_movie
 from psvideo.clip.record import Clip, Frame, Header, Picture
 from psvideo.errors import PsvideoError, UsageError
 
@@ -77,6 +76,8 @@ def _decoder(clip: Clip, numbers: list[int]) -> Callable[[int], Picture]:
     """Return what decodes a frame; a movie's are asked for in the order of ``numbers``."""
     if not clip.is_movie:
         return lambda number: decode(clip.kind, clip.file_of(number))
+    from psvideo.clip.movie import read_movie  # FFmpeg's libraries take memory: only where there is a movie
+
     pictures = read_movie(clip.path, [clip.timestamps[bisect_left(clip.numbers, number)] for number in numbers])
     return lambda _: next(pictures)
 
