@@ -169,7 +169,7 @@ def clip_plates(take: Take, timing: Timing, *, method: Method = "weights", watch
     clip, camera = take.clip, timed_camera(take.plan, timing)
     places = places_in_time(timing, clip.numbers)
     used = _within(timing, camera, take, places)
-    decoded = read_frames(clip, take.numbers, ahead=AHEAD, kept=take.kept)
+    decoded = read_frames(clip, take.numbers, ahead=AHEAD, threads=ALL_CORES, kept=take.kept)
     frames = _placed(watch(decoded, total=len(take.numbers), what="rebuilding flashes"), places)
     rebuild = split if method == "weights" else hudon2015.split
     plates = subtract(rebuild(frames, camera, used), darks=_dark_plates(take, camera, used, places))

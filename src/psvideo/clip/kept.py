@@ -55,6 +55,13 @@ class Kept:
         """How many pictures are kept."""
         return len(self._places)
 
+    def close(self) -> None:
+        """Give the disk back; whoever still wants to keep a picture finds no room."""
+        with self._lock:
+            self._most_bytes = 0
+            self._places.clear()
+            self._file.close()
+
     def put(self, number: int, picture: Picture) -> None:
         """Keep a picture, if there is room for it; a disk that turns out to be full ends the keeping, not the run."""
         codes = np.ascontiguousarray(picture.codes)
@@ -108,11 +115,14 @@ def keeping_near(output: Path) -> Iterator[Kept]:
     folder = next(parent for parent in output.absolute().parents if parent.is_dir())
     try:
         most_bytes = int(shutil.disk_usage(folder).free * SHARE_OF_FREE_SPACE)
-        opened = tempfile.TemporaryFile(dir=folder, prefix=".psvideo-", buffering=0)  # noqa: SIM115, closed below
+        opened = tempfile.TemporaryFile(dir=folder, prefix=".psvideo-", buffering=0)  # noqa: SIM115, closed by Kept
     except OSError as fault:
         raise PsvideoError(
             f"{folder}: no file can be made here ({fault.strerror or fault}), and {output.name} would be. Check the "
             "folder's permissions, or name another output."
         ) from fault
-    with opened as file:
-        yield Kept(file, most_bytes=most_bytes)
+    kept = Kept(opened, most_bytes=most_bytes)
+    try:
+        yield kept
+    finally:
+        kept.close()
