@@ -4,6 +4,7 @@ Every step is a function or a generator; nothing here holds state, and a clip of
 constant memory.
 """
 
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -166,6 +167,7 @@ def clip_rounds(
 
 def clip_plates(take: Take, timing: Timing, *, method: Method = "weights", watch: Watch = unwatched) -> Iterator[Plate]:
     """Decode a take once and yield the plate of every flash that it holds, ambient light taken off, demosaiced."""
+    _decode_ahead(take, watch)
     clip, camera = take.clip, timed_camera(take.plan, timing)
     places = places_in_time(timing, clip.numbers)
     used = _within(timing, camera, take, places)
@@ -174,6 +176,15 @@ def clip_plates(take: Take, timing: Timing, *, method: Method = "weights", watch
     rebuild = split if method == "weights" else hudon2015.split
     plates = subtract(rebuild(frames, camera, used), darks=_dark_plates(take, camera, used, places))
     return map(_colour_of(clip), plates)
+
+
+def _decode_ahead(take: Take, watch: Watch) -> None:
+    """Decode all frames into the take's store, unless the fit did: dark slots are read ahead, out of order."""
+    clip, kept = take.clip, take.kept
+    dark = len(take.plan.lit_slots) < len(take.plan.flashes)
+    if kept is not None and dark and not (len(kept) or kept.missed):
+        frames = read_frames(clip, take.numbers, ahead=ALL_CORES, threads=ALL_CORES, kept=kept, keep=True)
+        deque(watch(frames, total=len(take.numbers), what="decoding"), maxlen=0)
 
 
 def timed_camera(plan: Plan, timing: Timing) -> Camera:
@@ -209,11 +220,8 @@ def _dark_plates(take: Take, camera: Camera, timing: Timing, places: Mapping[int
         if dark.complete and not any(dark.lights.values()):
             touched = range(first[dark.index], last[dark.index] + 1)
             near = tuple(number_at[place] for place in touched if place in number_at)
-            plate = (
-                plate_of(dark, _placed(read_frames(take.clip, near, kept=take.kept), places), camera, timing)
-                if near
-                else None
-            )
+            frames = _placed(read_frames(take.clip, near, kept=take.kept), places)
+            plate = plate_of(dark, frames, camera, timing) if near else None
             if plate is not None:
                 yield plate
             del plate

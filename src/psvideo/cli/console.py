@@ -65,7 +65,7 @@ def tell_kept(voice: Voice, kept: Kept | None) -> None:
     if kept.missed:
         voice.warn(
             f"{kept.missed} decoded frames found no room on the output's disk, half of whose free space may be taken, "
-            "and were decoded twice. Make room there, or find the flashes first with psvideo sync and give --timing."
+            "and were decoded again where they were needed. Make room there, or name an output on another disk."
         )
 
 
