@@ -2,7 +2,7 @@
 
 The clips are 1080p colour in 16-bit PNG, three lights or eight, noise and all. Decoding and encoding alone use the same
 functions as the run does: decoding once with the threads that a caller gets unless told, and once with all cores, as in
-the run. Every command is a process of its own, in turn; the least of three times counts, because others use the machine
+the run. Every command is a process of its own, in turn; the lesser of two times counts, because others use the machine
 too.
 """
 
@@ -28,7 +28,7 @@ from psvideo.rigfile import format_rig
 from psvideo.synth import Noise, StrobeClock, expose
 
 SHORT, LONG = 40, 100
-REPEATS = 3
+REPEATS = 2
 REPEATED = 8
 THREE = {"key": (0.5, 0.4, 0.768), "left": (-0.6, 0.2, 0.775), "right": (0.1, -0.5, 0.86)}
 RING = {f"l{k}": (0.5 * math.cos(0.3 + k * math.pi / 4), 0.5 * math.sin(0.3 + k * math.pi / 4), 0.86) for k in range(8)}
