@@ -17,12 +17,14 @@ from psvideo.camera import Camera, FloatArray
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.plan import Plan
 from psvideo.rowfit.beat import Beat, train_until
-from psvideo.rowfit.fit import Found, window_frames
+from psvideo.rowfit.course import window_frames
+from psvideo.rowfit.fit import Found
+from psvideo.rowfit.frame_remarks import remarks_on_frames
 from psvideo.rowfit.judge import judged
 from psvideo.rowfit.order import turns
 from psvideo.rowfit.profiles import Profiles
 from psvideo.rowfit.refine import Fit
-from psvideo.rowfit.refusal import nothing_to_find, why_not
+from psvideo.rowfit.refusal import clock_too_far, nothing_to_find, why_not
 from psvideo.rowfit.remarks import remarks, remarks_on_lights
 from psvideo.shutter import frames_touched
 from psvideo.timing import DroppedFrames, Flash, Order, Timing
@@ -76,12 +78,16 @@ def find_timing(
         clip=clip,
         dropped=_all_dropped(dropped, numbered, np.asarray(indices), found.track.index),
         repeated=tuple(int(number) for number in numbered[found.track.repeated]),
-        notes=remarks(plan, found) + remarks_on_lights(plan, found, beat, named=order != "guess"),
+        notes=(
+            *remarks(plan, found),
+            *remarks_on_lights(plan, found, beat, named=order != "guess"),
+            *remarks_on_frames(plan, found, np.asarray(indices)),
+        ),
     )
 
 
 def _not_found(plan: Plan, rows: Profiles, found: Found, clip: str) -> str:
-    reason = why_not(plan, rows)
+    reason = why_not(plan, rows) or clock_too_far(plan, found)
     return (
         f"{clip}: no strobe like the plan's was found in the picture: the best fit explains "
         f"{100 * max(found.fit.explained, 0):.0f} % of the rows' changes from frame to frame"
@@ -172,7 +178,7 @@ def _assemble(
     start_s = train.start_s + found.jitter.of(train.start_s)
     first, last = frames_touched(camera, start_s, train.duration_s)
     seen = (last >= index[0]) & (first <= index[-1])
-    complete = (first >= index[0]) & (last <= index[-1])
+    complete = (first >= found.trusted[0]) & (last <= found.trusted[1])
     flashes = tuple(
         Flash(
             index=number,

@@ -2,20 +2,19 @@
 
 from dataclasses import dataclass, replace
 
-from psvideo.plan import UNKNOWN_CLOCK_PPM, Plan
-from psvideo.rowfit.fit import Found, find, gain_of
+from psvideo.plan import Plan
+from psvideo.rowfit.course import too_many
+from psvideo.rowfit.fit import Found, find
 from psvideo.rowfit.profiles import Profiles, unexplained
 from psvideo.rowfit.refine import freedom, refine, robust_loss
+from psvideo.rowfit.refusal import MOST_PPM
 from psvideo.rowfit.rivals import BETTER, CLEARLY, FAIR, camera_rivals, double_rivals, likeliest, strobe_rivals
+from psvideo.rowfit.seed import gain_of
 
 MIN_EXPLAINED, MIN_GAIN = 0.5, 0.3
 """A fit that explains less of the rows' changes, or takes less of the robust loss away, has not found a strobe."""
 LUCK = 0.25
 """Share of noise that the best place of a search explains besides what brightnesses do anywhere."""
-MOST_STEPS, MOST_STEPS_SHARE = 3, 0.04
-"""Frames before which others may be missing (or a share of all frames) until only an excellent fit is believed."""
-MOST_PPM = 1.5 * UNKNOWN_CLOCK_PPM
-"""No two clocks are further apart than this, errors of short clips included."""
 LOST = 0.5
 """Times whose standard error is more than this share of the shortest flash are not found."""
 UNSURE_GAIN, UNSURE = 0.7, 0.1
@@ -76,7 +75,7 @@ def convincing(plan: Plan, found: Found) -> bool:
     rows, fit = found.rows, found.fit
     by_chance = 1 - freedom(plan, rows, fit.beat)
     share, explained = gain_of(rows, fit.rest), fit.explained
-    often = found.steps > max(MOST_STEPS, MOST_STEPS_SHARE * len(rows.value))
+    often = too_many(found.steps, len(rows.value))
     return (
         explained > max(MIN_EXPLAINED, by_chance + LUCK * (1 - by_chance))
         and share > max(MIN_GAIN, by_chance)

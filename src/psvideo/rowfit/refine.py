@@ -172,7 +172,8 @@ def projected(
     common = basis[knots:]
     for w, matrix in enumerate(windows):
         local = np.vstack([basis[w], basis[w + 1], common])
-        hessian += local.T @ matrix @ local
+        moved = np.flatnonzero(local.any(axis=0))
+        hessian[np.ix_(moved, moved)] += local[:, moved].T @ matrix @ local[:, moved]
     window = np.searchsorted(rows.window_start, np.arange(len(rows.value)), side="right") - 1
     scores = score[:, :1] * basis[window] + score[:, 1:2] * basis[window + 1] + score[:, 2:] @ common
     return rest, hessian, scores

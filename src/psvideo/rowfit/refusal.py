@@ -4,11 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from psvideo.plan import Plan
-from psvideo.rowfit.fit import SEARCH_ROWS, first_guess, gain_of
+from psvideo.plan import UNKNOWN_CLOCK_PPM, Plan
+from psvideo.rowfit.fit import Found
 from psvideo.rowfit.profiles import Profiles, unexplained
 from psvideo.rowfit.rivals import Rival, likeliest, likely_rates, strobe_rivals
 from psvideo.rowfit.search import search
+from psvideo.rowfit.seed import SEARCH_ROWS, first_guess, gain_of
 
 STEADY = 0.02
 """Rows that change by less than this share of their light from frame to frame saw no strobe."""
@@ -21,6 +22,8 @@ NOISE = 0.15
 WRONG_PERIOD_GAIN = 0.6
 OTHER_PERIOD = 0.02
 """Share by which the time from flash to flash must be off to be called another one."""
+MOST_PPM = 1.5 * UNKNOWN_CLOCK_PPM
+"""No two clocks are further apart than this, errors of short clips included."""
 PERIOD_FRAMES, PERIOD_ROWS = 14, 8
 
 
@@ -90,6 +93,20 @@ def why_not(plan: Plan, rows: Profiles) -> str:
             "Check that the strobe played, and that exposure and gain were fixed."
         )
     return _other_strobe(plan, rows)
+
+
+def clock_too_far(plan: Plan, found: Found) -> str:
+    """Return which number of the plan to doubt where the fit slipped to a clock beyond those searched; or nothing."""
+    ppm = found.fit.beat.clock.mean_offset_ppm()
+    if abs(ppm) < MOST_PPM or found.steps:
+        return ""
+    flash_s = plan.cycle_s / len(plan.cycle_slots)
+    return (
+        f"It puts the strobe's clock {ppm:+.0f} ppm off the camera's, beyond the {UNKNOWN_CLOCK_PPM:.0f} ppm that are "
+        f"searched: one flash every {flash_s * (1 + ppm * 1e-6) * 1e3:.4g} ms, where the plan says "
+        f"{flash_s * 1e3:.4g} ms. No clock is off by so much: check duration_s and dark_s of the strobe, and fps "
+        f"({float(plan.camera.fps):.6g}) and exposure of the camera."
+    )
 
 
 def _repeats(plan: Plan, rows: Profiles) -> bool:

@@ -12,9 +12,9 @@ from typing import Literal
 import numpy as np
 
 from psvideo.plan import Plan
-from psvideo.rowfit.fit import MISNAMED_PPM, SEARCH_ROWS, first_guess, seeded
 from psvideo.rowfit.profiles import Profiles
 from psvideo.rowfit.search import search
+from psvideo.rowfit.seed import MISNAMED_PPM, SEARCH_ROWS, first_guess, seeded
 
 SHUTTERS_DEG = (360.0, 270.0, 240.0, 216.0, 180.0, 172.8, 144.0, 120.0, 90.0, 72.0, 60.0, 45.0, 22.5, 11.25)
 SHUTTERS_S = tuple(1.0 / n for n in (24, 25, 30, 48, 50, 60, 96, 100, 120, 125, 160, 200, 240, 250, 500, 1000))
