@@ -52,7 +52,9 @@ class Filmed:
 class Case:
     """One virtual shoot: ``plan`` is what happened, ``claimed`` what plan.toml says of it (the same if None).
 
-    ``told`` says that the numbering shows the dropped frames, ``recorder`` what kind of file the clip goes through.
+    ``told`` says that the numbering shows the dropped frames, ``recorder`` what kind of file the clip goes through. The
+    clip goes on by ``step`` frames a frame, rounded down; ``recoded`` is what encoding it again adds to each row's
+    mean, in standard deviations of the picture.
     """
 
     plan: Plan
@@ -64,6 +66,8 @@ class Case:
     flicker: Flicker | None = None
     dropped: tuple[int, ...] = ()
     repeated: tuple[int, ...] = ()
+    step: Fraction = Fraction(1)
+    recoded: float = 0.0
     told: bool = False
     marker: bool = True
     recorder: Recorder | None = None
@@ -88,13 +92,18 @@ class Case:
             seed=seed,
         )
         pictures = shot.frames if self.recorder is None else _through(self.recorder, self.plan, shot.frames)
-        order = np.sort(np.concatenate([np.arange(len(pictures)), np.array(self.repeated, np.int64)]))
+        shown = np.arange(int(len(pictures) / self.step)) * self.step.numerator // self.step.denominator
+        order = np.sort(np.concatenate([shown, np.array(self.repeated, np.int64)]))
+        added = self.recoded * float(np.std(pictures[0])) * rng.standard_normal((len(order), len(pictures[0]), 1))
         numbers = np.array(shot.indices) if self.told else np.arange(len(order))
         again = np.append(False, np.diff(order) == 0)
         return Filmed(
             exposure=shot,
             plate_of=plate_of,
-            frames=[HeldFrame(int(number), pictures[n]) for number, n in zip(numbers, order, strict=True)],
+            frames=[
+                HeldFrame(int(number), np.asarray(pictures[n] + more, np.float32) if self.recoded else pictures[n])
+                for number, n, more in zip(numbers, order, added, strict=True)
+            ],
             true_index=np.where(again, -1, np.array(shot.indices)[order]),
         )
 
@@ -129,6 +138,7 @@ def groups() -> dict[str, dict[str, Case]]:
         "Other light": _other_light(),
         "Flashes": _flashes(),
         "Frames missing or twice": _holes(),
+        "Movies re-timed": _retimed(),
         "Files": _files(),
         "Several at once": _combined(),
     }
@@ -228,12 +238,31 @@ def _flashes() -> dict[str, Case]:
 
 def _holes() -> dict[str, Case]:
     plain = plan_of()
+    at_random = tuple(np.random.default_rng(0).choice(np.arange(1, 300), 18, replace=False).tolist())
     return {
         "dropped, numbers tell": Case(plan=plain, dropped=(31, 32, 60), told=True),
         "dropped, nothing tells": Case(plan=plain, dropped=(31, 32, 60)),
         "dropped near either end": Case(plan=plain, dropped=(5, 90)),
         "one repeated": Case(plan=plain, repeated=(50,)),
         "one repeated for one dropped": Case(plan=plain, dropped=(40,), repeated=(39,)),
+        "dropped before the last frame": Case(plan=plain, dropped=(94,)),
+        "dropped after the first frame": Case(plan=plain, dropped=(1, 2)),
+        "6 of 100 dropped at random": Case(plan=plain, dropped=at_random, frames=300),
+    }
+
+
+def _retimed() -> dict[str, Case]:
+    plain, wide = plan_of(), plan_of(tolerance_ppm=None)
+    sixth, four_fifths = Fraction(6, 5), Fraction(4, 5)
+    return {
+        "every 6th missing (30 to 25)": Case(plan=plain, step=sixth, frames=120),
+        "3 of 5 missing (60 to 24)": Case(plan=plain, step=Fraction(5, 2), frames=240),
+        "every 2nd missing": Case(plan=plain, step=Fraction(2), frames=200),
+        "one of five repeated, encoded again": Case(plan=plain, step=four_fifths, recoded=0.01),
+        "2:3 repeats, encoded again": Case(plan=plain, step=Fraction(2, 5), recoded=0.01),
+        "every 6th missing, void": Case(plan=plain, scene=void, step=sixth, frames=120),
+        "every 6th missing, global shutter": Case(plan=plan_of(readout=0.0), step=sixth, frames=120),
+        "every 6th missing, 3000 ppm": Case(plan=wide, step=sixth, frames=120, clock=_clock(3000)),
     }
 
 
