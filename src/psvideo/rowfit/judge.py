@@ -21,6 +21,8 @@ UNSURE_GAIN, UNSURE = 0.7, 0.1
 """A fit that takes less of the robust loss away, or is unsure by such a share of a flash, is worth a second look."""
 MOVED = 0.05
 """So is one that had to move the exposure or the readout by more than this share."""
+GAPPED = 0.8
+"""A fit that needs frames to be missing and explains less than this share of the changes is worth one, too."""
 OTHER_LENGTHS = (0.5, 0.7, 1.4, 2.0)
 LENGTH_FRAMES = 200
 FLASHES_DIFFER = 0.7
@@ -47,7 +49,7 @@ def judged(plan: Plan, rows: Profiles) -> Verdict:
         return Verdict(plan=plan, found=found, believed=True)
     meant, found = _as_meant(plan, rows, found)
     believed = convincing(meant, found)
-    if believed and (_unsure(meant, found) or flashes_differ(meant, found)):
+    if believed and (_unsure(meant, found) or _gaps_feigned(found) or flashes_differ(meant, found)):
         believed = likeliest(meant, rows, list(strobe_rivals(plan))) is None
     return Verdict(plan=meant, found=found, believed=believed)
 
@@ -95,6 +97,7 @@ def doubtful(plan: Plan, found: Found) -> bool:
         moved
         or gain_of(found.rows, found.fit.rest) < UNSURE_GAIN
         or _unsure(plan, found)
+        or _gaps_feigned(found)
         or not convincing(plan, found)
         or flashes_differ(plan, found)
     )
@@ -102,6 +105,11 @@ def doubtful(plan: Plan, found: Found) -> bool:
 
 def _unsure(plan: Plan, found: Found) -> bool:
     return found.slack_s == 0 and found.fit.shift_error_s > UNSURE * _shortest_s(plan)
+
+
+def _gaps_feigned(found: Found) -> bool:
+    """Tell whether holes may only stand for a strobe that drifts away from the plan's: true ones leave little."""
+    return found.steps > 0 and found.fit.explained < GAPPED
 
 
 def flashes_differ(plan: Plan, found: Found) -> bool:
