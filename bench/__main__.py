@@ -10,4 +10,7 @@ TABLES = ("kernel", "reconstruction", "whole_run", "timing", "strobe")
 for name in sys.argv[1:] or TABLES:
     module = import_module(f"bench.{name}")
     print(f"\n## {module.__doc__.splitlines()[0]}\n", flush=True)
-    print(table(module.rows()), flush=True)
+    lines = list(module.rows())
+    print(table(lines), flush=True)
+    if hasattr(module, "summary"):
+        print(f"\n{table(module.summary(lines))}", flush=True)

@@ -262,3 +262,21 @@ def test_colour_and_mosaics_are_followed_alike(plan: Plan) -> None:
     grey = {plate.flash.index: plate.image for plate in take.without_ambient()}
     for plate in replace(take, plates=coloured).without_ambient():
         assert np.abs(plate.image - grey[plate.flash.index][..., None] * tint).max() < 2e-4
+
+
+def test_ripples_of_an_average_of_hundreds_of_dark_slots_die_out() -> None:
+    rng = np.random.default_rng(4)
+    size, row = (240, 64), np.ones((1, 240))
+
+    def dark(index: int, light: np.ndarray) -> Plate:
+        flash = Flash(index=index, slot=0, lights={}, start_s=index / 30, duration_s=1e-3, complete=True)
+        image = (light + 2e-3 * rng.standard_normal(size)).astype(np.float32)
+        return Plate(flash=flash, image=image, shares=row, middles_s=row * index / 30, seen=np.ones(240, bool))
+
+    waves = 1 + 0.05 * np.sin(np.arange(240)[:, None] * np.linspace(0.1, 0.6, 64))  # every length that a window turns
+    averaged = None
+    for index in range(200):
+        swing = 1 + 0.1 * (index % 2)  # so that there is always a level to follow
+        averaged = ambient.update(averaged, dark(index, LEVEL * swing * (waves if index < 3 else 1)))
+    assert averaged is not None
+    assert rms(averaged.image - LEVEL * swing) < 1.5e-3

@@ -69,6 +69,19 @@ def test_the_strobe_s_tolerance_has_its_part_in_the_error(make_plan: PlanMaker) 
     assert loose.error_s > 20 * exact.error_s
 
 
+def test_a_tolerance_that_is_given_counts_instead_of_the_plan_s(
+    shared_data: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    clip = str(shared_data / "clips" / "plain")
+    found = []
+    for arguments in ([], ["--led-tolerance-ppm", "5000"]):
+        assert main(["calibrate", "readout", clip, "--json", *arguments]) == 0
+        found.append(json.loads(capsys.readouterr().out))
+    assert found[1]["tolerance_ppm"] == 5000
+    assert found[1]["clock_error_s"] == pytest.approx(found[1]["readout_s"] * 5000e-6 / np.sqrt(3))
+    assert found[0]["clock_error_s"] < 0.2 * found[1]["clock_error_s"]
+
+
 def test_a_timing_that_took_the_plan_s_word_is_no_measurement(make_plan: PlanMaker) -> None:
     plan = make_plan(mode="synced", readout=0.0)
     timing = find_timing(plan, np.arange(8), np.zeros((8, plan.camera.height_px)))

@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from psvideo.camera import Encoding
-from psvideo.clip import open_clip, read_frames
+from psvideo.clip import keeping_near, movie, open_clip, read_frames
 from psvideo.clip.yuv import CODES, HIGHEST, LOWEST, to_rgb
 from psvideo.errors import PsvideoError
 from psvideo.plan import Plan
@@ -198,6 +198,22 @@ def test_frames_come_in_the_order_of_time_and_are_found_by_number(
         assert [frame.index for frame in frames] == list(wanted)
         places = [round((float(frame.image[16, 24, 1]) * 219 + 16 - 40) / 8, 1) for frame in frames]
         assert places == pytest.approx(list(wanted), abs=0.2)
+
+
+def test_frames_of_a_movie_that_are_kept_are_not_decoded_again(
+    tmp_path: Path, plan_for: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_movie(tmp_path / "x.mp4", grey_ramp(24), codec="libx264", options={"g": "6"})
+    clip = open_clip(tmp_path / "x.mp4", plan=plan_for(rows=32, cols=48))
+    asked: list[int] = []
+    read = movie.read_movie
+    monkeypatch.setattr(movie, "read_movie", lambda path, stamps: (asked.extend(stamps), read(path, stamps))[1])
+    with keeping_near(tmp_path / "out") as kept:
+        early = list(read_frames(clip, range(3, 8), kept=kept, keep=True))
+        frames = list(read_frames(clip, kept=kept))
+    assert sorted(asked) == list(clip.timestamps)
+    assert [frame.index for frame in frames] == list(range(24))
+    assert all(np.array_equal(one.image, again.image) for one, again in zip(early, frames[3:8], strict=True))
 
 
 @pytest.mark.parametrize("name", ["x.mp4", "x.mkv", "x.mov"])

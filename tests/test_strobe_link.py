@@ -232,7 +232,9 @@ def test_leading_zeros_are_allowed() -> None:
     assert parse_words(*find_command("RUN " + "0" * 40 + "7")) == Run(cycles=7)
 
 
-@pytest.mark.parametrize("text", ["ID*", "ID*A21", "ID*a21b", "ID*A21B ", "ID*A21B*A21B", "*A21B", "I*D", "ID*0000"])
+@pytest.mark.parametrize(
+    "text", ["ID*", "ID*A21", "ID*a21b", "ID*A21B ", "ID*A21B*A21B", seal("ID*A21B"), "*A21B", "I*D", "ID*0000"]
+)
 def test_a_star_is_nothing_but_a_checksum(text: str) -> None:
     with pytest.raises(LineError) as caught:
         unseal(text)

@@ -1,29 +1,24 @@
 """The Pico's PIO program, assembled and emulated, makes every edge in the clock cycle that the plan says."""
 
+import random
 from collections import deque
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
-from types import FunctionType, ModuleType
+from types import FunctionType
 from typing import Any
 
 import adafruit_pioasm
 import pytest
+from pico import PROGRAM, random_slot
 from pioemu import State, emulate
-from rp2040 import MOV_PINS_NULL, Chip, board_of, load_program
+from rp2040 import MOV_PINS_NULL, Chip, board_of
 
 from psvideo.strobe.messages import Lit, Slot
 from psvideo.strobe.playing import moments
 
-MAIN = Path(__file__).resolve().parents[1] / "lights" / "pico" / "main.py"
 LEAD = 1_250_000
 ROUNDS = 3
-
-
-@pytest.fixture(scope="module")
-def program() -> ModuleType:
-    """main.py, with stand-ins for the modules of a board."""
-    return load_program(MAIN)
 
 
 def assembled(play: FunctionType) -> adafruit_pioasm.Program:
@@ -39,12 +34,12 @@ def assembled(play: FunctionType) -> adafruit_pioasm.Program:
     return adafruit_pioasm.Program("\n".join(text))
 
 
-def words_of(program: ModuleType, cycle: Sequence[Slot], rounds: int) -> list[list[int]]:
+def words_of(cycle: Sequence[Slot], rounds: int) -> list[list[int]]:
     """Return what the DMA brings to each state machine behind the lead, as the table makes it."""
     chip = Chip()
-    board = board_of(program, chip)
+    board = board_of(PROGRAM, chip)
     slots = [(slot.duration, slot.dark, slot.period, [(lit.line, lit.on) for lit in slot.lit]) for slot in cycle]
-    tables = [program.Table(group, link) for group, link in enumerate(board.links)]
+    tables = [PROGRAM.Table(group, link) for group, link in enumerate(board.links)]
     for table in tables:
         table.lay_out(slots, range(len(slots)))
         table.wind(rounds)
@@ -108,18 +103,27 @@ CYCLES = {
 
 
 @pytest.mark.parametrize("name", CYCLES)
-def test_every_edge_is_in_its_clock_cycle_over_back_to_back_cycles(program: ModuleType, name: str) -> None:
-    made = assembled(program.play)
-    for group, words in enumerate(words_of(program, CYCLES[name], ROUNDS)):
+def test_every_edge_is_in_its_clock_cycle_over_back_to_back_cycles(name: str) -> None:
+    made = assembled(PROGRAM.play)
+    for group, words in enumerate(words_of(CYCLES[name], ROUNDS)):
         length = ROUNDS * sum(slot.duration + slot.dark for slot in CYCLES[name])
         assert play(made.assembled, words, length) == expected(CYCLES[name], ROUNDS, group)
 
 
-def test_the_program_wraps_around_and_fits(program: ModuleType) -> None:
-    made = assembled(program.play)
+@pytest.mark.parametrize("seed", range(12))
+def test_edges_of_random_cycles_are_too(seed: int) -> None:
+    dice = random.Random(seed)
+    cycle = [replace(random_slot(dice, 0), dark=400) for _ in range(3)]
+    length = ROUNDS * sum(slot.duration + slot.dark for slot in cycle)
+    for group, words in enumerate(words_of(cycle, ROUNDS)):
+        assert play(assembled(PROGRAM.play).assembled, words, length) == expected(cycle, ROUNDS, group)
+
+
+def test_the_program_wraps_around_and_fits() -> None:
+    made = assembled(PROGRAM.play)
     assert made.pio_kwargs["wrap_target"] == 0
-    assert made.pio_kwargs.get("wrap", len(made.assembled) - 1) == len(made.assembled) - 1 == program.STATES + 1
-    assert len(made.assembled) == program.SHORTEST
+    assert made.pio_kwargs.get("wrap", len(made.assembled) - 1) == len(made.assembled) - 1 == PROGRAM.STATES + 1
+    assert len(made.assembled) == PROGRAM.SHORTEST
 
 
 def test_what_darkens_is_one_instruction() -> None:
@@ -127,7 +131,7 @@ def test_what_darkens_is_one_instruction() -> None:
 
 
 @pytest.mark.parametrize("delay", [0, 1, 1000])
-def test_an_entry_lasts_ten_cycles_and_its_wait(program: ModuleType, delay: int) -> None:
+def test_an_entry_lasts_ten_cycles_and_its_wait(delay: int) -> None:
     words = [0x0000_0F0F, delay, 0x1111_1111, 0]
-    changes = play(assembled(program.play).assembled, words, delay + 100)
+    changes = play(assembled(PROGRAM.play).assembled, words, delay + 100)
     assert changes == [(0, 15), (1, 0), (2, 15), (3, 0), (10 + delay, 1)]

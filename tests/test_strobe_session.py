@@ -238,6 +238,39 @@ def test_damaged_answers_are_asked_for_again() -> None:
         assert link.repaired > 5
 
 
+def test_an_answer_that_lost_its_checksum_is_not_believed() -> None:
+    count = 0
+
+    def strip(data: bytes) -> bytes:
+        nonlocal count
+        count += data.startswith(b"OK keep_ms")
+        return b"OK keep_ms=2000\n" if data.startswith(b"OK keep_ms") and count % 2 else data
+
+    with plugged((bad := Board(spoil=strip)).device):
+        link = opened(bad.device)
+        greet(link)
+        assert [link.ask(Keep(ms=ms), KeepSet).keep_ms for ms in (100, 200, 300)] == [100, 200, 300]
+
+
+def test_an_answer_that_comes_late_is_not_taken_for_the_next_one() -> None:
+    held = b""
+
+    def delay(data: bytes) -> bytes:
+        nonlocal held
+        if data.startswith(b"OK keep_ms=100"):
+            held += data
+            return b""
+        back, held = held + data, b"" if data else held
+        return back if data else b""
+
+    with plugged((late := Board(spoil=delay)).device):
+        link = opened(late.device)
+        greet(link)
+        with pytest.raises(NoReplyError):
+            link.ask(Keep(ms=100), KeepSet)
+        assert [link.ask(Keep(ms=ms), KeepSet).keep_ms for ms in (200, 300)] == [200, 300]
+
+
 def test_a_run_whose_answer_is_lost_is_never_told_twice(board: Board, program: Program) -> None:
     link = opened(board.device)
     prepare(link)

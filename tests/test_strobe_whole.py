@@ -130,10 +130,13 @@ def _true_offset_ppm(plan: Path, trace: Path) -> float:
 
 
 @contextlib.contextmanager
-def emulation(*words: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
+def emulation(*words: str, path: str | None = None) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """Run psvideo strobe emulate; give the process and its first line."""
     command = [sys.executable, "-m", "psvideo.cli.app", "strobe", "emulate", *words]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+    environment = os.environ | ({} if path is None else {"PATH": path})
+    with subprocess.Popen(
+        command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
         try:
             assert process.stdout is not None
             yield process, process.stdout.readline().strip()
@@ -219,7 +222,18 @@ def test_systems_without_pseudo_terminals_get_a_socket(monkeypatch: pytest.Monke
         assert not server.is_alive()
 
 
-def test_without_the_tools_the_imitation_answers_and_says_so(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_without_the_tools_the_imitation_answers_and_says_so(tmp_path: Path) -> None:
+    with emulation(path=str(tmp_path)) as (process, port):
+        with serial.serial_for_url(port, 115200, timeout=10) as line:
+            assert "firmware=emulated" in ask(line, "ID")
+        process.send_signal(signal.SIGTERM)
+        _, said = process.communicate(timeout=STARTS_WITHIN_S)
+    assert process.returncode == 0
+    assert "needs the Debian packages make gcc gcc-avr" in said
+    assert said.count("\n") == 1
+
+
+def test_what_lacks_is_named_where_the_firmware_was_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(toolchain, "_has", lambda program: program != "avr-gcc")
     assert toolchain.missing_packages() == ("gcc-avr", "avr-libc")
     with pytest.raises(PsvideoError, match=r"needs the Debian packages gcc-avr avr-libc\. .*--board python"):

@@ -157,9 +157,34 @@ def test_lights_hang_on_the_lines_that_are_named(tmp_path: Path) -> None:
     assert wired_lines(plan, {"top": 0}) == {1: "key", 2: "left", 0: "top"}
 
 
+def test_a_run_that_was_stopped_and_begun_again_starts_its_cycle_anew(tmp_path: Path) -> None:
+    scene = scene_file(tmp_path)
+    plan = true_plan(read_scene(scene))
+    first = ideal_edges(plan, 2)
+    again = [(cycle + round(0.06 * HZ), line, level) for cycle, line, level in ideal_edges(plan, 8)]
+    _, truth = film(tmp_path, scene, "clip", first + again)
+    lit = [flash for flash in truth["flashes"] if flash["lights"]]
+    assert [flash["slot"] for flash in truth["flashes"]][:6] == [0, 1, 0, 1, 2, 3]
+    assert lit[2]["start_s"] - lit[0]["start_s"] == pytest.approx(0.06 * (1 + 40e-6), abs=1e-7)
+
+
 Change = Callable[[list[Edge]], list[Edge]]
 UNFIT: dict[str, tuple[Change, dict[str, object], dict[str, int], type[PsvideoError], str]] = {
-    "another order": (lambda e: [(c, (n + 1) % 3, v) for c, n, v in e], {}, {}, PsvideoError, "flash 1 of the trace"),  # type: ignore[operator]
+    "another order": (
+        lambda e: [(c, (n + 1) % 3, v) for c, n, v in e],
+        {},
+        {},
+        PsvideoError,
+        "flash 1 of the trace lights",
+    ),  # type: ignore[operator]
+    "another dark time": (lambda e: e, {"dark_s": 0.0115}, {}, PsvideoError, "flash 2 of the trace starts 11.001 ms"),
+    "longer flashes": (
+        lambda e: [(c + 8000 * (1 - v), n, v) for c, n, v in e],
+        {},
+        {},
+        PsvideoError,
+        "lasts 1.5 ms",  # type: ignore[operator]
+    ),
     "no light at all": (lambda e: [], {}, {}, PsvideoError, "no light was ever on"),
     "a line without a light": (lambda e: [(c, 7, v) for c, _, v in e], {}, {}, PsvideoError, "line 7 is lit"),
     "a light that is not there": (lambda e: e, {}, {"kye": 0}, UsageError, "did you mean 'key'"),

@@ -21,8 +21,9 @@ from psvideo.split import CLIPPED, Image, Plate
 
 LONGEST_MEMORY = 16
 """Dark slots that the average spans at most."""
-COARSE, LEVEL_PX = 4, 7
-"""Levels are compared over squares of 7 pixels of pictures a quarter as large: the factor adds hardly any noise."""
+COARSE, LEVEL_SIGMA_PX = 4, 2.0
+"""Levels are compared over about 7 pixels of pictures a quarter as large: the factor adds hardly any noise. The window
+is a Gaussian: a box turns some ripples of the average around, and the average would feed on them."""
 LEAST_GAIN, MOST_GAIN = 0.5, 2.0
 """Where light changed by more than these factors between dark slots, the average begins anew."""
 SPARSE = 5
@@ -119,12 +120,10 @@ class _Change:
 def _gain(old: Image, new: Image, both: NDArray[np.bool_]) -> Image:
     """Return by which factor each neighbourhood's light changed, of the image's shape; 1 where it is dark."""
     rows, cols = old.shape[:2]
-    shrink = COARSE if min(rows, cols) >= 4 * COARSE * LEVEL_PX else 1
+    shrink = COARSE if min(rows, cols) >= 50 * LEVEL_SIGMA_PX else 1
     shown = both.astype(np.float32)
-    small = [
-        cv2.blur(_coarse(picture if both.all() else _times_rows(picture, shown), shrink), (LEVEL_PX, LEVEL_PX))
-        for picture in (old, new)
-    ]
+    coarse = [_coarse(picture if both.all() else _times_rows(picture, shown), shrink) for picture in (old, new)]
+    small = [cv2.GaussianBlur(picture, (0, 0), LEVEL_SIGMA_PX) for picture in coarse]
     across = np.diff(new[::SPARSE, ::SPARSE] - old[::SPARSE, ::SPARSE], axis=1)
     floor = np.float32(2 * float(np.median(np.abs(across))) + 1e-5) if across.size else np.float32(1e-5)
     gain = (np.maximum(small[1], 0) + floor) / (np.maximum(small[0], 0) + floor)

@@ -11,7 +11,7 @@ from psvideo.clip import Clip, read_frames
 from psvideo.export.results import Delivery
 from psvideo.export.space import Space
 from psvideo.files import refuse_existing, whole_file
-from psvideo.pipeline import Instant, Watch, open_take, unwatched
+from psvideo.pipeline import Instant, Watch, decoded_once, open_take, unwatched
 from psvideo.rig import Vector
 from psvideo.runs import Output, normals_run, read_lighting, timing_of
 from psvideo.surface import Surface
@@ -35,13 +35,13 @@ def run_demo(folder: Path, *, force: bool = False, watch: Watch = unwatched) -> 
     shoot(
         builtin_scene(), clip_path, force=force, track=lambda frames: watch(frames, total=len(frames), what="filming")
     )
-    take = open_take(clip_path)
-    timing = timing_of(take, None, first_light=None, watch=watch)
     delivery = Delivery(space=Space())
     output = Output(folder=out, force=force)
-    lighting = read_lighting(take, clip_path / "rig.toml")
-    sheet_of = partial(demo_sheet, take.clip)
-    result = normals_run(take, timing, lighting, output, delivery=delivery, watch=watch, picture_of=sheet_of)
+    with decoded_once(open_take(clip_path), output=out) as take:
+        timing = timing_of(take, None, first_light=None, watch=watch)
+        lighting = read_lighting(take, clip_path / "rig.toml")
+        sheet_of = partial(demo_sheet, take.clip)
+        result = normals_run(take, timing, lighting, output, delivery=delivery, watch=watch, picture_of=sheet_of)
     _write_png(folder / "demo.png", result.picture)
     return folder / "demo.png"
 

@@ -4,7 +4,9 @@ Every step is a function or a generator; nothing here holds state, and a clip of
 constant memory.
 """
 
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, Protocol, TypeVar
@@ -16,7 +18,18 @@ from psvideo import hudon2015
 from psvideo.ambient import subtract
 from psvideo.calibrate.strobed_readout import StrobedReadout, readout_of
 from psvideo.camera import Camera
-from psvideo.clip import Clip, Frame, demosaic, holes, open_clip, parse_range, read_frames
+from psvideo.clip import (
+    ALL_CORES,
+    Clip,
+    Frame,
+    Kept,
+    demosaic,
+    holes,
+    keeping_near,
+    open_clip,
+    parse_range,
+    read_frames,
+)
 from psvideo.normals.illumination import illumination
 from psvideo.normals.woodham1980 import solve
 from psvideo.plan import Plan
@@ -51,10 +64,14 @@ def unwatched(items: Iterable[Item], *, total: int, what: str, unit: str = "fram
 
 @dataclass(frozen=True, kw_only=True)
 class Take:
-    """A clip that is open, and the numbers of its frames that are to be used."""
+    """A clip that is open, and the numbers of its frames that are to be used.
+
+    ``kept`` holds pictures that are decoded already, and takes those that will be looked at again.
+    """
 
     clip: Clip
     numbers: tuple[int, ...]
+    kept: Kept | None = None
 
     @property
     def plan(self) -> Plan:
@@ -79,6 +96,13 @@ def _as_played(clip: Clip) -> Clip:
     return replace(clip, plan=played.plan, warnings=warnings, notes=notes)
 
 
+@contextmanager
+def decoded_once(take: Take, *, output: Path) -> Iterator[Take]:
+    """Give the take with a store for its decoded frames, on the disk of ``output``; at the end the store is gone."""
+    with keeping_near(output) as kept:
+        yield replace(take, kept=kept)
+
+
 def find_clip_timing(
     take: Take, *, first_light: str | None = None, watch: Watch = unwatched, picture: Path | None = None
 ) -> Timing:
@@ -92,7 +116,7 @@ def find_clip_timing(
         indices = np.array([clip.index_of(number) for number in take.numbers], np.int64)
         profiles, doubt = np.zeros((len(indices), clip.height_px)), None
     else:
-        frames = read_frames(clip, take.numbers)
+        frames = read_frames(clip, take.numbers, ahead=ALL_CORES, threads=ALL_CORES, kept=take.kept, keep=True)
         watched = watch(frames, total=len(take.numbers), what="finding the flashes")
         indices, profiles, doubt = collect_with_doubt(watched)
     timing = find_timing(
@@ -113,14 +137,15 @@ def find_clip_timing(
     return timing
 
 
-def measure_take_readout(take: Take, *, watch: Watch = unwatched) -> StrobedReadout:
+def measure_take_readout(take: Take, *, tolerance_ppm: float | None = None, watch: Watch = unwatched) -> StrobedReadout:
     """Measure a camera's readout time from a strobed take, whatever its plan says of it.
 
+    ``tolerance_ppm`` is how far the strobe's clock may be from true seconds (left out: what the plan says of it).
     Raises PsvideoError where no strobe is found.
     """
     unknown = replace(take.plan, camera=replace(take.plan.camera, readout_s=None))
     timing = find_clip_timing(replace(take, clip=replace(take.clip, plan=unknown)), watch=watch)
-    return readout_of(unknown, timing, frames=len(take.numbers))
+    return readout_of(unknown, timing, frames=len(take.numbers), tolerance_ppm=tolerance_ppm)
 
 
 def clip_rounds(
@@ -143,14 +168,24 @@ def clip_rounds(
 
 def clip_plates(take: Take, timing: Timing, *, method: Method = "weights", watch: Watch = unwatched) -> Iterator[Plate]:
     """Decode a take once and yield the plate of every flash that it holds, ambient light taken off, demosaiced."""
+    _decode_ahead(take, watch)
     clip, camera = take.clip, timed_camera(take.plan, timing)
     places = places_in_time(timing, clip.numbers)
     used = _within(timing, camera, take, places)
-    decoded = read_frames(clip, take.numbers, ahead=AHEAD)
+    decoded = read_frames(clip, take.numbers, ahead=AHEAD, threads=ALL_CORES, kept=take.kept)
     frames = _placed(watch(decoded, total=len(take.numbers), what="rebuilding flashes"), places)
     rebuild = split if method == "weights" else hudon2015.split
     plates = subtract(rebuild(frames, camera, used), darks=_dark_plates(take, camera, used, places))
     return map(_colour_of(clip), plates)
+
+
+def _decode_ahead(take: Take, watch: Watch) -> None:
+    """Decode all frames into the take's store, unless the fit did: dark slots are read ahead, out of order."""
+    clip, kept = take.clip, take.kept
+    dark = len(take.plan.lit_slots) < len(take.plan.flashes)
+    if kept is not None and dark and not (len(kept) or kept.missed):
+        frames = read_frames(clip, take.numbers, ahead=ALL_CORES, threads=ALL_CORES, kept=kept, keep=True)
+        deque(watch(frames, total=len(take.numbers), what="decoding"), maxlen=0)
 
 
 def timed_camera(plan: Plan, timing: Timing) -> Camera:
@@ -186,7 +221,8 @@ def _dark_plates(take: Take, camera: Camera, timing: Timing, places: Mapping[int
         if dark.complete and not any(dark.lights.values()):
             touched = range(first[dark.index], last[dark.index] + 1)
             near = tuple(number_at[place] for place in touched if place in number_at)
-            plate = plate_of(dark, _placed(read_frames(take.clip, near), places), camera, timing) if near else None
+            frames = _placed(read_frames(take.clip, near, kept=take.kept), places)
+            plate = plate_of(dark, frames, camera, timing) if near else None
             if plate is not None:
                 yield plate
             del plate

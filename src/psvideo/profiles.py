@@ -11,8 +11,8 @@ from psvideo.camera import FloatArray
 
 SATURATED = 0.998
 """A sample from here on is clipped."""
-LOST = 0.3
-"""Light, as a share of saturation, that a clipped sample may well have lost."""
+LOST = 1.0
+"""Light, as a share of saturation, that a clipped sample may well have lost: one that two lights clip loses as much."""
 
 
 class LinearFrame(Protocol):

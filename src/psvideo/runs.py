@@ -227,7 +227,10 @@ def normals_run(
         residual = "residual" in delivery.aovs
         for instant in surfaces(rounds, clip.plan, lighting.rig, mask=mask, half=delivery.half, residual=residual):
             if not (output.resume and is_written(folder, clip.name, instant.round.number, delivery)):
-                write(partial(_write_instant, folder, clip.name, instant, delivery, tags))
+                # the surface only: plates are many times larger, and must not wait for the files
+                surface, at = instant.surface, (instant.round.number, instant.round.time_s)
+                write(partial(write_surface, folder, clip.name, *at, surface, delivery=delivery, tags=tags))
+                del surface
             facts.append(instant_facts(instant.round, instant.surface, mask))
             if len(facts) in (1, SAMPLE_ROUND):
                 picture = (picture_of or look)(instant)
@@ -259,11 +262,6 @@ def _tags(clip: Clip, rig_path: Path | None = None, space: Space = CAMERA_SPACE)
         camera_fps=clip.plan.camera.fps,
         first_time_code=clip.time_code,
     )
-
-
-def _write_instant(folder: Path, clip: str, instant: Instant, delivery: Delivery, tags: Tags) -> None:
-    one = instant.round
-    write_surface(folder, clip, one.number, one.time_s, instant.surface, delivery=delivery, tags=tags)
 
 
 def look(instant: Instant) -> Pixels:

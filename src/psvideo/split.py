@@ -70,12 +70,14 @@ def split(frames: Iterable[LinearFrame], camera: Camera, timing: Timing) -> Iter
     """
     stream = _Window(iter(frames))
     first, last = frames_touched(camera, timing.start_s, timing.duration_s)
-    for flash in timing.flashes:
-        if flash.complete and first[flash.index] <= last[flash.index]:
-            touched = range(int(first[flash.index]), int(last[flash.index]) + 1)
-            images = stream.between(touched)
-            if images:
-                yield _rebuild(camera, timing, flash, images, touched)
+
+    def rebuilt(flash: Flash) -> Plate | None:
+        touched = range(int(first[flash.index]), int(last[flash.index]) + 1)
+        images = stream.between(touched) if flash.complete and touched else {}
+        return _rebuild(camera, timing, flash, images, touched) if images else None
+
+    # map and filter hold neither frames nor plates while the next one is rebuilt, as a loop's variables would
+    return filter(None, map(rebuilt, timing.flashes))
 
 
 def plate_of(flash: Flash, frames: Iterable[LinearFrame], camera: Camera, timing: Timing) -> Plate | None:

@@ -17,12 +17,24 @@ from psvideo.camera import Camera, FloatArray
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.plan import Plan
 from psvideo.rowfit.beat import Beat, train_until
-from psvideo.rowfit.fit import Found, find, window_frames
-from psvideo.rowfit.judge import convincing, notes, why_not
+from psvideo.rowfit.course import window_frames
+from psvideo.rowfit.fit import Found
+from psvideo.rowfit.frame_remarks import remarks_on_frames
+from psvideo.rowfit.judge import judged
 from psvideo.rowfit.order import turns
 from psvideo.rowfit.profiles import Profiles
+from psvideo.rowfit.refine import Fit
+from psvideo.rowfit.refusal import clock_too_far, nothing_to_find, why_not
+from psvideo.rowfit.remarks import remarks, remarks_on_lights
 from psvideo.shutter import frames_touched
 from psvideo.timing import DroppedFrames, Flash, Order, Timing
+
+NO_READOUT = 3.0
+"""A readout of fewer standard errors is taken for a global shutter."""
+ADVICE = (
+    "Check that plan.toml is the plan that the strobe played (frame rate, flash durations, dark time), that the lights "
+    "flashed brightly enough, and that the exposure was fixed."
+)
 
 
 def find_timing(
@@ -49,11 +61,13 @@ def find_timing(
         )
     if plan.mode == "synced":
         return _synced_timing(plan, indices, clip=clip, dropped=dropped)
-    if len(indices) < 4:
-        raise PsvideoError(f"{clip}: holds {len(indices)} frame(s); finding the strobe's timing needs at least 4.")
     rows = _as_profiles(plan, indices, profiles, doubt)
-    found = find(plan, rows)
-    if not convincing(found):
+    hopeless = nothing_to_find(plan, rows)
+    if hopeless:
+        raise PsvideoError(f"{clip}: {hopeless}")
+    verdict = judged(plan, rows)
+    found = verdict.found
+    if not verdict.believed:
         raise PsvideoError(_not_found(plan, rows, found, clip))
     beat, order = _order_of_lights(plan, found, first_light)
     numbered = np.asarray(indices if numbers is None else numbers, np.int64)
@@ -64,18 +78,20 @@ def find_timing(
         clip=clip,
         dropped=_all_dropped(dropped, numbered, np.asarray(indices), found.track.index),
         repeated=tuple(int(number) for number in numbered[found.track.repeated]),
-        notes=notes(plan, found),
+        notes=(
+            *remarks(plan, found),
+            *remarks_on_lights(plan, found, beat, named=order != "guess"),
+            *remarks_on_frames(plan, found, np.asarray(indices)),
+        ),
     )
 
 
 def _not_found(plan: Plan, rows: Profiles, found: Found, clip: str) -> str:
-    reason = why_not(plan, rows)
+    reason = why_not(plan, rows) or clock_too_far(plan, found)
     return (
         f"{clip}: no strobe like the plan's was found in the picture: the best fit explains "
         f"{100 * max(found.fit.explained, 0):.0f} % of the rows' changes from frame to frame"
-        f"{' only by taking many frames for missing' if found.steps else ''}. {reason + ' ' if reason else ''}"
-        "Check that plan.toml is the plan that the strobe played (frame rate, flash durations, dark time), that the "
-        "lights flashed, and that the exposure was fixed."
+        f"{' only by taking many frames for missing' if found.steps else ''}. {reason or ADVICE}"
     )
 
 
@@ -137,10 +153,11 @@ def _all_dropped(
     return tuple(DroppedFrames(after=after, count=count) for after, count in sorted(counts.items()))
 
 
-def _fitted_camera(plan: Plan, beat: Beat) -> Camera:
-    """Return the plan's camera with the shutter that was found."""
-    height = plan.camera.height_px
-    readout_s = beat.row_time_s * height * (-1 if beat.upward else 1)
+def _fitted_camera(plan: Plan, fit: Fit) -> Camera:
+    """Return the plan's camera with the shutter that was found; a readout that may as well be none is none."""
+    beat = fit.beat
+    may_be_none = beat.row_time_s < NO_READOUT * fit.errors_s.get("row_time_s", 0.0)
+    readout_s = 0.0 if may_be_none else beat.row_time_s * plan.camera.height_px * (-1 if beat.upward else 1)
     return replace(plan.camera, exposure_s=beat.exposure_s, readout_s=readout_s)
 
 
@@ -156,12 +173,12 @@ def _assemble(
 ) -> Timing:
     """List every flash that the clip saw any of, and mark those that its start or end cuts."""
     beat, index = found.fit.beat, found.rows.index
-    camera = _fitted_camera(plan, beat)
+    camera = _fitted_camera(plan, found.fit)
     train = train_until(plan, beat.clock, (int(index[-1]) + 2) * camera.frame_period_s)
     start_s = train.start_s + found.jitter.of(train.start_s)
     first, last = frames_touched(camera, start_s, train.duration_s)
     seen = (last >= index[0]) & (first <= index[-1])
-    complete = (first >= index[0]) & (last <= index[-1])
+    complete = (first >= found.trusted[0]) & (last <= found.trusted[1])
     flashes = tuple(
         Flash(
             index=number,
@@ -180,11 +197,12 @@ def _assemble(
         exposure_s=camera.exposure_s,
         row_time_s=row_time_s,
         clock_offset_ppm=beat.clock.mean_offset_ppm(),
-        phase_error_rows=found.fit.shift_error_s / abs(row_time_s) if row_time_s else 0.0,
+        phase_error_rows=found.fit.shift_error_s / (abs(row_time_s) or camera.frame_period_s / camera.height_px),
         order=order,
         dropped_frames=dropped,
         repeated_frames=repeated,
         notes=notes,
+        phase_error_s=found.fit.shift_error_s,
         row_time_error_s=found.fit.errors_s.get("row_time_s"),
         flashes=flashes,
     )

@@ -44,9 +44,10 @@ class StrobedReadout:
     warnings: tuple[str, ...]
 
 
-def readout_of(plan: Plan, timing: Timing, *, frames: int) -> StrobedReadout:
+def readout_of(plan: Plan, timing: Timing, *, frames: int, tolerance_ppm: float | None = None) -> StrobedReadout:
     """Return the readout time that a timing found, the plan's own readout left aside.
 
+    ``tolerance_ppm`` is how far the strobe's clock may be from true seconds (left out: what the plan says of it).
     Raises PsvideoError where the timing took the row time from the plan instead of measuring it.
     """
     if timing.row_time_error_s is None:
@@ -57,14 +58,15 @@ def readout_of(plan: Plan, timing: Timing, *, frames: int) -> StrobedReadout:
     rows, period_s = plan.camera.height_px, timing.frame_period_s
     readout_s = timing.row_time_s * rows
     rows_error_s = float(np.hypot(timing.row_time_error_s * rows, MODEL_ERROR_SHARE * period_s))
-    clock_error_s = abs(readout_s) * plan.clock_range_ppm * 1e-6 / np.sqrt(3)
+    clock_ppm = plan.clock_range_ppm if tolerance_ppm is None else tolerance_ppm
+    clock_error_s = abs(readout_s) * clock_ppm * 1e-6 / np.sqrt(3)
     sure = abs(readout_s) > SURE_ERRORS * rows_error_s
     return StrobedReadout(
         readout_s=readout_s,
         error_s=float(np.hypot(rows_error_s, clock_error_s)),
         rows_error_s=rows_error_s,
         clock_error_s=float(clock_error_s),
-        tolerance_ppm=plan.clock_range_ppm,
+        tolerance_ppm=clock_ppm,
         clock_offset_ppm=timing.clock_offset_ppm,
         frame_share=abs(readout_s) / period_s,
         frame_share_error=rows_error_s / period_s,

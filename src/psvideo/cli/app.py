@@ -1,5 +1,7 @@
 """psvideo: the commands, assembled, and how faults become one paragraph and an exit status."""
 
+import contextlib
+import ctypes
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -12,6 +14,8 @@ from psvideo.errors import PsvideoError
 
 STOPPED = 130
 """What the command line library ends with when the user interrupts."""
+M_ARENA_MAX = -8
+"""glibc's number of the setting (malloc.h)."""
 COMMANDS = ("capture-plan", "strobe", "calibrate", "synth", "sync", "split", "normals", "info", "demo")
 
 
@@ -55,6 +59,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     A fault is printed as one paragraph on stderr.
     """
+    _share_one_heap()
     words = list(sys.argv[1:] if arguments is None else arguments)
     try:
         application(words)(args=words)
@@ -69,6 +74,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return 1
         return end.code if isinstance(end.code, int) else 0
     return 0
+
+
+def _share_one_heap() -> None:
+    """Let all threads allocate from one heap, where the C library is glibc.
+
+    By default each thread has a heap of its own, which keeps what was freed in it: pictures that one thread makes and
+    another drops would cost memory several times.
+    """
+    with contextlib.suppress(OSError, AttributeError, TypeError):  # another C library, or none to be called by name
+        ctypes.CDLL(None).mallopt(M_ARENA_MAX, 1)
 
 
 if __name__ == "__main__":

@@ -23,6 +23,7 @@ from psvideo.cli.options import Frames, Json, PlanPath, Quiet, Verbose
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.pipeline import measure_take_readout, open_take
 
+CRYSTAL_PPM = 100.0
 calibrate = typer.Typer(help="Measure cameras and lights before a shoot.", no_args_is_help=True)
 
 
@@ -42,8 +43,13 @@ def readout(
         typer.Option(help="How often the LED blinks a second; left out: a strobed clip with its plan.", min=0.1),
     ] = None,
     led_tolerance_ppm: Annotated[
-        float, typer.Option(help="Tolerance of the LED's clock: a crystal 100, a ceramic resonator 5000.", min=0)
-    ] = 100.0,
+        float | None,
+        typer.Option(
+            help="Tolerance of the LED's or the strobe's clock: a crystal 100, a ceramic resonator 5000. Left out: "
+            "100, or the plan's where the pictures are a strobed clip.",
+            min=0,
+        ),
+    ] = None,
     rows: Annotated[
         int | None, typer.Option(help="Rows of the whole frame, where the pictures are cropped.", min=2)
     ] = None,
@@ -73,11 +79,11 @@ def readout(
     made = MeasuredMode(make=make, model=model, mode=mode)
     if led_hz is None:
         _refuse_led_options(rows=rows, zoom=zoom, columns=columns, near=near, fps=fps)
-        _strobed(pictures, made, frames=frames, plan=plan, voice=voice)
+        _strobed(pictures, made, tolerance_ppm=led_tolerance_ppm, frames=frames, plan=plan, voice=voice)
         return
     if plan is not None:
         raise UsageError("--plan: belongs to a strobed clip, which is measured without --led-hz. Leave one out.")
-    led = Led(rate_hz=led_hz, tolerance_ppm=led_tolerance_ppm)
+    led = Led(rate_hz=led_hz, tolerance_ppm=CRYSTAL_PPM if led_tolerance_ppm is None else led_tolerance_ppm)
     near_s = None if near is None else parse_positive_seconds(near, option="--near")
     given = None if fps is None else parse_rate(fps)
     span = None if columns is None else parse_columns(columns)
@@ -103,7 +109,15 @@ def _refuse_led_options(**options: object) -> None:
         )
 
 
-def _strobed(pictures: list[Path], made: MeasuredMode, *, frames: str | None, plan: Path | None, voice: Voice) -> None:
+def _strobed(
+    pictures: list[Path],
+    made: MeasuredMode,
+    *,
+    tolerance_ppm: float | None,
+    frames: str | None,
+    plan: Path | None,
+    voice: Voice,
+) -> None:
     if len(pictures) > 1:
         raise UsageError(
             f"{len(pictures)} files without --led-hz: for an LED's stripes give its rate with --led-hz, for a strobed "
@@ -115,7 +129,7 @@ def _strobed(pictures: list[Path], made: MeasuredMode, *, frames: str | None, pl
         raise type(fault)(f"{fault} (Without --led-hz a strobed clip is expected.)") from None
     for warning in take.clip.warnings:
         voice.warn(warning)
-    measured = measure_take_readout(take, watch=voice.track)
+    measured = measure_take_readout(take, tolerance_ppm=tolerance_ppm, watch=voice.track)
     camera = dataclasses.replace(made, width_px=take.plan.camera.width_px, fps=take.plan.camera.fps)
     lines = {
         "camera_line": strobed_camera_line(measured, camera),

@@ -10,6 +10,8 @@ from typing import TypeVar
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from psvideo.clip import Kept
+
 Item = TypeVar("Item")
 PLAIN_PROGRESS_EVERY_S = 5.0
 
@@ -50,6 +52,21 @@ class Voice:
             yield from _bar(items, total, what, unit)
         else:
             yield from _lines(items, total, what, unit)
+
+
+def tell_kept(voice: Voice, kept: Kept | None) -> None:
+    """Say how much disk the decoded frames took, and which of them found no room there."""
+    if kept is None:
+        return
+    voice.detail(
+        f"{len(kept)} decoded frames ({kept.bytes_held / 1e9:.2f} GB) were kept in a temporary file beside the output "
+        "and read back; the file is gone."
+    )
+    if kept.missed:
+        voice.warn(
+            f"{kept.missed} decoded frames found no room on the output's disk, half of whose free space may be taken, "
+            "and were decoded again where they were needed. Make room there, or name an output on another disk."
+        )
 
 
 def _bar(items: Iterable[Item], total: int, what: str, unit: str) -> Iterator[Item]:

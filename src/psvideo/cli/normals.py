@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from psvideo.cli.console import Voice
+from psvideo.cli.console import Voice, tell_kept
 from psvideo.cli.opening import open_and_tell
 from psvideo.cli.options import (
     ClipPath,
@@ -24,6 +24,7 @@ from psvideo.cli.options import (
 from psvideo.cli.sync import describe_timing
 from psvideo.export.results import Delivery
 from psvideo.export.space import choose_space
+from psvideo.pipeline import decoded_once
 from psvideo.runs import Output, normals_run, read_lighting, timing_of
 from psvideo.view.report import findings, report_record, verdict
 
@@ -98,8 +99,10 @@ def normals(
     )
     take = open_and_tell(clip, voice, plan=plan, frames=frames)
     lighting = read_lighting(take, rig, mask)
-    found = timing_of(take, timing, first_light=first_light, rig=lighting.rig, watch=voice.track)
-    report = normals_run(take, found, lighting, output, delivery=delivery, watch=voice.track).report
+    with decoded_once(take, output=out) as take:
+        found = timing_of(take, timing, first_light=first_light, rig=lighting.rig, watch=voice.track)
+        report = normals_run(take, found, lighting, output, delivery=delivery, watch=voice.track).report
+        tell_kept(voice, take.kept)
     voice.result(report_record(report))
     voice.say(describe_timing(found))
     voice.say(verdict(report))

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from psvideo.cli.console import Voice
+from psvideo.cli.console import Voice, tell_kept
 from psvideo.cli.opening import open_and_tell
 from psvideo.cli.options import (
     ClipPath,
@@ -23,6 +23,7 @@ from psvideo.cli.options import (
     Verbose,
 )
 from psvideo.cli.sync import describe_timing
+from psvideo.pipeline import decoded_once
 from psvideo.rigfile import read_rig
 from psvideo.runs import Output, split_run, timing_of
 from psvideo.timing import timing_record
@@ -60,8 +61,10 @@ def split(
     output.check()
     take = open_and_tell(clip, voice, plan=plan, frames=frames)
     known = None if rig is None else read_rig(rig, plan_lights=take.plan.lights)
-    found = timing_of(take, timing, first_light=first_light, rig=known, watch=voice.track)
-    written = split_run(take, found, output, method=method.value, flashes=flashes, watch=voice.track)
+    with decoded_once(take, output=out) as take:
+        found = timing_of(take, timing, first_light=first_light, rig=known, watch=voice.track)
+        written = split_run(take, found, output, method=method.value, flashes=flashes, watch=voice.track)
+        tell_kept(voice, take.kept)
     voice.result(timing_record(written))
     voice.say(describe_timing(written))
     voice.say(f"{out}: {sum(flash.plate is not None for flash in written.flashes)} plates written.")

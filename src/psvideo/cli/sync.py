@@ -60,11 +60,8 @@ def describe_timing(timing: Timing) -> str:
     """Return what was found and how sure it is, in a few lines for people."""
     complete = sum(flash.complete for flash in timing.flashes)
     lines = [f"{len(timing.flashes)} flashes, {complete} of them complete."]
-    if timing.row_time_s:
-        lines.append(
-            f"The strobe's clock is off by {timing.clock_offset_ppm:+.1f} ppm; flash times are sure to "
-            f"{timing.phase_error_rows:.2g} row."
-        )
+    if timing.how_sure:
+        lines.append(f"The strobe's clock is off by {timing.clock_offset_ppm:+.1f} ppm. {timing.how_sure}")
     lines.append(ORDER_SENTENCE[timing.order])
     lines += [timing.order_note] if timing.order_note else []
     lines += [f"{hole.count} frame(s) missing after number {hole.after}." for hole in timing.dropped_frames]

@@ -1,14 +1,29 @@
 """A clip on disk becomes linear float frames, lazily. The only room that knows decoders.
 
 ``open_clip`` finds the footage and its plan and checks that they fit; ``read_frames`` decodes, takes the transfer curve
-off and gives one frame after the other; ``demosaic`` makes colour of a mosaic; ``describe`` says what a file is.
+off and gives one frame after the other; ``keeping_near`` keeps what was decoded for a second look; ``demosaic`` makes
+colour of a mosaic; ``describe`` says what a file is.
 """
 
 from psvideo.clip.describe import describe
+from psvideo.clip.kept import Kept, keeping_near
 from psvideo.clip.malvar2004 import demosaic
 from psvideo.clip.mask import read_mask
 from psvideo.clip.opening import open_clip
-from psvideo.clip.reading import parse_range, read_frames
+from psvideo.clip.reading import ALL_CORES, parse_range, read_frames
 from psvideo.clip.record import Clip, Frame, holes
 
-__all__ = ["Clip", "Frame", "demosaic", "describe", "holes", "open_clip", "parse_range", "read_frames", "read_mask"]
+__all__ = [
+    "ALL_CORES",
+    "Clip",
+    "Frame",
+    "Kept",
+    "demosaic",
+    "describe",
+    "holes",
+    "keeping_near",
+    "open_clip",
+    "parse_range",
+    "read_frames",
+    "read_mask",
+]

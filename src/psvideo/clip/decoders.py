@@ -1,45 +1,35 @@
 """The decoders by kind of file. Each is a module with ``header(path)`` and ``decode(path)``.
 
+Only the one that is needed is imported: the libraries behind them take time and memory.
 Whatever goes wrong inside a decoder becomes a PsvideoError that names the file.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 from typing import TypeVar
 
-from psvideo.clip import dng, dpx, exr, jpeg, png, tiff
 from psvideo.clip.record import Header, Picture
 from psvideo.errors import PsvideoError
 
-
-@dataclass(frozen=True, kw_only=True)
-class Decoder:
-    """How one kind of file is read."""
-
-    header: Callable[[Path], Header]
-    decode: Callable[[Path], Picture]
-
-
-DECODERS = {
-    "dng": Decoder(header=dng.header, decode=dng.decode),
-    "dpx": Decoder(header=dpx.header, decode=dpx.decode),
-    "exr": Decoder(header=exr.header, decode=exr.decode),
-    "jpeg": Decoder(header=jpeg.header, decode=jpeg.decode),
-    "png": Decoder(header=png.header, decode=png.decode),
-    "tiff": Decoder(header=tiff.header, decode=tiff.decode),
-}
 Read = TypeVar("Read")
 
 
 def read_header(kind: str, file: Path) -> Header:
     """Read what a picture's file says about itself, without decoding its pixels."""
-    return _guarded(DECODERS[kind].header, file)
+    find: Callable[[Path], Header] = _module(kind).header
+    return _guarded(find, file)
 
 
 def decode(kind: str, file: Path) -> Picture:
     """Decode one picture."""
-    return _guarded(DECODERS[kind].decode, file)
+    read: Callable[[Path], Picture] = _module(kind).decode
+    return _guarded(read, file)
+
+
+def _module(kind: str) -> ModuleType:
+    return import_module(f"psvideo.clip.{kind}")
 
 
 def _guarded(read: Callable[[Path], Read], file: Path) -> Read:

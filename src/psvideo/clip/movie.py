@@ -23,6 +23,7 @@ VIDEO_RANGE, FULL_RANGE = 1, 2  # FFmpeg's AVCOL_RANGE_MPEG and AVCOL_RANGE_JPEG
 UNTAGGED = 2  # matrix coefficients "unspecified" (H.273)
 HD_HEIGHT_PX = 720
 UNEVEN = 0.25
+MOST_REORDERED = 16  # frames by which H.264 and H.265 may put decoding before showing
 AS_RECORDED = {"ignore_editlist": "1"}  # all frames that the camera wrote, whatever an edit list would show
 
 
@@ -76,7 +77,7 @@ def read_movie(path: Path, timestamps: Sequence[int]) -> Iterator[Picture]:
     wanted = deque(timestamps)
     with _opened(path) as (container, stream):
         if wanted[0] > (stream.start_time or 0):
-            container.seek(wanted[0], stream=stream)
+            container.seek(_safe_start(stream, wanted[0]), stream=stream)
         for frame in container.decode(stream):
             if frame.pts is None or frame.pts < wanted[0]:
                 continue
@@ -90,6 +91,14 @@ def read_movie(path: Path, timestamps: Sequence[int]) -> Iterator[Picture]:
         f"{path}: the frame with timestamp {wanted[0]} cannot be decoded; the movie is truncated or damaged there. "
         "Copy it again, or choose other frames with --frames."
     )
+
+
+def _safe_start(stream: VideoStream, timestamp: int) -> int:
+    """Return where to seek for a frame. Files are searched by the order of decoding, which B-frames' own runs ahead."""
+    if not stream.codec_context.has_b_frames or not stream.average_rate:
+        return timestamp
+    period = float(1 / (stream.average_rate * (stream.time_base or 1)))
+    return max(timestamp - int(MOST_REORDERED * period), stream.start_time or 0)
 
 
 @contextmanager

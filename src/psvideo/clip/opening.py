@@ -2,17 +2,20 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from psvideo.camera import Encoding
 from psvideo.clip.decoders import read_header
 from psvideo.clip.folder import MOVIES, find_sequence
-from psvideo.clip.movie import Movie, index_movie
 from psvideo.clip.record import Clip, Header
 from psvideo.clip.transfer import find_curve
 from psvideo.clip.yuv import signal_range
 from psvideo.errors import PsvideoError
 from psvideo.plan import Plan
 from psvideo.planfile import find_plan, read_plan
+
+if TYPE_CHECKING:
+    from psvideo.clip.movie import Movie
 
 RATE_TOLERANCE = 5e-4
 """A movie's rate counts as the plan's within this share: tighter than 120 for 119.88."""
@@ -60,6 +63,8 @@ def _open_folder(path: Path, plan_path: Path | None) -> Clip:
 
 
 def _open_movie(path: Path, plan_path: Path | None) -> Clip:
+    from psvideo.clip.movie import index_movie  # FFmpeg's libraries take memory: only where there is a movie
+
     plan_path = find_plan(path, given=plan_path)
     plan = read_plan(plan_path)
     movie = index_movie(path)
@@ -110,7 +115,7 @@ def _curve_warning(kind: str, plan: Plan) -> tuple[str, ...]:
     return (f"DNG files hold linear light, so the plan's transfer = {transfer!r} is not applied",)
 
 
-def _rate_warning(movie: Movie, plan: Plan) -> tuple[str, ...]:
+def _rate_warning(movie: "Movie", plan: Plan) -> tuple[str, ...]:
     """Say where a movie plays at another rate than the plan's."""
     fps = float(plan.camera.fps)
     if movie.rate_hz is None or abs(movie.rate_hz / fps - 1) < RATE_TOLERANCE + movie.rate_error:

@@ -1,32 +1,45 @@
 """Reading a clip's frames: lazily, in order, decoded some frames ahead of the one that is worked on."""
 
+import contextlib
 import os
 from bisect import bisect_left
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
+from typing import TypeVar
 
 import numpy as np
 from fileseq.exceptions import ParseException
 from fileseq.frameset import FrameSet
 
 from psvideo.clip.decoders import decode
+from psvideo.clip.kept import Kept
 from psvideo.clip.linear import linear_light
-from psvideo.clip.movie import read_movie
 from psvideo.clip.record import Clip, Frame, Header, Picture
 from psvideo.errors import PsvideoError, UsageError
 
-DECODING_THREADS = max((os.cpu_count() or 1) // 2, 1)
+Item = TypeVar("Item")
+ALL_CORES = os.cpu_count() or 1
+DECODING_THREADS = max(ALL_CORES // 2, 1)
 """Half of the cores: rebuilding, solving and encoding want the others."""
 
 
-def read_frames(clip: Clip, numbers: Iterable[int] | None = None, *, ahead: int = 2) -> Iterator[Frame]:
+def read_frames(
+    clip: Clip,
+    numbers: Iterable[int] | None = None,
+    *,
+    ahead: int = 2,
+    threads: int = DECODING_THREADS,
+    kept: Kept | None = None,
+    keep: bool = False,
+) -> Iterator[Frame]:
     """Give the clip's frames in linear light, in ascending order, each decoded once; ``numbers`` chooses some of them.
 
     Up to ``ahead`` frames are decoded in advance by threads, so memory does not grow with the clip. The threads end
-    when the iterator is used up, closed, or ends in an error. Raises PsvideoError that names the file where a frame is
-    missing, damaged, or of another size or depth than the first.
+    when the iterator is used up, closed, or ends in an error. Frames that are in ``kept`` are read back from there;
+    with ``keep`` the others are put into it once they are decoded. Raises PsvideoError that names the file where a
+    frame is missing, damaged, or of another size or depth than the first.
     """
     chosen = clip.numbers if numbers is None else tuple(sorted(set(numbers)))
     absent = set(chosen) - set(clip.numbers)
@@ -34,11 +47,9 @@ def read_frames(clip: Clip, numbers: Iterable[int] | None = None, *, ahead: int 
         raise UsageError(f"{clip.path}: has no frame number {min(absent)}; {_span(clip.numbers)}.")
     if not chosen:
         return iter(())
-    if clip.is_movie:
-        pictures = read_movie(clip.path, [clip.timestamps[bisect_left(clip.numbers, number)] for number in chosen])
-        return _ahead((partial(_next_frame, clip, number, pictures) for number in chosen), ahead=ahead, threads=1)
-    jobs = (partial(_read_frame, clip, number) for number in chosen)
-    return _ahead(jobs, ahead=ahead, threads=DECODING_THREADS)
+    decoded = _decoder(clip, [number for number in chosen if kept is None or number not in kept])
+    jobs = (partial(_picture, clip, number, decoded, kept, keep) for number in chosen)
+    return _in_linear_light(clip, _ahead(jobs, ahead=ahead, threads=1 if clip.is_movie else threads))
 
 
 def parse_range(text: str, numbers: Iterable[int]) -> tuple[int, ...]:
@@ -61,24 +72,48 @@ def _span(numbers: tuple[int, ...]) -> str:
     return f"its {len(numbers)} frames are numbered {numbers[0]} to {numbers[-1]}"
 
 
-def _read_frame(clip: Clip, number: int) -> Frame:
-    file = clip.file_of(number)
-    return _frame(clip, number, decode(clip.kind, file), str(file))
+def _decoder(clip: Clip, numbers: list[int]) -> Callable[[int], Picture]:
+    """Return what decodes a frame; a movie's are asked for in the order of ``numbers``."""
+    if not clip.is_movie:
+        return lambda number: decode(clip.kind, clip.file_of(number))
+    from psvideo.clip.movie import read_movie  # FFmpeg's libraries take memory: only where there is a movie
+
+    pictures = read_movie(clip.path, [clip.timestamps[bisect_left(clip.numbers, number)] for number in numbers])
+    return lambda _: next(pictures)
 
 
-def _next_frame(clip: Clip, number: int, pictures: Iterator[Picture]) -> Frame:
-    return _frame(clip, number, next(pictures), f"{clip.path}, frame {number}")
+def _picture(
+    clip: Clip, number: int, decoded: Callable[[int], Picture], kept: Kept | None, keep: bool
+) -> tuple[int, Picture]:
+    """Read a frame's picture back where it is kept, else decode it, and keep it if that is wanted."""
+    if kept is not None and number in kept:
+        return number, kept.get(number)
+    picture = decoded(number)
+    _check_like_first(clip, picture.header, _name(clip, number))
+    if kept is not None and keep:
+        kept.put(number, picture)
+    return number, picture
 
 
-def _frame(clip: Clip, number: int, picture: Picture, name: str) -> Frame:
-    _check_like_first(clip, picture.header, name)
+def _in_linear_light(clip: Clip, pictures: Generator[tuple[int, Picture]]) -> Iterator[Frame]:
+    """Make light of pictures as late as can be: codes take half of its memory or less."""
+    with contextlib.closing(pictures):
+        yield from map(partial(_frame, clip), pictures)  # holds no picture while its frame is worked on
+
+
+def _frame(clip: Clip, numbered: tuple[int, Picture]) -> Frame:
+    number, picture = numbered
     image = linear_light(picture, clip.encoding)
     if picture.header.bits is None and not np.isfinite(image.sum(dtype=np.float64)):
         raise PsvideoError(
-            f"{name}: holds {int((~np.isfinite(image)).sum())} values that are no numbers (NaN or infinity). Write the "
-            "frame again with finite pixels."
+            f"{_name(clip, number)}: holds {int((~np.isfinite(image)).sum())} values that are no numbers (NaN or "
+            "infinity). Write the frame again with finite pixels."
         )
     return Frame(index=clip.index_of(number), number=number, image=image)
+
+
+def _name(clip: Clip, number: int) -> str:
+    return f"{clip.path}, frame {number}" if clip.is_movie else str(clip.file_of(number))
 
 
 def _check_like_first(clip: Clip, found: Header, name: str) -> None:
@@ -97,10 +132,10 @@ def looks(head: Header) -> str:
     return f"{head.width_px} x {head.height_px} pixels, {head.channels} channel(s), {depth}{filters}"
 
 
-def _ahead(jobs: Iterator[Callable[[], Frame]], *, ahead: int, threads: int) -> Iterator[Frame]:
+def _ahead(jobs: Iterator[Callable[[], Item]], *, ahead: int, threads: int) -> Generator[Item]:
     """Run jobs in threads, up to ``ahead`` of them before they are asked for, and give their results in order."""
     pool = ThreadPoolExecutor(max_workers=min(threads, max(ahead, 1)), thread_name_prefix="decode")
-    waiting: deque[Future[Frame]] = deque()
+    waiting: deque[Future[Item]] = deque()
     try:
         for job in jobs:
             waiting.append(pool.submit(job))

@@ -17,7 +17,7 @@ def writing(*, threads: int = WRITING_THREADS, most_waiting: int = MOST_WAITING)
     """Give a function that takes jobs (functions without arguments) and runs them in threads.
 
     It blocks while ``most_waiting`` jobs are under way, and raises what a job before raised; so does the end of the
-    block, which waits for all jobs. A block that fails waits for the jobs under way and drops the rest.
+    block, which waits for all jobs. A block that fails waits for them too: what was computed is kept for --resume.
     """
     pool = ThreadPoolExecutor(threads, thread_name_prefix="write")
     waiting: deque[Future[None]] = deque()
@@ -32,4 +32,4 @@ def writing(*, threads: int = WRITING_THREADS, most_waiting: int = MOST_WAITING)
         while waiting:
             waiting.popleft().result()
     finally:
-        pool.shutdown(wait=True, cancel_futures=True)
+        pool.shutdown(wait=True)

@@ -13,7 +13,7 @@ from psvideo.camera import FloatArray
 from psvideo.plan import Plan
 from psvideo.rowfit.beat import Beat
 from psvideo.rowfit.profiles import Profiles, unexplained
-from psvideo.rowfit.refine import CAUCHY, GLOBALS, Fit, explained, mean_error, projected, sandwich, scaled
+from psvideo.rowfit.refine import CAUCHY, GLOBALS, Fit, believable, explained, mean_error, projected, scaled
 
 LEAST_WINDOWS = 4
 CLEARLY = 5.0
@@ -40,7 +40,8 @@ def bend(plan: Plan, rows: Profiles, fit: Fit, *, free: tuple[str, ...] = (), st
     basis = _basis(len(knots.at_s), free)
     for step in range(steps):
         scale = scaled(rows, rest, 0.02 if step == 0 and fit.beat.clock.knot_s else 0.0)
-        weight = 1.0 / (1.0 + (rest / (CAUCHY * scale)) ** 2) / scale**2
+        trust = 1.0 / (1.0 + (rest / (CAUCHY * scale)) ** 2)
+        weight = trust / scale**2
         rest, hessian, scores = projected(plan, rows, beat, weight, basis, tails=bool({"rise_s", "fall_s"} & set(free)))
         inflation = _inflation(hessian, scores, rows)
         strength, gain = _wandering(hessian / inflation, scores.sum(axis=0) / inflation, beat, knots)
@@ -51,9 +52,8 @@ def bend(plan: Plan, rows: Profiles, fit: Fit, *, free: tuple[str, ...] = (), st
         move = np.linalg.solve(hessian + known, scores.sum(axis=0) - known @ now)
         beat = _moved(rows, beat, knots, free, move)
     rest = unexplained(plan, rows, beat, weight)
-    covariance = sandwich(hessian, scores, known) + np.linalg.inv(hessian + known) @ known @ np.linalg.inv(
-        hessian + known
-    )
+    bread = np.linalg.inv(hessian + known)
+    covariance = believable(plan, rows, beat, weight, trust, basis, known) + bread @ known @ bread
     size = len(knots.at_s)
     return replace(
         fit,
@@ -110,15 +110,23 @@ def _wandering(hessian: FloatArray, pull: FloatArray, beat: Beat, knots: _Knots)
     """Return the most likely strength of the rate's random walk, and its log-likelihood above a straight clock's."""
     size = len(knots.at_s)
     h = hessian[:size, :size]
+    if not h.any():
+        return float(WANDERING[0]), 0.0
     b = pull[:size] + h @ beat.clock.bend(knots.at_s)
     data, stiff = _bands(h + 1e-12 * np.diag(np.diag(h) + 1e-30)), _bands(knots.penalty)
     likelihood = []
     for strength in WANDERING:
-        factor = cholesky_banded(data + stiff / strength, lower=True)
+        try:
+            factor = cholesky_banded(data + stiff / strength, lower=True)
+        except np.linalg.LinAlgError:  # too stiff to be told from a straight clock in double precision
+            likelihood.append(-np.inf)
+            continue
         gain = 0.5 * b @ cho_solve_banded((factor, True), b)  # type: ignore[no-untyped-call]
         likelihood.append(gain - np.log(factor[0]).sum() - 0.5 * (size - 2) * np.log(strength))
-    best = int(np.argmax(likelihood))
-    return float(WANDERING[best]), float(likelihood[best] - likelihood[0])
+    best, straight = int(np.argmax(likelihood)), int(np.argmax(np.isfinite(likelihood)))
+    if not np.isfinite(likelihood[best]):
+        return float(WANDERING[0]), 0.0
+    return float(WANDERING[best]), float(likelihood[best] - likelihood[straight])
 
 
 def _bands(matrix: FloatArray) -> FloatArray:

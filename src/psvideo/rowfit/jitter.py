@@ -83,9 +83,11 @@ def shift_error_s(plan: Plan, rows: Profiles, fit: Fit) -> float:
     for first, last in pairwise(edges.tolist()):
         block = rows.only_rows(slice(first, last))
         weight = np.ascontiguousarray(fit.weight[:, first:last])
-        _, hessian, score = equations(plan, block, fit.beat, weight, tails=False)
+        _, hessian, score = equations(plan, block, fit.beat, weight, tails=False, steepness=weight)
         pulls.append(score[:, :2].sum())
         stiff.append(hessian[:, :2, :2].sum())
     pull, whole = np.array(pulls), float(np.sum(stiff))
+    if whole <= 0.0:
+        return 0.0
     pull -= np.array(stiff) * pull.sum() / whole
     return float(np.sqrt(ROW_BLOCKS / (ROW_BLOCKS - 1) * (pull**2).sum()) / whole)

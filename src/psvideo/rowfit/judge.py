@@ -1,163 +1,138 @@
-"""What people should know of a fit: why there is none, and what to distrust where there is one."""
+"""Whether a fit is to be believed, and the fit of the plan that was meant where the one given is wrong by far."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
-import numpy as np
-
-from psvideo.camera import FloatArray
 from psvideo.plan import Plan
-from psvideo.rowfit.beat import Beat
-from psvideo.rowfit.fit import Found, first_guess, gain_of
-from psvideo.rowfit.profiles import Profiles, brightnesses, predictions, unexplained
-from psvideo.rowfit.search import search
+from psvideo.rowfit.course import too_many
+from psvideo.rowfit.fit import Found, find
+from psvideo.rowfit.profiles import Profiles, unexplained
+from psvideo.rowfit.refine import freedom, refine, robust_loss
+from psvideo.rowfit.refusal import MOST_PPM
+from psvideo.rowfit.rivals import BETTER, CLEARLY, FAIR, camera_rivals, double_rivals, likeliest, strobe_rivals
+from psvideo.rowfit.seed import gain_of
 
 MIN_EXPLAINED, MIN_GAIN = 0.5, 0.3
 """A fit that explains less of the rows' changes, or takes less of the robust loss away, has not found a strobe."""
-MOST_STEPS, MOST_STEPS_SHARE = 3, 0.04
-"""Frames before which others may be missing (or a share of all frames) until only an excellent fit is believed."""
-MISNAMED_PPM = (-1000.0, 999.0)
-"""Clock offsets that a frame rate misnamed by 1.001 leaves: 120 for 119.88, and 119.88 for 120."""
-NEAR_PPM = 150.0
-STEADY = 0.02
-"""Rows that change by less than this share of their light from frame to frame saw no strobe."""
-GAIN_RANGE, GAIN_EXPLAINS = 0.06, 0.6
-"""Exposure is called automatic where frames' gains differ by so much and explain such a share of what is left."""
-WRONG_PERIOD_GAIN = 0.35
-PERIOD_FRAMES, PERIOD_ROWS = 14, 8
-MIXED_ROWS = 0.02
-"""Share of the rows that may hold two flashes before it is worth a word."""
+LUCK = 0.25
+"""Share of noise that the best place of a search explains besides what brightnesses do anywhere."""
+LOST = 0.5
+"""Times whose standard error is more than this share of the shortest flash are not found."""
+UNSURE_GAIN, UNSURE = 0.7, 0.1
+"""A fit that takes less of the robust loss away, or is unsure by such a share of a flash, is worth a second look."""
+MOVED = 0.05
+"""So is one that had to move the exposure or the readout by more than this share."""
+GAPPED = 0.8
+"""A fit that needs frames to be missing and explains less than this share of the changes is worth one, too."""
+OTHER_LENGTHS = (0.5, 0.7, 1.4, 2.0)
+LENGTH_FRAMES = 200
+FLASHES_DIFFER = 0.7
+"""Flashes of other lengths are likely where they leave less than this share of the robust loss."""
 
 
-def convincing(found: Found) -> bool:
-    """Tell whether a fit has found a strobe, and not merely the least bad place for one."""
-    share = gain_of(found.rows, found.fit.rest)
-    often = found.steps > max(MOST_STEPS, MOST_STEPS_SHARE * len(found.rows.value))
+@dataclass(frozen=True, kw_only=True)
+class Verdict:
+    """A fit, the plan under which it was made (another camera than the given plan's where that was wrong by far), and
+    whether it is to be believed."""
+
+    plan: Plan
+    found: Found
+    believed: bool
+
+
+def judged(plan: Plan, rows: Profiles) -> Verdict:
+    """Return the best fit of a clip under the plan or, where another shutter or readout is far likelier, under that.
+
+    ``rows`` are laid out from the picture's top row.
+    """
+    found = find(plan, rows)
+    if not doubtful(plan, found):
+        return Verdict(plan=plan, found=found, believed=True)
+    meant, found = _as_meant(plan, rows, found)
+    believed = convincing(meant, found)
+    if believed and (_unsure(meant, found) or _gaps_feigned(found) or flashes_differ(meant, found)):
+        believed = likeliest(meant, rows, list(strobe_rivals(plan))) is None
+    return Verdict(plan=meant, found=found, believed=believed)
+
+
+def _as_meant(plan: Plan, rows: Profiles, found: Found) -> tuple[Plan, Found]:
+    """Return the likeliest plan with another camera and its fit, or the given ones where they are as good."""
+    leaves = CLEARLY if convincing(plan, found) else BETTER
+    for rivals in (camera_rivals(plan), double_rivals(plan)):
+        meant = likeliest(plan, rows, list(rivals), least=FAIR, leaves=leaves)
+        if meant is not None:
+            again = find(meant.plan, rows, measured=("exposure_s",) if meant.fault == "shutter" else ())
+            gains = [gain_of(one.rows, one.fit.rest) for one in (found, again)]
+            if convincing(meant.plan, again) and gains[1] > gains[0]:
+                return meant.plan, again
+        if convincing(plan, found):
+            break
+    return plan, found
+
+
+def convincing(plan: Plan, found: Found) -> bool:
+    """Tell whether a fit has found a strobe, and not merely the least bad place for one.
+
+    Brightnesses alone explain some of mere noise, which counts in short clips.
+    """
+    rows, fit = found.rows, found.fit
+    by_chance = 1 - freedom(plan, rows, fit.beat)
+    share, explained = gain_of(rows, fit.rest), fit.explained
+    often = too_many(found.steps, len(rows.value))
     return (
-        found.fit.explained > MIN_EXPLAINED
-        and share > MIN_GAIN
-        and (not often or min(share, found.fit.explained) > 0.9)
+        explained > max(MIN_EXPLAINED, by_chance + LUCK * (1 - by_chance))
+        and share > max(MIN_GAIN, by_chance)
+        and (not often or min(share, explained) > 0.9)
+        and abs(fit.beat.clock.mean_offset_ppm()) < MOST_PPM
+        and (found.slack_s > 0 or fit.shift_error_s < LOST * _shortest_s(plan))
     )
 
 
-def notes(plan: Plan, found: Found) -> tuple[str, ...]:
-    """Return sentences on what to distrust, or to put right, although the strobe was found."""
-    beat = found.fit.beat
-    said = [_clock(plan, beat), _mixed(plan, beat), _shutter(plan, found), _exposure(plan, found)]
-    return tuple(sentence for sentence in said if sentence)
-
-
-def _clock(plan: Plan, beat: Beat) -> str:
-    ppm = beat.clock.mean_offset_ppm()
-    near = min(MISNAMED_PPM, key=lambda misnamed: abs(ppm - misnamed))
-    tolerance = plan.clock_range_ppm
-    if abs(ppm - near) < NEAR_PPM and (tolerance < abs(near) or plan.clock_tolerance_ppm is None):
-        rate = plan.camera.fps
-        other = float(rate) / 1.001 if near < 0 else float(rate) * 1.001
-        return (
-            f"The strobe's clock seems off by {ppm:+.0f} ppm, which is what a frame rate misnamed by 1.001 looks like: "
-            f"the plan says {float(rate):.6g} frames a second, and the camera may well have run at {other:.6g}."
-        )
-    if abs(ppm) > tolerance + 1.0:
-        return f"The strobe's clock is off by {ppm:+.0f} ppm, which is more than the {tolerance:.0f} ppm of the plan."
-    return ""
-
-
-def _mixed(plan: Plan, beat: Beat) -> str:
-    short_s = beat.exposure_s - plan.dark_s * beat.clock.rate
-    span_s = plan.camera.frame_period_s
-    if short_s < MIXED_ROWS * span_s:
-        return ""
-    return (
-        f"The dark time of {plan.dark_s * 1e3:.4g} ms is shorter than the exposure of {beat.exposure_s * 1e3:.4g} ms: "
-        f"about {100 * min(short_s / span_s, 1):.0f} % of the rows of every frame hold two flashes, which cannot be "
-        "taken apart. Lengthen the dark time or shorten the exposure."
-    )
-
-
-def _shutter(plan: Plan, found: Found) -> str:
+def doubtful(plan: Plan, found: Found) -> bool:
+    """Tell whether a fit leaves so much, or had to stray so far from the plan, that the plan may be wrong by far."""
     beat, camera = found.fit.beat, plan.camera
-    parts = []
-    if abs(beat.exposure_s / camera.exposure_s - 1) > 1e-3:
-        parts.append(f"the exposure is {beat.exposure_s * 1e3:.5g} ms (plan: {camera.exposure_s * 1e3:.5g})")
+    moved = abs(beat.exposure_s / camera.exposure_s - 1) > MOVED
     if camera.readout_s:
-        readout_s = beat.row_time_s * camera.height_px
-        if abs(readout_s / abs(camera.readout_s) - 1) > 1e-3:
-            parts.append(f"the readout takes {readout_s * 1e3:.5g} ms (plan: {abs(camera.readout_s) * 1e3:.5g})")
-    if beat.fall_s > plan.fall_s + 1e-6 or beat.rise_s > plan.rise_s + 1e-6:
-        parts.append(f"the LEDs rise in {beat.rise_s * 1e6:.1f} us and fall in {beat.fall_s * 1e6:.1f} us")
-    if camera.readout_s is None:
-        height, error_s = camera.height_px, found.fit.errors_s.get("row_time_s", 0.0)
-        direction = "bottom" if beat.upward else "top"
-        return (
-            f"The readout was found to take {beat.row_time_s * height * 1e3:.5g} ms, give or take "
-            f"{error_s * height * 1e3:.1g} ms, {direction} row first."
-        )
-    return f"The picture tells otherwise than the plan: {'; '.join(parts)}." if parts else ""
-
-
-def _exposure(plan: Plan, found: Found) -> str:
-    gain, share = frame_gains(plan, found)
-    low, high = np.percentile(gain, [2, 98])
-    if high / max(low, 1e-9) - 1 < GAIN_RANGE or share < GAIN_EXPLAINS:
-        return ""
+        moved = moved or abs(beat.row_time_s * camera.height_px / abs(camera.readout_s) - 1) > MOVED
     return (
-        f"Whole frames grow brighter and darker by {100 * (high / low - 1):.0f} %: the camera seems to have set its "
-        "exposure or gain by itself. Plates of different moments cannot be compared; film with everything fixed."
+        moved
+        or gain_of(found.rows, found.fit.rest) < UNSURE_GAIN
+        or _unsure(plan, found)
+        or _gaps_feigned(found)
+        or not convincing(plan, found)
+        or flashes_differ(plan, found)
     )
 
 
-def frame_gains(plan: Plan, found: Found) -> tuple[FloatArray, float]:
-    """Return every frame's gain (frame,) against the whole clip's brightnesses, and what gains explain of the rest."""
-    rows = replace(found.rows, doubt=None)
-    beat = replace(found.fit.beat, beat_hz=())
-    expected = predictions(plan, rows, beat, brightnesses(plan, rows.one_window(), beat))
-    trust = found.fit.weight / found.fit.weight.max(axis=0)
-    width = min(9, len(rows.value))
-    around = [
-        np.convolve(np.pad(sums, width // 2, mode="edge"), np.ones(width), mode="valid")[: len(sums)]
-        for sums in ((trust * expected * rows.value).sum(axis=1), (trust * expected**2).sum(axis=1))
-    ]
-    smooth: FloatArray = around[0] / np.maximum(around[1], 1e-30)
-    before = float((trust * (rows.value - expected) ** 2).sum())
-    after = float((trust * (rows.value - smooth[:, None] * expected) ** 2).sum())
-    return smooth, 1 - after / max(before, 1e-30)
+def _unsure(plan: Plan, found: Found) -> bool:
+    return found.slack_s == 0 and found.fit.shift_error_s > UNSURE * _shortest_s(plan)
 
 
-def why_not(plan: Plan, rows: Profiles) -> str:
-    """Return what the picture looks like where no strobe like the plan's was found in it."""
-    change = np.abs(np.diff(rows.value, axis=0))
-    level = float(np.abs(rows.value).mean())
-    if float(change.mean()) < STEADY * level:
-        return (
-            "The rows hardly change from frame to frame, as without any strobe, or with one so fast that every row "
-            "sees the same light."
-        )
-    whole = rows.value.mean(axis=1)
-    alone = float(((rows.value - whole[:, None]) - (rows.value - whole[:, None]).mean(axis=0)).std())
-    if alone < 0.15 * float((whole - whole.mean()).std()) and plan.camera.readout_s != 0:
-        return "All rows change together, as under flicker or automatic exposure, and not as under flashes."
-    period_s, gain = other_period(plan, rows)
-    if gain < WRONG_PERIOD_GAIN:
-        return ""
-    planned_s = plan.dark_s + plan.flashes[plan.lit_slots[0]].duration_s
-    words = (
-        f"The picture looks like a strobe that flashes every {period_s * 1e3:.4g} ms, and not every "
-        f"{planned_s * 1e3:.4g} ms as planned"
-    )
-    short = period_s < plan.camera.exposure_s
-    return words + (", which is shorter than the exposure, so that rows hold two flashes mixed." if short else ".")
+def _gaps_feigned(found: Found) -> bool:
+    """Tell whether holes may only stand for a strobe that drifts away from the plan's: true ones leave little."""
+    return found.steps > 0 and found.fit.explained < GAPPED
 
 
-def other_period(plan: Plan, rows: Profiles) -> tuple[float, float]:
-    """Return the time from flash to flash that explains the picture best, and how much of the loss it takes away."""
-    part = rows.take(slice(0, min(PERIOD_FRAMES, len(rows.value)))).binned(PERIOD_ROWS).one_window()
-    longest_s = max(flash.duration_s for flash in plan.flashes)
-    step_s = longest_s / len(part.value)
-    best = (np.inf, 0.0)
-    for period_s in np.arange(longest_s + 0.25 * rows.period_s, 2.5 * rows.period_s, step_s):
-        tried = replace(plan, dark_s=float(period_s) - longest_s)
-        place = search(tried, part, range_ppm=0.0, start=first_guess(plan), readout_known=True)[0]
-        best = min(best, (place.loss, float(period_s)))
-    tried = replace(plan, dark_s=best[1] - longest_s)
-    place = search(tried, part, range_ppm=0.0, start=first_guess(plan), readout_known=True)[0]
-    return best[1], gain_of(part, unexplained(tried, part, place.beat))
+def flashes_differ(plan: Plan, found: Found) -> bool:
+    """Tell whether flashes much longer or shorter than the plan's, in the same places and without tails, fit better."""
+    rows, beat = found.rows.take(slice(0, LENGTH_FRAMES)).binned(48), found.fit.beat
+    rest = unexplained(plan, rows, beat)
+    limit = FLASHES_DIFFER * robust_loss(rows, rest, rest)
+    shortest_s = _shortest_s(plan)
+    tails_s = beat.rise_s + beat.fall_s - plan.rise_s - plan.fall_s
+    for factor in OTHER_LENGTHS:
+        longer_s = (factor - 1) * shortest_s
+        flashes = tuple(replace(flash, duration_s=flash.duration_s + longer_s) for flash in plan.flashes)
+        other = replace(plan, flashes=flashes, dark_s=plan.dark_s - longer_s)
+        moved = beat.with_phase(beat.clock.phase_s - 0.5 * longer_s + tails_s)
+        moved = replace(moved, rise_s=plan.rise_s, fall_s=plan.fall_s)
+        if other.dark_s <= 0:
+            continue
+        if tails_s > 0:  # which stood for some of the other length, and moved the flashes with them
+            moved = refine(other, rows, moved, steps=4, first_scale=0.1).beat
+        if robust_loss(rows, unexplained(other, rows, moved), rest) < limit:
+            return True
+    return False
+
+
+def _shortest_s(plan: Plan) -> float:
+    return min(plan.flashes[slot].duration_s for slot in plan.lit_slots)

@@ -20,6 +20,8 @@ IntArray = NDArray[np.int64]
 
 RIDGE = 1e-6
 """Share of the normal matrix's diagonal that is added to it, so that a brightness nobody saw stays at zero."""
+MOST_LEVERAGE = 0.9
+"""A sample that its brightness fits all by itself tells nothing of errors; its residual is not blown up without end."""
 REACH = 9.0
 """After so many fall times a flash is taken to be over."""
 LEFT, RIGHT, EXPOSURE, ROW_TIME, RISE, FALL = range(6)
@@ -213,9 +215,24 @@ def rests(rows, flashes, weight, first, last, rest):  # type: ignore[no-untyped-
 
 
 @nb.njit(cache=True, nogil=True)
-def equations(rows, flashes, weight, tails, first, last, rest, hessian, score):  # type: ignore[no-untyped-def]
+def leverage(normal, design, weight, size, solved):  # type: ignore[no-untyped-def]
+    """Return which share of a sample's own error the brightnesses that are fitted to it take up."""
+    taken = 0.0
+    for i in range(size):
+        left = design[i]
+        for m in range(i):
+            left -= normal[i, m] * solved[m]
+        solved[i] = left / normal[i, i]
+        taken += solved[i] ** 2
+    return min(weight * taken, MOST_LEVERAGE)
+
+
+@nb.njit(cache=True, nogil=True)
+def equations(rows, flashes, weight, steepness, tails, honest, first, last, rest, hessian, score):  # type: ignore[no-untyped-def]
     """Fill ``rest``; add the rows' normal matrices to ``hessian`` (window, SIGNALS, SIGNALS), their ``weight * signal *
-    rest`` to ``score`` (frame, SIGNALS), which keeps the frames apart."""
+    rest`` to ``score`` (frame, SIGNALS), which keeps the frames apart. The normal matrices hold ``steepness`` (frame,
+    row): how fast a residual's pull grows with it, which is its weight but in robust fits. Where ``honest``, residuals
+    count in the scores as large as if no brightness had been fitted to them (MacKinnon and White 1985, HC2)."""
     frames = len(rows.value)
     size = width(rows, flashes)
     design = np.empty((frames, size))
@@ -223,6 +240,7 @@ def equations(rows, flashes, weight, tails, first, last, rest, hessian, score): 
     normal, right = np.empty((size, size)), np.empty(size)
     signals = np.empty((frames, SIGNALS))
     cross = np.empty((SIGNALS, size))
+    solved = np.empty(size)
     for row in range(first, last):
         k = 0
         for n in range(frames):
@@ -252,11 +270,14 @@ def equations(rows, flashes, weight, tails, first, last, rest, hessian, score): 
                         for p in range(SIGNALS):
                             signals[n, p] -= design[n, i] * cross[p, i]
                 rest[n, row] = rows.value[n, row] - explained
+                error = rest[n, row]
+                if honest:
+                    error /= np.sqrt(1.0 - leverage(normal, design[n], weight[n, row], size, solved))
                 for p in range(SIGNALS):
                     pull = weight[n, row] * signals[n, p]
-                    score[n, p] += pull * rest[n, row]
+                    score[n, p] += pull * error
                     for q in range(p + 1):
-                        hessian[window, p, q] += pull * signals[n, q]
+                        hessian[window, p, q] += steepness[n, row] * signals[n, p] * signals[n, q]
 
 
 @nb.njit(cache=True, nogil=True)

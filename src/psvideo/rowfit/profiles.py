@@ -152,17 +152,28 @@ def unexplained(plan: Plan, rows: Profiles, beat: Beat, weight: FloatArray | Non
 
 
 def equations(
-    plan: Plan, rows: Profiles, beat: Beat, weight: FloatArray, *, tails: bool
+    plan: Plan,
+    rows: Profiles,
+    beat: Beat,
+    weight: FloatArray,
+    *,
+    tails: bool,
+    steepness: FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return residuals (frame, row), normal matrices (window, signal, signal) and scores (frame, signal)."""
+    """Return residuals (frame, row), normal matrices (window, signal, signal) and scores (frame, signal).
+
+    With ``steepness`` (frame, row), how fast residuals' pulls grow with them, they tell of errors and not of steps: it
+    stands in the matrices for the weight, and residuals count in the scores as if no brightness were fitted to them.
+    """
     seen, flashes = compiled_rows(rows, beat), compiled_flashes(plan, rows, beat)
+    honest, growth = steepness is not None, weight if steepness is None else steepness
     rest = np.empty_like(rows.value)
     parts: list[tuple[FloatArray, FloatArray]] = []
 
     def run(first: int, last: int) -> None:
         hessian = np.zeros((len(rows.window_start), kernel.SIGNALS, kernel.SIGNALS))
         score = np.zeros((len(rows.value), kernel.SIGNALS))
-        kernel.equations(seen, flashes, weight, tails, first, last, rest, hessian, score)
+        kernel.equations(seen, flashes, weight, growth, tails, honest, first, last, rest, hessian, score)
         parts.append((hessian, score))
 
     share(run, rows.value.shape[1], work=rows.value.size)

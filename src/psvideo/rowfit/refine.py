@@ -17,6 +17,8 @@ FIRST_SCALE, LAST_SCALE = 0.3, 2e-3
 that the few rows that a flash splits, which tell the time, are not taken for outliers before the fit is near."""
 WIDE_SCALE = 0.05
 """The scale at which a time that is off is looked for: rows that it spoils must not count as outliers then."""
+LEAST_STEEP = -0.1
+"""Cauchy's pull falls where residuals are large; of that so much counts, lest a few rule a short clip's errors."""
 LAG = 3
 """Residuals of frames so far apart may still err together (a subject that moves): Newey and West 1987."""
 CLUSTER, LEAST_CLUSTERS = 12, 8
@@ -55,7 +57,7 @@ def refine(
     basis = _straight(rows, free)
     unit_s = _units(plan, rows, beat, free)
     rest = unexplained(plan, rows, beat)
-    weight = np.ones_like(rest)
+    weight = trust = np.ones_like(rest)
     for step in range(steps):
         scale = scaled(rows, rest, first_scale * 0.4**step)
         trust = 1.0 / (1.0 + (rest / (CAUCHY * scale)) ** 2)
@@ -65,7 +67,7 @@ def refine(
         beat, rest, gained = _step(plan, rows, beat, free, _held(plan, move, free), weight, rest)
         if step > 6 and (not gained or (np.abs(move) < 1e-5 * unit_s).all()):
             break
-    covariance = sandwich(hessian, scores, prior(plan, rows, unit_s, free))
+    covariance = believable(plan, rows, beat, weight, trust, basis, prior(plan, rows, unit_s, free))
     return Fit(
         beat=beat,
         rest=rest,
@@ -153,20 +155,51 @@ def prior(plan: Plan, rows: Profiles, unit_s: FloatArray, free: tuple[str, ...])
 
 
 def projected(
-    plan: Plan, rows: Profiles, beat: Beat, weight: FloatArray, basis: FloatArray, *, tails: bool
+    plan: Plan,
+    rows: Profiles,
+    beat: Beat,
+    weight: FloatArray,
+    basis: FloatArray,
+    *,
+    tails: bool,
+    steepness: FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return residuals, the normal matrix and every frame's scores (frame, unknown) in the unknowns of a basis."""
-    rest, windows, score = equations(plan, rows, beat, weight, tails=tails)
+    rest, windows, score = equations(plan, rows, beat, weight, tails=tails, steepness=steepness)
     knots = len(rows.window_start) + 1
     size = basis.shape[1]
     hessian = np.zeros((size, size))
     common = basis[knots:]
     for w, matrix in enumerate(windows):
         local = np.vstack([basis[w], basis[w + 1], common])
-        hessian += local.T @ matrix @ local
+        moved = np.flatnonzero(local.any(axis=0))
+        hessian[np.ix_(moved, moved)] += local[:, moved].T @ matrix @ local[:, moved]
     window = np.searchsorted(rows.window_start, np.arange(len(rows.value)), side="right") - 1
     scores = score[:, :1] * basis[window] + score[:, 1:2] * basis[window + 1] + score[:, 2:] @ common
     return rest, hessian, scores
+
+
+def freedom(plan: Plan, rows: Profiles, beat: Beat) -> float:
+    """Return which share of the residuals' squares brightnesses that are fitted to them leave (MacKinnon, White 1985).
+
+    Not less than one frame's share, which a clip that has as many brightnesses as frames does not even have.
+    """
+    frames = len(rows.value)
+    fitted = len(rows.window_start) * (len(plan.lit_slots) + 1 + 2 * len(beat.beat_hz))
+    return max(frames - fitted, 1) / frames
+
+
+def believable(
+    plan: Plan, rows: Profiles, beat: Beat, weight: FloatArray, trust: FloatArray, basis: FloatArray, known: FloatArray
+) -> FloatArray:
+    """Return the covariance of the unknowns at the end of a robust fit.
+
+    ``weight`` is each sample's, ``trust`` (0 to 1) the part of it that is owed to its residual: a residual whose trust
+    falls as it grows pulls less than its weight tells (Huber 1981, section 7.6).
+    """
+    steepness = weight * np.maximum(2.0 * trust - 1.0, LEAST_STEEP)
+    _, hessian, scores = projected(plan, rows, beat, weight, basis, tails=True, steepness=steepness)
+    return sandwich(hessian, scores, known)
 
 
 def sandwich(hessian: FloatArray, scores: FloatArray, known: FloatArray) -> FloatArray:

@@ -8,7 +8,6 @@ the numbering tells costs something. Then the clock is sharpened on the latest f
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from psvideo.camera import FloatArray
 from psvideo.plan import Plan
@@ -16,21 +15,23 @@ from psvideo.rowfit.beat import Beat
 from psvideo.rowfit.kernel import IntArray
 from psvideo.rowfit.profiles import Profiles, brightnesses, predictions, unexplained
 from psvideo.rowfit.refine import refine
+from psvideo.rowfit.retime import Mask
+from psvideo.rowfit.retime import twins as twin_frames
 from psvideo.rowfit.search import ROBUST_STEEPNESS
 
-BLOCK = 16
+BLOCK, LONG_BLOCK = 16, 64
 LEAST, MOST = -6, 24
 """Frames that may be repeated (less than none) or missing at one place without a hole in the numbering."""
 JUMP_COST = 2.0
 """What an unexpected step costs, in mean losses of a frame (a frame at a wrong time costs 1 to 3)."""
 TWIN_COST = 0.2
 """What it costs to take a frame that looks exactly like the one before it for the same moment."""
-TWIN = 0.02
-"""Share of the rows' spreads by which two frames of the same moment differ at most."""
 SUSPICIOUS = 0.25
 """A frame's loss by which it must exceed what is usual before other places in time are tried for it."""
 HOLDS = 1.0
 """A step is believed where it takes away so much of the frames' losses once brightnesses are fitted anew."""
+NATURAL = 0.1
+"""A frame that looks like the one before it is repeated only where its own place in time fits worse by so much."""
 LEAST_ANCHOR = 12
 MEMORY, NEAR = 24, 10
 """Frames on either side of a hole that tell where it is, and how far from where it was found it may be."""
@@ -49,7 +50,7 @@ class Track:
     late_s: FloatArray
 
     @property
-    def repeated(self) -> NDArray[np.bool_]:
+    def repeated(self) -> Mask:
         """Frames that show the same moment as the one before them, shape (frame,)."""
         return np.append(False, np.diff(self.index) == 0)
 
@@ -63,7 +64,7 @@ def track(plan: Plan, rows: Profiles, beat: Beat, seed: slice, *, memory: int) -
         low, high = _anchor(plan, rows, beat, seed)
         beat = refine(plan, rows.take(slice(low, high)), beat, steps=6, first_scale=0.1).beat
     index = rows.index.copy()
-    twins = _twins(rows)
+    twins = twin_frames(rows)
     late = [_lateness(beat, beat, float(rows.frame_start_s[low:high].mean()))]
     now = beat
     while high < len(index):
@@ -83,15 +84,17 @@ def track(plan: Plan, rows: Profiles, beat: Beat, seed: slice, *, memory: int) -
         low -= len(extra)
         now, point = _sharpened(plan, replace(rows, index=index), now, beat, slice(low, min(low + memory, high)))
         late.append(point)
-    return _from_first_frame(rows, index, beat, late)
-
-
-def _from_first_frame(rows: Profiles, index: IntArray, beat: Beat, late: list[tuple[float, float]]) -> Track:
-    """Count time from the clip's first frame again, wherever frames before the anchor turned out to be missing."""
-    shift = int(index[0] - rows.index[0])
     points = np.array(sorted(late), np.float64)
-    moved = replace(beat, clock=replace(beat.clock, phase_s=beat.clock.phase_s - shift * rows.period_s))
-    return Track(index=index - shift, beat=moved, at_s=points[:, 0] - shift * rows.period_s, late_s=points[:, 1])
+    return from_first_frame(rows, Track(index=index, beat=beat, at_s=points[:, 0], late_s=points[:, 1]))
+
+
+def from_first_frame(rows: Profiles, tracked: Track) -> Track:
+    """Count time from the clip's first frame again, wherever frames after it turned out to be missing."""
+    shift = int(tracked.index[0] - rows.index[0])
+    shift_s, clock = shift * rows.period_s, tracked.beat.clock
+    knot_s = tuple(at_s - shift_s for at_s in clock.knot_s)
+    moved = replace(tracked.beat, clock=replace(clock, phase_s=clock.phase_s - shift_s, knot_s=knot_s))
+    return replace(tracked, index=tracked.index - shift, beat=moved, at_s=tracked.at_s - shift_s)
 
 
 def _anchor(plan: Plan, rows: Profiles, beat: Beat, seed: slice) -> tuple[int, int]:
@@ -100,7 +103,7 @@ def _anchor(plan: Plan, rows: Profiles, beat: Beat, seed: slice) -> tuple[int, i
     loss = frame_losses(part, unexplained(plan, part, beat))
     calm = np.array([np.median(loss[max(n - 1, 0) : n + 2]) for n in range(len(loss))])
     good = calm < np.median(loss) + max(SUSPICIOUS, float(np.median(loss)))
-    good &= ~_twins(rows)[seed]
+    good &= ~twin_frames(rows)[seed]
     edges = np.flatnonzero(np.diff(np.concatenate([[0], good.astype(np.int64), [0]])))
     runs = [(int(b - a), int(a)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
     length, first = max(runs)
@@ -117,16 +120,7 @@ def frame_losses(rows: Profiles, rest: FloatArray) -> FloatArray:
     return losses
 
 
-def _twins(rows: Profiles) -> NDArray[np.bool_]:
-    """Return the frames that look exactly like the one before them, shape (frame,)."""
-    change = np.abs(np.diff(rows.value, axis=0)) / rows.spread
-    lit = rows.spread > 0.03 * rows.spread.max()
-    return np.append(False, change[:, lit].mean(axis=1) < TWIN)
-
-
-def _course(
-    plan: Plan, rows: Profiles, beat: Beat, known: slice, block: slice, twins: NDArray[np.bool_], sign: int
-) -> IntArray:
+def _course(plan: Plan, rows: Profiles, beat: Beat, known: slice, block: slice, twins: Mask, sign: int) -> IntArray:
     """Return by how many frames more than the numbering tells the next frames lie away, shape (frame,).
 
     Where all is as usual, this is for the whole block; where not, for its nearer half, so that the other half is looked
@@ -135,16 +129,16 @@ def _course(
     learnt = rows.take(known)
     nearness = np.linspace(0.1, 1.0, len(learnt.value))[:: 1 if sign > 0 else -1, None]
     light = brightnesses(plan, learnt, beat, np.ascontiguousarray(np.broadcast_to(nearness, learnt.value.shape)))
-    usual = float(np.median(_losses(plan, learnt, learnt, beat, light)))
+    usual = float(np.median(losses_of(plan, learnt, learnt, beat, light)))
     ahead = rows.take(block)
-    loss = _losses(plan, learnt, ahead, beat, light)
+    loss = losses_of(plan, learnt, ahead, beat, light)
     same = twins[block] if sign > 0 else np.append(twins[block][1:], twins[block.stop])
     odd = np.convolve(loss, [0.5, 0.5], mode="same") if len(loss) > 1 else loss
     if odd.max() < usual + SUSPICIOUS and not same.any():
         return np.zeros(len(loss), np.int64)
     extras = np.arange(LEAST, MOST + 1)
     shifted = [replace(ahead, index=ahead.index + sign * int(extra)) for extra in extras]
-    table = np.stack([_losses(plan, learnt, one, beat, light) for one in shifted], axis=1)
+    table = np.stack([losses_of(plan, learnt, one, beat, light) for one in shifted], axis=1)
     course = _cheapest(table, same) if sign > 0 else _cheapest(table[::-1], same[::-1])[::-1]
     if course.any() and not _holds(plan, rows, beat, known, block, course, sign):
         course = np.zeros(len(loss), np.int64)
@@ -174,7 +168,8 @@ def _holds(plan: Plan, rows: Profiles, beat: Beat, known: slice, block: slice, c
     return float(gain.sum()) > HOLDS
 
 
-def _losses(plan: Plan, reference: Profiles, rows: Profiles, beat: Beat, light: FloatArray) -> FloatArray:
+def losses_of(plan: Plan, reference: Profiles, rows: Profiles, beat: Beat, light: FloatArray) -> FloatArray:
+    """Return how badly known brightnesses foretell frames, shape (frame,), on the scale of the reference's spreads."""
     rest = rows.value - predictions(plan, rows, beat, light)
     spread = reference.spread
     lit = spread > 0.03 * spread.max()
@@ -182,7 +177,7 @@ def _losses(plan: Plan, reference: Profiles, rows: Profiles, beat: Beat, light: 
     return losses
 
 
-def _cheapest(table: FloatArray, twin: NDArray[np.bool_]) -> IntArray:
+def _cheapest(table: FloatArray, twin: Mask) -> IntArray:
     """Return the course of least cost through a table (frame, extra); no frame comes before the one before it."""
     extras = np.arange(LEAST, MOST + 1)
     step = extras[None, :] - extras[:, None]  # from the row's state to the column's
@@ -236,3 +231,37 @@ def settled(plan: Plan, rows: Profiles, index: IntArray, beat: Beat) -> IntArray
             tried[start] = (float(frame_losses(part, unexplained(plan, part, beat)).sum()), moved)
         index = min(tried.values(), key=lambda pair: pair[0])[1]
     return index
+
+
+def with_repeats(plan: Plan, rows: Profiles, tracked: Track, kept: Mask) -> Track:
+    """Return the track of all frames from that of those that were ``kept`` (frame,).
+
+    A frame that was left out takes the place of the one before it, unless its own place is free and fits as well: dark
+    slots that follow one another look alike, too.
+    """
+    if kept.all():
+        return tracked
+    last = np.maximum.accumulate(np.where(kept, np.arange(len(kept)), 0))
+    index = tracked.index[np.cumsum(kept) - 1]
+    own = index + rows.index - rows.index[last]
+    following = np.append(tracked.index[1:], own[-1] + 1)[np.cumsum(kept) - 1]
+    for first in range(0, len(kept), LONG_BLOCK):
+        block = slice(first, min(first + LONG_BLOCK, len(kept)))
+        open_places = ~kept[block] & (own[block] < following[block])
+        if open_places.any():
+            there, here = (_fits(plan, rows, tracked, kept, block, places) for places in (own, index))
+            natural = open_places & (there < here + NATURAL)
+            index[block] = np.where(natural, own[block], index[block])
+    return replace(tracked, index=index)
+
+
+def _fits(plan: Plan, rows: Profiles, tracked: Track, kept: Mask, block: slice, places: IntArray) -> FloatArray:
+    """Return how badly frames fit at some places in time, shape (frame of the block,), by the frames around them."""
+    near = slice(max(block.start - MEMORY, 0), min(block.stop + MEMORY, len(kept)))
+    known = np.cumsum(kept)[near][kept[near]] - 1
+    learnt = replace(
+        rows.one_window(), value=np.ascontiguousarray(rows.value[near][kept[near]]), index=tracked.index[known]
+    )
+    light = brightnesses(plan, learnt, tracked.beat)
+    asked = replace(rows.one_window(), value=rows.value[block], index=places[block])
+    return losses_of(plan, learnt, asked, tracked.beat, light)

@@ -76,7 +76,7 @@ def unseal(text: str) -> tuple[str, bool]:
     found = CHECKSUM.search(text)
     body = text[:-5]
     if found is None or "*" in body or int(found[1], 16) != crc16(body.encode("ascii")):
-        raise LineError(Error.CRC, f"checksum of {text[:20]!r}")
+        raise LineError(Error.CRC, f"checksum behind {text.partition('*')[0][:20]}")
     return body, True
 
 

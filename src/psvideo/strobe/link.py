@@ -10,7 +10,7 @@ from typing import Protocol, TypeVar
 
 from psvideo.errors import PsvideoError
 from psvideo.strobe.lines import LONGEST_REPLY, Error, Line, LineError, LineReader
-from psvideo.strobe.messages import Arm, Clk, ClockReading, Nonce, Refusal, Reply, Request, Run
+from psvideo.strobe.messages import Arm, Clk, ClockReading, Nonce, Refusal, Reply, Request, Run, Stop
 from psvideo.strobe.protocol import format_request, parse_reply
 
 REPLY_WITHIN_S = 0.5
@@ -55,7 +55,10 @@ Answer = TypeVar("Answer", bound=Reply)
 
 
 class Link:
-    """A controller at a port. ``heard`` is the beginning of whatever came that was no reply, for messages."""
+    """A controller at a port.
+
+    ``heard`` is the beginning of what came, for messages; ``repaired`` counts the times that the way back was sought.
+    """
 
     def __init__(self, port: Port) -> None:
         self.port = port
@@ -63,17 +66,18 @@ class Link:
         self.repaired = 0
         self._reader = LineReader(LONGEST_REPLY)
         self._waiting: list[Line] = []
+        self._astray = False
         self._nonce = int(time.time() * 1000) & 0xFFFFFF
 
     def ask(self, request: Request, kind: type[Answer], *, within_s: float = REPLY_WITHIN_S) -> Answer:
         """Return the controller's reply. Raises RefusedError, NoReplyError, or what the port raises."""
-        for attempt in range(TRIES):
-            if attempt:
-                self.repaired += 1
-                self.find_the_way_back()
+        for _ in range(TRIES):
+            if self._astray:
+                self._repair(request)
             self.port.write(format_request(request))
             reply = self._reply(kind, within_s)
-            if isinstance(reply, Refusal) and reply.code not in NOT_DONE:
+            self._astray = reply is None or (isinstance(reply, Refusal) and reply.code in NOT_DONE)
+            if isinstance(reply, Refusal) and not self._astray:
                 raise RefusedError(self._refused(request, reply), code=reply.code)
             if reply is not None and not isinstance(reply, Refusal):
                 return reply
@@ -83,6 +87,13 @@ class Link:
             f"{self.port.name}: the controller gave no whole answer to {request.name}. Check cable and plug, keep the "
             "cable away from the lights' supply, and run the command again."
         )
+
+    def _repair(self, request: Request) -> None:
+        """Find the way back before a request; darkness does not wait for that."""
+        self.repaired += 1
+        if isinstance(request, Stop):
+            self.port.write(b"\n" + format_request(request))
+        self.find_the_way_back()
 
     def read_clock(self) -> tuple[ClockReading, float, float]:
         """Return the controller's clock, and the host's (time.monotonic) before asking and after the answer."""

@@ -138,19 +138,18 @@ def _with_dark_slots(plan: Plan, clock: StrobeClock, flashes: Sequence[TrueFlash
     found: list[TrueFlash] = []
     place = -1
     for flash in flashes:
-        skipped = []
-        for _ in cycle:
-            place = (place + 1) % len(cycle)
-            if cycle[place] == flash.slot:
-                break
-            skipped.append(cycle[place])
-        before_s = flash.start_s
-        dark = []
-        for slot in reversed(skipped):
+        ahead = [(place + k) % len(cycle) for k in range(1, len(cycle) + 1)]
+        step = next(k for k, there in enumerate(ahead) if cycle[there] == flash.slot)
+        skipped = [cycle[there] for there in ahead[:step]]
+        if not all(plan.flashes[slot].is_dark for slot in skipped):
+            skipped = []  # a new run
+        place = ahead[step]
+        at_s = flash.start_s - rate * sum(plan.flashes[slot].duration_s + plan.dark_s for slot in skipped)
+        for slot in skipped:
             duration_s = rate * plan.flashes[slot].duration_s
-            before_s -= duration_s + rate * plan.dark_s
-            dark.append(replace(flash, slot=slot, lights={}, start_s=before_s, duration_s=duration_s, bursts_s=()))
-        found += [*reversed(dark), flash]
+            found.append(replace(flash, slot=slot, lights={}, start_s=at_s, duration_s=duration_s, bursts_s=()))
+            at_s += duration_s + rate * plan.dark_s
+        found.append(flash)
     return found
 
 

@@ -41,8 +41,17 @@ def smaller(image: NDArray[np.floating], width_px: int) -> Image:
     rows, cols = image.shape[:2]
     if cols <= width_px:
         return image.astype(np.float32)
-    stride = max(cols // (2 * width_px), 1)  # resizing takes whole pictures in float32; twice the width is plenty
-    coarse = np.ascontiguousarray(image[::stride, ::stride]).astype(np.float32)
+    planes = np.moveaxis(image.reshape(rows, cols, -1), -1, 0)  # one by one: whole pictures in float32 are large
+    small = np.stack([_smaller_plane(plane, width_px) for plane in planes], axis=-1)
+    return small.reshape(*small.shape[:2], *image.shape[2:])
+
+
+def _smaller_plane(plane: NDArray[np.floating], width_px: int) -> Image:
+    """Average one channel down, by a whole number first: OpenCV averages whole squares several times faster."""
+    rows, cols = plane.shape
+    factor = cols // width_px
+    squares = np.ascontiguousarray(plane[: rows // factor * factor, : cols // factor * factor], np.float32)
+    coarse = cv2.resize(squares, (cols // factor, rows // factor), interpolation=cv2.INTER_AREA)
     size = (width_px, max(round(rows * width_px / cols), 1))
     return cv2.resize(coarse, size, interpolation=cv2.INTER_AREA).astype(np.float32)
 

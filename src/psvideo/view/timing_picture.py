@@ -32,7 +32,9 @@ def timing_picture(plan: Plan, timing: Timing, indices: NDArray[np.int64], profi
     rest = residuals_of(plan, timing, places, values)
     shown = _edges(timing, places, _grey(values, white), values.shape[1])
     strips = [
-        Strip(f"Row profiles, frame by frame ({len(places)} frames)", [Tile("", _grey(values, white))]),
+        Strip(
+            f"Row profiles, frame by frame ({len(places)} frames). {timing.how_sure}", [Tile("", _grey(values, white))]
+        ),
         Strip("The same with every flash's end and start as fitted, one colour a light", [Tile("", shown)]),
         Strip(f"What the fit leaves, {RESIDUAL_GAIN:.0f} times as bright", [Tile("", _signed(rest, white))]),
         Strip(_drift_title(timing), [Tile("", _drift(timing))]),

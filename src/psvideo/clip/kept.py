@@ -1,0 +1,128 @@
+"""Decoded pictures put by in a temporary file, so that a clip that is gone over twice is decoded once.
+
+Codes are written as they were decoded, and linear light is made of them again: nothing is lost, and 16-bit footage
+takes half of what its light would. The file has no name from the moment it is made, so however a run ends, nothing of
+it stays behind. What does not fit is not kept, and is decoded again by whoever asks for it.
+"""
+
+import contextlib
+import shutil
+import tempfile
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass
+from io import FileIO
+from pathlib import Path
+
+import numpy as np
+
+from psvideo.clip.record import Header, Picture
+from psvideo.errors import PsvideoError
+
+SHARE_OF_FREE_SPACE = 0.5
+"""What kept pictures may take of the disk's free space; the run's own files need room too."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Place:
+    """Where a picture's codes lie in the file, and how they are to be read."""
+
+    offset: int
+    shape: tuple[int, ...]
+    dtype: np.dtype[np.generic]
+    header: Header
+
+
+class Kept:
+    """Pictures by frame number, in one file; threads may put and get at the same time.
+
+    ``most_bytes`` bounds the file. ``missed`` counts the pictures for which there was no room.
+    """
+
+    def __init__(self, file: FileIO, *, most_bytes: int) -> None:
+        self._file = file
+        self._most_bytes = most_bytes
+        self._places: dict[int, _Place] = {}
+        self._lock = threading.Lock()
+        self.bytes_held = 0
+        self.missed = 0
+
+    def __contains__(self, number: int) -> bool:
+        """True where the picture of this frame is kept."""
+        return number in self._places
+
+    def __len__(self) -> int:
+        """How many pictures are kept."""
+        return len(self._places)
+
+    def close(self) -> None:
+        """Give the disk back; whoever still wants to keep a picture finds no room."""
+        with self._lock:
+            self._most_bytes = 0
+            self._places.clear()
+            self._file.close()
+
+    def put(self, number: int, picture: Picture) -> None:
+        """Keep a picture, if there is room for it; a disk that turns out to be full ends the keeping, not the run."""
+        codes = np.ascontiguousarray(picture.codes)
+        with self._lock:
+            if self.bytes_held + codes.nbytes > self._most_bytes:
+                self.missed += 1
+                return
+            try:
+                self._file.seek(self.bytes_held)
+                _write_all(self._file, codes.data.cast("B"))
+            except OSError:
+                self._most_bytes = 0
+                self.missed += 1
+                return
+            self._places[number] = _Place(
+                offset=self.bytes_held, shape=codes.shape, dtype=codes.dtype, header=picture.header
+            )
+            self.bytes_held += codes.nbytes
+
+    def get(self, number: int) -> Picture:
+        """Return a kept picture as it was put. Raises PsvideoError where the disk does not give it back."""
+        place = self._places[number]
+        codes = np.empty(place.shape, place.dtype)
+        try:
+            with self._lock:
+                self._file.seek(place.offset)
+                read = self._file.readinto(codes.data.cast("B"))
+        except OSError as fault:
+            raise PsvideoError(f"{_UNREADABLE} ({fault.strerror or fault}). {_ADVICE}") from fault
+        if read != codes.nbytes:
+            raise PsvideoError(f"{_UNREADABLE} ({read} of {codes.nbytes} bytes of frame {number}). {_ADVICE}")
+        return Picture(header=place.header, codes=codes)
+
+
+def _write_all(file: FileIO, data: memoryview) -> None:
+    """Write all of it; a disk that is nearly full takes a part and then raises OSError."""
+    while data:
+        data = data[file.write(data) :]
+
+
+_UNREADABLE = "The temporary file that holds decoded frames cannot be read back"
+_ADVICE = "Check the disk that the output is on, then run the command again."
+
+
+@contextlib.contextmanager
+def keeping_near(output: Path) -> Iterator[Kept]:
+    """Give an empty store of pictures on the disk where ``output`` will be written; at the end its file is gone.
+
+    Raises PsvideoError where no file can be made there.
+    """
+    folder = next(parent for parent in output.absolute().parents if parent.is_dir())
+    try:
+        most_bytes = int(shutil.disk_usage(folder).free * SHARE_OF_FREE_SPACE)
+        opened = tempfile.TemporaryFile(dir=folder, prefix=".psvideo-", buffering=0)  # noqa: SIM115, closed by Kept
+    except OSError as fault:
+        raise PsvideoError(
+            f"{folder}: no file can be made here ({fault.strerror or fault}), and {output.name} would be. Check the "
+            "folder's permissions, or name another output."
+        ) from fault
+    kept = Kept(opened, most_bytes=most_bytes)
+    try:
+        yield kept
+    finally:
+        kept.close()

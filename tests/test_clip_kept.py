@@ -1,0 +1,121 @@
+"""Decoded pictures come back from their temporary file as they were, within the room that they may take."""
+
+import io
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from psvideo.clip import Kept, keeping_near
+from psvideo.clip import kept as room
+from psvideo.clip.record import Header, Picture
+from psvideo.errors import PsvideoError
+
+KINDS = st.sampled_from([np.uint8, np.uint16, np.float32])
+SHAPES = st.one_of(
+    st.tuples(st.integers(1, 5), st.integers(1, 5)), st.tuples(st.integers(1, 5), st.integers(1, 5), st.just(3))
+)
+ARRAYS = KINDS.flatmap(lambda kind: hnp.arrays(kind, SHAPES))
+
+
+def picture(codes: np.ndarray, black: float = 0.0) -> Picture:
+    rows, cols = codes.shape[:2]
+    head = Header(width_px=cols, height_px=rows, channels=1, bits=16, black=((black,),))
+    return Picture(header=head, codes=codes)
+
+
+@given(st.lists(ARRAYS, min_size=1, max_size=5), st.booleans())
+def test_what_is_kept_comes_back_bit_for_bit_in_any_order(arrays: list[np.ndarray], turned: bool) -> None:
+    with keeping_near(Path(tempfile.gettempdir()) / "out") as kept:
+        put = {}
+        for number, codes in enumerate(arrays):
+            put[number] = picture(codes[::-1, ::-1] if turned else codes, black=number)
+            kept.put(number, put[number])
+        for number in reversed(put):
+            back = kept.get(number)
+            assert back.header == put[number].header, "every frame keeps its own levels"
+            assert back.codes.dtype == put[number].codes.dtype
+            assert back.codes.tobytes() == put[number].codes.tobytes()
+        assert kept.bytes_held == sum(codes.nbytes for codes in arrays)
+
+
+def test_no_more_room_is_taken_than_is_allowed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    codes = np.zeros((10, 10), np.uint16)
+
+    class Usage:
+        free = 1000
+
+    monkeypatch.setattr(room.shutil, "disk_usage", lambda folder: Usage)
+    with keeping_near(tmp_path / "out") as kept:
+        for number in range(5):
+            kept.put(number, picture(codes))
+        assert [number in kept for number in range(5)] == [True, True, False, False, False]
+        assert (len(kept), kept.bytes_held, kept.missed) == (2, 400, 3)
+
+
+def test_a_disk_that_turns_out_to_be_full_ends_the_keeping_and_not_the_run() -> None:
+    full = Path("/dev/full")
+    if not full.exists():
+        pytest.skip("this system has no device that is always full")
+    with io.FileIO(str(full), "r+") as file:
+        kept = Kept(file, most_bytes=10**9)
+        for number in range(2):
+            kept.put(number, picture(np.zeros((4, 4), np.uint16)))
+        assert (len(kept), kept.missed) == (0, 2)
+
+
+def test_a_write_that_takes_only_a_part_is_gone_on_with(tmp_path: Path) -> None:
+    class Slow(io.FileIO):
+        def write(self, data: memoryview) -> int:  # type: ignore[override]
+            return super().write(data[:7])
+
+    codes = np.arange(100, dtype=np.uint16).reshape(10, 10)
+    with Slow(str(tmp_path / "file"), "w+") as file:
+        kept = Kept(file, most_bytes=10**6)
+        kept.put(3, picture(codes))
+        assert np.array_equal(kept.get(3).codes, codes)
+
+
+def test_a_picture_that_the_disk_does_not_give_back_is_said(tmp_path: Path) -> None:
+    with io.FileIO(str(tmp_path / "file"), "w+") as file:
+        kept = Kept(file, most_bytes=10**6)
+        kept.put(3, picture(np.ones((10, 10), np.uint16)))
+        file.truncate(50)
+        with pytest.raises(PsvideoError, match="temporary file that holds decoded frames cannot be read back"):
+            kept.get(3)
+
+
+@pytest.mark.parametrize("end", [None, PsvideoError, KeyboardInterrupt])
+def test_nothing_is_left_however_the_run_ends(tmp_path: Path, end: type[BaseException] | None) -> None:
+    def work(kept: Kept) -> None:
+        kept.put(1, picture(np.ones((10, 10), np.uint16)))
+        assert list(tmp_path.iterdir()) == [], "the file has no name: even a process that is killed leaves nothing"
+        if end is not None:
+            raise end
+
+    held: list[Kept] = []
+    try:
+        with keeping_near(tmp_path / "not" / "yet" / "there") as kept:
+            held.append(kept)
+            work(kept)
+    except (PsvideoError, KeyboardInterrupt):
+        assert end is not None
+    assert list(tmp_path.iterdir()) == []
+    assert 1 not in held[0]
+    held[0].put(2, picture(np.ones((10, 10), np.uint16)))
+    assert held[0].missed == 1, "a decoding thread that comes late finds the file closed and does no harm"
+
+
+def test_a_folder_that_cannot_be_written_is_said_before_any_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(**_: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(room.tempfile, "TemporaryFile", refused)
+    with pytest.raises(PsvideoError, match="no file can be made here"), keeping_near(tmp_path / "out"):
+        pass

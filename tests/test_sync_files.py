@@ -1,0 +1,106 @@
+"""Timing found through the files that cameras write: eight-bit movies, log curves, mosaics."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import av
+import numpy as np
+import pytest
+
+from psvideo.camera import Encoding
+from psvideo.pipeline import find_clip_timing, open_take
+from psvideo.plan import Plan
+from psvideo.planfile import format_plan
+from psvideo.synth import Exposure, Noise, StrobeClock, expose
+from psvideo.synth.curves import CURVES
+from psvideo.synth.dpx import dpx_bytes
+from psvideo.synth.encode import Codes
+from psvideo.synth.frames import write_frame
+from psvideo.synth.scene import CameraTable
+from psvideo.timing import Timing
+
+PlanMaker = Callable[..., Plan]
+ROWS = 160
+
+
+def shoot(
+    plan: Plan, *, frames: int, ppm: float = 30.0, ambient: float = 0.0, pattern: np.ndarray | None = None
+) -> Exposure:
+    rng = np.random.default_rng(3)
+    shape = (plan.camera.height_px, plan.camera.width_px)
+    filters = np.ones((2, 2)) if pattern is None else pattern
+    mosaic = np.tile(filters, (shape[0] // 2, shape[1] // 2))
+    scene = {slot: (mosaic * (0.1 + 0.5 * rng.random(shape))).astype(np.float32) for slot in plan.lit_slots}
+    clock = StrobeClock(phase_s=0.0123, offset_ppm=ppm)
+    return expose(scene, plan, frames=frames, clock=clock, ambient=ambient, noise=Noise(full_well_e=20_000, read_e=8))
+
+
+def write_h264(path: Path, plan: Plan, frames: np.ndarray) -> None:
+    """Write grey frames as 8-bit sRGB, 4:2:0, BT.709, video range."""
+    rows, cols = frames.shape[1:]
+    luma = np.round(16 + 219 * CURVES["srgb"].encode(np.clip(frames, 0, 1))).astype(np.uint8)
+    with av.open(str(path), "w") as container:
+        stream: Any = container.add_stream("libx264", rate=plan.camera.fps, options={"crf": "18"})
+        stream.width, stream.height, stream.pix_fmt = cols, rows, "yuv420p"
+        stream.codec_context.colorspace, stream.codec_context.color_range = 1, 1
+        for number, picture in enumerate(luma):
+            planes = np.concatenate([picture, np.full((rows // 2, cols), 128, np.uint8)])
+            frame = av.VideoFrame.from_ndarray(planes, "yuv420p")
+            frame.pts, frame.time_base, frame.colorspace, frame.color_range = number, 1 / plan.camera.fps, 1, 1
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode(None))
+
+
+def timing_through(path: Path, plan: Plan) -> Timing:
+    (path if path.is_dir() else path.parent).joinpath("plan.toml").write_text(format_plan(plan))
+    return find_clip_timing(open_take(path))
+
+
+def rms_rows(timing: Timing, shot: Exposure, plan: Plan) -> float:
+    """Return the RMS distance of every flash found from the nearest true flash with the same lights."""
+    error_s = [
+        min(abs(true.start_s - flash.start_s) for true in shot.flashes if dict(true.lights) == dict(flash.lights))
+        for flash in timing.flashes
+    ]
+    return float(np.sqrt(np.mean(np.square(error_s)))) / plan.camera.row_time_s
+
+
+@pytest.mark.parametrize(("ppm", "shutter"), [(-5000.0, 0.5), (30.0, 1.0)])
+def test_compression_is_not_taken_for_slow_leds(
+    ppm: float, shutter: float, make_plan: PlanMaker, tmp_path: Path
+) -> None:
+    plan = make_plan(height_px=ROWS, width_px=64, shutter=shutter, clock_tolerance_ppm=10_000)
+    plan = replace(plan, camera=replace(plan.camera, encoding=Encoding(transfer="srgb")))
+    shot = shoot(plan, frames=150, ppm=ppm, ambient=0.1)
+    write_h264(tmp_path / "clip.mp4", plan, shot.frames)
+    timing = timing_through(tmp_path / "clip.mp4", plan)
+    assert rms_rows(timing, shot, plan) < 0.05
+    assert timing.order == "marker"
+    assert any("soft" in note for note in timing.notes) == (shutter == 0.5)
+
+
+def test_footage_in_a_log_curve_is_timed(make_plan: PlanMaker, tmp_path: Path) -> None:
+    plan = make_plan(height_px=ROWS, width_px=12)
+    plan = replace(plan, camera=replace(plan.camera, encoding=Encoding(transfer="slog3")))
+    shot = shoot(plan, frames=60)
+    codes = Codes(curve=CURVES["slog3"], bits=10, black=95, white=1023, top=1023)
+    for number, picture in enumerate(shot.frames):
+        coded = np.repeat(codes.from_light(picture)[..., None], 3, axis=2)
+        (tmp_path / f"frame.{number:04d}.dpx").write_bytes(dpx_bytes(coded, 10))
+    assert rms_rows(timing_through(tmp_path, plan), shot, plan) < 0.02
+
+
+def test_mosaics_are_timed_as_they_are(make_plan: PlanMaker, tmp_path: Path) -> None:
+    plan = make_plan(height_px=ROWS, width_px=12)
+    plan = replace(plan, camera=replace(plan.camera, encoding=Encoding(cfa="RGGB")))
+    shot = shoot(plan, frames=60, pattern=np.array([[0.4, 1.0], [1.0, 0.6]]))
+    codes = Codes(curve=CURVES["linear"], bits=12, black=256, white=4095, top=4095)
+    camera = CameraTable(
+        width_px=12, height_px=ROWS, fps=str(plan.camera.fps), shutter_deg=360, readout_s=0.0, cfa="RGGB"
+    )
+    for number, picture in enumerate(shot.frames):
+        path = tmp_path / f"frame.{number:04d}.dng"
+        write_frame(path, codes.from_light(picture), kind="dng", camera=camera, scale=codes)
+    assert rms_rows(timing_through(tmp_path, plan), shot, plan) < 0.02

@@ -1,0 +1,173 @@
+"""Plans that are wrong by far, clips without a strobe, times that the picture leaves open: each is found or said."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from psvideo.errors import PsvideoError
+from psvideo.plan import Plan
+from psvideo.sync import find_timing
+from psvideo.synth import Noise, StrobeClock, expose
+from psvideo.timing import Timing
+
+PlanMaker = Callable[..., Plan]
+ROWS, COLUMNS, FRAMES = 96, 8, 60
+NOISE = Noise(full_well_e=20_000, read_e=8)
+
+
+@pytest.fixture
+def plan(make_plan: PlanMaker) -> Plan:
+    return make_plan(height_px=ROWS, width_px=COLUMNS)
+
+
+def filmed(plan: Plan, *, frames: int = FRAMES, phase_s: float = 0.0123, **options: object) -> np.ndarray:
+    """Return the row profiles (frame, row) of a textured scene."""
+    rng = np.random.default_rng(4)
+    plates = {slot: 0.2 + 0.5 * rng.random((ROWS, COLUMNS)) for slot in plan.lit_slots}
+    for slot, factor in dict(options.pop("factors", {})).items():  # type: ignore[call-overload]
+        plates[slot] = plates[slot] * factor
+    if options.pop("together", False):
+        plates = dict.fromkeys(plan.lit_slots, plates[plan.lit_slots[0]])
+    clock = StrobeClock(phase_s=phase_s, offset_ppm=float(options.pop("ppm", 30.0)))  # type: ignore[arg-type]
+    shot = expose(plates, plan, frames=frames, clock=clock, noise=NOISE, bits=12, **options)  # type: ignore[arg-type]
+    return shot.frames.mean(axis=2, dtype=np.float64)
+
+
+def timing_of(plan: Plan, profiles: np.ndarray) -> Timing:
+    return find_timing(plan, np.arange(len(profiles)), profiles)
+
+
+def with_camera(plan: Plan, **changes: object) -> Plan:
+    return replace(plan, camera=replace(plan.camera, **changes))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("true", "told"), [(0.5, 1.0), (1.0, 0.5), (0.25, 0.5)])
+def test_a_shutter_wrong_by_a_factor_is_found_and_named(true: float, told: float, plan: Plan) -> None:
+    period_s = plan.camera.frame_period_s
+    film = with_camera(plan, exposure_s=true * period_s)
+    timing = timing_of(with_camera(plan, exposure_s=told * period_s), filmed(film))
+    assert timing.exposure_s == pytest.approx(true * period_s, rel=3e-4)
+    assert timing.phase_error_rows < 0.02
+    assert timing.order == "marker"
+    assert any("shutter is wrong" in note and f"({360 * told:g} degrees)" in note for note in timing.notes)
+
+
+@pytest.mark.parametrize(
+    ("true", "told", "words"),
+    [(-1.0, 1.0, "wrong way"), (0.5, 1.0, "readout is wrong"), (0.8, 0.0, "global shutter"), (0.0, 0.8, "all rows")],
+)
+def test_a_readout_wrong_by_far_is_found_and_named(true: float, told: float, words: str, plan: Plan) -> None:
+    period_s = plan.camera.frame_period_s
+    timing = timing_of(
+        with_camera(plan, readout_s=told * period_s), filmed(with_camera(plan, readout_s=true * period_s))
+    )
+    assert timing.row_time_s * ROWS == pytest.approx(true * period_s, abs=1e-3 * period_s)
+    assert timing.order == "marker"
+    assert any(words in note for note in timing.notes)
+
+
+def test_shutter_and_direction_both_wrong_are_found(plan: Plan) -> None:
+    period_s = plan.camera.frame_period_s
+    timing = timing_of(plan, filmed(with_camera(plan, exposure_s=0.5 * period_s, readout_s=-period_s)))
+    assert timing.exposure_s == pytest.approx(0.5 * period_s, rel=1e-3)
+    assert timing.row_time_s < 0
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_durations_halved_or_doubled_are_named(factor: float, plan: Plan) -> None:
+    flashes = tuple(replace(flash, duration_s=factor * flash.duration_s) for flash in plan.flashes)
+    kept_s = plan.dark_s - (factor - 1) * plan.flashes[0].duration_s
+    with pytest.raises(PsvideoError, match=r"fits flashes of 0\.8 ms"):
+        timing_of(replace(plan, flashes=flashes, dark_s=kept_s), filmed(plan))
+
+
+@pytest.mark.parametrize(("true", "told"), [(24, 25), (60, 120)])
+def test_a_frame_rate_mixed_up_is_named(true: int, told: int, make_plan: PlanMaker) -> None:
+    film = make_plan(height_px=ROWS, width_px=COLUMNS, fps=Fraction(true), duration_s=0.003)
+    angle = film.camera.exposure_s * true / told
+    with pytest.raises(PsvideoError, match=f"ran at {true} frames a second"):
+        timing_of(with_camera(film, fps=Fraction(told), exposure_s=angle), filmed(film))
+
+
+def test_a_clip_triggered_by_the_camera_is_recognised(plan: Plan) -> None:
+    synced = with_camera(replace(plan, mode="synced"), readout_s=0.0)
+    with pytest.raises(PsvideoError, match='mode = "synced"'):
+        timing_of(plan, filmed(synced, frames=40))
+
+
+RNG = np.random.default_rng(6)
+NOTHING = {
+    "black": (np.zeros((40, ROWS)), "do not change at all"),
+    "flat grey": (np.full((40, ROWS), 0.5), "do not change at all"),
+    "lens cap": (1e-4 * RNG.standard_normal((40, ROWS)), "is noise"),
+    "noisy grey": (0.5 + 0.01 * RNG.standard_normal((40, ROWS)), "is noise"),
+    "noise of 8 frames": (0.5 + 0.01 * RNG.standard_normal((8, ROWS)), "is noise"),
+    "3 frames": (RNG.random((3, ROWS)), "needs at least 6"),
+    "5 frames": (RNG.random((5, ROWS)), "needs at least 6"),
+}
+
+
+@pytest.mark.parametrize("kind", NOTHING)
+def test_clips_that_show_nothing_are_refused_at_once(kind: str, plan: Plan) -> None:
+    profiles, words = NOTHING[kind]
+    with pytest.raises(PsvideoError, match=words):
+        timing_of(plan, profiles)
+
+
+def test_a_good_clip_draws_no_remarks(plan: Plan) -> None:
+    assert timing_of(plan, filmed(plan)).notes == ()
+    assert timing_of(plan, filmed(plan, frames=10)).notes == ()
+
+
+def test_a_very_noisy_clip_is_timed_within_its_error(plan: Plan) -> None:
+    clean = filmed(plan)
+    noisy = timing_of(plan, clean + 0.05 * np.random.default_rng(1).standard_normal(clean.shape))
+    off_s = abs(noisy.start_s[5] - timing_of(plan, clean).start_s[5])
+    assert off_s < 4 * noisy.phase_error_rows * noisy.row_time_s
+
+
+def test_a_light_that_did_not_fire_is_named(make_plan: PlanMaker) -> None:
+    plan = make_plan(height_px=ROWS, width_px=COLUMNS, lights=tuple("abcd"))
+    timing = timing_of(plan, filmed(plan, factors={2: 0.0}))
+    assert timing.order == "guess"
+    assert any("no light is seen" in note for note in timing.notes)
+    assert not timing_of(plan, filmed(plan, factors={2: 0.1})).notes
+
+
+def test_lights_that_all_flash_at_once_are_recognised(plan: Plan) -> None:
+    assert any("flash together" in note for note in timing_of(plan, filmed(plan, together=True)).notes)
+
+
+def test_gain_that_jumps_from_frame_to_frame_is_said(plan: Plan) -> None:
+    gain = np.exp(0.15 * np.random.default_rng(2).standard_normal(FRAMES))
+    assert any("gain by itself" in note for note in timing_of(plan, filmed(plan, gain=gain)).notes)
+
+
+def locked(plan: Plan, shutter: float) -> Plan:
+    """Return a plan whose flashes come exactly once a frame, under a global shutter."""
+    period_s = plan.camera.frame_period_s
+    film = with_camera(plan, readout_s=0.0, exposure_s=shutter * period_s)
+    return replace(film, dark_s=period_s - plan.flashes[0].duration_s)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.4, 0.7])
+def test_flashes_that_no_exposure_cuts_are_known_to_an_interval_only(share: float, plan: Plan) -> None:
+    film = locked(plan, 0.9)
+    phase_s = share * film.camera.frame_period_s
+    timing = timing_of(film, filmed(film, phase_s=phase_s, ppm=0.0))
+    assert timing.phase_error_s is not None
+    assert timing.phase_error_s > 0.25 * film.camera.exposure_s
+    off_s = (timing.start_s - phase_s + 0.5 * film.camera.frame_period_s) % film.camera.frame_period_s
+    assert np.abs(off_s - 0.5 * film.camera.frame_period_s).max() < 1.1 * timing.phase_error_s
+    assert any("wherever in the exposure" in note for note in timing.notes)
+
+
+def test_under_a_global_shutter_errors_are_in_rows_of_height(make_plan: PlanMaker) -> None:
+    plan = make_plan(height_px=ROWS, width_px=COLUMNS, readout=0.0, shutter=0.5)
+    timing = timing_of(plan, filmed(plan))
+    assert timing.phase_error_s is not None
+    assert timing.phase_error_rows == pytest.approx(timing.phase_error_s * ROWS / plan.camera.frame_period_s)
+    assert 0 < timing.phase_error_rows < 0.05
