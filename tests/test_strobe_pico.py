@@ -165,6 +165,22 @@ def test_a_silent_host_means_dark_within_the_keep_alive(keep_ms: int) -> None:
     assert pico.feed(b"CLEAR\n", 3002 * MS) == b"OK state=idle\n"
 
 
+def test_the_time_that_a_board_takes_to_arm_is_no_silence(monkeypatch: pytest.MonkeyPatch) -> None:
+    pico, check_of = Pico(), PROGRAM.check_of
+
+    def slowly(cycle: list[object]) -> int:
+        pico.chip.advance(pico.chip.cycle + 150 * MS)
+        check: int = check_of(cycle)
+        return check
+
+    monkeypatch.setattr(PROGRAM, "check_of", slowly)
+    pico.feed(b"KEEP 100\n" + LOADED + ARM, 0)
+    pico.advance(249 * MS)
+    assert pico.controller.state == "armed"
+    pico.advance(250 * MS)
+    assert pico.controller.fault == "silent"
+
+
 def test_an_open_interlock_darkens_latches_and_forbids_arming() -> None:
     pico = running()
     pico.advance(1_260_000)

@@ -464,7 +464,7 @@ class Controller:
             if error:
                 raise RefusedError(error, error)
             said = self._act(*unseal(text).split(" "))
-            self.heard = self.now
+            self.heard = self.hardware.ticks()  # ARM takes its time
         except RefusedError as refused:
             said = f"E {ERRORS[refused.error]} {refused.text}"
         return ((seal(said) if "*" in text else said) + "\n").encode()
@@ -712,11 +712,12 @@ class Pico:
         for group in range(GROUPS):
             machine.mem32[PIO_INSTRUCTION + PIO_NEXT_INSTRUCTION * group] = PINS_LOW
         channels = [number for link in self.links for number in (link.turn, link.control, link.data)]
-        for channel in channels:
+        for channel in channels:  # a channel that is enabled may be triggered again by one that is aborted
             machine.mem32[DMA + 64 * channel + 16] = 0
         machine.mem32[DMA_ABORT] = sum([1 << channel for channel in channels])
-        while machine.mem32[DMA_ABORT]:
-            pass
+        for _ in range(100):  # a word on its way takes some cycles; the pins are low already
+            if not machine.mem32[DMA_ABORT]:
+                break
 
 
 def main():

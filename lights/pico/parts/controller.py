@@ -108,7 +108,7 @@ class Controller:
             if error:
                 raise RefusedError(error, error)
             said = self._act(*unseal(text).split(" "))
-            self.heard = self.now
+            self.heard = self.hardware.ticks()  # ARM takes its time
         except RefusedError as refused:
             said = f"E {ERRORS[refused.error]} {refused.text}"
         return ((seal(said) if "*" in text else said) + "\n").encode()
