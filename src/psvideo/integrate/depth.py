@@ -97,9 +97,7 @@ def _shift(
 
 def _depth_of(height: FloatArray, view: View) -> FloatArray:
     """Depth from height: metres or relative, or orthographic in widths of the picture about a median of 1."""
-    if view.focal_px is None:
-        return 1.0 + height / height.shape[1]
-    depth: FloatArray = np.exp(height / view.focal_px[0])
+    depth: FloatArray = 1.0 + height / height.shape[1] if view.focal_px is None else np.exp(height / view.focal_px[0])
     return depth
 
 
@@ -125,5 +123,5 @@ def _plane_height(plane: Plane, view: View, shape: tuple[int, ...]) -> FloatArra
         )
     inverse = np.maximum(inverse, FARTHEST_SHARE * inverse.max())
     focal = 1.0 if view.focal_px is None else view.focal_px[0]
-    height: FloatArray = np.broadcast_to(-np.log(inverse) * focal, shape)
+    height: FloatArray = np.broadcast_to(-np.log(inverse) * focal, shape).astype(np.float64)
     return height

@@ -13,6 +13,13 @@ from numpy.typing import NDArray
 from psvideo.compiled import compiled
 
 Grid = NDArray[np.floating]
+MOST_EVIDENCE = 13.8
+
+
+@compiled
+def _share(evidence: float) -> float:
+    """The logistic function, between 1e-6 and 1: a part held by less would float away on rounding errors."""
+    return 1.0 / (1.0 + math.exp(-min(max(evidence, -MOST_EVIDENCE), MOST_EVIDENCE)))
 
 
 @compiled
@@ -49,7 +56,7 @@ def tie(
             minus = c > 0 and facing[r, c - 1] > 0.0
             ahead = a * (height[r, c + 1] - height[r, c]) if plus else n
             behind = a * (height[r, c] - height[r, c - 1]) if minus else n
-            w = 1.0 / (1.0 + math.exp(-min(max(sharpness * (behind * behind - ahead * ahead), -40.0), 40.0)))
+            w = _share(sharpness * (behind * behind - ahead * ahead))
             if plus:
                 east[r, c] += w * a * a
                 target[r, c] -= w * a * n
@@ -66,7 +73,7 @@ def tie(
             minus = r > 0 and facing[r - 1, c] > 0.0
             ahead = a * (height[r + 1, c] - height[r, c]) if plus else n
             behind = a * (height[r, c] - height[r - 1, c]) if minus else n
-            w = 1.0 / (1.0 + math.exp(-min(max(sharpness * (behind * behind - ahead * ahead), -40.0), 40.0)))
+            w = _share(sharpness * (behind * behind - ahead * ahead))
             if plus:
                 south[r, c] += w * a * a
                 target[r, c] -= w * a * n

@@ -59,15 +59,13 @@ def _triangles(depth: Depth) -> NDArray[np.int32]:
         there[n - 1] & there[n] & there[(n + 1) % 4] & whole[n - 1] & whole[n] for n in range(4)
     ]
     values = depth.depth
-    other = np.abs(values[:-1, 1:] - values[1:, :-1]) < np.abs(values[:-1, :-1] - values[1:, 1:])
-    chosen = []
-    for about, opposite, diagonal in ((0, 2, other), (1, 3, ~other)):
-        both = fits[about] & fits[opposite]
-        rival = fits[1 - about] & fits[3 - about]
-        split = both & (diagonal | ~rival)
-        alone = ~both & ~rival
-        chosen += [_picked(corners, about, split | (alone & fits[about]))]
-        chosen += [_picked(corners, opposite, split | (alone & fits[opposite]))]
+    shorter = np.abs(values[:-1, 1:] - values[1:, :-1]) < np.abs(values[:-1, :-1] - values[1:, 1:])
+    full = (fits[0] & fits[2], fits[1] & fits[3])
+    some = (fits[0] | fits[2], fits[1] | fits[3])
+    neither = ~(full[0] | full[1])
+    # a square is split along one diagonal only, or its triangles would overlap: where both do, along the shorter
+    first = (full[0] & (shorter | ~full[1])) | (neither & some[0] & (shorter | ~some[1]))
+    chosen = [_picked(corners, n, fits[n] & (first if n % 2 == 0 else ~first)) for n in range(4)]
     return np.concatenate(chosen)
 
 
