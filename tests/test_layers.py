@@ -14,7 +14,19 @@ LAYERS = [
     {"plan", "planfile", "timing"},
     {"shutter", "clip", "strobe", "capture"},
     {"rowfit", "profiles"},
-    {"sync", "rigfield", "order", "split", "hudon2015", "flicker", "ambient", "sequence", "calibrate", "normals"},
+    {
+        "sync",
+        "rigfield",
+        "order",
+        "split",
+        "hudon2015",
+        "flicker",
+        "ambient",
+        "sequence",
+        "calibrate",
+        "normals",
+        "integrate",
+    },
     {"export", "view"},
     {"synth"},
     {"pipeline"},
@@ -99,6 +111,8 @@ def test_only_the_clip_room_knows_decoders_and_only_export_knows_writers() -> No
         names = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
         if _room(path) not in {"clip", "export", "synth"}:
             assert not names & (decoders | {"OpenEXR", "tifffile"}), path
+        froms = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module}
+        assert _room(path) == "export" or "pxr" not in froms, path
 
 
 def test_only_one_module_knows_serial_ports() -> None:

@@ -2,8 +2,8 @@
 
 import hashlib
 import json
-from collections.abc import Callable
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
@@ -15,13 +15,16 @@ from numpy.typing import NDArray
 from psvideo import __version__
 from psvideo.clip import Clip, read_mask
 from psvideo.errors import PsvideoError
+from psvideo.export.mesh import animation_name
 from psvideo.export.plates import plate_name, write_flash, write_plate
 from psvideo.export.publish import refuse_folder, whole_folder
-from psvideo.export.results import Delivery, is_written, write_surface
+from psvideo.export.results import Delivery, is_written, mesh_file, write_surface
 from psvideo.export.space import CAMERA_SPACE, Space
 from psvideo.export.tags import Tags, sha256_of
+from psvideo.export.usd import write_animation
 from psvideo.export.writer import writing
 from psvideo.files import write_text
+from psvideo.integrate import Shaping, begun, depth_of, reservations, view_of
 from psvideo.naming import named_by_rig, named_first
 from psvideo.normals.illumination import illumination
 from psvideo.pipeline import (
@@ -219,17 +222,27 @@ def normals_run(
     """
     clip, mask = take.clip, lighting.mask
     tags = _tags(clip, lighting.rig_path, delivery.space)
+    shaping = Shaping(view=view_of(lighting.rig), plane=lighting.rig.plane) if delivery.needs_depth else None
     facts: list[InstantFacts] = []
     picture: Pixels | None = None
     settings = _settings(take, timing, output, tags, delivery, lighting.mask_sha256)
-    with _folder(output, settings) as folder, writing() as write:
+    with (
+        _folder(output, settings) as folder,
+        _animation(folder, clip.name, facts, delivery, tags, shaping),
+        writing() as write,
+    ):
         rounds = clip_rounds(take, timing, start_number=output.start_number, watch=watch)
         residual = "residual" in delivery.aovs
         for instant in surfaces(rounds, clip.plan, lighting.rig, mask=mask, half=delivery.half, residual=residual):
+            if shaping is not None and shaping.first is None:
+                shaping = begun(shaping, instant.surface)
             if not (output.resume and is_written(folder, clip.name, instant.round.number, delivery)):
                 # the surface only: plates are many times larger, and must not wait for the files
                 surface, at = instant.surface, (instant.round.number, instant.round.time_s)
-                write(partial(write_surface, folder, clip.name, *at, surface, delivery=delivery, tags=tags))
+                shaped = None if shaping is None else partial(depth_of, shaping, surface)
+                write(
+                    partial(write_surface, folder, clip.name, *at, surface, delivery=delivery, tags=tags, depth=shaped)
+                )
                 del surface
             facts.append(instant_facts(instant.round, instant.surface, mask))
             if len(facts) in (1, SAMPLE_ROUND):
@@ -244,6 +257,7 @@ def normals_run(
             lights=clip.plan.lights,
             condition=lighting.condition,
             instants=tuple(facts),
+            warnings=() if shaping is None else reservations(shaping),
         )
         write_text(folder / "timing.json", format_timing(timing))
         write_text(folder / "report.json", json.dumps(report_record(report), indent=1) + "\n")
@@ -262,6 +276,20 @@ def _tags(clip: Clip, rig_path: Path | None = None, space: Space = CAMERA_SPACE)
         camera_fps=clip.plan.camera.fps,
         first_time_code=clip.time_code,
     )
+
+
+@contextmanager
+def _animation(
+    folder: Path, clip: str, facts: Sequence[InstantFacts], delivery: Delivery, tags: Tags, shaping: Shaping | None
+) -> Iterator[None]:
+    """At the end of a block that wrote the meshes of all instants, make one animated file of them where asked for."""
+    yield
+    if shaping is None or not facts or "usd" not in delivery.meshes:
+        return
+    parts = {one.number: folder / mesh_file(clip, one.number, "usd") for one in facts}
+    write_animation(folder / animation_name(clip), parts, tags.fps, metric=shaping.metric)
+    for part in parts.values():
+        part.unlink()
 
 
 def look(instant: Instant) -> Pixels:

@@ -24,6 +24,7 @@ from psvideo.cli.options import (
 from psvideo.cli.sync import describe_timing
 from psvideo.export.results import Delivery
 from psvideo.export.space import choose_space
+from psvideo.export.usd import require_usd
 from psvideo.pipeline import decoded_once
 from psvideo.runs import Output, normals_run, read_lighting, timing_of
 from psvideo.view.report import findings, report_record, verdict
@@ -48,6 +49,15 @@ class Aov(StrEnum):
     """What may be written besides."""
 
     residual = "residual"
+    depth = "depth"
+    position = "position"
+
+
+class MeshKind(StrEnum):
+    """Kinds of files for the surface as a mesh."""
+
+    ply = "ply"
+    usd = "usd"
 
 
 class Encoding(StrEnum):
@@ -71,7 +81,13 @@ def normals(
     ] = None,
     y: Annotated[YDirection, typer.Option("--y", help="up as in OpenGL, down as in DirectX.")] = YDirection.up,
     float32: Annotated[bool, typer.Option("--float", help="Store normals as 32-bit floats.")] = False,
-    aov: Annotated[list[Aov] | None, typer.Option("--aov", help="Write this besides.")] = None,
+    aov: Annotated[
+        list[Aov] | None, typer.Option("--aov", help="Write this besides; may be given several times.")
+    ] = None,
+    mesh: Annotated[
+        list[MeshKind] | None,
+        typer.Option("--mesh", help="Write meshes besides: ply, one per instant; usd, one animated file."),
+    ] = None,
     encode: Annotated[
         Encoding | None, typer.Option("--encode", help="Write 16-bit PNG maps of 0 to 1 besides.")
     ] = None,
@@ -93,10 +109,13 @@ def normals(
     delivery = Delivery(
         space=choose_space(space.value, y.value, camera_to_world),
         half=not float32,
-        aovs=tuple(name.value for name in aov or ()),
+        aovs=tuple(dict.fromkeys(name.value for name in aov or ())),
+        meshes=tuple(dict.fromkeys(kind.value for kind in mesh or ())),
         png16=encode is Encoding.png16,
         multipart=multipart,
     )
+    if "usd" in delivery.meshes:
+        require_usd()
     take = open_and_tell(clip, voice, plan=plan, frames=frames)
     lighting = read_lighting(take, rig, mask)
     with decoded_once(take, output=out) as take:

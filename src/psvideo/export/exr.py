@@ -128,14 +128,18 @@ def write_exr_parts(
     path: Path,
     parts: Mapping[str, Channels],
     *,
-    half: bool = True,
+    half: bool | Mapping[str, bool] = True,
     attributes: Mapping[str, Mapping[str, Attribute]],
     fps: Fraction | None = None,
 ) -> None:
-    """Write one file with a part per name; each has its own channels and ``attributes``, else as ``write_exr``."""
+    """Write one file with a part per name; each has its own channels and ``attributes``, else as ``write_exr``.
+
+    ``half`` may be given part by part.
+    """
     built = []
     for name, channels in parts.items():
-        planes = {channel: _plane(channel, values, half) for channel, values in channels.items()}
+        short = half if isinstance(half, bool) else half[name]
+        planes = {channel: _plane(channel, values, short) for channel, values in channels.items()}
         header = dict(attributes[name]) | _header(next(iter(planes.values())).shape, fps, None, None)
         built.append(OpenEXR.Part(header, planes, name))
     with whole_file(path) as beside:

@@ -1,5 +1,6 @@
 """Results as files: one EXR sequence per quantity, ``normals/<clip>_normals.<number>.exr`` and so on."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,10 +10,12 @@ from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError
 from psvideo.export.exr import write_exr, write_exr_parts
+from psvideo.export.mesh import mesh_name, write_part, write_ply
 from psvideo.export.plates import image_channels
 from psvideo.export.space import Space, placed
 from psvideo.export.tags import Tags
 from psvideo.files import whole_file
+from psvideo.integrate import Depth, mesh_of
 from psvideo.surface import Surface
 
 PNG_MAX = 65535
@@ -20,13 +23,23 @@ PNG_MAX = 65535
 
 @dataclass(frozen=True, kw_only=True)
 class Delivery:
-    """How results are written. ``half`` False stores normals as 32-bit floats; ``aovs`` may add "residual"."""
+    """How results are written.
+
+    ``half`` False stores normals as 32-bit floats; ``aovs`` may add "residual", "depth" and "position", the last two
+    always in 32 bits; ``meshes`` may hold "ply" and "usd".
+    """
 
     space: Space
     half: bool = True
     aovs: tuple[str, ...] = ()
+    meshes: tuple[str, ...] = ()
     png16: bool = False
     multipart: bool = False
+
+    @property
+    def needs_depth(self) -> bool:
+        """Whether normals are to be integrated."""
+        return bool(self.meshes) or not {"depth", "position"}.isdisjoint(self.aovs)
 
 
 def result_name(clip: str, quantity: str, number: int, *, suffix: str = "exr") -> str:
@@ -51,13 +64,30 @@ def is_written(folder: Path, clip: str, number: int, delivery: Delivery) -> bool
         names.append(bundle_name(clip, number))
     if delivery.png16:
         names += [result_name(clip, quantity, number, suffix="png") for quantity in ("normals", "valid")]
+    names += [mesh_file(clip, number, kind) for kind in delivery.meshes]
     return all((folder / name).is_file() for name in names)
 
 
+def mesh_file(clip: str, number: int, kind: str) -> str:
+    """Return the path below the output folder of one instant's mesh; for USD it is kept there until the end only."""
+    return mesh_name(clip, number) if kind == "ply" else mesh_name(clip, number, suffix="part.npz")
+
+
 def write_surface(
-    folder: Path, clip: str, number: int, time_s: float, surface: Surface, *, delivery: Delivery, tags: Tags
+    folder: Path,
+    clip: str,
+    number: int,
+    time_s: float,
+    surface: Surface,
+    *,
+    delivery: Delivery,
+    tags: Tags,
+    depth: Callable[[], Depth] | None = None,
 ) -> None:
-    """Write one instant: normals as signed unit vectors, linear albedo, validity, and the AOVs asked for."""
+    """Write one instant: normals as signed unit vectors, linear albedo, validity, and the AOVs and meshes asked for.
+
+    ``depth``, which integrates the normals, is needed where ``delivery.needs_depth``.
+    """
     normals = placed(surface.normals, delivery.space)
     planes: dict[str, dict[str, NDArray[np.floating]]] = {
         "normals": image_channels(normals),
@@ -68,24 +98,53 @@ def write_surface(
         if surface.residual is None:
             raise ValueError("the residual is to be written and was not solved for")
         planes["residual"] = {"Y": surface.residual}
+    if delivery.needs_depth:
+        if depth is None:
+            raise ValueError("depth is to be written and was not integrated")
+        shape = depth()
+        planes |= _shape_planes(shape, delivery)
+        _write_meshes(folder, clip, number, surface, shape, delivery)
     for quantity, channels in planes.items():
         write_exr(
             folder / result_name(clip, quantity, number),
             channels,
-            half=delivery.half or quantity != "normals",
+            half=is_half(quantity, delivery),
             attributes=tags.attributes(time_s=time_s, data=quantity != "albedo"),
             fps=tags.fps,
             time_code=tags.time_code(time_s),
         )
     if delivery.multipart:
         attributes = {name: tags.attributes(time_s=time_s, data=name != "albedo") for name in planes}
-        write_exr_parts(
-            folder / bundle_name(clip, number), planes, half=delivery.half, attributes=attributes, fps=tags.fps
-        )
+        halves = {name: is_half(name, delivery) for name in planes}
+        write_exr_parts(folder / bundle_name(clip, number), planes, half=halves, attributes=attributes, fps=tags.fps)
     if delivery.png16:
         write_png16(folder / result_name(clip, "normals", number, suffix="png"), encode_normals(normals))
         mask = np.where(surface.valid, np.uint16(PNG_MAX), np.uint16(0))
         write_png16(folder / result_name(clip, "valid", number, suffix="png"), mask)
+
+
+def is_half(quantity: str, delivery: Delivery) -> bool:
+    """Return whether a quantity is stored in 16 bits: 11 binary digits are too few for a place in space."""
+    return quantity not in ("depth", "position") and (delivery.half or quantity != "normals")
+
+
+def _shape_planes(depth: Depth, delivery: Delivery) -> dict[str, dict[str, NDArray[np.floating]]]:
+    planes: dict[str, dict[str, NDArray[np.floating]]] = {}
+    if "depth" in delivery.aovs:
+        planes["depth"] = {"Y": depth.depth}
+    if "position" in delivery.aovs:
+        points = depth.view.points(depth.depth).astype(np.float32)
+        planes["position"] = image_channels(placed(points, delivery.space))
+    return planes
+
+
+def _write_meshes(folder: Path, clip: str, number: int, surface: Surface, depth: Depth, delivery: Delivery) -> None:
+    if not delivery.meshes:
+        return
+    mesh = mesh_of(surface, depth)
+    for kind in delivery.meshes:
+        write = write_ply if kind == "ply" else write_part
+        write(folder / mesh_file(clip, number, kind), mesh, delivery.space)
 
 
 def _three_channels(albedo: NDArray[np.floating]) -> NDArray[np.floating]:

@@ -1,0 +1,86 @@
+"""Meshes as files: one PLY per instant, y up, in metres where the depth is.
+
+Colours in a PLY are 8-bit sRGB, which is what viewers take them for: the linear albedo, clipped at 1, never stretched.
+"""
+
+import io
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+
+from psvideo.export.space import Space
+from psvideo.files import whole_file
+from psvideo.integrate.mesh import Mesh
+
+
+def mesh_name(clip: str, number: int, *, suffix: str = "ply") -> str:
+    """Return a mesh's path below the output folder.
+
+    >>> mesh_name("take3", 1001)
+    'mesh/take3_mesh.1001.ply'
+    """
+    return f"mesh/{clip}_mesh.{number:04d}.{suffix}"
+
+
+def animation_name(clip: str) -> str:
+    """Return the path of the animated mesh below the output folder.
+
+    >>> animation_name("take3")
+    'mesh/take3_mesh.usdc'
+    """
+    return f"mesh/{clip}_mesh.usdc"
+
+
+def in_space(vectors: NDArray[np.float32], space: Space) -> NDArray[np.float32]:
+    """Return points or normals (vertex, 3) turned into world space where that is asked for.
+
+    y stays up whatever ``space.y`` says: meshes are right-handed, and flipping one axis would mirror them.
+    """
+    if space.camera_to_world is None:
+        return vectors
+    turned: NDArray[np.float32] = (vectors @ space.camera_to_world.T).astype(np.float32)
+    return turned
+
+
+def write_ply(path: Path, mesh: Mesh, space: Space) -> None:
+    """Write one mesh as a binary PLY with normals and vertex colours, whole or not at all."""
+    shape = trimesh.Trimesh(
+        vertices=in_space(mesh.points, space),
+        faces=mesh.triangles,
+        vertex_normals=in_space(mesh.normals, space),
+        vertex_colors=srgb_codes(mesh.colours),
+        process=False,
+    )
+    with whole_file(path) as beside:
+        beside.write_bytes(trimesh.exchange.ply.export_ply(shape, encoding="binary", vertex_normal=True))
+
+
+def srgb_codes(linear: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Return linear light as 8-bit sRGB codes with full opacity, (vertex, 4)."""
+    light = np.clip(linear, 0, 1)
+    curve = np.where(light <= 0.0031308, 12.92 * light, 1.055 * np.maximum(light, 1e-9) ** (1 / 2.4) - 0.055)
+    codes = np.full((len(linear), 4), 255, np.uint8)
+    codes[:, :3] = curve * 255 + 0.5
+    return codes
+
+
+def write_part(path: Path, mesh: Mesh, space: Space) -> None:
+    """Keep one instant's mesh for the animation that is put together when all are there."""
+    stream = io.BytesIO()
+    np.savez(
+        stream,
+        points=in_space(mesh.points, space),
+        triangles=mesh.triangles,
+        normals=in_space(mesh.normals, space),
+        colours=mesh.colours,
+    )
+    with whole_file(path) as beside:
+        beside.write_bytes(stream.getbuffer())
+
+
+def read_part(path: Path) -> Mesh:
+    """Read what ``write_part`` kept."""
+    with np.load(path) as held:
+        return Mesh(**{name: held[name] for name in ("points", "triangles", "normals", "colours")})

@@ -1,0 +1,54 @@
+"""Depth over a clip: the same view, plane and scale for every instant, each of which can be done by itself."""
+
+from dataclasses import dataclass, replace
+
+from psvideo.integrate.bilateral import BILATERAL, Integration, integrate
+from psvideo.integrate.depth import Depth, Plane, scaled
+from psvideo.integrate.view import View
+from psvideo.surface import Surface
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shaping:
+    """How a clip's surfaces become depth. ``first`` is the first instant's, whose scale the others keep."""
+
+    view: View
+    plane: Plane | None = None
+    how: Integration = BILATERAL
+    first: Depth | None = None
+
+    @property
+    def metric(self) -> bool:
+        """Whether depth is in metres: a perspective view, and a plane that says how far away things are."""
+        return self.view.perspective and self.plane is not None
+
+
+def depth_of(shaping: Shaping, surface: Surface) -> Depth:
+    """Return the depth of one instant; safe to call from several threads."""
+    height = integrate(surface.normals, surface.valid, shaping.view, how=shaping.how)
+    return scaled(height, shaping.view, plane=shaping.plane, reference=shaping.first)
+
+
+def begun(shaping: Shaping, surface: Surface) -> Shaping:
+    """Return the shaping with the first instant's depth, which fixes the scale; raises PsvideoError as ``scaled``."""
+    return replace(shaping, first=depth_of(replace(shaping, first=None), surface))
+
+
+def reservations(shaping: Shaping) -> tuple[str, ...]:
+    """Return in whole sentences what is not known of a clip's depth."""
+    said = []
+    if not shaping.view.perspective:
+        said.append(
+            "Depth was integrated for an orthographic view, because the rig has no [camera] focal_px: it is relative, "
+            "in widths of the picture about a median of 1, and bends a subject that is near the camera."
+        )
+    elif shaping.plane is None:
+        said.append(
+            "Depth is relative, its median 1, because the rig has no [surface] plane: give one (in metres) for scale."
+        )
+    if shaping.first is not None and shaping.first.parts > 1:
+        said.append(
+            f"What is valid falls into {shaping.first.parts} parts, and how they lie to each other normals cannot "
+            "tell: each was given its depth by itself."
+        )
+    return tuple(said)
