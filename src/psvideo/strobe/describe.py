@@ -44,9 +44,10 @@ def program_cautions(plan: Plan, program: Program, caps: Capabilities) -> Iterat
             f"{caps.tolerance_ppm:g}, or take a board with a crystal"
         )
     rounding_ppm = (program.played.cycle_s / plan.cycle_s - 1) * 1e6
+    way = "longer" if rounding_ppm > 0 else "shorter"
     if abs(rounding_ppm) >= SHOWN_PPM:
         yield (
-            f"in whole ticks of {caps.tick_ps / 1e6:g} µs the cycle is {rounding_ppm:+.1f} ppm longer than planned; "
+            f"in whole ticks of {caps.tick_ps / 1e6:g} µs the cycle is {abs(rounding_ppm):.1f} ppm {way} than planned; "
             "the log (--log) tells psvideo sync, and without it that looks like a clock offset"
         )
 
