@@ -9,9 +9,17 @@ from itertools import islice
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from psvideo.calibrate.light_files import find_plates, find_stills
-from psvideo.calibrate.light_pictures import LightFiles, LightPictures, averaged, light_pictures, read_sets
+from psvideo.calibrate.light_pictures import (
+    LightFiles,
+    LightPictures,
+    averaged,
+    light_pictures,
+    read_picture,
+    read_sets,
+)
 from psvideo.camera import Encoding
 from psvideo.clip.folder import MOVIES
 from psvideo.errors import PsvideoError, UsageError
@@ -26,11 +34,15 @@ PLAN = "plan.toml"
 
 @dataclass(frozen=True, kw_only=True)
 class LightSets:
-    """What shows each light by itself, as many times as it was taken. ``sets`` can be gone through once."""
+    """What shows each light by itself, as many times as it was taken. ``sets`` can be gone through once.
+
+    ``room`` is a picture under room light, where one lies beside stills or plates.
+    """
 
     name: str
     names: tuple[str, ...]
     sets: Iterator[LightPictures]
+    room: NDArray[np.float32] | None = None
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -92,7 +104,8 @@ def _of_files(files: LightFiles, encoding: Encoding, reading: Reading) -> LightS
         notes.append(f"JPEG pictures are read by the curve {transfer!r}; --transfer names another")
     read = Encoding(transfer=transfer, black_level=encoding.black_level, white_level=encoding.white_level)
     sets = read_sets(files, encoding=read, frames=reading.frames, most=None if reading.frames else reading.most)
-    return LightSets(name=files.folder.resolve().name, names=files.names, sets=sets, notes=tuple(notes))
+    room = None if files.room is None else read_picture(files.room, read)[0]
+    return LightSets(name=files.folder.resolve().name, names=files.names, sets=sets, room=room, notes=tuple(notes))
 
 
 def _of_clip(take: Take, reading: Reading, watch: Watch) -> LightSets:

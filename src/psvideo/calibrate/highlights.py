@@ -1,12 +1,12 @@
 """The highlight of a light on a mirror sphere, told from other bright spots.
 
-Candidates are the compact bright spots inside the outline. What is as bright in most other lights' pictures at the same
-place is no highlight of this light (a window, a white object that every light lights). Of the rest, the one that sends
-most light without being too large or too drawn out is taken; a second one that is nearly as good makes the light doubtful.
+Candidates are the compact bright spots inside the outline. What is as bright in most other lights' pictures at the
+same place is no highlight of this light (a window, a white object that every light lights). Of the rest, the one that
+sends most light without being too large or too drawn out is taken; a second one nearly as good makes it doubtful.
 
-A spot's place is the centroid of its light above a threshold. It is taken at several thresholds: how far the place moves
-with them says how well it is known. A clipped spot is flat on top, and around it are glare and the streaks of scratches;
-there pixels count by how deep inside the spot they lie, so that its round core decides and thin arms do not.
+A spot's place is the centroid of its light above a threshold. It is taken at several thresholds: how far the place
+moves with them says how well it is known. A clipped spot is flat on top, and around it are glare and the streaks of
+scratches; there pixels count by how deep inside the spot they lie, so that its round core decides, not thin arms.
 """
 
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ from psvideo.calibrate.light_pictures import LightPictures
 from psvideo.calibrate.sphere_outline import Outline
 from psvideo.camera import FloatArray
 
-LEVELS = (0.3, 0.45, 0.6, 0.75)
+LEVELS = (0.1, 0.2, 0.35, 0.5)
 CLIPPED_LEVELS = (0.8, 0.9, 0.98)
 """Thresholds, as shares of a spot's peak, at which its centroid is taken."""
 CANDIDATE_LEVEL = 0.3
@@ -31,8 +31,10 @@ DARK_PEAK = 0.02
 """A peak below this share of saturation, or of the other lights' peaks, is no highlight."""
 LARGEST_SPOT = 0.06
 """Share of the sphere's disc that a highlight may cover; a matte sphere's shading covers far more."""
-FEW_CLIPPED = 4
-"""So many clipped pixels do not yet flatten a spot."""
+SKIRT_PX = 2
+"""How far beyond the candidate's edge its light is counted: a small spot's flanks tell where it is."""
+FEW_CLIPPED = 40
+"""So many clipped pixels do not yet hide where a spot's middle is: its flanks tell it."""
 ALIKE = 0.5
 """A second spot with more than this share of the first one's score makes the choice doubtful."""
 STATIC = 0.6
@@ -42,7 +44,7 @@ SPOT_ERROR_SHARE = 0.04
 """What a centroid may be off in any case: in pixels, and as a share of the spot's radius (its shape is not known)."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Spot:
     """A bright spot: its place (x, y) and standard error in pixels, area in pixels, and why it was not chosen."""
 
@@ -62,7 +64,7 @@ class Spot:
 
 @dataclass(frozen=True, kw_only=True)
 class Found:
-    """What was found of one light on one sphere in one picture: the highlight, or why there is none, and other spots."""
+    """What was found of one light on one sphere in one picture: the highlight or why there is none, and other spots."""
 
     light: str
     highlight: Spot | None
@@ -81,12 +83,14 @@ def find_highlights(pictures: LightPictures, outline: Outline) -> list[Found]:
     clipped = pictures.saturated[crop]
     clipped = (clipped if clipped.ndim == 3 else clipped.all(axis=3)) & disc
     light = light - light.min(axis=0) if len(light) > 2 else light
-    peaks = np.array([float(np.quantile(one[disc], 1 - 4 / disc.sum())) if disc.sum() > 8 else 0.0 for one in light])
+    blur_px = max(0.7, 0.004 * outline.radius_px)
+    smooth = [np.where(disc, cv2.GaussianBlur(one, (0, 0), blur_px), 0.0).astype(np.float32) for one in light]
+    peaks = [float(one.max()) for one in smooth]
     usual = float(np.median(peaks))
     found = []
     for n, name in enumerate(pictures.names):
         fault = _too_dark(peaks[n], usual)
-        spots = [] if fault else _spots(light, n, peaks[n], clipped[n], outline, corner, int(disc.sum()))
+        spots = [] if fault else _spots(light, n, smooth[n], clipped[n], corner, int(disc.sum()))
         found.append(_chosen(name, spots, fault))
     return found
 
@@ -106,34 +110,35 @@ def _too_dark(peak: float, usual: float) -> str:
     if peak >= DARK_PEAK * max(usual, 1.0 if usual < DARK_PEAK else usual):
         return ""
     return (
-        f"no highlight: the brightest place inside the outline has {peak:.2g} of saturation, and under the other lights "
-        f"{usual:.2g}; the light is off, hidden from the sphere, or behind it"
+        f"no highlight: the brightest place inside the outline has {peak:.2g} of saturation, and under the other "
+        f"lights {usual:.2g}; the light is off, hidden from the sphere, or behind it"
     )
 
 
 def _spots(
     light: NDArray[np.float32],
     n: int,
-    peak: float,
+    smooth: NDArray[np.float32],
     clipped: NDArray[np.bool_],
-    outline: Outline,
     corner: tuple[int, int],
     disc_px: int,
 ) -> list[Spot]:
     """Return the bright spots of one light's picture (light, row, col), the best first."""
     picture = light[n]
-    smooth = cv2.GaussianBlur(picture, (0, 0), max(0.7, 0.004 * outline.radius_px))
-    bright = (smooth >= CANDIDATE_LEVEL * min(peak, float(smooth.max()))).astype(np.uint8)
+    bright = (smooth >= CANDIDATE_LEVEL * smooth.max()).astype(np.uint8)
     count, labels, boxes, _ = cv2.connectedComponentsWithStats(bright)
     order = np.argsort(boxes[1:, cv2.CC_STAT_AREA])[::-1][:8] + 1
     spots = []
     for label in order[: count - 1]:
         left, top, wide, tall = (int(value) for value in boxes[label, :4])
-        cut = np.s_[top : top + tall, left : left + wide]
-        mine = labels[cut] == label
-        others = [light[k][cut][mine] for k in range(len(light)) if k != n]
+        left, top, right, bottom = max(left - SKIRT_PX, 0), max(top - SKIRT_PX, 0), left + wide, top + tall
+        cut = np.s_[top : bottom + SKIRT_PX, left : right + SKIRT_PX]
+        mine = cv2.dilate((labels[cut] == label).astype(np.uint8), np.ones((2 * SKIRT_PX + 1,) * 2, np.uint8)) > 0
+        mine &= (labels[cut] == label) | (labels[cut] == 0)
+        others = [light[k][cut][labels[cut] == label] for k in range(len(light)) if k != n]
+        own = labels[cut] == label
         spot = _spot(np.where(mine, picture[cut], 0.0), clipped[cut] & mine, (corner[0] + top, corner[1] + left))
-        spots.append(_judged(spot, picture[cut][mine], others, disc_px))
+        spots.append(_judged(spot, picture[cut][own], others, disc_px))
     return sorted(spots, key=lambda one: one.score, reverse=True)
 
 
@@ -142,7 +147,7 @@ def _spot(values: NDArray[np.floating], clipped: NDArray[np.bool_], corner: tupl
     peak = float(values.max())
     rows, cols = np.mgrid[: values.shape[0], : values.shape[1]].astype(np.float64)
     places, areas = [], []
-    is_clipped = np.count_nonzero(clipped) > FEW_CLIPPED
+    is_clipped = int(np.count_nonzero(clipped)) > FEW_CLIPPED
     for level in CLIPPED_LEVELS if is_clipped else LEVELS:
         core = _largest(values >= level * peak)
         depth = cv2.distanceTransform(np.pad(core, 1).astype(np.uint8), cv2.DIST_L2, 5)[1:-1, 1:-1]
@@ -150,7 +155,7 @@ def _spot(values: NDArray[np.floating], clipped: NDArray[np.bool_], corner: tupl
         x, y = (float((weight * along).sum() / weight.sum()) for along in (cols, rows))
         places.append((x + corner[1], y + corner[0]))
         areas.append(float(core.sum()))
-    half = values >= 0.5 * peak
+    half = _largest(values >= 0.5 * peak)
     drawn = _drawn_out(np.where(half, 1.0, 0.0), cols - cols[half].mean(), rows - rows[half].mean())
     at = np.array(places)
     spread = float(np.sqrt(at.var(axis=0, ddof=1).sum() / 2))

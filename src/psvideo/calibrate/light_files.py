@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from psvideo.calibrate.light_pictures import AMBIENT_NAMES, LightFiles
+from psvideo.calibrate.light_pictures import AMBIENT_NAMES, ROOM_NAMES, LightFiles
 from psvideo.clip.folder import KINDS, number_of
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.timing import read_timing
@@ -25,6 +25,7 @@ def find_plates(folder: Path, *, lights: Sequence[str] = ()) -> LightFiles | Non
     held = {entry.name: pictures_in(entry) for entry in within if entry.name not in NOT_LIGHTS}
     held = {name: files for name, files in held.items() if files}
     ambient = next((tuple(held.pop(name)) for name in AMBIENT_NAMES if name in held), ())
+    room = next((held.pop(name)[0] for name in ROOM_NAMES if name in held), None)
     if not held or (set(held) == {"frames"}):
         return None
     order = lights or _timed_lights(folder)
@@ -41,6 +42,7 @@ def find_plates(folder: Path, *, lights: Sequence[str] = ()) -> LightFiles | Non
         by_light=_side_by_side({_checked(name, folder / name): held[name] for name in names}),
         ambient=ambient,
         ambient_is_off=made_by_split,
+        room=room,
     )
 
 
@@ -49,14 +51,15 @@ def find_stills(path: Path | Sequence[Path], *, lights: Sequence[str] = ()) -> L
 
     A file belongs to the light whose name it bears; where none bears one of ``lights``, the numbered files belong to
     the lights in order; without ``lights`` every file is a light of the file's name. A file named ambient or dark shows
-    the scene with every light off.
+    the scene with every light off, one named room, outline or ref with the room light on.
 
     Raises PsvideoError where there are no pictures, two of one light, or not as many as ``lights``.
     """
     folder = path if isinstance(path, Path) else path[0].parent
     files = pictures_in(path) if isinstance(path, Path) else list(path)
     dark = [file for file in files if file.stem.lower() in AMBIENT_NAMES]
-    files = [file for file in files if file not in dark]
+    room = [file for file in files if file.stem.lower() in ROOM_NAMES]
+    files = [file for file in files if file not in dark and file not in room]
     if not files:
         kinds = ", ".join(sorted(KINDS))
         raise PsvideoError(
@@ -77,6 +80,7 @@ def find_stills(path: Path | Sequence[Path], *, lights: Sequence[str] = ()) -> L
         folder=folder,
         by_light={_checked(light, found[0]): tuple(found) for light, found in chosen.items()},
         ambient=tuple(dark[:1]),
+        room=room[0] if room else None,
         left_aside=tuple(file for file in files if file not in used),
     )
 

@@ -5,7 +5,7 @@ a folder). Clips need their flashes found first: ``psvideo.light_sets`` takes al
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +23,8 @@ SATURATED = 0.98
 """From this share of the sensor's range on a pixel counts as clipped (lossy files blur the very end)."""
 AMBIENT_NAMES = ("ambient", "dark")
 """A picture or a folder of this name shows the scene with every light off; it is taken off the others."""
+ROOM_NAMES = ("room", "outline", "ref")
+"""A picture of this name shows the scene with the room light on: on it outlines show best."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,43 +89,52 @@ def light_pictures(
 
 def averaged(sets: Iterable[LightPictures]) -> LightPictures:
     """Return the mean over sets of the same lights, row by row over the frames that saw it; at least one set."""
-    first: LightPictures | None = None
-    total = clipped = count = ambient = None
-    frames = 0
+    total: LightPictures | None = None
+    count = np.zeros(())
     for one in sets:
         weight = one.seen.astype(np.float32)
-        shown = one.images * weight.reshape(*weight.shape, *[1] * (one.images.ndim - 2))
-        if first is None:
-            first, total, clipped, count, ambient = one, shown, one.saturated, weight, one.ambient
-        else:
-            total, clipped, count = total + shown, clipped | one.saturated, count + weight
-            ambient = None if ambient is None or one.ambient is None else ambient + one.ambient
-        frames += one.frames
-    if first is None or total is None or clipped is None or count is None:
+        shown = replace(one, images=one.images * _per_pixel(weight, one.images))
+        total = shown if total is None else _sum(total, shown)
+        count = count + weight
+    if total is None:
         raise ValueError("there is nothing to average")
-    divisor = np.maximum(count, 1).reshape(*count.shape, *[1] * (total.ndim - 2))
-    mean_ambient = None if ambient is None else (ambient / np.float32(frames / first.frames)).astype(np.float32)
-    return LightPictures(
-        names=first.names,
-        images=(total / divisor).astype(np.float32),
-        saturated=clipped,
-        seen=count > 0,
-        ambient=mean_ambient,
-        frames=frames,
+    images = total.images / _per_pixel(np.maximum(count, 1).astype(np.float32), total.images)
+    return replace(total, images=images, seen=count > 0)
+
+
+def _sum(one: LightPictures, other: LightPictures) -> LightPictures:
+    """Return the sum of pictures; of ambient light, which is averaged already, the mean weighted by frames."""
+    ambient = None
+    if one.ambient is not None and other.ambient is not None:
+        share = np.float32(other.frames / (one.frames + other.frames))
+        ambient = one.ambient * (1 - share) + other.ambient * share
+    return replace(
+        one,
+        images=one.images + other.images,
+        saturated=one.saturated | other.saturated,
+        ambient=ambient,
+        frames=one.frames + other.frames,
     )
+
+
+def _per_pixel(rows: NDArray[np.float32], images: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return what stands per row (light, row) in a shape that goes with pictures."""
+    return rows.reshape(*rows.shape, *[1] * (images.ndim - 2))
 
 
 @dataclass(frozen=True, kw_only=True)
 class LightFiles:
     """Which files show which light. ``by_light`` holds for every light one file per set (per round).
 
-    ``ambient`` holds one file per set, a single one for all sets, or none. ``left_aside`` are pictures that are none.
+    ``ambient`` holds one file per set, a single one for all sets, or none; ``room`` is a picture under room light.
+    ``left_aside`` are pictures that are none of these.
     """
 
     folder: Path
     by_light: Mapping[str, tuple[Path, ...]]
     ambient: tuple[Path, ...] = ()
     ambient_is_off: bool = False
+    room: Path | None = None
     left_aside: tuple[Path, ...] = ()
 
     @property
@@ -155,7 +166,7 @@ def read_sets(
     for number in chosen[:most]:
         images = []
         for paths in files.by_light.values():
-            image, look = _read(paths[number - 1], encoding)
+            image, look = read_picture(paths[number - 1], encoding)
             shape = shape or (look, str(paths[number - 1]))
             if look != shape[0]:
                 raise PsvideoError(
@@ -165,7 +176,7 @@ def read_sets(
             images.append(image)
         dark = None
         if files.ambient:
-            dark, _ = _read(files.ambient[min(number, len(files.ambient)) - 1], encoding)
+            dark, _ = read_picture(files.ambient[min(number, len(files.ambient)) - 1], encoding)
             if dark.shape != images[0].shape:
                 raise PsvideoError(
                     f"{files.ambient[0]}: shows the ambient light and is not of the size and channels of the other "
@@ -174,7 +185,13 @@ def read_sets(
         yield light_pictures(files.names, images, ambient=dark, ambient_is_off=files.ambient_is_off)
 
 
-def _read(path: Path, encoding: Encoding) -> tuple[NDArray[np.float32], str]:
+def read_picture(path: Path, encoding: Encoding = Encoding()) -> tuple[NDArray[np.float32], str]:
+    """Return a picture in linear light, (row, col) or (row, col, 3), and its size, channels and depth in words.
+
+    Raises PsvideoError where it cannot be read.
+    """
+    if path.suffix.lower() not in KINDS or not path.is_file():
+        raise PsvideoError(f"{path}: is no picture that can be read; expected one of {', '.join(KINDS)}.")
     picture = decode(KINDS[path.suffix.lower()], path)
     image = linear_light(picture, encoding)
     if not np.isfinite(image).all():

@@ -107,4 +107,5 @@ def crossing(rays: Sequence[Ray]) -> Crossing | None:
     miss = np.einsum("nij,nj->ni", across, point - starts)
     chi = float(((miss**2).sum(axis=1) / spread**2).sum())
     excess = float(np.sqrt(chi / (2 * len(rays) - 3)))
-    return Crossing(position_m=point, covariance=np.linalg.inv(matrix) * max(excess, 1.0) ** 2, excess=excess)
+    covariance: FloatArray = (np.linalg.inv(matrix) * max(excess, 1.0) ** 2).astype(np.float64)
+    return Crossing(position_m=point, covariance=covariance, excess=excess)

@@ -1,9 +1,9 @@
 """Where lights are, from their highlights on mirror spheres.
 
-The highlight of a light is where the sphere mirrors the viewing ray into the light's direction. What is known of the view
-decides how rays are taken (``sphere_view``); one or more sightings (frames, spheres, places) are joined: distant lights
-as a mean direction, near ones as the point where the mirrored rays meet (``mirror_law``). Lights that cannot be told are
-named with the reason, and left out of the rig. Highlights clip, so they tell no intensity: every light gets 1.
+The highlight of a light is where the sphere mirrors the viewing ray into the light's direction. What is known of the
+view decides how rays are taken (``sphere_view``); one or more sightings (frames, spheres, places) are joined: distant
+lights as a mean direction, near ones as the point where the mirrored rays meet (``mirror_law``). Lights that cannot be
+told are named with the reason, and left out of the rig. Highlights clip, so they tell no intensity: every light gets 1.
 """
 
 from collections.abc import Sequence
@@ -88,8 +88,8 @@ def calibrate_lights(sightings: Sequence[Sighting], *, radius_m: float | None = 
         reasons = "; ".join(f"{light.name}: {light.fault}" for light in lights[:3])
         raise PsvideoError(
             f"{sightings[0].where}: no light could be measured on the sphere ({reasons}). Expected a small bright "
-            "highlight of each light on a shiny sphere; a matte sphere is for psvideo calibrate matte-sphere. Look at the "
-            "picture of what was found, and mark the sphere with --circle where that was wrong."
+            "highlight of each light on a shiny sphere; a matte sphere is for psvideo calibrate matte-sphere. "
+            "Look at where the sphere was taken to be, and mark it with --circle where that was wrong."
         )
     warnings = (*_about_view(sightings), *_about_spheres(sightings), *_about_lights(lights, sightings, radius_m))
     return MirrorCalibration(lights=lights, sightings=tuple(sightings), warnings=warnings)
@@ -196,8 +196,8 @@ def _about_view(sightings: Sequence[Sighting]) -> list[str]:
         else ""
     )
     return [
-        "the focal length is not known, so the view is taken for orthographic, and all directions are wrong by about the "
-        f"angle by which the sphere stands off the lens's axis: {long_deg:.1f} degrees with a lens of "
+        "the focal length is not known, so the view is taken for orthographic, and all directions are wrong by about "
+        f"the angle by which the sphere stands off the lens's axis: {long_deg:.1f} degrees with a lens of "
         f"{USUAL_FIELDS_DEG[0]:.0f} degrees field of view, {normal_deg:.1f} with {USUAL_FIELDS_DEG[1]:.0f}.{seen} Give "
         "--focal-px, or --focal-mm and --sensor-mm. The standard errors leave this out."
     ]
@@ -214,8 +214,8 @@ def _about_spheres(sightings: Sequence[Sighting]) -> list[str]:
             )
         if sighting.moved_px > max(3 * outline.error_px, 1.0):
             said.append(
-                f"{sighting.where}: the outline moves by {sighting.moved_px:.1f} pixels from frame to frame; the sphere or "
-                "the camera did not stand still"
+                f"{sighting.where}: the outline moves by {sighting.moved_px:.1f} pixels from frame to frame; the "
+                "sphere or the camera did not stand still"
             )
     return said
 

@@ -23,9 +23,10 @@ USUAL_STRETCH = 0.005
 """How far from a circle an outline is expected to be where perspective is unknown (a sphere 8 degrees off the axis);
 outlines seen in part only hold to this."""
 EDGE_BIAS_PX = 0.2
-EDGE_BIAS_SHARE = 0.15
-"""What an edge's place may be off along a whole outline, in x, y and radius: in pixels, and as a share of half the
-edge's width (a rim of light, sharpening, what the mirror shows of its background)."""
+EDGE_BIAS_SHARE = 0.1
+FADING_BIAS_SHARE = 0.5
+"""What an edge's place may be off along a whole outline, in x, y and radius: in pixels, as a share of half the sharpest
+edges' width (a rim of light, sharpening), and of what the usual edge is wider than those (a mirror's fading rim)."""
 GIVEN_ERROR_PX = 0.5
 """Standard error in x, y and radius of an outline that a person marked."""
 BAND = 0.05
@@ -35,7 +36,7 @@ ALONG_RADII = 3.0
 MOST_FADING = 2.0
 """How many times an outer flank may be further out than that of a sharp edge to count as a mirror's fading rim."""
 SECTORS = 12
-TRIALS = 400
+TRIALS = 120
 LEAST_COVERAGE = 0.3
 """Share of the radii that must agree on an outline; by chance it is a tenth."""
 AGREE_PX = 1.5
@@ -44,7 +45,9 @@ AGREE_PX = 1.5
 
 @dataclass(frozen=True, kw_only=True)
 class Outline:
-    """A sphere's outline: ``place`` (5,) as in ``sphere_view``, with its ``covariance`` (5, 5). ``points`` (point, 2) are the edges it rests on, ``coverage`` the share of its radii that have one,
+    """A sphere's outline: ``place`` (5,) as in ``sphere_view``, with its ``covariance`` (5, 5).
+
+    ``points`` (point, 2) are the edges it rests on, ``coverage`` the share of its radii that have one,
     ``scatter_px`` their root mean square distance from it,
     ``blur_px`` half the width of those edges. ``given``: a person marked it."""
 
@@ -93,7 +96,7 @@ def given_outline(view: View, circle: tuple[float, float, float]) -> Outline:
 
 
 def edge_pictures(pictures: LightPictures) -> list[Grey]:
-    """Return pictures (row, col) in which a sphere's outline may show: mean and maximum over the lights, and ambient."""
+    """Return pictures (row, col) in which an outline may show: mean and maximum over the lights, and ambient light."""
     grey = pictures.grey
     shown = [grey.mean(axis=0), grey.max(axis=0)]
     if pictures.ambient is not None:
@@ -110,18 +113,24 @@ def _logarithm(picture: Grey) -> Grey:
 
 def find_outlines(pictures: Sequence[Grey], view: View, *, count: int = 1) -> list[Outline]:
     """Return up to ``count`` spheres' outlines, those that most radii agree on first, none over another."""
-    fits = [
-        fit
-        for picture in pictures
-        for thing in round_things(_logarithm(picture))
-        if (fit := fit_outline(picture, view, thing)) is not None and fit.coverage >= LEAST_COVERAGE
-    ]
+    fits = [fit for picture in pictures for fit in _fits(picture, view) if fit.coverage >= LEAST_COVERAGE]
     fits.sort(key=lambda fit: fit.coverage * np.sqrt(fit.radius_px), reverse=True)
     chosen: list[Outline] = []
     for fit in fits:
         if len(chosen) < count and all(_apart(fit, other) for other in chosen):
             chosen.append(_sharpest(fit, fits))
     return chosen
+
+
+def _fits(picture: Grey, view: View) -> list[Outline]:
+    """Return the outlines fitted to a picture's round things; things on an outline that was fitted are passed over."""
+    fits: list[Outline] = []
+    for thing in round_things(_logarithm(picture)):
+        circle = np.array([thing.x, thing.y, thing.radius])
+        if all(np.abs(fit.place[:3] - circle).max() > 0.1 * fit.radius_px for fit in fits):
+            fit = fit_outline(picture, view, thing)
+            fits += [fit] if fit is not None else []
+    return fits
 
 
 def _sharpest(best: Outline, fits: Sequence[Outline]) -> Outline:
@@ -150,7 +159,8 @@ def fit_outline(picture: Grey, view: View, start: RoundThing | Outline) -> Outli
     else:
         first = given_outline(view, (start.x, start.y, start.radius))
         around = first.place
-    smooth = cv2.GaussianBlur(picture, (0, 0), float(np.clip(around[2] / 200, 0.8, 3.0)))
+    blur_px = float(np.clip(around[2] / 200, 0.8, 3.0))
+    smooth: Grey = cv2.GaussianBlur(picture, (0, 0), blur_px).astype(np.float32)
     fits = [fit for fading in (False, True) if (fit := _fitted(smooth, view, around, fading=fading)) is not None]
     if not fits:
         return None
@@ -160,22 +170,20 @@ def fit_outline(picture: Grey, view: View, start: RoundThing | Outline) -> Outli
 
 def _fitted(smooth: Grey, view: View, around: FloatArray, *, fading: bool) -> Outline | None:
     """Fit an outline to edges; with ``fading``, to the outer ends of those that are less sharp than others."""
-    for _ in range(2):
-        edges = _edges_on_radii(smooth, view, around, fading=fading)
-        place = None if len(edges.points) < 12 else _agreed(view, edges, around)
-        if place is None:
-            return None
-        around = place
-    return _measured(view, _edges_on_radii(smooth, view, around, fading=fading), around)
+    edges = _edges_on_radii(smooth, view, around, fading=fading)
+    place = None if len(edges.points) < 12 else _agreed(view, edges, around)
+    return None if place is None else _measured(view, _edges_on_radii(smooth, view, place, fading=fading), place)
 
 
 @dataclass(frozen=True)
 class _Edges:
-    """Edge points (edge, 2), the radius on which each lies, how many radii were looked along, and how blurred it is."""
+    """Edge points (edge, 2), the radius on which each lies, how many radii were looked along, and half the width of
+    sharp edges and of the usual one."""
 
     points: FloatArray
     radius_index: NDArray[np.intp]
     radii: int
+    sharp_px: float
     blur_px: float
 
 
@@ -193,18 +201,18 @@ def _edges_on_radii(smooth: Grey, view: View, place: FloatArray, *, fading: bool
     ).astype(np.float64)
     rows, cols = smooth.shape
     inside = ((spots >= 0) & (spots <= (cols - 1, rows - 1))).all(axis=2).all(axis=1)
-    values = cv2.GaussianBlur(values, (1, 0), sigmaX=1e-3, sigmaY=ALONG_RADII, borderType=cv2.BORDER_REPLICATE)
-    steep = np.abs(np.gradient(values, axis=1))
+    averaged = cv2.GaussianBlur(values, (1, 0), sigmaX=1e-3, sigmaY=ALONG_RADII, borderType=cv2.BORDER_REPLICATE)
+    steep = np.abs(np.gradient(averaged.astype(np.float64), axis=1))
     steep[~inside] = 0
-    index, along, half_width = _crests(steep)
+    index, along, (sharp, usual) = _crests(steep)
     steps_out = along[0] + (along[1] if fading else 0.0)
     points = rim[index] + (outward / length)[index] * (-reach + 0.5 * steps_out)[:, None]
-    return _Edges(points, index, radii, 0.5 * half_width)
+    return _Edges(points, index, radii, 0.5 * sharp, 0.5 * usual)
 
 
-def _crests(steep: FloatArray) -> tuple[NDArray[np.intp], FloatArray, float]:
+def _crests(steep: FloatArray) -> tuple[NDArray[np.intp], FloatArray, tuple[float, float]]:
     """Return the two highest crests of steepness along each radius (radius, step): which radius, at which step, and
-    how many steps half an edge's width is.
+    how many steps half a sharp edge's width is, and half the usual one's.
 
     Towards its rim a mirror may fade into what is behind it; then an edge is a ramp with the outline at its outer end.
     The second row says by how many steps: what the outer flank of the edge (where it is half as steep) is further out
@@ -217,7 +225,7 @@ def _crests(steep: FloatArray) -> tuple[NDArray[np.intp], FloatArray, float]:
     index, rank = np.nonzero(np.take_along_axis(crest, best, axis=1) > 0)
     at = best[index, rank] + 1
     if not len(at):
-        return index, np.zeros((2, 0)), 0.0
+        return index, np.zeros((2, 0)), (0.0, 0.0)
     before, top, after = (steep[index, at + step] for step in (-1, 0, 1))
     shift = np.clip(0.5 * (before - after) / np.minimum(before - 2 * top + after, -1e-12), -0.5, 0.5)
     beyond = (steep[index] < 0.5 * top[:, None]) & (np.arange(steep.shape[1]) > at[:, None])
@@ -227,7 +235,7 @@ def _crests(steep: FloatArray) -> tuple[NDArray[np.intp], FloatArray, float]:
     width = flank - 1 + (inner - 0.5 * top) / np.maximum(inner - outer, 1e-12) - (at + shift)
     sharp, usual = np.quantile(width[ends], (0.2, 0.5)) if ends.any() else (0.0, 0.0)
     fading = np.where(ends, np.clip(width - sharp, 0.0, MOST_FADING * sharp), 0.0)
-    return index, np.array([at + shift, fading]), float(usual)
+    return index, np.array([at + shift, fading]), (float(sharp), float(usual))
 
 
 def _tolerance_px(place: FloatArray) -> float:
@@ -296,13 +304,18 @@ def _measured(view: View, edges: _Edges, place: FloatArray) -> Outline:
     return Outline(
         view=view,
         place=place,
-        covariance=_jackknife(view, points, place)
-        + _in_place(float(np.hypot(EDGE_BIAS_PX, EDGE_BIAS_SHARE * edges.blur_px))),
+        covariance=_jackknife(view, points, place) + _in_place(_bias_px(edges)),
         points=points,
         coverage=len(np.unique(edges.radius_index[near])) / edges.radii,
         blur_px=edges.blur_px,
         scatter_px=float(np.sqrt(np.mean(away[near] ** 2))) if near.any() else tolerance,
     )
+
+
+def _bias_px(edges: _Edges) -> float:
+    """Return what all edges of an outline may be off together."""
+    fading_px = edges.blur_px - edges.sharp_px
+    return float(np.linalg.norm([EDGE_BIAS_PX, EDGE_BIAS_SHARE * edges.sharp_px, FADING_BIAS_SHARE * fading_px]))
 
 
 def _jackknife(view: View, points: FloatArray, place: FloatArray) -> FloatArray:

@@ -1,7 +1,7 @@
 """Looking for round outlines in a picture: edges vote for the centres of circles, radius by radius.
 
-Every edge says which way it faces, so for a given radius it votes for two centres only, one on either side (a sphere may
-be darker or brighter than what is behind it). A circle's votes are counted as a share of its circumference.
+Every edge says which way it faces, so for a given radius it votes for two centres only, one on either side (a sphere
+may be darker or brighter than what is behind it). A circle's votes are counted as a share of its circumference.
 """
 
 from dataclasses import dataclass

@@ -65,18 +65,20 @@ class Sighting:
 class Looking:
     """How spheres are looked for: how many a picture holds, or where they are (x, y, radius), found by hand.
 
-    ``focal_px`` and ``principal_px`` give the pixels their rays; ``room`` is a picture on which the outline shows best.
+    ``focal_px``, or ``focal_widths`` in widths of the picture, and ``principal_px`` give the pixels their rays.
     """
 
     spheres: int = 1
     circles: tuple[tuple[float, float, float], ...] = ()
     focal_px: float | None = None
+    focal_widths: float | None = None
     principal_px: tuple[float, float] | None = None
 
     def view(self, *, width_px: int, height_px: int) -> View:
         """Return the view of pictures of this size; the lens's axis goes through their middle unless it is given."""
         middle = ((width_px - 1) / 2, (height_px - 1) / 2)
-        return View(focal_px=self.focal_px, principal_px=self.principal_px or middle)
+        focal_px = self.focal_px if self.focal_widths is None else self.focal_widths * width_px
+        return View(focal_px=focal_px, principal_px=self.principal_px or middle)
 
 
 def sight_spheres(
@@ -91,9 +93,7 @@ def sight_spheres(
     fits: list[list[FloatArray]] = []
     found: list[list[list[Found]]] = []
     shown: Grey | None = None
-    count = 0
-    for pictures in sets:
-        count += 1
+    for count, pictures in enumerate(sets, start=1):
         brightest = pictures.grey.max(axis=0)
         if shown is None:
             shown = brightest
@@ -141,9 +141,9 @@ def _first_outlines(
 def _not_found(where: str, found: int, wanted: int) -> str:
     what = "no sphere" if not found else f"{found} of {wanted} spheres"
     return (
-        f"{where}: {what} found: no round outline stands out from its background on a third of its length. Put something "
-        "lighter or darker behind the sphere, keep all of it in the picture, add a picture with the room light on "
-        "(--outline-picture), or mark the outline by hand with --circle x,y,radius."
+        f"{where}: {what} found: no round outline stands out from its background on a third of its length. Put "
+        "something lighter or darker behind the sphere, keep all of it in the picture, add a picture with the room "
+        "light on (--outline-picture), or mark the outline by hand with --circle x,y,radius."
     )
 
 

@@ -7,13 +7,15 @@ gives directions that are wrong by about that angle.
 
 An outline is five numbers, ``(x, y, radius, stretch, slant)``: where the centre appears in pixels, the radius in pixels
 that it would have in the middle of the picture, and, for parallel rays only, by which shares the circle is stretched
-along the columns (``cos 2t``) and along the diagonal (``sin 2t``), as an unknown perspective does. Points are ``(x, y)``: column to the right, row downwards, (0, 0) in the centre of the top left
-pixel. Vectors are in the camera frame: x right, y up, z towards the camera.
+along the columns (``cos 2t``) and along the diagonal (``sin 2t``), as an unknown perspective does. Points
+are ``(x, y)``: column to the right, row downwards, (0, 0) in the centre of the top left pixel. Vectors are in the
+camera frame: x right, y up, z towards the camera.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from psvideo.camera import FloatArray
 from psvideo.rig import Vector
@@ -60,8 +62,8 @@ class View:
         _, towards = self.rays(np.array([[x, y]]))
         _, rays = self.rays(points)
         angle = np.arctan2(np.linalg.norm(np.cross(rays, towards), axis=1), rays @ towards[0])
-        distance = (angle - np.arctan2(radius_px, self.focal_px)) * self.focal_px
-        return distance
+        outside: FloatArray = (angle - np.arctan2(radius_px, self.focal_px)) * self.focal_px
+        return outside
 
     def through(self, points: FloatArray) -> FloatArray | None:
         """Return the outline nearest to three or more points in an algebraic sense; None where there is none.
@@ -84,12 +86,13 @@ class View:
         radius_px = self.focal_px * np.tan(np.arccos(1.0 / length))
         return np.array([*self.project(axis[None])[0], radius_px, 0.0, 0.0])
 
-    def project(self, vectors: FloatArray) -> FloatArray:
+    def project(self, vectors: NDArray[np.floating]) -> FloatArray:
         """Return where vectors (n, 3) from the optical centre (orthographic: points) appear, shape (n, 2)."""
         if self.focal_px is None:
             return np.stack([vectors[:, 0], -vectors[:, 1]], axis=1)
         across, up, back = vectors.T
-        return np.stack([-across / back, up / back], axis=1) * self.focal_px + np.array(self.principal_px)
+        seen: FloatArray = np.stack([-across / back, up / back], axis=1) * self.focal_px + np.array(self.principal_px)
+        return seen
 
     def curve(self, outline: FloatArray, count: int = 360) -> FloatArray:
         """Return points (count, 2) along an outline, evenly by angle."""
