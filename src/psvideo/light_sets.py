@@ -98,14 +98,15 @@ def _is_clip(path: Path, plan_path: Path) -> bool:
 def _of_files(files: LightFiles, encoding: Encoding, reading: Reading) -> LightSets:
     transfer = reading.transfer or ("srgb" if files.is_jpeg and reading.plan is None else encoding.transfer)
     notes = []
-    if files.left_aside:
-        notes.append(f"left aside: {', '.join(file.name for file in files.left_aside)}")
+    aside = tuple(f"{file}: is taken for no light's picture and left aside" for file in files.left_aside)
     if files.is_jpeg and reading.transfer is None:
         notes.append(f"JPEG pictures are read by the curve {transfer!r}; --transfer names another")
     read = Encoding(transfer=transfer, black_level=encoding.black_level, white_level=encoding.white_level)
     sets = read_sets(files, encoding=read, frames=reading.frames, most=None if reading.frames else reading.most)
     room = None if files.room is None else read_picture(files.room, read)[0]
-    return LightSets(name=files.folder.resolve().name, names=files.names, sets=sets, room=room, notes=tuple(notes))
+    return LightSets(
+        name=files.folder.resolve().name, names=files.names, sets=sets, room=room, warnings=aside, notes=tuple(notes)
+    )
 
 
 def _of_clip(take: Take, reading: Reading, watch: Watch) -> LightSets:

@@ -12,6 +12,8 @@ from psvideo.timing import read_timing
 from psvideo.tomlfile import check_light_name
 
 TIMING = "timing.json"
+FEWEST_TO_ONE = 4
+"""So many numbered files for one of another name make that one no light (a mask); with fewer, all are lights."""
 NOT_LIGHTS = ("flashes", "truth")
 """Folders that may lie beside the lights' own: single flashes, and a virtual shoot's truth."""
 
@@ -105,12 +107,12 @@ def _bears(file: Path, light: str) -> bool:
 
 
 def _main_group(files: list[Path]) -> list[Path]:
-    """Return the numbered files that share a stem where they are most of all files, else all files."""
+    """Return the numbered files that share a stem where hardly any others lie beside them, else all files."""
     stems = Counter(_prefix(file) for file in files if number_of(file) is not None)
     if not stems:
         return files
     prefix, count = stems.most_common(1)[0]
-    if count < 2 or count <= len(files) // 2:
+    if count < FEWEST_TO_ONE * (len(files) - count):
         return files
     return [file for file in files if number_of(file) is not None and _prefix(file) == prefix]
 

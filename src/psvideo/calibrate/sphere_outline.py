@@ -7,12 +7,11 @@ with Tukey's weights goes on. The uncertainty comes from leaving out one sector 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from psvideo.calibrate.light_pictures import LightPictures
 from psvideo.calibrate.sphere_search import Grey, RoundThing, round_things
@@ -37,6 +36,7 @@ MOST_FADING = 2.0
 """How many times an outer flank may be further out than that of a sharp edge to count as a mirror's fading rim."""
 SECTORS = 12
 TRIALS = 120
+GAUSS_NEWTON_STEPS = 10
 LEAST_COVERAGE = 0.3
 """Share of the radii that must agree on an outline; by chance it is a tenth."""
 AGREE_PX = 1.5
@@ -140,7 +140,7 @@ def _sharpest(best: Outline, fits: Sequence[Outline]) -> Outline:
         for fit in fits
         if np.abs(fit.place - best.place)[:3].max() < 0.03 * best.radius_px and fit.coverage >= 0.8 * best.coverage
     ]
-    return min(same, key=lambda fit: fit.blur_px)
+    return _with_doubt(min(same, key=lambda fit: fit.blur_px), same)
 
 
 def _apart(one: Outline, other: Outline) -> bool:
@@ -165,7 +165,14 @@ def fit_outline(picture: Grey, view: View, start: RoundThing | Outline) -> Outli
     if not fits:
         return None
     most = max(fit.coverage for fit in fits)
-    return min((fit for fit in fits if fit.coverage >= 0.95 * most), key=lambda fit: fit.scatter_px)
+    fits = [fit for fit in fits if fit.coverage >= 0.95 * most]
+    return _with_doubt(min(fits, key=lambda fit: fit.scatter_px), fits)
+
+
+def _with_doubt(best: Outline, others: Sequence[Outline]) -> Outline:
+    """Return an outline whose uncertainty holds how far other readings of the same edges lie from it."""
+    away = np.array([other.place - best.place for other in others])
+    return replace(best, covariance=best.covariance + np.diag((away**2).sum(axis=0) / max(len(away) - 1, 1)))
 
 
 def _fitted(smooth: Grey, view: View, around: FloatArray, *, fading: bool) -> Outline | None:
@@ -289,7 +296,14 @@ def _least_squares(view: View, points: FloatArray, weight: FloatArray, place: Fl
         whole = np.array([*trial, *place[free:]])
         return np.concatenate([weight * view.distance_px(points, whole), strictness * whole[3:free]])
 
-    found = least_squares(misfit, place[:free], max_nfev=20, x_scale=[1.0, 1.0, 1.0, 0.01, 0.01][:free]).x
+    found = place[:free].copy()
+    for _ in range(GAUSS_NEWTON_STEPS):
+        now = misfit(found)
+        slopes = [(misfit(found + step) - now) / step.sum() for step in np.diag([1e-3, 1e-3, 1e-3, 1e-6, 1e-6][:free])]
+        move = np.linalg.lstsq(np.stack(slopes, axis=1), -now, rcond=None)[0]
+        found += move
+        if np.abs(move).max() < 1e-5:
+            break
     return np.array([*found, *place[free:]])
 
 
