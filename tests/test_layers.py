@@ -30,7 +30,7 @@ LAYERS = [
     {"export", "view"},
     {"synth"},
     {"pipeline"},
-    {"naming"},
+    {"naming", "light_sets"},
     {"runs"},
     {"demo"},
     {"cli"},

@@ -19,6 +19,8 @@ from psvideo.tomlfile import Contract, check_light_name, parse_toml, read_text
 
 SCHEMA = "psvideo-rig/1"
 UNIT_LENGTH_TOLERANCE = 0.01
+FARTHEST_LIGHT_M = 50.0
+"""No near light is further from the camera; positions in millimetres are, from 5 cm on."""
 
 Triple = Annotated[list[float], Field(min_length=3, max_length=3)]
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
@@ -53,6 +55,12 @@ class _Light(Contract):
                 raise ValueError(
                     f"light {self.name!r}: {key} has length {length:.4g}, expected a unit vector (length 1)"
                 )
+        away_m = 0.0 if self.position_m is None else float(np.linalg.norm(self.position_m))
+        if away_m > FARTHEST_LIGHT_M:
+            raise ValueError(
+                f"light {self.name!r}: position_m is {away_m:.4g} metres from the camera, and a near light is at most "
+                f"{FARTHEST_LIGHT_M:.0f}; if these are millimetres, divide them by 1000"
+            )
         return self
 
 

@@ -19,12 +19,16 @@ from psvideo.calibrate.readout_lines import (
 from psvideo.calibrate.strobed_readout import StrobedReadout
 from psvideo.capture.quantities import parse_positive_seconds, parse_rate
 from psvideo.cli.console import Voice
+from psvideo.cli.mirror_sphere import mirror_sphere
 from psvideo.cli.options import Frames, Json, PlanPath, Quiet, Verbose
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.pipeline import measure_take_readout, open_take
 
 CRYSTAL_PPM = 100.0
 calibrate = typer.Typer(help="Measure cameras and lights before a shoot.", no_args_is_help=True)
+
+
+calibrate.command("mirror-sphere")(mirror_sphere)
 
 
 @calibrate.callback()

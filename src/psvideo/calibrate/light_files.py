@@ -1,0 +1,167 @@
+"""Which files show which light: still photographs in a folder, one per light, or a folder per light (plates)."""
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+from psvideo.calibrate.light_pictures import AMBIENT_NAMES, ROOM_NAMES, LightFiles
+from psvideo.clip.folder import KINDS, number_of
+from psvideo.errors import PsvideoError, UsageError
+from psvideo.timing import read_timing
+from psvideo.tomlfile import check_light_name
+
+TIMING = "timing.json"
+FEWEST_TO_ONE = 4
+"""So many numbered files for one of another name make that one no light (a mask); with fewer, all are lights."""
+NOT_LIGHTS = ("flashes", "truth")
+"""Folders that may lie beside the lights' own: single flashes, and a virtual shoot's truth."""
+
+
+def find_plates(folder: Path, *, lights: Sequence[str] = ()) -> LightFiles | None:
+    """Return a folder's pictures where it holds one folder per light, None where it does not.
+
+    Lights come in the order of ``lights``, else of the timing.json beside them, else of their names.
+    """
+    within = sorted((entry for entry in folder.iterdir() if entry.is_dir()), key=lambda entry: _natural(entry.name))
+    held = {entry.name: pictures_in(entry) for entry in within if entry.name not in NOT_LIGHTS}
+    held = {name: files for name, files in held.items() if files}
+    ambient = next((tuple(held.pop(name)) for name in AMBIENT_NAMES if name in held), ())
+    room = next((held.pop(name)[0] for name in ROOM_NAMES if name in held), None)
+    if not held or (set(held) == {"frames"}):
+        return None
+    order = lights or _timed_lights(folder)
+    lacking = [name for name in order if name not in held]
+    if lacking and lights:
+        raise PsvideoError(
+            f"{folder}: holds no pictures of {', '.join(map(repr, lacking))}, which the plan flashes; its folders are "
+            f"{', '.join(held)}. Name the folders as the plan names its lights."
+        )
+    names = [name for name in order if name in held] or list(held)
+    made_by_split = (folder / TIMING).is_file()
+    return LightFiles(
+        folder=folder,
+        by_light=_side_by_side({_checked(name, folder / name): held[name] for name in names}),
+        ambient=ambient,
+        ambient_is_off=made_by_split,
+        room=room,
+    )
+
+
+def find_stills(path: Path | Sequence[Path], *, lights: Sequence[str] = ()) -> LightFiles:
+    """Return the still photographs of a folder (or the files named), one per light.
+
+    A file belongs to the light whose name it bears; where none bears one of ``lights``, the numbered files belong to
+    the lights in order; without ``lights`` every file is a light of the file's name. A file named ambient or dark shows
+    the scene with every light off, one named room, outline or ref with the room light on.
+
+    Raises PsvideoError where there are no pictures, two of one light, or not as many as ``lights``.
+    """
+    folder = path if isinstance(path, Path) else path[0].parent
+    files = pictures_in(path) if isinstance(path, Path) else list(path)
+    dark = [file for file in files if file.stem.lower() in AMBIENT_NAMES]
+    room = [file for file in files if file.stem.lower() in ROOM_NAMES]
+    files = [file for file in files if file not in dark and file not in room]
+    if not files:
+        kinds = ", ".join(sorted(KINDS))
+        raise PsvideoError(
+            f"{folder}: holds no pictures of lights. Expected still photographs, one per light ({kinds}), a folder of "
+            "plates per light, or a clip with plan.toml."
+        )
+    named = {light: [file for file in files if _bears(file, light)] for light in lights}
+    chosen = {light: found for light, found in named.items() if found} or _in_order(folder, _main_group(files), lights)
+    _refuse_twice(folder, chosen)
+    lacking = [light for light in lights if light not in chosen]
+    if lacking:
+        raise PsvideoError(
+            f"{folder}: holds no picture of {', '.join(map(repr, lacking))}; expected one for each of the plan's "
+            f"lights ({', '.join(lights)}). Take the missing ones, or name the files as the lights."
+        )
+    used = {found[0] for found in chosen.values()}
+    return LightFiles(
+        folder=folder,
+        by_light={_checked(light, found[0]): tuple(found) for light, found in chosen.items()},
+        ambient=tuple(dark[:1]),
+        room=room[0] if room else None,
+        left_aside=tuple(file for file in files if file not in used),
+    )
+
+
+def pictures_in(folder: Path) -> list[Path]:
+    """Return a folder's image files, ``L2`` before ``L10``."""
+    try:
+        entries = list(folder.iterdir())
+    except OSError as fault:
+        raise PsvideoError(f"{folder}: cannot be read ({fault.strerror or fault}). Check its name.") from fault
+    files = [entry for entry in entries if entry.suffix.lower() in KINDS and entry.name[0] != "." and entry.is_file()]
+    return sorted(files, key=lambda file: _natural(file.name))
+
+
+def _natural(name: str) -> list[tuple[int, str]]:
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", name)]
+
+
+def _bears(file: Path, light: str) -> bool:
+    """True where a file's name is the light's, or ends with it after a mark: ``take3_key.png``, ``key.png``."""
+    return re.search(rf"(^|[^A-Za-z0-9]){re.escape(light)}$", file.stem) is not None
+
+
+def _main_group(files: list[Path]) -> list[Path]:
+    """Return the numbered files that share a stem where hardly any others lie beside them, else all files."""
+    stems = Counter(_prefix(file) for file in files if number_of(file) is not None)
+    if not stems:
+        return files
+    prefix, count = stems.most_common(1)[0]
+    if count < FEWEST_TO_ONE * (len(files) - count):
+        return files
+    return [file for file in files if number_of(file) is not None and _prefix(file) == prefix]
+
+
+def _prefix(file: Path) -> str:
+    return re.sub(r"\d+$", "", file.stem)
+
+
+def _in_order(folder: Path, files: list[Path], lights: Sequence[str]) -> dict[str, list[Path]]:
+    """Give the files to the lights in order; without lights, each file is one of its own name."""
+    if not lights:
+        return {file.stem: [other for other in files if other.stem == file.stem] for file in files}
+    if len(files) != len(lights):
+        raise PsvideoError(
+            f"{folder}: holds {len(files)} pictures ({files[0].name} to {files[-1].name}), and the plan has "
+            f"{len(lights)} lights ({', '.join(lights)}). Expected one picture per light, in that order, or files that "
+            "bear the lights' names."
+        )
+    return {light: [file] for light, file in zip(lights, files, strict=True)}
+
+
+def _refuse_twice(folder: Path, chosen: dict[str, list[Path]]) -> None:
+    for light, found in chosen.items():
+        if len(found) > 1:
+            raise PsvideoError(
+                f"{folder}: two lights have the name {light!r}: {found[0].name} and {found[1].name}. Expected one "
+                "picture per light; move one elsewhere, or put several of each light into a folder per light."
+            )
+
+
+def _side_by_side(held: dict[str, list[Path]]) -> dict[str, tuple[Path, ...]]:
+    """Return files of one round side by side: by their numbers where all lights share some, else by their order."""
+    numbers = [{number_of(file): file for file in files} for files in held.values()]
+    shared = sorted(set.intersection(*[{n for n in by_number if n is not None} for by_number in numbers]))
+    if shared:
+        return {light: tuple(by_number[n] for n in shared) for light, by_number in zip(held, numbers, strict=True)}
+    return {light: tuple(files) for light, files in held.items()}
+
+
+def _timed_lights(folder: Path) -> tuple[str, ...]:
+    """Return the lights in the order in which a timing.json beside the plates saw them first."""
+    if not (folder / TIMING).is_file():
+        return ()
+    flashes = sorted(read_timing(folder / TIMING).flashes, key=lambda flash: flash.slot)
+    return tuple(dict.fromkeys(name for flash in flashes for name, power in flash.lights.items() if power > 0))
+
+
+def _checked(light: str, source: Path) -> str:
+    try:
+        return check_light_name(light)
+    except ValueError as fault:
+        raise UsageError(f"{source}: {fault}. Rename it, or give the plan with --plan.") from None

@@ -1,0 +1,77 @@
+"""Pictures of lights, from stills, folders of plates and clips: the same record, whatever they were read from."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from psvideo.calibrate.light_pictures import averaged, light_pictures
+from psvideo.cli.app import main
+from psvideo.errors import PsvideoError
+from psvideo.light_sets import Reading, open_light_sets, read_light_pictures
+
+SCENES = Path(__file__).resolve().parents[1] / "data_synth"
+
+
+def still(path: Path, value: float, size: tuple[int, int] = (6, 8)) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    cv2.imwrite(str(path), np.full(size, round(value * 65535), np.uint16))
+
+
+def test_stills_are_lights_of_their_names_and_ambient_light_is_taken_off(tmp_path: Path) -> None:
+    for name, value in (("L2", 0.3), ("L10", 0.5), ("key", 1.0), ("ambient", 0.1), ("room", 0.7)):
+        still(tmp_path / f"{name}.png", value)
+    opened = open_light_sets(tmp_path)
+    found = averaged(opened.sets)
+    assert found.names == ("L2", "L10", "key")
+    assert found.images[:, 0, 0] == pytest.approx([0.2, 0.4, 0.9], abs=1e-4)
+    assert found.saturated.all(axis=(1, 2)).tolist() == [False, False, True]
+    assert opened.room is not None
+    assert opened.room[0, 0] == pytest.approx(0.7, abs=1e-4)
+
+
+def test_a_folder_per_light_holds_several_frames(tmp_path: Path) -> None:
+    for light, values in (("a", (0.1, 0.3)), ("b", (0.5, 0.7))):
+        for number, value in enumerate(values, start=1001):
+            still(tmp_path / light / f"x_{light}.{number}.png", value)
+    found = read_light_pictures(tmp_path)
+    assert found.frames == 2
+    assert found.images[:, 0, 0] == pytest.approx([0.2, 0.6], abs=1e-4)
+    second = read_light_pictures(tmp_path, Reading(frames="2"))
+    assert second.images[:, 0, 0] == pytest.approx([0.3, 0.7], abs=1e-4)
+
+
+def test_rows_that_no_frame_saw_do_not_count_in_the_mean() -> None:
+    seen = np.ones((1, 4), np.bool_)
+    seen[0, 1] = False
+    half = light_pictures("a", [np.where(seen[0, :, None], 0.4, 0.0).astype(np.float32)], seen=seen)
+    whole = light_pictures("a", [np.full((4, 1), 0.6, np.float32)])
+    found = averaged([half, whole])
+    assert found.images[0, :, 0] == pytest.approx([0.5, 0.6, 0.5, 0.5])
+    assert found.seen.all()
+
+
+def test_a_strobed_clip_and_its_plates_show_the_same(tmp_path: Path) -> None:
+    clip, plates = tmp_path / "clip", tmp_path / "plates"
+    assert main(["synth", str(SCENES / "sphere.toml"), "-o", str(clip), "-q"]) == 0
+    assert main(["split", str(clip), "-o", str(plates), "-q"]) == 0
+    from_clip, from_plates = read_light_pictures(clip), read_light_pictures(plates)
+    assert from_clip.names == from_plates.names
+    assert from_clip.frames == from_plates.frames > 1
+    assert np.abs(from_clip.images - from_plates.images).max() < 1e-3
+
+
+def test_what_does_not_fit_is_said(tmp_path: Path) -> None:
+    with pytest.raises(PsvideoError, match="is not there"):
+        open_light_sets(tmp_path / "nowhere")
+    with pytest.raises(PsvideoError, match="holds no pictures"):
+        open_light_sets(tmp_path)
+    still(tmp_path / "two" / "key.png", 0.1)
+    still(tmp_path / "two" / "key.tif", 0.1)
+    with pytest.raises(PsvideoError, match="two lights have the name 'key'"):
+        open_light_sets(tmp_path / "two")
+    still(tmp_path / "sizes" / "a.png", 0.1)
+    still(tmp_path / "sizes" / "b.png", 0.1, (6, 9))
+    with pytest.raises(PsvideoError, match="one camera"):
+        read_light_pictures(tmp_path / "sizes")

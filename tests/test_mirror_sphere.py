@@ -1,0 +1,215 @@
+"""Lights measured on mirror spheres: real photographs against published directions, virtual ones against the truth."""
+
+import json
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from bench.mirror_scene import Ball, Lamp, Lens, photograph, unit
+
+from psvideo.calibrate.light_pictures import LightPictures, light_pictures
+from psvideo.calibrate.mirror_sphere import MirrorCalibration, calibrate_lights
+from psvideo.calibrate.sphere_sighting import Looking, SphereNotFoundError, sight_spheres
+from psvideo.cli.app import main
+from psvideo.errors import PsvideoError
+from psvideo.rigfile import parse_rig, read_rig
+
+DIRECTIONS = {"key": (0.3, 0.4, 0.87), "left": (-0.5, 0.2, 0.84), "low": (0.1, -0.4, 0.9), "rim": (0.7, 0.3, 0.4)}
+DISTANT = {name: Lamp(direction=vector) for name, vector in DIRECTIONS.items()}
+NEAR = {"a": (0.4, 0.3, 0.1), "b": (-0.5, 0.1, 0.0), "c": (0.1, -0.4, 0.2)}
+OFF = Lamp(direction=(0.0, 0.0, 1.0), strength=0.0)
+WIDE = Lens(width=480, height=300, focal=600.0)
+
+
+def shoot(lens: Lens, balls: list[Ball], lamps: Mapping[str, Lamp], *, noise: float = 0.003) -> LightPictures:
+    return light_pictures(
+        list(lamps), [photograph(lens, balls, [lamp], noise=noise, seed=n) for n, lamp in enumerate(lamps.values())]
+    )
+
+
+def angle_deg(one: object, other: object) -> float:
+    return float(np.degrees(np.arccos(np.clip(unit(np.asarray(one)) @ unit(np.asarray(other)), -1, 1))))
+
+
+def ball_at(off_axis_deg: float, *, radius_m: float = 0.05) -> Ball:
+    return Ball(centre=(0.45 * np.tan(np.radians(off_axis_deg)), 0.0, -0.45), radius_m=radius_m)
+
+
+@cache
+def calibrated(off_axis_deg: float, noise: float, focal: float | None) -> MirrorCalibration:
+    pictures = shoot(WIDE, [ball_at(off_axis_deg)], DISTANT, noise=noise)
+    return calibrate_lights(sight_spheres([pictures], Looking(focal_px=focal), where="ball"))
+
+
+@pytest.mark.parametrize(("off_axis_deg", "noise"), [(0.0, 0.0), (10.0, 0.0), (10.0, 0.003)])
+def test_with_the_focal_length_a_sphere_off_the_axis_tells_directions(off_axis_deg: float, noise: float) -> None:
+    found = calibrated(off_axis_deg, noise, WIDE.focal)
+    outline = found.sightings[0].outline
+    x = WIDE.middle[0] + WIDE.focal * np.tan(np.radians(off_axis_deg))
+    assert outline.place[:2] == pytest.approx([x, WIDE.middle[1]], abs=0.1), "the ray to the centre"
+    assert outline.coverage > 0.9
+    errors = {light.name: angle_deg(light.direction, DIRECTIONS[light.name]) for light in found.lights}
+    assert np.mean(list(errors.values())) < 0.2
+    assert all(errors[light.name] < light.error_deg for light in found.lights)
+
+
+def test_without_it_the_bias_is_as_large_as_the_angle_off_the_axis_and_is_said() -> None:
+    found = calibrated(10.0, 0.0, None)
+    errors = [angle_deg(light.direction, DIRECTIONS[light.name]) for light in found.lights]
+    assert 5 < np.mean(errors) < 12
+    assert any("orthographic" in warning and "off the axis" in warning for warning in found.warnings)
+    assert not any("orthographic" in warning for warning in calibrated(10.0, 0.0, WIDE.focal).warnings)
+
+
+def test_two_spheres_tell_where_near_lights_are() -> None:
+    lens = Lens(width=480, height=220, focal=800.0)
+    balls = [Ball(centre=(-0.12, 0.0, -0.6), radius_m=0.04), Ball(centre=(0.1, 0.01, -0.55), radius_m=0.04)]
+    pictures = shoot(lens, balls, {name: Lamp(position=place) for name, place in NEAR.items()})
+    sightings = sight_spheres([pictures], Looking(focal_px=lens.focal, spheres=2), where="two")
+    found = calibrate_lights(sightings, radius_m=0.04)
+    for light in found.lights:
+        assert light.position_m is not None
+        miss_m = np.linalg.norm(light.position_m - NEAR[light.name])
+        assert miss_m < 0.02
+        assert miss_m < light.position_error_m < 0.12
+    rig = found.rig
+    assert rig.focal_px == (lens.focal, lens.focal)
+    assert all(light.position_m and light.direction is None for light in rig.lights)
+    with pytest.raises(PsvideoError, match="the light is near"):
+        calibrate_lights(sightings)
+
+
+def test_a_second_reflection_is_told_by_its_strength_or_the_light_is_left_out() -> None:
+    def with_second(strength: float) -> MirrorCalibration:
+        lens, second = Lens(width=300, height=300, focal=900.0), Lamp(direction=(-0.6, -0.3, 0.7), strength=strength)
+        images = [
+            photograph(lens, [ball_at(0)], [lamp, *([second] if name == "key" else [])])
+            for name, lamp in DISTANT.items()
+        ]
+        pictures = light_pictures(list(DISTANT), images)
+        return calibrate_lights(sight_spheres([pictures], Looking(focal_px=lens.focal), where="ball"))
+
+    weak = with_second(0.6)
+    assert angle_deg(weak.lights[0].direction, DIRECTIONS["key"]) < 0.5
+    alike = with_second(3.0)
+    assert "several bright spots" in alike.lights[0].fault
+    assert [light.name for light in alike.rig.lights] == ["left", "low", "rim"]
+    assert any("'key'" in warning for warning in alike.warnings)
+
+
+def test_a_light_that_is_off_is_named_and_the_others_are_measured() -> None:
+    pictures = shoot(
+        Lens(width=300, height=300), [ball_at(0)], {**DISTANT, "key": Lamp(direction=(0, 0, 1), strength=0)}
+    )
+    found = calibrate_lights(sight_spheres([pictures], Looking(), where="ball"))
+    assert "no highlight" in found.lights[0].fault
+    assert len(found.rig.lights) == 3
+
+
+def test_lights_in_one_plane_are_warned_of() -> None:
+    flat = {name: Lamp(direction=(x, 0.0, np.sqrt(1 - x * x))) for name, x in (("a", -0.5), ("b", 0.1), ("c", 0.6))}
+    pictures = shoot(Lens(width=300, height=300), [ball_at(0)], flat)
+    found = calibrate_lights(sight_spheres([pictures], Looking(focal_px=900.0), where="ball"))
+    assert any("one plane" in warning for warning in found.warnings)
+
+
+def test_no_sphere_or_half_a_sphere_is_refused() -> None:
+    noise = np.random.default_rng(0).normal(0.1, 0.01, (3, 200, 300)).astype(np.float32)
+    with pytest.raises(SphereNotFoundError, match="no sphere found"):
+        sight_spheres([light_pictures("abc", list(noise))], Looking(), where="wall")
+    cut = shoot(Lens(width=300, height=300), [Ball(centre=(-0.085, 0.0, -0.5))], DISTANT)
+    with pytest.raises(SphereNotFoundError, match=r"cut by the frame|no sphere found"):
+        sight_spheres([cut], Looking(), where="cut")
+    with pytest.raises(SphereNotFoundError, match="cut by the frame"):
+        sight_spheres([cut], Looking(circles=((0.0, 150.0, 90.0),)), where="cut")
+
+
+def test_a_matte_sphere_is_refused_with_what_to_do() -> None:
+    rows, cols = np.mgrid[:240, :240]
+    across, up = (cols - 119.5) / 90, -(rows - 119.5) / 90
+    inside = across**2 + up**2 < 1
+    normals = np.stack([across, up, np.sqrt(np.maximum(1 - across**2 - up**2, 0))])
+    images = []
+    for vector in DIRECTIONS.values():
+        shade = np.maximum(np.tensordot(unit(np.array(vector)), normals, 1), 0)
+        images.append(np.where(inside, 0.6 * shade, 0.02).astype(np.float32))
+    sightings = sight_spheres([light_pictures(list(DIRECTIONS), images)], Looking(), where="ball")
+    with pytest.raises(PsvideoError, match="matte-sphere"):
+        calibrate_lights(sightings)
+
+
+def _psbox(shared_data: Path, out: Path, *more: str) -> tuple[np.ndarray, np.ndarray]:
+    folder = shared_data / "psbox_sphere" / "LightProbe-1"
+    assert main(["calibrate", "mirror-sphere", str(folder), "-o", str(out), "-q", *more]) == 0
+    truth = np.loadtxt(folder / "light_directions.txt").T
+    lights = read_rig(out).lights
+    errors = [angle_deg(light.direction, vector) for light, vector in zip(lights, truth, strict=True)]
+    return np.array(errors), np.array([light.error_deg for light in lights])
+
+
+def test_the_psbox_sphere_with_its_hand_made_circle(shared_data: Path, tmp_path: Path) -> None:
+    errors, own = _psbox(shared_data, tmp_path / "rig.toml", "--circle", "535.9,478.0,421.13")
+    assert (errors < 0.5).all()
+    assert np.sqrt((errors**2).mean()) < np.sqrt((own**2).mean())
+    assert (errors < 2 * own).all()
+
+
+def test_the_psbox_sphere_with_the_outline_found(shared_data: Path, tmp_path: Path) -> None:
+    errors, own = _psbox(shared_data, tmp_path / "rig.toml")
+    assert errors.mean() < 0.5
+    assert (errors < 2.5 * own).all()
+
+
+def test_the_chrome_sphere_of_washington(shared_data: Path, tmp_path: Path) -> None:
+    out = tmp_path / "rig.toml"
+    assert main(["calibrate", "mirror-sphere", str(shared_data / "uw_psm" / "chrome"), "-o", str(out), "-q"]) == 0
+    assert cv2.imread(str(out.with_suffix(".png"))).shape[1] == 1200
+    truth = np.loadtxt(shared_data / "uw_psm" / "lights.txt", skiprows=1)
+    lights = read_rig(out).lights
+    errors = np.array([angle_deg(light.direction, vector) for light, vector in zip(lights, truth, strict=True)])
+    assert errors.mean() <= 3.0
+    assert np.median(errors) < 2.2
+
+
+def test_the_command_writes_rig_and_picture_and_speaks_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder, out = tmp_path / "stills", tmp_path / "rig.toml"
+    folder.mkdir()
+    for n, (name, lamp) in enumerate(DISTANT.items()):
+        picture = photograph(Lens(width=300, height=300), [ball_at(0)], [lamp], noise=0.002, seed=n)
+        cv2.imwrite(str(folder / f"{name}.png"), np.round(picture * 65535).astype(np.uint16))
+    words = ["calibrate", "mirror-sphere", str(folder), "-o", str(out)]
+    assert main([*words, "--focal-mm", "54", "--sensor-mm", "18", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert {light["name"] for light in found["lights"]} == set(DIRECTIONS)
+    assert found["spheres"][0]["radius_px"] == pytest.approx(900 * np.tan(np.arcsin(0.05 / 0.45)), abs=0.2)
+    for light in read_rig(out).lights:
+        assert angle_deg(light.direction, DIRECTIONS[light.name]) < 0.3
+    assert out.with_suffix(".png").is_file()
+    assert main(words) == 2, "neither file is replaced without --force"
+    for bad, expected in (
+        (["--circle", "1,2"], "x,y,radius"),
+        (["--focal-mm", "50"], "go together"),
+        (["--radius-mm", "0.05"], "millimetres"),
+    ):
+        assert main([*words, "--force", *bad]) == 2
+        assert expected in capsys.readouterr().err
+
+
+def test_where_no_sphere_is_found_a_picture_shows_where_it_was_looked_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("a", "b", "c"):
+        cv2.imwrite(str(tmp_path / f"{name}.png"), np.full((100, 140, 3), 30, np.uint8))
+    assert main(["calibrate", "mirror-sphere", str(tmp_path), "-o", str(tmp_path / "out" / "rig.toml")]) == 1
+    assert "rig.png" in capsys.readouterr().err
+    assert (tmp_path / "out" / "rig.png").is_file()
+    assert not (tmp_path / "out" / "rig.toml").exists()
+
+
+def test_positions_in_millimetres_are_refused() -> None:
+    text = 'schema = "psvideo-rig/1"\n[[light]]\nname = "a"\nposition_m = [-400.0, 100.0, 50.0]\n'
+    with pytest.raises(PsvideoError, match="millimetres"):
+        parse_rig(text)
