@@ -20,6 +20,8 @@ class Surface:
     residual: shape (row, col), root mean square over the measurements used of what the fit does not explain, in units
         of sensor saturation; 0 where not valid. None where it was not asked for. Three measurements of one channel
         are always explained exactly, whatever they are.
+    error_deg: shape (row, col), the normal's standard error in degrees as the solver judges it; 0 where not valid.
+        None where it was not asked for, or the solver (least squares) does not judge it.
 
     Arrays are float32, or float16 where a solver was asked for half floats. Channels lie in separate planes in memory,
     so ``normals[..., 0]`` is contiguous.
@@ -29,12 +31,12 @@ class Surface:
     albedo: Pixels
     valid: NDArray[np.bool_]
     residual: Pixels | None = None
+    error_deg: Pixels | None = None
 
     def __post_init__(self) -> None:
         """Raise ValueError where the arrays' shapes do not belong together."""
         size = self.valid.shape
         shapes = [self.normals.shape[:2], self.albedo.shape[:2]]
-        if self.residual is not None:
-            shapes.append(self.residual.shape)
+        shapes += [plane.shape for plane in (self.residual, self.error_deg) if plane is not None]
         if len(size) != 2 or any(shape != size for shape in shapes) or self.normals.shape != (*size, 3):
             raise ValueError(f"normals {self.normals.shape}, albedo {self.albedo.shape} and valid {size} do not match")
