@@ -31,7 +31,7 @@ from psvideo.clip import (
     read_frames,
 )
 from psvideo.normals.illumination import illumination
-from psvideo.normals.woodham1980 import solve
+from psvideo.normals.solving import Solving
 from psvideo.plan import Plan
 from psvideo.profiles import collect_with_doubt
 from psvideo.rig import Light, Rig
@@ -277,8 +277,7 @@ def surfaces(
     rig: Rig,
     *,
     mask: NDArray[np.bool_] | None = None,
-    half: bool = False,
-    residual: bool = False,
+    solving: Solving = Solving(),
 ) -> Iterator[Instant]:
     """Solve every round that has a plate of each of the plan's lights; the clip's start and end cut the others.
 
@@ -292,8 +291,7 @@ def surfaces(
         seen = np.stack([plate.seen for plate in one.plates])
         plates = [_until_saturation(plate) for plate in one.plates]
         shown = None if seen.all() else seen
-        surface = solve(plates, lit, seen=shown, mask=mask, half=half, residual=residual)
-        return Instant(round=one, surface=surface)
+        return Instant(round=one, surface=solving.solve(plates, lit, seen=shown, mask=mask))
 
     # map and filter hold no round while the next one gathers, as a loop's variable would
     return map(solved, filter(lambda one: one.lights == plan.lights, gathered))

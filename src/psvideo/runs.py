@@ -27,6 +27,7 @@ from psvideo.files import write_text
 from psvideo.integrate import Shaping, begun, depth_of, reservations, view_of
 from psvideo.naming import named_by_rig, named_first
 from psvideo.normals.illumination import illumination
+from psvideo.normals.solving import Solver, Solving, trust_note
 from psvideo.pipeline import (
     Instant,
     Method,
@@ -213,6 +214,7 @@ def normals_run(
     output: Output,
     *,
     delivery: Delivery,
+    solver: Solver = "auto",
     watch: Watch = unwatched,
     picture_of: Callable[[Instant], Pixels] | None = None,
 ) -> NormalsResult:
@@ -225,15 +227,18 @@ def normals_run(
     shaping = Shaping(view=view_of(lighting.rig), plane=lighting.rig.plane) if delivery.needs_depth else None
     facts: list[InstantFacts] = []
     picture: Pixels | None = None
-    settings = _settings(take, timing, output, tags, delivery, lighting.mask_sha256)
+    solving = Solving(
+        solver=solver, half=delivery.half, residual="residual" in delivery.aovs, error="error" in delivery.aovs
+    )
+    method = solving.method(len(clip.plan.lights))
+    settings = _settings(take, timing, output, tags, delivery, lighting.mask_sha256, method)
     with (
         _folder(output, settings) as folder,
         _animation(folder, clip.name, facts, delivery, tags, shaping),
         writing() as write,
     ):
         rounds = clip_rounds(take, timing, start_number=output.start_number, watch=watch)
-        residual = "residual" in delivery.aovs
-        for instant in surfaces(rounds, clip.plan, lighting.rig, mask=mask, half=delivery.half, residual=residual):
+        for instant in surfaces(rounds, clip.plan, lighting.rig, mask=mask, solving=solving):
             if shaping is not None and shaping.first is None:
                 shaping = begun(shaping, instant.surface)
             if not (output.resume and is_written(folder, clip.name, instant.round.number, delivery)):
@@ -256,6 +261,8 @@ def normals_run(
             timing=timing,
             lights=clip.plan.lights,
             condition=lighting.condition,
+            solver=method,
+            trust=trust_note(method, len(clip.plan.lights)),
             instants=tuple(facts),
             warnings=() if shaping is None else reservations(shaping),
         )

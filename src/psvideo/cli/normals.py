@@ -45,10 +45,19 @@ class YDirection(StrEnum):
     down = "down"
 
 
+class SolverName(StrEnum):
+    """How normals are solved."""
+
+    auto = "auto"
+    least_squares = "least-squares"
+    robust = "robust"
+
+
 class Aov(StrEnum):
     """What may be written besides."""
 
     residual = "residual"
+    error = "error"
     depth = "depth"
     position = "position"
 
@@ -75,6 +84,9 @@ def normals(
     mask: Annotated[Path | None, typer.Option("--mask", help="A picture, white where to solve.")] = None,
     frames: Frames = None,
     first_light: FirstLight = None,
+    solver: Annotated[
+        SolverName, typer.Option(help="auto: robust against highlights and shadows from five lights on.")
+    ] = SolverName.auto,
     space: Annotated[SpaceName, typer.Option(help="Camera axes, the world's, or a flat card's.")] = SpaceName.camera,
     camera_to_world: Annotated[
         Path | None, typer.Option("--camera-to-world", help="For --space world: a text file, 3 x 3 or 4 x 4 matrix.")
@@ -120,7 +132,9 @@ def normals(
     lighting = read_lighting(take, rig, mask)
     with decoded_once(take, output=out) as take:
         found = timing_of(take, timing, first_light=first_light, rig=lighting.rig, watch=voice.track)
-        report = normals_run(take, found, lighting, output, delivery=delivery, watch=voice.track).report
+        report = normals_run(
+            take, found, lighting, output, delivery=delivery, solver=solver.value, watch=voice.track
+        ).report
         tell_kept(voice, take.kept)
     voice.result(report_record(report))
     voice.say(describe_timing(found))

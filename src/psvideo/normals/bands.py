@@ -1,4 +1,4 @@
-"""What every compiled solver needs around its kernel: arrays checked, bands of rows side by side, the surface handed out."""
+"""What every compiled solver needs around its kernel: arrays checked, bands of rows side by side, a surface made."""
 
 import itertools
 import os

@@ -39,12 +39,12 @@ class Reweighting:
     rounds: int = 3
     loss: Literal["cauchy", "tukey"] = "cauchy"
     width: float = 0.4
-    noise: float = 0.002
+    noise: float = 0.0005
     signal_noise: float = 0.01
-    darkest: float = 0.1
-    brightest: float = 0.3
+    darkest: float = 0.2
+    brightest: float = 0.4
     contradiction: float = 3.0
-    most_error_deg: float = 5.0
+    most_error_deg: float = 6.0
 
 
 TUKEY_WIDTH = 4.685  # beside Cauchy's, as far as weights go: so wide, Tukey's keeps 95 % of what Gaussian noise holds

@@ -40,7 +40,8 @@ class InstantFacts:
 
 @dataclass(frozen=True, kw_only=True)
 class RunReport:
-    """One run over one clip. ``warnings`` are whole sentences, the gravest first."""
+    """One run over one clip. ``trust`` says what a valid normal can be relied on for; ``warnings`` are whole sentences,
+    the gravest first."""
 
     clip: str
     version: str
@@ -48,6 +49,8 @@ class RunReport:
     lights: tuple[str, ...]
     condition: float
     instants: tuple[InstantFacts, ...]
+    solver: str
+    trust: str
     warnings: tuple[str, ...] = ()
 
 
@@ -144,6 +147,8 @@ def report_record(report: RunReport) -> dict[str, object]:
         "order_note": timing.order_note,
         "lights": list(report.lights),
         "condition": report.condition,
+        "solver": report.solver,
+        "trust": report.trust,
         "instants": [asdict(facts) for facts in report.instants],
     }
 
@@ -181,6 +186,8 @@ def _facts(report: RunReport) -> list[tuple[str, str]]:
         ("Order of the lights", f"{timing.order}. {timing.order_note}" if timing.order_note else timing.order),
         ("Lights", ", ".join(report.lights)),
         ("Condition of the lights", f"{report.condition:.2f}"),
+        ("Solver", report.solver),
+        ("What valid means", report.trust),
         ("Made with", f"psvideo {report.version}"),
     ]
 
