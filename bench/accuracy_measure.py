@@ -1,0 +1,158 @@
+"""What the accuracy tables share: their rows, angles between normals, lights on rings, virtual and real scenes."""
+
+import csv
+from pathlib import Path
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from psvideo.normals.illumination import Illumination
+from psvideo.surface import Surface
+from psvideo.synth import read_scene
+from psvideo.synth.shading import light_collected
+from psvideo.synth.stage import set_stage
+from psvideo.synth.truth import true_normals
+
+ROOT = Path(__file__).resolve().parents[1]
+SHARED_DATA = ROOT.parent / "shared" / "data"
+
+
+class Accuracy(NamedTuple):
+    """A fault or a subject. ``before`` is the result as it is, ``after`` the one with the remedy; ``bar`` is empty and
+    ``met`` None where none is set."""
+
+    what: str
+    before: str = ""
+    remedy: str = ""
+    after: str = ""
+    bar: str = ""
+    met: bool | None = None
+
+
+class Case(NamedTuple):
+    """A subject whose normals are known: a plate per light (row, col[, channel]), true normals, where they hold."""
+
+    name: str
+    plates: list[np.ndarray]
+    lit: Illumination
+    truth: np.ndarray
+    mask: np.ndarray
+
+    def choose(self, lights: np.ndarray) -> "Case":
+        """Return the same subject under some of its lights."""
+        lit = Illumination(directions=self.lit.directions[lights], intensities=self.lit.intensities[lights])
+        return self._replace(plates=[self.plates[n] for n in lights], lit=lit)
+
+
+def errors_deg(surface: Surface, case: Case, where: np.ndarray | None = None) -> np.ndarray:
+    """Angles to the true normals, where the surface is valid and the truth known."""
+    both = surface.valid & case.mask & (True if where is None else where)
+    return angles_deg(surface.normals[both], case.truth[both])
+
+
+def angles_deg(found: np.ndarray, truth: np.ndarray) -> np.ndarray:
+    """Angles between unit normals, good to small fractions of a degree."""
+    found = found.astype(np.float64)
+    found = found / np.linalg.norm(found, axis=-1, keepdims=True)
+    apart = np.linalg.norm(found - truth, axis=-1)
+    return np.degrees(2 * np.arcsin(np.clip(apart / 2, 0, 1)))
+
+
+def described(errors: np.ndarray) -> str:
+    """Return errors as words: their mean and median."""
+    return f"{errors.mean():.2f}° (median {np.median(errors):.2f}°)"
+
+
+def ring(lights: int, slant_deg: float) -> np.ndarray:
+    """Unit directions evenly around the camera's axis."""
+    around, slant = 0.3 + np.arange(lights) * 2 * np.pi / lights, np.radians(slant_deg)
+    up = np.full(lights, np.cos(slant))
+    return np.stack([np.sin(slant) * np.cos(around), np.sin(slant) * np.sin(around), up], axis=-1)
+
+
+def matte_ball(lights: int, *, reach_deg: float = 50.0, slant_deg: float = 35.0, albedo: float = 0.43) -> Case:
+    """The subject of the physics page's table: a ball as far as 50 degrees from its middle, lights 35 off the axis."""
+    size = 96
+    radius = (size - 1) / 2 / np.sin(np.radians(reach_deg))
+    rows, cols = np.mgrid[:size, :size] - (size - 1) / 2
+    x, y = cols / radius, -rows / radius
+    inside = x * x + y * y < np.sin(np.radians(reach_deg)) ** 2
+    truth = np.where(inside[..., None], np.stack([x, y, np.sqrt(np.where(inside, 1 - x * x - y * y, 0))], axis=-1), 0)
+    lit = Illumination(directions=ring(lights, slant_deg), intensities=np.ones((lights, 1)))
+    shade = np.maximum(0, np.einsum("rcx,lx->lrc", truth, lit.directions)) * albedo
+    return Case(f"ball, {lights} lights", list(shade.astype(np.float32)), lit, truth, inside)
+
+
+def gloss(lights: tuple[int, ...] = tuple(range(8)), *, scale: float = 1.0, noise: float = 0.0) -> Case:
+    """The scene data_synth/gloss.toml under some of its lights; what is beyond 1.0 is clipped.
+
+    ``scale`` multiplies the highlights' share, ``noise`` is added.
+    """
+    scene = read_scene(ROOT / "data_synth" / "gloss.toml")
+    shiny = [
+        table
+        if table.specular is None
+        else table.model_copy(
+            update={"specular": table.specular.model_copy(update={"strength": table.specular.strength * scale})}
+        )
+        for table in scene.object
+    ]
+    stage = set_stage(scene.model_copy(update={"object": shiny}), ROOT / "data_synth")
+    assert stage.still is not None
+    hits, chosen = stage.still.hits, [stage.rig.lights[n] for n in lights]
+    rng = np.random.default_rng(1)
+    plates = [hits.image(light_collected(stage.still, light)) for light in chosen]
+    noisy = [np.minimum(plate + rng.normal(0, noise, plate.shape), 1).astype(np.float32) for plate in plates]
+    truth = true_normals(hits)
+    directions = np.array([light.direction for light in chosen], np.float64)
+    lit = Illumination(directions=directions, intensities=np.full((len(chosen), 3), chosen[0].intensity[0]))
+    return Case(f"gloss, {len(chosen)} lights", noisy, lit, truth, np.linalg.norm(truth, axis=-1) > 0.5)
+
+
+def diligent_ball() -> Case:
+    """The ball of DiLiGenT, 48 lights."""
+    folder = SHARED_DATA / "diligent_ball"
+    with (folder / "lights.csv").open() as file:
+        listed = [row for row in csv.reader(file) if row[0].endswith(".png")]
+    numbers = np.array([[float(word) for word in row[1:7]] for row in listed])
+    plates = [cv2.imread(str(folder / row[0]), cv2.IMREAD_UNCHANGED)[..., ::-1] / np.float32(65535) for row in listed]
+    strengths = numbers[:, 3:] / numbers[:, 3:].mean()
+    mask = cv2.imread(str(folder / "mask.png"), cv2.IMREAD_GRAYSCALE) > 127
+    lit = Illumination(directions=numbers[:, :3], intensities=strengths)
+    plates = [np.ascontiguousarray(plate, np.float32) for plate in plates]
+    return Case("DiLiGenT ball", plates, lit, np.load(folder / "normal_gt.npy").astype(np.float64), mask)
+
+
+def rendered_bunny() -> Case:
+    """Another renderer's bunny with cast shadows, 25 lights."""
+    data = np.load(SHARED_DATA / "bunny_rendered" / "bunny_lambert.npz")
+    lit = Illumination(directions=data["lights"].astype(np.float64), intensities=np.ones((len(data["lights"]), 3)))
+    plates = list(data["images"].astype(np.float32) * 5)
+    return Case("rendered bunny", plates, lit, data["normal_gt"].astype(np.float64), data["mask"])
+
+
+def washington_sphere() -> Case:
+    """The matte sphere of the University of Washington, 12 lights, 8 bits."""
+    folder = SHARED_DATA / "uw_psm"
+    words = (folder / "lights.txt").read_text().split()
+    directions = np.array(words[1:], np.float64).reshape(int(words[0]), 3)
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    paths = [folder / "gray" / f"gray.{n}.png" for n in range(len(directions))]
+    plates = [(cv2.imread(str(path))[..., ::-1] / 255).astype(np.float32) for path in paths]
+    rows, cols = np.mgrid[: plates[0].shape[0], : plates[0].shape[1]]
+    x, y = (cols - 244.5) / 108.0, (144.5 - rows) / 108.0
+    truth = np.stack([x, y, np.sqrt(np.maximum(1 - x * x - y * y, 0))], axis=-1)
+    lit = Illumination(directions=directions, intensities=np.ones((len(directions), 3)))
+    return Case("Washington's matte sphere", plates, lit, truth, x * x + y * y < 0.95**2)
+
+
+def spread_subsets(directions: np.ndarray, lights: int, count: int, *, most_condition: float = 4.0) -> list[np.ndarray]:
+    """Random sets of lights whose directions' condition number shows that they are well spread."""
+    rng, found = np.random.default_rng(0), []
+    while len(found) < count:
+        chosen = np.sort(rng.choice(len(directions), lights, replace=False))
+        values = np.linalg.svd(directions[chosen], compute_uv=False)
+        if values[0] <= most_condition * values[2]:
+            found.append(chosen)
+    return found

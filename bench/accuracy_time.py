@@ -1,0 +1,65 @@
+"""Time per 1080p frame, 8 lights, 16-bit codes: plain numpy least squares (before), the solvers, and a per-pixel L1.
+
+Best of several runs taken in turn. The L1 reference is timed over a few pixels and scaled to the frame.
+"""
+
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from bench.accuracy_l1 import l1_normals
+from bench.accuracy_measure import Accuracy, Case, gloss
+from psvideo.normals import robust, woodham1980
+from psvideo.normals.illumination import Illumination
+
+ROWS, COLS, REPEATS, L1_PIXELS = 1080, 1920, 7, 2000
+
+
+def rows() -> Iterator[Accuracy]:
+    """Time solvers on the scene gloss.toml in grey, repeated to the size of a frame."""
+    case = _grey_frame()
+    codes = [(plate * 65535).astype(np.uint16) for plate in case.plates]
+    plain_s, careful_s, numpy_s = _best_of(
+        lambda: woodham1980.solve(codes, case.lit, scale=1 / 65535, half=True, residual=False),
+        lambda: robust.solve(codes, case.lit, scale=1 / 65535, half=True, residual=False),
+        lambda: _numpy(codes, case.lit.directions),
+    )
+    pixels = np.random.default_rng(0).choice(ROWS * COLS, L1_PIXELS, replace=False)
+    l1_s = _timed(lambda: l1_normals(case, pixels)) * ROWS * COLS / L1_PIXELS
+    yield Accuracy("plain numpy least squares", f"{1e3 * numpy_s:.0f} ms", "compiled", f"{1e3 * plain_s:.1f} ms")
+    yield Accuracy(
+        "L1 by reweighting in numpy", f"{l1_s:.0f} s", "robust, 3 reweightings", f"{1e3 * careful_s:.0f} ms",
+        "<= 80 ms", careful_s <= 0.08,
+    )  # fmt: skip
+    yield Accuracy(
+        "robust / numpy least squares", f"{careful_s / numpy_s:.2f}", "", "", "<= 0.25", careful_s <= numpy_s / 4
+    )
+
+
+def _grey_frame() -> Case:
+    small = gloss()
+    times = (ROWS // small.mask.shape[0] + 1, COLS // small.mask.shape[1] + 1)
+    plates = [np.ascontiguousarray(np.tile(plate.mean(axis=2), times)[:ROWS, :COLS]) for plate in small.plates]
+    lit = Illumination(directions=small.lit.directions, intensities=small.lit.intensities[:, :1])
+    return Case("a frame", plates, lit, np.zeros((ROWS, COLS, 3)), np.ones((ROWS, COLS), bool))
+
+
+def _numpy(codes: list[np.ndarray], directions: np.ndarray) -> np.ndarray:
+    measured = np.stack([plate.reshape(-1) for plate in codes], axis=1).astype(np.float64)
+    scaled = np.linalg.lstsq(directions, measured.T, rcond=None)[0].T
+    return scaled / np.maximum(np.linalg.norm(scaled, axis=1, keepdims=True), 1e-12)
+
+
+def _timed(action: Callable[[], object]) -> float:
+    began = time.perf_counter()
+    action()
+    return time.perf_counter() - began
+
+
+def _best_of(*actions: Callable[[], object]) -> list[float]:
+    for action in actions:
+        action()
+    return [
+        min(column) for column in zip(*[[_timed(action) for action in actions] for _ in range(REPEATS)], strict=True)
+    ]
