@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from bench.accuracy_measure import Accuracy, Case, errors_deg, matte_ball
-from psvideo.clip.transfer import to_linear
+from psvideo.clip.transfer import find_curve, to_light
 from psvideo.export.results import decode_normals, encode_normals
 from psvideo.normals.solving import Solving
 from psvideo.surface import Surface
@@ -81,7 +81,7 @@ def _srgb(case: Case, rng: np.random.Generator) -> Case:
 
 
 def _srgb_decoded(case: Case, rng: np.random.Generator) -> Case:
-    return _plates(case, to_linear(_encoded(case).astype(np.float32), "srgb"))
+    return _plates(case, to_light(find_curve("srgb"), _encoded(case).astype(np.float32)))
 
 
 def _black(level: float) -> Change:

@@ -67,8 +67,8 @@ def calibration(name: str, case: Case) -> Accuracy:
         f"{name}: predicted against true",
         f"{np.median(predicted):.2f}° predicted, {np.median(true):.2f}° true (medians)",
         "",
-        f"{100 * within:.0f} % within it, {100 * twice:.0f} % within twice; valid {100 * where[case.mask].mean():.1f} %, "
-        f"{100 * sound:.1f} % of them within 10°",
+        f"{100 * within:.0f} % within it, {100 * twice:.0f} % within twice; "
+        f"valid {100 * where[case.mask].mean():.1f} %, {100 * sound:.1f} % of them within 10°",
         "95 % within 10°",
         bool(sound >= 0.95),
     )
