@@ -17,7 +17,8 @@ def l1_normals(case: Case, pixels: np.ndarray) -> np.ndarray:
     usable = usable_of(case, pixels)
     g, weights = np.zeros((len(pixels), 3)), usable.astype(float)
     for _ in range(ROUNDS):
-        equations = np.einsum("pl,li,lj->pij", weights, rows, rows) + 1e-12 * np.eye(3)
+        equations = np.einsum("pl,li,lj->pij", weights, rows, rows)
+        equations += (1e-12 + 1e-10 * np.trace(equations, axis1=1, axis2=2))[:, None, None] * np.eye(3)
         g = np.linalg.solve(equations, np.einsum("pl,li,pl->pi", weights, rows, measured)[..., None])[..., 0]
         weights = usable / np.maximum(np.abs(measured - g @ rows.T), 1e-7)
     return g / np.maximum(np.linalg.norm(g, axis=1, keepdims=True), 1e-12)

@@ -14,7 +14,7 @@ import numpy as np
 
 from psvideo.normals.bands import check_arrays, in_bands, surface_of
 from psvideo.normals.illumination import Illumination
-from psvideo.normals.task import Mask, Samples, Usable, empty_result, task
+from psvideo.normals.task import Mask, Samples, Task, Usable, empty_result, task
 from psvideo.surface import Surface
 
 USABLE = Usable(shadow_ratio=0.4)
@@ -84,7 +84,7 @@ def solve(
     rows, cols = samples[0].shape[:2]
     result = empty_result(rows * cols, lit.intensities.shape[1], half=half, residual=residual)
     predicted = np.empty(rows * cols if error else 0, np.uint16 if half else np.float32)
-    given = task(samples, lit, seen, mask, usable, black_level, scale)
+    given = _balanced(task(samples, lit, seen, mask, usable, black_level, scale))
     how = kernel.Weights(
         rounds=reweighting.rounds,
         tukey=reweighting.loss == "tukey",
@@ -103,3 +103,19 @@ def solve(
         threads=threads,
     )
     return surface_of(result, predicted, plates[0].shape, half=half)
+
+
+def _balanced(given: Task) -> Task:
+    """Return the task in units in which residuals of strong and of weak lights compare, which thresholds need.
+
+    Photon noise grows with the root of a light's strength, highlights and shadows with the strength itself: dividing
+    by the root is right for the first, and between noise that is alike in all plates and the second.
+    """
+    factor = np.sqrt(given.per_strength)[: given.lights, None]
+    tone = given.tone.copy()
+    tone[: given.lights, :, :3] *= factor[..., None]
+    tone[: given.lights, :, 3] /= factor
+    matrix, per_strength = given.matrix.copy(), given.per_strength.copy()
+    matrix[: given.lights] *= factor
+    per_strength[: given.lights] /= factor[:, 0]
+    return given._replace(tone=tone, matrix=matrix, per_strength=per_strength)

@@ -53,7 +53,8 @@ from psvideo.normals.task import Floats, Result, Samples, Task
 HALF, THREE, EIGHT = np.float32(0.5), np.float32(3), np.float32(8)
 LITTLE = np.float32(0.02)  # the weight of what the start leaves out, so that no start is singular
 SIGMA_OF_MEDIAN = np.float32(1.4826)  # of Gaussian noise
-SMALL_SAMPLE = np.float32(1.4)  # the median of few residuals of a fit that follows them falls short by so much
+SMALL_SAMPLE = np.float32(1.9)  # the median of few residuals of a fit that follows them falls short by so much
+SUSPICION = np.float32(0.05)  # what a highlight among four that was left out still says against the other three
 UNCHECKED = np.float32(2.5)  # three measurements are explained exactly, and nothing tells a highlight among them
 DEGREES = np.float32(180 / np.pi)
 SOUND_SQUARED = np.float32(1e4)  # while weights change, the last solution is kept where they leave a worse condition
@@ -287,7 +288,7 @@ def _predict_error(weights: Weights, w: Floats, v: Floats, n: int) -> None:
         along = x * x * xx + y * y * yy + z * z * zz + TWO * (x * y * xy + x * z * xz + y * z * yz)
         solved = (square > ZERO) & (determinant > ZERO) & (w[COUNT + i] >= THREE)
         across = (xx + yy + zz - along / square) / determinant if solved else ZERO
-        sigma = max(v[SCALE + i], HALF * v[DOUBT + i]) * (UNCHECKED if w[COUNT + i] < FOUR else SMALL_SAMPLE)
+        sigma = max(v[SCALE + i], SUSPICION * v[DOUBT + i]) * (UNCHECKED if w[COUNT + i] < FOUR else SMALL_SAMPLE)
         spread = max(across * max(w[COUNT + i] / EIGHT, ONE) / square, ZERO) if solved else ZERO
         error = DEGREES * sigma * np.sqrt(spread) if solved else NO_ERROR
         trusted = error <= weights.most_error_deg

@@ -1,0 +1,300 @@
+"""Robust solving: exact on matte surfaces, at least as good as least absolute residuals, and honest about its doubt."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import linprog
+
+from psvideo.normals import robust, woodham1980
+from psvideo.normals.illumination import Illumination
+from psvideo.normals.robust import Reweighting, solve
+from psvideo.normals.solving import ROBUST_FROM_LIGHTS, Solving, trust_note
+from psvideo.surface import Surface
+from psvideo.synth import read_scene
+from psvideo.synth.shading import light_collected
+from psvideo.synth.stage import set_stage
+from psvideo.synth.truth import true_normals
+
+Array = NDArray[np.float64]
+Plates = list[NDArray[np.float32]]
+SCENES = Path(__file__).resolve().parents[1] / "data_synth"
+TRUST_ALL = Reweighting(most_error_deg=179.0)
+
+
+def ring(lights: int, slant_deg: float) -> Array:
+    """Unit directions evenly around the camera's axis."""
+    around, slant = 0.3 + np.arange(lights) * 2 * np.pi / lights, np.radians(slant_deg)
+    up = np.full(lights, np.cos(slant))
+    return np.stack([np.sin(slant) * np.cos(around), np.sin(slant) * np.sin(around), up], axis=-1)
+
+
+def ball(size: int = 96, *, reach_deg: float = 89.0) -> tuple[Array, NDArray[np.bool_]]:
+    """Normals of a ball's front, as far as ``reach_deg`` from its middle, and where they are."""
+    radius = (size - 1) / 2 / np.sin(np.radians(reach_deg))
+    rows, cols = np.mgrid[:size, :size] - (size - 1) / 2
+    x, y = cols / radius, -rows / radius
+    inside = x * x + y * y < np.sin(np.radians(reach_deg)) ** 2
+    z = np.sqrt(np.where(inside, 1 - x * x - y * y, 0))
+    return np.where(inside[..., None], np.stack([x, y, z], axis=-1), 0), inside
+
+
+def lit_by(directions: Array, *, channels: int = 1) -> Illumination:
+    strengths = np.random.default_rng(len(directions)).uniform(0.6, 1.1, (len(directions), channels))
+    return Illumination(directions=directions, intensities=strengths)
+
+
+def shoot(normals: Array, lit: Illumination, albedo: Array | float = 0.6) -> Plates:
+    """Plates of a matte surface with attached shadows."""
+    shade = np.maximum(0, np.einsum("rcx,lx->lrc", normals, lit.directions))
+    if lit.intensities.shape[1] == 1:
+        return list((shade * lit.intensities[:, 0, None, None] * albedo).astype(np.float32))
+    return list((shade[..., None] * lit.intensities[:, None, None, :] * albedo).astype(np.float32))
+
+
+def error_deg(surface: Surface, truth: Array, where: NDArray[np.bool_] | None = None) -> Array:
+    """Angles between the normals and the true ones, where both are valid."""
+    return angles_deg(surface.normals[both := surface.valid if where is None else surface.valid & where], truth[both])
+
+
+def angles_deg(found: NDArray[np.floating], truth: Array) -> Array:
+    found = found.astype(np.float64)
+    found = found / np.linalg.norm(found, axis=-1, keepdims=True)
+    return np.degrees(2 * np.arcsin(np.clip(np.linalg.norm(found - truth, axis=-1) / 2, 0, 1)))
+
+
+@pytest.fixture(scope="module")
+def gloss() -> tuple[Plates, Illumination, Array]:
+    """The scene of gloss and cast shadows under its eight lights, clipped at 1.0."""
+    stage = set_stage(read_scene(SCENES / "gloss.toml"), SCENES)
+    assert stage.still is not None
+    plates = [stage.still.hits.image(light_collected(stage.still, light)) for light in stage.rig.lights]
+    directions = np.array([light.direction for light in stage.rig.lights], np.float64)
+    lit = Illumination(directions=directions, intensities=np.full((8, 3), 0.8))
+    return [np.minimum(plate, 1) for plate in plates], lit, true_normals(stage.still.hits).astype(np.float64)
+
+
+@pytest.mark.parametrize("loss", ["cauchy", "tukey"])
+@pytest.mark.parametrize("channels", [1, 3])
+@pytest.mark.parametrize("lights", [3, 4, 5, 8, 17])
+def test_a_matte_ball_comes_out_exactly(lights: int, channels: int, loss: str) -> None:
+    normals, inside = ball()
+    lit = lit_by(ring(lights, 40), channels=channels)
+    albedo = np.array([0.7, 0.3, 0.05])[:channels]
+    plates = shoot(normals, lit, albedo if channels == 3 else 0.7)
+    surface = solve(plates, lit, reweighting=Reweighting(loss=loss))  # type: ignore[arg-type]
+    assert error_deg(surface, normals).max() < 1e-3
+    np.testing.assert_allclose(surface.albedo[surface.valid].reshape(-1, channels)[:, 0], 0.7, rtol=1e-4)
+    assert surface.residual is not None
+    assert surface.residual.max() < 3e-6
+    assert not surface.valid[~inside].any()
+    assert np.isfinite(surface.normals).all()
+
+
+def test_one_normal_from_three_channels_whatever_their_colours() -> None:
+    normals, inside = ball(reach_deg=60)
+    lit = lit_by(ring(8, 40), channels=3)
+    red = shoot(normals, lit, np.array([0.6, 0.0, 0.0]))
+    highlight = 0.5 * np.maximum(0, np.einsum("rcx,lx->lrc", normals, _halves(lit.directions))) ** 60
+    shiny = [
+        np.minimum(plate + gleam[..., None], 1).astype(np.float32) for plate, gleam in zip(red, highlight, strict=True)
+    ]
+    assert error_deg(solve(shiny, lit), normals, inside).mean() < 0.7
+    assert error_deg(woodham1980.solve(shiny, lit), normals, inside).mean() > 3
+
+
+def _halves(directions: Array) -> Array:
+    halves = directions + np.array([0.0, 0.0, 1.0])
+    return halves / np.linalg.norm(halves, axis=1, keepdims=True)
+
+
+def test_noise_on_a_matte_surface_costs_at_most_a_third_more_than_least_squares() -> None:
+    normals, inside = ball(reach_deg=50)
+    lit = lit_by(ring(8, 35))
+    rng = np.random.default_rng(2)
+    plates = [(plate + rng.normal(0, 0.005, plate.shape)).astype(np.float32) for plate in shoot(normals, lit)]
+    plain = error_deg(woodham1980.solve(plates, lit), normals, inside).mean()
+    assert error_deg(solve(plates, lit), normals, inside).mean() < 1.33 * plain
+
+
+def l1_normals(measured: Array, usable: NDArray[np.bool_], directions: Array) -> Array:
+    """Least absolute residuals over the usable measurements (pixel, light), reweighted until nothing changes."""
+    weights = usable.astype(np.float64)
+    for _ in range(300):
+        equations = np.einsum("pl,li,lj->pij", weights, directions, directions) + 1e-12 * np.eye(3)
+        right = np.einsum("pl,li,pl->pi", weights, directions, measured)
+        g = np.linalg.solve(equations, right[..., None])[..., 0]
+        weights = usable / np.maximum(np.abs(measured - g @ directions.T), 1e-8)
+    return np.asarray(g)
+
+
+def linear_program(measured: Array, directions: Array) -> float:
+    """The least sum of absolute residuals of one pixel, exactly."""
+    lights = len(measured)
+    block = np.block([[directions, -np.eye(lights)], [-directions, -np.eye(lights)]])
+    cost = np.concatenate([np.zeros(3), np.ones(lights)])
+    found = linprog(
+        cost, A_ub=block, b_ub=np.concatenate([measured, -measured]), bounds=[(None, None)] * 3 + [(0, None)] * lights
+    )
+    return float(found.fun)
+
+
+def test_gloss_and_cast_shadows_come_out_as_well_as_by_least_absolute_residuals(
+    gloss: tuple[Plates, Illumination, Array],
+) -> None:
+    plates, lit, truth = gloss
+    surface = solve(plates, lit, reweighting=TRUST_ALL)
+    chosen = np.flatnonzero(surface.valid.ravel())
+    chosen = np.random.default_rng(4).choice(chosen, 6000, replace=False)
+    samples = np.array([plate.reshape(-1, 3)[chosen] for plate in plates], np.float64) / 0.8
+    share = samples.sum(axis=0) / samples.sum(axis=(0, 2))[:, None]
+    measured = (samples * share).sum(axis=2).T
+    seen = (samples * 0.8 < 1).all(axis=2).T
+    usable = seen & (measured > 0.4 * (measured * seen).sum(axis=1, keepdims=True) / seen.sum(axis=1, keepdims=True))
+    found = l1_normals(measured, usable, lit.directions)
+    for pixel in range(25):
+        own = np.abs(measured[pixel] - found[pixel] @ lit.directions.T)[usable[pixel]].sum()
+        assert own == pytest.approx(
+            linear_program(measured[pixel][usable[pixel]], lit.directions[usable[pixel]]), abs=1e-4
+        )
+    expected = angles_deg(found, truth.reshape(-1, 3)[chosen])
+    ours = angles_deg(surface.normals.reshape(-1, 3)[chosen], truth.reshape(-1, 3)[chosen])
+    assert ours.mean() <= expected.mean()
+    assert np.quantile(ours, 0.99) <= np.quantile(expected, 0.99)
+    plain = error_deg(woodham1980.solve(plates, lit), truth).mean()
+    assert ours.mean() < 0.3 * plain
+
+
+@pytest.mark.parametrize(
+    ("noise", "lights"), [(0.0, range(8)), (0.005, range(8)), (0.005, (0, 1, 2, 3, 4, 6)), (0.01, range(8))]
+)
+def test_the_predicted_error_covers_the_true_one(
+    gloss: tuple[Plates, Illumination, Array], noise: float, lights: tuple[int, ...]
+) -> None:
+    plates, lit, truth = gloss
+    rng = np.random.default_rng(3)
+    noisy = [(plates[n] + rng.normal(0, noise, plates[n].shape)).astype(np.float32) for n in lights]
+    some = Illumination(directions=lit.directions[list(lights)], intensities=lit.intensities[list(lights)])
+    surface = solve(noisy, some)
+    assert surface.error_deg is not None
+    true, predicted = error_deg(surface, truth), surface.error_deg[surface.valid]
+    assert predicted.max() <= Reweighting().most_error_deg
+    assert np.mean(true <= predicted) >= 0.63  # a Rayleigh distribution's share
+    assert np.mean(true <= 2 * predicted) >= 0.95
+    assert np.mean(true <= 10) >= 0.98
+    doubted = solve(noisy, some, reweighting=TRUST_ALL)
+    left_out = doubted.valid & ~surface.valid
+    assert error_deg(doubted, truth, left_out).mean() > 1.5 * true.mean()
+    assert surface.valid.mean() > 0.85
+
+
+def test_the_predicted_error_grows_with_the_noise() -> None:
+    normals, inside = ball(reach_deg=45)
+    lit = lit_by(ring(8, 40))
+    rng = np.random.default_rng(0)
+    ratios = []
+    for noise in (0.01, 0.02, 0.04):
+        plates = [(plate + rng.normal(0, noise, plate.shape)).astype(np.float32) for plate in shoot(normals, lit)]
+        surface = solve(plates, lit, reweighting=TRUST_ALL)
+        assert surface.error_deg is not None
+        true = np.sqrt(np.mean(error_deg(surface, normals, inside) ** 2))
+        ratios.append(np.sqrt(np.mean(surface.error_deg[inside] ** 2.0)) / true)
+    assert all(0.7 < ratio < 1.5 for ratio in ratios)
+
+
+@pytest.mark.parametrize("spoilt", range(4))
+def test_of_four_measurements_the_highlight_is_left_out(spoilt: int) -> None:
+    """The highlight falls where the surface mirrors its light, as highlights do."""
+    lit = Illumination(directions=ring(4, 40), intensities=np.ones((4, 1)))
+    normals = np.tile(_halves(lit.directions)[spoilt], (4, 4, 1))
+    plates = shoot(normals, lit)
+    assert error_deg(solve(plates, lit), normals).max() < 1e-3
+    plates[spoilt] = plates[spoilt] + np.float32(0.2)
+    assert error_deg(solve(plates, lit), normals).max() < 1e-3
+    assert error_deg(woodham1980.solve(plates, lit), normals).min() > 3
+
+
+def test_four_measurements_that_agree_are_all_used() -> None:
+    normals, inside = ball(reach_deg=30)
+    lit = Illumination(directions=ring(4, 40), intensities=np.ones((4, 1)))
+    rng = np.random.default_rng(1)
+    plates = [(plate + rng.normal(0, 0.001, plate.shape)).astype(np.float32) for plate in shoot(normals, lit)]
+    plain = error_deg(woodham1980.solve(plates, lit), normals, inside).mean()
+    assert error_deg(solve(plates, lit), normals, inside).mean() < 1.2 * plain
+
+
+def test_what_is_not_seen_saturated_or_masked_counts_for_nothing() -> None:
+    normals, inside = ball(48, reach_deg=30)
+    lit = Illumination(directions=ring(8, 35), intensities=np.ones((8, 1)))
+    plates = shoot(normals, lit, 0.8)
+    plates[0][:] = 0.5
+    plates[1][:] = 1.0
+    plates[2][:20] = np.nan
+    seen = np.ones((8, 48), bool)
+    seen[0] = False
+    mask = inside.copy()
+    mask[:, :10] = False
+    surface = solve(plates, lit, seen=seen, mask=mask)
+    assert surface.valid[mask].all()
+    assert not surface.valid[~mask].any()
+    assert error_deg(surface, normals).max() < 1e-3
+    for plane in (surface.normals, surface.albedo, surface.residual, surface.error_deg):
+        assert plane is not None
+        assert np.isfinite(plane).all()
+        assert not plane[~surface.valid].any()
+
+
+def test_the_result_depends_neither_on_threads_nor_on_where_a_pixel_lies() -> None:
+    rng = np.random.default_rng(0)
+    plates = list(rng.random((7, 300, 500), np.float32))
+    lit = Illumination(directions=ring(7, 35), intensities=np.ones((7, 1)))
+    one, four = solve(plates, lit, threads=1), solve(plates, lit, threads=4)
+    np.testing.assert_array_equal(one.normals, four.normals)
+    np.testing.assert_array_equal(one.error_deg, four.error_deg)
+    part = solve([np.ascontiguousarray(plate[100:110, 7:90]) for plate in plates], lit)
+    np.testing.assert_allclose(part.normals, one.normals[100:110, 7:90], atol=2e-3)
+
+
+def test_codes_and_half_floats_give_the_same_surface() -> None:
+    normals, _ = ball(64)
+    lit = Illumination(directions=ring(6, 35), intensities=np.ones((6, 1)))
+    codes = [np.round(plate * 60_000 + 512).astype(np.uint16) for plate in shoot(normals, lit)]
+    exact = solve(codes, lit, black_level=512, scale=1 / 60_000)
+    half = solve(codes, lit, black_level=512, scale=1 / 60_000, half=True, residual=False, error=False)
+    assert half.normals.dtype == np.float16
+    assert half.residual is None
+    assert half.error_deg is None
+    np.testing.assert_array_equal(half.valid, exact.valid)
+    np.testing.assert_allclose(half.normals, exact.normals, atol=6e-4)
+
+
+def test_more_rounds_and_other_weights_change_little_where_one_measurement_is_spoilt() -> None:
+    normals, inside = ball(48, reach_deg=40)
+    lit = Illumination(directions=ring(8, 35), intensities=np.ones((8, 1)))
+    plates = shoot(normals, lit)
+    plates[3] = plates[3] + np.float32(0.3)
+    for how in (Reweighting(), Reweighting(rounds=8), Reweighting(loss="tukey")):
+        assert error_deg(solve(plates, lit, reweighting=how), normals, inside).mean() < 0.05
+    blind = replace(TRUST_ALL, rounds=1, width=100.0)
+    assert error_deg(solve(plates, lit, reweighting=blind), normals, inside).mean() > 1
+
+
+def test_auto_is_robust_from_five_lights_on() -> None:
+    assert [Solving().method(lights) for lights in (3, 4, 5, 8)] == ["least-squares"] * 2 + ["robust"] * 2
+    assert ROBUST_FROM_LIGHTS == 5
+    assert Solving(solver="robust").method(4) == "robust"
+    assert Solving(solver="least-squares").method(48) == "least-squares"
+    normals, _ = ball(32)
+    lit = lit_by(ring(5, 35))
+    plates = shoot(normals, lit)
+    assert Solving(error=True).solve(plates, lit).error_deg is not None
+    assert Solving(solver="least-squares", error=True).solve(plates, lit).error_deg is None
+    assert robust.solve(plates, lit).valid.dtype == np.bool_
+
+
+def test_the_note_says_what_three_lights_cannot_show() -> None:
+    assert "highlights" in trust_note("least-squares", 3)
+    assert "cannot be seen" in trust_note("robust", 3)
+    assert "6 degrees" in trust_note("robust", 8)

@@ -1,0 +1,117 @@
+"""Robust solving of photographs and of another renderer's pictures, against normals that are known."""
+
+import csv
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from psvideo.normals import robust, woodham1980
+from psvideo.normals.illumination import Illumination
+from psvideo.surface import Surface
+
+DIM = replace(robust.USABLE, dark_level=0.0005)  # the exposures of DiLiGenT are short, and 16 bits deep
+
+
+class Subject(NamedTuple):
+    plates: list[NDArray[np.uint16]] | list[NDArray[np.float32]]
+    lit: Illumination
+    truth: NDArray[np.floating]
+    mask: NDArray[np.bool_]
+    scale: float = 1.0
+
+    def under(self, lights: NDArray[np.intp]) -> "Subject":
+        lit = Illumination(directions=self.lit.directions[lights], intensities=self.lit.intensities[lights])
+        return self._replace(plates=[self.plates[n] for n in lights], lit=lit)
+
+    def plain_deg(self) -> NDArray[np.float64]:
+        """Errors of least squares over everything."""
+        usable = woodham1980.EVERYTHING
+        return self.errors_deg(woodham1980.solve(self.plates, self.lit, usable=usable, scale=self.scale))
+
+    def robust(self, usable: woodham1980.Usable = robust.USABLE) -> Surface:
+        return robust.solve(self.plates, self.lit, usable=usable, scale=self.scale)
+
+    def errors_deg(self, surface: Surface) -> NDArray[np.float64]:
+        both = surface.valid & self.mask
+        cosine = np.sum(surface.normals[both].astype(np.float64) * self.truth[both], axis=-1)
+        return np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+
+
+@pytest.fixture(scope="module")
+def ball(shared_data: Path) -> Subject:
+    folder = shared_data / "diligent_ball"
+    with (folder / "lights.csv").open() as file:
+        rows = [row for row in csv.reader(file) if row[0].endswith(".png")]
+    numbers = np.array([[float(word) for word in row[1:7]] for row in rows])
+    lit = Illumination(directions=numbers[:, :3], intensities=numbers[:, 3:] / numbers[:, 3:].mean())
+    plates = [cv2.imread(str(folder / row[0]), cv2.IMREAD_UNCHANGED)[..., ::-1] for row in rows]
+    mask = cv2.imread(str(folder / "mask.png"), cv2.IMREAD_GRAYSCALE) > 127
+    return Subject(plates, lit, np.load(folder / "normal_gt.npy"), mask, 1 / 65535)
+
+
+def test_the_ball_of_diligent_with_48_lights(ball: Subject) -> None:
+    surface = ball.robust(DIM)
+    assert surface.valid[ball.mask].mean() > 0.99
+    assert ball.errors_deg(surface).mean() <= 1.9
+    assert ball.plain_deg().mean() > 4
+    ours = ball.robust()  # as any clip is solved
+    assert ours.valid[ball.mask].mean() > 0.9
+    assert ball.errors_deg(ours).mean() <= 2.1
+
+
+def test_the_ball_of_diligent_with_twelve_lights_that_are_well_spread(ball: Subject) -> None:
+    rng = np.random.default_rng(20)
+    ours, plain = [], []
+    while len(ours) < 10:
+        lights = np.sort(rng.choice(48, 12, replace=False))
+        if np.linalg.cond(ball.lit.directions[lights]) <= 4:
+            some = ball.under(lights)
+            surface = some.robust(DIM)
+            assert surface.valid[ball.mask].mean() > 0.95
+            ours.append(ball.errors_deg(surface).mean())
+            plain.append(some.plain_deg().mean())
+    assert np.mean(ours) <= 2.8
+    assert max(ours) <= 2.8
+    assert np.mean(plain) > 4
+
+
+def test_the_predicted_error_of_the_ball_covers_the_true_one(ball: Subject) -> None:
+    surface = ball.robust(DIM)
+    assert surface.error_deg is not None
+    true, predicted = ball.errors_deg(surface), surface.error_deg[surface.valid & ball.mask]
+    assert np.mean(true <= predicted) >= 0.63
+    assert np.mean(true <= 2 * predicted) >= 0.95
+
+
+def test_the_rendered_bunny_with_cast_shadows(shared_data: Path) -> None:
+    data = np.load(shared_data / "bunny_rendered" / "bunny_lambert.npz")
+    lit = Illumination(directions=data["lights"].astype(np.float64), intensities=np.ones((len(data["lights"]), 3)))
+    bunny = Subject(list(data["images"].astype(np.float32) * 5), lit, data["normal_gt"], data["mask"])
+    surface = bunny.robust()
+    assert surface.valid[bunny.mask].mean() > 0.99
+    ours, plain = bunny.errors_deg(surface), bunny.plain_deg()
+    assert ours.mean() < 0.7 * plain.mean()
+    assert np.percentile(ours, 95) < 0.7 * np.percentile(plain, 95)
+
+
+def test_the_matte_sphere_of_washington_is_not_worse(shared_data: Path) -> None:
+    folder = shared_data / "uw_psm"
+    words = (folder / "lights.txt").read_text().split()
+    directions = np.array(words[1:], np.float64).reshape(int(words[0]), 3)
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    paths = [folder / "gray" / f"gray.{n}.png" for n in range(len(directions))]
+    plates = [(cv2.imread(str(path))[..., ::-1] / 255).astype(np.float32) for path in paths]
+    rows, cols = np.mgrid[: plates[0].shape[0], : plates[0].shape[1]]
+    x, y = (cols - 244.5) / 108.0, (144.5 - rows) / 108.0
+    truth = np.stack([x, y, np.sqrt(np.maximum(1 - x * x - y * y, 0))], axis=-1)
+    lit = Illumination(directions=directions, intensities=np.ones((len(directions), 3)))
+    sphere = Subject(plates, lit, truth, x * x + y * y < 0.95**2)
+    everywhere = robust.solve(plates, lit, reweighting=robust.Reweighting(most_error_deg=179.0))
+    careful = sphere.errors_deg(woodham1980.solve(plates, lit))
+    assert sphere.errors_deg(everywhere).mean() <= min(careful.mean(), sphere.plain_deg().mean())
+    assert sphere.errors_deg(sphere.robust()).mean() <= careful.mean()
