@@ -58,7 +58,7 @@ def test_the_ball_of_diligent_with_48_lights(ball: Subject) -> None:
     surface = ball.robust(DIM)
     assert surface.valid[ball.mask].mean() > 0.99
     assert ball.errors_deg(surface).mean() <= 1.9
-    assert ball.plain_deg().mean() > 4
+    assert ball.plain_deg().mean() > 3.5
     ours = ball.robust()  # as any clip is solved
     assert ours.valid[ball.mask].mean() > 0.9
     assert ball.errors_deg(ours).mean() <= 2.1
@@ -72,12 +72,12 @@ def test_the_ball_of_diligent_with_twelve_lights_that_are_well_spread(ball: Subj
         if np.linalg.cond(ball.lit.directions[lights]) <= 4:
             some = ball.under(lights)
             surface = some.robust(DIM)
-            assert surface.valid[ball.mask].mean() > 0.95
+            assert surface.valid[ball.mask].mean() > 0.9
             ours.append(ball.errors_deg(surface).mean())
             plain.append(some.plain_deg().mean())
     assert np.mean(ours) <= 2.8
     assert max(ours) <= 2.8
-    assert np.mean(plain) > 4
+    assert np.mean(plain) > 3.5
 
 
 def test_the_predicted_error_of_the_ball_covers_the_true_one(ball: Subject) -> None:

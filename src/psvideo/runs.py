@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from psvideo import __version__
 from psvideo.clip import Clip, read_mask
-from psvideo.errors import PsvideoError
+from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.mesh import animation_name
 from psvideo.export.plates import plate_name, write_flash, write_plate
 from psvideo.export.publish import refuse_folder, whole_folder
@@ -231,6 +231,11 @@ def normals_run(
         solver=solver, half=delivery.half, residual="residual" in delivery.aovs, error="error" in delivery.aovs
     )
     method = solving.method(len(clip.plan.lights))
+    if solving.error and method != "robust":
+        raise UsageError(
+            f"--aov error is what the robust solver predicts, and this run of {len(clip.plan.lights)} lights uses "
+            f"{method}. Add --solver robust, or leave --aov error out."
+        )
     settings = _settings(take, timing, output, tags, delivery, lighting.mask_sha256, method)
     with (
         _folder(output, settings) as folder,

@@ -25,8 +25,8 @@ PNG_MAX = 65535
 class Delivery:
     """How results are written.
 
-    ``half`` False stores normals as 32-bit floats; ``aovs`` may add "residual", "depth" and "position", the last two
-    always in 32 bits; ``meshes`` may hold "ply" and "usd".
+    ``half`` False stores normals as 32-bit floats; ``aovs`` may add "residual", "error", "depth" and "position", the last
+    two always in 32 bits; ``meshes`` may hold "ply" and "usd".
     """
 
     space: Space
@@ -98,6 +98,10 @@ def write_surface(
         if surface.residual is None:
             raise ValueError("the residual is to be written and was not solved for")
         planes["residual"] = {"Y": surface.residual}
+    if "error" in delivery.aovs:
+        if surface.error_deg is None:
+            raise ValueError("the error is to be written and was not predicted")
+        planes["error"] = {"Y": surface.error_deg}
     if delivery.needs_depth:
         if depth is None:
             raise ValueError("depth is to be written and was not integrated")

@@ -96,7 +96,8 @@ def _nearness_without(
     gx = w[X + i] - (xx * x + xy * y + xz * z) * step
     gy = w[Y + i] - (xy * x + yy * y + yz * z) * step
     gz = w[Z + i] - (xz * x + yz * y + zz * z) * step
-    return (gx * half_x + gy * half_y + gz * half_z) / np.sqrt(gx * gx + gy * gy + gz * gz + TINIEST)
+    cosine: np.float32 = (gx * half_x + gy * half_y + gz * half_z) / np.sqrt(gx * gx + gy * gy + gz * gz + TINIEST)
+    return cosine
 
 
 @inlined

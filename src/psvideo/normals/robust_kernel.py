@@ -298,5 +298,5 @@ def _predict_error(weights: Weights, w: Floats, v: Floats, n: int) -> None:
         w[Z + i] = z if trusted else ZERO
 
 
-_PARTS = b"".join(Path(module.__file__).read_bytes() for module in (equations, kernel, odd_of_four))
+_PARTS = b"".join(Path(str(module.__file__)).read_bytes() for module in (equations, kernel, odd_of_four))
 solve_rows = _entry(zlib.crc32(_PARTS))
