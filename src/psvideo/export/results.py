@@ -25,8 +25,8 @@ PNG_MAX = 65535
 class Delivery:
     """How results are written.
 
-    ``half`` False stores normals as 32-bit floats; ``aovs`` may add "residual", "error", "depth" and "position", the last
-    two always in 32 bits; ``meshes`` may hold "ply" and "usd".
+    ``half`` False stores normals as 32-bit floats; ``aovs`` may add "residual", "error", "depth" and "position", the
+    last two always in 32 bits; ``meshes`` may hold "ply" and "usd".
     """
 
     space: Space

@@ -10,7 +10,7 @@ from psvideo.normals.kernel import BLOCK, COUNT, HIGH, LOW, ONE, SUM, THREE, XX,
 from psvideo.normals.task import Floats
 
 HALF = np.float32(0.5)
-HALVINGS = 9  # a quantile is found to a 512th of the interval that holds it
+HALVINGS = 8  # a quantile is found to a 256th of the interval that holds it
 OUT = np.float32(1e30)  # beyond every interval: stands for what is MISSING
 
 # Planes of v: an interval (FROM, TO) around the value of that RANK; what the steps hand on; COUNTED is scratch.
@@ -19,27 +19,33 @@ RIGHT_X, RIGHT_Y, RIGHT_Z = LOW, HIGH, SUM  # the equations' right sides, in pla
 
 
 @inlined
-def clear_equations(w: Floats, n: int) -> None:
-    """Begin the normal equations anew."""
-    for plane in (XX, XY, XZ, YY, YZ, ZZ, RIGHT_X, RIGHT_Y, RIGHT_Z):
-        w[plane : plane + n] = ZERO
+def add_equations(matrix: Floats, w: Floats, m: Floats, weights: Floats, n: int) -> None:
+    """The normal equations of every pixel; ``m`` and ``weights`` are (light, pixel), of whole threes of lights."""
+    for k in range(0, len(m), 3):
+        _add_three(matrix, w, m[k], m[k + 1], m[k + 2], weights[k], weights[k + 1], weights[k + 2], k, n)
 
 
 @inlined
-def add_one(
-    w: Floats, i: int, x: np.float32, y: np.float32, z: np.float32, weight: np.float32, value: np.float32
+def _add_three(
+    matrix: Floats, w: Floats, a: Floats, b: Floats, c: Floats, p: Floats, q: Floats, r: Floats, k: int, n: int
 ) -> None:
-    """Add one measurement of one pixel to its normal equations."""
-    a, b, c = weight * x, weight * y, weight * z
-    w[XX + i] += a * x
-    w[XY + i] += a * y
-    w[XZ + i] += a * z
-    w[YY + i] += b * y
-    w[YZ + i] += b * z
-    w[ZZ + i] += c * z
-    w[RIGHT_X + i] += a * value
-    w[RIGHT_Y + i] += b * value
-    w[RIGHT_Z + i] += c * value
+    """Add three lights, from light k, with the weights p, q, r; the first three begin the equations anew."""
+    (xa, ya, za), (xb, yb, zb), (xc, yc, zc) = matrix[k], matrix[k + 1], matrix[k + 2]
+    old = ONE if k > 0 else ZERO
+    for i in range(n):
+        pa, qb, rc = p[i] * a[i], q[i] * b[i], r[i] * c[i]
+        w[RIGHT_X + i] = old * w[RIGHT_X + i] + xa * pa + xb * qb + xc * rc
+        w[RIGHT_Y + i] = old * w[RIGHT_Y + i] + ya * pa + yb * qb + yc * rc
+        w[RIGHT_Z + i] = old * w[RIGHT_Z + i] + za * pa + zb * qb + zc * rc
+    for i in range(n):
+        pa, qb, rc = p[i] * xa, q[i] * xb, r[i] * xc
+        w[XX + i] = old * w[XX + i] + pa * xa + qb * xb + rc * xc
+        w[XY + i] = old * w[XY + i] + pa * ya + qb * yb + rc * yc
+        w[XZ + i] = old * w[XZ + i] + pa * za + qb * zb + rc * zc
+        pa, qb, rc = p[i] * ya, q[i] * yb, r[i] * yc
+        w[YY + i] = old * w[YY + i] + pa * ya + qb * yb + rc * yc
+        w[YZ + i] = old * w[YZ + i] + pa * za + qb * zb + rc * zc
+        w[ZZ + i] = old * w[ZZ + i] + p[i] * za * za + q[i] * zb * zb + r[i] * zc * zc
 
 
 @inlined
@@ -68,12 +74,12 @@ def halve(v: Floats, e: Floats, n: int) -> None:
     Halving an interval runs over planes without a branch, for any number of lights.
     """
     for _ in range(HALVINGS):
-        for i in range(n):
-            v[COUNTED + i] = ZERO
-        for light in range(e.shape[0]):
-            plane = e[light]
+        for k in range(0, len(e), 3):
+            a, b, c, old = e[k], e[k + 1], e[k + 2], ONE if k > 0 else ZERO
             for i in range(n):
-                v[COUNTED + i] += ONE if plane[i] <= HALF * (v[FROM + i] + v[TO + i]) else ZERO
+                middle = HALF * (v[FROM + i] + v[TO + i])
+                two = (ONE if a[i] <= middle else ZERO) + (ONE if b[i] <= middle else ZERO)
+                v[COUNTED + i] = old * v[COUNTED + i] + two + (ONE if c[i] <= middle else ZERO)
         for i in range(n):
             middle, enough = HALF * (v[FROM + i] + v[TO + i]), v[COUNTED + i] >= v[RANK + i]
             v[TO + i] = middle if enough else v[TO + i]

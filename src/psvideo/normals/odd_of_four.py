@@ -8,7 +8,7 @@ are linearly dependent, and so must be the four brightnesses of a matte surface 
 import numpy as np
 
 from psvideo.normals.compiled import inlined
-from psvideo.normals.equations import DOUBT, LOWER, ODD, RANK, add_one, clear_equations, solve_equations
+from psvideo.normals.equations import DOUBT, LOWER, ODD, RANK, add_equations, solve_equations
 from psvideo.normals.kernel import ABSENT, COUNT, MISSING, ONE, XX, XY, XZ, YY, YZ, ZERO, ZZ, X, Y, Z
 from psvideo.normals.task import Floats, Task
 
@@ -63,7 +63,7 @@ def drop_odd_of_four(
     for light in range(task.lights):
         for i in range(n):
             m[light, i] = MISSING if v[ODD + i] == np.float32(light) else m[light, i]
-    _solve_again(task, w, v, m, n)
+    _solve_again(task, w, v, m, e, n)
 
 
 @inlined
@@ -101,12 +101,10 @@ def _nearness_without(
 
 
 @inlined
-def _solve_again(task: Task, w: Floats, v: Floats, m: Floats, n: int) -> None:
+def _solve_again(task: Task, w: Floats, v: Floats, m: Floats, e: Floats, n: int) -> None:
     """Solve with what is left, only where one of four was dropped."""
-    clear_equations(w, n)
-    for light in range(task.lights):
-        x, y, z = task.matrix[light]
+    for light in range(len(e)):
         for i in range(n):
-            weight = ONE if (v[ODD + i] >= ZERO) & (m[light, i] > ABSENT) else ZERO
-            add_one(w, i, x, y, z, weight, m[light, i] if weight > ZERO else ZERO)
+            e[light, i] = ONE if (v[ODD + i] >= ZERO) & (m[light, i] > ABSENT) else ZERO
+    add_equations(task.matrix, w, m, e, n)
     solve_equations(w, n, task.condition_squared, True)

@@ -22,8 +22,7 @@ from psvideo.normals.equations import (
     SCALE,
     TO,
     UPPER,
-    add_one,
-    clear_equations,
+    add_equations,
     halve,
     solve_equations,
 )  # fmt: skip
@@ -89,11 +88,11 @@ def working_memory(task: Task) -> Memory:
     """Return memory for one thread."""
     plain = kernel.working_memory(task)
     return Memory(
-        planes=plain.planes,
-        more=np.empty(9 * BLOCK, np.float32),
+        planes=np.zeros_like(plain.planes),
+        more=np.zeros(9 * BLOCK, np.float32),
         values=plain.values,
         measurements=plain.measurements,
-        errors=np.empty((task.lights, BLOCK), np.float32),
+        errors=np.full((len(plain.measurements), BLOCK), OUT, np.float32),
     )
 
 
@@ -193,12 +192,12 @@ def _choose_start(task: Task, weights: Weights, w: Floats, v: Floats, m: Floats,
     The darkest may be half in shadow, and highlights only add: that is why more is left out at the bright end.
     """
     v[UPPER : UPPER + n] = ZERO
-    for light in range(task.lights):
-        plane, per = m[light], task.per_strength[light]
+    for light in range(len(e)):
+        plane, sorted_out, per = m[light], e[light], task.per_strength[light]
         for i in range(n):
             bright = plane[i] * per
             v[UPPER + i] = max(v[UPPER + i], bright)
-            e[light, i] = bright if plane[i] > ABSENT else OUT
+            sorted_out[i] = bright if plane[i] > ABSENT else OUT
     for i in range(n):
         count = w[COUNT + i]
         spare = max(count - FOUR, ZERO)
@@ -218,14 +217,13 @@ def _choose_start(task: Task, weights: Weights, w: Floats, v: Floats, m: Floats,
 @inlined
 def _add_start(task: Task, w: Floats, v: Floats, m: Floats, e: Floats, n: int) -> None:
     """The normal equations of the start's measurements, with a little of the others."""
-    clear_equations(w, n)
-    for light in range(task.lights):
-        x, y, z = task.matrix[light]
+    for light in range(len(e)):
+        bright, there = e[light], m[light]
         for i in range(n):
-            inner = (e[light, i] >= v[LOWER + i]) & (e[light, i] <= v[UPPER + i])
+            inner = (bright[i] >= v[LOWER + i]) & (bright[i] <= v[UPPER + i])
             weight = ONE if inner else LITTLE
-            here = m[light, i] > ABSENT
-            add_one(w, i, x, y, z, weight if here else ZERO, m[light, i] if here else ZERO)
+            bright[i] = weight if there[i] > ABSENT else ZERO
+    add_equations(task.matrix, w, m, e, n)
 
 
 @inlined
@@ -236,13 +234,13 @@ def _find_scale(task: Task, weights: Weights, w: Floats, v: Floats, m: Floats, e
     """
     for i in range(n):
         v[TO + i], v[FROM + i] = ZERO, ZERO
-    for light in range(task.lights):
+    for light in range(len(e)):
         x, y, z = task.matrix[light]
+        there, errors = m[light], e[light]
         for i in range(n):
-            here = m[light, i] > ABSENT
-            error = abs(m[light, i] - (x * w[X + i] + y * w[Y + i] + z * w[Z + i]))
-            e[light, i] = error if here else OUT
-            v[TO + i] += error if here else ZERO
+            error = abs(there[i] - (x * w[X + i] + y * w[Y + i] + z * w[Z + i]))
+            errors[i] = error if there[i] > ABSENT else OUT
+            v[TO + i] += error if there[i] > ABSENT else ZERO
     for i in range(n):
         v[RANK + i] = np.floor(HALF * (w[COUNT + i] + THREE))
         v[TO + i] = v[TO + i] / max(w[COUNT + i] - v[RANK + i] + ONE, ONE)  # so many are as large or larger
@@ -260,15 +258,13 @@ def _add_weighted(
     """The normal equations, every measurement weighed by how well the last solution explains it."""
     for i in range(n):
         v[FROM + i] = ONE / (width * v[SCALE + i])
-    clear_equations(w, n)
-    for light in range(task.lights):
-        x, y, z = task.matrix[light]
+    for light in range(len(e)):
+        error = e[light]
         for i in range(n):
-            here = m[light, i] > ABSENT
-            square = (e[light, i] * v[FROM + i]) ** 2
+            square = (error[i] * v[FROM + i]) ** 2  # of what is OUT: infinite
             inside = max(ONE - square, ZERO)
-            weight = inside * inside if tukey else ONE / (ONE + square)
-            add_one(w, i, x, y, z, weight if here else ZERO, m[light, i] if here else ZERO)
+            error[i] = inside * inside if tukey else ONE / (ONE + square)
+    add_equations(task.matrix, w, m, e, n)
 
 
 @inlined
