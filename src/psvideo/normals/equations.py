@@ -10,7 +10,7 @@ from psvideo.normals.kernel import BLOCK, COUNT, HIGH, LOW, ONE, SUM, THREE, XX,
 from psvideo.normals.task import Floats
 
 HALF = np.float32(0.5)
-HALVINGS = 8  # a quantile is found to a 256th of the interval that holds it
+HALVINGS = 6  # a quantile is found to a 64th of the interval that holds it
 OUT = np.float32(1e30)  # beyond every interval: stands for what is MISSING
 
 # Planes of v: an interval (FROM, TO) around the value of that RANK; what the steps hand on; COUNTED is scratch.

@@ -35,14 +35,11 @@ def drop_odd_of_four(
     add light, so it is one that is too bright for the other three; of these, the one whose mirror direction is nearest
     to the normal that the other three give. DOUBT is the root of the squared residuals there, else 0.
     """
-    four = 0
-    for i in range(n):
-        v[SQUARES + i], v[BEST + i], v[ODD + i] = ZERO, -TWO, -ONE
-        four += w[COUNT + i] == FOUR
-    if four == 0:
-        v[DOUBT : DOUBT + n] = ZERO
+    v[DOUBT : DOUBT + n] = ZERO
+    if not _some_contradict(task, noise, signal_noise, contradiction, w, v, m, e, n):
         return
-    _find_errors(task, w, v, m, e, n)
+    for i in range(n):
+        v[BEST + i], v[ODD + i] = -TWO, -ONE
     for light in range(task.lights):
         x, y, z = task.matrix[light]
         to_mirror = ONE / np.sqrt(x * x + y * y + (z + np.sqrt(x * x + y * y + z * z)) ** 2)
@@ -54,16 +51,41 @@ def drop_odd_of_four(
             v[BEST + i] = nearness if better else v[BEST + i]
             v[ODD + i] = np.float32(light) if better else v[ODD + i]
     for i in range(n):
-        length = np.sqrt(w[X + i] ** 2 + w[Y + i] ** 2 + w[Z + i] ** 2)
-        sigma = noise + signal_noise * length
-        contradict = (w[COUNT + i] == FOUR) & (v[SQUARES + i] > (contradiction * sigma) ** 2)
-        v[ODD + i] = v[ODD + i] if contradict else -ONE
+        v[ODD + i] = v[ODD + i] if v[DOUBT + i] > ZERO else -ONE
         v[DOUBT + i] = np.sqrt(v[SQUARES + i]) if v[ODD + i] >= ZERO else ZERO
         w[COUNT + i] -= ONE if v[ODD + i] >= ZERO else ZERO
     for light in range(task.lights):
         for i in range(n):
             m[light, i] = MISSING if v[ODD + i] == np.float32(light) else m[light, i]
     _solve_again(task, w, v, m, e, n)
+
+
+@inlined
+def _some_contradict(
+    task: Task,
+    noise: np.float32,
+    signal_noise: np.float32,
+    contradiction: np.float32,
+    w: Floats,
+    v: Floats,
+    m: Floats,
+    e: Floats,
+    n: int,
+) -> bool:
+    """Whether any pixel of the block has four measurements that contradict each other; DOUBT is 1 where."""
+    four = 0
+    for i in range(n):
+        four += w[COUNT + i] == FOUR
+    if four == 0:
+        return False
+    _find_errors(task, w, v, m, e, n)
+    some = 0
+    for i in range(n):
+        sigma = noise + signal_noise * np.sqrt(w[X + i] ** 2 + w[Y + i] ** 2 + w[Z + i] ** 2)
+        contradict = (w[COUNT + i] == FOUR) & (v[SQUARES + i] > (contradiction * sigma) ** 2)
+        v[DOUBT + i] = ONE if contradict else ZERO
+        some += contradict
+    return some > 0
 
 
 @inlined
