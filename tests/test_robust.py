@@ -1,5 +1,6 @@
 """Robust solving: exact on matte surfaces, at least as good as least absolute residuals, and honest about its doubt."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
+from psvideo.cli.app import main
 from psvideo.normals import robust, woodham1980
 from psvideo.normals.illumination import Illumination
 from psvideo.normals.robust import Reweighting, solve
@@ -298,3 +300,21 @@ def test_the_note_says_what_three_lights_cannot_show() -> None:
     assert "highlights" in trust_note("least-squares", 3)
     assert "cannot be seen" in trust_note("robust", 3)
     assert "6 degrees" in trust_note("robust", 8)
+
+
+def test_the_command_says_which_solver_it_used_and_predicts_errors_only_where_it_can(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    clip, out = tmp_path / "clip", tmp_path / "out"
+    assert main(["synth", str(SCENES / "sphere.toml"), "-o", str(clip), "-q"]) == 0
+    command = ["normals", str(clip), "--rig", str(clip / "rig.toml"), "-o", str(out), "-q"]
+    assert main([*command, "--aov", "error"]) == 2
+    assert "Add --solver robust" in capsys.readouterr().err
+    assert not out.exists()
+    assert main(command) == 0
+    report = json.loads((out / "report.json").read_text())
+    assert report["solver"] == "least-squares"
+    assert "cannot be seen" in report["trust"]
+    assert main([*command, "--aov", "error", "--solver", "robust", "--force"]) == 0
+    assert json.loads((out / "report.json").read_text())["solver"] == "robust"
+    assert len(list((out / "error").iterdir())) == len(list((out / "normals").iterdir())) > 0
