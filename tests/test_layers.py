@@ -29,6 +29,7 @@ LAYERS = [
     },
     {"export", "view"},
     {"synth"},
+    {"near_surface"},
     {"pipeline"},
     {"naming", "light_sets"},
     {"runs"},

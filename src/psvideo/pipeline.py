@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Literal, Protocol, TypeVar
 
@@ -30,7 +31,8 @@ from psvideo.clip import (
     parse_range,
     read_frames,
 )
-from psvideo.normals.illumination import illumination
+from psvideo.near_surface import NearSurface, solve_near
+from psvideo.normals.illumination import Illumination, illumination
 from psvideo.normals.solving import Solving
 from psvideo.plan import Plan
 from psvideo.profiles import collect_with_doubt
@@ -278,20 +280,27 @@ def surfaces(
     *,
     mask: NDArray[np.bool_] | None = None,
     solving: Solving = Solving(),
+    near: NearSurface | None = None,
 ) -> Iterator[Instant]:
     """Solve every round that has a plate of each of the plan's lights; the clip's start and end cut the others.
 
-    Raises PsvideoError where the rig lacks a light, or its lights give no normals.
+    ``near`` says where near lights find the surface. Raises PsvideoError where the rig lacks a light, or its lights
+    give no normals.
     """
     lights = lights_as_planned(rig, plan)
 
     def solved(one: Round) -> Instant:
         scaled = [_weaker(light, plate.saturation) for light, plate in zip(lights, one.plates, strict=True)]
-        lit = illumination(scaled, channels=1 if one.plates[0].image.ndim == 2 else 3)
+        light = partial(illumination, scaled, channels=1 if one.plates[0].image.ndim == 2 else 3)
         seen = np.stack([plate.seen for plate in one.plates])
         plates = [_until_saturation(plate) for plate in one.plates]
         shown = None if seen.all() else seen
-        return Instant(round=one, surface=solving.solve(plates, lit, seen=shown, mask=mask))
+
+        def solve(lit: Illumination) -> Surface:
+            return solving.solve(plates, lit, seen=shown, mask=mask)
+
+        surface = solve(light()) if near is None else solve_near(near, lambda ground: light(ground=ground), solve)
+        return Instant(round=one, surface=surface)
 
     # map and filter hold no round while the next one gathers, as a loop's variable would
     return map(solved, filter(lambda one: one.lights == plan.lights, gathered))

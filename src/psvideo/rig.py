@@ -64,8 +64,8 @@ def directions(lights: Sequence[Light]) -> FloatArray:
     near = [light.name for light in lights if light.direction is None]
     if near:
         raise PsvideoError(
-            f"Light {near[0]!r} has a position (a near light), and this solver takes distant lights only. "
-            "Give the light a direction: the unit vector from the middle of the surface to the light."
+            f"Light {near[0]!r} has a position (a near light), and nothing says where the surface is. Add [camera] and "
+            "[surface] to the rig, or give the light a direction: the unit vector from the middle of the surface to it."
         )
     return np.array([light.direction for light in lights], np.float64)
 

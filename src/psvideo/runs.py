@@ -26,6 +26,7 @@ from psvideo.export.writer import writing
 from psvideo.files import write_text
 from psvideo.integrate import Shaping, begun, depth_of, reservations, view_of
 from psvideo.naming import named_by_rig, named_first
+from psvideo.near_surface import NEAR_ITERATIONS, NearSurface, near_surface_of, near_trust
 from psvideo.normals.illumination import illumination
 from psvideo.normals.solving import Solver, Solving, trust_note
 from psvideo.pipeline import (
@@ -52,6 +53,8 @@ Pixels = NDArray[np.uint8]
 MARK = "timing.json"
 """The file by which a folder of plates or results is known."""
 SHOWN_WIDTH_PX = 600
+UNSURE_DEG = 5.0
+"""A rig whose own standard error is so large is told of in the report; a guessed one says 20."""
 SAMPLE_ROUND = 3
 """The round that the report shows, counted from 1; the first where there are fewer."""
 
@@ -184,12 +187,35 @@ class NormalsResult:
 
 @dataclass(frozen=True, kw_only=True)
 class Lighting:
-    """What is solved with, read and checked before a long run begins: the rig, and where to solve."""
+    """What is solved with, read and checked before a long run begins: the rig, for near lights where the surface is
+    taken to be, and where to solve."""
 
     rig_path: Path
     rig: Rig
     condition: float
+    near: NearSurface | None = None
     mask: NDArray[np.bool_] | None = None
+
+    @property
+    def near_iterations(self) -> int:
+        """How often the surface is made anew for near lights; 0 where there are none."""
+        return 0 if self.near is None else self.near.iterations
+
+    @property
+    def near_notes(self) -> tuple[str, ...]:
+        """What normals depend on where lights are near, in whole sentences."""
+        return () if self.near is None else (near_trust(self.near),)
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What is to be distrusted about the rig itself, in whole sentences."""
+        worst = max(self.rig.lights, key=lambda light: light.error_deg or 0.0)
+        if (worst.error_deg or 0.0) < UNSURE_DEG:
+            return ()
+        return (
+            f"The rig file itself says that its lights are sure to {worst.error_deg:g} degrees only "
+            f"({worst.name!r}): normals are wrong by about as much. Calibrate on a sphere.",
+        )
 
     @property
     def mask_sha256(self) -> str | None:
@@ -197,14 +223,21 @@ class Lighting:
         return None if self.mask is None else hashlib.sha256(self.mask.tobytes()).hexdigest()
 
 
-def read_lighting(take: Take, rig_path: Path, mask_path: Path | None = None) -> Lighting:
-    """Read rig and mask of a take. Raises PsvideoError where they do not fit the plan, or give no normals."""
+def read_lighting(
+    take: Take, rig_path: Path, mask_path: Path | None = None, *, near_iterations: int = NEAR_ITERATIONS
+) -> Lighting:
+    """Read rig and mask of a take; ``near_iterations`` is how often near lights' surface is made anew.
+
+    Raises PsvideoError where they do not fit the plan, or give no normals.
+    """
     clip = take.clip
     check_separable(clip.plan)
     rig = read_rig(rig_path, plan_lights=clip.plan.lights)
-    lit = illumination(lights_as_planned(rig, clip.plan), channels=clip.channels)
+    lights = lights_as_planned(rig, clip.plan)
+    near = near_surface_of(rig, lights, height_px=clip.height_px, width_px=clip.width_px, iterations=near_iterations)
+    lit = illumination(lights, channels=clip.channels, ground=None if near is None else near.ground)
     mask = None if mask_path is None else read_mask(mask_path, width_px=clip.width_px, height_px=clip.height_px)
-    return Lighting(rig_path=rig_path, rig=rig, condition=lit.condition, mask=mask)
+    return Lighting(rig_path=rig_path, rig=rig, condition=lit.condition, near=near, mask=mask)
 
 
 def normals_run(
@@ -236,14 +269,14 @@ def normals_run(
             f"--aov error is what the robust solver predicts, and this run of {len(clip.plan.lights)} lights uses "
             f"{method}. Add --solver robust, or leave --aov error out."
         )
-    settings = _settings(take, timing, output, tags, delivery, lighting.mask_sha256, method)
+    settings = _settings(take, timing, output, tags, delivery, lighting.mask_sha256, method, lighting.near_iterations)
     with (
         _folder(output, settings) as folder,
         _animation(folder, clip.name, facts, delivery, tags, shaping),
         writing() as write,
     ):
         rounds = clip_rounds(take, timing, start_number=output.start_number, watch=watch)
-        for instant in surfaces(rounds, clip.plan, lighting.rig, mask=mask, solving=solving):
+        for instant in surfaces(rounds, clip.plan, lighting.rig, mask=mask, solving=solving, near=lighting.near):
             if shaping is not None and shaping.first is None:
                 shaping = begun(shaping, instant.surface)
             if not (output.resume and is_written(folder, clip.name, instant.round.number, delivery)):
@@ -267,9 +300,9 @@ def normals_run(
             lights=clip.plan.lights,
             condition=lighting.condition,
             solver=method,
-            trust=trust_note(method, len(clip.plan.lights)),
+            trust=" ".join([trust_note(method, len(clip.plan.lights)), *lighting.near_notes]),
             instants=tuple(facts),
-            warnings=() if shaping is None else reservations(shaping),
+            warnings=(*lighting.doubts, *(() if shaping is None else reservations(shaping))),
         )
         write_text(folder / "timing.json", format_timing(timing))
         write_text(folder / "report.json", json.dumps(report_record(report), indent=1) + "\n")

@@ -19,6 +19,7 @@ from psvideo.calibrate.readout_lines import (
 from psvideo.calibrate.strobed_readout import StrobedReadout
 from psvideo.capture.quantities import parse_positive_seconds, parse_rate
 from psvideo.cli.console import Voice
+from psvideo.cli.lights import flat_field, guess, intensities, matte_sphere
 from psvideo.cli.mirror_sphere import mirror_sphere
 from psvideo.cli.options import Frames, Json, PlanPath, Quiet, Verbose
 from psvideo.errors import PsvideoError, UsageError
@@ -29,6 +30,10 @@ calibrate = typer.Typer(help="Measure cameras and lights before a shoot.", no_ar
 
 
 calibrate.command("mirror-sphere")(mirror_sphere)
+calibrate.command("matte-sphere")(matte_sphere)
+calibrate.command("flat-field")(flat_field)
+calibrate.command("intensities")(intensities)
+calibrate.command("guess")(guess)
 
 
 @calibrate.callback()

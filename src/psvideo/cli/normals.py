@@ -25,6 +25,7 @@ from psvideo.cli.sync import describe_timing
 from psvideo.export.results import Delivery
 from psvideo.export.space import choose_space
 from psvideo.export.usd import require_usd
+from psvideo.near_surface import MOST_ITERATIONS, NEAR_ITERATIONS
 from psvideo.pipeline import decoded_once
 from psvideo.runs import Output, normals_run, read_lighting, timing_of
 from psvideo.view.report import findings, report_record, verdict
@@ -87,6 +88,14 @@ def normals(
     solver: Annotated[
         SolverName, typer.Option(help="auto: robust against highlights and shadows from five lights on.")
     ] = SolverName.auto,
+    near_iterations: Annotated[
+        int,
+        typer.Option(
+            help="Near lights only: how often their distances are taken anew from the depth of the normals found.",
+            min=0,
+            max=MOST_ITERATIONS,
+        ),
+    ] = NEAR_ITERATIONS,
     space: Annotated[SpaceName, typer.Option(help="Camera axes, the world's, or a flat card's.")] = SpaceName.camera,
     camera_to_world: Annotated[
         Path | None, typer.Option("--camera-to-world", help="For --space world: a text file, 3 x 3 or 4 x 4 matrix.")
@@ -129,7 +138,7 @@ def normals(
     if "usd" in delivery.meshes:
         require_usd()
     take = open_and_tell(clip, voice, plan=plan, frames=frames)
-    lighting = read_lighting(take, rig, mask)
+    lighting = read_lighting(take, rig, mask, near_iterations=near_iterations)
     with decoded_once(take, output=out) as take:
         found = timing_of(take, timing, first_light=first_light, rig=lighting.rig, watch=voice.track)
         report = normals_run(

@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 import llvmlite.ir
 import numba
 from numba import types
-from numba.extending import intrinsic
+from numba.extending import intrinsic, overload
 from numba.np.numpy_support import carray
 
 from psvideo.compiled import compiled as keep_compiled
@@ -62,6 +62,28 @@ def _encoded(typing_context: Any, value: Any, like: Any) -> Any:
 
 pointer: Any = intrinsic(_pointer)
 encoded: Any = intrinsic(_encoded)
+
+
+def at(numbers: Any, pixel: int) -> Any:
+    """What ``of_light`` or one light's 1 / strength, for all pixels or as planes, is in a pixel. Compiled only."""
+    raise NotImplementedError
+
+
+@overload(at, jit_options={"forceinline": True}, strict=False)
+def _at(numbers: Any, pixel: Any) -> Callable[[Any, int], Any]:
+    if isinstance(numbers, types.Float) or (
+        isinstance(numbers, types.UniTuple) and isinstance(numbers.dtype, types.Float)
+    ):
+        return lambda numbers, pixel: numbers
+    if isinstance(numbers, types.UniTuple):
+        return lambda numbers, pixel: (numbers[0][pixel], numbers[1][pixel], numbers[2][pixel])
+    return lambda numbers, pixel: numbers[pixel]
+
+
+@inlined
+def of_light(matrix: Any, light: int) -> Any:
+    """One light's three numbers: the same for all pixels (matrix (light, 3)), or planes ((light, 3, pixel))."""
+    return matrix[light, 0], matrix[light, 1], matrix[light, 2]
 
 
 @inlined

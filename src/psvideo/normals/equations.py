@@ -5,7 +5,7 @@ Planes lie in two flat working arrays, ``w`` (those of ``kernel.py``) and ``v`` 
 
 import numpy as np
 
-from psvideo.normals.compiled import inlined
+from psvideo.normals.compiled import at, inlined, of_light
 from psvideo.normals.kernel import BLOCK, COUNT, HIGH, LOW, ONE, SUM, THREE, XX, XY, XZ, YY, YZ, ZERO, ZZ, X, Y, Z
 from psvideo.normals.task import Floats
 
@@ -30,14 +30,16 @@ def _add_three(
     matrix: Floats, w: Floats, a: Floats, b: Floats, c: Floats, p: Floats, q: Floats, r: Floats, k: int, n: int
 ) -> None:
     """Add three lights, from light k, with the weights p, q, r; the first three begin the equations anew."""
-    (xa, ya, za), (xb, yb, zb), (xc, yc, zc) = matrix[k], matrix[k + 1], matrix[k + 2]
+    first, second, third = of_light(matrix, k), of_light(matrix, k + 1), of_light(matrix, k + 2)
     old = ONE if k > 0 else ZERO
     for i in range(n):
+        (xa, ya, za), (xb, yb, zb), (xc, yc, zc) = at(first, i), at(second, i), at(third, i)
         pa, qb, rc = p[i] * a[i], q[i] * b[i], r[i] * c[i]
         w[RIGHT_X + i] = old * w[RIGHT_X + i] + xa * pa + xb * qb + xc * rc
         w[RIGHT_Y + i] = old * w[RIGHT_Y + i] + ya * pa + yb * qb + yc * rc
         w[RIGHT_Z + i] = old * w[RIGHT_Z + i] + za * pa + zb * qb + zc * rc
     for i in range(n):
+        (xa, ya, za), (xb, yb, zb), (xc, yc, zc) = at(first, i), at(second, i), at(third, i)
         pa, qb, rc = p[i] * xa, q[i] * xb, r[i] * xc
         w[XX + i] = old * w[XX + i] + pa * xa + qb * xb + rc * xc
         w[XY + i] = old * w[XY + i] + pa * ya + qb * yb + rc * yc

@@ -7,6 +7,7 @@ import numpy as np
 
 from psvideo.camera import FloatArray
 from psvideo.errors import PsvideoError
+from psvideo.normals.near_light import Ground, NearField, is_near, middle_directions, near_field
 from psvideo.rig import Light, directions, intensities
 
 MAX_CONDITION = 20.0  # lights within about 3 degrees of one plane; a normal's error is the noise's times this
@@ -14,12 +15,14 @@ MAX_CONDITION = 20.0  # lights within about 3 degrees of one plane; a normal's e
 
 @dataclass(frozen=True, kw_only=True)
 class Illumination:
-    """Distant lights. ``directions`` (light, 3) are unit vectors from the surface to the light; ``intensities`` is
-    (light, channel): a plate is albedo * intensity * max(0, n . direction)."""
+    """The lights. ``directions`` (light, 3) are unit vectors from the surface to the light; ``intensities`` is
+    (light, channel): a plate is albedo * intensity * max(0, n . direction). With near lights both hold in the middle of
+    the surface, and ``near`` tells what they are in every pixel."""
 
     directions: FloatArray
     intensities: FloatArray
     names: tuple[str, ...] = ()
+    near: NearField | None = None
 
     @property
     def singular_values(self) -> FloatArray:
@@ -34,11 +37,12 @@ class Illumination:
         return float(largest / smallest) if smallest > 1e-12 * largest else float("inf")
 
 
-def illumination(lights: Sequence[Light], *, channels: int) -> Illumination:
-    """Return the lights as arrays, fit for solving pictures of 1 or 3 channels.
+def illumination(lights: Sequence[Light], *, channels: int, ground: Ground | None = None) -> Illumination:
+    """Return the lights as arrays, fit for solving pictures of 1 or 3 channels; near ones need a ``ground``.
 
-    Raises PsvideoError where there are fewer than three lights, where one is near or has no or a negative intensity,
-    and where they are so nearly coplanar that no normal could be trusted (condition number above MAX_CONDITION).
+    Raises PsvideoError where there are fewer than three lights, where one is near without a ground or cannot stand
+    where it is said to, where one has no or a negative intensity, and where they are so nearly coplanar that no normal
+    could be trusted (condition number above MAX_CONDITION).
     """
     names = tuple(light.name for light in lights)
     if len(lights) < 3:
@@ -46,7 +50,7 @@ def illumination(lights: Sequence[Light], *, channels: int) -> Illumination:
             f"Normals need at least three lights, and here are {len(lights)} ({', '.join(names) or 'none'}). "
             "Flash three or more lights that do not lie in one plane with the subject."
         )
-    lit = Illumination(directions=directions(lights), intensities=intensities(lights, channels), names=names)
+    lit = _arrays(lights, channels, ground)
     for name, strengths in zip(names, lit.intensities, strict=True):
         if not (np.isfinite(strengths).all() and (strengths > 0).all()):
             raise PsvideoError(
@@ -55,6 +59,15 @@ def illumination(lights: Sequence[Light], *, channels: int) -> Illumination:
             )
     _refuse_coplanar(lit)
     return lit
+
+
+def _arrays(lights: Sequence[Light], channels: int, ground: Ground | None) -> Illumination:
+    names, strengths = tuple(light.name for light in lights), intensities(lights, channels)
+    if ground is None or not is_near(lights):
+        return Illumination(directions=directions(lights), intensities=strengths, names=names)
+    field = near_field(lights, ground)
+    at_middle = strengths * field.middle_gain[:, None]
+    return Illumination(directions=middle_directions(field), intensities=at_middle, names=names, near=field)
 
 
 def _refuse_coplanar(lit: Illumination) -> None:

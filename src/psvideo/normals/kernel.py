@@ -6,14 +6,21 @@ saturated, not a number or unseen becomes MISSING, far below every threshold.
 
 Symbols: m = L g per pixel, with the measurements m, L = intensity * direction (light, 3) and g = albedo * normal.
 
-All loops are in this one file because numba's cache notices a change only in the file of the function that is called.
+The loops are in this one file because numba's cache notices a change only in the file of the function that is called;
+where near lights are placed (``near_kernel.py``) is taken in by its checksum. For distant lights the matrix is one for
+all pixels, for near ones each pixel of a block has its own: the same loops are compiled for both.
 """
+
+import zlib
+from pathlib import Path
 
 import numpy as np
 from numba.np.numpy_support import carray
 
-from psvideo.normals.compiled import compiled, encoded, inlined, lent, pointer
-from psvideo.normals.task import Bytes, Floats, Result, Samples, Task, Work
+from psvideo.normals import near_kernel
+from psvideo.normals.compiled import at, compiled, encoded, inlined, lent, of_light, pointer
+from psvideo.normals.near_kernel import place_lights
+from psvideo.normals.task import Bytes, Floats, Near, Result, Samples, Task, Work
 
 # Pixels of one block; not a power of two, whose planes would all fall on the same lines of the processor's cache.
 BLOCK = 480
@@ -29,23 +36,30 @@ X, Y, Z, ALBEDO, LIMIT, LOW, HIGH, SUM, COUNT = (BLOCK * plane for plane in rang
 XX, XY, XZ, YY, YZ, ZZ = (BLOCK * plane for plane in range(9, 15))
 PLANES = 15
 
+PLACING = zlib.crc32(Path(near_kernel.__file__).read_bytes())
+
 
 def working_memory(task: Task) -> Work:
     """What one call of ``solve_rows`` works in; no two calls at a time may share it."""
     lights, channels = task.tone.shape[:2]
     values = np.full((lights * channels, BLOCK), MISSING, np.float32)
     combined = values if channels == 1 else np.full((lights, BLOCK), MISSING, np.float32)
-    return Work(planes=np.empty(PLANES * BLOCK, np.float32), values=values, measurements=combined)
+    is_near = task.near.depth.size > 0
+    return Work(
+        planes=np.empty(PLANES * BLOCK, np.float32),
+        values=values,
+        measurements=combined,
+        matrix=np.zeros((lights, 3, BLOCK), np.float32) if is_near else task.matrix,
+        per_strength=np.zeros((lights, BLOCK), np.float32) if is_near else task.per_strength,
+    )
 
 
 @compiled
 def solve_rows(task: Task, result: Result, work: Work, first: int, last: int) -> None:
     """Solve the rows from ``first`` up to ``last``; no two calls may share rows, and any number may run at once."""
-    t = Task(
-        lent(task.plates), lent(task.like), task.lights, task.cols, lent(task.tone), lent(task.matrix),
-        lent(task.per_strength), lent(task.inverse), lent(task.origin), task.least, task.most, task.dark,
-        task.ratio, task.condition_squared, task.albedo_scale, lent(task.seen), lent(task.mask),
-    )  # fmt: skip
+    if PLACING < 0:  # never: it is named here so that the kept function is compiled anew where that file changes
+        return
+    t = lent_task(task, work.matrix, work.per_strength)
     out = Result(lent(result.normals), lent(result.albedo), lent(result.valid), lent(result.residual))
     w, values, m = lent(work.planes), lent(work.values), lent(work.measurements)
     for row in range(first, last):
@@ -59,12 +73,29 @@ def solve_rows(task: Task, result: Result, work: Work, first: int, last: int) ->
 
 
 @inlined
+def lent_task(task: Task, matrix: Floats, per_strength: Floats) -> Task:
+    """The task without reference counts, with the memory that takes every pixel's lights where they are near."""
+    near = task.near
+    return Task(
+        lent(task.plates), lent(task.like), task.lights, task.cols, lent(task.tone), lent(matrix), lent(per_strength),
+        Near(
+            lent(near.positions), lent(near.is_near), lent(near.axes), lent(near.anisotropy), lent(near.strengths),
+            lent(near.depth), lent(near.pinhole),
+        ),
+        lent(task.inverse), lent(task.origin), task.least, task.most, task.dark,
+        task.ratio, task.condition_squared, task.albedo_scale, lent(task.seen), lent(task.mask),
+    )  # fmt: skip
+
+
+@inlined
 def _solve_block(
     task: Task, w: Floats, values: Floats, m: Floats, row: int, col: int, n: int, keep_measurements: bool
 ) -> None:
     """Leave g in the planes X, Y, Z, all 0 where the pixel has no solution to be trusted."""
     start, channels = row * task.cols + col, task.tone.shape[1]
-    done = channels == 1 and _all_seen(task.seen, row, col, n) and _solve_all_usable(task, w, start, n)
+    place_lights(task.matrix, task.per_strength, task.near, row, col, n)
+    distant = task.near.depth.size == 0
+    done = distant and channels == 1 and _all_seen(task.seen, row, col, n) and _solve_all_usable(task, w, start, n)
     if not done or keep_measurements:
         if channels == 1:
             _gather_one(task, values, start, n)
@@ -212,7 +243,7 @@ def _solve_usable(task: Task, w: Floats, m: Floats, n: int) -> None:
     for light in range(task.lights):
         plane, per = m[light], task.per_strength[light]
         for i in range(n):
-            w[SUM + i] += plane[i] * per if plane[i] > ABSENT else ZERO
+            w[SUM + i] += plane[i] * at(per, i) if plane[i] > ABSENT else ZERO
             w[COUNT + i] += ONE if plane[i] > ABSENT else ZERO
     dark, ratio = task.dark, task.ratio
     for i in range(n):
@@ -228,14 +259,15 @@ def _add_equations(
     w: Floats, n: int, a: Floats, b: Floats, c: Floats, matrix: Floats, per_strength: Floats, k: int, begun: bool
 ) -> None:
     """Add three lights, from light k, to the normal equations of every pixel where they are usable."""
-    (xa, ya, za), per_a = matrix[k], per_strength[k]
-    (xb, yb, zb), per_b = matrix[k + 1], per_strength[k + 1]
-    (xc, yc, zc), per_c = matrix[k + 2], per_strength[k + 2]
+    light_a, per_a = of_light(matrix, k), per_strength[k]
+    light_b, per_b = of_light(matrix, k + 1), per_strength[k + 1]
+    light_c, per_c = of_light(matrix, k + 2), per_strength[k + 2]
     for i in range(n):
+        (xa, ya, za), (xb, yb, zb), (xc, yc, zc) = at(light_a, i), at(light_b, i), at(light_c, i)
         p, q, r, limit = a[i], b[i], c[i], w[LIMIT + i]
-        one_p = ONE if p * per_a > limit else ZERO
-        one_q = ONE if q * per_b > limit else ZERO
-        one_r = ONE if r * per_c > limit else ZERO
+        one_p = ONE if p * at(per_a, i) > limit else ZERO
+        one_q = ONE if q * at(per_b, i) > limit else ZERO
+        one_r = ONE if r * at(per_c, i) > limit else ZERO
         a[i] = p if one_p > ZERO else MISSING
         b[i] = q if one_q > ZERO else MISSING
         c[i] = r if one_r > ZERO else MISSING
@@ -321,9 +353,10 @@ def _albedo_given_normal(task: Task, w: Floats, values: Floats, m: Floats, chann
     """One channel's least squares albedo over the usable measurements, the normal being known."""
     w[SUM : SUM + n], w[COUNT : COUNT + n] = ZERO, ZERO
     for light in range(task.lights):
-        x, y, z = task.matrix[light]
+        lamp = of_light(task.matrix, light)
         plane = values[light * task.tone.shape[1] + channel]
         for i in range(n):
+            x, y, z = at(lamp, i)
             here = m[light, i] > ABSENT
             shade = x * w[X + i] + y * w[Y + i] + z * w[Z + i]
             shade = shade if here else ZERO
@@ -340,9 +373,10 @@ def _albedo_given_normal(task: Task, w: Floats, values: Floats, m: Floats, chann
 def _add_residual(task: Task, w: Floats, values: Floats, m: Floats, channel: int, n: int) -> None:
     """Add one channel's squared residuals in plate units to the plane XX, and their count to XY."""
     for light in range(task.lights):
-        x, y, z = task.matrix[light]
+        lamp = of_light(task.matrix, light)
         plane, to_plate = values[light * task.tone.shape[1] + channel], task.tone[light, channel, 3]
         for i in range(n):
+            x, y, z = at(lamp, i)
             here = m[light, i] > ABSENT
             shade = x * w[X + i] + y * w[Y + i] + z * w[Z + i]
             error = (plane[i] - w[ALBEDO + i] * shade) * to_plate

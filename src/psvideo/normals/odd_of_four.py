@@ -7,7 +7,7 @@ are linearly dependent, and so must be the four brightnesses of a matte surface 
 
 import numpy as np
 
-from psvideo.normals.compiled import inlined
+from psvideo.normals.compiled import at, inlined, of_light
 from psvideo.normals.equations import DOUBT, LOWER, ODD, RANK, add_equations, solve_equations
 from psvideo.normals.kernel import ABSENT, COUNT, MISSING, ONE, XX, XY, XZ, YY, YZ, ZERO, ZZ, X, Y, Z
 from psvideo.normals.task import Floats, Task
@@ -41,11 +41,12 @@ def drop_odd_of_four(
     for i in range(n):
         v[BEST + i], v[ODD + i] = -TWO, -ONE
     for light in range(task.lights):
-        x, y, z = task.matrix[light]
-        to_mirror = ONE / np.sqrt(x * x + y * y + (z + np.sqrt(x * x + y * y + z * z)) ** 2)
-        half_x, half_y = x * to_mirror, y * to_mirror
-        half_z = (z + np.sqrt(x * x + y * y + z * z)) * to_mirror
+        lamp = of_light(task.matrix, light)
         for i in range(n):
+            x, y, z = at(lamp, i)
+            to_mirror = ONE / np.sqrt(x * x + y * y + (z + np.sqrt(x * x + y * y + z * z)) ** 2)
+            half_x, half_y = x * to_mirror, y * to_mirror
+            half_z = (z + np.sqrt(x * x + y * y + z * z)) * to_mirror
             nearness = _nearness_without(w, v, i, x, y, z, e[light, i], half_x, half_y, half_z)
             better = (e[light, i] > ZERO) & (nearness > v[BEST + i])
             v[BEST + i] = nearness if better else v[BEST + i]
@@ -93,8 +94,9 @@ def _find_errors(task: Task, w: Floats, v: Floats, m: Floats, e: Floats, n: int)
     """Residuals, 0 where MISSING, and the sum of their squares in SQUARES."""
     v[SQUARES : SQUARES + n] = ZERO
     for light in range(task.lights):
-        x, y, z = task.matrix[light]
+        lamp = of_light(task.matrix, light)
         for i in range(n):
+            x, y, z = at(lamp, i)
             error = m[light, i] - (x * w[X + i] + y * w[Y + i] + z * w[Z + i])
             error = error if m[light, i] > ABSENT else ZERO
             e[light, i] = error

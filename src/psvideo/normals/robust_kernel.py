@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from psvideo.normals import equations, kernel, odd_of_four
-from psvideo.normals.compiled import compiled, encoded, inlined, lent
+from psvideo.normals import equations, kernel, near_kernel, odd_of_four
+from psvideo.normals.compiled import at, compiled, encoded, inlined, lent, of_light
 from psvideo.normals.equations import (
     DOUBT,
     FROM,
@@ -82,6 +82,8 @@ class Memory(NamedTuple):
     values: Floats
     measurements: Floats
     errors: Floats
+    matrix: Floats
+    per_strength: Floats
 
 
 def working_memory(task: Task) -> Memory:
@@ -93,6 +95,8 @@ def working_memory(task: Task) -> Memory:
         values=plain.values,
         measurements=plain.measurements,
         errors=np.full((len(plain.measurements), BLOCK), OUT, np.float32),
+        matrix=plain.matrix,
+        per_strength=plain.per_strength,
     )
 
 
@@ -109,11 +113,7 @@ def _entry(parts: int) -> Callable[[Task, Result, Samples, Memory, Weights, int,
         """
         if parts < 0:
             return
-        t = Task(
-            lent(task.plates), lent(task.like), task.lights, task.cols, lent(task.tone), lent(task.matrix),
-            lent(task.per_strength), lent(task.inverse), lent(task.origin), task.least, task.most, task.dark,
-            task.ratio, task.condition_squared, task.albedo_scale, lent(task.seen), lent(task.mask),
-        )  # fmt: skip
+        t = kernel.lent_task(task, memory.matrix, memory.per_strength)
         out = Result(lent(result.normals), lent(result.albedo), lent(result.valid), lent(result.residual))
         predicted = lent(error)
         w, v, values = lent(memory.planes), lent(memory.more), lent(memory.values)
@@ -140,6 +140,7 @@ def _solve_block(
 ) -> None:
     """Leave g in the planes X, Y, Z, all 0 where the normal is not to be trusted, and the error in DOUBT."""
     start, channels = row * task.cols + col, task.tone.shape[1]
+    near_kernel.place_lights(task.matrix, task.per_strength, task.near, row, col, n)
     if channels == 1:
         kernel._gather_one(task, values, start, n)
     else:
@@ -172,7 +173,7 @@ def _hide_shadows(task: Task, w: Floats, m: Floats, n: int) -> None:
     for light in range(task.lights):
         plane, per = m[light], task.per_strength[light]
         for i in range(n):
-            w[SUM + i] += max(plane[i] * per, ZERO) if plane[i] > ABSENT else ZERO
+            w[SUM + i] += max(plane[i] * at(per, i), ZERO) if plane[i] > ABSENT else ZERO
             w[COUNT + i] += ONE if plane[i] > ABSENT else ZERO
     for i in range(n):
         w[LIMIT + i] = max(task.dark, task.ratio * w[SUM + i] / (w[COUNT + i] + TINY))
@@ -180,7 +181,7 @@ def _hide_shadows(task: Task, w: Floats, m: Floats, n: int) -> None:
     for light in range(task.lights):
         plane, per = m[light], task.per_strength[light]
         for i in range(n):
-            lit = plane[i] * per > w[LIMIT + i]
+            lit = plane[i] * at(per, i) > w[LIMIT + i]
             plane[i] = plane[i] if lit else MISSING
             w[COUNT + i] += ONE if lit else ZERO
 
@@ -195,7 +196,7 @@ def _choose_start(task: Task, weights: Weights, w: Floats, v: Floats, m: Floats,
     for light in range(len(e)):
         plane, sorted_out, per = m[light], e[light], task.per_strength[light]
         for i in range(n):
-            bright = plane[i] * per
+            bright = plane[i] * at(per, i)
             v[UPPER + i] = max(v[UPPER + i], bright)
             sorted_out[i] = bright if plane[i] > ABSENT else OUT
     for i in range(n):
@@ -235,9 +236,9 @@ def _find_scale(task: Task, weights: Weights, w: Floats, v: Floats, m: Floats, e
     for i in range(n):
         v[TO + i], v[FROM + i] = ZERO, ZERO
     for light in range(len(e)):
-        x, y, z = task.matrix[light]
-        there, errors = m[light], e[light]
+        lamp, there, errors = of_light(task.matrix, light), m[light], e[light]
         for i in range(n):
+            x, y, z = at(lamp, i)
             error = abs(there[i] - (x * w[X + i] + y * w[Y + i] + z * w[Z + i]))
             errors[i] = error if there[i] > ABSENT else OUT
             v[TO + i] += error if there[i] > ABSENT else ZERO
@@ -294,5 +295,5 @@ def _predict_error(weights: Weights, w: Floats, v: Floats, n: int) -> None:
         w[Z + i] = z if trusted else ZERO
 
 
-_PARTS = b"".join(Path(str(module.__file__)).read_bytes() for module in (equations, kernel, odd_of_four))
+_PARTS = b"".join(Path(str(module.__file__)).read_bytes() for module in (equations, kernel, near_kernel, odd_of_four))
 solve_rows = _entry(zlib.crc32(_PARTS))

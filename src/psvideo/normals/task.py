@@ -38,6 +38,18 @@ class Usable:
 EVERYTHING = Usable(saturation=np.inf, dark_level=_NO_LIMIT, shadow_ratio=_NO_LIMIT)  # plain least squares
 
 
+class Near(NamedTuple):
+    """What gives every pixel a matrix of its own: where the lights stand, and where the surface is."""
+
+    positions: Floats  # (light, 3) in metres; of a distant light its direction
+    is_near: Bytes  # (light,)
+    axes: Floats  # (light, 3): unit vectors, the way a light shines
+    anisotropy: Floats  # (light,): the light falls off with this power of the cosine from its axis
+    strengths: Floats  # (light,): intensity at 1 m, or of a distant light, in the matrix's unit; 0 for a copy
+    depth: Floats  # (row, col) in metres along the camera's axis, or empty
+    pinhole: Floats  # (4,): 1 / focal length (x, y) and the principal point (col, row), in pixels
+
+
 class Task(NamedTuple):
     """What to solve. A plate's samples lie in memory pixel by pixel, channels side by side.
 
@@ -52,6 +64,7 @@ class Task(NamedTuple):
     tone: Floats  # (light, channel, 4): gain, offset and ceiling of the samples; factor from measurement to plate
     matrix: Floats  # (light, 3): intensity * direction, one for all channels; 0 for a copy
     per_strength: Floats  # (light,): 1 / intensity
+    near: Near  # empty where all lights are distant; else matrix and per_strength hold for the surface's middle only
     inverse: Floats  # (light, 3): the matrix's transposed pseudo-inverse, for samples as they are; 0 for a copy
     origin: Floats  # (3,): what black samples would give with it, to be added
     least: np.float32  # the smallest 1 / intensity
@@ -79,6 +92,8 @@ class Work(NamedTuple):
     planes: Floats
     values: Floats  # (light * channel, pixel)
     measurements: Floats  # (light, pixel): the channels combined
+    matrix: Floats  # the task's; for near lights (light, 3, pixel)
+    per_strength: Floats  # the task's; for near lights (light, pixel)
 
 
 def task(
@@ -112,6 +127,7 @@ def task(
         per_strength=_filled(unit / strength, copies, mode="edge"),
         inverse=_filled(gain[:, :1] * inverse.T, copies),
         origin=_filled(inverse @ tone[:, 0, 1], 0),
+        near=_near(lit, unit, copies),
         least=np.float32((unit / strength).min()),
         most=np.float32((unit / strength).max()),
         dark=np.float32(max(usable.dark_level, _NO_LIMIT)),
@@ -120,6 +136,24 @@ def task(
         albedo_scale=np.float32(1 / unit),
         seen=np.empty((0, 0, 0), np.uint8) if seen is None else _bytes(seen).reshape(len(plates), rows, -1),
         mask=np.empty((0, 0), np.uint8) if mask is None else _bytes(mask),
+    )
+
+
+def _near(lit: Illumination, unit: float, copies: int) -> Near:
+    field = lit.near
+    if field is None:
+        line, plane = np.empty(0, np.float32), np.empty((0, 0), np.float32)
+        return Near(plane, np.empty(0, np.uint8), plane, line, line, plane, line)
+    ground = field.ground
+    focal, principal = ground.focal_px, ground.principal_px
+    return Near(
+        positions=_filled(field.positions_m, copies, mode="edge"),
+        is_near=np.pad(_bytes(field.is_near), (0, copies)),
+        axes=_filled(field.axes, copies, mode="edge"),
+        anisotropy=_filled(field.anisotropy, copies),
+        strengths=_filled(lit.intensities.mean(axis=1) / field.middle_gain / unit, copies),
+        depth=np.ascontiguousarray(ground.depth_m, np.float32),
+        pinhole=np.array([1 / focal[0], 1 / focal[1], *principal], np.float32),
     )
 
 

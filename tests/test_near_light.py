@@ -1,0 +1,316 @@
+"""Near lights: every pixel has lights of its own, and their normals are as exact as the surface's place is known."""
+
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import pytest
+import scipy.io
+from numpy.typing import NDArray
+
+from psvideo.cli.app import main
+from psvideo.errors import PsvideoError
+from psvideo.integrate import Shaping, View
+from psvideo.near_surface import NearSurface, solve_near
+from psvideo.normals import robust, woodham1980
+from psvideo.normals.illumination import Illumination, illumination
+from psvideo.normals.near_light import ground_of
+from psvideo.rig import Light, Rig
+
+Array = NDArray[np.float64]
+SIZE, WIDTH_M, FAR_M = 96, 0.4, 1.6
+FOCAL_PX, MIDDLE = SIZE * FAR_M / WIDTH_M, (SIZE - 1) / 2
+
+
+def rays(u: Array, v: Array) -> Array:
+    return np.stack([(u - MIDDLE) / FOCAL_PX, -(v - MIDDLE) / FOCAL_PX, -np.ones_like(u)], axis=-1)
+
+
+def relief(u: Array, v: Array) -> Array:
+    """Depth of waves that tilt by 16 degrees in the mean."""
+    return FAR_M + 0.024 * WIDTH_M * np.sin(6 * np.pi * u / SIZE) * np.cos(5 * np.pi * v / SIZE)
+
+
+def bulge(u: Array, v: Array) -> Array:
+    """Depth of a ball as far as 50 degrees from its middle, as wide as the picture; its rim lies in the plane."""
+    reach = np.radians(50)
+    radius_m = 0.5 * WIDTH_M / np.sin(reach)
+    centre = np.array([0, 0, -FAR_M - radius_m * np.cos(reach)])
+    ray = rays(u, v)
+    a, b = (ray * ray).sum(axis=-1), ray @ centre
+    root = b * b - a * (centre @ centre - radius_m**2)
+    depth: Array = np.where(root > 0, (b - np.sqrt(np.maximum(root, 0))) / a, np.inf)
+    return np.minimum(depth, FAR_M)
+
+
+def surface(depth) -> tuple[Array, Array]:
+    """Points and normals of every pixel, by fine differences."""
+    v, u = np.mgrid[:SIZE, :SIZE].astype(float)
+    at = lambda u, v: depth(u, v)[..., None] * rays(u, v)  # noqa: E731
+    step = 1e-3
+    normals = np.cross(at(u, v + step) - at(u, v - step), at(u + step, v) - at(u - step, v))
+    return at(u, v), normals / np.linalg.norm(normals, axis=-1, keepdims=True)
+
+
+def ring_rig(lights: int, widths: float, *, distance_m: float = FAR_M, plane_m: float | None = None) -> Rig:
+    """Lights 35 degrees off the axis, so many subject widths from the point ``distance_m`` before the lens."""
+    around, slant = 0.3 + np.arange(lights) * 2 * np.pi / lights, np.radians(35)
+    way = np.stack([np.sin(slant) * np.cos(around), np.sin(slant) * np.sin(around), np.full(lights, np.cos(slant))], 1)
+    positions = np.array([0, 0, -distance_m]) + widths * WIDTH_M * way
+    strength = ((widths * WIDTH_M) ** 2,)
+    return Rig(
+        lights=tuple(Light(name=f"L{n}", position_m=tuple(p), intensity=strength) for n, p in enumerate(positions)),
+        focal_px=(FOCAL_PX, FOCAL_PX),
+        principal_px=(MIDDLE, MIDDLE),
+        plane=(0.0, 0.0, 1.0, plane_m or distance_m),
+    )
+
+
+def filmed(rig: Rig, points: Array, normals: Array, albedo: float = 0.43) -> list[NDArray[np.float32]]:
+    """A plate per light by the law of an LED: cos^mu about its axis, and the inverse square."""
+    plates = []
+    for light in rig.lights:
+        if light.direction is not None:
+            way, sent = np.array(light.direction), 1.0
+        else:
+            away = np.array(light.position_m) - points
+            distance = np.linalg.norm(away, axis=-1, keepdims=True)
+            way, sent = away / distance, 1 / distance[..., 0] ** 2
+            if light.axis is not None:
+                sent = sent * np.maximum(-(way @ np.array(light.axis)), 0) ** light.anisotropy
+        shade = np.maximum((way * normals).sum(axis=-1), 0) * sent
+        strengths = np.array(light.intensity)
+        picture = albedo * shade[..., None] * strengths
+        plates.append((picture[..., 0] if len(strengths) == 1 else picture).astype(np.float32))
+    return plates
+
+
+def lit_by(rig: Rig, channels: int = 1) -> Illumination:
+    return illumination(rig.lights, channels=channels, ground=ground_of(rig, height_px=SIZE, width_px=SIZE))
+
+
+def mean_error_deg(found, normals: Array, where: NDArray[np.bool_] | None = None) -> float:
+    both = found.valid if where is None else found.valid & where
+    assert both.mean() > 0.5
+    apart = np.linalg.norm(found.normals[both] - normals[both], axis=-1)
+    return float(np.degrees(2 * np.arcsin(apart / 2)).mean())
+
+
+@pytest.mark.parametrize("solver", [woodham1980, robust], ids=["least squares", "robust"])
+@pytest.mark.parametrize("lights", [3, 4, 8])
+def test_where_the_plane_is_the_surface_normals_and_albedo_are_exact(lights: int, solver) -> None:
+    rig = ring_rig(lights, 1.5)
+    tilted = Rig(lights=rig.lights, focal_px=rig.focal_px, principal_px=rig.principal_px, plane=(0.1, -0.2, 1.0, FAR_M))
+    toward = np.array([0.1, -0.2, 1.0])
+    v, u = np.mgrid[:SIZE, :SIZE].astype(float)
+    points = rays(u, v) * (-FAR_M / (rays(u, v) @ toward))[..., None]
+    normals = np.broadcast_to(toward / np.linalg.norm(toward), points.shape)
+    found = solver.solve(filmed(tilted, points, normals), lit_by(tilted))
+    assert found.valid.all()
+    assert mean_error_deg(found, normals) < 2e-3
+    np.testing.assert_allclose(found.albedo, 0.43, rtol=2e-4)
+
+
+# lights' distance in subject widths, mean error when taken for distant at least, with the right plane at most, and
+# with the plane off by a tenth (0.4 subject widths) at most
+PHYSICS = [(2, 16.6, 0.4, 7.0), (3, 11.6, 0.36, 3.5), (5, 7.2, 0.2, 2.0), (10, 3.7, 0.1, 1.0)]
+
+
+@pytest.mark.parametrize(("widths", "distant_deg", "near_deg", "off_deg"), PHYSICS)
+def test_directions_from_the_plane_undo_what_taking_lights_for_distant_costs(
+    widths: float, distant_deg: float, near_deg: float, off_deg: float
+) -> None:
+    points, normals = surface(relief)
+    rig = ring_rig(3, widths)
+    plates, near = filmed(rig, points, normals), lit_by(rig)
+    distant = Illumination(directions=near.directions, intensities=near.intensities)
+    assert mean_error_deg(woodham1980.solve(plates, distant), normals) > distant_deg
+    assert mean_error_deg(woodham1980.solve(plates, near), normals) < near_deg
+    for share in (0.9, 1.1):
+        off = lit_by(ring_rig(3, widths, plane_m=share * FAR_M))
+        assert mean_error_deg(woodham1980.solve(plates, off), normals) < off_deg
+
+
+@pytest.mark.parametrize("widths", [2, 3])
+def test_alternating_with_integrated_depth_takes_off_what_a_plane_cannot_know(widths: float) -> None:
+    points, normals = surface(bulge)
+    inside = -points[..., 2] < FAR_M - 1e-6
+    rig = ring_rig(8, widths, plane_m=float(np.median(-points[..., 2][inside])))
+    plates = filmed(rig, points, normals)
+    shaping = Shaping(view=View(focal_px=rig.focal_px, principal_px=rig.principal_px), plane=rig.plane)
+
+    def error_deg(iterations: int) -> float:
+        near = NearSurface(ground=ground_of(rig, height_px=SIZE, width_px=SIZE), shaping=shaping, iterations=iterations)
+        found = solve_near(
+            near,
+            lambda ground: illumination(rig.lights, channels=1, ground=ground),
+            lambda lit: woodham1980.solve(plates, lit, mask=inside),
+        )
+        return mean_error_deg(found, normals, inside)
+
+    with_plane = error_deg(0)
+    assert with_plane > 0.5
+    assert error_deg(1) < 0.12 * with_plane
+
+
+def test_distant_lights_may_stand_among_near_ones_and_a_far_light_is_a_distant_one() -> None:
+    points, normals = surface(relief)
+    near = ring_rig(4, 2)
+    mixed = Rig(
+        lights=(*near.lights, Light(name="sun", direction=(0.3, 0.5, np.sqrt(1 - 0.34)), intensity=(0.8,))),
+        focal_px=near.focal_px, principal_px=near.principal_px, plane=near.plane,
+    )  # fmt: skip
+    assert mean_error_deg(woodham1980.solve(filmed(mixed, points, normals), lit_by(mixed)), normals) < 0.2
+    far = Rig(
+        lights=tuple(
+            Light(name=light.name, position_m=tuple(45 * np.array(way)), intensity=(45.0**2,))
+            for light, way in zip(near.lights, lit_by(near).directions, strict=True)
+        ),
+        focal_px=near.focal_px, principal_px=near.principal_px, plane=near.plane,
+    )  # fmt: skip
+    distant = illumination(
+        [Light(name=str(n), direction=tuple(way)) for n, way in enumerate(lit_by(far).directions)], channels=1
+    )
+    plates = filmed(far, points, normals)
+    one, other = woodham1980.solve(plates, lit_by(far)), woodham1980.solve(plates, distant)
+    assert np.abs(one.normals - other.normals).max() < 0.02
+    assert (one.valid == other.valid).all()
+
+
+def led_rig(folder: Path) -> Rig:
+    """The real rig of eight LEDs in our axes (it has x right, y down, z forward, mm), its surface 0.75 m away."""
+    lights = scipy.io.loadmat(folder / "light.mat")
+    ours = np.array([1.0, -1.0, -1.0])
+    strengths = 0.06 * lights["Phi"] / lights["Phi"].mean()
+    return Rig(
+        lights=tuple(
+            Light(
+                name=f"led{n}",
+                position_m=tuple(1e-3 * lights["S"][n] * ours),
+                axis=tuple(lights["Dir"][n] * ours / np.linalg.norm(lights["Dir"][n])),
+                anisotropy=float(lights["mu"][n, 0]),
+                intensity=tuple(strengths[n]),
+            )
+            for n in range(8)
+        ),
+        focal_px=(FOCAL_PX, FOCAL_PX),
+        principal_px=(MIDDLE, MIDDLE),
+        plane=(0.0, 0.0, 1.0, FAR_M),
+    )
+
+
+def test_a_real_rig_of_leds_with_axes_and_unequal_strengths(shared_data: Path) -> None:
+    rig = led_rig(shared_data / "led_rig_near_light")
+    shift = FAR_M - 0.75  # the same waves, nearer: what is seen is then half as wide
+    points, normals = surface(lambda u, v: relief(u, v) - shift)
+    rig = Rig(lights=rig.lights, focal_px=rig.focal_px, principal_px=rig.principal_px, plane=(0.0, 0.0, 1.0, 0.75))
+    plates, near = filmed(rig, points, normals), lit_by(rig, channels=3)
+    assert max(plate.max() for plate in plates) < 1
+    distant = Illumination(directions=near.directions, intensities=near.intensities)
+    before = mean_error_deg(woodham1980.solve(plates, distant), normals)
+    for solver in (woodham1980, robust):
+        assert mean_error_deg(solver.solve(plates, near), normals) < min(0.6, 0.1 * before)
+
+
+@pytest.mark.parametrize("mu", [0.5, 1.0, 2.5])
+def test_an_led_without_an_axis_shines_at_the_surface_s_middle(mu: float) -> None:
+    points, normals = surface(relief)
+    bare = ring_rig(4, 2)
+    middle = lit_by(bare).near.ground.middle_m
+    aimed, unaimed = [], []
+    for light in bare.lights:
+        axis = middle - np.array(light.position_m)
+        common = {"name": light.name, "position_m": light.position_m, "intensity": light.intensity, "anisotropy": mu}
+        aimed.append(Light(**common, axis=tuple(axis / np.linalg.norm(axis))))
+        unaimed.append(Light(**common))
+    view = {"focal_px": bare.focal_px, "principal_px": bare.principal_px, "plane": bare.plane}
+    found = woodham1980.solve(
+        filmed(Rig(lights=tuple(aimed), **view), points, normals), lit_by(Rig(lights=tuple(unaimed), **view))
+    )
+    assert mean_error_deg(found, normals) < 0.25
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"plane": None}, r"\[surface\] plane = "),
+        ({"focal_px": None}, r"\[camera\] focal_px = "),
+        ({"principal_px": None}, r"principal_px = \[47.5, 47.5\]"),
+        ({"plane": (0.0, 0.0, 1.0, 1600.0)}, "looks like millimetres"),
+        ({"plane": (0.0, 0.0, 1.0, -1.6)}, "lies nowhere before the camera"),
+    ],
+)
+def test_a_rig_that_does_not_say_where_the_surface_is_is_refused_with_what_to_add(change: dict, words: str) -> None:
+    rig = ring_rig(3, 2)
+    known = {"focal_px": rig.focal_px, "principal_px": rig.principal_px, "plane": rig.plane} | change
+    with pytest.raises(PsvideoError, match=words):
+        ground_of(Rig(lights=rig.lights, **known), height_px=SIZE, width_px=SIZE)
+
+
+@pytest.mark.parametrize(
+    ("position_m", "words"),
+    [
+        ((-200.0, 150.0, 100.0), "looks like millimetres"),
+        ((0.0, 0.0, -FAR_M), "in the surface itself"),
+        ((0.3, 0.0, -2 * FAR_M), "behind the surface"),
+    ],
+)
+def test_a_light_that_cannot_stand_where_it_is_said_to_is_refused(position_m, words: str) -> None:
+    rig = ring_rig(3, 2)
+    wrong = (*rig.lights[:2], Light(name="odd", position_m=position_m))
+    with pytest.raises(PsvideoError, match=f"'odd'.*{words}"):
+        illumination(wrong, channels=1, ground=ground_of(rig, height_px=SIZE, width_px=SIZE))
+
+
+SCENE = """schema = "psvideo-scene/1"
+name = "near"
+frames = {frames}
+seed = 3
+[camera]
+width_px = 200
+height_px = 150
+fps = 100
+shutter_deg = 360.0
+readout_s = 0.01
+view = "perspective"
+focal_px = 300.0
+[strobe]
+flash_s = 0.001
+{lights}
+[[object]]
+mesh = "sphere"
+height_m = 0.3
+position_m = [0.02, 0.0, -0.85]
+albedo = 0.8
+"""
+
+
+def test_a_clip_lit_by_a_real_rig_of_leds_becomes_normals(
+    shared_data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lights = ""
+    for light in led_rig(shared_data / "led_rig_near_light").lights:
+        numbers = {name: [float(x) for x in getattr(light, name)] for name in ("position_m", "axis", "intensity")}
+        lights += f'[[light]]\nname = "{light.name}"\nanisotropy = {light.anisotropy}\n'
+        lights += "".join(f"{name} = {values}\n" for name, values in numbers.items())
+    (tmp_path / "scene.toml").write_text(SCENE.format(frames=26, lights=lights))
+    clip, out = tmp_path / "clip", tmp_path / "out"
+    assert main(["synth", str(tmp_path / "scene.toml"), "-o", str(clip), "-q"]) == 0
+    command = ["normals", str(clip), "--rig", str(clip / "rig.toml"), "-o", str(out)]
+    assert main(command) == 1
+    assert "[surface] plane" in capsys.readouterr().err
+    with (clip / "rig.toml").open("a") as file:
+        file.write("\n[surface]\nplane = [0.0, 0.0, 1.0, 0.73]\n")
+    assert main(command) == 0
+    assert "The lights are near" in (out / "report.json").read_text()
+    found, valid = picture(next((out / "normals").iterdir())), picture(next((out / "valid").iterdir())) > 0
+    true, inside = picture(clip / "truth" / "normals.exr"), picture(clip / "truth" / "mask.exr") > 0.5
+    assert (valid & inside).sum() > 0.7 * inside.sum()
+    apart = np.linalg.norm(found - true, axis=-1)[valid & inside]
+    assert np.degrees(2 * np.arcsin(np.minimum(apart / 2, 1))).mean() < 0.6
+
+
+def picture(path: Path) -> NDArray[np.float32]:
+    channels = OpenEXR.File(str(path)).channels()
+    planes = channels["RGB"].pixels if "RGB" in channels else next(iter(channels.values())).pixels
+    return planes.astype(np.float32)
