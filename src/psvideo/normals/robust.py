@@ -118,4 +118,7 @@ def _balanced(given: Task) -> Task:
     matrix, per_strength = given.matrix.copy(), given.per_strength.copy()
     matrix[: given.lights] *= factor
     per_strength[: given.lights] /= factor[:, 0]
-    return given._replace(tone=tone, matrix=matrix, per_strength=per_strength)
+    strengths = given.near.strengths.copy()  # empty where all lights are distant
+    strengths[: given.lights] *= factor[: len(strengths), 0]
+    near = given.near._replace(strengths=strengths)
+    return given._replace(tone=tone, matrix=matrix, per_strength=per_strength, near=near)
