@@ -15,6 +15,7 @@ LAYERS = [
     {"shutter", "clip", "strobe", "capture"},
     {"rowfit", "profiles"},
     {"sync", "rigfield", "order", "split", "hudon2015", "flicker", "ambient", "sequence", "calibrate", "normals"},
+    {"align"},
     {"export", "view"},
     {"synth"},
     {"pipeline"},
@@ -36,6 +37,7 @@ SYNTH_NEVER_USES = {
     "ambient",
     "sequence",
     "normals",
+    "align",
 } | {
     "clip",
     "strobe",
