@@ -23,9 +23,13 @@ LEAST_SQUARE = 1.0
 """... and where that change is more than this, in squared codes; elsewhere moving shows nothing."""
 UNLIKE = 12.0
 """Plates that differ by more codes than this, after blurring, do not show the same thing."""
+REST = 3.0
+"""Where the flow does not tell, plates that differ by fewer codes are taken as they are."""
 BLUR_PX, WINDOW_PX, DETAIL_PX = 1.5, 9, 6.0
 REACH_PX = 17
 """Around what moved, flow is used as well: bare parts of a subject move with it."""
+SLIVER_PX = 5
+"""What is told in narrower strips between what is not lies on outlines, where flow mixes what is before and behind."""
 SETTLED_PX = 0.5
 """How far the place that a pixel comes from may still wander when it is looked for step by step."""
 STEPS = 6
@@ -61,11 +65,12 @@ def track(before: Sketch, after: Sketch, flow: Flow, time_s: float) -> Track:
     flowing = np.select(
         [shows_before & shows_after & alike, shows_before & ~shows_after, shows_after & ~shows_before],
         [BOTH, BEFORE, AFTER],
-        NOWHERE,
+        np.where(square_at_rest < REST**2, AT_REST, NOWHERE),
     )
-    return Track(
-        from_before=from_before, from_after=from_after, source=np.where(moves, flowing, source).astype(np.uint8)
-    )
+    source = np.where(moves, flowing, source).astype(np.uint8)
+    told = cv2.morphologyEx((source != NOWHERE).astype(np.uint8), cv2.MORPH_OPEN, np.ones((SLIVER_PX, SLIVER_PX)))
+    source[(told == 0) & moves] = NOWHERE
+    return Track(from_before=from_before, from_after=from_after, source=source)
 
 
 def _way_to(flow: Vectors, share: float) -> tuple[Vectors, Flags]:

@@ -18,6 +18,9 @@ Flags = NDArray[np.bool_]
 WINDOW_PX = 5
 MOST_CHANGE = 2.0
 """A neighbourhood changed where its mean squared difference is so many times what noise makes of it."""
+MOST_DRIFT = 0.4
+"""... or its mean difference, squared, is this share of that; white noise leaves a 25th."""
+FINEST = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32) / 6
 LEVELS = 8
 LOW_SHARE, LOW_OF_MEAN = 0.25, 1.213 / 3
 """Noise is told from the lowest quarter of squared differences, for up to three quarters of a picture may move: the
@@ -64,25 +67,40 @@ def _updated(before: Average, now: Average, results: int) -> Average:
 
 
 def _alike(before: Average, now: Average, both: Flags) -> Flags:
-    """Return where a neighbourhood differs from its average by noise only."""
-    square = ((now.vectors - before.vectors) ** 2).sum(axis=0) * both
-    share = 1 + 1 / np.maximum(before.count, 1)  # the average is noisy as well, the less the longer it is
+    """Return where a neighbourhood differs from its average by noise only, pixel by pixel and as a whole."""
+    apart = (now.vectors - before.vectors) * both
+    share = np.float32(1) + 1 / np.maximum(
+        before.count, np.float32(1)
+    )  # the average is noisy as well, the less the longer it is
     level = np.sqrt((before.vectors**2).sum(axis=0))
-    expected = share * _noise(square / share, level, both)
-    window = (WINDOW_PX, WINDOW_PX)
-    return np.asarray(both & (cv2.blur(square, window) <= MOST_CHANGE * cv2.blur(expected * both, window)))
+    noise = _noise(np.asarray(apart / np.sqrt(share), np.float32), level, both)
+    expected = _mean(np.asarray(share * noise * both, np.float32))
+    each = _mean(np.sum(apart**2, axis=0, dtype=np.float32))
+    whole = np.sum([_mean(plane) ** 2 for plane in apart], axis=0)
+    return np.asarray(both & (each <= MOST_CHANGE * expected) & (whole <= MOST_DRIFT * expected))
 
 
-def _noise(square: Planes, level: Planes, both: Flags) -> Planes:
-    """Return the mean squared noise of one result by brightness; ``square`` is that of one, whatever moves."""
+def _mean(values: Planes) -> Planes:
+    return np.asarray(cv2.blur(values, (WINDOW_PX, WINDOW_PX)), np.float32)
+
+
+def _noise(apart: Planes, level: Planes, both: Flags) -> Planes:
+    """Return the mean squared noise of one result by brightness; ``apart`` (3, row, col) is what differs in time.
+
+    Only its finest detail is looked at (Immerkaer, "Fast noise variance estimation", CVIU 1996), which smooth surfaces
+    lack, moving or not. Brighter never is less noisy: a brightness that only what moves has tells nothing above that.
+    """
+    fine = [cv2.filter2D(plane, -1, FINEST) for plane in apart]
+    inner = cv2.erode(both.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    square = np.sum([plane**2 for plane in fine], axis=0)
     thin = (slice(None, None, 3), slice(None, None, 3))
-    squares, levels = square[thin][both[thin]], level[thin][both[thin]]
+    squares, levels = square[thin][inner[thin]], level[thin][inner[thin]]
     if len(squares) < LEVELS * 8:
-        return np.zeros_like(square)
+        return np.zeros_like(level)
     parts = np.array_split(np.argsort(levels), LEVELS)
     at = [float(np.median(levels[part])) for part in parts]
-    noise = [float(np.quantile(squares[part], LOW_SHARE)) / LOW_OF_MEAN for part in parts]
-    return np.interp(level, at, noise).astype(np.float32)
+    noise = np.array([float(np.quantile(squares[part], LOW_SHARE)) / LOW_OF_MEAN for part in parts])
+    return np.interp(level, at, np.minimum.accumulate(noise[::-1])[::-1]).astype(np.float32)
 
 
 def _with(surface: Surface, average: Average) -> Surface:
