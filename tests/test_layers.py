@@ -27,6 +27,7 @@ LAYERS = [
         "normals",
         "integrate",
     },
+    {"align"},
     {"export", "view"},
     {"synth"},
     {"near_surface"},
@@ -49,6 +50,7 @@ SYNTH_NEVER_USES = {
     "ambient",
     "sequence",
     "normals",
+    "align",
 } | {
     "clip",
     "strobe",

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo import hudon2015
+from psvideo.align.denoise import Average, averaged
 from psvideo.ambient import subtract
 from psvideo.calibrate.strobed_readout import StrobedReadout, readout_of
 from psvideo.camera import Camera
@@ -292,7 +293,8 @@ def surfaces(
     def solved(one: Round) -> Instant:
         scaled = [_weaker(light, plate.saturation) for light, plate in zip(lights, one.plates, strict=True)]
         light = partial(illumination, scaled, channels=1 if one.plates[0].image.ndim == 2 else 3)
-        seen = np.stack([plate.seen for plate in one.plates])
+        whole = all(plate.seen.ndim == 1 for plate in one.plates)
+        seen = np.stack([plate.seen if whole else plate.pixels_seen for plate in one.plates])
         plates = [_until_saturation(plate) for plate in one.plates]
         shown = None if seen.all() else seen
 
@@ -304,6 +306,15 @@ def surfaces(
 
     # map and filter hold no round while the next one gathers, as a loop's variable would
     return map(solved, filter(lambda one: one.lights == plan.lights, gathered))
+
+
+def denoised(instants: Iterable[Instant], results: int) -> Iterator[Instant]:
+    """Average every surface with those before it, up to so many ``results``, where nothing moves."""
+    average: Average | None = None
+    for instant in instants:
+        average, surface = averaged(average, instant.surface, results)
+        yield replace(instant, surface=surface)
+        del instant, surface
 
 
 def _weaker(light: Light, saturation: float) -> Light:

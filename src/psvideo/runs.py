@@ -4,7 +4,7 @@ import hashlib
 import json
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo import __version__
+from psvideo.align.rounds import Aligning, Rate, aligned
 from psvideo.clip import Clip, read_mask
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.mesh import animation_name
@@ -35,6 +36,7 @@ from psvideo.pipeline import (
     Take,
     Watch,
     clip_rounds,
+    denoised,
     find_clip_timing,
     lights_as_planned,
     surfaces,
@@ -48,6 +50,7 @@ from psvideo.timing import Timing, format_timing, read_timing
 from psvideo.view.contact import Strip, Tile, sheet
 from psvideo.view.report import InstantFacts, RunReport, instant_facts, report_page, report_record
 from psvideo.view.shading import exposure_for, normal_colours, smaller, srgb
+from psvideo.view.steadiness import Sample, change, sample_of
 
 Pixels = NDArray[np.uint8]
 MARK = "timing.json"
@@ -116,11 +119,30 @@ def _settings(take: Take, timing: Timing, output: Output, *what: object) -> str:
     return hashlib.sha256("\n".join(map(str, parts)).encode()).hexdigest()
 
 
-def sequence_fps(plan: Plan) -> Fraction:
-    """Return the rate of rounds, which is that of every delivered sequence; the mean where dark slots are rarer."""
+def sequence_fps(plan: Plan, rate: Rate = "round") -> Fraction:
+    """Return the rate of rounds, or of the lights' flashes, at which a sequence is delivered; the mean where dark slots
+    come between."""
+    results = len(plan.lights) if rate == "flash" else 1
     if plan.mode == "synced":
-        return plan.camera.fps / len(plan.flashes)
-    return Fraction(plan.dark_every / plan.cycle_s).limit_denominator(100_000)
+        return results * plan.camera.fps / len(plan.flashes)
+    return Fraction(results * plan.dark_every / plan.cycle_s).limit_denominator(100_000)
+
+
+@dataclass(frozen=True, kw_only=True)
+class OverTime:
+    """What is done between instants: how plates are brought to one, and how many results are averaged at rest."""
+
+    aligning: Aligning = field(default_factory=Aligning)
+    denoise: int = 1
+
+    def check(self, plan: Plan) -> None:
+        """Raise UsageError where a plan has no instant of its own for every light, and one is asked for."""
+        alone = all(sum(power > 0 for power in plan.flashes[slot].lights.values()) == 1 for slot in plan.lit_slots)
+        if self.aligning.rate == "flash" and not (alone and len(plan.lit_slots) == len(plan.lights)):
+            raise UsageError(
+                "--rate flash needs a plan in which every light flashes once a round, by itself; in this one lights "
+                "flash together, or several times. Leave it out: one result per round is given."
+            )
 
 
 def split_run(
@@ -240,6 +262,19 @@ def read_lighting(
     return Lighting(rig_path=rig_path, rig=rig, condition=lit.condition, near=near, mask=mask)
 
 
+def _solving(plan: Plan, solver: Solver, delivery: Delivery) -> Solving:
+    solving = Solving(
+        solver=solver, half=delivery.half, residual="residual" in delivery.aovs, error="error" in delivery.aovs
+    )
+    method = solving.method(len(plan.lights))
+    if solving.error and method != "robust":
+        raise UsageError(
+            f"--aov error is what the robust solver predicts, and this run of {len(plan.lights)} lights uses "
+            f"{method}. Add --solver robust, or leave --aov error out."
+        )
+    return solving
+
+
 def normals_run(
     take: Take,
     timing: Timing,
@@ -248,35 +283,35 @@ def normals_run(
     *,
     delivery: Delivery,
     solver: Solver = "auto",
+    over_time: OverTime | None = None,
     watch: Watch = unwatched,
     picture_of: Callable[[Instant], Pixels] | None = None,
 ) -> NormalsResult:
-    """Write normals, albedo and validity of every round, timing.json and the report; return what is to be reported.
+    """Write normals, albedo and validity of every instant, timing.json and the report; return what is to be reported.
 
     ``picture_of`` makes the picture of one round; left out, it shows plates and surface.
     """
     clip, mask = take.clip, lighting.mask
-    tags = _tags(clip, lighting.rig_path, delivery.space)
+    over_time = over_time or OverTime()
+    over_time.check(clip.plan)
+    tags = _tags(clip, lighting.rig_path, delivery.space, over_time.aligning.rate)
     shaping = Shaping(view=view_of(lighting.rig), plane=lighting.rig.plane) if delivery.needs_depth else None
     facts: list[InstantFacts] = []
     picture: Pixels | None = None
-    solving = Solving(
-        solver=solver, half=delivery.half, residual="residual" in delivery.aovs, error="error" in delivery.aovs
-    )
+    seen: Sample | None = None
+    solving = _solving(clip.plan, solver, delivery)
     method = solving.method(len(clip.plan.lights))
-    if solving.error and method != "robust":
-        raise UsageError(
-            f"--aov error is what the robust solver predicts, and this run of {len(clip.plan.lights)} lights uses "
-            f"{method}. Add --solver robust, or leave --aov error out."
-        )
-    settings = _settings(take, timing, output, tags, delivery, lighting.mask_sha256, method, lighting.near_iterations)
+    light = (lighting.mask_sha256, method, lighting.near_iterations)
+    settings = _settings(take, timing, output, tags, delivery, over_time, *light)
     with (
         _folder(output, settings) as folder,
         _animation(folder, clip.name, facts, delivery, tags, shaping),
         writing() as write,
     ):
         rounds = clip_rounds(take, timing, start_number=output.start_number, watch=watch)
-        for instant in surfaces(rounds, clip.plan, lighting.rig, mask=mask, solving=solving, near=lighting.near):
+        rounds = aligned(rounds, clip.plan.lights, over_time.aligning, first=output.start_number)
+        found = surfaces(rounds, clip.plan, lighting.rig, mask=mask, solving=solving, near=lighting.near)
+        for instant in found if over_time.denoise < 2 else denoised(found, over_time.denoise):
             if shaping is not None and shaping.first is None:
                 shaping = begun(shaping, instant.surface)
             if not (output.resume and is_written(folder, clip.name, instant.round.number, delivery)):
@@ -287,7 +322,9 @@ def normals_run(
                     partial(write_surface, folder, clip.name, *at, surface, delivery=delivery, tags=tags, depth=shaped)
                 )
                 del surface
-            facts.append(instant_facts(instant.round, instant.surface, mask))
+            before, seen = seen, sample_of(instant.surface)
+            changed = None if before is None else change(before, seen)
+            facts.append(instant_facts(instant.round, instant.surface, mask, changed))
             if len(facts) in (1, SAMPLE_ROUND):
                 picture = (picture_of or look)(instant)
             del instant  # its plates would be held while the next round gathers
@@ -310,9 +347,9 @@ def normals_run(
     return NormalsResult(report=report, picture=picture)
 
 
-def _tags(clip: Clip, rig_path: Path | None = None, space: Space = CAMERA_SPACE) -> Tags:
+def _tags(clip: Clip, rig_path: Path | None = None, space: Space = CAMERA_SPACE, rate: Rate = "round") -> Tags:
     return Tags(
-        fps=sequence_fps(clip.plan),
+        fps=sequence_fps(clip.plan, rate),
         colour=clip.colour,
         plan_sha256=sha256_of(clip.plan_path),
         rig_sha256=None if rig_path is None else sha256_of(rig_path),

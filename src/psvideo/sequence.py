@@ -23,7 +23,9 @@ FIRST_NUMBER = 1001
 
 @dataclass(frozen=True, kw_only=True)
 class LightPlate:
-    """The scene under one light at its full flash, at one instant. ``seen`` (row,) as in a Plate.
+    """The scene under one light at its full flash, at one instant.
+
+    ``seen`` (row,) is as in a Plate, or (row, col) where motion hid parts of the plate.
 
     ``saturation`` is the value from which on a pixel is clipped: 1.0, or more where the flash was weaker than full.
     """
@@ -34,6 +36,17 @@ class LightPlate:
     image: Image
     seen: NDArray[np.bool_]
     saturation: float = 1.0
+
+    @property
+    def rows_seen(self) -> NDArray[np.bool_]:
+        """Which rows any frame saw, whatever motion hid in them, shape (row,)."""
+        return self.seen if self.seen.ndim == 1 else np.asarray(self.seen.any(axis=1))
+
+    @property
+    def pixels_seen(self) -> NDArray[np.bool_]:
+        """What is known of the plate, shape (row, col)."""
+        known = self.seen if self.seen.ndim == 2 else self.seen[:, None]
+        return np.broadcast_to(known, self.image.shape[:2])
 
 
 @dataclass(frozen=True, kw_only=True)

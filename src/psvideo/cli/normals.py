@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from psvideo.align.rounds import Aligning
 from psvideo.cli.console import Voice, tell_kept
 from psvideo.cli.opening import open_and_tell
 from psvideo.cli.options import (
@@ -27,7 +28,7 @@ from psvideo.export.space import choose_space
 from psvideo.export.usd import require_usd
 from psvideo.near_surface import MOST_ITERATIONS, NEAR_ITERATIONS
 from psvideo.pipeline import decoded_once
-from psvideo.runs import Output, normals_run, read_lighting, timing_of
+from psvideo.runs import Output, OverTime, normals_run, read_lighting, timing_of
 from psvideo.view.report import findings, report_record, verdict
 
 
@@ -70,6 +71,21 @@ class MeshKind(StrEnum):
     usd = "usd"
 
 
+class AlignName(StrEnum):
+    """How plates of one round are brought to one instant."""
+
+    none = "none"
+    flow = "flow"
+    auto = "auto"
+
+
+class RateName(StrEnum):
+    """Which instants are shown."""
+
+    round = "round"
+    flash = "flash"
+
+
 class Encoding(StrEnum):
     """Other encodings of the same maps."""
 
@@ -101,6 +117,11 @@ def normals(
         Path | None, typer.Option("--camera-to-world", help="For --space world: a text file, 3 x 3 or 4 x 4 matrix.")
     ] = None,
     y: Annotated[YDirection, typer.Option("--y", help="up as in OpenGL, down as in DirectX.")] = YDirection.up,
+    align: Annotated[
+        AlignName, typer.Option(help="Move plates of one round to one instant: auto does where something moves.")
+    ] = AlignName.auto,
+    rate: Annotated[RateName, typer.Option(help="One result per round, or per flash.")] = RateName.round,
+    denoise: Annotated[int, typer.Option(min=1, max=64, help="Average up to N results where nothing moves.")] = 1,
     float32: Annotated[bool, typer.Option("--float", help="Store normals as 32-bit floats.")] = False,
     aov: Annotated[
         list[Aov] | None, typer.Option("--aov", help="Write this besides; may be given several times.")
@@ -137,12 +158,21 @@ def normals(
     )
     if "usd" in delivery.meshes:
         require_usd()
+    over_time = OverTime(aligning=Aligning(align=align.value, rate=rate.value), denoise=denoise)
     take = open_and_tell(clip, voice, plan=plan, frames=frames)
+    over_time.check(take.plan)
     lighting = read_lighting(take, rig, mask, near_iterations=near_iterations)
     with decoded_once(take, output=out) as take:
         found = timing_of(take, timing, first_light=first_light, rig=lighting.rig, watch=voice.track)
         report = normals_run(
-            take, found, lighting, output, delivery=delivery, solver=solver.value, watch=voice.track
+            take,
+            found,
+            lighting,
+            output,
+            delivery=delivery,
+            solver=solver.value,
+            over_time=over_time,
+            watch=voice.track,
         ).report
         tell_kept(voice, take.kept)
     voice.result(report_record(report))

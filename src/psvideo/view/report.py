@@ -16,12 +16,14 @@ from numpy.typing import NDArray
 from psvideo.sequence import Round
 from psvideo.surface import Surface
 from psvideo.timing import Timing
+from psvideo.view.steadiness import Change
 
 SURE_ENOUGH_ROWS = 0.3
 MOST_CLIPPED = 0.02
 LEAST_VALID = 0.3
 MOST_UNSEEN = 0.02
 HARDLY_VALID = 0.05
+MOST_FLICKER_PERCENT = 1.0
 LIT = 0.01
 """A pixel brighter than this share of saturation under any light is part of the scene."""
 
@@ -29,13 +31,14 @@ LIT = 0.01
 @dataclass(frozen=True, kw_only=True)
 class InstantFacts:
     """What one round gave: which shares of what is lit (or masked) are valid or saturated, and which share of rows no
-    frame saw. A void background counts as neither."""
+    frame saw. A void background counts as neither. ``change`` is what differs from the result before, at rest."""
 
     number: int
     time_s: float
     valid_share: float
     clipped_share: float
     unseen_share: float
+    change: Change | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,8 +61,10 @@ STRIDE = 4
 """Shares are counted over every fourth row and column, which is plenty and costs a sixteenth."""
 
 
-def instant_facts(one: Round, surface: Surface, mask: NDArray[np.bool_] | None) -> InstantFacts:
-    """Return what to remember of one solved round."""
+def instant_facts(
+    one: Round, surface: Surface, mask: NDArray[np.bool_] | None, change: Change | None = None
+) -> InstantFacts:
+    """Return what to remember of one solved round; ``change`` is how it differs from the one before."""
     bright = [_brightest(plate.image[::STRIDE, ::STRIDE]) for plate in one.plates]
     solved = np.any([picture > LIT for picture in bright], axis=0) if mask is None else mask[::STRIDE, ::STRIDE]
     clipped = np.mean(
@@ -70,7 +75,8 @@ def instant_facts(one: Round, surface: Surface, mask: NDArray[np.bool_] | None) 
         time_s=one.time_s,
         valid_share=_share(surface.valid[::STRIDE, ::STRIDE], solved),
         clipped_share=float(clipped),
-        unseen_share=float(np.mean([1 - plate.seen.mean() for plate in one.plates])),
+        unseen_share=float(np.mean([1 - plate.rows_seen.mean() for plate in one.plates])),
+        change=change,
     )
 
 
@@ -112,11 +118,54 @@ def findings(report: RunReport) -> tuple[str, ...]:
             f"Only {100 * valid:.0f} % of what is lit has a normal to be trusted: give the subject more light, place "
             "the lights nearer to the camera's axis, or use more of them, so that three reach every part."
         )
+    worst = _by_level(instants)
+    if worst and abs(_change(worst[0]).level_percent) > MOST_FLICKER_PERCENT:
+        found.append(
+            "The scene flickers: from one result to the next, albedo at rest changes by up to "
+            f"{abs(_change(worst[0]).level_percent):.1f} % as a whole (number {worst[0].number}). Check the LEDs' "
+            "supply and the camera's automatics."
+        )
     found += [
         f"{hole.count} frame(s) are missing after number {hole.after}; rows that they held are not valid."
         for hole in timing.dropped_frames
     ]
     return (*found, *report.warnings)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Flicker:
+    """How much results in turn differ at rest: medians over the clip, and the numbers of the worst instants."""
+
+    normals_deg: float
+    albedo_percent: float
+    level_percent: float
+    worst: tuple[int, ...]
+
+
+def flicker(instants: Sequence[InstantFacts]) -> Flicker | None:
+    """Return the flicker of a clip; None where there are no two results in turn with anything at rest."""
+    known = _by_level(instants)
+    if not known:
+        return None
+    changes = [_change(facts) for facts in known]
+    return Flicker(
+        normals_deg=float(np.median([one.normals_deg for one in changes])),
+        albedo_percent=float(np.median([one.albedo_percent for one in changes])),
+        level_percent=float(np.median([abs(one.level_percent) for one in changes])),
+        worst=tuple(facts.number for facts in known[:3]),
+    )
+
+
+def _by_level(instants: Sequence[InstantFacts]) -> list[InstantFacts]:
+    """Return the instants of which a change is known, the largest change of level first."""
+    known = [facts for facts in instants if facts.change is not None]
+    return sorted(known, key=lambda facts: -abs(_change(facts).level_percent))
+
+
+def _change(facts: InstantFacts) -> Change:
+    if facts.change is None:
+        raise ValueError(f"the change to instant {facts.number} is not known")
+    return facts.change
 
 
 def verdict(report: RunReport) -> str:
@@ -149,6 +198,7 @@ def report_record(report: RunReport) -> dict[str, object]:
         "condition": report.condition,
         "solver": report.solver,
         "trust": report.trust,
+        "flicker": None if (steady := flicker(report.instants)) is None else asdict(steady),
         "instants": [asdict(facts) for facts in report.instants],
     }
 
@@ -188,8 +238,19 @@ def _facts(report: RunReport) -> list[tuple[str, str]]:
         ("Condition of the lights", f"{report.condition:.2f}"),
         ("Solver", report.solver),
         ("What valid means", report.trust),
+        ("Flicker at rest, from result to result", _flicker_words(report.instants)),
         ("Made with", f"psvideo {report.version}"),
     ]
+
+
+def _flicker_words(instants: Sequence[InstantFacts]) -> str:
+    found = flicker(instants)
+    if found is None:
+        return "not known: no two results in turn, or nothing at rest"
+    return (
+        f"normals {found.normals_deg:.2f} degrees, albedo {found.albedo_percent:.2f} %, its level "
+        f"{found.level_percent:.2f} % (medians; worst: {', '.join(map(str, found.worst))})"
+    )
 
 
 def _figure(caption: str, picture: NDArray[np.uint8]) -> str:
