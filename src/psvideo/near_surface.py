@@ -7,9 +7,13 @@ stays wrong.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from psvideo.integrate import Shaping, depth_of, view_of
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.integrate import Shaping, View, depth_of, view_of
 from psvideo.normals.illumination import Illumination
 from psvideo.normals.near_light import Ground, ground_of, is_near
 from psvideo.rig import Light, Rig
@@ -18,6 +22,10 @@ from psvideo.surface import Surface
 NEAR_ITERATIONS = 1
 """How often the surface is made anew unless the user says otherwise: one leaves what the plane's distance costs."""
 MOST_ITERATIONS = 10
+ROUGH_PX = 480
+"""Depth for the lights' sake is integrated on a picture of at most so many pixels along its longer side."""
+LEAST_COVERED = 0.5
+"""Share of a rough pixel's normals that must be there."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,9 +57,39 @@ def solve_near(
     ground = near.ground
     surface = solve(light(ground))
     for _ in range(near.iterations):
-        ground = ground.with_depth(depth_of(near.shaping, surface).depth)
+        ground = ground.with_depth(_rough_depth_m(near.shaping, surface))
         surface = solve(light(ground))
     return surface
+
+
+def _rough_depth_m(shaping: Shaping, surface: Surface) -> NDArray[np.float32]:
+    """Return a surface's depth, 0 where it has none, from normals averaged down to ROUGH_PX: lights see no detail."""
+    rows, cols = surface.valid.shape
+    step = max(int(np.ceil(max(rows, cols) / ROUGH_PX)), 1)
+    if step == 1:
+        return depth_of(shaping, surface).depth
+    high, wide = -(-rows // step), -(-cols // step)
+    margin = ((0, high * step - rows), (0, wide * step - cols), (0, 0))
+    blocks = np.pad(surface.normals.astype(np.float32), margin).reshape(high, step, wide, step, 3)
+    mean = blocks.mean(axis=(1, 3))
+    length = np.linalg.norm(mean, axis=-1)
+    valid = length > LEAST_COVERED
+    normals = np.where(valid[..., None], mean / np.maximum(length, LEAST_COVERED)[..., None], 0)
+    small = Surface(normals=normals, albedo=valid.astype(np.float32), valid=valid)
+    depth = depth_of(replace(shaping, view=_smaller(shaping.view, step)), small).depth
+    size = (wide * step, high * step)
+    known = cv2.resize((depth > 0).astype(np.float32), size, interpolation=cv2.INTER_LINEAR)
+    whole = cv2.resize(depth, size, interpolation=cv2.INTER_LINEAR) / np.maximum(known, 1e-6)
+    rough: NDArray[np.float32] = np.where(known > 0, whole, 0)[:rows, :cols].astype(np.float32)
+    return rough
+
+
+def _smaller(view: View, step: int) -> View:
+    """Return the view of a picture of which each pixel is ``step`` by ``step`` of the whole one's."""
+    if view.focal_px is None or view.principal_px is None:
+        raise ValueError("near lights need a perspective view")
+    x, y = ((middle + 0.5) / step - 0.5 for middle in view.principal_px)
+    return View(focal_px=(view.focal_px[0] / step, view.focal_px[1] / step), principal_px=(x, y))
 
 
 def near_trust(near: NearSurface) -> str:
