@@ -51,8 +51,9 @@ def track(before: Sketch, after: Sketch, flow: Flow, time_s: float) -> Track:
     share = (time_s - before.time_s) / (after.time_s - before.time_s)
     from_before, settled_before = _way_to(flow.forward, share)
     from_after, settled_after = _way_to(flow.backward, 1 - share)
-    shows_before = settled_before & _all_around(flow.steady_before, from_before)
-    shows_after = settled_after & _all_around(flow.steady_after, from_after)
+    compared = np.broadcast_to((before.seen & after.seen)[:, None], before.codes.shape)
+    shows_before = settled_before & _all_around(flow.steady_before & compared, from_before)
+    shows_after = settled_after & _all_around(flow.steady_after & compared, from_after)
     one, other = (_blurred(codes.astype(np.float32), BLUR_PX) for codes in comparable(before, after))
     at_rest = other - one
     along = _fetched(other, from_after) - _fetched(one, from_before)
@@ -65,7 +66,7 @@ def track(before: Sketch, after: Sketch, flow: Flow, time_s: float) -> Track:
     flowing = np.select(
         [shows_before & shows_after & alike, shows_before & ~shows_after, shows_after & ~shows_before],
         [BOTH, BEFORE, AFTER],
-        np.where(square_at_rest < REST**2, AT_REST, NOWHERE),
+        np.where((square_at_rest < REST**2) & compared, AT_REST, NOWHERE),
     )
     source = np.where(moves, flowing, source).astype(np.uint8)
     told = cv2.morphologyEx((source != NOWHERE).astype(np.uint8), cv2.MORPH_OPEN, np.ones((SLIVER_PX, SLIVER_PX)))

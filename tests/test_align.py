@@ -1,0 +1,278 @@
+"""Plates of one round, brought to one instant, show the surface of that instant; what cannot be told is not valid."""
+
+import functools
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from psvideo.align.rounds import Aligning, aligned
+from psvideo.normals.illumination import Illumination
+from psvideo.normals.woodham1980 import solve
+from psvideo.sequence import LightPlate, Round
+from psvideo.surface import Surface
+from psvideo.synth.scene import Scene
+from psvideo.synth.stage import Stage, set_stage
+from psvideo.synth.strobe import TrueFlash
+from psvideo.synth.truth import true_normals
+
+COLS, ROWS, WIDTH_M = 320, 240, 0.8
+PITCH_S = 0.009
+WALL_M = -0.9
+ROUNDS = 3
+
+Plates = tuple[Round, ...]
+
+
+def metres_per_s(px_per_flash: float) -> float:
+    return px_per_flash / PITCH_S * WIDTH_M / COLS
+
+
+MOTIONS: dict[str, dict[str, Any] | None] = {
+    "at rest": None,
+    "1 px": {"velocity_m_per_s": [metres_per_s(1.1), metres_per_s(0.3), 0]},
+    "4 px": {"velocity_m_per_s": [metres_per_s(4.2), metres_per_s(-0.7), 0]},
+    "spin": {"axis": [0, 0, 1], "spin_deg_per_s": float(np.rad2deg(3.0 / 80) / PITCH_S)},
+    "turn": {"axis": [0, 1, 0], "spin_deg_per_s": float(np.rad2deg(1.0 / 80) / PITCH_S)},
+}
+
+
+@dataclass(frozen=True)
+class Filmed:
+    """Rounds of plates, the lights, and what is true at any instant."""
+
+    rounds: Plates
+    lit: Illumination
+    stage: Stage
+
+    @property
+    def lights(self) -> tuple[str, ...]:
+        return self.lit.names
+
+    def error_deg(self, surface: Surface, time_s: float) -> tuple[float, float]:
+        """Return the mean error over the subject, and which share of it is valid."""
+        hits = self.stage.view(time_s).hits
+        subject = hits.image((hits.point_m[:, 2] > WALL_M + 0.01).astype(np.float32)) > 0.5
+        told = surface.valid & subject
+        return float(angle_deg(surface.normals, true_normals(hits))[told].mean()), float(told.sum() / subject.sum())
+
+    def solved(self, one: Round) -> Surface:
+        seen = np.stack([plate.pixels_seen for plate in one.plates])
+        return solve([plate.image for plate in one.plates], self.lit, seen=seen)
+
+
+def angle_deg(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    across = np.linalg.norm(np.cross(one, other), axis=-1)
+    return np.rad2deg(np.arctan2(across, (one * other).sum(axis=-1)))
+
+
+def filmed(lights: int, motion: str, noise: float = 0.0) -> Filmed:
+    """Film, and let the sensor add noise."""
+    clip = noiseless(lights, motion)
+    rng = np.random.default_rng(5)
+
+    def noisy(plate: LightPlate) -> LightPlate:
+        return replace(plate, image=np.asarray(plate.image + rng.normal(0, noise, plate.image.shape), np.float32))
+
+    return replace(clip, rounds=tuple(replace(one, plates=tuple(map(noisy, one.plates))) for one in clip.rounds))
+
+
+@functools.cache
+def noiseless(lights: int, motion: str) -> Filmed:
+    """Film a mottled subject before a wall: three rounds of the lights and a dark slot, middle at 0 s."""
+    turns = 2 * np.pi * np.arange(lights) / lights + 0.3
+    directions = np.stack([0.45 * np.cos(turns), 0.45 * np.sin(turns), np.full(lights, 0.893)], axis=1)
+    table = [{"name": f"l{n}", "direction": [float(x) for x in d], "intensity": 0.9} for n, d in enumerate(directions)]
+    skin = {"pattern": "noise", "colour": 0.8, "second": 0.3, "size_m": 0.05}
+    wall = {"pattern": "noise", "colour": 0.4, "second": 0.2, "size_m": 0.1}
+    stage = set_stage(
+        Scene.model_validate(
+            {
+                "schema": "psvideo-scene/1",
+                "camera": {"width_px": COLS, "height_px": ROWS, "fps": 120, "shutter_deg": 360.0, "readout_s": 0.008,
+                           "width_m": WIDTH_M, "colour": "grey"},
+                "light": table,
+                "object": [
+                    {"mesh": "sphere", "height_m": 0.4, "albedo": skin, "motion": MOTIONS[motion]},
+                    {"mesh": "plane", "scale": 4.0, "position_m": [0, 0, WALL_M], "albedo": wall},
+                ],
+            }
+        ),
+        Path(),
+    )  # fmt: skip
+    still: dict[int, np.ndarray] = {}
+    middle = (ROUNDS - 1) / 2 * (lights + 1) + (lights - 1) / 2
+    rounds = []
+    for index in range(ROUNDS):
+        plates = []
+        for n in range(lights):
+            time_s = (index * (lights + 1) + n - middle) * PITCH_S
+            flash = TrueFlash(
+                index=0, slot=n, lights={f"l{n}": 1.0}, start_s=time_s - 4e-4, duration_s=8e-4, complete=True
+            )
+            image = still.get(n)
+            if image is None:
+                image = stage.plate(flash, stage.view(time_s))
+            if MOTIONS[motion] is None:
+                still[n] = image
+            plates.append(
+                LightPlate(light=f"l{n}", number=1001 + index, time_s=time_s, image=image, seen=np.ones(ROWS, np.bool_))
+            )
+        rounds.append(Round(number=1001 + index, plates=tuple(plates)))
+    unit = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    names = tuple(f"l{n}" for n in range(lights))
+    lit = Illumination(directions=unit, intensities=np.full((lights, 1), 0.9), names=names)
+    return Filmed(rounds=tuple(rounds), lit=lit, stage=stage)
+
+
+def brought(clip: Filmed, how: Aligning = Aligning(), rounds: Plates | None = None) -> list[Round]:
+    return list(aligned(iter(rounds or clip.rounds), clip.lights, how, first=1001))
+
+
+@pytest.mark.parametrize(
+    ("lights", "motion", "before_deg"),
+    [(3, "1 px", 1.2), (3, "4 px", 4.6), (3, "spin", 4.6), (3, "turn", 2.0), (8, "1 px", 2.5), (8, "4 px", 8.8)],
+)
+def test_flow_takes_the_error_of_motion_away(lights: int, motion: str, before_deg: float) -> None:
+    clip = filmed(lights, motion)
+    middle = clip.rounds[1]
+    error_deg, told = clip.error_deg(clip.solved(middle), middle.time_s)
+    assert error_deg > before_deg
+    error_deg, told_after = clip.error_deg(clip.solved(brought(clip)[1]), middle.time_s)
+    assert error_deg < 1.0
+    assert told_after > 0.9 * told
+
+
+@pytest.mark.parametrize("lights", [3, 8])
+def test_through_noise_motion_costs_hardly_more_than_noise_alone(lights: int) -> None:
+    at_rest, clip = filmed(lights, "at rest", 0.01), filmed(lights, "4 px", 0.01)
+    alone_deg, _ = at_rest.error_deg(at_rest.solved(at_rest.rounds[1]), 0.0)
+    one = brought(clip)[1]
+    assert clip.error_deg(clip.solved(one), one.time_s)[0] < alone_deg + 0.2
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+@pytest.mark.parametrize("lights", [3, 8])
+def test_a_scene_at_rest_stays_as_it_is(lights: int, noise: float) -> None:
+    clip = filmed(lights, "at rest", noise)
+    middle = clip.rounds[1]
+    for given, shown in zip(middle.plates, brought(clip)[1].plates, strict=True):
+        assert shown.image is given.image
+    error_deg, told = clip.error_deg(clip.solved(middle), middle.time_s)
+    forced_deg, told_forced = clip.error_deg(clip.solved(brought(clip, Aligning(align="flow"))[1]), middle.time_s)
+    assert forced_deg < error_deg + 0.05
+    assert told_forced > 0.99 * told
+
+
+@pytest.mark.parametrize("rate", ["round", "flash"])
+def test_what_is_delivered_is_the_surface_at_the_time_that_it_names(rate: Any) -> None:
+    clip = filmed(3, "4 px")
+    results = brought(clip, Aligning(rate=rate))
+    for one in results[1:2] if rate == "round" else results[3:6]:
+        assert {plate.time_s for plate in one.plates} == {one.plates[0].time_s}
+        surface = clip.solved(one)
+        off_deg = [clip.error_deg(surface, one.time_s + late * PITCH_S)[0] for late in (-0.25, 0.0, 0.25)]
+        assert off_deg[1] < 1.0 < min(off_deg[0], off_deg[2])
+
+
+@pytest.mark.parametrize("which", [0, -1])
+def test_the_first_and_the_last_round_have_one_side_only(which: int) -> None:
+    clip = filmed(3, "4 px")
+    one = brought(clip)[which]
+    assert clip.error_deg(clip.solved(one), one.time_s)[0] < 1.5
+
+
+def test_one_result_per_flash_takes_numbers_of_its_own() -> None:
+    clip = filmed(3, "4 px")
+    results = brought(clip, Aligning(rate="flash"))
+    assert [one.number for one in results] == list(range(1001, 1001 + 3 * ROUNDS))
+    flashes_s = [plate.time_s for one in clip.rounds for plate in one.plates]
+    assert [one.time_s for one in results] == pytest.approx(flashes_s, abs=1e-12)
+    one_missing = [one.number for one in brought(clip, Aligning(rate="flash"), rounds=clip.rounds[1:])]
+    assert one_missing == list(range(1004, 1010))
+
+
+def test_without_flow_a_result_per_flash_takes_the_plates_nearest_in_time() -> None:
+    clip = filmed(3, "4 px")
+    first = brought(clip, Aligning(align="none", rate="flash"))[3]
+    want = [clip.rounds[1].plates[0], clip.rounds[1].plates[1], clip.rounds[0].plates[2]]
+    assert all(shown.image is given.image for shown, given in zip(first.plates, want, strict=True))
+
+
+def test_what_the_subject_hides_of_the_wall_is_right_or_not_valid() -> None:
+    clip = filmed(8, "4 px")
+    one = brought(clip)[1]
+    hits = clip.stage.view(one.time_s).hits
+    wall = hits.image((hits.point_m[:, 2] <= WALL_M + 0.01).astype(np.float32)) > 0.5
+
+    shadows = angle_deg(clip.solved(at_once(clip, one.time_s)).normals, true_normals(hits)) > 2
+
+    def wrong(shown: Round) -> float:
+        surface = clip.solved(shown)
+        off = angle_deg(surface.normals, true_normals(hits)) > 10
+        return float((off & surface.valid & wall & ~shadows).sum() / wall.sum())
+
+    assert wrong(one) < 0.4 * wrong(clip.rounds[1])
+
+
+def at_once(clip: Filmed, time_s: float) -> Round:
+    """The plates as they would be if all lights had flashed at one instant."""
+    view = clip.stage.view(time_s)
+    plates = []
+    for n, plate in enumerate(clip.rounds[1].plates):
+        flash = TrueFlash(index=0, slot=n, lights={plate.light: 1.0}, start_s=time_s, duration_s=1e-9, complete=True)
+        plates.append(replace(plate, image=clip.stage.plate(flash, view), time_s=time_s))
+    return Round(number=1, plates=tuple(plates))
+
+
+def changed(clip: Filmed, change: Callable[[LightPlate], LightPlate], index: int = 1) -> Plates:
+    rounds = list(clip.rounds)
+    rounds[index] = replace(rounds[index], plates=tuple(map(change, rounds[index].plates)))
+    return tuple(rounds)
+
+
+def test_rows_that_no_frame_saw_stay_unseen_and_do_not_look_like_motion() -> None:
+    clip = filmed(3, "at rest")
+    rows = np.arange(ROWS)
+    seen = (rows < 100) | (rows >= 140)
+
+    def cut(plate: LightPlate) -> LightPlate:
+        return replace(plate, seen=seen, image=plate.image * seen[:, None].astype(np.float32))
+
+    rounds = changed(clip, cut)
+    for shown, given in zip(brought(clip, rounds=rounds)[1].plates, rounds[1].plates, strict=True):
+        assert shown.image is given.image
+        assert (shown.rows_seen == seen).all()
+    moving = filmed(3, "4 px")
+    for shown in brought(moving, rounds=changed(moving, cut))[1].plates[::2]:
+        assert not shown.pixels_seen[103:137].any()
+        assert not shown.image[103:137].any()
+        assert shown.pixels_seen[:90].mean() > 0.8
+
+
+def test_clipped_light_stays_clipped_where_it_moves() -> None:
+    clip = filmed(3, "4 px")
+
+    def brighter(one: Round) -> Round:
+        bright = tuple(replace(p, image=np.minimum(2.2 * p.image, 1).astype(np.float32)) for p in one.plates)
+        return replace(one, plates=bright)
+
+    shown = brought(clip, rounds=tuple(map(brighter, clip.rounds)))[1]
+    truth = brighter(at_once(clip, shown.time_s))
+    for plate, true in zip(shown.plates, truth.plates, strict=True):
+        assert plate.image.max() == 1.0
+        well_clipped = true.image >= 1.0
+        assert well_clipped.sum() > 200
+        assert (plate.image >= 1.0)[well_clipped & plate.pixels_seen].mean() > 0.95
+
+
+def test_a_round_that_lacks_a_light_is_not_shown_but_helps_its_neighbours() -> None:
+    clip = filmed(3, "4 px")
+    rounds = list(clip.rounds)
+    rounds[2] = replace(rounds[2], plates=rounds[2].plates[:1])
+    results = brought(clip, rounds=tuple(rounds))
+    assert [one.number for one in results] == [1001, 1002]
+    assert clip.error_deg(clip.solved(results[1]), results[1].time_s)[0] < 1.5

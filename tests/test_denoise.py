@@ -1,0 +1,154 @@
+"""Averaging over time takes noise out of what is at rest, leaves alone what moves, and flicker is measured."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from psvideo.align.denoise import Average, averaged
+from psvideo.sequence import LightPlate, Round
+from psvideo.surface import Surface
+from psvideo.timing import Timing
+from psvideo.view.report import RunReport, findings, flicker, instant_facts, report_record
+from psvideo.view.steadiness import change, sample_of
+
+ROWS, COLS = 96, 128
+
+
+def surface(
+    rng: np.random.Generator, *, sigma: float = 0.01, gain: float = 1.0, bump_at: float | None = None
+) -> Surface:
+    """A tilted wall with a soft texture, and where ``bump_at`` says a smooth hemisphere of the same albedo."""
+    y, x = np.mgrid[0:ROWS, 0:COLS].astype(np.float64)
+    normals = np.broadcast_to([0.1, -0.2, 0.97], (ROWS, COLS, 3)) / np.linalg.norm([0.1, -0.2, 0.97])
+    if bump_at is not None:
+        across, down = (x - bump_at) / 20, (y - 48) / 20
+        inside = across**2 + down**2 < 0.9
+        dome = np.stack([across, -down, np.sqrt(np.clip(1 - across**2 - down**2, 0.05, 1))], axis=-1)
+        normals = np.where(inside[..., None], dome / np.linalg.norm(dome, axis=-1, keepdims=True), normals)
+    albedo = gain * (0.5 + 0.1 * np.sin(x / 9) * np.cos(y / 7))
+    vectors = albedo[..., None] * normals + rng.normal(0, sigma, normals.shape)
+    length = np.linalg.norm(vectors, axis=-1)
+    return Surface(
+        normals=np.asarray(vectors / length[..., None], np.float32),
+        albedo=np.asarray(length, np.float32),
+        valid=np.ones((ROWS, COLS), np.bool_),
+    )
+
+
+def angle_deg(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    across = np.linalg.norm(np.cross(one, other), axis=-1)
+    return np.rad2deg(np.arctan2(across, (one * other).sum(axis=-1)))
+
+
+def run(surfaces: list[Surface], results: int) -> list[Surface]:
+    average: Average | None = None
+    shown = []
+    for one in surfaces:
+        average, new = averaged(average, one, results)
+        shown.append(new)
+    return shown
+
+
+@pytest.mark.parametrize("results", [4, 9])
+def test_noise_at_rest_falls_with_the_root_of_the_results_averaged(results: int) -> None:
+    rng = np.random.default_rng(1)
+    true = surface(rng, sigma=0)
+    noisy = [surface(rng) for _ in range(results)]
+    shown = run(noisy, results)[-1]
+    before, after = (np.sqrt(np.mean(angle_deg(one.normals, true.normals) ** 2)) for one in (noisy[-1], shown))
+    assert after < 1.15 * before / np.sqrt(results)
+    assert np.mean(shown.albedo / true.albedo) == pytest.approx(1, abs=1e-3)
+
+
+@pytest.mark.parametrize("step_px", [0.5, 2.0, 15.0])
+def test_what_moves_leaves_no_ghost(step_px: float) -> None:
+    rng = np.random.default_rng(2)
+    places = [30 + step_px * n for n in range(5)]
+    noisy = [surface(rng, bump_at=at) for at in places]
+    shown = run(noisy, 8)[-1]
+    true = surface(rng, sigma=0, bump_at=places[-1])
+    y, x = np.mgrid[0:ROWS, 0:COLS]
+    reached = (np.abs(y - 48) < 21) & (x > 9) & (x < places[-1] + 21)
+    error = [angle_deg(one.normals, true.normals)[reached] for one in (noisy[-1], shown)]
+    assert error[1].mean() < error[0].mean() + 0.02
+    assert np.percentile(error[1], 99) < 1.1 * np.percentile(error[0], 99)
+
+
+def test_where_all_of_the_picture_moves_nothing_is_mixed() -> None:
+    rng = np.random.default_rng(3)
+    noisy = [surface(rng) for _ in range(2)]
+    noisy[1] = replace(noisy[1], normals=np.roll(noisy[1].normals[..., ::-1], 7, axis=1))
+    shown = run(noisy, 8)[-1]
+    assert (shown.normals == noisy[1].normals).mean() > 0.99
+
+
+def test_equal_results_stay_as_they_are_and_what_is_not_valid_stays_so() -> None:
+    one = surface(np.random.default_rng(4))
+    hole = one.valid.copy()
+    hole[10:20, 10:20] = False
+    cut = replace(one, valid=hole, normals=one.normals * hole[..., None], albedo=one.albedo * hole)
+    shown = run([one, cut, cut, one], 4)
+    assert not shown[1].normals[10:20, 10:20].any()
+    assert not shown[1].albedo[10:20, 10:20].any()
+    for result, given in zip(shown, [one, cut, cut, one], strict=True):
+        np.testing.assert_allclose(result.normals, given.normals, atol=1e-6)
+        np.testing.assert_allclose(result.albedo, given.albedo, rtol=1e-6)
+
+
+def test_half_floats_and_colour_keep_their_form() -> None:
+    grey = surface(np.random.default_rng(5))
+    tint = np.array([1.0, 0.8, 0.5], np.float32)
+    half = Surface(
+        normals=grey.normals.astype(np.float16),
+        albedo=(grey.albedo[..., None] * tint).astype(np.float16),
+        valid=grey.valid,
+    )
+    shown = run([half, half], 2)[1]
+    assert shown.normals.dtype == shown.albedo.dtype == np.float16
+    np.testing.assert_allclose(shown.albedo, half.albedo, atol=1e-3)
+
+
+def test_flicker_is_told_from_noise_and_from_motion() -> None:
+    rng = np.random.default_rng(6)
+    first = sample_of(surface(rng, bump_at=40))
+    steady = change(first, sample_of(surface(rng, bump_at=60)))
+    flickers = change(first, sample_of(surface(rng, bump_at=60, gain=1.03)))
+    assert steady is not None
+    assert flickers is not None
+    assert abs(steady.level_percent) < 0.3
+    assert flickers.level_percent == pytest.approx(3.0, abs=0.3)
+    # noise of 0.01 on 0.5 in two directions across, twice: Rayleigh's median
+    assert steady.normals_deg == pytest.approx(np.rad2deg(0.01 / 0.5) * np.sqrt(2) * 1.1774, rel=0.1)
+    assert steady.albedo_percent == pytest.approx(100 * 0.01 / 0.5 * np.sqrt(2) * 0.6745, rel=0.1)
+    nothing = Surface(
+        normals=np.zeros((ROWS, COLS, 3), np.float32),
+        albedo=np.zeros((ROWS, COLS), np.float32),
+        valid=np.zeros((ROWS, COLS), np.bool_),
+    )
+    assert change(first, sample_of(nothing)) is None
+
+
+def test_the_report_names_the_worst_instants() -> None:
+    rng = np.random.default_rng(7)
+    gains = [1.0, 1.0, 1.05, 1.05, 1.05]
+    facts, before = [], None
+    for n, gain in enumerate(gains):
+        one = surface(rng, gain=gain)
+        plate = LightPlate(light="a", number=n, time_s=float(n), image=one.albedo, seen=np.ones(ROWS, np.bool_))
+        now = sample_of(one)
+        changed = None if before is None else change(before, now)
+        facts.append(instant_facts(Round(number=1001 + n, plates=(plate,)), one, None, changed))
+        before = now
+    timing = Timing(clip="c", frame_period_s=1, exposure_s=1, row_time_s=0, clock_offset_ppm=0, phase_error_rows=0,
+                    order="given", flashes=())  # fmt: skip
+    report = RunReport(clip="c", version="0", timing=timing, lights=("a",), condition=1.0, instants=tuple(facts))
+    found = flicker(report.instants)
+    assert found is not None
+    assert found.worst[0] == 1003
+    assert found.level_percent < 0.5
+    assert any(re.search(r"[45]\.\d % as a whole \(number 1003\)", sentence) for sentence in findings(report))
+    steady = replace(report, instants=report.instants[:2])
+    assert not any("flickers" in sentence for sentence in findings(steady))
+    assert report_record(replace(report, instants=report.instants[:1]))["flicker"] is None
