@@ -132,7 +132,7 @@ def sequence_fps(plan: Plan, rate: Rate = "round") -> Fraction:
 class OverTime:
     """What is done between instants: how plates are brought to one, and how many results are averaged at rest."""
 
-    aligning: Aligning = field(default_factory=Aligning)
+    aligning: Aligning = field(default_factory=lambda: Aligning(align="none"))
     denoise: int = 1
 
     def check(self, plan: Plan) -> None:

@@ -102,8 +102,9 @@ def normals(
     frames: Frames = None,
     first_light: FirstLight = None,
     solver: Annotated[
-        SolverName, typer.Option(help="auto: robust against highlights and shadows from five lights on.")
-    ] = SolverName.auto,
+        SolverName,
+        typer.Option(help="auto: robust against highlights and shadows from five lights on."),
+    ] = SolverName.least_squares,
     near_iterations: Annotated[
         int,
         typer.Option(
@@ -118,8 +119,9 @@ def normals(
     ] = None,
     y: Annotated[YDirection, typer.Option("--y", help="up as in OpenGL, down as in DirectX.")] = YDirection.up,
     align: Annotated[
-        AlignName, typer.Option(help="Move plates of one round to one instant: auto does where something moves.")
-    ] = AlignName.auto,
+        AlignName,
+        typer.Option(help="Move plates of one round to one instant by flow; auto: where it moves."),
+    ] = AlignName.none,
     rate: Annotated[RateName, typer.Option(help="One result per round, or per flash.")] = RateName.round,
     denoise: Annotated[int, typer.Option(min=1, max=64, help="Average up to N results where nothing moves.")] = 1,
     float32: Annotated[bool, typer.Option("--float", help="Store normals as 32-bit floats.")] = False,
