@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
-from psvideo import runs
 from psvideo.cli.app import main
 from psvideo.clip import kept, reading
+from psvideo.runs import results as runs
 
 SCENES = Path(__file__).resolve().parents[1] / "data_synth"
 

@@ -1,0 +1,73 @@
+"""Where a run writes, at what rate its sequences play, and under which settings a stopped one may go on."""
+
+import hashlib
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+from psvideo import __version__
+from psvideo.align.rounds import Rate
+from psvideo.clip import Clip
+from psvideo.export.publish import refuse_folder, whole_folder
+from psvideo.export.space import CAMERA_SPACE, Space
+from psvideo.export.tags import Tags, sha256_of
+from psvideo.pipeline import (
+    Take,
+)
+from psvideo.plan import Plan
+from psvideo.sequence import FIRST_NUMBER
+from psvideo.timing import Timing, format_timing
+
+MARK = "timing.json"
+"""The file by which a folder of plates or results is known."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Output:
+    """Where a run writes, and what it may do there."""
+
+    folder: Path
+    force: bool = False
+    resume: bool = False
+    start_number: int = FIRST_NUMBER
+
+    def check(self) -> None:
+        """Raise UsageError where the folder exists and may not be replaced, before any work is done."""
+        refuse_folder(self.folder, mark=MARK, force=self.force)
+
+
+def settings_of(take: Take, timing: Timing, output: Output, *what: object) -> str:
+    """Return what a run depends on as a digest; a stopped run is resumed only under the same."""
+    numbers = f"{take.numbers[0]}-{take.numbers[-1]} ({len(take.numbers)})"
+    plan = sha256_of(take.clip.plan_path)
+    parts = [__version__, take.clip.path.resolve(), numbers, plan, format_timing(timing), output.start_number, *what]
+    return hashlib.sha256("\n".join(map(str, parts)).encode()).hexdigest()
+
+
+def folder_of(output: Output, settings: str) -> AbstractContextManager[Path]:
+    """Return the block that writes the folder whole or not at all."""
+    return whole_folder(output.folder, mark=MARK, force=output.force, resume=output.resume, settings=settings)
+
+
+def sequence_fps(plan: Plan, rate: Rate = "round") -> Fraction:
+    """Return the rate of rounds, or of the lights' flashes, at which a sequence is delivered; the mean where dark slots
+    come between."""
+    results = len(plan.lights) if rate == "flash" else 1
+    if plan.mode == "synced":
+        return results * plan.camera.fps / len(plan.flashes)
+    return Fraction(results * plan.dark_every / plan.cycle_s).limit_denominator(100_000)
+
+
+def tags_of(clip: Clip, rig_path: Path | None = None, space: Space = CAMERA_SPACE, rate: Rate = "round") -> Tags:
+    """Return what every file of a run says of itself."""
+    return Tags(
+        fps=sequence_fps(clip.plan, rate),
+        colour=clip.colour,
+        plan_sha256=sha256_of(clip.plan_path),
+        rig_sha256=None if rig_path is None else sha256_of(rig_path),
+        space=space.name,
+        y=space.y,
+        camera_fps=clip.plan.camera.fps,
+        first_time_code=clip.time_code,
+    )

@@ -1,0 +1,71 @@
+"""A whole split: a clip in, a folder of plates out."""
+
+from dataclasses import replace
+from functools import partial
+
+from psvideo.clip import Clip
+from psvideo.errors import PsvideoError
+from psvideo.export.plates import plate_name, write_flash, write_plate
+from psvideo.export.writer import writing
+from psvideo.files import write_text
+from psvideo.pipeline import (
+    Method,
+    Take,
+    Watch,
+    clip_rounds,
+    unwatched,
+)
+from psvideo.runs.output import Output, folder_of, settings_of, tags_of
+from psvideo.sequence import round_numbers
+from psvideo.timing import Timing, format_timing
+
+
+def split_run(
+    take: Take,
+    timing: Timing,
+    output: Output,
+    *,
+    method: Method = "weights",
+    flashes: bool = False,
+    watch: Watch = unwatched,
+) -> Timing:
+    """Write one sequence per light, ambient where there are dark slots, and timing.json; return what that holds."""
+    clip = take.clip
+    tags = tags_of(clip)
+    written: set[str] = set()
+    settings = settings_of(take, timing, output, method, flashes)
+    with folder_of(output, settings) as folder, writing() as write:
+        each = (lambda plate: write(partial(write_flash, folder, clip.name, plate, tags))) if flashes else None
+        for one in clip_rounds(
+            take, timing, method=method, start_number=output.start_number, watch=watch, each_flash=each
+        ):
+            for plate in (*one.plates, *((one.ambient,) if one.ambient else ())):
+                name = plate_name(clip.name, plate.light, plate.number)
+                written.add(name)
+                if not (output.resume and (folder / name).is_file()):
+                    write(partial(write_plate, folder, clip.name, plate, tags))
+        if not written:
+            raise PsvideoError(nothing_complete(clip, timing))
+        timing = _with_plates(timing, clip.name, written, start_number=output.start_number)
+        write_text(folder / "timing.json", format_timing(timing))
+    return timing
+
+
+def nothing_complete(clip: Clip, timing: Timing) -> str:
+    """Return what to say of a clip that gives no single round."""
+    return (
+        f"{clip.path}: holds no round in which every flash is complete ({len(timing.flashes)} flashes are seen), so "
+        "there is nothing to write. Use more frames: a round needs as many as it has flashes, and one or two more."
+    )
+
+
+def _with_plates(timing: Timing, clip: str, written: set[str], *, start_number: int) -> Timing:
+    """Note every flash's plate where one was written of the light that it shows alone, or of the ambient light."""
+    numbers = round_numbers(timing.flashes, start=start_number)
+    flashes = []
+    for flash, number in zip(timing.flashes, numbers, strict=True):
+        lit = [light for light, power in flash.lights.items() if power > 0]
+        name = plate_name(clip, lit[0] if lit else "ambient", number)
+        noted = flash.complete and len(lit) <= 1 and name in written
+        flashes.append(replace(flash, plate=name if noted else None))
+    return replace(timing, flashes=tuple(flashes))

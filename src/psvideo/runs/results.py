@@ -1,0 +1,168 @@
+"""A whole normals run: a clip in, a folder of files out, with decoding, computing and writing side by side."""
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo import __version__
+from psvideo.align.rounds import Aligning, aligned
+from psvideo.errors import PsvideoError, UsageError
+from psvideo.export.mesh import animation_name
+from psvideo.export.results import Delivery, is_written, mesh_file, write_surface
+from psvideo.export.tags import Tags
+from psvideo.export.usd import write_animation
+from psvideo.export.writer import writing
+from psvideo.files import write_text
+from psvideo.integrate import Shaping, begun, depth_of, reservations, view_of
+from psvideo.normals.solving import Solver, Solving, trust_note
+from psvideo.pipeline import (
+    Instant,
+    Take,
+    Watch,
+    clip_rounds,
+    denoised,
+    surfaces,
+    unwatched,
+)
+from psvideo.plan import Plan
+from psvideo.runs.lighting import Lighting
+from psvideo.runs.look import look
+from psvideo.runs.output import Output, folder_of, settings_of, tags_of
+from psvideo.runs.plates import nothing_complete
+from psvideo.timing import Timing, format_timing
+from psvideo.view.report import InstantFacts, RunReport, instant_facts, report_page, report_record
+from psvideo.view.steadiness import Sample, change, sample_of
+
+Pixels = NDArray[np.uint8]
+SAMPLE_ROUND = 3
+"""The round that the report shows, counted from 1; the first where there are fewer."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class OverTime:
+    """What is done between instants: how plates are brought to one, and how many results are averaged at rest."""
+
+    aligning: Aligning = field(default_factory=lambda: Aligning(align="none"))
+    denoise: int = 1
+
+    def check(self, plan: Plan) -> None:
+        """Raise UsageError where a plan has no instant of its own for every light, and one is asked for."""
+        alone = all(sum(power > 0 for power in plan.flashes[slot].lights.values()) == 1 for slot in plan.lit_slots)
+        if self.aligning.rate == "flash" and not (alone and len(plan.lit_slots) == len(plan.lights)):
+            raise UsageError(
+                "--rate flash needs a plan in which every light flashes once a round, by itself; in this one lights "
+                "flash together, or several times. Leave it out: one result per round is given."
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class NormalsResult:
+    """What a normals run gave: the report, and a picture of one round."""
+
+    report: RunReport
+    picture: Pixels
+
+
+def _solving(plan: Plan, solver: Solver, delivery: Delivery) -> Solving:
+    solving = Solving(
+        solver=solver, half=delivery.half, residual="residual" in delivery.aovs, error="error" in delivery.aovs
+    )
+    method = solving.method(len(plan.lights))
+    if solving.error and method != "robust":
+        raise UsageError(
+            f"--aov error is what the robust solver predicts, and this run of {len(plan.lights)} lights uses "
+            f"{method}. Add --solver robust, or leave --aov error out."
+        )
+    return solving
+
+
+def normals_run(
+    take: Take,
+    timing: Timing,
+    lighting: Lighting,
+    output: Output,
+    *,
+    delivery: Delivery,
+    solver: Solver = "auto",
+    over_time: OverTime | None = None,
+    watch: Watch = unwatched,
+    picture_of: Callable[[Instant], Pixels] | None = None,
+) -> NormalsResult:
+    """Write normals, albedo and validity of every instant, timing.json and the report; return what is to be reported.
+
+    ``picture_of`` makes the picture of one round; left out, it shows plates and surface.
+    """
+    clip, mask = take.clip, lighting.mask
+    over_time = over_time or OverTime()
+    over_time.check(clip.plan)
+    tags = tags_of(clip, lighting.rig_path, delivery.space, over_time.aligning.rate)
+    shaping = Shaping(view=view_of(lighting.rig), plane=lighting.rig.plane) if delivery.needs_depth else None
+    facts: list[InstantFacts] = []
+    picture: Pixels | None = None
+    seen: Sample | None = None
+    solving = _solving(clip.plan, solver, delivery)
+    method = solving.method(len(clip.plan.lights))
+    light = (lighting.mask_sha256, method, lighting.near_iterations)
+    settings = settings_of(take, timing, output, tags, delivery, over_time, *light)
+    with (
+        folder_of(output, settings) as folder,
+        _animation(folder, clip.name, facts, delivery, tags, shaping),
+        writing() as write,
+    ):
+        rounds = clip_rounds(take, timing, start_number=output.start_number, watch=watch)
+        rounds = aligned(rounds, clip.plan.lights, over_time.aligning, first=output.start_number)
+        found = surfaces(rounds, clip.plan, lighting.rig, mask=mask, solving=solving, near=lighting.near)
+        for instant in found if over_time.denoise < 2 else denoised(found, over_time.denoise):
+            if shaping is not None and shaping.first is None:
+                shaping = begun(shaping, instant.surface)
+            if not (output.resume and is_written(folder, clip.name, instant.round.number, delivery)):
+                # the surface only: plates are many times larger, and must not wait for the files
+                surface, at = instant.surface, (instant.round.number, instant.round.time_s)
+                shaped = None if shaping is None else partial(depth_of, shaping, surface)
+                write(
+                    partial(write_surface, folder, clip.name, *at, surface, delivery=delivery, tags=tags, depth=shaped)
+                )
+                del surface
+            before, seen = seen, sample_of(instant.surface)
+            changed = None if before is None else change(before, seen)
+            facts.append(instant_facts(instant.round, instant.surface, mask, changed))
+            if len(facts) in (1, SAMPLE_ROUND):
+                picture = (picture_of or look)(instant)
+            del instant  # its plates would be held while the next round gathers
+        if picture is None:
+            raise PsvideoError(nothing_complete(clip, timing))
+        report = RunReport(
+            clip=clip.name,
+            version=__version__,
+            timing=timing,
+            lights=clip.plan.lights,
+            condition=lighting.condition,
+            solver=method,
+            trust=" ".join([trust_note(method, len(clip.plan.lights)), *lighting.near_notes]),
+            instants=tuple(facts),
+            warnings=(*lighting.doubts, *(() if shaping is None else reservations(shaping))),
+        )
+        write_text(folder / "timing.json", format_timing(timing))
+        write_text(folder / "report.json", json.dumps(report_record(report), indent=1) + "\n")
+        write_text(folder / "report.html", report_page(report, [("One round", picture)]))
+    return NormalsResult(report=report, picture=picture)
+
+
+@contextmanager
+def _animation(
+    folder: Path, clip: str, facts: Sequence[InstantFacts], delivery: Delivery, tags: Tags, shaping: Shaping | None
+) -> Iterator[None]:
+    """At the end of a block that wrote the meshes of all instants, make one animated file of them where asked for."""
+    yield
+    if shaping is None or not facts or "usd" not in delivery.meshes:
+        return
+    parts = {one.number: folder / mesh_file(clip, one.number, "usd") for one in facts}
+    write_animation(folder / animation_name(clip), parts, tags.fps, metric=shaping.metric)
+    for part in parts.values():
+        part.unlink()
