@@ -19,9 +19,11 @@ from psvideo import __version__
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.exr import Crop, write_exr
 from psvideo.export.plates import write_flash, write_plate
+from psvideo.export.png import decode_normals, encode_normals
+from psvideo.export.pose import read_pose
 from psvideo.export.publish import whole_folder
-from psvideo.export.results import Delivery, decode_normals, encode_normals, is_written, write_surface
-from psvideo.export.space import Space, choose_space, placed, read_rotation
+from psvideo.export.results import Delivery, is_written, write_surface
+from psvideo.export.space import Space, choose_space, placed
 from psvideo.export.tags import Tags
 from psvideo.export.writer import writing
 from psvideo.sequence import LightPlate
@@ -187,7 +189,7 @@ def test_world_normals_are_turned_by_the_camera_and_unturned_by_its_inverse(tmp_
     matrix[:3, :3] = 2 * quarter
     path = tmp_path / "camera.txt"
     np.savetxt(path, matrix)
-    rotation = read_rotation(path)
+    rotation = read_pose(path).rotation
     np.testing.assert_allclose(rotation, quarter, atol=1e-12)
     normals = unit_normals()
     world = placed(normals, Space(name="world", camera_to_world=rotation))
@@ -201,7 +203,7 @@ def test_what_is_no_rotation_is_refused(text: str, tmp_path: Path) -> None:
     path = tmp_path / "camera.txt"
     path.write_text(text)
     with pytest.raises(PsvideoError, match=r"camera\.txt"):
-        read_rotation(path)
+        read_pose(path)
 
 
 def test_spaces_that_do_not_fit_their_options_are_refused() -> None:

@@ -15,7 +15,8 @@ from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
 from psvideo.export.mesh import srgb_codes, write_part, write_ply
 from psvideo.export.space import CAMERA_SPACE, Space
-from psvideo.export.usd import require_usd, write_animation
+from psvideo.export.usd import write_animation
+from psvideo.export.usd_core import require_usd
 from psvideo.integrate import Mesh
 from psvideo.runs import Output
 

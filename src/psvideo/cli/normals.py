@@ -8,6 +8,22 @@ import typer
 
 from psvideo.align.rounds import Aligning
 from psvideo.cli.console import Voice, tell_kept
+from psvideo.cli.delivery_options import (
+    AovOption,
+    CameraName,
+    CameraTimeOption,
+    CameraToWorld,
+    EncodeOption,
+    Encoding,
+    FloatOption,
+    MeshOption,
+    Multipart,
+    Separate,
+    SpaceName,
+    SpaceOption,
+    YDirection,
+    YOption,
+)
 from psvideo.cli.opening import open_and_tell
 from psvideo.cli.options import (
     ClipPath,
@@ -25,26 +41,11 @@ from psvideo.cli.options import (
 from psvideo.cli.sync import describe_timing
 from psvideo.export.results import Delivery
 from psvideo.export.space import choose_space
-from psvideo.export.usd import require_usd
+from psvideo.export.usd_core import require_usd
 from psvideo.near_surface import MOST_ITERATIONS, NEAR_ITERATIONS
 from psvideo.pipeline import decoded_once
 from psvideo.runs import Output, OverTime, normals_run, read_lighting, timing_of
 from psvideo.view.report import findings, report_record, verdict
-
-
-class SpaceName(StrEnum):
-    """The frame of the delivered normals."""
-
-    camera = "camera"
-    world = "world"
-    tangent = "tangent"
-
-
-class YDirection(StrEnum):
-    """Which way the green channel points."""
-
-    up = "up"
-    down = "down"
 
 
 class SolverName(StrEnum):
@@ -53,22 +54,6 @@ class SolverName(StrEnum):
     auto = "auto"
     least_squares = "least-squares"
     robust = "robust"
-
-
-class Aov(StrEnum):
-    """What may be written besides."""
-
-    residual = "residual"
-    error = "error"
-    depth = "depth"
-    position = "position"
-
-
-class MeshKind(StrEnum):
-    """Kinds of files for the surface as a mesh."""
-
-    ply = "ply"
-    usd = "usd"
 
 
 class AlignName(StrEnum):
@@ -84,12 +69,6 @@ class RateName(StrEnum):
 
     round = "round"
     flash = "flash"
-
-
-class Encoding(StrEnum):
-    """Other encodings of the same maps."""
-
-    png16 = "png16"
 
 
 def normals(
@@ -113,32 +92,23 @@ def normals(
             max=MOST_ITERATIONS,
         ),
     ] = NEAR_ITERATIONS,
-    space: Annotated[SpaceName, typer.Option(help="Camera axes, the world's, or a flat card's.")] = SpaceName.camera,
-    camera_to_world: Annotated[
-        Path | None, typer.Option("--camera-to-world", help="For --space world: a text file, 3 x 3 or 4 x 4 matrix.")
-    ] = None,
-    y: Annotated[YDirection, typer.Option("--y", help="up as in OpenGL, down as in DirectX.")] = YDirection.up,
+    space: SpaceOption = SpaceName.camera,
+    camera_to_world: CameraToWorld = None,
+    camera: CameraName = None,
+    camera_time: CameraTimeOption = None,
+    y: YOption = YDirection.up,
     align: Annotated[
         AlignName,
         typer.Option(help="Move plates of one round to one instant by flow; auto: where it moves."),
     ] = AlignName.none,
     rate: Annotated[RateName, typer.Option(help="One result per round, or per flash.")] = RateName.round,
     denoise: Annotated[int, typer.Option(min=1, max=64, help="Average up to N results where nothing moves.")] = 1,
-    float32: Annotated[bool, typer.Option("--float", help="Store normals as 32-bit floats.")] = False,
-    aov: Annotated[
-        list[Aov] | None, typer.Option("--aov", help="Write this besides; may be given several times.")
-    ] = None,
-    mesh: Annotated[
-        list[MeshKind] | None,
-        typer.Option("--mesh", help="Write meshes besides: ply, one per instant; usd, one animated file."),
-    ] = None,
-    encode: Annotated[
-        Encoding | None, typer.Option("--encode", help="Write 16-bit PNG maps of 0 to 1 besides.")
-    ] = None,
-    separate: Annotated[
-        bool, typer.Option("--separate", help="One sequence per quantity; this is the default.")
-    ] = True,
-    multipart: Annotated[bool, typer.Option("--multipart", help="Write one EXR with all quantities besides.")] = False,
+    float32: FloatOption = False,
+    aov: AovOption = None,
+    mesh: MeshOption = None,
+    encode: EncodeOption = None,
+    separate: Separate = True,
+    multipart: Multipart = False,
     start_number: StartNumber = 1001,
     force: Force = False,
     resume: Resume = False,
@@ -151,7 +121,13 @@ def normals(
     output = Output(folder=out, force=force, resume=resume, start_number=start_number)
     output.check()
     delivery = Delivery(
-        space=choose_space(space.value, y.value, camera_to_world),
+        space=choose_space(
+            space.value,
+            y.value,
+            camera_to_world,
+            camera=camera,
+            camera_time=None if camera_time is None else camera_time.value,
+        ),
         half=not float32,
         aovs=tuple(dict.fromkeys(name.value for name in aov or ())),
         meshes=tuple(dict.fromkeys(kind.value for kind in mesh or ())),

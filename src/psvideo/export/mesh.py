@@ -1,16 +1,17 @@
-"""Meshes as files: one PLY per instant, y up, in metres where the depth is.
+"""Meshes as files: one PLY per instant, in the camera's frame (y up, metres where the depth is) or in the world's.
 
 Colours in a PLY are 8-bit sRGB, which is what viewers take them for: the linear albedo, clipped at 1, never stretched.
 """
 
 import io
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
 
-from psvideo.export.space import Space
+from psvideo.export.space import Space, placed, placed_points
 from psvideo.files import whole_file
 from psvideo.integrate.mesh import Mesh
 
@@ -33,24 +34,24 @@ def animation_name(clip: str) -> str:
     return f"mesh/{clip}_mesh.usdc"
 
 
-def in_space(vectors: NDArray[np.float32], space: Space) -> NDArray[np.float32]:
-    """Return points or normals (vertex, 3) turned into world space where that is asked for.
+def in_space(mesh: Mesh, space: Space) -> Mesh:
+    """Return a mesh placed in world space where that is asked for.
 
-    y stays up whatever ``space.y`` says: meshes are right-handed, and flipping one axis would mirror them.
+    y stays as it is whatever ``space.y`` says: meshes are right-handed, and flipping one axis would mirror them.
     """
-    if space.camera_to_world is None:
-        return vectors
-    turned: NDArray[np.float32] = (vectors @ space.camera_to_world.T).astype(np.float32)
-    return turned
+    kept = replace(space, y="up")
+    points = placed_points(mesh.points, kept, np.ones(len(mesh.points), np.bool_))
+    return replace(mesh, points=points.astype(np.float32), normals=placed(mesh.normals, kept).astype(np.float32))
 
 
 def write_ply(path: Path, mesh: Mesh, space: Space) -> None:
     """Write one mesh as a binary PLY with normals and vertex colours, whole or not at all."""
+    placed_mesh = in_space(mesh, space)
     shape = trimesh.Trimesh(
-        vertices=in_space(mesh.points, space),
-        faces=mesh.triangles,
-        vertex_normals=in_space(mesh.normals, space),
-        vertex_colors=srgb_codes(mesh.colours),
+        vertices=placed_mesh.points,
+        faces=placed_mesh.triangles,
+        vertex_normals=placed_mesh.normals,
+        vertex_colors=srgb_codes(placed_mesh.colours),
         process=False,
     )
     with whole_file(path) as beside:
@@ -69,13 +70,8 @@ def srgb_codes(linear: NDArray[np.float32]) -> NDArray[np.uint8]:
 def write_part(path: Path, mesh: Mesh, space: Space) -> None:
     """Keep one instant's mesh for the animation that is put together when all are there."""
     stream = io.BytesIO()
-    np.savez(
-        stream,
-        points=in_space(mesh.points, space),
-        triangles=mesh.triangles,
-        normals=in_space(mesh.normals, space),
-        colours=mesh.colours,
-    )
+    part = in_space(mesh, space)
+    np.savez(stream, points=part.points, triangles=part.triangles, normals=part.normals, colours=part.colours)
     with whole_file(path) as beside:
         beside.write_bytes(stream.getbuffer())
 

@@ -4,29 +4,28 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.errors import PsvideoError
 from psvideo.export.exr import write_exr, write_exr_parts
 from psvideo.export.mesh import mesh_name, write_part, write_ply
 from psvideo.export.plates import image_channels
-from psvideo.export.space import Space, placed
+from psvideo.export.png import PNG_MAX, encode_normals, write_png16
+from psvideo.export.space import Space, placed, placed_points
 from psvideo.export.tags import Tags
-from psvideo.files import whole_file
 from psvideo.integrate import Depth, mesh_of
 from psvideo.surface import Surface
 
-PNG_MAX = 65535
+COLOURS = frozenset({"albedo", "beauty"})
+"""What is light or colour; everything else is data."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Delivery:
     """How results are written.
 
-    ``half`` False stores normals as 32-bit floats; ``aovs`` may add "residual", "error", "depth" and "position", the
-    last two always in 32 bits; ``meshes`` may hold "ply" and "usd".
+    ``half`` False stores normals as 32-bit floats; ``aovs`` may add "residual", "error", "beauty", "depth" and
+    "position", the last two always in 32 bits; ``meshes`` may hold "ply" and "usd".
     """
 
     space: Space
@@ -83,10 +82,11 @@ def write_surface(
     delivery: Delivery,
     tags: Tags,
     depth: Callable[[], Depth] | None = None,
+    beauty: NDArray[np.floating] | None = None,
 ) -> None:
     """Write one instant: normals as signed unit vectors, linear albedo, validity, and the AOVs and meshes asked for.
 
-    ``depth``, which integrates the normals, is needed where ``delivery.needs_depth``.
+    ``depth``, which integrates the normals, is needed where ``delivery.needs_depth``, ``beauty`` where it is an AOV.
     """
     normals = placed(surface.normals, delivery.space)
     planes: dict[str, dict[str, NDArray[np.floating]]] = {
@@ -102,29 +102,35 @@ def write_surface(
         if surface.error_deg is None:
             raise ValueError("the error is to be written and was not predicted")
         planes["error"] = {"Y": surface.error_deg}
+    if "beauty" in delivery.aovs:
+        if beauty is None:
+            raise ValueError("the beauty plate is to be written and was not summed")
+        planes["beauty"] = image_channels(_three_channels(beauty))
     if delivery.needs_depth:
         if depth is None:
             raise ValueError("depth is to be written and was not integrated")
         shape = depth()
         planes |= _shape_planes(shape, delivery)
         _write_meshes(folder, clip, number, surface, shape, delivery)
+    world = delivery.space.attributes()
+    attributes = {name: tags.attributes(time_s=time_s, data=name not in COLOURS) | world for name in planes}
     for quantity, channels in planes.items():
         write_exr(
             folder / result_name(clip, quantity, number),
             channels,
             half=is_half(quantity, delivery),
-            attributes=tags.attributes(time_s=time_s, data=quantity != "albedo"),
+            attributes=attributes[quantity],
             fps=tags.fps,
             time_code=tags.time_code(time_s),
         )
     if delivery.multipart:
-        attributes = {name: tags.attributes(time_s=time_s, data=name != "albedo") for name in planes}
         halves = {name: is_half(name, delivery) for name in planes}
         write_exr_parts(folder / bundle_name(clip, number), planes, half=halves, attributes=attributes, fps=tags.fps)
     if delivery.png16:
-        write_png16(folder / result_name(clip, "normals", number, suffix="png"), encode_normals(normals))
+        texts = {key: str(value) for key, value in attributes["normals"].items()}
+        write_png16(folder / result_name(clip, "normals", number, suffix="png"), encode_normals(normals), texts=texts)
         mask = np.where(surface.valid, np.uint16(PNG_MAX), np.uint16(0))
-        write_png16(folder / result_name(clip, "valid", number, suffix="png"), mask)
+        write_png16(folder / result_name(clip, "valid", number, suffix="png"), mask, texts=texts)
 
 
 def is_half(quantity: str, delivery: Delivery) -> bool:
@@ -138,7 +144,7 @@ def _shape_planes(depth: Depth, delivery: Delivery) -> dict[str, dict[str, NDArr
         planes["depth"] = {"Y": depth.depth}
     if "position" in delivery.aovs:
         points = depth.view.points(depth.depth).astype(np.float32)
-        planes["position"] = image_channels(placed(points, delivery.space))
+        planes["position"] = image_channels(placed_points(points, delivery.space, depth.depth > 0))
     return planes
 
 
@@ -154,26 +160,3 @@ def _write_meshes(folder: Path, clip: str, number: int, surface: Surface, depth:
 def _three_channels(albedo: NDArray[np.floating]) -> NDArray[np.floating]:
     """Return the albedo with three channels: grey footage gives three alike."""
     return albedo if albedo.ndim == 3 else np.broadcast_to(albedo[..., None], (*albedo.shape, 3))
-
-
-def encode_normals(normals: NDArray[np.floating]) -> NDArray[np.uint16]:
-    """Return unit normals as 16-bit codes, 0.5 + 0.5 n over 0 to 65535; (0, 0, 0) becomes the middle."""
-    codes = np.clip(0.5 + 0.5 * normals.astype(np.float64), 0, 1) * PNG_MAX + 0.5
-    return codes.astype(np.uint16)
-
-
-def decode_normals(codes: NDArray[np.uint16]) -> NDArray[np.float32]:
-    """Return normals from their 16-bit codes, made unit again; what lies about the middle is (0, 0, 0)."""
-    normals = codes.astype(np.float64) / PNG_MAX * 2 - 1
-    length = np.linalg.norm(normals, axis=-1, keepdims=True)
-    unit = np.where(length > 0.5, normals / np.maximum(length, 1e-9), 0.0)
-    return unit.astype(np.float32)
-
-
-def write_png16(path: Path, codes: NDArray[np.uint16]) -> None:
-    """Write a 16-bit PNG, grey or R, G, B, whole or not at all."""
-    done, data = cv2.imencode(".png", codes if codes.ndim == 2 else codes[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 1])
-    if not done:
-        raise PsvideoError(f"{path}: the picture of shape {codes.shape} cannot be encoded as PNG.")
-    with whole_file(path) as beside:
-        beside.write_bytes(data.tobytes())

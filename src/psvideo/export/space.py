@@ -1,12 +1,13 @@
 """The frame in which normals are delivered: camera, world or tangent space, and which way y points.
 
-Solved normals are in the camera frame (x right, y up, z to the camera). *World* turns them by the camera's rotation.
-*Tangent* is the frame of a flat card that faces the camera, as game engines take a normal map: the same three numbers
-as camera space, under the name that says how to use them. ``y = "down"`` flips the green channel (DirectX).
+Solved normals are in the camera frame (x right, y up, z to the camera). *World* turns them by the camera's rotation,
+and moves positions to where the camera stands, in the world's own unit. *Tangent* is the frame of a flat card that
+faces the camera, as game engines take a normal map: the same three numbers as camera space, under the name that says
+how to use them. ``y = "down"`` flips the green channel (DirectX).
 """
 
-import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Literal
 
@@ -14,71 +15,126 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.camera import FloatArray
-from psvideo.errors import PsvideoError, UsageError
-from psvideo.tomlfile import read_text
+from psvideo.errors import UsageError
+from psvideo.export.pose import Pose, read_pose
+from psvideo.export.usd_camera import USD_SUFFIXES, UpAxis, UsdCamera, open_usd_camera
 
 SpaceName = Literal["camera", "world", "tangent"]
 YDirection = Literal["up", "down"]
-ROTATION_TOLERANCE = 1e-3
+CameraTime = Literal["frames", "numbers", "seconds"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Moving:
+    """A camera that moves: one time code per frame of the clip from the animation's first on, the numbers of the
+    results as time codes, or seconds at the stage's rate."""
+
+    camera: UsdCamera
+    by: CameraTime = "frames"
+
+    def pose(self, time_s: float, number: int, camera_fps: Fraction) -> Pose:
+        """Return where the camera stands at an instant of the clip."""
+        first = self.camera.codes[0] if self.camera.codes else 0.0
+        rate = float(camera_fps) if self.by == "frames" else self.camera.codes_per_s
+        return self.camera.pose(float(number) if self.by == "numbers" else first + time_s * rate)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Space:
-    """Where normals are expressed. ``camera_to_world`` (3, 3) is the camera's rotation, for world space only."""
+    """Where normals are expressed.
+
+    For world space: ``camera_to_world`` (3, 3) is the camera's rotation and ``origin`` (3,) its place in units of
+    ``unit_m`` metres; ``up`` is the world's axis that points up. ``moving`` gives both anew for every instant.
+    """
 
     name: SpaceName = "camera"
     y: YDirection = "up"
     camera_to_world: FloatArray | None = None
+    origin: FloatArray | None = None
+    unit_m: float = 1.0
+    up: UpAxis = "y"
+    moving: Moving | None = None
+
+    def at(self, time_s: float, number: int, camera_fps: Fraction) -> "Space":
+        """Return the space of one instant, with the camera where it is then."""
+        if self.moving is None:
+            return self
+        pose = self.moving.pose(time_s, number, camera_fps)
+        return replace(self, camera_to_world=pose.rotation, origin=pose.origin)
+
+    def attributes(self) -> dict[str, str | float]:
+        """Return what a file's header says of the world: its unit, its up axis, and the camera-to-world matrix."""
+        if self.camera_to_world is None:
+            return {}
+        origin = np.zeros(3) if self.origin is None else self.origin
+        rows = np.vstack([np.column_stack([self.camera_to_world, origin]), [0, 0, 0, 1]])
+        return {
+            "psvideo:meters_per_unit": float(self.unit_m),
+            "psvideo:up": self.up,
+            "psvideo:camera_to_world": " ".join(f"{number:.9g}" for number in rows.ravel()),
+        }
 
 
 CAMERA_SPACE = Space()
 
 
-def choose_space(name: SpaceName, y: YDirection, camera_to_world: Path | None) -> Space:
+def choose_space(
+    name: SpaceName,
+    y: YDirection,
+    camera_to_world: Path | None,
+    *,
+    camera: str | None = None,
+    camera_time: CameraTime | None = None,
+) -> Space:
     """Return the space that a command's options ask for. Raises UsageError where they do not fit together."""
+    is_usd = camera_to_world is not None and camera_to_world.suffix.lower() in USD_SUFFIXES
     if name == "world" and camera_to_world is None:
         raise UsageError(
-            "--space world: needs the camera's rotation. Give --camera-to-world FILE, a text file with the 3 x 3 or "
-            "4 x 4 camera-to-world matrix, row by row."
+            "--space world: needs the camera's rotation. Give --camera-to-world FILE: a USD file with the camera, or a "
+            "text file with the 3 x 3 or 4 x 4 camera-to-world matrix, row by row."
         )
-    if name != "world" and camera_to_world is not None:
-        raise UsageError(f"--camera-to-world: belongs to --space world, and --space is {name}.")
-    return Space(name=name, y=y, camera_to_world=None if camera_to_world is None else read_rotation(camera_to_world))
-
-
-def read_rotation(path: Path) -> FloatArray:
-    """Read a camera-to-world rotation (3, 3) from a text file of 9 or 16 numbers, row by row.
-
-    Of a 4 x 4 matrix (column vectors, the last row 0 0 0 1) the rotation is taken; a uniform scale is divided out.
-    Raises PsvideoError where the numbers are no rotation.
-    """
-    words = re.split(r"[\s,;\[\]()]+", read_text(path).strip(" \t\n[]()"))
-    try:
-        numbers = np.array([float(word) for word in words if word], np.float64)
-    except ValueError:
-        raise PsvideoError(f"{path}: holds words; expected the 9 or 16 numbers of a matrix, row by row.") from None
-    if numbers.size not in (9, 16):
-        raise PsvideoError(f"{path}: holds {numbers.size} numbers; expected 9 or 16, a matrix row by row.")
-    matrix = numbers.reshape(3, 3) if numbers.size == 9 else numbers.reshape(4, 4)[:3, :3]
-    scale = np.cbrt(np.linalg.det(matrix))
-    if (
-        not np.isfinite(scale)
-        or scale < 1e-9
-        or np.abs(matrix @ matrix.T / scale**2 - np.eye(3)).max() > ROTATION_TOLERANCE
-    ):
-        raise PsvideoError(
-            f"{path}: is no rotation (determinant {np.linalg.det(matrix):.4g}). Expected the camera's axes in the "
-            "world as columns: right, up, backwards, at right angles to each other and right-handed."
-        )
-    rotation: FloatArray = matrix / scale
-    return rotation
+    for option, value in {
+        "--camera-to-world": camera_to_world,
+        "--camera": camera,
+        "--camera-time": camera_time,
+    }.items():
+        if name != "world" and value is not None:
+            raise UsageError(f"{option}: belongs to --space world, and --space is {name}.")
+        if option != "--camera-to-world" and value is not None and not is_usd:
+            raise UsageError(f"{option}: belongs to a USD camera, and {camera_to_world} is a text file. Leave it out.")
+    if camera_to_world is None:
+        return Space(name=name, y=y)
+    if not is_usd:
+        pose = read_pose(camera_to_world)
+        return Space(name=name, y=y, camera_to_world=pose.rotation, origin=pose.origin)
+    found = open_usd_camera(camera_to_world, camera)
+    place = Space(name=name, y=y, unit_m=found.unit_m, up=found.up)
+    if found.codes is None:
+        pose = found.pose(0.0)
+        return replace(place, camera_to_world=pose.rotation, origin=pose.origin)
+    return replace(place, moving=Moving(camera=found, by=camera_time or "frames"))
 
 
 def placed(normals: NDArray[np.floating], space: Space) -> NDArray[np.floating]:
-    """Return normals (row, col, 3) of the camera frame in another space; invalid (0, 0, 0) stays so."""
+    """Return normals (..., 3) of the camera frame in another space; invalid (0, 0, 0) stays so."""
     if space.camera_to_world is not None:
         turned = normals.astype(np.float32) @ space.camera_to_world.T.astype(np.float32)
         normals = turned.astype(np.float32)
-    if space.y == "down":
-        normals = normals * np.array([1, -1, 1], normals.dtype)
-    return normals
+    return _flipped(normals, space)
+
+
+def placed_points(points: NDArray[np.floating], space: Space, valid: NDArray[np.bool_]) -> NDArray[np.floating]:
+    """Return points (..., 3) of the camera frame, in metres, in another space; those that are not valid are 0.
+
+    World space is in the world's own unit.
+    """
+    if space.camera_to_world is None:
+        return _flipped(points, space)
+    origin = np.zeros(3) if space.origin is None else space.origin
+    moved = points.astype(np.float64) / space.unit_m @ space.camera_to_world.T + origin
+    moved[~valid] = 0
+    return _flipped(moved.astype(np.float32), space)
+
+
+def _flipped(vectors: NDArray[np.floating], space: Space) -> NDArray[np.floating]:
+    return vectors * np.array([1, -1, 1], vectors.dtype) if space.y == "down" else vectors

@@ -4,7 +4,6 @@ usd-core (Pixar's OpenUSD, Tomorrow Open Source Technology Licence 1.0, which is
 trademarks) is an optional part of the installation and is imported only when something is written.
 """
 
-import importlib.util
 from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
@@ -13,29 +12,23 @@ from typing import Any
 import numpy as np
 
 from psvideo import __version__
-from psvideo.errors import PsvideoError
 from psvideo.export.mesh import read_part
+from psvideo.export.space import CAMERA_SPACE, Space
 from psvideo.files import whole_file
 from psvideo.integrate.mesh import Mesh
 
 PRIM = "/surface"
 
 
-def require_usd() -> None:
-    """Raise PsvideoError where the package that writes USD is not installed."""
-    if importlib.util.find_spec("pxr") is None:
-        raise PsvideoError(
-            "--mesh usd: needs the package usd-core, which is not installed. Install it (pip install usd-core, or "
-            'psvideo with its extra "usd"), or take --mesh ply.'
-        )
-
-
-def write_animation(path: Path, parts: Mapping[int, Path], fps: Fraction, *, metric: bool) -> None:
+def write_animation(
+    path: Path, parts: Mapping[int, Path], fps: Fraction, *, metric: bool, space: Space = CAMERA_SPACE
+) -> None:
     """Write the meshes kept in ``parts``, by number, as one animated USD file, whole or not at all.
 
-    Time codes are the numbers, so that frame 1001 of the stage is number 1001 of the pictures. Y is up and one unit a
-    metre; ``metric`` False notes in the layer's data that the scale is relative. Colours are linear (displayColor), and
-    triangles are used as they are (no subdivision). Instants are written one by one: memory holds one mesh.
+    Time codes are the numbers, so that frame 1001 of the stage is number 1001 of the pictures. The up axis and unit
+    are those of ``space``, in which the parts are (the camera's: y up, one unit a metre); ``metric`` False notes in the
+    layer's data that the scale is relative. Colours are linear (displayColor), and triangles are used as they are (no
+    subdivision). Instants are written one by one: memory holds one mesh.
     """
     from pxr import Usd
 
@@ -48,7 +41,7 @@ def write_animation(path: Path, parts: Mapping[int, Path], fps: Fraction, *, met
             stage.SetEndTimeCode(max(parts))
             stage.SetTimeCodesPerSecond(float(fps))
             stage.SetFramesPerSecond(float(fps))
-            prim = _prim(stage)
+            prim = _prim(stage, space)
             for number, part in sorted(parts.items()):
                 _sample(prim, read_part(part), number)
                 stage.Save()  # frees what this instant held
@@ -58,12 +51,12 @@ def write_animation(path: Path, parts: Mapping[int, Path], fps: Fraction, *, met
             named.unlink(missing_ok=True)
 
 
-def _prim(stage: Any) -> Any:
+def _prim(stage: Any, space: Space) -> Any:
     """Return the stage's one mesh, with all that does not change over time."""
     from pxr import Sdf, UsdGeom
 
-    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
-    UsdGeom.SetStageMetersPerUnit(stage, UsdGeom.LinearUnits.meters)
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z if space.up == "z" else UsdGeom.Tokens.y)
+    UsdGeom.SetStageMetersPerUnit(stage, space.unit_m)
     prim = UsdGeom.Mesh.Define(stage, PRIM)
     stage.SetDefaultPrim(prim.GetPrim())
     prim.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
@@ -31,6 +31,7 @@ from psvideo.pipeline import (
     unwatched,
 )
 from psvideo.plan import Plan
+from psvideo.runs.delivering import check_camera, world_doubts
 from psvideo.runs.lighting import Lighting
 from psvideo.runs.look import look
 from psvideo.runs.output import Output, folder_of, settings_of, tags_of
@@ -101,6 +102,7 @@ def normals_run(
     clip, mask = take.clip, lighting.mask
     over_time = over_time or OverTime()
     over_time.check(clip.plan)
+    check_camera(delivery.space, take, timing, output.start_number)
     tags = tags_of(clip, lighting.rig_path, delivery.space, over_time.aligning.rate)
     shaping = Shaping(view=view_of(lighting.rig), plane=lighting.rig.plane) if delivery.needs_depth else None
     facts: list[InstantFacts] = []
@@ -125,9 +127,8 @@ def normals_run(
                 # the surface only: plates are many times larger, and must not wait for the files
                 surface, at = instant.surface, (instant.round.number, instant.round.time_s)
                 shaped = None if shaping is None else partial(depth_of, shaping, surface)
-                write(
-                    partial(write_surface, folder, clip.name, *at, surface, delivery=delivery, tags=tags, depth=shaped)
-                )
+                there = replace(delivery, space=delivery.space.at(at[1], at[0], clip.plan.camera.fps))
+                write(partial(write_surface, folder, clip.name, *at, surface, delivery=there, tags=tags, depth=shaped))
                 del surface
             before, seen = seen, sample_of(instant.surface)
             changed = None if before is None else change(before, seen)
@@ -146,7 +147,11 @@ def normals_run(
             solver=method,
             trust=" ".join([trust_note(method, len(clip.plan.lights)), *lighting.near_notes]),
             instants=tuple(facts),
-            warnings=(*lighting.doubts, *(() if shaping is None else reservations(shaping))),
+            warnings=(
+                *lighting.doubts,
+                *(() if shaping is None else reservations(shaping)),
+                *world_doubts(delivery, metric=shaping is not None and shaping.metric),
+            ),
         )
         write_text(folder / "timing.json", format_timing(timing))
         write_text(folder / "report.json", json.dumps(report_record(report), indent=1) + "\n")
@@ -163,6 +168,6 @@ def _animation(
     if shaping is None or not facts or "usd" not in delivery.meshes:
         return
     parts = {one.number: folder / mesh_file(clip, one.number, "usd") for one in facts}
-    write_animation(folder / animation_name(clip), parts, tags.fps, metric=shaping.metric)
+    write_animation(folder / animation_name(clip), parts, tags.fps, metric=shaping.metric, space=delivery.space)
     for part in parts.values():
         part.unlink()

@@ -1,0 +1,83 @@
+"""Options that say how results are delivered, each written once, and what they make together."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+class SpaceName(StrEnum):
+    """The frame of the delivered normals."""
+
+    camera = "camera"
+    world = "world"
+    tangent = "tangent"
+
+
+class YDirection(StrEnum):
+    """Which way the green channel points."""
+
+    up = "up"
+    down = "down"
+
+
+class CameraTime(StrEnum):
+    """How an animated camera's time codes count."""
+
+    frames = "frames"
+    numbers = "numbers"
+    seconds = "seconds"
+
+
+class Aov(StrEnum):
+    """What may be written besides."""
+
+    residual = "residual"
+    error = "error"
+    depth = "depth"
+    position = "position"
+
+
+class MeshKind(StrEnum):
+    """Kinds of files for the surface as a mesh."""
+
+    ply = "ply"
+    usd = "usd"
+
+
+class Encoding(StrEnum):
+    """Other encodings of the same maps."""
+
+    png16 = "png16"
+
+
+SpaceOption = Annotated[SpaceName, typer.Option("--space", help="Camera axes, the world's, or a flat card's.")]
+CameraToWorld = Annotated[
+    Path | None,
+    typer.Option(
+        "--camera-to-world",
+        help="For --space world: a USD file with the camera, or a text file with a 3 x 3 or 4 x 4 matrix.",
+    ),
+]
+CameraName = Annotated[
+    str | None, typer.Option("--camera", help="Which camera of the USD file: its prim's path or name.")
+]
+CameraTimeOption = Annotated[
+    CameraTime | None,
+    typer.Option(
+        "--camera-time",
+        help="An animated camera's time codes: one per frame of the clip (frames, the default), the numbers of the "
+        "results (numbers), or seconds at the stage's rate (seconds).",
+    ),
+]
+YOption = Annotated[YDirection, typer.Option("--y", help="up as in OpenGL, down as in DirectX.")]
+FloatOption = Annotated[bool, typer.Option("--float", help="Store normals as 32-bit floats.")]
+AovOption = Annotated[list[Aov] | None, typer.Option("--aov", help="Write this besides; may be given several times.")]
+MeshOption = Annotated[
+    list[MeshKind] | None,
+    typer.Option("--mesh", help="Write meshes besides: ply, one per instant; usd, one animated file."),
+]
+EncodeOption = Annotated[Encoding | None, typer.Option("--encode", help="Write 16-bit PNG maps of 0 to 1 besides.")]
+Separate = Annotated[bool, typer.Option("--separate", help="One sequence per quantity; this is the default.")]
+Multipart = Annotated[bool, typer.Option("--multipart", help="Write one EXR with all quantities besides.")]
