@@ -3,7 +3,8 @@
 Near lights need the surface's depth, and depth comes from normals. The rig's [surface] plane is a first guess that is
 off by the relief of the subject; from its normals depth is integrated, each part put onto the plane by its median, and
 serves as the next guess. What no integration can tell is how far away the whole subject is: a plane at a wrong distance
-stays wrong.
+stays wrong. Depth that is known from elsewhere takes the plane's place, for each instant its own where there is more
+than one.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,6 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.clip import DepthMaps
 from psvideo.integrate import Shaping, View, depth_of, view_of
 from psvideo.normals.illumination import Illumination
 from psvideo.normals.near_light import Ground, ground_of, is_near
@@ -30,24 +32,49 @@ LEAST_COVERED = 0.5
 
 @dataclass(frozen=True, kw_only=True)
 class NearSurface:
-    """Where near lights find the surface: the first ``ground``, and how often it is made anew from the normals."""
+    """Where near lights find the surface: the first ``ground``, and how often it is made anew from the normals.
+
+    known_m: the depth (row, col) known of the instant with a number, 0 where unknown; it comes before the ground's.
+    """
 
     ground: Ground
     shaping: Shaping
     iterations: int = 0
+    known_m: Callable[[int], NDArray[np.float32]] | None = None
+
+    def at(self, number: int) -> "NearSurface":
+        """Return where the surface is at the instant with this number."""
+        if self.known_m is None:
+            return self
+        known_m = self.known_m(number)
+        return replace(
+            self, ground=self.ground.with_depth(known_m), shaping=replace(self.shaping, known_m=known_m), known_m=None
+        )
 
 
 def near_surface_of(
-    rig: Rig, lights: Sequence[Light], *, height_px: int, width_px: int, iterations: int = 0
+    rig: Rig,
+    lights: Sequence[Light],
+    *,
+    height_px: int,
+    width_px: int,
+    iterations: int = 0,
+    depths: DepthMaps | None = None,
 ) -> NearSurface | None:
-    """Return where near lights find the surface, None where all lights are distant.
+    """Return where near lights find the surface, None where all lights are distant; ``depths`` is what is known of it.
 
     Raises PsvideoError where the rig does not say where the surface or the camera's axis is.
     """
     if not is_near(lights):
         return None
-    ground = ground_of(rig, height_px=height_px, width_px=width_px)
-    return NearSurface(ground=ground, shaping=Shaping(view=view_of(rig), plane=rig.plane), iterations=iterations)
+    known_m = None if depths is None else depths.first
+    ground = ground_of(rig, height_px=height_px, width_px=width_px, known_m=known_m)
+    return NearSurface(
+        ground=ground,
+        shaping=Shaping(view=view_of(rig), plane=rig.plane, known_m=known_m),
+        iterations=iterations,
+        known_m=None if depths is None or depths.still is not None else depths.at,
+    )
 
 
 def solve_near(
@@ -76,12 +103,21 @@ def _rough_depth_m(shaping: Shaping, surface: Surface) -> NDArray[np.float32]:
     valid = length > LEAST_COVERED
     normals = np.where(valid[..., None], mean / np.maximum(length, LEAST_COVERED)[..., None], 0)
     small = Surface(normals=normals, albedo=valid.astype(np.float32), valid=valid)
-    depth = depth_of(replace(shaping, view=_smaller(shaping.view, step)), small).depth
+    known_m = None if shaping.known_m is None else _every(shaping.known_m, step, (high, wide))
+    depth = depth_of(replace(shaping, view=_smaller(shaping.view, step), known_m=known_m), small).depth
     size = (wide * step, high * step)
     known = cv2.resize((depth > 0).astype(np.float32), size, interpolation=cv2.INTER_LINEAR)
     whole = cv2.resize(depth, size, interpolation=cv2.INTER_LINEAR) / np.maximum(known, 1e-6)
     rough: NDArray[np.float32] = np.where(known > 0, whole, 0)[:rows, :cols].astype(np.float32)
     return rough
+
+
+def _every(known_m: NDArray[np.float32], step: int, shape: tuple[int, int]) -> NDArray[np.float32]:
+    """Return the known depth in the middle of every rough pixel; a mean would mix near and far."""
+    rows, cols = (
+        np.minimum(np.arange(n) * step + step // 2, size - 1) for n, size in zip(shape, known_m.shape, strict=True)
+    )
+    return known_m[np.ix_(rows, cols)]
 
 
 def _smaller(view: View, step: int) -> View:
@@ -95,8 +131,9 @@ def _smaller(view: View, step: int) -> View:
 def near_trust(near: NearSurface) -> str:
     """Return in a whole sentence what a valid normal under near lights depends on."""
     distance_m = -near.ground.middle_m[2]
+    source = "the rig's [surface] plane is" if near.shaping.known_m is None else "the depth that was given says"
     return (
-        f"The lights are near, and the subject is taken to be where the rig's [surface] plane is: {distance_m:.3g} m "
+        f"The lights are near, and the subject is taken to be where {source}: {distance_m:.3g} m "
         "away in the picture's middle. Were the lights' distances wrong by a tenth, normals would be off by about 3 "
         "degrees."
     )

@@ -301,7 +301,9 @@ def surfaces(
         def solve(lit: Illumination) -> Surface:
             return solving.solve(plates, lit, seen=shown, mask=mask)
 
-        surface = solve(light()) if near is None else solve_near(near, lambda ground: light(ground=ground), solve)
+        if near is None:
+            return Instant(round=one, surface=solve(light()))
+        surface = solve_near(near.at(one.number), lambda ground: light(ground=ground), solve)
         return Instant(round=one, surface=surface)
 
     # map and filter hold no round while the next one gathers, as a loop's variable would

@@ -1,6 +1,7 @@
 """psvideo normals: normal maps and albedo for every round of flashes."""
 
 from enum import StrEnum
+from math import inf
 from pathlib import Path
 from typing import Annotated
 
@@ -39,6 +40,7 @@ from psvideo.cli.options import (
     Verbose,
 )
 from psvideo.cli.sync import describe_timing
+from psvideo.errors import UsageError
 from psvideo.export.results import Delivery
 from psvideo.export.space import choose_space
 from psvideo.export.usd_core import require_usd
@@ -85,13 +87,26 @@ def normals(
         typer.Option(help="auto: robust against highlights and shadows from five lights on."),
     ] = SolverName.least_squares,
     near_iterations: Annotated[
-        int,
+        int | None,
         typer.Option(
-            help="Near lights only: how often their distances are taken anew from the depth of the normals found.",
+            help="Near lights only: how often their distances are taken anew from the depth of the normals found. "
+            f"[default: {NEAR_ITERATIONS}; 0 with --depth]",
             min=0,
             max=MOST_ITERATIONS,
         ),
-    ] = NEAR_ITERATIONS,
+    ] = None,
+    depth: Annotated[
+        Path | None,
+        typer.Option(
+            "--depth",
+            help="Known depth: an EXR in metres along the optical axis or a 16-bit PNG in millimetres, or a folder "
+            "with one per result. Near lights find the surface there, and depth its scale.",
+        ),
+    ] = None,
+    depth_scale: Annotated[
+        float | None,
+        typer.Option("--depth-scale", help="Metres per unit of --depth. [default: 1 for floats, 0.001 for integers]"),
+    ] = None,
     space: SpaceOption = SpaceName.camera,
     camera_to_world: CameraToWorld = None,
     camera: CameraName = None,
@@ -136,10 +151,17 @@ def normals(
     )
     if "usd" in delivery.meshes:
         require_usd()
+    if depth_scale is not None and (depth is None or not 0 < depth_scale < inf):
+        raise UsageError(
+            f"--depth-scale {depth_scale:g}: expected metres per unit, above 0, of the file given as --depth."
+        )
     over_time = OverTime(aligning=Aligning(align=align.value, rate=rate.value), denoise=denoise)
     take = open_and_tell(clip, voice, plan=plan, frames=frames)
     over_time.check(take.plan)
-    lighting = read_lighting(take, rig, mask, near_iterations=near_iterations)
+    lighting = read_lighting(
+        take, rig, mask, near_iterations=near_iterations, depth_path=depth, metres_per_unit=depth_scale
+    )
+    lighting.check(delivery)
     with decoded_once(take, output=out) as take:
         found = timing_of(take, timing, first_light=first_light, rig=lighting.rig, watch=voice.track)
         report = normals_run(

@@ -5,6 +5,7 @@ off and gives one frame after the other; ``keeping_near`` keeps what was decoded
 colour of a mosaic; ``describe`` says what a file is.
 """
 
+from psvideo.clip.depth_map import DepthMaps, open_depth
 from psvideo.clip.describe import describe
 from psvideo.clip.kept import Kept, keeping_near
 from psvideo.clip.malvar2004 import demosaic
@@ -16,6 +17,7 @@ from psvideo.clip.record import Clip, Frame, holes
 __all__ = [
     "ALL_CORES",
     "Clip",
+    "DepthMaps",
     "Frame",
     "Kept",
     "demosaic",
@@ -23,6 +25,7 @@ __all__ = [
     "holes",
     "keeping_near",
     "open_clip",
+    "open_depth",
     "parse_range",
     "read_frames",
     "read_mask",

@@ -19,20 +19,20 @@ Read = TypeVar("Read")
 def read_header(kind: str, file: Path) -> Header:
     """Read what a picture's file says about itself, without decoding its pixels."""
     find: Callable[[Path], Header] = _module(kind).header
-    return _guarded(find, file)
+    return guarded(find, file)
 
 
 def decode(kind: str, file: Path) -> Picture:
     """Decode one picture."""
     read: Callable[[Path], Picture] = _module(kind).decode
-    return _guarded(read, file)
+    return guarded(read, file)
 
 
 def _module(kind: str) -> ModuleType:
     return import_module(f"psvideo.clip.{kind}")
 
 
-def _guarded(read: Callable[[Path], Read], file: Path) -> Read:
+def guarded(read: Callable[[Path], Read], file: Path) -> Read:
     """Call a decoder; its library may raise anything over a damaged file, and all of it means the same."""
     try:
         if file.stat().st_size == 0:

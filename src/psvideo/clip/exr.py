@@ -4,7 +4,9 @@ Channels may stand in a layer (``key.R``); an alpha channel is left out. A pictu
 its display window is put in its place with 0 around it.
 """
 
+from collections.abc import Callable
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,13 +25,18 @@ OF_THE_CONTAINER = ("type", "name", "chunkCount", "pixelAspectRatio", "screenWin
 def header(path: Path) -> Header:
     """Read what the file says without decoding its pixels."""
     with _open(path, header_only=True) as file:
-        return _header(file, _channel_names(path, file))
+        return _header(file, _picture_channels(path, _names(file)))
 
 
 def decode(path: Path) -> Picture:
     """Decode a whole picture."""
+    return decode_channels(path, partial(_picture_channels, path))
+
+
+def decode_channels(path: Path, choose: Callable[[list[str]], tuple[str, ...]]) -> Picture:
+    """Decode the channels that ``choose`` takes from the names of all, one or three."""
     with _open(path, header_only=False) as file:
-        names = _channel_names(path, file)
+        names = choose(_names(file))
         channels = file.channels()
         planes = [channels[name].pixels for name in names]
         head = _header(file, names)
@@ -82,9 +89,12 @@ def _open(path: Path, *, header_only: bool) -> Any:
     return file
 
 
-def _channel_names(path: Path, file: Any) -> tuple[str, ...]:
+def _names(file: Any) -> list[str]:
+    return [channel.name for channel in file.header()["channels"]]
+
+
+def _picture_channels(path: Path, found: list[str]) -> tuple[str, ...]:
     """Find the channels that hold the picture: Y alone, or R, G and B, at the top level or in one layer."""
-    found = [channel.name for channel in file.header()["channels"]]
     layers = {name.rpartition(".")[0]: None for name in found}
     pictures = [names for layer in layers if (names := _picture_in(layer, found))]
     if len(pictures) != 1:

@@ -2,9 +2,10 @@
 
 Normals tell a surface's shape, in perspective up to one factor, and for every part of it that hangs together a factor
 of its own. The rig's [surface] plane gives it: each part's median depth is put onto the plane. Without a plane the
-median depth is 1. From a clip's second instant on, what is seen in the first instant too keeps the first one's scale,
-so that a flickering mask does not make the surface breathe; a subject that comes nearer keeps its distance as well,
-which normals cannot tell from one that stays.
+median depth is 1. Depth that is known from elsewhere (a scan, a depth camera) comes before both. From a clip's second
+instant on, what is seen in the first instant too keeps the first one's scale, so that a flickering mask does not make
+the surface breathe; a subject that comes nearer keeps its distance as well, which normals cannot tell from one that
+stays.
 """
 
 from dataclasses import dataclass
@@ -51,14 +52,20 @@ class Depth:
         return valid
 
 
-def scaled(height: Height, view: View, *, plane: Plane | None = None, reference: Depth | None = None) -> Depth:
-    """Return the depth of a height: its parts on the rig's ``plane``, or as in ``reference`` where that saw them.
+def scaled(
+    height: Height,
+    view: View,
+    *,
+    plane: Plane | None = None,
+    reference: Depth | None = None,
+    known_m: NDArray[np.float32] | None = None,
+) -> Depth:
+    """Return the depth of a height: its parts where they are known to be, or as in ``reference``, or on the ``plane``.
 
-    ``plane`` is n . X + d = 0 in camera coordinates, metres, and means something in a perspective view only.
+    ``plane`` is n . X + d = 0 in camera coordinates, metres; ``known_m`` (row, col) is depth along the axis, 0 where it
+    is not known. Both mean something in a perspective view only.
     """
-    metric = plane is not None and view.perspective
-    goal = _plane_height(plane, view, height.valid.shape) if plane is not None and metric else None
-    known = None if reference is None else _height_of(reference)
+    anchors = _anchors(view, height.valid.shape, plane, reference, known_m)
     count, labels, facts, _ = cv2.connectedComponentsWithStats(height.valid.astype(np.uint8), connectivity=4)
     shifted = np.zeros(height.height.shape)
     kept = np.zeros_like(height.valid)
@@ -70,29 +77,51 @@ def scaled(height: Height, view: View, *, plane: Plane | None = None, reference:
         box = slice(top, top + high), slice(left, left + width)
         part = labels[box] == number
         parts += 1
-        shifted[box][part] = height.height[box][part] + _shift(height.height, box, part, goal, known)
+        shifted[box][part] = height.height[box][part] + _shift(height.height, box, part, anchors)
         kept[box] |= part
-    depth = np.where(kept, _depth_of(shifted, view), 0).astype(np.float32)
     return Depth(
-        depth=depth, cut_east=height.cut_east, cut_south=height.cut_south, parts=parts, metric=metric, view=view
+        depth=np.where(kept, _depth_of(shifted, view), 0).astype(np.float32),
+        cut_east=height.cut_east,
+        cut_south=height.cut_south,
+        parts=parts,
+        metric=view.perspective and not (plane is None and known_m is None),
+        view=view,
     )
 
 
-def _shift(
-    height: FloatArray,
-    box: tuple[slice, slice],
-    part: Mask,
-    goal: FloatArray | None,
-    known: tuple[FloatArray, Mask] | None,
-) -> float:
+Anchor = tuple[FloatArray, Mask]
+"""Heights that parts are put onto, and where they are known."""
+
+
+def _anchors(
+    view: View,
+    shape: tuple[int, ...],
+    plane: Plane | None,
+    reference: Depth | None,
+    known_m: NDArray[np.float32] | None,
+) -> list[Anchor]:
+    """What tells how far away things are, the surest first; the last one in every pixel, if any."""
+    anchors = []
+    everywhere = np.ones(shape, np.bool_)
+    if known_m is not None and view.perspective:
+        anchors.append(_height_of(known_m, view))
+    if reference is not None:
+        anchors.append(_height_of(reference.depth, view))
+    if plane is not None and view.perspective:
+        anchors.append((_plane_height(plane, view, shape), everywhere))
+    elif known_m is not None and view.perspective:
+        height, seen = anchors[0]
+        anchors.append((np.full(shape, np.median(height[seen]) if seen.any() else 0.0), everywhere))
+    return anchors
+
+
+def _shift(height: FloatArray, box: tuple[slice, slice], part: Mask, anchors: list[Anchor]) -> float:
     """By how much a part's height is to be raised."""
-    if known is not None:
-        common = part & known[1][box]
+    for goal, seen in anchors:
+        common = part & seen[box]
         if common.sum() >= LEAST_COMMON_SHARE * part.sum():
-            return float(np.median((known[0][box] - height[box])[common]))
-    if goal is None:
-        return -float(np.median(height[box][part]))
-    return float(np.median((goal[box] - height[box])[part]))
+            return float(np.median((goal[box] - height[box])[common]))
+    return -float(np.median(height[box][part]))
 
 
 def _depth_of(height: FloatArray, view: View) -> FloatArray:
@@ -101,12 +130,13 @@ def _depth_of(height: FloatArray, view: View) -> FloatArray:
     return depth
 
 
-def _height_of(known: Depth) -> tuple[FloatArray, Mask]:
-    valid = known.valid
-    depth = np.where(valid, known.depth, 1).astype(np.float64)
-    if known.view.focal_px is None:
+def _height_of(known: NDArray[np.float32], view: View) -> Anchor:
+    """The inverse of ``_depth_of``, where the depth is above 0."""
+    valid = known > 0
+    depth = np.where(valid, known, 1).astype(np.float64)
+    if view.focal_px is None:
         return (depth - 1.0) * depth.shape[1], valid
-    height: FloatArray = np.log(depth) * known.view.focal_px[0]
+    height: FloatArray = np.log(depth) * view.focal_px[0]
     return height, valid
 
 

@@ -2,6 +2,9 @@
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from psvideo.integrate.bilateral import BILATERAL, Integration, integrate
 from psvideo.integrate.depth import Depth, Plane, scaled
 from psvideo.integrate.view import View
@@ -10,23 +13,27 @@ from psvideo.surface import Surface
 
 @dataclass(frozen=True, kw_only=True)
 class Shaping:
-    """How a clip's surfaces become depth. ``first`` is the first instant's, whose scale the others keep."""
+    """How a clip's surfaces become depth. ``first`` is the first instant's, whose scale the others keep.
+
+    known_m: depth (row, col) in metres that is known from elsewhere, 0 where it is not; comes before plane and first.
+    """
 
     view: View
     plane: Plane | None = None
     how: Integration = BILATERAL
     first: Depth | None = None
+    known_m: NDArray[np.float32] | None = None
 
     @property
     def metric(self) -> bool:
-        """Whether depth is in metres: a perspective view, and a plane that says how far away things are."""
-        return self.view.perspective and self.plane is not None
+        """Whether depth is in metres: a perspective view, and a plane or depth that says how far away things are."""
+        return self.view.perspective and (self.plane is not None or self.known_m is not None)
 
 
 def depth_of(shaping: Shaping, surface: Surface) -> Depth:
     """Return the depth of one instant; safe to call from several threads."""
     height = integrate(surface.normals, surface.valid, shaping.view, how=shaping.how)
-    return scaled(height, shaping.view, plane=shaping.plane, reference=shaping.first)
+    return scaled(height, shaping.view, plane=shaping.plane, reference=shaping.first, known_m=shaping.known_m)
 
 
 def begun(shaping: Shaping, surface: Surface) -> Shaping:
@@ -42,7 +49,7 @@ def reservations(shaping: Shaping) -> tuple[str, ...]:
             "Depth was integrated for an orthographic view, because the rig has no [camera] focal_px: it is relative, "
             "in widths of the picture about a median of 1, and bends a subject that is near the camera."
         )
-    elif shaping.plane is None:
+    elif not shaping.metric:
         said.append(
             "Depth is relative, its median 1, because the rig has no [surface] plane: give one (in metres) for scale."
         )

@@ -10,6 +10,7 @@ the compiled solvers, block by block (``near_kernel.py``), so that no field of v
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -68,13 +69,44 @@ def is_near(lights: Sequence[Light]) -> bool:
     return any(light.position_m is not None for light in lights)
 
 
-def ground_of(rig: Rig, *, height_px: int, width_px: int) -> Ground:
-    """Return the ground on the rig's plane, for a picture of that size.
+def ground_of(rig: Rig, *, height_px: int, width_px: int, known_m: NDArray[np.floating] | None = None) -> Ground:
+    """Return the ground for a picture of that size: on the rig's plane, and at the depth ``known_m`` where that is > 0.
 
-    Raises PsvideoError where the rig lacks the plane or the camera that near lights need, or where they make no sense.
+    Without a plane, pixels of unknown depth take that of the nearest known one. Raises PsvideoError where the rig lacks
+    the plane or the camera that near lights need, or where they make no sense.
     """
+    if rig.focal_px is None or rig.principal_px is None or (rig.plane is None and known_m is None):
+        raise PsvideoError(_what_is_lacking(rig, height_px=height_px, width_px=width_px, known=known_m is not None))
+    depth_m: NDArray[np.floating] | None
+    depth_m = None if rig.plane is None else _plane_depth_m(rig, height_px, width_px)
+    if known_m is not None:
+        depth_m = _spread(known_m) if depth_m is None else np.where(known_m > 0, known_m, depth_m)
+    if depth_m is None or depth_m.shape != (height_px, width_px):
+        raise ValueError(f"known depth for a picture of {height_px} x {width_px} expected")
+    x, y = _rays(rig.focal_px, rig.principal_px, height_px, width_px)
+    row, col = height_px // 2, width_px // 2
+    return Ground(
+        depth_m=depth_m.astype(np.float32),
+        middle_m=depth_m[row, col] * np.array([x[0, col], y[row, 0], -1.0]),
+        focal_px=rig.focal_px,
+        principal_px=rig.principal_px,
+    )
+
+
+def _spread(known_m: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Give pixels of unknown depth that of the nearest known pixel."""
+    unknown = (known_m <= 0).astype(np.uint8)
+    _, labels = cv2.distanceTransformWithLabels(unknown, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
+    depth_of_label = np.zeros(int(labels.max()) + 1, known_m.dtype)
+    depth_of_label[labels[known_m > 0]] = known_m[known_m > 0]
+    spread: NDArray[np.floating] = depth_of_label[labels]
+    return spread
+
+
+def _plane_depth_m(rig: Rig, height_px: int, width_px: int) -> FloatArray:
+    """Return the depth of the rig's plane in every pixel."""
     if rig.focal_px is None or rig.principal_px is None or rig.plane is None:
-        raise PsvideoError(_what_is_lacking(rig, height_px=height_px, width_px=width_px))
+        raise ValueError("a rig with camera and plane expected")
     x, y = _rays(rig.focal_px, rig.principal_px, height_px, width_px)
     a, b, c, d = rig.plane
     toward = c - a * x - b * y
@@ -86,16 +118,13 @@ def ground_of(rig: Rig, *, height_px: int, width_px: int) -> Ground:
             "Expected a, b, c, d of a x + b y + c z + d = 0 in metres with the scene at negative z: [0, 0, 1, 1.2] is "
             "a wall at 1.2 m."
         )
-    depth_m = 1 / np.maximum(inverse_m, FARTHEST_SHARE * inverse_m.max())
-    middle_m = depth_m[row, col] * np.array([x[0, col], y[row, 0], -1.0])
+    depth_m: FloatArray = 1 / np.maximum(inverse_m, FARTHEST_SHARE * inverse_m.max())
     if depth_m[row, col] > FARTHEST_M:
         raise PsvideoError(
             f"The rig's [surface] plane {list(rig.plane)} is {depth_m[row, col]:g} m away in the picture's middle, "
             "which looks like millimetres. Expected metres: divide d, and every position_m, by 1000."
         )
-    return Ground(
-        depth_m=depth_m.astype(np.float32), middle_m=middle_m, focal_px=rig.focal_px, principal_px=rig.principal_px
-    )
+    return depth_m
 
 
 def _rays(
@@ -107,7 +136,7 @@ def _rays(
     return x, y
 
 
-def _what_is_lacking(rig: Rig, *, height_px: int, width_px: int) -> str:
+def _what_is_lacking(rig: Rig, *, height_px: int, width_px: int, known: bool) -> str:
     near = [light.name for light in rig.lights if light.position_m is not None]
     lacking = []
     if rig.focal_px is None:
@@ -115,7 +144,7 @@ def _what_is_lacking(rig: Rig, *, height_px: int, width_px: int) -> str:
     if rig.principal_px is None:
         middle = f"[{(width_px - 1) / 2:g}, {(height_px - 1) / 2:g}]"
         lacking.append(f"[camera] principal_px = {middle} (the picture's middle, unless the lens was calibrated)")
-    if rig.plane is None:
+    if rig.plane is None and not known:
         lacking.append("[surface] plane = [0.0, 0.0, 1.0, 1.2] (a wall facing the camera 1.2 m away: where yours is)")
     return (
         f"Light {near[0]!r} is near (position_m), so every pixel sees it from another direction, and the rig does not "

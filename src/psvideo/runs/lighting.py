@@ -1,13 +1,16 @@
 """What normals are solved with, read and checked before a long run begins."""
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.clip import read_mask
+from psvideo.clip import DepthMaps, open_depth, read_mask
+from psvideo.errors import PsvideoError, UsageError
+from psvideo.export.results import Delivery
+from psvideo.integrate import Shaping, view_of
 from psvideo.near_surface import NEAR_ITERATIONS, NearSurface, near_surface_of, near_trust
 from psvideo.normals.illumination import illumination
 from psvideo.pipeline import (
@@ -25,13 +28,35 @@ UNSURE_DEG = 5.0
 @dataclass(frozen=True, kw_only=True)
 class Lighting:
     """What is solved with, read and checked before a long run begins: the rig, for near lights where the surface is
-    taken to be, and where to solve."""
+    taken to be, what is known of its depth, and where to solve."""
 
     rig_path: Path
     rig: Rig
     condition: float
     near: NearSurface | None = None
     mask: NDArray[np.bool_] | None = None
+    depths: DepthMaps | None = None
+
+    @property
+    def shaping(self) -> Shaping:
+        """How normals become depth, before the first instant."""
+        known_m = None if self.depths is None else self.depths.first
+        return Shaping(view=view_of(self.rig), plane=self.rig.plane, known_m=known_m)
+
+    def shaping_at(self, shaping: Shaping, number: int) -> Shaping:
+        """Return the shaping of the instant with this number: its known depth is its own where there are several."""
+        if self.depths is None or self.depths.still is not None:
+            return shaping
+        return replace(shaping, known_m=self.depths.at(number))
+
+    def check(self, delivery: Delivery) -> None:
+        """Raise UsageError where depth is known and nothing of the run would use it."""
+        if self.depths is not None and self.near is None and not delivery.needs_depth:
+            raise UsageError(
+                f"--depth {self.depths.path}: nothing would use it. All lights of this rig are distant, so that "
+                "normals do not depend on depth; add --aov depth, --aov position or --mesh, or leave it "
+                "out."
+            )
 
     @property
     def near_iterations(self) -> int:
@@ -61,17 +86,39 @@ class Lighting:
 
 
 def read_lighting(
-    take: Take, rig_path: Path, mask_path: Path | None = None, *, near_iterations: int = NEAR_ITERATIONS
+    take: Take,
+    rig_path: Path,
+    mask_path: Path | None = None,
+    *,
+    near_iterations: int | None = None,
+    depth_path: Path | None = None,
+    metres_per_unit: float | None = None,
 ) -> Lighting:
-    """Read rig and mask of a take; ``near_iterations`` is how often near lights' surface is made anew.
+    """Read rig, mask and known depth of a take, a file or a folder with one per instant.
 
+    ``near_iterations`` is how often near lights' surface is made anew; left out, once, and never where depth is known.
     Raises PsvideoError where they do not fit the plan, or give no normals.
     """
     clip = take.clip
     check_separable(clip.plan)
     rig = read_rig(rig_path, plan_lights=clip.plan.lights)
     lights = lights_as_planned(rig, clip.plan)
-    near = near_surface_of(rig, lights, height_px=clip.height_px, width_px=clip.width_px, iterations=near_iterations)
+    depths = None if depth_path is None else _read_depth(take, rig, depth_path, metres_per_unit)
+    if near_iterations is None:
+        near_iterations = NEAR_ITERATIONS if depths is None else 0
+    near = near_surface_of(
+        rig, lights, height_px=clip.height_px, width_px=clip.width_px, iterations=near_iterations, depths=depths
+    )
     lit = illumination(lights, channels=clip.channels, ground=None if near is None else near.ground)
     mask = None if mask_path is None else read_mask(mask_path, width_px=clip.width_px, height_px=clip.height_px)
-    return Lighting(rig_path=rig_path, rig=rig, condition=lit.condition, near=near, mask=mask)
+    return Lighting(rig_path=rig_path, rig=rig, condition=lit.condition, near=near, mask=mask, depths=depths)
+
+
+def _read_depth(take: Take, rig: Rig, path: Path, metres_per_unit: float | None) -> DepthMaps:
+    if rig.focal_px is None:
+        raise PsvideoError(
+            f"--depth {path}: needs the camera's perspective. Add to the rig file: [camera] focal_px = [f, f] (the "
+            "focal length in mm times pixels per mm of the sensor)."
+        )
+    clip = take.clip
+    return open_depth(path, width_px=clip.width_px, height_px=clip.height_px, metres_per_unit=metres_per_unit)

@@ -19,7 +19,7 @@ from psvideo.export.tags import Tags
 from psvideo.export.usd import write_animation
 from psvideo.export.writer import writing
 from psvideo.files import write_text
-from psvideo.integrate import Shaping, begun, depth_of, reservations, view_of
+from psvideo.integrate import Shaping, reservations
 from psvideo.normals.solving import Solver, Solving, trust_note
 from psvideo.pipeline import (
     Instant,
@@ -36,6 +36,7 @@ from psvideo.runs.lighting import Lighting
 from psvideo.runs.look import look
 from psvideo.runs.output import Output, folder_of, settings_of, tags_of
 from psvideo.runs.plates import nothing_complete
+from psvideo.runs.shape import shape_of
 from psvideo.timing import Timing, format_timing
 from psvideo.view.report import InstantFacts, RunReport, instant_facts, report_page, report_record
 from psvideo.view.steadiness import Sample, change, sample_of
@@ -104,13 +105,14 @@ def normals_run(
     over_time.check(clip.plan)
     check_camera(delivery.space, take, timing, output.start_number)
     tags = tags_of(clip, lighting.rig_path, delivery.space, over_time.aligning.rate)
-    shaping = Shaping(view=view_of(lighting.rig), plane=lighting.rig.plane) if delivery.needs_depth else None
+    shaping = lighting.shaping if delivery.needs_depth else None
     facts: list[InstantFacts] = []
     picture: Pixels | None = None
     seen: Sample | None = None
     solving = _solving(clip.plan, solver, delivery)
     method = solving.method(len(clip.plan.lights))
-    light = (lighting.mask_sha256, method, lighting.near_iterations)
+    known = () if lighting.depths is None else lighting.depths.identity
+    light = (lighting.mask_sha256, method, lighting.near_iterations, *known)
     settings = settings_of(take, timing, output, tags, delivery, over_time, *light)
     with (
         folder_of(output, settings) as folder,
@@ -121,15 +123,14 @@ def normals_run(
         rounds = aligned(rounds, clip.plan.lights, over_time.aligning, first=output.start_number)
         found = surfaces(rounds, clip.plan, lighting.rig, mask=mask, solving=solving, near=lighting.near)
         for instant in found if over_time.denoise < 2 else denoised(found, over_time.denoise):
-            if shaping is not None and shaping.first is None:
-                shaping = begun(shaping, instant.surface)
+            shaping, shaped = shape_of(shaping, lighting, instant)
             if not (output.resume and is_written(folder, clip.name, instant.round.number, delivery)):
                 # the surface only: plates are many times larger, and must not wait for the files
                 surface, at = instant.surface, (instant.round.number, instant.round.time_s)
-                shaped = None if shaping is None else partial(depth_of, shaping, surface)
                 there = replace(delivery, space=delivery.space.at(at[1], at[0], clip.plan.camera.fps))
                 write(partial(write_surface, folder, clip.name, *at, surface, delivery=there, tags=tags, depth=shaped))
                 del surface
+            del shaped  # it holds the surface too
             before, seen = seen, sample_of(instant.surface)
             changed = None if before is None else change(before, seen)
             facts.append(instant_facts(instant.round, instant.surface, mask, changed))

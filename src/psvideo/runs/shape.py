@@ -1,0 +1,35 @@
+"""The depth of a run's instants, of which the first is integrated at once, because it fixes the scale of the others."""
+
+from collections.abc import Callable
+from functools import partial
+
+from psvideo.integrate import Depth, Shaping, begun, depth_of
+from psvideo.pipeline import Instant
+from psvideo.runs.lighting import Lighting
+from psvideo.surface import Surface
+
+
+def shape_of(
+    shaping: Shaping | None, lighting: Lighting, instant: Instant
+) -> tuple[Shaping | None, Callable[[], Depth] | None]:
+    """Return the clip's shaping, begun with its first instant, and what integrates this one when it is called.
+
+    Both are None where no depth is asked for. The first instant's depth is there already and not found twice.
+    """
+    if shaping is None:
+        return None, None
+    number, surface = instant.round.number, instant.surface
+    if shaping.first is None:
+        shaping = begun(lighting.shaping_at(shaping, number), surface)
+        return shaping, partial(_first, shaping)
+    return shaping, partial(_later, lighting, shaping, number, surface)
+
+
+def _first(shaping: Shaping) -> Depth:
+    if shaping.first is None:
+        raise ValueError("the shaping has not begun")
+    return shaping.first
+
+
+def _later(lighting: Lighting, shaping: Shaping, number: int, surface: Surface) -> Depth:
+    return depth_of(lighting.shaping_at(shaping, number), surface)
