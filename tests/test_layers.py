@@ -9,7 +9,7 @@ import pytest
 PACKAGE = Path(__file__).resolve().parents[1] / "src" / "psvideo"
 
 LAYERS = [
-    {"errors", "tomlfile", "files", "compiled"},
+    {"errors", "tomlfile", "files", "compiled", "near_limits"},
     {"camera", "rig", "rigfile", "surface", "tracefile"},
     {"plan", "planfile", "timing"},
     {"shutter", "clip", "strobe", "capture"},

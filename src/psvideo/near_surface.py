@@ -21,9 +21,6 @@ from psvideo.normals.near_light import Ground, ground_of, is_near
 from psvideo.rig import Light, Rig
 from psvideo.surface import Surface
 
-NEAR_ITERATIONS = 1
-"""How often the surface is made anew unless the user says otherwise: one leaves what the plane's distance costs."""
-MOST_ITERATIONS = 10
 ROUGH_PX = 480
 """Depth for the lights' sake is integrated on a picture of at most so many pixels along its longer side."""
 LEAST_COVERED = 0.5

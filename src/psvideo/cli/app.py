@@ -2,47 +2,58 @@
 
 import contextlib
 import ctypes
+import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib import import_module
 from typing import Annotated
 
 import typer
 
-from psvideo import __version__
+from psvideo.cli.commands import COMMANDS, Entry
+from psvideo.cli.teaching import PROGRAM, command_called, teach, words_typed
 from psvideo.errors import PsvideoError
 
 STOPPED = 130
 """What the command line library ends with when the user interrupts."""
 M_ARENA_MAX = -8
 """glibc's number of the setting (malloc.h)."""
-COMMANDS = ("capture-plan", "strobe", "calibrate", "synth", "sync", "split", "normals", "info", "demo")
 
 
 def application(arguments: Sequence[str]) -> typer.Typer:
-    """Return the commands as one program; only the one that is called is imported, all of them for the help."""
+    """Return the commands as one program; only the one that is called is loaded, of the others one line is known."""
     app = typer.Typer(
-        name="psvideo",
-        help="Normals and albedo for every instant, from strobed rolling-shutter video.",
+        name=PROGRAM,
         no_args_is_help=True,
         pretty_exceptions_enable=False,
         context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
     )
     app.callback()(psvideo)
-    called = arguments[0] if arguments else ""
-    for name in (called,) if called in COMMANDS else COMMANDS:
-        function = name.replace("-", "_")
-        command = getattr(import_module(f"psvideo.cli.{function}"), function)
+    called = command_called(arguments)
+    for entry in COMMANDS:
+        command = _loaded(entry) if entry.name == called else _not_loaded
         if isinstance(command, typer.Typer):
-            app.add_typer(command, name=name)
+            app.add_typer(command, name=entry.name, rich_help_panel=entry.panel)
         else:
-            app.command(name)(command)
-    return app
+            summary = entry.summary if command is _not_loaded else None
+            app.command(entry.name, help=summary, rich_help_panel=entry.panel)(command)
+    return teach(app)
+
+
+def _loaded(entry: Entry) -> Callable[..., None] | typer.Typer:
+    command: Callable[..., None] | typer.Typer = getattr(import_module(f"psvideo.cli.{entry.word}"), entry.word)
+    return command
+
+
+def _not_loaded() -> None:
+    """Stand for a command of which only its line in the list is asked for."""
 
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        print(f"psvideo {__version__}")
+        from psvideo import __version__
+
+        print(f"{PROGRAM} {__version__}")
         raise typer.Exit
 
 
@@ -60,9 +71,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     A fault is printed as one paragraph on stderr.
     """
     _share_one_heap()
-    words = list(sys.argv[1:] if arguments is None else arguments)
+    words = words_typed(sys.argv[1:] if arguments is None else arguments, os.environ)
     try:
-        application(words)(args=words)
+        application(words)(args=words, prog_name=PROGRAM)
     except PsvideoError as fault:
         print(f"psvideo: {fault}", file=sys.stderr)
         return fault.exit_status

@@ -1,29 +1,24 @@
 """psvideo calibrate: measure cameras and lights before a shoot."""
 
+from __future__ import annotations
+
 import dataclasses
 from datetime import date
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from psvideo.calibrate.led_pictures import exact_rate, parse_columns, read_led_pictures
-from psvideo.calibrate.readout import Led, Readout, measure_readout
-from psvideo.calibrate.readout_lines import (
-    MeasuredMode,
-    camera_line,
-    record_line,
-    strobed_camera_line,
-    strobed_record_line,
-)
-from psvideo.calibrate.strobed_readout import StrobedReadout
-from psvideo.capture.quantities import parse_positive_seconds, parse_rate
 from psvideo.cli.console import Voice
 from psvideo.cli.lights import flat_field, guess, intensities, matte_sphere
 from psvideo.cli.mirror_sphere import mirror_sphere
 from psvideo.cli.options import Frames, Json, PlanPath, Quiet, Verbose
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.pipeline import measure_take_readout, open_take
+
+if TYPE_CHECKING:
+    from psvideo.calibrate.readout import Led, Readout
+    from psvideo.calibrate.readout_lines import MeasuredMode
+    from psvideo.calibrate.strobed_readout import StrobedReadout
 
 CRYSTAL_PPM = 100.0
 calibrate = typer.Typer(help="Measure cameras and lights before a shoot.", no_args_is_help=True)
@@ -54,7 +49,7 @@ def readout(
     led_tolerance_ppm: Annotated[
         float | None,
         typer.Option(
-            help="Tolerance of the LED's or the strobe's clock: a crystal 100, a ceramic resonator 5000. Left out: "
+            help="Tolerance of the LED's or the strobe's clock in ppm: a crystal 100, a ceramic resonator 5000. Left out: "
             "100, or the plan's where the pictures are a strobed clip.",
             min=0,
         ),
@@ -84,6 +79,11 @@ def readout(
     quiet: Quiet = False,
 ) -> None:
     """Measure a camera's readout time from the stripes of an LED of known rate, or from a strobed clip."""
+    from psvideo.calibrate.led_pictures import exact_rate, parse_columns, read_led_pictures
+    from psvideo.calibrate.readout import Led, measure_readout
+    from psvideo.calibrate.readout_lines import MeasuredMode, camera_line, record_line
+    from psvideo.capture.quantities import parse_positive_seconds, parse_rate
+
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     made = MeasuredMode(make=make, model=model, mode=mode)
     if led_hz is None:
@@ -127,6 +127,9 @@ def _strobed(
     plan: Path | None,
     voice: Voice,
 ) -> None:
+    from psvideo.calibrate.readout_lines import strobed_camera_line, strobed_record_line
+    from psvideo.pipeline import measure_take_readout, open_take
+
     if len(pictures) > 1:
         raise UsageError(
             f"{len(pictures)} files without --led-hz: for an LED's stripes give its rate with --led-hz, for a strobed "

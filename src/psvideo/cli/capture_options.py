@@ -22,7 +22,7 @@ Readout = Annotated[
     str | None,
     _option(CAMERA, "--readout", "Time to read a frame: 8.1ms, global, unknown; -8.1ms: upwards."),
 ]
-CameraClock = Annotated[float, _option(CAMERA, "--camera-clock-ppm", "Tolerance of the camera's clock.")]
+CameraClock = Annotated[float, _option(CAMERA, "--camera-clock-ppm", "Tolerance of the camera's clock in ppm.")]
 Lights = Annotated[str, _option(LIGHTS, "--lights", "The lights' names, in the order in which they flash.")]
 Power = Annotated[str, _option(LIGHTS, "--power", "Power, above 0 and up to 1: 0.5, or key=1,left=0.5,right=0.5.")]
 Flash = Annotated[str | None, _option(LIGHTS, "--flash", "Flash duration: 0.8ms, or key=0.8ms,left=0.4ms,right=0.4ms.")]
@@ -44,7 +44,9 @@ DarkEvery = Annotated[
     int | None, _option(STROBE, "--dark-every", "A dark slot in every Nth round; default: two a second.")
 ]
 Dark = Annotated[str | None, _option(STROBE, "--dark", "Dark time between flashes; default: exposure and margin.")]
-StrobeClock = Annotated[str, _option(STROBE, "--strobe-clock-ppm", "Tolerance of the strobe's clock, or unknown.")]
+StrobeClock = Annotated[
+    str, _option(STROBE, "--strobe-clock-ppm", "Tolerance of the strobe's clock in ppm, or unknown.")
+]
 Transfer = Annotated[str, _option(ENCODING, "--transfer", "Transfer curve of the files: linear, slog3, logc3, srgb.")]
 Black = Annotated[float | None, _option(ENCODING, "--black", "Code value of black.")]
 White = Annotated[float | None, _option(ENCODING, "--white", "Code value of saturation.")]

@@ -4,23 +4,25 @@ Without ``-o`` the plan goes to standard output and everything for people to sta
 ``psvideo capture-plan ... > plan.toml`` is the same as ``-o plan.toml``.
 """
 
+from __future__ import annotations
+
 import dataclasses
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
-from rich.console import Console
 
 import psvideo.cli.capture_options as option
-from psvideo.capture.cameras import CameraMode, camera_modes
-from psvideo.capture.diagram import TERMINAL, check_diagram_name, diagram_text, write_diagram
-from psvideo.capture.planning import Shoot, plan_shoot
-from psvideo.capture.report import camera_table, shoot_report
-from psvideo.capture.words import ShootWords, parse_request
 from psvideo.cli.console import Voice
 from psvideo.cli.options import Force, Json, Quiet, Verbose
 from psvideo.files import refuse_existing, write_text
-from psvideo.planfile import format_plan
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from psvideo.capture.cameras import CameraMode
+    from psvideo.capture.planning import Shoot
 
 PIPE_WIDTH = 120
 WIDEST_DIAGRAM = 120
@@ -63,6 +65,12 @@ def capture_plan(
     quiet: Quiet = False,
 ) -> None:
     """Plan a shoot: write plan.toml, and print what decides the shoot and what to beware of."""
+    from rich.console import Console
+
+    from psvideo.capture.diagram import check_diagram_name, write_diagram
+    from psvideo.capture.planning import plan_shoot
+    from psvideo.capture.words import ShootWords, parse_request
+
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     if list_cameras:
         _list_cameras(voice)
@@ -89,6 +97,11 @@ def capture_plan(
 
 
 def _list_cameras(voice: Voice) -> None:
+    from rich.console import Console
+
+    from psvideo.capture.cameras import camera_modes
+    from psvideo.capture.report import camera_table
+
     if voice.json:
         modes = [{**dataclasses.asdict(mode), "fps": str(mode.fps)} for mode in camera_modes()]
         voice.result(modes)
@@ -100,6 +113,8 @@ def _list_cameras(voice: Voice) -> None:
 
 def _deliver(shoot: Shoot, out: Path | None, voice: Voice) -> None:
     """Write the plan where it was asked for, or to standard output, which --json takes for its own."""
+    from psvideo.planfile import format_plan
+
     text = format_plan(shoot.plan).rstrip("\n") + "\n"
     if out is not None:
         write_text(out, text)
@@ -112,6 +127,9 @@ def _deliver(shoot: Shoot, out: Path | None, voice: Voice) -> None:
 
 
 def _report(shoot: Shoot, preset: CameraMode | None, console: Console, *, diagram: str | None) -> None:
+    from psvideo.capture.diagram import TERMINAL, diagram_text
+    from psvideo.capture.report import shoot_report
+
     if diagram == TERMINAL or (diagram is None and console.is_terminal):
         console.print(diagram_text(shoot.plan, width=min(console.width, WIDEST_DIAGRAM)))
     for part in shoot_report(shoot, preset=preset):

@@ -5,12 +5,10 @@ import sys
 import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-from psvideo.clip import Kept
+if TYPE_CHECKING:
+    from psvideo.clip import Kept
 
 Item = TypeVar("Item")
 PLAIN_PROGRESS_EVERY_S = 5.0
@@ -54,7 +52,7 @@ class Voice:
             yield from _lines(items, total, what, unit)
 
 
-def tell_kept(voice: Voice, kept: Kept | None) -> None:
+def tell_kept(voice: Voice, kept: "Kept | None") -> None:
     """Say how much disk the decoded frames took, and which of them found no room there."""
     if kept is None:
         return
@@ -70,6 +68,9 @@ def tell_kept(voice: Voice, kept: Kept | None) -> None:
 
 
 def _bar(items: Iterable[Item], total: int, what: str, unit: str) -> Iterator[Item]:
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
     rate = TextColumn("{task.fields[rate]} " + unit + "/s")
     columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), rate, TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:

@@ -7,7 +7,6 @@ import typer
 
 from psvideo.cli.console import Voice
 from psvideo.cli.options import Force, Json, Quiet, Verbose
-from psvideo.demo import run_demo
 
 
 def demo(
@@ -18,6 +17,8 @@ def demo(
     quiet: Quiet = False,
 ) -> None:
     """Film a virtual bust, find the flashes, solve for normals, and end with the path of a picture of it all."""
+    from psvideo.demo import run_demo
+
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     picture = run_demo(out, force=force, watch=voice.track)
     voice.result({"picture": str(picture)})

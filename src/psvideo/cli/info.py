@@ -8,7 +8,6 @@ import typer
 
 from psvideo.cli.console import Voice
 from psvideo.cli.options import Json, PlanPath, Quiet, Verbose
-from psvideo.clip import describe
 
 
 def info(
@@ -19,6 +18,8 @@ def info(
     quiet: Quiet = False,
 ) -> None:
     """Say what a file or folder is, and whether it fits together: exit status 1 where it does not."""
+    from psvideo.clip import describe
+
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     found = describe(path, plan=plan)
     voice.say(f"{path}: {found.kind}")

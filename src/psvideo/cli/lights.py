@@ -1,29 +1,23 @@
 """psvideo calibrate matte-sphere, flat-field, intensities, guess: where lights are and how strong."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
 
-from psvideo.calibrate.flat_field import Target, measure_flat_field, with_intensities
-from psvideo.calibrate.guess import ERROR_DEG, Prior, guess_rig
-from psvideo.calibrate.light_pictures import LightPictures, averaged
-from psvideo.calibrate.matte_sphere import MatteLight, matte_rig, measure_matte_sphere
-from psvideo.calibrate.sphere_outline import edge_pictures, find_outlines, given_outline
-from psvideo.calibrate.sphere_sighting import Looking
-from psvideo.calibrate.strengths import measure_strengths
 from psvideo.cli.console import Voice
 from psvideo.cli.options import FirstLight, Force, Frames, Json, PlanPath, Quiet, Verbose
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.files import refuse_existing, write_text
-from psvideo.light_sets import Reading, open_light_sets
-from psvideo.normals.near_light import ground_of, is_near
-from psvideo.rig import directions
-from psvideo.rigfile import SCHEMA, format_rig, read_rig
-from psvideo.view.matte_picture import matte_picture
-from psvideo.view.timing_picture import write_sheet
+
+if TYPE_CHECKING:
+    from psvideo.calibrate.guess import Prior
+    from psvideo.calibrate.light_pictures import LightPictures
+    from psvideo.calibrate.matte_sphere import MatteLight
+    from psvideo.light_sets import Reading
 
 Pictures = Annotated[Path, typer.Argument(help="A folder of stills (one per light), of plates, or a clip.")]
 RigOut = Annotated[Path, typer.Option("-o", "--out", help="The rig file to write.")]
@@ -52,6 +46,14 @@ def matte_sphere(
     quiet: Quiet = False,
 ) -> None:
     """Measure directions and intensities of lights from a matte sphere; writes rig.toml and a picture beside it."""
+    from psvideo.calibrate.matte_sphere import matte_rig, measure_matte_sphere
+    from psvideo.calibrate.sphere_outline import edge_pictures, find_outlines, given_outline
+    from psvideo.calibrate.sphere_sighting import Looking
+    from psvideo.light_sets import Reading
+    from psvideo.rigfile import SCHEMA, format_rig
+    from psvideo.view.matte_picture import matte_picture
+    from psvideo.view.timing_picture import write_sheet
+
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     refuse_existing(out, force=force, mark=SCHEMA)
     refuse_existing(out.with_suffix(".png"), force=force)
@@ -110,7 +112,14 @@ def flat_field(
     quiet: Quiet = False,
 ) -> None:
     """Measure every light's intensity, per channel, from a matte white target that faces the camera (or lies in the
-    rig's [surface] plane); writes the rig with intensities."""
+    plane that the rig gives); writes the rig with intensities."""
+    import numpy as np
+
+    from psvideo.calibrate.flat_field import Target, measure_flat_field, with_intensities
+    from psvideo.light_sets import Reading
+    from psvideo.normals.near_light import ground_of, is_near
+    from psvideo.rigfile import SCHEMA, format_rig, read_rig
+
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     refuse_existing(out, force=force, mark=SCHEMA)
     if not 0 < albedo <= 1:
@@ -165,6 +174,11 @@ def intensities(
     quiet: Quiet = False,
 ) -> None:
     """Measure the relative intensities of four or more distant lights of known directions from any matte scene."""
+    from psvideo.calibrate.strengths import measure_strengths
+    from psvideo.light_sets import Reading
+    from psvideo.rig import directions
+    from psvideo.rigfile import SCHEMA, format_rig, read_rig
+
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     refuse_existing(out, force=force, mark=SCHEMA)
     found = _read(pictures, Reading(plan=plan, frames=frames, first_light=first_light, transfer=transfer), voice)
@@ -201,6 +215,10 @@ def guess(
     quiet: Quiet = False,
 ) -> None:
     """Guess directions of distant lights from pictures of a matte, rounded subject, where nothing was calibrated."""
+    from psvideo.calibrate.guess import ERROR_DEG, guess_rig
+    from psvideo.light_sets import Reading
+    from psvideo.rigfile import SCHEMA, format_rig
+
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     refuse_existing(out, force=force, mark=SCHEMA)
     if prior not in (None, "equal-lights", "equal-albedo"):
@@ -225,6 +243,9 @@ def guess(
 
 
 def _read(path: Path, reading: Reading, voice: Voice) -> LightPictures:
+    from psvideo.calibrate.light_pictures import averaged
+    from psvideo.light_sets import open_light_sets
+
     opened = open_light_sets(path, reading, watch=voice.track)
     for warning in opened.warnings:
         voice.warn(warning)

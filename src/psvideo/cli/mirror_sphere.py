@@ -1,21 +1,20 @@
 """psvideo calibrate mirror-sphere: where the lights are, from their highlights on a chrome ball."""
 
+from __future__ import annotations
+
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from psvideo.calibrate.light_pictures import read_picture
-from psvideo.calibrate.mirror_sphere import MeasuredLight, MirrorCalibration, calibrate_lights
-from psvideo.calibrate.sphere_sighting import Looking, Sighting, SphereNotFoundError, sight_spheres
 from psvideo.cli.console import Voice
 from psvideo.cli.options import FirstLight, Force, Frames, Json, PlanPath, Quiet, Verbose
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.files import refuse_existing, write_text
-from psvideo.light_sets import Reading, open_light_sets
-from psvideo.rigfile import SCHEMA, format_rig
-from psvideo.view.sphere_picture import faulty_picture, sphere_picture
-from psvideo.view.timing_picture import write_sheet
+
+if TYPE_CHECKING:
+    from psvideo.calibrate.mirror_sphere import MeasuredLight, MirrorCalibration
+    from psvideo.calibrate.sphere_sighting import Sighting
 
 LEAST_RADIUS_MM, LARGEST_RADIUS_MM = 1.0, 1000.0
 
@@ -55,6 +54,14 @@ def mirror_sphere(
     quiet: Quiet = False,
 ) -> None:
     """Measure where the lights are from their highlights on one or more mirror spheres; writes rig.toml."""
+    from psvideo.calibrate.light_pictures import read_picture
+    from psvideo.calibrate.mirror_sphere import calibrate_lights
+    from psvideo.calibrate.sphere_sighting import Looking, SphereNotFoundError, sight_spheres
+    from psvideo.light_sets import Reading, open_light_sets
+    from psvideo.rigfile import SCHEMA, format_rig
+    from psvideo.view.sphere_picture import faulty_picture, sphere_picture
+    from psvideo.view.timing_picture import write_sheet
+
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     refuse_existing(out, force=force, mark=SCHEMA)
     picture_path = _picture_path(out, force=force)

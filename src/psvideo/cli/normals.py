@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from psvideo.align.rounds import Aligning
 from psvideo.cli.console import Voice, tell_kept
 from psvideo.cli.delivery_options import (
     AovOption,
@@ -25,7 +24,6 @@ from psvideo.cli.delivery_options import (
     YDirection,
     YOption,
 )
-from psvideo.cli.opening import open_and_tell
 from psvideo.cli.options import (
     ClipPath,
     FirstLight,
@@ -41,13 +39,7 @@ from psvideo.cli.options import (
 )
 from psvideo.cli.sync import describe_timing
 from psvideo.errors import UsageError
-from psvideo.export.results import Delivery
-from psvideo.export.space import choose_space
-from psvideo.export.usd_core import require_usd
-from psvideo.near_surface import MOST_ITERATIONS, NEAR_ITERATIONS
-from psvideo.pipeline import decoded_once
-from psvideo.runs import Output, OverTime, normals_run, read_lighting, timing_of
-from psvideo.view.report import findings, report_record, verdict
+from psvideo.near_limits import MOST_ITERATIONS, NEAR_ITERATIONS
 
 
 class SolverName(StrEnum):
@@ -132,6 +124,15 @@ def normals(
     quiet: Quiet = False,
 ) -> None:
     """Write normals, albedo and validity for every round of flashes; does sync and split by itself."""
+    from psvideo.align.rounds import Aligning
+    from psvideo.cli.opening import open_and_tell
+    from psvideo.export.results import Delivery
+    from psvideo.export.space import choose_space
+    from psvideo.export.usd_core import require_usd
+    from psvideo.pipeline import decoded_once
+    from psvideo.runs import Output, OverTime, normals_run, read_lighting, timing_of
+    from psvideo.view.report import findings, report_record, verdict
+
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     output = Output(folder=out, force=force, resume=resume, start_number=start_number)
     output.check()

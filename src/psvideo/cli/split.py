@@ -7,7 +7,6 @@ from typing import Annotated
 import typer
 
 from psvideo.cli.console import Voice, tell_kept
-from psvideo.cli.opening import open_and_tell
 from psvideo.cli.options import (
     ClipPath,
     FirstLight,
@@ -23,10 +22,6 @@ from psvideo.cli.options import (
     Verbose,
 )
 from psvideo.cli.sync import describe_timing
-from psvideo.pipeline import decoded_once
-from psvideo.rigfile import read_rig
-from psvideo.runs import Output, split_run, timing_of
-from psvideo.timing import timing_record
 
 
 class Method(StrEnum):
@@ -56,6 +51,12 @@ def split(
     quiet: Quiet = False,
 ) -> None:
     """Rebuild one plate per flash and write one EXR sequence per light, ambient light taken off."""
+    from psvideo.cli.opening import open_and_tell
+    from psvideo.pipeline import decoded_once
+    from psvideo.rigfile import read_rig
+    from psvideo.runs import Output, split_run, timing_of
+    from psvideo.timing import timing_record
+
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     output = Output(folder=out, force=force, resume=resume, start_number=start_number)
     output.check()

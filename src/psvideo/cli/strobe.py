@@ -1,8 +1,11 @@
 """psvideo strobe: make lights flash as planned, on a board or on an emulated one."""
 
+from __future__ import annotations
+
 import sys
 from dataclasses import asdict
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -13,19 +16,14 @@ from psvideo.cli.strobe_emulate import emulate
 from psvideo.cli.strobe_progress import watching
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.files import refuse_existing, write_text
-from psvideo.plan import Plan
-from psvideo.planfile import read_plan
 from psvideo.strobe.boards import BOARDS, Board, capabilities
-from psvideo.strobe.confirmed import is_confirmed, remember, state_folder
-from psvideo.strobe.controller import serial_ports
-from psvideo.strobe.describe import describe_program, program_cautions, program_record
-from psvideo.strobe.flicker import flicker_warning
-from psvideo.strobe.greeting import greet
-from psvideo.strobe.link import Link
 from psvideo.strobe.messages import Capabilities, Stat, Status, Stop, Stopped, WiringName
-from psvideo.strobe.program import Program, make_program
-from psvideo.strobe.runlog import format_log, log_record, plan_sha256, run_log
-from psvideo.strobe.session import Outcome, cycles_for, prepare, run_program
+from psvideo.strobe.ports import AUTO
+
+if TYPE_CHECKING:
+    from psvideo.plan import Plan
+    from psvideo.strobe.program import Program
+    from psvideo.strobe.session import Outcome
 
 TELLING_PPM = 1000.0
 """A clock that was measured less exactly is not worth a line: the run was short."""
@@ -37,6 +35,8 @@ strobe.command()(emulate)
 @strobe.command("list")
 def list_ports(json: Json = False, verbose: Verbose = False, quiet: Quiet = False) -> None:
     """Show the serial ports at which a controller may be, by their USB identity; nothing is opened."""
+    from psvideo.strobe.controller import serial_ports
+
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     ports = serial_ports()
     voice.result([{**asdict(port), "board": port.board, "likely": port.is_candidate} for port in ports])
@@ -61,6 +61,10 @@ def check(
     quiet: Quiet = False,
 ) -> None:
     """Say whether a plan can be played, and how: on the board at a port, on one of the table, or on any of them."""
+    from psvideo.planfile import read_plan
+    from psvideo.strobe.describe import program_record
+    from psvideo.strobe.program import make_program
+
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     planned, wanted = read_plan(plan), option.parse_wiring(wiring)
     lines, known = option.parse_lines(line), option.parse_board(board)
@@ -74,6 +78,9 @@ def check(
 
 
 def _caps_at(port: str, board: Board | None, wiring: WiringName | None) -> Capabilities:
+    from psvideo.strobe.link import Link
+    from psvideo.strobe.session import prepare
+
     opened = option.open_port(port, board=board)
     try:
         return prepare(Link(opened), wiring=wiring).caps
@@ -89,6 +96,9 @@ def _caps_of(board: Board, wiring: WiringName | None) -> Capabilities:
 
 def _check_table(voice: Voice, plan: Plan, path: Path, wanted: WiringName | None, lines: dict[str, int]) -> None:
     """Check a plan against every board of the table and each of its wirings."""
+    from psvideo.strobe.describe import program_record
+    from psvideo.strobe.program import make_program
+
     found: list[dict[str, object]] = []
     for board in BOARDS.values():
         for wiring in board.lines:
@@ -110,6 +120,9 @@ def _check_table(voice: Voice, plan: Plan, path: Path, wanted: WiringName | None
 
 def _tell_program(voice: Voice, plan: Plan, program: Program, caps: Capabilities) -> list[str]:
     """Describe a program, and return what to beware of."""
+    from psvideo.strobe.describe import describe_program, program_cautions
+    from psvideo.strobe.flicker import flicker_warning
+
     for line in describe_program(program, caps):
         voice.say(line)
     flicker = flicker_warning(program.played)
@@ -122,7 +135,7 @@ def _tell_program(voice: Voice, plan: Plan, program: Program, caps: Capabilities
 @strobe.command()
 def run(
     plan: option.PlanFile,
-    port: option.PortName = option.AUTO,
+    port: option.PortName = AUTO,
     board: option.BoardName = None,
     seconds: option.Seconds = None,
     rounds: option.Rounds = None,
@@ -136,6 +149,13 @@ def run(
     quiet: Quiet = False,
 ) -> None:
     """Play a plan until Ctrl-C, or for a time; whatever happens, the lights are dark afterwards."""
+    from psvideo.planfile import read_plan
+    from psvideo.strobe.describe import describe_program, program_cautions
+    from psvideo.strobe.link import Link
+    from psvideo.strobe.program import make_program
+    from psvideo.strobe.runlog import format_log, log_record, run_log
+    from psvideo.strobe.session import prepare, run_program
+
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     if log is not None:
         refuse_existing(log, force=force, mark="psvideo-strobe/")
@@ -169,6 +189,8 @@ def run(
 
 
 def _length(plan: Plan, seconds: float | None, rounds: int | None) -> int | None:
+    from psvideo.strobe.session import cycles_for
+
     if seconds is not None and rounds is not None:
         raise UsageError("--seconds and --rounds are both given; expected one of the two, or neither for Ctrl-C.")
     if seconds is not None and not 0 < seconds < 1e6:
@@ -180,6 +202,10 @@ def _length(plan: Plan, seconds: float | None, rounds: int | None) -> int | None
 
 def _confirm(voice: Voice, plan: Plan, path: Path, *, yes: bool, emulated: bool) -> None:
     """Warn of the flashing before the first flash, and have it confirmed once for each plan."""
+    from psvideo.strobe.confirmed import is_confirmed, remember, state_folder
+    from psvideo.strobe.flicker import flicker_warning
+    from psvideo.strobe.runlog import plan_sha256
+
     warning = flicker_warning(plan) if plan.mode != "synced" else None
     if warning is None:
         return
@@ -218,12 +244,15 @@ def _tell_outcome(voice: Voice, plan: Plan, outcome: Outcome, log: Path | None) 
 
 @strobe.command()
 def stop(
-    port: option.PortName = option.AUTO,
+    port: option.PortName = AUTO,
     json: Json = False,
     verbose: Verbose = False,
     quiet: Quiet = False,
 ) -> None:
     """Make a board dark, and say how it is."""
+    from psvideo.strobe.greeting import greet
+    from psvideo.strobe.link import Link
+
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     opened = option.open_port(port, board=None)
     try:

@@ -1,5 +1,7 @@
 """psvideo strobe emulate: a strobe controller without a board."""
 
+from __future__ import annotations
+
 import contextlib
 import signal
 import sys
@@ -7,7 +9,7 @@ import threading
 from collections.abc import Iterator
 from pathlib import Path
 from types import FrameType
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -16,12 +18,11 @@ from psvideo.cli.options import Force, Quiet
 from psvideo.errors import UsageError
 from psvideo.files import refuse_existing, whole_file
 from psvideo.strobe.boards import BOARDS
-from psvideo.strobe.emulated import EmulatedController
-from psvideo.strobe.imitation import TRACE_HZ, open_port, serve
 from psvideo.strobe.messages import WiringName
-from psvideo.strobe.simulated import Simulation, simulated_board
-from psvideo.strobe.toolchain import AvrBoard, why_not
-from psvideo.tracefile import SCHEMA, TraceWriter
+from psvideo.strobe.toolchain import AvrBoard
+
+if TYPE_CHECKING:
+    from psvideo.strobe.simulated import Simulation
 
 LOOK_EVERY_S = 0.2
 IMITATED: AvrBoard = "atmega328p"
@@ -51,6 +52,10 @@ def emulate(
     quiet: Quiet = False,
 ) -> None:
     """Emulate a strobe controller: print its port, run until stopped (Ctrl-C). Other commands take it with --port."""
+    from psvideo.strobe.simulated import Simulation
+    from psvideo.strobe.toolchain import why_not
+    from psvideo.tracefile import SCHEMA
+
     voice = Voice(quiet=quiet)
     if trace is not None:
         refuse_existing(trace, force=force, mark=SCHEMA)
@@ -67,6 +72,8 @@ def emulate(
 
 
 def _run_firmware(voice: Voice, wish: Simulation) -> None:
+    from psvideo.strobe.simulated import simulated_board
+
     with _until_stopped() as stopped, simulated_board(wish) as simulated:
         _introduce(voice, simulated.port, f"the real firmware on an emulated {wish.board}", wish.trace)
         while simulated.is_running and not stopped.wait(LOOK_EVERY_S):
@@ -74,6 +81,10 @@ def _run_firmware(voice: Voice, wish: Simulation) -> None:
 
 
 def _imitate(voice: Voice, wiring: WiringName, trace: Path | None) -> None:
+    from psvideo.strobe.emulated import EmulatedController
+    from psvideo.strobe.imitation import TRACE_HZ, open_port, serve
+    from psvideo.tracefile import TraceWriter
+
     with _until_stopped() as stopped, contextlib.ExitStack() as stack:
         writer = None
         if trace is not None:

@@ -1,17 +1,19 @@
 """The options of psvideo strobe, each written once, and what becomes of their words."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from psvideo.errors import UsageError, nearest
 from psvideo.strobe.boards import BOARDS, Board
-from psvideo.strobe.controller import AUTO, OpenPort
-from psvideo.strobe.emulated_port import EmulatedPort
-from psvideo.strobe.link import Port
 from psvideo.strobe.messages import WIRINGS, WiringName
+
+if TYPE_CHECKING:
+    from psvideo.strobe.link import Port
 
 EMULATED = "emulated"
 
@@ -76,11 +78,11 @@ def parse_board(word: str | None) -> Board | None:
 
 def open_port(name: str, *, board: Board | None) -> Port:
     """Open a port by what --port says."""
+    from psvideo.strobe.controller import OpenPort
+    from psvideo.strobe.emulated_port import EmulatedPort
+
     if name == EMULATED:
         return EmulatedPort(board or next(iter(BOARDS.values())))
     if board is not None:
         raise UsageError(f"--board {board.name}: the board at {name} says itself what it is; leave --board out.")
     return OpenPort(name)
-
-
-__all__ = ["AUTO"]

@@ -1,21 +1,27 @@
 """How a strobe run is shown while it lasts: a line that is written over on a terminal, plain lines elsewhere."""
 
+from __future__ import annotations
+
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
-from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
 from psvideo.cli.console import PLAIN_PROGRESS_EVERY_S, Voice
-from psvideo.strobe.program import Program
-from psvideo.strobe.session import Beat
+
+if TYPE_CHECKING:
+    from psvideo.strobe.program import Program
+    from psvideo.strobe.session import Beat
 
 
 @contextmanager
 def watching(voice: Voice, program: Program, *, lasts_s: float | None) -> Iterator[Callable[[Beat], None]]:
     """Give what shows each beat of a run; ``lasts_s`` is how long the run is meant to be, None: until Ctrl-C."""
+    from rich.console import Console
+
     if voice.quiet:
         yield lambda beat: None
     elif sys.stderr.isatty():

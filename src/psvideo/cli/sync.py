@@ -1,18 +1,16 @@
 """psvideo sync: find when every flash fired."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from psvideo.cli.console import Voice
-from psvideo.cli.opening import open_and_tell
 from psvideo.cli.options import ClipPath, FirstLight, Force, Frames, Json, OrderRig, PlanPath, Quiet, Verbose
 from psvideo.files import refuse_existing, write_text
-from psvideo.naming import named_by_rig
-from psvideo.pipeline import find_clip_timing
-from psvideo.rigfile import read_rig
-from psvideo.timing import Timing, format_timing, timing_record
+
+if TYPE_CHECKING:
+    from psvideo.timing import Timing
 
 TimingOut = Annotated[
     Path | None, typer.Option("-o", "--out", help="Where to write timing.json; left out: only a summary is printed.")
@@ -36,6 +34,12 @@ def sync(
     quiet: Quiet = False,
 ) -> None:
     """Find phase, clock offset, light order and dropped frames of a strobed clip, from the picture alone."""
+    from psvideo.cli.opening import open_and_tell
+    from psvideo.naming import named_by_rig
+    from psvideo.pipeline import find_clip_timing
+    from psvideo.rigfile import read_rig
+    from psvideo.timing import format_timing, timing_record
+
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     if out is not None:
         refuse_existing(out, force=force, mark="psvideo-timing/")
@@ -56,7 +60,7 @@ def sync(
             voice.say(f"{written}: written.")
 
 
-def describe_timing(timing: Timing) -> str:
+def describe_timing(timing: "Timing") -> str:
     """Return what was found and how sure it is, in a few lines for people."""
     complete = sum(flash.complete for flash in timing.flashes)
     lines = [f"{len(timing.flashes)} flashes, {complete} of them complete."]

@@ -2,15 +2,16 @@
 
 import dataclasses
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from psvideo.cli.console import Voice
 from psvideo.cli.options import Force, Json, Quiet, Verbose
 from psvideo.errors import UsageError
-from psvideo.synth.shoot import shoot
-from psvideo.synth.traced import TraceOptions
+
+if TYPE_CHECKING:
+    from psvideo.synth.traced import TraceOptions
 
 
 def synth(
@@ -28,7 +29,9 @@ def synth(
     verbose: Verbose = False,
     quiet: Quiet = False,
 ) -> None:
-    """Film a virtual scene: a clip folder as a camera would leave it, and the exact truth beside it in truth/."""
+    """Film a virtual scene: a clip folder as a camera would leave it, and the truth beside it in truth/."""
+    from psvideo.synth.shoot import shoot
+
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     shot = shoot(
         scene,
@@ -49,7 +52,9 @@ def synth(
     voice.result({**dataclasses.asdict(shot), "path": str(shot.path)})
 
 
-def _trace_options(trace: Path | None, lines: list[str]) -> TraceOptions | None:
+def _trace_options(trace: Path | None, lines: list[str]) -> "TraceOptions | None":
+    from psvideo.synth.traced import TraceOptions
+
     if trace is None:
         if lines:
             raise UsageError("--line: says which line of a trace a light hangs on; give --trace FILE with it.")

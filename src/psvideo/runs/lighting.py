@@ -11,7 +11,8 @@ from psvideo.clip import DepthMaps, open_depth, read_mask
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.results import Delivery
 from psvideo.integrate import Shaping, view_of
-from psvideo.near_surface import NEAR_ITERATIONS, NearSurface, near_surface_of, near_trust
+from psvideo.near_limits import NEAR_ITERATIONS
+from psvideo.near_surface import NearSurface, near_surface_of, near_trust
 from psvideo.normals.illumination import illumination
 from psvideo.pipeline import (
     Take,

@@ -10,12 +10,11 @@ import serial
 from serial.tools.list_ports import comports  # type: ignore[attr-defined]
 
 from psvideo.errors import PsvideoError
-from psvideo.strobe.ports import SerialPort, choose_port
+from psvideo.strobe.ports import AUTO, SerialPort, choose_port
 
 BAUD = 115_200
 WAIT_S = 0.02
 WRITE_WITHIN_S = 2.0
-AUTO = "auto"
 
 
 def serial_ports() -> tuple[SerialPort, ...]:

@@ -1,0 +1,51 @@
+"""The commands in the order of the work, and what the first screen says of each, so that it loads none of them."""
+
+from dataclasses import dataclass
+
+PLAN, MEASURE, SPLIT = "1  Plan and light", "2  Measure cameras and lights", "3  From footage to plates"
+SOLVE, TRY = "4  From plates to normals", "Try it, and see whether all is there"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Entry:
+    """One line of the first screen: the command, the panel it stands in, and its own help's first sentence."""
+
+    name: str
+    panel: str
+    summary: str
+
+    @property
+    def word(self) -> str:
+        """The command's module under ``psvideo.cli``, and the name of what it holds."""
+        return self.name.replace("-", "_")
+
+
+def _entries(panel: str, **summaries: str) -> tuple[Entry, ...]:
+    return tuple(
+        Entry(name=word.replace("_", "-"), panel=panel, summary=summary) for word, summary in summaries.items()
+    )
+
+
+COMMANDS = (
+    *_entries(
+        PLAN,
+        capture_plan="Plan a shoot: write plan.toml, and print what decides the shoot and what to beware of.",
+        strobe="Make lights flash as planned: on a board, or on an emulated one.",
+    ),
+    *_entries(MEASURE, calibrate="Measure cameras and lights before a shoot."),
+    *_entries(
+        SPLIT,
+        info="Say what a file or folder is, and whether it fits together: exit status 1 where it does not.",
+        sync="Find phase, clock offset, light order and dropped frames of a strobed clip, from the picture alone.",
+        split="Rebuild one plate per flash and write one EXR sequence per light, ambient light taken off.",
+    ),
+    *_entries(
+        SOLVE, normals="Write normals, albedo and validity for every round of flashes; does sync and split by itself."
+    ),
+    *_entries(
+        TRY,
+        demo="Film a virtual bust, find the flashes, solve for normals, and end with the path of a picture of it all.",
+        synth="Film a virtual scene: a clip folder as a camera would leave it, and the truth beside it in truth/.",
+    ),
+)
+"""Every command; ``tests/test_help.py`` holds the sentences to those of the commands themselves."""

@@ -1,0 +1,88 @@
+"""Help that ends with examples to copy, and completion that loads no more than the command it is asked about."""
+
+import shlex
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+
+from psvideo.cli.examples import EXAMPLES
+from psvideo.cli.panels import MANY, panel_of
+
+PROGRAM = "psvideo"
+
+
+def examples_of(path: str) -> tuple[tuple[str, str], ...]:
+    """Return the examples of a command by its path (``calibrate readout``): what each does, and the line to type."""
+    return EXAMPLES.get(path, ())
+
+
+def _print_examples(context: typer.Context) -> None:
+    """Print examples as they are typed: no frame around them and no wrapping, so that they can be copied."""
+    path = context.command_path.partition(" ")[2]
+    for place, (purpose, line) in enumerate(examples_of(path)):
+        print(f"{'' if place else ' Examples'}\n   # {purpose}\n   {line}")
+
+
+class Teaching(TyperCommand):
+    """A command whose help ends with its examples."""
+
+    def get_params(self, ctx: Any) -> Any:
+        """Return the options, where they are many each with the panel it stands in."""
+        params: list[Any] = list(super().get_params(ctx))
+        if len(params) > MANY and not any(getattr(param, "rich_help_panel", None) for param in params):
+            for param in params:
+                if param.param_type_name == "option" and not param.required:
+                    param.rich_help_panel = panel_of(param.name or "")
+        return params
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Print the help, then the examples."""
+        super().format_help(ctx, formatter)
+        _print_examples(ctx)
+
+
+class TeachingGroup(TyperGroup):
+    """A group of commands whose help ends with its examples; its commands stand in the order of the work."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Print the help, then the examples."""
+        super().format_help(ctx, formatter)
+        _print_examples(ctx)
+
+
+def teach(app: typer.Typer) -> typer.Typer:
+    """Give every command of ``app`` and of its groups help with examples; return ``app``."""
+    app.info.cls = TeachingGroup
+    for command in app.registered_commands:
+        command.cls = Teaching
+    for group in app.registered_groups:
+        group.cls = TeachingGroup
+        if group.typer_instance is not None:
+            teach(group.typer_instance)
+    return app
+
+
+def words_typed(arguments: Sequence[str], environment: Mapping[str, str]) -> list[str]:
+    """Return the words after ``psvideo``, or, where a shell asks what could be typed next, those that it sent along.
+
+    >>> words_typed([], {"_PSVIDEO_COMPLETE": "complete_bash", "COMP_WORDS": "psvideo strobe r"})
+    ['strobe', 'r']
+    >>> words_typed(["help", "sync"], {})
+    ['sync', '--help']
+    """
+    if "_PSVIDEO_COMPLETE" in environment:
+        line = environment.get("COMP_WORDS") or environment.get("_TYPER_COMPLETE_ARGS", "")
+        try:
+            return shlex.split(line)[1:]
+        except ValueError:  # a quotation mark that is not closed yet
+            return line.split()[1:]
+    if arguments and arguments[0] == "help":
+        return [*arguments[1:], "--help"]
+    return list(arguments)
+
+
+def command_called(words: Sequence[str]) -> str:
+    """Return the first word that is no option: the command's name, or nothing."""
+    return next((word for word in words if not word.startswith("-")), "")
