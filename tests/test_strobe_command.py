@@ -32,7 +32,7 @@ def plan_file(tmp_path: Path) -> Path:
 def state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Keep what is remembered away from the user's own folder."""
     folder = tmp_path / "state"
-    monkeypatch.setattr("psvideo.cli.strobe.state_folder", lambda: folder)
+    monkeypatch.setattr("psvideo.strobe.confirmed.state_folder", lambda: folder)
     return folder
 
 
