@@ -49,8 +49,8 @@ def readout(
     led_tolerance_ppm: Annotated[
         float | None,
         typer.Option(
-            help="Tolerance of the LED's or the strobe's clock in ppm: a crystal 100, a ceramic resonator 5000. Left out: "
-            "100, or the plan's where the pictures are a strobed clip.",
+            help="Tolerance of the LED's or the strobe's clock in ppm: a crystal 100, a ceramic resonator 5000. "
+            "Left out: 100, or the plan's where the pictures are a strobed clip.",
             min=0,
         ),
     ] = None,
