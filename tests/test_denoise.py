@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 
 from psvideo.align.denoise import Average, averaged
+from psvideo.quality.judge_result import steadiness
+from psvideo.quality.observed import instant_facts
+from psvideo.quality.steadiness import change, sample_of
 from psvideo.sequence import LightPlate, Round
 from psvideo.surface import Surface
 from psvideo.timing import Timing
-from psvideo.view.report import RunReport, findings, flicker, instant_facts, report_record
-from psvideo.view.steadiness import change, sample_of
+from psvideo.view.report import RunReport, findings, flicker, report_record
 
 ROWS, COLS = 96, 128
 
@@ -143,13 +145,13 @@ def test_the_report_names_the_worst_instants() -> None:
         before = now
     timing = Timing(clip="c", frame_period_s=1, exposure_s=1, row_time_s=0, clock_offset_ppm=0, phase_error_rows=0,
                     order="given", flashes=())  # fmt: skip
-    report = RunReport(clip="c", version="0", timing=timing, lights=("a",), condition=1.0, solver="", trust="",
-                       instants=tuple(facts))  # fmt: skip
+    report = RunReport(clip="c", version="0", timing=timing, lights=(), shot={}, settings={}, instants=tuple(facts),
+                       judgements=tuple(steadiness(facts)))  # fmt: skip
     found = flicker(report.instants)
     assert found is not None
     assert found.worst[0] == 1003
     assert found.level_percent < 0.5
     assert any(re.search(r"[45]\.\d % as a whole \(number 1003\)", sentence) for sentence in findings(report))
-    steady = replace(report, instants=report.instants[:2])
+    steady = replace(report, judgements=tuple(steadiness(facts[:2])))
     assert not any("flickers" in sentence for sentence in findings(steady))
     assert report_record(replace(report, instants=report.instants[:1]))["flicker"] is None

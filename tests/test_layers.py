@@ -28,6 +28,7 @@ LAYERS = [
         "integrate",
     },
     {"align"},
+    {"quality"},
     {"export", "view"},
     {"synth"},
     {"near_surface"},

@@ -12,6 +12,7 @@ import pytest
 
 from psvideo.cli.app import main
 from psvideo.clip import kept, reading
+from psvideo.quality.observed import Observed
 from psvideo.runs import results as runs
 
 SCENES = Path(__file__).resolve().parents[1] / "data_synth"
@@ -96,7 +97,7 @@ def test_a_run_that_is_stopped_leaves_no_decoded_frames_behind(
         raise end
 
     monkeypatch.setattr(kept.Kept, "__init__", remembered)
-    monkeypatch.setattr(runs, "instant_facts", stop)
+    monkeypatch.setattr(Observed, "add", stop)
     with contextlib.suppress(RuntimeError):
         assert run("normals", clip, "--rig", clip / "rig.toml", "-o", tmp_path / "out", "-q") == 1
     assert [path.name for path in tmp_path.iterdir()] == [".out.partial"], "what --resume goes on with, and no more"

@@ -73,7 +73,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     _share_one_heap()
     words = words_typed(sys.argv[1:] if arguments is None else arguments, os.environ)
     try:
-        application(words)(args=words, prog_name=PROGRAM)
+        application(words)(args=words, prog_name=PROGRAM, obj=words)
     except PsvideoError as fault:
         print(f"psvideo: {fault}", file=sys.stderr)
         return fault.exit_status

@@ -1,6 +1,7 @@
 """What commands print: plain text or JSON on stdout; notes, warnings and progress on stderr."""
 
 import json
+import shlex
 import sys
 import time
 from collections.abc import Iterable, Iterator
@@ -8,7 +9,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:
+    import typer
+
     from psvideo.clip import Kept
+    from psvideo.view.report import RunReport
 
 Item = TypeVar("Item")
 PLAIN_PROGRESS_EVERY_S = 5.0
@@ -50,6 +54,21 @@ class Voice:
             yield from _bar(items, total, what, unit)
         else:
             yield from _lines(items, total, what, unit)
+
+
+def command_line(context: "typer.Context") -> str:
+    """Return the command as it was typed, quoted for a shell; empty where nobody typed one."""
+    words = context.find_root().obj
+    return shlex.join(["psvideo", *words]) if isinstance(words, list) else ""
+
+
+def tell_report(voice: Voice, report: "RunReport") -> None:
+    """Say whether the take is usable, and warn of all that speaks against it."""
+    from psvideo.view.report import findings, verdict
+
+    voice.say(verdict(report))
+    for sentence in findings(report):
+        voice.warn(sentence)
 
 
 def tell_kept(voice: Voice, kept: "Kept | None") -> None:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from psvideo.cli.console import Voice, tell_kept
+from psvideo.cli.console import Voice, command_line, tell_kept, tell_report
 from psvideo.cli.delivery_options import (
     AovOption,
     CameraName,
@@ -66,6 +66,7 @@ class RateName(StrEnum):
 
 
 def normals(
+    context: typer.Context,
     clip: ClipPath,
     rig: Annotated[Path, typer.Option("--rig", help="Where the lights are: rig.toml, .lp, DiLiGenT or UW list.")],
     out: Annotated[Path, typer.Option("-o", "--out", help="The folder to write.")],
@@ -131,10 +132,10 @@ def normals(
     from psvideo.export.usd_core import require_usd
     from psvideo.pipeline import decoded_once
     from psvideo.runs import Output, OverTime, normals_run, read_lighting, timing_of
-    from psvideo.view.report import findings, report_record, verdict
+    from psvideo.view.report import report_record
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
-    output = Output(folder=out, force=force, resume=resume, start_number=start_number)
+    output = Output(folder=out, force=force, resume=resume, start_number=start_number, command=command_line(context))
     output.check()
     delivery = Delivery(
         space=choose_space(
@@ -178,7 +179,5 @@ def normals(
         tell_kept(voice, take.kept)
     voice.result(report_record(report))
     voice.say(describe_timing(found))
-    voice.say(verdict(report))
-    for sentence in findings(report):
-        voice.warn(sentence)
+    tell_report(voice, report)
     voice.say(f"{out}: {len(report.instants)} instants written; see {out / 'report.html'}.")

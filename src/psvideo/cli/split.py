@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from psvideo.cli.console import Voice, tell_kept
+from psvideo.cli.console import Voice, command_line, tell_kept, tell_report
 from psvideo.cli.options import (
     ClipPath,
     FirstLight,
@@ -32,6 +32,7 @@ class Method(StrEnum):
 
 
 def split(
+    context: typer.Context,
     clip: ClipPath,
     out: Annotated[Path, typer.Option("-o", "--out", help="The folder of plates to write.")],
     plan: PlanPath = None,
@@ -58,14 +59,17 @@ def split(
     from psvideo.timing import timing_record
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
-    output = Output(folder=out, force=force, resume=resume, start_number=start_number)
+    output = Output(folder=out, force=force, resume=resume, start_number=start_number, command=command_line(context))
     output.check()
     take = open_and_tell(clip, voice, plan=plan, frames=frames)
     known = None if rig is None else read_rig(rig, plan_lights=take.plan.lights)
     with decoded_once(take, output=out) as take:
         found = timing_of(take, timing, first_light=first_light, rig=known, watch=voice.track)
-        written = split_run(take, found, output, method=method.value, flashes=flashes, watch=voice.track)
+        done = split_run(take, found, output, method=method.value, flashes=flashes, known=known, watch=voice.track)
         tell_kept(voice, take.kept)
+    written = done.timing
     voice.result(timing_record(written))
     voice.say(describe_timing(written))
-    voice.say(f"{out}: {sum(flash.plate is not None for flash in written.flashes)} plates written.")
+    tell_report(voice, done.report)
+    plates = sum(flash.plate is not None for flash in written.flashes)
+    voice.say(f"{out}: {plates} plates written; see {out / 'report.html'}.")

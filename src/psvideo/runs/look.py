@@ -6,19 +6,28 @@ from numpy.typing import NDArray
 from psvideo.pipeline import (
     Instant,
 )
+from psvideo.sequence import Round
 from psvideo.view.contact import Strip, Tile, sheet
 from psvideo.view.shading import exposure_for, normal_colours, smaller, srgb
 
 Pixels = NDArray[np.uint8]
-SHOWN_WIDTH_PX = 600
+SHOWN_WIDTH_PX, WIDE_PX = 600, 1200
 
 
 def look(instant: Instant) -> Pixels:
     """Return a picture of one instant for eyes: its plates, its normals and its albedo."""
-    shown = [(plate.light, smaller(plate.image, SHOWN_WIDTH_PX)) for plate in instant.round.plates]
-    exposure = exposure_for(shown[0][1])
     albedo = smaller(instant.surface.albedo, SHOWN_WIDTH_PX)
     normals = smaller(instant.surface.normals, SHOWN_WIDTH_PX)
     surface = [Tile("normals", normal_colours(normals)), Tile("albedo", srgb(albedo, exposure=exposure_for(albedo)))]
-    plates = [Tile(light, srgb(picture, exposure=exposure)) for light, picture in shown]
-    return sheet([Strip("Plates, one per light", plates), Strip("Surface", surface)], width_px=1200)
+    return sheet([_plates(instant.round), Strip("Surface", surface)], width_px=WIDE_PX)
+
+
+def look_at_plates(one: Round) -> Pixels:
+    """Return a picture of one round's plates for eyes."""
+    return sheet([_plates(one)], width_px=WIDE_PX)
+
+
+def _plates(one: Round) -> Strip:
+    shown = [(plate.light, smaller(plate.image, SHOWN_WIDTH_PX)) for plate in one.plates]
+    exposure = exposure_for(shown[0][1])
+    return Strip("Plates, one per light", [Tile(light, srgb(picture, exposure=exposure)) for light, picture in shown])

@@ -25,12 +25,13 @@ MARK = "timing.json"
 
 @dataclass(frozen=True, kw_only=True)
 class Output:
-    """Where a run writes, and what it may do there."""
+    """Where a run writes, and what it may do there. ``command`` is what the user typed, for the report."""
 
     folder: Path
     force: bool = False
     resume: bool = False
     start_number: int = FIRST_NUMBER
+    command: str = ""
 
     def check(self) -> None:
         """Raise UsageError where the folder exists and may not be replaced, before any work is done."""

@@ -1,6 +1,6 @@
 """A whole split: a clip in, a folder of plates out."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 from psvideo.clip import Clip
@@ -15,9 +15,24 @@ from psvideo.pipeline import (
     clip_rounds,
     unwatched,
 )
+from psvideo.rig import Rig
+from psvideo.runs.look import look_at_plates
 from psvideo.runs.output import Output, folder_of, settings_of, tags_of
+from psvideo.runs.reporting import observing, run_report, write_report
 from psvideo.sequence import round_numbers
 from psvideo.timing import Timing, format_timing
+from psvideo.view.report import RunReport
+
+SAMPLE_ROUND = 3
+"""The round that the report shows, counted from 1; the first where there are fewer."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SplitResult:
+    """What a split run gave: the timing with every plate's file, and the report."""
+
+    timing: Timing
+    report: RunReport
 
 
 def split_run(
@@ -27,10 +42,15 @@ def split_run(
     *,
     method: Method = "weights",
     flashes: bool = False,
+    known: Rig | None = None,
     watch: Watch = unwatched,
-) -> Timing:
-    """Write one sequence per light, ambient where there are dark slots, and timing.json; return what that holds."""
+) -> SplitResult:
+    """Write one sequence per light, ambient where there are dark slots, timing.json and the report.
+
+    ``known`` is the rig, if there is one, to be held against the plates.
+    """
     clip = take.clip
+    observed, picture = observing(take, known), None
     tags = tags_of(clip)
     written: set[str] = set()
     settings = settings_of(take, timing, output, method, flashes)
@@ -44,11 +64,17 @@ def split_run(
                 written.add(name)
                 if not (output.resume and (folder / name).is_file()):
                     write(partial(write_plate, folder, clip.name, plate, tags))
-        if not written:
+            observed.add(one)
+            if len(observed.facts) in (1, SAMPLE_ROUND):
+                picture = look_at_plates(one)
+            del one, plate  # they would be held while the next round gathers
+        if picture is None:
             raise PsvideoError(nothing_complete(clip, timing))
         timing = _with_plates(timing, clip.name, written, start_number=output.start_number)
         write_text(folder / "timing.json", format_timing(timing))
-    return timing
+        report = run_report(take, timing, observed, output)
+        write_report(folder, report, [("One round", picture)])
+    return SplitResult(timing=timing, report=report)
 
 
 def nothing_complete(clip: Clip, timing: Timing) -> str:

@@ -1,6 +1,5 @@
 """A whole normals run: a clip in, a folder of files out, with decoding, computing and writing side by side."""
 
-import json
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -10,7 +9,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo import __version__
 from psvideo.align.rounds import Aligning, aligned
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.mesh import animation_name
@@ -31,15 +29,16 @@ from psvideo.pipeline import (
     unwatched,
 )
 from psvideo.plan import Plan
+from psvideo.quality.observed import InstantFacts
 from psvideo.runs.delivering import check_camera, world_doubts
 from psvideo.runs.lighting import Lighting
 from psvideo.runs.look import look
 from psvideo.runs.output import Output, folder_of, settings_of, tags_of
 from psvideo.runs.plates import nothing_complete
+from psvideo.runs.reporting import Solved, observing, run_report, write_report
 from psvideo.runs.shape import shape_of
 from psvideo.timing import Timing, format_timing
-from psvideo.view.report import InstantFacts, RunReport, instant_facts, report_page, report_record
-from psvideo.view.steadiness import Sample, change, sample_of
+from psvideo.view.report import RunReport
 
 Pixels = NDArray[np.uint8]
 SAMPLE_ROUND = 3
@@ -106,9 +105,8 @@ def normals_run(
     check_camera(delivery.space, take, timing, output.start_number)
     tags = tags_of(clip, lighting.rig_path, delivery.space, over_time.aligning.rate)
     shaping = lighting.shaping if delivery.needs_depth else None
-    facts: list[InstantFacts] = []
+    observed = observing(take, lighting.rig, mask)
     picture: Pixels | None = None
-    seen: Sample | None = None
     solving = _solving(clip.plan, solver, delivery)
     method = solving.method(len(clip.plan.lights))
     known = () if lighting.depths is None else lighting.depths.identity
@@ -116,7 +114,7 @@ def normals_run(
     settings = settings_of(take, timing, output, tags, delivery, over_time, *light)
     with (
         folder_of(output, settings) as folder,
-        _animation(folder, clip.name, facts, delivery, tags, shaping),
+        _animation(folder, clip.name, observed.facts, delivery, tags, shaping),
         writing() as write,
     ):
         rounds = clip_rounds(take, timing, start_number=output.start_number, watch=watch)
@@ -131,32 +129,26 @@ def normals_run(
                 write(partial(write_surface, folder, clip.name, *at, surface, delivery=there, tags=tags, depth=shaped))
                 del surface
             del shaped  # it holds the surface too
-            before, seen = seen, sample_of(instant.surface)
-            changed = None if before is None else change(before, seen)
-            facts.append(instant_facts(instant.round, instant.surface, mask, changed))
-            if len(facts) in (1, SAMPLE_ROUND):
+            observed.add(instant.round, instant.surface)
+            if len(observed.facts) in (1, SAMPLE_ROUND):
                 picture = (picture_of or look)(instant)
             del instant  # its plates would be held while the next round gathers
         if picture is None:
             raise PsvideoError(nothing_complete(clip, timing))
-        report = RunReport(
-            clip=clip.name,
-            version=__version__,
-            timing=timing,
-            lights=clip.plan.lights,
-            condition=lighting.condition,
+        solved = Solved(
+            lighting=lighting,
             solver=method,
             trust=" ".join([trust_note(method, len(clip.plan.lights)), *lighting.near_notes]),
-            instants=tuple(facts),
             warnings=(
                 *lighting.doubts,
                 *(() if shaping is None else reservations(shaping)),
                 *world_doubts(delivery, metric=shaping is not None and shaping.metric),
             ),
+            aligned=over_time.aligning.align != "none",
         )
+        report = run_report(take, timing, observed, output, solved=solved)
         write_text(folder / "timing.json", format_timing(timing))
-        write_text(folder / "report.json", json.dumps(report_record(report), indent=1) + "\n")
-        write_text(folder / "report.html", report_page(report, [("One round", picture)]))
+        write_report(folder, report, [("One round", picture)])
     return NormalsResult(report=report, picture=picture)
 
 

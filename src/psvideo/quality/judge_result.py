@@ -1,0 +1,168 @@
+"""Judgements on what came out: sharpness, the rig's fit, valid normals, noise and flicker."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from psvideo.quality.judgement import Grade, Judgement
+from psvideo.quality.observed import InstantFacts, Observed
+from psvideo.quality.rigfit import RigFit
+from psvideo.quality.steadiness import Change
+
+SOFT_PX, LOST_SOFT_PX = 2.0, 4.0
+MISFIT, LOST_MISFIT = 0.12, 0.25
+"""Shares of the light that no normal explains under the rig."""
+BY_STRENGTH, OTHER_STRENGTH = 0.5, 1.25
+AGREE, DISAGREE = 0.3, -0.1
+LEAST_VALID, HARDLY_VALID = 0.3, 0.05
+MOST_FLICKER_PERCENT = 1.0
+NOISY_DEG, LOST_NOISY_DEG = 4.0, 10.0
+
+
+def focus(observed: Observed) -> Judgement:
+    """Judge the sharpest edges."""
+    if not observed.blurs_px:
+        return Judgement(
+            subject="focus", grade="unknown", found="Sharpness cannot be told: no edge stands out of the noise."
+        )
+    blur_px = float(np.median(observed.blurs_px))
+    found = f"The sharpest edges are blurred by {blur_px:.1f} px."
+    if blur_px <= SOFT_PX:
+        return Judgement(subject="focus", grade="good", found=found)
+    return Judgement(
+        subject="focus",
+        grade="bad" if blur_px > LOST_SOFT_PX else "doubtful",
+        found=f"{found} Nothing in the picture is in focus.",
+        advice="Focus on the subject by hand, close the aperture, and keep the camera still.",
+    )
+
+
+def rig(observed: Observed) -> Iterator[Judgement]:
+    """Judge whether the rig's directions and strengths can have made these plates."""
+    fit = None if observed.points is None else observed.points.fit(observed.light_at_points)
+    wrong = None if fit is None else _misfit(observed.lights, fit)
+    crossed = _crossed(observed)
+    if wrong or crossed:
+        yield from (one for one in (wrong, crossed) if one)
+    elif fit is not None:
+        yield Judgement(
+            subject="rig",
+            grade="good",
+            found=f"The rig explains the plates: {100 * fit.misfit:.1f} % of the light is left over.",
+        )
+    elif observed.slopes:
+        yield Judgement(
+            subject="rig",
+            grade="good",
+            found="The normals fit together as one surface's; strengths cannot be checked with so few lights.",
+        )
+
+
+def _misfit(lights: Sequence[str], fit: RigFit) -> Judgement | None:
+    if fit.misfit <= MISFIT or fit.misfit < 1.5 * fit.own_misfit:
+        return None
+    grade: Grade = "bad" if fit.misfit > LOST_MISFIT else "doubtful"
+    found = f"The rig does not fit the plates: {100 * fit.misfit:.0f} % of the light cannot come from its lights"
+    off = [
+        (light, strength)
+        for light, strength in zip(lights, fit.strengths, strict=True)
+        if not 1 / OTHER_STRENGTH < strength < OTHER_STRENGTH
+    ]
+    if fit.scaled_misfit < BY_STRENGTH * fit.misfit and off:
+        named = ", ".join(f"{light!r} {100 * strength:.0f} %" for light, strength in off)
+        return Judgement(
+            subject="rig",
+            grade=grade,
+            found=f"{found}; with other strengths it would: {named} of what the rig says.",
+            advice="Check the power and the driver of these lights, or calibrate the rig again.",
+        )
+    return Judgement(
+        subject="rig",
+        grade=grade,
+        found=f"{found}.",
+        advice="Use the rig file of this set-up; calibrate again if a light or the camera was moved; check that lights "
+        "have the same names in plan and rig.",
+    )
+
+
+def _crossed(observed: Observed) -> Judgement | None:
+    agreement = float(np.median(observed.slopes)) if observed.slopes else 1.0
+    if agreement > AGREE or not quiet(observed.facts):
+        return None
+    return Judgement(
+        subject="rig",
+        grade="bad" if agreement < DISAGREE else "doubtful",
+        found=f"The normals cannot be those of one surface (agreement of slopes {agreement:.2f}, 1 at best): "
+        "directions are mirrored or turned, or lights exchanged.",
+        advice="Check that the rig file is in camera axes (x right, y up), belongs to this set-up, and names the "
+        "lights as the plan does; calibrate again if anything was moved.",
+    )
+
+
+def quiet(facts: Sequence[InstantFacts]) -> bool:
+    """Tell whether normals are steady enough to be held against each other."""
+    known = [one.change.normals_deg for one in facts if one.change is not None]
+    return not known or float(np.median(known)) < NOISY_DEG
+
+
+def validity(observed: Observed) -> Iterator[Judgement]:
+    """Judge how much of the subject has a normal."""
+    shares = [one.valid_share for one in observed.facts if one.valid_share is not None]
+    if not shares:
+        return
+    usual, least = float(np.median(shares)), min(shares)
+    found = f"{100 * usual:.0f} % of what is lit has a normal to be trusted"
+    if usual >= LEAST_VALID:
+        yield Judgement(subject="validity", grade="good", found=f"{found} ({100 * least:.0f} % in the worst round).")
+        return
+    yield Judgement(
+        subject="validity",
+        grade="bad" if max(shares) < HARDLY_VALID else "doubtful",
+        found=f"Only {found}.",
+        advice="Give the subject more light, place the lights nearer to the camera's axis, or use more of them, so "
+        "that three reach every part.",
+    )
+
+
+def steadiness(facts: Sequence[InstantFacts]) -> Iterator[Judgement]:
+    """Judge noise and flicker where nothing moves."""
+    known = by_level(facts)
+    if not known:
+        return
+    worst, level = known[0], abs(change_of(known[0]).level_percent)
+    noise_deg = float(np.median([change_of(one).normals_deg for one in known]))
+    if level > MOST_FLICKER_PERCENT:
+        yield Judgement(
+            subject="flicker",
+            grade="doubtful",
+            found="The scene flickers: from one result to the next, albedo at rest changes by up to "
+            f"{level:.1f} % as a whole (number {worst.number}).",
+            advice="Check the LEDs' supply and the camera's automatics.",
+        )
+    if noise_deg > NOISY_DEG:
+        yield Judgement(
+            subject="noise",
+            grade="bad" if noise_deg > LOST_NOISY_DEG else "doubtful",
+            found=f"Normals at rest change by {noise_deg:.1f} degrees from one result to the next.",
+            advice="Give more light or open the lens; --denoise averages what stands still.",
+        )
+    elif level <= MOST_FLICKER_PERCENT:
+        yield Judgement(
+            subject="flicker",
+            grade="good",
+            found=f"At rest, normals change by {noise_deg:.2f} degrees and light by up to {level:.2f} % from one "
+            "result to the next.",
+        )
+
+
+def by_level(facts: Sequence[InstantFacts]) -> list[InstantFacts]:
+    """Return the instants of which a change is known, the largest change of level first."""
+    known = [one for one in facts if one.change is not None]
+    return sorted(known, key=lambda one: -abs(change_of(one).level_percent))
+
+
+def change_of(facts: InstantFacts) -> Change:
+    """Return the change to an instant. Raises ValueError where it is not known."""
+    if facts.change is None:
+        raise ValueError(f"the change to instant {facts.number} is not known")
+    return facts.change

@@ -1,0 +1,46 @@
+"""Judgements: one subject, one word, what was found, and what to change on set."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+Grade = Literal["good", "doubtful", "bad", "unknown"]
+DECISIVE = ("strobe", "timing", "order", "rig")
+"""Where one of these is doubtful, all normals may be wrong, and not only parts of them."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Judgement:
+    """One line of a judgement. ``subject`` is a word such as ``exposure``; ``found`` a sentence with its figures;
+    ``advice`` what to change on set, empty where there is nothing to change. ``unknown``: it could not be told."""
+
+    subject: str
+    grade: Grade
+    found: str
+    advice: str = ""
+
+    @property
+    def sentence(self) -> str:
+        """What was found, and what to do about it."""
+        return f"{self.found} {self.advice}".strip()
+
+
+def usable(judgements: Sequence[Judgement]) -> bool:
+    """Tell whether nothing is bad."""
+    return all(one.grade != "bad" for one in judgements)
+
+
+def verdict_of(judgements: Sequence[Judgement]) -> str:
+    """Return the sentence that a report begins with."""
+    grades = {one.grade for one in judgements}
+    if "bad" in grades:
+        subjects = list(dict.fromkeys(one.subject for one in judgements if one.grade == "bad"))
+        return f"This take is not usable as it is: {', '.join(subjects)}."
+    if any(one.grade == "doubtful" and one.subject in DECISIVE for one in judgements):
+        return "This take is doubtful: see below before using it."
+    return "This take is usable." if "doubtful" not in grades else "This take is usable, with reservations."
+
+
+def gravest_first(judgements: Sequence[Judgement]) -> tuple[Judgement, ...]:
+    """Return what is bad, then what is doubtful, each in the given order; what is good or unknown is left out."""
+    return tuple(one for grade in ("bad", "doubtful") for one in judgements if one.grade == grade)

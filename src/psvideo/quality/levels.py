@@ -1,0 +1,79 @@
+"""How a plate is exposed: counts of its light in stops below saturation, and what they say of power and aperture."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+STOPS = 14
+PER_STOP = 8
+BINS = STOPS * PER_STOP
+_BASE = (127 - STOPS) * PER_STOP
+_EDGES = np.concatenate([2.0 ** (octave - STOPS) * (1 + np.arange(PER_STOP) / PER_STOP) for octave in range(STOPS)])
+TARGET_QUANTILE = 0.995
+"""This share of the subject should be below saturation ..."""
+HEADROOM = 0.9
+"""... by a tenth."""
+LEAST_POWER = 0.1
+
+Counts = NDArray[np.int64]
+
+
+def count_levels(light: NDArray[np.float32], saturation: float) -> Counts:
+    """Return how many samples lie in every bin, shape (BINS + 2,): first those below 14 stops under saturation, last
+    those that are clipped. Bins are read off the numbers' own bits: 8 of equal width per doubling."""
+    relative = np.ascontiguousarray(light, np.float32).ravel() / np.float32(saturation)
+    place = np.clip((relative.view(np.int32) >> 20) - _BASE + 1, 0, BINS + 1)
+    return np.bincount(place, minlength=BINS + 2).astype(np.int64)
+
+
+@dataclass(frozen=True)
+class Levels:
+    """The light of one lamp on the subject over a take, as ``counts`` of ``count_levels``."""
+
+    counts: Counts
+
+    @cached_property
+    def total(self) -> int:
+        """How many samples were counted."""
+        return int(self.counts.sum())
+
+    @property
+    def clipped_share(self) -> float:
+        """Which share of the samples is saturated."""
+        return float(self.counts[-1] / max(self.total, 1))
+
+    def quantile(self, share: float) -> float:
+        """Return the light, 1.0 = saturation, below which a share of the samples lies; 1.0 where it is clipped."""
+        upto = np.concatenate([[0], np.cumsum(self.counts[:-1])]) / max(self.total, 1)
+        if share >= upto[-1]:
+            return 1.0
+        edges = np.concatenate([[0.0], _EDGES, [1.0]])
+        return float(np.interp(share, upto, edges))
+
+    def stops(self, share: float) -> float:
+        """Return a quantile in stops below saturation: 0 is saturation, -1 half of it; -14 at least."""
+        return float(np.log2(max(self.quantile(share), 2.0**-STOPS)))
+
+    @cached_property
+    def right_power(self) -> float:
+        """By which factor to change the lamp's light so that 99.5 % of the subject lie just below saturation.
+
+        What is clipped tells no level: the brightest half of what is not is carried on in a straight line, as light on
+        a rounded matte subject goes on.
+        """
+        clipped = self.clipped_share
+        if clipped <= 1 - TARGET_QUANTILE:
+            return HEADROOM / max(self.quantile(TARGET_QUANTILE), 2.0**-STOPS)
+        shares = np.linspace(0.5, 0.98, 13) * (1 - clipped)
+        levels = np.array([self.quantile(float(share)) for share in shares])
+        slope, start = np.polyfit(shares, levels, 1)
+        expected = max(start + slope * TARGET_QUANTILE, 1 / HEADROOM)
+        return float(np.clip(HEADROOM / expected, LEAST_POWER, 0.9))
+
+    def by_stop(self, per_stop: int = 4) -> NDArray[np.float64]:
+        """Return the share of samples in ``per_stop`` bins a stop, darkest first, the clipped last, for drawing."""
+        inner = self.counts[1:-1].reshape(STOPS * per_stop, PER_STOP // per_stop).sum(axis=1)
+        inner[0] += self.counts[0]
+        return np.append(inner, self.counts[-1]) / max(self.total, 1)

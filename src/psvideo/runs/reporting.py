@@ -1,0 +1,164 @@
+"""What a run says of itself: the report of a take that was observed, written beside its results."""
+
+import json
+import platform
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version as version_of
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo import __version__
+from psvideo.clip import Clip
+from psvideo.export.tags import sha256_of
+from psvideo.files import write_text
+from psvideo.pipeline import Take
+from psvideo.plan import Plan
+from psvideo.quality.judge_light import ambient, exposure, lamps
+from psvideo.quality.judge_result import focus, rig, steadiness, validity
+from psvideo.quality.judge_time import coverage, motion, timing_and_order
+from psvideo.quality.judgement import Judgement
+from psvideo.quality.observed import Observed
+from psvideo.quality.rigpoints import rig_points
+from psvideo.rig import Light, Rig
+from psvideo.runs.lighting import Lighting
+from psvideo.runs.output import Output
+from psvideo.timing import Timing
+from psvideo.view.report import LightFacts, RunReport, report_record
+from psvideo.view.report_page import report_page
+
+Pixels = NDArray[np.uint8]
+LIBRARIES = ("numpy", "opencv-contrib-python-headless", "numba", "OpenEXR")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Solved:
+    """What a normals run adds to a report: what it was solved with, by which solver, and what its validity means."""
+
+    lighting: Lighting
+    solver: str
+    trust: str
+    warnings: tuple[str, ...] = ()
+    aligned: bool = False
+
+
+def observing(take: Take, rig: Rig | None = None, mask: NDArray[np.bool_] | None = None) -> Observed:
+    """Return what gathers the facts of a take's rounds; with a rig, it is held against the plates."""
+    clip = take.clip
+    points = None
+    if rig is not None:
+        size = {"height_px": clip.height_px, "width_px": clip.width_px}
+        points = rig_points(clip.plan, rig, channels=clip.channels, **size)
+    return Observed(lights=clip.plan.lights, mask=mask, points=points)
+
+
+def judgements(
+    plan: Plan, timing: Timing, observed: Observed, *, known: Rig | None = None, aligned: bool = False
+) -> tuple[Judgement, ...]:
+    """Return one line per thing that decides whether a take can be used."""
+    rated = None if known is None else {light.name: float(np.mean(light.intensity)) for light in _distant(known)}
+    return (
+        *timing_and_order(timing, plan.mode),
+        *coverage(plan, timing, observed),
+        *exposure(observed),
+        *lamps(observed, rated),
+        ambient(observed),
+        motion(plan, timing, observed, aligned=aligned),
+        focus(observed),
+        *rig(observed),
+        *validity(observed),
+        *steadiness(observed.facts),
+    )
+
+
+def _distant(known: Rig) -> Iterator[Light]:
+    """Give the lights whose intensities are what the subject gets."""
+    return (light for light in known.lights if light.direction is not None)
+
+
+def run_report(
+    take: Take, timing: Timing, observed: Observed, output: Output, *, solved: Solved | None = None
+) -> RunReport:
+    """Return the report of a run over a take."""
+    clip = take.clip
+    known = None if solved is None else solved.lighting.rig
+    by_name = {} if known is None else {light.name: light for light in known.lights}
+    lights = tuple(
+        LightFacts(
+            name=name,
+            levels=observed.levels(name),
+            where=_where(by_name.get(name)),
+            error_deg=by_name[name].error_deg if name in by_name else None,
+        )
+        for name in clip.plan.lights
+    )
+    return RunReport(
+        clip=clip.name,
+        version=__version__,
+        kind="split" if solved is None else "normals",
+        timing=timing,
+        lights=lights,
+        instants=tuple(observed.facts),
+        judgements=judgements(clip.plan, timing, observed, known=known, aligned=solved is not None and solved.aligned),
+        condition=None if solved is None else solved.lighting.condition,
+        solver="" if solved is None else solved.solver,
+        trust="" if solved is None else solved.trust,
+        warnings=(*clip.warnings, *(() if solved is None else solved.warnings)),
+        shot=_shot(clip, take.numbers),
+        settings=_settings(take, output, solved),
+        thumbnails=observed.thumbnails,
+    )
+
+
+def write_report(folder: Path, report: RunReport, pictures: Sequence[tuple[str, Pixels]]) -> None:
+    """Write report.json and report.html into a folder of results."""
+    write_text(folder / "report.json", json.dumps(report_record(report), indent=1) + "\n")
+    write_text(folder / "report.html", report_page(report, pictures))
+
+
+def _where(light: Light | None) -> str:
+    if light is None:
+        return "not told: no rig"
+    place = light.direction if light.direction is not None else light.position_m
+    numbers = ", ".join(f"{value:.3f}" for value in place or ())
+    return f"direction ({numbers})" if light.direction is not None else f"position ({numbers}) m"
+
+
+def _shot(clip: Clip, numbers: Sequence[int]) -> dict[str, str]:
+    plan, camera = clip.plan, clip.plan.camera
+    flashes = " · ".join(
+        f"{' + '.join(flash.lights) or 'dark'} {flash.duration_s * 1e3:.3g} ms" for flash in plan.flashes
+    )
+    readout = "not known" if camera.readout_s is None else f"{camera.readout_s * 1e3:.4g} ms"
+    shutter_deg = 360 * camera.exposure_s / camera.frame_period_s
+    return {
+        "Clip": str(clip.path.resolve()),
+        "Frames": f"{len(numbers)} of {len(clip.numbers)}, numbered {numbers[0]} to {numbers[-1]}",
+        "Pictures": f"{clip.width_px} x {clip.height_px} pixels, {clip.kind}, "
+        + (f"{clip.header.bits} bits" if clip.header.bits else "floating point")
+        + (f", mosaic {clip.cfa}" if clip.cfa else ""),
+        "Camera": f"{float(camera.fps):.6g} frames a second, shutter {shutter_deg:.4g} degrees, readout {readout}, "
+        f"transfer {clip.encoding.transfer}",
+        "Lasts": f"{(numbers[-1] - numbers[0] + 1) * camera.frame_period_s:.3f} s"
+        + (f", from {clip.time_code}" if clip.time_code else ""),
+        "Strobe": f"{plan.mode}; {flashes}; {plan.dark_s * 1e3:.4g} ms dark between them",
+        "Rounds a second": f"{plan.dark_every / plan.cycle_s:.4g}"
+        if plan.mode != "synced"
+        else f"{float(camera.fps) / len(plan.flashes):.4g}",
+        "Remarks": "; ".join((*clip.warnings, *clip.notes)) or "none",
+    }
+
+
+def _settings(take: Take, output: Output, solved: Solved | None) -> dict[str, str]:
+    facts = {"Command": output.command or "called from Python", "Plan, SHA-256": sha256_of(take.clip.plan_path)}
+    if solved is not None:
+        facts["Rig, SHA-256"] = sha256_of(solved.lighting.rig_path)
+        facts["Mask, SHA-256"] = solved.lighting.mask_sha256 or "no mask"
+        facts["Solver"] = solved.solver
+        facts["What valid means"] = solved.trust
+    libraries = ", ".join(f"{name} {version_of(name)}" for name in LIBRARIES)
+    facts["Made with"] = f"psvideo {__version__}, Python {platform.python_version()}, {libraries}"
+    facts["Run in"] = str(Path.cwd())
+    return facts
