@@ -1,19 +1,25 @@
 """The options of ``psvideo capture-plan``, in the groups in which its help shows them."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from psvideo.cli.completing import offer_cameras, offer_transfers
+
 CAMERA, LIGHTS, LIMITS = "Camera", "Lights", "What limits the flash"
 STROBE, ENCODING = "Strobe", "How the files encode light"
 
 
-def _option(panel: str, name: str, text: str) -> Any:
-    return typer.Option(name, help=text, rich_help_panel=panel)
+def _option(panel: str, name: str, text: str, *, offer: Callable[..., list[str]] | None = None) -> Any:
+    return typer.Option(name, help=text, rich_help_panel=panel, autocompletion=offer)
 
 
-CameraName = Annotated[str | None, _option(CAMERA, "--camera", "A camera of the table (--list-cameras): 'Sony F65'.")]
+CameraName = Annotated[
+    str | None,
+    _option(CAMERA, "--camera", "A camera of the table (--list-cameras): 'Sony F65'.", offer=offer_cameras),
+]
 Fps = Annotated[str | None, _option(CAMERA, "--fps", "Frame rate: 120, 119.88 or 120000/1001.")]
 Size = Annotated[str | None, _option(CAMERA, "--size", "Width x height in pixels: 1920x1080.")]
 Shutter = Annotated[float | None, _option(CAMERA, "--shutter", "Shutter angle in degrees; left out: 360.")]
@@ -47,7 +53,10 @@ Dark = Annotated[str | None, _option(STROBE, "--dark", "Dark time between flashe
 StrobeClock = Annotated[
     str, _option(STROBE, "--strobe-clock-ppm", "Tolerance of the strobe's clock in ppm, or unknown.")
 ]
-Transfer = Annotated[str, _option(ENCODING, "--transfer", "Transfer curve of the files: linear, slog3, logc3, srgb.")]
+Transfer = Annotated[
+    str,
+    _option(ENCODING, "--transfer", "Transfer curve of the files: linear, slog3, logc3, srgb.", offer=offer_transfers),
+]
 Black = Annotated[float | None, _option(ENCODING, "--black", "Code value of black.")]
 White = Annotated[float | None, _option(ENCODING, "--white", "Code value of saturation.")]
 Cfa = Annotated[str | None, _option(ENCODING, "--cfa", "Colour filters of mosaiced files: RGGB, BGGR, GRBG or GBRG.")]

@@ -5,12 +5,18 @@ from typing import Annotated
 
 import typer
 
+from psvideo.cli.completing import offer_lights
+
 ClipPath = Annotated[Path, typer.Argument(help="A clip: a folder of numbered frames with plan.toml, or a movie file.")]
 PlanPath = Annotated[Path | None, typer.Option("--plan", help="The plan, where it does not lie beside the footage.")]
 Frames = Annotated[str | None, typer.Option("--frames", help="File numbers to use, such as 1-100 or 1-100x2.")]
 FirstLight = Annotated[
     str | None,
-    typer.Option("--first-light", help="The light of the clip's first complete flash, for plans without a marker."),
+    typer.Option(
+        "--first-light",
+        help="The light of the clip's first complete flash, for plans without a marker.",
+        autocompletion=offer_lights,
+    ),
 ]
 OrderRig = Annotated[
     Path | None,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from psvideo.cli.completing import offer_boards, offer_lines, offer_ports
 from psvideo.errors import UsageError, nearest
 from psvideo.strobe.boards import BOARDS, Board
 from psvideo.strobe.messages import WIRINGS, WiringName
@@ -21,14 +22,26 @@ PlanFile = Annotated[Path, typer.Argument(help="The plan to play: plan.toml.")]
 PortName = Annotated[
     str,
     typer.Option(
-        "--port", help="auto (by USB identity), a serial port, a pseudo-terminal, socket://host:port, or emulated."
+        "--port",
+        help="auto (by USB identity), a serial port, a pseudo-terminal, socket://host:port, or emulated.",
+        autocompletion=offer_ports,
     ),
 ]
 BoardName = Annotated[
-    str | None, typer.Option("--board", help=f"Which board to emulate, or to check against: {', '.join(BOARDS)}.")
+    str | None,
+    typer.Option(
+        "--board",
+        help=f"Which board to emulate, or to check against: {', '.join(BOARDS)}.",
+        autocompletion=offer_boards,
+    ),
 ]
 LineWords = Annotated[
-    list[str] | None, typer.Option("--line", help="Which line a light is wired to, such as key=0; may be repeated.")
+    list[str] | None,
+    typer.Option(
+        "--line",
+        help="Which line a light is wired to, such as key=0; may be repeated.",
+        autocompletion=offer_lines,
+    ),
 ]
 WiringWord = Annotated[
     str | None,
