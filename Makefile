@@ -1,5 +1,6 @@
 # Two commands for a fresh machine: `make demo` and `make test`. Each sets up its own environment in .venv; the tests also
-# need Debian's AVR tools, which lights/emulator/install.sh installs where it may and names where it may not.
+# need Debian's AVR tools and its Chromium, which lights/emulator/install.sh and tests/install.sh install where they may
+# and name where they may not.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -11,6 +12,7 @@ demo: $(VENV)/.installed
 
 test: $(VENV)/.installed-test
 	@lights/emulator/install.sh || echo "Going on; the tests of the strobe's firmware will fail." >&2
+	@tests/install.sh || echo "Going on; the tests of the page in a browser will fail." >&2
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy

@@ -35,7 +35,7 @@ LAYERS = [
     {"pipeline"},
     {"naming", "light_sets"},
     {"runs"},
-    {"demo"},
+    {"demo", "page"},
     {"cli"},
 ]
 """Rooms from the bottom up; a module may use its own layer (without circles) and those below."""

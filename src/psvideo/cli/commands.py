@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 
 PLAN, MEASURE, SPLIT = "1  Plan and light", "2  Measure cameras and lights", "3  From footage to plates"
-SOLVE, TRY = "4  From plates to normals", "Try it, and see whether all is there"
+SOLVE, LOOK = "4  From plates to normals", "5  Look at it"
+TRY = "Try it, and see whether all is there"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,6 +42,10 @@ COMMANDS = (
     ),
     *_entries(
         SOLVE, normals="Write normals, albedo and validity for every round of flashes; does sync and split by itself."
+    ),
+    *_entries(
+        LOOK,
+        view="Show a result in the browser: scrub, compare, and light it anew; only this machine can open the page.",
     ),
     *_entries(
         TRY,

@@ -152,6 +152,13 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
             "psvideo normals clip/ --rig rig.toml --y down --encode png16 -o out/",
         ),
     ),
+    "view": (
+        ("scrub normals and albedo, and move a light over them", "psvideo view out/"),
+        (
+            "at a port of your choice, opened by yourself",
+            "psvideo view out/ --port 9000 --no-browser",
+        ),
+    ),
     "demo": (
         ("the whole chain, into ./psvideo-demo", "psvideo demo"),
         ("again, into another folder", "psvideo demo -o try2/ --force"),

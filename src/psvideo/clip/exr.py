@@ -4,7 +4,8 @@ Channels may stand in a layer (``key.R``); an alpha channel is left out. A pictu
 its display window is put in its place with 0 around it.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
@@ -44,6 +45,27 @@ def decode_channels(path: Path, choose: Callable[[list[str]], tuple[str, ...]]) 
         return Picture(header=head, codes=_in_display_window(codes, file.header(), head))
 
 
+@dataclass(frozen=True, kw_only=True)
+class Stored:
+    """A picture as its file stores it: one plane (row, col) per channel (R, G, B, or Y), float16 or float32, and the
+    header's attributes that can be written in a line."""
+
+    planes: tuple[NDArray[np.floating], ...]
+    attributes: Mapping[str, str | int | float | None]
+
+
+def stored(path: Path) -> Stored:
+    """Read a picture without making floats of its halves, for showing it: a third of the time that ``decode`` takes.
+
+    What lies outside the data window is 0. Raises PsvideoError where the file is damaged or holds no one picture.
+    """
+    with _open(path, header_only=False) as file:
+        names = _picture_channels(path, _names(file))
+        channels, head = file.channels(), _header(file, names)
+        planes = tuple(_in_display_window(channels[name].pixels, file.header(), head) for name in names)
+        return Stored(planes=planes, attributes=_lines(dict(file.header())))
+
+
 def contents(path: Path, *, header_only: bool = True) -> tuple[list[str], dict[str, str | int | float | None]]:
     """Return the names of all channels, and the attributes that can be written in a line, with the picture's size.
 
@@ -58,15 +80,20 @@ def contents(path: Path, *, header_only: bool = True) -> tuple[list[str], dict[s
         for channel in sorted(part["channels"], key=_usual_order)
     ]
     width_px, height_px = _size(parts[0]["displayWindow"])
-    found: dict[str, str | int | float | None] = {"width_px": width_px, "height_px": height_px}
-    for name, value in parts[0].items():
+    return names, {"width_px": width_px, "height_px": height_px} | _lines(parts[0])
+
+
+def _lines(attributes: Mapping[str, Any]) -> dict[str, str | int | float | None]:
+    """Return the attributes that can be written in a line."""
+    found: dict[str, str | int | float | None] = {}
+    for name, value in attributes.items():
         if name == "timeCode":
             found[name] = _time_code(value)
         elif isinstance(value, str | int | float) and name not in OF_THE_CONTAINER:
             found[name] = value
         elif isinstance(value, Fraction):
             found[name] = str(value)
-    return names, found
+    return found
 
 
 def _usual_order(channel: Any) -> tuple[str, int, str]:
@@ -142,11 +169,11 @@ def _time_code(code: Any) -> str | None:
     return f"{code.hours:02d}:{code.minutes:02d}:{code.seconds:02d}:{code.frame:02d}"
 
 
-def _in_display_window(codes: NDArray[np.float32], attributes: Any, head: Header) -> NDArray[np.float32]:
+def _in_display_window(codes: NDArray[Any], attributes: Any, head: Header) -> NDArray[Any]:
     display, data = attributes["displayWindow"], attributes["dataWindow"]
     if codes.shape[:2] == (head.height_px, head.width_px) and np.array_equal(display[0], data[0]):
         return codes
-    canvas = np.zeros((head.height_px, head.width_px, *codes.shape[2:]), np.float32)
+    canvas = np.zeros((head.height_px, head.width_px, *codes.shape[2:]), codes.dtype)
     col, row = (int(data[0][axis] - display[0][axis]) for axis in (0, 1))
     top, left = max(row, 0), max(col, 0)
     part = codes[top - row : head.height_px - row, left - col : head.width_px - col]

@@ -1,0 +1,11 @@
+"""The page that shows a result and lights it anew: what is shown, and a small server of it.
+
+``show_of`` looks at a folder of results or plates and says what can be shown of it; ``serving`` answers a browser on
+this machine only. The page itself lies in ``assets``.
+"""
+
+from psvideo.page.folders import show_of
+from psvideo.page.serving import page_server
+from psvideo.page.show import Show
+
+__all__ = ["Show", "page_server", "show_of"]

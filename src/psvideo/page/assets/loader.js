@@ -1,0 +1,115 @@
+// Which place of the sequence is shown: the wanted one once all its pictures are there, one place after the other, so
+// that something moves on the screen however fast the wanted place runs ahead.
+import { blockKey } from "./source.js";
+import { needsOf, numberFor, sequenceOf, widthFor } from "./looks.js";
+
+const AHEAD = 4;
+const REST_MS = 300;
+
+export class Loader {
+  constructor(app, changed) {
+    this.app = app;
+    this.changed = changed;
+    this.shown = { at: 0, blocks: {}, keys: {} };
+    this.loading = null;
+    this.arrivals = [];
+    this.restTimer = 0;
+    this.direction = 1;
+  }
+
+  // Say that the place, the panes or their sizes have changed. `moving`: more changes are likely at once.
+  update({ moving = false } = {}) {
+    clearTimeout(this.restTimer);
+    if (moving) this.restTimer = setTimeout(() => this.update(), REST_MS);
+    this.moving = moving;
+    this.step();
+  }
+
+  // Blocks came: show what is whole.
+  step() {
+    const { app } = this;
+    for (let turn = 0; turn < 2; turn += 1) {
+      if (!this.loading) {
+        const keys = this.keysAt(app.state.at);
+        if (this.shown.at === app.state.at && same(keys, this.shown.keys)) break;
+        this.loading = { at: app.state.at, keys };
+      } else if (!this.moving && this.loading.at === app.state.at) {
+        this.loading.keys = this.keysAt(app.state.at);
+      }
+      const missing = Object.values(this.loading.keys).filter((key) => !app.source.get(key));
+      if (missing.length) {
+        app.source.want([...missing, ...this.slowKeys(), ...this.keysAhead()]);
+        return;
+      }
+      this.show();
+    }
+    app.source.want([...this.slowKeys(), ...this.keysAhead()]);
+  }
+
+  show() {
+    const { at, keys } = this.loading;
+    const blocks = Object.fromEntries(Object.entries(keys).map(([id, key]) => [id, this.app.source.get(key)]));
+    if (at !== this.shown.at) {
+      this.direction = at < this.shown.at ? -1 : 1;
+      this.arrivals.push(performance.now());
+    }
+    this.shown = { at, keys, blocks };
+    this.loading = null;
+    this.changed();
+  }
+
+  // How many other places were shown in the last second.
+  rate() {
+    const since = performance.now() - 1000;
+    this.arrivals = this.arrivals.filter((time) => time > since);
+    return this.arrivals.length;
+  }
+
+  // The keys of all pictures that the panes need at a place, by the sequence's id, but for those that are slow to make.
+  keysAt(at) {
+    const ids = new Set(this.app.panes().flatMap((content) => needsOf(this.app, content)));
+    return this.keysOf(at, [...ids].filter((id) => !this.app.sequences.get(id).slow));
+  }
+
+  slowKeys() {
+    if (this.moving || this.app.state.playing) return [];
+    return Object.values(this.keysOf(this.app.state.at, this.slowIds()));
+  }
+
+  slowIds() {
+    return this.app.panes().filter((content) => sequenceOf(this.app, content).slow);
+  }
+
+  // The blocks that can be drawn now: those shown, and slow ones as far as they are there.
+  blocks() {
+    const slow = this.keysOf(this.shown.at, this.slowIds());
+    const found = Object.entries(slow).map(([id, key]) => [id, this.app.source.get(key)]);
+    return { ...this.shown.blocks, ...Object.fromEntries(found.filter(([, block]) => block)) };
+  }
+
+  keysAhead() {
+    const count = this.app.master.numbers.length;
+    const keys = [];
+    for (let step = 1; step <= AHEAD; step += 1) {
+      let at = this.app.state.at + step * this.direction;
+      if (this.app.state.playing) at = (at + count) % count;
+      if (at >= 0 && at < count) keys.push(...Object.values(this.keysAt(at)));
+    }
+    return keys;
+  }
+
+  keysOf(at, ids) {
+    const width = widthFor(this.app, this.app.paneWidth(), this.moving || this.app.state.playing);
+    const keys = {};
+    for (const id of ids) {
+      const number = numberFor(this.app, this.app.sequences.get(id), at);
+      if (number !== null) keys[id] = blockKey(id, number, width);
+    }
+    return keys;
+  }
+}
+
+function same(one, other) {
+  const ids = Object.keys(one);
+  return ids.length === Object.keys(other).length && ids.every((id) => one[id] === other[id]);
+}

@@ -1,0 +1,142 @@
+// From what is chosen to what is drawn: which pictures a pane needs, and how they are to be looked at.
+import { percentiles, pixelAt } from "./block.js";
+
+export const RELIT = "relit";
+const WIDTHS = [240, 480, 960, 1920, 3840, 7680];
+const QUICK_WIDTH = 960;
+const WHITE = 0.8;
+
+// The things that a pane can show, in the order of the keys 1 to 9.
+export function contentsOf(index) {
+  const own = index.sequences.map((sequence) => ({ id: sequence.id, label: sequence.label, group: sequence.group }));
+  const relit = index.sequences.some((sequence) => sequence.id === "normals");
+  return relit ? [{ id: RELIT, label: "Relit", group: "Results" }, ...own] : own;
+}
+
+export function sequenceOf(app, content) {
+  return app.sequences.get(content === RELIT ? "normals" : content);
+}
+
+// The ids of all sequences that a pane's content is made from.
+export function needsOf(app, content) {
+  const ids = content === RELIT ? ["normals", "albedo", placeIdOf(app)] : [content];
+  if (app.state.markInvalid) ids.push("valid");
+  return ids.filter((id) => id && app.sequences.has(id));
+}
+
+// Where near lights find the surface: in the points, else in the depth, else on a plane.
+function placeIdOf(app) {
+  if (!app.state.lights.some((light) => light.near)) return null;
+  return ["position", "depth"].find((id) => app.sequences.has(id)) ?? null;
+}
+
+// The number of a sequence's picture for a place on the scrubbed timeline; null where it has none.
+export function numberFor(app, sequence, at) {
+  const master = app.master;
+  if (sequence.timeline === master.timeline) {
+    const number = master.numbers[at];
+    return app.numbers.get(sequence.id).has(number) ? number : null;
+  }
+  return sequence.numbers[nearest(sequence.times_s, master.times_s[at])] ?? null;
+}
+
+export function nearest(times, wanted) {
+  let best = 0;
+  for (let place = 1; place < times.length; place += 1) {
+    if (Math.abs(times[place] - wanted) < Math.abs(times[best] - wanted)) best = place;
+  }
+  return best;
+}
+
+// The width of the pictures to ask for: no more than a pane can show, and at most the quick one while things move.
+export function widthFor(app, paneWidth, quick) {
+  const whole = app.index.width_px;
+  const shown = Math.min(paneWidth * app.state.zoom, quick ? QUICK_WIDTH : Infinity, app.mostWidth);
+  const width = WIDTHS.find((candidate) => candidate >= 0.85 * shown) ?? WIDTHS[WIDTHS.length - 1];
+  return Math.min(width, whole);
+}
+
+// The part of the picture that a pane shows, in shares of the picture.
+export function windowOf(app, width, height) {
+  const { width_px: across, height_px: down } = app.index;
+  const scale = Math.min(width / across, height / down) * app.state.zoom;
+  const seen = { width: width / (across * scale), height: height / (down * scale) };
+  const centre = app.state.centre;
+  return { x: centre[0] - seen.width / 2, y: centre[1] - seen.height / 2, ...seen, scale };
+}
+
+// The exposure that is kept for the whole clip: the brightest hundredth of the first picture seen lies at 0.8.
+export function baseExposure(app, content, blocks) {
+  const light = content === RELIT ? "albedo" : content;
+  const family = app.sequences.get(light)?.family ?? light;
+  if (!app.bases.has(family) && blocks[light]?.data) {
+    const [bright] = percentiles(blocks[light], [0.99]);
+    app.bases.set(family, bright > 1e-6 ? WHITE / bright : 1);
+  }
+  return app.bases.get(family) ?? 1;
+}
+
+export function rangeOf(app, sequence, blocks) {
+  if (sequence.kind !== "heat") return [0, 1];
+  if (!app.ranges.has(sequence.id) && blocks[sequence.id]?.data) {
+    const [low, high] = percentiles(blocks[sequence.id], [0.02, 0.98]);
+    if (high !== undefined) app.ranges.set(sequence.id, [sequence.id === "depth" ? low : 0, high]);
+  }
+  return app.ranges.get(sequence.id) ?? [0, 1];
+}
+
+const PLANE = { id: null, kind: 0, middle: [0, 0, 0], scale: 1 };
+
+// How a point of the surface is found for near lights, in widths of the picture from the subject's middle.
+export function placeOf(app, blocks, ySign) {
+  const id = placeIdOf(app);
+  if (!id || !blocks[id]?.data) return PLANE;
+  if (!app.places.has(id)) app.places.set(id, id === "position" ? measured(blocks[id], ySign) : relief(blocks[id]));
+  const place = app.places.get(id);
+  return id === "depth" ? { ...place, scale: app.state.relief } : place;
+}
+
+function relief(block) {
+  const [middle] = percentiles(block, [0.5]);
+  return { id: "depth", kind: 2, middle: [middle ?? 1, 0, 0], scale: 1 };
+}
+
+// The middle of the points, and how many of their units one width of the picture is, where they lie.
+export function measured(block, ySign) {
+  const points = [];
+  for (let v = 0.02; v < 1; v += 0.04) {
+    for (let u = 0.02; u < 1; u += 0.02) {
+      const point = pixelAt(block, u, v);
+      if (point.some((value) => value !== 0)) points.push([u, point]);
+    }
+  }
+  if (points.length < 8) return PLANE;
+  const middle = [0, 1, 2].map((axis) => median(points.map(([, point]) => point[axis])) * (axis === 1 ? ySign : 1));
+  const meanU = points.reduce((sum, [u]) => sum + u, 0) / points.length;
+  const spread = points.reduce((sum, [u]) => sum + (u - meanU) ** 2, 0);
+  const slopes = [0, 1, 2].map((axis) => points.reduce((sum, [u, point]) => sum + (u - meanU) * point[axis], 0) / spread);
+  return { id: "position", kind: 1, middle, scale: Math.max(Math.hypot(...slopes), 1e-6) };
+}
+
+function median(values) {
+  return values.sort((a, b) => a - b)[Math.floor(values.length / 2)];
+}
+
+// Everything that a stage needs to draw one pane; null where its picture is not there.
+export function lookOf(app, content, blocks) {
+  const sequence = sequenceOf(app, content);
+  if (!blocks[sequence.id]?.data) return null;
+  const present = Object.fromEntries(Object.entries(blocks).filter(([, block]) => block?.data));
+  const kind = content === RELIT ? RELIT : sequence.kind;
+  const { exposure, channels, lights, specular, exponent, markInvalid } = app.state;
+  const ySign = sequence.y === "down" ? -1 : 1;
+  const place = kind === RELIT ? placeOf(app, present, ySign) : PLANE;
+  return {
+    kind, sequence, blocks: present, channels, lights, exponent, aspect: app.index.height_px / app.index.width_px,
+    place: kind === "position" ? measured(present[sequence.id], ySign) : place,
+    markInvalid: markInvalid && Boolean(present.valid) && app.sequences.get("valid").timeline === sequence.timeline,
+    specular: sequence.space === "world" ? 0 : specular,
+    exposure: 2 ** exposure * baseExposure(app, content, present),
+    range: rangeOf(app, sequence, present),
+  };
+}

@@ -1,0 +1,188 @@
+// Drawing with WebGL2: textures of the current pictures, panes cut out of one canvas, and light read back as floats.
+import { FRAGMENT, VERTEX } from "./shaders.js";
+import { CIVIDIS, INVALID, VALID, VIRIDIS, paletteBytes, paletteOf } from "./palettes.js";
+import { lightUniforms } from "./lights.js";
+
+const KINDS = { light: 0, normals: 1, mask: 2, heat: 3, position: 4, relit: 5 };
+const UNITS = { uMain: 0, uAlbedo: 1, uValid: 2, uPlace: 3, uPalette: 4 };
+export const BACKGROUND = [0.165, 0.165, 0.165];
+
+export function openStage(canvas) {
+  const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, depth: false, preserveDrawingBuffer: false });
+  return gl ? new Stage(gl, canvas) : null;
+}
+
+class Stage {
+  constructor(gl, canvas) {
+    this.gl = gl;
+    this.canvas = canvas;
+    this.floats = gl.getExtension("EXT_color_buffer_float") !== null;
+    gl.getExtension("OES_texture_float_linear");
+    this.build();
+  }
+
+  build() {
+    const gl = this.gl;
+    this.program = linked(gl);
+    this.at = new Map();
+    this.textures = new Map();
+    gl.useProgram(this.program);
+    const corners = gl.createBuffer();
+    gl.bindBuffer(gl.ARRAY_BUFFER, corners);
+    gl.bufferData(gl.ARRAY_BUFFER, new Float32Array([-1, -1, 3, -1, -1, 3]), gl.STATIC_DRAW);
+    const place = gl.getAttribLocation(this.program, "corner");
+    gl.enableVertexAttribArray(place);
+    gl.vertexAttribPointer(place, 2, gl.FLOAT, false, 0, 0);
+    gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
+    gl.enable(gl.SCISSOR_TEST);
+    this.empty = this.colours(new Uint8Array(4), 1);
+    this.palettes = new Map([CIVIDIS, VIRIDIS].map((palette) => [palette, this.colours(paletteBytes(palette), 256)]));
+    for (const [name, unit] of Object.entries(UNITS)) gl.uniform1i(this.uniform(name), unit);
+    gl.uniform3fv(this.uniform("uBackground"), BACKGROUND);
+    gl.uniform3fv(this.uniform("uValidInk"), VALID);
+    gl.uniform3fv(this.uniform("uInvalidInk"), INVALID);
+  }
+
+  uniform(name) {
+    if (!this.at.has(name)) this.at.set(name, this.gl.getUniformLocation(this.program, name));
+    return this.at.get(name);
+  }
+
+  colours(bytes, width) {
+    const gl = this.gl;
+    const texture = gl.createTexture();
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, width, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
+    filtered(gl, gl.LINEAR);
+    return texture;
+  }
+
+  // The texture of a sequence's current picture; it is sent again only when the picture is another.
+  texture(id, block) {
+    const gl = this.gl;
+    let held = this.textures.get(id);
+    if (held && held.block === block) return held.texture;
+    if (!held) this.textures.set(id, (held = { texture: gl.createTexture(), size: "" }));
+    gl.bindTexture(gl.TEXTURE_2D, held.texture);
+    const format = block.channels === 1 ? gl.RED : gl.RGB;
+    const inside = block.channels === 1 ? (block.half ? gl.R16F : gl.R32F) : block.half ? gl.RGB16F : gl.RGB32F;
+    const type = block.half ? gl.HALF_FLOAT : gl.FLOAT;
+    const size = `${block.width}x${block.height}x${block.channels}${block.half}`;
+    if (held.size === size) {
+      gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, block.width, block.height, format, type, block.data);
+    } else {
+      gl.texImage2D(gl.TEXTURE_2D, 0, inside, block.width, block.height, 0, format, type, block.data);
+      filtered(gl, block.half ? gl.LINEAR : gl.NEAREST);
+    }
+    held.block = block;
+    held.size = size;
+    return held.texture;
+  }
+
+  resize(width, height) {
+    if (this.canvas.width !== width) this.canvas.width = width;
+    if (this.canvas.height !== height) this.canvas.height = height;
+  }
+
+  clear() {
+    const gl = this.gl;
+    gl.scissor(0, 0, this.canvas.width, this.canvas.height);
+    gl.clearColor(...BACKGROUND, 1);
+    gl.clear(gl.COLOR_BUFFER_BIT);
+  }
+
+  // Draw one pane into a rectangle of the canvas in its pixels, from the top left; `cut` is the part that may be drawn.
+  draw(look, rect, cut) {
+    const gl = this.gl;
+    const below = this.canvas.height - rect.y - rect.height;
+    gl.viewport(rect.x, below, rect.width, rect.height);
+    gl.scissor(cut.x, this.canvas.height - cut.y - cut.height, cut.width, cut.height);
+    gl.uniform4f(this.uniform("uWindow"), look.window.x, look.window.y, look.window.width, look.window.height);
+    gl.uniform1i(this.uniform("uLinear"), 0);
+    this.set(look);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+  }
+
+  set(look) {
+    const gl = this.gl;
+    const { blocks, sequence } = look;
+    const uses = (name, id) => {
+      gl.activeTexture(gl.TEXTURE0 + UNITS[name]);
+      gl.bindTexture(gl.TEXTURE_2D, id && blocks[id] ? this.texture(id, blocks[id]) : this.empty);
+    };
+    const relit = look.kind === "relit";
+    uses("uMain", relit ? "normals" : sequence.id);
+    uses("uAlbedo", relit ? "albedo" : null);
+    uses("uValid", look.markInvalid ? "valid" : null);
+    uses("uPlace", relit ? look.place.id : null);
+    gl.activeTexture(gl.TEXTURE0 + UNITS.uPalette);
+    gl.bindTexture(gl.TEXTURE_2D, this.palettes.get(paletteOf(sequence)));
+    gl.uniform1i(this.uniform("uKind"), KINDS[look.kind]);
+    gl.uniform1i(this.uniform("uMarkInvalid"), look.markInvalid ? 1 : 0);
+    gl.uniform1i(this.uniform("uHasValid"), blocks.valid ? 1 : 0);
+    gl.uniform1i(this.uniform("uHasAlbedo"), blocks.albedo ? 1 : 0);
+    gl.uniform1i(this.uniform("uChannels"), look.channels);
+    gl.uniform1i(this.uniform("uGrey"), !relit && blocks[sequence.id]?.channels === 1 ? 1 : 0);
+    gl.uniform1f(this.uniform("uExposure"), look.exposure);
+    gl.uniform1f(this.uniform("uYSign"), sequence.y === "down" ? -1 : 1);
+    gl.uniform1f(this.uniform("uAspect"), look.aspect);
+    gl.uniform2f(this.uniform("uRange"), ...look.range);
+    gl.uniform1i(this.uniform("uPlaceKind"), look.place.kind);
+    gl.uniform3fv(this.uniform("uMiddle"), look.place.middle);
+    gl.uniform1f(this.uniform("uScale"), look.place.scale);
+    const lights = lightUniforms(look.lights);
+    gl.uniform1i(this.uniform("uLightCount"), lights.count);
+    gl.uniform4fv(this.uniform("uLightPlace"), lights.places);
+    gl.uniform3fv(this.uniform("uLightColour"), lights.colours);
+    gl.uniform1f(this.uniform("uSpecular"), look.specular);
+    gl.uniform1f(this.uniform("uExponent"), look.exponent);
+  }
+
+  // The surface under the lights as linear light, one pixel per pixel of the normals: { width, height, values (RGBA) }.
+  relitValues(look) {
+    const gl = this.gl;
+    const { width, height } = look.blocks.normals;
+    const target = gl.createTexture();
+    gl.activeTexture(gl.TEXTURE0 + 7);
+    gl.bindTexture(gl.TEXTURE_2D, target);
+    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.RGBA32F, width, height);
+    const buffer = gl.createFramebuffer();
+    gl.bindFramebuffer(gl.FRAMEBUFFER, buffer);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, target, 0);
+    gl.viewport(0, 0, width, height);
+    gl.scissor(0, 0, width, height);
+    gl.uniform4f(this.uniform("uWindow"), 0, 1, 1, -1); // the first row read is the top one
+    gl.uniform1i(this.uniform("uLinear"), 1);
+    this.set(look);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+    const values = new Float32Array(4 * width * height);
+    gl.readPixels(0, 0, width, height, gl.RGBA, gl.FLOAT, values);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    gl.deleteFramebuffer(buffer);
+    gl.deleteTexture(target);
+    return { width, height, values };
+  }
+}
+
+function filtered(gl, filter) {
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, filter);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, filter);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE);
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE);
+}
+
+function linked(gl) {
+  const program = gl.createProgram();
+  for (const [type, text] of [[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, FRAGMENT]]) {
+    const shader = gl.createShader(type);
+    gl.shaderSource(shader, text);
+    gl.compileShader(shader);
+    gl.attachShader(program, shader);
+  }
+  gl.linkProgram(program);
+  if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) {
+    const logs = gl.getAttachedShaders(program).map((shader) => gl.getShaderInfoLog(shader));
+    throw new Error(`the picture's program does not compile: ${logs.join(" ")} ${gl.getProgramInfoLog(program)}`);
+  }
+  return program;
+}

@@ -1,0 +1,167 @@
+"""What a folder of results, plates or frames has to show."""
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from fractions import Fraction
+from functools import partial
+from pathlib import Path
+
+from psvideo.clip.about_output import is_plates, is_results
+from psvideo.clip.exr import contents, stored
+from psvideo.clip.folder import number_of
+from psvideo.errors import PsvideoError
+from psvideo.page.picture import Picture, shown
+from psvideo.page.show import Kind, Sequence, Show
+from psvideo.timing import read_timing, timing_record
+
+RESULTS: Mapping[str, tuple[str, Kind, str]] = {
+    "normals": ("Normals", "normals", ""),
+    "albedo": ("Albedo", "light", ""),
+    "valid": ("Validity", "mask", ""),
+    "depth": ("Depth", "heat", ""),
+    "residual": ("Residual", "heat", ""),
+    "error": ("Predicted error", "heat", "°"),
+    "position": ("Position", "position", ""),
+}
+"""What ``normals`` writes: label, kind and unit by the folder's name, in the order in which they are listed."""
+FULL = ("depth", "position")
+"""What needs more digits than halves have."""
+
+
+def show_of(path: Path, *, clip: Path | None = None) -> Show:
+    """Return what a folder that psvideo wrote, or a clip, has to show.
+
+    Raises PsvideoError where the folder is nothing that can be shown.
+    """
+    if not path.is_dir():
+        raise PsvideoError(f"{path}: there is no such folder. Name a folder of results or plates, or a clip.")
+    if is_results(path):
+        return _results(path)
+    if is_plates(path):
+        return _plates(path)
+    raise PsvideoError(f"{path}: holds neither results nor plates. Name a folder that normals or split wrote.")
+
+
+def _results(path: Path) -> Show:
+    known = [name for name in RESULTS if _files(path / name)]
+    sequences = [_result(path / name, *RESULTS[name]) for name in known]
+    width_px, height_px, fps = _look(path / known[0])
+    report = _report(path / "report.json")
+    return Show(
+        name=path.resolve().name if not report else str(report.get("clip", path.name)),
+        kind="results",
+        fps=fps,
+        width_px=width_px,
+        height_px=height_px,
+        sequences=tuple(sequences),
+        verdict=str(report.get("verdict", "")),
+        findings=tuple(str(sentence) for sentence in _list(report.get("findings"))),
+        facts=dict(_facts(report)),
+        timing=_timing_of(path / "timing.json"),
+    )
+
+
+def _plates(path: Path) -> Show:
+    folders = sorted(entry for entry in path.iterdir() if entry.is_dir() and _files(entry))
+    folders.sort(key=lambda folder: folder.name == "ambient")
+    sequences = [
+        replace(_result(folder, folder.name, "light", ""), group="Plates", id=f"plate-{place}")
+        for place, folder in enumerate(folders)
+        if folder.name != "flashes"
+    ]
+    width_px, height_px, fps = _look(folders[0])
+    return Show(
+        name=path.resolve().name,
+        kind="plates",
+        fps=fps,
+        width_px=width_px,
+        height_px=height_px,
+        sequences=tuple(sequences),
+        timing=_timing_of(path / "timing.json"),
+    )
+
+
+def _result(folder: Path, label: str, kind: Kind, unit: str) -> Sequence:
+    files = _files(folder)
+    head = _first_header(files)
+    rate = float(Fraction(str(head.get("framesPerSecond", "24"))))
+    numbers = tuple(sorted(files))
+    first_s = float(head.get("psvideo:time_s") or 0.0)
+    return Sequence(
+        id=folder.name,
+        label=label,
+        kind=kind,
+        group="Results",
+        timeline="rounds",
+        numbers=numbers,
+        times_s=tuple(first_s + (number - numbers[0]) / rate for number in numbers),
+        read=partial(_read, files, kind, folder.name in FULL),
+        unit=unit,
+        y=str(head.get("psvideo:y", "up")),
+        space=str(head.get("psvideo:space", "camera")),
+    )
+
+
+def _read(files: Mapping[int, Path], kind: Kind, full: bool, number: int, width_px: int) -> Picture:
+    found = stored(files[number])
+    pixels = shown(found.planes, width_px, directions=kind == "normals", full=full)
+    facts = {"time_s": found.attributes.get("psvideo:time_s"), "full_width": found.planes[0].shape[1]}
+    return Picture(pixels=pixels, facts=facts)
+
+
+def _files(folder: Path) -> dict[int, Path]:
+    """Return a folder's EXR files by number."""
+    found = ((number_of(file), file) for file in sorted(folder.glob("[!.]*.exr")))
+    return {number: file for number, file in found if number is not None}
+
+
+def _first_header(files: Mapping[int, Path]) -> Mapping[str, str | int | float | None]:
+    """Return the attributes of the first file whose header can be read. Raises PsvideoError where there is none."""
+    fault: PsvideoError | None = None
+    for number in sorted(files):
+        try:
+            return contents(files[number])[1]
+        except PsvideoError as error:
+            fault = fault or error
+    raise fault or PsvideoError("a folder without EXR files has no header")
+
+
+def _look(folder: Path) -> tuple[int, int, float]:
+    head = _first_header(_files(folder))
+    rate = float(Fraction(str(head.get("framesPerSecond", "24"))))
+    return int(head["width_px"] or 0), int(head["height_px"] or 0), rate
+
+
+def _timing_of(path: Path) -> partial[Mapping[str, object]] | None:
+    return partial(_read_timing, path) if path.is_file() else None
+
+
+def _read_timing(path: Path) -> Mapping[str, object]:
+    return timing_record(read_timing(path))
+
+
+def _report(path: Path) -> Mapping[str, object]:
+    """Return report.json, nothing where there is none. Raises PsvideoError where it is damaged."""
+    if not path.is_file():
+        return {}
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as fault:
+        raise PsvideoError(
+            f"{path}: cannot be read as JSON ({fault}). Run psvideo normals again, or remove it."
+        ) from fault
+    return found if isinstance(found, dict) else {}
+
+
+def _list(value: object) -> list[object]:
+    return value if isinstance(value, list) else []
+
+
+def _facts(report: Mapping[str, object]) -> Iterator[tuple[str, str]]:
+    if lights := _list(report.get("lights")):
+        yield "Lights", ", ".join(map(str, lights))
+    if solver := report.get("solver"):
+        yield "Solver", str(solver)
+    if version := report.get("version"):
+        yield "Made with", f"psvideo {version}"

@@ -1,0 +1,93 @@
+"""What the page can show: sequences of pictures, each picture with its place in time, and what is known of them.
+
+``index_of`` is what the browser is told. It names sequences by an id and pictures by their number, never by a path.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from psvideo.page.picture import Picture
+
+Kind = Literal["normals", "light", "mask", "heat", "position"]
+"""How a sequence is shown: as directions, as light, as yes and no, as a measure in false colours, as points."""
+Reader = Callable[[int, int], Picture]
+"""Gives the picture of a number, at most so many pixels wide. Raises PsvideoError where it cannot be read."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sequence:
+    """Pictures of one quantity. ``times_s`` are the instants that the pictures show, on the camera's clock.
+
+    Sequences of one ``timeline`` share their numbers; those of another are put beside them by time. ``slow``: pictures
+    are computed when they are asked for, so none is made ahead.
+    """
+
+    id: str
+    label: str
+    kind: Kind
+    group: str
+    timeline: Literal["rounds", "frames"]
+    numbers: tuple[int, ...]
+    times_s: tuple[float, ...]
+    read: Reader
+    unit: str = ""
+    y: str = "up"
+    space: str = "camera"
+    slow: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Show:
+    """Everything that the page can show of one folder. The first sequence's timeline is the one that is scrubbed."""
+
+    name: str
+    kind: Literal["results", "plates", "clip"]
+    fps: float
+    width_px: int
+    height_px: int
+    sequences: tuple[Sequence, ...]
+    verdict: str = ""
+    findings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    facts: Mapping[str, str] = field(default_factory=dict)
+    timing: Callable[[], Mapping[str, object]] | None = None
+    """Gives what the diagram of flashes is drawn from; None where nothing is known of them."""
+
+    def sequence(self, name: str) -> Sequence | None:
+        """Return the sequence with this id."""
+        return next((sequence for sequence in self.sequences if sequence.id == name), None)
+
+
+def index_of(show: Show) -> dict[str, object]:
+    """Return what the browser is told of a show, as JSON's types."""
+    return {
+        "schema": "psvideo-page/1",
+        "name": show.name,
+        "kind": show.kind,
+        "fps": show.fps,
+        "width_px": show.width_px,
+        "height_px": show.height_px,
+        "verdict": show.verdict,
+        "findings": list(show.findings),
+        "notes": list(show.notes),
+        "facts": dict(show.facts),
+        "timing": show.timing is not None,
+        "sequences": [_entry(sequence) for sequence in show.sequences],
+    }
+
+
+def _entry(sequence: Sequence) -> dict[str, object]:
+    return {
+        "id": sequence.id,
+        "label": sequence.label,
+        "kind": sequence.kind,
+        "group": sequence.group,
+        "timeline": sequence.timeline,
+        "numbers": list(sequence.numbers),
+        "times_s": [round(time_s, 7) for time_s in sequence.times_s],
+        "unit": sequence.unit,
+        "y": sequence.y,
+        "space": sequence.space,
+        "slow": sequence.slow,
+    }
