@@ -79,7 +79,7 @@ class Watched:
 def watched(browser: Browser) -> Iterator[Watched]:
     context = browser.new_context(viewport=LAPTOP, has_touch=True)
     one = Watched(context.new_page())
-    one.page.set_default_timeout(20_000)
+    one.page.set_default_timeout(60_000)
     yield one
     context.close()
     assert not one.complaints
