@@ -23,6 +23,7 @@ LAYERS = [
         "flicker",
         "ambient",
         "sequence",
+        "beauty",
         "calibrate",
         "normals",
         "integrate",

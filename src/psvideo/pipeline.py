@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from psvideo import hudon2015
 from psvideo.align.denoise import Average, averaged
-from psvideo.ambient import subtract
+from psvideo.ambient import subtract, update
 from psvideo.calibrate.strobed_readout import StrobedReadout, readout_of
 from psvideo.camera import Camera
 from psvideo.clip import (
@@ -180,6 +180,19 @@ def clip_plates(take: Take, timing: Timing, *, method: Method = "weights", watch
     rebuild = split if method == "weights" else hudon2015.split
     plates = subtract(rebuild(frames, camera, used), darks=_dark_plates(take, camera, used, places))
     return map(_colour_of(clip), plates)
+
+
+def first_ambient(take: Take, timing: Timing) -> LightPlate | None:
+    """Return what the take's first dark slot shows of the ambient light, None where there is none; decodes its frames.
+
+    A round that comes before any dark slot has no ambient plate of its own.
+    """
+    camera, places = timed_camera(take.plan, timing), places_in_time(timing, take.clip.numbers)
+    dark = next(_dark_plates(take, camera, _within(timing, camera, take, places), places), None)
+    if dark is None:
+        return None
+    plate = _colour_of(take.clip)(replace(dark, image=update(None, dark).image))
+    return LightPlate(light="ambient", number=0, time_s=plate.time_s, image=plate.image, seen=plate.seen)
 
 
 def _decode_ahead(take: Take, watch: Watch) -> None:

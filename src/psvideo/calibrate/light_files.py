@@ -14,8 +14,8 @@ from psvideo.tomlfile import check_light_name
 TIMING = "timing.json"
 FEWEST_TO_ONE = 4
 """So many numbered files for one of another name make that one no light (a mask); with fewer, all are lights."""
-NOT_LIGHTS = ("flashes", "truth")
-"""Folders that may lie beside the lights' own: single flashes, and a virtual shoot's truth."""
+NOT_LIGHTS = ("flashes", "beauty", "truth")
+"""Folders that may lie beside the lights' own: single flashes, the lights' sum, and a virtual shoot's truth."""
 
 
 def find_plates(folder: Path, *, lights: Sequence[str] = ()) -> LightFiles | None:

@@ -1,4 +1,4 @@
-"""Options that say how results are delivered, each written once, and what they make together."""
+"""Options that say how results are delivered, each written once."""
 
 from enum import StrEnum
 from pathlib import Path
@@ -37,6 +37,7 @@ class Aov(StrEnum):
     error = "error"
     depth = "depth"
     position = "position"
+    beauty = "beauty"
 
 
 class MeshKind(StrEnum):
@@ -52,7 +53,41 @@ class Encoding(StrEnum):
     png16 = "png16"
 
 
-SpaceOption = Annotated[SpaceName, typer.Option("--space", help="Camera axes, the world's, or a flat card's.")]
+class PreviewName(StrEnum):
+    """What a movie for eyes shows."""
+
+    relit = "relit"
+    normals = "normals"
+    plates = "plates"
+    beauty = "beauty"
+
+
+class PlatesPreview(StrEnum):
+    """What a movie of plates shows."""
+
+    plates = "plates"
+    beauty = "beauty"
+
+
+class CodecName(StrEnum):
+    """How movies are coded."""
+
+    vp9 = "vp9"
+    prores = "prores"
+
+
+class ProgramName(StrEnum):
+    """The programs that a delivery can be made for."""
+
+    nuke = "nuke"
+    blender = "blender"
+    unreal = "unreal"
+    houdini = "houdini"
+
+
+SpaceOption = Annotated[
+    SpaceName | None, typer.Option("--space", help="Camera axes (the default), the world's, or a flat card's.")
+]
 CameraToWorld = Annotated[
     Path | None,
     typer.Option(
@@ -71,7 +106,7 @@ CameraTimeOption = Annotated[
         "results (numbers), or seconds at the stage's rate (seconds).",
     ),
 ]
-YOption = Annotated[YDirection, typer.Option("--y", help="up as in OpenGL, down as in DirectX.")]
+YOption = Annotated[YDirection | None, typer.Option("--y", help="up as in OpenGL (the default), down as in DirectX.")]
 FloatOption = Annotated[bool, typer.Option("--float", help="Store normals as 32-bit floats.")]
 AovOption = Annotated[list[Aov] | None, typer.Option("--aov", help="Write this besides; may be given several times.")]
 MeshOption = Annotated[
@@ -80,4 +115,31 @@ MeshOption = Annotated[
 ]
 EncodeOption = Annotated[Encoding | None, typer.Option("--encode", help="Write 16-bit PNG maps of 0 to 1 besides.")]
 Separate = Annotated[bool, typer.Option("--separate", help="One sequence per quantity; this is the default.")]
-Multipart = Annotated[bool, typer.Option("--multipart", help="Write one EXR with all quantities besides.")]
+Multipart = Annotated[
+    bool | None, typer.Option("--multipart/--no-multipart", help="Write one EXR with all quantities besides.")
+]
+Plates = Annotated[bool, typer.Option("--plates", help="Write the plates besides, one sequence per light.")]
+WithAmbient = Annotated[
+    bool, typer.Option("--with-ambient", help="Leave ambient light in the beauty plate, as one exposure saw it.")
+]
+Weights = Annotated[
+    list[str] | None,
+    typer.Option("--weight", help="How strong a light is in the beauty plate: key=0.5; may be given several times."),
+]
+PreviewOption = Annotated[
+    list[PreviewName] | None,
+    typer.Option("--preview", help="Make a movie for eyes; may be given several times."),
+]
+PlatesPreviewOption = Annotated[
+    list[PlatesPreview] | None,
+    typer.Option("--preview", help="Make a movie for eyes; may be given several times."),
+]
+CodecOption = Annotated[
+    CodecName, typer.Option("--preview-codec", help="vp9 (.mp4) for browsers and players, prores (.mov) for editors.")
+]
+ProgramOption = Annotated[
+    ProgramName | None,
+    typer.Option(
+        "--for", help="Set what this program wants, where no option says otherwise, and write a note on how to load it."
+    ),
+]

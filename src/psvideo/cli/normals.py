@@ -13,15 +13,19 @@ from psvideo.cli.delivery_options import (
     CameraName,
     CameraTimeOption,
     CameraToWorld,
+    CodecName,
+    CodecOption,
     EncodeOption,
-    Encoding,
     FloatOption,
     MeshOption,
     Multipart,
+    Plates,
+    PreviewOption,
+    ProgramOption,
     Separate,
-    SpaceName,
     SpaceOption,
-    YDirection,
+    Weights,
+    WithAmbient,
     YOption,
 )
 from psvideo.cli.options import (
@@ -100,11 +104,12 @@ def normals(
         float | None,
         typer.Option("--depth-scale", help="Metres per unit of --depth. [default: 1 for floats, 0.001 for integers]"),
     ] = None,
-    space: SpaceOption = SpaceName.camera,
+    program: ProgramOption = None,
+    space: SpaceOption = None,
     camera_to_world: CameraToWorld = None,
     camera: CameraName = None,
     camera_time: CameraTimeOption = None,
-    y: YOption = YDirection.up,
+    y: YOption = None,
     align: Annotated[
         AlignName,
         typer.Option(help="Move plates of one round to one instant by flow; auto: where it moves."),
@@ -116,7 +121,12 @@ def normals(
     mesh: MeshOption = None,
     encode: EncodeOption = None,
     separate: Separate = True,
-    multipart: Multipart = False,
+    multipart: Multipart = None,
+    plates: Plates = False,
+    with_ambient: WithAmbient = False,
+    weight: Weights = None,
+    preview: PreviewOption = None,
+    preview_codec: CodecOption = CodecName.vp9,
     start_number: StartNumber = 1001,
     force: Force = False,
     resume: Resume = False,
@@ -126,9 +136,8 @@ def normals(
 ) -> None:
     """Write normals, albedo and validity for every round of flashes; does sync and split by itself."""
     from psvideo.align.rounds import Aligning
+    from psvideo.cli.delivery import Asked, delivery_of
     from psvideo.cli.opening import open_and_tell
-    from psvideo.export.results import Delivery
-    from psvideo.export.space import choose_space
     from psvideo.export.usd_core import require_usd
     from psvideo.pipeline import decoded_once
     from psvideo.runs import Output, OverTime, normals_run, read_lighting, timing_of
@@ -137,20 +146,27 @@ def normals(
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     output = Output(folder=out, force=force, resume=resume, start_number=start_number, command=command_line(context))
     output.check()
-    delivery = Delivery(
-        space=choose_space(
-            space.value,
-            y.value,
-            camera_to_world,
-            camera=camera,
-            camera_time=None if camera_time is None else camera_time.value,
-        ),
-        half=not float32,
-        aovs=tuple(dict.fromkeys(name.value for name in aov or ())),
-        meshes=tuple(dict.fromkeys(kind.value for kind in mesh or ())),
-        png16=encode is Encoding.png16,
+    asked = Asked(
+        program=program,
+        space=space,
+        camera_to_world=camera_to_world,
+        camera=camera,
+        camera_time=camera_time,
+        y=y,
+        float32=float32,
+        aovs=aov or (),
+        meshes=mesh or (),
+        encode=encode,
         multipart=multipart,
+        plates=plates,
+        with_ambient=with_ambient,
+        weights=weight or (),
+        previews=preview or (),
+        codec=preview_codec,
     )
+    delivery, at_odds = delivery_of(asked)
+    for sentence in at_odds:
+        voice.warn(sentence)
     if "usd" in delivery.meshes:
         require_usd()
     if depth_scale is not None and (depth is None or not 0 < depth_scale < inf):

@@ -23,7 +23,7 @@ def plate_name(clip: str, light: str, number: int) -> str:
 def write_plate(folder: Path, clip: str, plate: LightPlate, tags: Tags) -> None:
     """Write one plate: channels R, G, B or Y, and ``valid`` where rows are missing."""
     path = folder / plate_name(clip, plate.light, plate.number)
-    channels = _with_validity(plate.image, plate.seen)
+    channels = _with_validity(plate.image, plate.pixels_seen)
     write_exr(
         path,
         channels,
@@ -40,17 +40,17 @@ def write_flash(folder: Path, clip: str, plate: Plate, tags: Tags) -> None:
     attributes = tags.attributes(time_s=plate.time_s, data=False) | {"psvideo:lights": lights}
     write_exr(
         path,
-        _with_validity(plate.image, plate.seen),
+        _with_validity(plate.image, np.broadcast_to(plate.seen[:, None], plate.image.shape[:2])),
         attributes=attributes,
         fps=tags.fps,
         time_code=tags.time_code(plate.time_s),
     )
 
 
-def _with_validity(image: NDArray[np.float32], seen: NDArray[np.bool_]) -> dict[str, NDArray[np.floating]]:
+def _with_validity(image: NDArray[np.floating], seen: NDArray[np.bool_]) -> dict[str, NDArray[np.floating]]:
     channels = image_channels(image)
     if not seen.all():
-        channels["valid"] = np.broadcast_to(seen[:, None], image.shape[:2]).astype(np.float32)
+        channels["valid"] = seen.astype(np.float32)
     return channels
 
 

@@ -1,12 +1,14 @@
 """Results as files: one EXR sequence per quantity, ``normals/<clip>_normals.<number>.exr`` and so on."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.beauty import Mix
 from psvideo.export.exr import write_exr, write_exr_parts
 from psvideo.export.mesh import mesh_name, write_part, write_ply
 from psvideo.export.plates import image_channels
@@ -16,6 +18,10 @@ from psvideo.export.tags import Tags
 from psvideo.integrate import Depth, mesh_of
 from psvideo.surface import Surface
 
+Preview = Literal["relit", "normals", "plates", "beauty"]
+Codec = Literal["vp9", "prores"]
+Program = Literal["nuke", "blender", "unreal", "houdini"]
+MOVIE_SUFFIXES: dict[Codec, str] = {"vp9": "mp4", "prores": "mov"}
 COLOURS = frozenset({"albedo", "beauty"})
 """What is light or colour; everything else is data."""
 
@@ -25,7 +31,9 @@ class Delivery:
     """How results are written.
 
     ``half`` False stores normals as 32-bit floats; ``aovs`` may add "residual", "error", "beauty", "depth" and
-    "position", the last two always in 32 bits; ``meshes`` may hold "ply" and "usd".
+    "position", the last two always in 32 bits; ``meshes`` may hold "ply" and "usd". ``plates`` writes the plates that
+    were solved from besides, ``mix`` is what the beauty plate is summed with, ``previews`` are movies for eyes, and
+    ``program`` is the one that a note on loading is written for.
     """
 
     space: Space
@@ -34,6 +42,11 @@ class Delivery:
     meshes: tuple[str, ...] = ()
     png16: bool = False
     multipart: bool = False
+    plates: bool = False
+    mix: Mix = field(default_factory=Mix)
+    previews: tuple[Preview, ...] = ()
+    codec: Codec = "vp9"
+    program: Program | None = None
 
     @property
     def needs_depth(self) -> bool:
@@ -57,7 +70,7 @@ def bundle_name(clip: str, number: int) -> str:
 
 
 def is_written(folder: Path, clip: str, number: int, delivery: Delivery) -> bool:
-    """Return whether all files of one instant are there (each appears whole)."""
+    """Return whether all files of one instant's surface are there (each appears whole)."""
     names = [result_name(clip, quantity, number) for quantity in ("normals", "albedo", "valid", *delivery.aovs)]
     if delivery.multipart:
         names.append(bundle_name(clip, number))

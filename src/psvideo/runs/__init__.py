@@ -3,11 +3,12 @@
 from psvideo.runs.lighting import Lighting, read_lighting
 from psvideo.runs.look import look
 from psvideo.runs.output import Output, sequence_fps
-from psvideo.runs.plates import split_run
+from psvideo.runs.plates import Besides, split_run
 from psvideo.runs.results import NormalsResult, OverTime, normals_run
 from psvideo.runs.timed import timing_of
 
 __all__ = [
+    "Besides",
     "Lighting",
     "NormalsResult",
     "Output",

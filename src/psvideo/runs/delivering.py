@@ -1,14 +1,29 @@
-"""What a delivery asks of a run before it begins: that the camera is known at every instant, and in which unit."""
+"""What a delivery asks of a run: a camera that is known at every instant, the plates and their sum written besides."""
 
 from collections import defaultdict
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
+from psvideo.beauty import AMBIENT, Mix, beauty_of
+from psvideo.export.exr import HALF_MAX
+from psvideo.export.plates import plate_name, write_plate
 from psvideo.export.results import Delivery
 from psvideo.export.space import Space
+from psvideo.export.tags import Tags
 from psvideo.pipeline import Take
-from psvideo.sequence import round_numbers
+from psvideo.sequence import LightPlate, Round, round_numbers
 from psvideo.timing import Timing
+
+
+def check_delivery(delivery: Delivery, take: Take, timing: Timing, start_number: int) -> None:
+    """Raise UsageError or PsvideoError where a delivery asks for what this take does not have."""
+    delivery.mix.check(take.plan)
+    check_camera(delivery.space, take, timing, start_number)
 
 
 def check_camera(space: Space, take: Take, timing: Timing, start_number: int) -> None:
@@ -33,3 +48,25 @@ def world_doubts(delivery: Delivery, *, metric: bool) -> tuple[str, ...]:
         "Positions and meshes in world space need depth in metres, and here it is relative: they do not lie where the "
         "scene is. Give the rig [camera] focal_px and a [surface] plane.",
     )
+
+
+def plates_of(one: Round) -> Iterator[LightPlate]:
+    """Yield what a round's sequences of plates show: every light, and ambient light where the round has it."""
+    yield from one.plates
+    if one.ambient is not None and AMBIENT not in one.lights:
+        yield replace(one.ambient, number=one.number)
+
+
+def write_plates(
+    folder: Path, clip: str, one: Round, tags: Tags, *, resume: bool, write: Callable[[Callable[[], None]], None]
+) -> None:
+    """Hand a round's plates to the writing threads, which let only few wait, so that memory is bounded."""
+    for plate in plates_of(one):
+        if not (resume and (folder / plate_name(clip, plate.light, plate.number)).is_file()):
+            write(partial(write_plate, folder, clip, plate, tags))
+
+
+def beauty_image(one: Round, mix: Mix, ambient: LightPlate | None) -> NDArray[np.float16]:
+    """Return the sum of a round's plates as half floats; ``ambient`` as for ``beauty_of``."""
+    image = np.clip(beauty_of(one, mix, ambient).image, -HALF_MAX, HALF_MAX)
+    return np.asarray(image, np.float16)

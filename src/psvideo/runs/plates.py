@@ -1,11 +1,17 @@
 """A whole split: a clip in, a folder of plates out."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 
+from psvideo.beauty import AMBIENT, BEAUTY, Mix, beauty_of
 from psvideo.clip import Clip
 from psvideo.errors import PsvideoError
 from psvideo.export.plates import plate_name, write_flash, write_plate
+from psvideo.export.results import Codec, Preview
+from psvideo.export.tags import Tags
 from psvideo.export.writer import writing
 from psvideo.files import write_text
 from psvideo.pipeline import (
@@ -13,9 +19,13 @@ from psvideo.pipeline import (
     Take,
     Watch,
     clip_rounds,
+    first_ambient,
     unwatched,
 )
+from psvideo.plan import Plan
 from psvideo.rig import Rig
+from psvideo.runs.delivering import plates_of
+from psvideo.runs.handover import Finished, write_previews, write_timeline
 from psvideo.runs.look import look_at_plates
 from psvideo.runs.output import Output, folder_of, settings_of, tags_of
 from psvideo.runs.reporting import observing, run_report, write_report
@@ -35,13 +45,33 @@ class SplitResult:
     report: RunReport
 
 
+@dataclass(frozen=True, kw_only=True)
+class Besides:
+    """What a split writes besides the plates: every flash by itself, their sum as the ``mix`` says, movies."""
+
+    flashes: bool = False
+    mix: Mix | None = None
+    previews: tuple[Preview, ...] = ()
+    codec: Codec = "vp9"
+
+    def check(self, plan: Plan) -> None:
+        """Raise UsageError or PsvideoError where the plan does not have what is asked for."""
+        if self.mix is not None:
+            self.mix.check(plan)
+            if BEAUTY in plan.lights:
+                raise PsvideoError(
+                    f"A light of the plan is named {BEAUTY!r}, and so is the folder of the lights' sum: both cannot be "
+                    "written. Rename the light in plan and rig, or leave --beauty out."
+                )
+
+
 def split_run(
     take: Take,
     timing: Timing,
     output: Output,
     *,
     method: Method = "weights",
-    flashes: bool = False,
+    besides: Besides = Besides(),
     known: Rig | None = None,
     watch: Watch = unwatched,
 ) -> SplitResult:
@@ -52,14 +82,27 @@ def split_run(
     clip = take.clip
     observed, picture = observing(take, known), None
     tags = tags_of(clip)
+    besides.check(clip.plan)
     written: set[str] = set()
-    settings = settings_of(take, timing, output, method, flashes)
-    with folder_of(output, settings) as folder, writing() as write:
+    times_s: list[float] = []
+    settings = settings_of(take, timing, output, method, besides)
+    with (
+        folder_of(output, settings) as folder,
+        _at_the_end(folder, take, output, times_s, besides, tags, watch),
+        writing() as write,
+    ):
+        flashes, mix = besides.flashes, besides.mix
         each = (lambda plate: write(partial(write_flash, folder, clip.name, plate, tags))) if flashes else None
-        for one in clip_rounds(
+        gathered = clip_rounds(
             take, timing, method=method, start_number=output.start_number, watch=watch, each_flash=each
-        ):
-            for plate in (*one.plates, *((one.ambient,) if one.ambient else ())):
+        )
+        ambient = first_ambient(take, timing) if mix is not None and mix.of(AMBIENT) else None
+        for one in gathered:
+            times_s.append(one.time_s)
+            ambient = one.ambient or ambient
+            whole = one.lights == clip.plan.lights
+            sums = (beauty_of(one, mix, ambient),) if mix is not None and whole else ()
+            for plate in (*plates_of(one), *sums):
                 name = plate_name(clip.name, plate.light, plate.number)
                 written.add(name)
                 if not (output.resume and (folder / name).is_file()):
@@ -67,7 +110,7 @@ def split_run(
             observed.add(one)
             if len(observed.facts) in (1, SAMPLE_ROUND):
                 picture = look_at_plates(one)
-            del one, plate  # they would be held while the next round gathers
+            del one, plate, sums  # they would be held while the next round gathers
         if picture is None:
             raise PsvideoError(nothing_complete(clip, timing))
         timing = _with_plates(timing, clip.name, written, start_number=output.start_number)
@@ -75,6 +118,18 @@ def split_run(
         report = run_report(take, timing, observed, output)
         write_report(folder, report, [("One round", picture)])
     return SplitResult(timing=timing, report=report)
+
+
+@contextmanager
+def _at_the_end(
+    folder: Path, take: Take, output: Output, times_s: list[float], besides: Besides, tags: Tags, watch: Watch
+) -> Iterator[None]:
+    """At the end of a block that wrote all plates, make of them what needs them all."""
+    yield
+    if times_s:
+        run = Finished(folder=folder, target=output.folder, clip=take.clip, fps=tags.fps, first_time_s=times_s[0])
+        write_previews(run, besides.previews, besides.codec, take.plan.lights, watch)
+        write_timeline(run)
 
 
 def nothing_complete(clip: Clip, timing: Timing) -> str:

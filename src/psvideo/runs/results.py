@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.align.rounds import Aligning, aligned
+from psvideo.beauty import AMBIENT
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.mesh import animation_name
 from psvideo.export.results import Delivery, is_written, mesh_file, write_surface
@@ -25,12 +26,14 @@ from psvideo.pipeline import (
     Watch,
     clip_rounds,
     denoised,
+    first_ambient,
     surfaces,
     unwatched,
 )
 from psvideo.plan import Plan
 from psvideo.quality.observed import InstantFacts
-from psvideo.runs.delivering import check_camera, world_doubts
+from psvideo.runs.delivering import beauty_image, check_delivery, world_doubts, write_plates
+from psvideo.runs.handover import Finished, write_note, write_previews, write_timeline
 from psvideo.runs.lighting import Lighting
 from psvideo.runs.look import look
 from psvideo.runs.output import Output, folder_of, settings_of, tags_of
@@ -102,7 +105,7 @@ def normals_run(
     clip, mask = take.clip, lighting.mask
     over_time = over_time or OverTime()
     over_time.check(clip.plan)
-    check_camera(delivery.space, take, timing, output.start_number)
+    check_delivery(delivery, take, timing, output.start_number)
     tags = tags_of(clip, lighting.rig_path, delivery.space, over_time.aligning.rate)
     shaping = lighting.shaping if delivery.needs_depth else None
     observed = observing(take, lighting.rig, mask)
@@ -114,20 +117,26 @@ def normals_run(
     settings = settings_of(take, timing, output, tags, delivery, over_time, *light)
     with (
         folder_of(output, settings) as folder,
-        _animation(folder, clip.name, observed.facts, delivery, tags, shaping),
+        _at_the_end(folder, take, output, observed.facts, delivery, tags, shaping, watch),
         writing() as write,
     ):
         rounds = clip_rounds(take, timing, start_number=output.start_number, watch=watch)
+        ambient = first_ambient(take, timing) if delivery.mix.of(AMBIENT) else None
         rounds = aligned(rounds, clip.plan.lights, over_time.aligning, first=output.start_number)
         found = surfaces(rounds, clip.plan, lighting.rig, mask=mask, solving=solving, near=lighting.near)
         for instant in found if over_time.denoise < 2 else denoised(found, over_time.denoise):
             shaping, shaped = shape_of(shaping, lighting, instant)
+            ambient = instant.round.ambient or ambient
+            if delivery.plates:
+                write_plates(folder / "plates", clip.name, instant.round, tags, resume=output.resume, write=write)
             if not (output.resume and is_written(folder, clip.name, instant.round.number, delivery)):
                 # the surface only: plates are many times larger, and must not wait for the files
                 surface, at = instant.surface, (instant.round.number, instant.round.time_s)
                 there = replace(delivery, space=delivery.space.at(at[1], at[0], clip.plan.camera.fps))
-                write(partial(write_surface, folder, clip.name, *at, surface, delivery=there, tags=tags, depth=shaped))
-                del surface
+                beauty = beauty_image(instant.round, delivery.mix, ambient) if "beauty" in delivery.aovs else None
+                job = partial(write_surface, folder, clip.name, *at, surface, tags=tags, depth=shaped, beauty=beauty)
+                write(partial(job, delivery=there))
+                del surface, beauty, job
             del shaped  # it holds the surface too
             observed.add(instant.round, instant.surface)
             if len(observed.facts) in (1, SAMPLE_ROUND):
@@ -153,14 +162,28 @@ def normals_run(
 
 
 @contextmanager
-def _animation(
-    folder: Path, clip: str, facts: Sequence[InstantFacts], delivery: Delivery, tags: Tags, shaping: Shaping | None
+def _at_the_end(
+    folder: Path,
+    take: Take,
+    output: Output,
+    facts: Sequence[InstantFacts],
+    delivery: Delivery,
+    tags: Tags,
+    shaping: Shaping | None,
+    watch: Watch,
 ) -> Iterator[None]:
-    """At the end of a block that wrote the meshes of all instants, make one animated file of them where asked for."""
+    """At the end of a block that wrote the files of all instants, make of them what needs them all."""
     yield
-    if shaping is None or not facts or "usd" not in delivery.meshes:
+    if not facts:
         return
-    parts = {one.number: folder / mesh_file(clip, one.number, "usd") for one in facts}
-    write_animation(folder / animation_name(clip), parts, tags.fps, metric=shaping.metric, space=delivery.space)
-    for part in parts.values():
-        part.unlink()
+    clip = take.clip
+    metric = shaping is not None and shaping.metric
+    if "usd" in delivery.meshes:
+        parts = {one.number: folder / mesh_file(clip.name, one.number, "usd") for one in facts}
+        write_animation(folder / animation_name(clip.name), parts, tags.fps, metric=metric, space=delivery.space)
+        for part in parts.values():
+            part.unlink()
+    run = Finished(folder=folder, target=output.folder, clip=clip, fps=tags.fps, first_time_s=facts[0].time_s)
+    write_previews(run, delivery.previews, delivery.codec, [f"plates/{light}" for light in clip.plan.lights], watch)
+    write_timeline(run)
+    write_note(run, delivery, first=facts[0].number, last=facts[-1].number, metric=metric)

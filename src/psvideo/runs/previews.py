@@ -1,0 +1,123 @@
+"""Movies for eyes of what a run delivered, made from the files themselves once all are there.
+
+They are read back one instant at a time, so that a movie of any length needs the memory of one, and a run that was
+stopped makes them at its end as one that was not.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.clip import exr
+from psvideo.export.results import Codec, Preview
+from psvideo.pipeline import Watch
+from psvideo.view.shading import exposure_for, normal_colours, smaller, srgb
+
+Pixels = NDArray[np.uint8]
+Image = NDArray[np.float32]
+WIDTH_PX = 1280
+TURN_S = 4.0
+"""The light of the relit movie goes round once in so many seconds of playing,"""
+TILT = 0.8
+"""so far from the camera's axis (sine of the angle)."""
+INK = (226, 226, 226)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shown:
+    """The files of one instant, by what they show."""
+
+    number: int
+    files: Mapping[str, Path]
+
+
+def preview_name(clip: str, preview: Preview, suffix: str) -> str:
+    """Return a movie's path below the output folder.
+
+    >>> preview_name("take3", "relit", "mp4")
+    'preview/take3_relit.mp4'
+    """
+    return f"preview/{clip}_{preview}.{suffix}"
+
+
+def write_preview(
+    path: Path, preview: Preview, instants: Sequence[Shown], *, fps: Fraction, codec: Codec, watch: Watch
+) -> None:
+    """Write one movie of the instants, in the order of their numbers; a number that is not there holds the one before.
+
+    How bright pictures are shown is set by the first instant, for the whole movie.
+    """
+    from psvideo.export.movie import even, write_movie  # FFmpeg's libraries take memory: only where a movie is made
+
+    exposure = _exposure(preview, instants[0])
+
+    def pictures() -> Iterator[Pixels]:
+        told = watch(instants, total=len(instants), what=f"movie of {preview}", unit="pictures")
+        last = instants[-1].number + 1
+        for place, one in enumerate(told):
+            shown = even(_picture(preview, one, exposure, fps))
+            after = instants[place + 1].number if place + 1 < len(instants) else last
+            for _ in range(one.number, after):
+                yield shown
+
+    write_movie(path, pictures(), fps=fps, codec=codec)
+
+
+def _exposure(preview: Preview, first: Shown) -> float:
+    """Return by which factor a whole movie's light is shown: the least that the first instant's pictures ask for."""
+    measured = {"relit": ("albedo",), "normals": (), "beauty": ("beauty",)}.get(
+        preview, tuple(name for name in first.files if name != "ambient")
+    )
+    return min((exposure_for(_read(first.files[name], WIDTH_PX)) for name in measured), default=1.0)
+
+
+def _picture(preview: Preview, one: Shown, exposure: float, fps: Fraction) -> Pixels:
+    if preview == "normals":
+        return normal_colours(_read(one.files["normals"], WIDTH_PX))
+    if preview == "beauty":
+        return srgb(_read(one.files["beauty"], WIDTH_PX), exposure=exposure)
+    return _relit(one, exposure, fps) if preview == "relit" else _sheet(one, exposure)
+
+
+def _relit(one: Shown, exposure: float, fps: Fraction) -> Pixels:
+    """Return the surface under a light that goes round the camera's axis."""
+    said = exr.contents(one.files["normals"])[1]
+    angle = 2 * math.pi * one.number / float(fps) / TURN_S
+    light = np.array([TILT * math.cos(angle), TILT * math.sin(angle), math.sqrt(1 - TILT**2)])
+    facing = np.maximum(_read(one.files["normals"], WIDTH_PX) @ _delivered(light, said).astype(np.float32), 0)
+    return srgb(_read(one.files["albedo"], WIDTH_PX) * facing[..., None], exposure=exposure)
+
+
+def _delivered(light: NDArray[np.float64], said: Mapping[str, object]) -> NDArray[np.float64]:
+    """Return a direction of the camera frame in the frame that a file of normals says it is in."""
+    matrix = said.get("psvideo:camera_to_world")
+    if isinstance(matrix, str):
+        light = np.array(matrix.split(), np.float64).reshape(4, 4)[:3, :3] @ light
+    return light * (1, -1, 1) if said.get("psvideo:y") == "down" else light
+
+
+def _sheet(one: Shown, exposure: float) -> Pixels:
+    """Return the plates side by side, each with its name, all at one exposure."""
+    across = math.ceil(math.sqrt(len(one.files)))
+    plates = {name: _read(path, WIDTH_PX // across) for name, path in one.files.items()}
+    tiles = [_named(srgb(image, exposure=exposure), name) for name, image in plates.items()]
+    tiles += [np.zeros_like(tiles[0])] * (-len(tiles) % across)
+    rows = [np.concatenate(tiles[a : a + across], axis=1) for a in range(0, len(tiles), across)]
+    return np.concatenate(rows, axis=0)
+
+
+def _named(picture: Pixels, name: str) -> Pixels:
+    size = max(picture.shape[1] / 640, 0.35)
+    place = (int(8 * size) + 2, int(24 * size) + 2)
+    named = cv2.putText(picture.copy(), name, place, cv2.FONT_HERSHEY_SIMPLEX, 0.7 * size, INK, 1, cv2.LINE_AA)
+    return np.asarray(named, np.uint8)
+
+
+def _read(path: Path, width_px: int) -> Image:
+    return smaller(np.asarray(exr.decode(path).codes, np.float32), width_px)

@@ -1,0 +1,230 @@
+"""What lies beside the maps of a delivery: plates, their sum, movies, the timeline, presets and their notes."""
+
+import hashlib
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import numpy as np
+import OpenEXR
+import pytest
+
+from psvideo.beauty import Mix, beauty_of, parse_mix
+from psvideo.cli.app import main
+from psvideo.errors import PsvideoError, UsageError
+from psvideo.export.movie import even, write_movie
+from psvideo.export.timeline import Footage, Images, timeline_text
+from psvideo.sequence import LightPlate, Round
+
+otio = pytest.importorskip("opentimelineio")
+SCENES = Path(__file__).resolve().parents[1] / "data_synth"
+
+
+@pytest.fixture(scope="module")
+def clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A clip of a sphere, as the virtual shoot leaves it."""
+    folder = tmp_path_factory.mktemp("shoot") / "clip"
+    assert main(["synth", str(SCENES / "sphere.toml"), "-o", str(folder), "-q"]) == 0
+    return folder
+
+
+EVERYTHING = ("--plates", "--aov", "beauty", "--with-ambient", "--weight", "key=0.5", "--encode", "png16")
+EVERYTHING += ("--multipart", *(word for name in ("relit", "normals", "plates") for word in ("--preview", name)))
+
+
+@pytest.fixture(scope="module")
+def whole(clip: Path) -> Path:
+    """Everything that a run can deliver but depth."""
+    out = clip.parent / "whole"
+    assert normals(clip, out, *EVERYTHING) == 0
+    return out
+
+
+def normals(clip: Path, out: Path, *more: str) -> int:
+    return main(["normals", str(clip), "--rig", str(clip / "rig.toml"), "-o", str(out), "-q", *more])
+
+
+def picture(path: Path) -> np.ndarray:
+    """Return an EXR's channels in the order R, G, B, or Y."""
+    planes = OpenEXR.File(str(path), separate_channels=True).channels()
+    return np.stack([planes[name].pixels.astype(np.float32) for name in "RGBY" if name in planes], axis=-1)
+
+
+def at_or_before(folder: Path, number: int) -> Path:
+    """Return a light's plate of a round, or the one before: a dark slot may be cut off at the clip's end."""
+    return max(path for path in folder.iterdir() if int(path.name.split(".")[1]) <= number)
+
+
+def digest(folder: Path) -> dict[str, str]:
+    files = (path for path in sorted(folder.rglob("*")) if path.is_file())
+    return {str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
+
+
+def decoded(path: Path) -> tuple[av.video.stream.VideoStream, list[np.ndarray]]:
+    with av.open(str(path)) as container:
+        return container.streams.video[0], [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+
+
+def test_the_beauty_plate_is_the_sum_of_the_plates_with_each_light_as_strong_as_asked(whole: Path) -> None:
+    for path in (whole / "beauty").iterdir():
+        number = path.name.split(".")[1]
+        plates = {p.name: picture(at_or_before(p, int(number))) for p in (whole / "plates").iterdir()}
+        assert set(plates) > {"key", "ambient"}
+        total = sum(image * (0.5 if name == "key" else 1.0) for name, image in plates.items())
+        assert np.abs(picture(path) - total).max() < 2e-3
+        parts = {part.name(): part for part in OpenEXR.File(str(whole / f"clip.{number}.exr")).parts}
+        assert parts["beauty"].header["colorInteropID"] == OpenEXR.File(str(path)).header()["colorInteropID"] != "data"
+
+
+def test_split_sums_its_plates_without_ambient_light_unless_asked(clip: Path, tmp_path: Path) -> None:
+    plates = tmp_path / "plates"
+    assert main(["split", str(clip), "-o", str(plates), "--beauty", "--preview", "plates", "-q"]) == 0
+    for path in (plates / "beauty").iterdir():
+        number = path.name.split(".")[1]
+        lights = [p.name for p in plates.iterdir() if p.is_dir() and p.name not in ("ambient", "beauty", "preview")]
+        total = sum(picture(plates / name / f"clip_{name}.{number}.exr") for name in lights)
+        assert np.abs(picture(path) - total).max() < 2e-3
+    assert (plates / "preview" / "clip_plates.mp4").is_file()
+    assert main(["info", str(plates)]) == 0
+
+
+def test_a_row_that_one_light_lacks_is_missing_in_the_sum() -> None:
+    def plate(name: str, seen: list[bool]) -> LightPlate:
+        rows = np.array(seen)
+        image = np.ones((3, 2), np.float32) * rows[:, None]
+        return LightPlate(light=name, number=1, time_s=0.0, image=image, seen=rows)
+
+    one = Round(number=1, plates=(plate("a", [True, True, False]), plate("b", [True, True, True])))
+    total = beauty_of(one, Mix())
+    assert total.image[:, 0].tolist() == [2, 2, 0]
+    assert total.seen.tolist() == [True, True, False]
+    assert beauty_of(one, Mix(weights=(("a", 0.0),))).seen.all(), "a light that does not count need not be seen"
+    held = beauty_of(one, parse_mix([], with_ambient=True), plate("ambient", [True, False, True]))
+    assert held.image[:, 0].tolist() == [3, 0, 0]
+
+
+@pytest.mark.parametrize("text", ["key", "key=", "key=-1", "key=nan", "=x"])
+def test_a_weight_that_is_none_is_refused(text: str) -> None:
+    with pytest.raises(UsageError, match=r"such as key=0\.5"):
+        parse_mix([text], with_ambient=False)
+
+
+def test_weights_without_a_beauty_plate_and_of_unknown_lights_are_refused(
+    clip: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert normals(clip, tmp_path / "out", "--with-ambient") == 2
+    assert "Add --aov beauty" in capsys.readouterr().err
+    assert normals(clip, tmp_path / "out", "--aov", "beauty", "--weight", "kay=1") == 2
+    assert "'key'" in capsys.readouterr().err
+    assert main(["split", str(clip), "-o", str(tmp_path / "out"), "--weight", "key=1"]) == 2
+    assert "Add --beauty" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_previews_play_with_the_sequences_rate_and_say_which_colours_they_hold(whole: Path) -> None:
+    header = OpenEXR.File(str(min((whole / "normals").iterdir()))).header()
+    count = len(list((whole / "normals").iterdir()))
+    for name in ("relit", "normals", "plates"):
+        stream, frames = decoded(whole / "preview" / f"clip_{name}.mp4")
+        assert len(frames) == count
+        assert stream.average_rate == pytest.approx(header["framesPerSecond"], rel=1e-6)
+        assert (stream.width % 2, stream.height % 2) == (0, 0)
+        context = stream.codec_context
+        assert context.pix_fmt == "yuv420p"
+        assert (context.color_primaries, context.colorspace) == (1, 1)  # BT.709 (ITU-T H.273)
+        assert (context.color_trc, context.color_range) == (13, 1)  # sRGB; video range
+    path = min((whole / "normals").iterdir())
+    coded = np.rint(127.5 * (picture(path) + 1))
+    middle = tuple(n // 2 for n in coded.shape[:2])
+    shown = decoded(whole / "preview" / "clip_normals.mp4")[1][0]
+    assert np.abs(shown[middle].astype(float) - coded[middle]).max() <= 4
+
+
+@pytest.mark.parametrize(("codec", "suffix", "pixels"), [("vp9", "mp4", "yuv420p"), ("prores", "mov", "yuv422p10le")])
+def test_a_movie_shows_the_colours_that_it_was_given(codec: str, suffix: str, pixels: str, tmp_path: Path) -> None:
+    colours = np.array([[255, 0, 0], [0, 255, 0], [0, 0, 255], [128, 128, 255], [0, 0, 0], [200, 90, 30]], np.uint8)
+    given = even(np.repeat(np.repeat(colours[None], 31, axis=0), 21, axis=1)[:, :125])
+    assert given.shape == (32, 126, 3)
+    path = tmp_path / f"a.{suffix}"
+    write_movie(path, [given] * 3, fps=Fraction(24000, 1001), codec=codec)  # type: ignore[arg-type]
+    stream, frames = decoded(path)
+    assert (stream.average_rate, stream.codec_context.pix_fmt) == (Fraction(24000, 1001), pixels)
+    for place, colour in enumerate(colours):
+        assert np.abs(frames[2][16, 21 * place + 10].astype(int) - colour).max() <= 4
+    with pytest.raises(PsvideoError, match="no picture"):
+        write_movie(path, [], fps=Fraction(24))
+    assert [p.name for p in tmp_path.iterdir()] == [path.name], "a movie that fails leaves the one before"
+
+
+def test_the_timeline_ties_every_sequence_to_the_clip(whole: Path, clip: Path) -> None:
+    timeline = otio.adapters.read_from_file(str(whole / "clip.otio"))
+    tracks = {track.name: track for track in timeline.tracks}
+    assert {"clip", "normals", "albedo", "valid", "beauty", "plates/key", "normals_png16"} < set(tracks)
+    fps = float(OpenEXR.File(str(min((whole / "normals").iterdir()))).header()["framesPerSecond"])
+    for name, track in tracks.items():
+        (held,) = track
+        media = held.media_reference
+        assert media.available_range.contains(held.source_range) or name == "clip"
+        for index in range(media.number_of_images_in_sequence()):
+            assert (whole / media.target_url_for_image_number(index)).is_file()
+        assert media.rate == pytest.approx(100 if name == "clip" else fps)
+    footage = tracks["clip"][0]
+    files = sorted(path.name for path in (clip / "frames").iterdir())
+    first = int(footage.source_range.start_time.value - footage.media_reference.start_frame)
+    time_s = float(OpenEXR.File(str(min((whole / "normals").iterdir()))).header()["psvideo:time_s"])
+    assert first == int(time_s * 100), "the clip begins with the frame that was open at the first instant"
+    assert Path(footage.media_reference.target_url_for_image_number(first)).name == files[first]
+    assert footage.duration().to_seconds() == pytest.approx(tracks["normals"].duration().to_seconds(), abs=0.02)
+
+
+def test_a_sequence_that_begins_later_lies_later_and_a_movie_is_named(tmp_path: Path) -> None:
+    def images(name: str, first: int) -> Images:
+        return Images(name=name, folder=f"{name}/", prefix="a.", suffix=".exr", first=first, count=4, fps=Fraction(24))
+
+    footage = Footage(name="m", media="../m.mov", frames=100, fps=Fraction(120), start=5)
+    path = tmp_path / "a.otio"
+    path.write_text(timeline_text("a", [images("x", 1001), images("y", 1003)], footage))
+    movie, x, y = otio.adapters.read_from_file(str(path)).tracks
+    assert movie[0].media_reference.target_url == "../m.mov"
+    assert movie[0].source_range == otio.opentime.TimeRange(
+        otio.opentime.RationalTime(5, 120), otio.opentime.RationalTime(30, 120)
+    )
+    assert y.range_of_child(y[1]).start_time.to_seconds() - x.range_of_child(x[0]).start_time.to_seconds() == 2 / 24
+
+
+def test_a_stopped_run_goes_on_to_the_same_delivery(clip: Path, whole: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    out = clip.parent / "again"
+
+    def stop(*_: object, **__: object) -> None:
+        raise PsvideoError("stopped")
+
+    with monkeypatch.context() as patched:
+        patched.setattr("psvideo.runs.handover.write_preview", stop)
+        assert normals(clip, out, *EVERYTHING) == 1
+    assert not out.exists()
+    partial = clip.parent / ".again.partial"
+    min((partial / "plates" / "key").iterdir()).unlink()
+    min((partial / "beauty").iterdir()).unlink()
+    assert normals(clip, out, *EVERYTHING, "--resume") == 0
+    assert digest(out) == digest(whole)
+
+
+def test_a_preset_sets_what_its_program_wants_and_tells_how_to_load_it(
+    clip: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert normals(clip, out, "--for", "unreal", "--frames", "1-20") == 0
+    header = OpenEXR.File(str(min((out / "normals").iterdir()))).header()
+    assert (header["psvideo:space"], header["psvideo:y"]) == ("tangent", "down")
+    assert list((out / "normals_png16").iterdir())
+    told = (out / "README-unreal.txt").read_text(encoding="utf-8")
+    assert "Flip Green Channel off" in told
+    assert "green channel is flipped" in told
+    number = min((out / "normals").iterdir()).name.split(".")[1]
+    assert f"clip_normals.{number}.png" in told
+    command = ["normals", str(clip), "--rig", str(clip / "rig.toml"), "-o", str(tmp_path / "up"), "--frames", "1-20"]
+    assert main([*command, "--for", "unreal", "--y", "up"]) == 0
+    assert "--y up goes against --for unreal" in capsys.readouterr().err
+    header = OpenEXR.File(str(min((tmp_path / "up" / "normals").iterdir()))).header()
+    assert header["psvideo:y"] == "up"
+    assert "Flip Green Channel on" in (tmp_path / "up" / "README-unreal.txt").read_text(encoding="utf-8")
