@@ -56,7 +56,8 @@ def at_or_before(folder: Path, number: int) -> Path:
 
 
 def digest(folder: Path) -> dict[str, str]:
-    files = (path for path in sorted(folder.rglob("*")) if path.is_file())
+    """Return the digest of every file but the report, which names its own command."""
+    files = (path for path in sorted(folder.rglob("*")) if path.is_file() and path.stem != "report")
     return {str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
 
 
