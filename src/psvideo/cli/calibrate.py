@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from psvideo.cli.console import Voice
+from psvideo.cli.convert import convert
 from psvideo.cli.lights import flat_field, guess, intensities, matte_sphere
 from psvideo.cli.mirror_sphere import mirror_sphere
 from psvideo.cli.options import Frames, Json, PlanPath, Quiet, Verbose
@@ -29,6 +30,7 @@ calibrate.command("matte-sphere")(matte_sphere)
 calibrate.command("flat-field")(flat_field)
 calibrate.command("intensities")(intensities)
 calibrate.command("guess")(guess)
+calibrate.command("convert")(convert)
 
 
 @calibrate.callback()

@@ -107,6 +107,13 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("nothing was calibrated: a first guess", "psvideo calibrate guess plates/ -o guess.toml"),
         ("many lights of one kind", "psvideo calibrate guess plates/ --prior equal-lights -o guess.toml"),
     ),
+    "calibrate convert": (
+        ("for RTI programs", "psvideo calibrate convert clip/rig.toml -o lights.lp"),
+        (
+            "an .lp file of three lights as rig.toml, with names",
+            "psvideo calibrate convert lights.lp --name key --name left --name right -o rig.toml",
+        ),
+    ),
     "calibrate readout": (
         ("from stripes of an LED that blinks at 1000 Hz", "psvideo calibrate readout clip.mov --led-hz 1000"),
         (
@@ -132,6 +139,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
             "only a part, with the timing found before",
             "psvideo split clip/ --frames 1-100 --timing timing.json -o part/",
         ),
+        ("the scene under all lights at once besides", "psvideo split clip/ --beauty --preview beauty -o plates/"),
         ("the paper's Algorithm 1, to compare with", "psvideo split clip/ --method hudon2015 -o plates_2015/"),
     ),
     "normals": (
@@ -148,8 +156,12 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
             "psvideo normals clip/ --rig rig.toml --align auto --rate flash -o out/",
         ),
         (
-            "for Unreal (DirectX): green down, 16-bit PNG besides",
-            "psvideo normals clip/ --rig rig.toml --y down --encode png16 -o out/",
+            "for Unreal: tangent space, green down, 16-bit PNG besides, and a note on how to load them",
+            "psvideo normals clip/ --rig rig.toml --for unreal -o out/",
+        ),
+        (
+            "in the scene's space, with the camera of a USD file; a movie for eyes",
+            "psvideo normals clip/ --rig rig.toml --space world --camera-to-world shot.usd --preview relit -o out/",
         ),
     ),
     "view": (

@@ -1,0 +1,95 @@
+"""Light lists of other programs: what is written is read back to the last digit, and what they cannot hold is told."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from psvideo.cli.app import main
+from psvideo.errors import PsvideoError, UsageError
+from psvideo.rig import Light, Rig, Vector
+from psvideo.rig_lists import write_rig
+from psvideo.rigfile import read_rig
+
+coordinate = st.floats(-1, 1)
+vectors = st.tuples(coordinate, coordinate, st.floats(0.1, 1))
+strengths = st.tuples(*[st.floats(0.01, 100)] * 3)
+
+
+def unit(vector: Vector) -> Vector:
+    length = sum(value * value for value in vector) ** 0.5
+    return vector[0] / length, vector[1] / length, vector[2] / length
+
+
+def rig_of(directions: list[Vector], intensity: list[tuple[float, ...]]) -> Rig:
+    lights = (
+        Light(name=f"light{n}", direction=unit(at), intensity=how)
+        for n, (at, how) in enumerate(zip(directions, intensity, strict=True))
+    )
+    return Rig(lights=tuple(lights))
+
+
+@given(st.lists(st.tuples(vectors, strengths), min_size=1, max_size=6))
+def test_a_rig_survives_the_lists_of_diligent_and_rti(
+    tmp_path_factory: pytest.TempPathFactory, lights: list[tuple[Vector, tuple[float, ...]]]
+) -> None:
+    rig = rig_of([at for at, _ in lights], [how for _, how in lights])
+    folder = tmp_path_factory.mktemp("lists")
+    for name in ("light_directions.txt", "lights.lp"):
+        write_rig(folder / name, rig)
+        back = read_rig(folder / name, plan_lights=rig.names)
+        for found, given_light in zip(back.lights, rig.lights, strict=True):
+            assert found.name == given_light.name
+            assert found.direction == pytest.approx(given_light.direction, abs=1e-15)
+            assert name == "lights.lp" or found.intensity == given_light.intensity
+
+
+def test_an_lp_file_is_a_count_and_a_line_for_each_light(tmp_path: Path) -> None:
+    lost = write_rig(tmp_path / "a.lp", rig_of([(0, 0, 1), (0.6, 0, 0.8)], [(1.0,), (2.0,)]))
+    assert (tmp_path / "a.lp").read_text().split() == [
+        "2",
+        "light0",
+        "0.0",
+        "0.0",
+        "1.0",
+        "light1",
+        "0.6",
+        "0.0",
+        "0.8",
+    ]
+    assert "differ in theirs" in lost[0]
+
+
+def test_a_near_light_is_in_no_list_and_a_name_that_tells_no_kind_is_refused(tmp_path: Path) -> None:
+    near = Rig(lights=(Light(name="lamp", position_m=(1.0, 0.0, 0.0)),))
+    for name in ("a.lp", "light_directions.txt"):
+        with pytest.raises(PsvideoError, match="'lamp' has a position"):
+            write_rig(tmp_path / name, near)
+    with pytest.raises(UsageError, match=r"lights\.csv: tells no kind"):
+        write_rig(tmp_path / "lights.csv", near)
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_command_converts_there_and_back_and_overwrites_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rig = rig_of([(0, 0, 1), (0.6, 0, 0.8)], [(1.0, 0.9, 0.8), (2.0, 2.0, 2.5)])
+    write_rig(tmp_path / "rig.toml", rig)
+    lists = tmp_path / "light_directions.txt"
+    assert main(["calibrate", "convert", str(tmp_path / "rig.toml"), "-o", str(lists)]) == 0
+    assert "hold no names" in capsys.readouterr().err
+    back = tmp_path / "back.toml"
+    words = ["calibrate", "convert", str(lists), "-o", str(back), "--name", "light0", "--name", "light1", "-q"]
+    assert main(words) == 0
+    assert read_rig(back) == rig
+    assert main(words) == 2
+
+
+@pytest.mark.parametrize("name", ["psbox_sphere/LightProbe-1/light_directions.txt", "uw_psm/lights.txt"])
+def test_measured_lights_of_other_programs_survive_a_round_trip(name: str, shared_data: Path, tmp_path: Path) -> None:
+    rig = read_rig(shared_data / name)
+    for kind in ("light_directions.txt", "lights.lp"):
+        write_rig(tmp_path / kind, rig)
+        for found, measured in zip(read_rig(tmp_path / kind).lights, rig.lights, strict=True):
+            assert found.direction == pytest.approx(measured.direction, abs=1e-15)
