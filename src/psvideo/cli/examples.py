@@ -111,7 +111,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("for RTI programs", "psvideo calibrate convert clip/rig.toml -o lights.lp"),
         (
             "an .lp file of three lights as rig.toml, with names",
-            "psvideo calibrate convert lights.lp --name key --name left --name right -o rig.toml",
+            "psvideo calibrate convert lights.lp --name key --name left --name right -o rig3.toml",
         ),
     ),
     "calibrate readout": (
