@@ -5,7 +5,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test check bench clean
+.PHONY: demo test blender check bench clean
 
 demo: $(VENV)/.installed
 	$(BIN)/psvideo demo --force
@@ -17,6 +17,15 @@ test: $(VENV)/.installed-test
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -n auto --dist worksteal --durations 15
+
+# Blender fits one version of Python (bpy 5.0: 3.11; 5.1 and newer: 3.13) and takes some 350 MB: an environment of its own
+blender: $(VENV)/.installed-test .venv-blender/.installed
+	$(BIN)/python -m pytest -q -s tests/test_clients_blender.py
+
+.venv-blender/.installed:
+	$(PYTHON) -m venv .venv-blender
+	.venv-blender/bin/python -m pip install --quiet --disable-pip-version-check --only-binary :all: bpy
+	touch $@
 
 bench: $(VENV)/.installed-test
 	$(BIN)/python -m bench
@@ -36,4 +45,4 @@ $(VENV)/.installed-test: $(VENV)/.installed
 	touch $@
 
 clean:
-	rm -rf $(VENV) psvideo-demo lights/firmware/build lights/emulator/build
+	rm -rf $(VENV) .venv-blender tests/clients/node_modules psvideo-demo lights/firmware/build lights/emulator/build

@@ -21,7 +21,8 @@ def material(job, image):
     """A diffuse card whose normal is what the texture says."""
     made = bpy.data.materials.new("card")
     made.use_nodes = True
-    made.cycles.use_bump_map_correction = job["bump_correction"]
+    if hasattr(made.cycles, "use_bump_map_correction"):  # from Blender 4 on
+        made.cycles.use_bump_map_correction = job["bump_correction"]
     tree = made.node_tree
     tree.nodes.clear()
     texture = tree.nodes.new("ShaderNodeTexImage")
