@@ -1,7 +1,8 @@
 """Plates of one round, brought to one instant, show the surface of that instant; what cannot be told is not valid."""
 
 import functools
-from collections.abc import Callable
+import weakref
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from psvideo.align import held
+from psvideo.align.packed import Packed, packed, unpacked
 from psvideo.align.rounds import Aligning, aligned
 from psvideo.normals.illumination import Illumination
 from psvideo.normals.woodham1980 import solve
@@ -66,7 +69,7 @@ class Filmed:
 
 def angle_deg(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     across = np.linalg.norm(np.cross(one, other), axis=-1)
-    return np.rad2deg(np.arctan2(across, (one * other).sum(axis=-1)))
+    return np.asarray(np.rad2deg(np.arctan2(across, (one * other).sum(axis=-1))))
 
 
 def filmed(lights: int, motion: str, noise: float = 0.0) -> Filmed:
@@ -129,7 +132,8 @@ def noiseless(lights: int, motion: str) -> Filmed:
 
 
 def brought(clip: Filmed, how: Aligning = Aligning(), rounds: Plates | None = None) -> list[Round]:
-    return list(aligned(iter(rounds or clip.rounds), clip.lights, how, first=1001))
+    plates = (plate for one in rounds or clip.rounds for plate in one.plates)
+    return list(aligned(plates, clip.lights, how, first=1001))
 
 
 @pytest.mark.parametrize(
@@ -183,6 +187,69 @@ def test_the_first_and_the_last_round_have_one_side_only(which: int) -> None:
     clip = filmed(3, "4 px")
     one = brought(clip)[which]
     assert clip.error_deg(clip.solved(one), one.time_s)[0] < 1.5
+
+
+@pytest.mark.parametrize(
+    ("motion", "how", "per_light"),
+    [
+        ("at rest", Aligning(align="none"), 1.0),
+        ("at rest", Aligning(), 1.5),  # the early half of a round waits for that of the next
+        ("4 px", Aligning(), 2.0),  # the plates of an instant are made, and those they are made from packed
+        ("4 px", Aligning(align="none", rate="flash"), 2.0),  # two rounds
+        ("4 px", Aligning(rate="flash"), 2.0),  # two rounds packed, and an instant
+    ],
+)
+def test_no_more_plates_are_held_than_instants_need(
+    motion: str, how: Aligning, per_light: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clip = filmed(8, motion)
+    sizes: dict[int, float] = {}
+    most = 0.0
+
+    def count(image: np.ndarray) -> None:
+        if id(image) not in sizes:
+            sizes[id(image)] = image.nbytes / clip.rounds[0].plates[0].image.nbytes
+            weakref.finalize(image, sizes.pop, id(image))
+
+    def plates() -> Iterator[LightPlate]:
+        nonlocal most
+        for one in clip.rounds:
+            for plate in one.plates:
+                own = replace(plate, image=plate.image.copy())
+                count(own.image)
+                most = max(most, sum(sizes.values()))
+                yield own
+                del own
+
+    def watched(plate: LightPlate) -> Packed:
+        small = packed(plate)
+        count(small.codes)
+        return small
+
+    monkeypatch.setattr(held, "packed", watched)
+    for shown in aligned(plates(), clip.lights, how, first=1001):
+        for plate in shown.plates:
+            count(plate.image)
+        most = max(most, sum(sizes.values()))
+        del shown, plate
+    assert most <= per_light * len(clip.lights) + 1  # the plate that comes
+    assert not sizes
+
+
+def test_a_packed_plate_is_good_to_its_16_bits_and_what_is_clipped_stays_so() -> None:
+    rng = np.random.default_rng(8)
+    image = rng.uniform(-0.02, 1.7, (60, 80, 3)).astype(np.float32)
+    for saturation in (1.0, 1.37, 3.0):
+        clipped = np.minimum(image, saturation).astype(np.float32)
+        plate = LightPlate(
+            light="a", number=1, time_s=0.0, image=clipped, seen=np.ones(60, np.bool_), saturation=saturation
+        )
+        small = packed(plate)
+        assert small.codes.nbytes == image.nbytes / 2
+        again = unpacked(small)
+        assert np.abs(again.image - clipped).max() < 2e-5
+        assert ((again.image >= saturation) == (clipped >= saturation - 2e-5)).all()
+        assert replace(again, image=image) == replace(plate, image=image)
 
 
 def test_one_result_per_flash_takes_numbers_of_its_own() -> None:

@@ -106,8 +106,9 @@ def test_a_run_that_is_stopped_leaves_no_decoded_frames_behind(
         stores[0]._file.tell()
 
 
+@pytest.mark.parametrize("align", ["none", "auto", "flow"])
 def test_plates_are_let_go_while_their_surface_waits_to_be_written(
-    clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, align: str
 ) -> None:
     plates: list[weakref.ref[Any]] = []
     jobs: list[Callable[[], None]] = []
@@ -127,7 +128,7 @@ def test_plates_are_let_go_while_their_surface_waits_to_be_written(
 
     monkeypatch.setattr(runs, "surfaces", watched)
     monkeypatch.setattr(runs, "writing", never_written)
-    assert run("normals", clip, "--rig", clip / "rig.toml", "-o", tmp_path / "out", "-q") == 0
+    assert run("normals", clip, "--rig", clip / "rig.toml", "-o", tmp_path / "out", "--align", align, "-q") == 0
     assert len(jobs) == len(alive) == 2
     assert alive == [0, 0]
     assert not any(plate() is not None for plate in plates)

@@ -38,7 +38,15 @@ from psvideo.normals.solving import Solving
 from psvideo.plan import Plan
 from psvideo.profiles import collect_with_doubt
 from psvideo.rig import Light, Rig
-from psvideo.sequence import FIRST_NUMBER, LightPlate, Round, check_separable, reference_duration_s, rounds
+from psvideo.sequence import (
+    FIRST_NUMBER,
+    LightPlate,
+    Round,
+    check_separable,
+    light_plates,
+    reference_duration_s,
+    rounds,
+)
 from psvideo.shutter import frames_touched
 from psvideo.split import Image, Plate, plate_of, split
 from psvideo.strobe.runlog import as_played
@@ -167,6 +175,17 @@ def clip_rounds(
     check_separable(take.plan)
     shown = _shown(clip_plates(take, timing, method=method, watch=watch), each_flash)
     return rounds(shown, take.plan, timing.flashes, start=start_number)
+
+
+def clip_light_plates(
+    take: Take, timing: Timing, *, start_number: int = FIRST_NUMBER, watch: Watch = unwatched
+) -> Iterator[LightPlate]:
+    """Decode a take once and yield the plates of its lights as ``clip_rounds`` has them, each as soon as it is there.
+
+    Dark slots are left out. Nothing is held but what a light still waits for.
+    """
+    check_separable(take.plan)
+    return light_plates(clip_plates(take, timing, watch=watch), take.plan, timing.flashes, start=start_number)
 
 
 def clip_plates(take: Take, timing: Timing, *, method: Method = "weights", watch: Watch = unwatched) -> Iterator[Plate]:

@@ -127,6 +127,33 @@ def rounds(
         yield from _gathered(held, plan, numbers[held[0].flash.index])
 
 
+def light_plates(
+    plates: Iterable[Plate], plan: Plan, flashes: tuple[Flash, ...], *, start: int = FIRST_NUMBER
+) -> Iterator[LightPlate]:
+    """Yield every light's plate as soon as the flashes that it is made of are there; dark slots are left out.
+
+    Numbers are those of ``rounds``. Only flashes are held that a light still waits for.
+    """
+    numbers = round_numbers(flashes, start=start)
+    recipes = _recipes(plan)
+    waiting: list[_Recipe] = []
+    lit: dict[int, Plate] = {}
+    number: int | None = None
+    for plate in plates:
+        now = numbers[plate.flash.index]
+        if now != number:
+            number, waiting, lit = now, recipes, {}
+        if any(plate.flash.lights.values()):
+            lit[plate.flash.slot] = plate
+        del plate
+        for recipe in waiting:
+            if recipe.slots <= lit.keys():
+                yield _of_light(recipe, lit, now)
+        waiting = [recipe for recipe in waiting if not recipe.slots <= lit.keys()]
+        needed = {slot for recipe in waiting for slot in recipe.slots}
+        lit = {slot: held for slot, held in lit.items() if slot in needed}
+
+
 def _gathered(held: list[Plate], plan: Plan, number: int) -> Iterator[Round]:
     lit = {plate.flash.slot: plate for plate in held if any(plate.flash.lights.values())}
     dark = [plate for plate in held if not any(plate.flash.lights.values())]
@@ -143,20 +170,48 @@ def _gathered(held: list[Plate], plan: Plan, number: int) -> Iterator[Round]:
 
 def _demultiplexed(lit: dict[int, Plate], plan: Plan, number: int) -> list[LightPlate]:
     """Solve the round's mixture for the lights; a light is there once every flash that it depends on is."""
+    return [_of_light(recipe, lit, number) for recipe in _recipes(plan) if recipe.slots <= lit.keys()]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Recipe:
+    """How a light is had from the flashes of a round: ``shares`` by slot of what holds ``exposure`` of it (by slot);
+    ``alone`` where no other light is in these flashes."""
+
+    light: str
+    shares: dict[int, float]
+    exposures: dict[int, float]
+    alone: bool
+
+    @property
+    def slots(self) -> set[int]:
+        """The flashes that the light depends on."""
+        return set(self.shares)
+
+
+def _recipes(plan: Plan) -> list[_Recipe]:
     matrix = mixing_matrix(plan)
     inverse = np.linalg.pinv(matrix)
     inverse[np.abs(inverse) < 1e-12] = 0.0
-    plates = []
+    recipes = []
     for light, column, shares in zip(plan.lights, matrix.T, inverse, strict=True):
         needed = [row for row, share in enumerate(shares) if share]
-        if any(plan.lit_slots[row] not in lit for row in needed):
-            continue
-        parts = [lit[plan.lit_slots[row]] for row in needed]
-        if all(np.count_nonzero(matrix[row]) == 1 for row in needed):
-            plates.append(_merged(parts, column[needed], light, number))
-        else:
-            plates.append(_mixed(parts, shares[needed], light, number))
-    return plates
+        recipes.append(
+            _Recipe(
+                light=light,
+                shares={plan.lit_slots[row]: float(shares[row]) for row in needed},
+                exposures={plan.lit_slots[row]: float(column[row]) for row in needed},
+                alone=all(np.count_nonzero(matrix[row]) == 1 for row in needed),
+            )
+        )
+    return recipes
+
+
+def _of_light(recipe: _Recipe, lit: dict[int, Plate], number: int) -> LightPlate:
+    parts = [lit[slot] for slot in recipe.shares]
+    if recipe.alone:
+        return _merged(parts, np.array(list(recipe.exposures.values())), recipe.light, number)
+    return _mixed(parts, np.array(list(recipe.shares.values())), recipe.light, number)
 
 
 def _merged(parts: list[Plate], exposures: FloatArray, light: str, number: int) -> LightPlate:

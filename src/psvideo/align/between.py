@@ -4,6 +4,7 @@ What was hidden in one of the plates is taken from the other; what cannot be tol
 carries shading over, which changes where a surface turns.
 """
 
+import functools
 from dataclasses import dataclass
 
 import cv2
@@ -150,8 +151,7 @@ class _Side:
     def of(cls, plate: LightPlate | None) -> "_Side | None":
         if plate is None:
             return None
-        bright = plate.image if plate.image.ndim == 2 else plate.image.max(axis=2)
-        clipped = (bright >= plate.saturation).astype(np.uint8)
+        clipped = (_brightest(plate.image) >= plate.saturation).astype(np.uint8)
         within = cv2.erode(plate.seen.astype(np.uint8)[:, None], np.ones((5, 1), np.uint8))[:, 0] > 0
         wider = np.asarray(cv2.dilate(clipped, np.ones((5, 5), np.uint8)), np.uint8) if clipped.any() else None
         return cls(plate=plate, clipped=wider, within=within)
@@ -166,12 +166,18 @@ class _Side:
         return np.asarray(image, np.float32), self.within[row]
 
 
+def _brightest(image: Image) -> Image:
+    # channel by channel: numpy is slow along a short last axis
+    return image if image.ndim == 2 else functools.reduce(np.maximum, np.moveaxis(image, -1, 0))
+
+
 def _fill(band: slice, image: Image, seen: Flags, ends: Ends, sides: list[_Side | None], way: Track) -> None:
     """Make one band of rows of the plate at an instant."""
     own = ends.nearer
     rows, cols = seen.shape
     small_rows, small_cols = way.source.shape
-    x, y = places(rows, cols)[0][band], places(rows, cols)[1][band]
+    x, y = places(band.stop - band.start, cols)
+    y += np.float32(band.start)
     scale_x, scale_y = np.float32(cols / small_cols), np.float32(rows / small_rows)
     at = (x + 0.5) / scale_x - np.float32(0.5), (y + 0.5) / scale_y - np.float32(0.5)
     source = cv2.remap(way.source, *at, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)
@@ -191,8 +197,7 @@ def _fill(band: slice, image: Image, seen: Flags, ends: Ends, sides: list[_Side 
         counts = (np.where(source == BOTH, np.float32(max(share, 1e-6)), (source == alone)) * there).astype(np.float32)
         total += found * (counts if found.ndim == 2 else counts[..., None])
         weight += counts
-        bright = found if found.ndim == 2 else found.max(axis=2)
-        clipped |= (counts > 0) & (bright >= side.plate.saturation)
+        clipped |= (counts > 0) & (_brightest(found) >= side.plate.saturation)
     flowing = (source != AT_REST) & (source != NOWHERE)
     known = flowing & (weight > 0)
     blended = total / np.maximum(weight, 1e-6).reshape(*weight.shape, *[1] * (total.ndim - 2))

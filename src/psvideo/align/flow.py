@@ -27,20 +27,28 @@ LEAST_WHITE = 1 / 16
 """A clip that begins in the dark is not brightened by more than this."""
 BOTH_WAYS_PX, BOTH_WAYS_SHARE = 0.7, 0.05
 """How far there and back may miss the start: pixels, and a share of the way."""
+BLOCK_PX, AROUND = 4, 4
+"""Change is looked for in the means of blocks, over so many of them together."""
 LEAST_CHANGE = 1.5
-"""Blocks of 16 pixels that change by fewer codes did not move ..."""
+"""Blocks that change by fewer codes did not move ..."""
 NOISE_FACTOR = 5.0
 """... nor those that change by less than so many times what noise makes of them."""
+SOME, LEAST_LIT = 8, 8
+"""Noise is told from every so many rows, where codes are not less than this: below, it is cut off at zero."""
+QUARTER_OF_NORMAL = 0.3186
+"""A quarter of normal values of variance one is smaller than this."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Sketch:
-    """A plate as flow sees it: ``codes`` (row, col), and which of these rows any frame saw, ``seen`` (row,)."""
+    """A plate as flow sees it: ``codes`` (row, col), which of these rows any frame saw, ``seen`` (row,), and the means
+    of blocks of codes, ``blocks`` (row, col)."""
 
     number: int
     time_s: float
     codes: Codes
     seen: Flags
+    blocks: Vectors
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,21 +72,25 @@ def white_of(plate: LightPlate) -> float:
 
 def sketch_of(plate: LightPlate, *, white: float) -> Sketch:
     """Return what flow needs of a plate: a few hundred kilobytes; ``white`` becomes code 255."""
-    grey = _grey(plate.image)
-    rows, cols = grey.shape
+    rows, cols = plate.image.shape[:2]
     shrink = 2 if rows * cols > LARGEST_PX else 1
-    seen = plate.seen
+    seen, grey = plate.seen, _grey(plate.image)
     if shrink > 1:
         grey = np.asarray(cv2.resize(grey, (cols // 2, rows // 2), interpolation=cv2.INTER_AREA), np.float32)
         seen = np.asarray(seen[: rows // 2 * 2].reshape(-1, 2).all(axis=1))
-    light = np.clip(grey / np.float32(white), 0, 1) + np.float32(TOE)
+    light = np.clip(grey * np.float32(1 / white), 0, 1) + np.float32(TOE)
     scale = np.float32(255 / (np.sqrt(1 + TOE) - np.sqrt(TOE)))
-    codes = ((np.sqrt(light) - np.float32(np.sqrt(TOE))) * scale + np.float32(0.5)).astype(np.uint8)
-    return Sketch(number=plate.number, time_s=plate.time_s, codes=codes, seen=seen)
+    shown = np.asarray((cv2.sqrt(light) - np.float32(np.sqrt(TOE))) * scale, np.float32)
+    size = max(shown.shape[1] // BLOCK_PX, 1), max(shown.shape[0] // BLOCK_PX, 1)
+    blocks = np.asarray(cv2.resize(shown, size, interpolation=cv2.INTER_AREA), np.float32)
+    codes = (shown + np.float32(0.5)).astype(np.uint8)
+    return Sketch(number=plate.number, time_s=plate.time_s, codes=codes, seen=seen, blocks=blocks)
 
 
 def _grey(image: Image) -> Image:
-    return image if image.ndim == 2 else image @ np.full(image.shape[2], 1 / image.shape[2], np.float32)
+    if image.ndim == 2:
+        return image
+    return np.asarray(cv2.transform(image, np.full((1, image.shape[2]), 1 / image.shape[2], np.float32)), np.float32)
 
 
 def comparable(before: Sketch, after: Sketch) -> tuple[Codes, Codes]:
@@ -93,12 +105,28 @@ def comparable(before: Sketch, after: Sketch) -> tuple[Codes, Codes]:
 
 def moved(before: Sketch, after: Sketch) -> bool:
     """Return whether anything changed between two sketches by more than noise does; quick, and rather yes than no."""
-    one, other = (codes.astype(np.float32) for codes in comparable(before, after))
+    change = after.blocks - before.blocks
+    rows_seen = before.seen & after.seen
+    if not rows_seen.all():
+        shown = cv2.resize(rows_seen[:, None].astype(np.float32), (1, len(change)), interpolation=cv2.INTER_AREA)
+        change[shown[:, 0] < 1] = 0
+    local = cv2.blur(change * change, (AROUND, AROUND))
+    return bool(local.max() > max(LEAST_CHANGE, NOISE_FACTOR * _noise(before, after) / BLOCK_PX) ** 2)
+
+
+def _noise(before: Sketch, after: Sketch) -> float:
+    """Return the noise of the change between two sketches, in codes, told from its finest detail in some of the rows.
+
+    The quieter half tells it: up to half of what is lit may move and be as rich in detail as it likes.
+    """
+    some = np.flatnonzero(before.seen & after.seen)[::SOME]
+    one, other = (sketch.codes[some].astype(np.int16) for sketch in (before, after))
     change = other - one
-    noise = 1.4826 * float(np.median(np.abs(change - cv2.blur(change, (3, 3))))) * np.sqrt(9 / 8)
-    blocks = cv2.resize(change, (change.shape[1] // 4 or 1, change.shape[0] // 4 or 1), interpolation=cv2.INTER_AREA)
-    local = np.sqrt(cv2.blur(blocks * blocks, (4, 4)))
-    return bool(local.max() > max(LEAST_CHANGE, NOISE_FACTOR * noise / 4))
+    fine = np.abs(change[:, 2:] - 2 * change[:, 1:-1] + change[:, :-2])[one[:, 1:-1] >= LEAST_LIT]
+    if fine.size < 64:
+        return 0.0
+    quarter = np.partition(fine, fine.size // 4)[fine.size // 4]
+    return float(quarter) / QUARTER_OF_NORMAL / float(np.sqrt(6))
 
 
 def flow_between(before: Sketch, after: Sketch) -> Flow:

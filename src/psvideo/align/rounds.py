@@ -1,15 +1,18 @@
-"""Rounds of plates brought to one instant each: a window of three rounds slides over the clip.
+"""Plates brought to one instant each: a window of about two rounds slides over the clip, plate by plate.
 
 A round's flashes show different instants. Each light's plate at the wanted instant is made from the two plates of that
-light around it; at the clip's ends, and beside a gap, from the two that are nearest.
+light around it, as soon as the second one is there; at the clip's ends, and beside a gap, from the two nearest ones.
 """
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Literal
 
+import numpy as np
+
 from psvideo.align.between import Ends, plate_at, track
-from psvideo.align.flow import Flow, Sketch, flow_between, moved, sketch_of, white_of
+from psvideo.align.flow import Flow, flow_between, moved
+from psvideo.align.held import Around, Held, Instant
 from psvideo.sequence import LightPlate, Round
 
 Align = Literal["none", "flow", "auto"]
@@ -29,120 +32,127 @@ class Aligning:
     rate: Rate = "round"
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Held:
-    """A round in the window: its plates as far as they are needed still, and the sketches of all, by light."""
-
-    round: Round
-    sketches: dict[str, Sketch]
-
-    def plate(self, light: str) -> LightPlate | None:
-        """Return a light's plate, None where the round has none or has let it go."""
-        return next((plate for plate in self.round.plates if plate.light == light), None)
-
-
-@dataclass(frozen=True)
-class _Window:
-    """The round that is shown, and those before and after it, if any."""
-
-    before: _Held | None
-    current: _Held
-    after: _Held | None
-
-    def around(self, light: str, time_s: float) -> tuple[_Held, _Held] | None:
-        """Return the two rounds with a plate of the light, one round apart, that lie around an instant or nearest."""
-        number = self.current.round.number
-        near = [
-            held
-            for held in (self.before, self.current, self.after)
-            if held is not None and light in held.sketches and abs(held.round.number - number) <= 1
-        ]
-        if len(near) < 2:
-            return None
-        later = next((n for n, held in enumerate(near) if held.sketches[light].time_s > time_s), len(near))
-        end = min(max(later, 1), len(near) - 1)
-        return near[end - 1], near[end]
-
-    def nearest(self, light: str, time_s: float) -> LightPlate:
-        """Return the light's plate that is nearest in time."""
-        held = (one.plate(light) for one in (self.before, self.current, self.after) if one is not None)
-        return min((plate for plate in held if plate is not None), key=lambda plate: abs(plate.time_s - time_s))
-
-
-def aligned(gathered: Iterable[Round], lights: tuple[str, ...], how: Aligning, *, first: int) -> Iterator[Round]:
+def aligned(plates: Iterable[LightPlate], lights: tuple[str, ...], how: Aligning, *, first: int) -> Iterator[Round]:
     """Yield rounds whose plates all show one instant: one for every complete round, or for every flash of it.
 
-    ``first`` is the number of the clip's first round. One result per flash takes numbers of its own from there on, as
-    many a round as there are lights. Two rounds are held, the parts of the round before that are needed still, and what
-    is yielded. Plates between which nothing moved pass as they are.
+    ``plates`` come in the order of their rounds. ``first`` is the number of the clip's first round. One result per
+    flash takes numbers of its own from there on, as many a round as there are lights. Plates between which nothing
+    moved pass as they are. Held are, in plates per light, one without alignment, one and a half where nothing moves,
+    and two where all does or at one result per flash.
     """
     if how.align == "none" and how.rate == "round":
-        return filter(lambda one: one.lights == lights, gathered)
-    return _slid(gathered, lights, how, first)
+        return _gathered(plates, lights)
+    return _slid(plates, lights, how, first)
 
 
-def _slid(gathered: Iterable[Round], lights: tuple[str, ...], how: Aligning, first: int) -> Iterator[Round]:
-    whites: dict[str, float] = {}
+def _gathered(plates: Iterable[LightPlate], lights: tuple[str, ...]) -> Iterator[Round]:
+    """Yield complete rounds as they are."""
+    held: dict[str, LightPlate] = {}
+    number: int | None = None
+    for plate in plates:
+        if plate.number != number:
+            held.clear()
+        number = plate.number
+        held[plate.light] = plate
+        del plate
+        if len(held) == len(lights):
+            yield _handed_over(held, number, lights)
+
+
+def _handed_over(held: dict[str, LightPlate], number: int, lights: tuple[str, ...]) -> Round:
+    """Return a round, and hold nothing of it any more."""
+    plates = tuple(held.pop(light) for light in lights)
+    return Round(number=number, plates=plates)
+
+
+def _slid(plates: Iterable[LightPlate], lights: tuple[str, ...], how: Aligning, first: int) -> Iterator[Round]:
+    held = Held(
+        lights=lights,
+        sketched=how.align != "none",
+        keep_all=how.rate == "flash",
+        trusts_rest=how.align == "auto" and how.rate == "round",
+    )
     flows: Flows = {}
-    before: _Held | None = None
-    current: _Held | None = None
-    for one in gathered:
-        after = _hold(one, whites)
-        del one
-        if current is not None:
-            yield from _shown(_Window(before, current, after), lights, how, flows, first)
-            before = _let_go(current, how)
-            for key in [key for key in flows if key[1] < before.round.number]:
-                del flows[key]
-        current = after
-        del after
-    if current is not None:
-        yield from _shown(_Window(before, current, None), lights, how, flows, first)
+    for plate in plates:
+        number, times_s = plate.number, held.take(plate)
+        del plate
+        if times_s is not None:
+            held.waiting.extend(_instants(number, list(times_s.values()), how, first))
+        yield from _complete(held, how, flows)
+    held.ended = True
+    yield from _complete(held, how, flows)
 
 
-def _hold(one: Round, whites: dict[str, float]) -> _Held:
-    for plate in one.plates:
-        whites.setdefault(plate.light, white_of(plate))
-    return _Held(round=one, sketches={plate.light: sketch_of(plate, white=whites[plate.light]) for plate in one.plates})
+def _instants(number: int, times_s: list[float], how: Aligning, first: int) -> list[Instant]:
+    """Return the instants that are shown of a complete round."""
+    if how.rate == "round":
+        return [Instant(number=number, time_s=float(np.mean(times_s)), round=number)]
+    start = first + (number - first) * len(times_s)
+    return [Instant(number=start + n, time_s=time_s, round=number) for n, time_s in enumerate(sorted(times_s))]
 
 
-def _let_go(held: _Held, how: Aligning) -> _Held:
-    """Keep of a round only the plates from which a later instant is made: those after its middle, or all."""
-    one = held.round
-    kept = tuple(plate for plate in one.plates if how.rate == "flash" or plate.time_s > one.time_s)
-    return replace(held, round=Round(number=one.number, plates=kept))
+def _complete(held: Held, how: Aligning, flows: Flows) -> Iterator[Round]:
+    """Make what can be made by now, let go of what that needed, and yield the instants that are complete, in order."""
+    held.let_go()
+    while held.waiting:
+        instant = held.waiting[0]
+        for light in _ready(held, instant, how):
+            _make(held, light, instant, how, flows)
+            held.let_go()
+        if len(instant.made) < len(held.lights):
+            return
+        held.waiting.popleft()
+        held.let_go()
+        for key in [key for key in flows if key[1] < instant.round - 1]:
+            del flows[key]
+        yield _handed_over(instant.made, instant.number, held.lights)
 
 
-def _shown(window: _Window, lights: tuple[str, ...], how: Aligning, flows: Flows, first: int) -> Iterator[Round]:
-    """Make every instant of the window's middle round, if that has all lights."""
-    one = window.current.round
-    if one.lights != lights:
+def _ready(held: Held, instant: Instant, how: Aligning) -> Iterator[str]:
+    """Yield the lights whose plates at an instant are not made yet and can be; what the first tell counts for the last.
+
+    At one result per flash plates are held for other instants anyway: none is made before all can be.
+    """
+    undone = [light for light in held.lights if light not in instant.made]
+    undone.sort(key=lambda light: held.shots[light][instant.round].time_s)
+    if how.rate == "flash" and any(held.around(light, instant) is None for light in undone):
         return iter(())
-    instants = [(one.number, one.time_s)]
-    if how.rate == "flash":
-        start = first + (one.number - first) * len(lights)
-        instants = [(start + n, time_s) for n, time_s in enumerate(sorted(plate.time_s for plate in one.plates))]
-
-    def at(number: int, time_s: float) -> Round:
-        plates = [replace(_plate(window, light, time_s, how, flows), number=number, time_s=time_s) for light in lights]
-        return Round(number=number, plates=tuple(plates), ambient=one.ambient)
-
-    return (at(*instant) for instant in instants)
+    return (light for light in undone if held.around(light, instant) is not None)
 
 
-def _plate(window: _Window, light: str, time_s: float, how: Aligning, flows: Flows) -> LightPlate:
-    """Return a light's plate at an instant."""
-    pair = window.around(light, time_s)
-    nearest = window.nearest(light, time_s)
-    if how.align == "none" or pair is None or nearest.time_s == time_s:
-        return nearest
-    before, after = (held.sketches[light] for held in pair)
-    key = light, before.number
+def _make(held: Held, light: str, instant: Instant, how: Aligning, flows: Flows) -> None:
+    """Make a light's plate at an instant."""
+    around = held.around(light, instant)
+    if around is None:
+        raise ValueError(f"light {light} of instant {instant.number} is still to come")
+    time_s = instant.time_s
+    flow = None if around.before is around.after else _flow(around, light, how, flows)
+    if flow is None:
+        plate = around.nearest(time_s)
+    else:
+        instant.moves = True
+        held.pack(light, around)
+        plate = _moved_to(around, flow, time_s)
+    instant.made[light] = replace(plate, number=instant.number, time_s=time_s)
+
+
+def _flow(around: Around, light: str, how: Aligning, flows: Flows) -> Flow | None:
+    """Return the flow between two shots of a light, None where nothing moved or no flow is asked for."""
+    before, after = around.before.sketch, around.after.sketch
+    if before is None or after is None:
+        return None
+    key = light, around.before.round
     if key not in flows:
         flows[key] = flow_between(before, after) if how.align == "flow" or moved(before, after) else None
-    flow = flows[key] if how.rate == "flash" else flows.pop(key)
-    if flow is None:
-        return nearest
-    share = (time_s - before.time_s) / (after.time_s - before.time_s)
-    ends = Ends(before=pair[0].plate(light), after=pair[1].plate(light), share=share)
-    return plate_at(ends, track(before, after, flow, time_s), time_s=time_s, number=nearest.number)
+    return flows[key] if how.rate == "flash" else flows.pop(key)
+
+
+def _moved_to(around: Around, flow: Flow, time_s: float) -> LightPlate:
+    before, after = around.before, around.after
+    if before.sketch is None or after.sketch is None:
+        raise ValueError("there is no flow without sketches")
+    way = track(before.sketch, after.sketch, flow, time_s)
+    ends = Ends(
+        before=before.given(), after=after.given(), share=(time_s - before.time_s) / (after.time_s - before.time_s)
+    )
+    return plate_at(ends, way, time_s=time_s, number=after.round)

@@ -63,7 +63,7 @@ class AlignName(StrEnum):
 
 
 class RateName(StrEnum):
-    """Which instants are shown."""
+    """Which instants are delivered."""
 
     round = "round"
     flash = "flash"
@@ -112,9 +112,14 @@ def normals(
     y: YOption = None,
     align: Annotated[
         AlignName,
-        typer.Option(help="Move plates of one round to one instant by flow; auto: where it moves."),
-    ] = AlignName.none,
-    rate: Annotated[RateName, typer.Option(help="One result per round, or per flash.")] = RateName.round,
+        typer.Option(
+            help="Bring the plates of a round, which show different instants, to one. auto: where something moves; "
+            "flow: look for motion everywhere; none: leave them as they are."
+        ),
+    ] = AlignName.auto,
+    rate: Annotated[
+        RateName, typer.Option(help="One result per round, or one per flash: as many times more as there are lights.")
+    ] = RateName.round,
     denoise: Annotated[int, typer.Option(min=1, max=64, help="Average up to N results where nothing moves.")] = 1,
     float32: FloatOption = False,
     aov: AovOption = None,

@@ -24,7 +24,7 @@ from psvideo.pipeline import (
     Instant,
     Take,
     Watch,
-    clip_rounds,
+    clip_light_plates,
     denoised,
     first_ambient,
     surfaces,
@@ -52,7 +52,7 @@ SAMPLE_ROUND = 3
 class OverTime:
     """What is done between instants: how plates are brought to one, and how many results are averaged at rest."""
 
-    aligning: Aligning = field(default_factory=lambda: Aligning(align="none"))
+    aligning: Aligning = field(default_factory=Aligning)
     denoise: int = 1
 
     def check(self, plan: Plan) -> None:
@@ -120,9 +120,9 @@ def normals_run(
         _at_the_end(folder, take, output, observed.facts, delivery, tags, shaping, watch),
         writing() as write,
     ):
-        rounds = clip_rounds(take, timing, start_number=output.start_number, watch=watch)
+        plates = clip_light_plates(take, timing, start_number=output.start_number, watch=watch)
         ambient = first_ambient(take, timing) if delivery.mix.of(AMBIENT) else None
-        rounds = aligned(rounds, clip.plan.lights, over_time.aligning, first=output.start_number)
+        rounds = aligned(plates, clip.plan.lights, over_time.aligning, first=output.start_number)
         found = surfaces(rounds, clip.plan, lighting.rig, mask=mask, solving=solving, near=lighting.near)
         for instant in found if over_time.denoise < 2 else denoised(found, over_time.denoise):
             shaping, shaped = shape_of(shaping, lighting, instant)
