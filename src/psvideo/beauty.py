@@ -7,9 +7,9 @@ import numpy as np
 
 from psvideo.errors import UsageError, nearest
 from psvideo.plan import Plan
-from psvideo.sequence import LightPlate, Round
+from psvideo.sequence import AMBIENT, LightPlate, Round
 
-AMBIENT, BEAUTY = "ambient", "beauty"
+BEAUTY = "beauty"
 
 
 @dataclass(frozen=True, kw_only=True)

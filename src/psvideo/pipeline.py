@@ -178,14 +178,20 @@ def clip_rounds(
 
 
 def clip_light_plates(
-    take: Take, timing: Timing, *, start_number: int = FIRST_NUMBER, watch: Watch = unwatched
+    take: Take,
+    timing: Timing,
+    *,
+    start_number: int = FIRST_NUMBER,
+    with_ambient: bool = False,
+    watch: Watch = unwatched,
 ) -> Iterator[LightPlate]:
     """Decode a take once and yield the plates of its lights as ``clip_rounds`` has them, each as soon as it is there.
 
-    Dark slots are left out. Nothing is held but what a light still waits for.
+    Dark slots come only where they are wanted. Nothing is held but what a light still waits for.
     """
     check_separable(take.plan)
-    return light_plates(clip_plates(take, timing, watch=watch), take.plan, timing.flashes, start=start_number)
+    plates, flashes = clip_plates(take, timing, watch=watch), timing.flashes
+    return light_plates(plates, take.plan, flashes, start=start_number, with_ambient=with_ambient)
 
 
 def clip_plates(take: Take, timing: Timing, *, method: Method = "weights", watch: Watch = unwatched) -> Iterator[Plate]:

@@ -19,6 +19,8 @@ from psvideo.split import Image, Plate
 from psvideo.timing import Flash
 
 FIRST_NUMBER = 1001
+AMBIENT = "ambient"
+"""What stands for a light where a dark slot showed the ambient light."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,9 +130,14 @@ def rounds(
 
 
 def light_plates(
-    plates: Iterable[Plate], plan: Plan, flashes: tuple[Flash, ...], *, start: int = FIRST_NUMBER
+    plates: Iterable[Plate],
+    plan: Plan,
+    flashes: tuple[Flash, ...],
+    *,
+    start: int = FIRST_NUMBER,
+    with_ambient: bool = False,
 ) -> Iterator[LightPlate]:
-    """Yield every light's plate as soon as the flashes that it is made of are there; dark slots are left out.
+    """Yield every light's plate as soon as the flashes that it is made of are there; dark slots if they are wanted.
 
     Numbers are those of ``rounds``. Only flashes are held that a light still waits for.
     """
@@ -145,6 +152,8 @@ def light_plates(
             number, waiting, lit = now, recipes, {}
         if any(plate.flash.lights.values()):
             lit[plate.flash.slot] = plate
+        elif with_ambient:
+            yield _of_dark(plate, now)
         del plate
         for recipe in waiting:
             if recipe.slots <= lit.keys():
@@ -160,12 +169,11 @@ def _gathered(held: list[Plate], plan: Plan, number: int) -> Iterator[Round]:
     plates = _demultiplexed(lit, plan, number)
     if not plates:
         return
-    ambient = (
-        LightPlate(light="ambient", number=number, time_s=dark[0].time_s, image=dark[0].image, seen=dark[0].seen)
-        if dark
-        else None
-    )
-    yield Round(number=number, plates=tuple(plates), ambient=ambient)
+    yield Round(number=number, plates=tuple(plates), ambient=_of_dark(dark[0], number) if dark else None)
+
+
+def _of_dark(plate: Plate, number: int) -> LightPlate:
+    return LightPlate(light=AMBIENT, number=number, time_s=plate.time_s, image=plate.image, seen=plate.seen)
 
 
 def _demultiplexed(lit: dict[int, Plate], plan: Plan, number: int) -> list[LightPlate]:

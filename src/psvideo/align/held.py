@@ -61,18 +61,20 @@ class Instant:
 class Held:
     """The shots of every light by round, and the instants that wait for later ones.
 
-    ``sketched`` says whether flow is asked for, ``keep_all`` whether instants lie at every flash, and
-    ``trusts_rest`` whether lights that show nothing move speak for the others. ``newest`` is the
-    round that plates come of, ``whole`` the last one that was complete, and ``middle_s`` its middle.
+    ``sketched`` says whether flow is asked for, ``keep_all`` whether instants lie at every flash, ``trusts_rest``
+    whether lights that show nothing move speak for the others, and ``with_ambient`` whether dark slots come. ``newest``
+    is the round that plates come of, ``whole`` the last one that was complete, and ``middle_s`` its middle.
     """
 
     lights: tuple[str, ...]
     sketched: bool
     keep_all: bool
     trusts_rest: bool
+    with_ambient: bool
     whites: dict[str, float] = field(default_factory=dict)
     shots: dict[str, dict[int, Shot]] = field(default_factory=dict)
     waiting: deque[Instant] = field(default_factory=deque)
+    ambient: dict[int, LightPlate] = field(default_factory=dict)
     newest: int = 0
     whole: int = 0
     middle_s: float = 0.0
@@ -80,12 +82,15 @@ class Held:
 
     def take(self, plate: LightPlate) -> dict[str, float] | None:
         """Hold one more plate; return the times of its round's plates where it was the last that this lacked."""
+        self.newest = plate.number
+        if plate.light not in self.lights:
+            self.ambient[plate.number] = plate
+            return None
         sketch = None
         if self.sketched:
             if plate.light not in self.whites:
                 self.whites[plate.light] = white_of(plate)
             sketch = sketch_of(plate, white=self.whites[plate.light])
-        self.newest = plate.number
         shot = Shot(round=plate.number, time_s=plate.time_s, sketch=sketch, plate=plate)
         self.shots.setdefault(plate.light, {})[plate.number] = shot
         times_s = {
@@ -122,9 +127,15 @@ class Held:
         seen = self.newest > instant.round and all(light in instant.made for light in early)
         return self.trusts_rest and bool(early) and seen and not instant.moves
 
+    def lacks_ambient(self, instant: Instant) -> bool:
+        """Tell whether a round's dark slot is wanted and may still come."""
+        return self.with_ambient and not (self.ended or self.newest > instant.round or instant.round in self.ambient)
+
     def let_go(self) -> None:
         """Forget what no instant can be made from: none of those that wait, nor of rounds to come."""
         oldest = min([self.newest, self.whole or self.newest, *(one.round for one in self.waiting)]) - 1
+        for number in [number for number in self.ambient if number <= oldest]:
+            del self.ambient[number]
         for light, shots in self.shots.items():
             near = {number for one in self.waiting if light not in one.made for number in self._rounds_of(light, one)}
             for number, shot in list(shots.items()):

@@ -13,7 +13,7 @@ import numpy as np
 from psvideo.align.between import Ends, plate_at, track
 from psvideo.align.flow import Flow, flow_between, moved
 from psvideo.align.held import Around, Held, Instant
-from psvideo.sequence import LightPlate, Round
+from psvideo.sequence import AMBIENT, LightPlate, Round
 
 Align = Literal["none", "flow", "auto"]
 Rate = Literal["round", "flash"]
@@ -32,45 +32,56 @@ class Aligning:
     rate: Rate = "round"
 
 
-def aligned(plates: Iterable[LightPlate], lights: tuple[str, ...], how: Aligning, *, first: int) -> Iterator[Round]:
+def aligned(
+    plates: Iterable[LightPlate], lights: tuple[str, ...], how: Aligning, *, first: int, with_ambient: bool = False
+) -> Iterator[Round]:
     """Yield rounds whose plates all show one instant: one for every complete round, or for every flash of it.
 
     ``plates`` come in the order of their rounds. ``first`` is the number of the clip's first round. One result per
     flash takes numbers of its own from there on, as many a round as there are lights. Plates between which nothing
     moved pass as they are. Held are, in plates per light, one without alignment, one and a half where nothing moves,
-    and two where all does or at one result per flash.
+    and two where all does or at one result per flash. ``with_ambient`` says that dark slots come as well: every round
+    waits for its own, and takes it along as it is.
     """
     if how.align == "none" and how.rate == "round":
-        return _gathered(plates, lights)
-    return _slid(plates, lights, how, first)
+        return _gathered(plates, lights, with_ambient)
+    return _slid(plates, lights, how, first, with_ambient)
 
 
-def _gathered(plates: Iterable[LightPlate], lights: tuple[str, ...]) -> Iterator[Round]:
+def _gathered(plates: Iterable[LightPlate], lights: tuple[str, ...], with_ambient: bool) -> Iterator[Round]:
     """Yield complete rounds as they are."""
     held: dict[str, LightPlate] = {}
-    number: int | None = None
+    number = 0
     for plate in plates:
         if plate.number != number:
+            if with_ambient and held.keys() >= set(lights):
+                yield _handed_over(held, number, lights)
             held.clear()
         number = plate.number
         held[plate.light] = plate
         del plate
-        if len(held) == len(lights):
+        if held.keys() >= {*lights, AMBIENT} if with_ambient else len(held) == len(lights):
             yield _handed_over(held, number, lights)
+    if held.keys() >= set(lights):
+        yield _handed_over(held, number, lights)
 
 
 def _handed_over(held: dict[str, LightPlate], number: int, lights: tuple[str, ...]) -> Round:
     """Return a round, and hold nothing of it any more."""
-    plates = tuple(held.pop(light) for light in lights)
-    return Round(number=number, plates=plates)
+    plates, ambient = tuple(held.pop(light) for light in lights), held.pop(AMBIENT, None)
+    held.clear()
+    return Round(number=number, plates=plates, ambient=ambient)
 
 
-def _slid(plates: Iterable[LightPlate], lights: tuple[str, ...], how: Aligning, first: int) -> Iterator[Round]:
+def _slid(
+    plates: Iterable[LightPlate], lights: tuple[str, ...], how: Aligning, first: int, with_ambient: bool
+) -> Iterator[Round]:
     held = Held(
         lights=lights,
         sketched=how.align != "none",
         keep_all=how.rate == "flash",
         trusts_rest=how.align == "auto" and how.rate == "round",
+        with_ambient=with_ambient,
     )
     flows: Flows = {}
     for plate in plates:
@@ -99,8 +110,10 @@ def _complete(held: Held, how: Aligning, flows: Flows) -> Iterator[Round]:
         for light in _ready(held, instant, how):
             _make(held, light, instant, how, flows)
             held.let_go()
-        if len(instant.made) < len(held.lights):
+        if len(instant.made) < len(held.lights) or held.lacks_ambient(instant):
             return
+        if instant.round in held.ambient:
+            instant.made[AMBIENT] = held.ambient[instant.round]
         held.waiting.popleft()
         held.let_go()
         for key in [key for key in flows if key[1] < instant.round - 1]:

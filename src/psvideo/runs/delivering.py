@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.beauty import AMBIENT, Mix, beauty_of
+from psvideo.beauty import Mix, beauty_of
 from psvideo.export.exr import HALF_MAX
 from psvideo.export.plates import plate_name, write_plate
 from psvideo.export.results import Delivery
 from psvideo.export.space import Space
 from psvideo.export.tags import Tags
 from psvideo.pipeline import Take
-from psvideo.sequence import LightPlate, Round, round_numbers
+from psvideo.sequence import AMBIENT, LightPlate, Round, round_numbers
 from psvideo.timing import Timing
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from psvideo.beauty import AMBIENT, BEAUTY, Mix, beauty_of
+from psvideo.beauty import BEAUTY, Mix, beauty_of
 from psvideo.clip import Clip
 from psvideo.errors import PsvideoError
 from psvideo.export.plates import plate_name, write_flash, write_plate
@@ -29,7 +29,7 @@ from psvideo.runs.handover import Finished, write_previews, write_timeline
 from psvideo.runs.look import look_at_plates
 from psvideo.runs.output import Output, folder_of, settings_of, tags_of
 from psvideo.runs.reporting import observing, run_report, write_report
-from psvideo.sequence import round_numbers
+from psvideo.sequence import AMBIENT, round_numbers
 from psvideo.timing import Timing, format_timing
 from psvideo.view.report import RunReport
 

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.align.rounds import Aligning, aligned
-from psvideo.beauty import AMBIENT
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.mesh import animation_name
 from psvideo.export.results import Delivery, is_written, mesh_file, write_surface
@@ -40,6 +39,7 @@ from psvideo.runs.output import Output, folder_of, settings_of, tags_of
 from psvideo.runs.plates import nothing_complete
 from psvideo.runs.reporting import Solved, observing, run_report, write_report
 from psvideo.runs.shape import shape_of
+from psvideo.sequence import AMBIENT
 from psvideo.timing import Timing, format_timing
 from psvideo.view.report import RunReport
 
@@ -120,9 +120,14 @@ def normals_run(
         _at_the_end(folder, take, output, observed.facts, delivery, tags, shaping, watch),
         writing() as write,
     ):
-        plates = clip_light_plates(take, timing, start_number=output.start_number, watch=watch)
-        ambient = first_ambient(take, timing) if delivery.mix.of(AMBIENT) else None
-        rounds = aligned(plates, clip.plan.lights, over_time.aligning, first=output.start_number)
+        mixed = delivery.mix.of(AMBIENT) > 0
+        with_ambient = mixed or delivery.plates
+        plates = clip_light_plates(
+            take, timing, start_number=output.start_number, with_ambient=with_ambient, watch=watch
+        )
+        ambient = first_ambient(take, timing) if mixed else None
+        how = over_time.aligning
+        rounds = aligned(plates, clip.plan.lights, how, first=output.start_number, with_ambient=with_ambient)
         found = surfaces(rounds, clip.plan, lighting.rig, mask=mask, solving=solving, near=lighting.near)
         for instant in found if over_time.denoise < 2 else denoised(found, over_time.denoise):
             shaping, shaped = shape_of(shaping, lighting, instant)
