@@ -18,7 +18,7 @@ test: $(VENV)/.installed-test
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -n auto --dist worksteal --durations 15
 
-# Blender fits one version of Python (bpy 5.0: 3.11; 5.1 and newer: 3.13) and takes some 350 MB: an environment of its own
+# Blender fits one version of Python (bpy 5.0: 3.11; 5.1 and newer: 3.13) and takes about 1 GB: an environment of its own
 blender: $(VENV)/.installed-test .venv-blender/.installed
 	$(BIN)/python -m pytest -q -s tests/test_clients_blender.py
 

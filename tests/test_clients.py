@@ -1,5 +1,6 @@
 """Programs of others read what psvideo delivers as it was meant: OpenImageIO, FFmpeg and three.js."""
 
+import base64
 import json
 import shutil
 import subprocess
@@ -133,3 +134,38 @@ def test_three_js_reads_signed_normals_from_exr(out: Path, tmp_path: Path) -> No
         assert (told["width"], told["height"]) == (SIZE, SIZE)
         read = np.frombuffer(raw.read_bytes(), np.float32).reshape(SIZE, SIZE, 4)[::-1, :, :3]  # rows from the bottom
         assert np.abs(read - ball(1002)[0]).max() < HALF
+
+
+TEXTURE = """async ([data, convert]) => {
+    const image = new Image();
+    image.src = "data:image/png;base64," + data;
+    await image.decode();
+    const gl = new OffscreenCanvas(1, 1).getContext("webgl2");
+    gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
+    if (!convert) gl.pixelStorei(gl.UNPACK_COLORSPACE_CONVERSION_WEBGL, gl.NONE);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, image);
+    const bound = gl.getParameter(gl.TEXTURE_BINDING_2D);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, gl.createFramebuffer());
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, bound, 0);
+    const read = new Uint8Array(image.width * image.height * 4);
+    gl.readPixels(0, 0, image.width, image.height, gl.RGBA, gl.UNSIGNED_BYTE, read);
+    return Array.from(read);
+}"""
+
+
+def test_a_browser_hands_a_png_of_normals_to_webgl_as_it_is_where_conversion_is_off(out: Path) -> None:
+    play = pytest.importorskip("playwright.sync_api")
+    programs = map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))
+    program = next(filter(None, programs), None)
+    if program is None:
+        pytest.skip("needs a Chromium browser: tests/install.sh installs it")
+    data = base64.b64encode((out / "normals_png16" / f"ball_normals.{NUMBER}.png").read_bytes()).decode()
+    words = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+    with play.sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=program, args=words)
+        page = browser.new_page()
+        read = [np.array(page.evaluate(TEXTURE, [data, convert])) for convert in (False, True)]
+        browser.close()
+    raw, converted = (values.reshape(SIZE, SIZE, 4)[..., :3] / 255 * 2 - 1 for values in read)
+    assert np.abs(raw - ball(NUMBER)[0]).max() < 2 / 255, "browsers keep 8 bits"
+    assert np.abs(converted - ball(NUMBER)[0]).max() > 0.4

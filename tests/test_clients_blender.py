@@ -1,6 +1,6 @@
 """Blender lights a card by delivered normals as they are; set wrong in the known ways, it does not.
 
-bpy (Blender as a Python module) is some 350 MB and fits one version of Python: `make blender` installs it into an
+bpy (Blender as a Python module) is about 1 GB and fits one version of Python: `make blender` installs it into an
 environment of its own, .venv-blender, and runs these tests. PSVIDEO_BPY_PYTHON names another.
 """
 

@@ -229,3 +229,49 @@ def test_a_preset_sets_what_its_program_wants_and_tells_how_to_load_it(
     header = OpenEXR.File(str(min((tmp_path / "up" / "normals").iterdir()))).header()
     assert header["psvideo:y"] == "up"
     assert "Flip Green Channel on" in (tmp_path / "up" / "README-unreal.txt").read_text(encoding="utf-8")
+
+
+def moving_camera(path: Path, codes: range) -> Path:
+    """A USD camera that is at x = its time code, turned by a degree a code."""
+    usd, geom, gf = (pytest.importorskip(f"pxr.{name}") for name in ("Usd", "UsdGeom", "Gf"))
+    stage = usd.Stage.CreateNew(str(path))
+    geom.SetStageUpAxis(stage, "Z")
+    geom.SetStageMetersPerUnit(stage, 0.01)
+    camera = geom.Camera.Define(stage, "/shot")
+    place, turn = camera.AddTranslateOp(), camera.AddRotateYOp()
+    for code in codes:
+        place.Set(gf.Vec3d(code, 0, 0), code)
+        turn.Set(float(code), code)
+    stage.Save()
+    return path
+
+
+def test_normals_in_the_world_of_a_moving_camera_are_turned_by_where_it_was(clip: Path, tmp_path: Path) -> None:
+    frames = len(list((clip / "frames").iterdir()))
+    world = ("--space", "world", "--camera-to-world", str(moving_camera(tmp_path / "shot.usda", range(1, frames + 1))))
+    assert normals(clip, tmp_path / "out", *world, "--encode", "png16") == 0
+    assert normals(clip, tmp_path / "camera") == 0
+    for path in (tmp_path / "out" / "normals").iterdir():
+        header = OpenEXR.File(str(path)).header()
+        code = 1 + 100 * header["psvideo:time_s"]  # the clip has 100 frames a second
+        matrix = np.reshape([float(word) for word in header["psvideo:camera_to_world"].split()], (4, 4))
+        assert matrix[0, 3] == pytest.approx(code, abs=1e-4)
+        turn = np.radians(code)
+        rotation = np.array([[np.cos(turn), 0, np.sin(turn)], [0, 1, 0], [-np.sin(turn), 0, np.cos(turn)]])
+        local = picture(tmp_path / "camera" / "normals" / path.name)
+        assert np.abs(picture(path) - local @ rotation.T).max() < 2e-3
+        assert (header["psvideo:up"], header["psvideo:meters_per_unit"]) == ("z", pytest.approx(0.01))
+    valid = picture(next((tmp_path / "out" / "valid").iterdir()))
+    assert valid.any()
+
+
+def test_a_camera_that_is_known_for_a_part_of_the_clip_is_refused_before_any_work(
+    clip: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    short = moving_camera(tmp_path / "short.usda", range(1, 5))
+    assert normals(clip, tmp_path / "out", "--space", "world", "--camera-to-world", str(short)) == 1
+    told = capsys.readouterr().err
+    assert "moves from time code 1 to 4" in told
+    assert "--camera-time" in told
+    assert not (tmp_path / "out").exists()
+    assert not (tmp_path / ".out.partial").exists()

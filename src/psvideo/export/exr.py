@@ -131,6 +131,7 @@ def write_exr_parts(
     half: bool | Mapping[str, bool] = True,
     attributes: Mapping[str, Mapping[str, Attribute]],
     fps: Fraction | None = None,
+    time_code: str | None = None,
 ) -> None:
     """Write one file with a part per name; each has its own channels and ``attributes``, else as ``write_exr``.
 
@@ -140,7 +141,7 @@ def write_exr_parts(
     for name, channels in parts.items():
         short = half if isinstance(half, bool) else half[name]
         planes = {channel: _plane(channel, values, short) for channel, values in channels.items()}
-        header = dict(attributes[name]) | _header(next(iter(planes.values())).shape, fps, None, None)
+        header = dict(attributes[name]) | _header(next(iter(planes.values())).shape, fps, time_code, None)
         built.append(OpenEXR.Part(header, planes, name))
     with whole_file(path) as beside:
         beside.write_bytes(_bytes_of(path, lambda: OpenEXR.File(built)))

@@ -138,7 +138,14 @@ def write_surface(
         )
     if delivery.multipart:
         halves = {name: is_half(name, delivery) for name in planes}
-        write_exr_parts(folder / bundle_name(clip, number), planes, half=halves, attributes=attributes, fps=tags.fps)
+        write_exr_parts(
+            folder / bundle_name(clip, number),
+            planes,
+            half=halves,
+            attributes=attributes,
+            fps=tags.fps,
+            time_code=tags.time_code(time_s),
+        )
     if delivery.png16:
         texts = {key: str(value) for key, value in attributes["normals"].items()}
         write_png16(folder / result_name(clip, "normals", number, suffix="png"), encode_normals(normals), texts=texts)
