@@ -44,7 +44,7 @@ def lit(tmp_path_factory: pytest.TempPathFactory) -> dict[str, float]:
 
     def job(name: str, at: str = "camera", kind: str = "exr", **more: object) -> dict[str, object]:
         parent = "normals" if kind == "exr" else "normals_png16"
-        image = folder / at / parent / f"ball_normals.1001.{kind}"
+        image = folder / at / parent / f"ball_normals.1001.{'exr' if kind == 'exr' else 'png'}"
         usual = {"frame": 2, "offset": 1000, "colour_space": "", "flip_y": False, "bump_correction": False}
         camera = quaternion if more.pop("turned", False) else [1.0, 0.0, 0.0, 0.0]
         place = {"image": str(image), "kind": kind, "out": str(folder / f"{name}.exr"), "size": [SIZE, SIZE]}
@@ -56,6 +56,8 @@ def lit(tmp_path_factory: pytest.TempPathFactory) -> dict[str, float]:
         job("exr in world space", at="world", space="world", turned=True),
         job("exr, y down, flipped back", at="down", flip_y=True),
         job("png as data", kind="png", colour_space="Non-Color"),
+        job("png in a normal map node", kind="map", colour_space="Non-Color"),
+        job("exr in a normal map node", kind="map", image=str(folder / "camera/normals/ball_normals.1001.exr")),
         job("exr as srgb", colour_space="sRGB"),
         job("exr, y down", at="down"),
         job("png as blender takes it", kind="png"),
@@ -83,7 +85,8 @@ def mean_error(job: dict[str, object], rotation: np.ndarray) -> float:
 
 
 RIGHT_WAYS = ["exr", "exr of a turned camera", "exr in world space", "exr, y down, flipped back", "png as data"]
-WRONG_WAYS = ["exr as srgb", "exr, y down", "png as blender takes it"]
+RIGHT_WAYS += ["png in a normal map node"]
+WRONG_WAYS = ["exr as srgb", "exr, y down", "png as blender takes it", "exr in a normal map node"]
 
 
 @pytest.mark.parametrize("way", RIGHT_WAYS)

@@ -10,8 +10,11 @@ import pytest
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.mesh import read_part, write_part
 from psvideo.export.pose import read_pose
+from psvideo.export.results import Delivery
 from psvideo.export.space import Space, choose_space, placed, placed_points
 from psvideo.integrate import Mesh
+from psvideo.rig import Rig
+from psvideo.runs.delivering import world_doubts
 
 usd = pytest.importorskip("pxr.Usd")
 from pxr import Gf, UsdGeom  # noqa: E402
@@ -75,6 +78,21 @@ def test_a_camera_that_moves_is_where_it_was_at_the_instant(tmp_path: Path) -> N
 def test_a_camera_that_stands_still_is_where_it_is_at_any_instant(tmp_path: Path) -> None:
     space = choose_space("world", "up", stage_with_cameras(tmp_path / "shot.usda"))
     assert space.at(1e6, 5, FPS) is space
+
+
+def test_a_lens_that_is_not_the_rigs_and_depth_without_scale_are_told_of(tmp_path: Path) -> None:
+    space = choose_space("world", "up", stage_with_cameras(tmp_path / "shot.usda"))
+    lens_px = 1000 * 50 / 20.955  # USD's own focal length and aperture, at 1000 pixels
+    delivery = Delivery(space=space, aovs=("position",))
+
+    def doubts(focal_px: float | None, *, metric: bool = True) -> str:
+        rig = Rig(lights=(), focal_px=None if focal_px is None else (focal_px, focal_px))
+        return " ".join(world_doubts(delivery, rig, 1000, metric=metric))
+
+    assert doubts(1.005 * lens_px) == ""
+    assert "the USD camera's 2386.07" in doubts(1.1 * lens_px)
+    assert "would be 2386.07" in doubts(None, metric=False)
+    assert world_doubts(Delivery(space=space), Rig(lights=()), 1000, metric=False) == (), "normals need no scale"
 
 
 def test_one_of_several_cameras_is_named(tmp_path: Path) -> None:

@@ -1,9 +1,10 @@
 """Run by a Python that has Blender's bpy: load normals as an artist would, light a card by them, render.
 
 The argument is a JSON file with a list of jobs: "image" (the sequence's first file), "frame" (the scene's), "offset"
-(of file numbers), "kind" ("exr": signed, "png": 0 to 1), "colour_space" (empty: what Blender chooses by itself),
-"flip_y", "bump_correction", "space" ("camera", "world"), "camera" (w, x, y, z of its rotation), "light" (x, y, z
-towards the light in the world), "size" and "out" (an EXR to write). Prints as JSON what Blender made of each.
+(of file numbers), "kind" ("exr": signed, "png": 0 to 1, "map": 0 to 1 in a Normal Map node), "colour_space" (empty:
+what Blender chooses by itself), "flip_y", "bump_correction", "space" ("camera", "world"), "camera" (w, x, y, z of its
+rotation), "light" (x, y, z towards the light in the world), "size" and "out" (an EXR to write). Prints as JSON what
+Blender made of each.
 """
 
 import json
@@ -31,6 +32,10 @@ def material(job, image):
     user.frame_start, user.frame_duration, user.frame_offset = 1, 100_000, job["offset"]
     user.use_auto_refresh = True
     vector = texture.outputs["Color"]
+    if job["kind"] == "map":  # the node that takes 0 to 1, in the card's own tangent space
+        node = tree.nodes.new("ShaderNodeNormalMap")
+        link(tree, vector, node.inputs["Color"])
+        return with_normal(made, node.outputs[0])
     steps = [("MULTIPLY_ADD", (2, 2, 2), (-1, -1, -1))] if job["kind"] == "png" else []
     if job["flip_y"]:
         steps.append(("MULTIPLY", (1, -1, 1), None))
@@ -49,6 +54,12 @@ def material(job, image):
         turn.vector_type, turn.convert_from, turn.convert_to = "NORMAL", "CAMERA", "WORLD"
         link(tree, vector, turn.inputs[0])
         vector = turn.outputs[0]
+    return with_normal(made, vector)
+
+
+def with_normal(made, vector):
+    """Give a material a white diffuse surface with this normal."""
+    tree = made.node_tree
     diffuse = tree.nodes.new("ShaderNodeBsdfDiffuse")
     diffuse.inputs["Color"].default_value = (1, 1, 1, 1)
     link(tree, vector, diffuse.inputs["Normal"])

@@ -99,7 +99,8 @@ def _facts(made: Delivered) -> list[str]:
         "world": f"world space: the axes of the camera's file, {space.up} up",
         "tangent": "tangent space of a flat card that faces the camera: x right, y up, z out of it",
     }[space.name]
-    flipped = "; the green channel is flipped (y down, DirectX)" if space.y == "down" else " (y up, OpenGL)"
+    usual = "" if space.name == "world" else " (y up, OpenGL)"
+    flipped = "; the green channel is flipped (y down, DirectX)" if space.y == "down" else usual
     rate = f"{float(made.fps):.6g}" + (f" ({made.fps})" if made.fps.denominator > 1 else "")
     facts = [
         f"Numbers {made.first} to {made.last} ({count}), {rate} frames a second.",
@@ -165,7 +166,7 @@ def _blender(made: Delivered) -> tuple[Sequence[str], Sequence[str]]:
         [
             "sRGB as Color Space (Blender's choice for every PNG): off by 0.3 to 0.4 of n.l on average.",
             "y the wrong way (--y down): light comes from below when it stands above.",
-            "A Normal Map node on the EXR: it expects 0 to 1. Use it with the PNG only, in Object or Tangent space.",
+            "A Normal Map node on the EXR: it expects 0 to 1 (off by 0.5). It takes the PNG, in Tangent space.",
             "The multipart file: Image Texture shows nothing of it. Use the folders, one sequence each.",
         ],
     )

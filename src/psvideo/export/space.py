@@ -44,7 +44,8 @@ class Space:
     """Where normals are expressed.
 
     For world space: ``camera_to_world`` (3, 3) is the camera's rotation and ``origin`` (3,) its place in units of
-    ``unit_m`` metres; ``up`` is the world's axis that points up. ``moving`` gives both anew for every instant.
+    ``unit_m`` metres; ``up`` is the world's axis that points up, ``lens`` the focal length over the picture's width
+    where the camera's file says it. ``moving`` gives rotation and place anew for every instant.
     """
 
     name: SpaceName = "camera"
@@ -53,6 +54,7 @@ class Space:
     origin: FloatArray | None = None
     unit_m: float = 1.0
     up: UpAxis = "y"
+    lens: float | None = None
     moving: Moving | None = None
 
     def at(self, time_s: float, number: int, camera_fps: Fraction) -> "Space":
@@ -108,7 +110,7 @@ def choose_space(
         pose = read_pose(camera_to_world)
         return Space(name=name, y=y, camera_to_world=pose.rotation, origin=pose.origin)
     found = open_usd_camera(camera_to_world, camera)
-    place = Space(name=name, y=y, unit_m=found.unit_m, up=found.up)
+    place = Space(name=name, y=y, unit_m=found.unit_m, up=found.up, lens=found.lens)
     if found.codes is None:
         pose = found.pose(0.0)
         return replace(place, camera_to_world=pose.rotation, origin=pose.origin)

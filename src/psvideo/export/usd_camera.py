@@ -27,7 +27,8 @@ class UsdCamera:
     """One camera prim of a stage.
 
     ``unit_m`` is the stage's metersPerUnit, ``up`` its upAxis. ``codes`` are the first and last time code of the
-    camera's animation, None where it stands still, and ``codes_per_s`` how many of them pass in a second.
+    camera's animation, None where it stands still, and ``codes_per_s`` how many of them pass in a second. ``lens`` is
+    the focal length over the picture's width, as the animation begins; None where the view has none.
     """
 
     path: Path
@@ -37,6 +38,7 @@ class UsdCamera:
     up: UpAxis
     codes: tuple[float, float] | None
     codes_per_s: float
+    lens: float | None
     stage: Any = field(repr=False, compare=False)
 
     def pose(self, code: float) -> Pose:
@@ -82,6 +84,7 @@ def open_usd_camera(path: Path, name: str | None = None) -> UsdCamera:
         up="z" if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z else "y",
         codes=codes,
         codes_per_s=float(stage.GetTimeCodesPerSecond()),
+        lens=_lens(stage, chosen, codes),
         stage=stage,
     )
 
@@ -111,3 +114,13 @@ def _animated(stage: Any, prim: str) -> tuple[float, float] | None:
         samples.update(UsdGeom.Xformable(at).GetTimeSamples() if at.IsA(UsdGeom.Xformable) else ())
         at = at.GetParent()
     return (min(samples), max(samples)) if len(samples) > 1 else None
+
+
+def _lens(stage: Any, prim: str, codes: tuple[float, float] | None) -> float | None:
+    """Return a camera's focal length over its aperture's width, both in the same unit (a tenth of the stage's)."""
+    from pxr import UsdGeom
+
+    camera = UsdGeom.Camera(stage.GetPrimAtPath(prim)).GetCamera(codes[0] if codes else 0.0)
+    if camera.projection != camera.Perspective or camera.horizontalAperture <= 0:
+        return None
+    return float(camera.focalLength / camera.horizontalAperture)

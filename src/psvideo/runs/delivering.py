@@ -16,8 +16,12 @@ from psvideo.export.results import Delivery
 from psvideo.export.space import Space
 from psvideo.export.tags import Tags
 from psvideo.pipeline import Take
+from psvideo.rig import Rig
 from psvideo.sequence import AMBIENT, LightPlate, Round, round_numbers
 from psvideo.timing import Timing
+
+LENS_TOLERANCE = 0.01
+"""Share by which two focal lengths may differ before it is told: calibrations of one lens differ by less."""
 
 
 def check_delivery(delivery: Delivery, take: Take, timing: Timing, start_number: int) -> None:
@@ -39,15 +43,25 @@ def check_camera(space: Space, take: Take, timing: Timing, start_number: int) ->
         space.at(float(np.mean(times_s[number])), number, take.plan.camera.fps)
 
 
-def world_doubts(delivery: Delivery, *, metric: bool) -> tuple[str, ...]:
-    """Return in whole sentences what is wrong with points in the world where depth has no scale."""
-    moved = delivery.space.name == "world" and (delivery.space.moving is not None or delivery.space.origin is not None)
-    if metric or not (moved and delivery.needs_depth):
+def world_doubts(delivery: Delivery, rig: Rig, width_px: int, *, metric: bool) -> tuple[str, ...]:
+    """Return in whole sentences why points in the world do not lie where the scene is: no scale, or another lens."""
+    space = delivery.space
+    if space.name != "world" or not delivery.needs_depth:
         return ()
-    return (
-        "Positions and meshes in world space need depth in metres, and here it is relative: they do not lie where the "
-        "scene is. Give the rig [camera] focal_px and a [surface] plane.",
-    )
+    said = []
+    lens_px = None if space.lens is None else space.lens * width_px
+    if not metric:
+        known = "" if lens_px is None else f" (the USD camera's would be {lens_px:.6g})"
+        said.append(
+            "Positions and meshes in world space need depth in metres, and here it is relative: they do not lie where "
+            f"the scene is. Give the rig [camera] focal_px{known} and a [surface] plane."
+        )
+    if lens_px and rig.focal_px and abs(rig.focal_px[0] / lens_px - 1) > LENS_TOLERANCE:
+        said.append(
+            f"The rig's focal length is {rig.focal_px[0]:.6g} pixels and the USD camera's {lens_px:.6g}: positions do "
+            "not lie under their pixels when they are seen through that camera. Give both the same lens and crop."
+        )
+    return tuple(said)
 
 
 def plates_of(one: Round) -> Iterator[LightPlate]:

@@ -156,7 +156,7 @@ def normals_run(
             warnings=(
                 *lighting.doubts,
                 *(() if shaping is None else reservations(shaping)),
-                *world_doubts(delivery, metric=shaping is not None and shaping.metric),
+                *world_doubts(delivery, lighting.rig, clip.width_px, metric=shaping is not None and shaping.metric),
             ),
             aligned=over_time.aligning.align != "none",
         )
