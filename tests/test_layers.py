@@ -36,7 +36,7 @@ LAYERS = [
     {"pipeline"},
     {"naming", "light_sets"},
     {"runs"},
-    {"demo", "page"},
+    {"demo", "doctor", "page"},
     {"cli"},
 ]
 """Rooms from the bottom up; a module may use its own layer (without circles) and those below."""

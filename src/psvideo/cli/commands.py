@@ -49,6 +49,8 @@ COMMANDS = (
     ),
     *_entries(
         TRY,
+        doctor="Say what is installed, what the machine can do and what to do about the rest: exit status 1 where work "
+        "stops.",
         demo="Film a virtual bust, find the flashes, solve for normals, and end with the path of a picture of it all.",
         synth="Film a virtual scene: a clip folder as a camera would leave it, and the truth beside it in truth/.",
     ),

@@ -6,6 +6,7 @@ The tests parse every line with the real commands, and run those that cost littl
 EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "": (
         ("no camera at hand: see the whole chain on a virtual shoot", "psvideo demo"),
+        ("is everything there that a shoot needs?", "psvideo doctor"),
         ("from a clip with its plan.toml to normals and albedo", "psvideo normals clip/ --rig rig.toml -o out/"),
     ),
     "capture-plan": (
@@ -170,6 +171,10 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
             "at a port of your choice, opened by yourself",
             "psvideo view out/ --port 9000 --no-browser",
         ),
+    ),
+    "doctor": (
+        ("is everything here, and how fast is this machine?", "psvideo doctor"),
+        ("the disk that the results will go to, for a program", "psvideo doctor --folder /tmp --json"),
     ),
     "demo": (
         ("the whole chain, into ./psvideo-demo", "psvideo demo"),

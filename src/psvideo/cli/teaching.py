@@ -31,6 +31,9 @@ class Teaching(TyperCommand):
     def get_params(self, ctx: Any) -> Any:
         """Return the options, where they are many each with the panel it stands in."""
         params: list[Any] = list(super().get_params(ctx))
+        for param in params:
+            if getattr(param, "is_flag", False):
+                param.metavar = ""  # a flag takes no value; by itself the help would say <bool>
         if len(params) > MANY and not any(getattr(param, "rich_help_panel", None) for param in params):
             for param in params:
                 if param.param_type_name == "option" and not param.required:

@@ -84,7 +84,8 @@ def _changed(one: NDArray[np.float32], other: NDArray[np.float32]) -> NDArray[np
     level = float(np.median(other[one > 30] / one[one > 30])) if (one > 30).any() else 1.0
     change = other - one * np.float32(level)
     noise = 1.4826 * float(np.median(np.abs(change - cv2.blur(change, (3, 3))))) * np.sqrt(9 / 8)
-    local = np.sqrt(cv2.blur(cv2.blur(change, (3, 3)) ** 2, (8, 8)))
+    squares = cv2.blur(cv2.blur(change, (3, 3)) ** 2, (8, 8))
+    local = np.sqrt(np.maximum(squares, 0))  # running sums may leave a little less than nothing
     return np.asarray(local > max(LEAST_CHANGE, NOISE_FACTOR * noise / 3))
 
 

@@ -1,0 +1,78 @@
+"""psvideo doctor: says what is here and what is not, with the next step, and ends as scripts need it."""
+
+import importlib.metadata
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from psvideo.cli.app import main
+from psvideo.clip import abilities
+from psvideo.doctor import speed
+from psvideo.doctor.finding import Finding, is_well
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Measure for a moment only."""
+    monkeypatch.setattr(speed, "MEASURED_S", 0.0)
+    monkeypatch.setattr(speed, "DISK_MB", 2)
+
+
+def asked(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, dict[str, dict[str, object]], bool]:
+    status = main(["doctor", "--json", *words])
+    told = json.loads(capsys.readouterr().out)
+    return status, {finding["name"]: finding for finding in told["findings"]}, told["well"]
+
+
+def test_a_whole_machine_is_well_and_every_part_is_told(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    status, found, well = asked(capsys, "--folder", str(tmp_path))
+    assert (status, well) == (0, True)
+    assert found["numpy"]["text"] == importlib.metadata.version("numpy")
+    assert str(os.cpu_count()) in str(found["processor"]["text"])
+    assert {f"movies: {name}" for name in abilities.MOVIE_CODECS} <= set(found)
+    assert {"memory", "C library", "GPU", "strobe board", "least squares", "disk", "usd-core"} <= set(found)
+    assert list(tmp_path.iterdir()) == [], "measuring leaves nothing behind"
+
+
+def test_what_lacks_is_missing_with_the_next_step_and_exit_status_1(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(abilities.MOVIE_CODECS, "ProRes", "no_such_decoder")
+    monkeypatch.setattr("psvideo.doctor.software.version", _without("scipy", "usd-core"))
+    status, found, well = asked(capsys)
+    assert (status, well) == (1, False)
+    lacking = {name for name, finding in found.items() if finding["level"] == "missing"}
+    assert lacking == {"movies: ProRes", "scipy"}
+    assert found["usd-core"]["level"] == "note", "an extra is no fault"
+    assert all(finding["next_step"] for finding in found.values() if finding["level"] != "ok")
+
+
+def _without(*names: str) -> Callable[[str], str]:
+    def version(name: str) -> str:
+        if name in names:
+            raise importlib.metadata.PackageNotFoundError(name)
+        return importlib.metadata.version(name)
+
+    return version
+
+
+def test_a_folder_that_cannot_be_written_is_told(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    status, found, _ = asked(capsys, "--folder", str(tmp_path / "none"))
+    assert status == 1
+    assert "--folder" in str(found["disk"]["next_step"])
+
+
+def test_the_verdict_closes_what_people_read(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["doctor"]) == 0
+    told = capsys.readouterr().out
+    assert "All that psvideo needs is here." in told
+    assert "\x1b" not in told
+
+
+def test_nothing_missing_is_well_whatever_is_noted() -> None:
+    fine = Finding(name="a", level="note", text="slow")
+    assert is_well([fine])
+    assert not is_well([fine, Finding(name="b", level="missing", text="gone")])
