@@ -5,7 +5,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test blender check bench clean
+.PHONY: demo test blender check bench docs clean
 
 demo: $(VENV)/.installed
 	$(BIN)/psvideo demo --force
@@ -30,6 +30,12 @@ blender: $(VENV)/.installed-test .venv-blender/.installed
 bench: $(VENV)/.installed-test
 	$(BIN)/python -m bench
 
+# The pages as a site in docs/_site; a warning is an error. The tests build it too.
+docs: $(VENV)/.installed-test
+	$(BIN)/python -m docs.figures.commands
+	$(BIN)/python -m sphinx -q -W --keep-going -c docs -d docs/_site/.trees . docs/_site
+	@echo docs/_site/docs/index.html
+
 $(VENV)/.made:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 		{ echo "psvideo needs Python 3.11 or newer; $(PYTHON) is `$(PYTHON) -V`. Name another: make PYTHON=python3.12 demo"; exit 1; }
@@ -41,7 +47,7 @@ $(VENV)/.installed: $(VENV)/.made pyproject.toml constraints.txt
 	touch $@
 
 $(VENV)/.installed-test: $(VENV)/.installed
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test,docs]'
 	touch $@
 
 clean:

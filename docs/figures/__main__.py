@@ -1,20 +1,23 @@
-"""Make the pages' pictures: ``python -m docs.figures`` makes all, ``python -m docs.figures banding`` one."""
+"""Make the pages' pictures: ``python -m docs.figures`` makes all, ``python -m docs.figures fault_banding`` one."""
 
 import sys
 import tempfile
 from pathlib import Path
 
 import cv2
+from docs.figures.explained import EXPLAINED
 from docs.figures.faults import FAULTS
 from docs.figures.staging import PICTURES
+
+FIGURES = EXPLAINED | FAULTS
 
 
 def main(names: list[str]) -> None:
     """Write the pictures that are named, or all, and print what psvideo said."""
     with tempfile.TemporaryDirectory() as folder:
-        figures = {name: FAULTS[name](Path(folder) / name) for name in names or FAULTS}
+        figures = {name: FIGURES[name](Path(folder) / name) for name in names or FIGURES}
     for name, made in figures.items():
-        cv2.imwrite(str(PICTURES / f"fault_{name}.png"), made.picture[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 9])
+        cv2.imwrite(str(PICTURES / f"{name}.png"), made.picture[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 9])
         print(f"{name}: {made.said}\n")
 
 

@@ -14,25 +14,31 @@ from psvideo.view.shading import normal_colours, relit, srgb
 
 BRIGHT = 1.7
 """Exposure of all pictures of frames and plates."""
+STILL = ("--align", "none")
+"""The table stands still, and pictures of faults should show these alone."""
 LIGHTS = tomllib.loads(SCENE.read_text(encoding="utf-8"))["light"]
 
 
-def _shown(image: Image) -> Pixels:
+def shown(image: Image) -> Pixels:
+    """Return a linear picture as the pages show frames and plates."""
     return srgb(image, exposure=BRIGHT)
 
 
-def _paint(albedo: Image) -> Pixels:
+def paint(albedo: Image) -> Pixels:
+    """Return albedo as the pages show it."""
     return srgb(albedo, exposure=1.0)
 
 
-def _white(share: Image) -> Pixels:
+def white(share: Image) -> Pixels:
+    """Return shares of 0 to 1 as greys."""
     plane = share if share.ndim == 2 else share[..., 0]
     return np.repeat((255 * np.clip(plane, 0, 1)).astype(np.uint8)[..., None], 3, axis=-1)
 
 
-def _solved(clip: Path, *words: object) -> tuple[Path, str]:
+def solved(clip: Path, *words: object) -> tuple[Path, str]:
+    """Run psvideo normals on a clip; return its results and what it said."""
     out = clip.parent / "out"
-    return out, psvideo("normals", clip, "--rig", clip / "rig.toml", "-o", out, *words)
+    return out, psvideo("normals", clip, "--rig", clip / "rig.toml", "-o", out, *STILL, *words)
 
 
 def _normals(out: Path, place: int = 0) -> Image:
@@ -40,7 +46,7 @@ def _normals(out: Path, place: int = 0) -> Image:
 
 
 def _plate(folder: Path, light: str = "key", place: int = 0) -> Pixels:
-    return _shown(exr(folder / light, place))
+    return shown(exr(folder / light, place))
 
 
 def _edit(path: Path, *changes: tuple[str, str]) -> None:
@@ -61,7 +67,7 @@ def banding(folder: Path) -> Figure:
     )
     said = psvideo("split", clip, "-o", folder / "plates")
     psvideo("split", clip, "-o", folder / "copied", "--method", "hudon2015")
-    tiles = [("two frames: bands that wander", _shown(frames(clip)[4])), ("", _shown(frames(clip)[7]))]
+    tiles = [("two frames: bands that wander", shown(frames(clip)[4])), ("", shown(frames(clip)[7]))]
     copied = ("plate by Algorithm 1 of 2015", _plate(folder / "copied"))
     return figure([row("Banding", *tiles, copied, ("plate by psvideo", _plate(folder / "plates")))], said)
 
@@ -69,14 +75,14 @@ def banding(folder: Path) -> Figure:
 def short_dark_time(folder: Path) -> Figure:
     """Flashes come 6.5 ms after each other, and every row is open for 10 ms."""
     clip = film(folder, {"strobe": {"dark_s": 0.0065}})
-    out, said = _solved(clip)
+    out, said = solved(clip)
     seen = frames(clip)
     return figure(
         [
             row(
                 "Dark time too short: bright bands, no dark row",
-                *(("frame", _shown(seen[5])), ("next frame", _shown(seen[6]))),
-                *(("normals", normal_colours(_normals(out, 1))), ("valid is white", _white(exr(out / "valid", 1)))),
+                *(("frame", shown(seen[5])), ("next frame", shown(seen[6]))),
+                *(("normals", normal_colours(_normals(out, 1))), ("valid is white", white(exr(out / "valid", 1)))),
             )
         ],
         said,
@@ -86,10 +92,10 @@ def short_dark_time(folder: Path) -> Figure:
 def half_shutter(folder: Path) -> Figure:
     """At 180 degrees every row is blind for half of the time."""
     clip = film(folder, {"camera": {"shutter_deg": 180.0}, "strobe": {"dark_s": 0.0101}})
-    out, said = _solved(clip)
+    out, said = solved(clip)
     psvideo("split", clip, "-o", folder / "plates")
-    seen = [("frame: a wide black band", _shown(frames(clip)[5])), ("plate", _plate(folder / "plates"))]
-    left = [("normals", normal_colours(_normals(out))), ("valid is white", _white(exr(out / "valid")))]
+    seen = [("frame: a wide black band", shown(frames(clip)[5])), ("plate", _plate(folder / "plates"))]
+    left = [("normals", normal_colours(_normals(out))), ("valid is white", white(exr(out / "valid")))]
     return figure([row("Shutter of 180 degrees: rows that no frame saw", *seen, *left)], said)
 
 
@@ -97,7 +103,7 @@ def led_tails(folder: Path) -> Figure:
     """LEDs that glow on for long, and a plan that does not say so."""
     clip = film(folder, {"strobe": {"fall_s": 0.0006, "rise_s": 0.0002}, "plan": {"tails": False}})
     said = psvideo("sync", clip)
-    quick, slow = (_shown(frames(one)[5]) for one in (film(folder.parent / "quick"), clip))
+    quick, slow = (shown(frames(one)[5]) for one in (film(folder.parent / "quick"), clip))
     tiles = [("LEDs that are off at once", quick), ("slow LEDs: a soft, grey dark row", slow)]
     return figure([row("LEDs that glow on", *tiles)], said)
 
@@ -105,10 +111,10 @@ def led_tails(folder: Path) -> Figure:
 def swapped_lights(folder: Path) -> Figure:
     """The rig file calls the key light left, and the left one key."""
     clip = film(folder)
-    right, _ = _solved(clip)
+    right, _ = solved(clip)
     true = _normals(right)
     _edit(clip / "rig.toml", ('"key"', '"x"'), ('"left"', '"key"'), ('"x"', '"left"'))
-    said = psvideo("normals", clip, "--rig", clip / "rig.toml", "-o", folder / "wrong")
+    said = psvideo("normals", clip, "--rig", clip / "rig.toml", "-o", folder / "wrong", *STILL)
     wrong = _normals(folder / "wrong")
     albedo = exr(right / "albedo")
     good = [("right: normals", normal_colours(true)), ("lit from the right", _relit(true, albedo))]
@@ -126,7 +132,7 @@ def _relit(normals: Image, albedo: Image, light: tuple[float, float, float] = (0
 def wrong_y(folder: Path) -> Figure:
     """Normals for DirectX in a program that reads them as OpenGL."""
     clip = film(folder)
-    out, said = _solved(clip, "--y", "down")
+    out, said = solved(clip, "--y", "down")
     down, albedo, above = _normals(out), exr(out / "albedo"), (0.1, 0.85, 0.5)
     up = down * np.array([1, -1, 1], np.float32)
     good = [("Y up, read as Y up", normal_colours(up)), ("lit from above", _relit(up, albedo, above))]
@@ -138,13 +144,13 @@ def colour_shift(folder: Path) -> Figure:
     """A warm and a cold LED, and a rig file that takes all lights for white and alike."""
     tints = ([1.0, 0.8, 0.55], [0.6, 0.8, 1.0], [0.8, 0.8, 0.8], [0.8, 0.8, 0.8])
     clip = film(folder, {"light": [light | {"intensity": tint} for light, tint in zip(LIGHTS, tints, strict=True)]})
-    right, _ = _solved(clip)
+    right, _ = solved(clip)
     _edit(clip / "rig.toml", ("intensity = .*", "intensity = 0.8"))
-    said = psvideo("normals", clip, "--rig", clip / "rig.toml", "-o", folder / "wrong")
+    said = psvideo("normals", clip, "--rig", clip / "rig.toml", "-o", folder / "wrong", *STILL)
     wrong = folder / "wrong"
     tiles = [
-        ("albedo, the LEDs' colours in the rig", _paint(exr(right / "albedo"))),
-        ("albedo, all taken for white", _paint(exr(wrong / "albedo"))),
+        ("albedo, the LEDs' colours in the rig", paint(exr(right / "albedo"))),
+        ("albedo, all taken for white", paint(exr(wrong / "albedo"))),
         ("normals, all taken for white", normal_colours(_normals(wrong))),
     ]
     return figure([row("Colour shifts", *tiles)], said)
@@ -154,9 +160,9 @@ def wrong_curve(folder: Path) -> Figure:
     """S-Log3 footage under a plan that says linear."""
     clip = film(folder, {"camera": {"transfer": "slog3"}})
     _edit(clip / "plan.toml", ("transfer = .*", 'transfer = "linear"'))
-    out, said = _solved(clip)
+    out, said = solved(clip)
     codes = np.round(255 * frames(clip)[5]).astype(np.uint8)
-    tiles = [("frame: the flat, pale look of log", codes), ("albedo", _paint(exr(out / "albedo")))]
+    tiles = [("frame: the flat, pale look of log", codes), ("albedo", paint(exr(out / "albedo")))]
     return figure([row("Wrong transfer curve", *tiles, ("normals", normal_colours(_normals(out))))], said)
 
 
@@ -167,15 +173,15 @@ def flicker(folder: Path) -> Figure:
         codes = cv2.imread(str(file), cv2.IMREAD_UNCHANGED).astype(np.float64)
         gained = 4096 + (codes - 4096) * (1 + 0.25 * np.sin(0.55 * count))
         cv2.imwrite(str(file), np.clip(gained, 0, 65535).astype(np.uint16))
-    out, said = _solved(clip)
-    tiles = [(f"result {1001 + place}", _paint(exr(out / "albedo", place))) for place in range(3)]
+    out, said = solved(clip)
+    tiles = [(f"result {1001 + place}", paint(exr(out / "albedo", place))) for place in range(3)]
     return figure([row("Flicker: albedo of three results that follow each other", *tiles)], said)
 
 
 def clipped(folder: Path) -> Figure:
     """Flashes so strong that white paint saturates."""
     clip = film(folder, {"light": [light | {"intensity": 2.2} for light in LIGHTS]})
-    out, said = _solved(clip)
+    out, said = solved(clip)
     frame = frames(clip)[5]
     marked = np.where((frame.max(axis=-1) > 0.99)[..., None], np.array([255, 0, 200], np.uint8), srgb(frame))
     tiles = [("frame", srgb(frame)), ("clipped pixels in magenta", marked)]
@@ -197,26 +203,26 @@ def misnamed_rate(folder: Path) -> Figure:
 def dropped_frame(folder: Path) -> Figure:
     """The recorder lost one frame."""
     clip = film(folder, {"output": {"dropped": [8]}})
-    out, said = _solved(clip)
+    out, said = solved(clip)
     psvideo("split", clip, "-o", folder / "plates")
     count = len(list((out / "valid").glob("*.exr")))
     worst = min(range(count), key=lambda place: float(exr(out / "valid", place).mean()))
-    tiles = [("normals", normal_colours(_normals(out, worst))), ("valid is white", _white(exr(out / "valid", worst)))]
+    tiles = [("normals", normal_colours(_normals(out, worst))), ("valid is white", white(exr(out / "valid", worst)))]
     return figure([row("A frame is missing: its rows have no normal in that round", *tiles)], said)
 
 
 FAULTS: dict[str, Callable[[Path], Figure]] = {
-    "banding": banding,
-    "short_dark_time": short_dark_time,
-    "half_shutter": half_shutter,
-    "led_tails": led_tails,
-    "swapped_lights": swapped_lights,
-    "wrong_y": wrong_y,
-    "colour_shift": colour_shift,
-    "wrong_curve": wrong_curve,
-    "flicker": flicker,
-    "clipped": clipped,
-    "misnamed_rate": misnamed_rate,
-    "dropped_frame": dropped_frame,
+    "fault_banding": banding,
+    "fault_short_dark_time": short_dark_time,
+    "fault_half_shutter": half_shutter,
+    "fault_led_tails": led_tails,
+    "fault_swapped_lights": swapped_lights,
+    "fault_wrong_y": wrong_y,
+    "fault_colour_shift": colour_shift,
+    "fault_wrong_curve": wrong_curve,
+    "fault_flicker": flicker,
+    "fault_clipped": clipped,
+    "fault_misnamed_rate": misnamed_rate,
+    "fault_dropped_frame": dropped_frame,
 }
-"""By the picture's name: docs/pictures/fault_NAME.png."""
+"""By the picture's name: docs/pictures/NAME.png."""
