@@ -1,4 +1,4 @@
-"""The pages: links that lead somewhere, pictures that their scripts still make, commands as they are, one whole site."""
+"""The pages: links that lead somewhere, pictures that their scripts still make, commands as they are, one site."""
 
 import re
 import subprocess
