@@ -36,10 +36,10 @@ def mirror_sphere(
         float | None, typer.Option(help="Width in mm of the sensor's part that the picture shows.", min=0.1)
     ] = None,
     principal_px: Annotated[
-        str | None, typer.Option(help="Where the lens's axis meets the picture: x,y; left out: its middle.")
+        str | None, typer.Option(help="Where the lens's axis meets the picture, in pixels: x,y; left out: its middle.")
     ] = None,
     radius_mm: Annotated[
-        float | None, typer.Option(help="The spheres' radius: with two or more, near lights get positions.")
+        float | None, typer.Option(help="The spheres' radius in mm: with two or more, near lights get positions.")
     ] = None,
     outline_picture: Annotated[
         Path | None, typer.Option(help="A picture from the same camera, room light on, on which the outline shows.")
