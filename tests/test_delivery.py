@@ -1,6 +1,7 @@
 """What lies beside the maps of a delivery: plates, their sum, movies, the timeline, presets and their notes."""
 
 import hashlib
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -11,8 +12,11 @@ import pytest
 
 from psvideo.beauty import Mix, beauty_of, parse_mix
 from psvideo.cli.app import main
+from psvideo.cli.delivery import Asked, delivery_of
+from psvideo.cli.delivery_options import CodecName, ProgramName, SpaceName, YDirection
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.movie import even, write_movie
+from psvideo.export.programs import Delivered, note
 from psvideo.export.timeline import Footage, Images, timeline_text
 from psvideo.sequence import LightPlate, Round
 
@@ -275,3 +279,53 @@ def test_a_camera_that_is_known_for_a_part_of_the_clip_is_refused_before_any_wor
     assert "--camera-time" in told
     assert not (tmp_path / "out").exists()
     assert not (tmp_path / ".out.partial").exists()
+
+
+NOTHING = Asked(
+    program=None,
+    space=None,
+    camera_to_world=None,
+    camera=None,
+    camera_time=None,
+    y=None,
+    float32=False,
+    aovs=(),
+    meshes=(),
+    encode=None,
+    multipart=None,
+    plates=False,
+    with_ambient=False,
+    weights=(),
+    previews=(),
+    codec=CodecName.vp9,
+)
+
+
+@pytest.mark.parametrize("name", list(ProgramName))
+def test_every_program_has_a_note_with_numbers_rate_colour_and_wrong_ways(name: ProgramName) -> None:
+    delivery, at_odds = delivery_of(replace(NOTHING, program=name))
+    assert at_odds == ()
+    made = Delivered(clip="take7", first=1001, last=1100, fps=Fraction(24000, 1001), metric=True, delivery=delivery)
+    told = note(name.value, made)
+    for words in ("1001", "1100", "23.976", "Known wrong ways", "take7", "sRGB" if delivery.png16 else "Raw"):
+        assert words in told
+    assert ("position" in delivery.aovs) == ("Positions are" in told)
+
+
+def test_a_camera_beside_a_preset_puts_the_delivery_into_its_world(tmp_path: Path) -> None:
+    matrix = tmp_path / "camera.txt"
+    matrix.write_text("1 0 0 4  0 1 0 5  0 0 1 6  0 0 0 1")
+    delivery, at_odds = delivery_of(replace(NOTHING, program=ProgramName.nuke, camera_to_world=matrix))
+    assert (delivery.space.name, at_odds) == ("world", ())
+    assert delivery.multipart
+    with pytest.raises(UsageError, match="belongs to --space world"):
+        delivery_of(replace(NOTHING, program=ProgramName.unreal, camera_to_world=matrix))
+    with pytest.raises(UsageError, match="belongs to --space world"):
+        delivery_of(replace(NOTHING, camera_to_world=matrix))
+
+
+def test_options_that_go_against_a_preset_win_and_are_told_of() -> None:
+    asked = replace(NOTHING, program=ProgramName.nuke, y=YDirection.down, space=SpaceName.tangent, multipart=False)
+    delivery, at_odds = delivery_of(asked)
+    assert (delivery.space.y, delivery.space.name, delivery.multipart) == ("down", "tangent", False)
+    assert [sentence.split()[0] for sentence in at_odds] == ["--y", "--space", "--no-multipart"]

@@ -131,7 +131,7 @@ def normals_run(
         found = surfaces(rounds, clip.plan, lighting.rig, mask=mask, solving=solving, near=lighting.near)
         for instant in found if over_time.denoise < 2 else denoised(found, over_time.denoise):
             shaping, shaped = shape_of(shaping, lighting, instant)
-            ambient = instant.round.ambient or ambient
+            ambient = (instant.round.ambient or ambient) if mixed else None
             if delivery.plates:
                 write_plates(folder / "plates", clip.name, instant.round, tags, resume=output.resume, write=write)
             if not (output.resume and is_written(folder, clip.name, instant.round.number, delivery)):
