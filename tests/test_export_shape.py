@@ -148,6 +148,17 @@ def test_position_follows_the_space_that_normals_are_delivered_in(clip: Path, tm
     up, down = channels(tmp_path / "up" / path), channels(tmp_path / "down" / path)
     assert np.array_equal(up["G"], -down["G"])
     assert np.array_equal(up["B"], down["B"])
+    (tmp_path / "camera.txt").write_text("0 0 1 10  0 1 0 20  -1 0 0 30  0 0 0 1")
+    camera = ("--space", "world", "--camera-to-world", str(tmp_path / "camera.txt"))
+    assert run(clip, tmp_path / "world", "--aov", "position", "--mesh", "ply", *camera, "--frames", "1-20") == 0
+    world, there = channels(tmp_path / "world" / path), up["B"] != 0
+    turned = (up["B"] + 10, up["G"] + 20, 30 - up["R"])
+    for name, values in zip("RGB", turned, strict=True):
+        assert np.allclose(world[name][there], values[there], atol=1e-5)
+        assert not world[name][~there].any()
+    mesh = trimesh.load(min((tmp_path / "world" / "mesh").iterdir()), process=False)
+    assert mesh.vertices[:, 1].min() >= world["G"][there].min() - 1e-5
+    assert mesh.vertices[:, 1].max() <= world["G"][there].max() + 1e-5
 
 
 def test_a_stopped_run_with_meshes_resumes_to_the_same_files(
