@@ -3,6 +3,7 @@
 import shutil
 import threading
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import page_folder as small
 import pytest
 from playwright.sync_api import Browser, Page, sync_playwright
 
-from psvideo.page import page_server, show_of
+from psvideo.page import page_server, show_of, write_page
 from psvideo.page.serving import PageServer
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
@@ -26,6 +27,12 @@ ALONE = [
     "--enable-unsafe-swiftshader",
 ]
 LAPTOP = {"width": 1366, "height": 768}
+SMALL = {"width": 760, "height": 480}
+"""Software rendering takes its time over every pixel."""
+PATIENCE_MS = 60_000
+KEY, RIM = (0.3, 0.8, 0.5), (-0.9, -0.2, 0.1)
+ORANGE = np.array([1.0, ((0x80 / 255 + 0.055) / 1.055) ** 2.4, 0.0])
+"""#ff8000 in linear light (IEC 61966-2-1)."""
 
 
 @pytest.fixture(scope="session")
@@ -41,14 +48,13 @@ def browser() -> Iterator[Browser]:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return small.results(tmp_path_factory.mktemp("page") / "out")
+    made = small.results(tmp_path_factory.mktemp("page") / "out")
+    broken = made / "normals" / "take_normals.1005.exr"
+    broken.write_bytes(broken.read_bytes()[:900])
+    return made
 
 
-@pytest.fixture(scope="module")
-def server(folder: Path) -> Iterator[PageServer]:
-    yield from serving(folder)
-
-
+@contextmanager
 def serving(folder: Path) -> Iterator[PageServer]:
     with page_server(show_of(folder), port=0) as one:
         thread = threading.Thread(target=one.serve_forever)
@@ -58,6 +64,12 @@ def serving(folder: Path) -> Iterator[PageServer]:
         thread.join()
 
 
+@pytest.fixture(scope="module")
+def server(folder: Path) -> Iterator[PageServer]:
+    with serving(folder) as one:
+        yield one
+
+
 class Watched:
     """A page, and everything that it complained of or asked for."""
 
@@ -65,6 +77,7 @@ class Watched:
         self.page = page
         self.complaints: list[str] = []
         self.asked: list[str] = []
+        page.set_default_timeout(PATIENCE_MS)
         page.on("console", lambda message: self.complaints.append(message.text))
         page.on("pageerror", lambda error: self.complaints.append(str(error)))
         page.on("request", lambda request: self.asked.append(request.url))
@@ -77,9 +90,8 @@ class Watched:
 
 @pytest.fixture
 def watched(browser: Browser) -> Iterator[Watched]:
-    context = browser.new_context(viewport=LAPTOP, has_touch=True)
+    context = browser.new_context(viewport=SMALL, has_touch=True)
     one = Watched(context.new_page())
-    one.page.set_default_timeout(60_000)
     yield one
     context.close()
     assert not one.complaints
@@ -89,11 +101,9 @@ def shown(page: Page, number: int) -> None:
     page.wait_for_selector(f"body[data-shown='{number}']")
 
 
-def relit_in(page: Page, **state: object) -> np.ndarray:
-    """Return the relit light (row, col, 3) as floats, read back from the graphics processor."""
-    page.evaluate("state => psvideo.change(state)", state)
-    found = page.evaluate("() => { const f = psvideo.relitValues(); return [f.width, f.height, Array.from(f.values)] }")
-    return np.array(found[2], np.float64).reshape(found[1], found[0], 4)[..., :3]
+def settled(page: Page) -> None:
+    """Wait until what was asked for is drawn."""
+    page.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
 
 def light(direction: tuple[float, float, float], **more: object) -> dict[str, object]:
@@ -101,51 +111,281 @@ def light(direction: tuple[float, float, float], **more: object) -> dict[str, ob
     return {"place": 0, "name": "L", "direction": unit, "colour": "#ffffff", "intensity": 1, "near": False} | more
 
 
-@pytest.mark.parametrize("y", ["up", "down"])
-def test_relit_light_is_albedo_times_n_dot_l_whichever_way_y_points(y: str, tmp_path: Path, watched: Watched) -> None:
-    for server in serving(small.results(tmp_path / "out", y=y)):
+def relit_in(page: Page, **state: object) -> np.ndarray:
+    """Return the relit light (row, col, 3) as floats, read back from the graphics processor."""
+    page.evaluate("state => psvideo.change(state)", state)
+    page.wait_for_function("() => !psvideo.loader.loading")
+    found = page.evaluate("() => { const f = psvideo.relitValues(); return [f.width, f.height, Array.from(f.values)] }")
+    return np.array(found[2], np.float64).reshape(found[1], found[0], 4)[..., :3]
+
+
+def albedo() -> np.ndarray:
+    return small.albedo(small.FIRST).astype(np.float16).astype(np.float64)
+
+
+def lambert(direction: tuple[float, float, float]) -> np.ndarray:
+    """Return n . l, and 0 on the far side, (row, col, 1), from the ball's equation."""
+    unit = np.array(direction) / np.linalg.norm(direction)
+    return np.maximum(small.ball()[0].astype(np.float64) @ unit, 0)[..., None]
+
+
+@pytest.mark.parametrize(("y", "world"), [("up", False), ("down", False), ("up", True), ("down", True)])
+def test_relit_light_is_albedo_times_n_dot_l_in_every_space_and_whichever_way_y_points(
+    y: str, world: bool, tmp_path: Path, watched: Watched
+) -> None:
+    with serving(small.results(tmp_path / "out", y=y, world=world)) as server:
         page = watched.open(server.url)
-        normals, _ = small.ball()
-        albedo = small.albedo(small.FIRST).astype(np.float16).astype(np.float64)
-        key, rim = (0.3, 0.8, 0.5), (-0.9, -0.2, 0.1)
-        lights = [light(key), light(rim, colour="#ff8000", intensity=0.7)]
-        found = relit_in(page, lights=lights)
-        orange = np.array([1.0, ((0x80 / 255 + 0.055) / 1.055) ** 2.4, 0.0])
-        true = sum(
-            strength * colour * albedo * np.maximum(normals @ (np.array(way) / np.linalg.norm(way)), 0)[..., None]
-            for way, colour, strength in ((key, np.ones(3), 1.0), (rim, orange, 0.7))
-        )
-        assert np.abs(found - true).max() <= 1e-3
-        assert true.max() > 0.5
+        found = relit_in(page, lights=[light(KEY), light(RIM, colour="#ff8000", intensity=0.7)])
+    true = albedo() * (lambert(KEY) + 0.7 * ORANGE * lambert(RIM))
+    assert np.abs(found - true).max() <= 1e-3
+    assert true.max() > 0.5
 
 
-def test_it_scrubs_plays_and_takes_lights_by_mouse_and_keys(server: PageServer, watched: Watched) -> None:
+@pytest.mark.parametrize("world", [False, True])
+def test_a_near_light_falls_off_with_the_square_of_its_distance_to_every_point(
+    world: bool, tmp_path: Path, watched: Watched
+) -> None:
+    """Points in widths of the picture from their median, as the page says; the position pass is in metres."""
+    with serving(small.results(tmp_path / "out", world=world, position=True)) as server:
+        page = watched.open(server.url)
+        found = relit_in(page, lights=[light(KEY, near=True, distance=0.6)])
+    normals, inside = small.ball()
+    points = small.points() / small.SCALE_M
+    points -= np.median(points[inside], axis=0)
+    lamp = 0.6 * np.array(KEY) / np.linalg.norm(KEY)
+    away = lamp - points
+    reach = np.linalg.norm(away, axis=-1)
+    facing = np.maximum((normals * away).sum(axis=-1) / reach, 0)
+    true = albedo() * (facing * (0.6 / reach) ** 2)[..., None]
+    assert np.abs(found - true)[inside].max() < 1e-3
+    flat = albedo() * lambert(KEY)
+    assert np.abs(flat - true)[inside].mean() > 0.2 * true[inside].mean()
+
+
+def test_a_highlight_is_blinns(server: PageServer, watched: Watched) -> None:
+    found = relit_in(watched.open(server.url), lights=[light(KEY)], specular=0.4, exponent=20)
+    unit = np.array(KEY) / np.linalg.norm(KEY)
+    half = unit + np.array([0, 0, 1])
+    half /= np.linalg.norm(half)
+    normals = small.ball()[0].astype(np.float64)
+    shine = 0.4 * np.maximum(normals @ half, 0) ** 20 * (normals @ unit > 0)
+    true = albedo() * lambert(KEY) + shine[..., None]
+    near = np.abs(normals @ unit) > 0.01  # at the edge of its own shadow the highlight ends at once
+    assert np.abs(found - true)[near].max() <= 4e-3  # the 20th power of a half float
+
+
+def test_it_scrubs_plays_and_takes_lights_by_mouse_finger_and_keys(server: PageServer, watched: Watched) -> None:
     page = watched.open(server.url)
     shown(page, 1001)
     page.locator("#scrub").fill("3")
     shown(page, 1004)
-    page.locator("body").click(position={"x": 60, "y": 15})
-    page.keyboard.press("End")
-    shown(page, 1006)
-    page.keyboard.press("ArrowLeft")
-    shown(page, 1005)
-    page.keyboard.press("Home")
-    shown(page, 1001)
+    page.locator("h1").click()
+    for key, number in (("End", 1006), ("ArrowLeft", 1005), ("Home", 1001), ("ArrowRight", 1002)):
+        page.keyboard.press(key)
+        shown(page, number)
+    page.locator("#number").fill("1004")
+    page.keyboard.press("Enter")
+    shown(page, 1004)
+    page.locator("h1").click()
     page.keyboard.press("Space")
-    shown(page, 1003)
+    page.wait_for_selector("#play[aria-label=Stop]")
+    page.wait_for_function("() => psvideo.state.at !== 3")
     page.keyboard.press("Space")
+    page.wait_for_selector("#play[aria-label=Play]")
     page.keyboard.press("l")
     assert page.evaluate("() => psvideo.state.lights.length") == 2
-    before = page.evaluate("() => psvideo.state.lights[1].direction")
     pane = page.locator(".pane").first.bounding_box()
     assert pane is not None
-    page.mouse.move(pane["x"] + 0.5 * pane["width"], pane["y"] + 0.5 * pane["height"])
+    middle = (pane["x"] + pane["width"] / 2, pane["y"] + pane["height"] / 2)
+    page.mouse.move(*middle)
     page.mouse.down()
-    page.mouse.move(pane["x"] + 0.6 * pane["width"], pane["y"] + 0.4 * pane["height"], steps=4)
+    page.mouse.move(middle[0] + 30, middle[1] - 40, steps=4)
     page.mouse.up()
-    after = page.evaluate("() => psvideo.state.lights[1].direction")
-    assert after != before
-    assert after[0] > 0.1
-    assert after[1] > 0.1
-    assert np.isclose(np.linalg.norm(after), 1)
+    x, y, z = page.evaluate("() => psvideo.state.lights[1].direction")
+    assert 0 < x < y
+    assert np.isclose(x * x + y * y + z * z, 1)
+    page.touchscreen.tap(middle[0] - 30, middle[1])
+    assert page.evaluate("() => psvideo.state.lights[1].direction[0]") < 0
+    page.locator(".knob").nth(0).focus()
+    before = page.evaluate("() => psvideo.state.lights[0].direction")
+    page.keyboard.press("ArrowLeft")
+    after = page.evaluate("() => psvideo.state.lights[0].direction")
+    assert after[0] < before[0]
+    assert after[1] == before[1]
+    page.keyboard.press("Delete")
+    assert page.evaluate("() => psvideo.state.lights.length") == 1
     assert all(url.startswith((server.url, "data:")) for url in watched.asked)
+
+
+def test_a_corrupt_picture_says_so_in_its_pane_and_the_others_are_shown(server: PageServer, watched: Watched) -> None:
+    page = watched.open(server.url)
+    page.locator("#scrub").fill("4")
+    shown(page, 1005)
+    message = page.locator(".pane .message").first
+    message.wait_for()
+    assert "take_normals.1005.exr" in message.inner_text()
+    page.locator("#scrub").fill("5")
+    shown(page, 1006)
+    message.wait_for(state="hidden")
+
+
+def canvas_pixel(page: Page, right: float, down: float) -> list[int]:
+    """Return the colour that the screen shows at a share of the viewer's width and height."""
+    return list(
+        page.evaluate(
+            """async ([right, down]) => {
+              psvideo.drawNow();
+              const canvas = document.getElementById("picture");
+              const copy = document.createElement("canvas");
+              copy.width = canvas.width; copy.height = canvas.height;
+              const pen = copy.getContext("2d");
+              pen.drawImage(canvas, 0, 0);
+              return Array.from(pen.getImageData(right * canvas.width, down * canvas.height, 1, 1).data);
+            }""",
+            [right, down],
+        )
+    )
+
+
+def test_views_are_chosen_by_keys_and_show_what_they_name(server: PageServer, watched: Watched) -> None:
+    page = watched.open(server.url)
+    for key, layout, panes in (("s", "one", 1), ("f", "four", 4), ("w", "wipe", 2), ("d", "two", 2), ("s", "one", 1)):
+        page.keyboard.press(key)
+        assert page.locator(f"#viewer[data-layout={layout}]").count() == 1
+        assert page.locator(".pane").count() == panes
+    page.keyboard.press("2")
+    page.wait_for_selector(".pane[data-content=normals]")
+    page.wait_for_function("() => !psvideo.loader.loading")
+    assert canvas_pixel(page, 0.5, 0.5)[:3] == pytest.approx([128, 128, 255], abs=6), "it faces the camera"
+    page.keyboard.press("4")
+    page.wait_for_selector(".legend .key.valid")
+    page.wait_for_function("() => !psvideo.loader.loading")
+    assert min(canvas_pixel(page, 0.5, 0.5)[:3]) > 200
+    page.keyboard.press("5")
+    page.wait_for_selector(".pane[data-content=depth] .legend canvas")
+    page.keyboard.press("1")
+    page.keyboard.press("v")
+    settled(page)
+    assert page.locator("#mark-invalid").is_checked()
+    page.keyboard.press("]")
+    settled(page)
+    assert "+0.25 EV" in page.locator("#part-display").inner_text()
+    page.mouse.wheel(0, -600)
+    page.keyboard.press("0")
+    assert page.evaluate("() => psvideo.state.zoom") == 1
+
+
+def test_the_pixel_under_the_pointer_is_read_out(server: PageServer, watched: Watched) -> None:
+    page = watched.open(server.url)
+    page.keyboard.press("s")
+    page.keyboard.press("3")
+    page.wait_for_function("() => !psvideo.loader.loading && psvideo.loader.shown.blocks.albedo")
+    box = page.locator("#viewer").bounding_box()
+    assert box is not None
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    told = page.locator("#pixel").inner_text()
+    assert f"{small.COLS // 2}, {small.ROWS // 2}" in told
+    assert "0.505 0.5 0.1" in told
+
+
+def test_timing_is_drawn_and_told_and_leads_to_the_picture(server: PageServer, watched: Watched) -> None:
+    page = watched.open(server.url)
+    page.keyboard.press("t")
+    page.wait_for_selector("#timing-facts dt")
+    told = page.locator("#timing-facts").inner_text()
+    for words in ("18, 18 complete", "0.012 row", "+31.2 ppm", "1 after 7", "told by the dark slot", "key", "left"):
+        assert words in told
+    box = page.locator("#timing-diagram").bounding_box()
+    assert box is not None
+    page.mouse.click(box["x"] + box["width"] - 3, box["y"] + 8)
+    shown(page, 1004)  # the picture nearest to 0.2 s
+    page.keyboard.press("t")
+    page.locator("#timing").wait_for(state="hidden")
+
+
+def test_help_opens_and_closes_and_a_laptop_shows_all_controls_with_names(browser: Browser, server: PageServer) -> None:
+    context = browser.new_context(viewport=LAPTOP)
+    watched = Watched(context.new_page())
+    page = watched.open(server.url)
+    page.keyboard.press("?")
+    page.locator("#help").wait_for()
+    assert "add a light" in page.locator("#help").inner_text()
+    page.keyboard.press("Escape")
+    page.locator("#help").wait_for(state="hidden")
+    assert page.evaluate("() => [document.documentElement.scrollWidth, document.documentElement.scrollHeight]") == [
+        LAPTOP["width"],
+        LAPTOP["height"],
+    ]
+    nameless = page.evaluate(
+        """() => [...document.querySelectorAll("button, input, select, [role=slider]")]
+             .filter((one) => !(one.getAttribute("aria-label") || one.textContent.trim() || one.labels?.length))
+             .map((one) => one.outerHTML)"""
+    )
+    assert not nameless
+    assert not page.evaluate(CONTRAST_BELOW, 4.5)
+    context.close()
+    assert not watched.complaints
+
+
+CONTRAST_BELOW = """least => {
+  const channels = (text) => text.match(/[0-9.]+/g).map(Number);
+  const level = (code) => (code /= 255) <= 0.04045 ? code / 12.92 : ((code + 0.055) / 1.055) ** 2.4;
+  const luminance = ([r, g, b]) => 0.2126 * level(r) + 0.7152 * level(g) + 0.0722 * level(b);
+  const ground = (one) => {
+    for (; one; one = one.parentElement) {
+      const [r, g, b, alpha = 1] = channels(getComputedStyle(one).backgroundColor);
+      if (alpha > 0.5) return [r, g, b];
+    }
+    return [0, 0, 0];
+  };
+  const own = (one) => [...one.childNodes].some((node) => node.nodeType === 3 && node.textContent.trim());
+  return [...document.querySelectorAll("body *")].filter((one) => own(one) && one.checkVisibility() && !one.disabled)
+    .map((one) => {
+      const [ink, back] = [luminance(channels(getComputedStyle(one).color)), luminance(ground(one))];
+      return [one.outerHTML.slice(0, 80), (Math.max(ink, back) + 0.05) / (Math.min(ink, back) + 0.05)];
+    }).filter(([, contrast]) => contrast < least);
+}"""
+"""Texts whose contrast to their ground is below a bar (WCAG 2.2, 1.4.3)."""
+
+
+def test_one_file_opens_by_itself_and_relights_alike(folder: Path, tmp_path: Path, watched: Watched) -> None:
+    page_file = tmp_path / "page.html"
+    held = write_page(show_of(folder), page_file, width_px=640, count=3)
+    assert (held.pictures, held.missing, held.width_px) == (12, 0, small.COLS)
+    assert held.total_bytes == page_file.stat().st_size
+    text = page_file.read_text()
+    assert str(tmp_path) not in text
+    assert str(folder) not in text
+    page = watched.open(page_file.as_uri())
+    found = relit_in(page, lights=[light(KEY)])
+    assert np.abs(found - albedo() * lambert(KEY)).max() <= 1e-3
+    page.keyboard.press("End")
+    shown(page, 1006)
+    page.keyboard.press("t")
+    page.wait_for_selector("#timing-facts dt")
+    assert [url for url in watched.asked if not url.startswith("data:")] == [page_file.as_uri()]
+
+
+WITHOUT_WEBGL2 = """
+const open = HTMLCanvasElement.prototype.getContext;
+HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
+  return kind === "webgl2" ? null : open.call(this, kind, ...rest);
+};"""
+
+
+def test_a_browser_without_webgl2_says_so_and_shows_flat_pictures(server: PageServer, watched: Watched) -> None:
+    watched.page.add_init_script(WITHOUT_WEBGL2)
+    page = watched.open(server.url)
+    assert "WebGL2" in page.locator("#notice").inner_text()
+    page.keyboard.press("s")
+    page.evaluate("lights => psvideo.change({ lights })", [light((0, 0, 1))])
+    page.wait_for_function("() => !psvideo.loader.loading")
+    settled(page)
+    bright = canvas_pixel(page, 0.5, 0.5)
+    base = page.evaluate("() => psvideo.bases.get('albedo')")
+    linear = np.clip(albedo()[24, 32] * base, 0, 1)
+    assert bright[:3] == pytest.approx(255 * (1.055 * linear ** (1 / 2.4) - 0.055), abs=6)
+    page.keyboard.press("2")
+    settled(page)
+    page.wait_for_function("() => !psvideo.loader.loading")
+    assert canvas_pixel(page, 0.5, 0.5)[:3] == pytest.approx([128, 128, 255], abs=8)

@@ -28,16 +28,22 @@ def albedo(number: int) -> np.ndarray:
     return np.stack([ramp, np.full_like(ramp, 0.5), np.full_like(ramp, 0.1 * (number - FIRST + 1))], axis=-1)
 
 
-def write(path: Path, channels: dict[str, np.ndarray], number: int, *, y: str = "up") -> None:
+CAMERA = np.array([[0.0, 0.0, 1.0, 3.0], [0.6, 0.8, 0.0, -2.0], [-0.8, 0.6, 0.0, 5.0], [0.0, 0.0, 0.0, 1.0]])
+"""A camera-to-world matrix: where the camera's axes point in the world (columns), and where it stands."""
+
+
+def write(path: Path, channels: dict[str, np.ndarray], number: int, *, y: str = "up", world: bool = False) -> None:
     """Write one EXR as formats.md says results are."""
     header = {
         "type": OpenEXR.scanlineimage,
         "compression": OpenEXR.ZIP_COMPRESSION,
         "framesPerSecond": RATE,
         "psvideo:time_s": 0.1 + (number - FIRST) / float(RATE),
-        "psvideo:space": "camera",
+        "psvideo:space": "world" if world else "camera",
         "psvideo:y": y,
     }
+    if world:
+        header["psvideo:camera_to_world"] = " ".join(f"{number:.9g}" for number in CAMERA.ravel())
     path.parent.mkdir(parents=True, exist_ok=True)
     stored = {name: np.ascontiguousarray(plane) for name, plane in channels.items()}
     OpenEXR.File(header, stored).write(str(path))
@@ -48,16 +54,39 @@ def rgb(image: np.ndarray) -> dict[str, np.ndarray]:
     return {name: image[..., channel].astype(np.float16) for channel, name in enumerate("RGB")}
 
 
-def results(folder: Path, *, y: str = "up") -> Path:
-    """Write a folder of results: normals, albedo, validity, depth in 32 bits, timing and report."""
+SCALE_M = 2.0
+"""How many metres one width of the picture is in the position pass."""
+
+
+def points() -> np.ndarray:
+    """Return the ball's points (row, col, 3) in the camera's frame, in metres; (0, 0, 0) around it."""
     normals, inside = ball()
-    seen = normals * np.array([1, -1 if y == "down" else 1, 1], np.float32)
-    depth = np.where(inside, 2 - 0.3 * normals[..., 2], 0).astype(np.float32)
+    radius_m = 0.45 * ROWS / COLS * SCALE_M
+    return (normals * radius_m + np.array([0, 0, -4.0])) * inside[..., None]
+
+
+def placed(vectors: np.ndarray, *, y: str, world: bool, inside: np.ndarray, shift: bool = False) -> np.ndarray:
+    """Return vectors of the camera's frame as a file holds them."""
+    found = vectors
+    if world:
+        found = (vectors @ CAMERA[:3, :3].T + (CAMERA[:3, 3] if shift else 0)) * inside[..., None]
+    return (found * np.array([1, -1 if y == "down" else 1, 1])).astype(np.float32)
+
+
+def results(folder: Path, *, y: str = "up", world: bool = False, position: bool = False) -> Path:
+    """Write a folder of results: normals, albedo, validity, depth and maybe points in 32 bits, timing and report."""
+    normals, inside = ball()
+    seen = placed(normals, y=y, world=world, inside=inside)
+    depth = np.where(inside, 1 - 0.3 * normals[..., 2], 0).astype(np.float32)
+    where = placed(points(), y=y, world=world, inside=inside, shift=True)
     for number in range(FIRST, FIRST + COUNT):
-        write(folder / "normals" / f"take_normals.{number}.exr", rgb(seen), number, y=y)
-        write(folder / "albedo" / f"take_albedo.{number}.exr", rgb(albedo(number)), number, y=y)
-        write(folder / "valid" / f"take_valid.{number}.exr", {"Y": inside.astype(np.float16)}, number, y=y)
-        write(folder / "depth" / f"take_depth.{number}.exr", {"Y": depth}, number, y=y)
+        write(folder / "normals" / f"take_normals.{number}.exr", rgb(seen), number, y=y, world=world)
+        write(folder / "albedo" / f"take_albedo.{number}.exr", rgb(albedo(number)), number, y=y, world=world)
+        write(folder / "valid" / f"take_valid.{number}.exr", {"Y": inside.astype(np.float16)}, number, y=y, world=world)
+        write(folder / "depth" / f"take_depth.{number}.exr", {"Y": depth}, number, y=y, world=world)
+        if position:
+            planes = {name: where[..., axis] for axis, name in enumerate("RGB")}
+            write(folder / "position" / f"take_position.{number}.exr", planes, number, y=y, world=world)
     (folder / "timing.json").write_text(json.dumps(timing()))
     report = {"clip": "take", "verdict": "This take is usable.", "findings": [], "lights": ["key", "left"]}
     (folder / "report.json").write_text(json.dumps(report))

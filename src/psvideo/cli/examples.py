@@ -167,10 +167,9 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     ),
     "view": (
         ("scrub normals and albedo, and move a light over them", "psvideo view out/"),
-        (
-            "at a port of your choice, opened by yourself",
-            "psvideo view out/ --port 9000 --no-browser",
-        ),
+        ("what Algorithm 1 of Hudon et al. (2015) makes of a clip, against this split", "psvideo view clip/"),
+        ("one file to send to somebody, 24 pictures of each kind", "psvideo view out/ --export page.html"),
+        ("at a port of your choice, opened by yourself", "psvideo view out/ --port 9000 --no-browser"),
     ),
     "doctor": (
         ("is everything here, and how fast is this machine?", "psvideo doctor"),

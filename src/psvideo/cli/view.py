@@ -9,22 +9,41 @@ from typing import Annotated
 import typer
 
 from psvideo.cli.console import Voice
-from psvideo.cli.options import Json, Quiet, Verbose
+from psvideo.cli.options import Force, Json, PlanPath, Quiet, Verbose
 
 
 def view(
-    path: Annotated[Path, typer.Argument(help="Results, plates, or a clip.")],
+    path: Annotated[Path, typer.Argument(help="A folder of results (out/) or plates, or a clip.")],
+    clip: Annotated[
+        Path | None,
+        typer.Option(help="The clip that results or plates came from; left out: looked for beside them."),
+    ] = None,
+    plan: PlanPath = None,
     port: Annotated[int | None, typer.Option(help="The port to listen on; left out: a free one.")] = None,
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Do not open the page in a browser.")] = False,
+    export: Annotated[
+        Path | None, typer.Option(help="Write one file that holds the page and some pictures, instead of serving.")
+    ] = None,
+    export_width: Annotated[int, typer.Option(min=64, max=8192, help="Its pictures' width at most, in pixels.")] = 480,
+    export_count: Annotated[int, typer.Option(min=1, help="How many pictures of each sequence it holds at most.")] = 24,
+    force: Force = False,
     json: Json = False,
     verbose: Verbose = False,
     quiet: Quiet = False,
 ) -> None:
     """Show a result in the browser: scrub, compare, and light it anew; only this machine can open the page."""
-    from psvideo.page import page_server, show_of
+    from psvideo.page import page_server, show_of, write_page
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
-    with page_server(show_of(path), port=port) as server:
+    show = show_of(path, clip=clip, plan=plan)
+    for note in show.notes:
+        voice.detail(note)
+    if export is not None:
+        held = write_page(show, export, width_px=export_width, count=export_count, force=force, watch=voice.track)
+        voice.result({"page": str(export), **held.record})
+        voice.say(f"{export}: {held.words}")
+        return
+    with page_server(show, port=port) as server:
         voice.say(f"{path}: {server.url} (this machine only; Ctrl-C ends it)")
         voice.result({"url": server.url, "port": server.server_port})
         sys.stdout.flush()  # whoever reads a pipe wants the address now

@@ -1,11 +1,12 @@
 """The page that shows a result and lights it anew: what is shown, and a small server of it.
 
 ``show_of`` looks at a folder of results or plates and says what can be shown of it; ``serving`` answers a browser on
-this machine only. The page itself lies in ``assets``.
+this machine only; ``single_file`` writes the page and some pictures into one file. The page itself lies in ``assets``.
 """
 
 from psvideo.page.folders import show_of
 from psvideo.page.serving import page_server
 from psvideo.page.show import Show
+from psvideo.page.single_file import write_page
 
-__all__ = ["Show", "page_server", "show_of"]
+__all__ = ["Show", "page_server", "show_of", "write_page"]

@@ -1,4 +1,4 @@
-"""What a folder of results, plates or frames has to show."""
+"""What a folder of results or plates has to show, and the clip that it was made from beside it."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -10,7 +10,8 @@ from pathlib import Path
 from psvideo.clip.about_output import is_plates, is_results
 from psvideo.clip.exr import contents, stored
 from psvideo.clip.folder import number_of
-from psvideo.errors import PsvideoError
+from psvideo.errors import PsvideoError, UsageError
+from psvideo.page.footage import show_of_clip, with_clip
 from psvideo.page.picture import Picture, shown
 from psvideo.page.show import Kind, Sequence, Show
 from psvideo.timing import read_timing, timing_record
@@ -29,18 +30,37 @@ FULL = ("depth", "position")
 """What needs more digits than halves have."""
 
 
-def show_of(path: Path, *, clip: Path | None = None) -> Show:
+def show_of(path: Path, *, clip: Path | None = None, plan: Path | None = None) -> Show:
     """Return what a folder that psvideo wrote, or a clip, has to show.
 
-    Raises PsvideoError where the folder is nothing that can be shown.
+    Beside results and plates stand the frames of their ``clip``; left out, the clip is looked for next to the folder,
+    under the name in its timing.json. ``plan`` is the clip's, where it does not lie beside it. Raises PsvideoError
+    where the path is nothing that can be shown.
     """
-    if not path.is_dir():
-        raise PsvideoError(f"{path}: there is no such folder. Name a folder of results or plates, or a clip.")
-    if is_results(path):
-        return _results(path)
-    if is_plates(path):
-        return _plates(path)
-    raise PsvideoError(f"{path}: holds neither results nor plates. Name a folder that normals or split wrote.")
+    if not path.exists():
+        raise PsvideoError(f"{path}: there is no such file or folder. Name a folder of results or plates, or a clip.")
+    if not path.is_dir() or not (is_results(path) or is_plates(path)):
+        if clip is not None:
+            raise UsageError(f"--clip: goes with a folder of results or plates, and {path} is none. Leave it out.")
+        return show_of_clip(path, plan=plan)
+    show = _results(path) if is_results(path) else _plates(path)
+    if clip is not None:
+        return with_clip(show, clip, plan=plan, timing=path / "timing.json")
+    return _with_clip_beside(show, path)
+
+
+def _with_clip_beside(show: Show, path: Path) -> Show:
+    """Add the clip that lies next to a folder, where one of the right name does; say so where it cannot be used."""
+    timing = path / "timing.json"
+    if not timing.is_file():
+        return show
+    clip = path.resolve().parent / read_timing(timing).clip
+    if not clip.is_dir() or clip == path.resolve():
+        return show
+    try:
+        return with_clip(show, clip, timing=timing)
+    except PsvideoError as fault:
+        return replace(show, notes=(*show.notes, f"The clip beside this folder is not shown. {fault}"))
 
 
 def _results(path: Path) -> Show:
@@ -66,7 +86,7 @@ def _plates(path: Path) -> Show:
     folders = sorted(entry for entry in path.iterdir() if entry.is_dir() and _files(entry))
     folders.sort(key=lambda folder: folder.name == "ambient")
     sequences = [
-        replace(_result(folder, folder.name, "light", ""), group="Plates", id=f"plate-{place}")
+        replace(_result(folder, folder.name, "light", ""), group="Plates", id=f"plate-{place}", family="camera")
         for place, folder in enumerate(folders)
         if folder.name != "flashes"
     ]
@@ -106,7 +126,9 @@ def _result(folder: Path, label: str, kind: Kind, unit: str) -> Sequence:
 def _read(files: Mapping[int, Path], kind: Kind, full: bool, number: int, width_px: int) -> Picture:
     found = stored(files[number])
     pixels = shown(found.planes, width_px, directions=kind == "normals", full=full)
-    facts = {"time_s": found.attributes.get("psvideo:time_s"), "full_width": found.planes[0].shape[1]}
+    facts: dict[str, object] = {"time_s": found.attributes.get("psvideo:time_s")}
+    if (matrix := found.attributes.get("psvideo:camera_to_world")) is not None:
+        facts["camera_to_world"] = [float(word) for word in str(matrix).split()]
     return Picture(pixels=pixels, facts=facts)
 
 

@@ -8,10 +8,10 @@ import json
 import re
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from importlib.resources import files
 from urllib.parse import parse_qs, urlsplit
 
 from psvideo.errors import PsvideoError, UsageError
+from psvideo.page.assembled import assets
 from psvideo.page.show import Show, index_of
 from psvideo.page.store import BlockStore
 
@@ -26,11 +26,6 @@ POLICY = (
 PICTURE = re.compile(r"/picture/([A-Za-z0-9_.:+-]+)/(\d{1,9})")
 STALE_S = 20.0
 """A connection on which nothing is asked for so long is closed."""
-
-
-def assets() -> dict[str, bytes]:
-    """Return the page's own files by name."""
-    return {entry.name: entry.read_bytes() for entry in files("psvideo.page").joinpath("assets").iterdir()}
 
 
 class PageServer(ThreadingHTTPServer):

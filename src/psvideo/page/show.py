@@ -20,7 +20,8 @@ class Sequence:
     """Pictures of one quantity. ``times_s`` are the instants that the pictures show, on the camera's clock.
 
     Sequences of one ``timeline`` share their numbers; those of another are put beside them by time. ``slow``: pictures
-    are computed when they are asked for, so none is made ahead.
+    are computed when they are asked for, so none is made ahead. ``family``: what is shown at one exposure, to be
+    compared; left out, the sequence by itself.
     """
 
     id: str
@@ -35,6 +36,7 @@ class Sequence:
     y: str = "up"
     space: str = "camera"
     slow: bool = False
+    family: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,6 +53,8 @@ class Show:
     findings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     facts: Mapping[str, str] = field(default_factory=dict)
+    thinned: bool = False
+    """Whether pictures were left out on purpose, so that holes in the numbers mean nothing."""
     timing: Callable[[], Mapping[str, object]] | None = None
     """Gives what the diagram of flashes is drawn from; None where nothing is known of them."""
 
@@ -73,6 +77,7 @@ def index_of(show: Show) -> dict[str, object]:
         "notes": list(show.notes),
         "facts": dict(show.facts),
         "timing": show.timing is not None,
+        "thinned": show.thinned,
         "sequences": [_entry(sequence) for sequence in show.sequences],
     }
 
@@ -90,4 +95,5 @@ def _entry(sequence: Sequence) -> dict[str, object]:
         "y": sequence.y,
         "space": sequence.space,
         "slow": sequence.slow,
+        "family": sequence.family or sequence.id,
     }

@@ -2,9 +2,9 @@
 import { directionAt } from "./lights.js";
 
 const HELP = [
-  ["Sequence", [["Space", "play and stop"], ["← →", "one picture back or on; with Shift ten"], ["Home  End", "first and last"], ["Number field", "go to a picture"]]],
-  ["Pictures", [["1 … 9", "what the active pane shows, in the list's order"], ["N", "make the next pane active"], ["S  D  F  W", "one, two or four panes, or a wipe"], ["X", "swap A and B"], ["B", "before and after: Algorithm 1 of Hudon et al. 2015 against this split"], ["Wheel, pinch", "zoom; Shift and drag moves; 0 or a double click fits"]]],
-  ["Light", [["Drag", "in the relit picture: moves the chosen light"], ["Tab, then ← → ↑ ↓", "the same by keys, on the light's handle"], ["L  Delete", "add a light; remove the chosen one"]]],
+  ["Sequence", [["Space", "play and stop"], ["← →", "one picture back or on; with Shift ten"], ["Home  End", "first and last"], ["Enter", "in the number field: go to that picture"]]],
+  ["Pictures", [["1 … 9", "what the active pane shows, in the list's order"], ["N", "make the next pane active"], ["S  D  F  W", "one, two or four panes, or a wipe"], ["X", "swap A and B"], ["B", "before and after: Algorithm 1 of Hudon et al. 2015 against this split"], ["Wheel", "or two fingers: zoom; Shift and drag moves; 0 or a double click fits"]]],
+  ["Light", [["Drag", "in the relit picture: moves the chosen light"], ["Tab ← → ↑ ↓", "the same by keys, on the light's handle"], ["L  Delete", "add a light; remove the chosen one"]]],
   ["Looking", [["[  ]", "a quarter stop darker, brighter"], ["A", "expose for this picture"], ["C", "next channel"], ["V", "hatch what is not valid"], ["T  P", "timing; panel"], ["?", "this page"]]],
 ];
 
@@ -20,13 +20,19 @@ export function buildHelp() {
     group.append(Object.assign(document.createElement("h3"), { textContent: name }));
     const list = document.createElement("dl");
     for (const [keys, words] of rows) {
-      list.append(Object.assign(document.createElement("dt"), { textContent: keys }), Object.assign(document.createElement("dd"), { textContent: words }));
+      list.append(keyNames(keys), Object.assign(document.createElement("dd"), { textContent: words }));
     }
     group.append(list);
     groups.append(group);
   }
   help.replaceChildren(title, close, groups);
   help.addEventListener("click", (event) => event.target === help && help.close());
+}
+
+function keyNames(keys) {
+  const term = document.createElement("dt");
+  term.append(...keys.split(" ").filter(Boolean).map((name) => Object.assign(document.createElement("kbd"), { textContent: name })));
+  return term;
 }
 
 export function listenToKeys(app) {

@@ -1,10 +1,12 @@
 // From what is chosen to what is drawn: which pictures a pane needs, and how they are to be looked at.
 import { percentiles, pixelAt } from "./block.js";
+import { product, toCameraOf } from "./matrix.js";
 
 export const RELIT = "relit";
 const WIDTHS = [240, 480, 960, 1920, 3840, 7680];
 const QUICK_WIDTH = 960;
 const WHITE = 0.8;
+const MOST_POINTS = 20000;
 
 // The things that a pane can show, in the order of the keys 1 to 9.
 export function contentsOf(index) {
@@ -51,6 +53,7 @@ export function nearest(times, wanted) {
 // The width of the pictures to ask for: no more than a pane can show, and at most the quick one while things move.
 export function widthFor(app, paneWidth, quick) {
   const whole = app.index.width_px;
+  if (app.fixedWidth) return app.fixedWidth;
   const shown = Math.min(paneWidth * app.state.zoom, quick ? QUICK_WIDTH : Infinity, app.mostWidth);
   const width = WIDTHS.find((candidate) => candidate >= 0.85 * shown) ?? WIDTHS[WIDTHS.length - 1];
   return Math.min(width, whole);
@@ -88,10 +91,10 @@ export function rangeOf(app, sequence, blocks) {
 const PLANE = { id: null, kind: 0, middle: [0, 0, 0], scale: 1 };
 
 // How a point of the surface is found for near lights, in widths of the picture from the subject's middle.
-export function placeOf(app, blocks, ySign) {
+function placeOf(app, blocks, ySign, view) {
   const id = placeIdOf(app);
   if (!id || !blocks[id]?.data) return PLANE;
-  if (!app.places.has(id)) app.places.set(id, id === "position" ? measured(blocks[id], ySign) : relief(blocks[id]));
+  if (!app.places.has(id)) app.places.set(id, id === "position" ? measured(blocks[id], ySign, view) : relief(blocks[id]));
   const place = app.places.get(id);
   return id === "depth" ? { ...place, scale: app.state.relief } : place;
 }
@@ -102,24 +105,34 @@ function relief(block) {
 }
 
 // The middle of the points, and how many of their units one width of the picture is, where they lie.
-export function measured(block, ySign) {
+function measured(block, ySign, { toCamera, origin }) {
   const points = [];
-  for (let v = 0.02; v < 1; v += 0.04) {
-    for (let u = 0.02; u < 1; u += 0.02) {
-      const point = pixelAt(block, u, v);
-      if (point.some((value) => value !== 0)) points.push([u, point]);
+  const step = Math.max(1, Math.floor(Math.sqrt(block.width * block.height / MOST_POINTS)));
+  for (let row = 0; row < block.height; row += step) {
+    for (let col = 0; col < block.width; col += step) {
+      const [u, v] = [(col + 0.5) / block.width, (row + 0.5) / block.height];
+      const [x, y, z] = pixelAt(block, u, v);
+      if (x || y || z) points.push([u, product(toCamera, [x - origin[0], y * ySign - origin[1], z - origin[2]])]);
     }
   }
   if (points.length < 8) return PLANE;
-  const middle = [0, 1, 2].map((axis) => median(points.map(([, point]) => point[axis])) * (axis === 1 ? ySign : 1));
+  const middle = [0, 1, 2].map((axis) => median(points.map(([, point]) => point[axis])));
   const meanU = points.reduce((sum, [u]) => sum + u, 0) / points.length;
   const spread = points.reduce((sum, [u]) => sum + (u - meanU) ** 2, 0);
   const slopes = [0, 1, 2].map((axis) => points.reduce((sum, [u, point]) => sum + (u - meanU) * point[axis], 0) / spread);
   return { id: "position", kind: 1, middle, scale: Math.max(Math.hypot(...slopes), 1e-6) };
 }
 
+// Points as they stand in the file, for showing their numbers as colours.
+function stored(app, block) {
+  const key = "position as stored";
+  if (!app.places.has(key)) app.places.set(key, measured(block, 1, toCameraOf(null)));
+  return app.places.get(key);
+}
+
 function median(values) {
-  return values.sort((a, b) => a - b)[Math.floor(values.length / 2)];
+  values.sort((a, b) => a - b);
+  return (values[(values.length - 1) >> 1] + values[values.length >> 1]) / 2;
 }
 
 // Everything that a stage needs to draw one pane; null where its picture is not there.
@@ -130,12 +143,13 @@ export function lookOf(app, content, blocks) {
   const kind = content === RELIT ? RELIT : sequence.kind;
   const { exposure, channels, lights, specular, exponent, markInvalid } = app.state;
   const ySign = sequence.y === "down" ? -1 : 1;
-  const place = kind === RELIT ? placeOf(app, present, ySign) : PLANE;
+  const view = toCameraOf(present[sequence.id].facts);
+  const place = kind === RELIT ? placeOf(app, present, ySign, view) : PLANE;
   return {
     kind, sequence, blocks: present, channels, lights, exponent, aspect: app.index.height_px / app.index.width_px,
-    place: kind === "position" ? measured(present[sequence.id], ySign) : place,
+    place: kind === "position" ? stored(app, present[sequence.id]) : place, ...view,
     markInvalid: markInvalid && Boolean(present.valid) && app.sequences.get("valid").timeline === sequence.timeline,
-    specular: sequence.space === "world" ? 0 : specular,
+    specular,
     exposure: 2 ** exposure * baseExposure(app, content, present),
     range: rangeOf(app, sequence, present),
   };

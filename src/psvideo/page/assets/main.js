@@ -2,17 +2,22 @@
 import { Source, fromPage, fromServer } from "./source.js";
 import { Loader } from "./loader.js";
 import { openStage } from "./stage.js";
-import { RELIT, contentsOf, lookOf, nearest, numberFor, sequenceOf, windowOf } from "./looks.js";
+import { RELIT, contentsOf, lookOf, windowOf } from "./looks.js";
 import { buildPanes, paneCount, tellPanes } from "./panes.js";
 import { buildPanel, tellControls, tellLights } from "./panel.js";
 import { MOST_LIGHTS, newLight } from "./lights.js";
 import { listenToPointers } from "./gestures.js";
 import { buildHelp, listenToKeys } from "./keys.js";
 import { listenToTransport, tellTransport } from "./transport.js";
+import { placeUnder, tellPixel } from "./probe.js";
+import { TimingView } from "./timing.js";
+import { FLAT_WIDTH, FlatStage } from "./flat.js";
 
 class App {
-  constructor(index, source) {
+  constructor(index, fetchBlock, fetchTiming) {
     this.index = index;
+    this.fetchTiming = fetchTiming;
+    this.timing = null;
     this.sequences = new Map(index.sequences.map((sequence) => [sequence.id, sequence]));
     this.numbers = new Map(index.sequences.map((sequence) => [sequence.id, new Set(sequence.numbers)]));
     this.master = index.sequences[0];
@@ -25,9 +30,9 @@ class App {
     this.faults = new Set();
     this.mostWidth = Infinity;
     this.state = firstState(this);
-    this.source = new Source(source, (key, block) => this.arrived(key, block));
+    this.source = new Source(fetchBlock, (key, block) => this.arrived(key, block));
     this.loader = new Loader(this, () => this.draw());
-    this.stage = openStage(this.canvas);
+    this.stage = openStage(this.canvas) ?? this.flat();
     this.drawing = false;
   }
 
@@ -50,6 +55,12 @@ class App {
     });
     this.loader.update();
     this.draw();
+  }
+
+  flat() {
+    this.mostWidth = FLAT_WIDTH;
+    notice("This browser shows no WebGL2, so pictures are small and painted by the processor. Switch hardware acceleration on in its settings, or open this page in another browser: current Firefox, Chrome, Edge and Safari have WebGL2.");
+    return new FlatStage(this.canvas);
   }
 
   // What the panes show, and how wide the widest of them is in the screen's own pixels.
@@ -119,7 +130,7 @@ class App {
 
   beforeAndAfter() {
     const before = this.index.sequences.find((sequence) => sequence.id.startsWith("hudon2015-"));
-    const after = before && this.sequences.get(before.id.replace("hudon2015-", "split-"));
+    const after = before && this.sequences.get(before.id.replace("hudon2015-", "weights-"));
     if (!after) return;
     const contents = [before.id, after.id, ...this.state.contents.slice(2)];
     this.change({ contents, layout: this.state.layout === "wipe" ? "two" : "wipe" });
@@ -156,7 +167,21 @@ class App {
     document.getElementById("panel-button").setAttribute("aria-pressed", String(!document.body.classList.contains("no-panel")));
   }
 
-  toggleTiming() {}
+  async toggleTiming() {
+    const section = document.getElementById("timing");
+    section.hidden = !section.hidden;
+    document.getElementById("timing-button").setAttribute("aria-pressed", String(!section.hidden));
+    if (!section.hidden && this.index.timing && !this.timing) await this.readTiming();
+    this.draw();
+  }
+
+  async readTiming() {
+    const facts = document.getElementById("timing-facts");
+    facts.textContent = "Finding the flashes …";
+    const record = await this.fetchTiming();
+    if (record.missing) facts.textContent = record.missing;
+    else this.timing = new TimingView(this, record);
+  }
 
   arrived(key, block) {
     if (block.missing) this.faulty(key);
@@ -198,6 +223,7 @@ class App {
     tellControls(this);
     tellTransport(this);
     this.tellBar();
+    if (this.timing && !document.getElementById("timing").hidden) this.timing.draw();
     document.body.dataset.shown = this.master.numbers[this.loader.shown.at];
     document.body.dataset.ready = Object.keys(blocks).length > 0;
   }
@@ -220,13 +246,8 @@ class App {
 
   // Say what lies under the pointer.
   pointAt(element, event) {
-    const list = document.getElementById("pixel");
-    if (!element) return;
-    const box = element.getBoundingClientRect();
-    const part = windowOf(this, box.width, box.height);
-    const u = part.x + (event.clientX - box.left) / box.width * part.width;
-    const v = part.y + (event.clientY - box.top) / box.height * part.height;
-    list.textContent = u >= 0 && u < 1 && v >= 0 && v < 1 ? `${Math.floor(u * this.index.width_px)}, ${Math.floor(v * this.index.height_px)}` : "";
+    this.under = element ? placeUnder(this, element, event) : null;
+    tellPixel(this, this.under);
   }
 
   // Linear light of the relit picture that is shown, as floats; for whoever wants numbers.
@@ -274,7 +295,10 @@ export function notice(text) {
 async function begin() {
   const inside = document.getElementById("index");
   const index = inside ? JSON.parse(inside.textContent) : await (await fetch("index.json")).json();
-  const app = new App(index, inside ? fromPage : fromServer);
+  const record = () => JSON.parse(document.getElementById("timing-record").textContent);
+  const asked = async () => (await fetch("timing.json")).json();
+  const app = new App(index, inside ? fromPage : fromServer, inside ? record : asked);
+  if (inside) app.fixedWidth = index.width_px;
   window.psvideo = app;
   app.start();
 }

@@ -5,7 +5,7 @@ import { RELIT } from "./looks.js";
 export function buildPanel(app) {
   const parts = [];
   if (app.contents.some(({ id }) => id === RELIT)) parts.push(lightsPart(app), surfacePart(app));
-  parts.push(displayPart(app), part("Pixel", "pixel", element("div", { id: "pixel", className: "facts" })), takePart(app));
+  parts.push(displayPart(app), part("Pixel", "pixel", element("dl", { id: "pixel", className: "facts", textContent: "Move over a picture." })), takePart(app));
   document.getElementById("panel").replaceChildren(...parts);
 }
 
@@ -93,9 +93,6 @@ function surfacePart(app) {
   ];
   if (app.sequences.has("depth") && !app.sequences.has("position")) {
     inside.push(slider("Relief", { id: "relief", min: 0, max: 4, step: 0.05, value: relief, show: plain(2), change: (value) => app.change({ relief: value }) }));
-  }
-  if (app.sequences.get("normals").space === "world") {
-    inside.push(element("p", { className: "hint", textContent: "Normals are in world space: lights move along the world's axes, and highlights, which need the camera's place, are off." }));
   }
   return part("Surface", "surface", ...inside);
 }

@@ -22,6 +22,8 @@ uniform bool uMarkInvalid;
 uniform int uChannels; // 0 all, 1 to 3 one of them, 4 luminance
 uniform float uExposure;
 uniform float uYSign; // -1 where y points down in the file
+uniform mat3 uToCamera; // from the frame of the file's vectors to the camera's
+uniform vec3 uOrigin; // the camera's place in that frame
 uniform float uAspect; // height over width
 uniform vec2 uRange;
 uniform vec3 uBackground, uValidInk, uInvalidInk;
@@ -50,7 +52,7 @@ vec3 pointAt(vec2 at) {
   if (uPlaceKind == 0) return vec3(flat_, 0.0);
   vec4 found = texture(uPlace, at);
   if (uPlaceKind == 2) return vec3(flat_, found.x == 0.0 ? 0.0 : -(found.x - uMiddle.x) / uMiddle.x * uScale);
-  vec3 place = found.xyz * vec3(1.0, uYSign, 1.0);
+  vec3 place = uToCamera * (found.xyz * vec3(1.0, uYSign, 1.0) - uOrigin);
   return (place - uMiddle) / uScale;
 }
 
@@ -58,7 +60,7 @@ vec3 relit(vec2 at) {
   vec3 n = texture(uMain, at).xyz * vec3(1.0, uYSign, 1.0);
   float size = length(n);
   if (size < 0.5) return vec3(0.0);
-  n /= size;
+  n = uToCamera * (n / size);
   vec3 albedo = uHasAlbedo ? texture(uAlbedo, at).rgb : vec3(0.7);
   vec3 place = pointAt(at);
   vec3 light = vec3(0.0);
@@ -102,7 +104,7 @@ void main() {
   else if (uKind == 2) shown = mix(uInvalidInk, uValidInk, clamp(value.x, 0.0, 1.0));
   else if (uKind == 3) shown = value.x == 0.0 ? uBackground
     : texture(uPalette, vec2(clamp((value.x - uRange.x) / max(uRange.y - uRange.x, 1e-9), 0.002, 0.998), 0.5)).rgb;
-  else shown = value.xyz == vec3(0.0) ? uBackground : chosen(clamp(0.5 + (value.xyz * vec3(1.0, uYSign, 1.0) - uMiddle) / uScale, 0.0, 1.0));
+  else shown = value.xyz == vec3(0.0) ? uBackground : chosen(clamp(0.5 + (value.xyz - uMiddle) / uScale, 0.0, 1.0));
   if (uMarkInvalid && uHasValid && uKind != 2 && texture(uValid, vAt).x < 0.5) {
     float stripe = step(0.5, fract((gl_FragCoord.x + gl_FragCoord.y) / 12.0));
     shown = mix(shown, mix(uInvalidInk, uValidInk, stripe), 0.55);

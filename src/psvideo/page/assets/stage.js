@@ -96,7 +96,9 @@ class Stage {
     const gl = this.gl;
     const below = this.canvas.height - rect.y - rect.height;
     gl.viewport(rect.x, below, rect.width, rect.height);
-    gl.scissor(cut.x, this.canvas.height - cut.y - cut.height, cut.width, cut.height);
+    const seen = withinPicture(look.window, rect, cut);
+    if (seen.width <= 0 || seen.height <= 0) return;
+    gl.scissor(seen.x, this.canvas.height - seen.y - seen.height, seen.width, seen.height);
     gl.uniform4f(this.uniform("uWindow"), look.window.x, look.window.y, look.window.width, look.window.height);
     gl.uniform1i(this.uniform("uLinear"), 0);
     this.set(look);
@@ -125,6 +127,8 @@ class Stage {
     gl.uniform1i(this.uniform("uGrey"), !relit && blocks[sequence.id]?.channels === 1 ? 1 : 0);
     gl.uniform1f(this.uniform("uExposure"), look.exposure);
     gl.uniform1f(this.uniform("uYSign"), sequence.y === "down" ? -1 : 1);
+    gl.uniformMatrix3fv(this.uniform("uToCamera"), true, look.toCamera);
+    gl.uniform3fv(this.uniform("uOrigin"), look.origin);
     gl.uniform1f(this.uniform("uAspect"), look.aspect);
     gl.uniform2f(this.uniform("uRange"), ...look.range);
     gl.uniform1i(this.uniform("uPlaceKind"), look.place.kind);
@@ -162,6 +166,15 @@ class Stage {
     gl.deleteTexture(target);
     return { width, height, values };
   }
+}
+
+// The part of a cut that the picture covers: what lies around it is background already.
+function withinPicture(window, rect, cut) {
+  const left = Math.max(cut.x, Math.floor(rect.x - window.x / window.width * rect.width));
+  const top = Math.max(cut.y, Math.floor(rect.y - window.y / window.height * rect.height));
+  const right = Math.min(cut.x + cut.width, Math.ceil(rect.x + (1 - window.x) / window.width * rect.width));
+  const bottom = Math.min(cut.y + cut.height, Math.ceil(rect.y + (1 - window.y) / window.height * rect.height));
+  return { x: left, y: top, width: right - left, height: bottom - top };
 }
 
 function filtered(gl, filter) {

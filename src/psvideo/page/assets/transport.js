@@ -1,5 +1,8 @@
 // Going through the sequence: the slider, its marks, play, and the figures beside them.
 
+const GO = "M4 2.5v11L13 8z";
+const STOP = "M4 3h3v10H4zM9 3h3v10H9z";
+
 export function listenToTransport(app) {
   const on = (id, act) => document.getElementById(id).addEventListener("click", act);
   on("first", () => app.go(0));
@@ -33,7 +36,7 @@ export function tellTransport(app) {
   if (document.activeElement !== number) number.value = master.numbers[state.at];
   document.getElementById("clock").textContent = `${master.times_s[state.at].toFixed(3)} s`;
   const play = document.getElementById("play");
-  play.textContent = state.playing ? "⏸" : "▶";
+  play.querySelector("path").setAttribute("d", state.playing ? STOP : GO);
   play.setAttribute("aria-label", state.playing ? "Stop" : "Play");
   const planned = app.index.fps;
   const shown = loader.rate();
@@ -55,7 +58,7 @@ function drawMarks(app) {
   const place = (at) => 8 + (wide - 16) * (numbers.length > 1 ? at / (numbers.length - 1) : 0);
   pen.fillStyle = "#d8d8d8";
   numbers.forEach((value, at) => {
-    if (at && value - numbers[at - 1] > 1) pen.fillRect(place(at - 0.5) - 1, 0, 2, 6);
+    if (at && !app.index.thinned && value - numbers[at - 1] > 1) pen.fillRect(place(at - 0.5) - 1, 0, 2, 6);
   });
   pen.fillStyle = "#d55e00";
   for (const at of app.faults) pen.fillRect(place(at) - 1.5, 0, 3, 6);

@@ -1,0 +1,129 @@
+"""The plates of one round by either method of splitting, computed from the few frames that the round touches.
+
+Algorithm 1 follows the dark row from frame to frame, so it starts at the clip's first frame, as ``split --method
+hudon2015`` does; in long clips it starts a few hundred frames before the round.
+"""
+
+import itertools
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.errors import PsvideoError
+from psvideo.timing import Timing, places_in_time, timing_record
+
+if TYPE_CHECKING:
+    from psvideo.pipeline import Take
+    from psvideo.sequence import LightPlate
+
+Method = Literal["weights", "hudon2015"]
+RUN_UP: Mapping[Method, int] = {"weights": 0, "hudon2015": 240}
+"""Frames before a round that a method looks at, where there are so many."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ComparedPlate:
+    """One light's plate of a round, as half floats (row, col[, channel])."""
+
+    image: NDArray[np.float16]
+    time_s: float
+    number: int
+
+
+class ComparedPlates:
+    """Gives a clip's plates by time; the timing is found once, and of each method the last round is kept.
+
+    What computes them is loaded when the first is asked for: it takes longer than the page itself.
+    """
+
+    def __init__(self, clip: Path, *, plan: Path | None = None, timing: Path | None = None) -> None:
+        self._clip, self._plan, self._given = clip, plan, timing
+        self._take: Take | None = None
+        self._timing: Timing | None = None
+        self._rounds: dict[Method, tuple[int, Mapping[str, ComparedPlate]]] = {}
+        self._lock = threading.Lock()
+
+    def timing(self) -> Timing:
+        """Return when every flash fired: as given, else found from all frames of the clip, which takes its time."""
+        with self._lock:
+            return self._timed()[1]
+
+    def record(self) -> Mapping[str, object]:
+        """Return what the page's diagram of flashes is drawn from."""
+        with self._lock:
+            take, timing = self._timed()
+        numbers = take.clip.numbers
+        told = {after for after, following in itertools.pairwise(numbers) if following - after > 1}
+        dropped = [
+            {"after": hole.after, "count": hole.count, "numbered": hole.after in told} for hole in timing.dropped_frames
+        ]
+        return timing_record(timing) | {"first_number": numbers[0], "dropped_frames": dropped}
+
+    def plate(self, method: Method, light: str, time_s: float) -> ComparedPlate:
+        """Return a light's plate of the round that is nearest to a time. Raises PsvideoError where there is none."""
+        with self._lock:
+            take, timing = self._timed()
+            number = _nearest_round(timing, time_s)
+            if method not in self._rounds or self._rounds[method][0] != number:
+                self._rounds[method] = (number, _plates(take, timing, method, number))
+            plates = self._rounds[method][1]
+        if light not in plates:
+            raise PsvideoError(f"Round {number} has no plate of {light} by this method.")
+        return plates[light]
+
+    def _timed(self) -> tuple["Take", Timing]:
+        from psvideo.pipeline import open_take
+        from psvideo.runs import timing_of
+
+        if self._take is None:
+            self._take = open_take(self._clip, plan=self._plan)
+        if self._timing is None:
+            self._timing = timing_of(self._take, self._given, first_light=None)
+        return self._take, self._timing
+
+
+def _nearest_round(timing: Timing, time_s: float) -> int:
+    """Return the number of the round whose complete lit flashes are nearest to a time."""
+    from psvideo.sequence import round_numbers
+
+    numbers = round_numbers(timing.flashes)
+    lit = [
+        (number, flash.start_s)
+        for number, flash in zip(numbers, timing.flashes, strict=True)
+        if flash.complete and any(flash.lights.values())
+    ]
+    if not lit:
+        raise PsvideoError("The clip holds no complete flash, so there is nothing to compare.")
+    times_s: dict[int, list[float]] = {}
+    for number, start_s in lit:
+        times_s.setdefault(number, []).append(start_s)
+    return min(times_s, key=lambda number: abs(float(np.mean(times_s[number])) - time_s))
+
+
+def _plates(take: "Take", timing: Timing, method: Method, number: int) -> Mapping[str, ComparedPlate]:
+    """Rebuild one round from the frames that it touches, and those before them that the method follows."""
+    from psvideo.pipeline import clip_rounds, timed_camera
+    from psvideo.sequence import round_numbers
+    from psvideo.shutter import frames_touched
+
+    flashes = [place for place, found in enumerate(round_numbers(timing.flashes)) if found == number]
+    first, last = frames_touched(timed_camera(take.plan, timing), timing.start_s, timing.duration_s)
+    begin, end = int(first[flashes[0]]) - RUN_UP[method], int(last[flashes[-1]]) + 1
+    places = places_in_time(timing, take.clip.numbers)
+    near = tuple(one for one in take.numbers if one in places and begin <= places[one] <= end)
+    if len(near) < 2:
+        raise PsvideoError(f"Round {number} lies where frames are missing, so its plates cannot be rebuilt.")
+    for one in clip_rounds(replace(take, numbers=near), timing, method=method):
+        if one.number == number:
+            return {plate.light: _kept(plate) for plate in one.plates}
+    return {}
+
+
+def _kept(plate: "LightPlate") -> ComparedPlate:
+    image = np.clip(plate.image, -65504, 65504).astype(np.float16)
+    return ComparedPlate(image=image, time_s=plate.time_s, number=plate.number)

@@ -1,0 +1,111 @@
+"""What the page shows of a clip: its frames, and plates by either method as the splitting commands write them."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import pytest
+
+from psvideo.cli.app import main
+from psvideo.errors import UsageError
+from psvideo.page import show_of
+from psvideo.page.show import Show, index_of
+
+SCENES = Path(__file__).resolve().parents[1] / "data_synth"
+
+
+@pytest.fixture(scope="module")
+def shoot(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a clip of a sphere, its plates by both methods, and its results."""
+    folder = tmp_path_factory.mktemp("shoot")
+    clip = folder / "clip"
+    assert main(["synth", str(SCENES / "sphere.toml"), "-o", str(clip), "-q"]) == 0
+    assert main(["split", str(clip), "-o", str(folder / "plates"), "-q"]) == 0
+    assert main(["split", str(clip), "-o", str(folder / "old"), "--method", "hudon2015", "-q"]) == 0
+    assert main(["normals", str(clip), "--rig", str(clip / "rig.toml"), "-o", str(folder / "out"), "-q"]) == 0
+    return folder
+
+
+def picture(show: Show, name: str, number: int) -> np.ndarray:
+    sequence = show.sequence(name)
+    assert sequence is not None
+    return sequence.read(number, show.width_px).pixels.astype(np.float64)
+
+
+def plate(folder: Path, light: str, number: int) -> np.ndarray:
+    (path,) = (folder / light).glob(f"*.{number}.exr")
+    channels = OpenEXR.File(str(path), separate_channels=True).channels()
+    names = ["Y"] if "Y" in channels else ["R", "G", "B"]
+    return np.stack([channels[name].pixels for name in names], axis=-1).astype(np.float64)
+
+
+def test_results_stand_beside_the_clip_they_were_made_from(shoot: Path) -> None:
+    show = show_of(shoot / "out")
+    groups = {sequence.group for sequence in show.sequences}
+    assert groups == {"Results", "Clip", "Plates by the rows' weights", "Plates by Algorithm 1"}
+    assert show.sequences[0].id == "normals"
+    assert show.sequence("frames") is not None
+
+
+@pytest.mark.parametrize("of", ["out", "clip"])
+def test_before_and_after_are_the_plates_that_the_command_writes(shoot: Path, of: str) -> None:
+    show = show_of(shoot / of)
+    master = show.sequences[0]
+    lights = [sequence for sequence in show.sequences if sequence.id.startswith("weights-")]
+    apart = []
+    for sequence in lights:
+        light = sequence.label.split(",")[0]
+        number = master.numbers[len(master.numbers) // 2]
+        found = sequence.read(number, show.width_px)
+        after = plate(shoot / "plates", light, int(str(found.facts["round"])))
+        assert np.abs(found.pixels.astype(np.float64) - after).max() < 1e-3
+        before = picture(show, sequence.id.replace("weights", "hudon2015"), number)
+        apart.append(np.abs(before - after).mean())
+    assert len(lights) >= 3
+    assert max(apart) > 0.01, "Algorithm 1 is led astray by the scene's dark rows"
+
+
+def test_algorithm_1_makes_the_plates_that_the_command_writes(shoot: Path) -> None:
+    show = show_of(shoot / "plates")
+    compared = 0
+    for sequence in show.sequences:
+        light = sequence.label.split(",")[0]
+        for number in sequence.numbers if sequence.id.startswith("hudon2015-") else ():
+            if list((shoot / "old" / light).glob(f"*.{number}.exr")):
+                found = picture(show, sequence.id, number)
+                assert np.abs(found - plate(shoot / "old", light, number)).max() < 1e-3
+                compared += 1
+    assert compared >= 3
+
+
+def test_a_clip_by_itself_shows_frames_and_finds_its_timing(shoot: Path) -> None:
+    show = show_of(shoot / "clip")
+    assert show.kind == "clip"
+    frames = show.sequences[0]
+    assert frames.id == "frames"
+    assert list(np.diff(frames.times_s)) == pytest.approx([1 / show.fps] * (len(frames.numbers) - 1))
+    assert show.timing is not None
+    record = show.timing()
+    assert record["order"] == "marker"
+    assert record["first_number"] == frames.numbers[0]
+
+
+def test_plates_show_every_light_and_the_ambient_last(shoot: Path) -> None:
+    show = show_of(shoot / "plates")
+    own = [sequence for sequence in show.sequences if sequence.group == "Plates"]
+    assert own[-1].label == "ambient"
+    number = own[0].numbers[0]
+    assert np.array_equal(picture(show, own[0].id, number), plate(shoot / "plates", own[0].label, number))
+    assert {entry["family"] for entry in index_of(show)["sequences"]} == {"camera"}  # type: ignore[attr-defined]
+
+
+def test_a_clip_that_cannot_be_used_is_said_to_be_so(shoot: Path, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="--clip"):
+        show_of(shoot / "clip", clip=shoot / "clip")
+    shutil.copytree(shoot / "out", tmp_path / "out")
+    (tmp_path / "clip").mkdir()
+    (tmp_path / "clip" / "plan.toml").write_text("nonsense")
+    show = show_of(tmp_path / "out")
+    assert {sequence.group for sequence in show.sequences} == {"Results"}
+    assert any("The clip beside this folder is not shown." in note for note in show.notes)
