@@ -156,5 +156,5 @@ def test_without_a_port_a_free_one_is_taken(server: PageServer) -> None:
 def test_a_folder_that_holds_nothing_to_show_is_named(tmp_path: Path) -> None:
     with pytest.raises(PsvideoError, match=str(tmp_path)):
         show_of(tmp_path)
-    with pytest.raises(PsvideoError, match="no such folder"):
+    with pytest.raises(PsvideoError, match="no such file or folder"):
         show_of(tmp_path / "out")
