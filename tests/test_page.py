@@ -192,6 +192,8 @@ def test_it_scrubs_plays_and_takes_lights_by_mouse_finger_and_keys(server: PageS
     page.wait_for_function("() => psvideo.state.at !== 3")
     page.keyboard.press("Space")
     page.wait_for_selector("#play[aria-label=Play]")
+    page.keyboard.press("Home")
+    shown(page, 1001)
     page.keyboard.press("l")
     assert page.evaluate("() => psvideo.state.lights.length") == 2
     pane = page.locator(".pane").first.bounding_box()
@@ -201,11 +203,12 @@ def test_it_scrubs_plays_and_takes_lights_by_mouse_finger_and_keys(server: PageS
     page.mouse.down()
     page.mouse.move(middle[0] + 30, middle[1] - 40, steps=4)
     page.mouse.up()
+    page.wait_for_function("() => psvideo.state.lights[1].direction[0] > 0")
     x, y, z = page.evaluate("() => psvideo.state.lights[1].direction")
     assert 0 < x < y
     assert np.isclose(x * x + y * y + z * z, 1)
     page.touchscreen.tap(middle[0] - 30, middle[1])
-    assert page.evaluate("() => psvideo.state.lights[1].direction[0]") < 0
+    page.wait_for_function("() => psvideo.state.lights[1].direction[0] < 0")
     page.locator(".knob").nth(0).focus()
     before = page.evaluate("() => psvideo.state.lights[0].direction")
     page.keyboard.press("ArrowLeft")

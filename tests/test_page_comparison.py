@@ -10,6 +10,7 @@ import pytest
 from psvideo.cli.app import main
 from psvideo.errors import UsageError
 from psvideo.page import show_of
+from psvideo.page.picture import Look
 from psvideo.page.show import Show, index_of
 
 SCENES = Path(__file__).resolve().parents[1] / "data_synth"
@@ -30,7 +31,7 @@ def shoot(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def picture(show: Show, name: str, number: int) -> np.ndarray:
     sequence = show.sequence(name)
     assert sequence is not None
-    return sequence.read(number, show.width_px).pixels.astype(np.float64)
+    return sequence.read(number, Look(width_px=show.width_px)).pixels.astype(np.float64)
 
 
 def plate(folder: Path, light: str, number: int) -> np.ndarray:
@@ -57,7 +58,7 @@ def test_before_and_after_are_the_plates_that_the_command_writes(shoot: Path, of
     for sequence in lights:
         light = sequence.label.split(",")[0]
         number = master.numbers[len(master.numbers) // 2]
-        found = sequence.read(number, show.width_px)
+        found = sequence.read(number, Look(width_px=show.width_px))
         after = plate(shoot / "plates", light, int(str(found.facts["round"])))
         assert np.abs(found.pixels.astype(np.float64) - after).max() < 1e-3
         before = picture(show, sequence.id.replace("weights", "hudon2015"), number)

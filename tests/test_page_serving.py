@@ -131,6 +131,13 @@ def test_smaller_normals_are_unit_vectors_of_the_mean_direction(server: PageServ
     assert np.abs(found - true).max() < 1e-3
 
 
+def test_a_quick_look_leaves_pixels_out(server: PageServer) -> None:
+    facts, pixels = unpacked(ask(server, "/picture/albedo/1002?width=32&quick=1")[1])
+    assert (facts["width"], facts["height"]) == (32, 24)
+    found = np.frombuffer(pixels, "<f2").reshape(24, 32, 3)
+    assert np.array_equal(found, small.albedo(1002).astype(np.float16)[1::2, 1::2])
+
+
 @pytest.mark.parametrize("width", ["0", "-5", "x", "15", "99999", "1e3", "٣٣"])
 def test_a_width_that_is_none_is_refused(server: PageServer, width: str) -> None:
     assert ask(server, f"/picture/normals/1001?width={quote(width)}")[0] == 400

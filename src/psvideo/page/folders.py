@@ -12,7 +12,7 @@ from psvideo.clip.exr import contents, stored
 from psvideo.clip.folder import number_of
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.page.footage import show_of_clip, with_clip
-from psvideo.page.picture import Picture, shown
+from psvideo.page.picture import Look, Picture, shown
 from psvideo.page.show import Kind, Sequence, Show
 from psvideo.timing import read_timing, timing_record
 
@@ -123,9 +123,9 @@ def _result(folder: Path, label: str, kind: Kind, unit: str) -> Sequence:
     )
 
 
-def _read(files: Mapping[int, Path], kind: Kind, full: bool, number: int, width_px: int) -> Picture:
+def _read(files: Mapping[int, Path], kind: Kind, full: bool, number: int, look: Look) -> Picture:
     found = stored(files[number])
-    pixels = shown(found.planes, width_px, directions=kind == "normals", full=full)
+    pixels = shown(found.planes, look, directions=kind == "normals", full=full)
     facts: dict[str, object] = {"time_s": found.attributes.get("psvideo:time_s")}
     if (matrix := found.attributes.get("psvideo:camera_to_world")) is not None:
         facts["camera_to_world"] = [float(word) for word in str(matrix).split()]

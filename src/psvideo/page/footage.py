@@ -10,7 +10,7 @@ import numpy as np
 from psvideo.camera import Camera
 from psvideo.clip import Clip, demosaic, open_clip, read_frames
 from psvideo.page.compared import ComparedPlates, Method
-from psvideo.page.picture import Picture, shown
+from psvideo.page.picture import Look, Picture, shown
 from psvideo.page.show import Sequence, Show
 
 METHODS: tuple[tuple[Method, str], ...] = (
@@ -44,7 +44,7 @@ def with_clip(show: Show, path: Path, *, timing: Path, plan: Path | None = None)
     clip = open_clip(path, plan=plan)
     plates = ComparedPlates(path, plan=plan, timing=timing if timing.is_file() else None)
     beside = (_frames(clip), *_compared(clip, plates, show.sequences[0]))
-    notes = (*show.notes, f"Frames are those of {path}.")
+    notes = (*show.notes, f"Frames are those of {path.name}/.")
     return replace(show, sequences=(*show.sequences, *beside), notes=notes, timing=plates.record)
 
 
@@ -68,17 +68,17 @@ def _middle_s(camera: Camera) -> float:
     return (camera.exposure_s + abs(camera.readout_s or 0.0)) / 2
 
 
-def _frame(clip: Clip, number: int, width_px: int) -> Picture:
+def _frame(clip: Clip, number: int, look: Look) -> Picture:
     image = next(iter(read_frames(clip, [number], ahead=1, threads=1))).image
     if clip.cfa is not None:
         image = demosaic(image, clip.cfa)
-    return picture_of(image, width_px)
+    return picture_of(image, look)
 
 
-def picture_of(image: np.ndarray, width_px: int, **facts: object) -> Picture:
+def picture_of(image: np.ndarray, look: Look, **facts: object) -> Picture:
     """Return linear light (row, col[, channel]) as the page shows it."""
     planes = [image] if image.ndim == 2 else [image[..., channel] for channel in range(image.shape[2])]
-    return Picture(pixels=shown(planes, width_px), facts=facts)
+    return Picture(pixels=shown(planes, look), facts=facts)
 
 
 def _compared(clip: Clip, plates: ComparedPlates, beside: Sequence) -> chain[Sequence]:
@@ -102,7 +102,7 @@ def _compared(clip: Clip, plates: ComparedPlates, beside: Sequence) -> chain[Seq
 
 
 def _plate(
-    plates: ComparedPlates, method: Method, light: str, times_s: dict[int, float], number: int, width_px: int
+    plates: ComparedPlates, method: Method, light: str, times_s: dict[int, float], number: int, look: Look
 ) -> Picture:
     found = plates.plate(method, light, times_s[number])
-    return picture_of(found.image, width_px, time_s=found.time_s, round=found.number)
+    return picture_of(found.image, look, time_s=found.time_s, round=found.number)

@@ -12,6 +12,7 @@ from urllib.parse import parse_qs, urlsplit
 
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.page.assembled import assets
+from psvideo.page.picture import Look
 from psvideo.page.show import Show, index_of
 from psvideo.page.store import BlockStore
 
@@ -109,13 +110,15 @@ class Handler(BaseHTTPRequestHandler):
     def _picture(self, name: str, number: int, query: str) -> None:
         show = self.server.show
         sequence = show.sequence(name)
-        width = parse_qs(query).get("width", [str(show.width_px)])[0]
+        asked = parse_qs(query)
+        width = asked.get("width", [str(show.width_px)])[0]
         if sequence is None or number not in sequence.numbers:
             self._refuse(HTTPStatus.NOT_FOUND, "There is no such picture.")
         elif not width.isascii() or not width.isdigit() or len(width) > 5 or int(width) not in WIDTHS_PX:
             self._refuse(HTTPStatus.BAD_REQUEST, f"width is {WIDTHS_PX.start} to {WIDTHS_PX.stop - 1} pixels.")
         else:
-            block = self.server.store.get(sequence, number, min(int(width), show.width_px))
+            look = Look(width_px=min(int(width), show.width_px), quick="quick" in asked)
+            block = self.server.store.get(sequence, number, look)
             self._answer(block, "application/octet-stream")
 
     def _answer_json(self, record: object) -> None:

@@ -7,12 +7,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from psvideo.page.picture import Picture
+from psvideo.page.picture import Look, Picture
 
 Kind = Literal["normals", "light", "mask", "heat", "position"]
 """How a sequence is shown: as directions, as light, as yes and no, as a measure in false colours, as points."""
-Reader = Callable[[int, int], Picture]
-"""Gives the picture of a number, at most so many pixels wide. Raises PsvideoError where it cannot be read."""
+Reader = Callable[[int, Look], Picture]
+"""Gives the picture of a number as it is to be looked at. Raises PsvideoError where it cannot be read."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,7 +20,7 @@ import numpy as np
 from psvideo.errors import PsvideoError
 from psvideo.files import refuse_existing, whole_file
 from psvideo.page.assembled import assets
-from psvideo.page.picture import block, missing_block
+from psvideo.page.picture import Look, block, missing_block
 from psvideo.page.show import Sequence, Show, index_of
 
 if TYPE_CHECKING:
@@ -115,7 +115,7 @@ def _only(sequence: Sequence, chosen: frozenset[int]) -> Sequence:
 def _packed(sequence: Sequence, number: int, width_px: int) -> tuple[str, bool]:
     """Return a picture's block as text, and whether it could not be read."""
     try:
-        picture = sequence.read(number, width_px)
+        picture = sequence.read(number, Look(width_px=width_px))
     except PsvideoError:  # its words name folders of this machine, and the page goes to others
         return _text(missing_block(f"{sequence.label} {number} could not be read when this page was written.")), True
     whole = block(picture)

@@ -1,4 +1,4 @@
-"""Blocks that were asked for, kept for a while, and those that will be asked for next, made ahead by threads."""
+"""Blocks that were asked for, each made once by a few threads and kept for a while."""
 
 import threading
 from collections import OrderedDict
@@ -7,44 +7,38 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 
 from psvideo.errors import PsvideoError
-from psvideo.page.picture import block, missing_block
+from psvideo.page.picture import Look, block, missing_block
 from psvideo.page.show import Sequence
 
 MOST_BYTES = 384_000_000
-AHEAD = 2
 THREADS = 2
 
 
 class BlockStore:
     """Gives blocks, each made once and kept until others need the room. May be asked by several threads at a time."""
 
-    def __init__(self, *, most_bytes: int = MOST_BYTES, ahead: int = AHEAD) -> None:
-        self._most_bytes, self._ahead = most_bytes, ahead
+    def __init__(self, *, most_bytes: int = MOST_BYTES) -> None:
+        self._most_bytes = most_bytes
         self._kept: OrderedDict[Hashable, Future[bytes]] = OrderedDict()
         self._held = 0
         self._lock = threading.Lock()
         self._pool = ThreadPoolExecutor(max_workers=THREADS, thread_name_prefix="page")
 
-    def get(self, sequence: Sequence, number: int, width_px: int) -> bytes:
-        """Return the block of one picture, and begin to make those of the next numbers."""
-        asked = self._begun(sequence, number, width_px)
-        if not sequence.slow:
-            place = sequence.numbers.index(number)
-            for following in sequence.numbers[place + 1 : place + 1 + self._ahead]:
-                self._begun(sequence, following, width_px)
-        return asked.result()
+    def get(self, sequence: Sequence, number: int, look: Look) -> bytes:
+        """Return the block of one picture. What will be wanted next, the page knows best, and asks for it early."""
+        return self._begun(sequence, number, look).result()
 
     def close(self) -> None:
         """Let go of everything; what was not begun is never made."""
         self._pool.shutdown(wait=True, cancel_futures=True)
 
-    def _begun(self, sequence: Sequence, number: int, width_px: int) -> Future[bytes]:
-        key = (sequence.id, number, width_px)
+    def _begun(self, sequence: Sequence, number: int, look: Look) -> Future[bytes]:
+        key = (sequence.id, number, look)
         with self._lock:
             if key in self._kept:
                 self._kept.move_to_end(key)
                 return self._kept[key]
-            future = self._pool.submit(_made, sequence, number, width_px)
+            future = self._pool.submit(_made, sequence, number, look)
             self._kept[key] = future
         future.add_done_callback(partial(self._weigh, key))
         return future
@@ -64,9 +58,9 @@ class BlockStore:
                     self._held -= len(kept.result())
 
 
-def _made(sequence: Sequence, number: int, width_px: int) -> bytes:
+def _made(sequence: Sequence, number: int, look: Look) -> bytes:
     """Read a picture; what cannot be read becomes a block that says so."""
     try:
-        return block(sequence.read(number, width_px))
+        return block(sequence.read(number, look))
     except PsvideoError as fault:
         return missing_block(str(fault))

@@ -66,14 +66,18 @@ export class Loader {
   }
 
   // The keys of all pictures that the panes need at a place, by the sequence's id, but for those that are slow to make.
-  keysAt(at) {
+  keysAt(at, quick = this.quick()) {
     const ids = new Set(this.app.panes().flatMap((content) => needsOf(this.app, content)));
-    return this.keysOf(at, [...ids].filter((id) => !this.app.sequences.get(id).slow));
+    return this.keysOf(at, [...ids].filter((id) => !this.app.sequences.get(id).slow), quick);
+  }
+
+  quick() {
+    return this.moving || this.app.state.playing;
   }
 
   slowKeys() {
     if (this.moving || this.app.state.playing) return [];
-    return Object.values(this.keysOf(this.app.state.at, this.slowIds()));
+    return Object.values(this.keysOf(this.app.state.at, this.slowIds(), false));
   }
 
   slowIds() {
@@ -82,28 +86,33 @@ export class Loader {
 
   // The blocks that can be drawn now: those shown, and slow ones as far as they are there.
   blocks() {
-    const slow = this.keysOf(this.shown.at, this.slowIds());
+    const slow = this.keysOf(this.shown.at, this.slowIds(), false);
     const found = Object.entries(slow).map(([id, key]) => [id, this.app.source.get(key)]);
     return { ...this.shown.blocks, ...Object.fromEntries(found.filter(([, block]) => block)) };
   }
 
+  // What is likely to be wanted next: while the place runs, where it will be by then; in play and at rest, what follows.
   keysAhead() {
+    const { at, playing } = this.app.state;
     const count = this.app.master.numbers.length;
+    const running = this.moving && !playing;
+    const stride = running ? at - this.shown.at : this.direction;
     const keys = [];
-    for (let step = 1; step <= AHEAD; step += 1) {
-      let at = this.app.state.at + step * this.direction;
-      if (this.app.state.playing) at = (at + count) % count;
-      if (at >= 0 && at < count) keys.push(...Object.values(this.keysAt(at)));
+    for (let step = 1; step <= (running ? 1 : playing ? AHEAD : 1); step += 1) {
+      let place = at + step * stride;
+      if (playing) place = (place + count) % count;
+      if (place >= 0 && place < count) keys.push(...Object.values(this.keysAt(place, true)));
     }
     return keys;
   }
 
-  keysOf(at, ids) {
-    const width = widthFor(this.app, this.app.paneWidth(), this.moving || this.app.state.playing);
+  keysOf(at, ids, quick) {
+    const { app } = this;
+    const width = widthFor(app, app.paneWidth(), quick);
     const keys = {};
     for (const id of ids) {
-      const number = numberFor(this.app, this.app.sequences.get(id), at);
-      if (number !== null) keys[id] = blockKey(id, number, width);
+      const number = numberFor(app, app.sequences.get(id), at);
+      if (number !== null) keys[id] = blockKey(id, number, width, quick && !app.fixedWidth && !app.sequences.get(id).slow);
     }
     return keys;
   }

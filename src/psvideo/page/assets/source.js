@@ -4,8 +4,9 @@ import { missingBlock, parseBlock } from "./block.js";
 const MOST_BYTES = 640e6;
 const AT_ONCE = 4;
 
-export function blockKey(id, number, width) {
-  return `${id}/${number}?width=${width}`;
+// `quick`: pixels are left out instead of averaged, which is made sooner; for what moves.
+export function blockKey(id, number, width, quick) {
+  return `${id}/${number}?width=${width}${quick ? "&quick=1" : ""}`;
 }
 
 export async function fromServer(key) {

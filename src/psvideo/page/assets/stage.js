@@ -1,9 +1,8 @@
 // Drawing with WebGL2: textures of the current pictures, panes cut out of one canvas, and light read back as floats.
-import { FRAGMENT, VERTEX } from "./shaders.js";
+import { VERTEX, fragment } from "./shaders.js";
 import { CIVIDIS, INVALID, VALID, VIRIDIS, paletteBytes, paletteOf } from "./palettes.js";
 import { lightUniforms } from "./lights.js";
 
-const KINDS = { light: 0, normals: 1, mask: 2, heat: 3, position: 4, relit: 5 };
 const UNITS = { uMain: 0, uAlbedo: 1, uValid: 2, uPlace: 3, uPalette: 4 };
 export const BACKGROUND = [0.165, 0.165, 0.165];
 
@@ -23,29 +22,39 @@ class Stage {
 
   build() {
     const gl = this.gl;
-    this.program = linked(gl);
-    this.at = new Map();
+    this.programs = new Map();
     this.textures = new Map();
-    gl.useProgram(this.program);
     const corners = gl.createBuffer();
     gl.bindBuffer(gl.ARRAY_BUFFER, corners);
     gl.bufferData(gl.ARRAY_BUFFER, new Float32Array([-1, -1, 3, -1, -1, 3]), gl.STATIC_DRAW);
-    const place = gl.getAttribLocation(this.program, "corner");
-    gl.enableVertexAttribArray(place);
-    gl.vertexAttribPointer(place, 2, gl.FLOAT, false, 0, 0);
+    gl.enableVertexAttribArray(0);
+    gl.vertexAttribPointer(0, 2, gl.FLOAT, false, 0, 0);
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
     gl.enable(gl.SCISSOR_TEST);
     this.empty = this.colours(new Uint8Array(4), 1);
     this.palettes = new Map([CIVIDIS, VIRIDIS].map((palette) => [palette, this.colours(paletteBytes(palette), 256)]));
-    for (const [name, unit] of Object.entries(UNITS)) gl.uniform1i(this.uniform(name), unit);
+  }
+
+  // Take the program for a way of looking into use, made when it is first asked for.
+  use(look, linear) {
+    const gl = this.gl;
+    const way = wayOf(look, linear);
+    const name = JSON.stringify(way);
+    const known = this.programs.has(name);
+    if (!known) this.programs.set(name, { program: linked(gl, way), at: new Map() });
+    this.current = this.programs.get(name);
+    gl.useProgram(this.current.program);
+    if (known) return;
+    for (const [sampler, unit] of Object.entries(UNITS)) gl.uniform1i(this.uniform(sampler), unit);
     gl.uniform3fv(this.uniform("uBackground"), BACKGROUND);
     gl.uniform3fv(this.uniform("uValidInk"), VALID);
     gl.uniform3fv(this.uniform("uInvalidInk"), INVALID);
   }
 
   uniform(name) {
-    if (!this.at.has(name)) this.at.set(name, this.gl.getUniformLocation(this.program, name));
-    return this.at.get(name);
+    const { at, program } = this.current;
+    if (!at.has(name)) at.set(name, this.gl.getUniformLocation(program, name));
+    return at.get(name);
   }
 
   colours(bytes, width) {
@@ -99,15 +108,15 @@ class Stage {
     const seen = withinPicture(look.window, rect, cut);
     if (seen.width <= 0 || seen.height <= 0) return;
     gl.scissor(seen.x, this.canvas.height - seen.y - seen.height, seen.width, seen.height);
-    gl.uniform4f(this.uniform("uWindow"), look.window.x, look.window.y, look.window.width, look.window.height);
-    gl.uniform1i(this.uniform("uLinear"), 0);
-    this.set(look);
+    this.set(look, look.window, false);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
 
-  set(look) {
+  set(look, window, linear) {
     const gl = this.gl;
     const { blocks, sequence } = look;
+    this.use(look, linear);
+    gl.uniform4f(this.uniform("uWindow"), window.x, window.y, window.width, window.height);
     const uses = (name, id) => {
       gl.activeTexture(gl.TEXTURE0 + UNITS[name]);
       gl.bindTexture(gl.TEXTURE_2D, id && blocks[id] ? this.texture(id, blocks[id]) : this.empty);
@@ -119,23 +128,15 @@ class Stage {
     uses("uPlace", relit ? look.place.id : null);
     gl.activeTexture(gl.TEXTURE0 + UNITS.uPalette);
     gl.bindTexture(gl.TEXTURE_2D, this.palettes.get(paletteOf(sequence)));
-    gl.uniform1i(this.uniform("uKind"), KINDS[look.kind]);
-    gl.uniform1i(this.uniform("uMarkInvalid"), look.markInvalid ? 1 : 0);
-    gl.uniform1i(this.uniform("uHasValid"), blocks.valid ? 1 : 0);
-    gl.uniform1i(this.uniform("uHasAlbedo"), blocks.albedo ? 1 : 0);
-    gl.uniform1i(this.uniform("uChannels"), look.channels);
-    gl.uniform1i(this.uniform("uGrey"), !relit && blocks[sequence.id]?.channels === 1 ? 1 : 0);
     gl.uniform1f(this.uniform("uExposure"), look.exposure);
     gl.uniform1f(this.uniform("uYSign"), sequence.y === "down" ? -1 : 1);
     gl.uniformMatrix3fv(this.uniform("uToCamera"), true, look.toCamera);
     gl.uniform3fv(this.uniform("uOrigin"), look.origin);
     gl.uniform1f(this.uniform("uAspect"), look.aspect);
     gl.uniform2f(this.uniform("uRange"), ...look.range);
-    gl.uniform1i(this.uniform("uPlaceKind"), look.place.kind);
     gl.uniform3fv(this.uniform("uMiddle"), look.place.middle);
     gl.uniform1f(this.uniform("uScale"), look.place.scale);
     const lights = lightUniforms(look.lights);
-    gl.uniform1i(this.uniform("uLightCount"), lights.count);
     gl.uniform4fv(this.uniform("uLightPlace"), lights.places);
     gl.uniform3fv(this.uniform("uLightColour"), lights.colours);
     gl.uniform1f(this.uniform("uSpecular"), look.specular);
@@ -155,9 +156,7 @@ class Stage {
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, target, 0);
     gl.viewport(0, 0, width, height);
     gl.scissor(0, 0, width, height);
-    gl.uniform4f(this.uniform("uWindow"), 0, 1, 1, -1); // the first row read is the top one
-    gl.uniform1i(this.uniform("uLinear"), 1);
-    this.set(look);
+    this.set(look, { x: 0, y: 1, width: 1, height: -1 }, true); // the first row read is the top one
     gl.drawArrays(gl.TRIANGLES, 0, 3);
     const values = new Float32Array(4 * width * height);
     gl.readPixels(0, 0, width, height, gl.RGBA, gl.FLOAT, values);
@@ -184,14 +183,27 @@ function filtered(gl, filter) {
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE);
 }
 
-function linked(gl) {
+// What of a look is written into its program: see shaders.js.
+function wayOf(look, linear) {
+  const { kind, blocks, lights } = look;
+  const relit = kind === "relit";
+  const near = relit && lights.some((light) => light.near);
+  return {
+    kind, linear, grey: !relit && blocks[look.sequence.id]?.channels === 1, channels: look.channels,
+    albedo: Boolean(blocks.albedo), valid: look.markInvalid && kind !== "mask" && !linear, place: near ? look.place.kind : 0,
+    lights: relit ? lights.length : 0, near, shine: relit && look.specular > 0,
+  };
+}
+
+function linked(gl, way) {
   const program = gl.createProgram();
-  for (const [type, text] of [[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, FRAGMENT]]) {
+  for (const [type, text] of [[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, fragment(way)]]) {
     const shader = gl.createShader(type);
     gl.shaderSource(shader, text);
     gl.compileShader(shader);
     gl.attachShader(program, shader);
   }
+  gl.bindAttribLocation(program, 0, "corner");
   gl.linkProgram(program);
   if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost()) {
     const logs = gl.getAttachedShaders(program).map((shader) => gl.getShaderInfoLog(shader));

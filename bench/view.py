@@ -1,0 +1,118 @@
+"""The page of `psvideo view` on 240 results at 1080p: how soon it is ready, and how fast it scrubs.
+
+Normals, albedo and validity of a bumpy surface with noise, drawn 960 pixels wide by Chromium with software rendering
+(SwiftShader), which shares the cores with the server and with whatever else runs. A scrub sets the slider sixty times a
+second to the next picture and counts the pictures that came onto the screen, relit. The best of some tries counts.
+"""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+from playwright.sync_api import Browser, Page, sync_playwright
+
+from bench.table import Row
+from psvideo.export.exr import write_exr
+
+COUNT, DIFFERENT = 240, 8
+ROWS, COLS = 1080, 1920
+VIEWPORT = {"width": 960 + 268, "height": 540 + 90}
+"""The page beside its panel, so that one pane is 960 pixels wide."""
+TRIES = 3
+SCRUB_MS = 4000
+FLAGS = (
+    "--no-sandbox --disable-quic --no-first-run --disable-background-networking --disable-component-update "
+    "--disable-sync --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader"
+)
+SCRUB = """async ([from, milliseconds]) => {
+  const app = psvideo, began = performance.now(), seen = new Set();
+  let at = from;
+  while (performance.now() - began < milliseconds && at < app.master.numbers.length) {
+    app.go(at);
+    at += 1;
+    await new Promise((done) => setTimeout(done, 1000 / 60));
+    seen.add(document.body.dataset.shown);
+  }
+  return [seen.size / (performance.now() - began) * 1000, at];
+}"""
+
+
+def rows() -> Iterator[Row]:
+    """Yield the table's rows."""
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as play:
+        out = Path(folder) / "out"
+        _results(out)
+        program = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))))
+        browser = play.chromium.launch(executable_path=program, args=FLAGS.split())
+        tries = [_tried(browser, out) for _ in range(TRIES)]
+        browser.close()
+    starts, readies, firsts, agains = zip(*tries, strict=True)
+    load = f"load of the machine's {os.cpu_count()} cores meanwhile {os.getloadavg()[1]:.0f}"
+    yield Row(f"command until it answers ({load})", f"{min(starts):.2f} s", "", None)
+    yield Row("address until the first relit picture is drawn", f"{min(readies):.2f} s", "2 s", min(readies) <= 2)
+    yield Row("scrubbing what was never shown", f"{max(firsts):.1f} fps", "15 fps", max(firsts) >= 15)
+    yield Row("scrubbing it again", f"{max(agains):.1f} fps", "15 fps", max(agains) >= 15)
+
+
+def _tried(browser: Browser, out: Path) -> tuple[float, float, float, float]:
+    """Return seconds until the server answers and until the page is ready, and pictures a second, new and again."""
+    call = [sys.executable, "-m", "psvideo.cli.app", "view", str(out), "--no-browser", "--json"]
+    began = time.perf_counter()
+    with subprocess.Popen(call, stdout=subprocess.PIPE, text=True) as server:
+        assert server.stdout is not None
+        told = "".join(server.stdout.readline() for _ in range(4))
+        answers_s = time.perf_counter() - began
+        page = browser.new_page(viewport=VIEWPORT)
+        began = time.perf_counter()
+        page.goto(json.loads(told)["url"])
+        page.wait_for_selector("body[data-ready=true]", timeout=120_000)
+        ready_s = time.perf_counter() - began
+        first, again = _scrubbed(page)
+        page.close()
+        server.terminate()
+    return answers_s, ready_s, first, again
+
+
+def _scrubbed(page: Page) -> tuple[float, float]:
+    page.keyboard.press("s")
+    page.wait_for_timeout(1000)
+    first, last = page.evaluate(SCRUB, [20, SCRUB_MS])
+    page.evaluate("() => psvideo.go(20)")
+    page.wait_for_timeout(1500)
+    again, _ = page.evaluate(SCRUB, [20, min(SCRUB_MS, (last - 20) * 17)])
+    return first, again
+
+
+def _results(out: Path) -> None:
+    """Write a few different results and link them to as many numbers as there are to be."""
+    rng = np.random.default_rng(7)
+    y, x = np.mgrid[0:ROWS, 0:COLS].astype(np.float32) / 60
+    for place in range(DIFFERENT):
+        slopes = np.stack([np.sin(x + place / 4), np.cos(y + place / 3), np.full_like(x, 1.5)], axis=-1)
+        slopes += rng.normal(0, 0.01, slopes.shape).astype(np.float32)
+        normals = slopes / np.linalg.norm(slopes, axis=-1, keepdims=True)
+        albedo = (0.4 + 0.2 * np.sin(x / 7 + y / 5))[..., None] + rng.normal(0, 0.005, slopes.shape)
+        valid = (np.hypot(x - 16, y - 9) < 15).astype(np.float32)
+        for name, channels in {
+            "normals": dict(zip("RGB", np.moveaxis(normals, -1, 0), strict=True)),
+            "albedo": dict(zip("RGB", np.moveaxis(albedo.astype(np.float32), -1, 0), strict=True)),
+            "valid": {"Y": valid},
+        }.items():
+            first = out / name / f"take_{name}.{1001 + place}.exr"
+            write_exr(first, channels, attributes={"psvideo:y": "up", "psvideo:time_s": 0.0}, fps=Fraction(24))
+            for number in range(1001 + place + DIFFERENT, 1001 + COUNT, DIFFERENT):
+                os.link(first, out / name / f"take_{name}.{number}.exr")
+
+
+if __name__ == "__main__":
+    from bench.table import table
+
+    print(table(rows()))
