@@ -33,6 +33,17 @@ def _list_decisions(app: Any, page: str, source: list[str]) -> None:
         source[0] += "\n```{toctree}\n:hidden:\n" + "\n".join(names) + "\n```\n"
 
 
+def _list_other_pages(app: Any, page: str, source: list[str]) -> None:
+    """Put pages that the index does not name among those on results, so that none is out of reach."""
+    if page == "docs/index":
+        named = set(source[0].splitlines())
+        others = [
+            path.stem for path in sorted(Path(app.srcdir, "docs").glob("*.md")) if path.stem not in named | {"index"}
+        ]
+        source[0] = source[0].replace("\ndepth\n", "\n" + "\n".join(["depth", *others]) + "\n")
+
+
 def setup(app: Any) -> None:
     """Called by Sphinx."""
     app.connect("source-read", _list_decisions)
+    app.connect("source-read", _list_other_pages)

@@ -1,5 +1,6 @@
 """Help that teaches: it comes at once, stands in the order of the work, and its examples are commands that work."""
 
+import json
 import re
 import shlex
 import subprocess
@@ -59,6 +60,11 @@ def test_an_example_is_a_call_that_its_command_understands(path: str, line: str)
     assert called == path or not path or called.startswith(f"{path} "), "an example shows the command it stands under"
     command = RUNNABLE[called]
     command.make_context(called, words, resilient_parsing=False)
+
+
+def test_every_command_speaks_to_machines() -> None:
+    silent = {path for path, command in RUNNABLE.items() if "json" not in {one.name for one in command.params}}
+    assert not silent
 
 
 def test_the_first_screen_says_of_each_command_what_its_own_help_says() -> None:
@@ -153,7 +159,7 @@ NOT_HERE = (
 """What the examples' folder has not: a board, other footage, more lights, a plan without a marker."""
 
 
-def test_the_examples_that_cost_little_do_what_they_say(
+def test_the_examples_that_cost_little_do_what_they_say_and_tell_machines_in_one_object(
     shoot: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(shoot)
@@ -162,7 +168,11 @@ def test_the_examples_that_cost_little_do_what_they_say(
         called, words = command_of(line)
         if called.startswith(CHEAP) and path == called and not any(word in line for word in NOT_HERE):
             extra = ["--force"] if "--force" in {o for p in RUNNABLE[called].params for o in p.opts} else []
-            assert main([*called.split(), *words, *extra]) == 0, f"{line}\n{capsys.readouterr().err}"
+            capsys.readouterr()
+            status = main([*called.split(), *words, *extra, "--json"])
+            said = capsys.readouterr()
+            assert status == 0, f"{line}\n{said.err}"
+            assert isinstance(json.loads(said.out), dict), f"{line}: one object, and nothing else"
             ran += 1
     assert ran >= 18
 

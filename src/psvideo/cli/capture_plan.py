@@ -104,7 +104,7 @@ def _list_cameras(voice: Voice) -> None:
 
     if voice.json:
         modes = [{**dataclasses.asdict(mode), "fps": str(mode.fps)} for mode in camera_modes()]
-        voice.result(modes)
+        voice.result({"cameras": modes})
     else:
         console = Console(highlight=False)
         console.width = console.width if console.is_terminal else PIPE_WIDTH

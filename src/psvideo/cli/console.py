@@ -1,10 +1,11 @@
 """What commands print: plain text or JSON on stdout; notes, warnings and progress on stderr."""
 
 import json
+import os
 import shlex
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
@@ -37,20 +38,20 @@ class Voice:
             print(text, file=sys.stderr)
 
     def warn(self, text: str) -> None:
-        """Print a warning on stderr; --json repeats warnings in its result."""
+        """Print a warning on stderr, for people and machines alike."""
         if not self.quiet:
             print(f"psvideo: warning: {text}", file=sys.stderr)
 
-    def result(self, data: object) -> None:
-        """Print the machine-readable result, where --json asked for it."""
+    def result(self, data: Mapping[str, object]) -> None:
+        """Print the machine-readable result, where --json asked for it: one object, all that stdout gets."""
         if self.json:
-            print(json.dumps(data, indent=1))
+            print(json.dumps(data, indent=1), flush=True)
 
     def track(self, items: Iterable[Item], *, total: int, what: str, unit: str = "frames") -> Iterator[Item]:
         """Pass items through and show progress with rate and time left: a bar on a terminal, plain lines elsewhere."""
         if self.quiet:
             yield from items
-        elif sys.stderr.isatty():
+        elif sys.stderr.isatty() and os.environ.get("TERM") != "dumb":
             yield from _bar(items, total, what, unit)
         else:
             yield from _lines(items, total, what, unit)
@@ -69,6 +70,15 @@ def tell_report(voice: Voice, report: "RunReport") -> None:
     voice.say(verdict(report))
     for sentence in findings(report):
         voice.warn(sentence)
+
+
+def counted(count: int, thing: str) -> str:
+    """Return a number with its noun.
+
+    >>> counted(1, "plate"), counted(0, "plate")
+    ('1 plate', '0 plates')
+    """
+    return f"{count} {thing}" if count == 1 else f"{count} {thing}s"
 
 
 def tell_kept(voice: Voice, kept: "Kept | None") -> None:

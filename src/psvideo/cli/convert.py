@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from psvideo.cli.console import Voice
+from psvideo.cli.console import Voice, counted
 from psvideo.cli.options import Force, Json, Quiet, Verbose
 
 
@@ -37,5 +37,5 @@ def convert(
     found = read_rig(rig, plan_lights=tuple(name or ()))
     for sentence in write_rig(out, found):
         voice.warn(sentence)
-    voice.say(f"{out}: {len(found.lights)} lights written ({', '.join(found.names)}).")
+    voice.say(f"{out}: {counted(len(found.lights), 'light')} written ({', '.join(found.names)}).")
     voice.result({"files": [str(file) for file in files_of(out)], "lights": list(found.names)})

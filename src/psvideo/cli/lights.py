@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from psvideo.cli.console import Voice
+from psvideo.cli.console import Voice, counted
 from psvideo.cli.options import FirstLight, Force, Frames, Json, PlanPath, Quiet, Verbose
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.files import refuse_existing, write_text
@@ -90,7 +90,7 @@ def matte_sphere(
         )
     if albedo is None:
         voice.say("Intensities are relative, their mean 1: give the sphere's --albedo to tie albedo to it.")
-    voice.say(f"{out}: {len(rig.lights)} of {len(lights)} lights written; see {out.with_suffix('.png')}.")
+    voice.say(f"{out}: {len(rig.lights)} of {counted(len(lights), 'light')} written; see {out.with_suffix('.png')}.")
     voice.result({"lights": [_matte_record(light) for light in lights]})
 
 
@@ -144,7 +144,7 @@ def flat_field(
             "the target is not evenly lit (lens falloff, or lamps that are narrow or near): the rig file holds one "
             "intensity per light, not a map, so strengths hold where the target was measured (--box)"
         )
-    voice.say(f"{out}: {len(lights)} lights written.")
+    voice.say(f"{out}: {counted(len(lights), 'light')} written.")
     voice.result(
         {
             "lights": [
@@ -192,7 +192,9 @@ def intensities(
     write_text(out, format_rig(replace(known, lights=measured)))
     for light, error in zip(measured, strengths.error, strict=True):
         voice.say(f"  {light.name:12} intensity {', '.join(f'{x:.4g}' for x in light.intensity)}  +- {error:.1%}")
-    voice.say(f"{out}: {len(measured)} lights written; intensities are relative, their mean 1 in every channel.")
+    voice.say(
+        f"{out}: {counted(len(measured), 'light')} written; intensities are relative, their mean 1 in every channel."
+    )
     voice.result({"lights": [{"name": light.name, "intensity": light.intensity} for light in measured]})
 
 
@@ -238,7 +240,7 @@ def guess(
         f"A matte surface explains {made.explained:.1%} of the pictures; {made.prior} holds to {made.spread:.1%}."
     )
     voice.warn(said)
-    voice.say(f"{out}: {len(made.rig.lights)} lights written.")
+    voice.say(f"{out}: {counted(len(made.rig.lights), 'light')} written.")
     voice.result({"guess": True, "prior": made.prior, "explained": made.explained, "spread": made.spread})
 
 

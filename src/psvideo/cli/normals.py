@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from psvideo.cli.console import Voice, command_line, tell_kept, tell_report
+from psvideo.cli.console import Voice, command_line, counted, tell_kept, tell_report
 from psvideo.cli.delivery_options import (
     AovOption,
     CameraName,
@@ -201,4 +201,4 @@ def normals(
     voice.result(report_record(report))
     voice.say(describe_timing(found))
     tell_report(voice, report)
-    voice.say(f"{out}: {len(report.instants)} instants written; see {out / 'report.html'}.")
+    voice.say(f"{out}: {counted(len(report.instants), 'instant')} written; see {out / 'report.html'}.")

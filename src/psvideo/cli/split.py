@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from psvideo.cli.console import Voice, command_line, tell_kept, tell_report
+from psvideo.cli.console import Voice, command_line, counted, tell_kept, tell_report
 from psvideo.cli.delivery_options import CodecName, CodecOption, PlatesPreviewOption, Weights, WithAmbient
 from psvideo.cli.options import (
     ClipPath,
@@ -88,4 +88,4 @@ def split(
     voice.say(describe_timing(written))
     tell_report(voice, done.report)
     plates = sum(flash.plate is not None for flash in written.flashes)
-    voice.say(f"{out}: {plates} plates written; see {out / 'report.html'}.")
+    voice.say(f"{out}: {counted(plates, 'plate')} written; see {out / 'report.html'}.")

@@ -39,7 +39,7 @@ def list_ports(json: Json = False, verbose: Verbose = False, quiet: Quiet = Fals
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     ports = serial_ports()
-    voice.result([{**asdict(port), "board": port.board, "likely": port.is_candidate} for port in ports])
+    voice.result({"ports": [{**asdict(port), "board": port.board, "likely": port.is_candidate} for port in ports]})
     likely = [port for port in ports if port.is_candidate]
     for port in ports if verbose else likely:
         voice.say(port.label)
@@ -113,7 +113,7 @@ def _check_table(voice: Voice, plan: Plan, path: Path, wanted: WiringName | None
             else:
                 found.append({"board": board.name, "wiring": wiring, "plays": True, **program_record(program, caps)})
                 voice.say(f"{board.name}, {wiring} wiring: yes.")
-    voice.result(found)
+    voice.result({"boards": found})
     if not any(row["plays"] for row in found):
         raise PsvideoError(f"{path}: no board of the table can play it (--board NAME says more).")
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from psvideo.cli.console import Voice
-from psvideo.cli.options import Force, Quiet
+from psvideo.cli.options import Force, Json, Quiet
 from psvideo.errors import UsageError
 from psvideo.files import refuse_existing, whole_file
 from psvideo.strobe.boards import BOARDS
@@ -49,6 +49,7 @@ def emulate(
         bool, typer.Option("--fast", help="As fast as it goes; then only virtual time counts, keep-alive included.")
     ] = False,
     force: Force = False,
+    json: Json = False,
     quiet: Quiet = False,
 ) -> None:
     """Emulate a strobe controller: print its port, run until stopped (Ctrl-C). Other commands take it with --port."""
@@ -56,7 +57,7 @@ def emulate(
     from psvideo.strobe.toolchain import why_not
     from psvideo.tracefile import SCHEMA
 
-    voice = Voice(quiet=quiet)
+    voice = Voice(json=json, quiet=quiet)
     if trace is not None:
         refuse_existing(trace, force=force, mark=SCHEMA)
     reason = None if board is not None else why_not()
@@ -96,7 +97,9 @@ def _imitate(voice: Voice, wiring: WiringName, trace: Path | None) -> None:
 
 
 def _introduce(voice: Voice, port: str, what: str, trace: Path | None) -> None:
-    print(port, flush=True)
+    if not voice.json:
+        print(port, flush=True)
+    voice.result({"port": port, "what": what, "trace": None if trace is None else str(trace)})
     voice.say(f"{what}; psvideo strobe run plan.toml --port {port} plays a plan on it. Ctrl-C ends it.")
     if trace is not None:
         voice.say(f"Every edge goes to {trace}, which is there when this ends.")

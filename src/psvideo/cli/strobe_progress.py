@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -24,7 +25,7 @@ def watching(voice: Voice, program: Program, *, lasts_s: float | None) -> Iterat
 
     if voice.quiet:
         yield lambda beat: None
-    elif sys.stderr.isatty():
+    elif sys.stderr.isatty() and os.environ.get("TERM") != "dumb":
         with Live(console=Console(stderr=True), transient=True, auto_refresh=False) as live:
             yield lambda beat: live.update(Text(beat_words(beat, program, lasts_s=lasts_s)), refresh=True)
     else:
