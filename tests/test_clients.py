@@ -5,7 +5,10 @@ import json
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
+from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import av
 import cv2
@@ -13,6 +16,7 @@ import numpy as np
 import pytest
 from ball_delivery import NUMBERS, SIZE, ball, deliver
 
+from psvideo.export.movie import write_movie
 from psvideo.export.png import PNG_MAX, encode_normals
 from psvideo.export.space import Space
 
@@ -153,19 +157,57 @@ TEXTURE = """async ([data, convert]) => {
 }"""
 
 
-def test_a_browser_hands_a_png_of_normals_to_webgl_as_it_is_where_conversion_is_off(out: Path) -> None:
+VIDEO = """async ([data, at]) => {
+    const video = document.createElement("video");
+    video.muted = true;
+    video.src = "data:video/mp4;base64," + data;
+    await new Promise((done, fail) => {
+        video.onloadeddata = done;
+        video.onerror = () => fail(video.error.message);
+    });
+    const shown = new Promise((done) => video.requestVideoFrameCallback(done));
+    video.currentTime = at;
+    await shown;
+    const canvas = document.createElement("canvas");
+    [canvas.width, canvas.height] = [video.videoWidth, video.videoHeight];
+    const context = canvas.getContext("2d");
+    context.drawImage(video, 0, 0);
+    return [video.duration, canvas.width, Array.from(context.getImageData(0, 0, canvas.width, canvas.height).data)];
+}"""
+
+
+@pytest.fixture(scope="module")
+def page() -> Iterator[Any]:
+    """A page in a real browser."""
     play = pytest.importorskip("playwright.sync_api")
     programs = map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))
     program = next(filter(None, programs), None)
     if program is None:
         pytest.skip("needs a Chromium browser: tests/install.sh installs it")
-    data = base64.b64encode((out / "normals_png16" / f"ball_normals.{NUMBER}.png").read_bytes()).decode()
     words = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
     with play.sync_playwright() as started:
         browser = started.chromium.launch(executable_path=program, args=words)
-        page = browser.new_page()
-        read = [np.array(page.evaluate(TEXTURE, [data, convert])) for convert in (False, True)]
+        yield browser.new_page()
         browser.close()
+
+
+def text_of(path: Path) -> str:
+    return base64.b64encode(path.read_bytes()).decode()
+
+
+def test_a_browser_hands_a_png_of_normals_to_webgl_as_it_is_where_conversion_is_off(out: Path, page: Any) -> None:
+    data = text_of(out / "normals_png16" / f"ball_normals.{NUMBER}.png")
+    read = [np.array(page.evaluate(TEXTURE, [data, convert])) for convert in (False, True)]
     raw, converted = (values.reshape(SIZE, SIZE, 4)[..., :3] / 255 * 2 - 1 for values in read)
     assert np.abs(raw - ball(NUMBER)[0]).max() < 2 / 255, "browsers keep 8 bits"
     assert np.abs(converted - ball(NUMBER)[0]).max() > 0.4
+
+
+def test_a_browser_plays_a_preview_in_its_colours(page: Any, tmp_path: Path) -> None:
+    colours = np.array([[255, 0, 0], [0, 255, 0], [0, 0, 255], [128, 128, 255], [0, 0, 0], [200, 90, 30]], np.uint8)
+    picture = np.repeat(np.repeat(colours[None], 32, axis=0), 32, axis=1)
+    write_movie(tmp_path / "a.mp4", [picture] * 12, fps=Fraction(24))
+    length_s, width, pixels = page.evaluate(VIDEO, [text_of(tmp_path / "a.mp4"), 0.25])
+    assert length_s == pytest.approx(0.5)
+    shown = np.array(pixels).reshape(32, width, 4)[16, 16::32, :3]
+    assert np.abs(shown - colours.astype(int)).max() <= 16
