@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from psvideo.cli.app import main
@@ -30,6 +30,7 @@ def rig_of(directions: list[Vector], intensity: list[tuple[float, ...]]) -> Rig:
     return Rig(lights=tuple(lights))
 
 
+@settings(max_examples=40, deadline=None)
 @given(st.lists(st.tuples(vectors, strengths), min_size=1, max_size=6))
 def test_a_rig_survives_the_lists_of_diligent_and_rti(
     tmp_path_factory: pytest.TempPathFactory, lights: list[tuple[Vector, tuple[float, ...]]]
