@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from psvideo.calibrate.highlights import Found, Spot, find_highlights
 from psvideo.calibrate.light_pictures import LightPictures
-from psvideo.calibrate.sphere_outline import Outline, edge_pictures, find_outlines, fit_outline, given_outline
+from psvideo.calibrate.sphere_outline import Outline, find_outlines, follow_outline, given_outline
 from psvideo.calibrate.sphere_search import Grey
 from psvideo.calibrate.sphere_view import View
 from psvideo.camera import FloatArray
@@ -100,7 +100,7 @@ def sight_spheres(
             outlines = _first_outlines(pictures, looking, where, room)
             fits, found = [[] for _ in outlines], [[] for _ in outlines]
         for n, outline in enumerate(outlines):
-            fits[n].append(outline.place if outline.given or count == 1 else _again(pictures, outline))
+            fits[n].append(outline.place if outline.given or count == 1 else follow_outline(pictures, outline))
             found[n].append(find_highlights(pictures, outline))
     if shown is None:
         raise PsvideoError(f"{where}: holds no pictures of lights. Name a folder of stills or plates, or a clip.")
@@ -122,15 +122,13 @@ def _first_outlines(
     if looking.circles:
         outlines = [given_outline(view, circle) for circle in looking.circles]
     else:
-        seen = edge_pictures(pictures)
-        if room is not None:
-            if room.shape[:2] != shown.shape:
-                raise UsageError(
-                    f"{where}: the picture for the outline is {room.shape[1]} x {room.shape[0]} pixels, and those of "
-                    f"the lights are {shown.shape[1]} x {shown.shape[0]}. Take both with the same camera and mode."
-                )
-            seen.append(room if room.ndim == 2 else room.mean(axis=2, dtype=np.float32))
-        outlines = find_outlines(seen, view, count=looking.spheres)
+        if room is not None and room.shape[:2] != shown.shape:
+            raise UsageError(
+                f"{where}: the picture for the outline is {room.shape[1]} x {room.shape[0]} pixels, and those of "
+                f"the lights are {shown.shape[1]} x {shown.shape[0]}. Take both with the same camera and mode."
+            )
+        bright = room.mean(axis=2, dtype=np.float32) if room is not None and room.ndim == 3 else room
+        outlines = find_outlines(pictures, view, count=looking.spheres, room=bright)
     if len(outlines) < max(looking.spheres, 1) and not looking.circles:
         raise SphereNotFoundError(_not_found(where, len(outlines), looking.spheres), shown)
     for outline in outlines:
@@ -165,13 +163,6 @@ def _refuse_cut(outline: Outline, where: str, shown: Grey) -> None:
             "it; or, if that is not the sphere, mark it with --circle x,y,radius.",
             shown,
         )
-
-
-def _again(pictures: LightPictures, outline: Outline) -> FloatArray:
-    """Return the outline's place fitted anew in another set's pictures; where that fails, the first one."""
-    fits = [fit for picture in edge_pictures(pictures) if (fit := fit_outline(picture, outline.view, outline))]
-    near = [fit for fit in fits if fit.coverage >= 0.8 * outline.coverage]
-    return min(near, key=lambda fit: fit.blur_px).place if near else outline.place
 
 
 def _sighting(

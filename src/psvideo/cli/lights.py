@@ -47,7 +47,7 @@ def matte_sphere(
 ) -> None:
     """Measure directions and intensities of lights from a matte sphere; writes rig.toml and a picture beside it."""
     from psvideo.calibrate.matte_sphere import matte_rig, measure_matte_sphere
-    from psvideo.calibrate.sphere_outline import edge_pictures, find_outlines, given_outline
+    from psvideo.calibrate.sphere_outline import find_outlines, given_outline
     from psvideo.calibrate.sphere_sighting import Looking
     from psvideo.light_sets import Reading
     from psvideo.rigfile import SCHEMA, format_rig
@@ -60,7 +60,7 @@ def matte_sphere(
     found = _read(pictures, Reading(plan=plan, frames=frames, first_light=first_light, transfer=transfer), voice)
     view = Looking(focal_px=focal_px).view(width_px=found.width_px, height_px=found.height_px)
     if circle is None:
-        outlines = find_outlines(edge_pictures(found), view)
+        outlines = find_outlines(found, view, surface="matte")
         if not outlines:
             raise PsvideoError(
                 f"{pictures}: no sphere was found. Give its outline with --circle x,y,radius in pixels, counted from "

@@ -1,0 +1,47 @@
+"""A mirror's outline in rooms that it mirrors: windows along the rim, stands, blur, noise; the truth is known."""
+
+import numpy as np
+import pytest
+from bench.mirror_rooms import Panel, Room, film
+from bench.mirror_scene import Ball, Lamp, Lens
+
+from psvideo.calibrate.light_pictures import light_pictures
+from psvideo.calibrate.sphere_outline import Outline, find_outlines
+from psvideo.calibrate.sphere_view import View
+
+LENS = Lens(width=190, height=190, focal=800.0)
+BALL = Ball(centre=(0.01, -0.006, -0.6), radius_m=0.045)
+LAMPS = [Lamp(direction=way) for way in ((0.3, 0.4, 0.87), (-0.5, 0.2, 0.84), (0.1, -0.4, 0.9))]
+WASHES = ((1.0, 0.5, 0.0), (0.5, -0.6, 0.3), (0.8, 0.0, -0.5))
+WINDOW = Panel(towards=(1.0, 0.3, -0.6), half_deg=(6.0, 20.0), brightness=0.3)
+ROOMS = {
+    "chrome before a bright wall": Room(wall=0.4, washes=WASHES, blur_px=1.2),
+    "black glass before a bright wall, its rim fading": Room(wall=0.3, washes=WASHES, facing=0.05, blur_px=1.8),
+    "a window along the rim, a stand that hides the foot": Room(
+        wall=0.15, washes=WASHES, panels=(WINDOW,), stand=0.3, blur_px=1.0
+    ),
+    "an edge in the wall": Room(wall=0.1, washes=WASHES, step=(30.0, 1.0, 4.0), blur_px=0.8, noise=0.004),
+}
+
+
+def truth() -> np.ndarray:
+    x, y, z = BALL.centre
+    middle = LENS.middle + LENS.focal * np.array([x, -y]) / -z
+    return np.array([*middle, LENS.focal * np.tan(np.arcsin(BALL.radius_m / np.linalg.norm(BALL.centre)))])
+
+
+def outline_in(room: Room, *, seed: int = 0) -> Outline:
+    pictures = light_pictures("abc", film(LENS, BALL, LAMPS, room, seed=seed))
+    found = find_outlines(pictures, View(focal_px=LENS.focal, principal_px=(94.5, 94.5)))
+    assert len(found) == 1
+    return found[0]
+
+
+@pytest.mark.parametrize("name", ROOMS)
+def test_an_outline_is_found_where_the_ball_ends_and_its_error_is_owned(name: str) -> None:
+    found = outline_in(ROOMS[name])
+    away = found.place[:3] - truth()
+    own = np.sqrt(np.diag(found.covariance)[:3])
+    assert np.abs(away).max() < 0.6
+    assert (np.abs(away) < 2.5 * own).all()
+    assert own.max() < 1.5
