@@ -1,8 +1,11 @@
 """What the page shows of a clip: its frames, and plates by either method as the splitting commands write them."""
 
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
+import cv2
 import numpy as np
 import OpenEXR
 import pytest
@@ -13,7 +16,8 @@ from psvideo.page import show_of
 from psvideo.page.picture import Look
 from psvideo.page.show import Show, index_of
 
-SCENES = Path(__file__).resolve().parents[1] / "data_synth"
+ROOT = Path(__file__).resolve().parents[1]
+SCENES = ROOT / "data_synth"
 
 
 @pytest.fixture(scope="module")
@@ -99,6 +103,22 @@ def test_plates_show_every_light_and_the_ambient_last(shoot: Path) -> None:
     number = own[0].numbers[0]
     assert np.array_equal(picture(show, own[0].id, number), plate(shoot / "plates", own[0].label, number))
     assert {entry["family"] for entry in index_of(show)["sequences"]} == {"camera"}  # type: ignore[attr-defined]
+
+
+def test_the_pictures_of_the_documentation_can_be_taken(shoot: Path, tmp_path: Path) -> None:
+    """In a process of its own: a browser may be open in this one."""
+    call = [sys.executable, "-m", "bench.view_pictures", str(shoot), str(tmp_path)]
+    subprocess.run(call, check=True, cwd=ROOT, capture_output=True, timeout=600)
+    taken = sorted(tmp_path.glob("*.png"))
+    assert [path.name for path in taken] == sorted(
+        path.name for path in (ROOT / "docs" / "pictures").glob("view_*.png")
+    )
+    for path in taken:
+        picture = cv2.imread(str(path))
+        assert picture is not None
+        assert picture.shape == (522, 928, 3)
+        assert picture[70:280, 70:640].std() > 10, "something is shown"
+        assert path.stat().st_size < 400_000
 
 
 def test_a_clip_that_cannot_be_used_is_said_to_be_so(shoot: Path, tmp_path: Path) -> None:

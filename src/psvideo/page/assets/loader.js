@@ -15,6 +15,7 @@ export class Loader {
     this.arrivals = [];
     this.restTimer = 0;
     this.direction = 1;
+    this.early = NaN;
   }
 
   // Say that the place, the panes or their sizes have changed. `moving`: more changes are likely at once.
@@ -30,20 +31,29 @@ export class Loader {
     const { app } = this;
     for (let turn = 0; turn < 2; turn += 1) {
       if (!this.loading) {
-        const keys = this.keysAt(app.state.at);
-        if (this.shown.at === app.state.at && same(keys, this.shown.keys)) break;
-        this.loading = { at: app.state.at, keys };
+        const at = this.next();
+        const keys = this.keysAt(at);
+        if (this.shown.at === at && same(keys, this.shown.keys)) break;
+        this.loading = { at, keys, ahead: this.keysAhead(at) };
       } else if (!this.moving && this.loading.at === app.state.at) {
         this.loading.keys = this.keysAt(app.state.at);
       }
       const missing = Object.values(this.loading.keys).filter((key) => !app.source.get(key));
       if (missing.length) {
-        app.source.want([...missing, ...this.slowKeys(), ...this.keysAhead()]);
+        app.source.want([...missing, ...this.slowKeys(), ...this.loading.ahead]);
         return;
       }
       this.show();
     }
-    app.source.want([...this.slowKeys(), ...this.keysAhead()]);
+    app.source.want([...this.slowKeys(), ...this.keysAhead(app.state.at)]);
+  }
+
+  // The place to load now: the wanted one; while it runs, one on the way there that was asked for early, if there is any.
+  next() {
+    const { at } = this.app.state;
+    const early = this.early;
+    const onTheWay = (early - this.shown.at) * (at - early) >= 0 && early !== this.shown.at;
+    return this.moving && !this.app.state.playing && onTheWay ? early : at;
   }
 
   show() {
@@ -92,11 +102,12 @@ export class Loader {
   }
 
   // What is likely to be wanted next: while the place runs, where it will be by then; in play and at rest, what follows.
-  keysAhead() {
-    const { at, playing } = this.app.state;
+  keysAhead(at) {
+    const { playing } = this.app.state;
     const count = this.app.master.numbers.length;
     const running = this.moving && !playing;
     const stride = running ? at - this.shown.at : this.direction;
+    this.early = running ? at + stride : NaN;
     const keys = [];
     for (let step = 1; step <= (running ? 1 : playing ? AHEAD : 1); step += 1) {
       let place = at + step * stride;

@@ -215,6 +215,7 @@ class App {
       if (look === null) return;
       const box = element.getBoundingClientRect();
       const rect = scaled({ x: box.left - whole.left, y: box.top - whole.top, width: box.width, height: box.height }, ratio);
+      look.quick = this.loader.quick(); // software rendering takes half as long without mixing neighbours
       look.window = windowOf(this, box.width, box.height);
       this.stage.draw(look, rect, this.cutOf(rect, place));
     });

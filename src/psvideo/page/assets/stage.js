@@ -67,12 +67,15 @@ class Stage {
   }
 
   // The texture of a sequence's current picture; it is sent again only when the picture is another.
-  texture(id, block) {
+  texture(id, block, quick) {
     const gl = this.gl;
     let held = this.textures.get(id);
-    if (held && held.block === block) return held.texture;
-    if (!held) this.textures.set(id, (held = { texture: gl.createTexture(), size: "" }));
+    if (!held) this.textures.set(id, (held = { texture: gl.createTexture(), size: "", filter: null, block: null }));
     gl.bindTexture(gl.TEXTURE_2D, held.texture);
+    const filter = block.half && !quick ? gl.LINEAR : gl.NEAREST;
+    if (held.filter !== filter) filtered(gl, filter);
+    held.filter = filter;
+    if (held.block === block) return held.texture;
     const format = block.channels === 1 ? gl.RED : gl.RGB;
     const inside = block.channels === 1 ? (block.half ? gl.R16F : gl.R32F) : block.half ? gl.RGB16F : gl.RGB32F;
     const type = block.half ? gl.HALF_FLOAT : gl.FLOAT;
@@ -81,7 +84,6 @@ class Stage {
       gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, block.width, block.height, format, type, block.data);
     } else {
       gl.texImage2D(gl.TEXTURE_2D, 0, inside, block.width, block.height, 0, format, type, block.data);
-      filtered(gl, block.half ? gl.LINEAR : gl.NEAREST);
     }
     held.block = block;
     held.size = size;
@@ -119,7 +121,7 @@ class Stage {
     gl.uniform4f(this.uniform("uWindow"), window.x, window.y, window.width, window.height);
     const uses = (name, id) => {
       gl.activeTexture(gl.TEXTURE0 + UNITS[name]);
-      gl.bindTexture(gl.TEXTURE_2D, id && blocks[id] ? this.texture(id, blocks[id]) : this.empty);
+      gl.bindTexture(gl.TEXTURE_2D, id && blocks[id] ? this.texture(id, blocks[id], look.quick) : this.empty);
     };
     const relit = look.kind === "relit";
     uses("uMain", relit ? "normals" : sequence.id);
