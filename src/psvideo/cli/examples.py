@@ -52,6 +52,14 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("the real firmware on an emulated chip, its edges in a file", "psvideo strobe emulate --trace edges.csv"),
         ("an imitation in Python, on every system", "psvideo strobe emulate --board python"),
     ),
+    "check": (
+        ("can this take be used, and if not, what is to change on set?", "psvideo check clip/"),
+        ("hold the plates against the rig as well", "psvideo check clip/ --rig rig.toml"),
+        (
+            "every take that is copied into a folder, with one plan for all, and a page that others may look at",
+            "psvideo check --watch takes/ --plan plan.toml --report checks.html",
+        ),
+    ),
     "calibrate": (
         (
             "where the lights are, from a chrome ball",

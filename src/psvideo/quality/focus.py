@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 AGAIN_PX = 1.5
 """Standard deviation of the second blur."""
-LEAST_EDGES = 60
+LEAST_EDGES = 40
 SHARPEST = 0.1
 NOISE_FACTOR = 8.0
 LARGEST_PX = 1600

@@ -17,6 +17,8 @@ MOST_CLIPPED, LOST_CLIPPED = 0.02, 0.1
 SPARE_CLIPPED = 0.25
 """With more lamps than three the others still tell the normal."""
 MOST_AMBIENT, LOST_AMBIENT = 0.1, 0.5
+NOTICED, MOST_SWING = 0.05, 0.1
+"""Ambient light of more than the first share that changes from dark slot to dark slot by more than the second."""
 NO_LIGHT, WEAK_LIGHT = 0.01, 1 / 8
 """Shares of the brightest lamp's light."""
 MISSED = 0.5
@@ -40,7 +42,7 @@ def exposure(observed: Observed) -> Iterator[Judgement]:
             grade="bad" if top < DARK_STOPS else "doubtful",
             found=f"The picture is dark: its brightest parts under the brightest light are {-top:.1f} stops below "
             "saturation, so noise is large.",
-            advice=f"Open the aperture by about {_half(BEST_STOPS - top):g} stops, or flash longer or stronger.",
+            advice=f"Open the aperture by about {_half(BEST_STOPS - top)}, or flash longer or stronger.",
         )
     elif not clipped:
         yield Judgement(
@@ -67,8 +69,7 @@ def _clipping(levels: dict[str, Levels]) -> Iterator[Judgement]:
             subject="clipping",
             grade="bad" if max(shares) > lost else "doubtful",
             found=f"Every light clips: {100 * min(shares):.0f} to {100 * max(shares):.0f} % of the subject.",
-            advice=f"Close the aperture by about {_half(-np.log2(power)):g} stops, or lower all powers to "
-            f"{_percent(power)}.",
+            advice=f"Close the aperture by about {_half(-np.log2(power))}, or lower all powers to {_percent(power)}.",
         )
         return
     for light, one in over.items():
@@ -80,35 +81,37 @@ def _clipping(levels: dict[str, Levels]) -> Iterator[Judgement]:
         )
 
 
-def _half(stops: float) -> float:
-    return max(round(2 * float(stops)) / 2, 0.5)
+def _half(stops: float) -> str:
+    halves = max(round(2 * float(stops)), 1)
+    return f"{halves / 2:g} {'stop' if halves <= 2 else 'stops'}"
 
 
 def _percent(power: float) -> str:
     return f"{max(5 * int(20 * power), 5)} %"
 
 
-def lamps(observed: Observed, intensities: dict[str, float] | None = None) -> Iterator[Judgement]:
-    """Judge whether every lamp gives light, always, and steadily. ``intensities`` are what the rig says of them."""
+def lamps(observed: Observed, *, timed: bool = True) -> Iterator[Judgement]:
+    """Judge whether every lamp gives light, always, and steadily; where flash times are not sure (``timed``), only
+    whether it does at all."""
     facts = [one for one in observed.facts if len(one.levels) == len(observed.lights)]
     if not facts:
         return
     level = np.array([one.levels for one in facts])
     usual = np.median(level, axis=0)
-    rated = np.array([(intensities or {}).get(light, 1.0) for light in observed.lights])
-    relative = usual / rated / max(float((usual / rated).max()), 1e-12)
+    relative = usual / max(float(usual.max()), 1e-12)
     said = list(_weak(observed.lights, relative))
     alive = usual > NO_LIGHT * usual.max()
-    said += _missed(observed.lights, facts, level, usual, alive)
-    said += _unsteady(observed.lights, facts, level, usual, alive)
+    if timed:
+        said += _missed(observed.lights, facts, level, usual, alive)
+        said += _unsteady(observed.lights, facts, level, usual, alive)
     yield from said
     if not said:
-        spread = -np.log2(relative.min())
+        spread = -np.log2(max(relative.min(), 1e-9))
         yield Judgement(
             subject="lights",
             grade="good",
-            found=f"All {len(observed.lights)} lights fire in every round; the weakest gives {spread:.1f} stops less "
-            "than the strongest.",
+            found=f"All {len(observed.lights)} lights fire{' in every round' if timed else ''}; the weakest gives "
+            f"{spread:.1f} stops less than the strongest.",
         )
 
 
@@ -176,6 +179,7 @@ def _unsteady(
 def ambient(observed: Observed) -> Judgement:
     """Judge how much of what is recorded is light that is always there."""
     shares = [one.ambient for one in observed.facts if one.ambient is not None]
+    swing = float(np.std(shares)) / max(float(np.mean(shares)), 1e-9) if len(shares) > 2 else 0.0
     if not shares:
         return Judgement(
             subject="ambient",
@@ -184,7 +188,9 @@ def ambient(observed: Observed) -> Judgement:
         )
     share = float(np.median(shares))
     found = f"Ambient light is {100 * share:.0f} % of the signal."
-    if share <= MOST_AMBIENT:
+    if share > NOTICED and swing > MOST_SWING:
+        found = f"{found[:-1]} and flickers or changes by {100 * swing:.0f} % (mains light, a screen, the sun)."
+    elif share <= MOST_AMBIENT:
         return Judgement(subject="ambient", grade="good", found=found)
     return Judgement(
         subject="ambient",

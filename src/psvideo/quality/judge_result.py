@@ -16,6 +16,8 @@ BY_STRENGTH, OTHER_STRENGTH = 0.5, 1.25
 AGREE, DISAGREE = 0.3, -0.1
 LEAST_VALID, HARDLY_VALID = 0.3, 0.05
 MOST_FLICKER_PERCENT = 1.0
+AT_REST = 0.05
+"""Noise is judged by results between which less of the picture than this moves."""
 NOISY_DEG, LOST_NOISY_DEG = 4.0, 10.0
 
 
@@ -101,7 +103,7 @@ def _crossed(observed: Observed) -> Judgement | None:
 
 def quiet(facts: Sequence[InstantFacts]) -> bool:
     """Tell whether normals are steady enough to be held against each other."""
-    known = [one.change.normals_deg for one in facts if one.change is not None]
+    known = [one.change.normals_deg for one in facts if one.change is not None and (one.moving_share or 0.0) < AT_REST]
     return not known or float(np.median(known)) < NOISY_DEG
 
 
@@ -126,7 +128,7 @@ def validity(observed: Observed) -> Iterator[Judgement]:
 
 def steadiness(facts: Sequence[InstantFacts]) -> Iterator[Judgement]:
     """Judge noise and flicker where nothing moves."""
-    known = by_level(facts)
+    known = by_level([one for one in facts if (one.moving_share or 0.0) < AT_REST])
     if not known:
         return
     worst, level = known[0], abs(change_of(known[0]).level_percent)

@@ -15,7 +15,10 @@ BLIND = 0.97
 MOST_UNSEEN, LOST_UNSEEN = 0.02, 0.3
 FAST_PX, LOST_PX = 1.0, 4.0
 """Pixels from flash to flash: 1 costs about 1 degree, 4 cost 5 to 9."""
-FEW_MOVE = 0.02
+FEW_MOVE, MUCH_CHANGES = 0.02, 0.1
+OFTEN = 0.9
+"""Motion is judged by what is reached in a tenth of the rounds."""
+LEAST_FOLLOWED = 0.5
 NAMED = 3
 
 
@@ -130,12 +133,21 @@ def _dropped(timing: Timing, observed: Observed) -> Iterator[Judgement]:
 
 def motion(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = False) -> Judgement:
     """Judge how far the fastest parts move from flash to flash, and within one flash."""
-    known = [(one.speed_px_s, one.moving_share) for one in observed.facts if one.speed_px_s is not None]
-    if not known:
+    shares = [one.moving_share for one in observed.facts if one.moving_share is not None]
+    speeds = [one.speed_px_s for one in observed.facts if one.speed_px_s is not None]
+    if not shares:
         return Judgement(
             subject="motion", grade="unknown", found="Motion is not known: no two whole plates of one light in turn."
         )
-    speed, share = (float(np.quantile([one[n] or 0.0 for one in known], 0.9)) for n in (0, 1))
+    share = float(np.quantile(shares, OFTEN))
+    if len(speeds) < LEAST_FOLLOWED * len(shares):
+        return Judgement(
+            subject="motion",
+            grade="bad" if share > MUCH_CHANGES and not aligned else "doubtful",
+            found=f"{100 * share:.0f} % of the picture changes from round to round faster than can be followed.",
+            advice="Move slower, raise the frame rate, or flash fewer lights; if nothing moved, light flickers.",
+        )
+    speed = float(np.quantile(speeds, OFTEN))
     flash_s = timing.frame_period_s if plan.mode == "synced" else plan.cycle_s / len(plan.cycle_slots)
     step_px = speed * flash_s
     blur_px = speed * max(plan.flashes[slot].duration_s for slot in plan.lit_slots)

@@ -21,6 +21,8 @@ LEAST_BLOCKS = 0.002
 FASTEST = 0.95
 """What is told is how fast the fastest twentieth of what moves is."""
 RETURN_PX = 0.7
+FOLLOWED = 0.3
+"""Where there and back meet for less than this share of what changed, flow tells no speed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,9 +38,10 @@ class Glimpse:
 
 @dataclass(frozen=True, kw_only=True)
 class Motion:
-    """Speed of the fastest things in pixels of the picture per second, and which share of the picture moves."""
+    """Speed of the fastest things in pixels of the picture per second, and which share of the picture moves. The speed
+    is None where most of what changes cannot be followed from one round to the next."""
 
-    speed_px_s: float
+    speed_px_s: float | None
     share: float
 
 
@@ -72,8 +75,8 @@ def motion(before: Glimpse, after: Glimpse) -> Motion | None:
         search.calc(*pair, None) for pair in ((before.codes, after.codes), (after.codes, before.codes))
     )
     told = changed & _returns(forward, backward)
-    if told.mean() <= LEAST_BLOCKS:
-        return still
+    if told.sum() < FOLLOWED * changed.sum():
+        return Motion(speed_px_s=None, share=float(changed.mean()))
     way = np.hypot(forward[..., 0], forward[..., 1])[told] * before.scale
     speed = float(np.quantile(way, FASTEST)) / abs(after.time_s - before.time_s)
     return Motion(speed_px_s=speed, share=float(told.mean()))

@@ -36,7 +36,7 @@ class InstantFacts:
     ``valid_share`` is None where no normals were solved. ``levels`` (light) is each light's mean on the subject, 1.0 =
     saturation; ``clipped`` (light) the share of it that is saturated. ``ambient`` is the ambient light's share of what
     an exposure holds. ``speed_px_s`` is how fast the fastest parts move, and ``moving_share`` how much
-    of the picture does; None where it could not be told.
+    of the picture does; None where it could not be told. What changes too fast to be followed has a share and no speed.
     """
 
     number: int
@@ -83,11 +83,11 @@ def instant_facts(
     seen = seen or seen_of(one, mask)
     subject, bright = seen.subject, seen.bright
     count = max(int(subject.sum()), 1)
-    shares = [
-        float(((picture >= plate.saturation) & subject).sum() / count)
-        for picture, plate in zip(bright, one.plates, strict=True)
-    ]
-    levels = [float(picture.mean(where=subject)) if subject.any() else 0.0 for picture in bright]
+    shares, levels = [], []
+    for picture, plate in zip(bright, one.plates, strict=True):
+        shares.append(float(((picture >= plate.saturation) & subject).sum() / count))
+        shown = subject & plate.rows_seen[::STRIDE, None]
+        levels.append(float(picture.mean(where=shown)) if shown.any() else 0.0)
     return InstantFacts(
         number=one.number,
         time_s=one.time_s,
@@ -142,7 +142,8 @@ class Observed:
         facts = instant_facts(one, surface, self.mask, changed, seen=seen, moving=moving)
         self.facts.append(facts)
         for plate, bright in zip(one.plates, seen.bright, strict=True):
-            counted = count_levels(bright[seen.subject], plate.saturation)
+            shown = seen.subject & plate.rows_seen[::STRIDE, None]
+            counted = count_levels(bright[shown], plate.saturation)
             self.counts[plate.light] = self.counts.get(plate.light, np.zeros(BINS + 2, np.int64)) + counted
         if len(self.facts).bit_count() == 1:
             self._look_closely(one, surface)

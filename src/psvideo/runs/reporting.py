@@ -2,7 +2,7 @@
 
 import json
 import platform
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import version as version_of
 from pathlib import Path
@@ -54,16 +54,14 @@ def observing(take: Take, rig: Rig | None = None, mask: NDArray[np.bool_] | None
     return Observed(lights=clip.plan.lights, mask=mask, points=points)
 
 
-def judgements(
-    plan: Plan, timing: Timing, observed: Observed, *, known: Rig | None = None, aligned: bool = False
-) -> tuple[Judgement, ...]:
+def judgements(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = False) -> tuple[Judgement, ...]:
     """Return one line per thing that decides whether a take can be used."""
-    rated = None if known is None else {light.name: float(np.mean(light.intensity)) for light in _distant(known)}
+    on_time = tuple(timing_and_order(timing, plan.mode))
     return (
-        *timing_and_order(timing, plan.mode),
+        *on_time,
         *coverage(plan, timing, observed),
         *exposure(observed),
-        *lamps(observed, rated),
+        *lamps(observed, timed=all(one.grade == "good" for one in on_time)),
         ambient(observed),
         motion(plan, timing, observed, aligned=aligned),
         focus(observed),
@@ -71,11 +69,6 @@ def judgements(
         *validity(observed),
         *steadiness(observed.facts),
     )
-
-
-def _distant(known: Rig) -> Iterator[Light]:
-    """Give the lights whose intensities are what the subject gets."""
-    return (light for light in known.lights if light.direction is not None)
 
 
 def run_report(
@@ -101,7 +94,7 @@ def run_report(
         timing=timing,
         lights=lights,
         instants=tuple(observed.facts),
-        judgements=judgements(clip.plan, timing, observed, known=known, aligned=solved is not None and solved.aligned),
+        judgements=judgements(clip.plan, timing, observed, aligned=solved is not None and solved.aligned),
         condition=None if solved is None else solved.lighting.condition,
         solver="" if solved is None else solved.solver,
         trust="" if solved is None else solved.trust,

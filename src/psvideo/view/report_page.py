@@ -26,7 +26,7 @@ JPEG_QUALITY = 90
 def report_page(report: RunReport, pictures: Sequence[tuple[str, Pixels]]) -> str:
     """Return the report as one self-contained HTML page; ``pictures`` are (caption, 8-bit sRGB pixels)."""
     sections = [
-        _section("Line by line", _judgements(report.judgements)),
+        _section("Line by line", judgement_lines(report.judgements)),
         "".join(_figure(caption, picture) for caption, picture in pictures),
         _section("What was shot", _table(report.shot)),
         _section("Timing", _timing(report)),
@@ -56,7 +56,8 @@ def _head(report: RunReport) -> str:
     )
 
 
-def _judgements(judgements: Sequence[Judgement]) -> str:
+def judgement_lines(judgements: Sequence[Judgement]) -> str:
+    """Return a table with a line per judgement: mark and word, subject, sentence."""
     rows = "".join(
         f'<tr><td class="grade {one.grade}"><i>{MARKS[one.grade]}</i> {one.grade}</td>'
         f"<th>{html.escape(one.subject)}</th><td>{html.escape(one.sentence)}</td></tr>"

@@ -1,0 +1,223 @@
+"""The check on the set: in seconds, from a few dozen frames, whether a take can be used. Nothing is written."""
+
+import math
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from psvideo.clip import Clip, Kept, holes, keeping_near, read_frames
+from psvideo.errors import PsvideoError
+from psvideo.naming import named_by_rig
+from psvideo.pipeline import Take, Watch, clip_rounds, find_clip_timing, open_take, unwatched
+from psvideo.plan import Plan
+from psvideo.profiles import SATURATED
+from psvideo.quality.judgement import Judgement, usable, verdict_of
+from psvideo.rigfile import read_rig
+from psvideo.runs.reporting import judgements, observing
+from psvideo.timing import DroppedFrames, Timing
+
+LEAST_FRAMES, MOST_FRAMES = 30, 160
+ROUNDS = 4
+"""So many rounds are looked at, where the clip is long enough."""
+SPREAD = 6
+"""Frames besides, over the rest of the take: whether light and exposure stay."""
+BRIGHTER, DARKER = 1.25, 0.4
+"""Later frames that reach so many times the light of those looked at."""
+MOST_KEPT_BYTES = 1_500_000_000
+"""Larger windows are decoded twice: temporary folders may lie in memory."""
+SCHEMA = "psvideo-check/1"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Check:
+    """What was found of one take, line by line; ``looked_at`` of its ``frames`` frames were decoded."""
+
+    clip: str
+    path: Path
+    frames: int
+    looked_at: int
+    seconds: float
+    judgements: tuple[Judgement, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def usable(self) -> bool:
+        """True where nothing is bad."""
+        return usable(self.judgements)
+
+    @property
+    def verdict(self) -> str:
+        """The sentence that sums the lines up."""
+        return verdict_of(self.judgements)
+
+
+def check_record(check: Check) -> dict[str, object]:
+    """Return a check as what ``--json`` prints."""
+    lines = [
+        {"subject": one.subject, "grade": one.grade, "found": one.found, "advice": one.advice}
+        for one in check.judgements
+    ]
+    return {
+        "schema": SCHEMA,
+        "clip": check.clip,
+        "path": str(check.path),
+        "usable": check.usable,
+        "verdict": check.verdict,
+        "judgements": lines,
+        "notes": list(check.notes),
+        "frames": check.frames,
+        "looked_at": check.looked_at,
+        "seconds": round(check.seconds, 2),
+    }
+
+
+def check_take(
+    path: Path,
+    *,
+    plan: Path | None = None,
+    rig: Path | None = None,
+    first_light: str | None = None,
+    watch: Watch = unwatched,
+) -> Check:
+    """Judge a take by frames from its start and a few from the rest; with a ``rig``, the plates are held against it.
+
+    Raises PsvideoError where the footage or its plan cannot be read, or where there are too few frames to tell.
+    """
+    began = time.monotonic()
+    whole = open_take(path, plan=plan)
+    clip = whole.clip
+    known = None if rig is None else read_rig(rig, plan_lights=clip.plan.lights)
+    window = window_of(clip.plan, clip.numbers)
+    later = _later(clip, window)
+    with _store(clip, window) as kept:
+        take = replace(whole, numbers=window, kept=kept)
+        try:
+            timing = find_clip_timing(take, first_light=first_light, watch=watch)
+        except PsvideoError as fault:
+            if too_short(clip.plan, window):
+                raise
+            lines: tuple[Judgement, ...] = (_unseen(str(fault)), *_raw_light(take))
+            notes: tuple[str, ...] = ()
+        else:
+            timing = timing if known is None else named_by_rig(take, timing, known)
+            timing = _with_later_holes(timing, clip, window)
+            observed = observing(take, known)
+            for one in clip_rounds(take, timing, watch=watch):
+                observed.add(one)
+                del one
+            if not observed.facts:
+                raise PsvideoError(
+                    f"{path}: its first {len(window)} frames hold no round in which a light is complete. Film longer: "
+                    "a round needs as many frames as it has flashes, and one or two more."
+                )
+            seen = Judgement(subject="strobe", grade="good", found=_strobe_words(clip.plan, timing))
+            lines = (seen, *judgements(clip.plan, timing, observed), *_steady_later(take, later))
+            notes = timing.notes
+    return Check(
+        clip=clip.name,
+        path=path,
+        frames=len(clip.numbers),
+        looked_at=len(window) + len(later),
+        seconds=time.monotonic() - began,
+        judgements=lines,
+        notes=(*clip.warnings, *notes),
+    )
+
+
+def _store(clip: Clip, window: Sequence[int]) -> AbstractContextManager[Kept | None]:
+    """Return a store for the frames looked at, off the footage's disk; none where they would fill a small one."""
+    samples = clip.width_px * clip.height_px * (1 if clip.cfa else clip.channels)
+    if 2 * samples * len(window) > MOST_KEPT_BYTES:
+        return nullcontext(None)
+    return keeping_near(Path(tempfile.gettempdir()) / "psvideo-check")
+
+
+def window_of(plan: Plan, numbers: Sequence[int]) -> tuple[int, ...]:
+    """Return the frames from a clip's start that show a few rounds, and a whole cycle with its marker."""
+    if plan.mode == "synced":
+        return tuple(numbers[: ROUNDS * len(plan.flashes)])
+    per_frame = plan.camera.frame_period_s
+    round_s = plan.cycle_s / plan.dark_every
+    wanted = max(ROUNDS * round_s / per_frame, 1.3 * plan.cycle_s / per_frame + 6)
+    return tuple(numbers[: min(max(math.ceil(wanted), LEAST_FRAMES), MOST_FRAMES)])
+
+
+def too_short(plan: Plan, numbers: Sequence[int]) -> bool:
+    """Tell whether so few frames cannot be expected to show the strobe."""
+    return len(numbers) < 2 * len(plan.cycle_slots) / max(plan.dark_every, 1) + 3
+
+
+def _later(clip: Clip, window: tuple[int, ...]) -> tuple[int, ...]:
+    """Return a few frames from the rest; none of a movie, which would have to be decoded on the way there."""
+    rest = clip.numbers[len(window) :]
+    if clip.is_movie or len(rest) < SPREAD:
+        return ()
+    return tuple(rest[round(place)] for place in np.linspace(0, len(rest) - 1, SPREAD))
+
+
+def _strobe_words(plan: Plan, timing: Timing) -> str:
+    flashes = sum(any(flash.lights.values()) for flash in timing.flashes)
+    if plan.mode == "synced":
+        return f"{flashes} flashes, one a frame, as the plan says."
+    return f"The strobe was seen: {flashes} flashes of {len(plan.lights)} lights, as planned."
+
+
+def _unseen(reason: str) -> Judgement:
+    return Judgement(subject="strobe", grade="bad", found=reason)
+
+
+def _with_later_holes(timing: Timing, clip: Clip, window: tuple[int, ...]) -> Timing:
+    """Add the holes that the numbering shows after the frames that were looked at."""
+    known = {hole.after for hole in timing.dropped_frames}
+    more = [DroppedFrames(after=after, count=count) for after, count in holes(clip.numbers) if after not in known]
+    return replace(timing, dropped_frames=(*timing.dropped_frames, *more))
+
+
+def _raw_light(take: Take) -> Iterator[Judgement]:
+    """Judge the frames as they are, where no strobe was found in them."""
+    tops, clipped = zip(*_frame_light(take, take.numbers[:: max(len(take.numbers) // 12, 1)]), strict=True)
+    top, share = max(tops), max(clipped)
+    advice = ""
+    if top < 2**-6:
+        advice = "Check that the lights fire and that the lens is open."
+    elif share > 0.1:
+        advice = "Close the aperture or lower the powers."
+    yield Judgement(
+        subject="exposure",
+        grade="bad" if advice else "good",
+        found=f"The brightest parts reach {100 * min(top, 1):.0f} % of saturation; at most {100 * share:.1f} % of a "
+        "frame is clipped.",
+        advice=advice,
+    )
+
+
+def _steady_later(take: Take, later: tuple[int, ...]) -> Iterator[Judgement]:
+    """Say whether frames from the rest of the take are as bright as those from its start."""
+    if not later:
+        return
+    early = [top for top, _ in _frame_light(take, take.numbers[:: max(len(take.numbers) // 16, 1)])]
+    late = [top for top, _ in _frame_light(take, later)]
+    ratio = max(late) / max(max(early), 1e-6)
+    if DARKER < ratio < BRIGHTER:
+        yield Judgement(subject="later", grade="good", found="Light and exposure stay through the take.")
+        return
+    change = abs(np.log2(max(ratio, 1e-6)))
+    word = "brighter" if ratio > 1 else "darker"
+    yield Judgement(
+        subject="later",
+        grade="bad" if ratio < DARKER / 4 else "doubtful",
+        found=f"Later in the take the picture is {change:.1f} stops {word} than at its start.",
+        advice="Check that the strobe ran to the end, and that exposure, gain and aperture are fixed.",
+    )
+
+
+def _frame_light(take: Take, numbers: Sequence[int]) -> Iterator[tuple[float, float]]:
+    """Give every frame's light at its brightest thousandth, and which share of it is clipped."""
+    for frame in read_frames(take.clip, tuple(numbers), kept=take.kept):
+        thin = frame.image[::4, ::4]
+        yield float(np.quantile(thin, 0.999)), float((thin >= SATURATED).mean())
