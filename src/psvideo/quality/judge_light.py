@@ -101,9 +101,11 @@ def lamps(observed: Observed, *, timed: bool = True) -> Iterator[Judgement]:
     relative = usual / max(float(usual.max()), 1e-12)
     said = list(_weak(observed.lights, relative))
     alive = usual > NO_LIGHT * usual.max()
-    if timed:
-        said += _missed(observed.lights, facts, level, usual, alive)
-        said += _unsteady(observed.lights, facts, level, usual, alive)
+    whole = np.array([one.unseen_share == 0 for one in facts])
+    if timed and whole.any():
+        shown = [one for one in facts if one.unseen_share == 0]
+        said += _missed(observed.lights, shown, level[whole], usual, alive)
+        said += _unsteady(observed.lights, shown, level[whole], usual, alive)
     yield from said
     if not said:
         spread = -np.log2(max(relative.min(), 1e-9))

@@ -32,6 +32,11 @@ class RigFit:
     scaled_misfit: float
     strengths: tuple[float, ...]
 
+    @property
+    def excess(self) -> float:
+        """The share of the light that another rig could explain, and this one cannot."""
+        return float(np.sqrt(max(self.misfit**2 - self.own_misfit**2, 0.0)))
+
 
 def rig_fit(light: FloatArray, vectors: FloatArray) -> RigFit | None:
     """Judge a rig by points: ``light`` (point, light) is unclipped, ``vectors`` (point or 1, light, 3) what the rig
