@@ -14,7 +14,8 @@ MISFIT, LOST_MISFIT = 0.135, 0.25
 """Shares of the light that another rig would explain and this one cannot. A rig that was off by 1 to 5 degrees left
 0.11 to 0.13 on photographs, two lights exchanged among five 0.18, a list in another order 0.19."""
 NOT_MATTE = 0.1
-BY_STRENGTH, OTHER_STRENGTH = 0.5, 1.25
+STRENGTH_MISFIT, BY_STRENGTH, OTHER_STRENGTH = 0.05, 0.5, 1.25
+"""Less is enough where other strengths of some lights take half of it away."""
 AGREE, DISAGREE = 0.3, -0.1
 LEAST_VALID, HARDLY_VALID = 0.3, 0.05
 MOST_FLICKER_PERCENT = 1.0
@@ -73,16 +74,17 @@ def _explained(fit: RigFit) -> Judgement:
 
 
 def _misfit(lights: Sequence[str], fit: RigFit) -> Judgement | None:
-    if fit.excess <= MISFIT:
-        return None
-    grade: Grade = "bad" if fit.excess > LOST_MISFIT else "doubtful"
-    found = f"The rig does not fit the plates: {100 * fit.misfit:.0f} % of the light cannot come from its lights"
     off = [
         (light, strength)
         for light, strength in zip(lights, fit.strengths, strict=True)
         if not 1 / OTHER_STRENGTH < strength < OTHER_STRENGTH
     ]
-    if fit.scaled_misfit < BY_STRENGTH * fit.misfit and off:
+    by_strength = bool(off) and fit.excess > STRENGTH_MISFIT and fit.scaled_misfit < BY_STRENGTH * fit.misfit
+    if fit.excess <= MISFIT and not by_strength:
+        return None
+    grade: Grade = "bad" if fit.excess > LOST_MISFIT else "doubtful"
+    found = f"The rig does not fit the plates: {100 * fit.misfit:.0f} % of the light cannot come from its lights"
+    if by_strength:
         named = ", ".join(f"{light!r} {100 * strength:.0f} %" for light, strength in off)
         return Judgement(
             subject="rig",

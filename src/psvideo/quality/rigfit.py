@@ -25,7 +25,7 @@ LEAST_POINTS = 60
 class RigFit:
     """What a few thousand points said of the rig. ``misfit`` is the median share of a point's light that no normal
     explains, ``own_misfit`` the share that no rig at all would explain (shadows, gloss, motion), ``scaled_misfit`` what
-    is left once every light's strength is free, and ``strengths`` (light,) what they come out as, 1 in the mean."""
+    is left once every light's strength is free, and ``strengths`` (light,) what they come out as, 1 for the median."""
 
     misfit: float
     own_misfit: float
@@ -56,7 +56,7 @@ def rig_fit(light: FloatArray, vectors: FloatArray) -> RigFit | None:
     gains = np.einsum("pi,pj,pij->ij", unit, unit, np.broadcast_to(beyond, (len(unit), count, count)))
     share, h = (found[..., 0] for found in scipy.linalg.eigh(gains, np.diag(np.diag(moments))))
     true = 1 / np.maximum(np.abs(h), 1e-3 * np.abs(h).max())
-    strengths = tuple(float(value) for value in true / np.exp(np.mean(np.log(true))))
+    strengths = tuple(float(value) for value in true / np.median(true))
     return RigFit(misfit=misfit, own_misfit=own, scaled_misfit=float(np.sqrt(max(share, 0))), strengths=strengths)
 
 
