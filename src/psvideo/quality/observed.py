@@ -5,6 +5,7 @@ rounds 1, 2, 4, 8 and so on, so that ten thousand rounds cost hardly more than a
 """
 
 import functools
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,7 +18,7 @@ from psvideo.quality.rigpoints import RigPoints
 from psvideo.quality.slopes import slope_agreement
 from psvideo.quality.steadiness import Change, Sample, change, sample_of
 from psvideo.quality.worst import Thumbnail, Worst
-from psvideo.sequence import LightPlate, Round
+from psvideo.sequence import AMBIENT, LightPlate, Round
 from psvideo.surface import Surface
 
 LIT = 0.01
@@ -78,8 +79,10 @@ def instant_facts(
     *,
     seen: Seen | None = None,
     moving: Motion | None = None,
+    dark: NDArray[np.float32] | None = None,
 ) -> InstantFacts:
-    """Return what to remember of one round; ``change`` is how its surface differs from the one before."""
+    """Return what to remember of one round; ``change`` is how its surface differs from the one before, ``dark`` the
+    ambient light of one exposure, thinned out as ``seen`` is."""
     seen = seen or seen_of(one, mask)
     subject, bright = seen.subject, seen.bright
     count = max(int(subject.sum()), 1)
@@ -97,17 +100,17 @@ def instant_facts(
         change=change,
         levels=tuple(level / plate.saturation for level, plate in zip(levels, one.plates, strict=True)),
         clipped=tuple(shares),
-        ambient=_ambient_share(one.ambient, subject, levels),
+        ambient=_ambient_share(dark, subject, levels),
         speed_px_s=None if moving is None else moving.speed_px_s,
         moving_share=None if moving is None else moving.share,
     )
 
 
-def _ambient_share(ambient: LightPlate | None, subject: NDArray[np.bool_], levels: list[float]) -> float | None:
+def _ambient_share(dark: NDArray[np.float32] | None, subject: NDArray[np.bool_], levels: list[float]) -> float | None:
     """Return which share of what a row under one light holds is ambient light, in the mean over subject and lights."""
-    if ambient is None or not subject.any():
+    if dark is None or not subject.any():
         return None
-    level = max(float(_brightest(ambient.image[::STRIDE, ::STRIDE]).mean(where=subject)), 0.0)
+    level = max(float(dark.mean(where=subject)), 0.0)
     return level / max(level + float(np.mean(levels)), 1e-9)
 
 
@@ -134,12 +137,35 @@ class Observed:
     worst: Worst = field(default_factory=Worst)
     _glimpse: Glimpse | None = None
     _sample: Sample | None = None
+    _dark: NDArray[np.float32] | None = None
+    _moving: Motion | None = None
+    _passed: bool = False
+
+    def passing(self, plates: Iterable[LightPlate], *, with_ambient: bool) -> Iterator[LightPlate]:
+        """Pass plates on before they are moved to one instant: motion is seen in them, and ambient light in the dark
+        slots, which go no further unless they are wanted."""
+        self._passed = True
+        for plate in plates:
+            if plate.light == self.lights[0]:
+                self._look_for_motion(plate)
+            if plate.light == AMBIENT:
+                self._look_at_dark(plate)
+            if plate.light != AMBIENT or with_ambient:
+                yield plate
+            del plate  # nothing holds it while the next one is made
+
+    def _look_at_dark(self, plate: LightPlate) -> None:
+        self._dark = np.array(_brightest(plate.image[::STRIDE, ::STRIDE]))
 
     def add(self, one: Round, surface: Surface | None = None) -> None:
         """Take in one round, and the surface that was solved from it, if any."""
+        if one.ambient is not None:
+            self._look_at_dark(one.ambient)
         seen = seen_of(one, self.mask)
-        moving, changed = self._motion(one), self._change(surface)
-        facts = instant_facts(one, surface, self.mask, changed, seen=seen, moving=moving)
+        if not self._passed and one.plates[0].light == self.lights[0]:
+            self._look_for_motion(one.plates[0])
+        moving, changed = self._moving, self._change(surface)
+        facts = instant_facts(one, surface, self.mask, changed, seen=seen, moving=moving, dark=self._dark)
         self.facts.append(facts)
         for plate, bright in zip(one.plates, seen.bright, strict=True):
             shown = seen.subject & plate.rows_seen[::STRIDE, None]
@@ -170,13 +196,10 @@ class Observed:
         if self.points is not None and one.lights == self.lights:
             self.light_at_points.append(self.points.light(one))
 
-    def _motion(self, one: Round) -> Motion | None:
-        plate = next((plate for plate in one.plates if plate.light == self.lights[0]), None)
+    def _look_for_motion(self, plate: LightPlate) -> None:
         before = self._glimpse
-        if plate is None:
-            return None
         self._glimpse = glimpse(plate, None if before is None else before.white)
-        return None if before is None else motion(before, self._glimpse)
+        self._moving = None if before is None else motion(before, self._glimpse)
 
     def _change(self, surface: Surface | None) -> Change | None:
         before, self._sample = self._sample, None if surface is None else sample_of(surface)

@@ -122,9 +122,8 @@ def normals_run(
     ):
         mixed = delivery.mix.of(AMBIENT) > 0
         with_ambient = mixed or delivery.plates
-        plates = clip_light_plates(
-            take, timing, start_number=output.start_number, with_ambient=with_ambient, watch=watch
-        )
+        plates = clip_light_plates(take, timing, start_number=output.start_number, with_ambient=True, watch=watch)
+        plates = observed.passing(plates, with_ambient=with_ambient)
         ambient = first_ambient(take, timing) if mixed else None
         how = over_time.aligning
         rounds = aligned(plates, clip.plan.lights, how, first=output.start_number, with_ambient=with_ambient)
