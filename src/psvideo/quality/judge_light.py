@@ -63,21 +63,23 @@ def _clipping(levels: dict[str, Levels]) -> Iterator[Judgement]:
     over = {light: one for light, one in levels.items() if one.clipped_share > MOST_CLIPPED}
     lost = LOST_CLIPPED if len(levels) < 4 else SPARE_CLIPPED
     if len(over) == len(levels) > 1:
-        power = min(one.right_power for one in over.values())
+        power = min(one.right_power() for one in over.values())
         shares = [one.clipped_share for one in over.values()]
         yield Judgement(
             subject="clipping",
             grade="bad" if max(shares) > lost else "doubtful",
             found=f"Every light clips: {100 * min(shares):.0f} to {100 * max(shares):.0f} % of the subject.",
-            advice=f"Close the aperture by about {_half(-np.log2(power))}, or lower all powers to {_percent(power)}.",
+            advice=f"Close the aperture by about {_half(-np.log2(power))}, or lower all powers to "
+            f"{_percent(power)}, and look again.",
         )
         return
+    whole = [one for one in levels.values() if one.clipped_share <= 1 - TARGET_QUANTILE]
     for light, one in over.items():
         yield Judgement(
             subject="clipping",
             grade="bad" if one.clipped_share > lost else "doubtful",
             found=f"The flash of {light!r} is clipped in {100 * one.clipped_share:.0f} % of the subject.",
-            advice=f"Lower its power (or its duration) to about {_percent(one.right_power)}.",
+            advice=f"Lower its power (or its duration) to about {_percent(one.right_power(whole))}.",
         )
 
 

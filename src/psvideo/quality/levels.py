@@ -1,5 +1,6 @@
 """How a plate is exposed: counts of its light in stops below saturation, and what they say of power and aperture."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -56,16 +57,19 @@ class Levels:
         """Return a quantile in stops below saturation: 0 is saturation, -1 half of it; -14 at least."""
         return float(np.log2(max(self.quantile(share), 2.0**-STOPS)))
 
-    @cached_property
-    def right_power(self) -> float:
+    def right_power(self, whole: "Sequence[Levels]" = ()) -> float:
         """By which factor to change the lamp's light so that 99.5 % of the subject lie just below saturation.
 
-        What is clipped tells no level: the brightest half of what is not is carried on in a straight line, as light on
-        a rounded matte subject goes on.
+        What is clipped tells no level. How much brighter the brightest parts are than those that just clip is taken
+        from other lamps on the same subject that do not clip, ``whole``. Without any, the brightest half of what is not
+        clipped is carried on in a straight line, which is the least that a rounded matte subject comes to.
         """
         clipped = self.clipped_share
         if clipped <= 1 - TARGET_QUANTILE:
             return HEADROOM / max(self.quantile(TARGET_QUANTILE), 2.0**-STOPS)
+        tops = [one.quantile(TARGET_QUANTILE) / max(one.quantile(1 - clipped), 2.0**-STOPS) for one in whole]
+        if tops:
+            return float(np.clip(HEADROOM / max(float(np.median(tops)), 1.0), LEAST_POWER, 0.9))
         shares = np.linspace(0.5, 0.98, 13) * (1 - clipped)
         levels = np.array([self.quantile(float(share)) for share in shares])
         slope, start = np.polyfit(shares, levels, 1)

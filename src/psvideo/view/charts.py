@@ -7,12 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-WIDE, TALL = 720, 170
+WIDE, TALL = 560, 170
 LEFT, RIGHT, TOP, BELOW = 46, 96, 10, 26
 MOST_POINTS = 300
 DASHES = ("", "6 3", "2 3", "9 3 2 3", "12 4", "4 2 1 2", "1 4", "14 3 4 3")
 """Series are told apart by these as well as by their colour class ``s0`` to ``s7``."""
-STOP_WIDE, STOP_TALL = 340, 120
+STOP_WIDE, STOP_TALL = 300, 130
+SHOWN_STOPS = 10
+"""Darker light is drawn in the first bin."""
 
 Values = NDArray[np.float64]
 
@@ -109,7 +111,9 @@ def _names(ends: list[tuple[float, int, str]], right: int) -> list[str]:
 
 def stops_chart(shares: Values, name: str, *, stops: int) -> str:
     """Return a histogram of light in stops below saturation; the last of ``shares`` (bin,) is what is clipped."""
-    inner, clipped = shares[:-1], float(shares[-1])
+    hidden = (stops - SHOWN_STOPS) * (len(shares) - 1) // stops
+    inner, clipped, stops = shares[hidden:-1].copy(), float(shares[-1]), SHOWN_STOPS
+    inner[0] += shares[:hidden].sum()
     left, right, bottom = 8, STOP_WIDE - 56, STOP_TALL - 22
     tallest = max(float(inner.max()), 1e-9)
     step = (right - left) / len(inner)

@@ -72,7 +72,7 @@ def _timing(report: RunReport) -> str:
     readout_s = abs(timing.row_time_s)
     facts = {
         "Flashes": f"{len(timing.flashes)}, of which {complete} complete",
-        "Flash times sure to": f"{timing.phase_error_rows:.3f} row",
+        "Flash times sure to": f"{timing.phase_error_rows:.2g} row",
         "Strobe's clock": f"{timing.clock_offset_ppm:+.1f} ppm off the camera's",
         "Order of the lights": f"{timing.order}. {timing.order_note}".strip(" ."),
         "Exposure": f"{timing.exposure_s * 1e3:.4g} ms ({360 * timing.exposure_s / timing.frame_period_s:.0f} degrees)",
@@ -156,7 +156,7 @@ def _over_time(report: RunReport) -> str:
         f"{steady.albedo_percent:.2f} %, its level {steady.level_percent:.2f} % (worst: "
         f"{', '.join(map(str, steady.worst))}).</p>"
     )
-    return drawn + words
+    return f'<div class="grid2">{drawn}</div>{words}'
 
 
 def _worst(report: RunReport) -> str:

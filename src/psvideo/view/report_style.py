@@ -27,7 +27,8 @@ td,th{padding:.28rem 1rem .28rem 0;border-bottom:1px solid var(--rule);vertical-
 .facts th{white-space:nowrap;color:var(--soft);font-weight:500}.facts td{overflow-wrap:anywhere}
 .figures td,.figures th{font-variant-numeric:tabular-nums}.wide{overflow-x:auto}
 figure{margin:1rem 0}figcaption{color:var(--soft);font-size:.87rem}img{max-width:100%;height:auto;border-radius:3px}
-.grid4{display:grid;grid-template-columns:repeat(auto-fill,minmax(240px,1fr));gap:.8rem 1.2rem}.grid4 figure{margin:0}
+.grid4{display:grid;grid-template-columns:repeat(auto-fill,minmax(250px,1fr));gap:.8rem 1.2rem}.grid4 figure{margin:0}
+.grid2{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(480px,100%),1fr));gap:.4rem 1.6rem}
 .grid4 img{width:100%;image-rendering:auto}
 svg{width:100%;height:auto;max-width:820px;display:block}
 svg text{fill:var(--soft);font:11px system-ui,sans-serif}svg .grid{stroke:var(--rule);stroke-width:1}
