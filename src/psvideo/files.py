@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -33,6 +34,20 @@ def write_text(path: Path, text: str) -> None:
     """Write a small text file, whole or not at all."""
     with whole_file(path) as beside:
         beside.write_text(text, encoding="utf-8")
+
+
+PICTURE_MARK = "psvideo-picture"
+"""What pictures that commands draw hold near their start, so that --force replaces these and nobody else's."""
+_PNG_HEAD_BYTES = 33
+"""A PNG's signature and its first chunk, IHDR, whose size is fixed (PNG specification, 5.2 and 11.2.1)."""
+
+
+def marked_png(data: bytes) -> bytes:
+    """Return an encoded PNG with a text chunk that says that psvideo drew it (PNG specification, 11.3.3.2)."""
+    kind_and_text = b"tEXtSoftware\x00" + PICTURE_MARK.encode("latin-1")
+    length, check = len(kind_and_text) - 4, zlib.crc32(kind_and_text)
+    chunk = length.to_bytes(4, "big") + kind_and_text + check.to_bytes(4, "big")
+    return data[:_PNG_HEAD_BYTES] + chunk + data[_PNG_HEAD_BYTES:]
 
 
 def refuse_existing(path: Path, *, force: bool, mark: str | None = None) -> None:

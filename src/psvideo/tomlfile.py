@@ -5,6 +5,7 @@ unknown key is answered with the nearest known one.
 """
 
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -44,6 +45,12 @@ def read_toml(path: Path, model: type[Model], schema: str) -> Model:
 
 def read_text(path: Path) -> str:
     """Read a small text file; raises PsvideoError where it is missing or no text."""
+    if path.is_dir():
+        inside = sorted(found.name for found in path.glob("*.toml"))
+        advice = (
+            f"Name the file in it: {' or '.join(str(path / name) for name in inside)}." if inside else "Name a file."
+        )
+        raise PsvideoError(f"{path}: is a folder, and a file is expected. {advice}")
     try:
         return path.read_text(encoding="utf-8")
     except FileNotFoundError:
@@ -84,8 +91,31 @@ def check_schema(found: object, expected: str, *, source: str) -> None:
 
 def _sentence(source: str, model: type[BaseModel], fault: ValidationError) -> str:
     """Put every mistake of a validation into one paragraph."""
-    told = f"{source}: " + "; ".join(_mistake(model, error) for error in fault.errors())
+    told = f"{source}: " + "; ".join(_mistake(model, error) for error in _one_a_key(fault.errors()))
     return told if told.endswith("?") else told + "."
+
+
+def _one_a_key(errors: Sequence[Any]) -> list[Any]:
+    """Put what a key of several allowed kinds may be into one mistake: it says first what each kind lacks."""
+    by_key: dict[str, list[Any]] = {}
+    for error in errors:
+        by_key.setdefault(f"{_key_path(error['loc'])} {error['type'] == 'extra_forbidden'}", []).append(error)
+    told = []
+    for same in by_key.values():
+        kinds = [_expected(error["msg"]) for error in same]
+        told.append(same[0] if len(same) == 1 else same[0] | {"msg": f"expected {' or '.join(dict.fromkeys(kinds))}"})
+    return told
+
+
+def _expected(message: str) -> str:
+    """Return what a message expects: ``Input should be a valid number`` expects ``a number``."""
+    return (
+        message.removeprefix("Value error, ")
+        .removeprefix("Input should be ")
+        .replace("a valid ", "a ")
+        .replace("a integer", "a whole number")
+        .replace("a string", "text")
+    )
 
 
 def _mistake(model: type[BaseModel], error: Any) -> str:
@@ -97,6 +127,8 @@ def _mistake(model: type[BaseModel], error: Any) -> str:
     if error["type"] == "missing":
         return f"key '{key}' is missing"
     message = error["msg"].removeprefix("Value error, ")
+    if message.startswith("Input should be "):
+        message = f"expected {_expected(message)}"
     message = message[:1].lower() + message[1:]
     if isinstance(error["input"], dict | list) and error["type"] == "value_error":
         return f"{message}" if not key else f"'{key}': {message}"

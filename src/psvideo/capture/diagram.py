@@ -9,7 +9,7 @@ from psvideo.capture.draw_svg import svg
 from psvideo.capture.draw_text import timing_text
 from psvideo.capture.picture import timing_picture
 from psvideo.errors import UsageError
-from psvideo.files import whole_file
+from psvideo.files import PICTURE_MARK, marked_png, whole_file
 from psvideo.plan import Plan
 
 TERMINAL = "-"
@@ -29,7 +29,10 @@ def check_diagram_name(name: str | None, *, option: str = "--diagram") -> Path |
 def write_diagram(plan: Plan, path: Path) -> None:
     """Write the diagram of a plan as SVG or PNG, whole or not at all."""
     picture = timing_picture(plan)
-    data = png(picture) if path.suffix.lower() == ".png" else svg(picture).encode()
+    if path.suffix.lower() == ".png":
+        data = marked_png(png(picture))
+    else:
+        data = svg(picture).replace("<svg ", f'<svg id="{PICTURE_MARK}" ', 1).encode()
     with whole_file(path) as beside:
         beside.write_bytes(data)
 

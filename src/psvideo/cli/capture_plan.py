@@ -16,7 +16,7 @@ import typer
 import psvideo.cli.capture_options as option
 from psvideo.cli.console import Voice
 from psvideo.cli.options import Force, Json, Quiet, Verbose
-from psvideo.files import refuse_existing, write_text
+from psvideo.files import PICTURE_MARK, refuse_existing, write_text
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -78,7 +78,7 @@ def capture_plan(
     picture = check_diagram_name(diagram)
     outputs = [path for path in (out, picture) if path is not None]
     for path in outputs:
-        refuse_existing(path, force=force, mark="psvideo-plan/" if path == out else None)
+        refuse_existing(path, force=force, mark="psvideo-plan/" if path == out else PICTURE_MARK)
     words = {field.name: context.params[field.name] for field in dataclasses.fields(ShootWords)}
     request = parse_request(ShootWords(**words))
     shoot = plan_shoot(request)

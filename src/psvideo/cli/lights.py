@@ -11,7 +11,7 @@ import typer
 from psvideo.cli.console import Voice, counted
 from psvideo.cli.options import FirstLight, Force, Frames, Json, PlanPath, Quiet, Verbose
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.files import refuse_existing, write_text
+from psvideo.files import PICTURE_MARK, refuse_existing, write_text
 
 if TYPE_CHECKING:
     from psvideo.calibrate.guess import Prior
@@ -56,7 +56,7 @@ def matte_sphere(
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     refuse_existing(out, force=force, mark=SCHEMA)
-    refuse_existing(out.with_suffix(".png"), force=force)
+    refuse_existing(out.with_suffix(".png"), force=force, mark=PICTURE_MARK)
     found = _read(pictures, Reading(plan=plan, frames=frames, first_light=first_light, transfer=transfer), voice)
     view = Looking(focal_px=focal_px).view(width_px=found.width_px, height_px=found.height_px)
     if circle is None:

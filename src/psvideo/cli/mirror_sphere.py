@@ -10,7 +10,7 @@ import typer
 from psvideo.cli.console import Voice
 from psvideo.cli.options import FirstLight, Force, Frames, Json, PlanPath, Quiet, Verbose
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.files import refuse_existing, write_text
+from psvideo.files import PICTURE_MARK, refuse_existing, write_text
 
 if TYPE_CHECKING:
     from psvideo.calibrate.mirror_sphere import MeasuredLight, MirrorCalibration
@@ -100,7 +100,7 @@ def mirror_sphere(
 
 def _picture_path(out: Path, *, force: bool) -> Path:
     path = out.with_suffix(".png")
-    refuse_existing(path, force=force)
+    refuse_existing(path, force=force, mark=PICTURE_MARK)
     return path
 
 

@@ -200,5 +200,7 @@ def normals(
         tell_kept(voice, take.kept)
     voice.result(report_record(report))
     voice.say(describe_timing(found))
+    for note in found.notes:
+        voice.warn(note)
     tell_report(voice, report)
     voice.say(f"{out}: {counted(len(report.instants), 'instant')} written; see {out / 'report.html'}.")

@@ -86,6 +86,8 @@ def split(
     written = done.timing
     voice.result(timing_record(written))
     voice.say(describe_timing(written))
+    for note in found.notes:
+        voice.warn(note)
     tell_report(voice, done.report)
     plates = sum(flash.plate is not None for flash in written.flashes)
     voice.say(f"{out}: {counted(plates, 'plate')} written; see {out / 'report.html'}.")

@@ -86,7 +86,8 @@ def parse_board(word: str | None) -> Board | None:
     """Return the board of the table that was asked for."""
     if word is None or word in BOARDS:
         return None if word is None else BOARDS[word]
-    raise UsageError(f"--board {word}: {nearest(word, BOARDS)}")
+    usual = "An Uno or Nano has an atmega328p, a Mega an atmega2560, a Pico an rp2040."
+    raise UsageError(f"--board {word}: {nearest(word, BOARDS)} {usual}")
 
 
 def open_port(name: str, *, board: Board | None) -> Port:

@@ -7,7 +7,8 @@ import typer
 
 from psvideo.cli.console import Voice
 from psvideo.cli.options import ClipPath, FirstLight, Force, Frames, Json, OrderRig, PlanPath, Quiet, Verbose
-from psvideo.files import refuse_existing, write_text
+from psvideo.errors import UsageError
+from psvideo.files import PICTURE_MARK, refuse_existing, write_text
 
 if TYPE_CHECKING:
     from psvideo.timing import Timing
@@ -44,7 +45,9 @@ def sync(
     if out is not None:
         refuse_existing(out, force=force, mark="psvideo-timing/")
     if picture is not None:
-        refuse_existing(picture, force=force)
+        if picture.suffix.lower() != ".png":
+            raise UsageError(f"--picture {picture}: expected the name of a PNG, such as {picture.with_suffix('.png')}.")
+        refuse_existing(picture, force=force, mark=PICTURE_MARK)
     take = open_and_tell(clip, voice, plan=plan, frames=frames)
     known = None if rig is None else read_rig(rig, plan_lights=take.plan.lights)
     timing = find_clip_timing(take, first_light=first_light, watch=voice.track, picture=picture)

@@ -1,13 +1,25 @@
 """A mask that a user painted: white where to solve."""
 
+import contextlib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from psvideo.clip.decoders import decode
 from psvideo.clip.folder import KINDS
 from psvideo.errors import PsvideoError
+
+
+def _codes(kind: str, path: Path) -> NDArray[Any]:
+    """Decode a mask; PNGs in any of the ways in which painting programs save black and white (1 bit, palettes)."""
+    if kind == "png":
+        with contextlib.suppress(OSError, Image.DecompressionBombError), Image.open(path) as picture:
+            if picture.mode in ("1", "P"):
+                return np.asarray(picture.convert("L"))
+    return decode(kind, path).codes
 
 
 def read_mask(path: Path, *, width_px: int, height_px: int) -> NDArray[np.bool_]:
@@ -20,7 +32,7 @@ def read_mask(path: Path, *, width_px: int, height_px: int) -> NDArray[np.bool_]
         raise PsvideoError(f"{path}: is no picture that can be a mask; expected one of {', '.join(KINDS)}.")
     if not path.is_file():
         raise PsvideoError(f"{path}: there is no such mask. Check the name.")
-    codes = decode(kind, path).codes
+    codes = _codes(kind, path)
     brightest = codes if codes.ndim == 2 else codes.max(axis=2)
     if brightest.shape != (height_px, width_px):
         rows, cols = brightest.shape

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from psvideo.camera import FloatArray
 from psvideo.errors import PsvideoError
-from psvideo.files import whole_file
+from psvideo.files import marked_png, whole_file
 from psvideo.plan import Plan
 from psvideo.rowfit.profiles import residuals_of
 from psvideo.timing import Timing
@@ -128,4 +128,4 @@ def write_sheet(path: Path, picture: Pixels) -> None:
     if not done:
         raise PsvideoError(f"{path}: the picture of shape {picture.shape} cannot be encoded as PNG.")
     with whole_file(path) as beside:
-        beside.write_bytes(data.tobytes())
+        beside.write_bytes(marked_png(data.tobytes()))
