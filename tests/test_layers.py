@@ -10,7 +10,7 @@ PACKAGE = Path(__file__).resolve().parents[1] / "src" / "psvideo"
 
 LAYERS = [
     {"errors", "tomlfile", "files", "compiled", "near_limits"},
-    {"camera", "rig", "rigfile", "rig_lists", "surface", "tracefile"},
+    {"camera", "rig", "rigfile", "falloff", "rig_lists", "surface", "tracefile"},
     {"plan", "planfile", "timing"},
     {"shutter", "clip", "strobe", "capture"},
     {"rowfit", "profiles"},

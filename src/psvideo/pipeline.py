@@ -32,6 +32,7 @@ from psvideo.clip import (
     parse_range,
     read_frames,
 )
+from psvideo.falloff import Falloff
 from psvideo.near_surface import NearSurface, solve_near
 from psvideo.normals.illumination import Illumination, illumination
 from psvideo.normals.solving import Solving
@@ -304,6 +305,10 @@ def _at_full_flash(light: Light, duration_s: float) -> Light:
     )
 
 
+CLIPPED_WITHIN = 1e-5
+"""The largest code may come out a rounding below 1.0."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Instant:
     """The surface at one instant, and the round of plates that it was solved from."""
@@ -320,13 +325,17 @@ def surfaces(
     mask: NDArray[np.bool_] | None = None,
     solving: Solving = Solving(),
     near: NearSurface | None = None,
+    falloff: Falloff | None = None,
 ) -> Iterator[Instant]:
     """Solve every round that has a plate of each of the plan's lights; the clip's start and end cut the others.
 
-    ``near`` says where near lights find the surface. Raises PsvideoError where the rig lacks a light, or its lights
-    give no normals.
+    ``near`` says where near lights find the surface, ``falloff`` what share of their light arrives where. Raises
+    PsvideoError where the rig lacks a light, or its lights give no normals.
     """
     lights = lights_as_planned(rig, plan)
+    shares = None if falloff is None else [falloff.field(light.name) for light in lights]
+    if shares is not None:
+        lights = tuple(_at_least(light, share) for light, share in zip(lights, shares, strict=True))
 
     def solved(one: Round) -> Instant:
         scaled = [_weaker(light, plate.saturation) for light, plate in zip(lights, one.plates, strict=True)]
@@ -334,6 +343,8 @@ def surfaces(
         whole = all(plate.seen.ndim == 1 for plate in one.plates)
         seen = np.stack([plate.seen if whole else plate.pixels_seen for plate in one.plates])
         plates = [_until_saturation(plate) for plate in one.plates]
+        if shares is not None:
+            plates = [_evened(plate, share) for plate, share in zip(plates, shares, strict=True)]
         shown = None if seen.all() else seen
 
         def solve(lit: Illumination) -> Surface:
@@ -360,6 +371,19 @@ def denoised(instants: Iterable[Instant], results: int) -> Iterator[Instant]:
 def _weaker(light: Light, saturation: float) -> Light:
     """Return a light as the solver is to see it, whose plates are clipped at 1.0."""
     return replace(light, intensity=tuple(strength / saturation for strength in light.intensity))
+
+
+def _at_least(light: Light, share: NDArray[np.float32]) -> Light:
+    """Return a light as strong as where least of it arrives."""
+    least = float(share.min())
+    return replace(light, intensity=tuple(strength * least for strength in light.intensity))
+
+
+def _evened(image: Image, share: NDArray[np.float32]) -> Image:
+    """Return a plate as if everywhere as little light arrived as where least does; what is clipped stays clipped."""
+    factor = share.min() / share
+    even = image * (factor if image.ndim == 2 else factor[..., None])
+    return np.where(image >= 1 - CLIPPED_WITHIN, image, even).astype(image.dtype, copy=False)
 
 
 def _until_saturation(plate: LightPlate) -> Image:

@@ -5,6 +5,7 @@ says of directions and distances, the picture of each light is flat but for the 
 its median is the intensity.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,23 +13,29 @@ import numpy as np
 from psvideo.calibrate.light_pictures import LightPictures
 from psvideo.camera import FloatArray
 from psvideo.errors import PsvideoError
+from psvideo.falloff import POWERS, Falloff, terms
 from psvideo.normals.near_light import Ground, field_of
 from psvideo.rig import Light, Rig
 
 LEAST_SHARE = 0.5
 """Share of the target's pixels that must be unsaturated and seen."""
 LEAST_COSINE = 0.05
+MOST_PIXELS = 20_000
+ROUNDS = 5
 
 
 @dataclass(frozen=True, kw_only=True)
 class FlatLight:
     """One light's intensity per channel and its relative standard error, and the falloff that the rig does not explain:
-    the share by which the middle 90 % of the target differ from each other."""
+    the share by which the middle 90 % of the target differ from each other. ``coefficients`` are that falloff's smooth
+    part (``psvideo.falloff``), ``left`` what differs beside it in the same way."""
 
     name: str
     intensity: FloatArray
     intensity_error: float
     falloff: float
+    coefficients: tuple[float, ...]
+    left: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,11 +96,46 @@ def _flat(light: Light, n: int, pictures: LightPictures, target: Target, ground:
         for rows_ in rows
         if len(rows_) and usable[rows_[0] : rows_[-1] + 1].any()
     ]
-    low, high = np.percentile(flat[usable].mean(axis=1), [5, 95])
     mean = float(level.mean())
+    grey = np.where(usable, flat.mean(axis=2) / mean, np.nan)
+    coefficients, left = _smooth(grey, target, pictures)
+    low, high = np.nanpercentile(grey, [5, 95])
     return FlatLight(
         name=light.name,
         intensity=level,
         intensity_error=float(np.std(patches) / np.sqrt(max(len(patches) - 1, 1)) / mean),
-        falloff=float((high - low) / mean),
+        falloff=float(high - low),
+        coefficients=coefficients,
+        left=left,
     )
+
+
+def falloff_of(found: Sequence[FlatLight], target: Target, pictures: LightPictures) -> Falloff:
+    """Return the falloff that was measured, for ``psvideo normals``."""
+    return Falloff(
+        width_px=pictures.width_px,
+        height_px=pictures.height_px,
+        box=(target.cols.start, target.rows.start, target.cols.stop, target.rows.stop),
+        lights=tuple((one.name, one.coefficients) for one in found),
+    )
+
+
+def _smooth(grey: FloatArray, target: Target, pictures: LightPictures) -> tuple[tuple[float, ...], float]:
+    """Return the polynomial of the logarithm of what a target shows (row, col), NaN where unknown, robustly; and the
+    share by which the middle 90 % of the target still differ."""
+    step = max(int(np.sqrt(grey.size / MOST_PIXELS)), 1)
+    cols = np.arange(target.cols.start, target.cols.stop)[::step]
+    rows = np.arange(target.rows.start, target.rows.stop)[::step]
+    across, down = terms(cols, rows, width_px=pictures.width_px, height_px=pictures.height_px)
+    thinned = grey[::step, ::step]
+    known = np.isfinite(thinned) & (thinned > 0)
+    basis = np.stack([np.outer(down**j, across**i)[known] for i, j in POWERS], axis=1)
+    values = np.log(thinned[known])
+    weight = np.ones_like(values)
+    for _ in range(ROUNDS):
+        solved = np.linalg.lstsq(basis * weight[:, None], values * weight, rcond=None)[0]
+        rest = values - basis @ solved
+        scale = 1.4826 * float(np.median(np.abs(rest))) + 1e-6
+        weight = np.sqrt(1 / (1 + (rest / (2.385 * scale)) ** 2))  # Cauchy: dirt and print weigh little
+    low, high = np.percentile(np.exp(rest), [5, 95])
+    return tuple(float(f"{value:.6g}") for value in solved), float(high - low)

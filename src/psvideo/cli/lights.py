@@ -102,6 +102,9 @@ def flat_field(
     box: Annotated[
         str | None, typer.Option(help="The target's part of the picture: left,top,right,bottom in pixels.")
     ] = None,
+    flat: Annotated[
+        Path | None, typer.Option(help="A file to write how light falls off over the target, for psvideo normals.")
+    ] = None,
     transfer: Transfer = None,
     plan: PlanPath = None,
     frames: Frames = None,
@@ -115,13 +118,17 @@ def flat_field(
     plane that the rig gives); writes the rig with intensities."""
     import numpy as np
 
-    from psvideo.calibrate.flat_field import Target, measure_flat_field, with_intensities
+    from psvideo.calibrate.flat_field import Target, falloff_of, measure_flat_field, with_intensities
+    from psvideo.falloff import SCHEMA as FLAT_SCHEMA
+    from psvideo.falloff import format_falloff
     from psvideo.light_sets import Reading
     from psvideo.normals.near_light import ground_of, is_near
     from psvideo.rigfile import SCHEMA, format_rig, read_rig
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     refuse_existing(out, force=force, mark=SCHEMA)
+    if flat is not None:
+        refuse_existing(flat, force=force, mark=FLAT_SCHEMA)
     if not 0 < albedo <= 1:
         raise UsageError(f"--albedo {albedo:g}: expected a share above 0 and up to 1.")
     found = _read(pictures, Reading(plan=plan, frames=frames, first_light=first_light, transfer=transfer), voice)
@@ -133,16 +140,21 @@ def flat_field(
     target = Target(albedo=albedo, normal=normal / np.linalg.norm(normal), rows=rows, cols=cols)
     lights = measure_flat_field(found, known, target, ground=ground)
     write_text(out, format_rig(with_intensities(known, lights)))
+    if flat is not None:
+        write_text(flat, format_falloff(falloff_of(lights, target, found)))
     for light in lights:
         strengths = ", ".join(f"{value:.4g}" for value in light.intensity)
         voice.say(
             f"  {light.name:12} intensity {strengths}  +- {light.intensity_error:.1%}; the target differs by "
             f"{light.falloff:.0%} beyond what the rig explains"
         )
-    if max(light.falloff for light in lights) > 0.1:
+    if flat is not None:
+        left = max(light.left for light in lights)
+        voice.say(f"{flat}: falloff written, which leaves {left:.1%}; give it to psvideo normals with --flat.")
+    elif max(light.falloff for light in lights) > 0.1:
         voice.warn(
             "the target is not evenly lit (lens falloff, or lamps that are narrow or near): the rig file holds one "
-            "intensity per light, not a map, so strengths hold where the target was measured (--box)"
+            "intensity per light, not a map. Write the map with --flat flat.toml, and give it to psvideo normals"
         )
     voice.say(f"{out}: {counted(len(lights), 'light')} written.")
     voice.result(
@@ -153,6 +165,7 @@ def flat_field(
                     "intensity": light.intensity.tolist(),
                     "intensity_error": light.intensity_error,
                     "falloff": light.falloff,
+                    "left": light.left,
                 }
                 for light in lights
             ]

@@ -77,6 +77,9 @@ def normals(
     plan: PlanPath = None,
     timing: TimingPath = None,
     mask: Annotated[Path | None, typer.Option("--mask", help="A picture, white where to solve.")] = None,
+    flat: Annotated[
+        Path | None, typer.Option(help="How light falls off over the picture, from psvideo calibrate flat-field.")
+    ] = None,
     frames: Frames = None,
     first_light: FirstLight = None,
     solver: Annotated[
@@ -182,7 +185,7 @@ def normals(
     take = open_and_tell(clip, voice, plan=plan, frames=frames)
     over_time.check(take.plan)
     lighting = read_lighting(
-        take, rig, mask, near_iterations=near_iterations, depth_path=depth, metres_per_unit=depth_scale
+        take, rig, mask, near_iterations=near_iterations, depth_path=depth, metres_per_unit=depth_scale, flat_path=flat
     )
     lighting.check(delivery)
     with decoded_once(take, output=out) as take:

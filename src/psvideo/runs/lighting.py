@@ -1,6 +1,7 @@
 """What normals are solved with, read and checked before a long run begins."""
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from psvideo.clip import DepthMaps, open_depth, read_mask
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.results import Delivery
+from psvideo.falloff import Falloff, read_falloff
 from psvideo.integrate import Shaping, view_of
 from psvideo.near_limits import NEAR_ITERATIONS
 from psvideo.near_surface import NearSurface, near_surface_of, near_trust
@@ -18,7 +20,7 @@ from psvideo.pipeline import (
     Take,
     lights_as_planned,
 )
-from psvideo.rig import Rig
+from psvideo.rig import Light, Rig
 from psvideo.rigfile import read_rig
 from psvideo.sequence import check_separable
 
@@ -37,6 +39,7 @@ class Lighting:
     near: NearSurface | None = None
     mask: NDArray[np.bool_] | None = None
     depths: DepthMaps | None = None
+    falloff: Falloff | None = None
 
     @property
     def shaping(self) -> Shaping:
@@ -94,6 +97,7 @@ def read_lighting(
     near_iterations: int | None = None,
     depth_path: Path | None = None,
     metres_per_unit: float | None = None,
+    flat_path: Path | None = None,
 ) -> Lighting:
     """Read rig, mask and known depth of a take, a file or a folder with one per instant.
 
@@ -112,7 +116,18 @@ def read_lighting(
     )
     lit = illumination(lights, channels=clip.channels, ground=None if near is None else near.ground)
     mask = None if mask_path is None else read_mask(mask_path, width_px=clip.width_px, height_px=clip.height_px)
-    return Lighting(rig_path=rig_path, rig=rig, condition=lit.condition, near=near, mask=mask, depths=depths)
+    falloff = None if flat_path is None else _read_falloff(flat_path, take, lights)
+    return Lighting(
+        rig_path=rig_path, rig=rig, condition=lit.condition, near=near, mask=mask, depths=depths, falloff=falloff
+    )
+
+
+def _read_falloff(path: Path, take: Take, lights: Sequence[Light]) -> Falloff:
+    """Read a flat field; raises PsvideoError where it lacks a light, before a long run begins."""
+    falloff = read_falloff(path, width_px=take.clip.width_px, height_px=take.clip.height_px)
+    for light in lights:
+        falloff.field(light.name)
+    return falloff
 
 
 def _read_depth(take: Take, rig: Rig, path: Path, metres_per_unit: float | None) -> DepthMaps:

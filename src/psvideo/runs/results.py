@@ -113,7 +113,7 @@ def normals_run(
     solving = _solving(clip.plan, solver, delivery)
     method = solving.method(len(clip.plan.lights))
     known = () if lighting.depths is None else lighting.depths.identity
-    light = (lighting.mask_sha256, method, lighting.near_iterations, *known)
+    light = (lighting.mask_sha256, lighting.falloff, method, lighting.near_iterations, *known)
     settings = settings_of(take, timing, output, tags, delivery, over_time, *light)
     with (
         folder_of(output, settings) as folder,
@@ -127,7 +127,9 @@ def normals_run(
         ambient = first_ambient(take, timing) if mixed else None
         how = over_time.aligning
         rounds = aligned(plates, clip.plan.lights, how, first=output.start_number, with_ambient=with_ambient)
-        found = surfaces(rounds, clip.plan, lighting.rig, mask=mask, solving=solving, near=lighting.near)
+        found = surfaces(
+            rounds, clip.plan, lighting.rig, mask=mask, solving=solving, near=lighting.near, falloff=lighting.falloff
+        )
         for instant in found if over_time.denoise < 2 else denoised(found, over_time.denoise):
             shaping, shaped = shape_of(shaping, lighting, instant)
             ambient = (instant.round.ambient or ambient) if mixed else None
