@@ -1,9 +1,11 @@
 """Integration: depth from normals is the surface that they came from, whatever the mask, the view and the steps."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import cv2
 import numpy as np
+import OpenEXR
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -11,11 +13,13 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import lsqr
 
+from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
 from psvideo.integrate import Depth, Shaping, View, begun, depth_of, integrate, mesh_of, reservations, scaled
 from psvideo.integrate.bilateral import SMOOTH, Integration
-from psvideo.integrate.multigrid import empty_levels, solve
+from psvideo.integrate.multigrid import empty_grids, prepare, solve, weighed
 from psvideo.integrate.poisson import poisson_height
+from psvideo.integrate.reweighting import write_board
 from psvideo.integrate.view import slopes_of
 from psvideo.surface import Surface
 
@@ -201,12 +205,16 @@ def test_the_fast_path_undoes_differences_exactly(rows: int, cols: int, seed: in
 def test_one_multigrid_cycle_is_worth_many_plain_steps() -> None:
     rng = np.random.default_rng(1)
     shape = (129, 200)
-    east, south = rng.uniform(0.01, 1, shape), rng.uniform(0.01, 1, shape)
+    grids = empty_grids(shape)
+    east, south, right = rng.uniform(0.01, 1, shape), rng.uniform(0.01, 1, shape), rng.normal(size=shape)
     east[:, -1], south[-1] = 0, 0
-    right = rng.normal(size=shape)
-    right -= right.mean()
-    height = np.zeros(shape)
-    assert solve(empty_levels(shape), east, south, right, height, tolerance=1e-6, most=100) < 40
+    finest = grids.levels[0]
+    for plane, board in ((east, finest.ties[0]), (south, finest.ties[1]), (right - right.mean(), finest.right)):
+        write_board(plane.astype(np.float32), board)
+    prepare(grids)
+    wanted = weighed(grids)
+    assert solve(grids, stop=1e-8 * wanted, most=100)[1] < 30
+    assert weighed(grids) <= 1e-8 * wanted
 
 
 def torn() -> tuple[Floats, Floats]:
@@ -361,3 +369,93 @@ def test_real_shapes_come_out_as_near_as_published(name: str, shared_data: Path)
     scale = np.median((true / np.where(seen, found.depth, 1))[seen])
     wrong_mm = np.abs(scale * found.depth - true)[seen].mean()
     assert wrong_mm < 1.15 * PUBLISHED_MM[name]
+
+
+@pytest.fixture(scope="module")
+def bust(tmp_path_factory: pytest.TempPathFactory) -> Callable[[int], Surface]:
+    """The virtual bust before its wall, with normals that are off by one or two degrees, by a seed."""
+    folder = tmp_path_factory.mktemp("bust")
+    scene = (Path(__file__).resolve().parents[1] / "data_synth" / "bust.toml").read_text()
+    for old, new in (("frames = 60", "frames = 7"), ("_px = 640", "_px = 320"), ("_px = 360", "_px = 180")):
+        scene = scene.replace(old, new)
+    (folder / "bust.toml").write_text(scene)
+    assert main(["synth", str(folder / "bust.toml"), "-o", str(folder / "clip"), "-q"]) == 0
+    file = OpenEXR.File(str(folder / "clip" / "truth" / "normals.exr"))
+    true = file.channels()["RGB"].pixels.astype(np.float64)
+
+    def seen(seed: int) -> Surface:
+        normals = true + 0.02 * np.random.default_rng(seed).normal(size=true.shape)
+        return surface(normals / np.linalg.norm(normals, axis=2, keepdims=True), np.ones(true.shape[:2], np.bool_))
+
+    return seen
+
+
+def test_in_a_clip_that_stands_still_nothing_wanders_and_no_instant_depends_on_another(
+    bust: Callable[[int], Surface],
+) -> None:
+    shaping = begun(Shaping(view=View()), bust(0))
+    assert shaping.first is not None
+
+    def wandered_px(depth: Depth) -> float:
+        """By how much all but a hundredth stand nearer or farther than in the first instant, at most."""
+        assert shaping.first is not None
+        return float(np.percentile(np.abs(depth.depth - shaping.first.depth), 99)) * 320
+
+    later = [depth_of(shaping, bust(seed)) for seed in (1, 2, 3)]
+    assert max(map(wandered_px, later)) < 1.0
+    alone = [depth_of(Shaping(view=View()), bust(seed)) for seed in (1, 2, 3)]
+    assert max(map(wandered_px, alone)) > 2.0  # which is what the first instant is for
+    assert np.array_equal(depth_of(shaping, bust(2)).depth, later[1].depth)
+
+
+def ball(col: float, seed: int) -> Surface:
+    """A ball before a wall, its middle in a column."""
+    r, c = np.mgrid[:ROWS, :COLS]
+    x, y = (c - col) / 24, -(r - 36.2) / 24
+    inside = x**2 + y**2 < 0.97
+    normals = np.dstack([x, y, np.sqrt(np.maximum(1 - x**2 - y**2, 0))]) * inside[..., None]
+    normals[~inside] = (0, 0, 1)
+    normals += 0.015 * np.random.default_rng(seed).normal(size=normals.shape)
+    return surface(normals / np.linalg.norm(normals, axis=2, keepdims=True), EVERYWHERE)
+
+
+def test_what_moves_is_not_held_where_it_was() -> None:
+    shaping = begun(Shaping(view=View()), ball(30.2, 0))
+    moved = ball(57.3, 1)
+    held, free = depth_of(shaping, moved), depth_of(Shaping(view=View()), moved)
+    r, c = np.mgrid[:ROWS, :COLS]
+    inside = (c - 57.3) ** 2 + (r - 36.2) ** 2 < 20**2
+    true = -np.sqrt(np.maximum(24.0**2 - (c - 57.3) ** 2 - (r - 36.2) ** 2, 0))
+
+    def wrong_px(depth: Depth) -> float:
+        wrong = (depth.depth * COLS - true)[inside]
+        return float(np.abs(wrong - np.median(wrong)).mean())
+
+    assert wrong_px(held) < 1.3 * wrong_px(free) + 0.1
+    assert wrong_px(held) < 0.6
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 10_000), st.floats(0.0, 1.0), st.sampled_from([None, (0.0, 0.0, 1.0, 0.9)]))
+def test_any_mask_gives_finite_depth_where_it_is_valid_and_none_elsewhere(
+    seed: int, share: float, plane: tuple[float, float, float, float] | None
+) -> None:
+    """Dust, islands, single pixels, nothing, everything: also in the first instant of a clip, and after it."""
+    rng = np.random.default_rng(seed)
+    size = int(rng.integers(1, 40)), int(rng.integers(1, 40))
+    masks = [rng.random(size) < share, cv2.blur(rng.random(size), (5, 5)) < 0.3 + 0.4 * share]
+    normals = rng.normal(size=(*size, 3)) * [0.5, 0.5, 0.3] + [0, 0, 1]
+    normals /= np.linalg.norm(normals, axis=2, keepdims=True)
+    shaping = Shaping(view=PINHOLE if plane else View(), plane=plane)
+    first = begun(shaping, surface(normals, masks[seed % 2]))
+    for depth in (first.first, depth_of(first, surface(normals, masks[1 - seed % 2]))):
+        assert depth is not None
+        valid = masks[seed % 2] if depth is first.first else masks[1 - seed % 2]
+        assert np.isfinite(depth.depth).all()
+        assert not depth.depth[~valid].any()
+        parts, labels = cv2.connectedComponents(valid.astype(np.uint8), connectivity=4)
+        large = [number for number in range(1, parts) if (labels == number).sum() >= 64]
+        assert np.array_equal(depth.depth != 0, np.isin(labels, large))
+        mesh = mesh_of(surface(normals, valid), depth)
+        assert np.isfinite(mesh.points).all()
+        assert len(mesh.points) == 0 or mesh.triangles.max() == len(mesh.points) - 1

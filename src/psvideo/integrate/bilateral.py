@@ -4,47 +4,38 @@ X. Cao, H. Santo, B. Shi, F. Okura and Y. Matsushita, Bilateral Normal Integrati
 be smooth on at least one side of every pixel in each direction, and the two one-sided differences are weighed against
 each other by how far they step. The weights depend on the height, so weighted least squares are repeated with the
 weights of the height before, beginning with equal ones. Each round is solved by multigrid, in two to ten cycles.
+
+A later instant of a clip begins with the weights of the first one wherever it looks the same, which saves most of the
+rounds, and is held there to the first one's height by so weak a force that only what nothing else decides follows it:
+how far away a piece is around which the surface is cut.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.camera import FloatArray
-from psvideo.integrate.kernel import tie
-from psvideo.integrate.multigrid import empty_levels, solve
-from psvideo.integrate.poisson import poisson_height
+from psvideo.integrate.rounds import BILATERAL, SMOOTH, Held, Integration, find_height
 from psvideo.integrate.view import Slopes, View, slopes_of
 
 Mask = NDArray[np.bool_]
+Floats = NDArray[np.float32]
+Box = tuple[slice, slice]
+
+__all__ = ["BILATERAL", "SMOOTH", "Before", "Height", "Integration", "integrate"]
 
 CUT_SHARE = 0.1
 """Neighbours count as cut apart when less than this share of the weight between them is left; half is left where a
 surface is smooth, and with the paper's sharpness never less than 0.12 where steps are those of the normals."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Integration:
-    """How normals are integrated.
-
-    sharpness: the paper's k: the larger, the more easily a jump is kept; 0 takes the whole surface for smooth.
-    rounds: most rounds of reweighting.
-    settled: relative change of the energy below which the rounds end.
-    tolerance: how exactly each round is solved, relative to its right side.
-    """
-
-    sharpness: float = 2.0
-    rounds: int = 60
-    settled: float = 1e-3
-    tolerance: float = 1e-3
-
-
-BILATERAL = Integration()
-SMOOTH = Integration(sharpness=0.0, tolerance=1e-7)
-MOST_CYCLES = 100
-LAST_TOLERANCE = 0.01
-"""How much more exactly the last round's equations are solved than those on the way."""
+SAME_COSINE = 0.996
+"""Normals less than 5 degrees apart look the same as in the instant before."""
+AROUND_PX, SAME_SHARE = 7, 0.7
+"""A pixel is the same where so many of those around it look the same: along outlines normals are noisy."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,30 +46,64 @@ class Height:
         not valid.
     valid: (row, col).
     cut_east, cut_south: (row, col), True where the surface jumps between a pixel and its right or lower neighbour.
+    rightward, downward: (row, col), how much a pixel's step to the right and down counts against the opposite one.
     """
 
     height: FloatArray
     valid: Mask
     cut_east: Mask
     cut_south: Mask
+    rightward: Floats
+    downward: Floats
 
 
-def integrate(normals: NDArray[np.floating], valid: Mask, view: View, *, how: Integration = BILATERAL) -> Height:
-    """Return the height of a surface from its normals (row, col, 3), camera frame, over a mask of any shape."""
-    slopes = slopes_of(normals, valid, view)
+@dataclass(frozen=True, kw_only=True)
+class Before:
+    """An instant that was integrated before, in the same view: its height and normals (row, col, 3)."""
+
+    height: Height
+    normals: NDArray[np.floating]
+
+
+def integrate(
+    normals: NDArray[np.floating],
+    valid: Mask,
+    view: View,
+    *,
+    how: Integration = BILATERAL,
+    before: Before | None = None,
+) -> Height:
+    """Return the height of a surface from its normals (row, col, 3), camera frame, over a mask of any shape.
+
+    What looks the same as ``before`` keeps its jumps, where they still hold, and its place.
+    """
     box = _box(valid)
+    slopes = slopes_of(normals, valid, view)
     within = Slopes(
         facing=np.ascontiguousarray(slopes.facing[box]),
         across=np.ascontiguousarray(slopes.across[box]),
         down=np.ascontiguousarray(slopes.down[box]),
         aspect=slopes.aspect,
     )
-    height, cut_east, cut_south = np.zeros(valid.shape), np.zeros_like(valid), np.zeros_like(valid)
-    height[box], cut_east[box], cut_south[box] = _height(within, how)
-    return Height(height=height, valid=valid, cut_east=cut_east, cut_south=cut_south)
+    del slopes
+    height, rightward, downward = find_height(
+        within, how, held=None if before is None else _held(before, normals, valid, box)
+    )
+    planes = (height, *_cuts(within, rightward, downward), rightward, downward)
+    height, cut_east, cut_south, rightward, downward = (_whole(plane, valid.shape, box) for plane in planes)
+    return Height(
+        height=height, valid=valid, cut_east=cut_east, cut_south=cut_south, rightward=rightward, downward=downward
+    )
 
 
-def _box(valid: Mask) -> tuple[slice, slice]:
+def _whole(plane: NDArray[Any], shape: tuple[int, ...], box: Box) -> NDArray[Any]:
+    """Put a plane into its place in the picture."""
+    whole = np.zeros(shape, plane.dtype)
+    whole[box] = plane
+    return whole
+
+
+def _box(valid: Mask) -> Box:
     """The smallest rectangle that holds all that is valid; the first pixel where nothing is."""
     rows, cols = np.flatnonzero(valid.any(axis=1)), np.flatnonzero(valid.any(axis=0))
     if not rows.size:
@@ -86,35 +111,30 @@ def _box(valid: Mask) -> tuple[slice, slice]:
     return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(cols[0]), int(cols[-1]) + 1)
 
 
-def _height(slopes: Slopes, how: Integration) -> tuple[FloatArray, Mask, Mask]:
-    whole = bool((slopes.facing > 0).all())
-    height = poisson_height(slopes) if whole else np.zeros(slopes.facing.shape)
-    if whole and how.sharpness == 0.0:
-        uncut = np.zeros(height.shape, np.bool_)
-        return height, uncut, uncut
-    shape = (height.shape[0], height.shape[1])
-    east, south, target = (np.zeros(shape) for _ in range(3))
-    levels = empty_levels(shape)
-    given = (slopes.facing, slopes.across, slopes.down, slopes.aspect)
-    before = tie(height, *given, 0.0, east, south, target)
-    for _ in range(1 if how.sharpness == 0.0 else how.rounds):
-        solve(levels, east, south, target, height, tolerance=how.tolerance, most=MOST_CYCLES)
-        energy = tie(height, *given, how.sharpness, east, south, target)
-        if abs(energy - before) <= how.settled * before:
-            break
-        before = energy
-    solve(levels, east, south, target, height, tolerance=how.tolerance * LAST_TOLERANCE, most=MOST_CYCLES)
-    height[slopes.facing == 0.0] = 0.0
-    return height, *_cuts(slopes, east, south)
+def _held(before: Before, normals: NDArray[np.floating], valid: Mask, box: Box) -> Held:
+    both = valid[box] & before.height.valid[box]
+    cosine = sum(
+        normals[box][..., axis].astype(np.float32) * before.normals[box][..., axis].astype(np.float32)
+        for axis in range(3)
+    )
+    alike = cv2.blur((both & (cosine > SAME_COSINE)).astype(np.float32), (AROUND_PX, AROUND_PX))
+    there = cv2.blur(both.astype(np.float32), (AROUND_PX, AROUND_PX))
+    return Held(
+        same=both & (alike > SAME_SHARE * there),
+        rightward=before.height.rightward[box],
+        downward=before.height.downward[box],
+        height=before.height.height[box],
+    )
 
 
-def _cuts(slopes: Slopes, east: FloatArray, south: FloatArray) -> tuple[Mask, Mask]:
+def _cuts(slopes: Slopes, rightward: Floats, downward: Floats) -> tuple[Mask, Mask]:
     """Where hardly any weight is left between neighbours that are both valid."""
     squared = slopes.facing**2
-    cut_east, cut_south = np.zeros(east.shape, np.bool_), np.zeros(east.shape, np.bool_)
-    both = (squared[:, 1:] > 0) & (squared[:, :-1] > 0)
-    cut_east[:, :-1] = both & (east[:, :-1] < CUT_SHARE * (squared[:, 1:] + squared[:, :-1]))
-    both = (squared[1:] > 0) & (squared[:-1] > 0)
-    scale = CUT_SHARE * slopes.aspect**2
-    cut_south[:-1] = both & (south[:-1] < scale * (squared[1:] + squared[:-1]))
+    cut_east, cut_south = np.zeros(squared.shape, np.bool_), np.zeros(squared.shape, np.bool_)
+    one, other = squared[:, :-1], squared[:, 1:]
+    tie = rightward[:, :-1] * one + (1 - rightward[:, 1:]) * other
+    cut_east[:, :-1] = (one > 0) & (other > 0) & (tie < CUT_SHARE * (one + other))
+    one, other = squared[:-1], squared[1:]
+    tie = downward[:-1] * one + (1 - downward[1:]) * other
+    cut_south[:-1] = (one > 0) & (other > 0) & (tie < CUT_SHARE * (one + other))
     return cut_east, cut_south

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.integrate.bilateral import BILATERAL, Integration, integrate
+from psvideo.integrate.bilateral import BILATERAL, Before, Height, Integration, integrate
 from psvideo.integrate.depth import Depth, Plane, scaled
 from psvideo.integrate.view import View
 from psvideo.surface import Surface
@@ -13,7 +13,8 @@ from psvideo.surface import Surface
 
 @dataclass(frozen=True, kw_only=True)
 class Shaping:
-    """How a clip's surfaces become depth. ``first`` is the first instant's, whose scale the others keep.
+    """How a clip's surfaces become depth. ``first`` is the first instant's, whose scale the others keep, and
+    ``before`` what its integration leaves to theirs.
 
     known_m: depth (row, col) in metres that is known from elsewhere, 0 where it is not; comes before plane and first.
     """
@@ -22,6 +23,7 @@ class Shaping:
     plane: Plane | None = None
     how: Integration = BILATERAL
     first: Depth | None = None
+    before: Before | None = None
     known_m: NDArray[np.float32] | None = None
 
     @property
@@ -32,13 +34,23 @@ class Shaping:
 
 def depth_of(shaping: Shaping, surface: Surface) -> Depth:
     """Return the depth of one instant; safe to call from several threads."""
-    height = integrate(surface.normals, surface.valid, shaping.view, how=shaping.how)
+    return _scaled(
+        shaping, integrate(surface.normals, surface.valid, shaping.view, how=shaping.how, before=shaping.before)
+    )
+
+
+def _scaled(shaping: Shaping, height: Height) -> Depth:
     return scaled(height, shaping.view, plane=shaping.plane, reference=shaping.first, known_m=shaping.known_m)
 
 
 def begun(shaping: Shaping, surface: Surface) -> Shaping:
-    """Return the shaping with the first instant's depth, which fixes the scale; raises PsvideoError as ``scaled``."""
-    return replace(shaping, first=depth_of(replace(shaping, first=None), surface))
+    """Return the shaping with the first instant's depth, which fixes the scale; raises PsvideoError as ``scaled``.
+
+    All later instants begin from the first one, and never from each other: each can be done by itself.
+    """
+    height = integrate(surface.normals, surface.valid, shaping.view, how=shaping.how)
+    first = _scaled(replace(shaping, first=None), height)
+    return replace(shaping, first=first, before=Before(height=height, normals=surface.normals))
 
 
 def reservations(shaping: Shaping) -> tuple[str, ...]:
