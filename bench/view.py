@@ -1,8 +1,9 @@
 """The page of `psvideo view` on 240 results at 1080p: how soon it is ready, and how fast it scrubs.
 
-Normals, albedo and validity of a bumpy surface with noise, drawn 960 pixels wide by Chromium with software rendering
-(SwiftShader), which shares the cores with the server and with whatever else runs. A scrub sets the slider sixty times a
-second to the next picture and counts the pictures that came onto the screen, relit. The best of some tries counts.
+Normals, albedo and validity of a bumpy surface with noise (which takes longer to decode than one without), drawn 960
+pixels wide by Chromium with software rendering (SwiftShader), which shares the cores with the server and with whatever
+else runs. A scrub sets the slider sixty times a second to the next picture and counts the pictures that came onto the
+screen, relit. The best of some tries counts.
 Processor time, of the server and of all of the browser, depends less on what else runs.
 """
 

@@ -68,7 +68,7 @@ class ComparedPlates:
         """Return a light's plate of the round that is nearest to a time. Raises PsvideoError where there is none."""
         with self._lock:
             take, timing = self._timed()
-            number = _nearest_round(timing, time_s)
+            number = _nearest_round(timing, light, time_s)
             if method not in self._rounds or self._rounds[method][0] != number:
                 self._rounds[method] = (number, _plates(take, timing, method, number))
             plates = self._rounds[method][1]
@@ -87,22 +87,18 @@ class ComparedPlates:
         return self._take, self._timing
 
 
-def _nearest_round(timing: Timing, time_s: float) -> int:
-    """Return the number of the round whose complete lit flashes are nearest to a time."""
+def _nearest_round(timing: Timing, light: str, time_s: float) -> int:
+    """Return the number of the round whose complete flashes of a light are nearest to a time."""
     from psvideo.sequence import round_numbers
 
-    numbers = round_numbers(timing.flashes)
-    lit = [
-        (number, flash.start_s)
-        for number, flash in zip(numbers, timing.flashes, strict=True)
-        if flash.complete and any(flash.lights.values())
-    ]
-    if not lit:
-        raise PsvideoError("The clip holds no complete flash, so there is nothing to compare.")
-    times_s: dict[int, list[float]] = {}
-    for number, start_s in lit:
-        times_s.setdefault(number, []).append(start_s)
-    return min(times_s, key=lambda number: abs(float(np.mean(times_s[number])) - time_s))
+    away_s = {
+        abs(flash.start_s - time_s): number
+        for number, flash in zip(round_numbers(timing.flashes), timing.flashes, strict=True)
+        if flash.complete and flash.lights.get(light, 0) > 0
+    }
+    if not away_s:
+        raise PsvideoError(f"The clip holds no complete flash of {light}, so there is nothing to compare.")
+    return away_s[min(away_s)]
 
 
 def _plates(take: "Take", timing: Timing, method: Method, number: int) -> Mapping[str, ComparedPlate]:

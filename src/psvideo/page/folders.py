@@ -42,11 +42,19 @@ def show_of(path: Path, *, clip: Path | None = None, plan: Path | None = None) -
     if not path.is_dir() or not (is_results(path) or is_plates(path)):
         if clip is not None:
             raise UsageError(f"--clip: goes with a folder of results or plates, and {path} is none. Leave it out.")
-        return show_of_clip(path, plan=plan)
+        return _clip(path, plan)
     show = _results(path) if is_results(path) else _plates(path)
     if clip is not None:
         return with_clip(show, clip, plan=plan, timing=path / "timing.json")
     return _with_clip_beside(show, path)
+
+
+def _clip(path: Path, plan: Path | None) -> Show:
+
+    try:
+        return show_of_clip(path, plan=plan)
+    except PsvideoError as fault:
+        raise PsvideoError(f"{fault} Results and plates, which normals and split write, can be shown too.") from None
 
 
 def _with_clip_beside(show: Show, path: Path) -> Show:

@@ -1,10 +1,13 @@
 // Which place of the sequence is shown: the wanted one once all its pictures are there, one place after the other, so
 // that something moves on the screen however fast the wanted place runs ahead.
-import { blockKey } from "./source.js";
+import { MOST_BYTES, blockKey } from "./source.js";
 import { needsOf, numberFor, sequenceOf, widthFor } from "./looks.js";
 
 const AHEAD = 4;
 const REST_MS = 300;
+const RESTING_AT_ONCE = 2; // so that whoever moves on need not wait long for what was begun meanwhile
+const RESTING_SHARE = 0.7; // of the memory for blocks, for places around the one that rests
+const MOST_AROUND = 1000;
 
 export class Loader {
   constructor(app, changed) {
@@ -40,12 +43,12 @@ export class Loader {
       }
       const missing = Object.values(this.loading.keys).filter((key) => !app.source.get(key));
       if (missing.length) {
-        app.source.want([...missing, ...this.slowKeys(), ...this.loading.ahead]);
+        app.source.want([...missing, ...this.slowKeys()], this.loading.ahead);
         return;
       }
       this.show();
     }
-    app.source.want([...this.slowKeys(), ...this.keysAhead(app.state.at)]);
+    app.source.want(this.slowKeys(), this.keysAhead(app.state.at), this.quick() ? undefined : RESTING_AT_ONCE);
   }
 
   // The place to load now: the wanted one; while it runs, one on the way there that was asked for early, if there is any.
@@ -101,20 +104,33 @@ export class Loader {
     return { ...this.shown.blocks, ...Object.fromEntries(found.filter(([, block]) => block)) };
   }
 
-  // What is likely to be wanted next: while the place runs, where it will be by then; in play and at rest, what follows.
+  // What is likely to be wanted next: while the place runs, where it will be by then; in play, what follows; at rest, all
+  // around it that memory holds.
   keysAhead(at) {
-    const { playing } = this.app.state;
-    const count = this.app.master.numbers.length;
-    const running = this.moving && !playing;
-    const stride = running ? at - this.shown.at : this.direction;
+    const { app } = this;
+    const running = this.moving && !app.state.playing;
+    const stride = at - this.shown.at;
     this.early = running ? at + stride : NaN;
-    const keys = [];
-    for (let step = 1; step <= (running ? 1 : playing ? AHEAD : 1); step += 1) {
-      let place = at + step * stride;
-      if (playing) place = (place + count) % count;
-      if (place >= 0 && place < count) keys.push(...Object.values(this.keysAt(place, true)));
-    }
-    return keys;
+    const places = running ? [this.early] : app.state.playing ? this.following(at) : this.around(at);
+    const count = app.master.numbers.length;
+    return places.filter((place) => place >= 0 && place < count).flatMap((place) => Object.values(this.keysAt(place, true)));
+  }
+
+  following(at) {
+    const count = this.app.master.numbers.length;
+    return Array.from({ length: AHEAD }, (_, step) => (at + this.direction * (step + 1) + count) % count);
+  }
+
+  around(at) {
+    const blocks = Object.values(this.shown.blocks);
+    const bytes = Math.max(blocks.reduce((sum, block) => sum + block.bytes, 0), 1);
+    const reach = Math.min(RESTING_SHARE * MOST_BYTES / bytes, MOST_AROUND, 2 * this.app.master.numbers.length) / 2;
+    return Array.from({ length: Math.floor(reach) }, (_, step) => [at + step + 1, at - step - 1]).flat();
+  }
+
+  // Whether a place could be shown at once.
+  holds(at) {
+    return Object.values(this.keysAt(at, true)).every((key) => this.app.source.kept.has(key));
   }
 
   keysOf(at, ids, quick) {

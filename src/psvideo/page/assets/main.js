@@ -53,7 +53,7 @@ class App {
       this.stage.build();
       this.draw();
     });
-    this.loader.update();
+    this.loader.update({ moving: true }); // something to see first, sharp a moment later
     this.draw();
   }
 
@@ -187,10 +187,15 @@ class App {
     if (block.missing) this.faulty(key);
     this.loader.step();
     if (this.loader.slowIds().length) this.draw();
+    this.telling ||= requestAnimationFrame(() => {
+      this.telling = 0;
+      tellTransport(this);
+    });
   }
 
   faulty(key) {
     const [id, rest] = key.split("/");
+    if (this.sequences.get(id).slow) return;
     const number = Number(rest.split("?")[0]);
     if (this.sequences.get(id).timeline === this.master.timeline) this.faults.add(this.master.numbers.indexOf(number));
   }
@@ -266,7 +271,7 @@ function scaled(rect, ratio) {
 function firstState(app) {
   const ids = app.contents.map(({ id }) => id);
   const contents = [0, 1, 2, 3].map((place) => ids[Math.min(place, ids.length - 1)]);
-  return { at: 0, playing: false, layout: ids.length > 1 ? "two" : "one", contents, active: 0, wipe: 0.5, exposure: 0,
+  return { at: 0, playing: false, layout: ids.length > 1 && app.index.kind !== "clip" ? "two" : "one", contents, active: 0, wipe: 0.5, exposure: 0,
     channels: 0, lights: [newLight([])], selected: 0, specular: 0, exponent: 30, relief: 1, zoom: 1, centre: [0.5, 0.5],
     markInvalid: false };
 }

@@ -1,7 +1,8 @@
 // Where pictures come from, which of them are kept, and in what order they are fetched.
 import { missingBlock, parseBlock } from "./block.js";
 
-const MOST_BYTES = 640e6;
+const GIGABYTES = navigator.deviceMemory ?? 3.2; // browsers that tell it say 8 at most
+export const MOST_BYTES = 0.2e9 * GIGABYTES;
 const AT_ONCE = 4;
 
 // `quick`: pixels are left out instead of averaged, which is made sooner; for what moves.
@@ -47,6 +48,7 @@ export class Source {
     this.kept = new Map();
     this.underway = new Set();
     this.wanted = [];
+    this.early = [];
     this.bytes = 0;
   }
 
@@ -59,16 +61,18 @@ export class Source {
     return block;
   }
 
-  want(keys) {
-    this.wanted = keys.filter((key) => !this.kept.has(key));
+  // Fetch some blocks at once, and then others that may be wanted soon, so many at a time.
+  want(keys, early = [], earlyAtOnce = AT_ONCE) {
+    const absent = (key) => !this.kept.has(key) && !this.underway.has(key);
+    this.wanted = keys.filter(absent);
+    this.early = early.filter(absent);
+    this.earlyAtOnce = earlyAtOnce;
     this.fetchNext();
   }
 
   fetchNext() {
-    for (const key of this.wanted) {
-      if (this.underway.size >= AT_ONCE) return;
-      if (!this.underway.has(key)) this.fetch(key);
-    }
+    while (this.wanted.length && this.underway.size < AT_ONCE) this.fetch(this.wanted.shift());
+    while (!this.wanted.length && this.early.length && this.underway.size < this.earlyAtOnce) this.fetch(this.early.shift());
   }
 
   async fetch(key) {
@@ -80,7 +84,6 @@ export class Source {
       block = missingBlock(`Nothing came from psvideo (${fault.message}). Is the command still running?`);
     }
     this.underway.delete(key);
-    this.wanted = this.wanted.filter((other) => other !== key);
     this.keep(key, block);
     this.fetchNext();
     this.arrived(key, block);

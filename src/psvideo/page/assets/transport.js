@@ -44,11 +44,11 @@ export function tellTransport(app) {
   drawMarks(app);
 }
 
-// Under the slider: dropped numbers and pictures that could not be read.
+// Over the slider: what is held and can be shown at once, dropped numbers, and pictures that could not be read.
 function drawMarks(app) {
   const canvas = document.getElementById("marks");
   const wide = canvas.clientWidth;
-  const wanted = `${wide} ${app.faults.size}`;
+  const wanted = `${wide} ${app.faults.size} ${app.source.kept.size} ${app.panes()}`;
   if (canvas.dataset.of === wanted || !wide) return;
   canvas.dataset.of = wanted;
   canvas.width = wide;
@@ -56,6 +56,8 @@ function drawMarks(app) {
   const pen = canvas.getContext("2d");
   const { numbers } = app.master;
   const place = (at) => 8 + (wide - 16) * (numbers.length > 1 ? at / (numbers.length - 1) : 0);
+  pen.fillStyle = "#6c6c6c";
+  numbers.forEach((_, at) => app.loader.holds(at) && pen.fillRect(place(at - 0.5), 4, place(1) - place(0) + 1, 2));
   pen.fillStyle = "#d8d8d8";
   numbers.forEach((value, at) => {
     if (at && !app.index.thinned && value - numbers[at - 1] > 1) pen.fillRect(place(at - 0.5) - 1, 0, 2, 6);
