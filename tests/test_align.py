@@ -236,6 +236,29 @@ def test_no_more_plates_are_held_than_instants_need(
     assert not sizes
 
 
+@pytest.mark.parametrize("rate", ["round", "flash"])
+@pytest.mark.parametrize("align", ["none", "auto", "flow"])
+def test_a_dark_slot_goes_with_its_own_round_wherever_it_lies_and_a_round_without_has_none(
+    align: Any, rate: Any
+) -> None:
+    clip = filmed(3, "at rest")
+
+    def plates(dark_at: int) -> Iterator[LightPlate]:
+        for one in clip.rounds:
+            given = list(one.plates)
+            if one.number != 1002:
+                given.insert(dark_at, replace(given[0], light="ambient"))
+            yield from given
+
+    for dark_at in (0, 2, 3):
+        how = Aligning(align=align, rate=rate)
+        results = list(aligned(plates(dark_at), clip.lights, how, first=1001, with_ambient=True))
+        numbers = [None if one.ambient is None else one.ambient.number for one in results]
+        each = 3 if rate == "flash" else 1
+        assert numbers == [number for number in (1001, None, 1003) for _ in range(each)]
+        assert [one.lights for one in results] == [clip.lights] * len(results)
+
+
 def test_a_packed_plate_is_good_to_its_16_bits_and_what_is_clipped_stays_so() -> None:
     rng = np.random.default_rng(8)
     image = rng.uniform(-0.02, 1.7, (60, 80, 3)).astype(np.float32)
