@@ -102,23 +102,7 @@ def write_surface(
     ``depth``, which integrates the normals, is needed where ``delivery.needs_depth``, ``beauty`` where it is an AOV.
     """
     normals = placed(surface.normals, delivery.space)
-    planes: dict[str, dict[str, NDArray[np.floating]]] = {
-        "normals": image_channels(normals),
-        "albedo": image_channels(_three_channels(surface.albedo)),
-        "valid": {"Y": surface.valid.astype(np.float32)},
-    }
-    if "residual" in delivery.aovs:
-        if surface.residual is None:
-            raise ValueError("the residual is to be written and was not solved for")
-        planes["residual"] = {"Y": surface.residual}
-    if "error" in delivery.aovs:
-        if surface.error_deg is None:
-            raise ValueError("the error is to be written and was not predicted")
-        planes["error"] = {"Y": surface.error_deg}
-    if "beauty" in delivery.aovs:
-        if beauty is None:
-            raise ValueError("the beauty plate is to be written and was not summed")
-        planes["beauty"] = image_channels(_three_channels(beauty))
+    planes = {"normals": image_channels(normals), **_planes(surface, beauty, delivery)}
     if delivery.needs_depth:
         if depth is None:
             raise ValueError("depth is to be written and was not integrated")
@@ -151,6 +135,23 @@ def write_surface(
         write_png16(folder / result_name(clip, "normals", number, suffix="png"), encode_normals(normals), texts=texts)
         mask = np.where(surface.valid, np.uint16(PNG_MAX), np.uint16(0))
         write_png16(folder / result_name(clip, "valid", number, suffix="png"), mask, texts=texts)
+
+
+def _planes(
+    surface: Surface, beauty: NDArray[np.floating] | None, delivery: Delivery
+) -> dict[str, dict[str, NDArray[np.floating]]]:
+    """Return the channels of what is written but normals and shape."""
+    planes = {
+        "albedo": image_channels(_three_channels(surface.albedo)),
+        "valid": {"Y": surface.valid.astype(np.float32)},
+    }
+    asked = {"residual": surface.residual, "error": surface.error_deg, "beauty": beauty}
+    for name in (name for name in asked if name in delivery.aovs):
+        image = asked[name]
+        if image is None:
+            raise ValueError(f"{name} is to be written and was not made")
+        planes[name] = image_channels(_three_channels(image)) if name == "beauty" else {"Y": image}
+    return planes
 
 
 def is_half(quantity: str, delivery: Delivery) -> bool:

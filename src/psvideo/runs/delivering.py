@@ -7,15 +7,16 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from psvideo.beauty import Mix, beauty_of
+from psvideo.beauty import beauty_of
+from psvideo.clip import Clip
 from psvideo.export.exr import HALF_MAX
 from psvideo.export.plates import plate_name, write_plate
-from psvideo.export.results import Delivery
+from psvideo.export.results import Delivery, write_surface
 from psvideo.export.space import Space
 from psvideo.export.tags import Tags
-from psvideo.pipeline import Take
+from psvideo.integrate import Depth
+from psvideo.pipeline import Instant, Take
 from psvideo.rig import Rig
 from psvideo.sequence import AMBIENT, LightPlate, Round, round_numbers
 from psvideo.timing import Timing
@@ -80,7 +81,25 @@ def write_plates(
             write(partial(write_plate, folder, clip, plate, tags))
 
 
-def beauty_image(one: Round, mix: Mix, ambient: LightPlate | None) -> NDArray[np.float16]:
-    """Return the sum of a round's plates as half floats; ``ambient`` as for ``beauty_of``."""
-    image = np.clip(beauty_of(one, mix, ambient).image, -HALF_MAX, HALF_MAX)
-    return np.asarray(image, np.float16)
+def surface_job(
+    folder: Path,
+    clip: Clip,
+    instant: Instant,
+    delivery: Delivery,
+    tags: Tags,
+    *,
+    depth: Callable[[], Depth] | None,
+    ambient: LightPlate | None,
+) -> Callable[[], None]:
+    """Return what writes one instant's surface: it holds the surface and the plates' sum, but no plate.
+
+    ``depth`` integrates the normals, and ``ambient`` is as for ``beauty_of``.
+    """
+    one = instant.round
+    there = replace(delivery, space=delivery.space.at(one.time_s, one.number, clip.plan.camera.fps))
+    beauty = None
+    if "beauty" in delivery.aovs:
+        image = np.clip(beauty_of(one, delivery.mix, ambient).image, -HALF_MAX, HALF_MAX)
+        beauty = np.asarray(image, np.float16)
+    job = partial(write_surface, folder, clip.name, one.number, one.time_s, instant.surface)
+    return partial(job, delivery=there, tags=tags, depth=depth, beauty=beauty)

@@ -2,8 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
-from functools import partial
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 from psvideo.align.rounds import Aligning, aligned
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.mesh import animation_name
-from psvideo.export.results import Delivery, is_written, mesh_file, write_surface
+from psvideo.export.results import Delivery, is_written, mesh_file
 from psvideo.export.tags import Tags
 from psvideo.export.usd import write_animation
 from psvideo.export.writer import writing
@@ -31,7 +30,7 @@ from psvideo.pipeline import (
 )
 from psvideo.plan import Plan
 from psvideo.quality.observed import InstantFacts
-from psvideo.runs.delivering import beauty_image, check_delivery, world_doubts, write_plates
+from psvideo.runs.delivering import check_delivery, surface_job, world_doubts, write_plates
 from psvideo.runs.handover import Finished, write_note, write_previews, write_timeline
 from psvideo.runs.lighting import Lighting
 from psvideo.runs.look import look
@@ -137,12 +136,7 @@ def normals_run(
                 write_plates(folder / "plates", clip.name, instant.round, tags, resume=output.resume, write=write)
             if not (output.resume and is_written(folder, clip.name, instant.round.number, delivery)):
                 # the surface only: plates are many times larger, and must not wait for the files
-                surface, at = instant.surface, (instant.round.number, instant.round.time_s)
-                there = replace(delivery, space=delivery.space.at(at[1], at[0], clip.plan.camera.fps))
-                beauty = beauty_image(instant.round, delivery.mix, ambient) if "beauty" in delivery.aovs else None
-                job = partial(write_surface, folder, clip.name, *at, surface, tags=tags, depth=shaped, beauty=beauty)
-                write(partial(job, delivery=there))
-                del surface, beauty, job
+                write(surface_job(folder, clip, instant, delivery, tags, depth=shaped, ambient=ambient))
             del shaped  # it holds the surface too
             observed.add(instant.round, instant.surface)
             if len(observed.facts) in (1, SAMPLE_ROUND):
