@@ -25,8 +25,10 @@ _HEADER_END = 33  # signature 8, IHDR 4 + 4 + 13 + 4
 
 def encode_normals(normals: NDArray[np.floating]) -> NDArray[np.uint16]:
     """Return unit normals as 16-bit codes, 0.5 + 0.5 n over 0 to 65535; (0, 0, 0) becomes the middle."""
-    codes = np.clip(0.5 + 0.5 * normals.astype(np.float64), 0, 1) * PNG_MAX + 0.5
-    return codes.astype(np.uint16)
+    codes = np.empty(normals.shape, np.uint16)
+    for axis in range(normals.shape[-1]):  # one by one: float64 of whole pictures is large
+        codes[..., axis] = np.clip(0.5 + 0.5 * normals[..., axis].astype(np.float64), 0, 1) * PNG_MAX + 0.5
+    return codes
 
 
 def decode_normals(codes: NDArray[np.uint16]) -> NDArray[np.float32]:
