@@ -75,7 +75,7 @@ class App {
 
   change(patch) {
     Object.assign(this.state, patch);
-    this.loader.update({ moving: "zoom" in patch || "at" in patch });
+    this.loader.update({ moving: "zoom" in patch });
     this.draw();
   }
 
@@ -83,7 +83,22 @@ class App {
     const last = this.master.numbers.length - 1;
     const wanted = Math.min(Math.max(at, 0), last);
     this.playedFrom = null;
-    if (wanted !== this.state.at) this.change({ at: wanted });
+    if (wanted !== this.state.at) this.run(wanted);
+  }
+
+  // Go to a place: nothing is drawn anew until its pictures are there.
+  run(at) {
+    this.state.at = at;
+    this.loader.update({ moving: true });
+    if (this.loader.slowIds().length) this.draw();
+    this.tellSoon();
+  }
+
+  tellSoon() {
+    this.telling ||= requestAnimationFrame(() => {
+      this.telling = 0;
+      tellTransport(this);
+    });
   }
 
   play(playing) {
@@ -98,11 +113,7 @@ class App {
     this.playedFrom ??= { time: now, at: this.state.at };
     const steps = Math.floor((now - this.playedFrom.time) / 1000 * this.index.fps);
     const at = (this.playedFrom.at + steps) % this.master.numbers.length;
-    if (at !== this.state.at) {
-      this.state.at = at;
-      this.loader.update();
-      this.draw();
-    }
+    if (at !== this.state.at) this.run(at);
     requestAnimationFrame((next) => this.tick(next));
   }
 
@@ -187,10 +198,7 @@ class App {
     if (block.missing) this.faulty(key);
     this.loader.step();
     if (this.loader.slowIds().length) this.draw();
-    this.telling ||= requestAnimationFrame(() => {
-      this.telling = 0;
-      tellTransport(this);
-    });
+    this.tellSoon();
   }
 
   faulty(key) {
