@@ -85,7 +85,7 @@ def films(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("films")
 
 
-SLOW = {"how_frames", "how_plates", "gallery_depth"}
+SLOW = {"how_frames", "how_plates", "how_normals", "gallery_depth", "fault_colour_shift", "fault_wrong_curve"}
 """Left out here, for time: other figures are made in the same way of the same film."""
 
 

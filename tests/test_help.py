@@ -87,6 +87,7 @@ def test_the_first_screen_stands_in_the_order_of_the_work(capsys: pytest.Capture
 def test_help_shows_every_option_and_its_examples_unwrapped(path: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([*path.split(), "--help"]) == 0
     told = capsys.readouterr().out
+    assert "<bool>" not in told, "a flag takes no value"
     for _, line in EXAMPLES[path]:
         assert f"   {line}\n" in told
     for parameter in EVERY[path].params:

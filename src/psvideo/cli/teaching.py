@@ -25,15 +25,20 @@ def _print_examples(context: typer.Context) -> None:
         print(f"{'' if place else ' Examples'}\n   # {purpose}\n   {line}")
 
 
+def _take_no_value(params: list[Any]) -> None:
+    """Let help show flags without a value; by itself it would say <bool>."""
+    for param in params:
+        if getattr(param, "is_flag", False):
+            param.metavar = ""
+
+
 class Teaching(TyperCommand):
     """A command whose help ends with its examples."""
 
     def get_params(self, ctx: Any) -> Any:
         """Return the options, where they are many each with the panel it stands in."""
         params: list[Any] = list(super().get_params(ctx))
-        for param in params:
-            if getattr(param, "is_flag", False):
-                param.metavar = ""  # a flag takes no value; by itself the help would say <bool>
+        _take_no_value(params)
         if len(params) > MANY and not any(getattr(param, "rich_help_panel", None) for param in params):
             for param in params:
                 if param.param_type_name == "option" and not param.required:
@@ -48,6 +53,12 @@ class Teaching(TyperCommand):
 
 class TeachingGroup(TyperGroup):
     """A group of commands whose help ends with its examples; its commands stand in the order of the work."""
+
+    def get_params(self, ctx: Any) -> Any:
+        """Return the options."""
+        params: list[Any] = list(super().get_params(ctx))
+        _take_no_value(params)
+        return params
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Print the help, then the examples."""
