@@ -1,0 +1,75 @@
+"""Lights calibrated on spheres in strobed clips, and normals solved with the rigs that came out of it."""
+
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import pytest
+
+from psvideo.cli.app import main
+from psvideo.rigfile import read_rig
+
+SCENE = Path(__file__).resolve().parents[1] / "data_synth" / "sphere.toml"
+MATTE = '[[object]]\nmesh = "sphere"\nalbedo = 0.8\n'
+WALL = '[[object]]\nmesh = "plane"\nscale = 3\nposition_m = [0, 0, -0.8]\nalbedo = 0.35\ncasts_shadow = false\n'
+CHROME = '[[object]]\nmesh = "sphere"\nalbedo = 0.02\nspecular = { strength = 0.2, roughness = 0.13 }\n\n' + WALL
+
+
+@pytest.fixture(scope="module")
+def subject(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A rolling-shutter clip of a matte sphere under three strobed lights."""
+    return shot(tmp_path_factory.mktemp("subject"), SCENE.read_text())
+
+
+def shot(folder: Path, scene: str) -> Path:
+    (folder / "scene.toml").write_text(scene)
+    assert main(["synth", str(folder / "scene.toml"), "-o", str(folder / "clip"), "-q"]) == 0
+    return folder / "clip"
+
+
+def pixels(path: Path) -> np.ndarray:
+    channels = OpenEXR.File(str(path)).channels()
+    picture: np.ndarray = (channels["RGB"] if "RGB" in channels else next(iter(channels.values()))).pixels
+    return picture.astype(np.float64)
+
+
+def errors_of(rig: Path, truth: Path) -> tuple[np.ndarray, np.ndarray]:
+    found = {light.name: light for light in read_rig(rig).lights}
+    true = read_rig(truth).lights
+    assert set(found) == {light.name for light in true}
+    cosine = [np.dot(found[light.name].direction, light.direction) for light in true]
+    return np.degrees(np.arccos(np.clip(cosine, -1, 1))), np.array([found[light.name].error_deg for light in true])
+
+
+def normals_error(subject: Path, rig: Path, out: Path) -> float:
+    assert main(["normals", str(subject), "--rig", str(rig), "-o", str(out), "-q"]) == 0
+    file = sorted((out / "normals").iterdir())[0]
+    found, true = pixels(file), pixels(subject / "truth" / "normals.exr")
+    valid = pixels(out / "valid" / file.name.replace("normals", "valid")) > 0
+    where = valid & (pixels(subject / "truth" / "mask.exr") > 0.5)
+    assert where.mean() > 0.1
+    return float(np.degrees(np.arccos(np.clip((found * true).sum(axis=-1), -1, 1)))[where].mean())
+
+
+def test_a_chrome_ball_in_a_strobed_clip_tells_the_lights_with_which_normals_come_out_right(
+    subject: Path, tmp_path: Path
+) -> None:
+    ball, rig = shot(tmp_path, SCENE.read_text().replace(MATTE, CHROME)), tmp_path / "rig.toml"
+    assert main(["calibrate", "mirror-sphere", str(ball), "-o", str(rig), "-q"]) == 0
+    errors, own = errors_of(rig, ball / "rig.toml")
+    assert errors.max() < 0.6
+    assert (errors < 2 * own).all()
+    assert normals_error(subject, rig, tmp_path / "out") < 1.0
+
+
+def test_a_matte_ball_in_a_strobed_clip_tells_directions_and_strengths(subject: Path, tmp_path: Path) -> None:
+    rig = tmp_path / "rig.toml"
+    words = ["calibrate", "matte-sphere", str(subject), "-o", str(rig), "--albedo", "0.8", "-q"]
+    assert main(words) == 0
+    errors, own = errors_of(rig, subject / "rig.toml")
+    assert errors.max() < 1.0
+    assert (errors < 2.5 * own).all()
+    true = {light.name: light.intensity[0] for light in read_rig(subject / "rig.toml").lights}
+    for light in read_rig(rig).lights:
+        assert np.mean(light.intensity) == pytest.approx(true[light.name], rel=0.03)
+    assert normals_error(subject, rig, tmp_path / "out") < 1.5
