@@ -114,6 +114,17 @@ def test_a_light_that_is_off_is_named_and_the_others_are_measured() -> None:
     assert len(found.rig.lights) == 3
 
 
+def test_pictures_in_which_the_ball_is_saturated_say_so_and_spoil_no_others() -> None:
+    pictures = shoot(Lens(width=200, height=200, focal=600.0), [ball_at(0)], DISTANT)
+    images = [np.ones_like(pictures.images[0]), *pictures.images[1:]]
+    looking = Looking(focal_px=600.0, circles=((99.5, 99.5, 600 * np.tan(np.arcsin(0.05 / 0.45))),))
+    found = calibrate_lights(sight_spheres([light_pictures(pictures.names, images)], looking, where="ball"))
+    assert "100% of the sphere is saturated in all channels" in found.lights[0].fault
+    assert all(angle_deg(light.direction, DIRECTIONS[light.name]) < 1 for light in found.lights[1:])
+    with pytest.raises(PsvideoError, match="saturated in all channels"):
+        calibrate_lights(sight_spheres([light_pictures("ab", [images[0], images[0]])], looking, where="ball"))
+
+
 def test_lights_in_one_plane_are_warned_of() -> None:
     flat = {name: Lamp(direction=(x, 0.0, np.sqrt(1 - x * x))) for name, x in (("a", -0.5), ("b", 0.1), ("c", 0.6))}
     pictures = shoot(Lens(width=300, height=300), [ball_at(0)], flat)

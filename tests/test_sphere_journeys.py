@@ -73,3 +73,41 @@ def test_a_matte_ball_in_a_strobed_clip_tells_directions_and_strengths(subject: 
     for light in read_rig(rig).lights:
         assert np.mean(light.intensity) == pytest.approx(true[light.name], rel=0.03)
     assert normals_error(subject, rig, tmp_path / "out") < 1.5
+
+
+NEAR = {"left": (-0.6, 0.15, -0.1), "right": (0.5, 0.25, -0.05), "low": (0.05, -0.5, 0.1)}
+PERSPECTIVE = """schema = "psvideo-scene/1"
+name = "near"
+frames = 9
+seed = 3
+[camera]
+width_px = 360
+height_px = 160
+fps = 100
+shutter_deg = 360.0
+readout_s = 0.01
+view = "perspective"
+focal_px = 500.0
+[strobe]
+flash_s = 0.001
+"""
+
+
+def test_two_chrome_balls_in_a_strobed_clip_tell_where_near_lights_are(tmp_path: Path) -> None:
+    lights = "".join(
+        f'[[light]]\nname = "{name}"\nposition_m = {list(place)}\nintensity = 0.4\n' for name, place in NEAR.items()
+    )
+    balls = "".join(
+        f'[[object]]\nmesh = "sphere"\nheight_m = 0.16\nposition_m = {place}\nalbedo = 0.02\n'
+        "specular = { strength = 0.2, roughness = 0.1 }\n"
+        for place in ([-0.14, 0.0, -0.7], [0.14, 0.01, -0.68])
+    )
+    wall = '[[object]]\nmesh = "plane"\nscale = 2\nposition_m = [0, 0, -0.95]\nalbedo = 0.5\ncasts_shadow = false\n'
+    clip, rig = shot(tmp_path, PERSPECTIVE + lights + balls + wall), tmp_path / "rig.toml"
+    words = ["calibrate", "mirror-sphere", str(clip), "-o", str(rig), "-q"]
+    assert main([*words, "--spheres", "2", "--radius-mm", "80", "--focal-px", "500"]) == 0
+    found = {light.name: light.position_m for light in read_rig(rig).lights}
+    assert set(found) == set(NEAR)
+    for name, place in NEAR.items():
+        assert np.linalg.norm(np.subtract(found[name], place)) < 0.02, name
+    assert read_rig(rig).focal_px == (500.0, 500.0)

@@ -31,6 +31,8 @@ DARK_PEAK = 0.02
 """A peak below this share of saturation, or of the other lights' peaks, is no highlight."""
 LARGEST_SPOT = 0.06
 """Share of the sphere's disc that a highlight may cover; a matte sphere's shading covers far more."""
+FLOODED = 0.3
+"""From this share of the disc on that is clipped in all channels, a picture tells no highlight, nor what is static."""
 SKIRT_PX = 2
 """How far beyond the candidate's edge its light is counted: a small spot's flanks tell where it is."""
 FEW_CLIPPED = 40
@@ -82,14 +84,17 @@ def find_highlights(pictures: LightPictures, outline: Outline) -> list[Found]:
     light = np.where(disc, pictures.grey[crop], 0.0).astype(np.float32)
     clipped = pictures.saturated[crop]
     clipped = (clipped if clipped.ndim == 3 else clipped.all(axis=3)) & disc
-    light = light - light.min(axis=0) if len(light) > 2 else light
+    share = clipped.sum(axis=(1, 2)) / max(int(disc.sum()), 1)
+    fit = share < FLOODED
+    light[~fit] = 0.0
+    light = np.where(fit[:, None, None], light - light[fit].min(axis=0), 0.0) if fit.sum() > 2 else light
     blur_px = max(0.7, 0.004 * outline.radius_px)
     smooth = [np.where(disc, cv2.GaussianBlur(one, (0, 0), blur_px), 0.0).astype(np.float32) for one in light]
     peaks = [float(one.max()) for one in smooth]
-    usual = float(np.median(peaks))
+    usual = float(np.median(np.array(peaks)[fit])) if fit.any() else 0.0
     found = []
     for n, name in enumerate(pictures.names):
-        fault = _too_dark(peaks[n], usual)
+        fault = _too_dark(peaks[n], usual) if fit[n] else _flooded(float(share[n]))
         spots = [] if fault else _spots(light, n, smooth[n], clipped[n], corner, int(disc.sum()))
         found.append(_chosen(name, spots, fault))
     return found
@@ -104,6 +109,13 @@ def _disc(pictures: LightPictures, outline: Outline) -> tuple[NDArray[np.bool_],
     points = np.stack([cols.ravel(), rows.ravel()], axis=1).astype(np.float64)
     inside = outline.view.distance_px(points, outline.place) < -(1 - RIM) * outline.radius_px
     return inside.reshape(rows.shape), (int(low[1]), int(low[0]))
+
+
+def _flooded(share: float) -> str:
+    return (
+        f"{share:.0%} of the sphere is saturated in all channels, so that no highlight stands out: expose less, or dim "
+        "the light"
+    )
 
 
 def _too_dark(peak: float, usual: float) -> str:
