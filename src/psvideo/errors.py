@@ -13,6 +13,10 @@ class PsvideoError(Exception):
     exit_status = 1
 
 
+class NoStrobeError(PsvideoError):
+    """Footage that can be read, and in which no strobe like the plan's is seen."""
+
+
 class UsageError(PsvideoError):
     """A command that was called in a way it cannot be meant."""
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.camera import Camera, FloatArray
-from psvideo.errors import PsvideoError, UsageError
+from psvideo.errors import NoStrobeError, PsvideoError, UsageError
 from psvideo.plan import Plan
 from psvideo.rowfit.beat import Beat, train_until
 from psvideo.rowfit.course import window_frames
@@ -64,11 +64,11 @@ def find_timing(
     rows = _as_profiles(plan, indices, profiles, doubt)
     hopeless = nothing_to_find(plan, rows)
     if hopeless:
-        raise PsvideoError(f"{clip}: {hopeless}")
+        raise NoStrobeError(f"{clip}: {hopeless}")
     verdict = judged(plan, rows)
     found = verdict.found
     if not verdict.believed:
-        raise PsvideoError(_not_found(plan, rows, found, clip))
+        raise NoStrobeError(_not_found(plan, rows, found, clip))
     beat, order = _order_of_lights(plan, found, first_light)
     numbered = np.asarray(indices if numbers is None else numbers, np.int64)
     return _assemble(

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from psvideo.clip import Clip, Kept, holes, keeping_near, read_frames
-from psvideo.errors import PsvideoError
+from psvideo.errors import NoStrobeError, PsvideoError
 from psvideo.naming import named_by_rig
 from psvideo.pipeline import Take, Watch, clip_rounds, find_clip_timing, open_take, unwatched
 from psvideo.plan import Plan
@@ -98,7 +98,7 @@ def check_take(
         take = replace(whole, numbers=window, kept=kept)
         try:
             timing = find_clip_timing(take, first_light=first_light, watch=watch)
-        except PsvideoError as fault:
+        except NoStrobeError as fault:
             if too_short(clip.plan, window):
                 raise
             lines: tuple[Judgement, ...] = (_unseen(str(fault)), *_raw_light(take))

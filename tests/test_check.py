@@ -1,0 +1,309 @@
+"""The check on the set: a line for each thing, an exit status, and each new take of a folder as soon as it is whole."""
+
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from psvideo.cli.app import main
+from psvideo.quality.focus import sharpest_blur_px
+from psvideo.runs.takes import takes_in, whole_takes
+
+SPHERE = (Path(__file__).resolve().parents[1] / "data_synth" / "sphere.toml").read_text()
+SCENE = SPHERE.replace("frames = 12", "frames = 26").replace("readout_s = 0.01\n", "readout_s = 0.01\nread_e = 5.0\n")
+SCENES = {
+    "good": SCENE,
+    "dead": SCENE.replace('name = "left"\n', 'name = "left"\nintensity = 0.0001\n'),
+    "clips": SCENE.replace('name = "key"\n', 'name = "key"\nintensity = 1.8\n'),
+    "room": SCENE + "\n[ambient]\nlevel = 0.6\n",
+}
+
+
+def run(*arguments: object) -> int:
+    return main([str(argument) for argument in arguments])
+
+
+@pytest.fixture(scope="module")
+def shot(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    folder = tmp_path_factory.mktemp("shoots")
+
+    def film(name: str) -> Path:
+        clip = folder / name
+        if not clip.is_dir():
+            (folder / f"{name}.toml").write_text(SCENES[name])
+            assert run("synth", folder / f"{name}.toml", "-o", clip, "-q") == 0
+        return clip
+
+    return film
+
+
+def listing(folder: Path) -> list[tuple[str, int, int]]:
+    return [(str(path), path.stat().st_size, path.stat().st_mtime_ns) for path in sorted(folder.rglob("*"))]
+
+
+def test_a_good_take_passes_with_a_word_for_each_thing_and_nothing_is_written(
+    shot: Callable[[str], Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    clip = shot("good")
+    before = listing(clip.parent)
+    assert run("check", clip, "--rig", clip / "rig.toml") == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "This take is usable." in lines[0]
+    words = dict(line.split()[1::-1] for line in lines[1:])
+    for subject in ("strobe", "timing", "order", "rows", "exposure", "lights", "ambient", "motion"):
+        assert words[subject] == "good", subject
+    assert set(words.values()) <= {"good", "unknown"}
+    assert listing(clip.parent) == before
+
+
+@pytest.mark.parametrize(
+    ("name", "subject", "words"),
+    [
+        ("dead", "lights", "'left' gives no light"),
+        ("clips", "clipping", "'key' is clipped in .* power"),
+        ("room", "ambient", "Ambient light is 5. %"),
+    ],
+)
+def test_a_spoilt_take_fails_and_says_what_to_change(
+    shot: Callable[[str], Path], capsys: pytest.CaptureFixture[str], name: str, subject: str, words: str
+) -> None:
+    assert run("check", shot(name), "--json") == 1
+    found = json.loads(capsys.readouterr().out)
+    assert found["schema"] == "psvideo-check/1"
+    assert not found["usable"]
+    line = next(one for one in found["judgements"] if one["subject"] == subject)
+    assert line["grade"] == "bad"
+    assert re.search(words, f"{line['found']} {line['advice']}")
+
+
+def test_lights_that_did_not_flash_are_a_strobe_that_is_not_seen(
+    shot: Callable[[str], Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    clip = tmp_path / "clip"
+    shutil.copytree(shot("good"), clip)
+    files = sorted((clip / "frames").iterdir())
+    lit = cv2.imread(str(files[4]), cv2.IMREAD_UNCHANGED)
+    for file in files:
+        cv2.imwrite(str(file), lit)
+    assert run("check", clip) == 1
+    out = capsys.readouterr().out
+    assert re.search(r"bad +strobe", out)
+    assert re.search(r"(good|bad) +exposure", out)
+
+
+def test_the_blur_of_sharp_shapes_is_told_and_that_of_noise_is_not() -> None:
+    rng = np.random.default_rng(4)
+    shapes = np.full((300, 420), 0.1, np.float32)
+    for _ in range(40):
+        middle, size = rng.integers(0, 420, 2).tolist(), rng.integers(30, 90, 2).tolist()
+        cv2.rectangle(shapes, middle, (middle[0] + size[0], middle[1] + size[1]), float(rng.uniform(0.1, 0.9)), -1)
+    for sigma_px in (1.0, 2.0, 4.0, 8.0):
+        noise = rng.normal(0, 0.004, shapes.shape).astype(np.float32)
+        told = sharpest_blur_px(np.asarray(cv2.GaussianBlur(shapes, (0, 0), sigma_px), np.float32) + noise)
+        assert told is not None
+        assert 0.45 * sigma_px < told < 1.2 * sigma_px, "corners look sharper: it is a lower bound"
+    assert sharpest_blur_px(rng.normal(0.2, 0.004, shapes.shape).astype(np.float32)) is None
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        ("no plan", "no plan.toml here.*--plan"),
+        ("empty", "holds no numbered|no image|nothing"),
+        ("short", r"holds \d+ frame"),
+        ("truncated", r"(truncated|damaged|cannot be|decoded)"),
+        ("missing", "there is no such clip"),
+    ],
+)
+def test_what_cannot_be_checked_is_one_plain_paragraph(
+    shot: Callable[[str], Path], tmp_path: Path, capsys: pytest.CaptureFixture[str], spoil: str, words: str
+) -> None:
+    clip = tmp_path / "clip"
+    if spoil != "missing":
+        shutil.copytree(shot("good"), clip)
+    files = sorted((clip / "frames").iterdir()) if clip.is_dir() else []
+    if spoil == "no plan":
+        (clip / "plan.toml").unlink()
+    elif spoil == "empty":
+        shutil.rmtree(clip / "frames")
+    elif spoil == "short":
+        for file in files[3:]:
+            file.unlink()
+    elif spoil == "truncated":
+        files[5].write_bytes(files[5].read_bytes()[:200])
+    assert run("check", clip) == 1
+    said = capsys.readouterr()
+    assert said.err.startswith("psvideo: ")
+    assert said.err.count("\n") == 1
+    assert re.search(words, said.err)
+    assert "Traceback" not in said.err
+
+
+def test_a_movie_is_not_decoded_to_its_end(
+    shot: Callable[[str], Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from psvideo.clip import movie
+
+    clip = shot("good")
+    frames = [cv2.imread(str(file), cv2.IMREAD_UNCHANGED) for file in sorted((clip / "frames").iterdir())]
+    write_movie(tmp_path / "take.mkv", frames * 8)
+    shutil.copy(clip / "plan.toml", tmp_path / "plan.toml")
+    decoded: list[int] = []
+    picture = movie._picture
+    monkeypatch.setattr(movie, "_picture", lambda *given: decoded.append(1) or picture(*given))  # type: ignore[func-returns-value]
+    run("check", tmp_path / "take.mkv", "-q")
+    assert 20 < len(decoded) < 60
+
+
+def write_movie(path: Path, frames: list[np.ndarray]) -> None:
+    import av
+
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("ffv1", rate=100)
+        stream.width, stream.height, stream.pix_fmt = frames[0].shape[1], frames[0].shape[0], "gbrp16le"
+        for frame in frames:
+            shown = av.VideoFrame.from_ndarray(np.ascontiguousarray(frame[..., ::-1]), format="rgb48le")
+            container.mux(stream.encode(shown.reformat(format="gbrp16le")))
+        container.mux(stream.encode(None))
+
+
+def looks(folder: Path, changes: list[Callable[[], object]], **options: Any) -> list[list[str]]:
+    """Return the names of the takes that are given after each look; before each but the first, one change is made."""
+    steps = iter(changes)
+
+    class OverError(Exception):
+        pass
+
+    def sleep(_: float) -> None:
+        step = next(steps, None)
+        if step is None:
+            raise OverError
+        step()
+
+    given: list[list[str]] = [[]]
+    try:
+        for path in whole_takes(folder, interval_s=0.0, sleep=sleep, **options):
+            if path is None:
+                given.append([])
+            else:
+                given[-1].append(path.name)
+    except OverError:
+        pass
+    return given
+
+
+def add_frames(clip: Path, first: int, count: int) -> None:
+    clip.mkdir(parents=True, exist_ok=True)
+    for number in range(first, first + count):
+        (clip / f"f.{number:04d}.png").write_bytes(b"x" * 100)
+
+
+def nothing() -> None:
+    """Let time pass."""
+
+
+def test_a_take_is_given_once_it_has_stopped_growing(tmp_path: Path) -> None:
+    add_frames(tmp_path / "old", 1, 3)
+    grow = [lambda n=n: add_frames(tmp_path / "new", n, 1) for n in range(4)]
+    given = looks(tmp_path, [*grow, nothing, nothing, nothing, nothing])
+    assert [name for names in given for name in names] == ["new"]
+    assert all(not names for names in given[:5]), "not while it grows"
+
+
+def test_many_takes_at_once_come_all_and_the_oldest_first(tmp_path: Path) -> None:
+    def appear() -> None:
+        for n in range(5):
+            add_frames(tmp_path / "card" / f"take{n}" / "frames", 1, 2)
+            for file in (tmp_path / "card" / f"take{n}" / "frames").iterdir():
+                os.utime(file, (1000 - n, 1000 - n))
+        (tmp_path / "movie.mov").write_bytes(b"x")
+
+    given = looks(tmp_path, [appear, nothing, nothing, nothing])
+    assert [name for names in given for name in names] == ["take4", "take3", "take2", "take1", "take0", "movie.mov"]
+
+
+def test_a_take_that_goes_away_is_forgotten_and_one_that_changes_comes_again(tmp_path: Path) -> None:
+    take = tmp_path / "take"
+    changes: list[Callable[[], object]] = [
+        lambda: add_frames(tmp_path / "gone", 1, 3),
+        lambda: shutil.rmtree(tmp_path / "gone"),
+        lambda: add_frames(take, 1, 3),
+        *[nothing] * 3,
+        lambda: (take / "plan.toml").write_text("late"),
+        *[nothing] * 3,
+    ]
+    given = looks(tmp_path, changes)
+    assert [name for names in given for name in names] == ["take", "take"]
+
+
+def test_takes_that_were_there_are_given_only_when_asked_for(tmp_path: Path) -> None:
+    add_frames(tmp_path / "old", 1, 3)
+    assert looks(tmp_path, [nothing] * 3)[-1] == []
+    assert [name for names in looks(tmp_path, [nothing] * 3, existing=True) for name in names] == ["old"]
+
+
+def test_a_drive_that_is_away_for_a_while_does_not_make_its_takes_new(tmp_path: Path) -> None:
+    folder, away = tmp_path / "drive", tmp_path / "away"
+    add_frames(folder / "old", 1, 3)
+    given = looks(folder, [lambda: folder.rename(away), nothing, lambda: away.rename(folder), *[nothing] * 4])
+    assert not any(given)
+
+
+def test_hidden_files_and_other_folders_are_no_takes(tmp_path: Path) -> None:
+    add_frames(tmp_path / ".copying", 1, 3)
+    (tmp_path / "notes").mkdir()
+    (tmp_path / "notes" / "list.txt").write_text("x")
+    (tmp_path / ".take.mov").write_bytes(b"x")
+    assert takes_in(tmp_path) == {}
+
+
+def test_watching_tells_of_every_take_and_ends_well_with_ctrl_c(shot: Callable[[str], Path], tmp_path: Path) -> None:
+    folder, page = tmp_path / "takes", tmp_path / "checks.html"
+    folder.mkdir()
+    command = [sys.executable, "-m", "psvideo.cli.app", "check", "--watch", str(folder), "--interval", "0.2"]
+    watching = subprocess.Popen(
+        [*command, "--report", str(page)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, bufsize=1
+    )
+    assert watching.stdout is not None
+    assert "Ctrl-C ends" in watching.stdout.readline()
+    time.sleep(0.5)  # its first look must come before the takes
+    shutil.copytree(shot("good"), folder / "good")
+    add_frames(folder / "broken", 1, 30)
+    said = ""
+    while not ("good: This take" in said and "broken: cannot" in said):
+        line = watching.stdout.readline()
+        assert line, said
+        said += line
+    until = time.monotonic() + 60
+    while time.monotonic() < until and not (page.is_file() and page.read_text().count('class="verdict') == 2):
+        time.sleep(0.1)
+    watching.send_signal(signal.SIGINT)
+    rest, _ = watching.communicate(timeout=120)
+    assert watching.returncode == 0
+    assert "2 take(s) checked: 1 usable, 0 not, 1 could not be read." in rest
+    assert re.search(r"good: This take is usable\.", said)
+    assert re.search(r"broken: cannot be checked yet", said)
+    assert "Traceback" not in said + rest
+    assert sorted(path.name for path in folder.iterdir()) == ["broken", "good"]
+    assert "good: This take is usable." in page.read_text()
+
+
+def test_a_page_among_the_footage_is_refused(shot: Callable[[str], Path], capsys: pytest.CaptureFixture[str]) -> None:
+    clip = shot("good")
+    assert run("check", clip, "--report", clip / "check.html") == 2
+    assert "among the footage" in capsys.readouterr().err
+    assert run("check", "--watch", clip.parent, "--report", clip / "check.html") == 2
+    assert run("check") == 2
+    assert run("check", clip, "--watch", clip) == 2
+    assert run("check", "--watch", clip / "nowhere") == 2
