@@ -1,6 +1,7 @@
 """What the accuracy tables share: their rows, angles between normals, lights on rings, virtual and real scenes."""
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -84,30 +85,57 @@ def matte_ball(lights: int, *, reach_deg: float = 50.0, slant_deg: float = 35.0,
     return Case(f"ball, {lights} lights", list(shade.astype(np.float32)), lit, truth, inside)
 
 
-def gloss(lights: tuple[int, ...] = tuple(range(8)), *, scale: float = 1.0, noise: float = 0.0) -> Case:
+def gloss(
+    lights: tuple[int, ...] = tuple(range(8)),
+    *,
+    scale: float = 1.0,
+    noise: float = 0.0,
+    roughness: float | None = None,
+    directions: np.ndarray | None = None,
+) -> Case:
     """The scene data_synth/gloss.toml under some of its lights; what is beyond 1.0 is clipped.
 
-    ``scale`` multiplies the highlights' share, ``noise`` is added.
+    ``scale`` multiplies the highlights' share, ``roughness`` is set for all that shines, ``noise`` is added.
+    ``directions`` (light, 3) stand in for the scene's own lights.
     """
     scene = read_scene(ROOT / "data_synth" / "gloss.toml")
     shiny = [
         table
         if table.specular is None
         else table.model_copy(
-            update={"specular": table.specular.model_copy(update={"strength": table.specular.strength * scale})}
+            update={
+                "specular": table.specular.model_copy(
+                    update={
+                        "strength": table.specular.strength * scale,
+                        "roughness": table.specular.roughness if roughness is None else roughness,
+                    }
+                )
+            }
         )
         for table in scene.object
     ]
     stage = set_stage(scene.model_copy(update={"object": shiny}), ROOT / "data_synth")
     assert stage.still is not None
     hits, chosen = stage.still.hits, [stage.rig.lights[n] for n in lights]
+    if directions is not None:
+        chosen = [replace(chosen[0], direction=(float(x), float(y), float(z))) for x, y, z in directions]
     rng = np.random.default_rng(1)
     plates = [hits.image(light_collected(stage.still, light)) for light in chosen]
     noisy = [np.minimum(plate + rng.normal(0, noise, plate.shape), 1).astype(np.float32) for plate in plates]
     truth = true_normals(hits)
-    directions = np.array([light.direction for light in chosen], np.float64)
-    lit = Illumination(directions=directions, intensities=np.full((len(chosen), 3), chosen[0].intensity[0]))
+    towards = np.array([light.direction for light in chosen], np.float64)
+    lit = Illumination(directions=towards, intensities=np.full((len(chosen), 3), chosen[0].intensity[0]))
     return Case(f"gloss, {len(chosen)} lights", noisy, lit, truth, np.linalg.norm(truth, axis=-1) > 0.5)
+
+
+def turned(case: Case, wrong_deg: float) -> Case:
+    """Return the case as solved with a rig whose every direction is off by so much, each its own way."""
+    true = case.lit.directions
+    across = np.random.default_rng(2).normal(size=true.shape)
+    across -= np.sum(across * true, axis=1, keepdims=True) * true
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    told = np.cos(np.radians(wrong_deg)) * true + np.sin(np.radians(wrong_deg)) * across
+    return case._replace(lit=Illumination(directions=told, intensities=case.lit.intensities))
 
 
 def diligent_ball() -> Case:
@@ -132,19 +160,31 @@ def rendered_bunny() -> Case:
     return Case("rendered bunny", plates, lit, data["normal_gt"].astype(np.float64), data["mask"])
 
 
-def washington_sphere() -> Case:
-    """The matte sphere of the University of Washington, 12 lights, 8 bits."""
+def washington(thing: str) -> Case:
+    """A subject of the University of Washington (gray, cat or horse), 12 lights, 8 bits.
+
+    Its rig is wrong by 1 to 8 degrees. The normals are known of "gray" only, a matte sphere.
+    """
     folder = SHARED_DATA / "uw_psm"
     words = (folder / "lights.txt").read_text().split()
     directions = np.array(words[1:], np.float64).reshape(int(words[0]), 3)
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    paths = [folder / "gray" / f"gray.{n}.png" for n in range(len(directions))]
+    paths = [folder / thing / f"{thing}.{n}.png" for n in range(len(directions))]
     plates = [(cv2.imread(str(path))[..., ::-1] / 255).astype(np.float32) for path in paths]
     rows, cols = np.mgrid[: plates[0].shape[0], : plates[0].shape[1]]
     x, y = (cols - 244.5) / 108.0, (144.5 - rows) / 108.0
     truth = np.stack([x, y, np.sqrt(np.maximum(1 - x * x - y * y, 0))], axis=-1)
+    mask = x * x + y * y < 0.95**2
+    if thing != "gray":
+        truth = np.full_like(truth, np.nan)
+        mask = cv2.imread(str(folder / thing / f"{thing}.mask.png"), cv2.IMREAD_GRAYSCALE) > 127
     lit = Illumination(directions=directions, intensities=np.ones((len(directions), 3)))
-    return Case("Washington's matte sphere", plates, lit, truth, x * x + y * y < 0.95**2)
+    return Case(f"Washington's {thing}", plates, lit, truth, mask)
+
+
+def washington_sphere() -> Case:
+    """The matte sphere of the University of Washington."""
+    return washington("gray")
 
 
 def spread_subsets(directions: np.ndarray, lights: int, count: int, *, most_condition: float = 4.0) -> list[np.ndarray]:

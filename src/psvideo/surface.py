@@ -9,6 +9,19 @@ Pixels = NDArray[np.floating]
 
 
 @dataclass(frozen=True, kw_only=True)
+class Misfit:
+    """What the lights leave unexplained in a typical pixel of one picture, whichever pixel that is.
+
+    share: of the pixel's own light, as a standard deviation; noise and a rig that is wrong make it. The solver never
+        takes it for less than 1 %.
+    error_deg: the normal's predicted standard error there.
+    """
+
+    share: float
+    error_deg: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class Surface:
     """Normals, albedo and what to think of them, per pixel; all arrays are finite everywhere.
 
@@ -22,6 +35,7 @@ class Surface:
         are always explained exactly, whatever they are.
     error_deg: shape (row, col), the normal's standard error in degrees as the solver judges it; 0 where not valid.
         None where it was not asked for, or the solver (least squares) does not judge it.
+    misfit: what is common to the picture; None where the solver does not look for it, or three lights explain all.
 
     Arrays are float32, or float16 where a solver was asked for half floats. Channels lie in separate planes in memory,
     so ``normals[..., 0]`` is contiguous.
@@ -32,6 +46,7 @@ class Surface:
     valid: NDArray[np.bool_]
     residual: Pixels | None = None
     error_deg: Pixels | None = None
+    misfit: Misfit | None = None
 
     def __post_init__(self) -> None:
         """Raise ValueError where the arrays' shapes do not belong together."""

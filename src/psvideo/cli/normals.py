@@ -85,7 +85,7 @@ def normals(
     solver: Annotated[
         SolverName,
         typer.Option(help="auto: robust against highlights and shadows from five lights on."),
-    ] = SolverName.least_squares,
+    ] = SolverName.auto,
     near_iterations: Annotated[
         int | None,
         typer.Option(

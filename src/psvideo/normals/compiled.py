@@ -32,6 +32,12 @@ def inlined(function: Function) -> Function:
     return part
 
 
+def apart(function: Function) -> Function:
+    """Compile a function for the compiled functions that call it, and optimise its long loops by themselves."""
+    part: Function = numba.njit(**(_PART | {"forceinline": False}))(function)
+    return part
+
+
 def _pointer(typing_context: Any, address: Any, like: Any) -> Any:
     """The address (an integer) as a pointer to elements of the array ``like``."""
     target: Any = types.CPointer(like.dtype)  # type: ignore[no-untyped-call]

@@ -5,7 +5,7 @@ Planes lie in two flat working arrays, ``w`` (those of ``kernel.py``) and ``v`` 
 
 import numpy as np
 
-from psvideo.normals.compiled import at, inlined, of_light
+from psvideo.normals.compiled import apart, at, inlined, of_light
 from psvideo.normals.kernel import BLOCK, COUNT, HIGH, LOW, ONE, SUM, THREE, XX, XY, XZ, YY, YZ, ZERO, ZZ, X, Y, Z
 from psvideo.normals.task import Floats
 
@@ -50,7 +50,7 @@ def _add_three(
         w[ZZ + i] = old * w[ZZ + i] + p[i] * za * za + q[i] * zb * zb + r[i] * zc * zc
 
 
-@inlined
+@apart
 def solve_equations(w: Floats, n: int, condition_squared: np.float32, keep: bool) -> None:
     """g from the normal equations; where they are badly conditioned what was there stays (``keep``), or 0."""
     for i in range(n):
@@ -69,7 +69,7 @@ def solve_equations(w: Floats, n: int, condition_squared: np.float32, keep: bool
         w[Z + i] = w[Z + i] if kept else z * scale
 
 
-@inlined
+@apart
 def halve(v: Floats, e: Floats, n: int) -> None:
     """Narrow FROM, TO around the RANK-th smallest of e (light, pixel): fewer than RANK lie up to FROM, RANK up to TO.
 

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from psvideo.normals import equations, kernel, near_kernel, odd_of_four
-from psvideo.normals.compiled import at, compiled, encoded, inlined, lent, of_light
+from psvideo.normals import equations, kernel, near_kernel, nine_kernel, odd_of_four
+from psvideo.normals.compiled import apart, at, compiled, encoded, inlined, lent, of_light
 from psvideo.normals.equations import (
     DOUBT,
     FROM,
@@ -46,11 +46,13 @@ from psvideo.normals.kernel import (
     Y,
     Z,
 )
+from psvideo.normals.nine_kernel import LITTLE, NINE, begin_nine, reweigh_nine
 from psvideo.normals.odd_of_four import FOUR, TWO, drop_odd_of_four
 from psvideo.normals.task import Floats, Result, Samples, Task
 
+STEP = 128  # pixels that are solved together: few enough that all of their planes stay in the nearest cache
 HALF, THREE, EIGHT = np.float32(0.5), np.float32(3), np.float32(8)
-LITTLE = np.float32(0.02)  # the weight of what the start leaves out, so that no start is singular
+MANY = np.float32(NINE)  # usable measurements beyond which the weight narrows
 SIGMA_OF_MEDIAN = np.float32(1.4826)  # of Gaussian noise
 SMALL_SAMPLE = np.float32(1.9)  # the median of few residuals of a fit that follows them falls short by so much
 SUSPICION = np.float32(0.05)  # what a highlight among four that was left out still says against the other three
@@ -58,10 +60,16 @@ UNCHECKED = np.float32(2.5)  # three measurements are explained exactly, and not
 DEGREES = np.float32(180 / np.pi)
 SOUND_SQUARED = np.float32(1e4)  # while weights change, the last solution is kept where they leave a worse condition
 NO_ERROR = np.float32(180)  # what is predicted where there is no solution
+LEAST_CHECKED = 5  # usable measurements from which on residuals tell how well the lights explain a pixel
+UNEXPLAINED = LOWER  # a plane of v that is free by then
 
 
 class Weights(NamedTuple):
-    """How measurements are weighed, and which normals are trusted; the fields are described in robust.Reweighting."""
+    """How measurements are weighed, and which normals are trusted; the fields are described in robust.Reweighting.
+
+    ``most_error_deg`` is the limit for this picture, and ``common`` the share of a pixel's light that its lights
+    usually leave unexplained.
+    """
 
     rounds: int
     tukey: bool
@@ -72,6 +80,7 @@ class Weights(NamedTuple):
     brightest: np.float32
     contradiction: np.float32
     most_error_deg: np.float32
+    common: np.float32
 
 
 class Memory(NamedTuple):
@@ -82,6 +91,7 @@ class Memory(NamedTuple):
     values: Floats
     measurements: Floats
     errors: Floats
+    flat: Floats
     matrix: Floats
     per_strength: Floats
 
@@ -95,48 +105,65 @@ def working_memory(task: Task) -> Memory:
         values=plain.values,
         measurements=plain.measurements,
         errors=np.full((len(plain.measurements), BLOCK), OUT, np.float32),
+        flat=plain.measurements.reshape(-1),
         matrix=plain.matrix,
         per_strength=plain.per_strength,
     )
 
 
-def _entry(parts: int) -> Callable[[Task, Result, Samples, Memory, Weights, int, int], None]:
+def _entry(parts: int) -> Callable[[Task, Result, Samples, Floats, Memory, Weights, int, int, int], None]:
     """Return the compiled function. Numba's cache does not see other files change, but values that are captured."""
 
     @compiled
     def solve_rows(
-        task: Task, result: Result, error: Samples, memory: Memory, weights: Weights, first: int, last: int
-    ) -> None:
+        task: Task, result: Result, error: Samples, misfit: Floats, memory: Memory, weights: Weights,
+        first: int, last: int, step: int,
+    ) -> None:  # fmt: skip
         """Solve the rows from ``first`` up to ``last``; no two calls may share rows, and any number may run at once.
 
-        ``error`` (pixel,) or empty takes the predicted error in degrees.
+        Only every ``step``-th row of the picture is solved. ``error`` (pixel,) or empty takes the predicted error in
+        degrees, ``misfit`` (pixel,) or empty the share of a pixel's light that its lights leave unexplained, 0 where
+        too few are usable to tell.
         """
         if parts < 0:
             return
         t = kernel.lent_task(task, memory.matrix, memory.per_strength)
         out = Result(lent(result.normals), lent(result.albedo), lent(result.valid), lent(result.residual))
-        predicted = lent(error)
+        predicted, unexplained = lent(error), lent(misfit)
         w, v, values = lent(memory.planes), lent(memory.more), lent(memory.values)
         m, e = lent(memory.measurements), lent(memory.errors)
-        for row in range(first, last):
-            for col in range(0, t.cols, BLOCK):
-                n = min(BLOCK, t.cols - col)
+        flat = lent(memory.flat)
+        for row in range(-(-first // step) * step, last, step):
+            for col in range(0, t.cols, STEP):
+                n = min(STEP, t.cols - col)
                 if t.mask.size and not t.mask[row, col : col + n].any():
                     w[X : X + n], w[Y : Y + n], w[Z : Z + n] = ZERO, ZERO, ZERO
-                    v[DOUBT : DOUBT + n] = NO_ERROR
+                    v[DOUBT : DOUBT + n], v[UNEXPLAINED : UNEXPLAINED + n] = NO_ERROR, ZERO
                 else:
-                    _solve_block(t, weights, w, v, values, m, e, row, col, n)
+                    _solve_block(t, weights, w, v, values, m, e, flat, row, col, n)
                 start = row * t.cols + col
                 kernel._store_block(t, out, w, values, m, start, n)
                 for i in range(min(n, len(predicted))):
                     predicted[start + i] = encoded(v[DOUBT + i] if out.valid[start + i] else ZERO, predicted)
+                for i in range(min(n, len(unexplained))):
+                    unexplained[start + i] = v[UNEXPLAINED + i] if out.valid[start + i] else ZERO
 
     return solve_rows
 
 
 @inlined
 def _solve_block(
-    task: Task, weights: Weights, w: Floats, v: Floats, values: Floats, m: Floats, e: Floats, row: int, col: int, n: int
+    task: Task,
+    weights: Weights,
+    w: Floats,
+    v: Floats,
+    values: Floats,
+    m: Floats,
+    e: Floats,
+    flat: Floats,
+    row: int,
+    col: int,
+    n: int,
 ) -> None:
     """Leave g in the planes X, Y, Z, all 0 where the normal is not to be trusted, and the error in DOUBT."""
     start, channels = row * task.cols + col, task.tone.shape[1]
@@ -149,21 +176,36 @@ def _solve_block(
     if channels > 1:
         kernel._combine(task, w, values, m, n)
     _hide_shadows(task, w, m, n)
-    _choose_start(task, weights, w, v, m, e, n)
-    _add_start(task, w, v, m, e, n)
+    nine = len(m) == NINE and task.near.depth.size == 0
+    if nine:
+        begin_nine(task.matrix, task.per_strength, weights.darkest, weights.brightest, w, flat, n)
+    else:
+        _choose_start(task, weights, w, v, m, e, n)
+        _add_start(task, w, v, m, e, n)
     solve_equations(w, n, SOUND_SQUARED, False)
     drop_odd_of_four(task, weights.noise, weights.signal_noise, weights.contradiction, w, v, m, e, n)
     for _ in range(weights.rounds):
-        _find_scale(task, weights, w, v, m, e, n)
-        _add_weighted(task, weights.tukey, weights.width, w, v, m, e, n)
+        _reweigh(task, weights, weights.tukey, weights.width, False, nine, w, v, m, e, flat, n)
         solve_equations(w, n, SOUND_SQUARED, True)
-    _find_scale(task, weights, w, v, m, e, n)
-    _add_weighted(task, False, TWO, w, v, m, e, n)
-    _predict_error(weights, w, v, n)
+    _reweigh(task, weights, False, TWO, True, nine, w, v, m, e, flat, n)
+    _predict_error(weights, min(task.lights, LEAST_CHECKED), w, v, n)
     if task.mask.size:
         for i in range(n):
             kept = ONE if task.mask[row, col + i] else ZERO
             w[X + i], w[Y + i], w[Z + i] = w[X + i] * kept, w[Y + i] * kept, w[Z + i] * kept
+
+
+@inlined
+def _reweigh(
+    task: Task, weights: Weights, tukey: bool, width: np.float32, last: bool, nine: bool,
+    w: Floats, v: Floats, m: Floats, e: Floats, flat: Floats, n: int,
+) -> None:  # fmt: skip
+    """SCALE and the normal equations, every measurement weighed by how well the last solution explains it."""
+    if nine:
+        reweigh_nine(task.matrix, tukey, width, weights.noise, weights.signal_noise, SIGMA_OF_MEDIAN, w, v, flat, n)
+    else:
+        _find_scale(task, weights, w, v, m, e, n)
+        _add_weighted(task, tukey, width, last, w, v, m, e, n)
 
 
 @inlined
@@ -254,11 +296,15 @@ def _find_scale(task: Task, weights: Weights, w: Floats, v: Floats, m: Floats, e
 
 @inlined
 def _add_weighted(
-    task: Task, tukey: bool, width: np.float32, w: Floats, v: Floats, m: Floats, e: Floats, n: int
+    task: Task, tukey: bool, width: np.float32, last: bool, w: Floats, v: Floats, m: Floats, e: Floats, n: int
 ) -> None:
-    """The normal equations, every measurement weighed by how well the last solution explains it."""
+    """The normal equations, every measurement weighed by how well the last solution explains it.
+
+    Of many measurements fewer will do: the weight narrows with the root of their number, not for the ``last`` time.
+    """
     for i in range(n):
-        v[FROM + i] = ONE / (width * v[SCALE + i])
+        narrow = ONE if last else np.sqrt(MANY / max(w[COUNT + i], MANY))
+        v[FROM + i] = ONE / (width * narrow * v[SCALE + i])
     for light in range(len(e)):
         error = e[light]
         for i in range(n):
@@ -268,32 +314,39 @@ def _add_weighted(
     add_equations(task.matrix, w, m, e, n)
 
 
-@inlined
-def _predict_error(weights: Weights, w: Floats, v: Floats, n: int) -> None:
+@apart
+def _predict_error(weights: Weights, checked: int, w: Floats, v: Floats, n: int) -> None:
     """The normal's standard error in degrees into DOUBT, and g = 0 where it is too large to be trusted.
 
     The residuals' scale through the weighted equations: sigma sqrt(trace(P A^-1 P)) / |g|, with P across the normal.
-    Beyond eight lights the error does not shrink further, because what is not matte does not average out.
+    Beyond eight lights the error does not shrink further, because what is not matte does not average out. Where fewer
+    than ``checked`` measurements are usable, residuals say little: they are taken for what is common in the picture.
     """
     for i in range(n):
         a, b, c, d, e, f = w[XX + i], w[XY + i], w[XZ + i], w[YY + i], w[YZ + i], w[ZZ + i]
         xx, xy, xz = d * f - e * e, c * e - b * f, b * e - c * d
         yy, yz, zz = a * f - c * c, b * c - a * e, a * d - b * b
         determinant = a * xx + b * xy + c * xz
-        x, y, z = w[X + i], w[Y + i], w[Z + i]
+        x, y, z, count = w[X + i], w[Y + i], w[Z + i], w[COUNT + i]
         square = x * x + y * y + z * z
         along = x * x * xx + y * y * yy + z * z * zz + TWO * (x * y * xy + x * z * xz + y * z * yz)
-        solved = (square > ZERO) & (determinant > ZERO) & (w[COUNT + i] >= THREE)
+        solved = (square > ZERO) & (determinant > ZERO) & (count >= THREE)
         across = (xx + yy + zz - along / square) / determinant if solved else ZERO
-        sigma = max(v[SCALE + i], SUSPICION * v[DOUBT + i]) * (UNCHECKED if w[COUNT + i] < FOUR else SMALL_SAMPLE)
-        spread = max(across * max(w[COUNT + i] / EIGHT, ONE) / square, ZERO) if solved else ZERO
+        few = count < np.float32(checked)
+        scale = max(v[SCALE + i], weights.common * np.sqrt(square) if few else ZERO)
+        sigma = max(scale, SUSPICION * v[DOUBT + i]) * (UNCHECKED if count < FOUR else SMALL_SAMPLE)
+        spread = max(across * max(count / EIGHT, ONE) / square, ZERO) if solved else ZERO
         error = DEGREES * sigma * np.sqrt(spread) if solved else NO_ERROR
         trusted = error <= weights.most_error_deg
+        told = solved & (not few) & (count > THREE)
+        v[UNEXPLAINED + i] = scale / np.sqrt(square) if told else ZERO
         v[DOUBT + i] = min(error, NO_ERROR)
         w[X + i] = x if trusted else ZERO
         w[Y + i] = y if trusted else ZERO
         w[Z + i] = z if trusted else ZERO
 
 
-_PARTS = b"".join(Path(str(module.__file__)).read_bytes() for module in (equations, kernel, near_kernel, odd_of_four))
+_PARTS = b"".join(
+    Path(str(module.__file__)).read_bytes() for module in (equations, kernel, near_kernel, nine_kernel, odd_of_four)
+)
 solve_rows = _entry(zlib.crc32(_PARTS))

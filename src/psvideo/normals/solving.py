@@ -59,8 +59,10 @@ def trust_note(method: Method, lights: int) -> str:
             "Of four lights that contradict each other the likeliest highlight is left out; where a shadow or a second "
             "highlight spoils another, it is not seen."
         )
+    how = robust.Reweighting()
     return (
         "Highlights and shadows weigh little, and a normal is valid where its predicted standard error is at most "
-        f"{robust.Reweighting().most_error_deg:g} degrees. Where only three measurements are usable nothing is "
-        "checked, and the prediction does not know a rig that is wrong."
+        f"{how.most_error_deg:g} degrees, or {how.beside_typical:g} times what is typical of the picture where that is "
+        "more. So a rig that is wrong makes no pixel invalid: the judgement of the rig speaks of it. Where only three "
+        "measurements are usable nothing is checked."
     )

@@ -17,6 +17,8 @@ MISFIT, LOST_MISFIT = 0.135, 0.25
 NOT_MATTE = 0.1
 STRENGTH_MISFIT, BY_STRENGTH, OTHER_STRENGTH = 0.05, 0.5, 1.25
 """Less is enough where other strengths of some lights take half of it away."""
+MOST_TYPICAL_DEG = 6.0
+"""A larger predicted error of the typical normal is no single pixel's fault."""
 AGREE, DISAGREE = 0.3, -0.1
 LEAST_VALID, HARDLY_VALID = 0.3, 0.05
 MOST_FLICKER_PERCENT = 1.0
@@ -50,6 +52,8 @@ def rig(observed: Observed) -> Iterator[Judgement]:
     crossed = _crossed(observed)
     if wrong or crossed:
         yield from (one for one in (wrong, crossed) if one)
+    elif common := _common(observed.facts):
+        yield common
     elif fit is not None:
         yield _explained(fit)
     elif observed.slopes:
@@ -99,6 +103,21 @@ def _misfit(lights: Sequence[str], fit: RigFit) -> Judgement | None:
         found=f"{found}.",
         advice="Use the rig file of this set-up; calibrate again if a light or the camera was moved; check that lights "
         "have the same names in plan and rig.",
+    )
+
+
+def _common(facts: Sequence[InstantFacts]) -> Judgement | None:
+    """Judge what is unexplained in all pixels alike, which makes none of them invalid."""
+    known = [one.misfit for one in facts if one.misfit is not None]
+    if not known or (error_deg := float(np.median([one.error_deg for one in known]))) <= MOST_TYPICAL_DEG:
+        return None
+    share = float(np.median([one.share for one in known]))
+    return Judgement(
+        subject="rig",
+        grade="doubtful",
+        found=f"In a typical pixel the lights of the rig do not explain the plates within {100 * share:.1f} %, which "
+        f"may turn every normal by about {error_deg:.0f} degrees; validity does not show it.",
+        advice="Calibrate the lights again; give more light where the plates are noisy.",
     )
 
 

@@ -19,7 +19,7 @@ from psvideo.quality.slopes import slope_agreement
 from psvideo.quality.steadiness import Change, Sample, change, sample_of
 from psvideo.quality.worst import Thumbnail, Worst
 from psvideo.sequence import AMBIENT, LightPlate, Round
-from psvideo.surface import Surface
+from psvideo.surface import Misfit, Surface
 
 LIT = 0.01
 """A pixel brighter than this share of saturation under any light is part of the scene; of dark takes, than a sixth of
@@ -38,6 +38,7 @@ class InstantFacts:
     saturation; ``clipped`` (light) the share of it that is saturated. ``ambient`` is the ambient light's share of what
     an exposure holds. ``speed_px_s`` is how fast the fastest parts move, and ``moving_share`` how much
     of the picture does; None where it could not be told. What changes too fast to be followed has a share and no speed.
+    ``misfit`` is what the robust solver found common to the whole picture.
     """
 
     number: int
@@ -51,6 +52,7 @@ class InstantFacts:
     ambient: float | None = None
     speed_px_s: float | None = None
     moving_share: float | None = None
+    misfit: Misfit | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,6 +105,7 @@ def instant_facts(
         ambient=_ambient_share(dark, subject, levels),
         speed_px_s=None if moving is None else moving.speed_px_s,
         moving_share=None if moving is None else moving.share,
+        misfit=None if surface is None else surface.misfit,
     )
 
 
