@@ -45,10 +45,14 @@ class Solved:
 
 
 def observing(take: Take, rig: Rig | None = None, mask: NDArray[np.bool_] | None = None) -> Observed:
-    """Return what gathers the facts of a take's rounds; with a rig, it is held against the plates."""
+    """Return what gathers the facts of a take's rounds; with a rig, it is held against the plates.
+
+    Near lights are so only on the rig's plane: where depth is known instead (``--depth``), there may be none.
+    """
     clip = take.clip
     points = None
-    if rig is not None:
+    near = rig is not None and any(light.position_m is not None for light in rig.lights)
+    if rig is not None and not (near and None in (rig.focal_px, rig.principal_px, rig.plane)):
         size = {"height_px": clip.height_px, "width_px": clip.width_px}
         points = rig_points(clip.plan, rig, channels=clip.channels, **size)
     return Observed(lights=clip.plan.lights, mask=mask, points=points)
