@@ -26,7 +26,7 @@ COARSE = ((0.08, 8.0), (0.03, 5.0))
 FINE = (0.012, 3.0)
 """How far from the expected outline the rim is looked for, round by round: as a share of the radius, in pixels."""
 COARSE_SPOKES = 64
-COARSE_BLURS_PX, BLURS_PX = (0.8, 1.5, 2.7), (0.6, 0.8, 1.1, 1.5, 2.0, 2.7, 3.6, 5.0)
+COARSE_BLURS_PX, BLURS_PX = (0.8, 1.5, 2.7), (0.3, 0.45, 0.6, 0.8, 1.1, 1.5, 2.0, 2.7, 3.6, 5.0)
 REACH_SHARE, LEAST_REACH_PX, MOST_REACH_PX = 0.045, 8.0, 60.0
 """How far to both sides of the rim the picture counts."""
 SPOKE_PX, FEWEST_SPOKES, MOST_SPOKES = 8.0, 48, 144
