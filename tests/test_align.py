@@ -366,3 +366,28 @@ def test_a_round_that_lacks_a_light_is_not_shown_but_helps_its_neighbours() -> N
     results = brought(clip, rounds=tuple(rounds))
     assert [one.number for one in results] == [1001, 1002]
     assert clip.error_deg(clip.solved(results[1]), results[1].time_s)[0] < 1.5
+
+
+@pytest.mark.parametrize("gain", [0.7, 1.02, 1.4])
+def test_an_exposure_that_changes_from_round_to_round_is_no_motion(gain: float) -> None:
+    clip = filmed(3, "at rest", 0.004)
+    breathing = tuple(
+        replace(one, plates=tuple(replace(plate, image=plate.image * np.float32(gain**n)) for plate in one.plates))
+        for n, one in enumerate(clip.rounds)
+    )
+    for given, shown in zip(breathing[1].plates, brought(clip, rounds=breathing)[1].plates, strict=True):
+        assert shown.image is given.image
+
+
+@pytest.mark.parametrize("gain", [0.85, 1.2])
+def test_what_moves_while_the_exposure_changes_is_still_followed(gain: float) -> None:
+    clip = filmed(3, "4 px", 0.004)
+    breathing = tuple(
+        replace(one, plates=tuple(replace(plate, image=plate.image * np.float32(gain**n)) for plate in one.plates))
+        for n, one in enumerate(clip.rounds)
+    )
+    time_s = clip.rounds[1].plates[1].time_s
+    told = [clip.error_deg(clip.solved(brought(clip, rounds=rounds)[1]), time_s) for rounds in (None, breathing)]
+    (_, share), (error_deg, share_breathing) = told
+    assert share_breathing > 0.9 * share
+    assert error_deg < 4.6

@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 
 from psvideo.align.between import Ends, plate_at, track
+from psvideo.align.brightness import evened
 from psvideo.align.flow import Flow, flow_between, moved
 from psvideo.align.held import Around, Held, Instant
 from psvideo.sequence import AMBIENT, LightPlate, Round
@@ -156,6 +157,7 @@ def _flow(around: Around, light: str, how: Aligning, flows: Flows) -> Flow | Non
         return None
     key = light, around.before.round
     if key not in flows:
+        after = evened(before, after)
         flows[key] = flow_between(before, after) if how.align == "flow" or moved(before, after) else None
     return flows[key] if how.rate == "flash" else flows.pop(key)
 
@@ -164,7 +166,7 @@ def _moved_to(around: Around, flow: Flow, time_s: float) -> LightPlate:
     before, after = around.before, around.after
     if before.sketch is None or after.sketch is None:
         raise ValueError("there is no flow without sketches")
-    way = track(before.sketch, after.sketch, flow, time_s)
+    way = track(before.sketch, evened(before.sketch, after.sketch), flow, time_s)
     ends = Ends(
         before=before.given(), after=after.given(), share=(time_s - before.time_s) / (after.time_s - before.time_s)
     )
