@@ -173,17 +173,13 @@ def test_the_psbox_sphere_with_its_hand_made_circle(shared_data: Path, tmp_path:
     assert (errors < 2 * own).all()
 
 
-SUPPLIED_DEG = 0.28
-"""What the supplied directions of psbox are uncertain by: eleven points that lie 1.45 px (rms) off their circle."""
-
-
 def test_the_psbox_outline_is_the_same_under_room_light_and_leds_and_its_errors_are_owned(
     shared_data: Path, tmp_path: Path
 ) -> None:
     folder = shared_data / "psbox_sphere" / "LightProbe-1"
     errors, own = _psbox(shared_data, tmp_path / "rig.toml")
-    assert errors.mean() < 0.65
-    assert (errors < 2.5 * np.hypot(own, SUPPLIED_DEG)).all()
+    assert errors.mean() < 0.5
+    assert (errors < 2.5 * own).all()
     opened = open_light_sets(folder)
     pictures = averaged(opened.sets)
     view = View(focal_px=None, principal_px=(549.5, 499.5))

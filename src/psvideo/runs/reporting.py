@@ -125,8 +125,10 @@ def _where(light: Light | None) -> str:
 
 def _shot(clip: Clip, numbers: Sequence[int]) -> dict[str, str]:
     plan, camera = clip.plan, clip.plan.camera
+    synced = plan.mode == "synced"
     flashes = " · ".join(
-        f"{' + '.join(flash.lights) or 'dark'} {flash.duration_s * 1e3:.3g} ms" for flash in plan.flashes
+        (" + ".join(flash.lights) or "dark") + ("" if synced else f" {flash.duration_s * 1e3:.4g} ms")
+        for flash in plan.flashes
     )
     readout = "not known" if camera.readout_s is None else f"{camera.readout_s * 1e3:.4g} ms"
     shutter_deg = 360 * camera.exposure_s / camera.frame_period_s
@@ -140,7 +142,9 @@ def _shot(clip: Clip, numbers: Sequence[int]) -> dict[str, str]:
         f"transfer {clip.encoding.transfer}",
         "Lasts": f"{(numbers[-1] - numbers[0] + 1) * camera.frame_period_s:.3f} s"
         + (f", from {clip.time_code}" if clip.time_code else ""),
-        "Strobe": f"{plan.mode}; {flashes}; {plan.dark_s * 1e3:.4g} ms dark between them",
+        "Strobe": f"synced, one flash a frame: {flashes}"
+        if synced
+        else f"{plan.mode}; {flashes}; {plan.dark_s * 1e3:.4g} ms dark between them",
         "Rounds a second": f"{plan.dark_every / plan.cycle_s:.4g}"
         if plan.mode != "synced"
         else f"{float(camera.fps) / len(plan.flashes):.4g}",
