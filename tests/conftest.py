@@ -1,11 +1,12 @@
 """What several tests share: where the real data lie, and small plans to try things on."""
 
 import subprocess
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from pathlib import Path
 
 import pytest
+from playwright.sync_api import Playwright, sync_playwright
 
 from psvideo.camera import Camera
 from psvideo.plan import Plan, PlannedFlash, default_dark_s
@@ -23,6 +24,13 @@ def shared_data() -> Path:
     if not SHARED_DATA.is_dir():
         pytest.skip("the real captures (../shared/data) are not on this machine")
     return SHARED_DATA
+
+
+@pytest.fixture(scope="session")
+def playwright() -> Iterator[Playwright]:
+    """What drives browsers; a process can start it once only."""
+    with sync_playwright() as started:
+        yield started
 
 
 @pytest.fixture(scope="session")

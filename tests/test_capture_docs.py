@@ -29,6 +29,6 @@ def test_the_commands_of_the_page_run_and_draw_its_pictures(command: str, tmp_pa
 
 def test_the_page_shows_pictures_that_are_there() -> None:
     shown = re.findall(r"!\[[^]]*\]\(([^)]+)\)", TEXT)
-    assert len(shown) == 2
+    assert len(shown) == 3
     assert all((ROOT / "docs" / name).is_file() for name in shown)
     assert len(COMMANDS) == 3

@@ -88,7 +88,7 @@ def test_the_cameras_are_listed_for_people_and_for_machines() -> None:
     listed = run("--list-cameras").stdout
     assert "Sony F65" in listed
     assert "global" in listed
-    modes = json.loads(run("--list-cameras", "--json").stdout)
+    modes = json.loads(run("--list-cameras", "--json").stdout)["cameras"]
     assert len(modes) >= 40
     assert all(mode["source"] for mode in modes)
 

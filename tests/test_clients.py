@@ -177,18 +177,16 @@ VIDEO = """async ([data, at]) => {
 
 
 @pytest.fixture(scope="module")
-def page() -> Iterator[Any]:
+def page(playwright: Any) -> Iterator[Any]:
     """A page in a real browser."""
-    play = pytest.importorskip("playwright.sync_api")
     programs = map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))
     program = next(filter(None, programs), None)
     if program is None:
         pytest.skip("needs a Chromium browser: tests/install.sh installs it")
     words = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-    with play.sync_playwright() as started:
-        browser = started.chromium.launch(executable_path=program, args=words)
-        yield browser.new_page()
-        browser.close()
+    browser = playwright.chromium.launch(executable_path=program, args=words)
+    yield browser.new_page()
+    browser.close()
 
 
 def text_of(path: Path) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import page_folder as small
 import pytest
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page, Playwright
 
 from psvideo.page import page_server, show_of, write_page
 from psvideo.page.serving import PageServer
@@ -36,14 +36,13 @@ ORANGE = np.array([1.0, ((0x80 / 255 + 0.055) / 1.055) ** 2.4, 0.0])
 
 
 @pytest.fixture(scope="session")
-def browser() -> Iterator[Browser]:
+def browser(playwright: Playwright) -> Iterator[Browser]:
     program = next((found for name in BROWSERS if (found := shutil.which(name))), None)
     if program is None:
         pytest.fail("these tests need a Chromium browser: Debian's package chromium (tests/install.sh installs it)")
-    with sync_playwright() as play:
-        started = play.chromium.launch(executable_path=program, headless=True, args=ALONE)
-        yield started
-        started.close()
+    started = playwright.chromium.launch(executable_path=program, headless=True, args=ALONE)
+    yield started
+    started.close()
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import cv2
 import pytest
-from playwright.sync_api import sync_playwright
+from playwright.sync_api import Playwright
 
 from psvideo.cli.app import main
 
@@ -36,28 +36,29 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_the_page_is_whole_on_a_laptop_and_asks_for_nothing(report: Path, tmp_path: Path, scheme: str) -> None:
+def test_the_page_is_whole_on_a_laptop_and_asks_for_nothing(
+    report: Path, tmp_path: Path, scheme: str, playwright: Playwright
+) -> None:
     program = next((found for name in ("chromium", "google-chrome") if (found := shutil.which(name))), None)
     if program is None:
         pytest.fail("this test needs a Chromium browser: Debian's package chromium (tests/install.sh installs it)")
     said: list[str] = []
-    with sync_playwright() as play:
-        browser = play.chromium.launch(executable_path=program, headless=True, args=ALONE)
-        page = browser.new_context(viewport=LAPTOP, color_scheme=scheme).new_page()  # type: ignore[arg-type]
-        page.on("console", lambda message: said.append(message.text))
-        page.on("request", lambda one: said.append(one.url) if not one.url.startswith(("file:", "data:")) else None)
-        page.goto(report.as_uri())
-        assert not said
-        assert page.evaluate("document.documentElement.scrollWidth") <= LAPTOP["width"], "nothing sticks out"
-        verdict = page.locator(".verdict")
-        assert "'key' is clipped" in verdict.inner_text()
-        box = verdict.bounding_box()
-        assert box is not None
-        assert box["y"] + box["height"] < LAPTOP["height"], "the verdict is read without scrolling"
-        assert _contrast(page.evaluate(COLOURS)) > 4.5, "WCAG 2.1, 1.4.3"
-        shown = page.screenshot(path=tmp_path / "report.png")
-        assert len(shown) > 20_000
-        browser.close()
+    browser = playwright.chromium.launch(executable_path=program, headless=True, args=ALONE)
+    page = browser.new_context(viewport=LAPTOP, color_scheme=scheme).new_page()  # type: ignore[arg-type]
+    page.on("console", lambda message: said.append(message.text))
+    page.on("request", lambda one: said.append(one.url) if not one.url.startswith(("file:", "data:")) else None)
+    page.goto(report.as_uri())
+    assert not said
+    assert page.evaluate("document.documentElement.scrollWidth") <= LAPTOP["width"], "nothing sticks out"
+    verdict = page.locator(".verdict")
+    assert "'key' is clipped" in verdict.inner_text()
+    box = verdict.bounding_box()
+    assert box is not None
+    assert box["y"] + box["height"] < LAPTOP["height"], "the verdict is read without scrolling"
+    assert _contrast(page.evaluate(COLOURS)) > 4.5, "WCAG 2.1, 1.4.3"
+    shown = page.screenshot(path=tmp_path / "report.png")
+    assert len(shown) > 20_000
+    browser.close()
     picture = cv2.imread(str(tmp_path / "report.png"))
     assert (picture.mean() > 128) == (scheme == "light")
     if scheme == "light":
