@@ -12,8 +12,8 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from psvideo.integrate import Integration, View, integrate, scaled
-from psvideo.integrate.bilateral import BILATERAL, SMOOTH
+from psvideo.solve.depth import Integration, View, integrate, scaled
+from psvideo.solve.depth.bilateral import BILATERAL, SMOOTH
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data" / "diligent_gt"
 PUBLISHED_MM = {"cat": 0.074, "bear": 0.334, "pot2": 0.220}

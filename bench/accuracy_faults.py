@@ -10,8 +10,8 @@ import numpy as np
 from bench.accuracy_measure import Accuracy, Case, errors_deg, matte_ball
 from psvideo.clip.transfer import find_curve, to_light
 from psvideo.export.results import decode_normals, encode_normals
-from psvideo.normals.solving import Solving
-from psvideo.surface import Surface
+from psvideo.model.surface import Surface
+from psvideo.solve.normals.solving import Solving
 
 DRAWS = 10
 Change = Callable[[Case, np.random.Generator], Case]

@@ -8,11 +8,11 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from psvideo.normals.illumination import Illumination
-from psvideo.surface import Surface
+from psvideo.model.surface import Surface
+from psvideo.solve.normals.illumination import Illumination
 from psvideo.synth import read_scene
-from psvideo.synth.shading import light_collected
 from psvideo.synth.stage import set_stage
+from psvideo.synth.subject.shading import light_collected
 from psvideo.synth.truth import true_normals
 
 ROOT = Path(__file__).resolve().parents[1]

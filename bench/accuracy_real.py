@@ -17,7 +17,7 @@ from bench.accuracy_measure import (
     washington_sphere,
 )
 from bench.accuracy_robust import calibration
-from psvideo.normals import robust, woodham1980
+from psvideo.solve.normals import robust, woodham1980
 
 DIM = replace(robust.USABLE, dark_level=0.0005)  # DiLiGenT's 16-bit exposures are short
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from bench.accuracy_l1 import l1_normals
 from bench.accuracy_measure import Accuracy, Case, angles_deg, described, errors_deg, gloss
-from psvideo.normals import robust, woodham1980
+from psvideo.solve.normals import robust, woodham1980
 
 CASES: tuple[tuple[str, tuple[int, ...], float, float], ...] = (
     ("8 lights", tuple(range(8)), 1.0, 0.0),

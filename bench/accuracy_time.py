@@ -11,8 +11,8 @@ import numpy as np
 
 from bench.accuracy_l1 import l1_normals
 from bench.accuracy_measure import Accuracy, Case, gloss
-from psvideo.normals import robust, woodham1980
-from psvideo.normals.illumination import Illumination
+from psvideo.solve.normals import robust, woodham1980
+from psvideo.solve.normals.illumination import Illumination
 
 ROWS, COLS, REPEATS, L1_PIXELS, CORES = 1080, 1920, 7, 2000, 2
 

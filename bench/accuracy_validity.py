@@ -21,7 +21,7 @@ from bench.accuracy_measure import (
     turned,
     washington,
 )
-from psvideo.normals import robust
+from psvideo.solve.normals import robust
 
 OWN_LIGHTS = {3: (0, 1, 2), 4: (0, 1, 2, 3), 5: (0, 2, 4, 5, 7), 8: tuple(range(8))}
 EVERYTHING = robust.Reweighting(most_error_deg=robust.EVERYTHING_DEG)

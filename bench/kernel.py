@@ -13,11 +13,11 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from bench.table import Row
-from psvideo.normals.compiled import compiled
-from psvideo.normals.illumination import Illumination
-from psvideo.normals.kernel import solve_rows, working_memory
-from psvideo.normals.task import Usable, empty_result, task
-from psvideo.normals.woodham1980 import solve
+from psvideo.compute.inlined import compiled
+from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.kernel import solve_rows, working_memory
+from psvideo.solve.normals.task import Usable, empty_result, task
+from psvideo.solve.normals.woodham1980 import solve
 
 ROWS, COLS = 1080, 1920
 PIXELS = ROWS * COLS

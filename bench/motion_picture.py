@@ -9,14 +9,14 @@ import numpy as np
 
 from bench.accuracy_measure import ROOT, angles_deg
 from bench.accuracy_motion import PITCH_S, Filmed, shoot
-from psvideo.align.rounds import Aligning
-from psvideo.normals.illumination import illumination
-from psvideo.sequence import Round
+from psvideo.pictures.contact import Strip, Tile, sheet
+from psvideo.pictures.shading import normal_colours, srgb
+from psvideo.plates.align.rounds import Aligning
+from psvideo.plates.sequence import Round
+from psvideo.solve.normals.illumination import illumination
 from psvideo.synth import read_scene
 from psvideo.synth.scene import MotionTable
 from psvideo.synth.stage import set_stage
-from psvideo.view.contact import Strip, Tile, sheet
-from psvideo.view.shading import normal_colours, srgb
 
 STEP_PX, FULL_DEG, GREY = 4.0, 10.0, 110
 LIGHTS = ("key", "left", "right")

@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 
 from bench.accuracy_measure import ROOT, SHARED_DATA, Case, angles_deg, diligent_ball, gloss, spread_subsets
-from psvideo.normals import robust, woodham1980
-from psvideo.surface import Surface
-from psvideo.view.contact import Strip, Tile, sheet
-from psvideo.view.shading import normal_colours, srgb
+from psvideo.model.surface import Surface
+from psvideo.pictures.contact import Strip, Tile, sheet
+from psvideo.pictures.shading import normal_colours, srgb
+from psvideo.solve.normals import robust, woodham1980
 
 FULL_DEG = 10.0
 GREY = 110

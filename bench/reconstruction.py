@@ -8,11 +8,11 @@ from fractions import Fraction
 import numpy as np
 
 from bench.table import Row
-from psvideo.camera import Camera
-from psvideo.plan import Plan, PlannedFlash
-from psvideo.shutter import frames_touched
-from psvideo.split import split
-from psvideo.timing import Flash, Timing
+from psvideo.model.camera import Camera
+from psvideo.model.plan import Plan, PlannedFlash
+from psvideo.model.shutter import frames_touched
+from psvideo.model.timing import Flash, Timing
+from psvideo.plates.split import split
 
 FRAMES = 24
 REPEATS = 9

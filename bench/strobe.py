@@ -10,16 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bench.table import Row
-from psvideo.camera import Camera
-from psvideo.plan import Plan, PlannedFlash
-from psvideo.strobe.boards import BOARDS, capabilities
-from psvideo.strobe.messages import WiringName
-from psvideo.strobe.playing import moments
+from psvideo.formats.trace_csv import Trace, read_trace
+from psvideo.model.camera import Camera
+from psvideo.model.plan import Plan, PlannedFlash
+from psvideo.strobe.link.boards import BOARDS, capabilities
+from psvideo.strobe.link.messages import WiringName
+from psvideo.strobe.link.protocol import format_request
 from psvideo.strobe.program import Program, make_program
-from psvideo.strobe.protocol import format_request
-from psvideo.strobe.simulated import play_script
-from psvideo.strobe.toolchain import AVR_BOARDS, AvrBoard
-from psvideo.tracefile import Trace, read_trace
+from psvideo.strobe.stand_ins.playing import moments
+from psvideo.strobe.stand_ins.simulated import play_script
+from psvideo.strobe.stand_ins.toolchain import AVR_BOARDS, AvrBoard
 
 FLASHES = 10_000
 BAR_CYCLES = 4

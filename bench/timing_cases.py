@@ -26,9 +26,9 @@ from bench.timing_scenes import (
     vignetted,
     void,
 )
-from psvideo.camera import Encoding
 from psvideo.clip import Frame
-from psvideo.plan import Plan
+from psvideo.model.camera import Encoding
+from psvideo.model.plan import Plan
 from psvideo.synth import Exposure, Flicker, Noise, StrobeClock, TrueFlash, expose
 
 NOISE = Noise(full_well_e=20_000, read_e=8)

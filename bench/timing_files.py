@@ -7,12 +7,12 @@ import av
 import numpy as np
 
 from psvideo.clip import Frame, open_clip, read_frames
-from psvideo.plan import Plan
-from psvideo.planfile import format_plan
-from psvideo.synth.curves import CURVES
-from psvideo.synth.dpx import dpx_bytes
-from psvideo.synth.encode import Codes
-from psvideo.synth.frames import write_frame
+from psvideo.formats.plan_toml import format_plan
+from psvideo.model.plan import Plan
+from psvideo.synth.camera.curves import CURVES
+from psvideo.synth.camera.dpx import dpx_bytes
+from psvideo.synth.camera.encode import Codes
+from psvideo.synth.camera.frames import write_frame
 from psvideo.synth.scene import CameraTable
 
 QUALITY = "18"

@@ -6,16 +6,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import solveh_banded
 
-from psvideo import hudon2015
-from psvideo.ambient import subtract
-from psvideo.camera import Camera
-from psvideo.plan import Plan
-from psvideo.split import Plate, split
+from psvideo.model.camera import Camera
+from psvideo.model.plan import Plan
+from psvideo.model.timing import Timing
+from psvideo.plates import hudon2015
+from psvideo.plates.ambient import subtract
+from psvideo.plates.split import Plate, split
 from psvideo.synth import TrueFlash
-from psvideo.synth.emission import Emission
-from psvideo.synth.sensor import seen_share
-from psvideo.synth.strobe import row_opens_s
-from psvideo.timing import Timing
+from psvideo.synth.camera.sensor import seen_share
+from psvideo.synth.lamps.emission import Emission
+from psvideo.synth.lamps.strobe import row_opens_s
 
 Picture = np.ndarray
 LEAST_SHARE = 0.05

@@ -5,8 +5,8 @@ from fractions import Fraction
 
 import numpy as np
 
-from psvideo.camera import Camera, Encoding
-from psvideo.plan import Plan, PlannedFlash, default_dark_s
+from psvideo.model.camera import Camera, Encoding
+from psvideo.model.plan import Plan, PlannedFlash, default_dark_s
 from psvideo.synth import TrueFlash
 
 HEIGHT, WIDTH = 240, 16

@@ -23,7 +23,7 @@ import numpy as np
 from playwright.sync_api import Browser, Page, sync_playwright
 
 from bench.table import Row
-from psvideo.export.exr import write_exr
+from psvideo.formats.exr_files import write_exr
 
 COUNT, DIFFERENT = 240, 8
 ROWS, COLS = 1080, 1920

@@ -19,12 +19,12 @@ import cv2
 import numpy as np
 
 from bench.table import Row
-from psvideo.camera import Camera
 from psvideo.clip import ALL_CORES
-from psvideo.plan import Plan, PlannedFlash
-from psvideo.planfile import format_plan, parse_fps
-from psvideo.rig import Light, Rig
-from psvideo.rigfile import format_rig
+from psvideo.formats.plan_toml import format_plan, parse_fps
+from psvideo.formats.rig_toml import format_rig
+from psvideo.model.camera import Camera
+from psvideo.model.plan import Plan, PlannedFlash
+from psvideo.model.rig import Light, Rig
 from psvideo.synth import Noise, StrobeClock, expose
 
 SHORT, LONG = 40, 100

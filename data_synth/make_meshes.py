@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from psvideo.synth.curves import CURVES
-from psvideo.synth.meshes import builtin_names, builtin_shape
+from psvideo.synth.camera.curves import CURVES
+from psvideo.synth.subject.meshes import builtin_names, builtin_shape
 
 
 def main() -> None:

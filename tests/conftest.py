@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Playwright, sync_playwright
 
-from psvideo.camera import Camera
-from psvideo.plan import Plan, PlannedFlash, default_dark_s
+from psvideo.model.camera import Camera
+from psvideo.model.plan import Plan, PlannedFlash, default_dark_s
 from psvideo.strobe.limits import cycle_check
-from psvideo.strobe.messages import Arm, Slot, Steps, WiringName
-from psvideo.strobe.protocol import format_request
-from psvideo.strobe.toolchain import AVR_BOARDS, AvrBoard, build
+from psvideo.strobe.link.messages import Arm, Slot, Steps, WiringName
+from psvideo.strobe.link.protocol import format_request
+from psvideo.strobe.stand_ins.toolchain import AVR_BOARDS, AvrBoard, build
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 

@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from psvideo.align import held
-from psvideo.align.packed import Packed, packed, unpacked
-from psvideo.align.rounds import Aligning, aligned
-from psvideo.normals.illumination import Illumination
-from psvideo.normals.woodham1980 import solve
-from psvideo.sequence import LightPlate, Round
-from psvideo.surface import Surface
+from psvideo.model.surface import Surface
+from psvideo.plates.align import held
+from psvideo.plates.align.packed import Packed, packed, unpacked
+from psvideo.plates.align.rounds import Aligning, aligned
+from psvideo.plates.sequence import LightPlate, Round
+from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.woodham1980 import solve
+from psvideo.synth.lamps.strobe import TrueFlash
 from psvideo.synth.scene import Scene
 from psvideo.synth.stage import Stage, set_stage
-from psvideo.synth.strobe import TrueFlash
 from psvideo.synth.truth import true_normals
 
 COLS, ROWS, WIDTH_M = 320, 240, 0.8

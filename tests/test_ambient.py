@@ -8,16 +8,16 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from psvideo import ambient
-from psvideo.flicker import Mains, Ripple, RowLight, find_ripple
-from psvideo.plan import Plan
-from psvideo.shutter import frames_touched
-from psvideo.split import Plate, split
+from psvideo.model.plan import Plan
+from psvideo.model.shutter import frames_touched
+from psvideo.model.timing import Flash, Timing
+from psvideo.plates import ambient
+from psvideo.plates.mains import Mains, Ripple, RowLight, find_ripple
+from psvideo.plates.split import Plate, split
 from psvideo.synth import Noise, StrobeClock
-from psvideo.synth.noise import NOISELESS, frame_rng
-from psvideo.synth.sensor import Flicker, expose_frames
-from psvideo.synth.strobe import true_flashes
-from psvideo.timing import Flash, Timing
+from psvideo.synth.camera.noise import NOISELESS, frame_rng
+from psvideo.synth.camera.sensor import Flicker, expose_frames
+from psvideo.synth.lamps.strobe import true_flashes
 
 PlanMaker = Callable[..., Plan]
 AmbientOf = Callable[[int, np.ndarray], np.ndarray]

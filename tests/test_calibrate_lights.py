@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 from psvideo.calibrate.flat_field import Target, measure_flat_field
 from psvideo.calibrate.guess import guess_rig
 from psvideo.calibrate.light_pictures import LightPictures, light_pictures
-from psvideo.calibrate.matte_sphere import measure_matte_sphere, sphere_normals
-from psvideo.calibrate.sphere_outline import given_outline
-from psvideo.calibrate.sphere_view import View
+from psvideo.calibrate.matte import measure_matte_sphere, sphere_normals
+from psvideo.calibrate.sphere.outline import given_outline
+from psvideo.calibrate.sphere.view import View
 from psvideo.calibrate.strengths import measure_strengths
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
-from psvideo.normals.near_light import ground_of
-from psvideo.rig import Light, Rig
-from psvideo.rigfile import read_rig
+from psvideo.formats.rig_toml import read_rig
+from psvideo.model.rig import Light, Rig
+from psvideo.solve.normals.near_light import ground_of
 
 Array = NDArray[np.float64]
 HIGH, WIDE = 150, 200

@@ -13,15 +13,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from psvideo.calibrate.led_pictures import LedPictures, in_colours, read_led_pictures
-from psvideo.calibrate.readout import Led, Readout, measure_readout
-from psvideo.calibrate.stripe_error import Pulls, standard_error
-from psvideo.calibrate.stripe_fit import fit_stripes
-from psvideo.camera import FloatArray
+from psvideo.calibrate.stripes.error import Pulls, standard_error
+from psvideo.calibrate.stripes.fit import fit_stripes
+from psvideo.calibrate.stripes.pictures import LedPictures, in_colours, read_led_pictures
+from psvideo.calibrate.stripes.readout import Led, Readout, measure_readout
 from psvideo.capture import cameras
 from psvideo.cli.app import main
 from psvideo.clip.record import Header, Picture
 from psvideo.errors import PsvideoError
+from psvideo.model.camera import FloatArray
 
 LED_HZ = 1013.0
 ROWS, COLS = 400, 64

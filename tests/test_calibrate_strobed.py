@@ -14,9 +14,9 @@ from psvideo.calibrate.strobed_readout import StrobedReadout, readout_of
 from psvideo.capture import cameras
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
-from psvideo.plan import Plan
-from psvideo.profiles import collect
-from psvideo.sync import find_timing
+from psvideo.model.plan import Plan
+from psvideo.model.row_profiles import collect
+from psvideo.sync.find import find_timing
 from psvideo.synth import Noise, StrobeClock, expose
 
 PlanMaker = Callable[..., Plan]

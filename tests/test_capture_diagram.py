@@ -10,14 +10,14 @@ import cv2
 import numpy as np
 import pytest
 
-from psvideo.capture.diagram import check_diagram_name, diagram_text, write_diagram
-from psvideo.capture.draw_png import png
-from psvideo.capture.draw_svg import svg
-from psvideo.capture.picture import HEIGHT, LIGHT_COLOURS, WIDTH, Label, Polygon, timing_picture
-from psvideo.capture.timeline import timeline
+from psvideo.capture.drawing.diagram import check_diagram_name, diagram_text, write_diagram
+from psvideo.capture.drawing.draw_png import png
+from psvideo.capture.drawing.draw_svg import svg
+from psvideo.capture.drawing.picture import HEIGHT, LIGHT_COLOURS, WIDTH, Label, Polygon, timing_picture
+from psvideo.capture.drawing.timeline import timeline
 from psvideo.errors import UsageError
-from psvideo.plan import Plan
-from psvideo.shutter import row_weights
+from psvideo.model.plan import Plan
+from psvideo.model.shutter import row_weights
 
 MakePlan = Callable[..., Plan]
 CASES: dict[str, dict[str, object]] = {

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from psvideo.camera import Camera
-from psvideo.capture.figures import dark_row_move_px, frames_per_flash, row_shares, shoot_figures
-from psvideo.plan import Mode, Plan, PlannedFlash
+from psvideo.model.camera import Camera
+from psvideo.model.plan import Mode, Plan, PlannedFlash
+from psvideo.model.shoot_figures import dark_row_move_px, frames_per_flash, row_shares, shoot_figures
 
 
 def paper_plan(

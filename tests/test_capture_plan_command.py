@@ -9,7 +9,7 @@ from typer.testing import CliRunner, Result
 
 from psvideo.cli.capture_plan import capture_plan
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.planfile import parse_plan, read_plan
+from psvideo.formats.plan_toml import parse_plan, read_plan
 
 APP = typer.Typer()
 APP.command()(capture_plan)

@@ -7,17 +7,17 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from psvideo.camera import Camera
 from psvideo.capture.cautions import shoot_cautions
-from psvideo.capture.figures import shoot_figures
 from psvideo.capture.planning import Shoot, make_plan, plan_shoot
 from psvideo.capture.request import CameraWish, Limits, ShootRequest, choose_camera
 from psvideo.capture.wish import LONG_MARKER, longest_flash
-from psvideo.capture.words import ShootWords, parse_request
+from psvideo.cli.shoot_words import ShootWords, parse_request
 from psvideo.errors import UsageError
-from psvideo.plan import Plan
-from psvideo.planfile import format_plan, parse_plan
-from psvideo.shutter import row_weights
+from psvideo.formats.plan_toml import format_plan, parse_plan
+from psvideo.model.camera import Camera
+from psvideo.model.plan import Plan
+from psvideo.model.shoot_figures import shoot_figures
+from psvideo.model.shutter import row_weights
 
 
 def words(**given_words: object) -> ShootWords:

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from psvideo.capture.quantities import (
+from psvideo.cli.typed import (
     parse_fraction,
     parse_lights,
     parse_metres,
@@ -16,9 +16,9 @@ from psvideo.capture.quantities import (
     parse_seconds,
     parse_size_px,
     parse_speed_px_s,
-    show_seconds,
 )
 from psvideo.errors import UsageError
+from psvideo.model.units import show_seconds
 
 
 @pytest.mark.parametrize(

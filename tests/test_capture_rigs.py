@@ -10,8 +10,8 @@ from typer import Typer
 from typer.testing import CliRunner
 
 from psvideo.cli.capture_plan import capture_plan
-from psvideo.planfile import read_plan
-from psvideo.rigfile import read_rig
+from psvideo.formats.plan_toml import read_plan
+from psvideo.formats.rig_toml import read_rig
 
 RIGS = Path(__file__).resolve().parents[1] / "lights" / "rigs"
 NAMES = ("head_ring", "dome")

@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from psvideo.capture.draw_svg import svg
+from psvideo.capture.drawing.draw_svg import svg
 
 CALIBRATION = Path(__file__).resolve().parents[1] / "calibration"
 SCRIPT = runpy.run_path(str(CALIBRATION / "make_targets.py"))

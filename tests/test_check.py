@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from psvideo.cli.app import main
-from psvideo.quality.focus import sharpest_blur_px
+from psvideo.report.observe.focus import sharpest_blur_px
 from psvideo.runs.takes import takes_in, whole_takes
 
 SPHERE = (Path(__file__).resolve().parents[1] / "data_synth" / "sphere.toml").read_text()
@@ -153,7 +153,7 @@ def test_what_cannot_be_checked_is_one_plain_paragraph(
 def test_a_movie_is_not_decoded_to_its_end(
     shot: Callable[[str], Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from psvideo.clip import movie
+    from psvideo.clip.decode import movie
 
     clip = shot("good")
     frames = [cv2.imread(str(file), cv2.IMREAD_UNCHANGED) for file in sorted((clip / "frames").iterdir())]

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from psvideo.camera import Encoding
 from psvideo.clip import holes, open_clip, parse_range, read_frames, reading
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.plan import Plan
-from psvideo.planfile import format_plan
+from psvideo.formats.plan_toml import format_plan
+from psvideo.model.camera import Encoding
+from psvideo.model.plan import Plan
 
 ROWS, COLS = 6, 8
 

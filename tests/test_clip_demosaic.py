@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from psvideo.clip import demosaic
-from psvideo.clip.malvar2004 import PATTERNS
+from psvideo.clip.decode.malvar2004 import PATTERNS
 from psvideo.errors import PsvideoError
 
 

@@ -10,10 +10,10 @@ import rawpy
 import tifffile
 from numpy.typing import NDArray
 
-from psvideo.camera import Encoding
-from psvideo.clip.decoders import decode, read_header
+from psvideo.clip.decode.decoders import decode, read_header
 from psvideo.clip.linear import linear_light
 from psvideo.errors import PsvideoError
+from psvideo.model.camera import Encoding
 
 LOSSLESS_JPEG = {"compression": 7, "compressionargs": {"lossless": True, "bitspersample": 16}}
 Tag = tuple[int, str, int, object, bool]

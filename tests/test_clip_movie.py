@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from psvideo.camera import Encoding
-from psvideo.clip import keeping_near, movie, open_clip, read_frames
-from psvideo.clip.yuv import CODES, HIGHEST, LOWEST, to_rgb
+from psvideo.clip import keeping_near, open_clip, read_frames
+from psvideo.clip.decode import movie
+from psvideo.clip.decode.yuv import CODES, HIGHEST, LOWEST, to_rgb
 from psvideo.errors import PsvideoError
-from psvideo.plan import Plan
-from psvideo.planfile import format_plan
+from psvideo.formats.plan_toml import format_plan
+from psvideo.model.camera import Encoding
+from psvideo.model.plan import Plan
 
 RATE = Fraction(120000, 1001)
 BT709, BT601, BT2020 = (0.2126, 0.0722), (0.299, 0.114), (0.2627, 0.0593)

@@ -13,8 +13,8 @@ import pytest
 import tifffile
 from numpy.typing import NDArray
 
-from psvideo.clip.decoders import decode, read_header
-from psvideo.clip.exr_chunks import is_cut_short
+from psvideo.clip.decode.decoders import decode, read_header
+from psvideo.clip.decode.exr_chunks import is_cut_short
 from psvideo.errors import PsvideoError
 
 Write = Callable[[Path, NDArray], None]  # type: ignore[type-arg]

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from psvideo.camera import Encoding
 from psvideo.clip.linear import linear_light
 from psvideo.clip.record import Header, Picture
 from psvideo.clip.transfer import CURVES, find_curve, to_light
 from psvideo.errors import PsvideoError
+from psvideo.model.camera import Encoding
 
 # Signal (share of the largest code) and linear light, as each curve's maker publishes them.
 PUBLISHED = [

@@ -10,7 +10,6 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from psvideo.beauty import Mix, beauty_of, parse_mix
 from psvideo.cli.app import main
 from psvideo.cli.delivery import Asked, delivery_of
 from psvideo.cli.delivery_options import CodecName, ProgramName, SpaceName, YDirection
@@ -18,7 +17,8 @@ from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.movie import even, write_movie
 from psvideo.export.programs import Delivered, note
 from psvideo.export.timeline import Footage, Images, timeline_text
-from psvideo.sequence import LightPlate, Round
+from psvideo.plates.beauty import Mix, beauty_of, parse_mix
+from psvideo.plates.sequence import LightPlate, Round
 
 otio = pytest.importorskip("opentimelineio")
 SCENES = Path(__file__).resolve().parents[1] / "data_synth"

@@ -6,14 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from psvideo.align.denoise import Average, averaged
-from psvideo.quality.judge_result import steadiness
-from psvideo.quality.observed import instant_facts
-from psvideo.quality.steadiness import change, sample_of
-from psvideo.sequence import LightPlate, Round
-from psvideo.surface import Surface
-from psvideo.timing import Timing
-from psvideo.view.report import RunReport, findings, flicker, report_record
+from psvideo.model.surface import Surface
+from psvideo.model.timing import Timing
+from psvideo.plates.align.denoise import Average, averaged
+from psvideo.plates.sequence import LightPlate, Round
+from psvideo.report.judge.result import steadiness
+from psvideo.report.observe.observed import instant_facts
+from psvideo.report.observe.steadiness import change, sample_of
+from psvideo.report.run_report import RunReport, findings, flicker, report_record
 
 ROWS, COLS = 96, 128
 

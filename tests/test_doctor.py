@@ -10,8 +10,8 @@ import pytest
 
 from psvideo.cli.app import main
 from psvideo.clip import abilities
-from psvideo.doctor import speed
-from psvideo.doctor.finding import Finding, is_well
+from psvideo.inspect import speed
+from psvideo.inspect.doctor_finding import Finding, is_well
 
 
 @pytest.fixture(autouse=True)
@@ -41,7 +41,7 @@ def test_what_lacks_is_missing_with_the_next_step_and_exit_status_1(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(abilities.MOVIE_CODECS, "ProRes", "no_such_decoder")
-    monkeypatch.setattr("psvideo.doctor.software.version", _without("scipy", "usd-core"))
+    monkeypatch.setattr("psvideo.inspect.software.version", _without("scipy", "usd-core"))
     status, found, well = asked(capsys)
     assert (status, well) == (1, False)
     lacking = {name for name, finding in found.items() if finding["level"] == "missing"}

@@ -17,19 +17,19 @@ from hypothesis.extra import numpy as hnp
 
 from psvideo import __version__
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.export.exr import Crop, write_exr
 from psvideo.export.plates import write_flash, write_plate
 from psvideo.export.png import decode_normals, encode_normals
-from psvideo.export.pose import read_pose
-from psvideo.export.publish import whole_folder
 from psvideo.export.results import Delivery, is_written, write_surface
 from psvideo.export.space import Space, choose_space, placed
 from psvideo.export.tags import Tags
+from psvideo.export.usd.pose import read_pose
 from psvideo.export.writer import writing
-from psvideo.sequence import LightPlate
-from psvideo.split import Plate
-from psvideo.surface import Surface
-from psvideo.timing import Flash
+from psvideo.formats.exr_files import Crop, write_exr
+from psvideo.formats.whole_folders import whole_folder
+from psvideo.model.surface import Surface
+from psvideo.model.timing import Flash
+from psvideo.plates.sequence import LightPlate
+from psvideo.plates.split import Plate
 
 TAGS = Tags(fps=Fraction(30000, 1001), colour="lin_rec709_scene", plan_sha256="ab" * 32, rig_sha256="cd" * 32)
 

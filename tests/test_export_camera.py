@@ -9,12 +9,12 @@ import pytest
 
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.mesh import read_part, write_part
-from psvideo.export.pose import read_pose
 from psvideo.export.results import Delivery
 from psvideo.export.space import Space, choose_space, placed, placed_points
-from psvideo.integrate import Mesh
-from psvideo.rig import Rig
+from psvideo.export.usd.pose import read_pose
+from psvideo.model.rig import Rig
 from psvideo.runs.delivering import world_doubts
+from psvideo.solve.depth import Mesh
 
 usd = pytest.importorskip("pxr.Usd")
 from pxr import Gf, UsdGeom  # noqa: E402

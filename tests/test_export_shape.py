@@ -15,10 +15,10 @@ from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
 from psvideo.export.mesh import srgb_codes, write_part, write_ply
 from psvideo.export.space import CAMERA_SPACE, Space
-from psvideo.export.usd import write_animation
-from psvideo.export.usd_core import require_usd
-from psvideo.integrate import Mesh
+from psvideo.export.usd.core import require_usd
+from psvideo.export.usd.scene import write_animation
 from psvideo.runs import Output
+from psvideo.solve.depth import Mesh
 
 SCENES = Path(__file__).resolve().parents[1] / "data_synth"
 TURNED = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])

@@ -9,8 +9,8 @@ import pytest
 
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
-from psvideo.falloff import read_falloff
-from psvideo.rigfile import read_rig
+from psvideo.formats.flat_toml import read_falloff
+from psvideo.formats.rig_toml import read_rig
 
 HIGH, WIDE = 90, 120
 WAYS = {"key": (0.5, 0.2, 0.84), "left": (-0.5, 0.3, 0.81), "low": (0.1, -0.55, 0.83), "top": (0.0, 0.6, 0.8)}

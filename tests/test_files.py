@@ -11,14 +11,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from psvideo.camera import Camera, Encoding
 from psvideo.errors import PsvideoError
-from psvideo.files import refuse_existing, write_text
-from psvideo.plan import Plan, PlannedFlash
-from psvideo.planfile import format_plan, parse_plan, read_plan
-from psvideo.rig import Light, Rig, directions, intensities
-from psvideo.rigfile import format_rig, parse_rig, read_rig
-from psvideo.timing import DroppedFrames, Flash, Timing, format_timing, read_timing
+from psvideo.formats.plan_toml import format_plan, parse_plan, read_plan
+from psvideo.formats.rig_toml import format_rig, parse_rig, read_rig
+from psvideo.formats.timing_json import format_timing, read_timing
+from psvideo.formats.whole_files import refuse_existing, write_text
+from psvideo.model.camera import Camera, Encoding
+from psvideo.model.plan import Plan, PlannedFlash
+from psvideo.model.rig import Light, Rig, directions, intensities
+from psvideo.model.timing import DroppedFrames, Flash, Timing
 
 names = st.text("abcdefgh_-é", min_size=1, max_size=8)
 positive = st.floats(1e-6, 1e-2)

@@ -14,17 +14,18 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from psvideo.camera import Encoding
 from psvideo.cli.info import info
-from psvideo.clip import describe
-from psvideo.clip.about_plan import has_marker
-from psvideo.clip.findings import Description
 from psvideo.errors import PsvideoError
-from psvideo.plan import Plan, PlannedFlash
-from psvideo.planfile import format_plan
-from psvideo.rig import Light, Rig
-from psvideo.rigfile import format_rig
-from psvideo.timing import DroppedFrames, Flash, Timing, format_timing
+from psvideo.formats.plan_toml import format_plan
+from psvideo.formats.rig_toml import format_rig
+from psvideo.formats.timing_json import format_timing
+from psvideo.inspect import describe
+from psvideo.inspect.about_plan import has_marker
+from psvideo.inspect.findings import Description
+from psvideo.model.camera import Encoding
+from psvideo.model.plan import Plan, PlannedFlash
+from psvideo.model.rig import Light, Rig
+from psvideo.model.timing import DroppedFrames, Flash, Timing
 
 ROWS, COLS = 12, 16
 LIGHTS = ("key", "left", "right")

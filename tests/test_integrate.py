@@ -15,13 +15,13 @@ from scipy.sparse.linalg import lsqr
 
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
-from psvideo.integrate import Depth, Shaping, View, begun, depth_of, integrate, mesh_of, reservations, scaled
-from psvideo.integrate.bilateral import SMOOTH, Integration
-from psvideo.integrate.multigrid import empty_grids, prepare, solve, weighed
-from psvideo.integrate.poisson import poisson_height
-from psvideo.integrate.reweighting import write_board
-from psvideo.integrate.view import slopes_of
-from psvideo.surface import Surface
+from psvideo.model.surface import Surface
+from psvideo.solve.depth import Depth, Shaping, View, begun, depth_of, integrate, mesh_of, reservations, scaled
+from psvideo.solve.depth.bilateral import SMOOTH, Integration
+from psvideo.solve.depth.multigrid import empty_grids, prepare, solve, weighed
+from psvideo.solve.depth.poisson import poisson_height
+from psvideo.solve.depth.reweighting import write_board
+from psvideo.solve.depth.view import slopes_of
 
 ROWS, COLS = 72, 90
 PINHOLE = View(focal_px=(150.0, 140.0), principal_px=(40.0, 38.0))

@@ -9,7 +9,7 @@ import pytest
 from psvideo.calibrate.light_pictures import averaged, light_pictures
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
-from psvideo.light_sets import Reading, open_light_sets, read_light_pictures
+from psvideo.runs.light_sets import Reading, open_light_sets, read_light_pictures
 
 SCENES = Path(__file__).resolve().parents[1] / "data_synth"
 

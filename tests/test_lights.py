@@ -10,8 +10,8 @@ from xml.etree import ElementTree
 import pytest
 
 from psvideo.cli.app import main
-from psvideo.planfile import read_plan
-from psvideo.strobe.boards import BOARDS
+from psvideo.formats.plan_toml import read_plan
+from psvideo.strobe.link.boards import BOARDS
 
 LIGHTS = Path(__file__).resolve().parents[1] / "lights"
 RIGS = ("head_ring", "dome")

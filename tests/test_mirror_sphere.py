@@ -12,14 +12,14 @@ import pytest
 from bench.mirror_scene import Ball, Lamp, Lens, photograph, unit
 
 from psvideo.calibrate.light_pictures import LightPictures, averaged, light_pictures
-from psvideo.calibrate.mirror_sphere import MirrorCalibration, calibrate_lights
-from psvideo.calibrate.sphere_outline import find_outlines, given_outline
-from psvideo.calibrate.sphere_sighting import Looking, SphereNotFoundError, sight_spheres
-from psvideo.calibrate.sphere_view import View
+from psvideo.calibrate.mirror.lights import MirrorCalibration, calibrate_lights
+from psvideo.calibrate.sphere.outline import find_outlines, given_outline
+from psvideo.calibrate.sphere.sighting import Looking, SphereNotFoundError, sight_spheres
+from psvideo.calibrate.sphere.view import View
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
-from psvideo.light_sets import open_light_sets
-from psvideo.rigfile import parse_rig, read_rig
+from psvideo.formats.rig_toml import parse_rig, read_rig
+from psvideo.runs.light_sets import open_light_sets
 
 DIRECTIONS = {"key": (0.3, 0.4, 0.87), "left": (-0.5, 0.2, 0.84), "low": (0.1, -0.4, 0.9), "rim": (0.7, 0.3, 0.4)}
 DISTANT = {name: Lamp(direction=vector) for name, vector in DIRECTIONS.items()}

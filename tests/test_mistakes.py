@@ -9,7 +9,7 @@ from PIL import Image
 
 from psvideo.cli.app import main
 from psvideo.clip import read_mask
-from psvideo.files import PICTURE_MARK, marked_png
+from psvideo.formats.whole_files import PICTURE_MARK, marked_png
 
 ROOT = Path(__file__).resolve().parents[1]
 

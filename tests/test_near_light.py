@@ -8,15 +8,15 @@ import pytest
 import scipy.io
 from numpy.typing import NDArray
 
-from psvideo import near_surface
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
-from psvideo.integrate import Shaping, View
-from psvideo.near_surface import NearSurface, solve_near
-from psvideo.normals import robust, woodham1980
-from psvideo.normals.illumination import Illumination, illumination
-from psvideo.normals.near_light import ground_of
-from psvideo.rig import Light, Rig
+from psvideo.model.rig import Light, Rig
+from psvideo.solve import near_surface
+from psvideo.solve.depth import Shaping, View
+from psvideo.solve.near_surface import NearSurface, solve_near
+from psvideo.solve.normals import robust, woodham1980
+from psvideo.solve.normals.illumination import Illumination, illumination
+from psvideo.solve.normals.near_light import ground_of
 
 Array = NDArray[np.float64]
 SIZE, WIDTH_M, FAR_M = 96, 0.4, 1.6

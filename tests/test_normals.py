@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError
-from psvideo.normals.illumination import MAX_CONDITION, Illumination, illumination
-from psvideo.normals.task import PIXEL_CONDITION
-from psvideo.normals.woodham1980 import EVERYTHING, Usable, solve
-from psvideo.rig import Light
-from psvideo.surface import Surface
+from psvideo.model.rig import Light
+from psvideo.model.surface import Surface
+from psvideo.solve.normals.illumination import MAX_CONDITION, Illumination, illumination
+from psvideo.solve.normals.task import PIXEL_CONDITION
+from psvideo.solve.normals.woodham1980 import EVERYTHING, Usable, solve
 
 Array = NDArray[np.float64]
 DEFAULT = Usable()

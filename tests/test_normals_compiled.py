@@ -7,9 +7,9 @@ import numba.core.caching
 import numpy as np
 import pytest
 
-from psvideo.normals import compiled
-from psvideo.normals.illumination import Illumination
-from psvideo.normals.woodham1980 import solve
+from psvideo.compute import inlined as compiled
+from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.woodham1980 import solve
 
 
 def twice(value: float) -> float:
@@ -36,7 +36,7 @@ def test_a_full_disk_under_the_cache_leaves_compiled_code_usable(monkeypatch: py
 
 
 def test_a_full_disk_under_the_cache_does_not_stop_a_solution(monkeypatch: pytest.MonkeyPatch) -> None:
-    kernel = importlib.import_module("psvideo.normals.kernel")
+    kernel = importlib.import_module("psvideo.solve.normals.kernel")
     solve_rows, calls = kernel.solve_rows, []
 
     def full_at_first(*arguments: Any) -> None:

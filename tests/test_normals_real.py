@@ -10,10 +10,10 @@ import OpenEXR
 import pytest
 from numpy.typing import NDArray
 
-from psvideo.normals.illumination import Illumination
-from psvideo.normals.woodham1980 import EVERYTHING, Usable, solve
-from psvideo.rigfile import read_rig
-from psvideo.surface import Surface
+from psvideo.formats.rig_toml import read_rig
+from psvideo.model.surface import Surface
+from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.woodham1980 import EVERYTHING, Usable, solve
 
 
 def error_deg(surface: Surface, truth: NDArray[np.floating], mask: NDArray[np.bool_]) -> NDArray[np.float64]:

@@ -12,7 +12,7 @@ import pytest
 
 from psvideo.cli.app import main
 from psvideo.clip import kept, reading
-from psvideo.quality.observed import Observed
+from psvideo.report.observe.observed import Observed
 from psvideo.runs import results as runs
 
 SCENES = Path(__file__).resolve().parents[1] / "data_synth"

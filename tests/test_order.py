@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from psvideo.order import alike_turns, order_by_rig, turned
-from psvideo.plan import Plan
-from psvideo.rig import Light, Rig
-from psvideo.rigfield import Points, light_vectors, points_on_plane
-from psvideo.timing import Flash, Timing
+from psvideo.model.light_field import Points, light_vectors, points_on_plane
+from psvideo.model.plan import Plan
+from psvideo.model.rig import Light, Rig
+from psvideo.model.timing import Flash, Timing
+from psvideo.sync.order_by_rig import alike_turns, order_by_rig, turned
 
 PlanMaker = Callable[..., Plan]
 NAMES = tuple("abcdefgh")

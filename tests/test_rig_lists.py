@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.rig import Light, Rig, Vector
-from psvideo.rig_lists import write_rig
-from psvideo.rigfile import read_rig
+from psvideo.formats.light_lists import write_rig
+from psvideo.formats.rig_toml import read_rig
+from psvideo.model.rig import Light, Rig, Vector
 
 coordinate = st.floats(-1, 1)
 vectors = st.tuples(coordinate, coordinate, st.floats(0.1, 1))

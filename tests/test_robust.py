@@ -10,17 +10,17 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from psvideo.cli.app import main
-from psvideo.normals import robust, woodham1980
-from psvideo.normals.illumination import Illumination
-from psvideo.normals.robust import Reweighting, solve
-from psvideo.normals.solving import ROBUST_FROM_LIGHTS, Solving, trust_note
-from psvideo.quality.judge_result import rig as judge_rig
-from psvideo.quality.judgement import Judgement
-from psvideo.quality.observed import InstantFacts, Observed
-from psvideo.surface import Misfit, Surface
+from psvideo.model.surface import Misfit, Surface
+from psvideo.report.judge.result import rig as judge_rig
+from psvideo.report.judgement import Judgement
+from psvideo.report.observe.observed import InstantFacts, Observed
+from psvideo.solve.normals import robust, woodham1980
+from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.robust import Reweighting, solve
+from psvideo.solve.normals.solving import ROBUST_FROM_LIGHTS, Solving, trust_note
 from psvideo.synth import read_scene
-from psvideo.synth.shading import light_collected
 from psvideo.synth.stage import set_stage
+from psvideo.synth.subject.shading import light_collected
 from psvideo.synth.truth import true_normals
 
 Array = NDArray[np.float64]

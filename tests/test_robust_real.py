@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from psvideo.normals import robust, woodham1980
-from psvideo.normals.illumination import Illumination
-from psvideo.surface import Surface
+from psvideo.model.surface import Surface
+from psvideo.solve.normals import robust, woodham1980
+from psvideo.solve.normals.illumination import Illumination
 
 DIM = replace(robust.USABLE, dark_level=0.0005)  # the exposures of DiLiGenT are short, and 16 bits deep
 

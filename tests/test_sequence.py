@@ -8,14 +8,14 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from psvideo import ambient
-from psvideo.plan import Plan, PlannedFlash
-from psvideo.sequence import Round, mixing_matrix, reference_duration_s, rounds
-from psvideo.shutter import frames_touched, row_weights
-from psvideo.split import split
+from psvideo.model.plan import Plan, PlannedFlash, mixing_matrix, reference_duration_s
+from psvideo.model.shutter import frames_touched, row_weights
+from psvideo.model.timing import Flash, Timing
+from psvideo.plates import ambient
+from psvideo.plates.sequence import Round, rounds
+from psvideo.plates.split import split
 from psvideo.synth import Exposure, Noise, StrobeClock, expose
-from psvideo.synth.noise import NOISELESS
-from psvideo.timing import Flash, Timing
+from psvideo.synth.camera.noise import NOISELESS
 
 PlanMaker = Callable[..., Plan]
 AMBIENT = 0.05

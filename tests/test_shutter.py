@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from psvideo.camera import Camera
-from psvideo.shutter import frames_touched, row_weights
+from psvideo.model.camera import Camera
+from psvideo.model.shutter import frames_touched, row_weights
 
 shares = st.floats(0.0, 1.0)
 PERIOD_S = 0.01

@@ -7,7 +7,7 @@ import OpenEXR
 import pytest
 
 from psvideo.cli.app import main
-from psvideo.rigfile import read_rig
+from psvideo.formats.rig_toml import read_rig
 
 SCENE = Path(__file__).resolve().parents[1] / "data_synth" / "sphere.toml"
 MATTE = '[[object]]\nmesh = "sphere"\nalbedo = 0.8\n'

@@ -6,8 +6,8 @@ from bench.mirror_rooms import Panel, Room, film
 from bench.mirror_scene import Ball, Lamp, Lens
 
 from psvideo.calibrate.light_pictures import light_pictures
-from psvideo.calibrate.sphere_outline import Outline, find_outlines
-from psvideo.calibrate.sphere_view import View
+from psvideo.calibrate.sphere.outline import Outline, find_outlines
+from psvideo.calibrate.sphere.view import View
 
 LENS = Lens(width=190, height=190, focal=800.0)
 BALL = Ball(centre=(0.01, -0.006, -0.6), radius_m=0.045)

@@ -10,15 +10,15 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from psvideo import ambient, hudon2015, sequence
-from psvideo.plan import Plan, PlannedFlash
-from psvideo.planfile import read_plan
-from psvideo.profiles import collect
-from psvideo.shutter import frames_touched, row_weights
-from psvideo.split import Plate, split
-from psvideo.sync import find_timing
+from psvideo.formats.plan_toml import read_plan
+from psvideo.model.plan import Plan, PlannedFlash
+from psvideo.model.row_profiles import collect
+from psvideo.model.shutter import frames_touched, row_weights
+from psvideo.model.timing import Flash, Timing
+from psvideo.plates import ambient, hudon2015, sequence
+from psvideo.plates.split import Plate, split
+from psvideo.sync.find import find_timing
 from psvideo.synth import Exposure, Noise, StrobeClock, expose
-from psvideo.timing import Flash, Timing
 
 PlanMaker = Callable[..., Plan]
 

@@ -9,11 +9,11 @@ import pytest
 
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
-from psvideo.plan import Plan, PlannedFlash
-from psvideo.planfile import format_plan, read_plan
+from psvideo.formats.plan_toml import format_plan, read_plan
+from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.strobe.confirmed import is_confirmed, remember, state_folder
-from psvideo.strobe.flicker import flash_rates, flicker_warning
 from psvideo.strobe.runlog import as_played, format_log, plan_sha256, read_log
+from psvideo.strobe.seizures import flash_rates, flicker_warning
 
 RIGS = Path(__file__).resolve().parents[1] / "lights" / "rigs"
 SCENES = Path(__file__).resolve().parents[1] / "data_synth"

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from psvideo.strobe.boards import BOARDS
-from psvideo.strobe.emulated import EmulatedController
 from psvideo.strobe.limits import cycle_check
-from psvideo.strobe.lines import LONGEST_REPLY, Error, LineReader, seal
-from psvideo.strobe.messages import Lit, Reset, Slot
-from psvideo.strobe.playing import Edge
+from psvideo.strobe.link.boards import BOARDS
+from psvideo.strobe.link.lines import LONGEST_REPLY, Error, LineReader, seal
+from psvideo.strobe.link.messages import Lit, Reset, Slot
+from psvideo.strobe.stand_ins.emulated import EmulatedController
+from psvideo.strobe.stand_ins.playing import Edge
 
 MS = 2000
 """Ticks of an AVR board in a millisecond."""

@@ -13,16 +13,16 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from psvideo.camera import Camera
-from psvideo.plan import Plan, PlannedFlash
-from psvideo.strobe import toolchain
-from psvideo.strobe.boards import BOARDS, capabilities
-from psvideo.strobe.emulated import EmulatedController
+from psvideo.formats.trace_csv import Trace, TraceWriter, read_trace
+from psvideo.model.camera import Camera
+from psvideo.model.plan import Plan, PlannedFlash
+from psvideo.strobe.link.boards import BOARDS, capabilities
+from psvideo.strobe.link.protocol import format_request
 from psvideo.strobe.program import Program, make_program
-from psvideo.strobe.protocol import format_request
-from psvideo.strobe.simulated import play_script
-from psvideo.strobe.toolchain import AVR_BOARDS, AvrBoard
-from psvideo.tracefile import Trace, TraceWriter, read_trace
+from psvideo.strobe.stand_ins import toolchain
+from psvideo.strobe.stand_ins.emulated import EmulatedController
+from psvideo.strobe.stand_ins.simulated import play_script
+from psvideo.strobe.stand_ins.toolchain import AVR_BOARDS, AvrBoard
 
 TICKS_PER_MS = 2000
 CYCLES_PER_TICK = 8

@@ -10,13 +10,13 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from psvideo.strobe.boards import BOARDS, capabilities
-from psvideo.strobe.emulated import EmulatedController
-from psvideo.strobe.lines import LONGEST_REPLY, LONGEST_REQUEST, Error, seal
-from psvideo.strobe.messages import Caps, Lit, Slot, WiringName
-from psvideo.strobe.protocol import format_reply
-from psvideo.strobe.toolchain import AvrBoard
-from psvideo.tracefile import read_trace
+from psvideo.formats.trace_csv import read_trace
+from psvideo.strobe.link.boards import BOARDS, capabilities
+from psvideo.strobe.link.lines import LONGEST_REPLY, LONGEST_REQUEST, Error, seal
+from psvideo.strobe.link.messages import Caps, Lit, Slot, WiringName
+from psvideo.strobe.link.protocol import format_reply
+from psvideo.strobe.stand_ins.emulated import EmulatedController
+from psvideo.strobe.stand_ins.toolchain import AvrBoard
 
 LIGHTS = Path(__file__).resolve().parents[1] / "lights"
 BOTH: tuple[AvrBoard, ...] = ("atmega328p", "atmega2560")

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from psvideo.strobe.boards import BOARDS, capabilities
+from psvideo.formats.trace_csv import Trace, read_trace
 from psvideo.strobe.limits import cycle_refusal, cycle_ticks, slot_refusal
-from psvideo.strobe.messages import Capabilities, Lit, Slot, WiringName
-from psvideo.strobe.playing import moments
-from psvideo.strobe.toolchain import AvrBoard
-from psvideo.tracefile import Trace, read_trace
+from psvideo.strobe.link.boards import BOARDS, capabilities
+from psvideo.strobe.link.messages import Capabilities, Lit, Slot, WiringName
+from psvideo.strobe.stand_ins.playing import moments
+from psvideo.strobe.stand_ins.toolchain import AvrBoard
 
 BAR_CYCLES = 4
 TICK_CYCLES = 8

@@ -10,10 +10,21 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from psvideo.strobe import boards, limits, lines, messages
-from psvideo.strobe.boards import BOARDS
-from psvideo.strobe.lines import LONGEST_REPLY, LONGEST_REQUEST, Error, Line, LineError, LineReader, crc16, seal, unseal
-from psvideo.strobe.messages import (
+from psvideo.strobe import limits
+from psvideo.strobe.link import boards, lines, messages
+from psvideo.strobe.link.boards import BOARDS
+from psvideo.strobe.link.lines import (
+    LONGEST_REPLY,
+    LONGEST_REQUEST,
+    Error,
+    Line,
+    LineError,
+    LineReader,
+    crc16,
+    seal,
+    unseal,
+)
+from psvideo.strobe.link.messages import (
     REQUESTS,
     Armed,
     Capabilities,
@@ -37,7 +48,7 @@ from psvideo.strobe.messages import (
     Stop,
     Wiring,
 )
-from psvideo.strobe.protocol import find_command, format_reply, format_request, parse_reply, parse_words
+from psvideo.strobe.link.protocol import find_command, format_reply, format_request, parse_reply, parse_words
 
 TABLE: dict[str, Any] = tomllib.loads(
     (Path(__file__).resolve().parents[1] / "lights" / "protocol.toml").read_text(encoding="utf-8")

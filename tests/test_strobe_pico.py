@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 from pico import ARM, LOADED, MS, PROGRAM, US, Pico, upload
 from rp2040 import Chip, board_of
 
-from psvideo.strobe.boards import BOARDS, capabilities
-from psvideo.strobe.emulated import EmulatedController
 from psvideo.strobe.limits import cycle_check
-from psvideo.strobe.lines import LONGEST_REPLY, LONGEST_REQUEST, Error, LineReader, seal
-from psvideo.strobe.messages import Lit, Slot
-from psvideo.strobe.playing import Edge
-from psvideo.strobe.protocol import format_reply
+from psvideo.strobe.link.boards import BOARDS, capabilities
+from psvideo.strobe.link.lines import LONGEST_REPLY, LONGEST_REQUEST, Error, LineReader, seal
+from psvideo.strobe.link.messages import Lit, Slot
+from psvideo.strobe.link.protocol import format_reply
+from psvideo.strobe.stand_ins.emulated import EmulatedController
+from psvideo.strobe.stand_ins.playing import Edge
 
 LIGHTS = Path(__file__).resolve().parents[1] / "lights"
 BUSY = [HealthCheck.too_slow]

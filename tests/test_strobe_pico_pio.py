@@ -14,8 +14,8 @@ from pico import PROGRAM, random_slot
 from pioemu import State, emulate
 from rp2040 import MOV_PINS_NULL, Chip, board_of
 
-from psvideo.strobe.messages import Lit, Slot
-from psvideo.strobe.playing import moments
+from psvideo.strobe.link.messages import Lit, Slot
+from psvideo.strobe.stand_ins.playing import moments
 
 LEAD = 1_250_000
 ROUNDS = 3

@@ -9,18 +9,18 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from psvideo.camera import Camera
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.plan import Plan, PlannedFlash
-from psvideo.strobe.boards import BOARDS, capabilities
+from psvideo.model.camera import Camera
+from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.strobe.bursts import POWER_TOLERANCE, find_bursts
-from psvideo.strobe.emulated import EmulatedController
 from psvideo.strobe.limits import cycle_refusal, slot_refusal
-from psvideo.strobe.lines import LONGEST_REQUEST
-from psvideo.strobe.messages import Armed, Run, Started, Wiring, WiringName
-from psvideo.strobe.playing import Edge
+from psvideo.strobe.link.boards import BOARDS, capabilities
+from psvideo.strobe.link.lines import LONGEST_REQUEST
+from psvideo.strobe.link.messages import Armed, Run, Started, Wiring, WiringName
+from psvideo.strobe.link.protocol import format_request, parse_reply
 from psvideo.strobe.program import Program, make_program, to_ticks
-from psvideo.strobe.protocol import format_request, parse_reply
+from psvideo.strobe.stand_ins.emulated import EmulatedController
+from psvideo.strobe.stand_ins.playing import Edge
 
 MakePlan = Callable[..., Plan]
 UNO = capabilities(BOARDS["atmega328p"], "gated")

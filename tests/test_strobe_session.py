@@ -14,19 +14,19 @@ import numpy as np
 import pytest
 
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.plan import Plan
-from psvideo.strobe.boards import BOARDS, capabilities
+from psvideo.model.plan import Plan
 from psvideo.strobe.clock import Reading, fit_clock
-from psvideo.strobe.controller import OpenPort
-from psvideo.strobe.emulated import EmulatedController
-from psvideo.strobe.emulated_port import EmulatedPort
-from psvideo.strobe.greeting import greet
-from psvideo.strobe.lines import seal
-from psvideo.strobe.link import Link, NoReplyError, RefusedError
-from psvideo.strobe.messages import Capabilities, Caps, Clear, Cleared, Keep, KeepSet, Run, Slot, Started
-from psvideo.strobe.ports import SerialPort, choose_port
+from psvideo.strobe.link.boards import BOARDS, capabilities
+from psvideo.strobe.link.controller import OpenPort
+from psvideo.strobe.link.greeting import greet
+from psvideo.strobe.link.lines import seal
+from psvideo.strobe.link.link import Link, NoReplyError, RefusedError
+from psvideo.strobe.link.messages import Capabilities, Caps, Clear, Cleared, Keep, KeepSet, Run, Slot, Started
+from psvideo.strobe.link.ports import SerialPort, choose_port
 from psvideo.strobe.program import Program, make_program
 from psvideo.strobe.session import Beat, Outcome, cycles_for, prepare, run_program
+from psvideo.strobe.stand_ins.emulated import EmulatedController
+from psvideo.strobe.stand_ins.emulated_port import EmulatedPort
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="needs pseudo-terminals")
 Answer = Callable[[bytes], bytes]

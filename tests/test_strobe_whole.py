@@ -21,18 +21,18 @@ import serial
 
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
-from psvideo.planfile import format_plan, read_plan
-from psvideo.strobe import imitation, toolchain
-from psvideo.strobe.boards import BOARDS, capabilities
-from psvideo.strobe.emulated import EmulatedController
+from psvideo.formats.plan_toml import format_plan, read_plan
+from psvideo.formats.trace_csv import read_trace
 from psvideo.strobe.limits import cycle_check
-from psvideo.strobe.messages import Lit, Slot
+from psvideo.strobe.link.boards import BOARDS, capabilities
+from psvideo.strobe.link.messages import Lit, Slot
+from psvideo.strobe.link.protocol import format_request
 from psvideo.strobe.program import make_program
-from psvideo.strobe.protocol import format_request
-from psvideo.strobe.simulated import play_script
+from psvideo.strobe.stand_ins import imitation, toolchain
+from psvideo.strobe.stand_ins.emulated import EmulatedController
+from psvideo.strobe.stand_ins.simulated import play_script
 from psvideo.synth import read_scene
 from psvideo.synth.shotplan import true_plan
-from psvideo.tracefile import read_trace
 
 STARTS_WITHIN_S = 60.0
 CAMERA_SECOND_PPM = 137.0

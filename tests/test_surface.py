@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from psvideo.surface import Surface
+from psvideo.model.surface import Surface
 
 
 def surface(**changed: np.ndarray) -> Surface:

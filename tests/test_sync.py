@@ -9,18 +9,18 @@ import cv2
 import numpy as np
 import pytest
 
-from psvideo.camera import FloatArray
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.plan import Plan, PlannedFlash
-from psvideo.planfile import read_plan
-from psvideo.profiles import collect, row_profile
-from psvideo.rowfit.beat import Beat, train_until
-from psvideo.rowfit.beat import StrobeClock as FoundClock
-from psvideo.rowfit.profiles import Profiles, unexplained
-from psvideo.shutter import row_weights
-from psvideo.sync import find_timing
+from psvideo.formats.plan_toml import read_plan
+from psvideo.model.camera import FloatArray
+from psvideo.model.plan import Plan, PlannedFlash
+from psvideo.model.row_profiles import collect, row_profile
+from psvideo.model.shutter import row_weights
+from psvideo.model.timing import Timing
+from psvideo.sync.find import find_timing
+from psvideo.sync.rowfit.beat import Beat, train_until
+from psvideo.sync.rowfit.beat import StrobeClock as FoundClock
+from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.synth import Exposure, Noise, StrobeClock, expose
-from psvideo.timing import Timing
 
 PlanMaker = Callable[..., Plan]
 CAMERA_NOISE = Noise(full_well_e=20_000, read_e=8)

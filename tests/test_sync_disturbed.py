@@ -9,15 +9,18 @@ import numpy as np
 import pytest
 
 from psvideo.errors import PsvideoError
-from psvideo.export.exr import write_exr
-from psvideo.pipeline import clip_rounds, find_clip_timing, open_take
-from psvideo.plan import Plan, PlannedFlash
-from psvideo.planfile import format_plan
-from psvideo.profiles import collect_with_doubt
-from psvideo.rowfit.beat import StrobeClock as FoundClock
-from psvideo.sync import find_timing
+from psvideo.formats.exr_files import write_exr
+from psvideo.formats.plan_toml import format_plan
+from psvideo.formats.timing_json import format_timing, read_timing
+from psvideo.model.plan import Plan, PlannedFlash
+from psvideo.model.row_profiles import collect_with_doubt
+from psvideo.model.timing import DroppedFrames, Timing, places_in_time
+from psvideo.plates.gather import clip_rounds
+from psvideo.runs.opening import open_take
+from psvideo.sync.find import find_timing
+from psvideo.sync.of_take import find_take_timing
+from psvideo.sync.rowfit.beat import StrobeClock as FoundClock
 from psvideo.synth import Exposure, Flicker, Noise, StrobeClock, TrueFlash, expose
-from psvideo.timing import DroppedFrames, Timing, format_timing, places_in_time, read_timing
 
 PlanMaker = Callable[..., Plan]
 
@@ -427,7 +430,7 @@ def test_plates_of_a_clip_with_frames_missing_unseen_are_those_of_the_whole_clip
     for number, frame in enumerate(shot.frames, start=1):
         write_exr(tmp_path / f"frame.{number:04d}.exr", {"Y": frame}, half=False)
     take = open_take(tmp_path)
-    timing = find_clip_timing(take)
+    timing = find_take_timing(take)
     assert timing.dropped_frames == (DroppedFrames(after=20, count=1),)
     last = list(clip_rounds(take, timing))[-1]
     for plate, slot in zip(last.plates, plan.lit_slots, strict=True):

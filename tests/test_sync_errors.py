@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from psvideo.plan import Plan
-from psvideo.sync import find_timing
+from psvideo.model.plan import Plan
+from psvideo.model.timing import Timing
+from psvideo.sync.find import find_timing
 from psvideo.synth import Noise, StrobeClock, expose
-from psvideo.timing import Timing
 
 PlanMaker = Callable[..., Plan]
 SEEDS = 40

@@ -9,17 +9,18 @@ import av
 import numpy as np
 import pytest
 
-from psvideo.camera import Encoding
-from psvideo.pipeline import find_clip_timing, open_take
-from psvideo.plan import Plan
-from psvideo.planfile import format_plan
+from psvideo.formats.plan_toml import format_plan
+from psvideo.model.camera import Encoding
+from psvideo.model.plan import Plan
+from psvideo.model.timing import Timing
+from psvideo.runs.opening import open_take
+from psvideo.sync.of_take import find_take_timing
 from psvideo.synth import Exposure, Noise, StrobeClock, expose
-from psvideo.synth.curves import CURVES
-from psvideo.synth.dpx import dpx_bytes
-from psvideo.synth.encode import Codes
-from psvideo.synth.frames import write_frame
+from psvideo.synth.camera.curves import CURVES
+from psvideo.synth.camera.dpx import dpx_bytes
+from psvideo.synth.camera.encode import Codes
+from psvideo.synth.camera.frames import write_frame
 from psvideo.synth.scene import CameraTable
-from psvideo.timing import Timing
 
 PlanMaker = Callable[..., Plan]
 ROWS = 160
@@ -55,7 +56,7 @@ def write_h264(path: Path, plan: Plan, frames: np.ndarray) -> None:
 
 def timing_through(path: Path, plan: Plan) -> Timing:
     (path if path.is_dir() else path.parent).joinpath("plan.toml").write_text(format_plan(plan))
-    return find_clip_timing(open_take(path))
+    return find_take_timing(open_take(path))
 
 
 def rms_rows(timing: Timing, shot: Exposure, plan: Plan) -> float:

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from psvideo.errors import PsvideoError
-from psvideo.plan import Plan
-from psvideo.sync import find_timing
+from psvideo.model.plan import Plan
+from psvideo.model.timing import Timing
+from psvideo.sync.find import find_timing
 from psvideo.synth import Noise, StrobeClock, expose
-from psvideo.timing import Timing
 
 PlanMaker = Callable[..., Plan]
 ROWS, COLUMNS, FRAMES = 96, 8, 60

@@ -11,16 +11,16 @@ import pytest
 from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError
-from psvideo.plan import Plan
-from psvideo.rowfit.fit import find
-from psvideo.rowfit.judge import convincing
-from psvideo.rowfit.profiles import Profiles
-from psvideo.rowfit.refusal import clock_too_far
-from psvideo.rowfit.retime import regular_step, twins
-from psvideo.rowfit.seed import find_seed
-from psvideo.sync import find_timing
+from psvideo.model.plan import Plan
+from psvideo.model.timing import DroppedFrames, Timing, places_in_time
+from psvideo.sync.find import find_timing
+from psvideo.sync.rowfit.fit import find
+from psvideo.sync.rowfit.profiles import Profiles
+from psvideo.sync.rowfit.retime import regular_step, twins
+from psvideo.sync.rowfit.seed import find_seed
+from psvideo.sync.verdict.judge import convincing
+from psvideo.sync.verdict.refusal import clock_too_far
 from psvideo.synth import Exposure, Noise, StrobeClock, expose
-from psvideo.timing import DroppedFrames, Timing, places_in_time
 
 PlanMaker = Callable[..., Plan]
 NOISE = Noise(full_well_e=20_000, read_e=8)
@@ -178,8 +178,8 @@ def test_a_clock_within_1100_ppm_is_found_at_once_whatever_the_plan_tolerates(
 
     Over a stretch as long as those of plans with many lights, short flashes slip by more than their length.
     """
-    monkeypatch.setattr("psvideo.rowfit.seed.SEED_FRAMES", 120)
-    monkeypatch.setattr("psvideo.rowfit.seed.UNKNOWN_CLOCK_PPM", 100.0)  # the widest search would find it, too, late
+    monkeypatch.setattr("psvideo.sync.rowfit.seed.SEED_FRAMES", 120)
+    monkeypatch.setattr("psvideo.sync.rowfit.seed.UNKNOWN_CLOCK_PPM", 100.0)  # the widest search finds it too, late
     plan = make_plan(height_px=160, width_px=12, duration_s=0.00025, clock_tolerance_ppm=100)
     seed = find_seed(plan, profiles_of(plan, shot_of(plan, 120, 999.0)))
     assert seed.frames == slice(0, 120)

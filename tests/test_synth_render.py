@@ -9,17 +9,17 @@ import pytest
 import trimesh
 
 from psvideo.errors import PsvideoError
-from psvideo.rig import Light
-from psvideo.synth.body import make_body
-from psvideo.synth.emission import Emission
-from psvideo.synth.material import layered_noise, pattern_albedo
-from psvideo.synth.meshes import builtin_names, builtin_shape
-from psvideo.synth.meshes.fields import ball, common, cut, ellipsoid, join
-from psvideo.synth.meshes.surface_nets import surface_of
-from psvideo.synth.render import View, look
+from psvideo.model.rig import Light
+from psvideo.synth.lamps.emission import Emission
 from psvideo.synth.scene import AlbedoTable, AmbientTable, CameraTable, ObjectTable
-from psvideo.synth.shading import ambient_plate, flash_plate, irradiance, light_collected
-from psvideo.synth.shape import load_shape
+from psvideo.synth.subject.body import make_body
+from psvideo.synth.subject.material import layered_noise, pattern_albedo
+from psvideo.synth.subject.meshes import builtin_names, builtin_shape
+from psvideo.synth.subject.meshes.fields import ball, common, cut, ellipsoid, join
+from psvideo.synth.subject.meshes.surface_nets import surface_of
+from psvideo.synth.subject.render import View, look
+from psvideo.synth.subject.shading import ambient_plate, flash_plate, irradiance, light_collected
+from psvideo.synth.subject.shape import load_shape
 from psvideo.synth.truth import true_albedo, true_mask, true_normals
 
 HERE = Path()
@@ -73,7 +73,7 @@ def test_a_plate_is_albedo_times_intensity_times_cosine_exactly():
 
 
 def test_power_and_duration_scale_a_plate_from_the_reference():
-    from psvideo.rig import Rig
+    from psvideo.model.rig import Rig
 
     view = see({"mesh": "plane", "albedo": 0.5})
     rig = Rig(lights=(Light(name="a", direction=(0, 0, 1), reference_duration_s=0.001),) * 1)

@@ -11,14 +11,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from psvideo.camera import Camera
 from psvideo.errors import PsvideoError
-from psvideo.plan import Plan, PlannedFlash
-from psvideo.planfile import read_plan
+from psvideo.formats.plan_toml import read_plan
+from psvideo.model.camera import Camera
+from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.synth import Flicker, Noise, StrobeClock, expose
-from psvideo.synth.emission import Emission
-from psvideo.synth.sensor import seen_share
-from psvideo.synth.strobe import TrueFlash, row_opens_s, true_flashes
+from psvideo.synth.camera.sensor import seen_share
+from psvideo.synth.lamps.emission import Emission
+from psvideo.synth.lamps.strobe import TrueFlash, row_opens_s, true_flashes
 
 PERIOD_S = 0.01
 

@@ -15,10 +15,10 @@ import tomlkit
 from psvideo.cli.app import main
 from psvideo.clip import open_clip, read_frames
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.planfile import read_plan
-from psvideo.rigfile import read_rig
+from psvideo.formats.plan_toml import read_plan
+from psvideo.formats.rig_toml import read_rig
 from psvideo.synth import builtin_scene, expose, read_scene, shoot
-from psvideo.synth.curves import CURVES
+from psvideo.synth.camera.curves import CURVES
 from psvideo.synth.scene import Scene
 from psvideo.synth.shotplan import true_clock, true_plan, true_rig
 from psvideo.synth.stage import set_stage

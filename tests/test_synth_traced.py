@@ -15,13 +15,13 @@ from hypothesis import strategies as st
 
 from psvideo.clip import open_clip, read_frames
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.plan import Plan
+from psvideo.formats.trace_csv import TraceWriter, read_trace
+from psvideo.model.plan import Plan
 from psvideo.synth import read_scene, shoot
-from psvideo.synth.emission import Emission
+from psvideo.synth.lamps.emission import Emission
+from psvideo.synth.lamps.traced import TraceOptions
+from psvideo.synth.lamps.traced_slots import wired_lines
 from psvideo.synth.shotplan import true_plan
-from psvideo.synth.traced import TraceOptions
-from psvideo.synth.traced_slots import wired_lines
-from psvideo.tracefile import TraceWriter, read_trace
 
 SPHERE = Path(__file__).resolve().parents[1] / "data_synth" / "sphere.toml"
 HZ = 16_000_000

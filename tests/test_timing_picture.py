@@ -7,11 +7,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from psvideo.plan import Plan
-from psvideo.rowfit.profiles import residuals_of
-from psvideo.sync import find_timing
+from psvideo.model.plan import Plan
+from psvideo.pictures.timing import timing_picture, write_sheet
+from psvideo.sync.find import find_timing
+from psvideo.sync.rowfit.profiles import residuals_of
 from psvideo.synth import StrobeClock, expose
-from psvideo.view.timing_picture import timing_picture, write_sheet
 
 
 def test_right_times_leave_nothing_and_wrong_ones_leave_red_and_blue(

@@ -7,11 +7,11 @@ import numpy as np
 from docs.figures.faults import BRIGHT, paint, shown, solved, white
 from docs.figures.staging import Figure, Image, Pixels, exr, figure, film, frames, psvideo, row
 
-from psvideo.planfile import read_plan
-from psvideo.shutter import row_weights
-from psvideo.surface import Surface
-from psvideo.timing import read_timing
-from psvideo.view.shading import normal_colours, relit, srgb
+from psvideo.formats.plan_toml import read_plan
+from psvideo.formats.timing_json import read_timing
+from psvideo.model.shutter import row_weights
+from psvideo.model.surface import Surface
+from psvideo.pictures.shading import normal_colours, relit, srgb
 
 FRAME = 5
 LAMPS = {

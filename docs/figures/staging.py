@@ -16,7 +16,7 @@ import tomlkit
 from numpy.typing import NDArray
 
 from psvideo.cli.app import main
-from psvideo.view.contact import Strip, Tile, sheet
+from psvideo.pictures.contact import Strip, Tile, sheet
 
 SCENE = Path(__file__).parent / "table.toml"
 PICTURES = Path(__file__).resolve().parents[1] / "pictures"

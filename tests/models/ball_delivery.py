@@ -9,8 +9,8 @@ import numpy as np
 from psvideo.export.results import Delivery, write_surface
 from psvideo.export.space import Space
 from psvideo.export.tags import Tags
-from psvideo.integrate import Depth, View
-from psvideo.surface import Surface
+from psvideo.model.surface import Surface
+from psvideo.solve.depth import Depth, View
 
 SIZE = 64
 NUMBERS = (1001, 1002, 1003)

@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from psvideo.calibrate.light_pictures import LightPictures
-from psvideo.camera import FloatArray
 from psvideo.errors import PsvideoError
-from psvideo.falloff import POWERS, Falloff, terms
-from psvideo.normals.near_light import Ground, field_of
-from psvideo.rig import Light, Rig
+from psvideo.model.camera import FloatArray
+from psvideo.model.falloff import POWERS, Falloff, terms
+from psvideo.model.rig import Light, Rig
+from psvideo.solve.normals.near_light import Ground, field_of
 
 LEAST_SHARE = 0.5
 """Share of the target's pixels that must be unsaturated and seen."""
@@ -28,7 +28,7 @@ ROUNDS = 5
 class FlatLight:
     """One light's intensity per channel and its relative standard error, and the falloff that the rig does not explain:
     the share by which the middle 90 % of the target differ from each other. ``coefficients`` are that falloff's smooth
-    part (``psvideo.falloff``), ``left`` what differs beside it in the same way."""
+    part (``psvideo.model.falloff``), ``left`` what differs beside it in the same way."""
 
     name: str
     intensity: FloatArray

@@ -18,9 +18,9 @@ from scipy.spatial.transform import Rotation
 
 from psvideo.calibrate.light_pictures import LightPictures
 from psvideo.calibrate.strengths import LIT
-from psvideo.camera import FloatArray
 from psvideo.errors import PsvideoError
-from psvideo.rig import Light, Rig
+from psvideo.model.camera import FloatArray
+from psvideo.model.rig import Light, Rig
 
 Prior = Literal["equal-lights", "equal-albedo"]
 LEAST_FOR_EQUAL_LIGHTS = 6

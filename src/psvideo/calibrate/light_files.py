@@ -8,8 +8,8 @@ from pathlib import Path
 from psvideo.calibrate.light_pictures import AMBIENT_NAMES, ROOM_NAMES, LightFiles
 from psvideo.clip.folder import KINDS, number_of
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.timing import read_timing
-from psvideo.tomlfile import check_light_name
+from psvideo.formats.contract import check_light_name
+from psvideo.formats.timing_json import read_timing
 
 TIMING = "timing.json"
 FEWEST_TO_ONE = 4

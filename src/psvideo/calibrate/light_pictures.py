@@ -1,7 +1,7 @@
 """Pictures of one scene, one per light, in linear light: what every calibration of lights starts from.
 
 Read here: still photographs, one per light, in a folder; and plates, a folder per light (``psvideo split`` writes such
-a folder). Clips need their flashes found first: ``psvideo.light_sets`` takes all three, and gives the same record.
+a folder). Clips need their flashes found first: ``psvideo.runs.light_sets`` takes all three, and gives the same record.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.camera import Encoding
 from psvideo.clip import demosaic, parse_range
-from psvideo.clip.decoders import decode
+from psvideo.clip.decode.decoders import decode
 from psvideo.clip.folder import KINDS
 from psvideo.clip.linear import linear_light
 from psvideo.clip.reading import looks
 from psvideo.errors import PsvideoError
+from psvideo.model.camera import Encoding
 
 SATURATED = 0.98
 """From this share of the sensor's range on a pixel counts as clipped (lossy files blur the very end)."""

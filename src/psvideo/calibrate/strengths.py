@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.calibrate.light_pictures import LightPictures
-from psvideo.camera import FloatArray
 from psvideo.errors import PsvideoError
+from psvideo.model.camera import FloatArray
 
 LIT, KEPT = 0.08, 0.8
 """A pixel counts that every light lights at least so much of its brightest one; of these the share that fits best."""

@@ -5,14 +5,17 @@ clock. In seconds it rests on the frame rate being what the plan names, which th
 tolerance.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from psvideo.calibrate.stripe_steps import Direction
+from psvideo.calibrate.stripes.steps import Direction
+from psvideo.clip import Take
+from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import PsvideoError
-from psvideo.plan import Plan
-from psvideo.timing import Timing
+from psvideo.model.plan import Plan
+from psvideo.model.timing import Timing
+from psvideo.sync.of_take import find_take_timing
 
 MODEL_ERROR_SHARE = 2e-5
 """Share of the frame period by which virtual shoots were off beyond the fit's own error (240 rows and fewer)."""
@@ -76,3 +79,14 @@ def readout_of(plan: Plan, timing: Timing, *, frames: int, tolerance_ppm: float 
         direction=("top-down" if readout_s > 0 else "bottom-up") if sure else "unknown",
         warnings=timing.notes,
     )
+
+
+def measure_take_readout(take: Take, *, tolerance_ppm: float | None = None, watch: Watch = unwatched) -> StrobedReadout:
+    """Measure a camera's readout time from a strobed take, whatever its plan says of it.
+
+    ``tolerance_ppm`` is how far the strobe's clock may be from true seconds (left out: what the plan says of it).
+    Raises PsvideoError where no strobe is found.
+    """
+    unknown = replace(take.plan, camera=replace(take.plan.camera, readout_s=None))
+    timing = find_take_timing(replace(take, clip=replace(take.clip, plan=unknown)), watch=watch)
+    return readout_of(unknown, timing, frames=len(take.numbers), tolerance_ppm=tolerance_ppm)

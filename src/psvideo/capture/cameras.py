@@ -14,8 +14,8 @@ from functools import cache
 from importlib.resources import files
 from typing import Literal, cast
 
-from psvideo.capture.quantities import show_rate
 from psvideo.errors import UsageError
+from psvideo.model.units import show_rate
 
 Sureness = Literal["measured", "consistent", "single", "specification", "assumed"]
 RATE_TOLERANCE = Fraction(15, 10_000)

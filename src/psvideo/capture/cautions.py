@@ -6,13 +6,10 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Literal
 
-from psvideo.capture.figures import LightFigures, ShootFigures, SlotFigures
-from psvideo.capture.quantities import NTSC, show_rate, show_seconds
 from psvideo.capture.request import Limits, ShootRequest
-from psvideo.plan import Plan
-
-FLICKER_HZ = (3.0, 65.0)
-"""Flashes at these rates can harm people with photosensitive epilepsy (about 3 to 70 Hz: IEEE 1789-2015)."""
+from psvideo.model.plan import Plan
+from psvideo.model.shoot_figures import FLICKER_HZ, LightFigures, ShootFigures, SlotFigures
+from psvideo.model.units import NTSC, show_rate, show_seconds
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,12 +5,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from psvideo.capture.cautions import Caution, request_cautions, shoot_cautions
-from psvideo.capture.figures import ShootFigures, shoot_figures
-from psvideo.capture.quantities import show_seconds
 from psvideo.capture.request import ShootRequest
 from psvideo.capture.wish import LONG_MARKER, longest_flash
 from psvideo.errors import UsageError
-from psvideo.plan import UNKNOWN_CLOCK_PPM, Plan, PlannedFlash, default_dark_s
+from psvideo.model.plan import UNKNOWN_CLOCK_PPM, Plan, PlannedFlash, default_dark_s
+from psvideo.model.shoot_figures import ShootFigures, shoot_figures
+from psvideo.model.units import show_seconds
 
 DARK_SLOT_EVERY_S = 0.5
 """Dark slots come about twice a second: often enough to follow ambient light, below any flicker that is felt."""

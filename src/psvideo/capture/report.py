@@ -7,10 +7,10 @@ from rich.table import Table
 from rich.text import Text
 
 from psvideo.capture.cameras import CameraMode
-from psvideo.capture.figures import ShootFigures, SlotFigures
 from psvideo.capture.planning import Shoot
-from psvideo.capture.quantities import show_rate, show_seconds
-from psvideo.plan import Plan
+from psvideo.model.plan import Plan
+from psvideo.model.shoot_figures import ShootFigures, SlotFigures
+from psvideo.model.units import show_rate, show_seconds
 
 
 def shoot_report(shoot: Shoot, *, preset: CameraMode | None) -> Iterator[RenderableType]:

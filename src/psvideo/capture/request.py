@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Literal
 
-from psvideo.camera import Camera, Encoding
 from psvideo.capture.cameras import HOW_TO_MEASURE, CameraMode, find_mode, find_model
-from psvideo.capture.quantities import show_rate, show_seconds
 from psvideo.errors import UsageError
-from psvideo.plan import Mode
+from psvideo.model.camera import Camera, Encoding
+from psvideo.model.plan import Mode
+from psvideo.model.units import show_rate, show_seconds
 
 Marker = Literal["dark", "long", "none"]
 

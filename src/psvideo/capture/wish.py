@@ -3,10 +3,10 @@
 import math
 from dataclasses import dataclass
 
-from psvideo.capture.quantities import show_seconds
 from psvideo.capture.request import ShootRequest
 from psvideo.errors import UsageError
-from psvideo.plan import default_dark_s
+from psvideo.model.plan import default_dark_s
+from psvideo.model.units import show_seconds
 
 LONG_MARKER = 1.5
 """The marker flash of ``--marker long`` is this much longer than the others: plainly so, and still cheap."""

@@ -17,8 +17,8 @@ from psvideo.cli.options import Frames, Json, PlanPath, Quiet, Verbose
 from psvideo.errors import PsvideoError, UsageError
 
 if TYPE_CHECKING:
-    from psvideo.calibrate.readout import Led, Readout
-    from psvideo.calibrate.readout_lines import MeasuredMode
+    from psvideo.calibrate.stripes.lines import MeasuredMode
+    from psvideo.calibrate.stripes.readout import Led, Readout
     from psvideo.calibrate.strobed_readout import StrobedReadout
 
 CRYSTAL_PPM = 100.0
@@ -81,10 +81,10 @@ def readout(
     quiet: Quiet = False,
 ) -> None:
     """Measure a camera's readout time from the stripes of an LED of known rate, or from a strobed clip."""
-    from psvideo.calibrate.led_pictures import exact_rate, parse_columns, read_led_pictures
-    from psvideo.calibrate.readout import Led, measure_readout
-    from psvideo.calibrate.readout_lines import MeasuredMode, camera_line, record_line
-    from psvideo.capture.quantities import parse_positive_seconds, parse_rate
+    from psvideo.calibrate.stripes.lines import MeasuredMode, camera_line, record_line
+    from psvideo.calibrate.stripes.pictures import exact_rate, parse_columns, read_led_pictures
+    from psvideo.calibrate.stripes.readout import Led, measure_readout
+    from psvideo.cli.typed import parse_positive_seconds, parse_rate
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     made = MeasuredMode(make=make, model=model, mode=mode)
@@ -129,8 +129,9 @@ def _strobed(
     plan: Path | None,
     voice: Voice,
 ) -> None:
-    from psvideo.calibrate.readout_lines import strobed_camera_line, strobed_record_line
-    from psvideo.pipeline import measure_take_readout, open_take
+    from psvideo.calibrate.stripes.lines import strobed_camera_line, strobed_record_line
+    from psvideo.calibrate.strobed_readout import measure_take_readout
+    from psvideo.runs.opening import open_take
 
     if len(pictures) > 1:
         raise UsageError(

@@ -16,7 +16,7 @@ import typer
 import psvideo.cli.capture_options as option
 from psvideo.cli.console import Voice
 from psvideo.cli.options import Force, Json, Quiet, Verbose
-from psvideo.files import PICTURE_MARK, refuse_existing, write_text
+from psvideo.formats.whole_files import PICTURE_MARK, refuse_existing, write_text
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -67,9 +67,9 @@ def capture_plan(
     """Plan a shoot: write plan.toml, and print what decides the shoot and what to beware of."""
     from rich.console import Console
 
-    from psvideo.capture.diagram import check_diagram_name, write_diagram
+    from psvideo.capture.drawing.diagram import check_diagram_name, write_diagram
     from psvideo.capture.planning import plan_shoot
-    from psvideo.capture.words import ShootWords, parse_request
+    from psvideo.cli.shoot_words import ShootWords, parse_request
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     if list_cameras:
@@ -113,7 +113,7 @@ def _list_cameras(voice: Voice) -> None:
 
 def _deliver(shoot: Shoot, out: Path | None, voice: Voice) -> None:
     """Write the plan where it was asked for, or to standard output, which --json takes for its own."""
-    from psvideo.planfile import format_plan
+    from psvideo.formats.plan_toml import format_plan
 
     text = format_plan(shoot.plan).rstrip("\n") + "\n"
     if out is not None:
@@ -127,7 +127,7 @@ def _deliver(shoot: Shoot, out: Path | None, voice: Voice) -> None:
 
 
 def _report(shoot: Shoot, preset: CameraMode | None, console: Console, *, diagram: str | None) -> None:
-    from psvideo.capture.diagram import TERMINAL, diagram_text
+    from psvideo.capture.drawing.diagram import TERMINAL, diagram_text
     from psvideo.capture.report import shoot_report
 
     if diagram == TERMINAL or (diagram is None and console.is_terminal):

@@ -156,7 +156,7 @@ def _keep(report: Path | None, checks: "list[Check]", failed: dict[Path, str] | 
     """Write the page of all checks anew."""
     if report is None:
         return
-    from psvideo.files import write_text
+    from psvideo.formats.whole_files import write_text
     from psvideo.runs.check_page import check_page
 
     write_text(report, check_page(checks, failed or {}))

@@ -61,14 +61,14 @@ def offer_transfers(incomplete: str) -> list[str]:
 
 def offer_boards(incomplete: str) -> list[str]:
     """Offer the boards of the table."""
-    from psvideo.strobe.boards import BOARDS
+    from psvideo.strobe.link.boards import BOARDS
 
     return _starting(BOARDS, incomplete)
 
 
 def offer_ports(incomplete: str) -> list[str]:
     """Offer what stands for a port, and the ports at which a board may be."""
-    from psvideo.strobe.controller import serial_ports
+    from psvideo.strobe.link.controller import serial_ports
 
     return _starting(["auto", "emulated", *(port.device for port in serial_ports() if port.is_candidate)], incomplete)
 

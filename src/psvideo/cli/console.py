@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import typer
 
     from psvideo.clip import Kept
-    from psvideo.view.report import RunReport
+    from psvideo.report.run_report import RunReport
 
 Item = TypeVar("Item")
 PLAIN_PROGRESS_EVERY_S = 5.0
@@ -65,7 +65,7 @@ def command_line(context: "typer.Context") -> str:
 
 def tell_report(voice: Voice, report: "RunReport") -> None:
     """Say whether the take is usable, and warn of all that speaks against it."""
-    from psvideo.view.report import findings, verdict
+    from psvideo.report.run_report import findings, verdict
 
     voice.say(verdict(report))
     for sentence in findings(report):

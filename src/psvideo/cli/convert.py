@@ -27,9 +27,9 @@ def convert(
     quiet: Quiet = False,
 ) -> None:
     """Write a rig as rig.toml, as an .lp file (RTI), or as DiLiGenT's two lists of directions and intensities."""
-    from psvideo.files import refuse_existing
-    from psvideo.rig_lists import files_of, write_rig
-    from psvideo.rigfile import read_rig
+    from psvideo.formats.light_lists import files_of, write_rig
+    from psvideo.formats.rig_toml import read_rig
+    from psvideo.formats.whole_files import refuse_existing
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     for file in files_of(out):

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from psvideo.beauty import parse_mix
 from psvideo.cli.delivery_options import (
     Aov,
     CameraTime,
@@ -20,6 +19,7 @@ from psvideo.errors import UsageError
 from psvideo.export.programs import NO_PRESET, PRESETS, Preset
 from psvideo.export.results import Delivery, Preview, Program
 from psvideo.export.space import choose_space
+from psvideo.plates.beauty import parse_mix
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,7 +17,7 @@ def demo(
     quiet: Quiet = False,
 ) -> None:
     """Film a virtual bust, find the flashes, solve for normals, and end with the path of a picture of it all."""
-    from psvideo.demo import run_demo
+    from psvideo.runs.demo import run_demo
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     picture = run_demo(out, force=force, watch=voice.track)

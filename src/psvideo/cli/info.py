@@ -18,7 +18,7 @@ def info(
     quiet: Quiet = False,
 ) -> None:
     """Say what a file or folder is, and whether it fits together: exit status 1 where it does not."""
-    from psvideo.clip import describe
+    from psvideo.inspect.describe import describe
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     found = describe(path, plan=plan)

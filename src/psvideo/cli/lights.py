@@ -11,13 +11,13 @@ import typer
 from psvideo.cli.console import Voice, counted
 from psvideo.cli.options import FirstLight, Force, Frames, Json, PlanPath, Quiet, Verbose
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.files import PICTURE_MARK, refuse_existing, write_text
+from psvideo.formats.whole_files import PICTURE_MARK, refuse_existing, write_text
 
 if TYPE_CHECKING:
     from psvideo.calibrate.guess import Prior
     from psvideo.calibrate.light_pictures import LightPictures
-    from psvideo.calibrate.matte_sphere import MatteLight
-    from psvideo.light_sets import Reading
+    from psvideo.calibrate.matte import MatteLight
+    from psvideo.runs.light_sets import Reading
 
 Pictures = Annotated[Path, typer.Argument(help="A folder of stills (one per light), of plates, or a clip.")]
 RigOut = Annotated[Path, typer.Option("-o", "--out", help="The rig file to write.")]
@@ -46,13 +46,13 @@ def matte_sphere(
     quiet: Quiet = False,
 ) -> None:
     """Measure directions and intensities of lights from a matte sphere; writes rig.toml and a picture beside it."""
-    from psvideo.calibrate.matte_sphere import matte_rig, measure_matte_sphere
-    from psvideo.calibrate.sphere_outline import find_outlines, given_outline
-    from psvideo.calibrate.sphere_sighting import Looking
-    from psvideo.light_sets import Reading
-    from psvideo.rigfile import SCHEMA, format_rig
-    from psvideo.view.matte_picture import matte_picture
-    from psvideo.view.timing_picture import write_sheet
+    from psvideo.calibrate.matte import matte_rig, measure_matte_sphere
+    from psvideo.calibrate.sphere.outline import find_outlines, given_outline
+    from psvideo.calibrate.sphere.sighting import Looking
+    from psvideo.formats.rig_toml import SCHEMA, format_rig
+    from psvideo.pictures.matte_sphere import matte_picture
+    from psvideo.pictures.timing import write_sheet
+    from psvideo.runs.light_sets import Reading
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     refuse_existing(out, force=force, mark=SCHEMA)
@@ -119,11 +119,11 @@ def flat_field(
     import numpy as np
 
     from psvideo.calibrate.flat_field import Target, falloff_of, measure_flat_field, with_intensities
-    from psvideo.falloff import SCHEMA as FLAT_SCHEMA
-    from psvideo.falloff import format_falloff
-    from psvideo.light_sets import Reading
-    from psvideo.normals.near_light import ground_of, is_near
-    from psvideo.rigfile import SCHEMA, format_rig, read_rig
+    from psvideo.formats.flat_toml import SCHEMA as FLAT_SCHEMA
+    from psvideo.formats.flat_toml import format_falloff
+    from psvideo.formats.rig_toml import SCHEMA, format_rig, read_rig
+    from psvideo.runs.light_sets import Reading
+    from psvideo.solve.normals.near_light import ground_of, is_near
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     refuse_existing(out, force=force, mark=SCHEMA)
@@ -188,9 +188,9 @@ def intensities(
 ) -> None:
     """Measure the relative intensities of four or more distant lights of known directions from any matte scene."""
     from psvideo.calibrate.strengths import measure_strengths
-    from psvideo.light_sets import Reading
-    from psvideo.rig import directions
-    from psvideo.rigfile import SCHEMA, format_rig, read_rig
+    from psvideo.formats.rig_toml import SCHEMA, format_rig, read_rig
+    from psvideo.model.rig import directions
+    from psvideo.runs.light_sets import Reading
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     refuse_existing(out, force=force, mark=SCHEMA)
@@ -231,8 +231,8 @@ def guess(
 ) -> None:
     """Guess directions of distant lights from pictures of a matte, rounded subject, where nothing was calibrated."""
     from psvideo.calibrate.guess import ERROR_DEG, guess_rig
-    from psvideo.light_sets import Reading
-    from psvideo.rigfile import SCHEMA, format_rig
+    from psvideo.formats.rig_toml import SCHEMA, format_rig
+    from psvideo.runs.light_sets import Reading
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     refuse_existing(out, force=force, mark=SCHEMA)
@@ -259,7 +259,7 @@ def guess(
 
 def _read(path: Path, reading: Reading, voice: Voice) -> LightPictures:
     from psvideo.calibrate.light_pictures import averaged
-    from psvideo.light_sets import open_light_sets
+    from psvideo.runs.light_sets import open_light_sets
 
     opened = open_light_sets(path, reading, watch=voice.track)
     for warning in opened.warnings:

@@ -10,11 +10,11 @@ import typer
 from psvideo.cli.console import Voice
 from psvideo.cli.options import FirstLight, Force, Frames, Json, PlanPath, Quiet, Verbose
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.files import PICTURE_MARK, refuse_existing, write_text
+from psvideo.formats.whole_files import PICTURE_MARK, refuse_existing, write_text
 
 if TYPE_CHECKING:
-    from psvideo.calibrate.mirror_sphere import MeasuredLight, MirrorCalibration
-    from psvideo.calibrate.sphere_sighting import Sighting
+    from psvideo.calibrate.mirror.lights import MeasuredLight, MirrorCalibration
+    from psvideo.calibrate.sphere.sighting import Sighting
 
 LEAST_RADIUS_MM, LARGEST_RADIUS_MM = 1.0, 1000.0
 
@@ -55,12 +55,12 @@ def mirror_sphere(
 ) -> None:
     """Measure where the lights are from their highlights on one or more mirror spheres; writes rig.toml."""
     from psvideo.calibrate.light_pictures import read_picture
-    from psvideo.calibrate.mirror_sphere import calibrate_lights
-    from psvideo.calibrate.sphere_sighting import Looking, SphereNotFoundError, sight_spheres
-    from psvideo.light_sets import Reading, open_light_sets
-    from psvideo.rigfile import SCHEMA, format_rig
-    from psvideo.view.sphere_picture import faulty_picture, sphere_picture
-    from psvideo.view.timing_picture import write_sheet
+    from psvideo.calibrate.mirror.lights import calibrate_lights
+    from psvideo.calibrate.sphere.sighting import Looking, SphereNotFoundError, sight_spheres
+    from psvideo.formats.rig_toml import SCHEMA, format_rig
+    from psvideo.pictures.mirror_sphere import faulty_picture, sphere_picture
+    from psvideo.pictures.timing import write_sheet
+    from psvideo.runs.light_sets import Reading, open_light_sets
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     refuse_existing(out, force=force, mark=SCHEMA)

@@ -43,7 +43,7 @@ from psvideo.cli.options import (
 )
 from psvideo.cli.sync import describe_timing
 from psvideo.errors import UsageError
-from psvideo.near_limits import MOST_ITERATIONS, NEAR_ITERATIONS
+from psvideo.solve.near_limits import MOST_ITERATIONS, NEAR_ITERATIONS
 
 
 class SolverName(StrEnum):
@@ -143,13 +143,13 @@ def normals(
     quiet: Quiet = False,
 ) -> None:
     """Write normals, albedo and validity for every round of flashes; does sync and split by itself."""
-    from psvideo.align.rounds import Aligning
     from psvideo.cli.delivery import Asked, delivery_of
     from psvideo.cli.opening import open_and_tell
-    from psvideo.export.usd_core import require_usd
-    from psvideo.pipeline import decoded_once
+    from psvideo.clip import decoded_once
+    from psvideo.export.usd.core import require_usd
+    from psvideo.plates.align.rounds import Aligning
+    from psvideo.report.run_report import report_record
     from psvideo.runs import Output, OverTime, normals_run, read_lighting, timing_of
-    from psvideo.view.report import report_record
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     output = Output(folder=out, force=force, resume=resume, start_number=start_number, command=command_line(context))

@@ -3,7 +3,8 @@
 from pathlib import Path
 
 from psvideo.cli.console import Voice
-from psvideo.pipeline import Take, open_take
+from psvideo.clip import Take
+from psvideo.runs.opening import open_take
 
 
 def open_and_tell(clip: Path, voice: Voice, *, plan: Path | None, frames: str | None) -> Take:

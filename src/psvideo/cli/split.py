@@ -59,13 +59,13 @@ def split(
     quiet: Quiet = False,
 ) -> None:
     """Rebuild one plate per flash and write one EXR sequence per light, ambient light taken off."""
-    from psvideo.beauty import parse_mix
     from psvideo.cli.opening import open_and_tell
+    from psvideo.clip import decoded_once
     from psvideo.export.results import Preview
-    from psvideo.pipeline import decoded_once
-    from psvideo.rigfile import read_rig
+    from psvideo.formats.rig_toml import read_rig
+    from psvideo.formats.timing_json import timing_record
+    from psvideo.plates.beauty import parse_mix
     from psvideo.runs import Besides, Output, split_run, timing_of
-    from psvideo.timing import timing_record
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     output = Output(folder=out, force=force, resume=resume, start_number=start_number, command=command_line(context))

@@ -15,13 +15,13 @@ from psvideo.cli.options import Force, Json, Quiet, Verbose
 from psvideo.cli.strobe_emulate import emulate
 from psvideo.cli.strobe_progress import watching
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.files import refuse_existing, write_text
-from psvideo.strobe.boards import BOARDS, Board, capabilities
-from psvideo.strobe.messages import Capabilities, Stat, Status, Stop, Stopped, WiringName
-from psvideo.strobe.ports import AUTO
+from psvideo.formats.whole_files import refuse_existing, write_text
+from psvideo.strobe.link.boards import BOARDS, Board, capabilities
+from psvideo.strobe.link.messages import Capabilities, Stat, Status, Stop, Stopped, WiringName
+from psvideo.strobe.link.ports import AUTO
 
 if TYPE_CHECKING:
-    from psvideo.plan import Plan
+    from psvideo.model.plan import Plan
     from psvideo.strobe.program import Program
     from psvideo.strobe.session import Outcome
 
@@ -35,7 +35,7 @@ strobe.command()(emulate)
 @strobe.command("list")
 def list_ports(json: Json = False, verbose: Verbose = False, quiet: Quiet = False) -> None:
     """Show the serial ports at which a controller may be, by their USB identity; nothing is opened."""
-    from psvideo.strobe.controller import serial_ports
+    from psvideo.strobe.link.controller import serial_ports
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     ports = serial_ports()
@@ -61,7 +61,7 @@ def check(
     quiet: Quiet = False,
 ) -> None:
     """Say whether a plan can be played, and how: on the board at a port, on one of the table, or on any of them."""
-    from psvideo.planfile import read_plan
+    from psvideo.formats.plan_toml import read_plan
     from psvideo.strobe.describe import program_record
     from psvideo.strobe.program import make_program
 
@@ -78,7 +78,7 @@ def check(
 
 
 def _caps_at(port: str, board: Board | None, wiring: WiringName | None) -> Capabilities:
-    from psvideo.strobe.link import Link
+    from psvideo.strobe.link.link import Link
     from psvideo.strobe.session import prepare
 
     opened = option.open_port(port, board=board)
@@ -121,7 +121,7 @@ def _check_table(voice: Voice, plan: Plan, path: Path, wanted: WiringName | None
 def _tell_program(voice: Voice, plan: Plan, program: Program, caps: Capabilities) -> list[str]:
     """Describe a program, and return what to beware of."""
     from psvideo.strobe.describe import describe_program, program_cautions
-    from psvideo.strobe.flicker import flicker_warning
+    from psvideo.strobe.seizures import flicker_warning
 
     for line in describe_program(program, caps):
         voice.say(line)
@@ -149,9 +149,9 @@ def run(
     quiet: Quiet = False,
 ) -> None:
     """Play a plan until Ctrl-C, or for a time; whatever happens, the lights are dark afterwards."""
-    from psvideo.planfile import read_plan
+    from psvideo.formats.plan_toml import read_plan
     from psvideo.strobe.describe import describe_program, program_cautions
-    from psvideo.strobe.link import Link
+    from psvideo.strobe.link.link import Link
     from psvideo.strobe.program import make_program
     from psvideo.strobe.runlog import format_log, log_record, run_log
     from psvideo.strobe.session import prepare, run_program
@@ -203,8 +203,8 @@ def _length(plan: Plan, seconds: float | None, rounds: int | None) -> int | None
 def _confirm(voice: Voice, plan: Plan, path: Path, *, yes: bool, emulated: bool) -> None:
     """Warn of the flashing before the first flash, and have it confirmed once for each plan."""
     from psvideo.strobe.confirmed import is_confirmed, remember, state_folder
-    from psvideo.strobe.flicker import flicker_warning
     from psvideo.strobe.runlog import plan_sha256
+    from psvideo.strobe.seizures import flicker_warning
 
     warning = flicker_warning(plan) if plan.mode != "synced" else None
     if warning is None:
@@ -250,8 +250,8 @@ def stop(
     quiet: Quiet = False,
 ) -> None:
     """Make a board dark, and say how it is."""
-    from psvideo.strobe.greeting import greet
-    from psvideo.strobe.link import Link
+    from psvideo.strobe.link.greeting import greet
+    from psvideo.strobe.link.link import Link
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     opened = option.open_port(port, board=None)

@@ -16,13 +16,13 @@ import typer
 from psvideo.cli.console import Voice
 from psvideo.cli.options import Force, Json, Quiet
 from psvideo.errors import UsageError
-from psvideo.files import refuse_existing, whole_file
-from psvideo.strobe.boards import BOARDS
-from psvideo.strobe.messages import WiringName
-from psvideo.strobe.toolchain import AvrBoard
+from psvideo.formats.whole_files import refuse_existing, whole_file
+from psvideo.strobe.link.boards import BOARDS
+from psvideo.strobe.link.messages import WiringName
+from psvideo.strobe.stand_ins.toolchain import AvrBoard
 
 if TYPE_CHECKING:
-    from psvideo.strobe.simulated import Simulation
+    from psvideo.strobe.stand_ins.simulated import Simulation
 
 LOOK_EVERY_S = 0.2
 IMITATED: AvrBoard = "atmega328p"
@@ -53,9 +53,9 @@ def emulate(
     quiet: Quiet = False,
 ) -> None:
     """Emulate a strobe controller: print its port, run until stopped (Ctrl-C). Other commands take it with --port."""
-    from psvideo.strobe.simulated import Simulation
-    from psvideo.strobe.toolchain import why_not
-    from psvideo.tracefile import SCHEMA
+    from psvideo.formats.trace_csv import SCHEMA
+    from psvideo.strobe.stand_ins.simulated import Simulation
+    from psvideo.strobe.stand_ins.toolchain import why_not
 
     voice = Voice(json=json, quiet=quiet)
     if trace is not None:
@@ -73,7 +73,7 @@ def emulate(
 
 
 def _run_firmware(voice: Voice, wish: Simulation) -> None:
-    from psvideo.strobe.simulated import simulated_board
+    from psvideo.strobe.stand_ins.simulated import simulated_board
 
     with _until_stopped() as stopped, simulated_board(wish) as simulated:
         _introduce(voice, simulated.port, f"the real firmware on an emulated {wish.board}", wish.trace)
@@ -82,9 +82,9 @@ def _run_firmware(voice: Voice, wish: Simulation) -> None:
 
 
 def _imitate(voice: Voice, wiring: WiringName, trace: Path | None) -> None:
-    from psvideo.strobe.emulated import EmulatedController
-    from psvideo.strobe.imitation import TRACE_HZ, open_port, serve
-    from psvideo.tracefile import TraceWriter
+    from psvideo.formats.trace_csv import TraceWriter
+    from psvideo.strobe.stand_ins.emulated import EmulatedController
+    from psvideo.strobe.stand_ins.imitation import TRACE_HZ, open_port, serve
 
     with _until_stopped() as stopped, contextlib.ExitStack() as stack:
         writer = None

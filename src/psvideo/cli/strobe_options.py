@@ -10,11 +10,11 @@ import typer
 
 from psvideo.cli.completing import offer_boards, offer_lines, offer_ports
 from psvideo.errors import UsageError, nearest
-from psvideo.strobe.boards import BOARDS, Board
-from psvideo.strobe.messages import WIRINGS, WiringName
+from psvideo.strobe.link.boards import BOARDS, Board
+from psvideo.strobe.link.messages import WIRINGS, WiringName
 
 if TYPE_CHECKING:
-    from psvideo.strobe.link import Port
+    from psvideo.strobe.link.link import Port
 
 EMULATED = "emulated"
 
@@ -92,8 +92,8 @@ def parse_board(word: str | None) -> Board | None:
 
 def open_port(name: str, *, board: Board | None) -> Port:
     """Open a port by what --port says."""
-    from psvideo.strobe.controller import OpenPort
-    from psvideo.strobe.emulated_port import EmulatedPort
+    from psvideo.strobe.link.controller import OpenPort
+    from psvideo.strobe.stand_ins.emulated_port import EmulatedPort
 
     if name == EMULATED:
         return EmulatedPort(board or next(iter(BOARDS.values())))

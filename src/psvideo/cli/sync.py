@@ -8,10 +8,10 @@ import typer
 from psvideo.cli.console import Voice
 from psvideo.cli.options import ClipPath, FirstLight, Force, Frames, Json, OrderRig, PlanPath, Quiet, Verbose
 from psvideo.errors import UsageError
-from psvideo.files import PICTURE_MARK, refuse_existing, write_text
+from psvideo.formats.whole_files import PICTURE_MARK, refuse_existing, write_text
 
 if TYPE_CHECKING:
-    from psvideo.timing import Timing
+    from psvideo.model.timing import Timing
 
 TimingOut = Annotated[
     Path | None, typer.Option("-o", "--out", help="Where to write timing.json; left out: only a summary is printed.")
@@ -36,10 +36,9 @@ def sync(
 ) -> None:
     """Find phase, clock offset, light order and dropped frames of a strobed clip, from the picture alone."""
     from psvideo.cli.opening import open_and_tell
-    from psvideo.naming import named_by_rig
-    from psvideo.pipeline import find_clip_timing
-    from psvideo.rigfile import read_rig
-    from psvideo.timing import format_timing, timing_record
+    from psvideo.formats.rig_toml import read_rig
+    from psvideo.formats.timing_json import format_timing, timing_record
+    from psvideo.runs.syncing import sync_take
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     if out is not None:
@@ -50,8 +49,7 @@ def sync(
         refuse_existing(picture, force=force, mark=PICTURE_MARK)
     take = open_and_tell(clip, voice, plan=plan, frames=frames)
     known = None if rig is None else read_rig(rig, plan_lights=take.plan.lights)
-    timing = find_clip_timing(take, first_light=first_light, watch=voice.track, picture=picture)
-    timing = timing if known is None else named_by_rig(take, timing, known)
+    timing = sync_take(take, first_light=first_light, rig=known, picture=picture, watch=voice.track)
     for note in timing.notes:
         voice.warn(note)
     if out is not None:

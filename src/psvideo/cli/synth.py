@@ -11,7 +11,7 @@ from psvideo.cli.options import Force, Json, Quiet, Verbose
 from psvideo.errors import UsageError
 
 if TYPE_CHECKING:
-    from psvideo.synth.traced import TraceOptions
+    from psvideo.synth.lamps.traced import TraceOptions
 
 
 def synth(
@@ -53,7 +53,7 @@ def synth(
 
 
 def _trace_options(trace: Path | None, lines: list[str]) -> "TraceOptions | None":
-    from psvideo.synth.traced import TraceOptions
+    from psvideo.synth.lamps.traced import TraceOptions
 
     if trace is None:
         if lines:

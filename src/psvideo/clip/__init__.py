@@ -2,17 +2,17 @@
 
 ``open_clip`` finds the footage and its plan and checks that they fit; ``read_frames`` decodes, takes the transfer curve
 off and gives one frame after the other; ``keeping_near`` keeps what was decoded for a second look; ``demosaic`` makes
-colour of a mosaic; ``describe`` says what a file is.
+colour of a mosaic.
 """
 
+from psvideo.clip.decode.malvar2004 import demosaic
 from psvideo.clip.depth_map import DepthMaps, open_depth
-from psvideo.clip.describe import describe
 from psvideo.clip.kept import Kept, keeping_near
-from psvideo.clip.malvar2004 import demosaic
 from psvideo.clip.mask import read_mask
 from psvideo.clip.opening import open_clip
 from psvideo.clip.reading import ALL_CORES, parse_range, read_frames
 from psvideo.clip.record import Clip, Frame, holes
+from psvideo.clip.take import Take, decoded_once
 
 __all__ = [
     "ALL_CORES",
@@ -20,8 +20,9 @@ __all__ = [
     "DepthMaps",
     "Frame",
     "Kept",
+    "Take",
+    "decoded_once",
     "demosaic",
-    "describe",
     "holes",
     "keeping_near",
     "open_clip",

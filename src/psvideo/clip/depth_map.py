@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.clip.decoders import decode, guarded
-from psvideo.clip.exr import decode_channels
+from psvideo.clip.decode.decoders import decode, guarded
+from psvideo.clip.decode.exr import decode_channels
 from psvideo.clip.folder import KINDS, find_sequence
 from psvideo.errors import PsvideoError
 

@@ -10,11 +10,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.camera import Encoding
+from psvideo.clip.decode.yuv import signal_range
 from psvideo.clip.record import Header, Levels, Picture
 from psvideo.clip.transfer import find_curve, to_light
-from psvideo.clip.yuv import signal_range
 from psvideo.errors import PsvideoError
+from psvideo.model.camera import Encoding
 
 
 def linear_light(picture: Picture, encoding: Encoding) -> NDArray[np.float32]:

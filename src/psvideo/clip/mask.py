@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from psvideo.clip.decoders import decode
+from psvideo.clip.decode.decoders import decode
 from psvideo.clip.folder import KINDS
 from psvideo.errors import PsvideoError
 

@@ -4,18 +4,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from psvideo.camera import Encoding
-from psvideo.clip.decoders import read_header
+from psvideo.clip.decode.decoders import read_header
+from psvideo.clip.decode.yuv import signal_range
 from psvideo.clip.folder import MOVIES, find_sequence
 from psvideo.clip.record import Clip, Header
 from psvideo.clip.transfer import find_curve
-from psvideo.clip.yuv import signal_range
 from psvideo.errors import PsvideoError
-from psvideo.plan import Plan
-from psvideo.planfile import find_plan, read_plan
+from psvideo.formats.plan_toml import find_plan, read_plan
+from psvideo.model.camera import Encoding
+from psvideo.model.plan import Plan
 
 if TYPE_CHECKING:
-    from psvideo.clip.movie import Movie
+    from psvideo.clip.decode.movie import Movie
 
 RATE_TOLERANCE = 5e-4
 """A movie's rate counts as the plan's within this share: tighter than 120 for 119.88."""
@@ -63,7 +63,7 @@ def _open_folder(path: Path, plan_path: Path | None) -> Clip:
 
 
 def _open_movie(path: Path, plan_path: Path | None) -> Clip:
-    from psvideo.clip.movie import index_movie  # FFmpeg's libraries take memory: only where there is a movie
+    from psvideo.clip.decode.movie import index_movie
 
     plan_path = find_plan(path, given=plan_path)
     plan = read_plan(plan_path)

@@ -13,7 +13,7 @@ import numpy as np
 from fileseq.exceptions import ParseException
 from fileseq.frameset import FrameSet
 
-from psvideo.clip.decoders import decode
+from psvideo.clip.decode.decoders import decode
 from psvideo.clip.kept import Kept
 from psvideo.clip.linear import linear_light
 from psvideo.clip.record import Clip, Frame, Header, Picture
@@ -76,7 +76,7 @@ def _decoder(clip: Clip, numbers: list[int]) -> Callable[[int], Picture]:
     """Return what decodes a frame; a movie's are asked for in the order of ``numbers``."""
     if not clip.is_movie:
         return lambda number: decode(clip.kind, clip.file_of(number))
-    from psvideo.clip.movie import read_movie  # FFmpeg's libraries take memory: only where there is a movie
+    from psvideo.clip.decode.movie import read_movie
 
     pictures = read_movie(clip.path, [clip.timestamps[bisect_left(clip.numbers, number)] for number in numbers])
     return lambda _: next(pictures)

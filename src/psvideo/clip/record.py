@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.camera import Encoding
-from psvideo.plan import Plan
+from psvideo.model.camera import Encoding
+from psvideo.model.plan import Plan
 
 Levels = tuple[tuple[float, ...], ...]
 """Black levels by position, a pattern that repeats over rows and columns from the picture's top left on."""

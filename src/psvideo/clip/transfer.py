@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.camera import FloatArray
 from psvideo.errors import PsvideoError, nearest
+from psvideo.model.camera import FloatArray
 
 STUDIO_CONFIG = "studio-config-v2.2.0_aces-v1.3_ocio-v2.4"
 UNKNOWN_COLOUR = "unknown"

@@ -12,8 +12,8 @@ import trimesh
 from numpy.typing import NDArray
 
 from psvideo.export.space import Space, placed, placed_points
-from psvideo.files import whole_file
-from psvideo.integrate.mesh import Mesh
+from psvideo.formats.whole_files import whole_file
+from psvideo.solve.depth.mesh import Mesh
 
 
 def mesh_name(clip: str, number: int, *, suffix: str = "ply") -> str:

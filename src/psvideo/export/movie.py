@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError
 from psvideo.export.results import Codec
-from psvideo.files import whole_file
+from psvideo.formats.whole_files import whole_file
 
 Pixels = NDArray[np.uint8]
 MOST_RATE = 1_000_000

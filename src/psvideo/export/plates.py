@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.export.exr import write_exr
 from psvideo.export.tags import Tags
-from psvideo.sequence import LightPlate
-from psvideo.split import Plate
+from psvideo.formats.exr_files import write_exr
+from psvideo.plates.sequence import LightPlate
+from psvideo.plates.split import Plate
 
 
 def plate_name(clip: str, light: str, number: int) -> str:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError
-from psvideo.files import whole_file
+from psvideo.formats.whole_files import whole_file
 
 PNG_MAX = 65535
 GAMMA_1 = struct.pack(">I", 100_000)  # in hundred-thousandths

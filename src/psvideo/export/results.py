@@ -8,15 +8,15 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.beauty import Mix
-from psvideo.export.exr import write_exr, write_exr_parts
 from psvideo.export.mesh import mesh_name, write_part, write_ply
 from psvideo.export.plates import image_channels
 from psvideo.export.png import PNG_MAX, encode_normals, write_png16
 from psvideo.export.space import Space, placed, placed_points
 from psvideo.export.tags import Tags
-from psvideo.integrate import Depth, mesh_of
-from psvideo.surface import Surface
+from psvideo.formats.exr_files import write_exr, write_exr_parts
+from psvideo.model.surface import Surface
+from psvideo.plates.beauty import Mix
+from psvideo.solve.depth import Depth, mesh_of
 
 Preview = Literal["relit", "normals", "plates", "beauty"]
 Codec = Literal["vp9", "prores"]

@@ -14,10 +14,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.camera import FloatArray
 from psvideo.errors import UsageError
-from psvideo.export.pose import Pose, read_pose
-from psvideo.export.usd_camera import USD_SUFFIXES, UpAxis, UsdCamera, open_usd_camera
+from psvideo.export.usd.camera import USD_SUFFIXES, UpAxis, UsdCamera, open_usd_camera
+from psvideo.export.usd.pose import Pose, read_pose
+from psvideo.model.camera import FloatArray
 
 SpaceName = Literal["camera", "world", "tangent"]
 YDirection = Literal["up", "down"]

@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError
-from psvideo.timing import Timing, places_in_time, timing_record
+from psvideo.formats.timing_json import timing_record
+from psvideo.model.timing import Timing, places_in_time
 
 if TYPE_CHECKING:
-    from psvideo.pipeline import Take
-    from psvideo.sequence import LightPlate
+    from psvideo.clip import Take
+    from psvideo.plates.sequence import LightPlate
 
 Method = Literal["weights", "hudon2015"]
 RUN_UP: Mapping[Method, int] = {"weights": 0, "hudon2015": 240}
@@ -77,8 +78,8 @@ class ComparedPlates:
         return plates[light]
 
     def _timed(self) -> tuple["Take", Timing]:
-        from psvideo.pipeline import open_take
         from psvideo.runs import timing_of
+        from psvideo.runs.opening import open_take
 
         if self._take is None:
             self._take = open_take(self._clip, plan=self._plan)
@@ -89,7 +90,7 @@ class ComparedPlates:
 
 def _nearest_round(timing: Timing, light: str, time_s: float) -> int:
     """Return the number of the round whose complete flashes of a light are nearest to a time."""
-    from psvideo.sequence import round_numbers
+    from psvideo.plates.sequence import round_numbers
 
     away_s = {
         abs(flash.start_s - time_s): number
@@ -103,9 +104,10 @@ def _nearest_round(timing: Timing, light: str, time_s: float) -> int:
 
 def _plates(take: "Take", timing: Timing, method: Method, number: int) -> Mapping[str, ComparedPlate]:
     """Rebuild one round from the frames that it touches, and those before them that the method follows."""
-    from psvideo.pipeline import clip_rounds, timed_camera
-    from psvideo.sequence import round_numbers
-    from psvideo.shutter import frames_touched
+    from psvideo.model.shutter import frames_touched
+    from psvideo.model.timing import timed_camera
+    from psvideo.plates.gather import clip_rounds
+    from psvideo.plates.sequence import round_numbers
 
     flashes = [place for place, found in enumerate(round_numbers(timing.flashes)) if found == number]
     first, last = frames_touched(timed_camera(take.plan, timing), timing.start_s, timing.duration_s)

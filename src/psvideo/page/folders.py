@@ -7,14 +7,14 @@ from fractions import Fraction
 from functools import partial
 from pathlib import Path
 
-from psvideo.clip.about_output import is_plates, is_results
-from psvideo.clip.exr import contents, stored
+from psvideo.clip.decode.exr import contents, stored
 from psvideo.clip.folder import number_of
 from psvideo.errors import PsvideoError, UsageError
+from psvideo.formats.timing_json import read_timing, timing_record
+from psvideo.inspect.about_output import is_plates, is_results
 from psvideo.page.footage import show_of_clip, with_clip
 from psvideo.page.picture import Look, Picture, shown
 from psvideo.page.show import Kind, Sequence, Show
-from psvideo.timing import read_timing, timing_record
 
 RESULTS: Mapping[str, tuple[str, Kind, str]] = {
     "normals": ("Normals", "normals", ""),

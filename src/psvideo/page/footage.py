@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from psvideo.camera import Camera
 from psvideo.clip import Clip, demosaic, open_clip, read_frames
+from psvideo.model.camera import Camera
 from psvideo.page.compared import ComparedPlates, Method
 from psvideo.page.picture import Look, Picture, shown
 from psvideo.page.show import Sequence, Show

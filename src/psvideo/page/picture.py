@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.view.shading import smaller
+from psvideo.pictures.shading import smaller
 
 MAGIC = b"PSVB"
 HALF_MAX = 65504.0

@@ -18,13 +18,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from psvideo.errors import PsvideoError
-from psvideo.files import refuse_existing, whole_file
+from psvideo.formats.whole_files import refuse_existing, whole_file
 from psvideo.page.assembled import assets
 from psvideo.page.picture import Look, block, missing_block
 from psvideo.page.show import Sequence, Show, index_of
 
 if TYPE_CHECKING:
-    from psvideo.pipeline import Watch
+    from psvideo.compute.progress import Watch
 
 MARK = "psvideo-page/1"
 

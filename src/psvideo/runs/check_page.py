@@ -5,9 +5,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from psvideo import __version__
+from psvideo.report.page import MARKS, PAGE, judgement_lines
+from psvideo.report.style import STYLE
 from psvideo.runs.checking import Check
-from psvideo.view.report_page import MARKS, PAGE, judgement_lines
-from psvideo.view.report_style import STYLE
 
 
 def check_page(checks: Sequence[Check], failed: Mapping[Path, str]) -> str:

@@ -10,16 +10,19 @@ from pathlib import Path
 
 import numpy as np
 
-from psvideo.clip import Clip, Kept, holes, keeping_near, read_frames
+from psvideo.clip import Clip, Kept, Take, holes, keeping_near, read_frames
+from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import NoStrobeError, PsvideoError
-from psvideo.naming import named_by_rig
-from psvideo.pipeline import Take, Watch, clip_rounds, find_clip_timing, open_take, unwatched
-from psvideo.plan import Plan
-from psvideo.profiles import SATURATED
-from psvideo.quality.judgement import Judgement, usable, verdict_of
-from psvideo.rigfile import read_rig
+from psvideo.formats.rig_toml import read_rig
+from psvideo.model.plan import Plan
+from psvideo.model.row_profiles import SATURATED
+from psvideo.model.timing import DroppedFrames, Timing
+from psvideo.plates.gather import clip_rounds
+from psvideo.plates.naming import named_by_rig
+from psvideo.report.judgement import Judgement, usable, verdict_of
+from psvideo.runs.opening import open_take
 from psvideo.runs.reporting import judgements, observing
-from psvideo.timing import DroppedFrames, Timing
+from psvideo.sync.of_take import find_take_timing
 
 LEAST_FRAMES, MOST_FRAMES = 30, 160
 ROUNDS = 4
@@ -97,7 +100,7 @@ def check_take(
     with _store(clip, window) as kept:
         take = replace(whole, numbers=window, kept=kept)
         try:
-            timing = find_clip_timing(take, first_light=first_light, watch=watch)
+            timing = find_take_timing(take, first_light=first_light, watch=watch)
         except NoStrobeError as fault:
             if too_short(clip.plan, window):
                 raise

@@ -8,18 +8,18 @@ from pathlib import Path
 
 import numpy as np
 
-from psvideo.beauty import beauty_of
-from psvideo.clip import Clip
-from psvideo.export.exr import HALF_MAX
+from psvideo.clip import Clip, Take
 from psvideo.export.plates import plate_name, write_plate
 from psvideo.export.results import Delivery, write_surface
 from psvideo.export.space import Space
 from psvideo.export.tags import Tags
-from psvideo.integrate import Depth
-from psvideo.pipeline import Instant, Take
-from psvideo.rig import Rig
-from psvideo.sequence import AMBIENT, LightPlate, Round, round_numbers
-from psvideo.timing import Timing
+from psvideo.formats.exr_files import HALF_MAX
+from psvideo.model.rig import Rig
+from psvideo.model.timing import Timing
+from psvideo.plates.beauty import beauty_of
+from psvideo.plates.sequence import AMBIENT, LightPlate, Round, round_numbers
+from psvideo.solve.depth import Depth
+from psvideo.solve.instants import Instant
 
 LENS_TOLERANCE = 0.01
 """Share by which two focal lengths may differ before it is told: calibrations of one lens differ by less."""

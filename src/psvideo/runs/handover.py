@@ -11,11 +11,11 @@ from urllib.parse import quote
 
 from psvideo.clip import Clip
 from psvideo.clip.folder import number_of
+from psvideo.compute.progress import Watch
 from psvideo.export.programs import Delivered, note, note_name
 from psvideo.export.results import MOVIE_SUFFIXES, Codec, Delivery, Preview
 from psvideo.export.timeline import Footage, Images, timeline_text
-from psvideo.files import write_text
-from psvideo.pipeline import Watch
+from psvideo.formats.whole_files import write_text
 from psvideo.runs.previews import Shown, preview_name, write_preview
 
 OTHER_RATES = ("flashes",)

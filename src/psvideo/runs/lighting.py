@@ -8,21 +8,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.clip import DepthMaps, open_depth, read_mask
+from psvideo.clip import DepthMaps, Take, open_depth, read_mask
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.results import Delivery
-from psvideo.falloff import Falloff, read_falloff
-from psvideo.integrate import Shaping, view_of
-from psvideo.near_limits import NEAR_ITERATIONS
-from psvideo.near_surface import NearSurface, near_surface_of, near_trust
-from psvideo.normals.illumination import illumination
-from psvideo.pipeline import (
-    Take,
-    lights_as_planned,
-)
-from psvideo.rig import Light, Rig
-from psvideo.rigfile import read_rig
-from psvideo.sequence import check_separable
+from psvideo.formats.flat_toml import read_falloff
+from psvideo.formats.rig_toml import read_rig
+from psvideo.model.falloff import Falloff
+from psvideo.model.rig import Light, Rig
+from psvideo.plates.sequence import check_separable
+from psvideo.solve.depth import Shaping, view_of
+from psvideo.solve.instants import lights_as_planned
+from psvideo.solve.near_limits import NEAR_ITERATIONS
+from psvideo.solve.near_surface import NearSurface, near_surface_of, near_trust
+from psvideo.solve.normals.illumination import illumination
 
 UNSURE_DEG = 5.0
 """A rig whose own standard error is so large is told of in the report; a guessed one says 20."""

@@ -3,12 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.pipeline import (
-    Instant,
-)
-from psvideo.sequence import Round
-from psvideo.view.contact import Strip, Tile, sheet
-from psvideo.view.shading import exposure_for, normal_colours, smaller, srgb
+from psvideo.pictures.contact import Strip, Tile, sheet
+from psvideo.pictures.shading import exposure_for, normal_colours, smaller, srgb
+from psvideo.plates.sequence import Round
+from psvideo.solve.instants import Instant
 
 Pixels = NDArray[np.uint8]
 SHOWN_WIDTH_PX, WIDE_PX = 600, 1200

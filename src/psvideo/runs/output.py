@@ -7,17 +7,15 @@ from fractions import Fraction
 from pathlib import Path
 
 from psvideo import __version__
-from psvideo.align.rounds import Rate
-from psvideo.clip import Clip
-from psvideo.export.publish import refuse_folder, whole_folder
+from psvideo.clip import Clip, Take
 from psvideo.export.space import CAMERA_SPACE, Space
 from psvideo.export.tags import Tags, sha256_of
-from psvideo.pipeline import (
-    Take,
-)
-from psvideo.plan import Plan
-from psvideo.sequence import FIRST_NUMBER
-from psvideo.timing import Timing, format_timing
+from psvideo.formats.timing_json import format_timing
+from psvideo.formats.whole_folders import refuse_folder, whole_folder
+from psvideo.model.plan import Plan
+from psvideo.model.timing import Timing
+from psvideo.plates.align.rounds import Rate
+from psvideo.plates.sequence import FIRST_NUMBER
 
 MARK = "timing.json"
 """The file by which a folder of plates or results is known."""

@@ -6,32 +6,27 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from psvideo.beauty import BEAUTY, Mix, beauty_of
-from psvideo.clip import Clip
+from psvideo.clip import Clip, Take
+from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import PsvideoError
 from psvideo.export.plates import plate_name, write_flash, write_plate
 from psvideo.export.results import Codec, Preview
 from psvideo.export.tags import Tags
 from psvideo.export.writer import writing
-from psvideo.files import write_text
-from psvideo.pipeline import (
-    Method,
-    Take,
-    Watch,
-    clip_rounds,
-    first_ambient,
-    unwatched,
-)
-from psvideo.plan import Plan
-from psvideo.rig import Rig
+from psvideo.formats.timing_json import format_timing
+from psvideo.formats.whole_files import write_text
+from psvideo.model.plan import Plan
+from psvideo.model.rig import Rig
+from psvideo.model.timing import Timing
+from psvideo.plates.beauty import BEAUTY, Mix, beauty_of
+from psvideo.plates.gather import Method, clip_rounds, first_ambient
+from psvideo.plates.sequence import AMBIENT, round_numbers
+from psvideo.report.run_report import RunReport
 from psvideo.runs.delivering import plates_of
 from psvideo.runs.handover import Finished, write_previews, write_timeline
 from psvideo.runs.look import look_at_plates
 from psvideo.runs.output import Output, folder_of, settings_of, tags_of
 from psvideo.runs.reporting import observing, run_report, write_report
-from psvideo.sequence import AMBIENT, round_numbers
-from psvideo.timing import Timing, format_timing
-from psvideo.view.report import RunReport
 
 SAMPLE_ROUND = 3
 """The round that the report shows, counted from 1; the first where there are fewer."""

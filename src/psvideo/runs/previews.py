@@ -14,10 +14,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.clip import exr
+from psvideo.clip.decode import exr
+from psvideo.compute.progress import Watch
 from psvideo.export.results import Codec, Preview
-from psvideo.pipeline import Watch
-from psvideo.view.shading import exposure_for, normal_colours, smaller, srgb
+from psvideo.pictures.shading import exposure_for, normal_colours, smaller, srgb
 
 Pixels = NDArray[np.uint8]
 Image = NDArray[np.float32]

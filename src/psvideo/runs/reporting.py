@@ -11,23 +11,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo import __version__
-from psvideo.clip import Clip
+from psvideo.clip import Clip, Take
 from psvideo.export.tags import sha256_of
-from psvideo.files import write_text
-from psvideo.pipeline import Take
-from psvideo.plan import Plan
-from psvideo.quality.judge_light import ambient, exposure, lamps
-from psvideo.quality.judge_result import focus, rig, steadiness, validity
-from psvideo.quality.judge_time import coverage, motion, timing_and_order
-from psvideo.quality.judgement import Judgement
-from psvideo.quality.observed import Observed
-from psvideo.quality.rigpoints import rig_points
-from psvideo.rig import Light, Rig
+from psvideo.formats.whole_files import write_text
+from psvideo.model.plan import Plan
+from psvideo.model.rig import Light, Rig
+from psvideo.model.timing import Timing
+from psvideo.report.judge.light import ambient, exposure, lamps
+from psvideo.report.judge.result import focus, rig, steadiness, validity
+from psvideo.report.judge.time import coverage, motion, timing_and_order
+from psvideo.report.judgement import Judgement
+from psvideo.report.observe.observed import Observed
+from psvideo.report.observe.rigpoints import rig_points
+from psvideo.report.page import report_page
+from psvideo.report.run_report import LightFacts, RunReport, report_record
 from psvideo.runs.lighting import Lighting
 from psvideo.runs.output import Output
-from psvideo.timing import Timing
-from psvideo.view.report import LightFacts, RunReport, report_record
-from psvideo.view.report_page import report_page
 
 Pixels = NDArray[np.uint8]
 LIBRARIES = ("numpy", "opencv-contrib-python-headless", "numba", "OpenEXR")

@@ -8,28 +8,23 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.align.rounds import Aligning, aligned
+from psvideo.clip import Take
+from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.mesh import animation_name
 from psvideo.export.results import Delivery, is_written, mesh_file
 from psvideo.export.tags import Tags
-from psvideo.export.usd import write_animation
+from psvideo.export.usd.scene import write_animation
 from psvideo.export.writer import writing
-from psvideo.files import write_text
-from psvideo.integrate import Shaping, reservations
-from psvideo.normals.solving import Solver, Solving, trust_note
-from psvideo.pipeline import (
-    Instant,
-    Take,
-    Watch,
-    clip_light_plates,
-    denoised,
-    first_ambient,
-    surfaces,
-    unwatched,
-)
-from psvideo.plan import Plan
-from psvideo.quality.observed import InstantFacts
+from psvideo.formats.timing_json import format_timing
+from psvideo.formats.whole_files import write_text
+from psvideo.model.plan import Plan
+from psvideo.model.timing import Timing
+from psvideo.plates.align.rounds import Aligning, aligned
+from psvideo.plates.gather import clip_light_plates, first_ambient
+from psvideo.plates.sequence import AMBIENT
+from psvideo.report.observe.observed import InstantFacts
+from psvideo.report.run_report import RunReport
 from psvideo.runs.delivering import check_delivery, surface_job, world_doubts, write_plates
 from psvideo.runs.handover import Finished, write_note, write_previews, write_timeline
 from psvideo.runs.lighting import Lighting
@@ -38,9 +33,9 @@ from psvideo.runs.output import Output, folder_of, settings_of, tags_of
 from psvideo.runs.plates import nothing_complete
 from psvideo.runs.reporting import Solved, observing, run_report, write_report
 from psvideo.runs.shape import shape_of
-from psvideo.sequence import AMBIENT
-from psvideo.timing import Timing, format_timing
-from psvideo.view.report import RunReport
+from psvideo.solve.depth import Shaping, reservations
+from psvideo.solve.instants import Instant, denoised, surfaces
+from psvideo.solve.normals.solving import Solver, Solving, trust_note
 
 Pixels = NDArray[np.uint8]
 SAMPLE_ROUND = 3

@@ -3,10 +3,10 @@
 from collections.abc import Callable
 from functools import partial
 
-from psvideo.integrate import Depth, Shaping, begun, depth_of
-from psvideo.pipeline import Instant
+from psvideo.model.surface import Surface
 from psvideo.runs.lighting import Lighting
-from psvideo.surface import Surface
+from psvideo.solve.depth import Depth, Shaping, begun, depth_of
+from psvideo.solve.instants import Instant
 
 
 def shape_of(

@@ -2,16 +2,14 @@
 
 from pathlib import Path
 
+from psvideo.clip import Take
+from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import PsvideoError
-from psvideo.naming import named_by_rig, named_first
-from psvideo.pipeline import (
-    Take,
-    Watch,
-    find_clip_timing,
-    unwatched,
-)
-from psvideo.rig import Rig
-from psvideo.timing import Timing, read_timing
+from psvideo.formats.timing_json import read_timing
+from psvideo.model.rig import Rig
+from psvideo.model.timing import Timing
+from psvideo.plates.naming import named_by_rig, named_first
+from psvideo.sync.of_take import find_take_timing
 
 
 def timing_of(
@@ -23,7 +21,7 @@ def timing_of(
     order is told by the ``rig`` where it can be. Raises PsvideoError where the file belongs to another clip.
     """
     if given is None:
-        timing = find_clip_timing(take, first_light=first_light, watch=watch)
+        timing = find_take_timing(take, first_light=first_light, watch=watch)
     else:
         timing = read_timing(given)
         wrong = _misfit(timing, take)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from psvideo.camera import FloatArray
+from psvideo.model.camera import FloatArray
 
 MOST_READINGS = 256
 """More are thinned: of those in one stretch of time the one with the shortest round trip is kept."""

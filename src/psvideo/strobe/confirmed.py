@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 from psvideo.errors import PsvideoError
-from psvideo.files import write_text
+from psvideo.formats.whole_files import write_text
 
 KEPT = 1000
 

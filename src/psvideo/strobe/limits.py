@@ -6,8 +6,8 @@ They stand in lights/protocol.md; the firmware has them once more by itself.
 import struct
 from collections.abc import Sequence
 
-from psvideo.strobe.lines import Error, crc16
-from psvideo.strobe.messages import Capabilities, Refusal, Slot
+from psvideo.strobe.link.lines import Error, crc16
+from psvideo.strobe.link.messages import Capabilities, Refusal, Slot
 
 LONGEST_DARK_TICKS = 2**31 - 1
 LONGEST_CYCLE_S = 60
@@ -17,7 +17,7 @@ CHECKED_LINES = 8
 def lit_ticks(slot: Slot, line: int) -> int:
     """Return for how many ticks of one flash a line is on.
 
-    >>> from psvideo.strobe.messages import Lit
+    >>> from psvideo.strobe.link.messages import Lit
     >>> lit_ticks(Slot(slot=0, duration=250, dark=200, period=100, lit=(Lit(line=1, on=40),)), 1)
     120
     """

@@ -9,9 +9,9 @@ nothing accumulates; ``Program.played`` is the plan with exactly the times and p
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from psvideo.capture.figures import slot_label
 from psvideo.errors import PsvideoError, UsageError, nearest
-from psvideo.plan import Plan, PlannedFlash
+from psvideo.model.plan import Plan, PlannedFlash
+from psvideo.model.shoot_figures import slot_label
 from psvideo.strobe.bursts import find_bursts, nearest_powers
 from psvideo.strobe.limits import (
     LONGEST_CYCLE_S,
@@ -23,7 +23,7 @@ from psvideo.strobe.limits import (
     slot_refusal,
     total_ppm,
 )
-from psvideo.strobe.messages import Arm, Capabilities, Lit, New, Request, Slot, Steps
+from psvideo.strobe.link.messages import Arm, Capabilities, Lit, New, Request, Slot, Steps
 
 PS_PER_S = 10**12
 STEPS_A_LINE = 20

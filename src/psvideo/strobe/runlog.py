@@ -11,13 +11,13 @@ from pathlib import Path
 from pydantic import Field, ValidationError
 
 from psvideo.errors import PsvideoError
-from psvideo.plan import UNKNOWN_CLOCK_PPM, Plan, PlannedFlash
+from psvideo.formats.contract import Contract, check_schema, read_text
+from psvideo.model.plan import UNKNOWN_CLOCK_PPM, Plan, PlannedFlash
 from psvideo.strobe.clock import ClockFit
 from psvideo.strobe.limits import lit_ticks
-from psvideo.strobe.messages import WiringName
+from psvideo.strobe.link.messages import WiringName
 from psvideo.strobe.program import PS_PER_S, Program
 from psvideo.strobe.session import Ended, Outcome, Ready
-from psvideo.tomlfile import Contract, check_schema, read_text
 
 SCHEMA = "psvideo-strobe/1"
 LOG_NAME = "strobe.json"

@@ -12,11 +12,11 @@ from datetime import UTC, datetime, timedelta
 from typing import Literal
 
 from psvideo.errors import PsvideoError
-from psvideo.plan import Plan
+from psvideo.model.plan import Plan
 from psvideo.strobe.clock import ClockFit, Reading, fit_clock
-from psvideo.strobe.greeting import START_WITHIN_S, greet
-from psvideo.strobe.link import Link
-from psvideo.strobe.messages import (
+from psvideo.strobe.link.greeting import START_WITHIN_S, greet
+from psvideo.strobe.link.link import Link
+from psvideo.strobe.link.messages import (
     Capabilities,
     Caps,
     Clear,

@@ -11,8 +11,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from psvideo.planfile import parse_fps
-from psvideo.tomlfile import Contract, read_toml
+from psvideo.formats.contract import Contract, read_toml
+from psvideo.formats.plan_toml import parse_fps
 
 SCHEMA = "psvideo-scene/1"
 

@@ -10,20 +10,20 @@ from pathlib import Path
 import numpy as np
 
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.export.publish import whole_folder
-from psvideo.files import refuse_existing
-from psvideo.planfile import format_plan
-from psvideo.rigfile import format_rig
-from psvideo.synth.encode import codes_of, mosaic, noise_of
-from psvideo.synth.frames import SUFFIX, write_frame
-from psvideo.synth.noise import frame_rng
-from psvideo.synth.render import View
+from psvideo.formats.plan_toml import format_plan
+from psvideo.formats.rig_toml import format_rig
+from psvideo.formats.whole_files import refuse_existing
+from psvideo.formats.whole_folders import whole_folder
+from psvideo.synth.camera.encode import codes_of, mosaic, noise_of
+from psvideo.synth.camera.frames import SUFFIX, write_frame
+from psvideo.synth.camera.noise import frame_rng
+from psvideo.synth.camera.sensor import Flicker, Image, expose_frames
+from psvideo.synth.lamps.strobe import StrobeClock, TrueFlash, true_flashes
+from psvideo.synth.lamps.traced import TraceOptions, traced_light
 from psvideo.synth.scene import read_scene
-from psvideo.synth.sensor import Flicker, Image, expose_frames
 from psvideo.synth.shotplan import claimed_plan, true_clock
 from psvideo.synth.stage import Stage, set_stage
-from psvideo.synth.strobe import StrobeClock, TrueFlash, true_flashes
-from psvideo.synth.traced import TraceOptions, traced_light
+from psvideo.synth.subject.render import View
 from psvideo.synth.truth import write_picture, write_scene_truth, write_surface, write_timing
 
 CLIPPED_WARNING = 0.005

@@ -4,13 +4,13 @@ import dataclasses
 
 import numpy as np
 
-from psvideo.camera import Camera, Encoding
-from psvideo.plan import Plan, PlannedFlash, default_dark_s
-from psvideo.planfile import parse_fps
-from psvideo.rig import Light, Rig, Vector
-from psvideo.synth.encode import codes_of
+from psvideo.formats.plan_toml import parse_fps
+from psvideo.model.camera import Camera, Encoding
+from psvideo.model.plan import Plan, PlannedFlash, default_dark_s
+from psvideo.model.rig import Light, Rig, Vector
+from psvideo.synth.camera.encode import codes_of
+from psvideo.synth.lamps.strobe import StrobeClock
 from psvideo.synth.scene import CameraTable, Kind, LightTable, Scene
-from psvideo.synth.strobe import StrobeClock
 
 
 def camera_of(table: CameraTable, kind: Kind) -> Camera:

@@ -10,16 +10,16 @@ from pathlib import Path
 
 import numpy as np
 
-from psvideo.plan import Plan
-from psvideo.rig import Rig
-from psvideo.synth.body import Body, make_body
-from psvideo.synth.emission import Emission
-from psvideo.synth.render import View, look
+from psvideo.model.plan import Plan
+from psvideo.model.rig import Rig
+from psvideo.synth.camera.sensor import Image
+from psvideo.synth.lamps.emission import Emission
+from psvideo.synth.lamps.strobe import TrueFlash, row_opens_s
 from psvideo.synth.scene import Scene
-from psvideo.synth.sensor import Image
-from psvideo.synth.shading import ambient_plate, flash_plate
 from psvideo.synth.shotplan import true_plan, true_rig
-from psvideo.synth.strobe import TrueFlash, row_opens_s
+from psvideo.synth.subject.body import Body, make_body
+from psvideo.synth.subject.render import View, look
+from psvideo.synth.subject.shading import ambient_plate, flash_plate
 from psvideo.synth.truth import as_seen
 
 

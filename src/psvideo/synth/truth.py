@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.export.exr import write_exr
-from psvideo.plan import Plan
-from psvideo.synth.render import Hits
+from psvideo.formats.exr_files import write_exr
+from psvideo.model.plan import Plan
+from psvideo.synth.lamps.strobe import StrobeClock, TrueFlash
+from psvideo.synth.lamps.traced import TracedLight
 from psvideo.synth.scene import Scene
-from psvideo.synth.strobe import StrobeClock, TrueFlash
-from psvideo.synth.traced import TracedLight
+from psvideo.synth.subject.render import Hits
 
 Plane = NDArray[np.float32]
 

@@ -1,0 +1,1 @@
+"""Where lights are, from their highlights on a mirror sphere."""

@@ -1,0 +1,201 @@
+"""A mirror sphere at one place, seen in one or several sets of pictures: its outline, and one highlight per light."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.calibrate.light_pictures import LightPictures
+from psvideo.calibrate.mirror.highlights import Found, Spot, find_highlights
+from psvideo.calibrate.sphere.outline import Outline, find_outlines, follow_outline, given_outline
+from psvideo.calibrate.sphere.search import Grey
+from psvideo.calibrate.sphere.view import View
+from psvideo.errors import PsvideoError, UsageError
+from psvideo.model.camera import FloatArray
+
+MOST_CUT = 0.15
+"""Share of the outline that may lie outside the picture."""
+LEAST_RADIUS_PX = 15.0
+
+
+class SphereNotFoundError(PsvideoError):
+    """No usable sphere in the pictures; ``picture`` (row, col), linear, shows where it was looked for."""
+
+    def __init__(self, message: str, picture: Grey) -> None:
+        """Keep the picture beside the message."""
+        super().__init__(message)
+        self.picture = picture
+
+
+@dataclass(frozen=True, kw_only=True)
+class Highlight:
+    """A light's highlight on one sphere over all sets: place (x, y), standard error in pixels, and what spoke against.
+
+    ``fault`` says why there is none; ``alike`` are other spots that could be it; ``rejected`` those that could not.
+    """
+
+    light: str
+    place: FloatArray | None
+    error_px: float = 0.0
+    radius_px: float = 0.0
+    clipped: bool = False
+    sets: int = 0
+    fault: str = ""
+    alike: tuple[Spot, ...] = ()
+    rejected: tuple[Spot, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sighting:
+    """A sphere at one place. ``picture`` (row, col), linear, is the brightest of all lights, for showing it.
+
+    ``moved_px`` is how far the outline moved between sets, root mean square.
+    """
+
+    where: str
+    outline: Outline
+    highlights: tuple[Highlight, ...]
+    picture: Grey
+    sets: int
+    moved_px: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Looking:
+    """How spheres are looked for: how many a picture holds, or where they are (x, y, radius), found by hand.
+
+    ``focal_px``, or ``focal_widths`` in widths of the picture, and ``principal_px`` give the pixels their rays.
+    """
+
+    spheres: int = 1
+    circles: tuple[tuple[float, float, float], ...] = ()
+    focal_px: float | None = None
+    focal_widths: float | None = None
+    principal_px: tuple[float, float] | None = None
+
+    def view(self, *, width_px: int, height_px: int) -> View:
+        """Return the view of pictures of this size; the lens's axis goes through their middle unless it is given."""
+        middle = ((width_px - 1) / 2, (height_px - 1) / 2)
+        focal_px = self.focal_px if self.focal_widths is None else self.focal_widths * width_px
+        return View(focal_px=focal_px, principal_px=self.principal_px or middle)
+
+
+def sight_spheres(
+    sets: Iterable[LightPictures], looking: Looking, *, where: str, room: NDArray[np.float32] | None = None
+) -> list[Sighting]:
+    """Return every sphere of a scene that stood still, with the mean place of each light's highlight.
+
+    ``room`` is a picture of the same scene on which the outline shows well, such as one under room light. Raises
+    SphereNotFoundError where fewer spheres than expected are found, or one is cut by the frame.
+    """
+    outlines: list[Outline] = []
+    fits: list[list[FloatArray]] = []
+    found: list[list[list[Found]]] = []
+    shown: Grey | None = None
+    for count, pictures in enumerate(sets, start=1):
+        brightest = pictures.grey.max(axis=0)
+        if shown is None:
+            shown = brightest
+            outlines = _first_outlines(pictures, looking, where, room)
+            fits, found = [[] for _ in outlines], [[] for _ in outlines]
+        for n, outline in enumerate(outlines):
+            fits[n].append(outline.place if outline.given or count == 1 else follow_outline(pictures, outline))
+            found[n].append(find_highlights(pictures, outline))
+    if shown is None:
+        raise PsvideoError(f"{where}: holds no pictures of lights. Name a folder of stills or plates, or a clip.")
+    return [
+        _sighting(_where(where, n, len(outlines)), outline, np.array(places), seen, shown)
+        for n, (outline, places, seen) in enumerate(zip(outlines, fits, found, strict=True))
+    ]
+
+
+def _where(where: str, n: int, count: int) -> str:
+    return where if count == 1 else f"{where}, sphere {n + 1}"
+
+
+def _first_outlines(
+    pictures: LightPictures, looking: Looking, where: str, room: NDArray[np.float32] | None
+) -> list[Outline]:
+    view = looking.view(width_px=pictures.width_px, height_px=pictures.height_px)
+    shown = pictures.grey.max(axis=0)
+    if looking.circles:
+        outlines = [given_outline(view, circle) for circle in looking.circles]
+    else:
+        if room is not None and room.shape[:2] != shown.shape:
+            raise UsageError(
+                f"{where}: the picture for the outline is {room.shape[1]} x {room.shape[0]} pixels, and those of "
+                f"the lights are {shown.shape[1]} x {shown.shape[0]}. Take both with the same camera and mode."
+            )
+        bright = room.mean(axis=2, dtype=np.float32) if room is not None and room.ndim == 3 else room
+        outlines = find_outlines(pictures, view, count=looking.spheres, room=bright)
+    if len(outlines) < max(looking.spheres, 1) and not looking.circles:
+        raise SphereNotFoundError(_not_found(where, len(outlines), looking.spheres), shown)
+    for outline in outlines:
+        _refuse_cut(outline, where, shown)
+    return sorted(outlines, key=lambda outline: float(outline.place[0]))
+
+
+def _not_found(where: str, found: int, wanted: int) -> str:
+    what = "no sphere" if not found else f"{found} of {wanted} spheres"
+    return (
+        f"{where}: {what} found: no round outline stands out from its background on a third of its length. Put "
+        "something lighter or darker behind the sphere, keep all of it in the picture, add a picture with the room "
+        "light on (--outline-picture), or mark the outline by hand with --circle x,y,radius."
+    )
+
+
+def _refuse_cut(outline: Outline, where: str, shown: Grey) -> None:
+    rows, cols = shown.shape
+    x, y, radius = outline.place[:3]
+    if radius < LEAST_RADIUS_PX:
+        raise SphereNotFoundError(
+            f"{where}: the sphere at {x:.0f},{y:.0f} has a radius of {radius:.1f} pixels, on which a highlight's place "
+            f"tells nothing; expected {LEAST_RADIUS_PX:.0f} at least, better 100. Go nearer, or use a larger sphere.",
+            shown,
+        )
+    rim = outline.view.curve(outline.place)
+    outside = 1.0 - float(((rim >= -0.5) & (rim <= (cols - 0.5, rows - 0.5))).all(axis=1).mean())
+    if outside > MOST_CUT:
+        raise SphereNotFoundError(
+            f"{where}: the sphere (centre {x:.0f},{y:.0f}, radius {radius:.0f} pixels) is cut by the frame of {cols} x "
+            f"{rows} pixels: {outside:.0%} of its outline lies outside. Frame the whole sphere with some room around "
+            "it; or, if that is not the sphere, mark it with --circle x,y,radius.",
+            shown,
+        )
+
+
+def _sighting(
+    where: str, outline: Outline, places: FloatArray, seen: Sequence[Sequence[Found]], picture: Grey
+) -> Sighting:
+    moved = float(np.sqrt(places[:, :2].var(axis=0).sum())) if len(places) > 2 else 0.0
+    if len(places) > 1 and not outline.given:
+        outline = replace(outline, place=np.median(places, axis=0))
+    lights = tuple(_over_sets([one[n] for one in seen]) for n in range(len(seen[0])))
+    return Sighting(where=where, outline=outline, highlights=lights, picture=picture, sets=len(places), moved_px=moved)
+
+
+def _over_sets(founds: Sequence[Found]) -> Highlight:
+    """Return the mean place of one light's highlight over sets; frames in which it is elsewhere are left out."""
+    last = founds[-1]
+    spots = [found.highlight for found in founds if found.highlight is not None]
+    rejected = tuple(spot for spot in last.others if spot not in last.alike)
+    if len(spots) * 2 <= len(founds):
+        fault = next((found.fault for found in founds if found.fault), "no highlight in most of the frames")
+        return Highlight(light=last.light, place=None, sets=len(spots), fault=fault, rejected=last.others)
+    places = np.array([spot.place for spot in spots])
+    away = np.linalg.norm(places - np.median(places, axis=0), axis=1)
+    near = away <= max(5 * float(np.median(away)), 2.0)
+    kept = [spot for spot, is_near in zip(spots, near, strict=True) if is_near]
+    scatter = places[near].var(axis=0, ddof=1).sum() / 2 / len(kept) if len(kept) > 1 else 0.0
+    shape = float(np.mean([spot.error_px for spot in kept]))
+    return Highlight(
+        light=last.light,
+        place=places[near].mean(axis=0),
+        error_px=float(np.sqrt(shape**2 + scatter)),
+        radius_px=float(np.mean([spot.radius_px for spot in kept])),
+        clipped=any(spot.clipped for spot in kept),
+        sets=len(kept),
+        alike=next((found.alike for found in founds if found.alike), ()),
+        rejected=rejected,
+    )

@@ -1,0 +1,1 @@
+"""The diagram of a shoot: when each row is open and each light is on."""

@@ -1,0 +1,148 @@
+"""Times, speeds, sizes and lists as people type them, each with its unit."""
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+
+from psvideo.errors import UsageError, nearest
+from psvideo.formats.plan_toml import parse_fps
+from psvideo.model.units import NTSC
+
+SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6}
+NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?"
+
+
+def parse_seconds(text: str, *, option: str) -> float:
+    """Return a time in seconds from text such as ``0.8ms``, ``800us``, ``1/1250s``; a bare 0 needs no unit.
+
+    Raises UsageError that names the option where the text is no time.
+
+    >>> parse_seconds("0.8ms", option="--flash"), parse_seconds("1/1250 s", option="--flash")
+    (0.0008, 0.0008)
+    """
+    found = re.fullmatch(rf"\s*({NUMBER})(?:\s*/\s*({NUMBER}))?\s*([a-zµμ]*)\s*", text, re.IGNORECASE)
+    unit = found[3].lower() if found else ""
+    if found is None or (unit not in SECONDS and not (unit == "" and float(found[1]) == 0)):
+        raise UsageError(
+            f"{option} {text!r} is not a time. Write a number and its unit, such as 0.8ms, 800us or 1/1250s."
+        )
+    below = float(found[2] or 1)
+    if below == 0:
+        raise UsageError(f"{option} {text!r} divides by zero. Write a time such as 0.8ms, 800us or 1/1250s.")
+    per_second = round(1 / SECONDS.get(unit, 1.0))
+    return float(found[1]) / below / per_second
+
+
+def parse_positive_seconds(text: str, *, option: str) -> float:
+    """Return a time above zero, as `parse_seconds` does."""
+    seconds = parse_seconds(text, option=option)
+    if not 0 < seconds < math.inf:
+        raise UsageError(f"{option} {text!r} is not above zero. Write a time such as 0.8ms or 800us.")
+    return seconds
+
+
+def parse_speed_px_s(text: str, *, field_width_m: float | None, width_px: int | None, option: str = "--speed") -> float:
+    """Return a speed in pixels per second from ``800`` or ``800px/s``, or from ``0.5m/s`` and the field's width.
+
+    >>> parse_speed_px_s("0.5 m/s", field_width_m=0.6, width_px=1920)
+    1600.0
+    """
+    found = re.fullmatch(rf"\s*({NUMBER})\s*(px/s|m/s)?\s*", text, re.IGNORECASE)
+    if found is None or not 0 < float(found[1]) < math.inf:
+        raise UsageError(f"{option} {text!r} is not a speed above zero. Write pixels per second (800) or 0.5m/s.")
+    if (found[2] or "px/s").lower() == "px/s":
+        return float(found[1])
+    if field_width_m is None or width_px is None:
+        raise UsageError(
+            f"{option} {text!r} is in metres per second, which needs the width of what the camera sees: add "
+            "--field-width, such as --field-width 0.6m, or give the speed in pixels per second."
+        )
+    return float(found[1]) / field_width_m * width_px
+
+
+def parse_metres(text: str, *, option: str) -> float:
+    """Return a length in metres from ``0.6m``, ``60cm``, ``600mm`` or a bare number of metres."""
+    found = re.fullmatch(rf"\s*({NUMBER})\s*(m|cm|mm)?\s*", text, re.IGNORECASE)
+    if found is None or not 0 < float(found[1]) < math.inf:
+        raise UsageError(f"{option} {text!r} is not a length above zero. Write it as 0.6m, 60cm or 600mm.")
+    return float(found[1]) / {"m": 1, "cm": 100, "mm": 1000}[(found[2] or "m").lower()]
+
+
+def parse_size_px(text: str, *, option: str = "--size") -> tuple[int, int]:
+    """Return (width, height) from ``1920x1080``."""
+    found = re.fullmatch(r"\s*(\d{1,6})\s*[x×*]\s*(\d{1,6})\s*", text, re.IGNORECASE)
+    if found is None or int(found[1]) == 0 or int(found[2]) == 0:
+        raise UsageError(f"{option} {text!r} is not a size. Write width x height in pixels, such as 1920x1080.")
+    return int(found[1]), int(found[2])
+
+
+def parse_rate(text: str, *, option: str = "--fps") -> Fraction:
+    """Return a frame rate; the usual roundings of broadcast rates (23.98, 59.94, 119.88) become the exact ratio.
+
+    >>> parse_rate("119.88"), parse_rate("120"), parse_rate("60000/1001")
+    (Fraction(120000, 1001), Fraction(120, 1), Fraction(60000, 1001))
+    """
+    try:
+        rate = parse_fps(text.strip())
+    except ValueError as fault:
+        raise UsageError(f"{option} {text!r} is not a frame rate: {fault}.") from None
+    whole = round(rate / NTSC)
+    exact = whole * NTSC
+    is_rounded = "." in text and rate.denominator > 1 and abs(rate / exact - 1) < Fraction(200, 1_000_000)
+    return exact if is_rounded and whole % 6 == 0 else rate
+
+
+def parse_lights(text: str) -> tuple[str, ...]:
+    """Return the lights' names from ``key,left,right``, in the order in which they will flash."""
+    names = tuple(name.strip() for name in text.split(","))
+    for name in names:
+        if re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]*", name) is None:
+            raise UsageError(
+                f"--lights {text!r}: {name!r} cannot name a light, because plates are kept in folders of that name. "
+                "Use letters, digits, - and _, such as --lights key,left,right."
+            )
+        if names.count(name) > 1:
+            raise UsageError(f"--lights {text!r} names {name!r} twice. Give every light a name of its own.")
+        if name.lower() == "ambient":
+            raise UsageError(f"--lights {text!r}: the name 'ambient' is taken by the dark slot. Choose another name.")
+    return names
+
+
+def parse_per_light(text: str, lights: Sequence[str], *, option: str) -> dict[str, str]:
+    """Return one text per light from ``0.8ms`` (all alike) or ``key=0.8ms,left=0.4ms,right=0.4ms`` (each one named)."""
+    if "=" not in text:
+        return dict.fromkeys(lights, text)
+    given: dict[str, str] = {}
+    for part in text.split(","):
+        name, equals, value = (piece.strip() for piece in part.partition("="))
+        if not equals or not value:
+            raise UsageError(f"{option} {text!r}: expected name=value in {part.strip()!r}, such as key=0.8ms.")
+        if name not in lights:
+            raise UsageError(
+                f"{option} {text!r} names {name!r}, which is not among the lights; {nearest(name, lights)}"
+            )
+        if name in given:
+            raise UsageError(f"{option} {text!r} gives {name!r} twice. Give one value for each light.")
+        given[name] = value
+    lacking = [name for name in lights if name not in given]
+    if lacking:
+        raise UsageError(
+            f"{option} {text!r} leaves out {', '.join(lacking)}. Give a value for every light, or one for all."
+        )
+    return given
+
+
+def parse_fraction(text: str, *, option: str) -> float:
+    """Return a share above 0 and at most 1 from ``0.1`` or ``10%``."""
+    found = re.fullmatch(rf"\s*({NUMBER})\s*(%?)\s*", text)
+    share = float(found[1]) / (100 if found[2] else 1) if found else math.nan
+    if not 0 < share <= 1:
+        raise UsageError(f"{option} {text!r} is not a share. Write a number above 0 and at most 1, or a percentage.")
+    return share
+
+
+def parse_powers(text: str, lights: Sequence[str]) -> Mapping[str, float]:
+    """Return the power of each light from ``0.5`` or ``key=1,left=0.5,right=0.5``."""
+    parts = parse_per_light(text, lights, option="--power")
+    return {name: parse_fraction(value, option="--power") for name, value in parts.items()}

@@ -1,0 +1,192 @@
+"""Movies: every frame at full depth, its place in time taken from the file's timestamps.
+
+Colours are converted by ``yuv`` with the matrix and range that the file is tagged with.
+"""
+
+from collections import deque
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import av
+import numpy as np
+from av.container import InputContainer
+from av.video.stream import VideoStream
+
+from psvideo.clip.decode.planes import planes
+from psvideo.clip.decode.yuv import CODES, HIGHEST, LOWEST, LUMA_WEIGHTS, signal_range, to_rgb
+from psvideo.clip.record import Header, Picture
+from psvideo.errors import PsvideoError
+
+VIDEO_RANGE, FULL_RANGE = 1, 2  # FFmpeg's AVCOL_RANGE_MPEG and AVCOL_RANGE_JPEG
+UNTAGGED = 2  # matrix coefficients "unspecified" (H.273)
+HD_HEIGHT_PX = 720
+UNEVEN = 0.25
+MOST_REORDERED = 16  # frames by which H.264 and H.265 may put decoding before showing
+AS_RECORDED = {"ignore_editlist": "1"}  # all frames that the camera wrote, whatever an edit list would show
+
+
+@dataclass(frozen=True, kw_only=True)
+class Movie:
+    """A movie's first frame's header and, in the order of time, every frame's timestamp and place.
+
+    ``places`` count frames from the first; a gap of whole frames between timestamps leaves places out. ``rate_hz`` is
+    the rate at which the file plays, None where a single frame tells none; rounded timestamps leave it unsure by the
+    share ``rate_error``.
+    """
+
+    header: Header
+    timestamps: tuple[int, ...]
+    places: tuple[int, ...]
+    rate_hz: float | None
+    rate_error: float = 0.0
+
+
+def index_movie(path: Path) -> Movie:
+    """Read a movie's header, first frame and timestamps. Raises PsvideoError where it is damaged or truncated."""
+    with _opened(path) as (container, stream):
+        timestamps = _timestamps(container, stream)
+        time_base_s = float(stream.time_base or 1)
+        length_s = (container.duration or 0) / av.time_base
+        promised = stream.frames
+        code = container.metadata.get("timecode") or stream.metadata.get("timecode")
+    places, period = _places(path, timestamps)
+    if not promised and period:
+        promised = int(length_s / (period * time_base_s) - 0.5)
+    if not timestamps or (len(timestamps) < promised and places[-1] + 1 < promised):
+        raise PsvideoError(
+            f"{path}: holds {len(timestamps)} frames, and its header promises {promised}: it is truncated. "
+            "Copy it again."
+        )
+    header = next(read_movie(path, timestamps[:1])).header
+    return Movie(
+        header=replace(header, time_code=code),
+        timestamps=timestamps,
+        places=places,
+        rate_hz=1 / (period * time_base_s) if period else None,
+        rate_error=1 / (timestamps[-1] - timestamps[0]) if period else 0.0,
+    )
+
+
+def read_movie(path: Path, timestamps: Sequence[int]) -> Iterator[Picture]:
+    """Decode the frames with these timestamps, in ascending order.
+
+    Raises PsvideoError where one of them cannot be decoded or does not come.
+    """
+    wanted = deque(timestamps)
+    with _opened(path) as (container, stream):
+        if wanted[0] > (stream.start_time or 0):
+            container.seek(_safe_start(stream, wanted[0]), stream=stream)
+        for frame in container.decode(stream):
+            if frame.pts is None or frame.pts < wanted[0]:
+                continue
+            if frame.pts > wanted[0] or frame.is_corrupt:  # a damaged frame is painted over, and flagged
+                break
+            yield _picture(path, frame)
+            wanted.popleft()
+            if not wanted:
+                return
+    raise PsvideoError(
+        f"{path}: the frame with timestamp {wanted[0]} cannot be decoded; the movie is truncated or damaged there. "
+        "Copy it again, or choose other frames with --frames."
+    )
+
+
+def _safe_start(stream: VideoStream, timestamp: int) -> int:
+    """Return where to seek for a frame. Files are searched by the order of decoding, which B-frames' own runs ahead."""
+    if not stream.codec_context.has_b_frames or not stream.average_rate:
+        return timestamp
+    period = float(1 / (stream.average_rate * (stream.time_base or 1)))
+    return max(timestamp - int(MOST_REORDERED * period), stream.start_time or 0)
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[tuple[InputContainer, VideoStream]]:
+    """Open a movie and its first video stream."""
+    try:
+        with av.open(str(path), options=AS_RECORDED) as container:
+            if not container.streams.video:
+                raise PsvideoError(f"{path}: holds no video. Name the movie that the camera recorded.")
+            stream = container.streams.video[0]
+            stream.thread_type = "AUTO"
+            yield container, stream
+    except (av.FFmpegError, UnicodeDecodeError) as fault:
+        raise PsvideoError(
+            f"{path}: cannot be decoded; it is truncated, damaged or of a kind that is not read ({fault}). "
+            "Copy it again from the camera's card."
+        ) from fault
+
+
+def _timestamps(container: InputContainer, stream: VideoStream) -> tuple[int, ...]:
+    """Return every frame's timestamp in the order of time, from the file's index where that holds all of them."""
+    index = stream.index_entries
+    if len(index) == stream.frames > 0 and not stream.codec_context.has_b_frames:
+        return tuple(entry.timestamp for entry in index)
+    packets = (packet for packet in container.demux(stream) if packet.size and not packet.is_discard)
+    return tuple(sorted(packet.pts for packet in packets if packet.pts is not None and not packet.is_corrupt))
+
+
+def _places(path: Path, timestamps: Sequence[int]) -> tuple[tuple[int, ...], float]:
+    """Return each frame's place in time, counted in frames, and the frame period in the timestamps' unit."""
+    steps = np.diff(np.array(timestamps, np.float64))
+    if not steps.size:
+        return (0,), 0.0
+    usual = float(np.median(steps))
+    period = float(steps[np.abs(steps - usual) < 0.5 * usual].mean()) if usual > 0 else 0.0
+    counts = np.rint(steps / period) if period else np.zeros_like(steps)
+    period = float(steps.sum() / max(counts.sum(), 1.0))
+    uneven = np.abs(steps - counts * period) > max(UNEVEN * period, 1.0)
+    if uneven.any() or (counts < 1).any():
+        raise PsvideoError(
+            f"{path}: its frames do not come at an even rate ({int(uneven.sum())} of {steps.size} steps between "
+            "timestamps are no whole number of frames), so their times are not known. Record at a constant frame rate."
+        )
+    return (0, *(int(place) for place in np.cumsum(counts))), period
+
+
+def _picture(path: Path, frame: av.VideoFrame) -> Picture:
+    """Take a decoded frame's planes and make R'G'B' codes of them."""
+    if frame.interlaced_frame:
+        raise PsvideoError(f"{path}: is interlaced; expected whole frames. Record progressive footage.")
+    found = planes(path, frame)
+    bits = frame.format.components[0].bits
+    is_yuv = frame.format.name.startswith("yuv") or (not frame.format.is_rgb and len(found) > 1)
+    full_by_name = frame.format.name.startswith("yuvj") or not is_yuv
+    video_range = frame.color_range == VIDEO_RANGE or (frame.color_range != FULL_RANGE and not full_by_name)
+    zero, one = signal_range(bits, video_range=video_range)
+    header = Header(
+        width_px=frame.width,
+        height_px=frame.height,
+        channels=3 if len(found) > 2 else 1,
+        bits=bits,
+        signal_at_0=-zero / (one - zero),
+        signal_per_code=1 / (one - zero),
+        video_range=video_range,
+        warnings=("the movie's alpha channel is left out",) if len(found) in (2, 4) else (),
+    )
+    if not is_yuv:
+        return Picture(header=header, codes=found[0] if len(found) < 3 else np.stack(found[:3], axis=-1))
+    matrix, warnings = _matrix(path, frame)
+    codes = to_rgb(found[0], found[1], found[2], bits=bits, matrix=matrix, video_range=video_range)
+    span = (HIGHEST - LOWEST) / CODES
+    header = replace(header, signal_at_0=LOWEST, signal_per_code=span, warnings=header.warnings + warnings)
+    return Picture(header=header, codes=codes)
+
+
+def _matrix(path: Path, frame: av.VideoFrame) -> tuple[int, tuple[str, ...]]:
+    """Return the matrix coefficients that the frame is tagged with, or what its height makes likely, with a note."""
+    tagged = int(frame.colorspace)
+    if tagged in LUMA_WEIGHTS:
+        return tagged, ()
+    if tagged != UNTAGGED:
+        names = ", ".join(sorted({name for name, *_ in LUMA_WEIGHTS.values()}))
+        raise PsvideoError(
+            f"{path}: its colours are coded with matrix {tagged} (ITU-T H.273), which is not read; expected {names} or "
+            "RGB. Export the movie with one of these."
+        )
+    likely = 1 if frame.height >= HD_HEIGHT_PX else 6
+    return likely, (
+        "the movie does not say which matrix its colours are coded with; taken for "
+        f"{LUMA_WEIGHTS[likely][0]}, as is usual at {frame.height} rows",
+    )

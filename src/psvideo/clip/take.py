@@ -1,0 +1,34 @@
+"""A take: a clip that is open, and the frames of it that are to be used."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from psvideo.clip.kept import Kept, keeping_near
+from psvideo.clip.record import Clip
+from psvideo.model.plan import Plan
+
+
+@dataclass(frozen=True, kw_only=True)
+class Take:
+    """A clip that is open, and the numbers of its frames that are to be used.
+
+    ``kept`` holds pictures that are decoded already, and takes those that will be looked at again.
+    """
+
+    clip: Clip
+    numbers: tuple[int, ...]
+    kept: Kept | None = None
+
+    @property
+    def plan(self) -> Plan:
+        """The plan that the strobe played."""
+        return self.clip.plan
+
+
+@contextmanager
+def decoded_once(take: Take, *, output: Path) -> Iterator[Take]:
+    """Give the take with a store for its decoded frames, on the disk of ``output``; at the end the store is gone."""
+    with keeping_near(output) as kept:
+        yield replace(take, kept=kept)

@@ -1,0 +1,1 @@
+"""How hot loops are compiled, kept on disk and shared between threads."""

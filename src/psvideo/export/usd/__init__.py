@@ -1,0 +1,1 @@
+"""Animated meshes and cameras as USD."""

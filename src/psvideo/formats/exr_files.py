@@ -1,0 +1,160 @@
+"""One EXR file: named channels with their attributes, losslessly compressed (ZIP), whole or not at all.
+
+The picture is encoded in memory and then written as bytes, so that a full disk is an ordinary error: OpenEXR itself
+swallows what goes wrong while it closes a file, and leaves a truncated one.
+"""
+
+import io
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+from numpy.typing import NDArray
+
+from psvideo.errors import PsvideoError
+from psvideo.formats.whole_files import whole_file
+
+HALF_MAX = 65504.0  # the largest finite half float
+_INT32_MAX = 2**31 - 1
+
+Channels = Mapping[str, NDArray[np.floating]]
+Attribute = str | int | float | Fraction
+
+
+@dataclass(frozen=True, kw_only=True)
+class Crop:
+    """Where a cut-out picture lies in the whole one: its top left pixel, and the whole picture's size."""
+
+    row: int
+    col: int
+    full_height_px: int
+    full_width_px: int
+
+
+def write_exr(
+    path: Path,
+    channels: Channels,
+    *,
+    half: bool = True,
+    attributes: Mapping[str, Attribute] | None = None,
+    fps: Fraction | None = None,
+    time_code: str | None = None,
+    crop: Crop | None = None,
+) -> None:
+    """Write one picture; the file appears under its name when it is whole, and folders are made as needed.
+
+    ``channels`` maps names ("R", "G", "B", "Y", "valid") to planes of one shape (row, col). ``half`` stores 16-bit
+    floats, and values beyond ±65504 as ±65504, the largest it has; otherwise 32-bit. ``attributes`` go into the header
+    as text, int or float (32-bit: EXR's readers in Python give other numbers as arrays). ``fps`` becomes the standard
+    attribute framesPerSecond, ``time_code`` ("01:02:03:04", or ";04" for drop frame) timeCode. With ``crop`` the
+    planes are a part of a larger picture: displayWindow stays whole, dataWindow is the part.
+
+    Raises PsvideoError where the file cannot be written, and ValueError for what must never be in a file: NaN,
+    infinity, planes of different shapes.
+    """
+    planes = {name: _plane(name, values, half) for name, values in channels.items()}
+    shapes = {plane.shape for plane in planes.values()}
+    if len(shapes) != 1:
+        raise ValueError(f"{path}: the channels' planes differ in shape or there are none: {sorted(shapes)}")
+    header = dict(attributes or {}) | _header(shapes.pop(), fps, time_code, crop)
+    with whole_file(path) as beside:
+        beside.write_bytes(_encoded(path, header, planes))
+
+
+def _plane(name: str, values: NDArray[np.floating], half: bool) -> NDArray[np.floating]:
+    """The channel as it is stored. OpenEXR takes every array for contiguous, and writes strided ones garbled."""
+    if values.ndim != 2:
+        raise ValueError(f"channel {name!r} has shape {values.shape}; expected (row, col)")
+    if values.dtype == np.float16:
+        stored, finite = values, not np.any((values.view(np.uint16) & 0x7C00) == 0x7C00)
+    else:
+        stored, finite = values.astype(np.float32, order="C", copy=False), bool(np.isfinite(values).all())
+    if not finite:
+        raise ValueError(f"channel {name!r} holds NaN or infinity; missing pixels are 0 and marked in 'valid'")
+    if not half:
+        return np.ascontiguousarray(stored, np.float32)
+    if stored.dtype != np.float16:
+        stored = np.clip(stored, -HALF_MAX, HALF_MAX).astype(np.float16)
+    return np.ascontiguousarray(stored)
+
+
+def _header(
+    shape: tuple[int, ...], fps: Fraction | None, time_code: str | None, crop: Crop | None
+) -> dict[str, object]:
+    rows, cols = shape
+    whole = crop or Crop(row=0, col=0, full_height_px=rows, full_width_px=cols)
+    if not (0 <= whole.row <= whole.full_height_px - rows and 0 <= whole.col <= whole.full_width_px - cols):
+        raise ValueError(f"a part of {rows} x {cols} pixels does not lie inside {whole}")
+    header: dict[str, object] = {
+        "type": OpenEXR.scanlineimage,
+        "compression": OpenEXR.ZIP_COMPRESSION,
+        "dataWindow": _box(whole.row, whole.col, rows, cols),
+        "displayWindow": _box(0, 0, whole.full_height_px, whole.full_width_px),
+    }
+    if fps is not None:
+        header["framesPerSecond"] = _rational(fps)
+    if time_code is not None:
+        header["timeCode"] = _time_code(time_code)
+    return header
+
+
+def _box(row: int, col: int, rows: int, cols: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    return np.array([col, row], np.int32), np.array([col + cols - 1, row + rows - 1], np.int32)
+
+
+def _rational(fps: Fraction) -> Fraction:
+    """The rate as EXR stores it: numerator and denominator of 32 bits."""
+    for limit in (_INT32_MAX, 1_000_000, 1_001):
+        near = fps.limit_denominator(limit)
+        if 0 < near.numerator <= _INT32_MAX:
+            return near
+    raise ValueError(f"{fps} is no frame rate")
+
+
+def _time_code(text: str) -> "OpenEXR.TimeCode":
+    """SMPTE time code: hours, minutes, seconds and frame (0 to 29) of ``01:02:03:04``."""
+    code = OpenEXR.TimeCode()
+    head, separator, frame = text.rpartition(";") if ";" in text else text.rpartition(":")
+    hours, minutes, seconds = (int(part) for part in head.split(":"))
+    code.hours, code.minutes, code.seconds, code.frame = hours, minutes, seconds, int(frame)
+    code.dropFrame = separator == ";"
+    return code
+
+
+def write_exr_parts(
+    path: Path,
+    parts: Mapping[str, Channels],
+    *,
+    half: bool | Mapping[str, bool] = True,
+    attributes: Mapping[str, Mapping[str, Attribute]],
+    fps: Fraction | None = None,
+    time_code: str | None = None,
+) -> None:
+    """Write one file with a part per name; each has its own channels and ``attributes``, else as ``write_exr``.
+
+    ``half`` may be given part by part.
+    """
+    built = []
+    for name, channels in parts.items():
+        short = half if isinstance(half, bool) else half[name]
+        planes = {channel: _plane(channel, values, short) for channel, values in channels.items()}
+        header = dict(attributes[name]) | _header(next(iter(planes.values())).shape, fps, time_code, None)
+        built.append(OpenEXR.Part(header, planes, name))
+    with whole_file(path) as beside:
+        beside.write_bytes(_bytes_of(path, lambda: OpenEXR.File(built)))
+
+
+def _encoded(path: Path, header: dict[str, object], planes: dict[str, NDArray[np.floating]]) -> memoryview:
+    return _bytes_of(path, lambda: OpenEXR.File(header, planes))
+
+
+def _bytes_of(path: Path, build: Callable[[], "OpenEXR.File"]) -> memoryview:
+    stream = io.BytesIO()
+    try:
+        build().write(stream)
+    except RuntimeError as fault:  # what OpenEXR raises for all its faults
+        raise PsvideoError(f"{path}: OpenEXR cannot encode this picture: {fault}") from fault
+    return stream.getbuffer()

@@ -1,0 +1,218 @@
+"""plan.toml: the capture plan as a file (schema ``psvideo-plan/1``)."""
+
+from fractions import Fraction
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+import tomlkit
+from pydantic import Field, field_validator, model_validator
+
+from psvideo.errors import PsvideoError
+from psvideo.formats.contract import Contract, check_light_name, parse_toml, read_text
+from psvideo.model.camera import Camera, Encoding
+from psvideo.model.plan import Plan, PlannedFlash, default_dark_s
+
+SCHEMA = "psvideo-plan/1"
+CFA_PATTERNS = ("RGGB", "BGGR", "GRBG", "GBRG")
+
+Power = Annotated[float, Field(ge=0, le=1)]
+
+
+class _Camera(Contract):
+    name: str = "camera"
+    width_px: int = Field(gt=0)
+    height_px: int = Field(gt=0)
+    fps: int | float | str
+    shutter_deg: float | None = Field(default=None, gt=0, le=360)
+    exposure_s: float | None = Field(default=None, gt=0)
+    readout_s: float | Literal["unknown"] | None = None
+    transfer: str = "linear"
+    black_level: float | None = None
+    white_level: float | None = None
+    cfa: Literal["RGGB", "BGGR", "GRBG", "GBRG"] | None = None
+
+    @field_validator("fps")
+    @classmethod
+    def _fps_is_a_rate(cls, fps: float | str) -> float | str:
+        parse_fps(fps)
+        return fps
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        if self.shutter_deg is not None and self.exposure_s is not None:
+            raise ValueError("shutter_deg and exposure_s are both given; expected one of the two")
+        period_s = float(1 / parse_fps(self.fps))
+        if self.exposure_s is not None and self.exposure_s > period_s * (1 + 1e-6):
+            raise ValueError(f"exposure_s is {self.exposure_s:g}, longer than the frame period of {period_s:.6g} s")
+        if isinstance(self.readout_s, float) and abs(self.readout_s) > period_s * (1 + 1e-3):
+            raise ValueError(f"readout_s is {self.readout_s:g}, longer than the frame period of {period_s:.6g} s")
+        levels = (self.black_level, self.white_level)
+        if levels[0] is not None and levels[1] is not None and levels[0] >= levels[1]:
+            raise ValueError(f"black_level is {levels[0]:g}; expected below white_level, which is {levels[1]:g}")
+        return self
+
+
+class _Flash(Contract):
+    lights: dict[str, Power]
+    duration_s: float | None = Field(default=None, gt=0)
+
+    @field_validator("lights")
+    @classmethod
+    def _names_can_name_files(cls, lights: dict[str, Power]) -> dict[str, Power]:
+        for name in lights:
+            check_light_name(name)
+        return lights
+
+
+class _Strobe(Contract):
+    mode: Literal["rolling", "half-rate", "synced"] = "rolling"
+    dark_s: float | None = Field(default=None, ge=0)
+    rise_s: float = Field(default=0.0, ge=0)
+    fall_s: float = Field(default=0.0, ge=0)
+    clock_tolerance_ppm: Annotated[float, Field(ge=0, le=10_000)] | Literal["unknown"] = 100.0
+    dark_every: int = Field(default=1, ge=1)
+    flash: list[_Flash] = Field(min_length=1)
+
+
+class _PlanFile(Contract):
+    schema_: str = Field(alias="schema")
+    camera: _Camera
+    strobe: _Strobe
+
+    @model_validator(mode="after")
+    def _has_what_its_mode_needs(self) -> Self:
+        if not any(power > 0 for flash in self.strobe.flash for power in flash.lights.values()):
+            raise ValueError("strobe.flash lights no light at all; expected at least one flash such as { key = 1.0 }")
+        if self.strobe.mode == "synced":
+            return self
+        missing = [f"strobe.flash[{i + 1}].duration_s" for i, f in enumerate(self.strobe.flash) if f.duration_s is None]
+        if self.camera.shutter_deg is None and self.camera.exposure_s is None:
+            missing.append("camera.shutter_deg (or camera.exposure_s)")
+        if self.camera.readout_s is None:
+            missing.append('camera.readout_s (in seconds, or "unknown")')
+        if missing:
+            raise ValueError(f"a {self.strobe.mode} plan needs {' and '.join(missing)}, which is missing")
+        return self
+
+
+def parse_fps(fps: float | str) -> Fraction:
+    """Return a frame rate as the exact ratio that it is written as; raises ValueError where it is none.
+
+    >>> parse_fps("120000/1001")
+    Fraction(120000, 1001)
+    >>> parse_fps(23.976)
+    Fraction(2997, 125)
+    """
+    try:
+        rate = Fraction(str(fps))
+    except (ValueError, ZeroDivisionError):
+        raise ValueError('expected a number or a ratio as text, such as 100 or "120000/1001"') from None
+    if not 0 < rate <= 1_000_000:
+        raise ValueError("expected a rate above 0")
+    return rate
+
+
+def read_plan(path: Path) -> Plan:
+    """Read plan.toml. Raises PsvideoError that names file, key, what was found and what was expected."""
+    return parse_plan(read_text(path), source=str(path))
+
+
+def parse_plan(text: str, *, source: str = "plan") -> Plan:
+    """Read a plan from TOML text; ``source`` is what messages call it."""
+    file = parse_toml(text, _PlanFile, SCHEMA, source=source)
+    camera = _camera(file.camera)
+    strobe = file.strobe
+    flashes = tuple(
+        PlannedFlash(lights=dict(flash.lights), duration_s=flash.duration_s or camera.frame_period_s)
+        for flash in strobe.flash
+    )
+    tolerance = None if strobe.clock_tolerance_ppm == "unknown" else strobe.clock_tolerance_ppm
+    dark_s = strobe.dark_s
+    if dark_s is None:
+        durations_s = [flash.duration_s for flash in flashes]
+        dark_s = default_dark_s(camera, durations_s, mode=strobe.mode, clock_tolerance_ppm=tolerance)
+    return Plan(
+        camera=camera,
+        flashes=flashes,
+        dark_s=dark_s,
+        mode=strobe.mode,
+        rise_s=strobe.rise_s,
+        fall_s=strobe.fall_s,
+        clock_tolerance_ppm=tolerance,
+        dark_every=strobe.dark_every,
+    )
+
+
+def _camera(file: _Camera) -> Camera:
+    fps = parse_fps(file.fps)
+    exposure_s = file.exposure_s
+    if exposure_s is None:
+        exposure_s = (file.shutter_deg or 360.0) / 360.0 * float(1 / fps)
+    readout_s = None if file.readout_s == "unknown" else file.readout_s or 0.0
+    encoding = Encoding(
+        transfer=file.transfer, black_level=file.black_level, white_level=file.white_level, cfa=file.cfa
+    )
+    return Camera(
+        name=file.name,
+        width_px=file.width_px,
+        height_px=file.height_px,
+        fps=fps,
+        exposure_s=exposure_s,
+        readout_s=readout_s,
+        encoding=encoding,
+    )
+
+
+def format_plan(plan: Plan) -> str:
+    """Return the plan as TOML text; reading it back gives an equal plan."""
+    document = tomlkit.document()
+    document["schema"] = SCHEMA
+    document["camera"] = _camera_table(plan.camera)
+    strobe = tomlkit.table()
+    strobe["mode"] = plan.mode
+    strobe["dark_s"] = plan.dark_s
+    strobe["rise_s"] = plan.rise_s
+    strobe["fall_s"] = plan.fall_s
+    strobe["clock_tolerance_ppm"] = "unknown" if plan.clock_tolerance_ppm is None else plan.clock_tolerance_ppm
+    strobe["dark_every"] = plan.dark_every
+    flashes = tomlkit.aot()
+    for flash in plan.flashes:
+        table = tomlkit.table()
+        lights = tomlkit.inline_table()
+        lights.update(dict(flash.lights))
+        table["lights"] = lights
+        table["duration_s"] = flash.duration_s
+        flashes.append(table)
+    strobe["flash"] = flashes
+    document["strobe"] = strobe
+    return tomlkit.dumps(document)
+
+
+def _camera_table(camera: Camera) -> tomlkit.items.Table:
+    table = tomlkit.table()
+    table["name"] = camera.name
+    table["width_px"] = camera.width_px
+    table["height_px"] = camera.height_px
+    table["fps"] = camera.fps.numerator if camera.fps.denominator == 1 else str(camera.fps)
+    table["exposure_s"] = camera.exposure_s
+    table["readout_s"] = "unknown" if camera.readout_s is None else camera.readout_s
+    table["transfer"] = camera.encoding.transfer
+    for key in ("black_level", "white_level", "cfa"):
+        value = getattr(camera.encoding, key)
+        if value is not None:
+            table[key] = value
+    return table
+
+
+def find_plan(path: Path, *, given: Path | None = None) -> Path:
+    """Return the plan that belongs to a clip: the one given, else plan.toml in the folder or beside the movie."""
+    if given is not None:
+        return given
+    folder = path if path.is_dir() else path.parent
+    plan = folder / "plan.toml"
+    if not plan.is_file():
+        raise PsvideoError(
+            f"{folder}: there is no plan.toml here. Put the plan that the strobe played beside the footage, "
+            "name it with --plan FILE, or write one with psvideo capture-plan."
+        )
+    return plan

@@ -1,0 +1,101 @@
+"""A timing as timing.json (schema ``psvideo-timing/1``)."""
+
+import json
+from pathlib import Path
+
+from pydantic import Field, ValidationError
+
+from psvideo.errors import PsvideoError
+from psvideo.formats.contract import Contract, check_schema, read_text
+from psvideo.model.timing import DroppedFrames, Flash, Order, Timing
+
+SCHEMA = "psvideo-timing/1"
+
+
+class _FlashFile(Contract):
+    index: int
+    slot: int = Field(ge=0)
+    lights: dict[str, float]
+    start_s: float
+    duration_s: float = Field(gt=0)
+    complete: bool
+    plate: str | None = None
+
+
+class _DroppedFile(Contract):
+    after: int
+    count: int = Field(gt=0)
+
+
+class _TimingFile(Contract):
+    schema_: str = Field(alias="schema")
+    clip: str
+    frame_period_s: float = Field(gt=0)
+    exposure_s: float = Field(gt=0)
+    row_time_s: float
+    clock_offset_ppm: float
+    phase_error_rows: float = Field(ge=0)
+    order: Order
+    order_note: str = ""
+    dropped_frames: list[_DroppedFile] = Field(default_factory=list)
+    repeated_frames: list[int] = Field(default_factory=list)
+    flashes: list[_FlashFile]
+
+
+def read_timing(path: Path) -> Timing:
+    """Read timing.json. Raises PsvideoError that names the file, the key and what was expected."""
+    try:
+        data = json.loads(read_text(path))
+        check_schema(data.get("schema"), SCHEMA, source=str(path))
+        file = _TimingFile.model_validate(data)
+    except (json.JSONDecodeError, AttributeError) as fault:
+        raise PsvideoError(f"{path}: not a JSON object ({fault}). Make it again with psvideo sync.") from fault
+    except ValidationError as fault:
+        first = fault.errors()[0]
+        key = ".".join(map(str, first["loc"]))
+        raise PsvideoError(f"{path}: key '{key}': {first['msg']}. Make it again with psvideo sync.") from None
+    flashes = tuple(Flash(**flash.model_dump()) for flash in file.flashes)
+    dropped = tuple(DroppedFrames(after=hole.after, count=hole.count) for hole in file.dropped_frames)
+    scalars = file.model_dump(exclude={"schema_", "flashes", "dropped_frames", "repeated_frames"})
+    repeated = tuple(file.repeated_frames)
+    return Timing(flashes=flashes, dropped_frames=dropped, repeated_frames=repeated, **scalars)
+
+
+def timing_record(timing: Timing) -> dict[str, object]:
+    """Return the timing as what timing.json holds."""
+    order_note = {"order_note": timing.order_note} if timing.order_note else {}
+    repeated = {"repeated_frames": list(timing.repeated_frames)} if timing.repeated_frames else {}
+    return {
+        "schema": SCHEMA,
+        "clip": timing.clip,
+        "frame_period_s": timing.frame_period_s,
+        "exposure_s": timing.exposure_s,
+        "row_time_s": timing.row_time_s,
+        "clock_offset_ppm": timing.clock_offset_ppm,
+        "phase_error_rows": timing.phase_error_rows,
+        "order": timing.order,
+        **order_note,
+        "dropped_frames": [{"after": hole.after, "count": hole.count} for hole in timing.dropped_frames],
+        **repeated,
+        "flashes": [_flash_row(flash) for flash in timing.flashes],
+    }
+
+
+def format_timing(timing: Timing) -> str:
+    """Return the timing as JSON text, one flash a line; reading it back gives an equal timing."""
+    record = timing_record(timing)
+    rows = ",\n  ".join(json.dumps(row) for row in map(_flash_row, timing.flashes))
+    head = json.dumps(record | {"flashes": []}, indent=1)
+    return head.removesuffix("[]\n}") + f"[\n  {rows}\n ]\n}}\n"
+
+
+def _flash_row(flash: Flash) -> dict[str, object]:
+    row: dict[str, object] = {
+        "index": flash.index,
+        "slot": flash.slot,
+        "lights": dict(flash.lights),
+        "start_s": flash.start_s,
+        "duration_s": flash.duration_s,
+        "complete": flash.complete,
+    }
+    return row if flash.plate is None else row | {"plate": flash.plate}

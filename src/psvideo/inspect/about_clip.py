@@ -1,0 +1,115 @@
+"""What can be said of a clip: whether its frames are alike and fit the plan, before any long run begins."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from psvideo.clip.decode.decoders import read_header
+from psvideo.clip.opening import open_clip
+from psvideo.clip.reading import looks, read_frames
+from psvideo.clip.record import Clip, holes
+from psvideo.errors import PsvideoError
+from psvideo.inspect.about_plan import length_finding, plan_findings, rig_findings
+from psvideo.inspect.findings import Description, Fact, Finding, caught, fault, ok, warn
+
+MANY = 3
+SATURATED_SHARE = 0.01
+DIM = 0.05
+
+
+def describe_clip(path: Path, plan: Path | None) -> Description:
+    """Describe a folder of frames or a movie, with the plan that belongs to it."""
+    what = "clip folder" if path.is_dir() else "movie"
+    try:
+        clip = open_clip(path, plan=plan)
+    except PsvideoError as error:
+        return Description(path=path, kind=what, findings=(fault(error),))
+    findings = tuple(caught(_findings(clip)))
+    return Description(path=path, kind=what, facts=_facts(clip), findings=findings)
+
+
+def _facts(clip: Clip) -> dict[str, Fact]:
+    return {
+        "name": clip.name,
+        "kind_of_files": clip.kind,
+        "width_px": clip.width_px,
+        "height_px": clip.height_px,
+        "channels": clip.channels,
+        "bits": clip.header.bits,
+        "cfa": clip.cfa,
+        "colour": clip.colour,
+        "frames": len(clip.numbers),
+        "first_number": clip.numbers[0],
+        "last_number": clip.numbers[-1],
+        "dropped_frames": sum(count for _, count in holes(clip.numbers)),
+        "time_code": clip.time_code,
+        "fps": float(clip.plan.camera.fps),
+        "mode": clip.plan.mode,
+        "lights": list(clip.plan.lights),
+    }
+
+
+def _findings(clip: Clip) -> Iterator[Finding]:
+    span = f"numbered {clip.numbers[0]} to {clip.numbers[-1]}"
+    yield ok(f"{len(clip.numbers)} frames, {span}: {clip.kind}, {looks(clip.header)}")
+    yield from (warn(text) for text in clip.warnings)
+    yield from (ok(text) for text in clip.notes)
+    yield from _hole_findings(clip)
+    yield from _likeness_findings(clip)
+    yield from plan_findings(clip.plan)
+    yield length_finding(clip.plan, clip.numbers)
+    rig = clip.plan_path.with_name("rig.toml")
+    if rig.is_file():
+        yield from rig_findings(rig, clip.plan)
+    yield from _level_findings(clip)
+
+
+def _hole_findings(clip: Clip) -> Iterator[Finding]:
+    found = holes(clip.numbers)
+    if not found:
+        return
+    shown = ", ".join(f"{count} after {after}" for after, count in found[:MANY])
+    more = f" and {len(found) - MANY} more places" if len(found) > MANY else ""
+    if clip.plan.mode == "synced":
+        yield ok(f"the numbers have holes ({shown}{more}): these frames, and the flashes in them, are missing")
+    else:
+        yield warn(f"{sum(count for _, count in found)} frame(s) dropped: {shown}{more}")
+
+
+def _likeness_findings(clip: Clip) -> Iterator[Finding]:
+    """Read every file's header: a frame of another size or depth, or an unreadable one, stops a run half way."""
+    if clip.is_movie:
+        return
+    wrong = []
+    for file in clip.files:
+        try:
+            found = looks(read_header(clip.kind, file))
+        except PsvideoError as error:
+            wrong.append(str(error))
+            continue
+        if found != looks(clip.header):
+            wrong.append(f"{file}: is {found}, unlike the first frame")
+    yield from (fault(text) for text in wrong[:MANY])
+    if len(wrong) > MANY:
+        yield fault(f"{len(wrong) - MANY} more frames like these")
+    if not wrong:
+        yield ok("all frames' headers are alike")
+
+
+def _level_findings(clip: Clip) -> Iterator[Finding]:
+    """Decode a few frames and hold their light against the levels: 0 is black, 1 saturation."""
+    chosen = sorted({clip.numbers[0], clip.numbers[len(clip.numbers) // 2], clip.numbers[-1]})
+    frames = (frame for number in chosen for frame in read_frames(clip, [number]))  # one by one: a movie seeks
+    light = np.concatenate([frame.image.ravel() for frame in frames])
+    low, high = (float(value) for value in np.percentile(light, (1, 99.9)))
+    saturated = float(np.mean(light >= 1.0))
+    levels = f"light from {low:.3g} to {high:.3g} (1st and 99.9th percentile; 0 is black, 1 saturation)"
+    if low < -DIM or high > 1.2:
+        yield warn(f"{levels}: the plan's black_level or white_level does not fit the files' codes")
+    elif saturated > SATURATED_SHARE:
+        yield warn(f"{levels}: {saturated:.1%} of the pixels are saturated")
+    elif high < DIM:
+        yield warn(f"{levels}: very dark, or white_level is not counted in the files' codes")
+    else:
+        yield ok(levels)

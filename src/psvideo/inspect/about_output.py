@@ -1,0 +1,80 @@
+"""What can be said of a folder that psvideo wrote: plates, or results; whether its sequences go together."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from psvideo.clip.decode import exr
+from psvideo.clip.folder import number_of
+from psvideo.errors import PsvideoError
+from psvideo.formats.timing_json import read_timing
+from psvideo.inspect.findings import Description, Finding, caught, fault, ok, warn
+
+RESULTS = ("normals", "albedo", "valid")
+
+
+def is_plates(folder: Path) -> bool:
+    """True where ``split`` wrote this folder: a timing beside one folder of plates per light."""
+    return (folder / "timing.json").is_file() and bool(_sequences(folder)) and not is_results(folder)
+
+
+def is_results(folder: Path) -> bool:
+    """True where ``normals`` wrote this folder."""
+    return any((folder / "normals").glob("*.exr"))
+
+
+def describe_output(folder: Path) -> Description:
+    """Describe a folder of plates or of results."""
+    sequences = _sequences(folder)
+    kind = "results folder" if is_results(folder) else "plates folder"
+    findings = tuple(caught(_findings(folder, sequences, kind)))
+    facts = {name: len(files) for name, files in sequences.items()}
+    return Description(path=folder, kind=kind, facts={"sequences": list(sequences), **facts}, findings=findings)
+
+
+def _sequences(folder: Path) -> dict[str, list[Path]]:
+    """Return the EXR files of every folder inside, by the folder's name."""
+    inside = sorted(entry for entry in folder.iterdir() if entry.is_dir() and not entry.name.startswith("."))
+    found = {entry.name: sorted(entry.glob("[!.]*.exr")) for entry in inside}
+    return {name: files for name, files in found.items() if files}
+
+
+def _findings(folder: Path, sequences: dict[str, list[Path]], kind: str) -> Iterator[Finding]:
+    for name, files in sequences.items():
+        numbers = [number for file in files if (number := number_of(file)) is not None]
+        channels, attributes = exr.contents(files[0])
+        span = f"numbered {min(numbers)} to {max(numbers)}, " if numbers else ""
+        size = f"{attributes['width_px']} x {attributes['height_px']}"
+        yield ok(f"{name}: {len(files)} file(s), {span}{size}, channels {', '.join(channels)}")
+    if kind == "results folder":
+        yield from _results_go_together(sequences)
+    if (folder / "timing.json").is_file():
+        yield from _plates_are_there(folder)
+
+
+def _results_go_together(sequences: dict[str, list[Path]]) -> Iterator[Finding]:
+    numbers = {name: {number_of(file) for file in files} for name, files in sequences.items()}
+    for name in RESULTS:
+        if name not in numbers:
+            yield warn(f"there is no {name}/ beside normals/")
+        elif numbers[name] != numbers["normals"]:
+            differ = len(numbers[name] ^ numbers["normals"])
+            yield fault(
+                f"{name}/ and normals/ do not hold the same numbers ({differ} differ): "
+                "the run was stopped; run it again with --resume"
+            )
+
+
+def _plates_are_there(folder: Path) -> Iterator[Finding]:
+    """Check that every plate that the timing lists is a file that can be opened."""
+    plates = [flash.plate for flash in read_timing(folder / "timing.json").flashes if flash.plate]
+    missing = [plate for plate in plates if not (folder / plate).is_file()]
+    if missing:
+        yield fault(f"timing.json lists {missing[0]} and {len(missing) - 1} more plate(s) that are not here")
+    elif plates:
+        yield ok(f"all {len(plates)} plates that timing.json lists are here")
+    for plate in plates:
+        try:
+            if plate not in missing:
+                exr.contents(folder / plate)
+        except PsvideoError as error:
+            yield fault(error)

@@ -1,0 +1,96 @@
+"""Python, the libraries, and what footage they read."""
+
+import platform
+import sys
+from collections.abc import Callable, Iterator
+from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
+
+from psvideo.clip import abilities
+from psvideo.inspect.doctor_finding import Finding
+from psvideo.strobe.stand_ins.toolchain import why_not
+
+REINSTALL = "Install psvideo again in a fresh environment: pip install ."
+LIBRARIES = (
+    *("numpy", "scipy", "numba", "opencv-contrib-python-headless", "trimesh", "pyserial", "tifffile", "imagecodecs"),
+    *("pillow", "fileseq", "pydantic", "tomlkit", "typer", "rich", "embreex"),
+)
+EXTRAS = {
+    "usd-core": ("meshes and cameras as USD (--mesh usd, --camera-to-world shot.usd)", "pip install 'psvideo[usd]'"),
+}
+LEAST_PYTHON = (3, 11)
+
+
+def software() -> Iterator[Finding]:
+    """Give a finding for Python and each library."""
+    yield Finding(name="psvideo", level="ok", text=version("psvideo"))
+    yield _python()
+    yield from (_library(name) for name in LIBRARIES)
+    yield _compiler()
+    yield from (
+        _loaded("OpenEXR", abilities.exr_library, "EXR"),
+        _loaded("LibRaw (rawpy)", abilities.raw_library, "DNG"),
+        _loaded("OpenColorIO", abilities.curve_library, "log curves"),
+    )
+    yield from _movies()
+    yield from (_extra(name, *words) for name, words in EXTRAS.items())
+    reason = why_not()
+    yield Finding(
+        name="emulated board",
+        level="ok" if reason is None else "note",
+        text="the strobe's real firmware can be emulated" if reason is None else reason,
+        next_step="" if reason is None else "Only strobe emulate needs it; --board python does without.",
+    )
+
+
+def _python() -> Finding:
+    good = sys.version_info >= LEAST_PYTHON
+    step = "" if good else f"psvideo needs Python {'.'.join(map(str, LEAST_PYTHON))} or newer."
+    text = f"{platform.python_version()}, {platform.python_implementation()}, {platform.machine()}"
+    return Finding(name="Python", level="ok" if good else "missing", text=text, next_step=step)
+
+
+def _library(name: str) -> Finding:
+    try:
+        return Finding(name=name, level="ok", text=version(name))
+    except PackageNotFoundError:
+        return Finding(name=name, level="missing", text="not installed", next_step=REINSTALL)
+
+
+def _compiler() -> Finding:
+    """Say how loops are compiled: each by itself in psvideo's own threads, never in numba's."""
+    try:
+        config = import_module("numba").config
+    except ImportError as fault:
+        return Finding(name="numba's compiler", level="missing", text=str(fault), next_step=REINSTALL)
+    if config.DISABLE_JIT:
+        step = "Unset NUMBA_DISABLE_JIT: without compiling everything is a hundred times slower."
+        return Finding(name="numba's compiler", level="missing", text="switched off", next_step=step)
+    text = "compiles for this processor; rows are shared out over psvideo's own threads, not numba's"
+    return Finding(name="numba's compiler", level="ok", text=text)
+
+
+def _loaded(name: str, ask: Callable[[], str], reads: str) -> Finding:
+    try:
+        return Finding(name=name, level="ok", text=f"{ask()}: {reads}")
+    except (ImportError, AttributeError, OSError) as fault:
+        return Finding(name=name, level="missing", text=f"{reads} cannot be read ({fault})", next_step=REINSTALL)
+
+
+def _movies() -> Iterator[Finding]:
+    try:
+        found = abilities.movie_decoders()
+    except ImportError as fault:
+        yield Finding(name="movies (PyAV)", level="missing", text=str(fault), next_step=REINSTALL)
+        return
+    for name, there in found.items():
+        step = "" if there else "Install PyAV from its wheel (pip install --force-reinstall av), or shoot frames."
+        text = "decoded" if there else "no decoder"
+        yield Finding(name=f"movies: {name}", level="ok" if there else "missing", text=text, next_step=step)
+
+
+def _extra(name: str, what: str, how: str) -> Finding:
+    try:
+        return Finding(name=name, level="ok", text=f"{version(name)}: {what}")
+    except PackageNotFoundError:
+        return Finding(name=name, level="note", text=f"not installed; only for {what}", next_step=f"{how}.")

@@ -1,0 +1,89 @@
+"""The light that every flash of a plan sends to points of the picture, from the rig: direction times strength.
+
+Distant lights send the same everywhere. Near ones are taken at the rig's plane, which stands in for the surface: each
+pixel's ray is followed to it, and the light falls off with the square of the distance, and with the angle from the
+light's axis where the rig tells its anisotropy.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.model.camera import FloatArray
+from psvideo.model.plan import Plan, reference_duration_s
+from psvideo.model.rig import Light, Rig
+
+
+@dataclass(frozen=True, kw_only=True)
+class Points:
+    """Points of a picture: ``down`` and ``across`` (point,) as shares of its height and width, 0 at the top left
+    corner, and which of its ``channels`` each is taken in, ``channel`` (point,)."""
+
+    down: FloatArray
+    across: FloatArray
+    channel: NDArray[np.intp]
+    channels: int
+
+
+def light_vectors(plan: Plan, rig: Rig, points: Points) -> FloatArray:
+    """Return what every lit slot's flash sends to points of the picture, shape (point, lit slot, 3).
+
+    Near lights need the rig's camera and plane.
+    """
+    lights = rig.select(plan.lights)
+    near = any(light.position_m is not None for light in lights)
+    points_m = points_on_plane(plan, rig, down=points.down, across=points.across) if near else None
+    middle_m = points_on_plane(plan, rig, down=np.array([0.5]), across=np.array([0.5]))[0] if near else None
+    of_light = {}
+    for light in lights:
+        per_s = _strength(light, points) / (light.reference_duration_s or reference_duration_s(plan, light.name))
+        of_light[light.name] = per_s[:, None] * _field(light, points_m, middle_m)
+    slots = []
+    for slot in plan.lit_slots:
+        flash = plan.flashes[slot]
+        parts = [power * flash.duration_s * of_light[name] for name, power in flash.lights.items() if power > 0]
+        slots.append(np.sum(parts, axis=0))
+    return np.stack(slots, axis=1)
+
+
+def points_on_plane(plan: Plan, rig: Rig, *, down: FloatArray, across: FloatArray) -> FloatArray:
+    """Return where the rays through points of the picture meet the rig's plane, in metres, shape (point, 3)."""
+    if rig.focal_px is None or rig.principal_px is None or rig.plane is None:
+        raise ValueError("near lights need the rig's camera and plane")
+    col = across * plan.camera.width_px - 0.5
+    row = down * plan.camera.height_px - 0.5
+    x = (col - rig.principal_px[0]) / rig.focal_px[0]
+    y = -(row - rig.principal_px[1]) / rig.focal_px[1]
+    ray = np.stack([x, y, -np.ones_like(x)], axis=1)
+    normal, offset_m = np.array(rig.plane[:3]), rig.plane[3]
+    points: FloatArray = ray * (-offset_m / (ray @ normal))[:, None]
+    return points
+
+
+def _strength(light: Light, points: Points) -> FloatArray:
+    """Return a light's intensity in each point's channel; its mean where it was measured in other channels."""
+    strengths = np.array(light.intensity, np.float64)
+    if len(strengths) == points.channels:
+        chosen: FloatArray = strengths[points.channel]
+        return chosen
+    return np.full(len(points.channel), strengths.mean())
+
+
+def _field(light: Light, points_m: FloatArray | None, middle_m: FloatArray | None) -> FloatArray:
+    """Return the direction to a light times its falloff, shape (point, 3), or (3,) for a distant one."""
+    if light.direction is not None:
+        return np.array(light.direction, np.float64)
+    if points_m is None or middle_m is None:
+        raise ValueError(f"light {light.name!r} is near: it needs points in space")
+    position_m = np.array(light.position_m)
+    away_m = position_m - points_m
+    distance_m = np.linalg.norm(away_m, axis=1, keepdims=True)
+    direction: FloatArray = away_m / distance_m
+    shine: FloatArray = np.ones_like(distance_m)
+    if light.anisotropy:
+        axis = np.array(light.axis) if light.axis is not None else middle_m - position_m
+        cosine = -(direction @ axis) / np.linalg.norm(axis)
+        shine = np.clip(cosine, 1e-3, None)[:, None] ** light.anisotropy
+    vectors: FloatArray = shine * direction / distance_m**2
+    return vectors

@@ -1,0 +1,130 @@
+"""The capture plan: which lights flash, how long, how far apart, and for which camera.
+
+A plan is frozen data that expands to arrays of flash times; it neither acts nor draws. A *round* is one pass through
+the list of flashes. Dark slots are kept in every ``dark_every``-th round only, so the *cycle*, which repeats exactly,
+is ``dark_every`` rounds: the first has its dark slots, the others skip them. Flash ``k + 1`` starts
+``duration_s[k] + dark_s`` after flash ``k`` starts, in seconds of the strobe's clock (Hudon et al. 2015, eq. 1 and 14).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.model.camera import Camera, FloatArray
+
+Mode = Literal["rolling", "half-rate", "synced"]
+
+UNKNOWN_CLOCK_PPM = 10_000.0
+"""How far apart clocks of unknown tolerance are at most (a resonator-driven board is off by 2,000 to 5,000)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlannedFlash:
+    """One flash of a round: the power (0 to 1) of every light that is on, and its length on the strobe's clock."""
+
+    lights: Mapping[str, float]
+    duration_s: float
+
+    @property
+    def is_dark(self) -> bool:
+        """True for a dark slot: no light is on; it shows the ambient light and marks the cycle."""
+        return not any(self.lights.values())
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlashTrain:
+    """Consecutive flashes as arrays of shape (flash,): slot in the round's list, start and length in strobe seconds."""
+
+    slot: NDArray[np.intp]
+    start_s: FloatArray
+    duration_s: FloatArray
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """What the strobe plays and the camera records. ``clock_tolerance_ppm`` is None where it is unknown."""
+
+    camera: Camera
+    flashes: tuple[PlannedFlash, ...]
+    dark_s: float
+    mode: Mode = "rolling"
+    rise_s: float = 0.0
+    fall_s: float = 0.0
+    clock_tolerance_ppm: float | None = 100.0
+    dark_every: int = 1
+
+    @property
+    def lights(self) -> tuple[str, ...]:
+        """The lights' names in the order in which the plan first lights them."""
+        return tuple(dict.fromkeys(name for flash in self.flashes for name, power in flash.lights.items() if power > 0))
+
+    @property
+    def lit_slots(self) -> tuple[int, ...]:
+        """The slots in which any light is on."""
+        return tuple(slot for slot, flash in enumerate(self.flashes) if not flash.is_dark)
+
+    @property
+    def cycle_slots(self) -> tuple[int, ...]:
+        """The slots of one cycle: a round with its dark slots, then ``dark_every - 1`` rounds without them."""
+        return tuple(range(len(self.flashes))) + self.lit_slots * (self.dark_every - 1)
+
+    @property
+    def clock_range_ppm(self) -> float:
+        """How far the strobe's clock may be from the camera's, either way."""
+        return UNKNOWN_CLOCK_PPM if self.clock_tolerance_ppm is None else self.clock_tolerance_ppm
+
+    @property
+    def cycle_s(self) -> float:
+        """The cycle's length in strobe seconds."""
+        return sum(self.flashes[slot].duration_s + self.dark_s for slot in self.cycle_slots)
+
+    @property
+    def power(self) -> FloatArray:
+        """The power matrix of the lit slots, shape (lit slot, light)."""
+        rows = [[self.flashes[slot].lights.get(name, 0.0) for name in self.lights] for slot in self.lit_slots]
+        return np.array(rows, np.float64).reshape(len(self.lit_slots), len(self.lights))
+
+    def train(self, first: int, count: int) -> FlashTrain:
+        """Return flashes ``first`` to ``first + count - 1``, counted from a cycle's start, which is at 0 s.
+
+        Flash 0 is the cycle's first; negative ``first`` reaches into the cycles before.
+        """
+        slots = np.array(self.cycle_slots, np.intp)
+        durations_s = np.array([self.flashes[slot].duration_s for slot in slots], np.float64)
+        starts_s = np.concatenate([[0.0], np.cumsum(durations_s + self.dark_s)[:-1]])
+        cycle, place = np.divmod(np.arange(first, first + count), len(slots))
+        return FlashTrain(
+            slot=slots[place], start_s=cycle * self.cycle_s + starts_s[place], duration_s=durations_s[place]
+        )
+
+
+def reference_duration_s(plan: Plan, light: str) -> float:
+    """Return the duration of a light's full flash in strobe seconds: the longest for which the plan lights it."""
+    return max(flash.duration_s for flash in plan.flashes if flash.lights.get(light, 0.0) > 0)
+
+
+def mixing_matrix(plan: Plan) -> FloatArray:
+    """Return how much of each light's full flash every lit slot holds, shape (lit slot, light)."""
+    reference_s = np.array([reference_duration_s(plan, light) for light in plan.lights])
+    duration_s = np.array([plan.flashes[slot].duration_s for slot in plan.lit_slots])
+    matrix: FloatArray = plan.power * duration_s[:, None] / reference_s
+    return matrix
+
+
+def default_dark_s(
+    camera: Camera, durations_s: Sequence[float], *, mode: Mode, clock_tolerance_ppm: float | None
+) -> float:
+    """Return the dark time where a plan gives none, in strobe seconds.
+
+    Rolling: the exposure (eq. 1) plus the margin by which a strobe clock that runs fast would shorten it. Half-rate:
+    what makes the longest flash start every two frames (Bradley 2009). Synced: what fills the frame.
+    """
+    period_s = camera.frame_period_s
+    if mode == "rolling":
+        tolerance = (UNKNOWN_CLOCK_PPM if clock_tolerance_ppm is None else clock_tolerance_ppm) * 1e-6
+        return camera.exposure_s / (1.0 - tolerance)
+    frames = 2 if mode == "half-rate" else 1
+    return max(frames * period_s - max(durations_s), 0.0)

@@ -1,0 +1,84 @@
+"""The rig: where the lights are and how strong, as measured by calibration or given by the user.
+
+Camera frame: x right, y up, z from the surface towards the camera. A distant light has a direction, the unit vector
+from the surface to the light; a near light has a position in metres, origin at the optical centre, scene at negative z.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from psvideo.errors import PsvideoError, nearest
+from psvideo.model.camera import FloatArray
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Light:
+    """One light. ``plate = albedo * intensity * max(0, n . direction)`` at power 1 and the reference duration.
+
+    ``intensity`` has one entry or one per channel; for a near light it is the irradiance at 1 m.
+    ``reference_duration_s`` None means the duration with which the plan flashes this light.
+    """
+
+    name: str
+    intensity: tuple[float, ...] = (1.0,)
+    direction: Vector | None = None
+    position_m: Vector | None = None
+    error_deg: float | None = None
+    reference_duration_s: float | None = None
+    anisotropy: float | None = None
+    axis: Vector | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rig:
+    """The lights, with the camera's perspective and a first guess of the surface where near lights need them."""
+
+    lights: tuple[Light, ...]
+    focal_px: tuple[float, float] | None = None
+    principal_px: tuple[float, float] | None = None
+    plane: tuple[float, float, float, float] | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The lights' names, in the file's order."""
+        return tuple(light.name for light in self.lights)
+
+    def select(self, names: Sequence[str]) -> tuple[Light, ...]:
+        """Return the named lights in the given order; raises PsvideoError that names the ones the rig lacks."""
+        by_name = {light.name: light for light in self.lights}
+        lacking = [name for name in names if name not in by_name]
+        if lacking:
+            raise PsvideoError(
+                f"The rig has no light named {', '.join(map(repr, lacking))}, which the plan flashes; "
+                f"{nearest(lacking[0], by_name)} Give the lights the same names in the rig file and in the plan."
+            )
+        return tuple(by_name[name] for name in names)
+
+
+def directions(lights: Sequence[Light]) -> FloatArray:
+    """Return the unit directions of distant lights, shape (light, 3); raises PsvideoError where a light is near."""
+    near = [light.name for light in lights if light.direction is None]
+    if near:
+        raise PsvideoError(
+            f"Light {near[0]!r} has a position (a near light), and nothing says where the surface is. Add [camera] and "
+            "[surface] to the rig, or give the light a direction: the unit vector from the middle of the surface to it."
+        )
+    return np.array([light.direction for light in lights], np.float64)
+
+
+def intensities(lights: Sequence[Light], channels: int) -> FloatArray:
+    """Return the lights' intensities, shape (light, channel); one number stands for all channels.
+
+    Raises PsvideoError where a light has another count of channels than the pictures.
+    """
+    for light in lights:
+        if len(light.intensity) not in (1, channels):
+            raise PsvideoError(
+                f"Light {light.name!r} has {len(light.intensity)} intensities and the pictures have {channels} "
+                "channel(s); expected one number, or one per channel."
+            )
+    return np.array([np.broadcast_to(light.intensity, channels) for light in lights], np.float64)

@@ -1,0 +1,189 @@
+"""The figures that decide a shoot, as a pure function of the plan.
+
+The paper's equations are special cases: with dark time = exposure = frame period the rate of flashes is eq. 5 and 6,
+for flashes of different length eq. 15; the dark row's move is eq. 13.
+"""
+
+import math
+from collections import Counter
+from dataclasses import dataclass
+
+from psvideo.model.plan import Plan, PlannedFlash
+
+FLICKER_HZ = (3.0, 65.0)
+"""Flashes at these rates can harm people with photosensitive epilepsy (about 3 to 70 Hz: IEEE 1789-2015)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlotFigures:
+    """One flash of the round.
+
+    ``light_share``: what a row receives against the same lights left on at full power for the exposure, and ``stops``
+    the same as a number of stops lost. ``partial_row_share`` and ``missing_row_share``: of the rows of its plate, mean
+    over all start phases, those that no single frame holds whole, and those that no frame saw at all (below 360°).
+    ``frames_min`` to ``frames_max`` frames see something of the flash, the larger number for ``most_frames_share`` of
+    the start phases; None where the readout is unknown. ``dark_row_move_px``: how many rows further down the dark row
+    before the next flash lies than the one before this flash did a frame (in half-rate mode two frames) earlier; None
+    where there is no dark row to follow.
+    """
+
+    slot: int
+    label: str
+    is_dark: bool
+    duration_s: float
+    light_share: float
+    stops: float | None
+    partial_row_share: float
+    missing_row_share: float
+    frames_min: int | None
+    frames_max: int | None
+    most_frames_share: float | None
+    dark_row_move_px: float | None
+    blur_px: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class LightFigures:
+    """One light: how often it flashes, and for what share of the time it is on (``duty``, power not counted)."""
+
+    name: str
+    rate_hz: float
+    duty: float
+    longest_pulse_s: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class ShootFigures:
+    """The whole shoot, in strobe time. ``motion_*_px`` are how far the subject moves at the given speed, else None.
+
+    ``flash_rate_hz`` counts lit flashes, ``result_rate_hz`` rounds (each gives one result), ``dark_slot_rate_hz`` dark
+    slots. ``margin_ppm`` is how much faster than nominal the strobe may run against the camera before rows hold two
+    flashes; negative where they do already, None in synced mode.
+    """
+
+    flash_rate_hz: float
+    result_rate_hz: float
+    dark_slot_rate_hz: float
+    round_s: float
+    cycle_s: float
+    partial_row_share: float
+    missing_row_share: float
+    margin_ppm: float | None
+    motion_per_flash_px: float | None
+    motion_per_round_px: float | None
+    slots: tuple[SlotFigures, ...]
+    lights: tuple[LightFigures, ...]
+
+
+def shoot_figures(plan: Plan, *, speed_px_s: float | None = None) -> ShootFigures:
+    """Return the figures of a plan; ``speed_px_s`` is how fast the subject moves in the picture."""
+    times = Counter(plan.cycle_slots)
+    lit = sum(times[slot] for slot in plan.lit_slots)
+    slots = tuple(_slot_figures(plan, slot, speed_px_s) for slot in range(len(plan.flashes)))
+    cycle_s = cycle_length_s(plan)
+
+    def mean(share: str) -> float:
+        return float(sum(times[slot] * getattr(slots[slot], share) for slot in plan.lit_slots) / lit)
+
+    margin_ppm = None if plan.mode == "synced" else (1 - plan.camera.exposure_s / plan.dark_s) * 1e6
+    return ShootFigures(
+        flash_rate_hz=lit / cycle_s,
+        result_rate_hz=plan.dark_every / cycle_s,
+        dark_slot_rate_hz=(len(plan.cycle_slots) - lit) / cycle_s,
+        round_s=cycle_s / plan.dark_every,
+        cycle_s=cycle_s,
+        partial_row_share=mean("partial_row_share"),
+        missing_row_share=mean("missing_row_share"),
+        margin_ppm=margin_ppm,
+        motion_per_flash_px=None if speed_px_s is None else speed_px_s * cycle_s / lit,
+        motion_per_round_px=None if speed_px_s is None else speed_px_s * cycle_s / plan.dark_every,
+        slots=slots,
+        lights=tuple(_light_figures(plan, name, times) for name in plan.lights),
+    )
+
+
+def cycle_length_s(plan: Plan) -> float:
+    """Return how long a cycle takes: what the strobe plays by itself, or one frame per flash where it is triggered."""
+    return len(plan.cycle_slots) * plan.camera.frame_period_s if plan.mode == "synced" else plan.cycle_s
+
+
+def slot_label(flash: PlannedFlash) -> str:
+    """Return the lights that a flash has on, as people call them; ``dark slot`` where none is."""
+    return "+".join(name for name, power in flash.lights.items() if power > 0) or "dark slot"
+
+
+def _slot_figures(plan: Plan, slot: int, speed_px_s: float | None) -> SlotFigures:
+    flash = plan.flashes[slot]
+    share = max(flash.lights.values(), default=0.0) * flash.duration_s / plan.camera.exposure_s
+    partial, missing = row_shares(plan, flash.duration_s)
+    frames = frames_per_flash(plan, flash.duration_s)
+    return SlotFigures(
+        slot=slot,
+        label=slot_label(flash),
+        is_dark=flash.is_dark,
+        duration_s=flash.duration_s,
+        light_share=share,
+        stops=-math.log2(share) if share > 0 else None,
+        partial_row_share=partial,
+        missing_row_share=missing,
+        frames_min=frames[0] if frames else None,
+        frames_max=frames[1] if frames else None,
+        most_frames_share=frames[2] if frames else None,
+        dark_row_move_px=dark_row_move_px(plan, flash.duration_s),
+        blur_px=None if speed_px_s is None else speed_px_s * flash.duration_s,
+    )
+
+
+def _light_figures(plan: Plan, name: str, times: Counter[int]) -> LightFigures:
+    cycle_s = cycle_length_s(plan)
+    own = [slot for slot, flash in enumerate(plan.flashes) if flash.lights.get(name, 0.0) > 0]
+    return LightFigures(
+        name=name,
+        rate_hz=sum(times[slot] for slot in own) / cycle_s,
+        duty=sum(times[slot] * plan.flashes[slot].duration_s for slot in own) / cycle_s,
+        longest_pulse_s=max(plan.flashes[slot].duration_s for slot in own),
+    )
+
+
+def row_shares(plan: Plan, duration_s: float) -> tuple[float, float]:
+    """Return (partial, missing): the rows of a plate that no frame holds whole, and that none saw, mean over phases.
+
+    A row's openings last the exposure and come once a frame, so these shares do not depend on the readout.
+    """
+    if plan.mode == "synced":
+        return 0.0, 0.0
+    period_s, exposure_s = plan.camera.frame_period_s, plan.camera.exposure_s
+    whole = max(exposure_s - duration_s, 0.0) / period_s
+    missing = max(period_s - exposure_s - duration_s, 0.0) / period_s
+    return max(1.0 - whole - missing, 0.0), missing
+
+
+def frames_per_flash(plan: Plan, duration_s: float) -> tuple[int, int, float] | None:
+    """Return (fewest, most, share of start phases with the most) of the frames that see some of a flash (§3.3).
+
+    Frame n is touched where ``(s - R - Te) / Tc < n < (s + d) / Tc`` with R the last row's opening after the first's:
+    an open interval whose length alone decides. None where the readout is unknown.
+    """
+    camera = plan.camera
+    if plan.mode == "synced":
+        return 1, 1, 1.0
+    if camera.readout_s is None:
+        return None
+    last_row_s = abs(camera.readout_s) - abs(camera.row_time_s)
+    length = (duration_s + last_row_s + camera.exposure_s) / camera.frame_period_s
+    if abs(length - round(length)) < 1e-9:
+        return round(length), round(length), 1.0
+    fewest = math.floor(length)
+    return fewest, fewest + 1, length - fewest
+
+
+def dark_row_move_px(plan: Plan, duration_s: float) -> float | None:
+    """Return by how many rows a flash of this length moves the dark row from frame to frame (eq. 13 at 360°).
+
+    Negative is up. None without a rolling readout (global, unknown) and in synced mode.
+    """
+    camera = plan.camera
+    if plan.mode == "synced" or not camera.readout_s:
+        return None
+    frames = 2 if plan.mode == "half-rate" else 1
+    return (plan.dark_s + duration_s - frames * camera.frame_period_s) / camera.row_time_s

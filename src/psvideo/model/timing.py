@@ -1,0 +1,111 @@
+"""When every flash fired, on the camera's clock, and how sure that is: what ``sync`` finds and ``split`` uses."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+
+from psvideo.model.camera import Camera, FloatArray
+from psvideo.model.plan import Plan
+
+Order = Literal["marker", "rig", "given", "guess"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Flash:
+    """One flash of the clip. ``slot`` is its place in the plan's list; ``complete`` False: the clip cuts it."""
+
+    index: int
+    slot: int
+    lights: Mapping[str, float]
+    start_s: float
+    duration_s: float
+    complete: bool
+    plate: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class DroppedFrames:
+    """A hole in the clip: ``count`` frames are missing after the file numbered ``after``."""
+
+    after: int
+    count: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Timing:
+    """The flashes of a clip in order. ``order`` says how the lights' names were found: a guess is called ``guess``.
+
+    ``order_note`` is a sentence on how a rig's directions decided the order, or why they did not; empty where none were
+    asked. ``repeated_frames`` are the numbers of frames that show the same moment as the frame before them. ``notes``
+    are sentences for people on what to distrust; ``row_time_error_s`` is the row time's standard error where the
+    picture told it, None where the plan did; ``phase_error_s`` is ``phase_error_rows`` in seconds. None of these three
+    goes into the file. A global shutter's rows open together: its ``phase_error_rows`` are of ``frame_period_s`` /
+    height each.
+    """
+
+    clip: str
+    frame_period_s: float
+    exposure_s: float
+    row_time_s: float
+    clock_offset_ppm: float
+    phase_error_rows: float
+    order: Order
+    flashes: tuple[Flash, ...]
+    dropped_frames: tuple[DroppedFrames, ...] = ()
+    repeated_frames: tuple[int, ...] = ()
+    order_note: str = ""
+    notes: tuple[str, ...] = field(default=(), compare=False)
+    row_time_error_s: float | None = field(default=None, compare=False)
+    phase_error_s: float | None = field(default=None, compare=False)
+
+    @property
+    def how_sure(self) -> str:
+        """One sentence on how sure the flashes' times are; empty where nothing was fitted."""
+        rows = f"{self.phase_error_rows:.2g} row"
+        if self.phase_error_s is None:
+            return f"Flash times are sure to {rows}." if self.phase_error_rows else ""
+        times = (
+            f"{self.phase_error_s * 1e6:.2g} us" if self.phase_error_s < 1e-3 else f"{self.phase_error_s * 1e3:.2g} ms"
+        )
+        return f"Flash times are sure to {times}, {rows}." if self.row_time_s else f"Flash times are sure to {times}."
+
+    @property
+    def start_s(self) -> FloatArray:
+        """When every flash starts, shape (flash,)."""
+        return np.array([flash.start_s for flash in self.flashes], np.float64)
+
+    @property
+    def duration_s(self) -> FloatArray:
+        """How long every flash lasts on the camera's clock, shape (flash,)."""
+        return np.array([flash.duration_s for flash in self.flashes], np.float64)
+
+
+def timed_camera(plan: Plan, timing: Timing) -> Camera:
+    """Return the plan's camera with the exposure and readout that the timing found."""
+    readout_s = timing.row_time_s * plan.camera.height_px
+    return replace(plan.camera, exposure_s=timing.exposure_s, readout_s=readout_s)
+
+
+def places_in_time(timing: Timing, numbers: Sequence[int]) -> dict[int, int]:
+    """Return the true index of every frame of a clip, by number; repeated frames, which add nothing, are left out.
+
+    ``numbers`` are all the clip's frame numbers, ascending. Holes that the numbering does not show count too.
+
+    >>> timing = Timing(clip="", frame_period_s=1, exposure_s=1, row_time_s=0, clock_offset_ppm=0, phase_error_rows=0,
+    ...     order="given", flashes=(), dropped_frames=(DroppedFrames(after=2, count=3),), repeated_frames=(5,))
+    >>> places_in_time(timing, [1, 2, 4, 5, 6])
+    {1: 0, 2: 1, 4: 5, 6: 6}
+    """
+    missing = {hole.after: hole.count for hole in timing.dropped_frames}
+    repeated = set(timing.repeated_frames)
+    places: dict[int, int] = {}
+    index = 0
+    for number, following in zip(numbers, (*numbers[1:], None), strict=True):
+        if number not in repeated:
+            places[number] = index
+        if following is not None:
+            told = following - number - 1
+            index += 1 + max(missing.get(number, 0), told) - (following in repeated)
+    return places

@@ -1,0 +1,1 @@
+"""Pictures for eyes: contact sheets, shading, charts, timing, spheres."""

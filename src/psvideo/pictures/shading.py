@@ -1,0 +1,81 @@
+"""Relighting a surface, and how linear light, normals and masks become pixels that a screen shows."""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.model.rig import Vector
+from psvideo.model.surface import Surface
+
+Image = NDArray[np.float32]
+Pixels = NDArray[np.uint8]
+
+
+def relit(
+    surface: Surface,
+    direction: Vector,
+    *,
+    strength: float = 1.0,
+    colour: Vector = (1.0, 1.0, 1.0),
+    gloss: float = 0.0,
+    shininess: float = 30.0,
+) -> Image:
+    """Return the surface under a new distant light, linear, shape (row, col, 3): albedo * strength * max(0, n . l).
+
+    ``gloss`` adds a highlight (Blinn 1977) of that strength; the camera looks along -z.
+    """
+    light = (np.asarray(direction) / np.linalg.norm(direction)).astype(np.float32)
+    normals = surface.normals.astype(np.float32)
+    facing = np.maximum(normals @ light, 0.0)[..., None]
+    shade = three_channels(surface.albedo.astype(np.float32)) * facing
+    if gloss:
+        half = (light + np.array([0, 0, 1])).astype(np.float32)
+        half /= np.float32(np.linalg.norm(half))
+        shade = shade + gloss * np.maximum(normals @ half, 0.0)[..., None] ** shininess * (facing > 0)
+    lit: Image = (np.float32(strength) * shade * np.asarray(colour, np.float32)).astype(np.float32)
+    return lit
+
+
+def smaller(image: NDArray[np.floating], width_px: int) -> Image:
+    """Return a picture at most this wide, averaged down, for showing it."""
+    rows, cols = image.shape[:2]
+    if cols <= width_px:
+        return image.astype(np.float32)
+    planes = np.moveaxis(image.reshape(rows, cols, -1), -1, 0)  # one by one: whole pictures in float32 are large
+    small = np.stack([_smaller_plane(plane, width_px) for plane in planes], axis=-1)
+    return small.reshape(*small.shape[:2], *image.shape[2:])
+
+
+def _smaller_plane(plane: NDArray[np.floating], width_px: int) -> Image:
+    """Average one channel down, by a whole number first: OpenCV averages whole squares several times faster."""
+    rows, cols = plane.shape
+    factor = cols // width_px
+    squares = np.ascontiguousarray(plane[: rows // factor * factor, : cols // factor * factor], np.float32)
+    coarse = cv2.resize(squares, (cols // factor, rows // factor), interpolation=cv2.INTER_AREA)
+    size = (width_px, max(round(rows * width_px / cols), 1))
+    return cv2.resize(coarse, size, interpolation=cv2.INTER_AREA).astype(np.float32)
+
+
+def three_channels(image: Image) -> Image:
+    """Return a grey picture as three equal channels; a colour picture as it is."""
+    return image if image.ndim == 3 else np.repeat(image[..., None], 3, axis=2)
+
+
+def srgb(linear: Image, *, exposure: float = 1.0) -> Pixels:
+    """Return linear light as 8-bit sRGB pixels (IEC 61966-2-1); what is above 1 after ``exposure`` is white."""
+    light = np.clip(three_channels(linear) * np.float32(exposure), 0.0, 1.0)
+    coded: Image = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+    pixels: Pixels = (255 * coded + 0.5).astype(np.uint8)
+    return pixels
+
+
+def normal_colours(normals: NDArray[np.floating]) -> Pixels:
+    """Return normals (row, col, 3) in the usual colours, 128 + 127 n; grey where there are none."""
+    coded: Pixels = (127.5 * (normals.astype(np.float32) + 1.0) + 0.5).clip(0, 255).astype(np.uint8)
+    return coded
+
+
+def exposure_for(image: Image, *, white: float = 0.8) -> float:
+    """Return the factor that puts the brightest hundredth of a picture's pixels at ``white``, for showing it only."""
+    bright = float(np.percentile(image, 99))
+    return white / bright if bright > 1e-6 else 1.0

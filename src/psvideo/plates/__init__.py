@@ -1,0 +1,1 @@
+"""Frames and their timing in, one clean picture per light and round out."""

@@ -1,0 +1,57 @@
+"""Plates of one light that differ in brightness as a whole (exposure set by the camera, lamps that sag) are compared as
+if they did not: a change of exposure is no motion.
+"""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.plates.align.flow import TOE, Sketch, Vectors
+
+LIT, CLIPPED = 32, 250
+"""Codes between which brightness is compared: below is mostly black, above may be clipped."""
+FEWEST = 64
+"""Blocks that are compared, at least."""
+EXPLAINED = 0.5
+"""Brightness is evened out where it leaves less than this share of the squared change unexplained."""
+ROOT_TOE = float(np.sqrt(TOE))
+SCALE = 255 / (float(np.sqrt(1 + TOE)) - ROOT_TOE)
+
+
+def evened(before: Sketch, after: Sketch) -> Sketch:
+    """Return ``after`` in the brightness of ``before`` where one factor explains most of what changed; else as it is.
+
+    Both sketches are of one light and one scale. What moves changes few blocks by one factor, so that the median over
+    all lit blocks tells the exposure, and motion is left to be found.
+    """
+    rows = np.linspace(0, len(before.seen) - 1, len(before.blocks)).astype(np.intp)
+    seen = (before.seen & after.seen)[rows]
+    one, other = before.blocks[seen], after.blocks[seen]
+    lit = (np.minimum(one, other) > LIT) & (np.maximum(one, other) < CLIPPED)
+    if np.count_nonzero(lit) < FEWEST:
+        return after
+    gain = float(np.median(_light(one[lit]) / _light(other[lit])))
+    change = float(np.mean(np.square(other[lit] - one[lit])))
+    left = float(np.mean(np.square(_brightened(other[lit], gain) - one[lit])))
+    if left >= EXPLAINED * change:
+        return after
+    table = np.rint(_brightened(np.arange(256, dtype=np.float32), gain)).astype(np.uint8)
+    codes = table[after.codes]
+    codes = np.where(after.codes < CLIPPED, codes, np.maximum(codes, before.codes))  # clipped: so bright at least
+    codes = np.where(np.maximum(codes, before.codes) < LIT, before.codes, codes)  # nearly black: noise cut off at zero
+    size = after.blocks.shape[1], after.blocks.shape[0]
+    blocks = cv2.resize(codes.astype(np.float32), size, interpolation=cv2.INTER_AREA)
+    return replace(after, codes=codes, blocks=np.asarray(blocks, np.float32))
+
+
+def _light(codes: NDArray[np.float32]) -> Vectors:
+    """Return the light that a sketch's codes stand for, 1 = white."""
+    return np.asarray(np.square(codes / np.float32(SCALE) + np.float32(ROOT_TOE)) - np.float32(TOE), np.float32)
+
+
+def _brightened(codes: NDArray[np.float32], gain: float) -> Vectors:
+    """Return the codes of so many times the light."""
+    light = np.clip(np.float32(gain) * _light(codes), 0, 1)
+    return np.asarray((np.sqrt(light + np.float32(TOE)) - np.float32(ROOT_TOE)) * np.float32(SCALE), np.float32)

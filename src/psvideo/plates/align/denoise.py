@@ -1,0 +1,117 @@
+"""Noise taken out over time: results are averaged for as long as a pixel shows the same.
+
+Averaged is albedo * normal, in which the plates are linear, so that the mean is what the mean of the plates would give.
+A pixel whose neighbourhood changes by more than noise begins anew: what moves is never mixed with what was there.
+"""
+
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.model.surface import Surface
+
+Planes = NDArray[np.float32]
+Flags = NDArray[np.bool_]
+
+WINDOW_PX = 5
+MOST_CHANGE = 2.0
+"""A neighbourhood changed where its mean squared difference is so many times what noise makes of it."""
+MOST_DRIFT = 0.4
+"""... or its mean difference, squared, is this share of that; white noise leaves a 25th."""
+FINEST = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32) / 6
+LEVELS = 8
+LOW_SHARE, LOW_OF_MEAN = 0.25, 1.213 / 3
+"""Noise is told from the lowest quarter of squared differences, for up to three quarters of a picture may move: the
+quarter's border as a share of the mean, for three normal components (chi squared)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Average:
+    """``vectors`` (3, row, col) are albedo * normal, ``albedo`` (channel, row, col), ``count`` (row, col) results."""
+
+    vectors: Planes
+    albedo: Planes
+    count: Planes
+
+
+def averaged(before: Average | None, surface: Surface, results: int) -> tuple[Average, Surface]:
+    """Return the average that a surface adds to, and the surface as it has it.
+
+    ``before`` is the average up to the result before. It is of ``results`` at most; beyond that the oldest fade out, so
+    that memory does not depend on it.
+    """
+    now = _average_of(surface)
+    average = now if before is None else _updated(before, now, results)
+    return average, _with(surface, average)
+
+
+def _average_of(surface: Surface) -> Average:
+    albedo = surface.albedo if surface.albedo.ndim == 3 else surface.albedo[..., None]
+    channels = np.ascontiguousarray(np.moveaxis(albedo, -1, 0), np.float32)
+    vectors = np.moveaxis(surface.normals, -1, 0).astype(np.float32) * channels.mean(axis=0)
+    return Average(vectors=vectors, albedo=channels, count=surface.valid.astype(np.float32))
+
+
+def _updated(before: Average, now: Average, results: int) -> Average:
+    both = (before.count > 0) & (now.count > 0)
+    same = _alike(before, now, both)
+    count = np.where(same, np.minimum(before.count + 1, np.float32(results)), now.count)
+    share = np.where(same, 1 / np.maximum(count, 1), 1).astype(np.float32)
+    return Average(
+        vectors=before.vectors + share * (now.vectors - before.vectors),
+        albedo=before.albedo + share * (now.albedo - before.albedo),
+        count=count,
+    )
+
+
+def _alike(before: Average, now: Average, both: Flags) -> Flags:
+    """Return where a neighbourhood differs from its average by noise only, pixel by pixel and as a whole."""
+    apart = (now.vectors - before.vectors) * both
+    share = np.float32(1) + 1 / np.maximum(
+        before.count, np.float32(1)
+    )  # the average is noisy as well, the less the longer it is
+    level = np.sqrt((before.vectors**2).sum(axis=0))
+    noise = _noise(np.asarray(apart / np.sqrt(share), np.float32), level, both)
+    expected = _mean(np.asarray(share * noise * both, np.float32))
+    each = _mean(np.sum(apart**2, axis=0, dtype=np.float32))
+    whole = np.sum([_mean(plane) ** 2 for plane in apart], axis=0)
+    return np.asarray(both & (each <= MOST_CHANGE * expected) & (whole <= MOST_DRIFT * expected))
+
+
+def _mean(values: Planes) -> Planes:
+    return np.asarray(cv2.blur(values, (WINDOW_PX, WINDOW_PX)), np.float32)
+
+
+def _noise(apart: Planes, level: Planes, both: Flags) -> Planes:
+    """Return the mean squared noise of one result by brightness; ``apart`` (3, row, col) is what differs in time.
+
+    Only its finest detail is looked at (Immerkaer, "Fast noise variance estimation", CVIU 1996), which smooth surfaces
+    lack, moving or not. Brighter never is less noisy: a brightness that only what moves has tells nothing above that.
+    """
+    fine = [cv2.filter2D(plane, -1, FINEST) for plane in apart]
+    inner = cv2.erode(both.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    square = np.sum([plane**2 for plane in fine], axis=0)
+    thin = (slice(None, None, 3), slice(None, None, 3))
+    squares, levels = square[thin][inner[thin]], level[thin][inner[thin]]
+    if len(squares) < LEVELS * 8:
+        return np.zeros_like(level)
+    parts = np.array_split(np.argsort(levels), LEVELS)
+    at = [float(np.median(levels[part])) for part in parts]
+    noise = np.array([float(np.quantile(squares[part], LOW_SHARE)) / LOW_OF_MEAN for part in parts])
+    return np.interp(level, at, np.minimum.accumulate(noise[::-1])[::-1]).astype(np.float32)
+
+
+def _with(surface: Surface, average: Average) -> Surface:
+    """Return the surface as its average has it; pixels that began anew stay to the bit."""
+    longer = average.count > 1
+    length = np.sqrt((average.vectors**2).sum(axis=0))
+    normals = np.empty((3, *longer.shape), surface.normals.dtype)
+    normals[:] = np.where(longer, average.vectors / np.maximum(length, 1e-12), np.moveaxis(surface.normals, -1, 0))
+    brightness = length / np.maximum(average.albedo.mean(axis=0), 1e-12)
+    given = surface.albedo if surface.albedo.ndim == 3 else surface.albedo[..., None]
+    albedo = np.empty(average.albedo.shape, surface.albedo.dtype)
+    albedo[:] = np.where(longer, average.albedo * brightness, np.moveaxis(given, -1, 0))
+    shown = albedo[0] if surface.albedo.ndim == 2 else np.moveaxis(albedo, 0, -1)
+    return replace(surface, normals=np.moveaxis(normals, 0, -1), albedo=shown)

@@ -1,0 +1,161 @@
+"""Where things moved between two plates of one light: dense optical flow both ways, and where the two agree.
+
+Kroeger, Timofte, Dai and Van Gool, "Fast Optical Flow using Dense Inverse Search", ECCV 2016, as OpenCV has it. Lights
+differ in what they show, so only plates of the same light are compared. Flow is found on 8-bit sketches of the plates,
+whose codes follow the square root of light: photon noise is then the same everywhere. Their exposure is fixed.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.plates.sequence import LightPlate
+from psvideo.plates.split import Image
+
+Codes = NDArray[np.uint8]
+Vectors = NDArray[np.float32]
+Flags = NDArray[np.bool_]
+
+LARGEST_PX = 1_200_000
+"""Pictures of more pixels are halved before flow is looked for."""
+TOE = 0.02
+"""Light that is added before the square root, as a share of white: it keeps the noise of dark pixels small."""
+LEAST_WHITE = 1 / 16
+"""A clip that begins in the dark is not brightened by more than this."""
+BOTH_WAYS_PX, BOTH_WAYS_SHARE = 0.7, 0.05
+"""How far there and back may miss the start: pixels, and a share of the way."""
+BLOCK_PX, AROUND = 4, 4
+"""Change is looked for in the means of blocks, over so many of them together."""
+LEAST_CHANGE = 1.5
+"""Blocks that change by fewer codes did not move ..."""
+NOISE_FACTOR = 5.0
+"""... nor those that change by less than so many times what noise makes of them."""
+SOME, LEAST_LIT = 8, 8
+"""Noise is told from every so many rows, where codes are not less than this: below, it is cut off at zero."""
+QUARTER_OF_NORMAL = 0.3186
+"""A quarter of normal values of variance one is smaller than this."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sketch:
+    """A plate as flow sees it: ``codes`` (row, col), which of these rows any frame saw, ``seen`` (row,), and the means
+    of blocks of codes, ``blocks`` (row, col)."""
+
+    number: int
+    time_s: float
+    codes: Codes
+    seen: Flags
+    blocks: Vectors
+
+
+@dataclass(frozen=True, kw_only=True)
+class Flow:
+    """The way from every pixel of one sketch to the next and back, shape (row, col, 2) as (x right, y down), px.
+
+    ``steady_before`` and ``steady_after`` (row, col) are True where there and back leads to the start: what the pixel
+    shows is visible in both.
+    """
+
+    forward: Vectors
+    backward: Vectors
+    steady_before: Flags
+    steady_after: Flags
+
+
+def white_of(plate: LightPlate) -> float:
+    """Return the light that becomes the brightest code, from a light's first plate."""
+    return float(np.clip(1.2 * np.percentile(_grey(plate.image[::4, ::4]), 99.5), LEAST_WHITE, plate.saturation))
+
+
+def sketch_of(plate: LightPlate, *, white: float) -> Sketch:
+    """Return what flow needs of a plate: a few hundred kilobytes; ``white`` becomes code 255."""
+    rows, cols = plate.image.shape[:2]
+    shrink = 2 if rows * cols > LARGEST_PX else 1
+    seen, grey = plate.seen, _grey(plate.image)
+    if shrink > 1:
+        grey = np.asarray(cv2.resize(grey, (cols // 2, rows // 2), interpolation=cv2.INTER_AREA), np.float32)
+        seen = np.asarray(seen[: rows // 2 * 2].reshape(-1, 2).all(axis=1))
+    light = np.clip(grey * np.float32(1 / white), 0, 1) + np.float32(TOE)
+    scale = np.float32(255 / (np.sqrt(1 + TOE) - np.sqrt(TOE)))
+    shown = np.asarray((cv2.sqrt(light) - np.float32(np.sqrt(TOE))) * scale, np.float32)
+    size = max(shown.shape[1] // BLOCK_PX, 1), max(shown.shape[0] // BLOCK_PX, 1)
+    blocks = np.asarray(cv2.resize(shown, size, interpolation=cv2.INTER_AREA), np.float32)
+    codes = (shown + np.float32(0.5)).astype(np.uint8)
+    return Sketch(number=plate.number, time_s=plate.time_s, codes=codes, seen=seen, blocks=blocks)
+
+
+def _grey(image: Image) -> Image:
+    if image.ndim == 2:
+        return image
+    return np.asarray(cv2.transform(image, np.full((1, image.shape[2]), 1 / image.shape[2], np.float32)), np.float32)
+
+
+def comparable(before: Sketch, after: Sketch) -> tuple[Codes, Codes]:
+    """Return the codes of both; a row that one of them lacks shows the same in both, and so does not seem to move."""
+    one, other = before.codes, after.codes
+    if not before.seen.all():
+        one = np.where(before.seen[:, None], one, other)
+    if not after.seen.all():
+        other = np.where(after.seen[:, None], other, one)
+    return one, other
+
+
+def moved(before: Sketch, after: Sketch) -> bool:
+    """Return whether anything changed between two sketches by more than noise does; quick, and rather yes than no."""
+    change = after.blocks - before.blocks
+    rows_seen = before.seen & after.seen
+    if not rows_seen.all():
+        shown = cv2.resize(rows_seen[:, None].astype(np.float32), (1, len(change)), interpolation=cv2.INTER_AREA)
+        change[shown[:, 0] < 1] = 0
+    local = cv2.blur(change * change, (AROUND, AROUND))
+    return bool(local.max() > max(LEAST_CHANGE, NOISE_FACTOR * _noise(before, after) / BLOCK_PX) ** 2)
+
+
+def _noise(before: Sketch, after: Sketch) -> float:
+    """Return the noise of the change between two sketches, in codes, told from its finest detail in some of the rows.
+
+    The quieter half tells it: up to half of what is lit may move and be as rich in detail as it likes.
+    """
+    some = np.flatnonzero(before.seen & after.seen)[::SOME]
+    one, other = (sketch.codes[some].astype(np.int16) for sketch in (before, after))
+    change = other - one
+    fine = np.abs(change[:, 2:] - 2 * change[:, 1:-1] + change[:, :-2])[one[:, 1:-1] >= LEAST_LIT]
+    if fine.size < 64:
+        return 0.0
+    quarter = np.partition(fine, fine.size // 4)[fine.size // 4]
+    return float(quarter) / QUARTER_OF_NORMAL / float(np.sqrt(6))
+
+
+def flow_between(before: Sketch, after: Sketch) -> Flow:
+    """Return the flow between two sketches, both ways."""
+    one, other = comparable(before, after)
+    search: Any = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
+    search.setFinestScale(0)
+    forward, backward = (np.asarray(search.calc(*pair, None), np.float32) for pair in ((one, other), (other, one)))
+    return Flow(
+        forward=forward,
+        backward=backward,
+        steady_before=_returns(forward, backward),
+        steady_after=_returns(backward, forward),
+    )
+
+
+def _returns(there: Vectors, back: Vectors) -> Flags:
+    """Return where going there and back leads to the start again, within the picture."""
+    rows, cols = there.shape[:2]
+    x, y = places(rows, cols)
+    x, y = x + there[..., 0], y + there[..., 1]
+    returned = cv2.remap(back, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    missed_px = np.hypot(there[..., 0] + returned[..., 0], there[..., 1] + returned[..., 1])
+    inside = (x >= -0.5) & (x <= cols - 0.5) & (y >= -0.5) & (y <= rows - 0.5)
+    allowed_px = BOTH_WAYS_PX + BOTH_WAYS_SHARE * np.hypot(there[..., 0], there[..., 1])
+    return np.asarray(inside & (missed_px <= allowed_px))
+
+
+def places(rows: int, cols: int) -> tuple[Vectors, Vectors]:
+    """Return the column and the row of every pixel, each (row, col)."""
+    x, y = np.meshgrid(np.arange(cols, dtype=np.float32), np.arange(rows, dtype=np.float32))
+    return x, y

@@ -1,0 +1,165 @@
+"""What is held of each light while plates come in: sketches of the last rounds, and plates as long as they are needed.
+
+Plates are most of a run's memory: one is let go as soon as no instant, of those that wait and those to come, can be
+made from it, and packed once it was found to move. Sketches are a fiftieth of that, and stay a round longer.
+"""
+
+from collections import deque
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from psvideo.plates.align.flow import Sketch, sketch_of, white_of
+from psvideo.plates.align.packed import Packed, packed, unpacked
+from psvideo.plates.sequence import LightPlate
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shot:
+    """A light in one round: what flow sees of it, None where no flow is asked for; and its plate, while it is held."""
+
+    round: int
+    time_s: float
+    sketch: Sketch | None
+    plate: LightPlate | Packed | None
+
+    def given(self) -> LightPlate | None:
+        """Return the plate, if it is held."""
+        return unpacked(self.plate) if isinstance(self.plate, Packed) else self.plate
+
+
+@dataclass(frozen=True, kw_only=True)
+class Around:
+    """The shots of a light, one round apart, that lie around an instant or nearest to it; twice the same where there is
+    only one, or where it shows that very instant."""
+
+    before: Shot
+    after: Shot
+
+    def nearest(self, time_s: float) -> LightPlate:
+        """Return the plate that is nearest in time, of those that are held."""
+        held = [shot for shot in (self.before, self.after) if shot.plate is not None]
+        plate = min(held, key=lambda shot: abs(shot.time_s - time_s)).given()
+        if plate is None:
+            raise ValueError("an instant needs at least one of its two plates")
+        return plate
+
+
+@dataclass(kw_only=True)
+class Instant:
+    """An instant that is to be shown, of a round, and the lights' plates at it that are made already; ``moves`` once
+    any of them was found to move."""
+
+    number: int
+    time_s: float
+    round: int
+    made: dict[str, LightPlate] = field(default_factory=dict)
+    moves: bool = False
+
+
+@dataclass(kw_only=True)
+class Held:
+    """The shots of every light by round, and the instants that wait for later ones.
+
+    ``sketched`` says whether flow is asked for, ``keep_all`` whether instants lie at every flash, ``trusts_rest``
+    whether lights that show nothing move speak for the others, and ``with_ambient`` whether dark slots come. ``newest``
+    is the round that plates come of, ``whole`` the last one that was complete, and ``middle_s`` its middle.
+    """
+
+    lights: tuple[str, ...]
+    sketched: bool
+    keep_all: bool
+    trusts_rest: bool
+    with_ambient: bool
+    whites: dict[str, float] = field(default_factory=dict)
+    shots: dict[str, dict[int, Shot]] = field(default_factory=dict)
+    waiting: deque[Instant] = field(default_factory=deque)
+    ambient: dict[int, LightPlate] = field(default_factory=dict)
+    newest: int = 0
+    whole: int = 0
+    middle_s: float = 0.0
+    ended: bool = False
+
+    def take(self, plate: LightPlate) -> dict[str, float] | None:
+        """Hold one more plate; return the times of its round's plates where it was the last that this lacked."""
+        self.newest = plate.number
+        if plate.light not in self.lights:
+            self.ambient[plate.number] = plate
+            return None
+        sketch = None
+        if self.sketched:
+            if plate.light not in self.whites:
+                self.whites[plate.light] = white_of(plate)
+            sketch = sketch_of(plate, white=self.whites[plate.light])
+        shot = Shot(round=plate.number, time_s=plate.time_s, sketch=sketch, plate=plate)
+        self.shots.setdefault(plate.light, {})[plate.number] = shot
+        times_s = {
+            light: self.shots[light][plate.number].time_s
+            for light in self.lights
+            if plate.number in self.shots.get(light, {})
+        }
+        if len(times_s) < len(self.lights):
+            return None
+        self.whole, self.middle_s = plate.number, float(np.mean(list(times_s.values())))
+        return times_s
+
+    def around(self, light: str, instant: Instant) -> Around | None:
+        """Return what a light's plate at an instant is made from; None where that is still to come."""
+        before, own, after = (self.shots[light].get(instant.round + step) for step in (-1, 0, 1))
+        if own is None or own.plate is None:
+            raise ValueError(f"light {light} of round {instant.round} is gone before instant {instant.number} is made")
+        if own.time_s == instant.time_s:
+            return Around(before=own, after=own)
+        if before is not None and own.time_s > instant.time_s:
+            return Around(before=before, after=own)
+        if after is not None:
+            return Around(before=own, after=after)
+        if not (self.ended or self.newest > instant.round + 1 or self._rests(instant)):
+            return None
+        return Around(before=before or own, after=own)
+
+    def _rests(self, instant: Instant) -> bool:
+        """Tell whether all lights before an instant, one at least, were compared with the next round, and none moves.
+
+        The lights after it, of which the round before lacks plates, need not wait for the next round then.
+        """
+        early = [light for light in self.lights if self.shots[light][instant.round].time_s < instant.time_s]
+        seen = self.newest > instant.round and all(light in instant.made for light in early)
+        return self.trusts_rest and bool(early) and seen and not instant.moves
+
+    def lacks_ambient(self, instant: Instant) -> bool:
+        """Tell whether a round's dark slot is wanted and may still come."""
+        return self.with_ambient and not (self.ended or self.newest > instant.round or instant.round in self.ambient)
+
+    def let_go(self) -> None:
+        """Forget what no instant can be made from: none of those that wait, nor of rounds to come."""
+        oldest = min([self.newest, self.whole or self.newest, *(one.round for one in self.waiting)]) - 1
+        for number in [number for number in self.ambient if number <= oldest]:
+            del self.ambient[number]
+        for light, shots in self.shots.items():
+            near = {number for one in self.waiting if light not in one.made for number in self._rounds_of(light, one)}
+            for number, shot in list(shots.items()):
+                if number < oldest:
+                    del shots[number]
+                elif shot.plate is not None and number not in near and not self._is_for_later(shot):
+                    shots[number] = replace(shot, plate=None)
+
+    def _rounds_of(self, light: str, instant: Instant) -> tuple[int, int]:
+        """Return the rounds whose plates of a light an instant is made from; at the clip's end the first is enough."""
+        late = self.shots[light][instant.round].time_s > instant.time_s
+        before = late and instant.round - 1 in self.shots[light]
+        return instant.round, instant.round - 1 if before else instant.round + 1
+
+    def pack(self, light: str, around: Around) -> None:
+        """Hold the plates around an instant, which moved, in less memory: none of them will pass as it is."""
+        shots = self.shots[light]
+        for shot in (around.before, around.after):
+            if isinstance(shot.plate, LightPlate):
+                shots[shot.round] = replace(shot, plate=packed(shot.plate))
+
+    def _is_for_later(self, shot: Shot) -> bool:
+        """Tell whether a plate may serve an instant of a round that is not complete yet."""
+        coming = self.newest if self.newest > self.whole else self.newest + 1
+        if shot.round < coming - 1:
+            return False
+        return self.keep_all or shot.round != self.whole or shot.time_s > self.middle_s

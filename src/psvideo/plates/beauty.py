@@ -1,0 +1,70 @@
+"""The beauty plate: the scene under all lights of a round at once, each as strong as wished, ambient off or on."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from psvideo.errors import UsageError, nearest
+from psvideo.model.plan import Plan
+from psvideo.plates.sequence import AMBIENT, LightPlate, Round
+
+BEAUTY = "beauty"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mix:
+    """How strong each light is in the sum: ``weights`` by name, 1 where not named, and 0 for ``ambient``."""
+
+    weights: tuple[tuple[str, float], ...] = ()
+
+    def of(self, light: str) -> float:
+        """Return a light's weight."""
+        return dict(self.weights).get(light, 0.0 if light == AMBIENT else 1.0)
+
+    def check(self, plan: Plan) -> None:
+        """Raise UsageError where a weight's light is not in the plan, or ambient light was never seen alone."""
+        known = (*plan.lights, AMBIENT)
+        for light, _ in self.weights:
+            if light not in known:
+                raise UsageError(f"--weight {light}: the plan has no such light; {nearest(light, known)}")
+        if self.of(AMBIENT) and all(any(flash.lights.values()) for flash in plan.flashes):
+            raise UsageError(
+                "--with-ambient: the plan has no dark slot, so that ambient light was never seen alone; it is in every "
+                "plate already. Leave the option out."
+            )
+
+
+def parse_mix(weights: Sequence[str], *, with_ambient: bool) -> Mix:
+    """Return the mix of a command's options: ``key=0.5``, one a light. Raises UsageError where one is no such thing."""
+    found = {AMBIENT: 1.0} if with_ambient else {}
+    for text in weights:
+        name, equals, number = text.partition("=")
+        try:
+            weight = float(number)
+        except ValueError:
+            weight = np.nan
+        if not equals or not np.isfinite(weight) or weight < 0:
+            raise UsageError(f"--weight {text}: expected a light's name and how strong it is to be, such as key=0.5.")
+        found[name] = weight
+    return Mix(weights=tuple(sorted(found.items())))
+
+
+def beauty_of(one: Round, mix: Mix, ambient: LightPlate | None = None) -> LightPlate:
+    """Return the sum of a round's plates and, where the mix asks for it, of what one exposure saw of ambient light.
+
+    ``ambient`` is the latest that was seen, where the round has no dark slot of its own. What a plate does not know is
+    0 and not seen in the sum. A pixel that is clipped in a light is at least as bright as the sum says.
+    """
+    parts: Mapping[str, LightPlate | None] = {plate.light: plate for plate in one.plates} | {
+        AMBIENT: one.ambient or ambient
+    }
+    used = [(plate, mix.of(name)) for name, plate in parts.items() if plate is not None and mix.of(name)]
+    image = np.zeros_like(one.plates[0].image)
+    for plate, weight in used:
+        image += np.float32(weight) * plate.image
+    by_row = all(plate.seen.ndim == 1 for plate, _ in used)
+    known = [plate.seen if by_row else plate.pixels_seen for plate, _ in used]
+    seen = np.all(known, axis=0) if used else np.ones(image.shape[0], np.bool_)
+    image[~seen] = 0
+    return LightPlate(light=BEAUTY, number=one.number, time_s=one.time_s, image=image, seen=seen)

@@ -1,0 +1,142 @@
+"""From a take and its timing to plates: decode once, rebuild every flash, take ambient light off, gather into rounds.
+
+A clip of any length streams through in constant memory.
+"""
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
+from typing import Literal
+
+from psvideo.clip import ALL_CORES, Clip, Frame, Take, demosaic, read_frames
+from psvideo.compute.progress import Watch, unwatched
+from psvideo.model.camera import Camera
+from psvideo.model.shutter import frames_touched
+from psvideo.model.timing import Timing, places_in_time, timed_camera
+from psvideo.plates import hudon2015
+from psvideo.plates.ambient import subtract, update
+from psvideo.plates.sequence import FIRST_NUMBER, LightPlate, Round, check_separable, light_plates, rounds
+from psvideo.plates.split import Plate, plate_of, split
+
+Method = Literal["weights", "hudon2015"]
+AHEAD = 2
+"""Frames that are decoded in advance while plates are rebuilt; each costs memory."""
+
+
+def clip_rounds(
+    take: Take,
+    timing: Timing,
+    *,
+    method: Method = "weights",
+    start_number: int = FIRST_NUMBER,
+    watch: Watch = unwatched,
+    each_flash: Callable[[Plate], None] | None = None,
+) -> Iterator[Round]:
+    """Decode a take once and yield its rounds: one plate per light at its full flash, ambient light taken off.
+
+    ``each_flash`` is shown every single plate on its way, demosaiced.
+    """
+    check_separable(take.plan)
+    shown = _shown(clip_plates(take, timing, method=method, watch=watch), each_flash)
+    return rounds(shown, take.plan, timing.flashes, start=start_number)
+
+
+def clip_light_plates(
+    take: Take,
+    timing: Timing,
+    *,
+    start_number: int = FIRST_NUMBER,
+    with_ambient: bool = False,
+    watch: Watch = unwatched,
+) -> Iterator[LightPlate]:
+    """Decode a take once and yield the plates of its lights as ``clip_rounds`` has them, each as soon as it is there.
+
+    Dark slots come only where they are wanted. Nothing is held but what a light still waits for.
+    """
+    check_separable(take.plan)
+    plates, flashes = clip_plates(take, timing, watch=watch), timing.flashes
+    return light_plates(plates, take.plan, flashes, start=start_number, with_ambient=with_ambient)
+
+
+def clip_plates(take: Take, timing: Timing, *, method: Method = "weights", watch: Watch = unwatched) -> Iterator[Plate]:
+    """Decode a take once and yield the plate of every flash that it holds, ambient light taken off, demosaiced."""
+    _decode_ahead(take, watch)
+    clip, camera = take.clip, timed_camera(take.plan, timing)
+    places = places_in_time(timing, clip.numbers)
+    used = _within(timing, camera, take, places)
+    decoded = read_frames(clip, take.numbers, ahead=AHEAD, threads=ALL_CORES, kept=take.kept)
+    frames = _placed(watch(decoded, total=len(take.numbers), what="rebuilding flashes"), places)
+    rebuild = split if method == "weights" else hudon2015.split
+    plates = subtract(rebuild(frames, camera, used), darks=_dark_plates(take, camera, used, places))
+    return map(_colour_of(clip), plates)
+
+
+def first_ambient(take: Take, timing: Timing) -> LightPlate | None:
+    """Return what the take's first dark slot shows of the ambient light, None where there is none; decodes its frames.
+
+    A round that comes before any dark slot has no ambient plate of its own.
+    """
+    camera, places = timed_camera(take.plan, timing), places_in_time(timing, take.clip.numbers)
+    dark = next(_dark_plates(take, camera, _within(timing, camera, take, places), places), None)
+    if dark is None:
+        return None
+    plate = _colour_of(take.clip)(replace(dark, image=update(None, dark).image))
+    return LightPlate(light="ambient", number=0, time_s=plate.time_s, image=plate.image, seen=plate.seen)
+
+
+def _decode_ahead(take: Take, watch: Watch) -> None:
+    """Decode all frames into the take's store, unless the fit did: dark slots are read ahead, out of order."""
+    clip, kept = take.clip, take.kept
+    dark = len(take.plan.lit_slots) < len(take.plan.flashes)
+    if kept is not None and dark and not (len(kept) or kept.missed):
+        frames = read_frames(clip, take.numbers, ahead=ALL_CORES, threads=ALL_CORES, kept=kept, keep=True)
+        deque(watch(frames, total=len(take.numbers), what="decoding"), maxlen=0)
+
+
+def _placed(frames: Iterable[Frame], places: Mapping[int, int]) -> Iterator[Frame]:
+    """Put frames where they truly are in time; repeated ones, which are nowhere, are left out."""
+    for frame in frames:
+        if frame.number in places:
+            yield frame if frame.index == places[frame.number] else replace(frame, index=places[frame.number])
+
+
+def _within(timing: Timing, camera: Camera, take: Take, places: Mapping[int, int]) -> Timing:
+    """Take as complete only the flashes whose frames all lie between the take's first frame and its last."""
+    first, last = frames_touched(camera, timing.start_s, timing.duration_s)
+    used = [places[number] for number in take.numbers if number in places]
+    begin, end = used[0], used[-1]
+    flashes = tuple(
+        replace(flash, complete=flash.complete and bool(first[n] >= begin and last[n] <= end))
+        for n, flash in enumerate(timing.flashes)
+    )
+    return replace(timing, flashes=flashes)
+
+
+def _dark_plates(take: Take, camera: Camera, timing: Timing, places: Mapping[int, int]) -> Iterator[Plate]:
+    """Read ahead, from the few frames that they touch, the dark slots, between which ambient light is interpolated."""
+    first, last = frames_touched(camera, timing.start_s, timing.duration_s)
+    number_at = {places[number]: number for number in take.numbers if number in places}
+    for dark in timing.flashes:
+        if dark.complete and not any(dark.lights.values()):
+            touched = range(first[dark.index], last[dark.index] + 1)
+            near = tuple(number_at[place] for place in touched if place in number_at)
+            frames = _placed(read_frames(take.clip, near, kept=take.kept), places)
+            plate = plate_of(dark, frames, camera, timing) if near else None
+            if plate is not None:
+                yield plate
+            del plate
+
+
+def _colour_of(clip: Clip) -> Callable[[Plate], Plate]:
+    """Return what makes colour of a clip's plates: demosaicing where its frames are mosaics, else nothing."""
+    if clip.cfa is None:
+        return lambda plate: plate
+    pattern = clip.cfa
+    return lambda plate: replace(plate, image=demosaic(plate.image, pattern))
+
+
+def _shown(plates: Iterable[Plate], show: Callable[[Plate], None] | None) -> Iterator[Plate]:
+    for plate in plates:
+        if show is not None:
+            show(plate)
+        yield plate

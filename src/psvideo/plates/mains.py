@@ -1,0 +1,145 @@
+"""Mains light: how much brighter or darker each row's exposure was than the ambient light's mean.
+
+Lamps on the mains pulse at 100 or 120 Hz. An exposure of another length than whole pulses collects more or less of
+them, each row at another phase: stripes that move from frame to frame. Between two dark slots the phases of every row
+are known from the clock, so that one amplitude and phase, the same for all rows, is found from how the rows' means
+changed. Two pairs of dark slots in a row must tell the same: a shadow that crosses the rows may look like a ripple
+once, but not twice. The lamps' share of the light is taken to be the same all over the picture.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.model.camera import FloatArray
+from psvideo.model.row_profiles import row_profile
+from psvideo.plates.split import CLIPPED, Plate
+
+PULSES_HZ = (100.0, 120.0)
+EXPLAINED = 0.8
+"""A ripple is believed where it explains this share of the rows' changes, beyond one change of level."""
+LEAST_TURN = 0.3
+"""Dark slots must differ at least so much in phase (of 2 at most, RMS) to tell a ripple."""
+LEAST_ROWS = 16
+LEAST_SWING, MOST_SWING = 1e-3, 0.9
+AGREES = 0.3
+"""Two findings agree that differ by no more than this share of themselves, which is 0.3 in phase as well."""
+LONGEST_UNSEEN = 4
+"""Dark slots for which a ripple is taken to go on that is not seen: the mains wander, by up to 0.2 Hz."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RowLight:
+    """The rows of a plate: their means (row,), and whose exposures went into them, ``shares`` and ``middles_s``
+    (frame, row). ``good`` (row,) is False where a row was not seen, holds no light or is clipped."""
+
+    mean: FloatArray
+    shares: FloatArray
+    middles_s: FloatArray
+    good: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, plate: Plate) -> "RowLight":
+        """Return the rows of a plate that still holds its ambient light."""
+        mean = row_profile(plate.image)
+        good = plate.seen & (mean > 0) & (mean < CLIPPED / plate.image[0].size)
+        return cls(mean=mean, shares=plate.shares, middles_s=plate.middles_s, good=good)
+
+    @property
+    def middle_s(self) -> FloatArray:
+        """The mean moment of each row's exposures, shape (row,)."""
+        middle: FloatArray = (self.shares * self.middles_s).sum(axis=0) / np.maximum(self.shares.sum(axis=0), 1e-12)
+        return middle
+
+    def phasor(self, hz: float) -> NDArray[np.complex128]:
+        """Return where in a pulse each row's exposures lie on average, shape (row,)."""
+        turns = np.exp(2j * np.pi * hz * self.middles_s)
+        mean: NDArray[np.complex128] = (self.shares * turns).sum(axis=0) / np.maximum(self.shares.sum(axis=0), 1e-12)
+        return mean
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ripple:
+    """The swing of the ambient light's exposures: of ``abs(amplitude)`` of their mean, ``hz`` times a second."""
+
+    hz: float
+    amplitude: complex
+
+    def swing(self, rows: RowLight) -> FloatArray:
+        """Return by which factor the rows' exposures were off the mean, shape (row,)."""
+        return _swing(self.amplitude, rows.phasor(self.hz))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mains:
+    """What dark slots told of mains light up to the one whose ``rows`` these are.
+
+    ``last`` is what the last pair of slots told, ``ripple`` what two pairs agreed on, ``unseen`` slots ago.
+    """
+
+    rows: RowLight
+    last: Ripple | None = None
+    ripple: Ripple | None = None
+    unseen: int = 0
+
+    def next(self, rows: RowLight) -> "Mains":
+        """Return what is told with one more dark slot."""
+        found = find_ripple(self.rows, rows)
+        if found is not None and self.last is not None and _agree(found, self.last):
+            return Mains(rows=rows, last=found, ripple=found)
+        if self.ripple is None or self.unseen == LONGEST_UNSEEN:
+            return Mains(rows=rows, last=found)
+        return Mains(rows=rows, last=found, ripple=self.ripple, unseen=self.unseen + 1)
+
+
+def _agree(one: Ripple, other: Ripple) -> bool:
+    return one.hz == other.hz and abs(one.amplitude - other.amplitude) < AGREES * abs(other.amplitude)
+
+
+def find_ripple(before: RowLight, after: RowLight) -> Ripple | None:
+    """Return the ripple by which the rows of two dark slots differ, None where none is seen clearly."""
+    good = before.good & after.good
+    if good.sum() < LEAST_ROWS:
+        return None
+    change = np.log(after.mean[good] / before.mean[good])
+    weight = np.minimum(before.mean, after.mean)[good]
+    weight = weight / weight.max()
+    tried = [_fitted(before, after, hz, good, change, weight) for hz in PULSES_HZ]
+    best = max((one for one in tried if one is not None), key=lambda one: one[0], default=None)
+    clear = best is not None and best[0] > EXPLAINED and abs(best[1].amplitude) > LEAST_SWING
+    return best[1] if best is not None and clear else None
+
+
+def _fitted(
+    before: RowLight,
+    after: RowLight,
+    hz: float,
+    good: NDArray[np.bool_],
+    change: FloatArray,
+    weight: FloatArray,
+) -> tuple[float, Ripple] | None:
+    """Fit one change of level and one ripple (Gauss-Newton); return the share of the change explained, and it."""
+    early, late = before.phasor(hz)[good], after.phasor(hz)[good]
+    if np.sqrt(np.mean(np.abs(late - early) ** 2)) < LEAST_TURN:
+        return None
+    amplitude = 0j
+    for _ in range(5):
+        low, high = _swing(amplitude, early), _swing(amplitude, late)
+        turn = late / high - early / low
+        slopes = np.stack([np.ones(len(turn)), turn.real, -turn.imag], axis=1) * weight[:, None]
+        rest = (change - np.log(high / low)) * weight
+        (_, real, imaginary), *_ = np.linalg.lstsq(slopes, rest, rcond=1e-3)
+        amplitude += complex(real, imaginary)
+        if abs(amplitude) > MOST_SWING:
+            return None
+    left = change - np.log(_swing(amplitude, late) / _swing(amplitude, early))
+    left = left - np.average(left, weights=weight**2)
+    flat = change - np.average(change, weights=weight**2)
+    explained = 1 - float(((left * weight) ** 2).sum() / max(((flat * weight) ** 2).sum(), 1e-18))
+    return explained, Ripple(hz=hz, amplitude=amplitude)
+
+
+def _swing(amplitude: complex, phasor: NDArray[np.complex128]) -> FloatArray:
+    swing: FloatArray = np.maximum(1 + (amplitude * phasor).real, 1 - MOST_SWING)
+    return swing

@@ -1,0 +1,125 @@
+"""Name the lights of a clip whose plan has no marker: by the light that the user names, or by the rig's directions.
+
+For the rig, small plates of one cycle are rebuilt at up to three places of the clip, and only their frames are decoded.
+All places that tell anything must tell the same; else the order stays a guess, and the timing says why.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import cv2
+import numpy as np
+
+from psvideo.clip import Take
+from psvideo.errors import PsvideoError, UsageError
+from psvideo.model.rig import Rig
+from psvideo.model.shutter import frames_touched
+from psvideo.model.timing import Timing, places_in_time, timed_camera
+from psvideo.plates.gather import clip_plates
+from psvideo.plates.split import Plate
+from psvideo.sync.order_by_rig import Image, Verdict, alike_turns, order_by_rig, turned, why_untold
+
+PLACES = 3
+"""Cycles that are looked at, spread over the clip."""
+SMALL_PX = 64
+"""The small plates' longer side: enough to see where light comes from, and hardly any noise."""
+
+
+def named_first(take: Take, timing: Timing, first_light: str) -> Timing:
+    """Return a timing, read from a file, whose first complete lit flash is the named light's.
+
+    Raises UsageError where the plan has no such light, and PsvideoError where the cycle's marker says otherwise.
+    """
+    if first_light not in take.plan.lights:
+        raise UsageError(
+            f"--first-light {first_light}: no such light in the plan; its lights are {', '.join(take.plan.lights)}."
+        )
+    for turn in alike_turns(take.plan):
+        named = turned(take.plan, timing, turn)
+        if first_light == _first_lights(named):
+            return replace(named, order="given", order_note="")
+    raise PsvideoError(
+        f"--first-light {first_light} does not fit the timing: its first complete flash is {_first_lights(timing)}'s, "
+        f"and no turn of the cycle by which flashes stay alike makes it {first_light}'s. "
+        "Leave the option out, or leave --timing out to find the flashes anew."
+    )
+
+
+def _first_lights(timing: Timing) -> str:
+    for flash in timing.flashes:
+        lit = [light for light, power in flash.lights.items() if power > 0]
+        if flash.complete and lit:
+            return "+".join(lit)
+    return ""
+
+
+def named_by_rig(take: Take, timing: Timing, rig: Rig) -> Timing:
+    """Return the timing with the order that the rig's directions tell, where the order was a guess.
+
+    Where they do not tell it, the names stay as they were guessed; ``order_note`` says why, either way. Raises
+    PsvideoError where the rig lacks a light of the plan.
+    """
+    if timing.order != "guess":
+        return timing
+    refusal = why_untold(take.plan, rig)
+    verdict = Verdict(turn=None, why=refusal) if refusal else _agreed(list(_verdicts(take, timing, rig)))
+    if verdict.turn is None:
+        return replace(timing, order_note=f"The rig does not tell the order of the lights: {verdict.why}.")
+    note = f"The rig tells the order of the lights: {verdict.why}."
+    return replace(turned(take.plan, timing, verdict.turn), order="rig", order_note=note)
+
+
+def _agreed(verdicts: list[Verdict]) -> Verdict:
+    """Return the verdict of all places together: none may contradict another."""
+    if not verdicts:
+        return Verdict(turn=None, why="the clip holds no whole cycle of complete flashes")
+    decided = [verdict for verdict in verdicts if verdict.turn is not None]
+    if len({verdict.turn for verdict in decided}) > 1:
+        return Verdict(turn=None, why="different parts of the clip tell different orders")
+    return decided[0] if decided else verdicts[0]
+
+
+def _verdicts(take: Take, timing: Timing, rig: Rig) -> Iterator[Verdict]:
+    """Judge cycles at the clip's start, middle and end, as far as they do not overlap."""
+    cycle = len(take.plan.cycle_slots)
+    starts = [n for n in range(len(timing.flashes) - cycle + 1) if _whole(timing, n, cycle)]
+    last_end = -1
+    for start in (starts[place * (len(starts) - 1) // (PLACES - 1)] for place in range(PLACES if starts else 0)):
+        if start >= last_end:
+            last_end = start + cycle
+            pictures = _small_plates(take, timing, range(start, last_end))
+            if all(slot in pictures for slot in take.plan.lit_slots):
+                yield order_by_rig(take.plan, rig, pictures)
+
+
+def _whole(timing: Timing, start: int, count: int) -> bool:
+    return all(flash.complete for flash in timing.flashes[start : start + count])
+
+
+def _small_plates(take: Take, timing: Timing, flashes: range) -> dict[int, Image]:
+    """Rebuild some flashes from the frames that they touch, and return small pictures of them by slot."""
+    camera = timed_camera(take.plan, timing)
+    first, last = frames_touched(camera, timing.start_s, timing.duration_s)
+    begin, end = int(first[flashes.start]), int(last[flashes.stop - 1])
+    places = places_in_time(timing, take.clip.numbers)
+    near = tuple(number for number in take.numbers if number in places and begin <= places[number] <= end)
+    if not near:
+        return {}
+    plates = clip_plates(replace(take, numbers=near), timing)
+    return {plate.flash.slot: _small(plate) for plate in plates if plate.flash.index in flashes}
+
+
+def _small(plate: Plate) -> Image:
+    """Return a small picture of a plate: 0 where any of it was unseen, 1.0 where any of it was saturated."""
+    rows, cols = plate.image.shape[:2]
+    shrink = max(max(rows, cols) / SMALL_PX, 1.0)
+    size = (max(round(cols / shrink), 1), max(round(rows / shrink), 1))
+
+    def smaller(image: Image) -> Image:
+        return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.float32)
+
+    small = smaller(plate.image)
+    small[smaller((plate.image >= 1.0).astype(np.float32)) > 0] = 1.0
+    seen = np.repeat(plate.seen[:, None], cols, axis=1).astype(np.float32)
+    small[smaller(seen) < 1.0 - 1e-4] = 0.0
+    return small

@@ -1,0 +1,1 @@
+"""Measurements in, judgements out: one line for each thing, with advice."""

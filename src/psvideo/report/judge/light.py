@@ -1,0 +1,204 @@
+"""Judgements on light: exposure, clipping, lamps that fail or flicker, and what else lit the set."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.report.judgement import Judgement
+from psvideo.report.observe.levels import TARGET_QUANTILE, Levels
+from psvideo.report.observe.observed import InstantFacts, Observed
+
+DIM_STOPS, DARK_STOPS = -3.5, -6.0
+"""A take whose brightest lamp's brightest parts stay so far below saturation is noisy, or lost in noise."""
+BEST_STOPS = -0.5
+MOST_CLIPPED, LOST_CLIPPED = 0.02, 0.1
+"""Shares of the subject that one lamp may clip: more costs normals there, and with three lamps all of them."""
+SPARE_CLIPPED = 0.25
+"""With more lamps than three the others still tell the normal."""
+MOST_AMBIENT, LOST_AMBIENT = 0.1, 0.5
+NOTICED, MOST_SWING = 0.05, 0.1
+"""Ambient light of more than the first share that changes from dark slot to dark slot by more than the second."""
+NO_LIGHT, WEAK_LIGHT = 0.01, 1 / 8
+"""Shares of the brightest lamp's light."""
+MISSED = 0.5
+"""A flash that gives less than this share of its lamp's usual light did not fire as it should."""
+UNSTEADY = 0.02
+NAMED = 4
+
+
+def exposure(observed: Observed) -> Iterator[Judgement]:
+    """Judge how bright the brightest lamp's plates are, and how much each lamp clips."""
+    levels = {light: observed.levels(light) for light in observed.lights if light in observed.counts}
+    if not any(one.total for one in levels.values()):
+        yield Judgement(subject="exposure", grade="bad", found="Nothing in the picture is lit.", advice=MORE_LIGHT)
+        return
+    clipped = list(_clipping(levels))
+    top = max(one.stops(TARGET_QUANTILE) for one in levels.values())
+    worst = max(one.clipped_share for one in levels.values())
+    if top < DIM_STOPS:
+        yield Judgement(
+            subject="exposure",
+            grade="bad" if top < DARK_STOPS else "doubtful",
+            found=f"The picture is dark: its brightest parts under the brightest light are {-top:.1f} stops below "
+            "saturation, so noise is large.",
+            advice=f"Open the aperture by about {_half(BEST_STOPS - top)}, or flash longer or stronger.",
+        )
+    elif not clipped:
+        yield Judgement(
+            subject="exposure",
+            grade="good",
+            found=f"The brightest parts are {-top:.1f} stops below saturation, and at most {100 * worst:.1f} % of the "
+            "subject is clipped.",
+        )
+    yield from clipped
+
+
+MORE_LIGHT = (
+    "Check that the lights fire, that the lens is open, and that plan.toml's black_level and transfer are right."
+)
+
+
+def _clipping(levels: dict[str, Levels]) -> Iterator[Judgement]:
+    over = {light: one for light, one in levels.items() if one.clipped_share > MOST_CLIPPED}
+    lost = LOST_CLIPPED if len(levels) < 4 else SPARE_CLIPPED
+    if len(over) == len(levels) > 1:
+        power = min(one.right_power() for one in over.values())
+        shares = [one.clipped_share for one in over.values()]
+        yield Judgement(
+            subject="clipping",
+            grade="bad" if max(shares) > lost else "doubtful",
+            found=f"Every light clips: {100 * min(shares):.0f} to {100 * max(shares):.0f} % of the subject.",
+            advice=f"Close the aperture by about {_half(-np.log2(power))}, or lower all powers to "
+            f"{_percent(power)}, and look again.",
+        )
+        return
+    whole = [one for one in levels.values() if one.clipped_share <= 1 - TARGET_QUANTILE]
+    for light, one in over.items():
+        yield Judgement(
+            subject="clipping",
+            grade="bad" if one.clipped_share > lost else "doubtful",
+            found=f"The flash of {light!r} is clipped in {100 * one.clipped_share:.0f} % of the subject.",
+            advice=f"Lower its power (or its duration) to about {_percent(one.right_power(whole))}.",
+        )
+
+
+def _half(stops: float) -> str:
+    halves = max(round(2 * float(stops)), 1)
+    return f"{halves / 2:g} {'stop' if halves <= 2 else 'stops'}"
+
+
+def _percent(power: float) -> str:
+    return f"{max(5 * int(20 * power), 5)} %"
+
+
+def lamps(observed: Observed, *, timed: bool = True) -> Iterator[Judgement]:
+    """Judge whether every lamp gives light, always, and steadily; where flash times are not sure (``timed``), only
+    whether it does at all."""
+    facts = [one for one in observed.facts if len(one.levels) == len(observed.lights)]
+    if not facts:
+        return
+    level = np.array([one.levels for one in facts])
+    usual = np.median(level, axis=0)
+    relative = usual / max(float(usual.max()), 1e-12)
+    said = list(_weak(observed.lights, relative))
+    alive = usual > NO_LIGHT * usual.max()
+    whole = np.array([one.unseen_share == 0 for one in facts])
+    if timed and whole.any():
+        shown = [one for one in facts if one.unseen_share == 0]
+        said += _missed(observed.lights, shown, level[whole], usual, alive)
+        said += _unsteady(observed.lights, shown, level[whole], usual, alive)
+    yield from said
+    if not said:
+        spread = -np.log2(max(relative.min(), 1e-9))
+        yield Judgement(
+            subject="lights",
+            grade="good",
+            found=f"All {len(observed.lights)} lights fire{' in every round' if timed else ''}; the weakest gives "
+            f"{spread:.1f} stops less than the strongest.",
+        )
+
+
+def _weak(lights: Sequence[str], relative: NDArray[np.float64]) -> Iterator[Judgement]:
+    for light, share in zip(lights, relative, strict=True):
+        if share < NO_LIGHT:
+            yield Judgement(
+                subject="lights",
+                grade="bad",
+                found=f"The light {light!r} gives no light ({100 * max(share, 0):.1f} % of the strongest).",
+                advice="Check its cable, driver and line, and that the plan names it as the board does.",
+            )
+        elif share < WEAK_LIGHT:
+            yield Judgement(
+                subject="lights",
+                grade="doubtful",
+                found=f"The light {light!r} is weak: {100 * share:.0f} % of the strongest.",
+                advice="Raise its power or its flash duration, or move it nearer.",
+            )
+
+
+def _missed(
+    lights: Sequence[str],
+    facts: Sequence[InstantFacts],
+    level: NDArray[np.float64],
+    usual: NDArray[np.float64],
+    alive: NDArray[np.bool_],
+) -> Iterator[Judgement]:
+    for k, light in enumerate(lights):
+        numbers = [one.number for one, value in zip(facts, level[:, k], strict=True) if value < MISSED * usual[k]]
+        if alive[k] and numbers:
+            more = f" and {len(numbers) - NAMED} more" if len(numbers) > NAMED else ""
+            named = ", ".join(map(str, numbers[:NAMED])) + more
+            yield Judgement(
+                subject="lights",
+                grade="bad" if len(numbers) > 0.1 * len(facts) else "doubtful",
+                found=f"The light {light!r} failed or was covered in {len(numbers)} of {len(facts)} rounds ({named}).",
+                advice="Check its driver and supply; these rounds' normals are wrong.",
+            )
+
+
+def _unsteady(
+    lights: Sequence[str],
+    facts: Sequence[InstantFacts],
+    level: NDArray[np.float64],
+    usual: NDArray[np.float64],
+    alive: NDArray[np.bool_],
+) -> Iterator[Judgement]:
+    """Say which lamps change from round to round while nothing moves."""
+    still = np.array([not one.moving_share for one in facts[1:]], bool)
+    steps = np.abs(np.diff(level, axis=0))[still]
+    if len(steps) < 4:
+        return
+    swing = np.median(steps, axis=0) / np.maximum(usual, 1e-9)
+    for light, share, lives in zip(lights, swing, alive, strict=True):
+        if lives and share > UNSTEADY:
+            yield Judgement(
+                subject="lights",
+                grade="doubtful",
+                found=f"The light {light!r} flickers: its level changes by {100 * share:.1f} % from round to round.",
+                advice="Check its driver and supply, and that no dimmer (PWM) is in its line.",
+            )
+
+
+def ambient(observed: Observed) -> Judgement:
+    """Judge how much of what is recorded is light that is always there."""
+    shares = [one.ambient for one in observed.facts if one.ambient is not None]
+    swing = float(np.std(shares)) / max(float(np.mean(shares)), 1e-9) if len(shares) > 2 else 0.0
+    if not shares:
+        return Judgement(
+            subject="ambient",
+            grade="unknown",
+            found="Ambient light is not known: the plan has no dark slot, or none was complete.",
+        )
+    share = float(np.median(shares))
+    found = f"Ambient light is {100 * share:.0f} % of the signal."
+    if share > NOTICED and swing > MOST_SWING:
+        found = f"{found[:-1]} and flickers or changes by {100 * swing:.0f} % (mains light, a screen, the sun)."
+    elif share <= MOST_AMBIENT:
+        return Judgement(subject="ambient", grade="good", found=found)
+    return Judgement(
+        subject="ambient",
+        grade="bad" if share > LOST_AMBIENT else "doubtful",
+        found=f"{found} It is taken off, but its noise stays, and less room is left below saturation.",
+        advice="Cover windows and switch room light and screens off, or flash stronger with a smaller aperture.",
+    )

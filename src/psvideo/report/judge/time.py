@@ -1,0 +1,173 @@
+"""Judgements on time: the flashes' moments, the lights' order, rows that nobody saw, and motion."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from psvideo.model.plan import Plan
+from psvideo.model.timing import Timing
+from psvideo.report.judgement import Judgement
+from psvideo.report.observe.observed import Observed
+
+SURE_ROWS, LOST_ROWS = 0.3, 2.0
+MIXED, LOST_MIXED = 0.02, 0.2
+BLIND = 0.97
+MOST_UNSEEN, LOST_UNSEEN = 0.02, 0.3
+FAST_PX, LOST_PX = 1.0, 4.0
+"""Pixels from flash to flash: 1 costs about 1 degree, 4 cost 5 to 9."""
+FEW_MOVE, MUCH_CHANGES = 0.02, 0.1
+OFTEN = 0.9
+"""Motion is judged by what is reached in a tenth of the rounds."""
+LEAST_FOLLOWED = 0.5
+NAMED = 3
+
+
+def timing_and_order(timing: Timing, mode: str) -> Iterator[Judgement]:
+    """Judge how sure the flashes' times and names are."""
+    rows = timing.phase_error_rows
+    if mode == "synced":
+        yield Judgement(
+            subject="timing", grade="good", found="One flash a frame, as the plan says: no time had to be found."
+        )
+    elif rows <= SURE_ROWS:
+        yield Judgement(
+            subject="timing",
+            grade="good",
+            found=f"Phase locked. {timing.how_sure} The clocks differ by {timing.clock_offset_ppm:+.1f} ppm.",
+        )
+    else:
+        yield Judgement(
+            subject="timing",
+            grade="bad" if rows > LOST_ROWS else "doubtful",
+            found=f"Flash times are sure to {rows:.2f} row only: plates may be torn near the dark row.",
+            advice="Fix the exposure, switch stabilisation off, and check that plan.toml is what the strobe played.",
+        )
+    if timing.order == "guess":
+        yield Judgement(
+            subject="order",
+            grade="doubtful",
+            found="Which light is which is a guess, so normals may be wrong everywhere."
+            + (f" {timing.order_note}" if timing.order_note else ""),
+            advice="Shoot with a dark slot as marker, or name the first light with --first-light.",
+        )
+    else:
+        yield Judgement(subject="order", grade="good", found=ORDER[timing.order])
+
+
+ORDER = {
+    "marker": "Which light is which is known from the cycle's marker.",
+    "rig": "Which light is which was told by the rig's directions.",
+    "given": "Which light is which was given.",
+}
+
+
+def coverage(plan: Plan, timing: Timing, observed: Observed) -> Iterator[Judgement]:
+    """Judge which rows were seen by nobody, or under two flashes, and why."""
+    unseen = max((one.unseen_share for one in observed.facts), default=0.0)
+    said = [] if plan.mode == "synced" else [*_mixed(plan, timing), *_blind(timing, unseen)]
+    said += _dropped(timing, observed)
+    if unseen > MOST_UNSEEN and not said:
+        said.append(
+            Judgement(
+                subject="rows",
+                grade="bad" if unseen > LOST_UNSEEN else "doubtful",
+                found=f"Up to {100 * unseen:.0f} % of a round's rows were seen by no frame.",
+                advice="Use all frames (no steps in --frames), and shoot at 360 degrees.",
+            )
+        )
+    yield from said
+    if not said:
+        yield Judgement(subject="rows", grade="good", found="Every row of every round was seen; no frame is missing.")
+
+
+def _mixed(plan: Plan, timing: Timing) -> Iterator[Judgement]:
+    dark_s = plan.dark_s * (1 + timing.clock_offset_ppm * 1e-6)
+    share = (timing.exposure_s - dark_s) / timing.frame_period_s
+    if share > MIXED:
+        yield Judgement(
+            subject="rows",
+            grade="bad" if share > LOST_MIXED else "doubtful",
+            found=f"The dark time of {dark_s * 1e3:.4g} ms is shorter than the exposure of "
+            f"{timing.exposure_s * 1e3:.4g} ms: about {100 * min(share, 1):.0f} % of the rows hold two flashes, and "
+            "plates are cut there.",
+            advice=f"Lengthen the dark time to at least {timing.exposure_s * 1e3:.4g} ms: make the plan anew with "
+            "psvideo capture-plan.",
+        )
+
+
+def _blind(timing: Timing, unseen: float) -> Iterator[Judgement]:
+    share = timing.exposure_s / timing.frame_period_s
+    if share < BLIND and unseen > MOST_UNSEEN:
+        yield Judgement(
+            subject="rows",
+            grade="bad" if unseen > LOST_UNSEEN else "doubtful",
+            found=f"Up to {100 * unseen:.0f} % of a round's rows were seen by no frame: the shutter is open for "
+            f"{360 * share:.0f} degrees only.",
+            advice="Shoot at 360 degrees.",
+        )
+
+
+def _dropped(timing: Timing, observed: Observed) -> Iterator[Judgement]:
+    holes, again = timing.dropped_frames, timing.repeated_frames
+    missing = sum(hole.count for hole in holes)
+    spoilt = [one.number for one in observed.facts if one.unseen_share > 0]
+    if missing:
+        where = ", ".join(f"{hole.count} after number {hole.after}" for hole in holes[:NAMED])
+        more = f" and {len(holes) - NAMED} more places" if len(holes) > NAMED else ""
+        grave = len(spoilt) > 0.1 * max(len(observed.facts), 1) and len(spoilt) > 1
+        yield Judgement(
+            subject="frames",
+            grade="doubtful",
+            found=f"{missing} frame(s) are missing ({where}{more}); rows that they held are not valid"
+            + (f", which spoils {len(spoilt)} of {len(observed.facts)} rounds." if grave else "."),
+            advice="Use a faster card or a lower data rate, and copy the take again before shooting it again.",
+        )
+    if again:
+        yield Judgement(
+            subject="frames",
+            grade="doubtful",
+            found=f"{len(again)} frame(s) repeat the one before (first: number {again[0]}).",
+            advice="Export the take without frame-rate conversion.",
+        )
+
+
+def motion(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = False) -> Judgement:
+    """Judge how far the fastest parts move from flash to flash, and within one flash."""
+    shares = [one.moving_share for one in observed.facts if one.moving_share is not None]
+    speeds = [one.speed_px_s for one in observed.facts if one.speed_px_s is not None]
+    if not shares:
+        return Judgement(
+            subject="motion", grade="unknown", found="Motion is not known: no two whole plates of one light in turn."
+        )
+    share = float(np.quantile(shares, OFTEN))
+    if len(speeds) < LEAST_FOLLOWED * len(shares):
+        return Judgement(
+            subject="motion",
+            grade="bad" if share > MUCH_CHANGES and not aligned else "doubtful",
+            found=f"{100 * share:.0f} % of the picture changes from round to round faster than can be followed.",
+            advice="Move slower, raise the frame rate, or flash fewer lights; if nothing moved, light flickers.",
+        )
+    speed = float(np.quantile(speeds, OFTEN))
+    flash_s = timing.frame_period_s if plan.mode == "synced" else plan.cycle_s / len(plan.cycle_slots)
+    step_px = speed * flash_s
+    blur_px = speed * max(plan.flashes[slot].duration_s for slot in plan.lit_slots)
+    if plan.mode == "synced":
+        blur_px = step_px
+    if step_px <= FAST_PX:
+        still = "Nothing moves." if step_px < 0.01 else f"At most {step_px:.2f} px of motion from flash to flash."
+        return Judgement(subject="motion", grade="good", found=still)
+    grave = step_px > LOST_PX and share > FEW_MOVE and not aligned
+    return Judgement(
+        subject="motion",
+        grade="bad" if grave else "doubtful",
+        found=f"{100 * share:.0f} % of the picture moves, by up to {step_px:.1f} px from flash to flash "
+        f"({blur_px:.1f} px of blur within one): normals there are off by about {_cost_deg(step_px):.0f} degrees"
+        + (" less what --align made good." if aligned else "."),
+        advice="Move slower, raise the frame rate or flash fewer lights"
+        + (", or let --align flow bring the plates together." if not aligned else "."),
+    )
+
+
+def _cost_deg(step_px: float) -> float:
+    """Return about what motion costs, from the table of docs on errors: 1.2 to 2.5 degrees a pixel, less from then."""
+    return float(np.interp(step_px, [0, 1, 4, 16], [0, 1.8, 6.7, 15]))

@@ -1,0 +1,1 @@
+"""What is measured on plates and surfaces while a run goes on, for its report."""

@@ -1,0 +1,100 @@
+"""How fast things move through the picture: flow between the plates of one light, round after round, on small pictures.
+
+Only what changed by more than noise is asked for its flow, so that noise does not pass for motion.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.plates.sequence import LightPlate
+
+WIDTH_PX = 480
+TOE = 0.02
+LEAST_CHANGE, NOISE_FACTOR = 1.5, 5.0
+"""Blocks of 8 pixels moved where they changed by more codes than the first, and by the second times their noise."""
+LEAST_BLOCKS = 0.002
+"""A share of the blocks that changed which is no more than chance."""
+FASTEST = 0.95
+"""What is told is how fast the fastest twentieth of what moves is."""
+RETURN_PX = 0.7
+FOLLOWED = 0.3
+"""Where there and back meet for less than this share of what changed, flow tells no speed."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Glimpse:
+    """A plate as motion is judged by: ``codes`` (row, col), how many picture pixels one of theirs is, and when."""
+
+    codes: NDArray[np.uint8]
+    scale: float
+    time_s: float
+    white: float
+    seen: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motion:
+    """Speed of the fastest things in pixels of the picture per second, and which share of the picture moves. The speed
+    is None where most of what changes cannot be followed from one round to the next."""
+
+    speed_px_s: float | None
+    share: float
+
+
+def glimpse(plate: LightPlate, white: float | None = None) -> Glimpse:
+    """Return what to keep of a plate; ``white`` is the light of the brightest code, left out: the plate's own."""
+    image = plate.image if plate.image.ndim == 2 else plate.image[..., 1]
+    step = max(round(image.shape[1] / (2 * WIDTH_PX)), 1)
+    grey = np.ascontiguousarray(image[::step, ::step])
+    if grey.shape[1] > WIDTH_PX:
+        size = (grey.shape[1] // 2, grey.shape[0] // 2)
+        grey = np.asarray(cv2.resize(grey, size, interpolation=cv2.INTER_AREA), np.float32)
+    white = white or max(1.2 * float(np.percentile(grey[::2, ::2], 99.5)), 1e-3)
+    light = np.clip(grey / np.float32(white), 0, 1) + np.float32(TOE)
+    scale = np.float32(255 / (np.sqrt(1 + TOE) - np.sqrt(TOE)))
+    codes = ((np.sqrt(light) - np.float32(np.sqrt(TOE))) * scale + np.float32(0.5)).astype(np.uint8)
+    whole = bool(plate.rows_seen.all())
+    return Glimpse(codes=codes, scale=image.shape[1] / grey.shape[1], time_s=plate.time_s, white=white, seen=whole)
+
+
+def motion(before: Glimpse, after: Glimpse) -> Motion | None:
+    """Return what moved between two plates of one light; None where rows are missing."""
+    if not (before.seen and after.seen):
+        return None
+    one, other = (picture.codes.astype(np.float32) for picture in (before, after))
+    changed = _changed(one, other)
+    still = Motion(speed_px_s=0.0, share=0.0)
+    if changed.mean() <= LEAST_BLOCKS:
+        return still
+    search: Any = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
+    forward, backward = (
+        search.calc(*pair, None) for pair in ((before.codes, after.codes), (after.codes, before.codes))
+    )
+    told = changed & _returns(forward, backward)
+    if told.sum() < FOLLOWED * changed.sum():
+        return Motion(speed_px_s=None, share=float(changed.mean()))
+    way = np.hypot(forward[..., 0], forward[..., 1])[told] * before.scale
+    speed = float(np.quantile(way, FASTEST)) / abs(after.time_s - before.time_s)
+    return Motion(speed_px_s=speed, share=float(told.mean()))
+
+
+def _changed(one: NDArray[np.float32], other: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """Tell where two pictures differ by more than noise, (row, col). A change of all light by one factor is none."""
+    level = float(np.median(other[one > 30] / one[one > 30])) if (one > 30).any() else 1.0
+    change = other - one * np.float32(level)
+    noise = 1.4826 * float(np.median(np.abs(change - cv2.blur(change, (3, 3))))) * np.sqrt(9 / 8)
+    squares = cv2.blur(cv2.blur(change, (3, 3)) ** 2, (8, 8))
+    local = np.sqrt(np.maximum(squares, 0))  # running sums may leave a little less than nothing
+    return np.asarray(local > max(LEAST_CHANGE, NOISE_FACTOR * noise / 3))
+
+
+def _returns(forward: NDArray[np.float32], backward: NDArray[np.float32]) -> NDArray[np.bool_]:
+    rows, cols = forward.shape[:2]
+    x, y = np.meshgrid(np.arange(cols, dtype=np.float32), np.arange(rows, dtype=np.float32))
+    back = cv2.remap(backward, x + forward[..., 0], y + forward[..., 1], cv2.INTER_LINEAR)
+    missed = np.hypot(*np.moveaxis(forward + back, -1, 0))
+    return np.asarray(missed < RETURN_PX + 0.1 * np.hypot(forward[..., 0], forward[..., 1]))

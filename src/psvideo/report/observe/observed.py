@@ -1,0 +1,209 @@
+"""What a run sees of a take, gathered round by round: a few numbers a round, and sums that do not grow.
+
+Shares are counted on every fourth row and column. What takes longer (sharpness, the rig's fit, slopes) is looked at in
+rounds 1, 2, 4, 8 and so on, so that ten thousand rounds cost hardly more than a hundred.
+"""
+
+import functools
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.model.surface import Misfit, Surface
+from psvideo.plates.sequence import AMBIENT, LightPlate, Round
+from psvideo.report.observe.focus import sharpest_blur_px
+from psvideo.report.observe.levels import BINS, Counts, Levels, count_levels
+from psvideo.report.observe.motion import Glimpse, Motion, glimpse, motion
+from psvideo.report.observe.rigpoints import RigPoints
+from psvideo.report.observe.slopes import slope_agreement
+from psvideo.report.observe.steadiness import Change, Sample, change, sample_of
+from psvideo.report.observe.worst import Thumbnail, Worst
+
+LIT = 0.01
+"""A pixel brighter than this share of saturation under any light is part of the scene; of dark takes, than a sixth of
+their brightest hundredth."""
+DARKEST = 1 / 6
+STRIDE = 4
+"""Shares are counted over every fourth row and column, which is plenty and costs a sixteenth."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class InstantFacts:
+    """What one round gave: which shares of what is lit (or masked) are valid or saturated, and which share of rows no
+    frame saw. A void background counts as neither. ``change`` is what differs from the result before, at rest.
+
+    ``valid_share`` is None where no normals were solved. ``levels`` (light) is each light's mean on the subject, 1.0 =
+    saturation; ``clipped`` (light) the share of it that is saturated. ``ambient`` is the ambient light's share of what
+    an exposure holds. ``speed_px_s`` is how fast the fastest parts move, and ``moving_share`` how much
+    of the picture does; None where it could not be told. What changes too fast to be followed has a share and no speed.
+    ``misfit`` is what the robust solver found common to the whole picture.
+    """
+
+    number: int
+    time_s: float
+    valid_share: float | None
+    clipped_share: float
+    unseen_share: float
+    change: Change | None = None
+    levels: tuple[float, ...] = ()
+    clipped: tuple[float, ...] = ()
+    ambient: float | None = None
+    speed_px_s: float | None = None
+    moving_share: float | None = None
+    misfit: Misfit | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Seen:
+    """One round on every fourth row and column: the lights' ``bright`` (light, row, col) by their brightest channel,
+    and the subject, (row, col)."""
+
+    bright: NDArray[np.float32]
+    subject: NDArray[np.bool_]
+
+
+def seen_of(one: Round, mask: NDArray[np.bool_] | None) -> Seen:
+    """Return a round thinned out, and where its subject is."""
+    bright = np.stack([_brightest(plate.image[::STRIDE, ::STRIDE]) for plate in one.plates])
+    if mask is not None:
+        return Seen(bright=bright, subject=mask[::STRIDE, ::STRIDE])
+    most = bright.max(axis=0)
+    return Seen(bright=bright, subject=most > min(LIT, DARKEST * float(np.percentile(most[::2, ::2], 99))))
+
+
+def instant_facts(
+    one: Round,
+    surface: Surface | None,
+    mask: NDArray[np.bool_] | None,
+    change: Change | None = None,
+    *,
+    seen: Seen | None = None,
+    moving: Motion | None = None,
+    dark: NDArray[np.float32] | None = None,
+) -> InstantFacts:
+    """Return what to remember of one round; ``change`` is how its surface differs from the one before, ``dark`` the
+    ambient light of one exposure, thinned out as ``seen`` is."""
+    seen = seen or seen_of(one, mask)
+    subject, bright = seen.subject, seen.bright
+    count = max(int(subject.sum()), 1)
+    shares, levels = [], []
+    for picture, plate in zip(bright, one.plates, strict=True):
+        shares.append(float(((picture >= plate.saturation) & subject).sum() / count))
+        shown = subject & plate.rows_seen[::STRIDE, None]
+        levels.append(float(picture.mean(where=shown)) if shown.any() else 0.0)
+    return InstantFacts(
+        number=one.number,
+        time_s=one.time_s,
+        valid_share=None if surface is None else float((surface.valid[::STRIDE, ::STRIDE] & subject).sum() / count),
+        clipped_share=float(np.mean(shares)),
+        unseen_share=float(np.mean([1 - plate.rows_seen.mean() for plate in one.plates])),
+        change=change,
+        levels=tuple(level / plate.saturation for level, plate in zip(levels, one.plates, strict=True)),
+        clipped=tuple(shares),
+        ambient=_ambient_share(dark, subject, levels),
+        speed_px_s=None if moving is None else moving.speed_px_s,
+        moving_share=None if moving is None else moving.share,
+        misfit=None if surface is None else surface.misfit,
+    )
+
+
+def _ambient_share(dark: NDArray[np.float32] | None, subject: NDArray[np.bool_], levels: list[float]) -> float | None:
+    """Return which share of what a row under one light holds is ambient light, in the mean over subject and lights."""
+    if dark is None or not subject.any():
+        return None
+    level = max(float(dark.mean(where=subject)), 0.0)
+    return level / max(level + float(np.mean(levels)), 1e-9)
+
+
+def _brightest(image: NDArray[np.float32]) -> NDArray[np.float32]:
+    # channel by channel: numpy is slow along a short last axis
+    return image if image.ndim == 2 else functools.reduce(np.maximum, np.moveaxis(image, -1, 0))
+
+
+@dataclass(kw_only=True)
+class Observed:
+    """What was seen of a take so far; ``add`` takes in one round after the other.
+
+    ``mask`` is where to look, None for all that is lit; ``points`` is where the rig is held against the plates.
+    """
+
+    lights: tuple[str, ...]
+    mask: NDArray[np.bool_] | None = None
+    points: RigPoints | None = None
+    facts: list[InstantFacts] = field(default_factory=list)
+    counts: dict[str, Counts] = field(default_factory=dict)
+    blurs_px: list[float] = field(default_factory=list)
+    slopes: list[float] = field(default_factory=list)
+    light_at_points: list[NDArray[np.float64]] = field(default_factory=list)
+    worst: Worst = field(default_factory=Worst)
+    _glimpse: Glimpse | None = None
+    _sample: Sample | None = None
+    _dark: NDArray[np.float32] | None = None
+    _moving: Motion | None = None
+    _passed: bool = False
+
+    def passing(self, plates: Iterable[LightPlate], *, with_ambient: bool) -> Iterator[LightPlate]:
+        """Pass plates on before they are moved to one instant: motion is seen in them, and ambient light in the dark
+        slots, which go no further unless they are wanted."""
+        self._passed = True
+        for plate in plates:
+            if plate.light == self.lights[0]:
+                self._look_for_motion(plate)
+            if plate.light == AMBIENT:
+                self._look_at_dark(plate)
+            if plate.light != AMBIENT or with_ambient:
+                yield plate
+            del plate  # nothing holds it while the next one is made
+
+    def _look_at_dark(self, plate: LightPlate) -> None:
+        self._dark = np.array(_brightest(plate.image[::STRIDE, ::STRIDE]))
+
+    def add(self, one: Round, surface: Surface | None = None) -> None:
+        """Take in one round, and the surface that was solved from it, if any."""
+        if one.ambient is not None:
+            self._look_at_dark(one.ambient)
+        seen = seen_of(one, self.mask)
+        if not self._passed and one.plates[0].light == self.lights[0]:
+            self._look_for_motion(one.plates[0])
+        moving, changed = self._moving, self._change(surface)
+        facts = instant_facts(one, surface, self.mask, changed, seen=seen, moving=moving, dark=self._dark)
+        self.facts.append(facts)
+        for plate, bright in zip(one.plates, seen.bright, strict=True):
+            shown = seen.subject & plate.rows_seen[::STRIDE, None]
+            counted = count_levels(bright[shown], plate.saturation)
+            self.counts[plate.light] = self.counts.get(plate.light, np.zeros(BINS + 2, np.int64)) + counted
+        if len(self.facts).bit_count() == 1:
+            self._look_closely(one, surface)
+        if surface is not None:
+            self.worst.offer(facts, surface)
+
+    def levels(self, light: str) -> Levels:
+        """Return a light's counts over the take."""
+        return Levels(self.counts.get(light, np.zeros(BINS + 2, np.int64)))
+
+    @property
+    def thumbnails(self) -> tuple[Thumbnail, ...]:
+        """Small pictures of the worst instants, the worst first."""
+        return self.worst.thumbnails
+
+    def _look_closely(self, one: Round, surface: Surface | None) -> None:
+        blur_px = sharpest_blur_px(one.plates[0].image)
+        if blur_px is not None:
+            self.blurs_px.append(blur_px)
+        if surface is not None:
+            agreement = slope_agreement(surface)
+            if agreement is not None:
+                self.slopes.append(agreement)
+        if self.points is not None and one.lights == self.lights:
+            self.light_at_points.append(self.points.light(one))
+
+    def _look_for_motion(self, plate: LightPlate) -> None:
+        before = self._glimpse
+        self._glimpse = glimpse(plate, None if before is None else before.white)
+        self._moving = None if before is None else motion(before, self._glimpse)
+
+    def _change(self, surface: Surface | None) -> Change | None:
+        before, self._sample = self._sample, None if surface is None else sample_of(surface)
+        return None if before is None or self._sample is None else change(before, self._sample)

@@ -1,0 +1,48 @@
+"""Whether normals can be those of one surface: its slopes must not turn in circles.
+
+For heights z(x, y) with slopes p and q, dp/dy = dq/dx. Normals found with mirrored, turned or exchanged lights break
+this, even with three lights, which explain any brightness. Both sides are held against each other by correlation.
+"""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.model.surface import Surface
+
+WIDTH_PX = 320
+LEAST_PIXELS = 400
+STEEPEST = 4.0
+"""Slopes beyond this lie on outlines, where neighbouring pixels show different things."""
+BLUR_PX = 1.5
+
+
+def slope_agreement(surface: Surface) -> float | None:
+    """Return the correlation of dp/dy with dq/dx: near 1 for a surface, 0 for noise, below it for wrong lights.
+
+    None where too few neighbouring normals are there.
+    """
+    step = max(surface.valid.shape[1] // WIDTH_PX, 1)
+    valid, normals = _thinned(surface, step)
+    blurred = np.asarray(cv2.GaussianBlur(normals * valid[..., None], (0, 0), BLUR_PX))
+    depth = np.maximum(blurred[..., 2], 1e-6)
+    slope_x, slope_y = -blurred[..., 0] / depth, -blurred[..., 1] / depth
+    gentle = valid & (np.hypot(slope_x, slope_y) < STEEPEST) & (blurred[..., 2] > 0)
+    inside = cv2.erode(gentle.astype(np.uint8), np.ones((7, 7), np.uint8), borderValue=0) > 0
+    if inside.sum() < LEAST_PIXELS:
+        return None
+    across = -np.gradient(slope_x, axis=0)[inside]  # y points up, rows down
+    along = np.gradient(slope_y, axis=1)[inside]
+    total = float((across**2).sum() + (along**2).sum())
+    return float(2 * (across * along).sum() / total) if total > 1e-12 else None
+
+
+def _thinned(surface: Surface, step: int) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
+    """Return validity and normals averaged over squares of ``step`` pixels; valid where all of a square is."""
+    rows, cols = (size // step for size in surface.valid.shape)
+    area = surface.normals[: rows * step, : cols * step].astype(np.float32)
+    planes = [cv2.resize(area[..., n], (cols, rows), interpolation=cv2.INTER_AREA) for n in range(3)]
+    small = np.stack(planes, axis=-1).astype(np.float32)
+    flags = surface.valid[: rows * step, : cols * step].astype(np.float32)
+    whole = cv2.resize(flags, (cols, rows), interpolation=cv2.INTER_AREA) > 0.999
+    return whole, small

@@ -1,0 +1,158 @@
+"""Pictures of a scene, one per light, from whatever a user names: stills, plates, or a synced or strobed clip.
+
+``open_light_sets`` gives one set per round, which shows the scatter between frames; ``read_light_pictures`` their mean.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.calibrate.light_files import find_plates, find_stills
+from psvideo.calibrate.light_pictures import (
+    LightFiles,
+    LightPictures,
+    averaged,
+    light_pictures,
+    read_picture,
+    read_sets,
+)
+from psvideo.clip import Take
+from psvideo.clip.folder import MOVIES
+from psvideo.compute.progress import Watch, unwatched
+from psvideo.errors import PsvideoError, UsageError
+from psvideo.formats.plan_toml import read_plan
+from psvideo.model.camera import Encoding
+from psvideo.plates.gather import clip_rounds
+from psvideo.plates.sequence import Round
+from psvideo.runs.opening import open_take
+from psvideo.sync.of_take import find_take_timing
+
+MOST_SETS = 12
+"""Rounds that are read where the user names no frames: more would hardly make a calibration surer."""
+PLAN = "plan.toml"
+
+
+@dataclass(frozen=True, kw_only=True)
+class LightSets:
+    """What shows each light by itself, as many times as it was taken. ``sets`` can be gone through once.
+
+    ``room`` is a picture under room light, where one lies beside stills or plates.
+    """
+
+    name: str
+    names: tuple[str, ...]
+    sets: Iterator[LightPictures]
+    room: NDArray[np.float32] | None = None
+    warnings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reading:
+    """How pictures of lights are to be read.
+
+    ``plan`` names the plan where none lies beside the pictures; ``frames`` chooses file numbers of a clip, or sets
+    counted from 1; ``transfer`` says how stills code light (left out: as the plan says; sRGB for JPEG, else linear).
+    """
+
+    plan: Path | None = None
+    frames: str | None = None
+    first_light: str | None = None
+    transfer: str | None = None
+    most: int = MOST_SETS
+
+
+def read_light_pictures(path: Path, reading: Reading = Reading(), *, watch: Watch = unwatched) -> LightPictures:
+    """Return the mean picture of the scene under each light. Raises as ``open_light_sets``."""
+    return averaged(open_light_sets(path, reading, watch=watch).sets)
+
+
+def open_light_sets(path: Path, reading: Reading = Reading(), *, watch: Watch = unwatched) -> LightSets:
+    """Open stills, plates or a clip; of a strobed clip, the flashes are found first.
+
+    Raises PsvideoError where there is nothing to read, or where it does not fit the plan.
+    """
+    if not path.exists():
+        raise PsvideoError(f"{path}: is not there. Name a folder of stills or plates, or a clip.")
+    if path.is_file() and path.suffix.lower() not in MOVIES:
+        raise UsageError(f"{path}: is one file. Name the folder that holds the pictures, or a movie ({MOVIES[0]}, …).")
+    plan_path = reading.plan or (path / PLAN if (path / PLAN).is_file() else None)
+    if path.is_file() or (plan_path is not None and _is_clip(path, plan_path)):
+        return _of_clip(open_take(path, plan=reading.plan, frames=reading.frames), reading, watch)
+    plan = None if plan_path is None else read_plan(plan_path)
+    lights = () if plan is None else plan.lights
+    files = find_plates(path, lights=lights) or find_stills(path, lights=lights)
+    encoding = Encoding() if plan is None else plan.camera.encoding
+    return _of_files(files, encoding, reading)
+
+
+def _is_clip(path: Path, plan_path: Path) -> bool:
+    """True where a folder holds a clip's frames, not stills that bear the lights' names nor a folder per light."""
+    if find_plates(path) is not None:
+        return False
+    lights = set(read_plan(plan_path).lights)
+    stems = {file.stem for folder in (path, path / "frames") if folder.is_dir() for file in folder.iterdir()}
+    return not lights <= stems
+
+
+def _of_files(files: LightFiles, encoding: Encoding, reading: Reading) -> LightSets:
+    transfer = reading.transfer or ("srgb" if files.is_jpeg and reading.plan is None else encoding.transfer)
+    notes = []
+    aside = tuple(f"{file}: is taken for no light's picture and left aside" for file in files.left_aside)
+    if files.is_jpeg and reading.transfer is None:
+        notes.append(f"JPEG pictures are read by the curve {transfer!r}; --transfer names another")
+    read = Encoding(transfer=transfer, black_level=encoding.black_level, white_level=encoding.white_level)
+    sets = read_sets(files, encoding=read, frames=reading.frames, most=None if reading.frames else reading.most)
+    room = None if files.room is None else read_picture(files.room, read)[0]
+    return LightSets(
+        name=files.folder.resolve().name, names=files.names, sets=sets, room=room, warnings=aside, notes=tuple(notes)
+    )
+
+
+def _of_clip(take: Take, reading: Reading, watch: Watch) -> LightSets:
+    timing = find_take_timing(take, first_light=reading.first_light, watch=watch)
+    plan = take.plan
+    whole = (one for one in clip_rounds(take, timing, watch=watch) if one.lights == plan.lights)
+    sets = map(_as_pictures, islice(whole, None if reading.frames else reading.most))
+    guessed = (_guess(take, timing.order_note),) if timing.order == "guess" else ()
+    return LightSets(
+        name=take.clip.name,
+        names=plan.lights,
+        sets=_at_least_one(sets, take),
+        warnings=(*take.clip.warnings, *guessed),
+        notes=(*take.clip.notes, *timing.notes),
+    )
+
+
+def _guess(take: Take, note: str) -> str:
+    return (
+        f"{take.clip.path}: the plan has no marker, so which light is which is a guess ({note or 'nothing tells it'}). "
+        "Name the light of the first complete flash with --first-light."
+    )
+
+
+def _as_pictures(one: Round) -> LightPictures:
+    return light_pictures(
+        one.lights,
+        [plate.image for plate in one.plates],
+        ambient=None if one.ambient is None else one.ambient.image,
+        ambient_is_off=True,
+        saturation=[plate.saturation for plate in one.plates],
+        seen=np.stack([plate.seen for plate in one.plates]),
+    )
+
+
+def _at_least_one(sets: Iterator[LightPictures], take: Take) -> Iterator[LightPictures]:
+    count = 0
+    for one in sets:
+        count += 1
+        yield one
+    if not count:
+        raise PsvideoError(
+            f"{take.clip.path}: holds no round in which every light is complete, so there is nothing to calibrate "
+            f"from. Use more frames: {len(take.numbers)} were read."
+        )

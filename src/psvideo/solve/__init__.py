@@ -1,0 +1,1 @@
+"""Plates and a rig in, the surface out: normals, albedo, depth."""

@@ -1,0 +1,28 @@
+"""From normals to shape: depth along the camera's axis, and a mesh cut where depth jumps.
+
+``view`` says how normals and depth hang together, ``kernel`` and ``multigrid`` solve large sparse equations on masked
+grids, ``poisson`` is the fast path for whole rectangles, ``bilateral`` finds the height with its jumps, ``depth`` gives
+it a scale, ``shaping`` keeps that over a clip, and ``mesh`` makes triangles of it.
+"""
+
+from psvideo.solve.depth.bilateral import Height, Integration, integrate
+from psvideo.solve.depth.depth import Depth, scaled
+from psvideo.solve.depth.mesh import Mesh, mesh_of
+from psvideo.solve.depth.shaping import Shaping, begun, depth_of, reservations
+from psvideo.solve.depth.view import View, view_of
+
+__all__ = [
+    "Depth",
+    "Height",
+    "Integration",
+    "Mesh",
+    "Shaping",
+    "View",
+    "begun",
+    "depth_of",
+    "integrate",
+    "mesh_of",
+    "reservations",
+    "scaled",
+    "view_of",
+]

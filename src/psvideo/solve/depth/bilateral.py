@@ -1,0 +1,140 @@
+"""The height of a surface from its normals, with jumps where the surface jumps.
+
+X. Cao, H. Santo, B. Shi, F. Okura and Y. Matsushita, Bilateral Normal Integration, ECCV 2022. The surface is taken to
+be smooth on at least one side of every pixel in each direction, and the two one-sided differences are weighed against
+each other by how far they step. The weights depend on the height, so weighted least squares are repeated with the
+weights of the height before, beginning with equal ones. Each round is solved by multigrid, in two to ten cycles.
+
+A later instant of a clip begins with the weights of the first one wherever it looks the same, which saves most of the
+rounds, and is held there to the first one's height by so weak a force that only what nothing else decides follows it:
+how far away a piece is around which the surface is cut.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.model.camera import FloatArray
+from psvideo.solve.depth.rounds import BILATERAL, SMOOTH, Held, Integration, find_height
+from psvideo.solve.depth.view import Slopes, View, slopes_of
+
+Mask = NDArray[np.bool_]
+Floats = NDArray[np.float32]
+Box = tuple[slice, slice]
+
+__all__ = ["BILATERAL", "SMOOTH", "Before", "Height", "Integration", "integrate"]
+
+CUT_SHARE = 0.1
+"""Neighbours count as cut apart when less than this share of the weight between them is left; half is left where a
+surface is smooth, and with the paper's sharpness never less than 0.12 where steps are those of the normals."""
+
+
+SAME_COSINE = 0.996
+"""Normals less than 5 degrees apart look the same as in the instant before."""
+AROUND_PX, SAME_SHARE = 7, 0.7
+"""A pixel is the same where so many of those around it look the same: along outlines normals are noisy."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Height:
+    """A surface's height, determined up to a shift in every part that hangs together.
+
+    height: (row, col), see ``psvideo.solve.depth.view``: pixels of depth, or focal length times its logarithm; 0 where
+        not valid.
+    valid: (row, col).
+    cut_east, cut_south: (row, col), True where the surface jumps between a pixel and its right or lower neighbour.
+    rightward, downward: (row, col), how much a pixel's step to the right and down counts against the opposite one.
+    """
+
+    height: FloatArray
+    valid: Mask
+    cut_east: Mask
+    cut_south: Mask
+    rightward: Floats
+    downward: Floats
+
+
+@dataclass(frozen=True, kw_only=True)
+class Before:
+    """An instant that was integrated before, in the same view: its height and normals (row, col, 3)."""
+
+    height: Height
+    normals: NDArray[np.floating]
+
+
+def integrate(
+    normals: NDArray[np.floating],
+    valid: Mask,
+    view: View,
+    *,
+    how: Integration = BILATERAL,
+    before: Before | None = None,
+) -> Height:
+    """Return the height of a surface from its normals (row, col, 3), camera frame, over a mask of any shape.
+
+    What looks the same as ``before`` keeps its jumps, where they still hold, and its place.
+    """
+    box = _box(valid)
+    slopes = slopes_of(normals, valid, view)
+    within = Slopes(
+        facing=np.ascontiguousarray(slopes.facing[box]),
+        across=np.ascontiguousarray(slopes.across[box]),
+        down=np.ascontiguousarray(slopes.down[box]),
+        aspect=slopes.aspect,
+    )
+    del slopes
+    height, rightward, downward = find_height(
+        within, how, held=None if before is None else _held(before, normals, valid, box)
+    )
+    planes = (height, *_cuts(within, rightward, downward), rightward, downward)
+    height, cut_east, cut_south, rightward, downward = (_whole(plane, valid.shape, box) for plane in planes)
+    return Height(
+        height=height, valid=valid, cut_east=cut_east, cut_south=cut_south, rightward=rightward, downward=downward
+    )
+
+
+def _whole(plane: NDArray[Any], shape: tuple[int, ...], box: Box) -> NDArray[Any]:
+    """Put a plane into its place in the picture."""
+    whole = np.zeros(shape, plane.dtype)
+    whole[box] = plane
+    return whole
+
+
+def _box(valid: Mask) -> Box:
+    """The smallest rectangle that holds all that is valid; the first pixel where nothing is."""
+    rows, cols = np.flatnonzero(valid.any(axis=1)), np.flatnonzero(valid.any(axis=0))
+    if not rows.size:
+        return slice(0, 1), slice(0, 1)
+    return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(cols[0]), int(cols[-1]) + 1)
+
+
+def _held(before: Before, normals: NDArray[np.floating], valid: Mask, box: Box) -> Held:
+    both = valid[box] & before.height.valid[box]
+    cosine = sum(
+        normals[box][..., axis].astype(np.float32) * before.normals[box][..., axis].astype(np.float32)
+        for axis in range(3)
+    )
+    alike = cv2.blur((both & (cosine > SAME_COSINE)).astype(np.float32), (AROUND_PX, AROUND_PX))
+    there = cv2.blur(both.astype(np.float32), (AROUND_PX, AROUND_PX))
+    return Held(
+        same=both & (alike > SAME_SHARE * there),
+        rightward=before.height.rightward[box],
+        downward=before.height.downward[box],
+        height=before.height.height[box],
+    )
+
+
+def _cuts(slopes: Slopes, rightward: Floats, downward: Floats) -> tuple[Mask, Mask]:
+    """Where hardly any weight is left between neighbours that are both valid."""
+    squared = slopes.facing**2
+    cut_east, cut_south = np.zeros(squared.shape, np.bool_), np.zeros(squared.shape, np.bool_)
+    one, other = squared[:, :-1], squared[:, 1:]
+    tie = rightward[:, :-1] * one + (1 - rightward[:, 1:]) * other
+    cut_east[:, :-1] = (one > 0) & (other > 0) & (tie < CUT_SHARE * (one + other))
+    one, other = squared[:-1], squared[1:]
+    tie = downward[:-1] * one + (1 - downward[1:]) * other
+    cut_south[:-1] = (one > 0) & (other > 0) & (tie < CUT_SHARE * (one + other))
+    return cut_east, cut_south

@@ -1,0 +1,173 @@
+"""The compiled loops of bilateral integration: how much each side of a pixel counts, and the equations that follow.
+
+X. Cao et al. 2022, section 4: at each pixel p and in each direction the one-sided steps a d+ and a d-, with a the
+facing, are weighed against each other by w+ = 1 / (1 + exp(-k ((a d-)^2 - (a d+)^2))), w- = 1 - w+. The energy is the
+sum over p of w+ (a d+ - n)^2 + w- (a d- - n)^2. Where a neighbour is missing, the step that a smooth surface would
+make, a d = n, stands in for comparing (the paper leaves that open).
+"""
+
+from typing import Any
+
+import numpy as np
+
+from psvideo.solve.depth.checkerboard import HALF, ONE, ZERO, called, inlined, loop
+
+LEAST_SHARE = np.float32(1e-6)
+"""A part held by less would float away on rounding errors."""
+STEEPEST = np.float32(7.9)
+# the coefficients of tanh(x) = x p(x^2) / q(x^2), accurate to 32 bits within STEEPEST (as in Eigen's ptanh)
+P = tuple(
+    np.float32(x)
+    for x in (
+        4.89352455891786e-03, 6.37261928875436e-04, 1.48572235717979e-05, 5.12229709037114e-08,
+        -8.60467152213735e-11, 2.00018790482477e-13, -2.76076847742355e-16,
+    )
+)  # fmt: skip
+Q = tuple(
+    np.float32(x) for x in (4.89352518554385e-03, 2.26843463243900e-03, 1.18534705686654e-04, 1.19825839466702e-06)
+)
+
+
+@inlined
+def logistic(evidence: Any) -> Any:
+    """The logistic function, between LEAST_SHARE and 1 less that, in operations that run on whole vectors."""
+    x = min(max(HALF * evidence, -STEEPEST), STEEPEST)
+    s = x * x
+    over = x * (P[0] + s * (P[1] + s * (P[2] + s * (P[3] + s * (P[4] + s * (P[5] + s * P[6]))))))
+    under = Q[0] + s * (Q[1] + s * (Q[2] + s * Q[3]))
+    return min(max(HALF + HALF * over / under, LEAST_SHARE), ONE - LEAST_SHARE)
+
+
+@called
+def _weigh(ahead: Any, behind: Any, slope: Any, sharpness: Any, share: Any) -> Any:
+    """Fill a line of shares of the step ahead; return the line's energy."""
+    energy = ZERO
+    for c in range(len(slope)):
+        share[c] = logistic(sharpness * (behind[c] * behind[c] - ahead[c] * ahead[c]))
+    for c in range(len(slope)):
+        one, other = ahead[c] - slope[c], behind[c] - slope[c]
+        energy += share[c] * one * one + (ONE - share[c]) * other * other
+    return energy
+
+
+@called
+def _row_steps(height: Any, facing: Any, slope: Any, ahead: Any, behind: Any) -> None:
+    """Fill a line's steps ahead and behind, along the row."""
+    cols = len(slope)
+    for c in range(cols - 1):
+        step = np.float32(height[c + 1] - height[c])
+        ahead[c] = facing[c] * step if facing[c + 1] > ZERO else slope[c]
+        behind[c + 1] = facing[c + 1] * step if facing[c] > ZERO else slope[c + 1]
+    ahead[cols - 1], behind[0] = slope[cols - 1], slope[0]
+
+
+@called
+def _col_steps(height: Any, facing: Any, slope: Any, aspect: Any, row: int, to: int, out: Any) -> None:
+    """Fill a line's steps towards the next row, or from the one before."""
+    sign = np.float32(to - row)
+    if to < 0 or to >= height.shape[0]:
+        for c in range(slope.shape[1]):
+            out[c] = slope[row, c]
+        return
+    here, there, own, other, wanted = height[row], height[to], facing[row], facing[to], slope[row]
+    for c in range(len(out)):
+        step = sign * np.float32(there[c] - here[c])
+        out[c] = aspect * own[c] * step if other[c] > ZERO else wanted[c]
+
+
+@loop
+def weigh_sides(
+    height: Any,
+    facing: Any,
+    across: Any,
+    down: Any,
+    aspect: Any,
+    sharpness: Any,
+    rightward: Any,
+    downward: Any,
+    lines: Any,
+) -> float:
+    """Fill every pixel's share of its right (rightward) and lower (downward) step; return the energy at the height.
+
+    ``sharpness`` is k, 0 for equal shares; ``lines`` (2, col) is memory.
+    """
+    ahead, behind = lines[0], lines[1]
+    energy = 0.0
+    for row in range(height.shape[0]):
+        _row_steps(height[row], facing[row], across[row], ahead, behind)
+        energy += _weigh(ahead, behind, across[row], sharpness, rightward[row])
+        _col_steps(height, facing, down, aspect, row, row + 1, ahead)
+        _col_steps(height, facing, down, aspect, row, row - 1, behind)
+        energy += _weigh(ahead, behind, down[row], sharpness, downward[row])
+    return energy
+
+
+@inlined
+def _tie(share: Any, facing: Any, slope: Any, next_share: Any, next_facing: Any, next_slope: Any) -> Any:
+    """The tie of two neighbours, and the flow between them that their slopes ask for; 0 where one is not valid."""
+    if facing <= ZERO or next_facing <= ZERO:
+        return ZERO, ZERO
+    ahead, behind = share * facing, (ONE - next_share) * next_facing
+    return ahead * facing + behind * next_facing, ahead * slope + behind * next_slope
+
+
+@loop
+def equations(
+    height: Any,
+    facing: Any,
+    across: Any,
+    down: Any,
+    aspect: Any,
+    rightward: Any,
+    downward: Any,
+    ties: Any,
+    lacking: Any,
+) -> None:
+    """Fill ties and what every pixel's equation lacks (0 before) at a height, as boards (see ``checkerboard.py``)."""
+    rows, cols = height.shape
+    for r in range(rows):
+        for c in range(cols - 1):
+            colour, k, to = (r + c) % 2, c // 2 + 1, (c + 1) // 2 + 1
+            tie, flow = _tie(
+                rightward[r, c], facing[r, c], across[r, c], rightward[r, c + 1], facing[r, c + 1], across[r, c + 1]
+            )
+            ties[0, colour, r + 1, k] = tie
+            lack = np.float32(tie * (height[r, c + 1] - height[r, c]) - flow)
+            lacking[colour, r + 1, k] += lack
+            lacking[1 - colour, r + 1, to] -= lack
+        if r + 1 < rows:
+            for c in range(cols):
+                colour, k = (r + c) % 2, c // 2 + 1
+                tie, flow = _tie(
+                    downward[r, c], facing[r, c] * aspect, down[r, c],
+                    downward[r + 1, c], facing[r + 1, c] * aspect, down[r + 1, c],
+                )  # fmt: skip
+                ties[1, colour, r + 1, k] = tie
+                lack = np.float32(tie * (height[r + 1, c] - height[r, c]) - flow)
+                lacking[colour, r + 1, k] += lack
+                lacking[1 - colour, r + 2, k] -= lack
+
+
+@loop
+def add_board(board: Any, height: Any) -> None:
+    """Add a board to a height (row, col)."""
+    for r in range(height.shape[0]):
+        for c in range(height.shape[1]):
+            height[r, c] += board[(r + c) % 2, r + 1, c // 2 + 1]
+
+
+@loop
+def write_board(values: Any, board: Any) -> None:
+    """Put a picture (row, col) onto a board."""
+    for r in range(values.shape[0]):
+        for c in range(values.shape[1]):
+            board[(r + c) % 2, r + 1, c // 2 + 1] = values[r, c]
+
+
+@loop
+def pull_to_pins(pins: Any, height: Any, wanted: Any, lacking: Any) -> None:
+    """Add to what equations lack what pins pull a height (row, col) towards the wanted one."""
+    for r in range(height.shape[0]):
+        for c in range(height.shape[1]):
+            colour, k = (r + c) % 2, c // 2 + 1
+            lacking[colour, r + 1, k] += pins[colour, r + 1, k] * np.float32(wanted[r, c] - height[r, c])

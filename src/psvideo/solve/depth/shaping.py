@@ -1,0 +1,73 @@
+"""Depth over a clip: the same view, plane and scale for every instant, each of which can be done by itself."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.model.surface import Surface
+from psvideo.solve.depth.bilateral import BILATERAL, Before, Height, Integration, integrate
+from psvideo.solve.depth.depth import Depth, Plane, scaled
+from psvideo.solve.depth.view import View
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shaping:
+    """How a clip's surfaces become depth. ``first`` is the first instant's, whose scale the others keep, and
+    ``before`` what its integration leaves to theirs.
+
+    known_m: depth (row, col) in metres that is known from elsewhere, 0 where it is not; comes before plane and first.
+    """
+
+    view: View
+    plane: Plane | None = None
+    how: Integration = BILATERAL
+    first: Depth | None = None
+    before: Before | None = None
+    known_m: NDArray[np.float32] | None = None
+
+    @property
+    def metric(self) -> bool:
+        """Whether depth is in metres: a perspective view, and a plane or depth that says how far away things are."""
+        return self.view.perspective and (self.plane is not None or self.known_m is not None)
+
+
+def depth_of(shaping: Shaping, surface: Surface) -> Depth:
+    """Return the depth of one instant; safe to call from several threads."""
+    return _scaled(
+        shaping, integrate(surface.normals, surface.valid, shaping.view, how=shaping.how, before=shaping.before)
+    )
+
+
+def _scaled(shaping: Shaping, height: Height) -> Depth:
+    return scaled(height, shaping.view, plane=shaping.plane, reference=shaping.first, known_m=shaping.known_m)
+
+
+def begun(shaping: Shaping, surface: Surface) -> Shaping:
+    """Return the shaping with the first instant's depth, which fixes the scale; raises PsvideoError as ``scaled``.
+
+    All later instants begin from the first one, and never from each other: each can be done by itself.
+    """
+    height = integrate(surface.normals, surface.valid, shaping.view, how=shaping.how)
+    first = _scaled(replace(shaping, first=None), height)
+    return replace(shaping, first=first, before=Before(height=height, normals=surface.normals))
+
+
+def reservations(shaping: Shaping) -> tuple[str, ...]:
+    """Return in whole sentences what is not known of a clip's depth."""
+    said = []
+    if not shaping.view.perspective:
+        said.append(
+            "Depth was integrated for an orthographic view, because the rig has no [camera] focal_px: it is relative, "
+            "in widths of the picture about a median of 1, and bends a subject that is near the camera."
+        )
+    elif not shaping.metric:
+        said.append(
+            "Depth is relative, its median 1, because the rig has no [surface] plane: give one (in metres) for scale."
+        )
+    if shaping.first is not None and shaping.first.parts > 1:
+        said.append(
+            f"What is valid falls into {shaping.first.parts} parts, and how they lie to each other normals cannot "
+            "tell: each was given its depth by itself."
+        )
+    return tuple(said)

@@ -1,0 +1,136 @@
+"""Normals under near lights where the surface is not known yet: solve, integrate the depth, solve again.
+
+Near lights need the surface's depth, and depth comes from normals. The rig's [surface] plane is a first guess that is
+off by the relief of the subject; from its normals depth is integrated, each part put onto the plane by its median, and
+serves as the next guess. What no integration can tell is how far away the whole subject is: a plane at a wrong distance
+stays wrong. Depth that is known from elsewhere takes the plane's place, for each instant its own where there is more
+than one.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.clip import DepthMaps
+from psvideo.model.rig import Light, Rig
+from psvideo.model.surface import Surface
+from psvideo.solve.depth import Shaping, View, depth_of, view_of
+from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.near_light import Ground, ground_of, is_near
+
+ROUGH_PX = 480
+"""Depth for the lights' sake is integrated on a picture of at most so many pixels along its longer side."""
+LEAST_COVERED = 0.5
+"""Share of a rough pixel's normals that must be there."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class NearSurface:
+    """Where near lights find the surface: the first ``ground``, and how often it is made anew from the normals.
+
+    known_m: the depth (row, col) known of the instant with a number, 0 where unknown; it comes before the ground's.
+    """
+
+    ground: Ground
+    shaping: Shaping
+    iterations: int = 0
+    known_m: Callable[[int], NDArray[np.float32]] | None = None
+
+    def at(self, number: int) -> "NearSurface":
+        """Return where the surface is at the instant with this number."""
+        if self.known_m is None:
+            return self
+        known_m = self.known_m(number)
+        return replace(
+            self, ground=self.ground.with_depth(known_m), shaping=replace(self.shaping, known_m=known_m), known_m=None
+        )
+
+
+def near_surface_of(
+    rig: Rig,
+    lights: Sequence[Light],
+    *,
+    height_px: int,
+    width_px: int,
+    iterations: int = 0,
+    depths: DepthMaps | None = None,
+) -> NearSurface | None:
+    """Return where near lights find the surface, None where all lights are distant; ``depths`` is what is known of it.
+
+    Raises PsvideoError where the rig does not say where the surface or the camera's axis is.
+    """
+    if not is_near(lights):
+        return None
+    known_m = None if depths is None else depths.first
+    ground = ground_of(rig, height_px=height_px, width_px=width_px, known_m=known_m)
+    return NearSurface(
+        ground=ground,
+        shaping=Shaping(view=view_of(rig), plane=rig.plane, known_m=known_m),
+        iterations=iterations,
+        known_m=None if depths is None or depths.still is not None else depths.at,
+    )
+
+
+def solve_near(
+    near: NearSurface, light: Callable[[Ground], Illumination], solve: Callable[[Illumination], Surface]
+) -> Surface:
+    """Return the surface that ``solve`` finds under the lights that ``light`` gives for the last ground."""
+    ground = near.ground
+    surface = solve(light(ground))
+    for _ in range(near.iterations):
+        ground = ground.with_depth(_rough_depth_m(near.shaping, surface))
+        surface = solve(light(ground))
+    return surface
+
+
+def _rough_depth_m(shaping: Shaping, surface: Surface) -> NDArray[np.float32]:
+    """Return a surface's depth, 0 where it has none, from normals averaged down to ROUGH_PX: lights see no detail."""
+    rows, cols = surface.valid.shape
+    step = max(int(np.ceil(max(rows, cols) / ROUGH_PX)), 1)
+    if step == 1:
+        return depth_of(shaping, surface).depth
+    high, wide = -(-rows // step), -(-cols // step)
+    margin = ((0, high * step - rows), (0, wide * step - cols), (0, 0))
+    blocks = np.pad(surface.normals.astype(np.float32), margin).reshape(high, step, wide, step, 3)
+    mean = blocks.mean(axis=(1, 3))
+    length = np.linalg.norm(mean, axis=-1)
+    valid = length > LEAST_COVERED
+    normals = np.where(valid[..., None], mean / np.maximum(length, LEAST_COVERED)[..., None], 0)
+    small = Surface(normals=normals, albedo=valid.astype(np.float32), valid=valid)
+    known_m = None if shaping.known_m is None else _every(shaping.known_m, step, (high, wide))
+    depth = depth_of(replace(shaping, view=_smaller(shaping.view, step), known_m=known_m), small).depth
+    size = (wide * step, high * step)
+    known = cv2.resize((depth > 0).astype(np.float32), size, interpolation=cv2.INTER_LINEAR)
+    whole = cv2.resize(depth, size, interpolation=cv2.INTER_LINEAR) / np.maximum(known, 1e-6)
+    rough: NDArray[np.float32] = np.where(known > 0, whole, 0)[:rows, :cols].astype(np.float32)
+    return rough
+
+
+def _every(known_m: NDArray[np.float32], step: int, shape: tuple[int, int]) -> NDArray[np.float32]:
+    """Return the known depth in the middle of every rough pixel; a mean would mix near and far."""
+    rows, cols = (
+        np.minimum(np.arange(n) * step + step // 2, size - 1) for n, size in zip(shape, known_m.shape, strict=True)
+    )
+    return known_m[np.ix_(rows, cols)]
+
+
+def _smaller(view: View, step: int) -> View:
+    """Return the view of a picture of which each pixel is ``step`` by ``step`` of the whole one's."""
+    if view.focal_px is None or view.principal_px is None:
+        raise ValueError("near lights need a perspective view")
+    x, y = ((middle + 0.5) / step - 0.5 for middle in view.principal_px)
+    return View(focal_px=(view.focal_px[0] / step, view.focal_px[1] / step), principal_px=(x, y))
+
+
+def near_trust(near: NearSurface) -> str:
+    """Return in a whole sentence what a valid normal under near lights depends on."""
+    distance_m = -near.ground.middle_m[2]
+    source = "the rig's [surface] plane is" if near.shaping.known_m is None else "the depth that was given says"
+    return (
+        f"The lights are near, and the subject is taken to be where {source}: {distance_m:.3g} m "
+        "away in the picture's middle. Were the lights' distances wrong by a tenth, normals would be off by about 3 "
+        "degrees."
+    )

@@ -1,0 +1,70 @@
+"""What every compiled solver needs around its kernel: arrays checked, bands of rows side by side, a surface made."""
+
+import itertools
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+
+from psvideo.model.surface import Surface
+from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.task import Mask, Result, Samples
+
+_SERIAL_PIXELS = 1 << 16  # smaller pictures are solved before a thread has started
+
+
+def check_arrays(plates: Sequence[Samples], lit: Illumination, seen: Mask | None, mask: Mask | None) -> None:
+    """Raise ValueError where plates, lights, ``seen`` and ``mask`` do not belong together."""
+    lights, channels = lit.intensities.shape
+    shape, kind = plates[0].shape, plates[0].dtype
+    if len(plates) != lights or any(plate.shape != shape or plate.dtype != kind for plate in plates):
+        raise ValueError(f"{len(plates)} plates for {lights} lights, or plates that differ in shape or type")
+    if (
+        kind not in (np.float32, np.uint16)
+        or shape[2:] not in ((), (channels,))
+        or (channels, len(shape))
+        not in (
+            (1, 2),
+            (1, 3),
+            (3, 3),
+        )
+    ):
+        raise ValueError(f"plates of {kind} {shape} and intensities of {channels} channel(s); see solve's description")
+    if seen is not None and (seen.dtype != np.bool_ or seen.shape not in ((lights, shape[0]), (lights, *shape[:2]))):
+        raise ValueError(f"seen has shape {seen.shape} and type {seen.dtype}; expected (light, row[, col]) of bool")
+    if mask is not None and (mask.dtype != np.bool_ or mask.shape != shape[:2]):
+        raise ValueError(f"mask has shape {mask.shape} and type {mask.dtype}; expected {shape[:2]} of bool")
+
+
+def in_bands(run: Callable[[int, int], None], *, rows: int, cols: int, threads: int | None) -> None:
+    """Call ``run(first, last)`` for bands of rows side by side. (Numba's own thread pool may abort when two use it.)"""
+
+    def once(band: tuple[int, int]) -> None:
+        try:
+            run(*band)
+        except OSError:  # the compiled code could not be kept on disk for the next run; it is there all the same
+            run(*band)
+
+    workers = threads or os.cpu_count() or 1
+    if workers == 1 or rows * cols <= _SERIAL_PIXELS:
+        once((0, rows))
+        return
+    edges = np.linspace(0, rows, 4 * workers + 1).astype(int).tolist()  # more bands than workers: they differ in work
+    with ThreadPoolExecutor(workers) as pool:
+        list(pool.map(once, itertools.pairwise(edges)))
+
+
+def surface_of(result: Result, error: Samples | None, shape: tuple[int, ...], *, half: bool) -> Surface:
+    """Return what a kernel stored as the surface of plates of that shape."""
+    rows, cols = shape[:2]
+    as_float: Any = np.float16 if half else np.float32
+    albedo = result.albedo.view(as_float).reshape(-1, rows, cols)
+    return Surface(
+        normals=result.normals.view(as_float).reshape(3, rows, cols).transpose(1, 2, 0),
+        albedo=albedo[0] if len(shape) == 2 else albedo.transpose(1, 2, 0),
+        valid=result.valid.view(np.bool_).reshape(rows, cols),
+        residual=result.residual.view(as_float).reshape(rows, cols) if result.residual.size else None,
+        error_deg=error.view(as_float).reshape(rows, cols) if error is not None and error.size else None,
+    )

@@ -1,0 +1,82 @@
+"""The lights as the solvers see them: directions and intensities as arrays, checked to span all three directions."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from psvideo.errors import PsvideoError
+from psvideo.model.camera import FloatArray
+from psvideo.model.rig import Light, directions, intensities
+from psvideo.solve.normals.near_light import Ground, NearField, is_near, middle_directions, near_field
+
+MAX_CONDITION = 20.0  # lights within about 3 degrees of one plane; a normal's error is the noise's times this
+
+
+@dataclass(frozen=True, kw_only=True)
+class Illumination:
+    """The lights. ``directions`` (light, 3) are unit vectors from the surface to the light; ``intensities`` is
+    (light, channel): a plate is albedo * intensity * max(0, n . direction). With near lights both hold in the middle of
+    the surface, and ``near`` tells what they are in every pixel."""
+
+    directions: FloatArray
+    intensities: FloatArray
+    names: tuple[str, ...] = ()
+    near: NearField | None = None
+
+    @property
+    def singular_values(self) -> FloatArray:
+        """The three singular values of the directions, largest first; the last is 0 where all lie in one plane."""
+        values: FloatArray = np.linalg.svd(self.directions, compute_uv=False).astype(np.float64)
+        return values
+
+    @property
+    def condition(self) -> float:
+        """The directions' condition number: 1.0 at best, infinite where all lights lie in one plane."""
+        largest, _, smallest = self.singular_values
+        return float(largest / smallest) if smallest > 1e-12 * largest else float("inf")
+
+
+def illumination(lights: Sequence[Light], *, channels: int, ground: Ground | None = None) -> Illumination:
+    """Return the lights as arrays, fit for solving pictures of 1 or 3 channels; near ones need a ``ground``.
+
+    Raises PsvideoError where there are fewer than three lights, where one is near without a ground or cannot stand
+    where it is said to, where one has no or a negative intensity, and where they are so nearly coplanar that no normal
+    could be trusted (condition number above MAX_CONDITION).
+    """
+    names = tuple(light.name for light in lights)
+    if len(lights) < 3:
+        raise PsvideoError(
+            f"Normals need at least three lights, and here are {len(lights)} ({', '.join(names) or 'none'}). "
+            "Flash three or more lights that do not lie in one plane with the subject."
+        )
+    lit = _arrays(lights, channels, ground)
+    for name, strengths in zip(names, lit.intensities, strict=True):
+        if not (np.isfinite(strengths).all() and (strengths > 0).all()):
+            raise PsvideoError(
+                f"Light {name!r} has the intensity {', '.join(f'{value:g}' for value in strengths)}; expected numbers "
+                "above 0. Measure the light, or take it out of the rig and the plan."
+            )
+    _refuse_coplanar(lit)
+    return lit
+
+
+def _arrays(lights: Sequence[Light], channels: int, ground: Ground | None) -> Illumination:
+    names, strengths = tuple(light.name for light in lights), intensities(lights, channels)
+    if ground is None or not is_near(lights):
+        return Illumination(directions=directions(lights), intensities=strengths, names=names)
+    field = near_field(lights, ground)
+    at_middle = strengths * field.middle_gain[:, None]
+    return Illumination(directions=middle_directions(field), intensities=at_middle, names=names, near=field)
+
+
+def _refuse_coplanar(lit: Illumination) -> None:
+    if lit.condition <= MAX_CONDITION:
+        return
+    values = ", ".join(f"{value:.3g}" for value in lit.singular_values)
+    raise PsvideoError(
+        f"The lights {', '.join(lit.names)} lie nearly in one plane with the subject: their directions' condition "
+        f"number is {lit.condition:.3g} (at most {MAX_CONDITION:g} is accepted), singular values {values}. Across that "
+        "plane normals would be noise. Move a light out of the plane (spread the lights around the lens rather than "
+        "along a line), add one, or check the rig's directions."
+    )

@@ -1,0 +1,384 @@
+"""The fused least-squares kernel: from raw samples to stored normals in one pass over memory.
+
+Plain loops over contiguous planes, which the compiler turns into vectors. A block's planes lie one after another in one
+flat working array ``w``, BLOCK apart, so that the compiler sees that they do not overlap. A measurement that is
+saturated, not a number or unseen becomes MISSING, far below every threshold.
+
+Symbols: m = L g per pixel, with the measurements m, L = intensity * direction (light, 3) and g = albedo * normal.
+
+The loops are in this one file because numba's cache notices a change only in the file of the function that is called;
+where near lights are placed (``near_kernel.py``) is taken in by its checksum. For distant lights the matrix is one for
+all pixels, for near ones each pixel of a block has its own: the same loops are compiled for both.
+"""
+
+import zlib
+from pathlib import Path
+
+import numpy as np
+from numba.np.numpy_support import carray
+
+from psvideo.compute.inlined import at, compiled, encoded, inlined, lent, of_light, pointer
+from psvideo.solve.normals import near_kernel
+from psvideo.solve.normals.near_kernel import place_lights
+from psvideo.solve.normals.task import Bytes, Floats, Near, Result, Samples, Task, Work
+
+# Pixels of one block; not a power of two, whose planes would all fall on the same lines of the processor's cache.
+BLOCK = 480
+MISSING = np.float32(-1e30)
+ABSENT = np.float32(-1e29)  # what is below this is MISSING
+ZERO, ONE, THREE, TINY = np.float32(0), np.float32(1), np.float32(3), np.float32(1e-9)
+# In perspective what is seen may turn from the camera's axis by more than 90 degrees: by half the view (here 20).
+LEAST_Z = np.float32(-0.342)
+SLIGHTLY_MORE = np.float32(1.000001)
+
+# The planes of the working array: g, later the normal; what deciding on measurements needs; the normal equations.
+X, Y, Z, ALBEDO, LIMIT, LOW, HIGH, SUM, COUNT = (BLOCK * plane for plane in range(9))
+XX, XY, XZ, YY, YZ, ZZ = (BLOCK * plane for plane in range(9, 15))
+PLANES = 15
+
+PLACING = zlib.crc32(Path(near_kernel.__file__).read_bytes())
+
+
+def working_memory(task: Task) -> Work:
+    """What one call of ``solve_rows`` works in; no two calls at a time may share it."""
+    lights, channels = task.tone.shape[:2]
+    values = np.full((lights * channels, BLOCK), MISSING, np.float32)
+    combined = values if channels == 1 else np.full((lights, BLOCK), MISSING, np.float32)
+    is_near = task.near.depth.size > 0
+    return Work(
+        planes=np.empty(PLANES * BLOCK, np.float32),
+        values=values,
+        measurements=combined,
+        matrix=np.zeros((lights, 3, BLOCK), np.float32) if is_near else task.matrix,
+        per_strength=np.zeros((lights, BLOCK), np.float32) if is_near else task.per_strength,
+    )
+
+
+@compiled
+def solve_rows(task: Task, result: Result, work: Work, first: int, last: int) -> None:
+    """Solve the rows from ``first`` up to ``last``; no two calls may share rows, and any number may run at once."""
+    if PLACING < 0:  # never: it is named here so that the kept function is compiled anew where that file changes
+        return
+    t = lent_task(task, work.matrix, work.per_strength)
+    out = Result(lent(result.normals), lent(result.albedo), lent(result.valid), lent(result.residual))
+    w, values, m = lent(work.planes), lent(work.values), lent(work.measurements)
+    for row in range(first, last):
+        for col in range(0, t.cols, BLOCK):
+            n = min(BLOCK, t.cols - col)
+            if t.mask.size and not t.mask[row, col : col + n].any():
+                w[X : X + n], w[Y : Y + n], w[Z : Z + n] = ZERO, ZERO, ZERO
+            else:
+                _solve_block(t, w, values, m, row, col, n, out.residual.size > 0)
+            _store_block(t, out, w, values, m, row * t.cols + col, n)
+
+
+@inlined
+def lent_task(task: Task, matrix: Floats, per_strength: Floats) -> Task:
+    """The task without reference counts, with the memory that takes every pixel's lights where they are near."""
+    near = task.near
+    return Task(
+        lent(task.plates), lent(task.like), task.lights, task.cols, lent(task.tone), lent(matrix), lent(per_strength),
+        Near(
+            lent(near.positions), lent(near.is_near), lent(near.axes), lent(near.anisotropy), lent(near.strengths),
+            lent(near.depth), lent(near.pinhole),
+        ),
+        lent(task.inverse), lent(task.origin), task.least, task.most, task.dark,
+        task.ratio, task.condition_squared, task.albedo_scale, lent(task.seen), lent(task.mask),
+    )  # fmt: skip
+
+
+@inlined
+def _solve_block(
+    task: Task, w: Floats, values: Floats, m: Floats, row: int, col: int, n: int, keep_measurements: bool
+) -> None:
+    """Leave g in the planes X, Y, Z, all 0 where the pixel has no solution to be trusted."""
+    start, channels = row * task.cols + col, task.tone.shape[1]
+    place_lights(task.matrix, task.per_strength, task.near, row, col, n)
+    distant = task.near.depth.size == 0
+    done = distant and channels == 1 and _all_seen(task.seen, row, col, n) and _solve_all_usable(task, w, start, n)
+    if not done or keep_measurements:
+        if channels == 1:
+            _gather_one(task, values, start, n)
+        else:
+            _gather_three(task, values, start, n)
+        _hide_unseen(task, values, row, col, n)
+        if channels > 1:
+            _combine(task, w, values, m, n)
+    if not done:
+        _solve_usable(task, w, m, n)
+    if task.mask.size:
+        for i in range(n):
+            kept = ONE if task.mask[row, col + i] else ZERO
+            w[X + i], w[Y + i], w[Z + i] = w[X + i] * kept, w[Y + i] * kept, w[Z + i] * kept
+
+
+@inlined
+def _plate(task: Task, light: int, start: int, n: int) -> Samples:
+    """The samples of n pixels of one light's plate."""
+    channels = task.tone.shape[1]
+    end = (start + n) * channels
+    plate: Samples = carray(pointer(task.plates[light], task.like), end)
+    return plate[start * channels : end]
+
+
+@inlined
+def _solve_all_usable(task: Task, w: Floats, start: int, n: int) -> bool:
+    """Solve a block of one channel as if all measurements were usable; False where one is not, or hardly is.
+
+    The test is stricter than the rule for single pixels: every measurement is taken as if its light were the strongest
+    or the weakest, and the shadow limit follows the largest instead of the mean. Who fails it is solved by the rule.
+    """
+    for k in range(0, len(task.plates), 3):
+        a, b, c = _plate(task, k, start, n), _plate(task, k + 1, start, n), _plate(task, k + 2, start, n)
+        if k == 0:
+            _add_three(w, n, a, b, c, task.inverse, 0, False)
+        else:
+            _add_three(w, n, a, b, c, task.inverse, k, True)
+    (origin_x, origin_y, origin_z), (gain, offset, ceiling, _) = task.origin, task.tone[0, 0]
+    dark, least, most = task.dark, task.least, task.ratio * task.most
+    unusable = 0
+    for i in range(n):
+        x, y, z = w[X + i] + origin_x, w[Y + i] + origin_y, w[Z + i] + origin_z
+        w[X + i], w[Y + i], w[Z + i] = x, y, z
+        low, high = w[LOW + i] * gain + offset, w[HIGH + i] * gain + offset
+        in_shadow = low * least <= max(dark, high * most) * SLIGHTLY_MORE
+        unusable += in_shadow | (high >= ceiling) | (not x + y + z < -MISSING)
+    return bool(unusable == 0)
+
+
+@inlined
+def _add_three(w: Floats, n: int, a: Samples, b: Samples, c: Samples, inverse: Floats, k: int, begun: bool) -> None:
+    """Add three lights' samples, from light k, to g; beside it the lowest and the highest sample."""
+    (xp, yp, zp), (xq, yq, zq), (xr, yr, zr) = inverse[k], inverse[k + 1], inverse[k + 2]
+    for i in range(n):
+        low, high = np.float32(min(a[i], min(b[i], c[i]))), np.float32(max(a[i], max(b[i], c[i])))
+        p, q, r = np.float32(a[i]), np.float32(b[i]), np.float32(c[i])
+        x = xp * p + xq * q + xr * r
+        y = yp * p + yq * q + yr * r
+        z = zp * p + zq * q + zr * r
+        w[X + i] = w[X + i] + x if begun else x
+        w[Y + i] = w[Y + i] + y if begun else y
+        w[Z + i] = w[Z + i] + z if begun else z
+        w[LOW + i] = min(w[LOW + i], low) if begun else low
+        w[HIGH + i] = max(w[HIGH + i], high) if begun else high
+
+
+@inlined
+def _gather_one(task: Task, values: Floats, start: int, n: int) -> None:
+    """Raw samples of one channel to measurements, a plane per light."""
+    for light in range(task.lights):
+        samples, plane = _plate(task, light, start, n), values[light]
+        gain, offset, ceiling, _ = task.tone[light, 0]
+        for i in range(n):
+            value = np.float32(samples[i]) * gain + offset
+            plane[i] = value if (value < ceiling) & (value > ABSENT) else MISSING
+
+
+@inlined
+def _gather_three(task: Task, values: Floats, start: int, n: int) -> None:
+    """Raw samples of three channels to measurements, a plane per light and channel; a light counts whole or not."""
+    for light in range(task.lights):
+        samples = _plate(task, light, start, n)
+        red, green, blue = values[3 * light], values[3 * light + 1], values[3 * light + 2]
+        gain_r, offset_r, ceiling_r, _ = task.tone[light, 0]
+        gain_g, offset_g, ceiling_g, _ = task.tone[light, 1]
+        gain_b, offset_b, ceiling_b, _ = task.tone[light, 2]
+        for i in range(n):
+            r = np.float32(samples[3 * i]) * gain_r + offset_r
+            g = np.float32(samples[3 * i + 1]) * gain_g + offset_g
+            b = np.float32(samples[3 * i + 2]) * gain_b + offset_b
+            here = (r < ceiling_r) & (g < ceiling_g) & (b < ceiling_b) & (min(r, min(g, b)) > ABSENT)
+            red[i] = r if here else MISSING
+            green[i] = g if here else MISSING
+            blue[i] = b if here else MISSING
+
+
+@inlined
+def _combine(task: Task, w: Floats, values: Floats, m: Floats, n: int) -> None:
+    """One measurement per light from three channels, each weighted by its own brightness over the lights.
+
+    That is the matched filter for noise alike in all channels: a channel in which the surface is black adds nothing.
+    """
+    for plane in (XX, YY, ZZ):
+        w[plane : plane + n] = ZERO
+    for light in range(task.lights):
+        red, green, blue = values[3 * light], values[3 * light + 1], values[3 * light + 2]
+        for i in range(n):
+            w[XX + i] += max(red[i], ZERO)
+            w[YY + i] += max(green[i], ZERO)
+            w[ZZ + i] += max(blue[i], ZERO)
+    for i in range(n):
+        total = w[XX + i] + w[YY + i] + w[ZZ + i]
+        w[SUM + i] = ONE / total if total > ZERO else ZERO
+    for light in range(task.lights):
+        red, green, blue = values[3 * light], values[3 * light + 1], values[3 * light + 2]
+        for i in range(n):
+            value = (w[XX + i] * red[i] + w[YY + i] * green[i] + w[ZZ + i] * blue[i]) * w[SUM + i]
+            m[light, i] = value if red[i] > ABSENT else MISSING
+
+
+@inlined
+def _all_seen(seen: Bytes, row: int, col: int, n: int) -> bool:
+    """Whether every light was seen in n pixels; one entry may stand for the whole row."""
+    first, last = (0, 1) if seen.shape[2] == 1 else (col, col + n)
+    return not seen.size or bool(seen[:, row, first:last].all())
+
+
+@inlined
+def _hide_unseen(task: Task, values: Floats, row: int, col: int, n: int) -> None:
+    channels, seen = task.tone.shape[1], task.seen
+    for plane in range(channels * seen.shape[0]):
+        light = plane // channels
+        if seen.shape[2] > 1:
+            for i in range(n):
+                values[plane, i] = values[plane, i] if seen[light, row, col + i] else MISSING
+        elif not seen[light, row, 0]:
+            values[plane, :n] = MISSING
+
+
+@inlined
+def _solve_usable(task: Task, w: Floats, m: Floats, n: int) -> None:
+    """Solve every pixel from its own usable measurements; those in shadow become MISSING too."""
+    w[SUM : SUM + n], w[COUNT : COUNT + n] = ZERO, ZERO
+    for light in range(task.lights):
+        plane, per = m[light], task.per_strength[light]
+        for i in range(n):
+            w[SUM + i] += plane[i] * at(per, i) if plane[i] > ABSENT else ZERO
+            w[COUNT + i] += ONE if plane[i] > ABSENT else ZERO
+    dark, ratio = task.dark, task.ratio
+    for i in range(n):
+        w[LIMIT + i] = max(dark, ratio * w[SUM + i] / (w[COUNT + i] + TINY))
+    _add_equations(w, n, m[0], m[1], m[2], task.matrix, task.per_strength, 0, False)
+    for k in range(3, m.shape[0], 3):
+        _add_equations(w, n, m[k], m[k + 1], m[k + 2], task.matrix, task.per_strength, k, True)
+    _solve_normal_equations(w, n, task.condition_squared)
+
+
+@inlined
+def _add_equations(
+    w: Floats, n: int, a: Floats, b: Floats, c: Floats, matrix: Floats, per_strength: Floats, k: int, begun: bool
+) -> None:
+    """Add three lights, from light k, to the normal equations of every pixel where they are usable."""
+    light_a, per_a = of_light(matrix, k), per_strength[k]
+    light_b, per_b = of_light(matrix, k + 1), per_strength[k + 1]
+    light_c, per_c = of_light(matrix, k + 2), per_strength[k + 2]
+    for i in range(n):
+        (xa, ya, za), (xb, yb, zb), (xc, yc, zc) = at(light_a, i), at(light_b, i), at(light_c, i)
+        p, q, r, limit = a[i], b[i], c[i], w[LIMIT + i]
+        one_p = ONE if p * at(per_a, i) > limit else ZERO
+        one_q = ONE if q * at(per_b, i) > limit else ZERO
+        one_r = ONE if r * at(per_c, i) > limit else ZERO
+        a[i] = p if one_p > ZERO else MISSING
+        b[i] = q if one_q > ZERO else MISSING
+        c[i] = r if one_r > ZERO else MISSING
+        p, q, r = p * one_p, q * one_q, r * one_r
+        x, y, z = xa * p + xb * q + xc * r, ya * p + yb * q + yc * r, za * p + zb * q + zc * r
+        w[X + i] = w[X + i] + x if begun else x
+        w[Y + i] = w[Y + i] + y if begun else y
+        w[Z + i] = w[Z + i] + z if begun else z
+        count = one_p + one_q + one_r
+        w[COUNT + i] = w[COUNT + i] + count if begun else count
+        xx = xa * xa * one_p + xb * xb * one_q + xc * xc * one_r
+        xy = xa * ya * one_p + xb * yb * one_q + xc * yc * one_r
+        xz = xa * za * one_p + xb * zb * one_q + xc * zc * one_r
+        yy = ya * ya * one_p + yb * yb * one_q + yc * yc * one_r
+        yz = ya * za * one_p + yb * zb * one_q + yc * zc * one_r
+        zz = za * za * one_p + zb * zb * one_q + zc * zc * one_r
+        w[XX + i] = w[XX + i] + xx if begun else xx
+        w[XY + i] = w[XY + i] + xy if begun else xy
+        w[XZ + i] = w[XZ + i] + xz if begun else xz
+        w[YY + i] = w[YY + i] + yy if begun else yy
+        w[YZ + i] = w[YZ + i] + yz if begun else yz
+        w[ZZ + i] = w[ZZ + i] + zz if begun else zz
+
+
+@inlined
+def _solve_normal_equations(w: Floats, n: int, condition_squared: np.float32) -> None:
+    """g = adj(A) b / det(A), or 0 where A is badly conditioned or of fewer than three lights."""
+    for i in range(n):
+        a, b, c, d, e, f = w[XX + i], w[XY + i], w[XZ + i], w[YY + i], w[YZ + i], w[ZZ + i]
+        xx, xy, xz = d * f - e * e, c * e - b * f, b * e - c * d
+        yy, yz, zz = a * f - c * c, b * c - a * e, a * d - b * b
+        determinant = a * xx + b * xy + c * xz
+        x = xx * w[X + i] + xy * w[Y + i] + xz * w[Z + i]
+        y = xy * w[X + i] + yy * w[Y + i] + yz * w[Z + i]
+        z = xz * w[X + i] + yz * w[Y + i] + zz * w[Z + i]
+        sound = (a + d + f) * (xx + yy + zz) <= condition_squared * determinant
+        trusted = sound & (determinant > ZERO) & (w[COUNT + i] >= THREE)  # the latter as roundings may seem sound
+        scale = ONE / determinant if trusted else ZERO
+        w[X + i], w[Y + i], w[Z + i] = x * scale, y * scale, z * scale
+
+
+@inlined
+def _store_block(task: Task, result: Result, w: Floats, values: Floats, m: Floats, start: int, n: int) -> None:
+    end = start + n
+    x, y, z = result.normals[0, start:end], result.normals[1, start:end], result.normals[2, start:end]
+    _store_normals(w, n, x, y, z, result.albedo[0, start:end], result.valid[start:end], task.albedo_scale)
+    if result.residual.size:
+        w[XX : XX + n], w[XY : XY + n] = ZERO, ZERO
+    for channel in range(task.tone.shape[1]):
+        if task.tone.shape[1] > 1:
+            _albedo_given_normal(task, w, values, m, channel, n, result.albedo[channel, start:end])
+        if result.residual.size:
+            _add_residual(task, w, values, m, channel, n)
+    residual = result.residual[start:end]
+    for i in range(len(residual)):
+        error = np.sqrt(w[XX + i] / max(w[XY + i], ONE))
+        residual[i] = encoded(error if abs(w[X + i]) + abs(w[Y + i]) + abs(w[Z + i]) > ZERO else ZERO, residual)
+
+
+@inlined
+def _store_normals(
+    w: Floats, n: int, x: Samples, y: Samples, z: Samples, albedo: Samples, valid: Bytes, albedo_scale: np.float32
+) -> None:
+    """From g to the stored normal, albedo and validity, and to the planes X, Y, Z: all 0 where it faces away."""
+    for i in range(n):
+        gx, gy, gz = w[X + i], w[Y + i], w[Z + i]
+        square = gx * gx + gy * gy + gz * gz
+        length = np.sqrt(square)
+        trusted = gz > LEAST_Z * length
+        scale = ONE / length if trusted else ZERO
+        size = square * scale if trusted else ZERO
+        gx, gy, gz = gx * scale, gy * scale, gz * scale
+        w[X + i], w[Y + i], w[Z + i], w[ALBEDO + i] = gx, gy, gz, size
+        x[i] = encoded(gx, x)
+        y[i] = encoded(gy, y)
+        z[i] = encoded(gz, z)
+        albedo[i] = encoded(size * albedo_scale, albedo)
+        valid[i] = trusted
+
+
+@inlined
+def _albedo_given_normal(task: Task, w: Floats, values: Floats, m: Floats, channel: int, n: int, out: Samples) -> None:
+    """One channel's least squares albedo over the usable measurements, the normal being known."""
+    w[SUM : SUM + n], w[COUNT : COUNT + n] = ZERO, ZERO
+    for light in range(task.lights):
+        lamp = of_light(task.matrix, light)
+        plane = values[light * task.tone.shape[1] + channel]
+        for i in range(n):
+            x, y, z = at(lamp, i)
+            here = m[light, i] > ABSENT
+            shade = x * w[X + i] + y * w[Y + i] + z * w[Z + i]
+            shade = shade if here else ZERO
+            w[SUM + i] += shade * plane[i] if here else ZERO
+            w[COUNT + i] += shade * shade
+    scale = task.albedo_scale
+    for i in range(n):
+        albedo = w[SUM + i] / w[COUNT + i] if w[COUNT + i] > ZERO else ZERO
+        w[ALBEDO + i] = max(albedo, ZERO)
+        out[i] = encoded(max(albedo, ZERO) * scale, out)
+
+
+@inlined
+def _add_residual(task: Task, w: Floats, values: Floats, m: Floats, channel: int, n: int) -> None:
+    """Add one channel's squared residuals in plate units to the plane XX, and their count to XY."""
+    for light in range(task.lights):
+        lamp = of_light(task.matrix, light)
+        plane, to_plate = values[light * task.tone.shape[1] + channel], task.tone[light, channel, 3]
+        for i in range(n):
+            x, y, z = at(lamp, i)
+            here = m[light, i] > ABSENT
+            shade = x * w[X + i] + y * w[Y + i] + z * w[Z + i]
+            error = (plane[i] - w[ALBEDO + i] * shade) * to_plate
+            w[XX + i] += error * error if here else ZERO
+            w[XY + i] += ONE if here else ZERO

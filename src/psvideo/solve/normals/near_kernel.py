@@ -1,0 +1,72 @@
+"""Compiled part of all solvers: what near lights send to every pixel of a block, so that no field is ever kept.
+
+A near light at P sends ``intensity * max(0, cos)^mu / r^2`` to a point X at the distance r, from the direction
+(P - X) / r; cos is taken from the light's axis (Y. Queau et al., "LED-based photometric stereo: modeling, calibration
+and numerical solution", Journal of Mathematical Imaging and Vision 60, 2018, section 2).
+"""
+
+from typing import Any
+
+import numpy as np
+from numba.extending import overload
+
+from psvideo.compute.inlined import inlined
+from psvideo.solve.normals.task import Floats, Near
+
+LEAST_COSINE = np.float32(1e-3)  # nothing is behind an LED; what is there keeps a little light, and so no division by 0
+ONE = np.float32(1)
+
+
+@inlined
+def _place_one(matrix: Floats, per_strength: Floats, near: Near, light: int, row: int, col: int, n: int) -> None:
+    """Fill one near light's planes."""
+    (px, py, pz), (ax, ay, az) = near.positions[light], near.axes[light]
+    across, down, middle_col, middle_row = near.pinhole
+    strength, mu = near.strengths[light], near.anisotropy[light]
+    x_plane, y_plane, z_plane, per = matrix[light, 0], matrix[light, 1], matrix[light, 2], per_strength[light]
+    depth = near.depth[row]
+    slope_y = -(np.float32(row) - middle_row) * down
+    for i in range(n):
+        away = depth[col + i]
+        x = px - away * (np.float32(col + i) - middle_col) * across
+        y = py - away * slope_y
+        z = pz + away
+        inverse = ONE / np.sqrt(x * x + y * y + z * z)
+        x, y, z = x * inverse, y * inverse, z * inverse
+        cosine = max(-(x * ax + y * ay + z * az), LEAST_COSINE)
+        sent = strength * inverse * inverse * (cosine if mu == ONE else ONE)
+        x_plane[i], y_plane[i], z_plane[i], per[i] = sent * x, sent * y, sent * z, cosine
+    if mu != ONE and mu > np.float32(0):
+        for i in range(n):
+            factor = per[i] ** mu
+            x_plane[i], y_plane[i], z_plane[i] = x_plane[i] * factor, y_plane[i] * factor, z_plane[i] * factor
+    for i in range(n):
+        per[i] = ONE / np.sqrt(x_plane[i] ** 2 + y_plane[i] ** 2 + z_plane[i] ** 2)
+
+
+@inlined
+def _place_all(matrix: Floats, per_strength: Floats, near: Near, row: int, col: int, n: int) -> None:
+    """Fill the planes of all lights; a distant one sends the same everywhere, and a copy nothing."""
+    for light in range(len(near.strengths)):
+        strength = near.strengths[light]
+        if strength > np.float32(0) and near.is_near[light]:
+            _place_one(matrix, per_strength, near, light, row, col, n)
+        else:
+            for axis in range(3):
+                matrix[light, axis, :n] = near.positions[light, axis] * strength
+            per_strength[light, :n] = ONE / strength if strength > np.float32(0) else ONE
+
+
+def place_lights(matrix: Floats, per_strength: Floats, near: Near, row: int, col: int, n: int) -> None:
+    """Fill matrix (light, 3, pixel) and per_strength (light, pixel) for n pixels of a row from ``col`` on.
+
+    Nothing is done where all lights are distant: matrix (light, 3). Compiled only.
+    """
+    raise NotImplementedError
+
+
+@overload(place_lights, jit_options={"forceinline": True}, strict=False)
+def _place_lights(matrix: Any, per_strength: Any, near: Any, row: Any, col: Any, n: Any) -> Any:
+    if matrix.ndim == 2:
+        return lambda matrix, per_strength, near, row, col, n: None
+    return lambda matrix, per_strength, near, row, col, n: _place_all(matrix, per_strength, near, row, col, n)

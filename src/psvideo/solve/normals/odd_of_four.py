@@ -1,0 +1,134 @@
+"""Compiled part of the robust solver: which of four measurements that contradict each other is to be left out.
+
+S. Barsky and M. Petrou, "The 4-source photometric stereo technique for three-dimensional surfaces in the presence of
+highlights and shadows", IEEE Transactions on Pattern Analysis and Machine Intelligence 25(10), 2003. Four directions
+are linearly dependent, and so must be the four brightnesses of a matte surface that all of them light.
+"""
+
+import numpy as np
+
+from psvideo.compute.inlined import at, inlined, of_light
+from psvideo.solve.normals.equations import DOUBT, LOWER, ODD, RANK, add_equations, solve_equations
+from psvideo.solve.normals.kernel import ABSENT, COUNT, MISSING, ONE, XX, XY, XZ, YY, YZ, ZERO, ZZ, X, Y, Z
+from psvideo.solve.normals.task import Floats, Task
+
+TWO, FOUR = np.float32(2), np.float32(4)
+TINIEST = np.float32(1e-18)
+BEST, SQUARES = LOWER, RANK  # planes of v that are free at this step
+
+
+@inlined
+def drop_odd_of_four(
+    task: Task,
+    noise: np.float32,
+    signal_noise: np.float32,
+    contradiction: np.float32,
+    w: Floats,
+    v: Floats,
+    m: Floats,
+    e: Floats,
+    n: int,
+) -> None:
+    """Where four measurements remain and contradict each other, the likeliest highlight among them becomes MISSING.
+
+    The residuals of least squares over four always stand in one ratio, whichever measurement is to blame. Highlights
+    add light, so it is one that is too bright for the other three; of these, the one whose mirror direction is nearest
+    to the normal that the other three give. DOUBT is the root of the squared residuals there, else 0.
+    """
+    v[DOUBT : DOUBT + n] = ZERO
+    if not _some_contradict(task, noise, signal_noise, contradiction, w, v, m, e, n):
+        return
+    for i in range(n):
+        v[BEST + i], v[ODD + i] = -TWO, -ONE
+    for light in range(task.lights):
+        lamp = of_light(task.matrix, light)
+        for i in range(n):
+            x, y, z = at(lamp, i)
+            to_mirror = ONE / np.sqrt(x * x + y * y + (z + np.sqrt(x * x + y * y + z * z)) ** 2)
+            half_x, half_y = x * to_mirror, y * to_mirror
+            half_z = (z + np.sqrt(x * x + y * y + z * z)) * to_mirror
+            nearness = _nearness_without(w, v, i, x, y, z, e[light, i], half_x, half_y, half_z)
+            better = (e[light, i] > ZERO) & (nearness > v[BEST + i])
+            v[BEST + i] = nearness if better else v[BEST + i]
+            v[ODD + i] = np.float32(light) if better else v[ODD + i]
+    for i in range(n):
+        v[ODD + i] = v[ODD + i] if v[DOUBT + i] > ZERO else -ONE
+        v[DOUBT + i] = np.sqrt(v[SQUARES + i]) if v[ODD + i] >= ZERO else ZERO
+        w[COUNT + i] -= ONE if v[ODD + i] >= ZERO else ZERO
+    for light in range(task.lights):
+        for i in range(n):
+            m[light, i] = MISSING if v[ODD + i] == np.float32(light) else m[light, i]
+    _solve_again(task, w, v, m, e, n)
+
+
+@inlined
+def _some_contradict(
+    task: Task,
+    noise: np.float32,
+    signal_noise: np.float32,
+    contradiction: np.float32,
+    w: Floats,
+    v: Floats,
+    m: Floats,
+    e: Floats,
+    n: int,
+) -> bool:
+    """Whether any pixel of the block has four measurements that contradict each other; DOUBT is 1 where."""
+    four = 0
+    for i in range(n):
+        four += w[COUNT + i] == FOUR
+    if four == 0:
+        return False
+    _find_errors(task, w, v, m, e, n)
+    some = 0
+    for i in range(n):
+        sigma = noise + signal_noise * np.sqrt(w[X + i] ** 2 + w[Y + i] ** 2 + w[Z + i] ** 2)
+        contradict = (w[COUNT + i] == FOUR) & (v[SQUARES + i] > (contradiction * sigma) ** 2)
+        v[DOUBT + i] = ONE if contradict else ZERO
+        some += contradict
+    return some > 0
+
+
+@inlined
+def _find_errors(task: Task, w: Floats, v: Floats, m: Floats, e: Floats, n: int) -> None:
+    """Residuals, 0 where MISSING, and the sum of their squares in SQUARES."""
+    v[SQUARES : SQUARES + n] = ZERO
+    for light in range(task.lights):
+        lamp = of_light(task.matrix, light)
+        for i in range(n):
+            x, y, z = at(lamp, i)
+            error = m[light, i] - (x * w[X + i] + y * w[Y + i] + z * w[Z + i])
+            error = error if m[light, i] > ABSENT else ZERO
+            e[light, i] = error
+            v[SQUARES + i] += error * error
+
+
+@inlined
+def _nearness_without(
+    w: Floats, v: Floats, i: int, x: np.float32, y: np.float32, z: np.float32, error: np.float32,
+    half_x: np.float32, half_y: np.float32, half_z: np.float32,
+) -> np.float32:  # fmt: skip
+    """Cosine between a mirror direction and the normal that the other three give: g - A^-1 l (sum of squares / error).
+
+    With four measurements 1 - leverage is error squared / the sum of squares.
+    """
+    a, b, c, d, q, f = w[XX + i], w[XY + i], w[XZ + i], w[YY + i], w[YZ + i], w[ZZ + i]
+    xx, xy, xz = d * f - q * q, c * q - b * f, b * q - c * d
+    yy, yz, zz = a * f - c * c, b * c - a * q, a * d - b * b
+    determinant = a * xx + b * xy + c * xz
+    step = v[SQUARES + i] / (error * determinant) if error * determinant != ZERO else ZERO
+    gx = w[X + i] - (xx * x + xy * y + xz * z) * step
+    gy = w[Y + i] - (xy * x + yy * y + yz * z) * step
+    gz = w[Z + i] - (xz * x + yz * y + zz * z) * step
+    cosine: np.float32 = (gx * half_x + gy * half_y + gz * half_z) / np.sqrt(gx * gx + gy * gy + gz * gz + TINIEST)
+    return cosine
+
+
+@inlined
+def _solve_again(task: Task, w: Floats, v: Floats, m: Floats, e: Floats, n: int) -> None:
+    """Solve with what is left, only where one of four was dropped."""
+    for light in range(len(e)):
+        for i in range(n):
+            e[light, i] = ONE if (v[ODD + i] >= ZERO) & (m[light, i] > ABSENT) else ZERO
+    add_equations(task.matrix, w, m, e, n)
+    solve_equations(w, n, task.condition_squared, True)

@@ -1,0 +1,185 @@
+"""Normals that hold where the surface is not matte: highlights and cast shadows weigh little, and doubt is measured.
+
+Iteratively reweighted least squares (P. J. Huber, "Robust Statistics", 1981) per pixel, with Cauchy's or Tukey's
+weights. What physics says of the measurements comes first: a saturated one, or one that is dark beside the pixel's
+others (shadow, or light that grazes), is left out; highlights only ever add light, so the start is least squares
+without the brightest few.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from psvideo.model.surface import Misfit, Surface
+from psvideo.solve.normals.bands import check_arrays, in_bands, surface_of
+from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.task import Floats, Mask, Samples, Task, Usable, empty_result, task
+
+if TYPE_CHECKING:
+    from psvideo.solve.normals import robust_kernel as kernel
+
+NINE = 9
+USABLE = Usable(shadow_ratio=0.4)
+"""Least squares needs every measurement; here one that is dark beside the others may go sooner."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reweighting:
+    """How measurements are weighed; ``noise`` and ``signal_noise`` are the least that any camera's residuals have.
+
+    rounds: how often weights are taken anew.
+    loss: "cauchy" weighs everything a little, "tukey" leaves what is far off out entirely.
+    width: the residual, over the pixel's own median residual as a standard deviation, where Cauchy's weight is a half
+        and Tukey's becomes 0 at that times ``TUKEY_WIDTH``; narrower with the root of their number where more than nine
+        measurements are usable.
+    noise: in units of sensor saturation.
+    signal_noise: as a share of the pixel's albedo under one light, as lights and lenses are never known better.
+    darkest, brightest: the shares of the measurements that the start leaves out.
+    contradiction: four measurements contradict each other beyond so many times the noise.
+    most_error_deg, beside_typical: a normal whose predicted standard error is larger than this is not valid, unless
+        that error is less than so many times what is typical of the picture.
+    """
+
+    rounds: int = 3
+    loss: Literal["cauchy", "tukey"] = "cauchy"
+    width: float = 0.6
+    noise: float = 0.0005
+    signal_noise: float = 0.01
+    darkest: float = 0.2
+    brightest: float = 0.5
+    contradiction: float = 3.0
+    most_error_deg: float = 6.0
+    beside_typical: float = 2.5
+
+
+MOST_TYPICAL_DEG = 30.0
+"""However bad a picture is as a whole, beyond this no normal is valid."""
+SAMPLE_PIXELS = 1 << 16
+"""What is typical of a picture is looked for in about so many pixels: whole rows, evenly spread."""
+EVERYTHING_DEG = 179.0
+TUKEY_WIDTH = 4.685  # beside Cauchy's, as far as weights go: so wide, Tukey's keeps 95 % of what Gaussian noise holds
+
+
+def solve(
+    plates: Sequence[Samples],
+    lit: Illumination,
+    *,
+    seen: Mask | None = None,
+    mask: Mask | None = None,
+    usable: Usable = USABLE,
+    reweighting: Reweighting = Reweighting(),
+    black_level: float = 0.0,
+    scale: float = 1.0,
+    half: bool = False,
+    residual: bool = True,
+    error: bool = True,
+    misfit: Misfit | None = None,
+    threads: int | None = None,
+) -> Surface:
+    """Return the surface that explains most of the plates, one per light.
+
+    Arguments are those of ``woodham1980.solve``. ``error`` asks for the predicted standard error besides. ``misfit`` is
+    what is typical of the picture; left out, it is found first, from a sample of the picture's rows.
+
+    Of a pixel's usable measurements: five or more are reweighted; of four that contradict each other the likeliest
+    highlight is left out; three are taken as they are, and nothing tells whether one of them is a highlight.
+
+    A pixel is valid where the predicted standard error of its normal is at most ``reweighting.most_error_deg``, or
+    ``reweighting.beside_typical`` times what is typical of the picture where that is more, and the normal turns from
+    the camera's axis by 110 degrees at most. The prediction knows noise, highlights, shadows and how the usable lights
+    stand. A rig that is wrong spoils all pixels alike: that is the surface's ``misfit``, and no pixel's fault. The
+    residual is over the usable measurements.
+
+    The result does not depend on ``threads``. Raises ValueError where the arrays do not belong together.
+    """
+    check_arrays(plates, lit, seen, mask)
+    from psvideo.solve.normals import robust_kernel as kernel
+
+    samples = [np.ascontiguousarray(plate) for plate in plates]
+    rows, cols = samples[0].shape[:2]
+    result = empty_result(rows * cols, lit.intensities.shape[1], half=half, residual=residual)
+    predicted = np.zeros(rows * cols, np.uint16 if half else np.float32)
+    given = _balanced(task(samples, lit, seen, mask, usable, black_level, scale))
+
+    def run(into: Samples, unexplained: Floats, how: kernel.Weights, step: int) -> None:
+        def band(first: int, last: int) -> None:
+            kernel.solve_rows(given, result, into, unexplained, kernel.working_memory(given), how, first, last, step)
+
+        in_bands(band, rows=rows, cols=cols, threads=threads)
+
+    if misfit is None:
+        step, unexplained = max(rows * cols // SAMPLE_PIXELS, 1), np.zeros(rows * cols, np.float32)
+        run(predicted, unexplained, _weights(reweighting, limit_deg=EVERYTHING_DEG, common=0.0), step)
+        found = surface_of(result, predicted, plates[0].shape, half=half)
+        misfit = _typical(found, unexplained.reshape(rows, cols), step)
+    limit_deg = max(reweighting.most_error_deg, 0.0 if misfit is None else _limit_deg(reweighting, misfit))
+    how = _weights(reweighting, limit_deg=limit_deg, common=0.0 if misfit is None else misfit.share)
+    run(predicted if error else predicted[:0], np.zeros(0, np.float32), how, 1)
+    surface = surface_of(result, predicted if error else None, plates[0].shape, half=half)
+    return replace(surface, misfit=misfit)
+
+
+def _limit_deg(reweighting: Reweighting, misfit: Misfit) -> float:
+    return min(reweighting.beside_typical * misfit.error_deg, MOST_TYPICAL_DEG)
+
+
+def _weights(reweighting: Reweighting, *, limit_deg: float, common: float) -> "kernel.Weights":
+    from psvideo.solve.normals import robust_kernel as kernel
+
+    tukey = reweighting.loss == "tukey"
+    return kernel.Weights(
+        rounds=reweighting.rounds,
+        tukey=tukey,
+        width=np.float32(reweighting.width * (TUKEY_WIDTH if tukey else 1.0)),
+        noise=np.float32(reweighting.noise),
+        signal_noise=np.float32(reweighting.signal_noise),
+        darkest=np.float32(reweighting.darkest),
+        brightest=np.float32(reweighting.brightest),
+        contradiction=np.float32(reweighting.contradiction),
+        most_error_deg=np.float32(limit_deg),
+        common=np.float32(common),
+    )
+
+
+def _typical(found: Surface, unexplained: Floats, step: int) -> Misfit | None:
+    """Return what is typical of the pixels in every ``step``-th row whose measurements can contradict each other.
+
+    The share is that of their brighter half, where noise counts less. None where there is no such pixel.
+    """
+    sampled = unexplained[::step]
+    known = sampled > 0
+    if found.error_deg is None or not known.any():
+        return None
+    light = np.linalg.norm(found.albedo[::step][known].astype(np.float32).reshape(int(known.sum()), -1), axis=1)
+    bright = light >= np.median(light)
+    return Misfit(
+        share=float(np.median(sampled[known][bright])), error_deg=float(np.median(found.error_deg[::step][known]))
+    )
+
+
+def _balanced(given: Task) -> Task:
+    """Return the task in units in which residuals of strong and of weak lights compare, which thresholds need.
+
+    Photon noise grows with the root of a light's strength, highlights and shadows with the strength itself: dividing
+    by the root is right for the first, and between noise that is alike in all plates and the second. From four distant
+    lights on, up to NINE are filled up with lights that weigh nothing, for which there is a faster way.
+    """
+    factor = np.sqrt(given.per_strength)[: given.lights, None]
+    tone = given.tone.copy()
+    tone[: given.lights, :, :3] *= factor[..., None]
+    tone[: given.lights, :, 3] /= factor
+    matrix, per_strength = given.matrix.copy(), given.per_strength.copy()
+    matrix[: given.lights] *= factor
+    per_strength[: given.lights] /= factor[:, 0]
+    strengths = given.near.strengths.copy()  # empty where all lights are distant
+    strengths[: given.lights] *= factor[: len(strengths), 0]
+    near = given.near._replace(strengths=strengths)
+    more = max(NINE - len(tone), 0) if given.lights > 3 and not given.near.depth.size else 0
+    return given._replace(
+        tone=np.pad(tone, ((0, more), (0, 0), (0, 0)), mode="edge"),
+        matrix=np.pad(matrix, ((0, more), (0, 0))),
+        per_strength=np.pad(per_strength, (0, more), mode="edge"),
+        near=near,
+    )

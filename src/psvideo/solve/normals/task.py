@@ -1,0 +1,177 @@
+"""What the compiled least-squares kernel is given: lights and samples as plain arrays, and where the solution goes."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.model.camera import FloatArray
+from psvideo.solve.normals.illumination import Illumination
+
+Floats = NDArray[np.float32]
+Bytes = NDArray[np.uint8]
+Samples = NDArray[Any]  # of float32 or uint16
+Mask = NDArray[np.bool_]
+
+PIXEL_CONDITION = 12.0  # beyond it, with the lights that shadow leaves, albedo begins to burst in real creases
+
+_NO_LIMIT = -1e9
+
+
+@dataclass(frozen=True, kw_only=True)
+class Usable:
+    """Which measurements a pixel's solution may use, in units of the plates (1.0 = sensor saturation).
+
+    A measurement counts where it is seen, below ``saturation`` in all channels, and, taken relative to its light's
+    intensity (1 = the rig's mean), above ``dark_level`` and above ``shadow_ratio`` times the mean of the pixel's
+    measurements: in shadow, attached or cast, a surface does not show n . d. A light that grazes the surface is left
+    out with them, which costs little.
+    """
+
+    saturation: float = 1.0
+    dark_level: float = 0.004
+    shadow_ratio: float = 0.1
+
+
+EVERYTHING = Usable(saturation=np.inf, dark_level=_NO_LIMIT, shadow_ratio=_NO_LIMIT)  # plain least squares
+
+
+class Near(NamedTuple):
+    """What gives every pixel a matrix of its own: where the lights stand, and where the surface is."""
+
+    positions: Floats  # (light, 3) in metres; of a distant light its direction
+    is_near: Bytes  # (light,)
+    axes: Floats  # (light, 3): unit vectors, the way a light shines
+    anisotropy: Floats  # (light,): the light falls off with this power of the cosine from its axis
+    strengths: Floats  # (light,): intensity at 1 m, or of a distant light, in the matrix's unit; 0 for a copy
+    depth: Floats  # (row, col) in metres along the camera's axis, or empty
+    pinhole: Floats  # (4,): 1 / focal length (x, y) and the principal point (col, row), in pixels
+
+
+class Task(NamedTuple):
+    """What to solve. A plate's samples lie in memory pixel by pixel, channels side by side.
+
+    The kernel takes three lights at a time: arrays by light are filled up to whole threes with copies of the last
+    light that weigh nothing.
+    """
+
+    plates: NDArray[np.intp]  # (light,) addresses of the plates' first samples
+    like: Samples  # any array of the samples' type
+    lights: int  # without the copies
+    cols: int
+    tone: Floats  # (light, channel, 4): gain, offset and ceiling of the samples; factor from measurement to plate
+    matrix: Floats  # (light, 3): intensity * direction, one for all channels; 0 for a copy
+    per_strength: Floats  # (light,): 1 / intensity
+    near: Near  # empty where all lights are distant; else matrix and per_strength hold for the surface's middle only
+    inverse: Floats  # (light, 3): the matrix's transposed pseudo-inverse, for samples as they are; 0 for a copy
+    origin: Floats  # (3,): what black samples would give with it, to be added
+    least: np.float32  # the smallest 1 / intensity
+    most: np.float32  # the largest
+    dark: np.float32  # a measurement counts where it is above this, relative to the intensity,
+    ratio: np.float32  # and above this times the pixel's mean
+    condition_squared: np.float32  # largest trace(A) * trace(A^-1) of the usable lights' normal equations
+    albedo_scale: np.float32
+    seen: Bytes  # (light, row, col or 1), or empty
+    mask: Bytes  # (row, col), or empty
+
+
+class Result(NamedTuple):
+    """Where the solution goes: planes of float32, or of half floats as the bits of uint16."""
+
+    normals: Samples  # (3, pixel)
+    albedo: Samples  # (channel, pixel)
+    valid: Bytes  # (pixel,)
+    residual: Samples  # (pixel,), or empty
+
+
+class Work(NamedTuple):
+    """The kernel's working memory for one block of pixels."""
+
+    planes: Floats
+    values: Floats  # (light * channel, pixel)
+    measurements: Floats  # (light, pixel): the channels combined
+    matrix: Floats  # the task's; for near lights (light, 3, pixel)
+    per_strength: Floats  # the task's; for near lights (light, pixel)
+
+
+def task(
+    plates: Sequence[Samples],
+    lit: Illumination,
+    seen: Mask | None,
+    mask: Mask | None,
+    usable: Usable,
+    black_level: float,
+    scale: float,
+) -> Task:
+    """Return the task for contiguous plates, of which it holds the addresses only."""
+    rows, cols = plates[0].shape[:2]
+    strength = lit.intensities.mean(axis=1)  # one matrix for all channels: each channel's plates are scaled to it
+    unit = strength.mean()
+    to_strength = strength[:, None] / lit.intensities
+    gain = scale * to_strength
+    ceiling = usable.saturation * (1 - 1e-5) * to_strength  # the largest code may come out a rounding below 1.0
+    tone = np.stack([gain, -black_level * gain, ceiling, 1 / to_strength], axis=-1)
+    matrix = lit.directions * (strength / unit)[:, None]
+    inverse = np.linalg.pinv(matrix)
+    frobenius = (matrix**2).sum() * (inverse**2).sum()  # trace(A) * trace(A^-1) with all lights
+    copies = -len(plates) % 3
+    return Task(
+        plates=np.array([plate.ctypes.data for plate in [*plates, *[plates[-1]] * copies]], np.intp),
+        like=plates[0].reshape(-1)[:0],
+        lights=len(plates),
+        cols=cols,
+        tone=_filled(tone, copies, mode="edge"),
+        matrix=_filled(matrix, copies),
+        per_strength=_filled(unit / strength, copies, mode="edge"),
+        inverse=_filled(gain[:, :1] * inverse.T, copies),
+        origin=_filled(inverse @ tone[:, 0, 1], 0),
+        near=_near(lit, unit, copies),
+        least=np.float32((unit / strength).min()),
+        most=np.float32((unit / strength).max()),
+        dark=np.float32(max(usable.dark_level, _NO_LIMIT)),
+        ratio=np.float32(max(usable.shadow_ratio, _NO_LIMIT)),
+        condition_squared=np.float32(max(PIXEL_CONDITION**2, 1.001 * frobenius)),
+        albedo_scale=np.float32(1 / unit),
+        seen=np.empty((0, 0, 0), np.uint8) if seen is None else _bytes(seen).reshape(len(plates), rows, -1),
+        mask=np.empty((0, 0), np.uint8) if mask is None else _bytes(mask),
+    )
+
+
+def _near(lit: Illumination, unit: float, copies: int) -> Near:
+    field = lit.near
+    if field is None:
+        line, plane = np.empty(0, np.float32), np.empty((0, 0), np.float32)
+        return Near(plane, np.empty(0, np.uint8), plane, line, line, plane, line)
+    ground = field.ground
+    focal, principal = ground.focal_px, ground.principal_px
+    return Near(
+        positions=_filled(field.positions_m, copies, mode="edge"),
+        is_near=np.pad(_bytes(field.is_near), (0, copies)),
+        axes=_filled(field.axes, copies, mode="edge"),
+        anisotropy=_filled(field.anisotropy, copies),
+        strengths=_filled(lit.intensities.mean(axis=1) / field.middle_gain / unit, copies),
+        depth=np.ascontiguousarray(ground.depth_m, np.float32),
+        pinhole=np.array([1 / focal[0], 1 / focal[1], *principal], np.float32),
+    )
+
+
+def empty_result(pixels: int, channels: int, *, half: bool, residual: bool) -> Result:
+    """Return memory for the solution of so many pixels."""
+    stored = np.uint16 if half else np.float32
+    return Result(
+        normals=np.empty((3, pixels), stored),
+        albedo=np.empty((channels, pixels), stored),
+        valid=np.empty(pixels, np.uint8),
+        residual=np.empty(pixels if residual else 0, stored),
+    )
+
+
+def _filled(values: FloatArray, copies: int, *, mode: Literal["constant", "edge"] = "constant") -> Floats:
+    filled = np.pad(values, ((0, copies), *[(0, 0)] * (values.ndim - 1)), mode=mode)
+    return np.ascontiguousarray(filled, np.float32)
+
+
+def _bytes(flags: Mask) -> Bytes:
+    return np.ascontiguousarray(flags).view(np.uint8)

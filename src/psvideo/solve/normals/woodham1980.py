@@ -1,0 +1,63 @@
+"""Normals and albedo by linear least squares, the classic of photometric stereo.
+
+R. J. Woodham, "Photometric method for determining surface orientation from multiple images", Optical Engineering 19(1),
+1980. A matte surface under distant light l shows I_l = E_l a (n . d_l); with three or more lights not in one plane,
+a n is the least-squares solution of these equations, which minimises the plates' residual.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from psvideo.model.surface import Surface
+from psvideo.solve.normals.bands import check_arrays, in_bands, surface_of
+from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.task import EVERYTHING, Mask, Samples, Usable, empty_result, task
+
+__all__ = ["EVERYTHING", "Usable", "solve"]
+
+
+def solve(
+    plates: Sequence[Samples],
+    lit: Illumination,
+    *,
+    seen: Mask | None = None,
+    mask: Mask | None = None,
+    usable: Usable = Usable(),
+    black_level: float = 0.0,
+    scale: float = 1.0,
+    half: bool = False,
+    residual: bool = True,
+    threads: int | None = None,
+) -> Surface:
+    """Return the surface that explains one plate per light.
+
+    plates: one per light of ``lit``, in its order, each (row, col) or (row, col, 3), all of one type: float32 with
+        1.0 = saturation, or uint16 codes, for which (code - ``black_level``) * ``scale`` is that.
+    seen: True where a plate's rows were exposed, shape (light, row) or (light, row, col); by default all.
+    mask: True where to solve, shape (row, col); by default everywhere.
+    half: give half floats instead of float32.
+
+    Of three channels, one normal: each channel counts by its own brightness in the pixel; then each gets its
+    least-squares albedo for that normal. A pixel is valid where three or more usable measurements remain, their lights
+    are not nearly coplanar (Frobenius condition number at most PIXEL_CONDITION, or the rig's own), and the normal turns
+    from the camera's axis by 110 degrees at most (in perspective, what is seen may turn by more than 90). With three
+    lights that means: none in shadow, none saturated. What remains in a valid pixel is noise, and whatever is not matte
+    (highlights, light from neighbouring surfaces).
+
+    The result does not depend on ``threads``. Raises ValueError where the arrays do not belong together.
+    """
+    check_arrays(plates, lit, seen, mask)
+    from psvideo.solve.normals.kernel import solve_rows, working_memory
+
+    samples = [np.ascontiguousarray(plate) for plate in plates]
+    rows, cols = samples[0].shape[:2]
+    result = empty_result(rows * cols, lit.intensities.shape[1], half=half, residual=residual)
+    given = task(samples, lit, seen, mask, usable, black_level, scale)
+    in_bands(
+        lambda first, last: solve_rows(given, result, working_memory(given), first, last),
+        rows=rows,
+        cols=cols,
+        threads=threads,
+    )
+    return surface_of(result, None, plates[0].shape, half=half)

@@ -1,0 +1,1 @@
+"""The line to a controller: bytes, messages, ports, boards."""

@@ -1,0 +1,53 @@
+"""The first words with whatever is at a port: wait for a board that restarts, and tell it from other things."""
+
+import time
+from itertools import chain, repeat
+
+from psvideo.errors import PsvideoError
+from psvideo.strobe.link.link import Link
+from psvideo.strobe.link.messages import PROTOCOL, Id, Identity
+from psvideo.strobe.link.protocol import format_request
+
+START_WITHIN_S = 7.0
+"""A board that restarts when its port is opened is in its boot loader for one to two seconds."""
+PAUSES_S = (0.3, 0.3, 2.2)
+"""How long to wait for an answer the first times, and then: some boot loaders stay as long as anybody talks to them."""
+
+
+def greet(link: Link, *, within_s: float = START_WITHIN_S) -> Identity:
+    """Return who is at the port. Raises PsvideoError where it is no strobe controller, or speaks another protocol."""
+    link.heard = b""
+    until_s = time.monotonic() + within_s
+    identity = None
+    for pause_s in chain(PAUSES_S, repeat(PAUSES_S[-1])):
+        link.port.write(b"\n" + format_request(Id()))
+        identity = link.listen(Identity, within_s=min(pause_s, max(until_s - time.monotonic(), 0.0)))
+        if identity is not None or time.monotonic() >= until_s:
+            break
+    if identity is None or not link.find_the_way_back():
+        raise PsvideoError(_other(link.port.name, link.heard))
+    if identity.proto != PROTOCOL:
+        raise PsvideoError(
+            f"{link.port.name}: the controller speaks protocol {identity.proto}, and this psvideo {PROTOCOL}. Put the "
+            "firmware of this psvideo onto the board (lights/), or use the psvideo that came with the board's."
+        )
+    return identity
+
+
+def _other(name: str, heard: bytes) -> str:
+    """Say what is at a port that is no controller, by what came from it."""
+    told = "".join(chr(byte) if 0x20 <= byte <= 0x7E else " " for byte in heard[:60]).strip()
+    if not heard:
+        found = "nothing answers there: no board, a board without the strobe firmware, or one that is not powered"
+    elif format_request(Id()).strip() in heard:
+        found = "what is there sends back what it gets (a modem, or a plug that joins its two data wires)"
+    elif b"$GP" in heard or b"$GN" in heard:
+        found = f"a satellite receiver is there (it says {told!r})"
+    elif not told:
+        found = "what is there sends bytes that are no text: another device, or another speed than 115,200 baud"
+    else:
+        found = f"what is there is no strobe controller (it says {told!r})"
+    return (
+        f"{name}: {found}. Name the controller's port with --port (psvideo strobe list shows those that are likely), "
+        "or put the firmware onto the board (lights/)."
+    )

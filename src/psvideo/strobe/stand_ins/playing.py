@@ -1,0 +1,58 @@
+"""A cycle of slots as edges, lazily: what an emulated controller's outputs do from the start of a run on."""
+
+import heapq
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from psvideo.strobe.link.messages import Slot
+
+
+@dataclass(frozen=True, kw_only=True, order=True)
+class Edge:
+    """A light goes on (``level`` 1) or off (0) at a tick, counted from the controller's reset."""
+
+    tick: int
+    line: int
+    level: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Moment:
+    """What happens at a tick of a run: an edge, or (``edge`` None) the begin of step ``step`` of cycle ``cycle``."""
+
+    tick: int
+    cycle: int
+    step: int
+    edge: Edge | None = None
+
+
+def moments(steps: Sequence[Slot], *, start: int, cycles: int) -> Iterator[Moment]:
+    """Yield a run's moments in order of time; 0 cycles never end. The last is the begin of the cycle after the last.
+
+    Every time is counted in whole ticks from the run's start, so nothing accumulates.
+    """
+    tick, cycle = start, 0
+    while cycles == 0 or cycle < cycles:
+        for step, slot in enumerate(steps):
+            yield Moment(tick=tick, cycle=cycle, step=step)
+            for edge in slot_edges(slot, tick):
+                yield Moment(tick=edge.tick, cycle=cycle, step=step, edge=edge)
+            tick += slot.duration + slot.dark
+        cycle += 1
+    yield Moment(tick=tick, cycle=cycle, step=0)
+
+
+def slot_edges(slot: Slot, start: int) -> Iterator[Edge]:
+    """Yield one flash's edges in order of time; bursts that touch are one."""
+    return heapq.merge(*(_line_edges(slot, lit.line, lit.on, start) for lit in slot.lit))
+
+
+def _line_edges(slot: Slot, line: int, on: int, start: int) -> Iterator[Edge]:
+    end = start + slot.duration
+    if on == slot.period:
+        yield Edge(tick=start, line=line, level=1)
+        yield Edge(tick=end, line=line, level=0)
+        return
+    for begin in range(start, end, slot.period):
+        yield Edge(tick=begin, line=line, level=1)
+        yield Edge(tick=min(begin + on, end), line=line, level=0)

@@ -1,0 +1,236 @@
+"""Find when every flash fired, from the picture alone: row profiles in, Timing out.
+
+One global fit over many frames instead of a search for each frame's darkest row (``rowfit``): the strobe's phase and
+the ratio of the two clocks are searched, the brightness of every row under every light is eliminated. A coarse grid
+over a few dozen frames finds the place in the cycle; from there the clip is tracked, frames that were dropped or
+repeated without a word are found, and a robust fit over all frames sharpens the clock, its drift, and what the plan
+does not know exactly: readout, exposure, the LEDs' tails. The cycle's marker tells which light is which.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.errors import NoStrobeError, PsvideoError, UsageError
+from psvideo.model.camera import Camera, FloatArray
+from psvideo.model.plan import Plan
+from psvideo.model.shutter import frames_touched
+from psvideo.model.timing import DroppedFrames, Flash, Order, Timing
+from psvideo.sync.rowfit.beat import Beat, train_until
+from psvideo.sync.rowfit.course import window_frames
+from psvideo.sync.rowfit.fit import Found
+from psvideo.sync.rowfit.profiles import Profiles
+from psvideo.sync.rowfit.refine import Fit
+from psvideo.sync.turns import turns
+from psvideo.sync.verdict.frame_remarks import remarks_on_frames
+from psvideo.sync.verdict.judge import judged
+from psvideo.sync.verdict.refusal import clock_too_far, nothing_to_find, why_not
+from psvideo.sync.verdict.remarks import remarks, remarks_on_lights
+
+NO_READOUT = 3.0
+"""A readout of fewer standard errors is taken for a global shutter."""
+ADVICE = (
+    "Check that plan.toml is the plan that the strobe played (frame rate, flash durations, dark time), that the lights "
+    "flashed brightly enough, and that the exposure was fixed."
+)
+
+
+def find_timing(
+    plan: Plan,
+    indices: NDArray[np.int64],
+    profiles: FloatArray,
+    *,
+    clip: str = "clip",
+    first_light: str | None = None,
+    dropped: Sequence[DroppedFrames] = (),
+    numbers: Sequence[int] | None = None,
+    doubt: NDArray[np.floating] | None = None,
+) -> Timing:
+    """Return when every flash of a clip fired.
+
+    ``indices`` (frame,) are the frames' places in time as their numbering tells and ``profiles`` (frame, row) their row
+    means in linear light; ``doubt`` (frame, row) is by how much a mean may be wrong besides noise (saturated pixels).
+    ``numbers`` (frame,) are the frames' own numbers, by which dropped and repeated ones are reported (left out: the
+    indices). Raises PsvideoError where the profiles do not look like the plan's strobe.
+    """
+    if first_light is not None and first_light not in plan.lights:
+        raise UsageError(
+            f"--first-light {first_light}: no such light in the plan; its lights are {', '.join(plan.lights)}."
+        )
+    if plan.mode == "synced":
+        return _synced_timing(plan, indices, clip=clip, dropped=dropped)
+    rows = _as_profiles(plan, indices, profiles, doubt)
+    hopeless = nothing_to_find(plan, rows)
+    if hopeless:
+        raise NoStrobeError(f"{clip}: {hopeless}")
+    verdict = judged(plan, rows)
+    found = verdict.found
+    if not verdict.believed:
+        raise NoStrobeError(_not_found(plan, rows, found, clip))
+    beat, order = _order_of_lights(plan, found, first_light)
+    numbered = np.asarray(indices if numbers is None else numbers, np.int64)
+    return _assemble(
+        plan,
+        replace(found, fit=replace(found.fit, beat=beat)),
+        order=order,
+        clip=clip,
+        dropped=_all_dropped(dropped, numbered, np.asarray(indices), found.track.index),
+        repeated=tuple(int(number) for number in numbered[found.track.repeated]),
+        notes=(
+            *remarks(plan, found),
+            *remarks_on_lights(plan, found, beat, named=order != "guess"),
+            *remarks_on_frames(plan, found, np.asarray(indices)),
+        ),
+    )
+
+
+def _not_found(plan: Plan, rows: Profiles, found: Found, clip: str) -> str:
+    reason = why_not(plan, rows) or clock_too_far(plan, found)
+    return (
+        f"{clip}: no strobe like the plan's was found in the picture: the best fit explains "
+        f"{100 * max(found.fit.explained, 0):.0f} % of the rows' changes from frame to frame"
+        f"{' only by taking many frames for missing' if found.steps else ''}. {reason or ADVICE}"
+    )
+
+
+def _as_profiles(
+    plan: Plan, indices: NDArray[np.int64], values: FloatArray, doubt: NDArray[np.floating] | None
+) -> Profiles:
+    """Lay out the profiles for fitting, rows in the order in which they open as far as that is known."""
+    height = values.shape[1]
+    rows = Profiles(
+        value=np.ascontiguousarray(values, np.float64),
+        index=np.asarray(indices, np.int64),
+        period_s=plan.camera.frame_period_s,
+        place=np.arange(height, dtype=np.float64),
+        window_start=np.zeros(1, np.int64),
+        doubt=None if doubt is None else np.ascontiguousarray(doubt, np.float64),
+    )
+    return rows.windowed(window_frames(plan))
+
+
+def _order_of_lights(plan: Plan, found: Found, first_light: str | None) -> tuple[Beat, Order]:
+    """Return the beat whose names are right, and how they are known."""
+    if len(plan.cycle_slots) == 1:
+        return found.fit.beat, "given"
+    candidates = turns(plan, found.rows, found.fit.beat)
+    if first_light is not None:
+        return _given_order(plan, found.rows, candidates.beats, first_light), "given"
+    return candidates.beats[0], "marker" if candidates.sure else "guess"
+
+
+def _given_order(plan: Plan, rows: Profiles, alike: Sequence[Beat], first_light: str) -> Beat:
+    for beat in alike:
+        if first_light == _first_complete_light(plan, rows, beat):
+            return beat
+    seen = _first_complete_light(plan, rows, alike[0])
+    raise PsvideoError(
+        f"--first-light {first_light} does not fit the footage: by the cycle's marker the clip's first complete flash "
+        f"is {seen}'s. Leave the option out, or check that plan.toml is the plan that the strobe played."
+    )
+
+
+def _first_complete_light(plan: Plan, rows: Profiles, beat: Beat) -> str:
+    """Return the light (or lights, joined by +) of the first lit flash that the clip holds from the first row on."""
+    train = train_until(plan, beat.clock, float(rows.frame_start_s[-1]))
+    first_s = float(rows.frame_start_s[0] + rows.place.max() * beat.row_time_s)
+    for slot, start_s in zip(train.slot, train.start_s, strict=True):
+        if start_s >= first_s and not plan.flashes[slot].is_dark:
+            return "+".join(plan.flashes[slot].lights)
+    return ""
+
+
+def _all_dropped(
+    told: Sequence[DroppedFrames], numbers: NDArray[np.int64], indices: NDArray[np.int64], index: NDArray[np.int64]
+) -> tuple[DroppedFrames, ...]:
+    """Return the holes that the numbering shows with those that only the picture shows."""
+    counts = {hole.after: hole.count for hole in told}
+    for n in np.flatnonzero(np.diff(index) > np.maximum(np.diff(indices), 1)):
+        more = int(index[n + 1] - index[n] - max(indices[n + 1] - indices[n], 1))
+        counts[int(numbers[n])] = counts.get(int(numbers[n]), 0) + more
+    return tuple(DroppedFrames(after=after, count=count) for after, count in sorted(counts.items()))
+
+
+def _fitted_camera(plan: Plan, fit: Fit) -> Camera:
+    """Return the plan's camera with the shutter that was found; a readout that may as well be none is none."""
+    beat = fit.beat
+    may_be_none = beat.row_time_s < NO_READOUT * fit.errors_s.get("row_time_s", 0.0)
+    readout_s = 0.0 if may_be_none else beat.row_time_s * plan.camera.height_px * (-1 if beat.upward else 1)
+    return replace(plan.camera, exposure_s=beat.exposure_s, readout_s=readout_s)
+
+
+def _assemble(
+    plan: Plan,
+    found: Found,
+    *,
+    order: Order,
+    clip: str,
+    dropped: tuple[DroppedFrames, ...],
+    repeated: tuple[int, ...],
+    notes: tuple[str, ...],
+) -> Timing:
+    """List every flash that the clip saw any of, and mark those that its start or end cuts."""
+    beat, index = found.fit.beat, found.rows.index
+    camera = _fitted_camera(plan, found.fit)
+    train = train_until(plan, beat.clock, (int(index[-1]) + 2) * camera.frame_period_s)
+    start_s = train.start_s + found.jitter.of(train.start_s)
+    first, last = frames_touched(camera, start_s, train.duration_s)
+    seen = (last >= index[0]) & (first <= index[-1])
+    complete = (first >= found.trusted[0]) & (last <= found.trusted[1])
+    flashes = tuple(
+        Flash(
+            index=number,
+            slot=int(train.slot[k]),
+            lights=plan.flashes[train.slot[k]].lights,
+            start_s=float(start_s[k]),
+            duration_s=float(train.duration_s[k]),
+            complete=bool(complete[k]),
+        )
+        for number, k in enumerate(np.flatnonzero(seen))
+    )
+    row_time_s = camera.row_time_s
+    return Timing(
+        clip=clip,
+        frame_period_s=camera.frame_period_s,
+        exposure_s=camera.exposure_s,
+        row_time_s=row_time_s,
+        clock_offset_ppm=beat.clock.mean_offset_ppm(),
+        phase_error_rows=found.fit.shift_error_s / (abs(row_time_s) or camera.frame_period_s / camera.height_px),
+        order=order,
+        dropped_frames=dropped,
+        repeated_frames=repeated,
+        notes=notes,
+        phase_error_s=found.fit.shift_error_s,
+        row_time_error_s=found.fit.errors_s.get("row_time_s"),
+        flashes=flashes,
+    )
+
+
+def _synced_timing(plan: Plan, indices: NDArray[np.int64], *, clip: str, dropped: Sequence[DroppedFrames]) -> Timing:
+    """One flash a frame, in the plan's order: nothing is left to find, and when its rows open does not matter."""
+    period_s = plan.camera.frame_period_s
+    train = plan.train(0, int(indices[-1]) + 1)
+    flashes = tuple(
+        Flash(
+            index=n,
+            slot=int(slot),
+            lights=plan.flashes[slot].lights,
+            start_s=n * period_s,
+            duration_s=min(float(duration_s), plan.camera.exposure_s),
+            complete=True,
+        )
+        for n, (slot, duration_s) in enumerate(zip(train.slot, train.duration_s, strict=True))
+    )
+    return Timing(
+        clip=clip,
+        frame_period_s=period_s,
+        exposure_s=plan.camera.exposure_s,
+        row_time_s=0.0,
+        clock_offset_ppm=0.0,
+        phase_error_rows=0.0,
+        order="given",
+        dropped_frames=tuple(dropped),
+        flashes=flashes,
+    )

@@ -1,0 +1,57 @@
+"""A take's timing: its frames are decoded once, for their row profiles, and the flashes are found in these."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.clip import ALL_CORES, Take, holes, read_frames
+from psvideo.compute.progress import Watch, unwatched
+from psvideo.model.camera import FloatArray
+from psvideo.model.row_profiles import collect_with_doubt
+from psvideo.model.timing import DroppedFrames, Timing
+from psvideo.sync.find import find_timing
+
+
+@dataclass(frozen=True, kw_only=True)
+class TakeProfiles:
+    """What a take's frames show row by row.
+
+    index: (frame,), places in time as the files' numbers say; value: (frame, row), row means in linear light.
+    doubt: (frame, row), by how much a mean may be wrong because pixels are saturated; None where none is.
+    """
+
+    index: NDArray[np.int64]
+    value: FloatArray
+    doubt: NDArray[np.float32] | None = None
+
+
+def take_profiles(take: Take, *, watch: Watch = unwatched) -> TakeProfiles:
+    """Decode a take once, and keep what was decoded where the take has a store; a synced clip is not decoded."""
+    clip = take.clip
+    if clip.plan.mode == "synced":
+        index = np.array([clip.index_of(number) for number in take.numbers], np.int64)
+        return TakeProfiles(index=index, value=np.zeros((len(index), clip.height_px)))
+    frames = read_frames(clip, take.numbers, ahead=ALL_CORES, threads=ALL_CORES, kept=take.kept, keep=True)
+    watched = watch(frames, total=len(take.numbers), what="finding the flashes")
+    index, value, doubt = collect_with_doubt(watched)
+    return TakeProfiles(index=index, value=value, doubt=doubt)
+
+
+def timing_of_profiles(take: Take, profiles: TakeProfiles, *, first_light: str | None = None) -> Timing:
+    """Return when every flash fired. Raises PsvideoError where no strobe is found."""
+    return find_timing(
+        take.plan,
+        profiles.index,
+        profiles.value,
+        clip=take.clip.name,
+        first_light=first_light,
+        dropped=tuple(DroppedFrames(after=after, count=count) for after, count in holes(take.clip.numbers)),
+        numbers=take.numbers,
+        doubt=profiles.doubt,
+    )
+
+
+def find_take_timing(take: Take, *, first_light: str | None = None, watch: Watch = unwatched) -> Timing:
+    """Decode a take once and return when every flash fired. Raises PsvideoError where no strobe is found."""
+    return timing_of_profiles(take, take_profiles(take, watch=watch), first_light=first_light)

@@ -1,0 +1,146 @@
+"""A clock that drifts: its bends as a smoothing spline whose stiffness the clip itself tells.
+
+The bends are an integrated random walk of the clock's rate (Wahba 1978): how much the rate wanders is chosen by the
+marginal likelihood of the fit, and a clock that runs straight stays straight.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import cho_solve_banded, cholesky_banded
+
+from psvideo.model.camera import FloatArray
+from psvideo.model.plan import Plan
+from psvideo.sync.rowfit.beat import Beat
+from psvideo.sync.rowfit.profiles import Profiles, unexplained
+from psvideo.sync.rowfit.refine import CAUCHY, GLOBALS, Fit, believable, explained, mean_error, projected, scaled
+
+LEAST_WINDOWS = 4
+CLEARLY = 5.0
+"""By how much the log-likelihood of a bent clock must exceed a straight one's."""
+WANDERING = np.geomspace(1e-18, 1e-6, 49)
+"""Strengths of the rate's random walk that are tried, in s^2 per s^3."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Knots:
+    """Knots and what is known of bends at them: ``penalty`` / strength is their precision."""
+
+    at_s: FloatArray
+    penalty: FloatArray
+
+
+def bend(plan: Plan, rows: Profiles, fit: Fit, *, free: tuple[str, ...] = (), steps: int = 6) -> Fit:
+    """Return the fit with the clock's drift in it; unchanged where nothing tells of any."""
+    if len(rows.window_start) < LEAST_WINDOWS:
+        return fit
+    knots = _knots(rows)
+    beat, rest, weight = fit.beat, fit.rest, fit.weight
+    strength = 0.0
+    basis = _basis(len(knots.at_s), free)
+    for step in range(steps):
+        scale = scaled(rows, rest, 0.02 if step == 0 and fit.beat.clock.knot_s else 0.0)
+        trust = 1.0 / (1.0 + (rest / (CAUCHY * scale)) ** 2)
+        weight = trust / scale**2
+        rest, hessian, scores = projected(plan, rows, beat, weight, basis, tails=bool({"rise_s", "fall_s"} & set(free)))
+        inflation = _inflation(hessian, scores, rows)
+        strength, gain = _wandering(hessian / inflation, scores.sum(axis=0) / inflation, beat, knots)
+        if gain < CLEARLY and not fit.beat.clock.knot_s:
+            return fit
+        known = _known(hessian, knots, strength, inflation)
+        now = np.append(beat.clock.bend(knots.at_s), np.zeros(len(free)))
+        move = np.linalg.solve(hessian + known, scores.sum(axis=0) - known @ now)
+        beat = _moved(rows, beat, knots, free, move)
+    rest = unexplained(plan, rows, beat, weight)
+    bread = np.linalg.inv(hessian + known)
+    covariance = believable(plan, rows, beat, weight, trust, basis, known) + bread @ known @ bread
+    size = len(knots.at_s)
+    return replace(
+        fit,
+        beat=beat,
+        rest=rest,
+        weight=weight,
+        shift_error_s=mean_error(basis[:size], covariance),
+        errors_s={name: float(np.sqrt(covariance[size + n, size + n])) for n, name in enumerate(free)},
+        explained=explained(rows, rest),
+    )
+
+
+def _knots(rows: Profiles) -> _Knots:
+    at_s = rows.ends_s
+    gap_s = np.diff(at_s)
+    second = np.zeros((len(at_s) - 2, len(at_s)))
+    for n in range(len(second)):
+        second[n, n : n + 3] = 1 / gap_s[n], -1 / gap_s[n] - 1 / gap_s[n + 1], 1 / gap_s[n + 1]
+    spacing_s = (gap_s[:-1] + gap_s[1:]) / 2
+    return _Knots(at_s=at_s, penalty=second.T @ (second / spacing_s[:, None]))
+
+
+def _basis(knots: int, free: tuple[str, ...]) -> FloatArray:
+    basis = np.zeros((knots + len(GLOBALS), knots + len(free)))
+    basis[:knots, :knots] = np.eye(knots)
+    names = list(GLOBALS)
+    for n, name in enumerate(free):
+        basis[knots + names.index(name), knots + n] = 1.0
+    return basis
+
+
+def _known(hessian: FloatArray, knots: _Knots, strength: float, inflation: float) -> FloatArray:
+    size = len(knots.at_s)
+    known = 1e-9 * np.diag(np.diag(hessian) + 1e-30)
+    known[:size, :size] += inflation * knots.penalty / strength
+    return known
+
+
+def _inflation(hessian: FloatArray, scores: FloatArray, rows: Profiles) -> float:
+    """Return by how much shifts of neighbouring windows differ more than noise alone explains (variances' ratio)."""
+    knots = len(rows.window_start) + 1
+    window = np.searchsorted(rows.window_start, np.arange(len(rows.value)), side="right") - 1
+    pull = np.bincount(window, scores[:, :knots].sum(axis=1), minlength=knots - 1)
+    along = np.diag(hessian)[:knots]
+    cross = np.diag(hessian, 1)[: knots - 1]
+    stiff = (along[:-1] + along[1:]) / 2 + 2 * cross + 1e-30
+    shift = pull / stiff
+    bent = shift[:-2] - 2 * shift[1:-1] + shift[2:]
+    expected = 1 / stiff[:-2] + 4 / stiff[1:-1] + 1 / stiff[2:]
+    return max(float(np.median(bent**2 / expected)) / 0.455, 1.0)
+
+
+def _wandering(hessian: FloatArray, pull: FloatArray, beat: Beat, knots: _Knots) -> tuple[float, float]:
+    """Return the most likely strength of the rate's random walk, and its log-likelihood above a straight clock's."""
+    size = len(knots.at_s)
+    h = hessian[:size, :size]
+    if not h.any():
+        return float(WANDERING[0]), 0.0
+    b = pull[:size] + h @ beat.clock.bend(knots.at_s)
+    data, stiff = _bands(h + 1e-12 * np.diag(np.diag(h) + 1e-30)), _bands(knots.penalty)
+    likelihood = []
+    for strength in WANDERING:
+        try:
+            factor = cholesky_banded(data + stiff / strength, lower=True)
+        except np.linalg.LinAlgError:  # too stiff to be told from a straight clock in double precision
+            likelihood.append(-np.inf)
+            continue
+        gain = 0.5 * b @ cho_solve_banded((factor, True), b)  # type: ignore[no-untyped-call]
+        likelihood.append(gain - np.log(factor[0]).sum() - 0.5 * (size - 2) * np.log(strength))
+    best, straight = int(np.argmax(likelihood)), int(np.argmax(np.isfinite(likelihood)))
+    if not np.isfinite(likelihood[best]):
+        return float(WANDERING[0]), 0.0
+    return float(WANDERING[best]), float(likelihood[best] - likelihood[straight])
+
+
+def _bands(matrix: FloatArray) -> FloatArray:
+    """Return the diagonal and the two below it, one a row: knots act on their neighbours only."""
+    bands = np.zeros((3, len(matrix)))
+    for below in range(3):
+        bands[below, : len(matrix) - below] = np.diag(matrix, -below)
+    return bands
+
+
+def _moved(rows: Profiles, beat: Beat, knots: _Knots, free: tuple[str, ...], move: FloatArray) -> Beat:
+    size = len(knots.at_s)
+    clock = beat.clock.bent(knots.at_s, move[:size])
+    times_s = {name: max(getattr(beat, name) + float(move[size + n]), 0.0) for n, name in enumerate(free)}
+    if "exposure_s" in times_s:
+        times_s["exposure_s"] = min(times_s["exposure_s"], rows.period_s)
+    return replace(beat, clock=clock, **times_s)

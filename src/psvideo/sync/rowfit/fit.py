@@ -1,0 +1,242 @@
+"""From row profiles to the clip's times: seed, track, sharpen, and set free what the plan does not know exactly."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from psvideo.model.camera import FloatArray
+from psvideo.model.plan import Plan
+from psvideo.sync.rowfit.beat import Beat
+from psvideo.sync.rowfit.bend import LEAST_WINDOWS, bend
+from psvideo.sync.rowfit.course import followed, window_frames
+from psvideo.sync.rowfit.jitter import Jitter, jitter, shift_error_s
+from psvideo.sync.rowfit.plateau import centred
+from psvideo.sync.rowfit.profiles import Profiles, unexplained
+from psvideo.sync.rowfit.refine import Fit, clearest, explained, refine, robust_loss, scaled
+from psvideo.sync.rowfit.seed import find_seed, gain_of
+from psvideo.sync.rowfit.track import Track
+
+TRACK_ROWS = 60
+COARSE_ROWS = 288
+ENOUGH_SAMPLES = 250_000
+"""Row means that the last fit needs; a clip that has more gets its rows averaged, which bounds memory and time."""
+FLASH_ROWS = 8
+"""Rows that a flash must still span after that."""
+CLEAR = 5.0
+"""A time leaves the plan's value only when it is off by so many standard errors."""
+BETTER, LEAST_GAIN = 1e-3, 30.0
+"""And only where that takes away such a share of the robust loss, and so much of it: a subject that moves in step with
+the dark row bends errors and estimates alike."""
+STILL, PLAIN = 0.95, 0.3
+"""Where a fit takes away less of the robust loss than the first (a subject that moves), a time that leaves the plan's
+value must take away this share of what is left; else it is as likely that the subject feigns it."""
+SURER = 0.8
+"""Share of the standard error that must be left before brightnesses are fitted anew in windows half as long."""
+SOFT_ROWS, ALIKE, SOFT_GAIN = 1.5, 1.5, 0.08
+"""Edges soft by less than so many rows, alike (within a factor) at a flash's start and end, may as well be rows that
+compression or scaling has blurred: flashes are moved for it only where that takes away such a share of the robust loss
+(H.264 makes up 0.02 to 0.05 of it, tails of a row 0.1 to 0.5)."""
+MOST_WINDOWS = 400
+MAINS_HZ = (100.0, 120.0)
+FLICKERS = 0.8
+"""Flicker is believed where it leaves less than this share of the squares that are left without it, and less than this
+share of what frequencies that mains do not have leave: where many rows saturate, anything that swings explains much."""
+OTHER_SWINGS = (-2.5, -1.5, 1.5, 2.5)
+"""Frequencies tried instead, as swings more or fewer in a window: near enough to be alike, far enough to be told."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Found:
+    """The fit of a whole clip: its rows with the times that their frames truly have, and which frames are repeats.
+
+    ``steps`` counts the places where frames follow otherwise than the numbering tells and repeated frames explain;
+    ``trusted`` are the first and the last place in time at which frames fit. ``slack_s`` is by how much all flashes
+    could come earlier or later and the picture be the same, 0 where it tells their times; ``soft_s`` is how soft the
+    edges are where that was not taken for LEDs' tails, else 0.
+    """
+
+    fit: Fit
+    rows: Profiles
+    track: Track
+    jitter: Jitter
+    steps: int
+    trusted: tuple[int, int]
+    slack_s: float = 0.0
+    soft_s: float = 0.0
+
+
+def find(plan: Plan, rows: Profiles, *, measured: tuple[str, ...] = ()) -> Found:
+    """Return the times of a clip; ``Fit.explained`` tells how well they explain it.
+
+    ``measured`` names times that are fitted whatever the plan says of them, as the readout is where it is unknown.
+    """
+    seed = find_seed(plan, rows)
+    if seed.beat.upward:
+        rows = rows.turned()
+    rows = rows.binned(_rows_needed(plan, rows, seed.beat))
+    window = window_frames(plan)
+    course = followed(plan, rows.binned(TRACK_ROWS), seed)
+    tracked = course.track
+    keep = ~tracked.repeated
+    fine = replace(
+        rows,
+        value=np.ascontiguousarray(rows.value[keep]),
+        index=tracked.index[keep],
+        doubt=None if rows.doubt is None else np.ascontiguousarray(rows.doubt[keep]),
+    ).windowed(window)
+    free = measured if plan.camera.readout_s is not None else ("row_time_s", *measured)
+    fit = _with_flicker(plan, fine, _fit(plan, fine, tracked.beat, free), free)
+    fine, fit, apart_s = _in_short_windows(plan, fine, fit, free)
+    freed, unsure_s, soft_s = _believed(plan, fine, fit, free)
+    if freed.errors_s:
+        freed, apart_s = _with_window_errors(plan, fine, freed)
+        apart_s = float(np.hypot(unsure_s, apart_s))
+    fit, slack_s = centred(plan, fine, freed)
+    stray = jitter(plan, fine, fit)
+    known_s = max(fit.shift_error_s, shift_error_s(plan, fine, fit), slack_s)
+    error_s = float(np.sqrt(known_s**2 + stray.error_s**2 + apart_s**2))
+    fit = replace(fit, shift_error_s=error_s)
+    return Found(
+        fit=fit,
+        rows=fine,
+        track=tracked,
+        jitter=stray,
+        steps=course.steps,
+        trusted=course.trusted,
+        slack_s=slack_s,
+        soft_s=soft_s,
+    )
+
+
+def _rows_needed(plan: Plan, rows: Profiles, beat: Beat) -> int:
+    """Return to how many rows a clip may be averaged without blurring its flashes."""
+    shortest_s = min(plan.flashes[slot].duration_s for slot in plan.lit_slots)
+    sharp = int(FLASH_ROWS * beat.row_time_s * len(rows.place) / shortest_s)
+    return max(COARSE_ROWS, ENOUGH_SAMPLES // len(rows.value), sharp)
+
+
+def _in_short_windows(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> tuple[Profiles, Fit, float]:
+    """Fit brightnesses anew more often where the subject moves so much that this makes the times surer.
+
+    Return too how far apart the times are with and without: an error that neither of the two fits can know of.
+    """
+    short = rows.windowed(max(window_frames(plan) // 2, len(rows.value) // MOST_WINDOWS))
+    other = _fit(plan, short, fit.beat, free)
+    apart_s = float(np.sqrt(np.mean(_apart_s(rows, fit.beat, other.beat) ** 2)))
+    taken, better = (short, other) if other.shift_error_s < SURER * fit.shift_error_s else (rows, fit)
+    return taken, better, apart_s
+
+
+def _with_window_errors(plan: Plan, rows: Profiles, fit: Fit) -> tuple[Fit, float]:
+    """Add to the errors of what is free how far it moves when brightnesses are fitted anew twice as often.
+
+    Return too how far apart the flashes' times are then.
+    """
+    twice = rows.windowed(max(len(rows.value) // (2 * len(rows.window_start)), 1))
+    other = _fit(plan, twice, fit.beat, tuple(fit.errors_s))
+    errors_s = {
+        name: float(np.hypot(error_s, getattr(other.beat, name) - getattr(fit.beat, name)))
+        for name, error_s in fit.errors_s.items()
+    }
+    return replace(fit, errors_s=errors_s), float(np.sqrt(np.mean(_apart_s(rows, fit.beat, other.beat) ** 2)))
+
+
+def _apart_s(rows: Profiles, one: Beat, other: Beat) -> FloatArray:
+    """Return how far two clocks are apart at the windows' ends, shape (window + 1,)."""
+    strobe_s = (rows.ends_s - one.clock.phase_s) / one.clock.rate
+    straight_s = other.clock.phase_s + strobe_s * other.clock.rate
+    apart_s: FloatArray = straight_s + other.clock.bend(straight_s) - rows.ends_s - one.clock.bend(rows.ends_s)
+    return apart_s
+
+
+def _believed(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> tuple[Fit, float, float]:
+    """Let go of what the picture tells otherwise, but of tails only where blurred rows do not look the same.
+
+    Return too how unsure the times are for it, and how soft the edges are where that was not taken for tails. A tail
+    moves the start of its flash by as much as it is long, a blur does not: where both would do, a wrong tail is worse.
+    """
+    names = _may_differ(plan)
+    freed, unsure_s = _freed(plan, rows, fit, free, names)
+    short_s, long_s = sorted((freed.beat.rise_s, freed.beat.fall_s))
+    given = plan.rise_s > 0 or plan.fall_s > 0
+    if given or short_s == 0 or long_s > min(ALIKE * short_s, SOFT_ROWS * freed.beat.row_time_s):
+        return freed, unsure_s, 0.0
+    before = robust_loss(rows, fit.rest, fit.rest)
+    if before - robust_loss(rows, freed.rest, fit.rest) > SOFT_GAIN * before:
+        return freed, unsure_s, 0.0
+    others = tuple(name for name in names if name not in ("rise_s", "fall_s"))
+    return *_freed(plan, rows, fit, free, others), long_s
+
+
+def _freed(
+    plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...], may_differ: tuple[str, ...]
+) -> tuple[Fit, float]:
+    """Let go of the plan's values where the picture clearly tells otherwise, one after another, the clearest first.
+
+    Return too how unsure the times are where the subject moves so much that with and without both may be right.
+    """
+    refused: set[str] = set()
+    unsure_s, wider_s = 0.0, dict[str, float]()
+    while True:
+        names = tuple(name for name in may_differ if name not in free and name not in refused)
+        name = clearest(plan, rows, fit, free, names, at_least=LEAST_GAIN)
+        if name is None:
+            errors_s = {n: float(np.hypot(error_s, wider_s.get(n, 0.0))) for n, error_s in fit.errors_s.items()}
+            return (replace(fit, errors_s=errors_s) if wider_s else fit), unsure_s
+        tried = _fit(plan, rows, fit.beat, (*free, name))
+        before = robust_loss(rows, fit.rest, fit.rest)
+        gain = before - robust_loss(rows, tried.rest, fit.rest)
+        off_s = abs(getattr(tried.beat, name) - getattr(fit.beat, name))
+        clear = gain > max(BETTER * before, LEAST_GAIN) and off_s > CLEAR * tried.errors_s[name]
+        if not clear or not _plausible(plan, tried.beat):
+            refused.add(name)
+            continue
+        if gain < PLAIN * before and gain_of(rows, tried.rest) < STILL:
+            apart_s = float(np.sqrt(np.mean(_apart_s(rows, fit.beat, tried.beat) ** 2)))
+            unsure_s = float(np.hypot(unsure_s, apart_s / np.sqrt(2)))
+            wider_s[name] = off_s / np.sqrt(2)
+        fit, free = tried, (*free, name)
+
+
+def _plausible(plan: Plan, beat: Beat) -> bool:
+    """Tell whether a beat's tails are tails: no longer than the shortest flash, unless the plan says so."""
+    longest_s = max(min(plan.flashes[slot].duration_s for slot in plan.lit_slots), plan.rise_s, plan.fall_s)
+    return max(beat.rise_s, beat.fall_s) <= longest_s
+
+
+def _fit(plan: Plan, rows: Profiles, beat: Beat, free: tuple[str, ...]) -> Fit:
+    if beat.clock.knot_s and len(rows.window_start) >= LEAST_WINDOWS:
+        rest = unexplained(plan, rows, beat)
+        rough = Fit(
+            beat=beat,
+            rest=rest,
+            weight=scaled(rows, rest, 0.0) ** -2.0,
+            shift_error_s=0.0,
+            errors_s={},
+            explained=explained(rows, rest),
+        )
+        return bend(plan, rows, rough, free=free)
+    straight = replace(beat, clock=replace(beat.clock, knot_s=(), bend_s=()))
+    return bend(plan, rows, refine(plan, rows, straight, free=free), free=free)
+
+
+def _may_differ(plan: Plan) -> tuple[str, ...]:
+    names = ("exposure_s", "row_time_s", "rise_s", "fall_s")
+    return names if plan.camera.readout_s != 0 else tuple(name for name in names if name != "row_time_s")
+
+
+def _with_flicker(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> Fit:
+    """Try ambient light that flickers with the mains, and keep it where it explains much of what is left."""
+
+    def left(hz: float) -> float:
+        beat = replace(fit.beat, beat_hz=(hz,))
+        return float((fit.weight * unexplained(plan, rows, beat, fit.weight) ** 2).sum())
+
+    hz = min(MAINS_HZ, key=left)
+    least = left(hz)
+    if least > FLICKERS * fit.loss:
+        return fit
+    window_s = float(np.median(np.diff(rows.ends_s)))
+    if least > FLICKERS * float(np.median([left(hz + swings / window_s) for swings in OTHER_SWINGS])):
+        return fit
+    return _fit(plan, rows, replace(fit.beat, beat_hz=(hz,)), free)

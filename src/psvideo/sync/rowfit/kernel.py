@@ -1,0 +1,369 @@
+"""The row model, compiled: what each row saw, the brightnesses that fit best, and what moving an edge would change.
+
+A row's mean in frame n is ``ambient + sum_k (F(close - s_k) - F(open - s_k)) * brightness[slot of k]``, F being the
+share of its light that a flash has given off (an exponential rise and fall, 1/e times, round a square pulse). The
+brightnesses of every row in every window of frames are eliminated with least squares (variable projection: Golub and
+Pereyra 1973). For the times that remain, the derivatives of the model are projected on what the brightnesses cannot
+explain (Kaufman 1975), which gives the normal equations of a Gauss-Newton step in one pass. The flashes' weights equal
+``shutter.row_weights`` where there are no tails; a test holds the two together.
+"""
+
+from typing import NamedTuple
+
+import numba as nb
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.model.camera import FloatArray
+
+IntArray = NDArray[np.int64]
+
+RIDGE = 1e-6
+"""Share of the normal matrix's diagonal that is added to it, so that a brightness nobody saw stays at zero."""
+MOST_LEVERAGE = 0.9
+"""A sample that its brightness fits all by itself tells nothing of errors; its residual is not blown up without end."""
+REACH = 9.0
+"""After so many fall times a flash is taken to be over."""
+LEFT, RIGHT, EXPOSURE, ROW_TIME, RISE, FALL = range(6)
+"""The signals of a step: the shift at a window's left and right end, exposure, row time, rise and fall time."""
+SIGNALS = 6
+
+
+class Rows(NamedTuple):
+    """Profiles as compiled code takes them. ``row_place`` counts rows from the first that opens."""
+
+    value: FloatArray
+    frame_start_s: FloatArray
+    row_place: FloatArray
+    row_time_s: float
+    exposure_s: float
+    bounds: IntArray
+    ends_s: FloatArray
+    """Where each window begins and the last one ends, on the camera's clock: the shift is linear in between."""
+    beat_hz: FloatArray
+    """Frequencies at which ambient light may flicker."""
+
+
+class Flashes(NamedTuple):
+    """A train of flashes. ``unknown`` numbers each flash's brightness from 1, 0 for a dark slot."""
+
+    start_s: FloatArray
+    duration_s: FloatArray
+    unknown: IntArray
+    unknowns: int
+    rise_s: float
+    fall_s: float
+
+
+@nb.njit(cache=True, nogil=True)
+def given_off(since_s, duration_s, rise_s, fall_s):  # type: ignore[no-untyped-def]
+    """Return the share of its light that a flash has given off, and the rate at which it does so now."""
+    if since_s <= 0.0:
+        return 0.0, 0.0
+    reached, whole = 1.0, duration_s
+    if rise_s > 0.0:
+        reached = 1.0 - np.exp(-duration_s / rise_s)
+        whole -= rise_s * reached
+    whole += reached * fall_s
+    if since_s < duration_s:
+        if rise_s > 0.0:
+            lit = 1.0 - np.exp(-since_s / rise_s)
+            return (since_s - rise_s * lit) / whole, lit / whole
+        return since_s / whole, 1.0 / whole
+    if fall_s <= 0.0:
+        return 1.0, 0.0
+    left = reached * np.exp(-(since_s - duration_s) / fall_s)
+    return 1.0 - fall_s * left / whole, left / whole
+
+
+@nb.njit(cache=True, nogil=True)
+def width(rows, flashes):  # type: ignore[no-untyped-def]
+    """Return how many numbers a row has in a window: brightnesses, and flicker's two phases."""
+    return flashes.unknowns + 2 * len(rows.beat_hz)
+
+
+@nb.njit(cache=True, nogil=True)
+def see(rows, flashes, frame, row, k, design):  # type: ignore[no-untyped-def]
+    """Fill ``design`` (unknown,) with what a row saw in a frame; return the first flash that may matter to the next."""
+    design[:] = 0.0
+    design[0] = 1.0
+    open_s = rows.frame_start_s[frame] + rows.row_place[row] * rows.row_time_s
+    close_s = open_s + rows.exposure_s
+    tail_s = REACH * flashes.fall_s
+    while k < len(flashes.start_s) and flashes.start_s[k] + flashes.duration_s[k] + tail_s <= open_s:
+        k += 1
+    j = k
+    while j < len(flashes.start_s) and flashes.start_s[j] < close_s:
+        u = flashes.unknown[j]
+        if u > 0:
+            start_s, duration_s = flashes.start_s[j], flashes.duration_s[j]
+            if flashes.rise_s == 0.0 and flashes.fall_s == 0.0:
+                design[u] += max(min(close_s, start_s + duration_s) - max(open_s, start_s), 0.0) / duration_s
+            else:
+                after, _ = given_off(close_s - start_s, duration_s, flashes.rise_s, flashes.fall_s)
+                before, _ = given_off(open_s - start_s, duration_s, flashes.rise_s, flashes.fall_s)
+                design[u] += after - before
+        j += 1
+    for b in range(len(rows.beat_hz)):
+        turn = 2 * np.pi * rows.beat_hz[b] * (open_s + 0.5 * rows.exposure_s)
+        design[flashes.unknowns + 2 * b] = np.cos(turn)
+        design[flashes.unknowns + 2 * b + 1] = np.sin(turn)
+    return k
+
+
+@nb.njit(cache=True, nogil=True)
+def _slopes(rows, flashes, frame, row, k, brightness, tails, signals):  # type: ignore[no-untyped-def]
+    """Fill ``signals`` (SIGNALS,) with how the model's value changes with each unknown time."""
+    open_s = rows.frame_start_s[frame] + rows.row_place[row] * rows.row_time_s
+    close_s = open_s + rows.exposure_s
+    rise_s, fall_s = flashes.rise_s, flashes.fall_s
+    probe_s = 0.01 * flashes.duration_s[0]
+    tail_s = REACH * fall_s
+    signals[:] = 0.0
+    j = k
+    while j > 0 and flashes.start_s[j - 1] + flashes.duration_s[j - 1] + tail_s + REACH * probe_s > open_s:
+        j -= 1
+    closing = opening = 0.0
+    while j < len(flashes.start_s) and flashes.start_s[j] < close_s:
+        u = flashes.unknown[j]
+        if u > 0:
+            d = flashes.duration_s[j]
+            since_close, since_open = close_s - flashes.start_s[j], open_s - flashes.start_s[j]
+            after, after_rate = given_off(since_close, d, rise_s, fall_s)
+            before, before_rate = given_off(since_open, d, rise_s, fall_s)
+            closing += brightness[u] * after_rate
+            opening += brightness[u] * before_rate
+            if tails:
+                a, _ = given_off(since_close, d, rise_s + probe_s, fall_s)
+                b, _ = given_off(since_open, d, rise_s + probe_s, fall_s)
+                signals[RISE] += brightness[u] * (a - b - after + before) / probe_s
+                a, _ = given_off(since_close, d, rise_s, fall_s + probe_s)
+                b, _ = given_off(since_open, d, rise_s, fall_s + probe_s)
+                signals[FALL] += brightness[u] * (a - b - after + before) / probe_s
+        j += 1
+    signals[EXPOSURE] = closing
+    signals[ROW_TIME] = (closing - opening) * rows.row_place[row]
+    return opening - closing
+
+
+@nb.njit(cache=True, nogil=True)
+def factor(matrix, size):  # type: ignore[no-untyped-def]
+    """Replace the lower half of a symmetric positive definite matrix by its Cholesky factor."""
+    for i in range(size):
+        matrix[i, i] += RIDGE * matrix[i, i] + 1e-30
+        for j in range(i + 1):
+            rest = matrix[i, j]
+            for m in range(j):
+                rest -= matrix[i, m] * matrix[j, m]
+            matrix[i, j] = np.sqrt(max(rest, 1e-30)) if i == j else rest / matrix[j, j]
+
+
+@nb.njit(cache=True, nogil=True)
+def solve_factored(matrix, right, size):  # type: ignore[no-untyped-def]
+    """Solve with a Cholesky factor; the answer stands in ``right``."""
+    for i in range(size):
+        for m in range(i):
+            right[i] -= matrix[i, m] * right[m]
+        right[i] /= matrix[i, i]
+    for i in range(size - 1, -1, -1):
+        for m in range(i + 1, size):
+            right[i] -= matrix[m, i] * right[m]
+        right[i] /= matrix[i, i]
+
+
+@nb.njit(cache=True, nogil=True)
+def _fit_window(value, weight, design, first, last, normal, right):  # type: ignore[no-untyped-def]
+    """Fit one row's brightnesses over some frames: ``normal`` ends as a Cholesky factor, ``right`` as the answer."""
+    size = design.shape[1]
+    normal[:] = 0.0
+    right[:] = 0.0
+    for n in range(first, last):
+        for i in range(size):
+            scaled = weight[n] * design[n, i]
+            if scaled != 0.0:
+                right[i] += scaled * value[n]
+                for j in range(i + 1):
+                    normal[i, j] += scaled * design[n, j]
+    factor(normal, size)
+    solve_factored(normal, right, size)
+
+
+@nb.njit(cache=True, nogil=True)
+def row_rest(rows, flashes, weight, row, design, rest):  # type: ignore[no-untyped-def]
+    """Fill ``rest`` (frame,) with what one row's own brightnesses, fitted window by window, leave unexplained."""
+    size = design.shape[1]
+    normal, right = np.empty((size, size)), np.empty(size)
+    k = 0
+    for n in range(len(rows.value)):
+        k = see(rows, flashes, n, row, k, design[n])
+    for window in range(len(rows.bounds) - 1):
+        first, last = rows.bounds[window], rows.bounds[window + 1]
+        _fit_window(rows.value[:, row], weight[:, row], design, first, last, normal, right)
+        for n in range(first, last):
+            explained = 0.0
+            for i in range(size):
+                explained += design[n, i] * right[i]
+            rest[n] = rows.value[n, row] - explained
+
+
+@nb.njit(cache=True, nogil=True)
+def rests(rows, flashes, weight, first, last, rest):  # type: ignore[no-untyped-def]
+    """Fill the columns ``first`` to ``last`` of ``rest`` (frame, row)."""
+    design = np.empty((len(rows.value), width(rows, flashes)))
+    for row in range(first, last):
+        row_rest(rows, flashes, weight, row, design, rest[:, row])
+
+
+@nb.njit(cache=True, nogil=True)
+def leverage(normal, design, weight, size, solved):  # type: ignore[no-untyped-def]
+    """Return which share of a sample's own error the brightnesses that are fitted to it take up."""
+    taken = 0.0
+    for i in range(size):
+        left = design[i]
+        for m in range(i):
+            left -= normal[i, m] * solved[m]
+        solved[i] = left / normal[i, i]
+        taken += solved[i] ** 2
+    return min(weight * taken, MOST_LEVERAGE)
+
+
+@nb.njit(cache=True, nogil=True)
+def equations(rows, flashes, weight, steepness, tails, honest, first, last, rest, hessian, score):  # type: ignore[no-untyped-def]
+    """Fill ``rest``; add the rows' normal matrices to ``hessian`` (window, SIGNALS, SIGNALS), their ``weight * signal *
+    rest`` to ``score`` (frame, SIGNALS), which keeps the frames apart. The normal matrices hold ``steepness`` (frame,
+    row): how fast a residual's pull grows with it, which is its weight but in robust fits. Where ``honest``, residuals
+    count in the scores as large as if no brightness had been fitted to them (MacKinnon and White 1985, HC2)."""
+    frames = len(rows.value)
+    size = width(rows, flashes)
+    design = np.empty((frames, size))
+    first_flash = np.empty(frames, np.int64)
+    normal, right = np.empty((size, size)), np.empty(size)
+    signals = np.empty((frames, SIGNALS))
+    cross = np.empty((SIGNALS, size))
+    solved = np.empty(size)
+    for row in range(first, last):
+        k = 0
+        for n in range(frames):
+            k = see(rows, flashes, n, row, k, design[n])
+            first_flash[n] = k
+        for window in range(len(rows.bounds) - 1):
+            begin, end = rows.bounds[window], rows.bounds[window + 1]
+            _fit_window(rows.value[:, row], weight[:, row], design, begin, end, normal, right)
+            cross[:] = 0.0
+            span_s = rows.ends_s[window + 1] - rows.ends_s[window]
+            for n in range(begin, end):
+                shift = _slopes(rows, flashes, n, row, first_flash[n], right, tails, signals[n])
+                along = (rows.frame_start_s[n] + rows.row_place[row] * rows.row_time_s - rows.ends_s[window]) / span_s
+                signals[n, LEFT] = shift * (1.0 - along)
+                signals[n, RIGHT] = shift * along
+                for i in range(size):
+                    if design[n, i] != 0.0:
+                        for p in range(SIGNALS):
+                            cross[p, i] += weight[n, row] * design[n, i] * signals[n, p]
+            for p in range(SIGNALS):
+                solve_factored(normal, cross[p], size)
+            for n in range(begin, end):
+                explained = 0.0
+                for i in range(size):
+                    if design[n, i] != 0.0:
+                        explained += design[n, i] * right[i]
+                        for p in range(SIGNALS):
+                            signals[n, p] -= design[n, i] * cross[p, i]
+                rest[n, row] = rows.value[n, row] - explained
+                error = rest[n, row]
+                if honest:
+                    error /= np.sqrt(1.0 - leverage(normal, design[n], weight[n, row], size, solved))
+                for p in range(SIGNALS):
+                    pull = weight[n, row] * signals[n, p]
+                    score[n, p] += pull * error
+                    for q in range(p + 1):
+                        hessian[window, p, q] += steepness[n, row] * signals[n, p] * signals[n, q]
+
+
+@nb.njit(cache=True, nogil=True)
+def losses_by_row(rows, flashes, phase_s, rate, spread, steepness, first, last, found):  # type: ignore[no-untyped-def]
+    """Fill ``found`` (clock, row) with the robust loss of every clock in every row."""
+    frames, height = rows.value.shape
+    design = np.empty((frames, width(rows, flashes)))
+    rest = np.empty(frames)
+    weight = np.ones((frames, height))
+    for clock in range(first, last):
+        start_s = phase_s[clock] + rate[clock] * flashes.start_s
+        moved = Flashes(
+            start_s,
+            rate[clock] * flashes.duration_s,
+            flashes.unknown,
+            flashes.unknowns,
+            flashes.rise_s,
+            flashes.fall_s,
+        )
+        for row in range(height):
+            row_rest(rows, moved, weight, row, design, rest)
+            total = 0.0
+            for n in range(frames):
+                total += np.log1p(steepness * (rest[n] / spread[row]) ** 2)
+            found[clock, row] = total
+
+
+@nb.njit(cache=True, nogil=True)
+def brightnesses(rows, flashes, weight, first, last, found):  # type: ignore[no-untyped-def]
+    """Fill ``found`` (row, unknown) with the brightnesses fitted over all frames as one window."""
+    size = flashes.unknowns + 2 * len(rows.beat_hz)
+    design = np.empty((len(rows.value), size))
+    normal = np.empty((size, size))
+    for row in range(first, last):
+        k = 0
+        for n in range(len(rows.value)):
+            k = see(rows, flashes, n, row, k, design[n])
+        _fit_window(rows.value[:, row], weight[:, row], design, 0, len(rows.value), normal, found[row])
+
+
+@nb.njit(cache=True, nogil=True)
+def predictions(rows, flashes, brightness, first, last, found):  # type: ignore[no-untyped-def]
+    """Fill ``found`` (frame, row) with what known brightnesses (row, unknown) give."""
+    size = flashes.unknowns + 2 * len(rows.beat_hz)
+    design = np.empty(size)
+    for row in range(first, last):
+        k = 0
+        for n in range(len(rows.value)):
+            k = see(rows, flashes, n, row, k, design)
+            total = 0.0
+            for i in range(size):
+                total += design[i] * brightness[row, i]
+            found[n, row] = total
+
+
+@nb.njit(cache=True, nogil=True)
+def edges(rows, flashes, weight, first, last, pull, stiff):  # type: ignore[no-untyped-def]
+    """Add to ``pull`` and ``stiff`` (flash, 2) how strongly rows that open (0) or close (1) during a flash shift it."""
+    frames = len(rows.value)
+    design = np.empty((frames, width(rows, flashes)))
+    size = design.shape[1]
+    first_flash = np.empty(frames, np.int64)
+    normal, right = np.empty((size, size)), np.empty(size)
+    for row in range(first, last):
+        k = 0
+        for n in range(frames):
+            k = see(rows, flashes, n, row, k, design[n])
+            first_flash[n] = k
+        for window in range(len(rows.bounds) - 1):
+            begin, end = rows.bounds[window], rows.bounds[window + 1]
+            _fit_window(rows.value[:, row], weight[:, row], design, begin, end, normal, right)
+            for n in range(begin, end):
+                rest = rows.value[n, row]
+                for i in range(size):
+                    rest -= design[n, i] * right[i]
+                open_s = rows.frame_start_s[n] + rows.row_place[row] * rows.row_time_s
+                for j in range(first_flash[n], len(flashes.start_s)):
+                    if flashes.start_s[j] >= open_s + rows.exposure_s:
+                        break
+                    u = flashes.unknown[j]
+                    if u > 0:
+                        light = right[u]
+                        since_s, d = open_s - flashes.start_s[j], flashes.duration_s[j]
+                        _, opening = given_off(since_s, d, flashes.rise_s, flashes.fall_s)
+                        _, closing = given_off(since_s + rows.exposure_s, d, flashes.rise_s, flashes.fall_s)
+                        pull[j, 0] += weight[n, row] * light * opening * rest
+                        pull[j, 1] -= weight[n, row] * light * closing * rest
+                        stiff[j, 0] += weight[n, row] * (light * opening) ** 2
+                        stiff[j, 1] += weight[n, row] * (light * closing) ** 2

@@ -1,0 +1,234 @@
+"""Row profiles laid out for fitting, and the compiled row model run over them on all processors."""
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from psvideo.model.camera import FloatArray
+from psvideo.model.plan import Plan
+from psvideo.model.timing import Timing
+from psvideo.sync.rowfit import kernel
+from psvideo.sync.rowfit.beat import Beat, train_between
+from psvideo.sync.rowfit.kernel import IntArray
+
+THREADS = min(os.cpu_count() or 1, 8)
+WORTH_THREADS = 40_000
+"""Samples from which on starting threads costs less than it saves."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Profiles:
+    """Row profiles of a clip: ``value`` (frame, row) in the order in which rows open, ``index`` (frame,) in time.
+
+    ``place`` (row,) counts sensor rows from the one that opens first; ``window_start`` (window,) are the frames at
+    which windows begin, in each of which a row has brightnesses of its own. ``doubt`` (frame, row) is by how much a
+    value may be wrong besides noise, as where pixels saturate.
+    """
+
+    value: FloatArray
+    index: IntArray
+    period_s: float
+    place: FloatArray
+    window_start: IntArray
+    doubt: FloatArray | None = None
+
+    @property
+    def frame_start_s(self) -> FloatArray:
+        """When each frame's first row opens, shape (frame,)."""
+        start_s: FloatArray = np.asarray(self.index, np.float64) * self.period_s
+        return start_s
+
+    def take(self, frames: slice) -> "Profiles":
+        """Return some consecutive frames, with the windows that lie in them."""
+        count = len(range(*frames.indices(len(self.value))))
+        starts = self.window_start - (frames.start or 0)
+        inside = starts[(starts > 0) & (starts < count)]
+        return replace(
+            self,
+            value=self.value[frames],
+            index=self.index[frames],
+            window_start=np.concatenate([[0], inside]).astype(np.int64),
+            doubt=None if self.doubt is None else self.doubt[frames],
+        )
+
+    def only_rows(self, rows: slice) -> "Profiles":
+        """Return some neighbouring rows of all frames."""
+        return replace(
+            self,
+            value=np.ascontiguousarray(self.value[:, rows]),
+            place=self.place[rows],
+            doubt=None if self.doubt is None else self.doubt[:, rows],
+        )
+
+    def one_window(self) -> "Profiles":
+        """Return the same profiles with brightnesses that hold for all frames."""
+        return replace(self, window_start=np.zeros(1, np.int64))
+
+    def windowed(self, frames_each: int) -> "Profiles":
+        """Return the same profiles in windows of about so many frames."""
+        count = max(len(self.value) // max(frames_each, 1), 1)
+        starts = np.linspace(0, len(self.value), count, endpoint=False).astype(np.int64)
+        return replace(self, window_start=starts)
+
+    def binned(self, bins: int) -> "Profiles":
+        """Average neighbouring rows, so that at most ``bins`` are left."""
+        height = self.value.shape[1]
+        if height <= bins:
+            return self
+        edges = np.linspace(0, height, bins + 1).astype(np.int64)[:-1]
+        counts = np.diff(np.append(edges, height))
+        return replace(
+            self,
+            value=np.ascontiguousarray(np.add.reduceat(self.value, edges, axis=1) / counts),
+            place=np.add.reduceat(self.place, edges) / counts,
+            doubt=None if self.doubt is None else np.add.reduceat(self.doubt, edges, axis=1) / counts,
+        )
+
+    def turned(self) -> "Profiles":
+        """Return the profiles of the same picture read from the other end."""
+        return replace(
+            self,
+            value=np.ascontiguousarray(self.value[:, ::-1]),
+            place=np.ascontiguousarray(self.place.max() + self.place.min() - self.place[::-1]),
+            doubt=None if self.doubt is None else np.ascontiguousarray(self.doubt[:, ::-1]),
+        )
+
+    @property
+    def spread(self) -> FloatArray:
+        """How much each row changes over time, shape (row,); rows in the dark are held at a thousandth."""
+        spread = self.value.std(axis=0)
+        held: FloatArray = np.maximum(spread, 1e-3 * spread.max() + 1e-12)
+        return held
+
+    @property
+    def ends_s(self) -> FloatArray:
+        """Where each window begins and the last one ends, shape (window + 1,)."""
+        start_s = self.frame_start_s
+        return np.append(start_s[self.window_start], start_s[-1] + self.period_s)
+
+
+def slot_unknowns(plan: Plan) -> IntArray:
+    """Return which brightness each slot shows: 1, 2, … for the lit slots, 0 for dark ones."""
+    number = np.zeros(len(plan.flashes), np.int64)
+    number[list(plan.lit_slots)] = np.arange(1, len(plan.lit_slots) + 1)
+    return number
+
+
+def compiled_rows(rows: Profiles, beat: Beat) -> kernel.Rows:
+    """Return the profiles as compiled code takes them."""
+    return kernel.Rows(
+        rows.value,
+        rows.frame_start_s,
+        rows.place,
+        beat.row_time_s,
+        beat.exposure_s,
+        np.append(rows.window_start, len(rows.value)),
+        rows.ends_s,
+        np.array(beat.beat_hz, np.float64),
+    )
+
+
+def compiled_flashes(plan: Plan, rows: Profiles, beat: Beat) -> kernel.Flashes:
+    """Return the flashes that the profiles may show as compiled code takes them."""
+    start_s = rows.frame_start_s
+    until_s = float(start_s[-1] + rows.place.max() * beat.row_time_s + beat.exposure_s)
+    train = train_between(plan, beat.clock, float(start_s[0]), until_s)
+    unknown = slot_unknowns(plan)
+    return kernel.Flashes(
+        train.start_s, train.duration_s, unknown[train.slot], int(unknown.max()) + 1, beat.rise_s, beat.fall_s
+    )
+
+
+def unexplained(plan: Plan, rows: Profiles, beat: Beat, weight: FloatArray | None = None) -> FloatArray:
+    """Return the residuals (frame, row) that the best brightnesses leave; ``weight`` is the trust in each sample."""
+    seen, flashes = compiled_rows(rows, beat), compiled_flashes(plan, rows, beat)
+    trust = np.ones_like(rows.value) if weight is None else weight
+    rest = np.empty_like(rows.value)
+    share(lambda a, b: kernel.rests(seen, flashes, trust, a, b, rest), rows.value.shape[1], work=rows.value.size)
+    return rest
+
+
+def equations(
+    plan: Plan,
+    rows: Profiles,
+    beat: Beat,
+    weight: FloatArray,
+    *,
+    tails: bool,
+    steepness: FloatArray | None = None,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return residuals (frame, row), normal matrices (window, signal, signal) and scores (frame, signal).
+
+    With ``steepness`` (frame, row), how fast residuals' pulls grow with them, they tell of errors and not of steps: it
+    stands in the matrices for the weight, and residuals count in the scores as if no brightness were fitted to them.
+    """
+    seen, flashes = compiled_rows(rows, beat), compiled_flashes(plan, rows, beat)
+    honest, growth = steepness is not None, weight if steepness is None else steepness
+    rest = np.empty_like(rows.value)
+    parts: list[tuple[FloatArray, FloatArray]] = []
+
+    def run(first: int, last: int) -> None:
+        hessian = np.zeros((len(rows.window_start), kernel.SIGNALS, kernel.SIGNALS))
+        score = np.zeros((len(rows.value), kernel.SIGNALS))
+        kernel.equations(seen, flashes, weight, growth, tails, honest, first, last, rest, hessian, score)
+        parts.append((hessian, score))
+
+    share(run, rows.value.shape[1], work=rows.value.size)
+    lower = np.sum([hessian for hessian, _ in parts], axis=0)
+    full = lower + np.swapaxes(np.tril(lower, -1), 1, 2)
+    return rest, full, np.sum([score for _, score in parts], axis=0)
+
+
+def brightnesses(plan: Plan, rows: Profiles, beat: Beat, weight: FloatArray | None = None) -> FloatArray:
+    """Return every row's brightnesses, fitted over all frames together, shape (row, unknown)."""
+    seen, flashes = compiled_rows(rows, beat), compiled_flashes(plan, rows, beat)
+    trust = np.ones_like(rows.value) if weight is None else weight
+    found = np.zeros((rows.value.shape[1], flashes.unknowns + 2 * len(beat.beat_hz)))
+    kernel.brightnesses(seen, flashes, trust, 0, rows.value.shape[1], found)
+    return found
+
+
+def predictions(plan: Plan, rows: Profiles, beat: Beat, brightness: FloatArray) -> FloatArray:
+    """Return the profiles (frame, row) that known brightnesses (row, unknown) give at the times of ``rows``."""
+    found = np.empty_like(rows.value)
+    seen, flashes = compiled_rows(rows, beat), compiled_flashes(plan, rows, beat)
+    kernel.predictions(seen, flashes, brightness, 0, rows.value.shape[1], found)
+    return found
+
+
+def residuals_of(plan: Plan, timing: Timing, index: IntArray, value: FloatArray) -> FloatArray:
+    """Return what a timing that was found leaves of profiles (frame, row), with brightnesses that hold throughout."""
+    height = value.shape[1]
+    upward = timing.row_time_s < 0
+    place = np.arange(height, dtype=np.float64)
+    rows = kernel.Rows(
+        np.ascontiguousarray(value, np.float64),
+        np.asarray(index, np.float64) * timing.frame_period_s,
+        height - 1 - place if upward else place,
+        abs(timing.row_time_s),
+        timing.exposure_s,
+        np.array([0, len(value)]),
+        np.zeros(2),
+        np.zeros(0),
+    )
+    unknown = slot_unknowns(plan)
+    slots = [flash.slot for flash in timing.flashes]
+    flashes = kernel.Flashes(
+        timing.start_s, timing.duration_s, unknown[slots], int(unknown.max()) + 1, plan.rise_s, plan.fall_s
+    )
+    rest = np.empty(value.shape)
+    kernel.rests(rows, flashes, np.ones(value.shape), 0, height, rest)
+    return rest
+
+
+def share(run: Callable[[int, int], None], count: int, *, work: int) -> None:
+    """Share ``count`` rows or clocks between threads (numba's own may not be nested), if that is worth the start."""
+    if work < WORTH_THREADS:
+        run(0, count)
+        return
+    edges = np.linspace(0, count, THREADS + 1).astype(int).tolist()
+    with ThreadPoolExecutor(THREADS) as pool:
+        list(pool.map(run, edges[:-1], edges[1:]))

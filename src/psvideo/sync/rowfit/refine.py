@@ -1,0 +1,290 @@
+"""Sharpening: robust Gauss-Newton steps on a clock that runs straight, the shutter's times with it where asked for."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from psvideo.model.camera import FloatArray
+from psvideo.model.plan import Plan
+from psvideo.sync.rowfit.beat import Beat
+from psvideo.sync.rowfit.kernel import EXPOSURE, FALL, RISE, ROW_TIME
+from psvideo.sync.rowfit.profiles import Profiles, equations, unexplained
+
+CAUCHY = 2.4
+"""Residuals of this many standard deviations are trusted half as much (95 % efficiency for Gaussian noise)."""
+FIRST_SCALE, LAST_SCALE = 0.3, 2e-3
+"""The robust fit's residual scale as a share of each row's spread: it shrinks from step to step down to the noise, so
+that the few rows that a flash splits, which tell the time, are not taken for outliers before the fit is near."""
+WIDE_SCALE = 0.05
+"""The scale at which a time that is off is looked for: rows that it spoils must not count as outliers then."""
+LEAST_STEEP = -0.1
+"""Cauchy's pull falls where residuals are large; of that so much counts, lest a few rule a short clip's errors."""
+LAG = 3
+"""Residuals of frames so far apart may still err together (a subject that moves): Newey and West 1987."""
+CLUSTER, LEAST_CLUSTERS = 12, 8
+"""Or whole stretches of frames err together; that needs so many of them to tell."""
+GLOBALS = {"exposure_s": EXPOSURE, "row_time_s": ROW_TIME, "rise_s": RISE, "fall_s": FALL}
+"""The times besides the clock's that can be set free, and the signal of each."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fit:
+    """A beat and how well it fits. ``errors_s`` holds the standard error of every time that was free, by name."""
+
+    beat: Beat
+    rest: FloatArray
+    weight: FloatArray
+    shift_error_s: float
+    errors_s: dict[str, float]
+    explained: float
+
+    @property
+    def loss(self) -> float:
+        """The weighted sum of squares that is left."""
+        return float((self.weight * self.rest**2).sum())
+
+
+def refine(
+    plan: Plan,
+    rows: Profiles,
+    beat: Beat,
+    *,
+    free: tuple[str, ...] = (),
+    steps: int = 10,
+    first_scale: float = FIRST_SCALE,
+) -> Fit:
+    """Fit shift and clock ratio, and the times named in ``free``, by steps that are taken only as far as they help."""
+    basis = _straight(rows, free)
+    unit_s = _units(plan, rows, beat, free)
+    rest = unexplained(plan, rows, beat)
+    weight = trust = np.ones_like(rest)
+    for step in range(steps):
+        scale = scaled(rows, rest, first_scale * 0.4**step)
+        trust = 1.0 / (1.0 + (rest / (CAUCHY * scale)) ** 2)
+        weight = trust / scale**2
+        rest, hessian, scores = projected(plan, rows, beat, weight, basis, tails=bool({"rise_s", "fall_s"} & set(free)))
+        move = np.linalg.solve(hessian + prior(plan, rows, unit_s, free), scores.sum(axis=0))
+        beat, rest, gained = _step(plan, rows, beat, free, _held(plan, move, free), weight, rest)
+        if step > 6 and (not gained or (np.abs(move) < 1e-5 * unit_s).all()):
+            break
+    covariance = believable(plan, rows, beat, weight, trust, basis, prior(plan, rows, unit_s, free))
+    return Fit(
+        beat=beat,
+        rest=rest,
+        weight=weight,
+        shift_error_s=mean_error(basis[: len(rows.window_start) + 1], covariance),
+        errors_s={name: float(np.sqrt(covariance[2 + n, 2 + n])) for n, name in enumerate(free)},
+        explained=explained(rows, rest),
+    )
+
+
+def clearest(
+    plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...], names: tuple[str, ...], *, at_least: float
+) -> str | None:
+    """Return the time that would explain most if it were free (a score test), or None where none explains enough."""
+    for share in (WIDE_SCALE, 0.0) if names else ():
+        gains = _gains(plan, rows, fit, free, names, share=share, at_least=at_least)
+        if gains:
+            return max(gains, key=lambda name: gains[name])
+    return None
+
+
+def _gains(
+    plan: Plan,
+    rows: Profiles,
+    fit: Fit,
+    free: tuple[str, ...],
+    names: tuple[str, ...],
+    *,
+    share: float,
+    at_least: float,
+) -> dict[str, float]:
+    """Return what the times would explain that explain enough; residuals count up to a share of their row's spread."""
+    every = (*free, *names)
+    scale = scaled(rows, fit.rest, share)
+    weight = 1.0 / (1.0 + (fit.rest / (CAUCHY * scale)) ** 2) / scale**2
+    _, hessian, scores = projected(plan, rows, fit.beat, weight, _straight(rows, every), tails=True)
+    gains: dict[str, float] = {}
+    for name in names:
+        kept = [*range(2 + len(free)), 2 + every.index(name)]
+        part, pulls = hessian[np.ix_(kept, kept)], scores[:, kept]
+        known = prior(plan, rows, _units(plan, rows, fit.beat, (*free, name)), (*free, name))
+        move = np.linalg.solve(part + known, pulls.sum(axis=0))
+        gain = float(move @ part @ move)
+        if gain > at_least and _may_move(rows, fit.beat, name, float(move[-1])):
+            gains[name] = gain
+    return gains
+
+
+def _may_move(rows: Profiles, beat: Beat, name: str, move: float) -> bool:
+    """Tell whether a time has room to move: tails are not negative, exposures not longer than the frame."""
+    if move < 0:
+        return bool(getattr(beat, name) > 0)
+    return name != "exposure_s" or beat.exposure_s < rows.period_s * (1 - 1e-9)
+
+
+def _straight(rows: Profiles, free: tuple[str, ...]) -> FloatArray:
+    """Return the columns by which shift and slope move the knots, and each free time itself."""
+    ends_s = rows.ends_s
+    pivot_s, half_s = _pivot(rows)
+    basis = np.zeros((len(ends_s) + len(GLOBALS), 2 + len(free)))
+    basis[: len(ends_s), 0] = 1.0
+    basis[: len(ends_s), 1] = (ends_s - pivot_s) / half_s
+    for n, name in enumerate(free):
+        basis[len(ends_s) + GLOBALS[name] - EXPOSURE, 2 + n] = 1.0
+    return basis
+
+
+def _pivot(rows: Profiles) -> tuple[float, float]:
+    start_s = rows.frame_start_s
+    return float(start_s.mean()), max(float(start_s[-1] - start_s[0]) / 2, rows.period_s)
+
+
+def _units(plan: Plan, rows: Profiles, beat: Beat, free: tuple[str, ...]) -> FloatArray:
+    """Return a fiftieth of a flash in every unknown, which is small for all of them."""
+    shortest_s = 0.02 * min(plan.flashes[slot].duration_s for slot in plan.lit_slots)
+    return np.array([shortest_s] * 2 + [shortest_s / (rows.place.max() if n == "row_time_s" else 1.0) for n in free])
+
+
+def prior(plan: Plan, rows: Profiles, unit_s: FloatArray, free: tuple[str, ...]) -> FloatArray:
+    """Return the precision of what is known beforehand: free times stay within a few flashes of where they are."""
+    known = np.zeros((len(unit_s), len(unit_s)))
+    for n in range(len(free)):
+        known[2 + n, 2 + n] = (50.0 * unit_s[2 + n]) ** -2.0
+    return known + 1e-12 * np.diag(unit_s**-2.0)
+
+
+def projected(
+    plan: Plan,
+    rows: Profiles,
+    beat: Beat,
+    weight: FloatArray,
+    basis: FloatArray,
+    *,
+    tails: bool,
+    steepness: FloatArray | None = None,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return residuals, the normal matrix and every frame's scores (frame, unknown) in the unknowns of a basis."""
+    rest, windows, score = equations(plan, rows, beat, weight, tails=tails, steepness=steepness)
+    knots = len(rows.window_start) + 1
+    size = basis.shape[1]
+    hessian = np.zeros((size, size))
+    common = basis[knots:]
+    for w, matrix in enumerate(windows):
+        local = np.vstack([basis[w], basis[w + 1], common])
+        moved = np.flatnonzero(local.any(axis=0))
+        hessian[np.ix_(moved, moved)] += local[:, moved].T @ matrix @ local[:, moved]
+    window = np.searchsorted(rows.window_start, np.arange(len(rows.value)), side="right") - 1
+    scores = score[:, :1] * basis[window] + score[:, 1:2] * basis[window + 1] + score[:, 2:] @ common
+    return rest, hessian, scores
+
+
+def freedom(plan: Plan, rows: Profiles, beat: Beat) -> float:
+    """Return which share of the residuals' squares brightnesses that are fitted to them leave (MacKinnon, White 1985).
+
+    Not less than one frame's share, which a clip that has as many brightnesses as frames does not even have.
+    """
+    frames = len(rows.value)
+    fitted = len(rows.window_start) * (len(plan.lit_slots) + 1 + 2 * len(beat.beat_hz))
+    return max(frames - fitted, 1) / frames
+
+
+def believable(
+    plan: Plan, rows: Profiles, beat: Beat, weight: FloatArray, trust: FloatArray, basis: FloatArray, known: FloatArray
+) -> FloatArray:
+    """Return the covariance of the unknowns at the end of a robust fit.
+
+    ``weight`` is each sample's, ``trust`` (0 to 1) the part of it that is owed to its residual: a residual whose trust
+    falls as it grows pulls less than its weight tells (Huber 1981, section 7.6).
+    """
+    steepness = weight * np.maximum(2.0 * trust - 1.0, LEAST_STEEP)
+    _, hessian, scores = projected(plan, rows, beat, weight, basis, tails=True, steepness=steepness)
+    return sandwich(hessian, scores, known)
+
+
+def sandwich(hessian: FloatArray, scores: FloatArray, known: FloatArray) -> FloatArray:
+    """Return the covariance of the unknowns, true also where frames near one another err together.
+
+    Of several estimates, each right under other correlations, the one that claims least certainty is taken.
+    """
+    bread = np.linalg.inv(hessian + known)
+    filling = scores.T @ scores
+    for lag in range(1, min(LAG, len(scores) - 1) + 1):
+        cross = scores[lag:].T @ scores[:-lag]
+        filling = filling + (1 - lag / (LAG + 1)) * (cross + cross.T)
+    fillings = [filling, scores.T @ scores]
+    if len(scores) >= LEAST_CLUSTERS * CLUSTER:
+        apart = np.add.reduceat(scores, np.arange(0, len(scores), CLUSTER), axis=0)
+        fillings.append(apart.T @ apart * len(apart) / max(len(apart) - 2, 1))
+    errors = [bread @ one @ bread for one in fillings]
+    return max(errors, key=lambda covariance: float(covariance[0, 0]))
+
+
+def mean_error(knots: FloatArray, covariance: FloatArray) -> float:
+    """Return the root of the mean variance over the knots."""
+    return float(np.sqrt(max(np.mean(np.einsum("ka,ab,kb->k", knots, covariance, knots)), 0.0)))
+
+
+def _held(plan: Plan, move: FloatArray, free: tuple[str, ...]) -> FloatArray:
+    """Take no step of more than a third of a flash."""
+    longest_s = 0.33 * min(plan.flashes[slot].duration_s for slot in plan.lit_slots)
+    largest_s = float(np.abs(move[:2]).max())
+    held: FloatArray = move * min(1.0, longest_s / max(largest_s, 1e-30))
+    return held
+
+
+def _step(
+    plan: Plan,
+    rows: Profiles,
+    beat: Beat,
+    free: tuple[str, ...],
+    move: FloatArray,
+    weight: FloatArray,
+    rest: FloatArray,
+) -> tuple[Beat, FloatArray, bool]:
+    """Take a step, halved until it explains more; say whether it did."""
+    loss = float((weight * rest**2).sum())
+    for _ in range(5):
+        moved = _moved(rows, beat, free, move)
+        moved_rest = unexplained(plan, rows, moved, weight)
+        if float((weight * moved_rest**2).sum()) < loss:
+            return moved, moved_rest, True
+        move = move / 2
+    return beat, rest, False
+
+
+def _moved(rows: Profiles, beat: Beat, free: tuple[str, ...], move: FloatArray) -> Beat:
+    pivot_s, half_s = _pivot(rows)
+    clock = beat.clock.shifted(float(move[0]), float(move[1]) / half_s * 1e6, pivot_s=pivot_s)
+    times_s = {name: max(getattr(beat, name) + float(move[2 + n]), 0.0) for n, name in enumerate(free)}
+    if "exposure_s" in times_s:
+        times_s["exposure_s"] = min(times_s["exposure_s"], rows.period_s)
+    if "row_time_s" in times_s:
+        times_s["row_time_s"] = min(times_s["row_time_s"], 1.02 * rows.period_s / (rows.place.max() + 1))
+    return replace(beat, clock=clock, **times_s)
+
+
+def scaled(rows: Profiles, rest: FloatArray, share: float) -> FloatArray:
+    """Return how far each residual may be off: noise, at first a share of the row's spread, and what is doubtful."""
+    scale = np.maximum(row_noise(rest), rows.spread * max(share, LAST_SCALE))
+    if rows.doubt is None:
+        return np.broadcast_to(scale, rest.shape)
+    return np.sqrt(scale**2 + rows.doubt**2)
+
+
+def row_noise(rest: FloatArray) -> FloatArray:
+    """Return each row's own residual spread (from the median, so that outliers do not count), shape (row,)."""
+    spread = 1.4826 * np.median(np.abs(rest), axis=0)
+    noise: FloatArray = np.maximum(spread, 0.1 * np.median(spread) + 1e-9)
+    return noise
+
+
+def robust_loss(rows: Profiles, rest: FloatArray, reference: FloatArray) -> float:
+    """Return Cauchy's loss of residuals against the noise that ``reference`` residuals tell of."""
+    return float(np.log1p((rest / (CAUCHY * scaled(rows, reference, 0.0))) ** 2).sum())
+
+
+def explained(rows: Profiles, rest: FloatArray) -> float:
+    """Return which share of the rows' changes from frame to frame a fit explains."""
+    change = rows.value - rows.value.mean(axis=0)
+    return 1.0 - float((rest**2).sum() / max(float((change**2).sum()), 1e-30))

@@ -1,0 +1,148 @@
+"""The coarse search: every place in the cycle, every clock ratio in reach, and every readout where it is unknown.
+
+A row's loss depends on its own opening time only. So each row is scored alone against phase and clock ratio, and any
+readout's loss is a sum over rows, each read at the phase at which that readout opens it: a readout costs a sum, not a
+search.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from psvideo.model.camera import FloatArray
+from psvideo.model.plan import Plan
+from psvideo.sync.rowfit import kernel
+from psvideo.sync.rowfit.beat import Beat, StrobeClock
+from psvideo.sync.rowfit.profiles import Profiles, compiled_rows, share, slot_unknowns
+
+ROBUST_STEEPNESS = 20.0
+"""Of the coarse loss ``log(1 + 20 r^2)``, r being a residual over its row's own spread (physics.md)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Found:
+    """A place on the grid and its mean loss per sample."""
+
+    beat: Beat
+    loss: float
+
+
+def search(
+    plan: Plan, rows: Profiles, *, range_ppm: float, start: Beat, readout_known: bool, keep: int = 1
+) -> list[Found]:
+    """Return the best places of a grid (a third of a flash in phase, half a flash's slip in ratio), best first.
+
+    ``start`` gives exposure, tails and, where it is known, row time and direction.
+    """
+    phases_s, ppm = _grid(plan, rows, range_ppm)
+    pivot_s = float(rows.frame_start_s.mean())
+    clocks = [
+        StrobeClock(phase_s=float(phase_s), offset_ppm=0.0).shifted(0.0, float(offset), pivot_s=pivot_s)
+        for offset in ppm
+        for phase_s in phases_s
+    ]
+    loss = _losses(plan, rows, clocks, start, place=rows.place if readout_known else np.zeros_like(rows.place))
+    loss = loss.reshape(len(ppm), len(phases_s), -1) / len(rows.value)
+    if readout_known:
+        best = _best(loss.mean(axis=2)[None], keep)
+        return [Found(beat=_placed(start, clocks[a * len(phases_s) + b]), loss=value) for _, a, b, value in best]
+    return _over_readouts(plan, rows, loss, clocks, phases_s, start, keep)
+
+
+def _grid(plan: Plan, rows: Profiles, range_ppm: float) -> tuple[FloatArray, FloatArray]:
+    shortest_s = min(plan.flashes[slot].duration_s for slot in plan.lit_slots)
+    span_s = float(rows.frame_start_s[-1] - rows.frame_start_s[0]) + rows.period_s
+    slips = int(np.ceil(range_ppm * 1e-6 * span_s / (0.5 * shortest_s)))
+    ppm: FloatArray = np.linspace(-1.0, 1.0, 2 * slips + 1) * range_ppm if slips else np.zeros(1)
+    steps = int(np.ceil(plan.cycle_s / (shortest_s / 3)))
+    phases_s: FloatArray = np.arange(steps, dtype=np.float64) * (plan.cycle_s / steps)
+    return phases_s, ppm
+
+
+def _losses(plan: Plan, rows: Profiles, clocks: list[StrobeClock], start: Beat, *, place: FloatArray) -> FloatArray:
+    """Return the loss of every clock in every row, shape (clock, row)."""
+    first_s, last_s = float(rows.frame_start_s[0]), float(rows.frame_start_s[-1])
+    latest_s = max(clock.phase_s for clock in clocks)
+    earliest_s = min(clock.phase_s for clock in clocks)
+    cycle = len(plan.cycle_slots)
+    begin = int(np.floor((first_s - latest_s) / plan.cycle_s)) - 1
+    end = int(np.ceil((last_s + 3 * rows.period_s - earliest_s) / plan.cycle_s)) + 1
+    train = plan.train(begin * cycle, (end - begin) * cycle)
+    unknown = slot_unknowns(plan)
+    flashes = kernel.Flashes(
+        train.start_s, train.duration_s, unknown[train.slot], int(unknown.max()) + 1, start.rise_s, start.fall_s
+    )
+    seen = compiled_rows(rows, start)._replace(row_place=place)
+    phase_s, rate = np.array([c.phase_s for c in clocks]), np.array([c.rate for c in clocks])
+    found = np.empty((len(clocks), rows.value.shape[1]))
+    spread = rows.spread
+    share(
+        lambda a, b: kernel.losses_by_row(seen, flashes, phase_s, rate, spread, ROBUST_STEEPNESS, a, b, found),
+        len(clocks),
+        work=len(clocks) * rows.value.size,
+    )
+    return found
+
+
+def _over_readouts(
+    plan: Plan,
+    rows: Profiles,
+    loss: FloatArray,
+    clocks: list[StrobeClock],
+    phases_s: FloatArray,
+    start: Beat,
+    keep: int,
+) -> list[Found]:
+    """Sum the rows' losses along every readout from the whole frame upward to the whole frame downward."""
+    height = rows.place.max() + rows.place.min() + 1
+    step_s = phases_s[1] - phases_s[0]
+    count = int(np.ceil(rows.period_s / step_s))
+    readouts_s = np.arange(-count, count + 1) * rows.period_s / count
+    total = np.empty((len(readouts_s), *loss.shape[:2]))
+    at = np.arange(len(phases_s))
+    for r, readout_s in enumerate(readouts_s):
+        place = rows.place if readout_s >= 0 else height - 1 - rows.place
+        total[r] = 0.0
+        for row, offset_s in enumerate(place / height * abs(readout_s)):
+            below, part = divmod(offset_s / step_s, 1.0)
+            low = (at - int(below)) % len(phases_s)
+            total[r] += (1 - part) * loss[:, low, row] + part * loss[:, low - 1, row]
+    found = []
+    for r, a, b, value in _best(total / loss.shape[2], keep):
+        beat = Beat(
+            clock=clocks[a * len(phases_s) + b],
+            row_time_s=abs(float(readouts_s[r])) / height,
+            exposure_s=start.exposure_s,
+            upward=bool(readouts_s[r] < 0),
+            rise_s=start.rise_s,
+            fall_s=start.fall_s,
+            beat_hz=start.beat_hz,
+        )
+        found.append(Found(beat=beat, loss=value))
+    return found
+
+
+def _best(loss: FloatArray, keep: int) -> list[tuple[int, int, int, float]]:
+    """Return the lowest places of a cube, no two of them neighbours in phase."""
+    left = loss.copy()
+    found = []
+    for _ in range(keep):
+        at = np.unravel_index(int(np.argmin(left)), left.shape)
+        found.append((int(at[0]), int(at[1]), int(at[2]), float(left[at])))
+        near = (np.arange(at[2] - 2, at[2] + 3)) % left.shape[2]
+        left[:, :, near] = np.inf
+        if not np.isfinite(left).any():
+            break
+    return found
+
+
+def _placed(start: Beat, clock: StrobeClock) -> Beat:
+    return Beat(
+        clock=clock,
+        row_time_s=start.row_time_s,
+        exposure_s=start.exposure_s,
+        upward=start.upward,
+        rise_s=start.rise_s,
+        fall_s=start.fall_s,
+        beat_hz=start.beat_hz,
+    )

@@ -1,0 +1,38 @@
+"""What people should know of how a clip's frames follow one another: regular patterns, and ends that fit no place."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.model.plan import Plan
+from psvideo.sync.rowfit.fit import Found
+from psvideo.sync.rowfit.retime import regular_step
+
+
+def remarks_on_frames(plan: Plan, found: Found, told: NDArray[np.int64]) -> Iterator[str]:
+    """Yield what is odd about how the frames follow one another."""
+    index, rate = found.track.index, float(plan.camera.fps)
+    step = regular_step(index, told)
+    shown = f"{rate / float(step):.6g} frames a second" if step != 1 else ""
+    if step.denominator == 1 and step > 1:
+        yield (
+            f"The clip holds one of every {step} frames that the plan's {rate:.6g} frames a second tell: it was "
+            f"thinned to {shown}, or fps in the plan is {step} times too high."
+        )
+    elif step > 1:
+        yield (
+            f"The clip holds {step.denominator} of every {step.numerator} frames, regularly, as a movie that was made "
+            f"{shown} from {rate:.6g} by leaving frames out; what fell into the missing ones is lost."
+        )
+    elif step < 1:
+        yield (
+            f"Of every {step.denominator} frames the clip repeats {step.denominator - step.numerator}, regularly, as a "
+            f"movie that was made {rate:.6g} frames a second from {shown}; repeated ones are left out."
+        )
+    for name, place in (("first", found.trusted[0] - index[0]), ("last", index[-1] - found.trusted[1])):
+        if place:
+            yield (
+                f"The {name} frame (or the {name} two) fit no place in time, or more than one, as when frames are "
+                f"missing beside them: flashes that they saw are marked as incomplete."
+            )

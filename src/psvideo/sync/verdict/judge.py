@@ -1,0 +1,138 @@
+"""Whether a fit is to be believed, and the fit of the plan that was meant where the one given is wrong by far."""
+
+from dataclasses import dataclass, replace
+
+from psvideo.model.plan import Plan
+from psvideo.sync.rowfit.course import too_many
+from psvideo.sync.rowfit.fit import Found, find
+from psvideo.sync.rowfit.profiles import Profiles, unexplained
+from psvideo.sync.rowfit.refine import freedom, refine, robust_loss
+from psvideo.sync.rowfit.seed import gain_of
+from psvideo.sync.verdict.refusal import MOST_PPM
+from psvideo.sync.verdict.rivals import BETTER, CLEARLY, FAIR, camera_rivals, double_rivals, likeliest, strobe_rivals
+
+MIN_EXPLAINED, MIN_GAIN = 0.5, 0.3
+"""A fit that explains less of the rows' changes, or takes less of the robust loss away, has not found a strobe."""
+LUCK = 0.25
+"""Share of noise that the best place of a search explains besides what brightnesses do anywhere."""
+LOST = 0.5
+"""Times whose standard error is more than this share of the shortest flash are not found."""
+UNSURE_GAIN, UNSURE = 0.7, 0.1
+"""A fit that takes less of the robust loss away, or is unsure by such a share of a flash, is worth a second look."""
+MOVED = 0.05
+"""So is one that had to move the exposure or the readout by more than this share."""
+GAPPED = 0.8
+"""A fit that needs frames to be missing and explains less than this share of the changes is worth one, too."""
+OTHER_LENGTHS = (0.5, 0.7, 1.4, 2.0)
+LENGTH_FRAMES = 200
+FLASHES_DIFFER = 0.7
+"""Flashes of other lengths are likely where they leave less than this share of the robust loss."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verdict:
+    """A fit, the plan under which it was made (another camera than the given plan's where that was wrong by far), and
+    whether it is to be believed."""
+
+    plan: Plan
+    found: Found
+    believed: bool
+
+
+def judged(plan: Plan, rows: Profiles) -> Verdict:
+    """Return the best fit of a clip under the plan or, where another shutter or readout is far likelier, under that.
+
+    ``rows`` are laid out from the picture's top row.
+    """
+    found = find(plan, rows)
+    if not doubtful(plan, found):
+        return Verdict(plan=plan, found=found, believed=True)
+    meant, found = _as_meant(plan, rows, found)
+    believed = convincing(meant, found)
+    if believed and (_unsure(meant, found) or _gaps_feigned(found) or flashes_differ(meant, found)):
+        believed = likeliest(meant, rows, list(strobe_rivals(plan))) is None
+    return Verdict(plan=meant, found=found, believed=believed)
+
+
+def _as_meant(plan: Plan, rows: Profiles, found: Found) -> tuple[Plan, Found]:
+    """Return the likeliest plan with another camera and its fit, or the given ones where they are as good."""
+    leaves = CLEARLY if convincing(plan, found) else BETTER
+    for rivals in (camera_rivals(plan), double_rivals(plan)):
+        meant = likeliest(plan, rows, list(rivals), least=FAIR, leaves=leaves)
+        if meant is not None:
+            again = find(meant.plan, rows, measured=("exposure_s",) if meant.fault == "shutter" else ())
+            gains = [gain_of(one.rows, one.fit.rest) for one in (found, again)]
+            if convincing(meant.plan, again) and gains[1] > gains[0]:
+                return meant.plan, again
+        if convincing(plan, found):
+            break
+    return plan, found
+
+
+def convincing(plan: Plan, found: Found) -> bool:
+    """Tell whether a fit has found a strobe, and not merely the least bad place for one.
+
+    Brightnesses alone explain some of mere noise, which counts in short clips.
+    """
+    rows, fit = found.rows, found.fit
+    by_chance = 1 - freedom(plan, rows, fit.beat)
+    share, explained = gain_of(rows, fit.rest), fit.explained
+    often = too_many(found.steps, len(rows.value))
+    return (
+        explained > max(MIN_EXPLAINED, by_chance + LUCK * (1 - by_chance))
+        and share > max(MIN_GAIN, by_chance)
+        and (not often or min(share, explained) > 0.9)
+        and abs(fit.beat.clock.mean_offset_ppm()) < MOST_PPM
+        and (found.slack_s > 0 or fit.shift_error_s < LOST * _shortest_s(plan))
+    )
+
+
+def doubtful(plan: Plan, found: Found) -> bool:
+    """Tell whether a fit leaves so much, or had to stray so far from the plan, that the plan may be wrong by far."""
+    beat, camera = found.fit.beat, plan.camera
+    moved = abs(beat.exposure_s / camera.exposure_s - 1) > MOVED
+    if camera.readout_s:
+        moved = moved or abs(beat.row_time_s * camera.height_px / abs(camera.readout_s) - 1) > MOVED
+    return (
+        moved
+        or gain_of(found.rows, found.fit.rest) < UNSURE_GAIN
+        or _unsure(plan, found)
+        or _gaps_feigned(found)
+        or not convincing(plan, found)
+        or flashes_differ(plan, found)
+    )
+
+
+def _unsure(plan: Plan, found: Found) -> bool:
+    return found.slack_s == 0 and found.fit.shift_error_s > UNSURE * _shortest_s(plan)
+
+
+def _gaps_feigned(found: Found) -> bool:
+    """Tell whether holes may only stand for a strobe that drifts away from the plan's: true ones leave little."""
+    return found.steps > 0 and found.fit.explained < GAPPED
+
+
+def flashes_differ(plan: Plan, found: Found) -> bool:
+    """Tell whether flashes much longer or shorter than the plan's, in the same places and without tails, fit better."""
+    rows, beat = found.rows.take(slice(0, LENGTH_FRAMES)).binned(48), found.fit.beat
+    rest = unexplained(plan, rows, beat)
+    limit = FLASHES_DIFFER * robust_loss(rows, rest, rest)
+    shortest_s = _shortest_s(plan)
+    tails_s = beat.rise_s + beat.fall_s - plan.rise_s - plan.fall_s
+    for factor in OTHER_LENGTHS:
+        longer_s = (factor - 1) * shortest_s
+        flashes = tuple(replace(flash, duration_s=flash.duration_s + longer_s) for flash in plan.flashes)
+        other = replace(plan, flashes=flashes, dark_s=plan.dark_s - longer_s)
+        moved = beat.with_phase(beat.clock.phase_s - 0.5 * longer_s + tails_s)
+        moved = replace(moved, rise_s=plan.rise_s, fall_s=plan.fall_s)
+        if other.dark_s <= 0:
+            continue
+        if tails_s > 0:  # which stood for some of the other length, and moved the flashes with them
+            moved = refine(other, rows, moved, steps=4, first_scale=0.1).beat
+        if robust_loss(rows, unexplained(other, rows, moved), rest) < limit:
+            return True
+    return False
+
+
+def _shortest_s(plan: Plan) -> float:
+    return min(plan.flashes[slot].duration_s for slot in plan.lit_slots)

@@ -1,0 +1,181 @@
+"""Why no strobe like the plan's was found in a clip: what the picture looks like instead, and what to do about it."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from psvideo.model.plan import UNKNOWN_CLOCK_PPM, Plan
+from psvideo.sync.rowfit.fit import Found
+from psvideo.sync.rowfit.profiles import Profiles, unexplained
+from psvideo.sync.rowfit.search import search
+from psvideo.sync.rowfit.seed import SEARCH_ROWS, first_guess, gain_of
+from psvideo.sync.verdict.rivals import Rival, likeliest, likely_rates, strobe_rivals
+
+STEADY = 0.02
+"""Rows that change by less than this share of their light from frame to frame saw no strobe."""
+ALONE = 0.15
+"""Rows that change by less than this share of what whole frames do change all together."""
+REPEATS = 0.03
+"""A picture repeats where a cycle's frames leave less than this share of its changes."""
+NOISE = 0.15
+"""Correlation of neighbouring rows' changes below which there is nothing but noise."""
+WRONG_PERIOD_GAIN = 0.6
+OTHER_PERIOD = 0.02
+"""Share by which the time from flash to flash must be off to be called another one."""
+MOST_PPM = 1.5 * UNKNOWN_CLOCK_PPM
+"""No two clocks are further apart than this, errors of short clips included."""
+PERIOD_FRAMES, PERIOD_ROWS = 14, 8
+
+
+def nothing_to_find(plan: Plan, rows: Profiles) -> str:
+    """Return why no search is worth while, or nothing where one is: too few frames, no change at all, or mere noise."""
+    least = least_frames(plan)
+    if len(rows.value) < least:
+        return (
+            f"holds {len(rows.value)} frame(s); finding the timing of a strobe with {len(plan.lit_slots)} lit "
+            f"flash(es) a round needs at least {least}, and 50 or more make it sure."
+        )
+    changes = _changes(rows)
+    if float(np.abs(changes).max()) < 1e-9:
+        return (
+            "no strobe like the plan's was found in the picture: its rows do not change at all from frame to frame. "
+            "Check that the lights flashed, that the lens was open, and that this is the right clip."
+        )
+    if _likeness(changes) < NOISE:
+        return (
+            "no strobe like the plan's was found in the picture: what changes from frame to frame is noise, which "
+            f"neighbouring rows do not share (mean level {float(rows.value.mean()):.2g} of saturation). Check that the "
+            "lights flashed and are bright enough; open the lens or raise the gain."
+        )
+    return ""
+
+
+def least_frames(plan: Plan) -> int:
+    """Return how many frames tell more than the brightnesses that are fitted to them."""
+    return len(plan.lit_slots) + 3
+
+
+def _changes(rows: Profiles) -> np.ndarray:
+    change: np.ndarray = np.diff(rows.binned(SEARCH_ROWS).value, axis=0)
+    return change
+
+
+def _likeness(changes: np.ndarray) -> float:
+    """Return the correlation of neighbouring rows' changes from frame to frame."""
+    if changes.shape[1] < 2:
+        return 1.0
+    above, below = changes[:, :-1], changes[:, 1:]
+    return float((above * below).sum() / np.sqrt((above**2).sum() * (below**2).sum()))
+
+
+def why_not(plan: Plan, rows: Profiles) -> str:
+    """Return what the picture looks like where no strobe like the plan's was found, and what to do; or nothing."""
+    change = np.abs(np.diff(rows.value, axis=0))
+    level = float(np.abs(rows.value).mean())
+    if float(change.mean()) < STEADY * level:
+        return (
+            "The rows hardly change from frame to frame, as without any strobe, or with one so fast that every row "
+            "sees the same light. Check that the lights flashed."
+        )
+    if _repeats(plan, rows):
+        return (
+            f"The picture repeats itself every {len(plan.cycle_slots)} frames, one flash a frame: the strobe seems to "
+            'be triggered by the camera. If so, write mode = "synced" under [strobe] in plan.toml.'
+        )
+    meant = likeliest(plan, rows, list(strobe_rivals(plan)))
+    if meant is not None:
+        return _told(plan, meant)
+    whole = rows.value.mean(axis=1)
+    alone = float(((rows.value - whole[:, None]) - (rows.value - whole[:, None]).mean(axis=0)).std())
+    if alone < ALONE * float((whole - whole.mean()).std()) and plan.camera.readout_s != 0:
+        return (
+            "All rows change together, as under flicker or automatic exposure, and not as under flashes. "
+            "Check that the strobe played, and that exposure and gain were fixed."
+        )
+    return _other_strobe(plan, rows)
+
+
+def clock_too_far(plan: Plan, found: Found) -> str:
+    """Return which number of the plan to doubt where the fit slipped to a clock beyond those searched; or nothing."""
+    ppm = found.fit.beat.clock.mean_offset_ppm()
+    if abs(ppm) < MOST_PPM or found.steps:
+        return ""
+    flash_s = plan.cycle_s / len(plan.cycle_slots)
+    return (
+        f"It puts the strobe's clock {ppm:+.0f} ppm off the camera's, beyond the {UNKNOWN_CLOCK_PPM:.0f} ppm that are "
+        f"searched: one flash every {flash_s * (1 + ppm * 1e-6) * 1e3:.4g} ms, where the plan says "
+        f"{flash_s * 1e3:.4g} ms. No clock is off by so much: check duration_s and dark_s of the strobe, and fps "
+        f"({float(plan.camera.fps):.6g}) and exposure of the camera."
+    )
+
+
+def _repeats(plan: Plan, rows: Profiles) -> bool:
+    """Tell whether the picture is the same in every cycle's frames, as where the camera triggers the strobe."""
+    cycle, frames = len(plan.cycle_slots), len(rows.value)
+    if frames < 2 * cycle + 1 or cycle < 2:
+        return False
+    place = rows.index % cycle
+    change = rows.value - rows.value.mean(axis=0)
+    left = sum(float(((part - part.mean(axis=0)) ** 2).sum()) for part in (change[place == n] for n in range(cycle)))
+    return left * frames / (frames - cycle) < REPEATS * float((change**2).sum())
+
+
+def _told(plan: Plan, rival: Rival) -> str:
+    if rival.fault == "rate":
+        rate, planned = float(rival.plan.camera.fps), float(plan.camera.fps)
+        return (
+            f"The picture fits a camera that ran at {rate:.6g} frames a second, and the plan says {planned:.6g}: put "
+            f"the true frame rate (and the shutter that goes with it) into plan.toml, or film at {planned:.6g}."
+        )
+    meant = rival.plan
+    parts = [
+        f"{name} {other * 1e3:.4g} ms (plan: {planned * 1e3:.4g} ms)"
+        for name, other, planned in (
+            ("flashes of", meant.flashes[meant.lit_slots[0]].duration_s, plan.flashes[plan.lit_slots[0]].duration_s),
+            ("dark times of", meant.dark_s, plan.dark_s),
+        )
+        if abs(other / planned - 1) > 1e-9
+    ]
+    return (
+        f"The picture fits {' and '.join(parts)} far better: the strobe played another plan, or its durations were "
+        "doubled or halved on the way. Put the plan that it played beside the clip."
+    )
+
+
+def _other_strobe(plan: Plan, rows: Profiles) -> str:
+    period_s, gain = other_period(plan, rows)
+    flash_s = plan.flashes[plan.lit_slots[0]].duration_s
+    planned_s = plan.dark_s + flash_s
+    if gain < WRONG_PERIOD_GAIN or abs(period_s / planned_s - 1) < OTHER_PERIOD:
+        return ""
+    words = (
+        f"The picture looks like a strobe that flashes every {period_s * 1e3:.4g} ms, and not every "
+        f"{planned_s * 1e3:.4g} ms as planned"
+    )
+    for rate in likely_rates(plan):
+        if abs(period_s / planned_s * float(plan.camera.fps / rate) - 1) < 0.5 * OTHER_PERIOD:
+            return (
+                f"{words}, as if the camera had run at {float(rate):.6g} frames a second instead of the plan's "
+                f"{float(plan.camera.fps):.6g}. Check the frame rate, and the plan that the strobe played."
+            )
+    if period_s - flash_s < plan.camera.exposure_s * (1 - OTHER_PERIOD):
+        words += (
+            f"; its dark time is then shorter than the exposure of {plan.camera.exposure_s * 1e3:.4g} ms, so that rows "
+            "hold two flashes mixed"
+        )
+    return f"{words}. Put the plan that it played beside the clip, or let it play this one."
+
+
+def other_period(plan: Plan, rows: Profiles) -> tuple[float, float]:
+    """Return the time from flash to flash that explains the picture best, and how much of the loss it takes away."""
+    part = rows.take(slice(0, min(PERIOD_FRAMES, len(rows.value)))).binned(PERIOD_ROWS).one_window()
+    longest_s = max(flash.duration_s for flash in plan.flashes)
+    step_s = longest_s / len(part.value)
+    best = (np.inf, 0.0)
+    for period_s in np.arange(longest_s + 0.25 * rows.period_s, 2.5 * rows.period_s, step_s):
+        tried = replace(plan, dark_s=float(period_s) - longest_s)
+        place = search(tried, part, range_ppm=0.0, start=first_guess(plan), readout_known=True)[0]
+        best = min(best, (place.loss, float(period_s)))
+    tried = replace(plan, dark_s=best[1] - longest_s)
+    place = search(tried, part, range_ppm=0.0, start=first_guess(plan), readout_known=True)[0]
+    return best[1], gain_of(part, unexplained(tried, part, place.beat))

@@ -1,0 +1,224 @@
+"""What people should know of a clip whose strobe was found: what to distrust, and what to put right in its plan."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+
+from psvideo.model.camera import Camera, FloatArray
+from psvideo.model.plan import Plan
+from psvideo.sync.rowfit.beat import Beat
+from psvideo.sync.rowfit.fit import Found
+from psvideo.sync.rowfit.profiles import brightnesses, predictions
+
+MISNAMED_PPM = (-1000.0, 999.0)
+"""Clock offsets that a frame rate misnamed by 1.001 leaves: 120 for 119.88, and 119.88 for 120."""
+NEAR_PPM = 150.0
+CHANGED, GROSS = 1e-3, 0.08
+"""Shares by which an exposure or a readout must be off to be worth a word, and to make the plan's value a mistake."""
+SURE = 5.0
+"""Standard errors by which it must be off besides to be called a mistake."""
+GAIN_RANGE, GAIN_EXPLAINS = 0.06, 0.6
+"""Exposure is called automatic where frames' gains differ by so much and explain such a share of what is left."""
+GAIN_FRAMES = (9, 1)
+"""Frames over which a gain is taken to be the same: exposures creep, and some jump."""
+DIM = 0.05
+"""Frames with less than this share of the usual light tell no gain."""
+MIXED_ROWS = 0.02
+"""Share of the rows that may hold two flashes before it is worth a word."""
+UNFIRED = 0.01
+"""Share of the brightest light's level below which a light is said not to have fired."""
+ALIKE = 0.01
+"""Share of their level by which lights that flash one at a time differ at least, in some rows."""
+LEAST_LIGHTS = 3
+UNSURE = 0.05
+"""Share of a flash from which on a standard error is worth a word."""
+
+
+def remarks(plan: Plan, found: Found) -> tuple[str, ...]:
+    """Return sentences on what to distrust or to put right. ``plan`` is the one that was given, as it was given."""
+    beat = found.fit.beat
+    said = [
+        _clock(plan, found),
+        _mixed(plan, beat),
+        *_camera(plan, found),
+        _exposure(plan, found),
+        _soft(found),
+        _sureness(plan, found),
+    ]
+    return tuple(sentence for sentence in said if sentence)
+
+
+def _clock(plan: Plan, found: Found) -> str:
+    ppm = found.fit.beat.clock.mean_offset_ppm()
+    start_s = found.rows.frame_start_s
+    error_ppm = 2e6 * found.fit.shift_error_s / float(start_s[-1] - start_s[0])
+    near = min(MISNAMED_PPM, key=lambda misnamed: abs(ppm - misnamed))
+    tolerance = plan.clock_range_ppm
+    if abs(ppm - near) + error_ppm < NEAR_PPM and (tolerance < abs(near) or plan.clock_tolerance_ppm is None):
+        rate = plan.camera.fps
+        other = float(rate) / 1.001 if near < 0 else float(rate) * 1.001
+        return (
+            f"The strobe's clock seems off by {ppm:+.0f} ppm, which is what a frame rate misnamed by 1.001 looks like: "
+            f"the plan says {float(rate):.6g} frames a second, and the camera may well have run at {other:.6g}."
+        )
+    if abs(ppm) > tolerance + 1.0 + 3 * error_ppm:
+        return f"The strobe's clock is off by {ppm:+.0f} ppm, which is more than the {tolerance:.0f} ppm of the plan."
+    return ""
+
+
+def _mixed(plan: Plan, beat: Beat) -> str:
+    short_s = beat.exposure_s - plan.dark_s * beat.clock.rate
+    span_s = plan.camera.frame_period_s
+    if short_s < MIXED_ROWS * span_s:
+        return ""
+    return (
+        f"The dark time of {plan.dark_s * 1e3:.4g} ms is shorter than the exposure of {beat.exposure_s * 1e3:.4g} ms: "
+        f"about {100 * min(short_s / span_s, 1):.0f} % of the rows of every frame hold two flashes, which cannot be "
+        "taken apart. Lengthen the dark time or shorten the exposure."
+    )
+
+
+def _camera(plan: Plan, found: Found) -> Iterator[str]:
+    """Say what the picture tells of the shutter and the LEDs that the plan does not, or tells otherwise."""
+    beat, camera, errors_s = found.fit.beat, plan.camera, found.fit.errors_s
+    parts = []
+    exposure = f"{_ms(beat.exposure_s, errors_s.get('exposure_s'))} ({_degrees(camera, beat.exposure_s)} degrees)"
+    off = abs(beat.exposure_s / camera.exposure_s - 1)
+    if off > GROSS and abs(beat.exposure_s - camera.exposure_s) > SURE * errors_s.get("exposure_s", 0.0):
+        yield (
+            f"The plan's shutter is wrong: the exposure is {exposure}, and the plan says {_ms(camera.exposure_s)} "
+            f"({_degrees(camera, camera.exposure_s)} degrees). Put exposure_s = {beat.exposure_s:.6g} into plan.toml."
+        )
+    elif off > CHANGED:
+        parts.append(f"the exposure is {exposure} (plan: {camera.exposure_s * 1e3:.5g} ms)")
+    readout_s = beat.row_time_s * camera.height_px * (-1 if beat.upward else 1)
+    error_s = errors_s.get("row_time_s", 0.0) * camera.height_px
+    if abs(readout_s) < 3 * error_s:
+        readout_s = 0.0
+    if camera.readout_s is None and found.slack_s > 0:
+        yield "The readout cannot be told from this clip: no row opens or closes during a flash."
+    elif camera.readout_s is None:
+        yield f"The readout was found to take {_ms(abs(readout_s), error_s)}, {_direction(readout_s)}."
+    elif abs(readout_s - camera.readout_s) > GROSS * max(abs(camera.readout_s), abs(readout_s)):
+        yield _wrong_readout(camera.readout_s, readout_s, error_s)
+    elif camera.readout_s and abs(readout_s / camera.readout_s - 1) > CHANGED:
+        parts.append(f"the readout takes {_ms(abs(readout_s), error_s)} (plan: {abs(camera.readout_s) * 1e3:.5g} ms)")
+    if beat.fall_s > plan.fall_s + 1e-6 or beat.rise_s > plan.rise_s + 1e-6:
+        parts.append(f"the LEDs rise in {beat.rise_s * 1e6:.1f} us and fall in {beat.fall_s * 1e6:.1f} us")
+    if parts:
+        yield f"The picture tells otherwise than the plan: {'; '.join(parts)}."
+
+
+def _wrong_readout(planned_s: float, readout_s: float, error_s: float) -> str:
+    found = f"it takes {_ms(abs(readout_s), error_s)}, {_direction(readout_s)}"
+    if planned_s * readout_s < 0:
+        fault = f"The plan's readout runs the wrong way: {found}, and the plan says {_direction(planned_s)}"
+    elif planned_s == 0:
+        fault = f"The plan's camera has a global shutter, but the picture shows a rolling readout: {found}"
+    else:
+        fault = f"The plan's readout is wrong: {found}, and the plan says {_ms(abs(planned_s))}"
+    return f"{fault}. Put readout_s = {readout_s:.6g} into plan.toml."
+
+
+def _ms(time_s: float, error_s: float | None = None) -> str:
+    return f"{time_s * 1e3:.5g} ms" + (f" +- {error_s * 1e3:.1g} ms" if error_s else "")
+
+
+def _degrees(camera: Camera, exposure_s: float) -> str:
+    return f"{360.0 * exposure_s / camera.frame_period_s:.4g}"
+
+
+def _direction(readout_s: float) -> str:
+    if readout_s == 0:
+        return "all rows at once"
+    return f"{'bottom' if readout_s < 0 else 'top'} row first"
+
+
+def _exposure(plan: Plan, found: Found) -> str:
+    for frames_each in GAIN_FRAMES:
+        gain, share = frame_gains(plan, found, frames_each=frames_each)
+        low, high = np.percentile(gain, [2, 98])
+        if share > GAIN_EXPLAINS and 0 < low < high / (1 + GAIN_RANGE):
+            return (
+                f"Whole frames grow brighter and darker by {100 * (high / low - 1):.0f} %: the camera seems to have "
+                "set its exposure or gain by itself. Plates of different moments cannot be compared; film with "
+                "everything fixed."
+            )
+    return ""
+
+
+def frame_gains(plan: Plan, found: Found, *, frames_each: int) -> tuple[FloatArray, float]:
+    """Return every frame's gain (frame,) against the whole clip's brightnesses, and what gains explain of the rest."""
+    rows = replace(found.rows, doubt=None)
+    beat = replace(found.fit.beat, beat_hz=())
+    expected = predictions(plan, rows, beat, brightnesses(plan, rows.one_window(), beat))
+    trust = found.fit.weight / found.fit.weight.max(axis=0)
+    width = min(frames_each, len(rows.value))
+    around = [
+        np.convolve(np.pad(sums, width // 2, mode="edge"), np.ones(width), mode="valid")[: len(sums)]
+        for sums in ((trust * expected * rows.value).sum(axis=1), (trust * expected**2).sum(axis=1))
+    ]
+    lit = around[1] > DIM * np.median(around[1])
+    smooth: FloatArray = np.where(lit, around[0] / np.maximum(around[1], 1e-30), 1.0)
+    before = float((trust * (rows.value - expected) ** 2).sum())
+    after = float((trust * (rows.value - smooth[:, None] * expected) ** 2).sum())
+    return smooth, 1 - after / max(before, 1e-30)
+
+
+def _soft(found: Found) -> str:
+    if found.soft_s == 0.0:
+        return ""
+    return (
+        f"The flashes' edges in the picture are soft, as when compression or scaling blurs rows, which moves no flash. "
+        f"If the LEDs themselves take {found.soft_s * 1e6:.0f} us to rise and to fall, all flashes start earlier by as "
+        "much: then give rise_s and fall_s in the plan."
+    )
+
+
+def _sureness(plan: Plan, found: Found) -> str:
+    error_s = found.fit.shift_error_s
+    shortest_s = min(plan.flashes[slot].duration_s for slot in plan.lit_slots)
+    if found.slack_s > 0:
+        return (
+            f"The flashes' times are known to +- {found.slack_s * 1e3:.3g} ms only: no row opens or closes during a "
+            "flash, so that the picture looks the same wherever in the exposure they fired. The plates do not suffer."
+        )
+    if error_s > UNSURE * shortest_s:
+        return (
+            f"The flashes' times are known to +- {error_s * 1e6:.2g} us only, and flashes last {shortest_s * 1e6:.3g} "
+            "us: the clip is too short or too noisy, or its subject moves too much, to tell them better."
+        )
+    return ""
+
+
+def remarks_on_lights(plan: Plan, found: Found, beat: Beat, *, named: bool) -> tuple[str, ...]:
+    """Return sentences on lights that seem not to have fired, or all at once.
+
+    ``beat`` is the fit's, its cycle turned to where the lights' names are; ``named`` tells that these are not a guess.
+    """
+    lit = plan.lit_slots
+    drive_s = np.array([sum(plan.flashes[slot].lights.values()) * plan.flashes[slot].duration_s for slot in lit])
+    light = brightnesses(plan, found.rows.one_window(), beat)[:, 1 : len(lit) + 1] / drive_s
+    level = light.mean(axis=0)
+    if level.min() < -UNFIRED * level.max():
+        return ()  # no flash takes light away: the names are wrong, and not the lights
+    off = [slot for slot, one in zip(lit, level, strict=True) if one < UNFIRED * level.max()]
+    if off:
+        dark = " and ".join(dict.fromkeys("+".join(plan.flashes[slot].lights) for slot in off))
+        unless = "" if named else " If the order guessed here is not the true one, it is another light."
+        return (
+            f"{dark}: no light is seen from there, less than {100 * UNFIRED:.0f} % of the brightest. Check that it "
+            f"fires, and that it reaches what the camera sees.{unless}",
+        )
+    if len({frozenset(plan.flashes[slot].lights) for slot in lit}) < LEAST_LIGHTS:
+        return ()
+    size = float(np.sqrt((light**2).mean()))
+    apart = [float(np.sqrt(((light[:, a] - light[:, b]) ** 2).mean())) for a, b in combinations(range(len(lit)), 2)]
+    if max(apart) > ALIKE * size:
+        return ()
+    return (
+        f"All lights give the same picture to within {100 * max(apart) / size:.1g} %: they seem to flash together, "
+        "not one after the other. Check the wiring and that each light listens to its own line.",
+    )

@@ -1,0 +1,1 @@
+"""The virtual camera: sensor, exposure, noise, transfer curve, files."""

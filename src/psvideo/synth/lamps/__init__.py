@@ -1,0 +1,1 @@
+"""The virtual lights: what they emit, when, and edges traced from real firmware."""

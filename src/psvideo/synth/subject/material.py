@@ -1,0 +1,84 @@
+"""Albedo over a surface: procedural patterns in the object's own space, vertex colours, and textures."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.model.camera import FloatArray
+from psvideo.synth.scene import AlbedoTable, Colour
+
+Colours = NDArray[np.float32]
+
+PLAIN = 0.7
+"""The albedo of a mesh that is asked for colours of its own and has none."""
+
+
+def colour(value: Colour) -> Colours:
+    """Return a scene file's colour, one number or three, as (3,)."""
+    return np.broadcast_to(np.asarray(value, np.float32), (3,))
+
+
+def pattern_albedo(table: AlbedoTable, points_m: FloatArray) -> Colours:
+    """Return the albedo at points of the object's own space, shape (point, 3)."""
+    share = _share(table, points_m).astype(np.float32)[:, None]
+    return colour(table.colour) + share * (colour(table.second) - colour(table.colour))
+
+
+def _share(table: AlbedoTable, points_m: FloatArray) -> FloatArray:
+    """Return how much of the second colour each point has, 0 to 1."""
+    along = points_m @ (np.asarray(table.axis, np.float64) / (np.linalg.norm(table.axis) or 1.0))
+    cells = points_m / table.size_m
+    if table.pattern == "noise":
+        return np.clip(0.5 + 0.9 * layered_noise(cells), 0.0, 1.0)
+    if table.pattern == "marble":
+        return np.asarray(np.clip(1.0 - 6.0 * np.abs(layered_noise(cells)), 0.0, 1.0) ** 3)
+    if table.pattern == "stripes":
+        return (np.floor(along / table.size_m) % 2).astype(np.float64)
+    if table.pattern == "checker":
+        return np.asarray(np.floor(cells + 1e-9).sum(axis=1) % 2)
+    if table.pattern == "bands":
+        inside = [(along >= low) & (along < high) for low, high in table.bands_m]
+        return np.any(inside, axis=0).astype(np.float64) if inside else np.zeros(len(points_m))
+    return np.zeros(len(points_m))
+
+
+def layered_noise(cells: FloatArray, octaves: int = 4) -> FloatArray:
+    """Return fractal value noise at points in units of its largest cells, about -1 to 1, the same on every machine."""
+    total = np.zeros(len(cells))
+    for octave in range(octaves):
+        total += 0.5**octave * _value_noise(cells * 2.0**octave + 17.3 * octave)
+    return total
+
+
+def _value_noise(points: FloatArray) -> FloatArray:
+    """Return smooth noise between random values at the integer lattice, -1 to 1."""
+    base = np.floor(points).astype(np.int64)
+    part = points - base
+    part = part * part * (3.0 - 2.0 * part)
+    total = np.zeros(len(points))
+    for corner in np.ndindex(2, 2, 2):
+        weight = np.prod(np.where(np.array(corner, bool), part, 1.0 - part), axis=1)
+        total += weight * _lattice(base + np.array(corner))
+    return total
+
+
+def _lattice(nodes: NDArray[np.int64]) -> FloatArray:
+    """Return a fixed random value of each lattice node, -1 to 1 (the mixing steps of splitmix64)."""
+    key = nodes.astype(np.uint64)
+    mixed = key[:, 0] * np.uint64(0x9E3779B97F4A7C15) + key[:, 1] * np.uint64(0xC2B2AE3D27D4EB4F)
+    mixed += key[:, 2] * np.uint64(0x165667B19E3779F9)
+    mixed = (mixed ^ (mixed >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return np.asarray((mixed >> np.uint64(11)).astype(np.float64) * (2.0 / 2**53) - 1.0)
+
+
+def sample_texture(texture: Colours, uv: FloatArray) -> Colours:
+    """Return the texture's colours at (u, v), bilinear and repeating; v runs upwards."""
+    rows, cols = texture.shape[:2]
+    x = uv[:, 0] * cols - 0.5
+    y = (1.0 - uv[:, 1]) * rows - 0.5
+    col, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
+    right, down = (x - col).astype(np.float32)[:, None], (y - row).astype(np.float32)[:, None]
+    left_col, right_col, top, bottom = col % cols, (col + 1) % cols, row % rows, (row + 1) % rows
+    upper = texture[top, left_col] * (1 - right) + texture[top, right_col] * right
+    lower = texture[bottom, left_col] * (1 - right) + texture[bottom, right_col] * right
+    return np.asarray(upper * (1 - down) + lower * down, np.float32)
