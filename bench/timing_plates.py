@@ -68,7 +68,7 @@ def plate_errors(
     sums = np.zeros(5)
     rows = np.zeros(2)
     for plate in ours:
-        if not any(plate.flash.lights.values()):
+        if plate.flash.is_dark:
             continue
         k = int(np.abs(true_s - plate.flash.start_s).argmin())
         truth = plate_of(flashes[k])
@@ -89,7 +89,7 @@ def plate_errors(
 
 def _without_ambient(plates: list[Plate]) -> list[Plate]:
     """Take the ambient light off between the dark slots before and after, as the pipeline does."""
-    darks = [plate for plate in plates if not any(plate.flash.lights.values())]
+    darks = [plate for plate in plates if plate.flash.is_dark]
     return list(subtract(plates, darks=darks))
 
 
@@ -100,7 +100,7 @@ def oracle(plan: Plan, flashes: Sequence[TrueFlash], frames: Mapping[int, Pictur
     indices = np.array(sorted(frames))
     pictures = np.stack([frames[n] for n in indices]).astype(np.float64)
     place = np.searchsorted(indices, first[:, None] + np.arange(TOUCHED))
-    lit = [k for k, flash in enumerate(flashes) if any(flash.lights.values())]
+    lit = [k for k, flash in enumerate(flashes) if not flash.is_dark]
     solved = np.zeros((len(flashes), *pictures.shape[1:]))
     with_ambient = len(lit) < len(flashes)
     at = np.clip(place, 0, len(indices) - 1)

@@ -19,8 +19,7 @@ from psvideo.errors import PsvideoError
 from psvideo.formats.plan_toml import format_plan
 from psvideo.formats.rig_toml import format_rig
 from psvideo.formats.timing_json import format_timing
-from psvideo.inspect import describe
-from psvideo.inspect.about_plan import has_marker
+from psvideo.inspect.describe import describe
 from psvideo.inspect.findings import Description
 from psvideo.model.camera import Encoding
 from psvideo.model.plan import Plan, PlannedFlash
@@ -159,30 +158,6 @@ def test_a_synced_clip_has_one_frame_per_flash(
     put_frames(tmp_path, range(frames))
     put_plan(tmp_path, dataclasses.replace(plan, mode="synced"))
     assert message in lines(describe(tmp_path), level)
-
-
-@pytest.mark.parametrize(
-    ("flashes", "dark_every", "tells"),
-    [
-        ("abc", 1, False),
-        ("abc-", 1, True),
-        ("abc-", 5, True),
-        ("a-b-", 1, False),
-        ("aB", 1, True),
-        ("abAB", 1, True),
-        ("aBcB", 1, False),
-        ("a", 1, True),
-    ],
-)
-def test_a_cycle_has_a_marker_where_no_shift_looks_like_it(
-    plan: Plan, flashes: str, dark_every: int, tells: bool
-) -> None:
-    """Letters are lights, capitals flash twice as long, dashes are dark slots."""
-    slots = tuple(
-        PlannedFlash(lights={} if light == "-" else {light.lower(): 1.0}, duration_s=2e-3 if light.isupper() else 1e-3)
-        for light in flashes
-    )
-    assert has_marker(dataclasses.replace(plan, flashes=slots, dark_every=dark_every)) is tells
 
 
 def test_plan_and_rig_files_are_known_by_their_schema(shot: Path) -> None:

@@ -10,7 +10,7 @@ from psvideo.model.light_field import Points, light_vectors, points_on_plane
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Light, Rig
 from psvideo.model.timing import Flash, Timing
-from psvideo.sync.order_by_rig import alike_turns, order_by_rig, turned
+from psvideo.sync.order_by_rig import order_by_rig, turned
 
 PlanMaker = Callable[..., Plan]
 NAMES = tuple("abcdefgh")
@@ -207,11 +207,6 @@ def test_over_many_rigs_and_scenes_no_order_is_ever_wrong(kind: str, least_right
         right += verdict.turn == turn
     assert right >= least_right
     assert right == 0 or kind != "regular"
-
-
-def test_a_dark_slot_leaves_no_turn(make_plan: PlanMaker) -> None:
-    assert alike_turns(make_plan(dark=True)) == (0,)
-    assert alike_turns(make_plan(dark=False)) == (0, 1, 2)
 
 
 def test_turning_renames_the_flashes_and_nothing_else(make_plan: PlanMaker) -> None:

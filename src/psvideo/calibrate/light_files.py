@@ -157,7 +157,7 @@ def _timed_lights(folder: Path) -> tuple[str, ...]:
     if not (folder / TIMING).is_file():
         return ()
     flashes = sorted(read_timing(folder / TIMING).flashes, key=lambda flash: flash.slot)
-    return tuple(dict.fromkeys(name for flash in flashes for name, power in flash.lights.items() if power > 0))
+    return tuple(dict.fromkeys(name for flash in flashes for name in flash.lit))
 
 
 def _checked(light: str, source: Path) -> str:

@@ -7,6 +7,7 @@ from psvideo.clip.transfer import find_curve
 from psvideo.errors import PsvideoError
 from psvideo.formats.rig_toml import read_rig
 from psvideo.inspect.findings import Finding, fault, ok, warn
+from psvideo.model.marker import has_marker
 from psvideo.model.plan import Plan
 
 ROUNDING = 1e-4
@@ -31,12 +32,6 @@ def plan_findings(plan: Plan) -> Iterator[Finding]:
         yield ok("its cycle tells which flash is which (a dark slot or a flash of another length)")
     else:
         yield warn("all its flashes are alike, so their names are a guess: give --first-light")
-
-
-def has_marker(plan: Plan) -> bool:
-    """True where no shift of the cycle looks like the cycle itself, so that timing alone tells the flashes apart."""
-    looks = [(plan.flashes[slot].is_dark, plan.flashes[slot].duration_s) for slot in plan.cycle_slots]
-    return all(looks[shift:] + looks[:shift] != looks for shift in range(1, len(looks)))
 
 
 def length_finding(plan: Plan, numbers: tuple[int, ...]) -> Finding:

@@ -42,7 +42,7 @@ def light_vectors(plan: Plan, rig: Rig, points: Points) -> FloatArray:
     slots = []
     for slot in plan.lit_slots:
         flash = plan.flashes[slot]
-        parts = [power * flash.duration_s * of_light[name] for name, power in flash.lights.items() if power > 0]
+        parts = [flash.lights[name] * flash.duration_s * of_light[name] for name in flash.lit]
         slots.append(np.sum(parts, axis=0))
     return np.stack(slots, axis=1)
 

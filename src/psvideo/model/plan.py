@@ -21,17 +21,28 @@ UNKNOWN_CLOCK_PPM = 10_000.0
 """How far apart clocks of unknown tolerance are at most (a resonator-driven board is off by 2,000 to 5,000)."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class PlannedFlash:
-    """One flash of a round: the power (0 to 1) of every light that is on, and its length on the strobe's clock."""
+class HasLights:
+    """What has the power (0 to 1) of lights by name: a flash of the plan, of a clip, of the virtual shoot."""
 
     lights: Mapping[str, float]
-    duration_s: float
+
+    @property
+    def lit(self) -> tuple[str, ...]:
+        """The names of the lights that are on, in the order in which they are listed; one of power 0 is off."""
+        return tuple(name for name, power in self.lights.items() if power > 0)
 
     @property
     def is_dark(self) -> bool:
         """True for a dark slot: no light is on; it shows the ambient light and marks the cycle."""
-        return not any(self.lights.values())
+        return not self.lit
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlannedFlash(HasLights):
+    """One flash of a round: the power (0 to 1) of every light that is on, and its length on the strobe's clock."""
+
+    lights: Mapping[str, float]
+    duration_s: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,7 +70,7 @@ class Plan:
     @property
     def lights(self) -> tuple[str, ...]:
         """The lights' names in the order in which the plan first lights them."""
-        return tuple(dict.fromkeys(name for flash in self.flashes for name, power in flash.lights.items() if power > 0))
+        return tuple(dict.fromkeys(name for flash in self.flashes for name in flash.lit))
 
     @property
     def lit_slots(self) -> tuple[int, ...]:
@@ -103,7 +114,7 @@ class Plan:
 
 def reference_duration_s(plan: Plan, light: str) -> float:
     """Return the duration of a light's full flash in strobe seconds: the longest for which the plan lights it."""
-    return max(flash.duration_s for flash in plan.flashes if flash.lights.get(light, 0.0) > 0)
+    return max(flash.duration_s for flash in plan.flashes if light in flash.lit)
 
 
 def mixing_matrix(plan: Plan) -> FloatArray:

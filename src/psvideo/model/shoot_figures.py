@@ -109,7 +109,7 @@ def cycle_length_s(plan: Plan) -> float:
 
 def slot_label(flash: PlannedFlash) -> str:
     """Return the lights that a flash has on, as people call them; ``dark slot`` where none is."""
-    return "+".join(name for name, power in flash.lights.items() if power > 0) or "dark slot"
+    return "+".join(flash.lit) or "dark slot"
 
 
 def _slot_figures(plan: Plan, slot: int, speed_px_s: float | None) -> SlotFigures:
@@ -136,7 +136,7 @@ def _slot_figures(plan: Plan, slot: int, speed_px_s: float | None) -> SlotFigure
 
 def _light_figures(plan: Plan, name: str, times: Counter[int]) -> LightFigures:
     cycle_s = cycle_length_s(plan)
-    own = [slot for slot, flash in enumerate(plan.flashes) if flash.lights.get(name, 0.0) > 0]
+    own = [slot for slot, flash in enumerate(plan.flashes) if name in flash.lit]
     return LightFigures(
         name=name,
         rate_hz=sum(times[slot] for slot in own) / cycle_s,

@@ -7,13 +7,13 @@ from typing import Literal
 import numpy as np
 
 from psvideo.model.camera import Camera, FloatArray
-from psvideo.model.plan import Plan
+from psvideo.model.plan import HasLights, Plan
 
 Order = Literal["marker", "rig", "given", "guess"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Flash:
+class Flash(HasLights):
     """One flash of the clip. ``slot`` is its place in the plan's list; ``complete`` False: the clip cuts it."""
 
     index: int

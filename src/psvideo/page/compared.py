@@ -95,7 +95,7 @@ def _nearest_round(timing: Timing, light: str, time_s: float) -> int:
     away_s = {
         abs(flash.start_s - time_s): number
         for number, flash in zip(round_numbers(timing.flashes), timing.flashes, strict=True)
-        if flash.complete and flash.lights.get(light, 0) > 0
+        if flash.complete and light in flash.lit
     }
     if not away_s:
         raise PsvideoError(f"The clip holds no complete flash of {light}, so there is nothing to compare.")

@@ -62,11 +62,11 @@ def _signed(rest: FloatArray, white: float) -> Pixels:
 
 def _edges(timing: Timing, places: NDArray[np.int64], picture: Pixels, height: int) -> Pixels:
     """Draw where each flash starts and ends while a row opens or closes."""
-    names = list(dict.fromkeys("+".join(flash.lights) for flash in timing.flashes))
+    names = list(dict.fromkeys("+".join(flash.lit) for flash in timing.flashes))
     drawn, per_frame = picture.copy(), WIDE_PX / len(places)
     for column, place in enumerate(places.tolist()):
         for flash in timing.flashes:
-            colour = COLOURS[names.index("+".join(flash.lights)) % len(COLOURS)] if flash.lights else DARK
+            colour = COLOURS[names.index("+".join(flash.lit)) % len(COLOURS)] if flash.lit else DARK
             for moment_s in (flash.start_s, flash.start_s + flash.duration_s):
                 row = _row_at(timing, moment_s - place * timing.frame_period_s, height)
                 if row is not None:

@@ -12,12 +12,13 @@ import numpy as np
 
 from psvideo.clip import Take
 from psvideo.errors import PsvideoError, UsageError
+from psvideo.model.marker import alike_turns
 from psvideo.model.rig import Rig
 from psvideo.model.shutter import frames_touched
 from psvideo.model.timing import Timing, places_in_time, timed_camera
 from psvideo.plates.gather import clip_plates
 from psvideo.plates.split import Plate
-from psvideo.sync.order_by_rig import Image, Verdict, alike_turns, order_by_rig, turned, why_untold
+from psvideo.sync.order_by_rig import Image, Verdict, order_by_rig, turned, why_untold
 
 PLACES = 3
 """Cycles that are looked at, spread over the clip."""
@@ -47,9 +48,8 @@ def named_first(take: Take, timing: Timing, first_light: str) -> Timing:
 
 def _first_lights(timing: Timing) -> str:
     for flash in timing.flashes:
-        lit = [light for light, power in flash.lights.items() if power > 0]
-        if flash.complete and lit:
-            return "+".join(lit)
+        if flash.complete and flash.lit:
+            return "+".join(flash.lit)
     return ""
 
 

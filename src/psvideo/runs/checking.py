@@ -164,7 +164,7 @@ def _later(clip: Clip, window: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def _strobe_words(plan: Plan, timing: Timing) -> str:
-    flashes = sum(any(flash.lights.values()) for flash in timing.flashes)
+    flashes = sum(not flash.is_dark for flash in timing.flashes)
     if plan.mode == "synced":
         return f"{flashes} flashes, one a frame, as the plan says."
     return f"The strobe was seen: {flashes} flashes of {len(plan.lights)} lights, as planned."

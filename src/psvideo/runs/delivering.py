@@ -37,7 +37,7 @@ def check_camera(space: Space, take: Take, timing: Timing, start_number: int) ->
         return
     times_s: dict[int, list[float]] = defaultdict(list)
     for flash, number in zip(timing.flashes, round_numbers(timing.flashes, start=start_number), strict=True):
-        if flash.complete and any(flash.lights.values()):
+        if flash.complete and not flash.is_dark:
             times_s[number].append(flash.start_s + flash.duration_s / 2)
     whole = [number for number, times in times_s.items() if len(times) == len(take.plan.lit_slots)]
     for number in (min(whole), max(whole)) if whole else ():

@@ -140,8 +140,7 @@ def _with_plates(timing: Timing, clip: str, written: set[str], *, start_number: 
     numbers = round_numbers(timing.flashes, start=start_number)
     flashes = []
     for flash, number in zip(timing.flashes, numbers, strict=True):
-        lit = [light for light, power in flash.lights.items() if power > 0]
-        name = plate_name(clip, lit[0] if lit else "ambient", number)
-        noted = flash.complete and len(lit) <= 1 and name in written
+        name = plate_name(clip, flash.lit[0] if flash.lit else "ambient", number)
+        noted = flash.complete and len(flash.lit) <= 1 and name in written
         flashes.append(replace(flash, plate=name if noted else None))
     return replace(timing, flashes=tuple(flashes))

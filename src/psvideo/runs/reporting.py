@@ -126,7 +126,7 @@ def _shot(clip: Clip, numbers: Sequence[int]) -> dict[str, str]:
     plan, camera = clip.plan, clip.plan.camera
     synced = plan.mode == "synced"
     flashes = " · ".join(
-        (" + ".join(flash.lights) or "dark") + ("" if synced else f" {flash.duration_s * 1e3:.4g} ms")
+        (" + ".join(flash.lit) or "dark") + ("" if synced else f" {flash.duration_s * 1e3:.4g} ms")
         for flash in plan.flashes
     )
     readout = "not known" if camera.readout_s is None else f"{camera.readout_s * 1e3:.4g} ms"

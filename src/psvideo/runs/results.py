@@ -51,7 +51,7 @@ class OverTime:
 
     def check(self, plan: Plan) -> None:
         """Raise UsageError where a plan has no instant of its own for every light, and one is asked for."""
-        alone = all(sum(power > 0 for power in plan.flashes[slot].lights.values()) == 1 for slot in plan.lit_slots)
+        alone = all(len(plan.flashes[slot].lit) == 1 for slot in plan.lit_slots)
         if self.aligning.rate == "flash" and not (alone and len(plan.lit_slots) == len(plan.lights)):
             raise UsageError(
                 "--rate flash needs a plan in which every light flashes once a round, by itself; in this one lights "

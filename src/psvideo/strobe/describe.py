@@ -18,7 +18,7 @@ def describe_program(program: Program, caps: Capabilities) -> Iterator[str]:
     for number, flash in enumerate(program.played.flashes):
         slot = program.slots[program.of_flash[number]]
         bursts = f", bursts of {slot.period * tick_ms:.4g} ms" if slot.lit and slot.period < slot.duration else ""
-        powers = ", ".join(f"{name} at {power:.4g}" for name, power in flash.lights.items() if power > 0)
+        powers = ", ".join(f"{name} at {flash.lights[name]:.4g}" for name in flash.lit)
         what = powers or slot_label(flash)
         yield f"flash {number + 1}: {what}, {slot.duration * tick_ms:.6g} ms = {slot.duration} ticks{bursts}"
     yield f"dark time: {program.slots[0].dark * tick_ms:.6g} ms = {program.slots[0].dark} ticks"

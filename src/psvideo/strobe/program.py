@@ -160,7 +160,7 @@ def _make_slot(plan: Plan, number: int, dark: int, caps: Capabilities, lines: Ma
             f"{name} lasts {show_ticks(duration, caps)}, and the board's flashes {shortest} to "
             f"{show_ticks(caps.max_flash, caps)}"
         )
-    lit = {light: power for light, power in flash.lights.items() if power > 0}
+    lit = {light: flash.lights[light] for light in flash.lit}
     if not lit:
         return Slot(slot=0, duration=duration, dark=dark, period=duration)
     bursts = find_bursts(list(lit.values()), duration, caps)

@@ -73,7 +73,7 @@ def run_log(plan_path: Path, ready: Ready, program: Program, outcome: Outcome) -
         PlayedFlash(
             duration_ticks=slot.duration,
             period_ticks=slot.period,
-            lit_ticks={name: lit_ticks(slot, program.lines[name]) for name, power in flash.lights.items() if power > 0},
+            lit_ticks={name: lit_ticks(slot, program.lines[name]) for name in flash.lit},
         )
         for flash, slot in zip(program.played.flashes, (program.slots[n] for n in program.of_flash), strict=True)
     ]
@@ -166,8 +166,7 @@ def as_played(plan: Plan, plan_path: Path) -> AsPlayed:
 
 
 def _fits(plan: Plan, log: RunLog) -> bool:
-    lit = [{name for name, power in flash.lights.items() if power > 0} for flash in plan.flashes]
-    return lit == [set(flash.lit_ticks) for flash in log.flashes]
+    return [set(flash.lit) for flash in plan.flashes] == [set(flash.lit_ticks) for flash in log.flashes]
 
 
 def _played(plan: Plan, log: RunLog) -> Plan:

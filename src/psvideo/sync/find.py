@@ -138,7 +138,7 @@ def _first_complete_light(plan: Plan, rows: Profiles, beat: Beat) -> str:
     first_s = float(rows.frame_start_s[0] + rows.place.max() * beat.row_time_s)
     for slot, start_s in zip(train.slot, train.start_s, strict=True):
         if start_s >= first_s and not plan.flashes[slot].is_dark:
-            return "+".join(plan.flashes[slot].lights)
+            return "+".join(plan.flashes[slot].lit)
     return ""
 
 

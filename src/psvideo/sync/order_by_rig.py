@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from psvideo.model.camera import FloatArray
 from psvideo.model.light_field import Points, light_vectors
+from psvideo.model.marker import alike_turns, has_marker, turned_slot
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Light, Rig
 from psvideo.model.timing import Timing
@@ -66,16 +67,9 @@ class _Fit:
     left: float
 
 
-def alike_turns(plan: Plan) -> tuple[int, ...]:
-    """Return by how many flashes the cycle can be turned without a change in when light comes, 0 first."""
-    kinds = [(plan.flashes[slot].duration_s, plan.flashes[slot].is_dark) for slot in plan.cycle_slots]
-    return tuple(turn for turn in range(len(kinds)) if kinds[turn:] + kinds[:turn] == kinds)
-
-
 def turned(plan: Plan, timing: Timing, turn: int) -> Timing:
     """Return the timing with every flash named as the one ``turn`` places further on in the cycle."""
-    cycle = plan.cycle_slots
-    slots = {slot: cycle[(cycle.index(slot) + turn) % len(cycle)] for slot in cycle}
+    slots = {slot: turned_slot(plan, slot, turn) for slot in plan.cycle_slots}
     flashes = tuple(
         replace(flash, slot=slots[flash.slot], lights=plan.flashes[slots[flash.slot]].lights, plate=None)
         for flash in timing.flashes
@@ -89,7 +83,7 @@ def why_untold(plan: Plan, rig: Rig) -> str | None:
     Raises PsvideoError where the rig lacks a light of the plan.
     """
     lights = rig.select(plan.lights)
-    if len(plan.cycle_slots) != len(plan.flashes) or len(alike_turns(plan)) < 2:
+    if len(plan.cycle_slots) != len(plan.flashes) or has_marker(plan):
         return "the plan's cycle has a marker, and the picture does not show it clearly enough"
     if len(plan.lit_slots) < 4:
         return (
@@ -159,8 +153,8 @@ def _own_error_deg(lights: tuple[Light, ...]) -> float:
 
 def _named_after(plan: Plan, turn: int) -> list[int]:
     """Return for every lit slot which lit slot's light it shows after a turn."""
-    cycle, lit = plan.cycle_slots, plan.lit_slots
-    return [lit.index(cycle[(cycle.index(slot) + turn) % len(cycle)]) for slot in lit]
+    lit = plan.lit_slots
+    return [lit.index(turned_slot(plan, slot, turn)) for slot in lit]
 
 
 def _samples(pictures: list[Image]) -> _Samples:

@@ -5,11 +5,13 @@ several flashes hold the same lights at known powers, their brightnesses tell. A
 believed only where it beats each of them clearly, frame by frame (Vuong 1989).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from psvideo.model.camera import FloatArray
+from psvideo.model.marker import alike_turns, turned_slot
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.profiles import Profiles, brightnesses, unexplained
@@ -36,12 +38,10 @@ class Turns:
 
 def turns(plan: Plan, rows: Profiles, beat: Beat) -> Turns:
     """Return the turns of the cycle among which the picture does not decide."""
-    cycle = plan.cycle_slots
-    kinds = [(plan.flashes[slot].duration_s, plan.flashes[slot].is_dark) for slot in cycle]
-    twins = [turn for turn in range(len(cycle)) if kinds[turn:] + kinds[:turn] == kinds]
+    same = alike_turns(plan)
     part = _part(plan, rows)
-    best = _fitted(plan, part, beat, period=twins[1] if len(twins) > 1 else len(cycle))
-    alike = [turned(plan, one, turn) for one in best for turn in _told_by_power(plan, rows, one, twins)]
+    best = _fitted(plan, part, beat, period=same[1] if len(same) > 1 else len(plan.cycle_slots))
+    alike = [turned(plan, one, turn) for one in best for turn in _told_by_power(plan, rows, one, same)]
     names = {
         tuple(tuple(sorted(plan.flashes[s].lights.items())) for s in _seen_slots(plan, one, beat)) for one in alike
     }
@@ -100,21 +100,21 @@ def _beaten(gain: FloatArray) -> bool:
     return plainly or (total / error > SURE and total / len(gain) > 0.02)
 
 
-def _told_by_power(plan: Plan, rows: Profiles, beat: Beat, twins: list[int]) -> list[int]:
+def _told_by_power(plan: Plan, rows: Profiles, beat: Beat, same: Sequence[int]) -> Sequence[int]:
     """Return the turns that the slots' brightnesses allow: flashes of one light at known powers are proportional."""
     lit = plan.lit_slots
     duration_s = np.array([plan.flashes[slot].duration_s for slot in lit])
     mixing = plan.power * duration_s[:, None]
-    if len(twins) < 2 or np.linalg.matrix_rank(mixing) == len(lit):
-        return twins
+    if len(same) < 2 or np.linalg.matrix_rank(mixing) == len(lit):
+        return same
     light = brightnesses(plan, rows.one_window(), beat)[:, 1 : len(lit) + 1]
     leaving = np.eye(len(lit)) - mixing @ np.linalg.pinv(mixing)
     left = []
-    for turn in twins:
-        slots = [plan.cycle_slots[(plan.cycle_slots.index(slot) - turn) % len(plan.cycle_slots)] for slot in lit]
+    for turn in same:
+        slots = [turned_slot(plan, slot, -turn) for slot in lit]
         seen = light[:, [lit.index(slot) for slot in slots]]
         left.append(float(((seen @ leaving) ** 2).sum() / (seen**2).sum()))
     order = np.argsort(left)
     if left[order[0]] < MIXED_WELL**2 and left[order[1]] > MIXED_BADLY**2 * left[order[0]]:
-        return [twins[order[0]]]
-    return twins
+        return [same[order[0]]]
+    return same

@@ -172,7 +172,7 @@ class _Truth:
 
     def plate(self, flash: TrueFlash) -> Image | None:
         """Return the plate of a flash or a part of one, None for a dark slot; called once for each, in order."""
-        if not any(flash.lights.values()):
+        if flash.is_dark:
             return None
         view = self._stage.view(flash.middle_s)
         look = (flash.slot, *sorted(flash.lights.items()))

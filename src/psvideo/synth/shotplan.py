@@ -79,9 +79,8 @@ def reference_durations_s(plan: Plan) -> dict[str, float]:
     """Return the duration at which a light's intensity is meant: that of its first flash in the round."""
     found: dict[str, float] = {}
     for flash in plan.flashes:
-        for name, power in flash.lights.items():
-            if power > 0:
-                found.setdefault(name, flash.duration_s)
+        for name in flash.lit:
+            found.setdefault(name, flash.duration_s)
     return found
 
 

@@ -56,11 +56,10 @@ def write_timing(folder: Path, plan: Plan, flashes: tuple[TrueFlash, ...], plate
     """Write timing.json; ``plates`` names the file of each flash (by index) whose plate was written."""
     rows = []
     for flash in flashes:
-        lit = [name for name, power in flash.lights.items() if power > 0]
         row: dict[str, object] = {
             "index": flash.index,
             "slot": flash.slot,
-            "light": "+".join(lit) or None,
+            "light": "+".join(flash.lit) or None,
             "lights": dict(flash.lights),
             "start_s": flash.start_s,
             "duration_s": flash.duration_s,

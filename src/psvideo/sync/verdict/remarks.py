@@ -206,13 +206,13 @@ def remarks_on_lights(plan: Plan, found: Found, beat: Beat, *, named: bool) -> t
         return ()  # no flash takes light away: the names are wrong, and not the lights
     off = [slot for slot, one in zip(lit, level, strict=True) if one < UNFIRED * level.max()]
     if off:
-        dark = " and ".join(dict.fromkeys("+".join(plan.flashes[slot].lights) for slot in off))
+        dark = " and ".join(dict.fromkeys("+".join(plan.flashes[slot].lit) for slot in off))
         unless = "" if named else " If the order guessed here is not the true one, it is another light."
         return (
             f"{dark}: no light is seen from there, less than {100 * UNFIRED:.0f} % of the brightest. Check that it "
             f"fires, and that it reaches what the camera sees.{unless}",
         )
-    if len({frozenset(plan.flashes[slot].lights) for slot in lit}) < LEAST_LIGHTS:
+    if len({frozenset(plan.flashes[slot].lit) for slot in lit}) < LEAST_LIGHTS:
         return ()
     size = float(np.sqrt((light**2).mean()))
     apart = [float(np.sqrt(((light[:, a] - light[:, b]) ** 2).mean())) for a, b in combinations(range(len(lit)), 2)]

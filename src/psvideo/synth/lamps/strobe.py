@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import Camera, FloatArray
-from psvideo.model.plan import FlashTrain, Plan
+from psvideo.model.plan import FlashTrain, HasLights, Plan
 from psvideo.synth.lamps.emission import Bursts, Emission
 
 TAIL_LOST = 1e-3
@@ -45,7 +45,7 @@ class StrobeClock:
 
 
 @dataclass(frozen=True, kw_only=True)
-class TrueFlash:
+class TrueFlash(HasLights):
     """One flash as it happened: ``index`` from 0 for the clip's first, times on the camera's clock.
 
     ``complete`` tells that no light of it was lost before the clip's first frame, after its last, or in a dropped one.

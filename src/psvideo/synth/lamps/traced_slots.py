@@ -87,7 +87,7 @@ def _is_later(found_s: float, wanted_s: float) -> bool:
 
 
 def _other_lights(plan: Plan, slot: int, names: set[str]) -> str | None:
-    meant = {name for name, power in plan.flashes[slot].lights.items() if power > 0}
+    meant = set(plan.flashes[slot].lit)
     if names == meant:
         return None
     return f"lights {' and '.join(sorted(names))}, where the plan's round lights {' and '.join(sorted(meant))}"

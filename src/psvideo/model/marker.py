@@ -1,0 +1,41 @@
+"""The marker: what tells the flashes of a cycle apart by when light comes, whatever the picture shows.
+
+Timing sees of a flash how long it lasts and whether it is dark. A dark slot, a flash of another length, or rounds that
+skip their dark slots mark the cycle. Where turning the cycle by some flashes gives a cycle that looks the same, the
+lights' names are not in the timing: their powers, a rig's directions or a person must tell.
+"""
+
+from dataclasses import dataclass
+
+from psvideo.model.plan import Plan
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlotKind:
+    """What timing sees of a flash: its length on the strobe's clock, and whether it is a dark slot."""
+
+    duration_s: float
+    is_dark: bool
+
+
+def slot_kinds(plan: Plan) -> tuple[SlotKind, ...]:
+    """Return what timing sees of every flash of one cycle, in order."""
+    flashes = (plan.flashes[slot] for slot in plan.cycle_slots)
+    return tuple(SlotKind(duration_s=flash.duration_s, is_dark=flash.is_dark) for flash in flashes)
+
+
+def alike_turns(plan: Plan) -> tuple[int, ...]:
+    """Return by how many flashes the cycle can be turned without a change in when light comes, 0 first."""
+    kinds = slot_kinds(plan)
+    return tuple(turn for turn in range(len(kinds)) if kinds[turn:] + kinds[:turn] == kinds)
+
+
+def has_marker(plan: Plan) -> bool:
+    """True where no turn of the cycle looks like the cycle itself, so that timing alone tells the flashes apart."""
+    return len(alike_turns(plan)) == 1
+
+
+def turned_slot(plan: Plan, slot: int, turn: int) -> int:
+    """Return the slot that stands ``turn`` places further on in the cycle; negative turns go back."""
+    cycle = plan.cycle_slots
+    return cycle[(cycle.index(slot) + turn) % len(cycle)]
