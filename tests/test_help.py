@@ -148,7 +148,6 @@ def shoot(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert main(["synth", str(ROOT / "data_synth/sphere.toml"), "-o", str(folder / "clip"), "-q"]) == 0
     for name in ("plan.toml", "rig.toml"):
         (folder / name).write_bytes((folder / "clip" / name).read_bytes())
-    (folder / "data_synth").symlink_to(ROOT / "data_synth")
     return folder
 
 

@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import re
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 import pytest
+import setuptools
 import tomlkit
 
 from psvideo.cli.app import main
@@ -17,9 +19,10 @@ from psvideo.clip import open_clip, read_frames
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.plan_toml import read_plan
 from psvideo.formats.rig_toml import read_rig
-from psvideo.synth import builtin_scene, expose, read_scene, shoot
+from psvideo.synth import expose, read_scene, shoot
 from psvideo.synth.camera.curves import CURVES
 from psvideo.synth.scene import Scene
+from psvideo.synth.scenes import builtin_scene, builtin_scenes, scene_file
 from psvideo.synth.shotplan import true_clock, true_plan, true_rig
 from psvideo.synth.stage import set_stage
 
@@ -345,10 +348,39 @@ def test_shipped_scenes_are_sound(path):
     assert np.linalg.cond(directions) < 4
 
 
-def test_the_built_in_scene_is_the_shipped_one():
-    assert builtin_scene().resolve() == (ROOT / "data_synth" / "bust.toml").resolve()
-    with pytest.raises(PsvideoError, match="known are: bust"):
-        builtin_scene("bist")
+def test_the_shipped_scenes_are_found_by_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for path in SCENES:
+        assert scene_file(Path(path.stem)) == builtin_scene(path.stem)
+        assert builtin_scene(path.stem).read_bytes() == path.read_bytes()
+    assert set(builtin_scenes()) == {path.stem for path in SCENES} >= {"bust", "fan", "still_life", "sphere", "gloss"}
+    with pytest.raises(PsvideoError, match=r"bist: is neither a file nor .*those are bust, fan, gloss"):
+        scene_file(Path("bist"))
+
+
+def test_a_file_goes_before_a_shipped_scene_of_its_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("bust").write_text(SCENE)
+    assert scene_file(Path("bust")) == Path("bust")
+    assert scene_file(Path("other/bust")) == Path("other/bust"), "only a bare name is looked up"
+    assert scene_file(Path("bust.toml")) == Path("bust.toml")
+
+
+def test_a_built_package_holds_the_scenes_of_the_repository(tmp_path, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    ran = {}
+    monkeypatch.setattr(setuptools, "setup", lambda **given: ran.update(given))
+    runpy.run_path(str(ROOT / "setup.py"))
+    built = setuptools.Distribution(
+        {"script_name": "setup.py", "packages": ["psvideo"], "package_dir": {"": "src"}, **ran}
+    )
+    command = built.get_command_obj("build_py")
+    command.build_lib = str(tmp_path)
+    command.ensure_finalized()
+    command.run()
+    copies = {path.name: path.read_bytes() for path in (tmp_path / "psvideo" / "synth" / "scenes").iterdir()}
+    assert copies == {path.name: path.read_bytes() for path in SCENES}
+    assert {str(tmp_path / "psvideo" / "synth" / "scenes" / name) for name in copies} <= set(command.get_outputs())
 
 
 @pytest.mark.parametrize("name", sorted(CURVES))

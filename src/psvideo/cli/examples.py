@@ -188,10 +188,10 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("again, into another folder", "psvideo demo -o try2/ --force"),
     ),
     "synth": (
-        ("film a virtual bust; the truth lies beside the clip", "psvideo synth data_synth/bust.toml -o clip/"),
+        ("film a virtual bust; the truth lies beside the clip", "psvideo synth bust -o clip/"),
         (
             "lit by what an emulated board really did",
-            "psvideo synth data_synth/sphere.toml --trace edges.csv --line key=0 -o traced/",
+            "psvideo synth sphere --trace edges.csv --line key=0 -o traced/",
         ),
     ),
 }

@@ -19,7 +19,8 @@ from psvideo.pictures.shading import exposure_for, normal_colours, relit, srgb
 from psvideo.runs import Output, normals_run, read_lighting, timing_of
 from psvideo.runs.opening import open_take
 from psvideo.solve.instants import Instant
-from psvideo.synth.shoot import builtin_scene, shoot
+from psvideo.synth.scenes import builtin_scene
+from psvideo.synth.shoot import shoot
 
 SHOWN_FRAMES = slice(3, 7)
 RELIT_FROM: tuple[Vector, ...] = ((0.85, 0.2, 0.5), (-0.6, 0.75, 0.35))

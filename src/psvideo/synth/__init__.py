@@ -8,7 +8,8 @@ from psvideo.synth.camera.noise import Noise
 from psvideo.synth.camera.sensor import Flicker
 from psvideo.synth.lamps.strobe import StrobeClock, TrueFlash
 from psvideo.synth.scene import Scene, read_scene
-from psvideo.synth.shoot import Shot, builtin_scene, shoot
+from psvideo.synth.scenes import builtin_scene
+from psvideo.synth.shoot import Shot, shoot
 
 __all__ = [
     "Exposure",

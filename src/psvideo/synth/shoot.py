@@ -21,6 +21,7 @@ from psvideo.synth.camera.sensor import Flicker, Image, expose_frames
 from psvideo.synth.lamps.strobe import StrobeClock, TrueFlash, true_flashes
 from psvideo.synth.lamps.traced import TraceOptions, traced_light
 from psvideo.synth.scene import read_scene
+from psvideo.synth.scenes import scene_file
 from psvideo.synth.shotplan import claimed_plan, true_clock
 from psvideo.synth.stage import Stage, set_stage
 from psvideo.synth.subject.render import View
@@ -45,19 +46,10 @@ class Shot:
     warnings: tuple[str, ...]
 
 
-def builtin_scene(name: str = "bust") -> Path:
-    """Return the file of a scene that comes with the package."""
-    path = Path(__file__).parent / "scenes" / f"{name}.toml"
-    if not path.is_file():
-        names = sorted(file.stem for file in path.parent.glob("*.toml"))
-        raise PsvideoError(f"There is no built-in scene {name!r}; known are: {', '.join(names)}.")
-    return path
-
-
 def shoot(
     scene: Path, out: Path, *, force: bool = False, track: Track = iter, trace: TraceOptions | None = None
 ) -> Shot:
-    """Film a scene file and write the clip folder ``out``, whole or not at all.
+    """Film a scene, given as a file or by its name, and write the clip folder ``out``, whole or not at all.
 
     The folder holds frames/, plan.toml and rig.toml as a camera and its crew would leave them, and truth/ with what
     only the virtual shoot knows. ``track`` passes frame indices through, for showing progress; ``trace`` lets the
@@ -65,7 +57,8 @@ def shoot(
     ``out`` exists and ``force`` is not given, PsvideoError for a faulty scene or mesh or where writing fails.
     """
     _refuse_footage(out, force=force)
-    stage = set_stage(read_scene(scene), scene.parent)
+    file = scene_file(scene)
+    stage = set_stage(read_scene(file), file.parent)
     with whole_folder(out, mark="truth/scene.json", force=force) as folder, _nothing_left(folder, out):
         (folder / "frames").mkdir()
         return _film(stage, folder, out, track, trace)
