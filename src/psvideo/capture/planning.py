@@ -2,13 +2,13 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from psvideo.capture.cautions import Caution, request_cautions, shoot_cautions
 from psvideo.capture.request import ShootRequest
 from psvideo.capture.wish import LONG_MARKER, longest_flash
 from psvideo.errors import UsageError
-from psvideo.model.plan import UNKNOWN_CLOCK_PPM, Plan, PlannedFlash, default_dark_s
+from psvideo.model.plan import UNKNOWN_CLOCK_PPM, Plan, PlannedFlash, assemble_plan
 from psvideo.model.shoot_figures import ShootFigures, shoot_figures
 from psvideo.model.units import show_seconds
 
@@ -45,28 +45,25 @@ def make_plan(request: ShootRequest, flash_s: Mapping[str, float]) -> Plan:
 
     A long marker is the first light's flash; a dark slot ends the round and takes the shortest flash's duration.
     """
-    camera = request.camera
     lit = [_lit(request, name, flash_s[name], is_first=index == 0) for index, name in enumerate(request.lights)]
     dark = []
     if request.marker == "dark":
         dark_slot_s = request.dark_slot_s or min(flash.duration_s for flash in lit)
         dark = [PlannedFlash(lights={}, duration_s=dark_slot_s)]
     flashes = (*lit, *dark)
-    durations_s = [flash.duration_s for flash in flashes]
-    _refuse_overfull(request, max(durations_s))
-    dark_s = request.dark_s
-    if dark_s is None:
-        dark_s = default_dark_s(camera, durations_s, mode=request.mode, clock_tolerance_ppm=request.clock_tolerance_ppm)
-    _refuse_short_dark(request, dark_s)
-    round_s = sum(flash.duration_s + dark_s for flash in lit)
-    return Plan(
-        camera=camera,
+    _refuse_overfull(request, max(flash.duration_s for flash in flashes))
+    plan = assemble_plan(
+        camera=request.camera,
         flashes=flashes,
-        dark_s=dark_s,
+        dark_s=request.dark_s,
         mode=request.mode,
         clock_tolerance_ppm=request.clock_tolerance_ppm,
-        dark_every=(request.dark_every or max(1, math.ceil(DARK_SLOT_EVERY_S / round_s))) if dark else 1,
     )
+    _refuse_short_dark(request, plan.dark_s)
+    if not dark:
+        return plan
+    round_s = sum(flash.duration_s + plan.dark_s for flash in lit)
+    return replace(plan, dark_every=request.dark_every or max(1, math.ceil(DARK_SLOT_EVERY_S / round_s)))
 
 
 def _lit(request: ShootRequest, name: str, duration_s: float, *, is_first: bool) -> PlannedFlash:

@@ -7,7 +7,7 @@ from typing import Literal
 
 from psvideo.capture.cameras import HOW_TO_MEASURE, CameraMode, find_mode, find_model
 from psvideo.errors import UsageError
-from psvideo.model.camera import Camera, Encoding
+from psvideo.model.camera import Camera, Encoding, exposure_of
 from psvideo.model.plan import Mode
 from psvideo.model.units import show_rate, show_seconds
 
@@ -130,7 +130,7 @@ def _exposure_s(wish: CameraWish, fps: Fraction) -> float:
     shutter_deg = 360.0 if wish.shutter_deg is None else wish.shutter_deg
     if not 0 < shutter_deg <= 360:
         raise UsageError(f"--shutter {shutter_deg:g} is no shutter angle. Give more than 0 and at most 360 degrees.")
-    return shutter_deg / 360.0 * period_s
+    return exposure_of(fps, shutter_deg=shutter_deg)
 
 
 def _refuse_impossible_readout(camera: Camera) -> None:

@@ -1,5 +1,6 @@
 """plan.toml: the capture plan as a file (schema ``psvideo-plan/1``)."""
 
+from collections.abc import Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Literal, Self
@@ -9,8 +10,8 @@ from pydantic import Field, field_validator, model_validator
 
 from psvideo.errors import PsvideoError
 from psvideo.formats.contract import Contract, check_light_name, parse_toml, read_text
-from psvideo.model.camera import Camera, Encoding
-from psvideo.model.plan import Plan, PlannedFlash, default_dark_s
+from psvideo.model.camera import Camera, Encoding, exposure_of
+from psvideo.model.plan import Mode, Plan, PlannedFlash, assemble_plan
 
 SCHEMA = "psvideo-plan/1"
 CFA_PATTERNS = ("RGGB", "BGGR", "GRBG", "GBRG")
@@ -64,13 +65,31 @@ class _Flash(Contract):
         return lights
 
 
-class _Strobe(Contract):
-    mode: Literal["rolling", "half-rate", "synced"] = "rolling"
+class RoundTable(Contract):
+    """How the strobe plays its list of flashes: what a plan's and a scene's ``[strobe]`` have in common."""
+
+    mode: Mode = "rolling"
     dark_s: float | None = Field(default=None, ge=0)
     rise_s: float = Field(default=0.0, ge=0)
     fall_s: float = Field(default=0.0, ge=0)
     clock_tolerance_ppm: Annotated[float, Field(ge=0, le=10_000)] | Literal["unknown"] = 100.0
     dark_every: int = Field(default=1, ge=1)
+
+    def plan(self, camera: Camera, flashes: Sequence[PlannedFlash]) -> Plan:
+        """Return the plan that plays these flashes for a camera."""
+        return assemble_plan(
+            camera=camera,
+            flashes=flashes,
+            dark_s=self.dark_s,
+            mode=self.mode,
+            rise_s=self.rise_s,
+            fall_s=self.fall_s,
+            clock_tolerance_ppm=self.clock_tolerance_ppm,
+            dark_every=self.dark_every,
+        )
+
+
+class _Strobe(RoundTable):
     flash: list[_Flash] = Field(min_length=1)
 
 
@@ -121,33 +140,15 @@ def parse_plan(text: str, *, source: str = "plan") -> Plan:
     """Read a plan from TOML text; ``source`` is what messages call it."""
     file = parse_toml(text, _PlanFile, SCHEMA, source=source)
     camera = _camera(file.camera)
-    strobe = file.strobe
-    flashes = tuple(
+    flashes = [
         PlannedFlash(lights=dict(flash.lights), duration_s=flash.duration_s or camera.frame_period_s)
-        for flash in strobe.flash
-    )
-    tolerance = None if strobe.clock_tolerance_ppm == "unknown" else strobe.clock_tolerance_ppm
-    dark_s = strobe.dark_s
-    if dark_s is None:
-        durations_s = [flash.duration_s for flash in flashes]
-        dark_s = default_dark_s(camera, durations_s, mode=strobe.mode, clock_tolerance_ppm=tolerance)
-    return Plan(
-        camera=camera,
-        flashes=flashes,
-        dark_s=dark_s,
-        mode=strobe.mode,
-        rise_s=strobe.rise_s,
-        fall_s=strobe.fall_s,
-        clock_tolerance_ppm=tolerance,
-        dark_every=strobe.dark_every,
-    )
+        for flash in file.strobe.flash
+    ]
+    return file.strobe.plan(camera, flashes)
 
 
 def _camera(file: _Camera) -> Camera:
     fps = parse_fps(file.fps)
-    exposure_s = file.exposure_s
-    if exposure_s is None:
-        exposure_s = (file.shutter_deg or 360.0) / 360.0 * float(1 / fps)
     readout_s = None if file.readout_s == "unknown" else file.readout_s or 0.0
     encoding = Encoding(
         transfer=file.transfer, black_level=file.black_level, white_level=file.white_level, cfa=file.cfa
@@ -157,7 +158,7 @@ def _camera(file: _Camera) -> Camera:
         width_px=file.width_px,
         height_px=file.height_px,
         fps=fps,
-        exposure_s=exposure_s,
+        exposure_s=exposure_of(fps, shutter_deg=file.shutter_deg, exposure_s=file.exposure_s),
         readout_s=readout_s,
         encoding=encoding,
     )

@@ -26,6 +26,15 @@ class Encoding:
     cfa: str | None = None
 
 
+def exposure_of(fps: Fraction, *, shutter_deg: float | None = None, exposure_s: float | None = None) -> float:
+    """Return the exposure in seconds where a shutter angle or the exposure itself is given; else the whole period.
+
+    >>> exposure_of(Fraction(100), shutter_deg=180.0)
+    0.005
+    """
+    return exposure_s or (shutter_deg or 360.0) / 360.0 * float(1 / fps)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Camera:
     """One camera in one mode. ``readout_s`` is None where it is unknown, 0 for a global shutter, negative bottom-up."""

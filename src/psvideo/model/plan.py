@@ -139,3 +139,34 @@ def default_dark_s(
         return camera.exposure_s / (1.0 - tolerance)
     frames = 2 if mode == "half-rate" else 1
     return max(frames * period_s - max(durations_s), 0.0)
+
+
+def assemble_plan(
+    *,
+    camera: Camera,
+    flashes: Sequence[PlannedFlash],
+    dark_s: float | None,
+    mode: Mode = "rolling",
+    rise_s: float = 0.0,
+    fall_s: float = 0.0,
+    clock_tolerance_ppm: float | Literal["unknown"] | None = 100.0,
+    dark_every: int = 1,
+) -> Plan:
+    """Return the plan of these flashes; where ``dark_s`` is None, with the dark time that its mode needs.
+
+    ``clock_tolerance_ppm`` is ``"unknown"`` or None where it is unknown.
+    """
+    tolerance_ppm = None if clock_tolerance_ppm == "unknown" else clock_tolerance_ppm
+    if dark_s is None:
+        durations_s = [flash.duration_s for flash in flashes]
+        dark_s = default_dark_s(camera, durations_s, mode=mode, clock_tolerance_ppm=tolerance_ppm)
+    return Plan(
+        camera=camera,
+        flashes=tuple(flashes),
+        dark_s=dark_s,
+        mode=mode,
+        rise_s=rise_s,
+        fall_s=fall_s,
+        clock_tolerance_ppm=tolerance_ppm,
+        dark_every=dark_every,
+    )

@@ -12,7 +12,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from psvideo.formats.contract import Contract, read_toml
-from psvideo.formats.plan_toml import parse_fps
+from psvideo.formats.plan_toml import RoundTable, parse_fps
 
 SCHEMA = "psvideo-scene/1"
 
@@ -89,18 +89,12 @@ class FlashTable(Contract):
     duration_s: Positive
 
 
-class StrobeTable(Contract):
+class StrobeTable(RoundTable):
     """The strobe: the plan that it plays, and how its clock truly runs (which the plan does not tell)."""
 
-    mode: Literal["rolling", "half-rate", "synced"] = "rolling"
     flash_s: Positive = 0.0008
     marker: bool = True
     flash: list[FlashTable] = Field(default_factory=list)
-    dark_s: Strength | None = None
-    dark_every: int = Field(default=1, ge=1)
-    rise_s: Strength = 0.0
-    fall_s: Strength = 0.0
-    clock_tolerance_ppm: Annotated[float, Field(ge=0, le=10_000)] | Literal["unknown"] = 100.0
     phase_s: float | None = None
     clock_offset_ppm: Annotated[float, Field(ge=-50_000, le=50_000)] = 0.0
     drift_ppm_per_s: float = 0.0

@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 
 from psvideo.formats.plan_toml import parse_fps
-from psvideo.model.camera import Camera, Encoding
-from psvideo.model.plan import Plan, PlannedFlash, default_dark_s
+from psvideo.model.camera import Camera, Encoding, exposure_of
+from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.model.rig import Light, Rig, Vector
 from psvideo.synth.camera.encode import codes_of
 from psvideo.synth.lamps.strobe import StrobeClock
@@ -15,8 +15,6 @@ from psvideo.synth.scene import CameraTable, Kind, LightTable, Scene
 
 def camera_of(table: CameraTable, kind: Kind) -> Camera:
     """Return the camera; EXR and DNG files carry their levels themselves, and DNG its mosaic."""
-    period_s = float(1 / table.rate)
-    exposure_s = table.exposure_s or period_s * (table.shutter_deg or 360.0) / 360.0
     scale = codes_of(table, kind)
     told = Encoding(transfer=table.transfer, black_level=scale.black, white_level=scale.white, cfa=table.cfa)
     encoding = Encoding(transfer=table.transfer, cfa=table.cfa if kind == "exr" else None)
@@ -25,7 +23,7 @@ def camera_of(table: CameraTable, kind: Kind) -> Camera:
         width_px=table.width_px,
         height_px=table.height_px,
         fps=table.rate,
-        exposure_s=exposure_s,
+        exposure_s=exposure_of(table.rate, shutter_deg=table.shutter_deg, exposure_s=table.exposure_s),
         readout_s=table.readout_s,
         encoding=encoding if kind in ("exr", "dng") else told,
     )
@@ -33,25 +31,8 @@ def camera_of(table: CameraTable, kind: Kind) -> Camera:
 
 def true_plan(scene: Scene) -> Plan:
     """Return the plan as it is really played, with the camera as it really is."""
-    strobe = scene.strobe
-    camera = camera_of(scene.camera, scene.output.kind)
-    listed = tuple(PlannedFlash(lights=dict(f.lights), duration_s=f.duration_s) for f in strobe.flash)
-    flashes = listed or _one_flash_per_light(scene)
-    tolerance = None if strobe.clock_tolerance_ppm == "unknown" else float(strobe.clock_tolerance_ppm)
-    dark_s = strobe.dark_s
-    if dark_s is None:
-        durations_s = [flash.duration_s for flash in flashes]
-        dark_s = default_dark_s(camera, durations_s, mode=strobe.mode, clock_tolerance_ppm=tolerance)
-    return Plan(
-        camera=camera,
-        flashes=flashes,
-        dark_s=dark_s,
-        mode=strobe.mode,
-        rise_s=strobe.rise_s,
-        fall_s=strobe.fall_s,
-        clock_tolerance_ppm=tolerance,
-        dark_every=strobe.dark_every,
-    )
+    listed = tuple(PlannedFlash(lights=dict(f.lights), duration_s=f.duration_s) for f in scene.strobe.flash)
+    return scene.strobe.plan(camera_of(scene.camera, scene.output.kind), listed or _one_flash_per_light(scene))
 
 
 def _one_flash_per_light(scene: Scene) -> tuple[PlannedFlash, ...]:
