@@ -47,7 +47,7 @@ from fractions import Fraction
 from functools import partial
 from pathlib import Path
 import OpenEXR
-from psvideo.export.exr import write_exr
+from psvideo.formats.exr_files import write_exr
 from psvideo.export.writer import writing
 sample, out, count = Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
 planes = {}

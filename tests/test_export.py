@@ -260,7 +260,7 @@ FULL_DISK = """
 import resource, sys, numpy as np
 from pathlib import Path
 from psvideo.errors import PsvideoError
-from psvideo.export.exr import write_exr
+from psvideo.formats.exr_files import write_exr
 resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
 try:
     write_exr(Path(sys.argv[1]), {"Y": np.random.default_rng(0).random((200, 200)).astype(np.float32)})
