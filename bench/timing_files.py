@@ -15,18 +15,30 @@ from psvideo.synth.camera.encode import Codes
 from psvideo.synth.camera.frames import write_frame
 from psvideo.synth.scene import CameraTable
 
-QUALITY = "18"
+QUALITY = 18
 """Constant rate factor of H.264: about what a camera's best setting gives."""
 BLACK_12_BIT = 256
 
 
 def as_h264(folder: Path, plan: Plan, frames: np.ndarray) -> list[Frame]:
     """An 8-bit sRGB movie, 4:2:0 in video range."""
+    write_h264(folder / "clip.mp4", plan, frames)
+    return _read(folder / "clip.mp4", folder, plan)
+
+
+def write_h264(
+    path: Path, plan: Plan, frames: np.ndarray, *, crf: int = QUALITY, preset: str = "medium", threads: int = 1
+) -> None:
+    """Write grey frames (frame, row, col) in linear light as 8-bit sRGB, 4:2:0, BT.709, video range.
+
+    With one thread the same frames give the same bytes; with a number that x264 chooses they do not.
+    """
     signal = CURVES["srgb"].encode(np.clip(frames, 0, 1))
     luma = np.round(16 + 219 * signal).astype(np.uint8)
     rows, cols = luma.shape[1:]
-    with av.open(str(folder / "clip.mp4"), "w") as container:
-        stream: Any = container.add_stream("libx264", rate=plan.camera.fps, options={"crf": QUALITY})
+    options = {"crf": str(crf), "preset": preset, "threads": str(threads)}
+    with av.open(str(path), "w") as container:
+        stream: Any = container.add_stream("libx264", rate=plan.camera.fps, options=options)
         stream.width, stream.height, stream.pix_fmt = cols, rows, "yuv420p"
         stream.codec_context.colorspace, stream.codec_context.color_range = 1, 1  # BT.709, video range
         stream.codec_context.time_base = 1 / plan.camera.fps
@@ -37,7 +49,6 @@ def as_h264(folder: Path, plan: Plan, frames: np.ndarray) -> list[Frame]:
             frame.pts, frame.time_base, frame.colorspace, frame.color_range = number, 1 / plan.camera.fps, 1, 1
             container.mux(stream.encode(frame))
         container.mux(stream.encode(None))
-    return _read(folder / "clip.mp4", folder, plan)
 
 
 def as_slog3(folder: Path, plan: Plan, frames: np.ndarray) -> list[Frame]:

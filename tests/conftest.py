@@ -1,12 +1,17 @@
-"""What several tests share: where the real data lie, and small plans to try things on."""
+"""What several tests share: where the real data lie, small plans to try things on, a browser for the few that need one.
 
+Nothing here imports Playwright: tests that open no browser run without it.
+"""
+
+import shutil
 import subprocess
 from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
-from playwright.sync_api import Playwright, sync_playwright
+from hypothesis import HealthCheck, settings
 
 from psvideo.model.camera import Camera
 from psvideo.model.plan import Plan, PlannedFlash, default_dark_s
@@ -15,6 +20,15 @@ from psvideo.strobe.link.messages import Arm, Slot, Steps, WiringName
 from psvideo.strobe.link.protocol import format_request
 from psvideo.strobe.stand_ins.toolchain import AVR_BOARDS, AvrBoard, build
 
+if TYPE_CHECKING:
+    from playwright.sync_api import Playwright
+
+settings.register_profile(
+    "suite", derandomize=True, deadline=None, database=None, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.load_profile("suite")
+"""The same examples in every run, however busy the machine is."""
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
 
@@ -27,10 +41,23 @@ def shared_data() -> Path:
 
 
 @pytest.fixture(scope="session")
-def playwright() -> Iterator[Playwright]:
-    """What drives browsers; a process can start it once only."""
+def playwright() -> "Iterator[Playwright]":
+    """What drives browsers; a process can start it once only. Tests fail, and say so, where it is not installed."""
+    try:
+        from playwright.sync_api import sync_playwright
+    except ModuleNotFoundError:
+        pytest.fail("this test needs Playwright: python -m pip install -e '.[test]' installs it, as make test does")
     with sync_playwright() as started:
         yield started
+
+
+@pytest.fixture(scope="session")
+def chromium() -> str:
+    """The path of the system's Chromium. Tests fail, and say so, where there is none."""
+    program = next((found for name in BROWSERS if (found := shutil.which(name))), None)
+    if program is None:
+        pytest.fail("this test needs a Chromium browser: Debian's package chromium (tests/install.sh installs it)")
+    return program
 
 
 @pytest.fixture(scope="session")

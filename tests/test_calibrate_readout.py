@@ -339,7 +339,7 @@ def test_single_files_and_a_movie_are_measured_too(
 ) -> None:
     movie = tmp_path / "led.mp4"
     with av.open(str(movie), "w") as container:
-        stream: Any = container.add_stream("mpeg4", rate=60)
+        stream: Any = container.add_stream("mpeg4", rate=60, options={"threads": "1"})
         stream.width, stream.height, stream.pix_fmt, stream.bit_rate = 64, 320, "yuv420p", 4_000_000
         for file in sorted(led_folder.iterdir()):
             frame = av.VideoFrame.from_ndarray(imagecodecs.png_decode(file.read_bytes()), format="rgb24")

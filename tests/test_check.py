@@ -170,7 +170,7 @@ def write_movie(path: Path, frames: list[np.ndarray]) -> None:
     import av
 
     with av.open(str(path), "w") as container:
-        stream = container.add_stream("ffv1", rate=100)
+        stream = container.add_stream("ffv1", rate=100, options={"threads": "1"})
         stream.width, stream.height, stream.pix_fmt = frames[0].shape[1], frames[0].shape[0], "gbrp16le"
         for frame in frames:
             shown = av.VideoFrame.from_ndarray(np.ascontiguousarray(frame[..., ::-1]), format="rgb48le")

@@ -177,14 +177,10 @@ VIDEO = """async ([data, at]) => {
 
 
 @pytest.fixture(scope="module")
-def page(playwright: Any) -> Iterator[Any]:
+def page(playwright: Any, chromium: str) -> Iterator[Any]:
     """A page in a real browser."""
-    programs = map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))
-    program = next(filter(None, programs), None)
-    if program is None:
-        pytest.skip("needs a Chromium browser: tests/install.sh installs it")
     words = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-    browser = playwright.chromium.launch(executable_path=program, args=words)
+    browser = playwright.chromium.launch(executable_path=chromium, args=words)
     yield browser.new_page()
     browser.close()
 

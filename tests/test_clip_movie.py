@@ -60,7 +60,7 @@ def write_movie(
 ) -> None:
     frames = list(frames)
     with av.open(str(path), "w", options={"movflags": movflags} if movflags else {}) as container:
-        stream: Any = container.add_stream(codec, rate=RATE, options=options or {})
+        stream: Any = container.add_stream(codec, rate=RATE, options={"threads": "1"} | (options or {}))
         stream.width, stream.height, stream.pix_fmt = frames[0].width, frames[0].height, frames[0].format.name
         stream.codec_context.colorspace, stream.codec_context.color_range = matrix, color_range
         stream.codec_context.time_base = 1 / RATE
@@ -233,7 +233,7 @@ def test_frames_that_an_edit_list_hides_are_frames(
 ) -> None:
     """Frames before time zero are hidden by an edit list, and players begin at the fifth; the camera did not."""
     with av.open(str(tmp_path / "x.mp4"), "w", options={"avoid_negative_ts": "disabled"}) as container:
-        stream: Any = container.add_stream("libx264", rate=RATE, options={"bf": reordered, "qp": "0"})
+        stream: Any = container.add_stream("libx264", rate=RATE, options={"bf": reordered, "qp": "0", "threads": "1"})
         stream.width, stream.height, stream.pix_fmt = 48, 32, "yuv420p"
         stream.codec_context.time_base = 1 / RATE
         for place, frame in enumerate(grey_ramp(12)):
@@ -247,7 +247,7 @@ def test_frames_that_an_edit_list_hides_are_frames(
 
 def test_uneven_timestamps_are_refused(tmp_path: Path, plan_for: Callable[..., Path]) -> None:
     with av.open(str(tmp_path / "x.mp4"), "w") as container:
-        stream: Any = container.add_stream("libx264", rate=120)
+        stream: Any = container.add_stream("libx264", rate=120, options={"threads": "1"})
         stream.width, stream.height, stream.pix_fmt = 48, 32, "yuv420p"
         stream.codec_context.time_base = Fraction(1, 1200)
         for place, frame in enumerate(grey_ramp(12)):

@@ -1,20 +1,23 @@
 """The page in a real browser: light is right to a thousandth, controls do what they say, no other host is asked."""
 
-import shutil
+from __future__ import annotations
+
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import page_folder as small
 import pytest
-from playwright.sync_api import Browser, Page, Playwright
 
 from psvideo.page import page_server, show_of, write_page
 from psvideo.page.serving import PageServer
 
-BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page, Playwright
+
 ALONE = [
     "--no-sandbox",
     "--disable-quic",
@@ -36,11 +39,8 @@ ORANGE = np.array([1.0, ((0x80 / 255 + 0.055) / 1.055) ** 2.4, 0.0])
 
 
 @pytest.fixture(scope="session")
-def browser(playwright: Playwright) -> Iterator[Browser]:
-    program = next((found for name in BROWSERS if (found := shutil.which(name))), None)
-    if program is None:
-        pytest.fail("these tests need a Chromium browser: Debian's package chromium (tests/install.sh installs it)")
-    started = playwright.chromium.launch(executable_path=program, headless=True, args=ALONE)
+def browser(playwright: Playwright, chromium: str) -> Iterator[Browser]:
+    started = playwright.chromium.launch(executable_path=chromium, headless=True, args=ALONE)
     yield started
     started.close()
 

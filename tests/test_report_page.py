@@ -1,13 +1,18 @@
 """The report as a browser shows it: whole at laptop width, in light and dark, without a request or a complaint."""
 
+from __future__ import annotations
+
 import shutil
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import cv2
 import pytest
-from playwright.sync_api import Playwright
 
 from psvideo.cli.app import main
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Playwright
 
 ROOT = Path(__file__).resolve().parents[1]
 PICTURE = ROOT / "docs" / "pictures" / "report.png"
@@ -37,13 +42,10 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_the_page_is_whole_on_a_laptop_and_asks_for_nothing(
-    report: Path, tmp_path: Path, scheme: str, playwright: Playwright
+    report: Path, tmp_path: Path, scheme: str, playwright: Playwright, chromium: str
 ) -> None:
-    program = next((found for name in ("chromium", "google-chrome") if (found := shutil.which(name))), None)
-    if program is None:
-        pytest.fail("this test needs a Chromium browser: Debian's package chromium (tests/install.sh installs it)")
     said: list[str] = []
-    browser = playwright.chromium.launch(executable_path=program, headless=True, args=ALONE)
+    browser = playwright.chromium.launch(executable_path=chromium, headless=True, args=ALONE)
     page = browser.new_context(viewport=LAPTOP, color_scheme=scheme).new_page()  # type: ignore[arg-type]
     page.on("console", lambda message: said.append(message.text))
     page.on("request", lambda one: said.append(one.url) if not one.url.startswith(("file:", "data:")) else None)

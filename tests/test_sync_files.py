@@ -3,11 +3,10 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-import av
 import numpy as np
 import pytest
+from bench.timing_files import write_h264
 
 from psvideo.formats.plan_toml import format_plan
 from psvideo.model.camera import Encoding
@@ -36,22 +35,6 @@ def shoot(
     scene = {slot: (mosaic * (0.1 + 0.5 * rng.random(shape))).astype(np.float32) for slot in plan.lit_slots}
     clock = StrobeClock(phase_s=0.0123, offset_ppm=ppm)
     return expose(scene, plan, frames=frames, clock=clock, ambient=ambient, noise=Noise(full_well_e=20_000, read_e=8))
-
-
-def write_h264(path: Path, plan: Plan, frames: np.ndarray) -> None:
-    """Write grey frames as 8-bit sRGB, 4:2:0, BT.709, video range."""
-    rows, cols = frames.shape[1:]
-    luma = np.round(16 + 219 * CURVES["srgb"].encode(np.clip(frames, 0, 1))).astype(np.uint8)
-    with av.open(str(path), "w") as container:
-        stream: Any = container.add_stream("libx264", rate=plan.camera.fps, options={"crf": "18"})
-        stream.width, stream.height, stream.pix_fmt = cols, rows, "yuv420p"
-        stream.codec_context.colorspace, stream.codec_context.color_range = 1, 1
-        for number, picture in enumerate(luma):
-            planes = np.concatenate([picture, np.full((rows // 2, cols), 128, np.uint8)])
-            frame = av.VideoFrame.from_ndarray(planes, "yuv420p")
-            frame.pts, frame.time_base, frame.colorspace, frame.color_range = number, 1 / plan.camera.fps, 1, 1
-            container.mux(stream.encode(frame))
-        container.mux(stream.encode(None))
 
 
 def timing_through(path: Path, plan: Plan) -> Timing:

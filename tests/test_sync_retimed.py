@@ -197,7 +197,7 @@ def test_repeats_survive_h264(plan: Plan, tmp_path: Path) -> None:
     frames = shot_of(wide, int(shown.max()) + 1).frames[shown]
     path = tmp_path / "movie.mp4"
     with av.open(str(path), "w") as movie:
-        stream = movie.add_stream("libx264", rate=60, options={"crf": "23"})
+        stream = movie.add_stream("libx264", rate=60, options={"crf": "23", "threads": "1"})
         stream.width, stream.height, stream.pix_fmt = 192, 160, "yuv420p"
         for frame in frames:
             grey = np.repeat(np.clip(255 * frame, 0, 255).astype(np.uint8)[:, :, None], 3, axis=2)
