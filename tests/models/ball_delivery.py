@@ -9,6 +9,7 @@ import numpy as np
 from psvideo.export.results import Delivery, write_surface
 from psvideo.export.space import Space
 from psvideo.export.tags import Tags
+from psvideo.model.quantities import Aov
 from psvideo.model.surface import Surface
 from psvideo.solve.depth import Depth, View
 
@@ -28,7 +29,7 @@ def ball(number: int) -> tuple[np.ndarray, np.ndarray]:
     return (np.stack([x, y, z], axis=-1) * inside[..., None]).astype(np.float32), inside
 
 
-def deliver(folder: Path, space: Space, *, aovs: tuple[str, ...] = ("residual", "depth", "position", "beauty")) -> Path:
+def deliver(folder: Path, space: Space, *, aovs: tuple[Aov, ...] = ("residual", "depth", "position", "beauty")) -> Path:
     """Write the ball's sequence with everything that a run can write of an instant."""
     delivery = Delivery(space=space, png16=True, multipart=True, aovs=aovs)
     for number in NUMBERS:

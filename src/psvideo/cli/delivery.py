@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from psvideo.cli.delivery_options import (
-    Aov,
     CameraTime,
     CodecName,
     Encoding,
@@ -19,6 +18,7 @@ from psvideo.errors import UsageError
 from psvideo.export.programs import NO_PRESET, PRESETS, Preset
 from psvideo.export.results import Delivery, Preview, Program
 from psvideo.export.space import choose_space
+from psvideo.model.quantities import AOVS, Aov
 from psvideo.plates.beauty import parse_mix
 
 
@@ -56,9 +56,8 @@ def delivery_of(asked: Asked) -> tuple[Delivery, tuple[str, ...]]:
     y = asked.y.value if asked.y else preset.y
     previews: tuple[Preview, ...] = tuple(dict.fromkeys(name.value for name in asked.previews))
     mix = parse_mix(asked.weights, with_ambient=asked.with_ambient)
-    given = [name.value for name in asked.aovs]
-    beauty = ("beauty",) if "beauty" in previews else ()
-    aovs = tuple(dict.fromkeys((*given, *preset.aovs, *beauty)))
+    wanted = {*asked.aovs, *preset.aovs, *(["beauty"] if "beauty" in previews else [])}
+    aovs = tuple(name for name in AOVS if name in wanted)
     if mix.weights and "beauty" not in aovs:
         raise UsageError(
             "--with-ambient and --weight: belong to the beauty plate. Add --aov beauty, or leave them out."

@@ -2,9 +2,16 @@
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from psvideo.model.quantities import AOVS, Aov
+
+if TYPE_CHECKING:
+    AovName = Aov
+else:  # typer takes no lists of Literals
+    AovName = StrEnum("AovName", {name: name for name in AOVS})
 
 
 class SpaceName(StrEnum):
@@ -28,16 +35,6 @@ class CameraTime(StrEnum):
     frames = "frames"
     numbers = "numbers"
     seconds = "seconds"
-
-
-class Aov(StrEnum):
-    """What may be written besides."""
-
-    residual = "residual"
-    error = "error"
-    depth = "depth"
-    position = "position"
-    beauty = "beauty"
 
 
 class MeshKind(StrEnum):
@@ -108,7 +105,9 @@ CameraTimeOption = Annotated[
 ]
 YOption = Annotated[YDirection | None, typer.Option("--y", help="up as in OpenGL (the default), down as in DirectX.")]
 FloatOption = Annotated[bool, typer.Option("--float", help="Store normals as 32-bit floats.")]
-AovOption = Annotated[list[Aov] | None, typer.Option("--aov", help="Write this besides; may be given several times.")]
+AovOption = Annotated[
+    list[AovName] | None, typer.Option("--aov", help="Write this besides; may be given several times.")
+]
 MeshOption = Annotated[
     list[MeshKind] | None,
     typer.Option("--mesh", help="Write meshes besides: ply, one per instant; usd, one animated file."),

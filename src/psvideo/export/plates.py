@@ -7,8 +7,11 @@ from numpy.typing import NDArray
 
 from psvideo.export.tags import Tags
 from psvideo.formats.exr_files import write_exr
+from psvideo.model.quantities import QUANTITIES
 from psvideo.plates.sequence import LightPlate
 from psvideo.plates.split import Plate
+
+PLATE = QUANTITIES["plate"]
 
 
 def plate_name(clip: str, light: str, number: int) -> str:
@@ -27,7 +30,7 @@ def write_plate(folder: Path, clip: str, plate: LightPlate, tags: Tags) -> None:
     write_exr(
         path,
         channels,
-        attributes=tags.attributes(time_s=plate.time_s, data=False),
+        attributes=tags.attributes(time_s=plate.time_s, data=not PLATE.colour),
         fps=tags.fps,
         time_code=tags.time_code(plate.time_s),
     )
@@ -37,7 +40,7 @@ def write_flash(folder: Path, clip: str, plate: Plate, tags: Tags) -> None:
     """Write what one flash showed by itself, whatever lights it held: ``flashes/<clip>_flash.<index>.exr``."""
     path = folder / "flashes" / f"{clip}_flash.{plate.flash.index:04d}.exr"
     lights = " ".join(f"{name}={power:g}" for name, power in plate.flash.lights.items()) or "dark"
-    attributes = tags.attributes(time_s=plate.time_s, data=False) | {"psvideo:lights": lights}
+    attributes = tags.attributes(time_s=plate.time_s, data=not PLATE.colour) | {"psvideo:lights": lights}
     write_exr(
         path,
         _with_validity(plate.image, np.broadcast_to(plate.seen[:, None], plate.image.shape[:2])),
@@ -48,14 +51,14 @@ def write_flash(folder: Path, clip: str, plate: Plate, tags: Tags) -> None:
 
 
 def _with_validity(image: NDArray[np.floating], seen: NDArray[np.bool_]) -> dict[str, NDArray[np.floating]]:
-    channels = image_channels(image)
+    channels = _channels(image)
     if not seen.all():
         channels["valid"] = seen.astype(np.float32)
     return channels
 
 
-def image_channels(image: NDArray[np.floating]) -> dict[str, NDArray[np.floating]]:
-    """Return a picture's channels by their names in a file: R, G, B, or Y for grey."""
+def _channels(image: NDArray[np.floating]) -> dict[str, NDArray[np.floating]]:
+    """Return a plate's channels by their names in a file: one for a grey camera's."""
     if image.ndim == 2:
         return {"Y": image}
-    return {name: image[..., channel] for channel, name in enumerate("RGB")}
+    return {name: image[..., place] for place, name in enumerate(PLATE.channels)}

@@ -10,6 +10,7 @@ from fractions import Fraction
 
 from psvideo.export.results import Delivery, Program, result_name
 from psvideo.export.space import SpaceName, YDirection
+from psvideo.model.quantities import Aov
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,7 +22,7 @@ class Preset:
     reasons: dict[str, str]
     png16: bool = False
     multipart: bool = False
-    aovs: tuple[str, ...] = ()
+    aovs: tuple[Aov, ...] = ()
 
 
 NO_PRESET = Preset(space="camera", y="up", reasons={})

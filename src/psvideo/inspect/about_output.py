@@ -8,8 +8,7 @@ from psvideo.clip.folder import number_of
 from psvideo.errors import PsvideoError
 from psvideo.formats.timing_json import read_timing
 from psvideo.inspect.findings import Description, Finding, caught, fault, ok, warn
-
-RESULTS = ("normals", "albedo", "valid")
+from psvideo.model.quantities import ALWAYS
 
 
 def is_plates(folder: Path) -> bool:
@@ -53,7 +52,7 @@ def _findings(folder: Path, sequences: dict[str, list[Path]], kind: str) -> Iter
 
 def _results_go_together(sequences: dict[str, list[Path]]) -> Iterator[Finding]:
     numbers = {name: {number_of(file) for file in files} for name, files in sequences.items()}
-    for name in RESULTS:
+    for name in ALWAYS:
         if name not in numbers:
             yield warn(f"there is no {name}/ beside normals/")
         elif numbers[name] != numbers["normals"]:

@@ -12,22 +12,12 @@ from psvideo.clip.folder import number_of
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.timing_json import read_timing, timing_record
 from psvideo.inspect.about_output import is_plates, is_results
+from psvideo.model.quantities import QUANTITIES, Quantity
 from psvideo.page.footage import show_of_clip, with_clip
 from psvideo.page.picture import Look, Picture, shown
-from psvideo.page.show import Kind, Sequence, Show
+from psvideo.page.show import Sequence, Show
 
-RESULTS: Mapping[str, tuple[str, Kind, str]] = {
-    "normals": ("Normals", "normals", ""),
-    "albedo": ("Albedo", "light", ""),
-    "valid": ("Validity", "mask", ""),
-    "depth": ("Depth", "heat", ""),
-    "residual": ("Residual", "heat", ""),
-    "error": ("Predicted error", "heat", "°"),
-    "position": ("Position", "position", ""),
-}
-"""What ``normals`` writes: label, kind and unit by the folder's name, in the order in which they are listed."""
-FULL = ("depth", "position")
-"""What needs more digits than halves have."""
+PLATE, AMBIENT = QUANTITIES["plate"], QUANTITIES["ambient"]
 
 
 def show_of(path: Path, *, clip: Path | None = None, plan: Path | None = None) -> Show:
@@ -72,9 +62,9 @@ def _with_clip_beside(show: Show, path: Path) -> Show:
 
 
 def _results(path: Path) -> Show:
-    known = [name for name in RESULTS if _files(path / name)]
-    sequences = [_result(path / name, *RESULTS[name]) for name in known]
-    width_px, height_px, fps = _look(path / known[0])
+    known = [row for row in QUANTITIES.values() if row.written != "plates" and _files(path / row.name)]
+    sequences = [_sequence(path / row.name, row) for row in known]
+    width_px, height_px, fps = _look(path / known[0].name)
     report = _report(path / "report.json")
     return Show(
         name=path.resolve().name if not report else str(report.get("clip", path.name)),
@@ -92,9 +82,9 @@ def _results(path: Path) -> Show:
 
 def _plates(path: Path) -> Show:
     folders = sorted(entry for entry in path.iterdir() if entry.is_dir() and _files(entry))
-    folders.sort(key=lambda folder: folder.name == "ambient")
+    folders.sort(key=lambda folder: folder.name == AMBIENT.name)
     sequences = [
-        replace(_result(folder, folder.name, "light", ""), group="Plates", id=f"plate-{place}", family="camera")
+        replace(_sequence(folder, PLATE), label=folder.name, group="Plates", id=f"plate-{place}", family="camera")
         for place, folder in enumerate(folders)
         if folder.name != "flashes"
     ]
@@ -110,7 +100,7 @@ def _plates(path: Path) -> Show:
     )
 
 
-def _result(folder: Path, label: str, kind: Kind, unit: str) -> Sequence:
+def _sequence(folder: Path, quantity: Quantity) -> Sequence:
     files = _files(folder)
     head = _first_header(files)
     rate = float(Fraction(str(head.get("framesPerSecond", "24"))))
@@ -118,22 +108,23 @@ def _result(folder: Path, label: str, kind: Kind, unit: str) -> Sequence:
     first_s = float(head.get("psvideo:time_s") or 0.0)
     return Sequence(
         id=folder.name,
-        label=label,
-        kind=kind,
+        label=quantity.label,
+        kind=quantity.shown,
         group="Results",
         timeline="rounds",
         numbers=numbers,
         times_s=tuple(first_s + (number - numbers[0]) / rate for number in numbers),
-        read=partial(_read, files, kind, folder.name in FULL),
-        unit=unit,
+        read=partial(_read, files, quantity),
+        unit=quantity.unit,
+        from_zero=quantity.from_zero,
         y=str(head.get("psvideo:y", "up")),
         space=str(head.get("psvideo:space", "camera")),
     )
 
 
-def _read(files: Mapping[int, Path], kind: Kind, full: bool, number: int, look: Look) -> Picture:
+def _read(files: Mapping[int, Path], quantity: Quantity, number: int, look: Look) -> Picture:
     found = stored(files[number])
-    pixels = shown(found.planes, look, directions=kind == "normals", full=full)
+    pixels = shown(found.planes, look, directions=quantity.shown == "normals", full=quantity.digits == "float")
     facts: dict[str, object] = {"time_s": found.attributes.get("psvideo:time_s")}
     if (matrix := found.attributes.get("psvideo:camera_to_world")) is not None:
         facts["camera_to_world"] = [float(word) for word in str(matrix).split()]

@@ -7,10 +7,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from psvideo.model.quantities import Shown
 from psvideo.page.picture import Look, Picture
 
-Kind = Literal["normals", "light", "mask", "heat", "position"]
-"""How a sequence is shown: as directions, as light, as yes and no, as a measure in false colours, as points."""
 Reader = Callable[[int, Look], Picture]
 """Gives the picture of a number as it is to be looked at. Raises PsvideoError where it cannot be read."""
 
@@ -20,19 +19,21 @@ class Sequence:
     """Pictures of one quantity. ``times_s`` are the instants that the pictures show, on the camera's clock.
 
     Sequences of one ``timeline`` share their numbers; those of another are put beside them by time. ``slow``: pictures
-    are computed when they are asked for, so none is made ahead. ``family``: what is shown at one exposure, to be
+    are computed when they are asked for, so none is made ahead. ``kind``, ``unit`` and ``from_zero`` are those of the
+    table of quantities. ``family``: what is shown at one exposure, to be
     compared; left out, the sequence by itself.
     """
 
     id: str
     label: str
-    kind: Kind
+    kind: Shown
     group: str
     timeline: Literal["rounds", "frames"]
     numbers: tuple[int, ...]
     times_s: tuple[float, ...]
     read: Reader
     unit: str = ""
+    from_zero: bool = True
     y: str = "up"
     space: str = "camera"
     slow: bool = False
@@ -92,6 +93,7 @@ def _entry(sequence: Sequence) -> dict[str, object]:
         "numbers": list(sequence.numbers),
         "times_s": [round(time_s, 7) for time_s in sequence.times_s],
         "unit": sequence.unit,
+        "from_zero": sequence.from_zero,
         "y": sequence.y,
         "space": sequence.space,
         "slow": sequence.slow,

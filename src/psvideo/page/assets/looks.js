@@ -83,7 +83,7 @@ export function rangeOf(app, sequence, blocks) {
   if (sequence.kind !== "heat") return [0, 1];
   if (!app.ranges.has(sequence.id) && blocks[sequence.id]?.data) {
     const [low, high] = percentiles(blocks[sequence.id], [0.02, 0.98]);
-    if (high !== undefined) app.ranges.set(sequence.id, [sequence.id === "depth" ? low : 0, high]);
+    if (high !== undefined) app.ranges.set(sequence.id, [sequence.from_zero ? 0 : low, high]);
   }
   return app.ranges.get(sequence.id) ?? [0, 1];
 }

@@ -19,7 +19,7 @@ export function colourAt(palette, share) {
 }
 
 export function paletteOf(sequence) {
-  return sequence.id === "depth" ? VIRIDIS : CIVIDIS;
+  return sequence.from_zero ? CIVIDIS : VIRIDIS;
 }
 
 // 256 colours in a row as bytes, for a texture.

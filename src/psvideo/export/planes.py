@@ -1,0 +1,58 @@
+"""The planes of an instant's files: for each quantity of the table, its picture, and its channels by name."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.export.space import Space, placed, placed_points
+from psvideo.model.quantities import QUANTITIES
+from psvideo.model.surface import Surface
+from psvideo.solve.depth import Depth
+
+Image = NDArray[np.floating]
+Planes = dict[str, Image]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Made:
+    """What an instant's files are written from; ``beauty`` and ``depth`` are None where nothing asks for them."""
+
+    surface: Surface
+    space: Space
+    beauty: Image | None = None
+    depth: Depth | None = None
+
+    @property
+    def position(self) -> Image | None:
+        """The place of every pixel's surface point (row, col, 3) in the delivered space; 0 where there is none."""
+        if self.depth is None:
+            return None
+        points = self.depth.view.points(self.depth.depth).astype(np.float32)
+        return placed_points(points, self.space, self.depth.depth > 0)
+
+
+PICTURES: Mapping[str, Callable[[Made], Image | None]] = {
+    "normals": lambda made: placed(made.surface.normals, made.space),
+    "albedo": lambda made: made.surface.albedo,
+    "valid": lambda made: made.surface.valid.astype(np.float32),
+    "residual": lambda made: made.surface.residual,
+    "error": lambda made: made.surface.error_deg,
+    "beauty": lambda made: made.beauty,
+    "depth": lambda made: None if made.depth is None else made.depth.depth,
+    "position": lambda made: made.position,
+}
+"""What computes the picture of each quantity that belongs to an instant; None where it was not made."""
+
+
+def planes_of(name: str, made: Made) -> Planes:
+    """Return a quantity's channels, each (row, col), by their names in a file; grey fills three channels alike.
+
+    Raises ValueError where the picture was not made.
+    """
+    image = PICTURES[name](made)
+    if image is None:
+        raise ValueError(f"{name} is to be written and was not made")
+    channels = QUANTITIES[name].channels
+    return {channel: image[..., place] if image.ndim == 3 else image for place, channel in enumerate(channels)}
