@@ -19,7 +19,7 @@ import cv2
 import numpy as np
 
 from bench.table import Row
-from psvideo.clip import ALL_CORES
+from psvideo.compute.threads import thread_count
 from psvideo.formats.plan_toml import format_plan, parse_fps
 from psvideo.formats.rig_toml import format_rig
 from psvideo.model.camera import Camera
@@ -48,7 +48,7 @@ from functools import partial
 from pathlib import Path
 import OpenEXR
 from psvideo.formats.exr_files import write_exr
-from psvideo.export.writer import writing
+from psvideo.compute.threads import writing
 sample, out, count = Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
 planes = {}
 for name in ("normals", "albedo", "valid"):
@@ -81,7 +81,7 @@ def _time_rows(clip: Path, lights: int) -> Iterator[Row]:
         "once": normals,
         "timed": (*normals, "--timing", timing),
         "usual": ("-c", DECODE, clip, LONG),
-        "all": ("-c", DECODE, clip, LONG, ALL_CORES),
+        "all": ("-c", DECODE, clip, LONG, thread_count()),
         "encode": ("-c", ENCODE, out, spare, rounds),
     }
     found: dict[str, float] = {}
@@ -92,7 +92,7 @@ def _time_rows(clip: Path, lights: int) -> Iterator[Row]:
         f"{lights} lights: decoding {LONG} frames alone, threads as by default", f"{found['usual']:.2f} s", "", None
     )
     yield Row(
-        f"{lights} lights: decoding {LONG} frames alone, all {ALL_CORES} cores", f"{found['all']:.2f} s", "", None
+        f"{lights} lights: decoding {LONG} frames alone, all {thread_count()} cores", f"{found['all']:.2f} s", "", None
     )
     yield Row(f"{lights} lights: encoding {rounds} rounds alone", f"{found['encode']:.2f} s", "", None)
     for name, what in (("timed", "normals with timing.json"), ("once", "normals, timing found")):

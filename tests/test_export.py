@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from psvideo import __version__
+from psvideo.compute.threads import writing
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.plates import write_flash, write_plate
 from psvideo.export.png import decode_normals, encode_normals
@@ -23,7 +24,6 @@ from psvideo.export.results import Delivery, is_written, write_surface
 from psvideo.export.space import Space, choose_space, placed
 from psvideo.export.tags import Tags
 from psvideo.export.usd.pose import read_pose
-from psvideo.export.writer import writing
 from psvideo.formats.exr_files import Crop, write_exr
 from psvideo.formats.whole_folders import whole_folder
 from psvideo.model.surface import Surface

@@ -9,7 +9,8 @@ import pytest
 PACKAGE = Path(__file__).resolve().parents[1] / "src" / "psvideo"
 
 FLOORS = [
-    {"errors", "compute"},
+    {"errors"},
+    {"compute"},
     {"model"},
     {"formats"},
     {"clip", "strobe", "capture", "synth"},

@@ -10,12 +10,11 @@ from psvideo.clip.depth_map import DepthMaps, open_depth
 from psvideo.clip.kept import Kept, keeping_near
 from psvideo.clip.mask import read_mask
 from psvideo.clip.opening import open_clip
-from psvideo.clip.reading import ALL_CORES, parse_range, read_frames
+from psvideo.clip.reading import parse_range, read_frames
 from psvideo.clip.record import Clip, Frame, holes
 from psvideo.clip.take import Take, decoded_once
 
 __all__ = [
-    "ALL_CORES",
     "Clip",
     "DepthMaps",
     "Frame",

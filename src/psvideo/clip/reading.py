@@ -1,13 +1,9 @@
 """Reading a clip's frames: lazily, in order, decoded some frames ahead of the one that is worked on."""
 
 import contextlib
-import os
 from bisect import bisect_left
-from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
-from typing import TypeVar
 
 import numpy as np
 from fileseq.exceptions import ParseException
@@ -17,12 +13,8 @@ from psvideo.clip.decode.decoders import decode
 from psvideo.clip.kept import Kept
 from psvideo.clip.linear import linear_light
 from psvideo.clip.record import Clip, Frame, Header, Picture
+from psvideo.compute.threads import in_order, thread_count
 from psvideo.errors import PsvideoError, UsageError
-
-Item = TypeVar("Item")
-ALL_CORES = os.cpu_count() or 1
-DECODING_THREADS = max(ALL_CORES // 2, 1)
-"""Half of the cores: rebuilding, solving and encoding want the others."""
 
 
 def read_frames(
@@ -30,16 +22,17 @@ def read_frames(
     numbers: Iterable[int] | None = None,
     *,
     ahead: int = 2,
-    threads: int = DECODING_THREADS,
+    threads: int | None = None,
     kept: Kept | None = None,
     keep: bool = False,
 ) -> Iterator[Frame]:
     """Give the clip's frames in linear light, in ascending order, each decoded once; ``numbers`` chooses some of them.
 
-    Up to ``ahead`` frames are decoded in advance by threads, so memory does not grow with the clip. The threads end
-    when the iterator is used up, closed, or ends in an error. Frames that are in ``kept`` are read back from there;
-    with ``keep`` the others are put into it once they are decoded. Raises PsvideoError that names the file where a
-    frame is missing, damaged, or of another size or depth than the first.
+    Up to ``ahead`` frames are decoded in advance by ``threads``, left out by half of those that compute: rebuilding,
+    solving and encoding want the others. So memory does not grow with the clip. The threads end when the iterator is
+    used up, closed, or ends in an error. Frames that are in ``kept`` are read back from there; with ``keep`` the others
+    are put into it once they are decoded. Raises PsvideoError that names the file where a frame is missing, damaged, or
+    of another size or depth than the first.
     """
     chosen = clip.numbers if numbers is None else tuple(sorted(set(numbers)))
     absent = set(chosen) - set(clip.numbers)
@@ -49,7 +42,8 @@ def read_frames(
         return iter(())
     decoded = _decoder(clip, [number for number in chosen if kept is None or number not in kept])
     jobs = (partial(_picture, clip, number, decoded, kept, keep) for number in chosen)
-    return _in_linear_light(clip, _ahead(jobs, ahead=ahead, threads=1 if clip.is_movie else threads))
+    workers = 1 if clip.is_movie else threads or max(thread_count() // 2, 1)
+    return _in_linear_light(clip, in_order(jobs, ahead=ahead, threads=workers, name="decode"))
 
 
 def parse_range(text: str, numbers: Iterable[int]) -> tuple[int, ...]:
@@ -130,18 +124,3 @@ def looks(head: Header) -> str:
     depth = f"{head.bits} bits" if head.bits else "floating point"
     filters = f", filters {head.cfa}" if head.cfa else ""
     return f"{head.width_px} x {head.height_px} pixels, {head.channels} channel(s), {depth}{filters}"
-
-
-def _ahead(jobs: Iterator[Callable[[], Item]], *, ahead: int, threads: int) -> Generator[Item]:
-    """Run jobs in threads, up to ``ahead`` of them before they are asked for, and give their results in order."""
-    pool = ThreadPoolExecutor(max_workers=min(threads, max(ahead, 1)), thread_name_prefix="decode")
-    waiting: deque[Future[Item]] = deque()
-    try:
-        for job in jobs:
-            waiting.append(pool.submit(job))
-            if len(waiting) > max(ahead, 1):
-                yield waiting.popleft().result()
-        while waiting:
-            yield waiting.popleft().result()
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)

@@ -8,8 +8,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Literal
 
-from psvideo.clip import ALL_CORES, Clip, Frame, Take, demosaic, read_frames
+from psvideo.clip import Clip, Frame, Take, demosaic, read_frames
 from psvideo.compute.progress import Watch, unwatched
+from psvideo.compute.threads import thread_count
 from psvideo.model.camera import Camera
 from psvideo.model.shutter import frames_touched
 from psvideo.model.timing import Timing, places_in_time, timed_camera
@@ -64,7 +65,7 @@ def clip_plates(take: Take, timing: Timing, *, method: Method = "weights", watch
     clip, camera = take.clip, timed_camera(take.plan, timing)
     places = places_in_time(timing, clip.numbers)
     used = _within(timing, camera, take, places)
-    decoded = read_frames(clip, take.numbers, ahead=AHEAD, threads=ALL_CORES, kept=take.kept)
+    decoded = read_frames(clip, take.numbers, ahead=AHEAD, threads=thread_count(), kept=take.kept)
     frames = _placed(watch(decoded, total=len(take.numbers), what="rebuilding flashes"), places)
     rebuild = split if method == "weights" else hudon2015.split
     plates = subtract(rebuild(frames, camera, used), darks=_dark_plates(take, camera, used, places))
@@ -89,7 +90,7 @@ def _decode_ahead(take: Take, watch: Watch) -> None:
     clip, kept = take.clip, take.kept
     dark = len(take.plan.lit_slots) < len(take.plan.flashes)
     if kept is not None and dark and not (len(kept) or kept.missed):
-        frames = read_frames(clip, take.numbers, ahead=ALL_CORES, threads=ALL_CORES, kept=kept, keep=True)
+        frames = read_frames(clip, take.numbers, ahead=thread_count(), threads=thread_count(), kept=kept, keep=True)
         deque(watch(frames, total=len(take.numbers), what="decoding"), maxlen=0)
 
 

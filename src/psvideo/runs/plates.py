@@ -8,11 +8,11 @@ from pathlib import Path
 
 from psvideo.clip import Clip, Take
 from psvideo.compute.progress import Watch, unwatched
+from psvideo.compute.threads import writing
 from psvideo.errors import PsvideoError
 from psvideo.export.plates import plate_name, write_flash, write_plate
 from psvideo.export.results import Codec, Preview
 from psvideo.export.tags import Tags
-from psvideo.export.writer import writing
 from psvideo.formats.timing_json import format_timing
 from psvideo.formats.whole_files import write_text
 from psvideo.model.plan import Plan

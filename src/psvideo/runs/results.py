@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from psvideo.clip import Take
 from psvideo.compute.progress import Watch, unwatched
+from psvideo.compute.threads import writing
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.mesh import animation_name
 from psvideo.export.results import Delivery, is_written, mesh_file
 from psvideo.export.tags import Tags
 from psvideo.export.usd.scene import write_animation
-from psvideo.export.writer import writing
 from psvideo.formats.timing_json import format_timing
 from psvideo.formats.whole_files import write_text
 from psvideo.model.plan import Plan

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.clip import ALL_CORES, Take, holes, read_frames
+from psvideo.clip import Take, holes, read_frames
 from psvideo.compute.progress import Watch, unwatched
+from psvideo.compute.threads import thread_count
 from psvideo.model.camera import FloatArray
 from psvideo.model.row_profiles import collect_with_doubt
 from psvideo.model.timing import DroppedFrames, Timing
@@ -32,7 +33,7 @@ def take_profiles(take: Take, *, watch: Watch = unwatched) -> TakeProfiles:
     if clip.plan.mode == "synced":
         index = np.array([clip.index_of(number) for number in take.numbers], np.int64)
         return TakeProfiles(index=index, value=np.zeros((len(index), clip.height_px)))
-    frames = read_frames(clip, take.numbers, ahead=ALL_CORES, threads=ALL_CORES, kept=take.kept, keep=True)
+    frames = read_frames(clip, take.numbers, ahead=thread_count(), threads=thread_count(), kept=take.kept, keep=True)
     watched = watch(frames, total=len(take.numbers), what="finding the flashes")
     index, value, doubt = collect_with_doubt(watched)
     return TakeProfiles(index=index, value=value, doubt=doubt)

@@ -1,18 +1,17 @@
 """What every compiled solver needs around its kernel: arrays checked, bands of rows side by side, a surface made."""
 
-import itertools
-import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
 
+from psvideo.compute.threads import over_ranges
 from psvideo.model.surface import Surface
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.task import Mask, Result, Samples
 
-_SERIAL_PIXELS = 1 << 16  # smaller pictures are solved before a thread has started
+BAND_PIXELS = 1 << 16
+"""Pixels of one band; fewer are solved before a thread has started."""
 
 
 def check_arrays(plates: Sequence[Samples], lit: Illumination, seen: Mask | None, mask: Mask | None) -> None:
@@ -41,19 +40,13 @@ def check_arrays(plates: Sequence[Samples], lit: Illumination, seen: Mask | None
 def in_bands(run: Callable[[int, int], None], *, rows: int, cols: int, threads: int | None) -> None:
     """Call ``run(first, last)`` for bands of rows side by side. (Numba's own thread pool may abort when two use it.)"""
 
-    def once(band: tuple[int, int]) -> None:
+    def once(first: int, last: int) -> None:
         try:
-            run(*band)
+            run(first, last)
         except OSError:  # the compiled code could not be kept on disk for the next run; it is there all the same
-            run(*band)
+            run(first, last)
 
-    workers = threads or os.cpu_count() or 1
-    if workers == 1 or rows * cols <= _SERIAL_PIXELS:
-        once((0, rows))
-        return
-    edges = np.linspace(0, rows, 4 * workers + 1).astype(int).tolist()  # more bands than workers: they differ in work
-    with ThreadPoolExecutor(workers) as pool:
-        list(pool.map(once, itertools.pairwise(edges)))
+    over_ranges(once, rows, each=BAND_PIXELS // cols, threads=threads)
 
 
 def surface_of(result: Result, error: Samples | None, shape: tuple[int, ...], *, half: bool) -> Surface:

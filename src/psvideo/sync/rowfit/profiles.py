@@ -1,12 +1,10 @@
 """Row profiles laid out for fitting, and the compiled row model run over them on all processors."""
 
-import os
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from psvideo.compute.threads import over_ranges
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
@@ -14,9 +12,8 @@ from psvideo.sync.rowfit import kernel
 from psvideo.sync.rowfit.beat import Beat, train_between
 from psvideo.sync.rowfit.kernel import IntArray
 
-THREADS = min(os.cpu_count() or 1, 8)
-WORTH_THREADS = 40_000
-"""Samples from which on starting threads costs less than it saves."""
+WORTH_A_THREAD = 40_000
+"""Samples of one part of the work; with fewer, starting a thread costs more than it saves."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,7 +144,11 @@ def unexplained(plan: Plan, rows: Profiles, beat: Beat, weight: FloatArray | Non
     seen, flashes = compiled_rows(rows, beat), compiled_flashes(plan, rows, beat)
     trust = np.ones_like(rows.value) if weight is None else weight
     rest = np.empty_like(rows.value)
-    share(lambda a, b: kernel.rests(seen, flashes, trust, a, b, rest), rows.value.shape[1], work=rows.value.size)
+    over_ranges(
+        lambda a, b: kernel.rests(seen, flashes, trust, a, b, rest),
+        rows.value.shape[1],
+        each=rows_of_a_part(len(rows.value)),
+    )
     return rest
 
 
@@ -168,15 +169,14 @@ def equations(
     seen, flashes = compiled_rows(rows, beat), compiled_flashes(plan, rows, beat)
     honest, growth = steepness is not None, weight if steepness is None else steepness
     rest = np.empty_like(rows.value)
-    parts: list[tuple[FloatArray, FloatArray]] = []
 
-    def run(first: int, last: int) -> None:
+    def run(first: int, last: int) -> tuple[FloatArray, FloatArray]:
         hessian = np.zeros((len(rows.window_start), kernel.SIGNALS, kernel.SIGNALS))
         score = np.zeros((len(rows.value), kernel.SIGNALS))
         kernel.equations(seen, flashes, weight, growth, tails, honest, first, last, rest, hessian, score)
-        parts.append((hessian, score))
+        return hessian, score
 
-    share(run, rows.value.shape[1], work=rows.value.size)
+    parts = over_ranges(run, rows.value.shape[1], each=rows_of_a_part(len(rows.value)))
     lower = np.sum([hessian for hessian, _ in parts], axis=0)
     full = lower + np.swapaxes(np.tril(lower, -1), 1, 2)
     return rest, full, np.sum([score for _, score in parts], axis=0)
@@ -224,11 +224,6 @@ def residuals_of(plan: Plan, timing: Timing, index: IntArray, value: FloatArray)
     return rest
 
 
-def share(run: Callable[[int, int], None], count: int, *, work: int) -> None:
-    """Share ``count`` rows or clocks between threads (numba's own may not be nested), if that is worth the start."""
-    if work < WORTH_THREADS:
-        run(0, count)
-        return
-    edges = np.linspace(0, count, THREADS + 1).astype(int).tolist()
-    with ThreadPoolExecutor(THREADS) as pool:
-        list(pool.map(run, edges[:-1], edges[1:]))
+def rows_of_a_part(samples: int) -> int:
+    """Return how many rows or clocks of so many samples each one thread takes at a time."""
+    return -(-WORTH_A_THREAD // samples)

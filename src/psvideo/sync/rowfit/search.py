@@ -9,11 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from psvideo.compute.threads import over_ranges
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit import kernel
 from psvideo.sync.rowfit.beat import Beat, StrobeClock
-from psvideo.sync.rowfit.profiles import Profiles, compiled_rows, share, slot_unknowns
+from psvideo.sync.rowfit.profiles import Profiles, compiled_rows, rows_of_a_part, slot_unknowns
 
 ROBUST_STEEPNESS = 20.0
 """Of the coarse loss ``log(1 + 20 r^2)``, r being a residual over its row's own spread (physics.md)."""
@@ -76,10 +77,10 @@ def _losses(plan: Plan, rows: Profiles, clocks: list[StrobeClock], start: Beat, 
     phase_s, rate = np.array([c.phase_s for c in clocks]), np.array([c.rate for c in clocks])
     found = np.empty((len(clocks), rows.value.shape[1]))
     spread = rows.spread
-    share(
+    over_ranges(
         lambda a, b: kernel.losses_by_row(seen, flashes, phase_s, rate, spread, ROBUST_STEEPNESS, a, b, found),
         len(clocks),
-        work=len(clocks) * rows.value.size,
+        each=rows_of_a_part(rows.value.size),
     )
     return found
 

@@ -1,0 +1,96 @@
+"""Work shared between threads, whose results come in order and are the same for any number of threads.
+
+Python threads are used: compiled functions, decoders and encoders work without the interpreter's lock. What is shared
+is cut by the size of the work, never by the number of threads: sums of floating-point numbers depend on the cut.
+"""
+
+import contextlib
+import os
+from collections import deque
+from collections.abc import Callable, Generator, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import TypeVar
+
+from psvideo.errors import UsageError
+
+WRITING_THREADS = 2
+MOST_WAITING = 2
+"""Files that may wait to be written: what bounds memory."""
+
+Item = TypeVar("Item")
+Submit = Callable[[Callable[[], None]], None]
+
+THREADS = "PSVIDEO_THREADS"
+"""The environment variable that sets how many threads compute; without it, as many as the machine has cores."""
+
+
+def thread_count() -> int:
+    """Return how many threads compute at a time. Raises UsageError where PSVIDEO_THREADS is no whole number above 0."""
+    text = os.environ.get(THREADS, "")
+    if not text:
+        return os.cpu_count() or 1
+    if not (text.isascii() and text.isdecimal() and int(text) > 0):
+        raise UsageError(
+            f"{THREADS}={text}: expected a whole number of threads, 1 or more. Correct the environment variable, or "
+            "remove it to use all cores."
+        )
+    return int(text)
+
+
+def over_ranges(run: Callable[[int, int], Item], count: int, *, each: int, threads: int | None = None) -> list[Item]:
+    """Call ``run(first, last)`` for ranges of ``each`` out of ``count``, side by side, and return its results in order.
+
+    >>> over_ranges(lambda first, last: last - first, 5, each=2)
+    [2, 2, 1]
+    """
+    firsts = range(0, count, max(each, 1))
+    lasts = [min(first + firsts.step, count) for first in firsts]
+    workers = min(threads or thread_count(), len(firsts))
+    if workers < 2:
+        return [run(first, last) for first, last in zip(firsts, lasts, strict=True)]
+    with ThreadPoolExecutor(workers) as pool:
+        return list(pool.map(run, firsts, lasts))
+
+
+def in_order(
+    jobs: Iterator[Callable[[], Item]], *, ahead: int, threads: int | None = None, name: str
+) -> Generator[Item]:
+    """Run jobs in threads, up to ``ahead`` of them before they are asked for, and give their results in order.
+
+    The threads, which are called ``name``, end when the iterator is used up, closed, or ends in an error.
+    """
+    most = max(ahead, 1)
+    pool = ThreadPoolExecutor(min(threads or thread_count(), most), thread_name_prefix=name)
+    waiting: deque[Future[Item]] = deque()
+    try:
+        for job in jobs:
+            waiting.append(pool.submit(job))
+            if len(waiting) > most:
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)
+
+
+@contextlib.contextmanager
+def writing(*, threads: int = WRITING_THREADS, most_waiting: int = MOST_WAITING) -> Iterator[Submit]:
+    """Give a function that takes jobs (functions without arguments) and runs them in up to so many threads.
+
+    It blocks while ``most_waiting`` jobs are under way, and raises what a job before raised; so does the end of the
+    block, which waits for all jobs. A block that fails waits for them too: what was computed is kept for resuming.
+    """
+    pool = ThreadPoolExecutor(min(threads, thread_count()), thread_name_prefix="write")
+    waiting: deque[Future[None]] = deque()
+
+    def submit(job: Callable[[], None]) -> None:
+        while len(waiting) >= most_waiting or (waiting and waiting[0].done()):
+            waiting.popleft().result()
+        waiting.append(pool.submit(job))
+
+    try:
+        yield submit
+        while waiting:
+            waiting.popleft().result()
+    finally:
+        pool.shutdown(wait=True)
