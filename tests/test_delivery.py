@@ -4,6 +4,7 @@ import hashlib
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
+from typing import get_args
 
 import av
 import numpy as np
@@ -11,13 +12,14 @@ import OpenEXR
 import pytest
 
 from psvideo.cli.app import main
-from psvideo.cli.delivery import Asked, delivery_of
-from psvideo.cli.delivery_options import CodecName, ProgramName, SpaceName, YDirection
+from psvideo.cli.typed import parse_weights
 from psvideo.errors import PsvideoError, UsageError
+from psvideo.export.asked import Asked, delivery_of
 from psvideo.export.movie import even, write_movie
 from psvideo.export.programs import Delivered, note
 from psvideo.export.timeline import Footage, Images, timeline_text
-from psvideo.plates.beauty import Mix, beauty_of, parse_mix
+from psvideo.model.choices import Program
+from psvideo.plates.beauty import Mix, beauty_of, mix_of
 from psvideo.plates.sequence import LightPlate, Round
 
 otio = pytest.importorskip("opentimelineio")
@@ -104,14 +106,14 @@ def test_a_row_that_one_light_lacks_is_missing_in_the_sum() -> None:
     assert total.image[:, 0].tolist() == [2, 2, 0]
     assert total.seen.tolist() == [True, True, False]
     assert beauty_of(one, Mix(weights=(("a", 0.0),))).seen.all(), "a light that does not count need not be seen"
-    held = beauty_of(one, parse_mix([], with_ambient=True), plate("ambient", [True, False, True]))
+    held = beauty_of(one, mix_of({}, with_ambient=True), plate("ambient", [True, False, True]))
     assert held.image[:, 0].tolist() == [3, 0, 0]
 
 
 @pytest.mark.parametrize("text", ["key", "key=", "key=-1", "key=nan", "=x"])
 def test_a_weight_that_is_none_is_refused(text: str) -> None:
     with pytest.raises(UsageError, match=r"such as key=0\.5"):
-        parse_mix([text], with_ambient=False)
+        parse_weights([text])
 
 
 def test_weights_without_a_beauty_plate_and_of_unknown_lights_are_refused(
@@ -281,32 +283,15 @@ def test_a_camera_that_is_known_for_a_part_of_the_clip_is_refused_before_any_wor
     assert not (tmp_path / ".out.partial").exists()
 
 
-NOTHING = Asked(
-    program=None,
-    space=None,
-    camera_to_world=None,
-    camera=None,
-    camera_time=None,
-    y=None,
-    float32=False,
-    aovs=(),
-    meshes=(),
-    encode=None,
-    multipart=None,
-    plates=False,
-    with_ambient=False,
-    weights=(),
-    previews=(),
-    codec=CodecName.vp9,
-)
+NOTHING = Asked()
 
 
-@pytest.mark.parametrize("name", list(ProgramName))
-def test_every_program_has_a_note_with_numbers_rate_colour_and_wrong_ways(name: ProgramName) -> None:
-    delivery, at_odds = delivery_of(replace(NOTHING, program=name))
+@pytest.mark.parametrize("name", get_args(Program))
+def test_every_program_has_a_note_with_numbers_rate_colour_and_wrong_ways(name: Program) -> None:
+    delivery, at_odds = delivery_of(replace(NOTHING, preset=name))
     assert at_odds == ()
     made = Delivered(clip="take7", first=1001, last=1100, fps=Fraction(24000, 1001), metric=True, delivery=delivery)
-    told = note(name.value, made)
+    told = note(name, made)
     for words in ("1001", "1100", "23.976", "Known wrong ways", "take7", "sRGB" if delivery.png16 else "Raw"):
         assert words in told
     assert ("position" in delivery.aovs) == ("Positions are" in told)
@@ -315,17 +300,17 @@ def test_every_program_has_a_note_with_numbers_rate_colour_and_wrong_ways(name: 
 def test_a_camera_beside_a_preset_puts_the_delivery_into_its_world(tmp_path: Path) -> None:
     matrix = tmp_path / "camera.txt"
     matrix.write_text("1 0 0 4  0 1 0 5  0 0 1 6  0 0 0 1")
-    delivery, at_odds = delivery_of(replace(NOTHING, program=ProgramName.nuke, camera_to_world=matrix))
+    delivery, at_odds = delivery_of(replace(NOTHING, preset="nuke", camera_to_world=matrix))
     assert (delivery.space.name, at_odds) == ("world", ())
     assert delivery.multipart
     with pytest.raises(UsageError, match="belongs to --space world"):
-        delivery_of(replace(NOTHING, program=ProgramName.unreal, camera_to_world=matrix))
+        delivery_of(replace(NOTHING, preset="unreal", camera_to_world=matrix))
     with pytest.raises(UsageError, match="belongs to --space world"):
         delivery_of(replace(NOTHING, camera_to_world=matrix))
 
 
 def test_options_that_go_against_a_preset_win_and_are_told_of() -> None:
-    asked = replace(NOTHING, program=ProgramName.nuke, y=YDirection.down, space=SpaceName.tangent, multipart=False)
+    asked = replace(NOTHING, preset="nuke", y="down", space="tangent", multipart=False)
     delivery, at_odds = delivery_of(asked)
     assert (delivery.space.y, delivery.space.name, delivery.multipart) == ("down", "tangent", False)
     assert [sentence.split()[0] for sentence in at_odds] == ["--y", "--space", "--no-multipart"]

@@ -8,7 +8,6 @@ CVPR 1997) fixes the rotation up to convex or concave; the subject is taken to b
 """
 
 from dataclasses import dataclass
-from typing import Literal
 
 import cv2
 import numpy as np
@@ -20,9 +19,9 @@ from psvideo.calibrate.light_pictures import LightPictures
 from psvideo.calibrate.strengths import LIT
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import FloatArray
+from psvideo.model.choices import Prior
 from psvideo.model.rig import Light, Rig
 
-Prior = Literal["equal-lights", "equal-albedo"]
 LEAST_FOR_EQUAL_LIGHTS = 6
 LEAST_PIXELS = 1000
 ROUNDS = 3

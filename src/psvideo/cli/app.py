@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from psvideo.cli.commands import COMMANDS, Entry
+from psvideo.cli.spelling import spelled
 from psvideo.cli.teaching import PROGRAM, command_called, teach, words_typed
 from psvideo.errors import PsvideoError
 
@@ -75,7 +76,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         application(words)(args=words, prog_name=PROGRAM, obj=words)
     except PsvideoError as fault:
-        print(f"psvideo: {fault}", file=sys.stderr)
+        print(f"psvideo: {spelled(str(fault))}", file=sys.stderr)
         return fault.exit_status
     except SystemExit as end:
         if end.code == STOPPED:

@@ -3,6 +3,8 @@
 import json as json_text
 import os
 import sys
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,10 +12,13 @@ import typer
 
 from psvideo.cli.console import Voice
 from psvideo.cli.options import FirstLight, Json, OrderRig, PlanPath, Quiet, Verbose
-from psvideo.errors import PsvideoError, UsageError
+from psvideo.errors import UsageError
 
 if TYPE_CHECKING:
-    from psvideo.runs.checking import Check
+    from collections.abc import Iterator
+
+    from psvideo.runs.check_folder import Unread
+    from psvideo.runs.checked import Check
 
 INTERVAL_S = 2.0
 COLOURS = {"good": "32", "doubtful": "33", "bad": "31", "unknown": "2"}
@@ -47,63 +52,56 @@ def check(
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     if (clip is None) == (watch is None):
         raise UsageError("Name either a clip to check, or a folder of takes with --watch FOLDER.")
-    from psvideo.runs.checking import check_take
-
     if clip is not None:
-        _refuse_inside(report, clip)
-        found = check_take(clip, plan=plan, rig=rig, first_light=first_light, watch=voice.track)
+        from psvideo.runs.check import check as judge
+
+        found = judge(
+            clip,
+            plan=plan,
+            rig=rig,
+            first_light=first_light,
+            report=report,
+            watch=voice.track,
+            caller=voice.caller(),
+        )
         _tell(voice, found)
-        _keep(report, [found])
         if not found.usable:
             raise typer.Exit(1)
     elif watch is not None:
-        if not watch.is_dir():
-            raise UsageError(f"{watch}: is no folder. Name the folder into which takes are copied.")
-        _refuse_inside(report, watch)
-        _watch(voice, watch, interval=interval, existing=existing, report=report, given=(plan, rig, first_light))
+        from psvideo.runs.check_folder import check_folder
+
+        checks = check_folder(
+            watch,
+            interval_s=interval,
+            existing=existing,
+            plan=plan,
+            rig=rig,
+            first_light=first_light,
+            report=report,
+            caller=replace(voice.caller(), say=partial(_note, voice)),
+        )
+        _note(voice, f"Watching {watch} for new takes; Ctrl-C ends.")
+        _follow(voice, checks)
 
 
-def _watch(
-    voice: Voice,
-    folder: Path,
-    *,
-    interval: float,
-    existing: bool,
-    report: Path | None,
-    given: tuple[Path | None, Path | None, str | None],
-) -> None:
-    """Check take after take until Ctrl-C, and end with a line that sums up."""
-    from psvideo.runs.checking import check_take
-    from psvideo.runs.takes import whole_takes
+def _follow(voice: Voice, checks: "Iterator[Check | Unread]") -> None:
+    """Say of take after take what was found until Ctrl-C, and end with a line that sums up."""
+    from psvideo.runs.checked import Check
 
-    plan, rig, first_light = given
-    checks: dict[Path, Check] = {}
-    failed: dict[Path, str] = {}
-    _note(voice, f"Watching {folder} for new takes; Ctrl-C ends.")
-    there = True
+    last: dict[Path, bool | None] = {}
     try:
-        for path in whole_takes(folder, interval_s=interval, existing=existing):
-            if path is None:
-                if there != folder.is_dir():
-                    there = not there
-                    _note(voice, f"{folder}: {'is there again.' if there else 'cannot be reached; waiting for it.'}")
-                continue
-            checks.pop(path, None)
-            failed.pop(path, None)
-            try:
-                checks[path] = check_take(path, plan=plan, rig=rig, first_light=first_light)
-            except (PsvideoError, OSError) as fault:
-                gone = not path.exists()
-                failed[path] = f"{path}: was removed before it could be checked." if gone else str(fault)
-                _tell_fault(voice, path, failed[path])
+        for found in checks:
+            if isinstance(found, Check):
+                last[found.path] = found.usable
+                _tell(voice, found)
             else:
-                _tell(voice, checks[path])
-            _keep(report, list(checks.values()), failed)
+                last[found.path] = None
+                _tell_fault(voice, found.path, found.fault)
     except KeyboardInterrupt:
-        usable = sum(one.usable for one in checks.values())
+        read = [usable for usable in last.values() if usable is not None]
         _note(
             voice,
-            f"{len(checks) + len(failed)} take(s) checked: {usable} usable, {len(checks) - usable} not, {len(failed)} "
+            f"{len(last)} take(s) checked: {sum(read)} usable, {len(read) - sum(read)} not, {len(last) - len(read)} "
             "could not be read.",
         )
 
@@ -118,7 +116,7 @@ def _note(voice: Voice, text: str) -> None:
 
 def _tell(voice: Voice, check: "Check") -> None:
     if voice.json:
-        from psvideo.runs.checking import check_record
+        from psvideo.runs.checked import check_record
 
         print(json_text.dumps(check_record(check)), flush=True)
         return
@@ -143,20 +141,3 @@ def _word(grade: str) -> str:
     word = f"{grade:8}"
     coloured = sys.stdout.isatty() and "NO_COLOR" not in os.environ
     return f"\x1b[{COLOURS[grade]}m{word}\x1b[0m" if coloured else word
-
-
-def _refuse_inside(report: Path | None, footage: Path) -> None:
-    """Nothing is ever written among footage."""
-    folder = footage if footage.is_dir() else footage.parent
-    if report is not None and report.resolve().is_relative_to(folder.resolve()):
-        raise UsageError(f"--report {report}: lies among the footage of {folder}. Name a file somewhere else.")
-
-
-def _keep(report: Path | None, checks: "list[Check]", failed: dict[Path, str] | None = None) -> None:
-    """Write the page of all checks anew."""
-    if report is None:
-        return
-    from psvideo.formats.whole_files import write_text
-    from psvideo.runs.check_page import check_page
-
-    write_text(report, check_page(checks, failed or {}))

@@ -5,15 +5,17 @@ import os
 import shlex
 import sys
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:
     import typer
 
-    from psvideo.clip import Kept
     from psvideo.report.run_report import RunReport
+    from psvideo.runs.caller import Caller
+
+from psvideo.cli.spelling import spelled
 
 Item = TypeVar("Item")
 PLAIN_PROGRESS_EVERY_S = 5.0
@@ -56,6 +58,13 @@ class Voice:
         else:
             yield from _lines(items, total, what, unit)
 
+    def caller(self, context: "typer.Context | None" = None) -> "Caller":
+        """Return what a run is called with, so that its sentences come here, and its report holds what was typed."""
+        from psvideo.runs.caller import Caller
+
+        command = "" if context is None else command_line(context)
+        return Caller(say=self.say, warn=self.warn, detail=self.detail, spell=spelled, command=command)
+
 
 def command_line(context: "typer.Context") -> str:
     """Return the command as it was typed, quoted for a shell; empty where nobody typed one."""
@@ -81,19 +90,9 @@ def counted(count: int, thing: str) -> str:
     return f"{count} {thing}" if count == 1 else f"{count} {thing}s"
 
 
-def tell_kept(voice: Voice, kept: "Kept | None") -> None:
-    """Say how much disk the decoded frames took, and which of them found no room there."""
-    if kept is None:
-        return
-    voice.detail(
-        f"{len(kept)} decoded frames ({kept.bytes_held / 1e9:.2f} GB) were kept in a temporary file beside the output "
-        "and read back; the file is gone."
-    )
-    if kept.missed:
-        voice.warn(
-            f"{kept.missed} decoded frames found no room on the output's disk, half of whose free space may be taken, "
-            "and were decoded again where they were needed. Make room there, or name an output on another disk."
-        )
+def plain(words: "Sequence[Item] | None") -> "list[Item]":
+    """Return the words of an option that may be given several times, as plain text and each once."""
+    return [getattr(word, "value", word) for word in dict.fromkeys(words or ())]
 
 
 def _bar(items: Iterable[Item], total: int, what: str, unit: str) -> Iterator[Item]:

@@ -2,85 +2,35 @@
 
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
-from psvideo.model.quantities import AOVS, Aov
+from psvideo.model.choices import (
+    CameraTime,
+    Codec,
+    MapFiles,
+    MeshKind,
+    PlatesPreview,
+    Preview,
+    Program,
+    SpaceName,
+    YDirection,
+)
+from psvideo.model.quantities import Aov
 
 if TYPE_CHECKING:
-    AovName = Aov
-else:  # typer takes no lists of Literals
-    AovName = StrEnum("AovName", {name: name for name in AOVS})
+    AovWord = Aov
+    MeshWord = MeshKind
+    PreviewWord = Preview
+    PlatesPreviewWord = PlatesPreview
+else:
 
+    def _words(choices: Any) -> type[StrEnum]:
+        """Return choices as typer takes them in a list, where it takes no Literal."""
+        return StrEnum("Word", {word: word for word in get_args(choices)})
 
-class SpaceName(StrEnum):
-    """The frame of the delivered normals."""
-
-    camera = "camera"
-    world = "world"
-    tangent = "tangent"
-
-
-class YDirection(StrEnum):
-    """Which way the green channel points."""
-
-    up = "up"
-    down = "down"
-
-
-class CameraTime(StrEnum):
-    """How an animated camera's time codes count."""
-
-    frames = "frames"
-    numbers = "numbers"
-    seconds = "seconds"
-
-
-class MeshKind(StrEnum):
-    """Kinds of files for the surface as a mesh."""
-
-    ply = "ply"
-    usd = "usd"
-
-
-class Encoding(StrEnum):
-    """Other encodings of the same maps."""
-
-    png16 = "png16"
-
-
-class PreviewName(StrEnum):
-    """What a movie for eyes shows."""
-
-    relit = "relit"
-    normals = "normals"
-    plates = "plates"
-    beauty = "beauty"
-
-
-class PlatesPreview(StrEnum):
-    """What a movie of plates shows."""
-
-    plates = "plates"
-    beauty = "beauty"
-
-
-class CodecName(StrEnum):
-    """How movies are coded."""
-
-    vp9 = "vp9"
-    prores = "prores"
-
-
-class ProgramName(StrEnum):
-    """The programs that a delivery can be made for."""
-
-    nuke = "nuke"
-    blender = "blender"
-    unreal = "unreal"
-    houdini = "houdini"
-
+    AovWord, MeshWord, PreviewWord, PlatesPreviewWord = map(_words, (Aov, MeshKind, Preview, PlatesPreview))
 
 SpaceOption = Annotated[
     SpaceName | None, typer.Option("--space", help="Camera axes (the default), the world's, or a flat card's.")
@@ -106,13 +56,13 @@ CameraTimeOption = Annotated[
 YOption = Annotated[YDirection | None, typer.Option("--y", help="up as in OpenGL (the default), down as in DirectX.")]
 FloatOption = Annotated[bool, typer.Option("--float", help="Store normals as 32-bit floats.")]
 AovOption = Annotated[
-    list[AovName] | None, typer.Option("--aov", help="Write this besides; may be given several times.")
+    list[AovWord] | None, typer.Option("--aov", help="Write this besides; may be given several times.")
 ]
 MeshOption = Annotated[
-    list[MeshKind] | None,
+    list[MeshWord] | None,
     typer.Option("--mesh", help="Write meshes besides: ply, one per instant; usd, one animated file."),
 ]
-EncodeOption = Annotated[Encoding | None, typer.Option("--encode", help="Write 16-bit PNG maps of 0 to 1 besides.")]
+EncodeOption = Annotated[MapFiles | None, typer.Option("--encode", help="Write 16-bit PNG maps of 0 to 1 besides.")]
 Separate = Annotated[bool, typer.Option("--separate", help="One sequence per quantity; this is the default.")]
 Multipart = Annotated[
     bool | None, typer.Option("--multipart/--no-multipart", help="Write one EXR with all quantities besides.")
@@ -126,18 +76,18 @@ Weights = Annotated[
     typer.Option("--weight", help="How strong a light is in the beauty plate: key=0.5; may be given several times."),
 ]
 PreviewOption = Annotated[
-    list[PreviewName] | None,
+    list[PreviewWord] | None,
     typer.Option("--preview", help="Make a movie for eyes; may be given several times."),
 ]
 PlatesPreviewOption = Annotated[
-    list[PlatesPreview] | None,
+    list[PlatesPreviewWord] | None,
     typer.Option("--preview", help="Make a movie for eyes; may be given several times."),
 ]
 CodecOption = Annotated[
-    CodecName, typer.Option("--preview-codec", help="vp9 (.mp4) for browsers and players, prores (.mov) for editors.")
+    Codec, typer.Option("--preview-codec", help="vp9 (.mp4) for browsers and players, prores (.mov) for editors.")
 ]
 ProgramOption = Annotated[
-    ProgramName | None,
+    Program | None,
     typer.Option(
         "--for", help="Set what this program wants, where no option says otherwise, and write a note on how to load it."
     ),

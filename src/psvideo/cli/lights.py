@@ -14,9 +14,9 @@ from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.whole_files import PICTURE_MARK, refuse_existing, write_text
 
 if TYPE_CHECKING:
-    from psvideo.calibrate.guess import Prior
     from psvideo.calibrate.light_pictures import LightPictures
     from psvideo.calibrate.matte import MatteLight
+    from psvideo.model.choices import Prior
     from psvideo.runs.light_sets import Reading
 
 Pictures = Annotated[Path, typer.Argument(help="A folder of stills (one per light), of plates, or a clip.")]

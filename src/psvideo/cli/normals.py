@@ -1,19 +1,16 @@
 """psvideo normals: normal maps and albedo for every round of flashes."""
 
-from enum import StrEnum
-from math import inf
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from psvideo.cli.console import Voice, command_line, counted, tell_kept, tell_report
+from psvideo.cli.console import Voice, counted, plain, tell_report
 from psvideo.cli.delivery_options import (
     AovOption,
     CameraName,
     CameraTimeOption,
     CameraToWorld,
-    CodecName,
     CodecOption,
     EncodeOption,
     FloatOption,
@@ -42,31 +39,8 @@ from psvideo.cli.options import (
     Verbose,
 )
 from psvideo.cli.sync import describe_timing
-from psvideo.errors import UsageError
-from psvideo.solve.near_limits import MOST_ITERATIONS, NEAR_ITERATIONS
-
-
-class SolverName(StrEnum):
-    """How normals are solved."""
-
-    auto = "auto"
-    least_squares = "least-squares"
-    robust = "robust"
-
-
-class AlignName(StrEnum):
-    """How plates of one round are brought to one instant."""
-
-    none = "none"
-    flow = "flow"
-    auto = "auto"
-
-
-class RateName(StrEnum):
-    """Which instants are delivered."""
-
-    round = "round"
-    flash = "flash"
+from psvideo.cli.typed import parse_weights
+from psvideo.model.choices import MOST_ITERATIONS, NEAR_ITERATIONS, Align, Rate, Solver
 
 
 def normals(
@@ -83,9 +57,9 @@ def normals(
     frames: Frames = None,
     first_light: FirstLight = None,
     solver: Annotated[
-        SolverName,
+        Solver,
         typer.Option(help="auto: robust against highlights and shadows from five lights on."),
-    ] = SolverName.auto,
+    ] = "auto",
     near_iterations: Annotated[
         int | None,
         typer.Option(
@@ -107,22 +81,22 @@ def normals(
         float | None,
         typer.Option("--depth-scale", help="Metres per unit of --depth. [default: 1 for floats, 0.001 for integers]"),
     ] = None,
-    program: ProgramOption = None,
+    preset: ProgramOption = None,
     space: SpaceOption = None,
     camera_to_world: CameraToWorld = None,
     camera: CameraName = None,
     camera_time: CameraTimeOption = None,
     y: YOption = None,
     align: Annotated[
-        AlignName,
+        Align,
         typer.Option(
             help="Bring the plates of a round, which show different instants, to one. auto: where something moves; "
             "flow: look for motion everywhere; none: leave them as they are."
         ),
-    ] = AlignName.auto,
+    ] = "auto",
     rate: Annotated[
-        RateName, typer.Option(help="One result per round, or one per flash: as many times more as there are lights.")
-    ] = RateName.round,
+        Rate, typer.Option(help="One result per round, or one per flash: as many times more as there are lights.")
+    ] = "round",
     denoise: Annotated[int, typer.Option(min=1, max=64, help="Average up to N results where nothing moves.")] = 1,
     float32: FloatOption = False,
     aov: AovOption = None,
@@ -134,7 +108,7 @@ def normals(
     with_ambient: WithAmbient = False,
     weight: Weights = None,
     preview: PreviewOption = None,
-    preview_codec: CodecOption = CodecName.vp9,
+    preview_codec: CodecOption = "vp9",
     start_number: StartNumber = 1001,
     force: Force = False,
     resume: Resume = False,
@@ -143,67 +117,50 @@ def normals(
     quiet: Quiet = False,
 ) -> None:
     """Write normals, albedo and validity for every round of flashes; does sync and split by itself."""
-    from psvideo.cli.delivery import Asked, delivery_of
-    from psvideo.cli.opening import open_and_tell
-    from psvideo.clip import decoded_once
-    from psvideo.export.usd.core import require_usd
-    from psvideo.plates.align.rounds import Aligning
     from psvideo.report.run_report import report_record
-    from psvideo.runs import Output, OverTime, normals_run, read_lighting, timing_of
+    from psvideo.runs.normals import normals as solve
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
-    output = Output(folder=out, force=force, resume=resume, start_number=start_number, command=command_line(context))
-    output.check()
-    asked = Asked(
-        program=program,
+    report = solve(
+        clip,
+        rig=rig,
+        out=out,
+        plan=plan,
+        timing=timing,
+        mask=mask,
+        flat=flat,
+        frames=frames,
+        first_light=first_light,
+        solver=solver,
+        near_iterations=near_iterations,
+        depth=depth,
+        depth_scale=depth_scale,
+        align=align,
+        rate=rate,
+        denoise=denoise,
+        preset=preset,
         space=space,
         camera_to_world=camera_to_world,
         camera=camera,
         camera_time=camera_time,
         y=y,
         float32=float32,
-        aovs=aov or (),
-        meshes=mesh or (),
+        aov=plain(aov),
+        mesh=plain(mesh),
         encode=encode,
         multipart=multipart,
         plates=plates,
         with_ambient=with_ambient,
-        weights=weight or (),
-        previews=preview or (),
-        codec=preview_codec,
+        weight=parse_weights(weight),
+        preview=plain(preview),
+        preview_codec=preview_codec,
+        start_number=start_number,
+        force=force,
+        resume=resume,
+        watch=voice.track,
+        caller=voice.caller(context),
     )
-    delivery, at_odds = delivery_of(asked)
-    for sentence in at_odds:
-        voice.warn(sentence)
-    if "usd" in delivery.meshes:
-        require_usd()
-    if depth_scale is not None and (depth is None or not 0 < depth_scale < inf):
-        raise UsageError(
-            f"--depth-scale {depth_scale:g}: expected metres per unit, above 0, of the file given as --depth."
-        )
-    over_time = OverTime(aligning=Aligning(align=align.value, rate=rate.value), denoise=denoise)
-    take = open_and_tell(clip, voice, plan=plan, frames=frames)
-    over_time.check(take.plan)
-    lighting = read_lighting(
-        take, rig, mask, near_iterations=near_iterations, depth_path=depth, metres_per_unit=depth_scale, flat_path=flat
-    )
-    lighting.check(delivery)
-    with decoded_once(take, output=out) as take:
-        found = timing_of(take, timing, first_light=first_light, rig=lighting.rig, watch=voice.track)
-        report = normals_run(
-            take,
-            found,
-            lighting,
-            output,
-            delivery=delivery,
-            solver=solver.value,
-            over_time=over_time,
-            watch=voice.track,
-        ).report
-        tell_kept(voice, take.kept)
     voice.result(report_record(report))
-    voice.say(describe_timing(found))
-    for note in found.notes:
-        voice.warn(note)
+    voice.say(describe_timing(report.timing))
     tell_report(voice, report)
     voice.say(f"{out}: {counted(len(report.instants), 'instant')} written; see {out / 'report.html'}.")

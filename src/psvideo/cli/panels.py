@@ -6,7 +6,7 @@ PANELS = {
     "Motion and time": ("align", "rate", "denoise"),
     "What is written, and in which convention": (
         *("space", "camera_to_world", "camera", "camera_time", "y", "float32", "aov", "mesh", "encode"),
-        *("separate", "multipart", "program", "plates", "with_ambient", "weight", "beauty"),
+        *("separate", "multipart", "preset", "plates", "with_ambient", "weight", "beauty"),
         *("preview", "preview_codec"),
     ),
     "How the command runs": ("force", "resume", "json", "verbose", "quiet", "help"),

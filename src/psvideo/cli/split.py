@@ -1,13 +1,12 @@
 """psvideo split: one clean sequence per light."""
 
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from psvideo.cli.console import Voice, command_line, counted, tell_kept, tell_report
-from psvideo.cli.delivery_options import CodecName, CodecOption, PlatesPreviewOption, Weights, WithAmbient
+from psvideo.cli.console import Voice, counted, plain, tell_report
+from psvideo.cli.delivery_options import CodecOption, PlatesPreviewOption, Weights, WithAmbient
 from psvideo.cli.options import (
     ClipPath,
     FirstLight,
@@ -23,14 +22,8 @@ from psvideo.cli.options import (
     Verbose,
 )
 from psvideo.cli.sync import describe_timing
-from psvideo.errors import UsageError
-
-
-class Method(StrEnum):
-    """How plates are rebuilt."""
-
-    weights = "weights"
-    hudon2015 = "hudon2015"
+from psvideo.cli.typed import parse_weights
+from psvideo.model.choices import SplitMethod
 
 
 def split(
@@ -43,14 +36,14 @@ def split(
     first_light: FirstLight = None,
     rig: OrderRig = None,
     method: Annotated[
-        Method, typer.Option(help="By the rows' weights, or Algorithm 1 of Hudon et al. 2015, to compare with.")
-    ] = Method.weights,
+        SplitMethod, typer.Option(help="By the rows' weights, or Algorithm 1 of Hudon et al. 2015, to compare with.")
+    ] = "weights",
     flashes: Annotated[bool, typer.Option("--flashes", help="Write every flash by itself besides.")] = False,
     beauty: Annotated[bool, typer.Option("--beauty", help="Write the sum of all lights besides.")] = False,
     with_ambient: WithAmbient = False,
     weight: Weights = None,
     preview: PlatesPreviewOption = None,
-    preview_codec: CodecOption = CodecName.vp9,
+    preview_codec: CodecOption = "vp9",
     start_number: StartNumber = 1001,
     force: Force = False,
     resume: Resume = False,
@@ -59,35 +52,33 @@ def split(
     quiet: Quiet = False,
 ) -> None:
     """Rebuild one plate per flash and write one EXR sequence per light, ambient light taken off."""
-    from psvideo.cli.opening import open_and_tell
-    from psvideo.clip import decoded_once
-    from psvideo.export.results import Preview
-    from psvideo.formats.rig_toml import read_rig
     from psvideo.formats.timing_json import timing_record
-    from psvideo.plates.beauty import parse_mix
-    from psvideo.runs import Besides, Output, split_run, timing_of
+    from psvideo.runs.split import split as rebuild
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
-    output = Output(folder=out, force=force, resume=resume, start_number=start_number, command=command_line(context))
-    output.check()
-    previews: tuple[Preview, ...] = tuple(dict.fromkeys(name.value for name in preview or ()))
-    mix = parse_mix(weight or (), with_ambient=with_ambient)
-    summed = beauty or "beauty" in previews
-    if mix.weights and not summed:
-        raise UsageError("--with-ambient and --weight: belong to the beauty plate. Add --beauty, or leave them out.")
-    besides = Besides(flashes=flashes, mix=mix if summed else None, previews=previews, codec=preview_codec.value)
-    take = open_and_tell(clip, voice, plan=plan, frames=frames)
-    besides.check(take.plan)
-    known = None if rig is None else read_rig(rig, plan_lights=take.plan.lights)
-    with decoded_once(take, output=out) as take:
-        found = timing_of(take, timing, first_light=first_light, rig=known, watch=voice.track)
-        done = split_run(take, found, output, method=method.value, besides=besides, known=known, watch=voice.track)
-        tell_kept(voice, take.kept)
-    written = done.timing
-    voice.result(timing_record(written))
-    voice.say(describe_timing(written))
-    for note in found.notes:
-        voice.warn(note)
-    tell_report(voice, done.report)
-    plates = sum(flash.plate is not None for flash in written.flashes)
+    report = rebuild(
+        clip,
+        out=out,
+        plan=plan,
+        timing=timing,
+        frames=frames,
+        first_light=first_light,
+        rig=rig,
+        method=method,
+        flashes=flashes,
+        beauty=beauty,
+        with_ambient=with_ambient,
+        weight=parse_weights(weight),
+        preview=plain(preview),
+        preview_codec=preview_codec,
+        start_number=start_number,
+        force=force,
+        resume=resume,
+        watch=voice.track,
+        caller=voice.caller(context),
+    )
+    voice.result(timing_record(report.timing))
+    voice.say(describe_timing(report.timing))
+    tell_report(voice, report)
+    plates = sum(flash.plate is not None for flash in report.timing.flashes)
     voice.say(f"{out}: {counted(plates, 'plate')} written; see {out / 'report.html'}.")

@@ -7,8 +7,6 @@ import typer
 
 from psvideo.cli.console import Voice
 from psvideo.cli.options import ClipPath, FirstLight, Force, Frames, Json, OrderRig, PlanPath, Quiet, Verbose
-from psvideo.errors import UsageError
-from psvideo.formats.whole_files import PICTURE_MARK, refuse_existing, write_text
 
 if TYPE_CHECKING:
     from psvideo.model.timing import Timing
@@ -35,25 +33,22 @@ def sync(
     quiet: Quiet = False,
 ) -> None:
     """Find phase, clock offset, light order and dropped frames of a strobed clip, from the picture alone."""
-    from psvideo.cli.opening import open_and_tell
-    from psvideo.formats.rig_toml import read_rig
-    from psvideo.formats.timing_json import format_timing, timing_record
-    from psvideo.runs.syncing import sync_take
+    from psvideo.formats.timing_json import timing_record
+    from psvideo.runs.sync import sync as find
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
-    if out is not None:
-        refuse_existing(out, force=force, mark="psvideo-timing/")
-    if picture is not None:
-        if picture.suffix.lower() != ".png":
-            raise UsageError(f"--picture {picture}: expected the name of a PNG, such as {picture.with_suffix('.png')}.")
-        refuse_existing(picture, force=force, mark=PICTURE_MARK)
-    take = open_and_tell(clip, voice, plan=plan, frames=frames)
-    known = None if rig is None else read_rig(rig, plan_lights=take.plan.lights)
-    timing = sync_take(take, first_light=first_light, rig=known, picture=picture, watch=voice.track)
-    for note in timing.notes:
-        voice.warn(note)
-    if out is not None:
-        write_text(out, format_timing(timing))
+    timing = find(
+        clip,
+        out=out,
+        plan=plan,
+        frames=frames,
+        first_light=first_light,
+        rig=rig,
+        picture=picture,
+        force=force,
+        watch=voice.track,
+        caller=voice.caller(),
+    )
     voice.result(timing_record(timing))
     voice.say(describe_timing(timing))
     for written in (out, picture):

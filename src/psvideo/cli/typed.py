@@ -146,3 +146,22 @@ def parse_powers(text: str, lights: Sequence[str]) -> Mapping[str, float]:
     """Return the power of each light from ``0.5`` or ``key=1,left=0.5,right=0.5``."""
     parts = parse_per_light(text, lights, option="--power")
     return {name: parse_fraction(value, option="--power") for name, value in parts.items()}
+
+
+def parse_weights(words: Sequence[str] | None) -> dict[str, float]:
+    """Return how strong lights are in the beauty plate, from ``key=0.5``, one a light.
+
+    >>> parse_weights(["key=0.5", "left=2"])
+    {'key': 0.5, 'left': 2.0}
+    """
+    found: dict[str, float] = {}
+    for text in words or ():
+        name, equals, number = text.partition("=")
+        try:
+            weight = float(number)
+        except ValueError:
+            weight = math.nan
+        if not equals or not math.isfinite(weight) or weight < 0:
+            raise UsageError(f"--weight {text}: expected a light's name and how strong it is to be, such as key=0.5.")
+        found[name] = weight
+    return found

@@ -18,8 +18,8 @@ from av.video.stream import VideoStream
 from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError
-from psvideo.export.results import Codec
 from psvideo.formats.whole_files import whole_file
+from psvideo.model.choices import Codec
 
 Pixels = NDArray[np.uint8]
 MOST_RATE = 1_000_000

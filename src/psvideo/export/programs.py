@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from psvideo.export.results import Delivery, Program, result_name
-from psvideo.export.space import SpaceName, YDirection
+from psvideo.export.results import Delivery, result_name
+from psvideo.model.choices import Program, SpaceName, YDirection
 from psvideo.model.quantities import Aov
 
 

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,14 +13,12 @@ from psvideo.export.png import PNG_MAX, encode_normals, write_png16
 from psvideo.export.space import Space
 from psvideo.export.tags import Tags
 from psvideo.formats.exr_files import write_exr, write_exr_parts
+from psvideo.model.choices import Codec, Preview, Program
 from psvideo.model.quantities import ALWAYS, AOVS, QUANTITIES, SOURCES, Aov, is_half
 from psvideo.model.surface import Surface
 from psvideo.plates.beauty import Mix
 from psvideo.solve.depth import Depth, mesh_of
 
-Preview = Literal["relit", "normals", "plates", "beauty"]
-Codec = Literal["vp9", "prores"]
-Program = Literal["nuke", "blender", "unreal", "houdini"]
 MOVIE_SUFFIXES: dict[Codec, str] = {"vp9": "mp4", "prores": "mov"}
 
 

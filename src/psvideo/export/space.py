@@ -9,7 +9,6 @@ how to use them. ``y = "down"`` flips the green channel (DirectX).
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +17,7 @@ from psvideo.errors import UsageError
 from psvideo.export.usd.camera import USD_SUFFIXES, UpAxis, UsdCamera, open_usd_camera
 from psvideo.export.usd.pose import Pose, read_pose
 from psvideo.model.camera import FloatArray
-
-SpaceName = Literal["camera", "world", "tangent"]
-YDirection = Literal["up", "down"]
-CameraTime = Literal["frames", "numbers", "seconds"]
+from psvideo.model.choices import CameraTime, SpaceName, YDirection
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,6 +1,6 @@
 """When every flash fired, on the camera's clock, and how sure that is: what ``sync`` finds and ``split`` uses."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -59,6 +59,10 @@ class Timing:
     notes: tuple[str, ...] = field(default=(), compare=False)
     row_time_error_s: float | None = field(default=None, compare=False)
     phase_error_s: float | None = field(default=None, compare=False)
+
+    def spelled(self, spell: Callable[[str], str]) -> "Timing":
+        """Return the timing with its sentences in the words of whoever reads them: parameters, or options."""
+        return replace(self, order_note=spell(self.order_note), notes=tuple(map(spell, self.notes)))
 
     @property
     def how_sure(self) -> str:

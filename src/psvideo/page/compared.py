@@ -9,21 +9,21 @@ import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError
 from psvideo.formats.timing_json import timing_record
+from psvideo.model.choices import SplitMethod
 from psvideo.model.timing import Timing, places_in_time
 
 if TYPE_CHECKING:
     from psvideo.clip import Take
     from psvideo.plates.sequence import LightPlate
 
-Method = Literal["weights", "hudon2015"]
-RUN_UP: Mapping[Method, int] = {"weights": 0, "hudon2015": 240}
+RUN_UP: Mapping[SplitMethod, int] = {"weights": 0, "hudon2015": 240}
 """Frames before a round that a method looks at, where there are so many."""
 
 
@@ -46,7 +46,7 @@ class ComparedPlates:
         self._clip, self._plan, self._given = clip, plan, timing
         self._take: Take | None = None
         self._timing: Timing | None = None
-        self._rounds: dict[Method, tuple[int, Mapping[str, ComparedPlate]]] = {}
+        self._rounds: dict[SplitMethod, tuple[int, Mapping[str, ComparedPlate]]] = {}
         self._lock = threading.Lock()
 
     def timing(self) -> Timing:
@@ -65,7 +65,7 @@ class ComparedPlates:
         ]
         return timing_record(timing) | {"first_number": numbers[0], "dropped_frames": dropped}
 
-    def plate(self, method: Method, light: str, time_s: float) -> ComparedPlate:
+    def plate(self, method: SplitMethod, light: str, time_s: float) -> ComparedPlate:
         """Return a light's plate of the round that is nearest to a time. Raises PsvideoError where there is none."""
         with self._lock:
             take, timing = self._timed()
@@ -102,7 +102,7 @@ def _nearest_round(timing: Timing, light: str, time_s: float) -> int:
     return away_s[min(away_s)]
 
 
-def _plates(take: "Take", timing: Timing, method: Method, number: int) -> Mapping[str, ComparedPlate]:
+def _plates(take: "Take", timing: Timing, method: SplitMethod, number: int) -> Mapping[str, ComparedPlate]:
     """Rebuild one round from the frames that it touches, and those before them that the method follows."""
     from psvideo.model.shutter import frames_touched
     from psvideo.model.timing import timed_camera

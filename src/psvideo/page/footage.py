@@ -9,11 +9,12 @@ import numpy as np
 
 from psvideo.clip import Clip, demosaic, open_clip, read_frames
 from psvideo.model.camera import Camera
-from psvideo.page.compared import ComparedPlates, Method
+from psvideo.model.choices import SplitMethod
+from psvideo.page.compared import ComparedPlates
 from psvideo.page.picture import Look, Picture, shown
 from psvideo.page.show import Sequence, Show
 
-METHODS: tuple[tuple[Method, str], ...] = (
+METHODS: tuple[tuple[SplitMethod, str], ...] = (
     ("weights", "Plates by the rows' weights"),
     ("hudon2015", "Plates by Algorithm 1"),
 )
@@ -102,7 +103,7 @@ def _compared(clip: Clip, plates: ComparedPlates, beside: Sequence) -> chain[Seq
 
 
 def _plate(
-    plates: ComparedPlates, method: Method, light: str, times_s: dict[int, float], number: int, look: Look
+    plates: ComparedPlates, method: SplitMethod, light: str, times_s: dict[int, float], number: int, look: Look
 ) -> Picture:
     found = plates.plate(method, light, times_s[number])
     return picture_of(found.image, look, time_s=found.time_s, round=found.number)

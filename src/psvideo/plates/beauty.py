@@ -1,6 +1,6 @@
 """The beauty plate: the scene under all lights of a round at once, each as strong as wished, ambient off or on."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,18 +35,16 @@ class Mix:
             )
 
 
-def parse_mix(weights: Sequence[str], *, with_ambient: bool) -> Mix:
-    """Return the mix of a command's options: ``key=0.5``, one a light. Raises UsageError where one is no such thing."""
+def mix_of(weights: Mapping[str, float], *, with_ambient: bool) -> Mix:
+    """Return the mix of weights by light, 0 or more, and of ambient light as one exposure saw it.
+
+    Raises UsageError where a weight is no such number.
+    """
     found = {AMBIENT: 1.0} if with_ambient else {}
-    for text in weights:
-        name, equals, number = text.partition("=")
-        try:
-            weight = float(number)
-        except ValueError:
-            weight = np.nan
-        if not equals or not np.isfinite(weight) or weight < 0:
-            raise UsageError(f"--weight {text}: expected a light's name and how strong it is to be, such as key=0.5.")
-        found[name] = weight
+    for light, weight in weights.items():
+        if not np.isfinite(weight) or weight < 0:
+            raise UsageError(f"`weight` of {light}, {weight:g}: expected how strong it is to be, 0 or more.")
+        found[light] = float(weight)
     return Mix(weights=tuple(sorted(found.items())))
 
 

@@ -6,12 +6,12 @@ A clip of any length streams through in constant memory.
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
-from typing import Literal
 
 from psvideo.clip import Clip, Frame, Take, demosaic, read_frames
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.compute.threads import thread_count
 from psvideo.model.camera import Camera
+from psvideo.model.choices import SplitMethod
 from psvideo.model.shutter import frames_touched
 from psvideo.model.timing import Timing, places_in_time, timed_camera
 from psvideo.plates import hudon2015
@@ -19,7 +19,6 @@ from psvideo.plates.ambient import subtract, update
 from psvideo.plates.sequence import FIRST_NUMBER, LightPlate, Round, check_separable, light_plates, rounds
 from psvideo.plates.split import Plate, plate_of, split
 
-Method = Literal["weights", "hudon2015"]
 AHEAD = 2
 """Frames that are decoded in advance while plates are rebuilt; each costs memory."""
 
@@ -28,7 +27,7 @@ def clip_rounds(
     take: Take,
     timing: Timing,
     *,
-    method: Method = "weights",
+    method: SplitMethod = "weights",
     start_number: int = FIRST_NUMBER,
     watch: Watch = unwatched,
     each_flash: Callable[[Plate], None] | None = None,
@@ -59,7 +58,9 @@ def clip_light_plates(
     return light_plates(plates, take.plan, flashes, start=start_number, with_ambient=with_ambient)
 
 
-def clip_plates(take: Take, timing: Timing, *, method: Method = "weights", watch: Watch = unwatched) -> Iterator[Plate]:
+def clip_plates(
+    take: Take, timing: Timing, *, method: SplitMethod = "weights", watch: Watch = unwatched
+) -> Iterator[Plate]:
     """Decode a take once and yield the plate of every flash that it holds, ambient light taken off, demosaiced."""
     _decode_ahead(take, watch)
     clip, camera = take.clip, timed_camera(take.plan, timing)

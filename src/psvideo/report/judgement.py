@@ -1,7 +1,7 @@
 """Judgements: one subject, one word, what was found, and what to change on set."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 Grade = Literal["good", "doubtful", "bad", "unknown"]
@@ -23,6 +23,10 @@ class Judgement:
     def sentence(self) -> str:
         """What was found, and what to do about it."""
         return f"{self.found} {self.advice}".strip()
+
+    def spelled(self, spell: Callable[[str], str]) -> "Judgement":
+        """Return the line in the words of whoever reads it: parameters, or options."""
+        return replace(self, found=spell(self.found), advice=spell(self.advice))
 
 
 def usable(judgements: Sequence[Judgement]) -> bool:

@@ -13,9 +13,11 @@ from psvideo.clip import Clip
 from psvideo.clip.folder import number_of
 from psvideo.compute.progress import Watch
 from psvideo.export.programs import Delivered, note, note_name
-from psvideo.export.results import MOVIE_SUFFIXES, Codec, Delivery, Preview
+from psvideo.export.results import MOVIE_SUFFIXES, Delivery
 from psvideo.export.timeline import Footage, Images, timeline_text
 from psvideo.formats.whole_files import write_text
+from psvideo.model.choices import Codec, Preview
+from psvideo.runs.caller import Caller
 from psvideo.runs.previews import Shown, preview_name, write_preview
 
 OTHER_RATES = ("flashes",)
@@ -58,12 +60,12 @@ def write_previews(
             write_preview(path, preview, instants, fps=run.fps, codec=codec, watch=watch)
 
 
-def write_note(run: Finished, delivery: Delivery, *, first: int, last: int, metric: bool) -> None:
-    """Write how to load the delivery into the program that it is for."""
+def write_note(run: Finished, delivery: Delivery, *, first: int, last: int, metric: bool, caller: Caller) -> None:
+    """Write how to load the delivery into the program that it is for, in the caller's words."""
     if delivery.program is None:
         return
     made = Delivered(clip=run.clip.name, first=first, last=last, fps=run.fps, metric=metric, delivery=delivery)
-    write_text(run.folder / note_name(delivery.program), note(delivery.program, made))
+    write_text(run.folder / note_name(delivery.program), caller.spell(note(delivery.program, made)))
 
 
 def _sequences(folder: Path) -> dict[str, dict[int, Path]]:

@@ -12,10 +12,11 @@ from psvideo.export.space import CAMERA_SPACE, Space
 from psvideo.export.tags import Tags, sha256_of
 from psvideo.formats.timing_json import format_timing
 from psvideo.formats.whole_folders import refuse_folder, whole_folder
+from psvideo.model.choices import Rate
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
-from psvideo.plates.align.rounds import Rate
 from psvideo.plates.sequence import FIRST_NUMBER
+from psvideo.runs.caller import PYTHON, Caller
 
 MARK = "timing.json"
 """The file by which a folder of plates or results is known."""
@@ -23,13 +24,13 @@ MARK = "timing.json"
 
 @dataclass(frozen=True, kw_only=True)
 class Output:
-    """Where a run writes, and what it may do there. ``command`` is what the user typed, for the report."""
+    """Where a run writes, what it may do there, and who called it."""
 
     folder: Path
     force: bool = False
     resume: bool = False
     start_number: int = FIRST_NUMBER
-    command: str = ""
+    caller: Caller = PYTHON
 
     def check(self) -> None:
         """Raise UsageError where the folder exists and may not be replaced, before any work is done."""

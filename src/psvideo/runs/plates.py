@@ -11,15 +11,15 @@ from psvideo.compute.progress import Watch, unwatched
 from psvideo.compute.threads import writing
 from psvideo.errors import PsvideoError
 from psvideo.export.plates import plate_name, write_flash, write_plate
-from psvideo.export.results import Codec, Preview
 from psvideo.export.tags import Tags
 from psvideo.formats.timing_json import format_timing
 from psvideo.formats.whole_files import write_text
+from psvideo.model.choices import Codec, Preview, SplitMethod
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Rig
 from psvideo.model.timing import Timing
 from psvideo.plates.beauty import BEAUTY, Mix, beauty_of
-from psvideo.plates.gather import Method, clip_rounds, first_ambient
+from psvideo.plates.gather import clip_rounds, first_ambient
 from psvideo.plates.sequence import AMBIENT, round_numbers
 from psvideo.report.run_report import RunReport
 from psvideo.runs.delivering import plates_of
@@ -65,7 +65,7 @@ def split_run(
     timing: Timing,
     output: Output,
     *,
-    method: Method = "weights",
+    method: SplitMethod = "weights",
     besides: Besides = Besides(),
     known: Rig | None = None,
     watch: Watch = unwatched,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from psvideo.clip.decode import exr
 from psvideo.compute.progress import Watch
-from psvideo.export.results import Codec, Preview
+from psvideo.model.choices import Codec, Preview
 from psvideo.pictures.shading import exposure_for, normal_colours, smaller, srgb
 
 Pixels = NDArray[np.uint8]

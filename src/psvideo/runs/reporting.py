@@ -46,7 +46,7 @@ class Solved:
 def observing(take: Take, rig: Rig | None = None, mask: NDArray[np.bool_] | None = None) -> Observed:
     """Return what gathers the facts of a take's rounds; with a rig, it is held against the plates.
 
-    Near lights are so only on the rig's plane: where depth is known instead (``--depth``), there may be none.
+    Near lights are so only on the rig's plane: where depth is known instead, there may be none.
     """
     clip = take.clip
     points = None
@@ -90,6 +90,9 @@ def run_report(
         )
         for name in clip.plan.lights
     )
+    judged = judgements(clip.plan, timing, observed, aligned=solved is not None and solved.aligned)
+    warnings = (*clip.warnings, *(() if solved is None else solved.warnings))
+    spell = output.caller.spell
     return RunReport(
         clip=clip.name,
         version=__version__,
@@ -97,12 +100,12 @@ def run_report(
         timing=timing,
         lights=lights,
         instants=tuple(observed.facts),
-        judgements=judgements(clip.plan, timing, observed, aligned=solved is not None and solved.aligned),
+        judgements=tuple(one.spelled(spell) for one in judged),
         condition=None if solved is None else solved.lighting.condition,
         solver="" if solved is None else solved.solver,
-        trust="" if solved is None else solved.trust,
-        warnings=(*clip.warnings, *(() if solved is None else solved.warnings)),
-        shot=_shot(clip, take.numbers),
+        trust="" if solved is None else spell(solved.trust),
+        warnings=tuple(map(spell, warnings)),
+        shot={name: spell(words) for name, words in _shot(clip, take.numbers).items()},
         settings=_settings(take, output, solved),
         thumbnails=observed.thumbnails,
     )
@@ -152,12 +155,12 @@ def _shot(clip: Clip, numbers: Sequence[int]) -> dict[str, str]:
 
 
 def _settings(take: Take, output: Output, solved: Solved | None) -> dict[str, str]:
-    facts = {"Command": output.command or "called from Python", "Plan, SHA-256": sha256_of(take.clip.plan_path)}
+    facts = {"Command": output.caller.command or "called from Python", "Plan, SHA-256": sha256_of(take.clip.plan_path)}
     if solved is not None:
         facts["Rig, SHA-256"] = sha256_of(solved.lighting.rig_path)
         facts["Mask, SHA-256"] = solved.lighting.mask_sha256 or "no mask"
         facts["Solver"] = solved.solver
-        facts["What valid means"] = solved.trust
+        facts["What valid means"] = output.caller.spell(solved.trust)
     libraries = ", ".join(f"{name} {version_of(name)}" for name in LIBRARIES)
     facts["Made with"] = f"psvideo {__version__}, Python {platform.python_version()}, {libraries}"
     facts["Run in"] = str(Path.cwd())

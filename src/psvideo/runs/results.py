@@ -18,6 +18,7 @@ from psvideo.export.tags import Tags
 from psvideo.export.usd.scene import write_animation
 from psvideo.formats.timing_json import format_timing
 from psvideo.formats.whole_files import write_text
+from psvideo.model.choices import Solver
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.plates.align.rounds import Aligning, aligned
@@ -35,7 +36,7 @@ from psvideo.runs.reporting import Solved, observing, run_report, write_report
 from psvideo.runs.shape import shape_of
 from psvideo.solve.depth import Shaping, reservations
 from psvideo.solve.instants import Instant, denoised, surfaces
-from psvideo.solve.normals.solving import Solver, Solving, trust_note
+from psvideo.solve.normals.solving import Solving, trust_note
 
 Pixels = NDArray[np.uint8]
 SAMPLE_ROUND = 3
@@ -181,4 +182,4 @@ def _at_the_end(
     run = Finished(folder=folder, target=output.folder, clip=clip, fps=tags.fps, first_time_s=facts[0].time_s)
     write_previews(run, delivery.previews, delivery.codec, [f"plates/{light}" for light in clip.plan.lights], watch)
     write_timeline(run)
-    write_note(run, delivery, first=facts[0].number, last=facts[-1].number, metric=metric)
+    write_note(run, delivery, first=facts[0].number, last=facts[-1].number, metric=metric, caller=output.caller)

@@ -6,18 +6,16 @@ light around it, as soon as the second one is there; at the clip's ends, and bes
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
+from psvideo.model.choices import Align, Rate
 from psvideo.plates.align.between import Ends, plate_at, track
 from psvideo.plates.align.brightness import evened
 from psvideo.plates.align.flow import Flow, flow_between, moved
 from psvideo.plates.align.held import Around, Held, Instant
 from psvideo.plates.sequence import AMBIENT, LightPlate, Round
 
-Align = Literal["none", "flow", "auto"]
-Rate = Literal["round", "flash"]
 Flows = dict[tuple[str, int], Flow | None]
 """Flow from the plate of a light in a round (its number) to the next one; None where nothing moved."""
 

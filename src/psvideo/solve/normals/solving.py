@@ -4,13 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from psvideo.model.choices import Solver
 from psvideo.model.surface import Surface
 from psvideo.solve.normals import robust, woodham1980
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.task import Mask, Samples
 
 Method = Literal["least-squares", "robust"]
-Solver = Literal["auto", "least-squares", "robust"]
 ROBUST_FROM_LIGHTS = 5
 """With five lights a highlight and a shadow can both be told from the rest; with fewer there is nothing to weigh."""
 

@@ -5,21 +5,23 @@ import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from psvideo.clip import Clip, Kept, Take, holes, keeping_near, read_frames
 from psvideo.compute.progress import Watch, unwatched
-from psvideo.errors import NoStrobeError, PsvideoError
+from psvideo.errors import NoStrobeError, PsvideoError, UsageError
 from psvideo.formats.rig_toml import read_rig
 from psvideo.model.plan import Plan
 from psvideo.model.row_profiles import SATURATED
 from psvideo.model.timing import DroppedFrames, Timing
 from psvideo.plates.gather import clip_rounds
 from psvideo.plates.naming import named_by_rig
-from psvideo.report.judgement import Judgement, usable, verdict_of
+from psvideo.report.judgement import Judgement
+from psvideo.runs.caller import PYTHON, Caller
+from psvideo.runs.checked import Check, write_page
 from psvideo.runs.opening import open_take
 from psvideo.runs.reporting import judgements, observing
 from psvideo.sync.of_take import find_take_timing
@@ -33,64 +35,62 @@ BRIGHTER, DARKER = 1.25, 0.4
 """Later frames that reach so many times the light of those looked at."""
 MOST_KEPT_BYTES = 1_500_000_000
 """Larger windows are decoded twice: temporary folders may lie in memory."""
-SCHEMA = "psvideo-check/1"
 
 
-@dataclass(frozen=True, kw_only=True)
-class Check:
-    """What was found of one take, line by line; ``looked_at`` of its ``frames`` frames were decoded."""
+def check(
+    clip: Path | str,
+    *,
+    plan: Path | str | None = None,
+    rig: Path | str | None = None,
+    first_light: str | None = None,
+    report: Path | str | None = None,
+    watch: Watch = unwatched,
+    caller: Caller = PYTHON,
+) -> Check:
+    """Judge a take in seconds by frames from its start and a few from the rest, one line for each thing.
 
-    clip: str
-    path: Path
-    frames: int
-    looked_at: int
-    seconds: float
-    judgements: tuple[Judgement, ...]
-    notes: tuple[str, ...] = ()
+    - ``clip``: a folder of numbered frames with plan.toml, or a movie file. ``plan`` names the plan where it does not
+      lie beside the footage.
+    - ``rig``: where the lights are, to tell their order by where no marker does; the plates are held against it.
+      ``first_light`` names the light of the clip's first complete flash, for plans without a marker.
+    - ``report``: a page (HTML) to write of the check, outside of the footage. Nothing else is written.
 
-    @property
-    def usable(self) -> bool:
-        """True where nothing is bad."""
-        return usable(self.judgements)
-
-    @property
-    def verdict(self) -> str:
-        """The sentence that sums the lines up."""
-        return verdict_of(self.judgements)
-
-
-def check_record(check: Check) -> dict[str, object]:
-    """Return a check as what ``--json`` prints."""
-    lines = [
-        {"subject": one.subject, "grade": one.grade, "found": one.found, "advice": one.advice}
-        for one in check.judgements
-    ]
-    return {
-        "schema": SCHEMA,
-        "clip": check.clip,
-        "path": str(check.path),
-        "usable": check.usable,
-        "verdict": check.verdict,
-        "judgements": lines,
-        "notes": list(check.notes),
-        "frames": check.frames,
-        "looked_at": check.looked_at,
-        "seconds": round(check.seconds, 2),
-    }
+    ``watch`` is handed every long loop. Returns what was found; its ``usable`` says whether the take can be used.
+    Raises UsageError where the report would lie among the footage, and PsvideoError where the footage or its plan
+    cannot be read, or where there are too few frames to tell.
+    """
+    page = None if report is None else Path(report)
+    refuse_inside(page, Path(clip))
+    found = judged(
+        Path(clip),
+        plan=None if plan is None else Path(plan),
+        rig=None if rig is None else Path(rig),
+        first_light=first_light,
+        watch=watch,
+        caller=caller,
+    )
+    if page is not None:
+        write_page(page, [found], {})
+    return found
 
 
-def check_take(
+def refuse_inside(report: Path | None, footage: Path) -> None:
+    """Raise UsageError where a page of checks would lie among footage: nothing is ever written there."""
+    folder = footage if footage.is_dir() else footage.parent
+    if report is not None and report.resolve().is_relative_to(folder.resolve()):
+        raise UsageError(f"--report {report}: lies among the footage of {folder}. Name a file somewhere else.")
+
+
+def judged(
     path: Path,
     *,
-    plan: Path | None = None,
-    rig: Path | None = None,
-    first_light: str | None = None,
+    plan: Path | None,
+    rig: Path | None,
+    first_light: str | None,
     watch: Watch = unwatched,
+    caller: Caller = PYTHON,
 ) -> Check:
-    """Judge a take by frames from its start and a few from the rest; with a ``rig``, the plates are held against it.
-
-    Raises PsvideoError where the footage or its plan cannot be read, or where there are too few frames to tell.
-    """
+    """Judge a take, and write nothing. Raises PsvideoError as ``check`` does."""
     began = time.monotonic()
     whole = open_take(path, plan=plan)
     clip = whole.clip
@@ -127,8 +127,8 @@ def check_take(
         frames=len(clip.numbers),
         looked_at=len(window) + len(later),
         seconds=time.monotonic() - began,
-        judgements=lines,
-        notes=(*clip.warnings, *notes),
+        judgements=tuple(one.spelled(caller.spell) for one in lines),
+        notes=tuple(map(caller.spell, (*clip.warnings, *notes))),
     )
 
 

@@ -1,0 +1,194 @@
+"""The whole of ``psvideo normals``: a clip and a rig in, a folder of normals, albedo and validity out."""
+
+from collections.abc import Mapping, Sequence
+from math import inf
+from pathlib import Path
+
+from psvideo.clip import decoded_once
+from psvideo.compute.progress import Watch, unwatched
+from psvideo.errors import UsageError
+from psvideo.export.asked import Asked, delivery_of
+from psvideo.export.usd.core import require_usd
+from psvideo.model.choices import (
+    MOST_ITERATIONS,
+    Align,
+    CameraTime,
+    Codec,
+    MapFiles,
+    MeshKind,
+    Preview,
+    Program,
+    Rate,
+    Solver,
+    SpaceName,
+    YDirection,
+)
+from psvideo.model.quantities import Aov
+from psvideo.plates.align.rounds import Aligning
+from psvideo.plates.sequence import FIRST_NUMBER
+from psvideo.report.run_report import RunReport
+from psvideo.runs.caller import PYTHON, Caller
+from psvideo.runs.lighting import read_lighting
+from psvideo.runs.opening import open_take, say_kept, say_of_clip
+from psvideo.runs.output import Output
+from psvideo.runs.results import OverTime, normals_run
+from psvideo.runs.timed import timing_of
+
+MOST_AVERAGED = 64
+
+
+def normals(
+    clip: Path | str,
+    *,
+    rig: Path | str,
+    out: Path | str,
+    plan: Path | str | None = None,
+    timing: Path | str | None = None,
+    mask: Path | str | None = None,
+    flat: Path | str | None = None,
+    frames: str | None = None,
+    first_light: str | None = None,
+    solver: Solver = "auto",
+    near_iterations: int | None = None,
+    depth: Path | str | None = None,
+    depth_scale: float | None = None,
+    align: Align = "auto",
+    rate: Rate = "round",
+    denoise: int = 1,
+    preset: Program | None = None,
+    space: SpaceName | None = None,
+    camera_to_world: Path | str | None = None,
+    camera: str | None = None,
+    camera_time: CameraTime | None = None,
+    y: YDirection | None = None,
+    float32: bool = False,
+    aov: Sequence[Aov] = (),
+    mesh: Sequence[MeshKind] = (),
+    encode: MapFiles | None = None,
+    multipart: bool | None = None,
+    plates: bool = False,
+    with_ambient: bool = False,
+    weight: Mapping[str, float] | None = None,
+    preview: Sequence[Preview] = (),
+    preview_codec: Codec = "vp9",
+    start_number: int = FIRST_NUMBER,
+    force: bool = False,
+    resume: bool = False,
+    watch: Watch = unwatched,
+    caller: Caller = PYTHON,
+) -> RunReport:
+    """Write normals, albedo and validity for every round of flashes; find the timing and rebuild the plates besides.
+
+    What is read:
+
+    - ``clip``: a folder of numbered frames with plan.toml, or a movie file. ``plan`` names the plan where it does not
+      lie beside the footage.
+    - ``rig``: where the lights are: rig.toml, an .lp file, a DiLiGenT or UW list.
+    - ``timing``: timing.json of this clip; left out, the flashes are found from the picture. ``first_light`` names the
+      light of the clip's first complete flash, for plans without a marker.
+    - ``frames``: file numbers to use, such as ``"1-100"`` or ``"1-100x2"``; left out, all.
+    - ``mask``: a picture of the frames' size, white where to solve. ``flat``: how light falls off over the picture,
+      from ``calibrate flat-field``.
+    - ``depth``: known depth, an EXR in metres along the optical axis or a 16-bit PNG in millimetres, or a folder with
+      one per result; ``depth_scale``: metres per unit of it (left out: 1 for floats, 0.001 for integers).
+
+    How it is solved:
+
+    - ``solver``: "auto" is robust against highlights and shadows from five lights on. ``near_iterations``: how often
+      near lights' distances are taken again from the depth of the normals found, 0 to 10 (left out: 1, and 0 with
+      ``depth``).
+    - ``align``: "auto" brings the plates of a round to one instant where something moves, "flow" looks for motion
+      everywhere, "none" leaves them. ``rate``: one result per "round", or per "flash". ``denoise``: average up to so
+      many results, 1 to 64, where nothing moves.
+
+    What is written, into the folder ``out`` (float16 EXR sequences, numbered from ``start_number``):
+
+    - ``preset``: what this program wants, where no other parameter says otherwise, and a note on how to load it.
+    - ``space`` (left out: "camera"), with ``camera_to_world`` for "world": a USD file with the camera (which one:
+      ``camera``; how its time codes count: ``camera_time``), or a text file with a 3 x 3 or 4 x 4 matrix. ``y``: which
+      way green points (left out: "up"). ``float32``: normals in 32 bits.
+    - ``aov``: what is written besides. ``mesh``: "ply", one per instant; "usd", one animated file. ``encode``: 16-bit
+      PNG maps besides. ``multipart``: one EXR with all quantities besides. ``plates``: the plates besides.
+    - ``weight``: how strong a light is in the beauty plate, by name (1 where not named); ``with_ambient`` leaves
+      ambient light in it. ``preview``: movies for eyes, coded as ``preview_codec``.
+    - ``force`` replaces an ``out`` that exists; ``resume`` goes on where a run that was stopped left off.
+
+    ``watch`` is handed every long loop, and ``caller`` the sentences that come on the way. Returns the report that lies
+    in the folder too, with the timing in it. Raises UsageError where parameters do not fit together, before any work is
+    done, and PsvideoError where files cannot be used or hold no complete round.
+    """
+    output = Output(folder=Path(out), force=force, resume=resume, start_number=start_number, caller=caller)
+    output.check()
+    asked = Asked(
+        preset=preset,
+        space=space,
+        camera_to_world=_path(camera_to_world),
+        camera=camera,
+        camera_time=camera_time,
+        y=y,
+        float32=float32,
+        aov=aov,
+        mesh=mesh,
+        encode=encode,
+        multipart=multipart,
+        plates=plates,
+        with_ambient=with_ambient,
+        weight=weight or {},
+        preview=preview,
+        preview_codec=preview_codec,
+    )
+    delivery, at_odds = delivery_of(asked)
+    for sentence in at_odds:
+        caller.warn(sentence)
+    if "usd" in delivery.meshes:
+        require_usd()
+    _check_numbers(near_iterations=near_iterations, depth=depth, depth_scale=depth_scale, denoise=denoise)
+    over_time = OverTime(aligning=Aligning(align=align, rate=rate), denoise=denoise)
+    take = open_take(Path(clip), plan=_path(plan), frames=frames)
+    say_of_clip(take.clip, caller)
+    over_time.check(take.plan)
+    lighting = read_lighting(
+        take,
+        Path(rig),
+        _path(mask),
+        near_iterations=near_iterations,
+        depth_path=_path(depth),
+        metres_per_unit=depth_scale,
+        flat_path=_path(flat),
+    )
+    lighting.check(delivery)
+    with decoded_once(take, output=output.folder) as kept:
+        found = timing_of(kept, _path(timing), first_light=first_light, rig=lighting.rig, watch=watch).spelled(
+            caller.spell
+        )
+        for note in found.notes:
+            caller.warn(note)
+        done = normals_run(
+            kept,
+            found,
+            lighting,
+            output,
+            delivery=delivery,
+            solver=solver,
+            over_time=over_time,
+            watch=watch,
+        )
+        say_kept(kept.kept, caller)
+    return done.report
+
+
+def _path(given: Path | str | None) -> Path | None:
+    return None if given is None else Path(given)
+
+
+def _check_numbers(
+    *, near_iterations: int | None, depth: Path | str | None, depth_scale: float | None, denoise: int
+) -> None:
+    if depth_scale is not None and (depth is None or not 0 < depth_scale < inf):
+        raise UsageError(
+            f"--depth-scale {depth_scale:g}: expected metres per unit, above 0, of the file given as --depth."
+        )
+    if near_iterations is not None and not 0 <= near_iterations <= MOST_ITERATIONS:
+        raise UsageError(f"`near_iterations` {near_iterations}: expected a number from 0 to {MOST_ITERATIONS}.")
+    if not 1 <= denoise <= MOST_AVERAGED:
+        raise UsageError(f"`denoise` {denoise}: expected a number from 1 to {MOST_AVERAGED}.")

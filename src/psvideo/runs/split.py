@@ -1,0 +1,80 @@
+"""The whole of ``psvideo split``: a clip in, a folder of plates out."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from psvideo.clip import decoded_once
+from psvideo.compute.progress import Watch, unwatched
+from psvideo.errors import UsageError
+from psvideo.formats.rig_toml import read_rig
+from psvideo.model.choices import Codec, PlatesPreview, SplitMethod
+from psvideo.plates.beauty import mix_of
+from psvideo.plates.sequence import FIRST_NUMBER
+from psvideo.report.run_report import RunReport
+from psvideo.runs.caller import PYTHON, Caller
+from psvideo.runs.opening import open_take, say_kept, say_of_clip
+from psvideo.runs.output import Output
+from psvideo.runs.plates import Besides, split_run
+from psvideo.runs.timed import timing_of
+
+
+def split(
+    clip: Path | str,
+    *,
+    out: Path | str,
+    plan: Path | str | None = None,
+    timing: Path | str | None = None,
+    frames: str | None = None,
+    first_light: str | None = None,
+    rig: Path | str | None = None,
+    method: SplitMethod = "weights",
+    flashes: bool = False,
+    beauty: bool = False,
+    with_ambient: bool = False,
+    weight: Mapping[str, float] | None = None,
+    preview: Sequence[PlatesPreview] = (),
+    preview_codec: Codec = "vp9",
+    start_number: int = FIRST_NUMBER,
+    force: bool = False,
+    resume: bool = False,
+    watch: Watch = unwatched,
+    caller: Caller = PYTHON,
+) -> RunReport:
+    """Rebuild one plate per flash and write one EXR sequence per light into ``out``, ambient light taken off.
+
+    - ``clip``: a folder of numbered frames with plan.toml, or a movie file. ``plan`` names the plan where it does not
+      lie beside the footage. ``frames``: file numbers to use, such as ``"1-100"`` or ``"1-100x2"``; left out, all.
+    - ``timing``: timing.json of this clip; left out, the flashes are found from the picture. ``first_light`` names the
+      light of the clip's first complete flash, for plans without a marker; ``rig``, where the lights are, tells their
+      order too, and is held against the plates in the report.
+    - ``method``: by the rows' "weights", or Algorithm 1 of Hudon et al. ("hudon2015"), to compare with.
+    - ``flashes``: every flash by itself besides. ``beauty``: the sum of all lights besides, each as strong as
+      ``weight`` says (by name; 1 where not named), with ambient light where ``with_ambient``. ``preview``: movies for
+      eyes, coded as ``preview_codec``.
+    - ``start_number``: the number of the first round's files. ``force`` replaces an ``out`` that exists; ``resume``
+      goes on where a run that was stopped left off.
+
+    ``watch`` is handed every long loop, and ``caller`` the sentences that come on the way. Returns the report that lies
+    in the folder too; its ``timing`` names every flash's plate. Raises UsageError where parameters do not fit together,
+    before any work is done, and PsvideoError where files cannot be used or hold no complete round.
+    """
+    output = Output(folder=Path(out), force=force, resume=resume, start_number=start_number, caller=caller)
+    output.check()
+    mix = mix_of(weight or {}, with_ambient=with_ambient)
+    summed = beauty or "beauty" in preview
+    if mix.weights and not summed:
+        raise UsageError("--with-ambient and --weight: belong to the beauty plate. Add --beauty, or leave them out.")
+    previews = tuple(dict.fromkeys(preview))
+    besides = Besides(flashes=flashes, mix=mix if summed else None, previews=previews, codec=preview_codec)
+    take = open_take(Path(clip), plan=None if plan is None else Path(plan), frames=frames)
+    say_of_clip(take.clip, caller)
+    besides.check(take.plan)
+    known = None if rig is None else read_rig(Path(rig), plan_lights=take.plan.lights)
+    given = None if timing is None else Path(timing)
+    with decoded_once(take, output=output.folder) as kept:
+        found = timing_of(kept, given, first_light=first_light, rig=known, watch=watch).spelled(caller.spell)
+        for note in found.notes:
+            caller.warn(note)
+        done = split_run(kept, found, output, method=method, besides=besides, known=known, watch=watch)
+        say_kept(kept.kept, caller)
+    return done.report

@@ -1,0 +1,77 @@
+"""The whole of ``psvideo sync``: a clip in, its timing out, with a picture of how well the flashes were found."""
+
+from pathlib import Path
+
+import numpy as np
+
+from psvideo.clip import Take
+from psvideo.compute.progress import Watch, unwatched
+from psvideo.errors import UsageError
+from psvideo.formats.rig_toml import read_rig
+from psvideo.formats.timing_json import format_timing
+from psvideo.formats.whole_files import PICTURE_MARK, refuse_existing, write_text
+from psvideo.model.timing import Timing, places_in_time
+from psvideo.pictures.timing import timing_picture, write_sheet
+from psvideo.plates.naming import named_by_rig
+from psvideo.runs.caller import PYTHON, Caller
+from psvideo.runs.opening import open_take, say_of_clip
+from psvideo.sync.of_take import TakeProfiles, take_profiles, timing_of_profiles
+
+MARK = "psvideo-timing/"
+"""By which a file is known for a timing, which may be replaced."""
+
+
+def sync(
+    clip: Path | str,
+    *,
+    out: Path | str | None = None,
+    plan: Path | str | None = None,
+    frames: str | None = None,
+    first_light: str | None = None,
+    rig: Path | str | None = None,
+    picture: Path | str | None = None,
+    force: bool = False,
+    watch: Watch = unwatched,
+    caller: Caller = PYTHON,
+) -> Timing:
+    """Find phase, clock offset, light order and dropped frames of a strobed clip, from the picture alone.
+
+    - ``clip``: a folder of numbered frames with plan.toml, or a movie file. ``plan`` names the plan where it does not
+      lie beside the footage. ``frames``: file numbers to use, such as ``"1-100"`` or ``"1-100x2"``; left out, all.
+    - ``first_light`` names the light of the clip's first complete flash, for plans without a marker; ``rig``, where the
+      lights are, tells their order by where no marker does.
+    - ``out``: a timing.json to write. ``picture``: a PNG to write that shows how well the flashes were found. ``force``
+      replaces either where it exists.
+
+    ``watch`` is handed every long loop, and ``caller`` the sentences that come on the way. Returns when every flash
+    fired, in seconds on the camera's clock. Raises UsageError where an output exists or is no PNG, NoStrobeError where
+    no strobe is found, and PsvideoError where files cannot be used.
+    """
+    timing_path, picture_path = (None if path is None else Path(path) for path in (out, picture))
+    if timing_path is not None:
+        refuse_existing(timing_path, force=force, mark=MARK)
+    if picture_path is not None:
+        if picture_path.suffix.lower() != ".png":
+            such = picture_path.with_suffix(".png")
+            raise UsageError(f"--picture {picture_path}: expected the name of a PNG, such as {such}.")
+        refuse_existing(picture_path, force=force, mark=PICTURE_MARK)
+    take = open_take(Path(clip), plan=None if plan is None else Path(plan), frames=frames)
+    say_of_clip(take.clip, caller)
+    known = None if rig is None else read_rig(Path(rig), plan_lights=take.plan.lights)
+    profiles = take_profiles(take, watch=watch)
+    timing = timing_of_profiles(take, profiles, first_light=first_light)
+    if picture_path is not None and take.plan.mode != "synced":
+        _draw(picture_path, take, timing, profiles)
+    timing = (timing if known is None else named_by_rig(take, timing, known)).spelled(caller.spell)
+    for note in timing.notes:
+        caller.warn(note)
+    if timing_path is not None:
+        write_text(timing_path, format_timing(timing))
+    return timing
+
+
+def _draw(picture: Path, take: Take, timing: Timing, profiles: TakeProfiles) -> None:
+    places = places_in_time(timing, take.clip.numbers)
+    shown = [n for n, number in enumerate(take.numbers) if number in places]
+    index = np.array([places[take.numbers[n]] for n in shown], np.int64)
+    write_sheet(picture, timing_picture(take.plan, timing, index, profiles.value[shown]))
