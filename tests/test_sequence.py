@@ -95,7 +95,9 @@ def gathered(plan: Plan, shot: Exposure, timing: Timing) -> list[Round]:
     return list(rounds(plates, plan, timing.flashes))
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow])
+@settings(
+    max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
+)
 @given(
     powers=st.lists(
         st.lists(st.sampled_from([0.0, 0.0, 0.25, 0.5, 1.0]), min_size=3, max_size=3), min_size=3, max_size=5
