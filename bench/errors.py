@@ -13,7 +13,7 @@ from bench.timing_scenes import banded, plan_of, rolling_stripes, tumbling, void
 from psvideo.errors import PsvideoError
 from psvideo.model.row_profiles import collect_with_doubt
 from psvideo.sync.find import find_timing
-from psvideo.synth import StrobeClock
+from psvideo.synth import TrueClock
 
 SEEDS = 100
 BAR = (0.7, 1.4)
@@ -39,7 +39,7 @@ def cases() -> dict[str, Case]:
     unknown = replace(plain, camera=replace(plain.camera, readout_s=None))
     half = plan_of(shutter=0.5, readout=0.6)
     wide = plan_of(tolerance_ppm=None)
-    hundred = StrobeClock(phase_s=0.0, offset_ppm=100.0)
+    hundred = TrueClock(phase_s=0.0, offset_ppm=100.0)
     return {
         "clean": Case(plan=plain, frames=60),
         "clean, shutter 180": Case(plan=half, frames=60),

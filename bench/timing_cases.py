@@ -29,7 +29,7 @@ from bench.timing_scenes import (
 from psvideo.clip import Frame
 from psvideo.model.camera import Encoding
 from psvideo.model.plan import Plan
-from psvideo.synth import Exposure, Flicker, Noise, StrobeClock, TrueFlash, expose
+from psvideo.synth import Exposure, MainsSwing, Noise, TrueClock, TrueFlash, expose
 
 NOISE = Noise(full_well_e=20_000, read_e=8)
 DRIFTING, ALL_AT_ONCE = 0.1, 0.3
@@ -61,9 +61,9 @@ class Case:
     claimed: Plan | None = None
     scene: Scene = textured
     frames: int = 96
-    clock: StrobeClock = field(default_factory=lambda: StrobeClock(phase_s=0.0123, offset_ppm=40.0))
+    clock: TrueClock = field(default_factory=lambda: TrueClock(phase_s=0.0123, offset_ppm=40.0))
     ambient: float = 0.0
-    flicker: Flicker | None = None
+    flicker: MainsSwing | None = None
     dropped: tuple[int, ...] = ()
     repeated: tuple[int, ...] = ()
     step: Fraction = Fraction(1)
@@ -115,8 +115,8 @@ def _through(recorder: Recorder, plan: Plan, frames: np.ndarray) -> Sequence[Pic
     return [image if image.ndim == 2 else np.ascontiguousarray(image[..., 1]) for image in images]
 
 
-def _clock(ppm: float, drift: float = 0.0, jitter_s: float = 0.0) -> StrobeClock:
-    return StrobeClock(offset_ppm=ppm, drift_ppm_per_s=drift, jitter_s=jitter_s)
+def _clock(ppm: float, drift: float = 0.0, jitter_s: float = 0.0) -> TrueClock:
+    return TrueClock(offset_ppm=ppm, drift_ppm_per_s=drift, jitter_s=jitter_s)
 
 
 def _unknown(plan: Plan) -> Plan:
@@ -212,10 +212,10 @@ def _other_light() -> dict[str, Case]:
     plain, half = plan_of(), plan_of(shutter=0.5, readout=0.6)
     return {
         "ambient": Case(plan=plain, ambient=0.15),
-        "ambient at 100 Hz": Case(plan=plain, ambient=0.15, flicker=Flicker(hz=100, depth=0.6)),
-        "ambient at 120 Hz": Case(plan=plain, ambient=0.15, flicker=Flicker(hz=120, depth=0.6)),
-        "ambient at 100 Hz, 180 degrees": Case(plan=half, ambient=0.15, flicker=Flicker(hz=100, depth=0.6)),
-        "ambient at 120 Hz, 180 degrees": Case(plan=half, ambient=0.15, flicker=Flicker(hz=120, depth=0.6)),
+        "ambient at 100 Hz": Case(plan=plain, ambient=0.15, flicker=MainsSwing(hz=100, depth=0.6)),
+        "ambient at 120 Hz": Case(plan=plain, ambient=0.15, flicker=MainsSwing(hz=120, depth=0.6)),
+        "ambient at 100 Hz, 180 degrees": Case(plan=half, ambient=0.15, flicker=MainsSwing(hz=100, depth=0.6)),
+        "ambient at 120 Hz, 180 degrees": Case(plan=half, ambient=0.15, flicker=MainsSwing(hz=120, depth=0.6)),
     }
 
 
@@ -306,7 +306,7 @@ def _combined() -> dict[str, Case]:
             scene=tumbling,
             clock=drift,
             ambient=0.05,
-            flicker=Flicker(hz=100, depth=0.4),
+            flicker=MainsSwing(hz=100, depth=0.4),
             frames=300,
             dropped=(120,),
             bar_rows=ALL_AT_ONCE,

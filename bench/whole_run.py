@@ -25,7 +25,7 @@ from psvideo.formats.rig_toml import format_rig
 from psvideo.model.camera import Camera
 from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.model.rig import Light, Rig
-from psvideo.synth import Noise, StrobeClock, expose
+from psvideo.synth import Noise, TrueClock, expose
 
 SHORT, LONG = 40, 100
 REPEATS = 2
@@ -148,7 +148,7 @@ def _film(folder: Path, frames: int, directions: Directions) -> None:
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
     shades = [0.7 * np.maximum(normals @ np.array(d, np.float32), 0) for d in directions.values()]
     plates = [np.tile(np.repeat(shade[..., None], 3, axis=2), (1, REPEATED, 1)).astype(np.float32) for shade in shades]
-    clock = StrobeClock(phase_s=0.0123, offset_ppm=20.0)
+    clock = TrueClock(phase_s=0.0123, offset_ppm=20.0)
     (folder / "frames").mkdir(parents=True)
     for first in range(0, frames, 10):
         shot = expose(

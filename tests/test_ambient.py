@@ -14,9 +14,9 @@ from psvideo.model.timing import Flash, Timing
 from psvideo.plates import ambient
 from psvideo.plates.mains import Mains, Ripple, RowLight, find_ripple
 from psvideo.plates.split import Plate, split
-from psvideo.synth import Noise, StrobeClock
+from psvideo.synth import Noise, TrueClock
 from psvideo.synth.camera.noise import NOISELESS, frame_rng
-from psvideo.synth.camera.sensor import Flicker, expose_frames
+from psvideo.synth.camera.sensor import MainsSwing, expose_frames
 from psvideo.synth.lamps.strobe import true_flashes
 
 PlanMaker = Callable[..., Plan]
@@ -63,13 +63,13 @@ def shoot(
     ambient_of: AmbientOf,
     *,
     noise: Noise = NOISELESS,
-    flicker: Flicker | None = None,
+    flicker: MainsSwing | None = None,
     frames: int = 120,
     dropped: tuple[int, ...] = (),
 ) -> Take:
     scene = texture(plan)
     truth = {slot: (0.15 * scene * (1 + 0.5 * n)).astype(np.float32) for n, slot in enumerate(plan.lit_slots)}
-    clock = StrobeClock(phase_s=0.0123, offset_ppm=30.0)
+    clock = TrueClock(phase_s=0.0123, offset_ppm=30.0)
     flashes = true_flashes(plan, clock, frames=frames, dropped=frozenset(dropped))
     kept = [n for n in range(frames) if n not in dropped]
     images = expose_frames(
@@ -179,14 +179,14 @@ def test_where_someone_moves_the_average_begins_anew_and_elsewhere_it_goes_on(pl
 @pytest.mark.parametrize("depth", [0.3, 1.0])
 def test_mains_light_is_told_apart_row_by_row(hz: float, depth: float, make_plan: PlanMaker) -> None:
     plan = make_plan(width_px=160, height_px=120, fps=Fraction(110))
-    take = shoot(plan, dimmed, flicker=Flicker(hz=hz, depth=depth))
+    take = shoot(plan, dimmed, flicker=MainsSwing(hz=hz, depth=depth))
     assert rms(shoot(plan, held).errors()) < 1e-5
     assert rms(take.errors()[8:]) < 1e-4 + (2e-3 if hz == 100.2 else 0) * depth
 
 
 def test_exposures_of_whole_pulses_show_none(make_plan: PlanMaker) -> None:
     even = make_plan(width_px=160, height_px=120, fps=Fraction(100))
-    assert rms(shoot(even, held, flicker=Flicker(hz=100, depth=1.0)).errors()) < 1e-5
+    assert rms(shoot(even, held, flicker=MainsSwing(hz=100, depth=1.0)).errors()) < 1e-5
 
 
 def test_a_change_that_looks_like_a_ripple_once_is_not_believed() -> None:

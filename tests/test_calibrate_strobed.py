@@ -17,7 +17,7 @@ from psvideo.errors import PsvideoError
 from psvideo.model.plan import Plan
 from psvideo.model.row_profiles import collect
 from psvideo.sync.find import find_timing
-from psvideo.synth import Noise, StrobeClock, expose
+from psvideo.synth import Noise, TrueClock, expose
 
 PlanMaker = Callable[..., Plan]
 
@@ -33,7 +33,7 @@ def measured(plan: Plan, *, seed: int = 0, frames: int = 60) -> StrobedReadout:
     camera = plan.camera
     rng = np.random.default_rng(seed)
     plates = {slot: 0.1 + 0.6 * rng.random((camera.height_px, camera.width_px)) for slot in plan.lit_slots}
-    clock = StrobeClock(phase_s=0.0123 + 0.001 * seed, offset_ppm=30.0)
+    clock = TrueClock(phase_s=0.0123 + 0.001 * seed, offset_ppm=30.0)
     noise = Noise(full_well_e=20_000, read_e=8)
     shot = expose(plates, plan, frames=frames, clock=clock, noise=noise, bits=12, seed=seed)
     indices, profiles = collect(MemoryFrame(n, image) for n, image in zip(shot.indices, shot.frames, strict=True))

@@ -14,7 +14,7 @@ from psvideo.model.timing import Flash, Timing
 from psvideo.plates import ambient
 from psvideo.plates.sequence import Round, rounds
 from psvideo.plates.split import split
-from psvideo.synth import Exposure, Noise, StrobeClock, expose
+from psvideo.synth import Exposure, Noise, TrueClock, expose
 from psvideo.synth.camera.noise import NOISELESS
 
 PlanMaker = Callable[..., Plan]
@@ -56,7 +56,7 @@ def plates_under(plan: Plan, lights: dict[str, np.ndarray]) -> dict[int, np.ndar
 def shoot(
     plan: Plan, lights: dict[str, np.ndarray], *, frames: int = 36, noise: Noise = NOISELESS
 ) -> tuple[Exposure, Timing]:
-    clock = StrobeClock(phase_s=0.0123, offset_ppm=30.0)
+    clock = TrueClock(phase_s=0.0123, offset_ppm=30.0)
     shot = expose(plates_under(plan, lights), plan, frames=frames, clock=clock, ambient=AMBIENT, noise=noise)
     start_s = np.array([flash.start_s for flash in shot.flashes])
     duration_s = np.array([flash.duration_s for flash in shot.flashes])

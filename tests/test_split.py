@@ -18,7 +18,7 @@ from psvideo.model.timing import Flash, Timing
 from psvideo.plates import ambient, hudon2015, sequence
 from psvideo.plates.split import Plate, split
 from psvideo.sync.find import find_timing
-from psvideo.synth import Exposure, Noise, StrobeClock, expose
+from psvideo.synth import Exposure, Noise, TrueClock, expose
 
 PlanMaker = Callable[..., Plan]
 
@@ -74,7 +74,7 @@ def true_timing(plan: Plan, shot: Exposure, frames: int) -> Timing:
 
 
 def shoot(plan: Plan, plates: dict[int, np.ndarray], *, frames: int = 40, **options: object) -> tuple[Exposure, Timing]:
-    shot = expose(plates, plan, frames=frames, clock=StrobeClock(phase_s=0.0123, offset_ppm=30.0), **options)  # type: ignore[arg-type]
+    shot = expose(plates, plan, frames=frames, clock=TrueClock(phase_s=0.0123, offset_ppm=30.0), **options)  # type: ignore[arg-type]
     return shot, true_timing(plan, shot, frames)
 
 

@@ -17,9 +17,9 @@ from psvideo.strobe.link.lines import (
     LONGEST_REPLY,
     LONGEST_REQUEST,
     Error,
-    Line,
     LineError,
     LineReader,
+    TextLine,
     crc16,
     seal,
     unseal,
@@ -171,7 +171,7 @@ def test_every_single_flipped_bit_of_a_reply_is_noticed(reply: Reply) -> None:
             assert not _taken(line, type(reply)), bytes(flipped)
 
 
-def _taken(line: Line, kind: type[Reply]) -> bool:
+def _taken(line: TextLine, kind: type[Reply]) -> bool:
     """True where the host would take a line for the answer to a request that had a checksum."""
     if line.fault is not None:
         return False
@@ -195,16 +195,16 @@ def test_the_reader_gives_the_same_lines_however_the_bytes_are_cut(data: bytes, 
 @pytest.mark.parametrize(
     ("data", "expected"),
     [
-        (b"ID\r\n", Line(text="ID")),
-        (b"I\rD\n", Line(text="", fault=Error.BYTES)),
-        (b"ID\x00\n", Line(text="", fault=Error.BYTES)),
-        (b"\xff\n", Line(text="", fault=Error.BYTES)),
-        (b"x" * 96 + b"\r\n", Line(text="x" * 96)),
-        (b"x" * 97 + b"\n", Line(text="", fault=Error.LONG)),
-        (b"x" * 5000 + b"\n", Line(text="", fault=Error.LONG)),
+        (b"ID\r\n", TextLine(text="ID")),
+        (b"I\rD\n", TextLine(text="", fault=Error.BYTES)),
+        (b"ID\x00\n", TextLine(text="", fault=Error.BYTES)),
+        (b"\xff\n", TextLine(text="", fault=Error.BYTES)),
+        (b"x" * 96 + b"\r\n", TextLine(text="x" * 96)),
+        (b"x" * 97 + b"\n", TextLine(text="", fault=Error.LONG)),
+        (b"x" * 5000 + b"\n", TextLine(text="", fault=Error.LONG)),
     ],
 )
-def test_lines_as_the_page_has_them(data: bytes, expected: Line) -> None:
+def test_lines_as_the_page_has_them(data: bytes, expected: TextLine) -> None:
     assert list(LineReader(LONGEST_REQUEST).feed(b"\n\r\n" + data)) == [expected]
 
 

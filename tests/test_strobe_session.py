@@ -15,7 +15,7 @@ import pytest
 
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.model.plan import Plan
-from psvideo.strobe.clock import Reading, fit_clock
+from psvideo.strobe.clock import ClockReading, fit_clock
 from psvideo.strobe.link.boards import BOARDS, capabilities
 from psvideo.strobe.link.controller import OpenPort
 from psvideo.strobe.link.greeting import greet
@@ -24,7 +24,7 @@ from psvideo.strobe.link.link import Link, NoReplyError, RefusedError
 from psvideo.strobe.link.messages import Capabilities, Caps, Clear, Cleared, Keep, KeepSet, Run, Slot, Started
 from psvideo.strobe.link.ports import SerialPort, choose_port
 from psvideo.strobe.program import Program, make_program
-from psvideo.strobe.session import Beat, Outcome, cycles_for, prepare, run_program
+from psvideo.strobe.session import Outcome, RunProgress, cycles_for, prepare, run_program
 from psvideo.strobe.stand_ins.emulated import EmulatedController
 from psvideo.strobe.stand_ins.emulated_port import EmulatedPort
 
@@ -111,8 +111,8 @@ def opened(device: Device) -> Link:
     return Link(OpenPort(device.name))
 
 
-def play(link: Link, program: Program, **how: Any) -> tuple[Outcome, list[Beat]]:
-    beats: list[Beat] = []
+def play(link: Link, program: Program, **how: Any) -> tuple[Outcome, list[RunProgress]]:
+    beats: list[RunProgress] = []
     settings = {"cycles": None, "seconds": None, "watch": beats.append} | how
     return run_program(link, program, **settings), beats
 
@@ -142,7 +142,7 @@ def test_a_run_of_some_seconds_ends_in_time(board: Board, program: Program) -> N
 
 
 def test_ctrl_c_stops_the_lights(board: Board, program: Program) -> None:
-    def interrupt(beat: Beat) -> None:
+    def interrupt(beat: RunProgress) -> None:
         raise KeyboardInterrupt
 
     link = opened(board.device)
@@ -154,7 +154,7 @@ def test_ctrl_c_stops_the_lights(board: Board, program: Program) -> None:
 
 
 def test_a_fault_of_ours_while_lights_run_stops_them_too(board: Board, program: Program) -> None:
-    def fail(beat: Beat) -> None:
+    def fail(beat: RunProgress) -> None:
         raise ZeroDivisionError
 
     link = opened(board.device)
@@ -169,7 +169,7 @@ def test_unplugged_in_the_middle_is_one_paragraph_and_is_logged(board: Board, pr
     prepare(link)
     beats = 0
 
-    def unplug(beat: Beat) -> None:
+    def unplug(beat: RunProgress) -> None:
         nonlocal beats
         beats += 1
         if beats == 3:
@@ -406,7 +406,7 @@ def test_the_clock_is_found_within_its_bound(ppm: float, seed: int) -> None:
         trip = Trip(*(0.001 + rng.exponential(0.003, 2)))
         at_s = 100.0 + 0.2 * n
         ticks = int((at_s - 40.0) / tick_s)
-        readings.append(Reading(ticks=ticks, asked_s=at_s - trip.there_s, answered_s=at_s + trip.back_s))
+        readings.append(ClockReading(ticks=ticks, asked_s=at_s - trip.there_s, answered_s=at_s + trip.back_s))
     fit = fit_clock(readings, tick_ps=500_000)
     assert fit is not None
     assert abs(fit.offset_ppm - ppm) <= fit.gain_error_ppm < 100
@@ -419,7 +419,7 @@ def test_a_clock_that_drifts_has_a_wider_bound() -> None:
     for n in range(100):
         at_s = 0.2 * n
         ticks = int((at_s + 1e-4 * at_s**2) / 0.5e-6)
-        readings.append(Reading(ticks=ticks, asked_s=at_s - 1e-4, answered_s=at_s + 1e-4))
+        readings.append(ClockReading(ticks=ticks, asked_s=at_s - 1e-4, answered_s=at_s + 1e-4))
     fit = fit_clock(readings, tick_ps=500_000)
     assert fit is not None
     assert fit.gain_error_ppm > 1000
@@ -427,7 +427,7 @@ def test_a_clock_that_drifts_has_a_wider_bound() -> None:
 
 def test_one_reading_is_no_clock() -> None:
     assert fit_clock([], tick_ps=1) is None
-    assert fit_clock([Reading(ticks=5, asked_s=0, answered_s=1)] * 3, tick_ps=1) is None
+    assert fit_clock([ClockReading(ticks=5, asked_s=0, answered_s=1)] * 3, tick_ps=1) is None
 
 
 def test_rounds_and_seconds_become_whole_cycles(make_plan: Callable[..., Plan]) -> None:

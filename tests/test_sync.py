@@ -17,10 +17,9 @@ from psvideo.model.row_profiles import collect, row_profile
 from psvideo.model.shutter import row_weights
 from psvideo.model.timing import Timing
 from psvideo.sync.find import find_timing
-from psvideo.sync.rowfit.beat import Beat, train_until
-from psvideo.sync.rowfit.beat import StrobeClock as FoundClock
+from psvideo.sync.rowfit.beat import Beat, FoundClock, train_until
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
-from psvideo.synth import Exposure, Noise, StrobeClock, expose
+from psvideo.synth import Exposure, Noise, TrueClock, expose
 
 PlanMaker = Callable[..., Plan]
 CAMERA_NOISE = Noise(full_well_e=20_000, read_e=8)
@@ -44,7 +43,7 @@ def textured_plates(plan: Plan, seed: int = 3) -> dict[int, np.ndarray]:
 
 
 def shoot(plan: Plan, *, frames: int = 60, phase_s: float = 0.0123, ppm: float = 30.0, **options: object) -> Exposure:
-    clock = StrobeClock(phase_s=phase_s, offset_ppm=ppm)
+    clock = TrueClock(phase_s=phase_s, offset_ppm=ppm)
     options = {"noise": CAMERA_NOISE, "bits": 12} | options
     return expose(textured_plates(plan), plan, frames=frames, clock=clock, **options)  # type: ignore[arg-type]
 

@@ -19,8 +19,8 @@ from psvideo.plates.gather import clip_rounds
 from psvideo.runs.opening import open_take
 from psvideo.sync.find import find_timing
 from psvideo.sync.of_take import find_take_timing
-from psvideo.sync.rowfit.beat import StrobeClock as FoundClock
-from psvideo.synth import Exposure, Flicker, Noise, StrobeClock, TrueFlash, expose
+from psvideo.sync.rowfit.beat import FoundClock
+from psvideo.synth import Exposure, MainsSwing, Noise, TrueClock, TrueFlash, expose
 
 PlanMaker = Callable[..., Plan]
 
@@ -52,7 +52,7 @@ def plates(plan: Plan, seed: int = 3, bright: float = 1.0) -> dict[int, np.ndarr
 
 
 def shoot(plan: Plan, *, frames: int = 72, ppm: float = 30.0, drift: float = 0.0, **options: object) -> Exposure:
-    clock = StrobeClock(
+    clock = TrueClock(
         phase_s=0.0123, offset_ppm=ppm, drift_ppm_per_s=drift, jitter_s=float(options.pop("jitter_s", 0.0))
     )
     scene = options.pop("scene", None) or plates(plan)
@@ -150,7 +150,7 @@ def test_a_misnamed_frame_rate_is_found_and_said(make_plan: PlanMaker) -> None:
 @pytest.mark.parametrize("hz", [100.0, 120.0])
 def test_flickering_ambient_light_is_told_from_the_strobe(hz: float, make_plan: PlanMaker) -> None:
     plan = make_plan(height_px=ROWS, width_px=COLUMNS, shutter=0.5, readout=0.6, fps=Fraction(90))
-    shot = shoot(plan, ambient=0.15, flicker=Flicker(hz=hz, depth=0.8))
+    shot = shoot(plan, ambient=0.15, flicker=MainsSwing(hz=hz, depth=0.8))
     timing = timing_of(plan, shot)
     assert rms_rows(timing, shot, plan) < 0.02
 
@@ -337,7 +337,7 @@ def test_everything_at_once_is_borne(make_plan: PlanMaker) -> None:
         drift=2.0,
         scene=tumbling(plan),
         ambient=0.05,
-        flicker=Flicker(hz=100, depth=0.4),
+        flicker=MainsSwing(hz=100, depth=0.4),
         dropped=(120,),
     )
     timing = timing_of(unknown_readout(replace(plan, clock_tolerance_ppm=None)), shot)

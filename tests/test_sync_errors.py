@@ -9,7 +9,7 @@ import pytest
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.sync.find import find_timing
-from psvideo.synth import Noise, StrobeClock, expose
+from psvideo.synth import Noise, TrueClock, expose
 
 PlanMaker = Callable[..., Plan]
 SEEDS = 40
@@ -21,7 +21,7 @@ def timed(plan: Plan, told: Plan, seed: int, noise: Noise) -> tuple[Timing, floa
     """Film a textured scene and time it by what the plan ``told`` says; return too the RMS error in seconds."""
     rng = np.random.default_rng(seed)
     plates = {slot: 0.2 + 0.5 * rng.random((ROWS, COLUMNS)) for slot in plan.lit_slots}
-    clock = StrobeClock(phase_s=rng.uniform(0, plan.cycle_s), offset_ppm=rng.uniform(-100, 100))
+    clock = TrueClock(phase_s=rng.uniform(0, plan.cycle_s), offset_ppm=rng.uniform(-100, 100))
     shot = expose(plates, plan, frames=FRAMES, clock=clock, noise=noise, bits=12, seed=seed)
     timing = find_timing(told, np.arange(FRAMES), shot.frames.mean(axis=2, dtype=np.float64))
     true_s = np.array([flash.start_s for flash in shot.flashes])

@@ -14,7 +14,7 @@ from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.runs.opening import open_take
 from psvideo.sync.of_take import find_take_timing
-from psvideo.synth import Exposure, Noise, StrobeClock, expose
+from psvideo.synth import Exposure, Noise, TrueClock, expose
 from psvideo.synth.camera.curves import CURVES
 from psvideo.synth.camera.dpx import dpx_bytes
 from psvideo.synth.camera.encode import Codes
@@ -33,7 +33,7 @@ def shoot(
     filters = np.ones((2, 2)) if pattern is None else pattern
     mosaic = np.tile(filters, (shape[0] // 2, shape[1] // 2))
     scene = {slot: (mosaic * (0.1 + 0.5 * rng.random(shape))).astype(np.float32) for slot in plan.lit_slots}
-    clock = StrobeClock(phase_s=0.0123, offset_ppm=ppm)
+    clock = TrueClock(phase_s=0.0123, offset_ppm=ppm)
     return expose(scene, plan, frames=frames, clock=clock, ambient=ambient, noise=Noise(full_well_e=20_000, read_e=8))
 
 

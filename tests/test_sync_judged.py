@@ -11,7 +11,7 @@ from psvideo.errors import PsvideoError
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.sync.find import find_timing
-from psvideo.synth import Noise, StrobeClock, expose
+from psvideo.synth import Noise, TrueClock, expose
 
 PlanMaker = Callable[..., Plan]
 ROWS, COLUMNS, FRAMES = 96, 8, 60
@@ -31,7 +31,7 @@ def filmed(plan: Plan, *, frames: int = FRAMES, phase_s: float = 0.0123, **optio
         plates[slot] = plates[slot] * factor
     if options.pop("together", False):
         plates = dict.fromkeys(plan.lit_slots, plates[plan.lit_slots[0]])
-    clock = StrobeClock(phase_s=phase_s, offset_ppm=float(options.pop("ppm", 30.0)))  # type: ignore[arg-type]
+    clock = TrueClock(phase_s=phase_s, offset_ppm=float(options.pop("ppm", 30.0)))  # type: ignore[arg-type]
     shot = expose(plates, plan, frames=frames, clock=clock, noise=NOISE, bits=12, **options)  # type: ignore[arg-type]
     return shot.frames.mean(axis=2, dtype=np.float64)
 

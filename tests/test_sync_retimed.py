@@ -20,7 +20,7 @@ from psvideo.sync.rowfit.retime import regular_step, twins
 from psvideo.sync.rowfit.seed import find_seed
 from psvideo.sync.verdict.judge import convincing
 from psvideo.sync.verdict.refusal import clock_too_far
-from psvideo.synth import Exposure, Noise, StrobeClock, expose
+from psvideo.synth import Exposure, Noise, TrueClock, expose
 
 PlanMaker = Callable[..., Plan]
 NOISE = Noise(full_well_e=20_000, read_e=8)
@@ -37,7 +37,7 @@ def shot_of(plan: Plan, frames: int, ppm: float = 40.0) -> Exposure:
     rng = np.random.default_rng(3)
     shape = (plan.camera.height_px, plan.camera.width_px)
     plates = {slot: (0.2 + 0.5 * rng.random(shape)).astype(np.float32) for slot in plan.lit_slots}
-    clock = StrobeClock(phase_s=0.0123, offset_ppm=ppm)
+    clock = TrueClock(phase_s=0.0123, offset_ppm=ppm)
     return expose(plates, plan, frames=frames, clock=clock, noise=NOISE, bits=12)
 
 

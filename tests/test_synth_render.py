@@ -17,7 +17,7 @@ from psvideo.synth.subject.material import layered_noise, pattern_albedo
 from psvideo.synth.subject.meshes import builtin_names, builtin_shape
 from psvideo.synth.subject.meshes.fields import ball, common, cut, ellipsoid, join
 from psvideo.synth.subject.meshes.surface_nets import surface_of
-from psvideo.synth.subject.render import View, look
+from psvideo.synth.subject.render import SeenScene, look
 from psvideo.synth.subject.shading import ambient_plate, flash_plate, irradiance, light_collected
 from psvideo.synth.subject.shape import load_shape
 from psvideo.synth.truth import true_albedo, true_mask, true_normals
@@ -30,12 +30,12 @@ def camera(**keys: object) -> CameraTable:
     return CameraTable.model_validate(base | keys)
 
 
-def see(*objects: dict[str, object], time_s: float = 0.0, **keys: object) -> View:
+def see(*objects: dict[str, object], time_s: float = 0.0, **keys: object) -> SeenScene:
     bodies = [make_body(ObjectTable.model_validate(table), HERE) for table in objects]
     return look(bodies, camera(**keys), time_s)
 
 
-def plate(view: View, light: Light) -> np.ndarray:
+def plate(view: SeenScene, light: Light) -> np.ndarray:
     return view.hits.image(light_collected(view, light))
 
 

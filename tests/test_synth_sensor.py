@@ -15,7 +15,7 @@ from psvideo.errors import PsvideoError
 from psvideo.formats.plan_toml import read_plan
 from psvideo.model.camera import Camera
 from psvideo.model.plan import Plan, PlannedFlash
-from psvideo.synth import Flicker, Noise, StrobeClock, expose
+from psvideo.synth import MainsSwing, Noise, TrueClock, expose
 from psvideo.synth.camera.sensor import seen_share
 from psvideo.synth.lamps.emission import Emission
 from psvideo.synth.lamps.strobe import TrueFlash, row_opens_s, true_flashes
@@ -92,7 +92,7 @@ def test_the_dark_row_lies_where_the_flash_ended_and_moves_by_the_next_flash():
     cam = camera(height_px=1000, width_px=1)
     duration_s = 0.0004
     shot = expose(
-        [np.ones((1000, 1), np.float32)], plan_of(cam, (duration_s,)), frames=8, clock=StrobeClock(phase_s=0.0032)
+        [np.ones((1000, 1), np.float32)], plan_of(cam, (duration_s,)), frames=8, clock=TrueClock(phase_s=0.0032)
     )
     tr = PERIOD_S / 1000
     rows = []
@@ -109,10 +109,10 @@ def test_the_dark_row_lies_where_the_flash_ended_and_moves_by_the_next_flash():
 def test_no_row_sees_two_flashes_under_the_rolling_rule_and_some_do_when_it_is_broken():
     cam = camera()
     plates = [np.ones((60, 3), np.float32), np.ones((60, 3), np.float32)]
-    kept = expose(plates, plan_of(cam, (0.001, 0.002)), frames=12, clock=StrobeClock(phase_s=0.0021))
+    kept = expose(plates, plan_of(cam, (0.001, 0.002)), frames=12, clock=TrueClock(phase_s=0.0021))
     assert kept.frames.max() <= 1.0 + 1e-6
     halves = [0.4 * plate for plate in plates]
-    broken = expose(halves, plan_of(cam, (0.001, 0.002), dark_s=0.006), frames=12, clock=StrobeClock(phase_s=0.0021))
+    broken = expose(halves, plan_of(cam, (0.001, 0.002), dark_s=0.006), frames=12, clock=TrueClock(phase_s=0.0021))
     assert broken.frames.max() == pytest.approx(0.8, abs=1e-6)
 
 
@@ -120,7 +120,7 @@ def test_half_rate_flashes_are_whole_in_the_sum_of_two_frames():
     cam = camera()
     plates = ramp_plates(cam, 2)
     plan = plan_of(cam, (0.001, 0.001), dark_s=2 * PERIOD_S - 0.001, mode="half-rate")
-    shot = expose(plates, plan, frames=12, clock=StrobeClock(phase_s=0.0044))
+    shot = expose(plates, plan, frames=12, clock=TrueClock(phase_s=0.0044))
     for flash in shot.flashes:
         if flash.complete:
             n = int(flash.start_s // PERIOD_S)
@@ -131,14 +131,14 @@ def test_half_rate_flashes_are_whole_in_the_sum_of_two_frames():
 
 def test_a_global_shutter_gives_every_row_the_same_share():
     cam = camera(readout=0.0)
-    shot = expose([np.ones((60, 3), np.float32)], plan_of(cam), frames=6, clock=StrobeClock(phase_s=0.0096))
+    shot = expose([np.ones((60, 3), np.float32)], plan_of(cam), frames=6, clock=TrueClock(phase_s=0.0096))
     assert np.ptp(shot.frames, axis=(1, 2)).max() == 0.0
     np.testing.assert_allclose(shot.frames[:2, 0, 0], [0.4, 0.6], atol=1e-6)
 
 
 def test_a_bottom_up_camera_is_a_top_down_one_upside_down():
     plates = ramp_plates(camera(), 2)
-    clock = StrobeClock(phase_s=0.0043, offset_ppm=80)
+    clock = TrueClock(phase_s=0.0043, offset_ppm=80)
     down = expose(plates, plan_of(camera(readout=0.8), (0.001, 0.002)), frames=7, clock=clock)
     flipped = [plate[::-1] for plate in plates]
     up = expose(flipped, plan_of(camera(readout=-0.8), (0.001, 0.002)), frames=7, clock=clock)
@@ -150,7 +150,7 @@ def test_a_synced_clip_holds_one_whole_flash_per_frame_in_order():
     cam = camera(readout=0.3)
     plates = ramp_plates(cam, 3)
     plan = plan_of(cam, (0.001, 0.004, 0.002), dark_s=0.006, mode="synced")
-    shot = expose(plates, plan, frames=7, clock=StrobeClock(phase_s=0.004, offset_ppm=5000))
+    shot = expose(plates, plan, frames=7, clock=TrueClock(phase_s=0.004, offset_ppm=5000))
     for n in range(7):
         np.testing.assert_allclose(shot.frames[n], plates[n % 3], atol=1e-6)
     with pytest.raises(PsvideoError, match=r"synced plan flashes for 1 ms, but all rows .* only 0\.1667 ms"):
@@ -159,7 +159,7 @@ def test_a_synced_clip_holds_one_whole_flash_per_frame_in_order():
 
 def test_below_360_degrees_a_flash_in_the_blind_time_is_lost():
     cam = camera(shutter=0.5, readout=0.0)
-    shot = expose([np.ones((60, 3), np.float32)], plan_of(cam, dark_s=1.0), frames=3, clock=StrobeClock(phase_s=0.0147))
+    shot = expose([np.ones((60, 3), np.float32)], plan_of(cam, dark_s=1.0), frames=3, clock=TrueClock(phase_s=0.0147))
     np.testing.assert_allclose(shot.frames[:, 0, 0], [0, 0.3, 0], atol=1e-6)
 
 
@@ -170,7 +170,7 @@ def test_a_flash_is_complete_exactly_when_the_recorded_frames_hold_all_its_light
     lost = frozenset({7})
     emission, kept = Emission(fall_s=fall_s), 1 - (1e-3 if fall_s else 1e-9)
     for phase_s in np.linspace(-0.012, 0.012, 60):
-        clock = StrobeClock(phase_s=float(phase_s), offset_ppm=-300, drift_ppm_per_s=40, jitter_s=1e-5, seed=2)
+        clock = TrueClock(phase_s=float(phase_s), offset_ppm=-300, drift_ppm_per_s=40, jitter_s=1e-5, seed=2)
         flashes = true_flashes(plan, clock, frames=12, dropped=lost)
         held = [sum(seen_share(cam, emission, flash, n) for n in range(12) if n not in lost) for flash in flashes]
         assert [flash.complete for flash in flashes] == [bool((share >= kept).all()) for share in held]
@@ -182,14 +182,14 @@ def test_an_leds_tail_reaches_into_the_next_frame_and_nothing_of_it_is_lost():
     """The flash ends with frame 0; with equal rise and fall an LED gives off as much as a square pulse."""
     cam = camera(readout=0.0)
     plan = plan_of(cam, (0.0005,), dark_s=1.0, rise_s=2e-4, fall_s=2e-4)
-    shot = expose([np.ones((60, 3), np.float32)], plan, frames=3, clock=StrobeClock(phase_s=0.0095))
+    shot = expose([np.ones((60, 3), np.float32)], plan, frames=3, clock=TrueClock(phase_s=0.0095))
     late = 2e-4 * -np.expm1(-2.5) / 0.0005
     np.testing.assert_allclose(shot.frames[:, 0, 0], [1 - late, late, 0.0], atol=1e-6)
 
 
 def test_drift_and_offset_stretch_the_strobes_seconds():
     plan = plan_of(camera(), (0.001,), dark_s=0.099)
-    clock = StrobeClock(phase_s=0.02, offset_ppm=1000, drift_ppm_per_s=50)
+    clock = TrueClock(phase_s=0.02, offset_ppm=1000, drift_ppm_per_s=50)
     flashes = true_flashes(plan, clock, frames=1000)
     strobe_s = 0.1 * np.arange(len(flashes))
     expected_s = 0.02 + strobe_s * 1.001 + 25e-6 * strobe_s**2
@@ -200,7 +200,7 @@ def test_drift_and_offset_stretch_the_strobes_seconds():
 def test_jitter_has_the_given_spread_and_comes_from_the_seed():
     plan = plan_of(camera(), (0.001,))
     even, late, again = (
-        np.array([f.start_s for f in true_flashes(plan, StrobeClock(phase_s=0.004, jitter_s=j, seed=3), frames=3000)])
+        np.array([f.start_s for f in true_flashes(plan, TrueClock(phase_s=0.004, jitter_s=j, seed=3), frames=3000)])
         for j in (0.0, 2e-5, 2e-5)
     )
     assert np.std(late - even) == pytest.approx(2e-5, rel=0.06)
@@ -209,7 +209,7 @@ def test_jitter_has_the_given_spread_and_comes_from_the_seed():
 
 def test_ambient_light_adds_to_every_row_and_flickers_as_its_mean_over_the_exposure():
     cam = camera(shutter=0.4)
-    flicker = Flicker(hz=130.0, depth=0.6)
+    flicker = MainsSwing(hz=130.0, depth=0.6)
     shot = expose({0: np.zeros((60, 3), np.float32)}, plan_of(cam), frames=3, ambient=0.2, flicker=flicker)
     for n, row in ((0, 0), (1, 31), (2, 59)):
         opens_s = (n + row / 60) * PERIOD_S
@@ -252,7 +252,7 @@ def test_another_simulators_frames_come_out_of_its_plates_and_timing(shared_data
     planned = plan.flashes[slots[first["light"]]]
     ppm = (first["duration_s"] / planned.duration_s - 1) * 1e6
     strobe_s = float(plan.train(slots[first["light"]], 1).start_s[0])
-    clock = StrobeClock(phase_s=first["start_s"] - strobe_s * (1 + ppm * 1e-6), offset_ppm=ppm)
+    clock = TrueClock(phase_s=first["start_s"] - strobe_s * (1 + ppm * 1e-6), offset_ppm=ppm)
     files = sorted((folder / "frames").iterdir())
     codes = np.stack([cv2.imread(str(file), cv2.IMREAD_UNCHANGED)[..., ::-1] for file in files]).astype(np.float32)
     light = (codes - 4097) / (65535 - 4097)

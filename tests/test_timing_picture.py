@@ -11,7 +11,7 @@ from psvideo.model.plan import Plan
 from psvideo.pictures.timing import timing_picture, write_sheet
 from psvideo.sync.find import find_timing
 from psvideo.sync.rowfit.profiles import residuals_of
-from psvideo.synth import StrobeClock, expose
+from psvideo.synth import TrueClock, expose
 
 
 def test_right_times_leave_nothing_and_wrong_ones_leave_red_and_blue(
@@ -20,7 +20,7 @@ def test_right_times_leave_nothing_and_wrong_ones_leave_red_and_blue(
     plan = make_plan(height_px=60, width_px=2)
     rng = np.random.default_rng(0)
     scene = {slot: (0.2 + 0.5 * rng.random((60, 2))).astype(np.float32) for slot in plan.lit_slots}
-    shot = expose(scene, plan, frames=40, clock=StrobeClock(phase_s=0.004))
+    shot = expose(scene, plan, frames=40, clock=TrueClock(phase_s=0.004))
     profiles, places = shot.frames.mean(axis=2, dtype=np.float64), np.arange(40)
     timing = find_timing(plan, places, profiles)
     late = replace(timing, flashes=tuple(replace(flash, start_s=flash.start_s + 4e-4) for flash in timing.flashes))

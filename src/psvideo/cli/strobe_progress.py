@@ -15,11 +15,11 @@ from psvideo.cli.console import PLAIN_PROGRESS_EVERY_S, Voice
 
 if TYPE_CHECKING:
     from psvideo.strobe.program import Program
-    from psvideo.strobe.session import Beat
+    from psvideo.strobe.session import RunProgress
 
 
 @contextmanager
-def watching(voice: Voice, program: Program, *, lasts_s: float | None) -> Iterator[Callable[[Beat], None]]:
+def watching(voice: Voice, program: Program, *, lasts_s: float | None) -> Iterator[Callable[[RunProgress], None]]:
     """Give what shows each beat of a run; ``lasts_s`` is how long the run is meant to be, None: until Ctrl-C."""
     from rich.console import Console
 
@@ -32,10 +32,10 @@ def watching(voice: Voice, program: Program, *, lasts_s: float | None) -> Iterat
         yield _plain(program, lasts_s)
 
 
-def _plain(program: Program, lasts_s: float | None) -> Callable[[Beat], None]:
+def _plain(program: Program, lasts_s: float | None) -> Callable[[RunProgress], None]:
     said_s = 0.0
 
-    def show(beat: Beat) -> None:
+    def show(beat: RunProgress) -> None:
         nonlocal said_s
         if beat.elapsed_s - said_s >= PLAIN_PROGRESS_EVERY_S:
             print(beat_words(beat, program, lasts_s=lasts_s), file=sys.stderr)
@@ -44,7 +44,7 @@ def _plain(program: Program, lasts_s: float | None) -> Callable[[Beat], None]:
     return show
 
 
-def beat_words(beat: Beat, program: Program, *, lasts_s: float | None) -> str:
+def beat_words(beat: RunProgress, program: Program, *, lasts_s: float | None) -> str:
     """Return how a run goes in one line: rate, cycles, time left."""
     plan = program.played
     lit = sum(not plan.flashes[slot].is_dark for slot in plan.cycle_slots)

@@ -13,7 +13,7 @@ from typing import Literal
 
 from psvideo.errors import PsvideoError
 from psvideo.model.plan import Plan
-from psvideo.strobe.clock import ClockFit, Reading, fit_clock
+from psvideo.strobe.clock import ClockFit, ClockReading, fit_clock
 from psvideo.strobe.link.greeting import START_WITHIN_S, greet
 from psvideo.strobe.link.link import Link
 from psvideo.strobe.link.messages import (
@@ -55,7 +55,7 @@ class Ready:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Beat:
+class RunProgress:
     """How a run goes: seconds since it began, and whole cycles played."""
 
     elapsed_s: float
@@ -111,7 +111,7 @@ def cycles_for(plan: Plan, *, seconds: float | None, rounds: int | None) -> int 
 
 
 def run_program(
-    link: Link, program: Program, *, cycles: int | None, seconds: float | None, watch: Callable[[Beat], None]
+    link: Link, program: Program, *, cycles: int | None, seconds: float | None, watch: Callable[[RunProgress], None]
 ) -> Outcome:
     """Upload a program and play it for ``cycles`` cycles (None: until told), at most for ``seconds``.
 
@@ -150,7 +150,7 @@ class _Record:
     began_s: float | None = None
     start_tick: int = 0
     cycles: int = 0
-    readings: list[Reading] = field(default_factory=list)
+    readings: list[ClockReading] = field(default_factory=list)
     ended: Ended = "done"
     fault: str | None = None
     message: str | None = None
@@ -161,13 +161,13 @@ class _Record:
 
 
 def _follow(
-    link: Link, record: _Record, *, cycles: int | None, seconds: float | None, watch: Callable[[Beat], None]
+    link: Link, record: _Record, *, cycles: int | None, seconds: float | None, watch: Callable[[RunProgress], None]
 ) -> str | None:
     """Ask for clock and status again and again until the run is over; return what fault ended it, if one did."""
     began_s = time.monotonic()
     while True:
         clock, asked_s, answered_s = link.read_clock()
-        record.readings.append(Reading(ticks=clock.ticks, asked_s=asked_s, answered_s=answered_s))
+        record.readings.append(ClockReading(ticks=clock.ticks, asked_s=asked_s, answered_s=answered_s))
         status = link.ask(Stat(), Status)
         if status.state == "fault":
             return f"{status.fault}: {FAULTS[status.fault]}"
@@ -175,7 +175,7 @@ def _follow(
             return f"restarted: the board started anew in the middle of the run (reset: {status.reset})"
         record.cycles = status.cycles
         elapsed_s = time.monotonic() - began_s
-        watch(Beat(elapsed_s=elapsed_s, cycles=status.cycles))
+        watch(RunProgress(elapsed_s=elapsed_s, cycles=status.cycles))
         if status.state == "idle" or (seconds is not None and elapsed_s >= seconds):
             return None
         left_s = ASK_EVERY_S if seconds is None else min(ASK_EVERY_S, seconds - elapsed_s)

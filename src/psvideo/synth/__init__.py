@@ -5,20 +5,20 @@ It never uses the code that it is there to test: how a row integrates light is c
 
 from psvideo.synth.camera.exposure import Exposure, expose
 from psvideo.synth.camera.noise import Noise
-from psvideo.synth.camera.sensor import Flicker
-from psvideo.synth.lamps.strobe import StrobeClock, TrueFlash
+from psvideo.synth.camera.sensor import MainsSwing
+from psvideo.synth.lamps.strobe import TrueClock, TrueFlash
 from psvideo.synth.scene import Scene, read_scene
 from psvideo.synth.scenes import builtin_scene
-from psvideo.synth.shoot import Shot, shoot
+from psvideo.synth.shoot import VirtualTake, shoot
 
 __all__ = [
     "Exposure",
-    "Flicker",
+    "MainsSwing",
     "Noise",
     "Scene",
-    "Shot",
-    "StrobeClock",
+    "TrueClock",
     "TrueFlash",
+    "VirtualTake",
     "builtin_scene",
     "expose",
     "read_scene",

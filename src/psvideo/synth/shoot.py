@@ -17,14 +17,14 @@ from psvideo.formats.whole_folders import whole_folder
 from psvideo.synth.camera.encode import codes_of, mosaic, noise_of
 from psvideo.synth.camera.frames import SUFFIX, write_frame
 from psvideo.synth.camera.noise import frame_rng
-from psvideo.synth.camera.sensor import Flicker, Image, expose_frames
-from psvideo.synth.lamps.strobe import StrobeClock, TrueFlash, true_flashes
+from psvideo.synth.camera.sensor import Image, MainsSwing, expose_frames
+from psvideo.synth.lamps.strobe import TrueClock, TrueFlash, true_flashes
 from psvideo.synth.lamps.traced import TraceOptions, traced_light
 from psvideo.synth.scene import read_scene
 from psvideo.synth.scenes import scene_file
 from psvideo.synth.shotplan import claimed_plan, true_clock
 from psvideo.synth.stage import Stage, set_stage
-from psvideo.synth.subject.render import View
+from psvideo.synth.subject.render import SeenScene
 from psvideo.synth.truth import write_picture, write_scene_truth, write_surface, write_timing
 
 CLIPPED_WARNING = 0.005
@@ -34,21 +34,21 @@ Track = Callable[[Sequence[int]], Iterable[int]]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Shot:
+class VirtualTake:
     """What a virtual shoot left: the clip's folder, its frames and flashes, and what to know about them."""
 
     path: Path
     frames: int
     flashes: int
     complete: int
-    clock: StrobeClock
+    clock: TrueClock
     clipped_share: float
     warnings: tuple[str, ...]
 
 
 def shoot(
     scene: Path, out: Path, *, force: bool = False, track: Track = iter, trace: TraceOptions | None = None
-) -> Shot:
+) -> VirtualTake:
     """Film a scene, given as a file or by its name, and write the clip folder ``out``, whole or not at all.
 
     The folder holds frames/, plan.toml and rig.toml as a camera and its crew would leave them, and truth/ with what
@@ -90,7 +90,7 @@ def _nothing_left(folder: Path, out: Path) -> Iterator[None]:
         raise
 
 
-def _film(stage: Stage, folder: Path, out: Path, track: Track, trace: TraceOptions | None) -> Shot:
+def _film(stage: Stage, folder: Path, out: Path, track: Track, trace: TraceOptions | None) -> VirtualTake:
     """Expose and write frame by frame; only the plates that the current frame sees are held."""
     scene, plan = stage.scene, stage.plan
     clock = true_clock(scene)
@@ -107,7 +107,7 @@ def _film(stage: Stage, folder: Path, out: Path, track: Track, trace: TraceOptio
         truth.plate,
         frames=track(kept),
         ambient_of=stage.ambient(),
-        flicker=Flicker(hz=scene.ambient.flicker_hz, depth=scene.ambient.flicker_depth),
+        flicker=MainsSwing(hz=scene.ambient.flicker_hz, depth=scene.ambient.flicker_depth),
         channels=scene.camera.channels,
     )
     clipped = [_record(stage, folder, n, image) for n, image in zip(kept, light, strict=True)]
@@ -115,7 +115,7 @@ def _film(stage: Stage, folder: Path, out: Path, track: Track, trace: TraceOptio
     (folder / "rig.toml").write_text(format_rig(stage.rig), encoding="utf-8")
     write_timing(folder / "truth", plan, flashes, truth.plates)
     write_scene_truth(folder / "truth", scene, plan, clock, max(clipped), traced)
-    return Shot(
+    return VirtualTake(
         path=out,
         frames=len(kept),
         flashes=len(flashes),
@@ -183,7 +183,7 @@ class _Truth:
             self._write(flash, looks, whole, view)
         return image
 
-    def _write(self, flash: TrueFlash, looks: tuple[object, ...], plate: Image, view: View) -> None:
+    def _write(self, flash: TrueFlash, looks: tuple[object, ...], plate: Image, view: SeenScene) -> None:
         """Write a complete flash's plate and surface, unless a scene at rest has the same already."""
         if looks not in self._names:
             name = f"flash_{flash.index:04d}"

@@ -9,7 +9,7 @@ from psvideo.model.camera import Camera, Encoding, exposure_of
 from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.model.rig import Light, Rig, Vector
 from psvideo.synth.camera.encode import codes_of
-from psvideo.synth.lamps.strobe import StrobeClock
+from psvideo.synth.lamps.strobe import TrueClock
 from psvideo.synth.scene import CameraTable, Kind, LightTable, Scene
 
 
@@ -100,13 +100,13 @@ def _unit(values: list[float]) -> Vector:
     return float(x), float(y), float(z)
 
 
-def true_clock(scene: Scene) -> StrobeClock:
+def true_clock(scene: Scene) -> TrueClock:
     """Return how the strobe's clock truly runs; a phase that the scene leaves open is drawn from its seed."""
     strobe = scene.strobe
     phase_s = strobe.phase_s
     if phase_s is None:
         phase_s = float(np.random.default_rng([scene.seed, 0]).uniform(0.0, true_plan(scene).cycle_s))
-    return StrobeClock(
+    return TrueClock(
         phase_s=phase_s,
         offset_ppm=strobe.clock_offset_ppm,
         drift_ppm_per_s=strobe.drift_ppm_per_s,

@@ -18,7 +18,7 @@ from psvideo.synth.lamps.strobe import TrueFlash, row_opens_s
 from psvideo.synth.scene import Scene
 from psvideo.synth.shotplan import true_plan, true_rig
 from psvideo.synth.subject.body import Body, make_body
-from psvideo.synth.subject.render import View, look
+from psvideo.synth.subject.render import SeenScene, look
 from psvideo.synth.subject.shading import ambient_plate, flash_plate
 from psvideo.synth.truth import as_seen
 
@@ -31,13 +31,13 @@ class Stage:
     plan: Plan
     rig: Rig
     bodies: tuple[Body, ...]
-    still: View | None
+    still: SeenScene | None
 
-    def view(self, time_s: float) -> View:
+    def view(self, time_s: float) -> SeenScene:
         """Return what the camera sees at a time on its clock."""
         return self.still or look(self.bodies, self.scene.camera, time_s)
 
-    def plate(self, flash: TrueFlash, view: View) -> Image:
+    def plate(self, flash: TrueFlash, view: SeenScene) -> Image:
         """Return the scene as one whole flash lights it; averaged over the flash where the scene asks for that."""
         samples = self.scene.motion_samples
         if self.still is not None or samples == 1:
@@ -45,7 +45,7 @@ class Stage:
         instants_s = flash.start_s + flash.duration_s * (np.arange(samples) + 0.5) / samples
         return np.asarray(np.mean([self._lit(flash, self.view(float(t))) for t in instants_s], axis=0), np.float32)
 
-    def _lit(self, flash: TrueFlash, view: View) -> Image:
+    def _lit(self, flash: TrueFlash, view: SeenScene) -> Image:
         emission = Emission(rise_s=self.plan.rise_s, fall_s=self.plan.fall_s)
         duration_s = self.plan.flashes[flash.slot].duration_s
         return as_seen(flash_plate(view, self.rig, flash.lights, duration_s, emission), self.scene.camera.channels)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from psvideo.formats.exr_files import write_exr
 from psvideo.model.plan import Plan
-from psvideo.synth.lamps.strobe import StrobeClock, TrueFlash
+from psvideo.synth.lamps.strobe import TrueClock, TrueFlash
 from psvideo.synth.lamps.traced import TracedLight
 from psvideo.synth.scene import Scene
 from psvideo.synth.subject.render import Hits
@@ -73,7 +73,7 @@ def write_timing(folder: Path, plan: Plan, flashes: tuple[TrueFlash, ...], plate
 
 
 def write_scene_truth(
-    folder: Path, scene: Scene, plan: Plan, clock: StrobeClock, clipped: float, traced: TracedLight | None
+    folder: Path, scene: Scene, plan: Plan, clock: TrueClock, clipped: float, traced: TracedLight | None
 ) -> None:
     """Write scene.json: what the plan beside the footage does not tell."""
     data: dict[str, object] = {

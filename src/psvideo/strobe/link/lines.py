@@ -44,7 +44,7 @@ class LineError(ValueError):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Line:
+class TextLine:
     """One line without its end; ``fault`` tells that bytes were wrong or too many, and ``text`` is empty then."""
 
     text: str
@@ -97,7 +97,7 @@ class LineReader:
         """True between lines."""
         return not (self._held or self._too_long or self._bad)
 
-    def feed(self, data: bytes) -> Iterator[Line]:
+    def feed(self, data: bytes) -> Iterator[TextLine]:
         """Take bytes in and yield every line that they end; empty lines are passed over."""
         *ends, rest = data.split(b"\n")
         for piece in ends:
@@ -113,12 +113,12 @@ class LineReader:
         self._too_long = self._too_long or len(piece) > room
         self._held += piece[:room]
 
-    def _end(self) -> Line | None:
+    def _end(self) -> TextLine | None:
         held, bad, too_long = bytes(self._held).removesuffix(b"\r"), self._bad, self._too_long
         self._held.clear()
         self._bad = self._too_long = False
         if bad or b"\r" in held:
-            return Line(text="", fault=Error.BYTES)
+            return TextLine(text="", fault=Error.BYTES)
         if too_long or len(held) > self._longest:
-            return Line(text="", fault=Error.LONG)
-        return Line(text=held.decode("ascii")) if held else None
+            return TextLine(text="", fault=Error.LONG)
+        return TextLine(text=held.decode("ascii")) if held else None

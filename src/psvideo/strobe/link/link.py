@@ -9,7 +9,7 @@ import time
 from typing import Protocol, TypeVar
 
 from psvideo.errors import PsvideoError
-from psvideo.strobe.link.lines import LONGEST_REPLY, Error, Line, LineError, LineReader
+from psvideo.strobe.link.lines import LONGEST_REPLY, Error, LineError, LineReader, TextLine
 from psvideo.strobe.link.messages import Arm, Clk, ClockReading, Nonce, Refusal, Reply, Request, Run, Stop
 from psvideo.strobe.link.protocol import format_request, parse_reply
 
@@ -65,7 +65,7 @@ class Link:
         self.heard = b""
         self.repaired = 0
         self._reader = LineReader(LONGEST_REPLY)
-        self._waiting: list[Line] = []
+        self._waiting: list[TextLine] = []
         self._astray = False
         self._nonce = int(time.time() * 1000) & 0xFFFFFF
 
@@ -141,7 +141,7 @@ class Link:
         damaged = isinstance(reply, Refusal) and reply.code in NOT_DONE
         return reply if sealed or damaged else None
 
-    def _line(self, within_s: float) -> Line | None:
+    def _line(self, within_s: float) -> TextLine | None:
         until_s = time.monotonic() + within_s
         while not self._waiting:
             data = self.port.read()

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from psvideo.strobe.link.boards import Board
-from psvideo.strobe.link.lines import LONGEST_REQUEST, Error, Line, LineError, LineReader, unseal
+from psvideo.strobe.link.lines import LONGEST_REQUEST, Error, LineError, LineReader, TextLine, unseal
 from psvideo.strobe.link.messages import Fault, Interlock, Refusal, Reply, Reset, Run, State, Stop
 from psvideo.strobe.link.protocol import find_command, format_reply, parse_words
 from psvideo.strobe.stand_ins.playing import Edge, Moment, moments
@@ -130,7 +130,7 @@ class EmulatedController:
         self._darken()
         self._memory = replace(self._memory, state="fault", fault=fault)
 
-    def _answer(self, line: Line) -> bytes:
+    def _answer(self, line: TextLine) -> bytes:
         if line.fault is not None:
             return format_reply(Refusal(code=line.fault, text=SPOILED[line.fault]), sealed=False)
         try:

@@ -22,7 +22,7 @@ TRACE_HZ = 16_000_000
 """The traces of both emulations count the same cycles."""
 
 
-class Port(Protocol):
+class StandInPort(Protocol):
     """The controller's end of a serial line. ``name`` is what a host opens, as pyserial understands it."""
 
     name: str
@@ -93,13 +93,13 @@ class SocketPort:
             self._host.close()
 
 
-def open_port() -> Port:
+def open_port() -> StandInPort:
     """Return a pseudo-terminal, or a loopback socket on systems that have none (Windows)."""
     return PtyPort() if hasattr(os, "openpty") else SocketPort()
 
 
 def serve(
-    controller: EmulatedController, port: Port, *, stopped: Callable[[], bool], trace: TraceWriter | None = None
+    controller: EmulatedController, port: StandInPort, *, stopped: Callable[[], bool], trace: TraceWriter | None = None
 ) -> None:
     """Let a controller live behind a port, in the wall's time, until ``stopped`` says so; then it goes dark."""
     began_ns, answer, now = time.monotonic_ns(), b"", 0

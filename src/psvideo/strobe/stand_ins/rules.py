@@ -14,7 +14,7 @@ FIRMWARE = "emulated-1"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Memory:
+class ControllerMemory:
     """What a controller knows. A reset clears all but the board, its unit and the interlock's wire."""
 
     board: Board
@@ -44,9 +44,9 @@ class Memory:
         return known if known and len(known) == len(slots) else None
 
 
-def after_reset(board: Board, unit: str, *, cause: m.Reset, interlock: m.Interlock = "closed") -> Memory:
+def after_reset(board: Board, unit: str, *, cause: m.Reset, interlock: m.Interlock = "closed") -> ControllerMemory:
     """Return the memory of a controller that has just started: idle, or in fault after a watchdog reset."""
-    memory = Memory(
+    memory = ControllerMemory(
         board=board,
         unit=unit,
         wiring=board.first_wiring,
@@ -57,10 +57,10 @@ def after_reset(board: Board, unit: str, *, cause: m.Reset, interlock: m.Interlo
     return replace(memory, state="fault", fault="watchdog") if cause == "watchdog" else memory
 
 
-Answer = tuple[Memory, m.Reply | m.Refusal]
+Answer = tuple[ControllerMemory, m.Reply | m.Refusal]
 
 
-def answer(memory: Memory, request: m.Request, *, ticks: int, start: int) -> Answer:
+def answer(memory: ControllerMemory, request: m.Request, *, ticks: int, start: int) -> Answer:
     """Return what a request does and what is answered to it, in a state that allows it.
 
     ``ticks`` is the controller's clock; a run that begins now has its first flash at ``start``.
@@ -85,7 +85,7 @@ def answer(memory: Memory, request: m.Request, *, ticks: int, start: int) -> Ans
             return memory, _about(memory, request)
 
 
-def _about(memory: Memory, request: m.Request) -> m.Reply:
+def _about(memory: ControllerMemory, request: m.Request) -> m.Reply:
     if isinstance(request, m.Id):
         return m.Identity(proto=m.PROTOCOL, board=memory.board.name, firmware=FIRMWARE, unit=memory.unit)
     if isinstance(request, m.Caps):
@@ -101,7 +101,7 @@ def _about(memory: Memory, request: m.Request) -> m.Reply:
     )
 
 
-def _settings(memory: Memory, request: m.Wiring | m.Keep | m.New) -> Answer:
+def _settings(memory: ControllerMemory, request: m.Wiring | m.Keep | m.New) -> Answer:
     empty = replace(memory, slots=(None,) * memory.board.slots, steps=())
     if isinstance(request, m.New):
         return replace(empty, state="idle"), m.Renewed()
@@ -115,7 +115,7 @@ def _settings(memory: Memory, request: m.Wiring | m.Keep | m.New) -> Answer:
     return replace(empty, wiring=request.wiring), m.WiringSet(wiring=request.wiring)
 
 
-def _upload(memory: Memory, request: m.Slot | m.Steps | m.Arm) -> Answer:
+def _upload(memory: ControllerMemory, request: m.Slot | m.Steps | m.Arm) -> Answer:
     if isinstance(request, m.Slot):
         refusal = slot_refusal(request, memory.caps)
         if refusal is not None:
@@ -127,7 +127,7 @@ def _upload(memory: Memory, request: m.Slot | m.Steps | m.Arm) -> Answer:
     return _arm(memory, request)
 
 
-def _write_steps(memory: Memory, request: m.Steps) -> Answer:
+def _write_steps(memory: ControllerMemory, request: m.Steps) -> Answer:
     board, held = memory.board, len(memory.steps)
     count, highest = request.first + len(request.slots), max(request.slots)
     if request.first > held:
@@ -139,7 +139,7 @@ def _write_steps(memory: Memory, request: m.Steps) -> Answer:
     return replace(memory, steps=memory.steps[: request.first] + request.slots), m.StepsSet(steps=count)
 
 
-def _arm(memory: Memory, request: m.Arm) -> Answer:
+def _arm(memory: ControllerMemory, request: m.Arm) -> Answer:
     sequence = memory.sequence
     if sequence is None:
         return memory, _refuse(Error.INCOMPLETE, f"{len(memory.steps)} steps, or one names an empty slot")

@@ -9,7 +9,7 @@ from psvideo.model.plan import FlashTrain, Plan
 
 
 @dataclass(frozen=True, kw_only=True)
-class StrobeClock:
+class FoundClock:
     """The strobe's clock on the camera's: flash 0 of a cycle starts at ``phase_s``; ``offset_ppm`` as in files.
 
     Where the clock drifts, ``bend_s`` (knot,) is by how much flashes come later than that at the times ``knot_s``
@@ -26,12 +26,12 @@ class StrobeClock:
         """Camera seconds per strobe second, bends left aside."""
         return 1.0 + self.offset_ppm * 1e-6
 
-    def shifted(self, shift_s: float, ppm: float, *, pivot_s: float) -> "StrobeClock":
+    def shifted(self, shift_s: float, ppm: float, *, pivot_s: float) -> "FoundClock":
         """Return this clock moved by ``shift_s`` and made faster by ``ppm``, turning about ``pivot_s``."""
         phase_s = self.phase_s + shift_s + (self.phase_s - pivot_s) * ppm * 1e-6
         return replace(self, phase_s=phase_s, offset_ppm=self.offset_ppm + ppm * self.rate)
 
-    def bent(self, knot_s: FloatArray, shift_s: FloatArray) -> "StrobeClock":
+    def bent(self, knot_s: FloatArray, shift_s: FloatArray) -> "FoundClock":
         """Return this clock with ``shift_s`` (knot,) added to its bends at the given knots."""
         before_s = self.bend(knot_s)
         return replace(self, knot_s=tuple(float(t) for t in knot_s), bend_s=tuple(float(t) for t in before_s + shift_s))
@@ -62,7 +62,7 @@ class Beat:
     ``beat_hz`` are the frequencies at which ambient light flickers.
     """
 
-    clock: StrobeClock
+    clock: FoundClock
     row_time_s: float
     exposure_s: float
     upward: bool = False
@@ -75,12 +75,12 @@ class Beat:
         return replace(self, clock=replace(self.clock, phase_s=phase_s))
 
 
-def train_until(plan: Plan, clock: StrobeClock, until_s: float) -> FlashTrain:
+def train_until(plan: Plan, clock: FoundClock, until_s: float) -> FlashTrain:
     """Return the flashes that can touch frames from 0 s to ``until_s``, as times on the camera's clock."""
     return train_between(plan, clock, 0.0, until_s)
 
 
-def train_between(plan: Plan, clock: StrobeClock, from_s: float, until_s: float) -> FlashTrain:
+def train_between(plan: Plan, clock: FoundClock, from_s: float, until_s: float) -> FlashTrain:
     """Return the flashes between two times, and at least a cycle more at either end, on the camera's clock."""
     cycle = len(plan.cycle_slots)
     cycle_s = plan.cycle_s * clock.rate

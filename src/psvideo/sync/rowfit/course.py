@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from psvideo.model.plan import Plan
-from psvideo.sync.rowfit.beat import StrobeClock
+from psvideo.sync.rowfit.beat import FoundClock
 from psvideo.sync.rowfit.ends import ends
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.seed import CLEARER, Seed, gain_of, other_seeds, renumbered
@@ -72,7 +72,7 @@ def window_frames(plan: Plan) -> int:
     return max(24, 6 * (len(plan.lit_slots) + 1))
 
 
-def _clock_of(plan: Plan, tracked: Track) -> StrobeClock:
+def _clock_of(plan: Plan, tracked: Track) -> FoundClock:
     """Return a straight clock through the track's anchors, or a bent one where they stray from it."""
     clock = tracked.beat.clock
     if len(tracked.at_s) < 2:

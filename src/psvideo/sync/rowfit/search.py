@@ -13,7 +13,7 @@ from psvideo.compute.threads import over_ranges
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit import kernel
-from psvideo.sync.rowfit.beat import Beat, StrobeClock
+from psvideo.sync.rowfit.beat import Beat, FoundClock
 from psvideo.sync.rowfit.profiles import Profiles, compiled_rows, rows_of_a_part, slot_unknowns
 
 ROBUST_STEEPNESS = 20.0
@@ -38,7 +38,7 @@ def search(
     phases_s, ppm = _grid(plan, rows, range_ppm)
     pivot_s = float(rows.frame_start_s.mean())
     clocks = [
-        StrobeClock(phase_s=float(phase_s), offset_ppm=0.0).shifted(0.0, float(offset), pivot_s=pivot_s)
+        FoundClock(phase_s=float(phase_s), offset_ppm=0.0).shifted(0.0, float(offset), pivot_s=pivot_s)
         for offset in ppm
         for phase_s in phases_s
     ]
@@ -60,7 +60,7 @@ def _grid(plan: Plan, rows: Profiles, range_ppm: float) -> tuple[FloatArray, Flo
     return phases_s, ppm
 
 
-def _losses(plan: Plan, rows: Profiles, clocks: list[StrobeClock], start: Beat, *, place: FloatArray) -> FloatArray:
+def _losses(plan: Plan, rows: Profiles, clocks: list[FoundClock], start: Beat, *, place: FloatArray) -> FloatArray:
     """Return the loss of every clock in every row, shape (clock, row)."""
     first_s, last_s = float(rows.frame_start_s[0]), float(rows.frame_start_s[-1])
     latest_s = max(clock.phase_s for clock in clocks)
@@ -89,7 +89,7 @@ def _over_readouts(
     plan: Plan,
     rows: Profiles,
     loss: FloatArray,
-    clocks: list[StrobeClock],
+    clocks: list[FoundClock],
     phases_s: FloatArray,
     start: Beat,
     keep: int,
@@ -137,7 +137,7 @@ def _best(loss: FloatArray, keep: int) -> list[tuple[int, int, int, float]]:
     return found
 
 
-def _placed(start: Beat, clock: StrobeClock) -> Beat:
+def _placed(start: Beat, clock: FoundClock) -> Beat:
     return Beat(
         clock=clock,
         row_time_s=start.row_time_s,

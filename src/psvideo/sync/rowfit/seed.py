@@ -7,7 +7,7 @@ import numpy as np
 
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import UNKNOWN_CLOCK_PPM, Plan
-from psvideo.sync.rowfit.beat import Beat, StrobeClock
+from psvideo.sync.rowfit.beat import Beat, FoundClock
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import refine
 from psvideo.sync.rowfit.retime import Mask, Numbering, as_told, fold_frames, inserted, likeliest, stood_in, twins
@@ -189,7 +189,7 @@ def first_guess(plan: Plan) -> Beat:
     camera = plan.camera
     readout_s = camera.readout_s or 0.0
     return Beat(
-        clock=StrobeClock(phase_s=0.0, offset_ppm=0.0),
+        clock=FoundClock(phase_s=0.0, offset_ppm=0.0),
         row_time_s=abs(readout_s) / camera.height_px,
         exposure_s=camera.exposure_s,
         upward=readout_s < 0,

@@ -12,7 +12,7 @@ from psvideo.model.camera import FloatArray
 
 
 @dataclass(frozen=True, kw_only=True)
-class Curve:
+class CameraCurve:
     """``encode`` maps linear light to the code value, ``decode`` back; ``zero`` is the code of no light."""
 
     encode: Callable[[FloatArray], FloatArray]
@@ -24,7 +24,7 @@ class Curve:
         return float(self.encode(np.array(0.0)))
 
 
-def _power_curve(slope: float, knee: float, offset: float, power: float) -> Curve:
+def _power_curve(slope: float, knee: float, offset: float, power: float) -> CameraCurve:
     """Return a power curve with a straight foot, whose codes end at 1 for light 1."""
 
     def encode(light: FloatArray) -> FloatArray:
@@ -35,7 +35,7 @@ def _power_curve(slope: float, knee: float, offset: float, power: float) -> Curv
         bright = ((np.maximum(code, slope * knee) + offset) / (1 + offset)) ** power
         return np.where(code < slope * knee, code / slope, bright)
 
-    return Curve(encode=encode, decode=decode)
+    return CameraCurve(encode=encode, decode=decode)
 
 
 def _slog3_encode(light: FloatArray) -> FloatArray:
@@ -69,9 +69,9 @@ def _same(values: FloatArray) -> FloatArray:
 
 
 CURVES = {
-    "linear": Curve(encode=_same, decode=_same),
+    "linear": CameraCurve(encode=_same, decode=_same),
     "srgb": _power_curve(12.92, 0.0031308, 0.055, 2.4),  # IEC 61966-2-1
     "rec709": _power_curve(4.5, 0.018, 0.099, 1 / 0.45),  # ITU-R BT.709, camera curve
-    "slog3": Curve(encode=_slog3_encode, decode=_slog3_decode),
-    "logc3": Curve(encode=_logc3_encode, decode=_logc3_decode),
+    "slog3": CameraCurve(encode=_slog3_encode, decode=_slog3_decode),
+    "logc3": CameraCurve(encode=_logc3_encode, decode=_logc3_decode),
 }

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.synth.camera.curves import CURVES, Curve
+from psvideo.synth.camera.curves import CURVES, CameraCurve
 from psvideo.synth.camera.noise import Noise
 from psvideo.synth.camera.sensor import Image
 from psvideo.synth.scene import CameraTable, Kind
@@ -20,7 +20,7 @@ class Codes:
     ``bits`` are the camera's; ``top`` belongs to the file, whose codes may be spread over more bits.
     """
 
-    curve: Curve
+    curve: CameraCurve
     bits: int
     black: float
     white: float

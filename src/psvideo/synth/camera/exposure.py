@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from psvideo.model.plan import Plan
 from psvideo.synth.camera.noise import NOISELESS, Noise, frame_rng
-from psvideo.synth.camera.sensor import Flicker, Image, expose_frames, plates_by_slot
-from psvideo.synth.lamps.strobe import StrobeClock, TrueFlash, true_flashes
+from psvideo.synth.camera.sensor import Image, MainsSwing, expose_frames, plates_by_slot
+from psvideo.synth.lamps.strobe import TrueClock, TrueFlash, true_flashes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,9 +33,9 @@ def expose(
     plan: Plan,
     *,
     frames: int,
-    clock: StrobeClock | None = None,
+    clock: TrueClock | None = None,
     ambient: Image | float = 0.0,
-    flicker: Flicker | None = None,
+    flicker: MainsSwing | None = None,
     noise: Noise = NOISELESS,
     bits: int = 0,
     dropped: Sequence[int] = (),
@@ -56,13 +56,13 @@ def expose(
     >>> camera = Camera(width_px=1, height_px=4, fps=Fraction(100), exposure_s=0.01, readout_s=0.01)
     >>> flash = PlannedFlash(lights={"key": 1.0}, duration_s=0.001)
     >>> plan = Plan(camera=camera, flashes=(flash,), dark_s=1.0)
-    >>> shot = expose([np.full((4, 1), 0.8, np.float32)], plan, frames=3, clock=StrobeClock(phase_s=0.0145))
+    >>> shot = expose([np.full((4, 1), 0.8, np.float32)], plan, frames=3, clock=TrueClock(phase_s=0.0145))
     >>> shot.frames[:, :, 0].round(3)
     array([[0. , 0. , 0.4, 0.8],
            [0.8, 0.8, 0.4, 0. ],
            [0. , 0. , 0. , 0. ]], dtype=float32)
     """
-    flashes = true_flashes(plan, clock or StrobeClock(), frames=frames, dropped=frozenset(dropped))
+    flashes = true_flashes(plan, clock or TrueClock(), frames=frames, dropped=frozenset(dropped))
     kept = tuple(n for n in range(frames) if n not in set(dropped))
     plate_of = plates if callable(plates) else plates_by_slot(_by_slot(plates))
     shape = next(plate.shape for plate in map(plate_of, flashes) if plate is not None)

@@ -19,7 +19,7 @@ Image = NDArray[np.float32]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Flicker:
+class MainsSwing:
     """Ambient light on mains: it swings by ``depth`` (0 to 1) of its mean at ``hz`` light pulses per second."""
 
     hz: float = 0.0
@@ -47,7 +47,7 @@ def expose_frames(
     *,
     frames: Iterable[int],
     ambient_of: Callable[[int], Image] | None = None,
-    flicker: Flicker | None = None,
+    flicker: MainsSwing | None = None,
     channels: int = 0,
 ) -> Iterator[Image]:
     """Yield what the sensor collects in each frame, linear, 1.0 = saturation, not yet clipped and without noise.
@@ -75,7 +75,7 @@ def expose_frames(
         live = [(flash, plate) for flash, plate in live if flash.start_s + emission.lasts_s(flash.duration_s) > begin_s]
         image = np.zeros(shape, np.float32)
         if ambient_of is not None:
-            level = (flicker or Flicker()).mean(begin_s + opens_s, camera.exposure_s)
+            level = (flicker or MainsSwing()).mean(begin_s + opens_s, camera.exposure_s)
             image += _per_row(level, shape) * ambient_of(frame)
         for flash, plate in live:
             _collect(image, plate, seen_share(camera, emission, flash, frame))

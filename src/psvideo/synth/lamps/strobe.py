@@ -20,7 +20,7 @@ TAIL_LOST = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
-class StrobeClock:
+class TrueClock:
     """The strobe's clock against the camera's.
 
     ``phase_s`` is when a cycle begins, on the camera's clock. A strobe second lasts ``1 + offset_ppm * 1e-6`` camera
@@ -83,7 +83,7 @@ def clip_end_s(camera: Camera, frames: int) -> float:
 
 
 def true_flashes(
-    plan: Plan, clock: StrobeClock, *, frames: int, dropped: frozenset[int] = frozenset()
+    plan: Plan, clock: TrueClock, *, frames: int, dropped: frozenset[int] = frozenset()
 ) -> tuple[TrueFlash, ...]:
     """Return every flash that gives light while the clip records, in order, cut ones at the ends included.
 
@@ -109,7 +109,7 @@ def true_flashes(
     )
 
 
-def _free(plan: Plan, clock: StrobeClock, end_s: float) -> tuple[FlashTrain, FloatArray, FloatArray]:
+def _free(plan: Plan, clock: TrueClock, end_s: float) -> tuple[FlashTrain, FloatArray, FloatArray]:
     """Let the strobe run freely from well before the clip to well after it."""
     per_cycle = len(plan.cycle_slots)
     first = int(np.floor(-clock.phase_s / plan.cycle_s)) - 1

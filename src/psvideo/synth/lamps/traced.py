@@ -14,7 +14,7 @@ from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.trace_csv import Trace, merged_pulses, read_trace
 from psvideo.model.plan import Plan
 from psvideo.synth.lamps.emission import Emission
-from psvideo.synth.lamps.strobe import StrobeClock, TrueFlash, clip_end_s, is_complete
+from psvideo.synth.lamps.strobe import TrueClock, TrueFlash, clip_end_s, is_complete
 from psvideo.synth.lamps.traced_slots import Pulse, check_lines, flash_pulses, wired_lines
 from psvideo.synth.scene import Scene
 
@@ -35,13 +35,13 @@ class TracedLight:
     """
 
     trace: Trace
-    clock: StrobeClock
+    clock: TrueClock
     first_cycle: int
     flashes: tuple[TrueFlash, ...]
     parts: tuple[TrueFlash, ...]
 
 
-def traced_light(scene: Scene, plan: Plan, clock: StrobeClock, options: TraceOptions) -> TracedLight:
+def traced_light(scene: Scene, plan: Plan, clock: TrueClock, options: TraceOptions) -> TracedLight:
     """Return the light of a clip from a trace, in camera time.
 
     The first edge falls on the scene's ``phase_s``; where the scene leaves it open, on a moment drawn from its seed
@@ -85,7 +85,7 @@ def _refuse_unfit(scene: Scene, plan: Plan) -> None:
         )
 
 
-def _drawn_phase_s(scene: Scene, plan: Plan, clock: StrobeClock, run_s: float) -> float:
+def _drawn_phase_s(scene: Scene, plan: Plan, clock: TrueClock, run_s: float) -> float:
     spare_s = run_s - clip_end_s(plan.camera, scene.frames)
     if spare_s > 0:
         return float(-np.random.default_rng([scene.seed, 3]).uniform(0.0, spare_s))
@@ -98,7 +98,7 @@ class _Maker:
 
     plan: Plan
     trace: Trace
-    clock: StrobeClock
+    clock: TrueClock
     first: int
     wired: Mapping[int, str]
 
@@ -132,7 +132,7 @@ class _Maker:
         )
 
 
-def _with_dark_slots(plan: Plan, clock: StrobeClock, flashes: Sequence[TrueFlash]) -> list[TrueFlash]:
+def _with_dark_slots(plan: Plan, clock: TrueClock, flashes: Sequence[TrueFlash]) -> list[TrueFlash]:
     """Put the dark slots in, which leave no edge: where the plan has them, before the flash that follows."""
     cycle, rate = plan.cycle_slots, float(clock.rate(np.array(0.0)))
     found: list[TrueFlash] = []

@@ -40,7 +40,7 @@ class Hits:
 
 
 @dataclass(frozen=True, kw_only=True)
-class View:
+class SeenScene:
     """The scene at one instant: what the camera hits, and the triangles that can shadow it."""
 
     hits: Hits
@@ -63,7 +63,7 @@ def camera_rays(camera: CameraTable, far_m: float) -> tuple[FloatArray, FloatArr
     return np.zeros_like(directions), directions / np.linalg.norm(directions, axis=1, keepdims=True)
 
 
-def look(bodies: Sequence[Body], camera: CameraTable, time_s: float) -> View:
+def look(bodies: Sequence[Body], camera: CameraTable, time_s: float) -> SeenScene:
     """Pose the bodies at a time on the camera's clock and cast the camera's rays at them."""
     poses = [body.pose(time_s) for body in bodies]
     vertices = np.concatenate([vertices for vertices, _ in poses])
@@ -95,7 +95,7 @@ def look(bodies: Sequence[Body], camera: CameraTable, time_s: float) -> View:
         albedo=_albedo(bodies, owner[face], local, weights),
         gloss=np.array([_gloss(body) for body in bodies], np.float32)[owner[face]],
     )
-    return View(hits=hits, shadows=_shadow_caster(bodies, vertices, faces, owner, caster))
+    return SeenScene(hits=hits, shadows=_shadow_caster(bodies, vertices, faces, owner, caster))
 
 
 def _unit(vectors: FloatArray) -> FloatArray:

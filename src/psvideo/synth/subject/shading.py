@@ -14,14 +14,14 @@ from psvideo.model.rig import Light, Rig
 from psvideo.synth.lamps.emission import Emission
 from psvideo.synth.scene import AmbientTable
 from psvideo.synth.subject.material import Colours, colour
-from psvideo.synth.subject.render import Hits, View
+from psvideo.synth.subject.render import Hits, SeenScene
 
 LIFT = 1e-5
 """Shadow rays start this fraction of the scene's size above the surface, so that no triangle shadows itself."""
 
 
 def flash_plate(
-    view: View, rig: Rig, lights: Mapping[str, float], duration_s: float, emission: Emission
+    view: SeenScene, rig: Rig, lights: Mapping[str, float], duration_s: float, emission: Emission
 ) -> NDArray[np.float32]:
     """Return what a row records that sees a whole flash of the given powers and length, (row, col, 3)."""
     collected = np.zeros_like(view.hits.albedo)
@@ -34,7 +34,7 @@ def flash_plate(
     return view.hits.image(collected)
 
 
-def light_collected(view: View, light: Light) -> Colours:
+def light_collected(view: SeenScene, light: Light) -> Colours:
     """Return each hit's light under one lamp at full power and its reference duration, (hit, 3)."""
     hits = view.hits
     direction, distance_m, strength = irradiance(light, hits.point_m)
@@ -59,7 +59,9 @@ def irradiance(light: Light, points_m: FloatArray) -> tuple[FloatArray, FloatArr
     return direction, distance_m, strength * falloff.astype(np.float32)[:, None]
 
 
-def _shadowed(view: View, direction: FloatArray, distance_m: FloatArray, lit: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _shadowed(
+    view: SeenScene, direction: FloatArray, distance_m: FloatArray, lit: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
     """Tell for each hit whether something stands between it and the light; asked only where the light could reach."""
     shadowed = np.zeros(len(lit), bool)
     if view.shadows is not None and lit.any():
@@ -68,7 +70,7 @@ def _shadowed(view: View, direction: FloatArray, distance_m: FloatArray, lit: ND
     return shadowed
 
 
-def lifted(view: View) -> FloatArray:
+def lifted(view: SeenScene) -> FloatArray:
     """Return the hits' points a little above their surface, where rays towards lights start."""
     size_m = view.shadows.size_m if view.shadows is not None else 0.0
     return np.asarray(view.hits.point_m + LIFT * size_m * view.hits.facet)
@@ -85,7 +87,7 @@ def _highlight(hits: Hits, direction: FloatArray) -> NDArray[np.float32]:
     return np.asarray(strength * (exponent + 8.0) / 8.0 * cosine**exponent, np.float32)
 
 
-def ambient_plate(view: View, table: AmbientTable) -> NDArray[np.float32]:
+def ambient_plate(view: SeenScene, table: AmbientTable) -> NDArray[np.float32]:
     """Return what one whole exposure collects of the light that does not flash, (row, col, 3)."""
     hits = view.hits
     sky = 1.0 - table.sky * 0.5 * (1.0 - hits.normal[:, 1])
@@ -93,7 +95,7 @@ def ambient_plate(view: View, table: AmbientTable) -> NDArray[np.float32]:
     return hits.image(hits.albedo * colour(table.level) * open_share.astype(np.float32)[:, None])
 
 
-def _openness(view: View, rays: int) -> FloatArray:
+def _openness(view: SeenScene, rays: int) -> FloatArray:
     """Return the cosine-weighted share of the sky that each hit sees, from a fixed spiral of directions."""
     hits = view.hits
     if rays == 0 or view.shadows is None:
