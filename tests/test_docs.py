@@ -3,6 +3,7 @@
 import re
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -56,6 +57,34 @@ def test_every_link_between_pages_leads_to_a_file_and_to_a_heading_in_it() -> No
             dead.append(f"{page.relative_to(ROOT)}: {target}")
     assert not dead
     assert sum(1 for _ in links()) > 100
+
+
+FILE = re.compile(
+    r"(?<![\w/.])((?:src|tests|bench|lights|docs|data_synth|calibration)/[\w./-]+\.(?:py|md|toml|h|c|csv|svg|sh))\b"
+)
+
+
+def test_every_file_of_the_project_that_a_page_names_is_there() -> None:
+    named = [
+        (page, name) for page in PAGES for name in FILE.findall(page.read_text(encoding="utf-8")) if "<" not in name
+    ]
+    missing = [f"{page.relative_to(ROOT)}: {name}" for page, name in named if not (ROOT / name).is_file()]
+    assert not missing
+    assert sum(name.startswith("src/psvideo/") for _, name in named) >= 10
+
+
+def test_contributing_has_a_line_for_every_room() -> None:
+    rooms = {path.parent.name for path in (ROOT / "src" / "psvideo").glob("*/__init__.py")}
+    lines = re.findall(r"^\| `(\w+)` \|", (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"), flags=re.MULTILINE)
+    assert set(lines) == rooms
+    assert len(lines) == len(rooms)
+
+
+def test_the_newest_version_of_the_changelog_is_the_package_s() -> None:
+    newest = re.search(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), flags=re.MULTILINE)
+    package = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert newest is not None
+    assert newest[1] == package["version"]
 
 
 def test_the_page_of_commands_is_what_the_commands_say() -> None:
