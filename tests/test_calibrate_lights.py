@@ -12,7 +12,7 @@ from psvideo.calibrate.guess import guess_rig
 from psvideo.calibrate.light_pictures import LightPictures, light_pictures
 from psvideo.calibrate.matte import measure_matte_sphere, sphere_normals
 from psvideo.calibrate.sphere.outline import given_outline
-from psvideo.calibrate.sphere.view import View
+from psvideo.calibrate.sphere.view import SphereView
 from psvideo.calibrate.strengths import measure_strengths
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
@@ -34,7 +34,7 @@ def ways(count: int, *, seed: int = 0) -> Array:
 
 
 def sphere_pictures(
-    directions: Array, strengths: Array, *, view: View = View(focal_px=None, principal_px=(99.5, 74.5)),
+    directions: Array, strengths: Array, *, view: SphereView = SphereView(focal_px=None, principal_px=(99.5, 74.5)),
     noise: float = 0.002, gloss: float = 0.0,
 ) -> LightPictures:  # fmt: skip
     """A matte sphere, perhaps with a highlight, in the circle's outline; ``strengths`` (light, channel)."""
@@ -57,7 +57,7 @@ def off_deg(found: Array, true: Array) -> Array:
 
 @pytest.mark.parametrize("focal_px", [None, 300.0])
 def test_a_matte_sphere_tells_directions_and_intensities_per_channel(focal_px: float | None) -> None:
-    view = View(focal_px=focal_px, principal_px=(99.5, 74.5))
+    view = SphereView(focal_px=focal_px, principal_px=(99.5, 74.5))
     directions, strengths = ways(5), np.random.default_rng(2).uniform(0.5, 1.3, (5, 3))
     found = measure_matte_sphere(
         sphere_pictures(directions, strengths, view=view), given_outline(view, CIRCLE), albedo=0.6
@@ -71,7 +71,7 @@ def test_gloss_and_saturation_are_weighed_out_of_a_matte_sphere() -> None:
     directions, strengths = ways(4), np.full((4, 3), 1.5)
     glossy = sphere_pictures(directions, strengths, gloss=0.8)
     assert glossy.saturated.any()
-    found = measure_matte_sphere(glossy, given_outline(View(focal_px=None, principal_px=(99.5, 74.5)), CIRCLE))
+    found = measure_matte_sphere(glossy, given_outline(SphereView(focal_px=None, principal_px=(99.5, 74.5)), CIRCLE))
     assert off_deg(np.array([light.direction for light in found]), directions).max() < 0.5
     np.testing.assert_allclose([light.intensity for light in found], 1.0, rtol=0.01)
 
@@ -82,7 +82,7 @@ def test_a_wrong_outline_costs_what_the_standard_error_says() -> None:
     x, y, radius = CIRCLE
     ratios = []
     for dx, dy, dr in np.random.default_rng(3).normal(0, 0.5, (8, 3)):
-        outline = given_outline(View(focal_px=None, principal_px=(99.5, 74.5)), (x + dx, y + dy, radius + dr))
+        outline = given_outline(SphereView(focal_px=None, principal_px=(99.5, 74.5)), (x + dx, y + dy, radius + dr))
         found = measure_matte_sphere(pictures, outline)
         off = off_deg(np.array([light.direction for light in found]), directions)
         ratios += list(off / [light.error_deg for light in found])
@@ -92,7 +92,7 @@ def test_a_wrong_outline_costs_what_the_standard_error_says() -> None:
 def test_what_is_no_matte_sphere_is_refused_light_by_light() -> None:
     disc = np.zeros((HIGH, WIDE, 3), np.float32)
     cv2.circle(disc, (95, 72), 60, (0.5, 0.5, 0.5), -1)
-    outline = given_outline(View(focal_px=None, principal_px=(99.5, 74.5)), CIRCLE)
+    outline = given_outline(SphereView(focal_px=None, principal_px=(99.5, 74.5)), CIRCLE)
     found = measure_matte_sphere(light_pictures(["a", "b"], [disc, 0.01 * disc]), outline)
     assert all("not matte" in light.fault or "no matte sphere" in light.fault for light in found)
 

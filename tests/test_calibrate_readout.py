@@ -19,7 +19,7 @@ from psvideo.calibrate.stripes.pictures import LedPictures, in_colours, read_led
 from psvideo.calibrate.stripes.readout import Led, Readout, measure_readout
 from psvideo.capture import cameras
 from psvideo.cli.app import main
-from psvideo.clip.record import Header, Picture
+from psvideo.clip.record import CodedPicture, Header
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import FloatArray
 
@@ -303,7 +303,7 @@ def test_the_green_of_a_mosaic_is_taken_row_by_row() -> None:
             for col in range(8):
                 codes[row, col] = 1000 + row if cfa[2 * (row % 2) + col % 2] == "G" else 0
         header = Header(width_px=8, height_px=6, channels=1, bits=16, cfa=cfa)
-        green = in_colours(Picture(header=header, codes=codes))
+        green = in_colours(CodedPicture(header=header, codes=codes))
         assert (green[..., 0] == 1000 + np.arange(6)[:, None]).all()
 
 

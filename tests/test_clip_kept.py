@@ -12,7 +12,7 @@ from hypothesis.extra import numpy as hnp
 
 from psvideo.clip import Kept, keeping_near
 from psvideo.clip import kept as room
-from psvideo.clip.record import Header, Picture
+from psvideo.clip.record import CodedPicture, Header
 from psvideo.errors import PsvideoError
 
 KINDS = st.sampled_from([np.uint8, np.uint16, np.float32])
@@ -22,10 +22,10 @@ SHAPES = st.one_of(
 ARRAYS = KINDS.flatmap(lambda kind: hnp.arrays(kind, SHAPES))
 
 
-def picture(codes: np.ndarray, black: float = 0.0) -> Picture:
+def picture(codes: np.ndarray, black: float = 0.0) -> CodedPicture:
     rows, cols = codes.shape[:2]
     head = Header(width_px=cols, height_px=rows, channels=1, bits=16, black=((black,),))
-    return Picture(header=head, codes=codes)
+    return CodedPicture(header=head, codes=codes)
 
 
 @given(st.lists(ARRAYS, min_size=1, max_size=5), st.booleans())

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from psvideo.clip.linear import linear_light
-from psvideo.clip.record import Header, Picture
+from psvideo.clip.record import CodedPicture, Header
 from psvideo.clip.transfer import CURVES, find_curve, to_light
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import Encoding
@@ -77,9 +77,11 @@ def test_colour_is_named_only_where_the_curve_tells_the_gamut() -> None:
     assert find_curve("slog3").colour == "unknown"
 
 
-def picture(codes: list[int] | np.ndarray, *, bits: int = 16, **header: Any) -> Picture:  # type: ignore[type-arg]
+def picture(codes: list[int] | np.ndarray, *, bits: int = 16, **header: Any) -> CodedPicture:  # type: ignore[type-arg]
     values = np.array([codes], np.uint8 if bits == 8 else np.uint16)
-    return Picture(header=Header(width_px=values.shape[1], height_px=1, channels=1, bits=bits, **header), codes=values)  # type: ignore[arg-type]
+    return CodedPicture(
+        header=Header(width_px=values.shape[1], height_px=1, channels=1, bits=bits, **header), codes=values
+    )  # type: ignore[arg-type]
 
 
 @given(black=st.integers(0, 5000), white=st.integers(6000, 65535), code=st.integers(0, 65535))
@@ -113,15 +115,15 @@ def test_levels_that_the_curve_turns_round_are_refused() -> None:
 def test_black_levels_by_position_are_taken_off_by_position() -> None:
     codes = np.full((4, 6), 1000, np.uint16)
     head = Header(width_px=6, height_px=4, channels=1, bits=14, black=((100.0, 200.0), (300.0, 400.0)), white=1400.0)
-    light = linear_light(Picture(header=head, codes=codes), Encoding())
+    light = linear_light(CodedPicture(header=head, codes=codes), Encoding())
     expected = [[900 / 1300, 800 / 1200], [700 / 1100, 600 / 1000]]
     assert np.allclose(light, np.tile(expected, (2, 3)))
-    assert np.allclose(linear_light(Picture(header=head, codes=codes), Encoding(black_level=0)), 1000 / 1400)
+    assert np.allclose(linear_light(CodedPicture(header=head, codes=codes), Encoding(black_level=0)), 1000 / 1400)
 
 
 def test_floating_point_stays_as_it_is_unless_the_plan_gives_levels() -> None:
     codes = np.array([[-0.01, 0.5, 3.0]], np.float32)
-    floats = Picture(header=Header(width_px=3, height_px=1, channels=1, bits=None), codes=codes)
+    floats = CodedPicture(header=Header(width_px=3, height_px=1, channels=1, bits=None), codes=codes)
     assert np.array_equal(linear_light(floats, Encoding()), codes)
     assert linear_light(floats, Encoding(black_level=0.5, white_level=3.0))[0].tolist() == pytest.approx([-0.204, 0, 1])
 

@@ -15,7 +15,7 @@ from psvideo.calibrate.light_pictures import LightPictures, averaged, light_pict
 from psvideo.calibrate.mirror.lights import MirrorCalibration, calibrate_lights
 from psvideo.calibrate.sphere.outline import find_outlines, given_outline
 from psvideo.calibrate.sphere.sighting import Looking, SphereNotFoundError, sight_spheres
-from psvideo.calibrate.sphere.view import View
+from psvideo.calibrate.sphere.view import SphereView
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
 from psvideo.formats.rig_toml import parse_rig, read_rig
@@ -182,7 +182,7 @@ def test_the_psbox_outline_is_the_same_under_room_light_and_leds_and_its_errors_
     assert (errors < 2.5 * own).all()
     opened = open_light_sets(folder)
     pictures = averaged(opened.sets)
-    view = View(focal_px=None, principal_px=(549.5, 499.5))
+    view = SphereView(focal_px=None, principal_px=(549.5, 499.5))
     assert opened.room is not None
     under_leds = find_outlines(pictures, view)[0]
     room = replace(pictures, names=("room",), images=opened.room[None], seen=pictures.seen[:1])
@@ -196,7 +196,7 @@ def test_the_psbox_outline_is_the_same_under_room_light_and_leds_and_its_errors_
 def test_the_psbox_outline_lies_where_the_ball_ends_before_white_paper(shared_data: Path) -> None:
     """A dark ball before bright paper: half-way between their brightness is just inside its rim."""
     opened = open_light_sets(shared_data / "psbox_sphere" / "LightProbe-1")
-    view = View(focal_px=None, principal_px=(549.5, 499.5))
+    view = SphereView(focal_px=None, principal_px=(549.5, 499.5))
     assert opened.room is not None
     picture = opened.room.mean(axis=2)
     outline = find_outlines(averaged(opened.sets), view, room=picture)[0]

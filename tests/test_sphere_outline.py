@@ -7,7 +7,7 @@ from bench.mirror_scene import Ball, Lamp, Lens
 
 from psvideo.calibrate.light_pictures import light_pictures
 from psvideo.calibrate.sphere.outline import Outline, find_outlines
-from psvideo.calibrate.sphere.view import View
+from psvideo.calibrate.sphere.view import SphereView
 
 LENS = Lens(width=190, height=190, focal=800.0)
 BALL = Ball(centre=(0.01, -0.006, -0.6), radius_m=0.045)
@@ -32,7 +32,7 @@ def truth() -> np.ndarray:
 
 def outline_in(room: Room, *, seed: int = 0) -> Outline:
     pictures = light_pictures("abc", film(LENS, BALL, LAMPS, room, seed=seed))
-    found = find_outlines(pictures, View(focal_px=LENS.focal, principal_px=(94.5, 94.5)))
+    found = find_outlines(pictures, SphereView(focal_px=LENS.focal, principal_px=(94.5, 94.5)))
     assert len(found) == 1
     return found[0]
 

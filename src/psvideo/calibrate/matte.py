@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from psvideo.calibrate.light_pictures import LightPictures
 from psvideo.calibrate.sphere.outline import Outline
-from psvideo.calibrate.sphere.view import View
+from psvideo.calibrate.sphere.view import SphereView
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import FloatArray
 from psvideo.model.rig import Light, Rig
@@ -84,7 +84,7 @@ def measure_matte_sphere(pictures: LightPictures, outline: Outline, *, albedo: f
     return [replace(light, intensity=light.intensity * scale) for light in found]
 
 
-def matte_rig(lights: list[MatteLight], view: View) -> Rig:
+def matte_rig(lights: list[MatteLight], view: SphereView) -> Rig:
     """Return the rig of the lights that could be measured."""
     focal = None if view.focal_px is None else (view.focal_px, view.focal_px)
     return Rig(
@@ -100,7 +100,7 @@ def _as_light(light: MatteLight) -> Light:
     return Light(name=light.name, direction=(x, y, z), intensity=strengths, error_deg=round(light.error_deg, 3))
 
 
-def sphere_normals(view: View, place: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+def sphere_normals(view: SphereView, place: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the sphere's normals (point, 3) where the rays through points (x, y) meet it, and the facing cosines.
 
     The cosine between normal and the ray back is 0 or less where the ray misses.
@@ -115,7 +115,7 @@ def sphere_normals(view: View, place: FloatArray, points: FloatArray) -> tuple[F
     return normals, facing
 
 
-def _pixels(pictures: LightPictures, view: View, place: FloatArray) -> _Sphere:
+def _pixels(pictures: LightPictures, view: SphereView, place: FloatArray) -> _Sphere:
     """Take the sphere's pixels out of the pictures, evenly thinned where they are very many."""
     x, y, radius = place[:3]
     step = max(int(np.ceil(np.sqrt(np.pi * radius**2 / MOST_PIXELS))), 1)

@@ -22,7 +22,7 @@ NUMBERED = re.compile(r"(.*?)(\d+)", re.DOTALL)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sequence:
+class NumberedImages:
     """Numbered images: their kind, files in ascending order, numbers, and the images that were passed over."""
 
     kind: str
@@ -31,7 +31,7 @@ class Sequence:
     passed_over: tuple[Path, ...] = ()
 
 
-def find_sequence(folder: Path) -> Sequence:
+def find_sequence(folder: Path) -> NumberedImages:
     """Return the one sequence of numbered images in a folder or in its ``frames/``.
 
     Raises PsvideoError where there is none, or where it is not clear which images are meant.
@@ -49,7 +49,9 @@ def find_sequence(folder: Path) -> Sequence:
     _refuse_mixture(frames)
     numbers = tuple(_number(file) for file in frames)
     passed_over = tuple(image for image in images if image not in set(frames))
-    return Sequence(kind=KINDS[frames[0].suffix.lower()], files=tuple(frames), numbers=numbers, passed_over=passed_over)
+    return NumberedImages(
+        kind=KINDS[frames[0].suffix.lower()], files=tuple(frames), numbers=numbers, passed_over=passed_over
+    )
 
 
 def _images(folder: Path) -> list[Path]:

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from psvideo.clip.record import Header, Picture
+from psvideo.clip.record import CodedPicture, Header
 from psvideo.errors import PsvideoError
 
 SHARE_OF_FREE_SPACE = 0.5
@@ -62,7 +62,7 @@ class Kept:
             self._places.clear()
             self._file.close()
 
-    def put(self, number: int, picture: Picture) -> None:
+    def put(self, number: int, picture: CodedPicture) -> None:
         """Keep a picture, if there is room for it; a disk that turns out to be full ends the keeping, not the run."""
         codes = np.ascontiguousarray(picture.codes)
         with self._lock:
@@ -81,7 +81,7 @@ class Kept:
             )
             self.bytes_held += codes.nbytes
 
-    def get(self, number: int) -> Picture:
+    def get(self, number: int) -> CodedPicture:
         """Return a kept picture as it was put. Raises PsvideoError where the disk does not give it back."""
         place = self._places[number]
         codes = np.empty(place.shape, place.dtype)
@@ -93,7 +93,7 @@ class Kept:
             raise PsvideoError(f"{_UNREADABLE} ({fault.strerror or fault}). {_ADVICE}") from fault
         if read != codes.nbytes:
             raise PsvideoError(f"{_UNREADABLE} ({read} of {codes.nbytes} bytes of frame {number}). {_ADVICE}")
-        return Picture(header=place.header, codes=codes)
+        return CodedPicture(header=place.header, codes=codes)
 
 
 def _write_all(file: FileIO, data: memoryview) -> None:

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.clip.decode.yuv import signal_range
-from psvideo.clip.record import Header, Levels, Picture
+from psvideo.clip.record import CodedPicture, Header, Levels
 from psvideo.clip.transfer import find_curve, to_light
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import Encoding
 
 
-def linear_light(picture: Picture, encoding: Encoding) -> NDArray[np.float32]:
+def linear_light(picture: CodedPicture, encoding: Encoding) -> NDArray[np.float32]:
     """Return a picture in linear light, same shape. The plan's levels, where it gives them, override the file's."""
     head, codes = picture.header, picture.codes
     white = head.white if encoding.white_level is None else encoding.white_level

@@ -12,7 +12,7 @@ from fileseq.frameset import FrameSet
 from psvideo.clip.decode.decoders import decode
 from psvideo.clip.kept import Kept
 from psvideo.clip.linear import linear_light
-from psvideo.clip.record import Clip, Frame, Header, Picture
+from psvideo.clip.record import Clip, CodedPicture, Frame, Header
 from psvideo.compute.threads import in_order, thread_count
 from psvideo.errors import PsvideoError, UsageError
 
@@ -66,7 +66,7 @@ def _span(numbers: tuple[int, ...]) -> str:
     return f"its {len(numbers)} frames are numbered {numbers[0]} to {numbers[-1]}"
 
 
-def _decoder(clip: Clip, numbers: list[int]) -> Callable[[int], Picture]:
+def _decoder(clip: Clip, numbers: list[int]) -> Callable[[int], CodedPicture]:
     """Return what decodes a frame; a movie's are asked for in the order of ``numbers``."""
     if not clip.is_movie:
         return lambda number: decode(clip.kind, clip.file_of(number))
@@ -77,8 +77,8 @@ def _decoder(clip: Clip, numbers: list[int]) -> Callable[[int], Picture]:
 
 
 def _picture(
-    clip: Clip, number: int, decoded: Callable[[int], Picture], kept: Kept | None, keep: bool
-) -> tuple[int, Picture]:
+    clip: Clip, number: int, decoded: Callable[[int], CodedPicture], kept: Kept | None, keep: bool
+) -> tuple[int, CodedPicture]:
     """Read a frame's picture back where it is kept, else decode it, and keep it if that is wanted."""
     if kept is not None and number in kept:
         return number, kept.get(number)
@@ -89,13 +89,13 @@ def _picture(
     return number, picture
 
 
-def _in_linear_light(clip: Clip, pictures: Generator[tuple[int, Picture]]) -> Iterator[Frame]:
+def _in_linear_light(clip: Clip, pictures: Generator[tuple[int, CodedPicture]]) -> Iterator[Frame]:
     """Make light of pictures as late as can be: codes take half of its memory or less."""
     with contextlib.closing(pictures):
         yield from map(partial(_frame, clip), pictures)  # holds no picture while its frame is worked on
 
 
-def _frame(clip: Clip, numbered: tuple[int, Picture]) -> Frame:
+def _frame(clip: Clip, numbered: tuple[int, CodedPicture]) -> Frame:
     number, picture = numbered
     image = linear_light(picture, clip.encoding)
     if picture.header.bits is None and not np.isfinite(image.sum(dtype=np.float64)):

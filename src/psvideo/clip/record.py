@@ -43,7 +43,7 @@ class Header:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Picture:
+class CodedPicture:
     """One decoded picture as the file codes it: (row, col) or (row, col, 3) as R, G, B; uint8, uint16 or float."""
 
     header: Header

@@ -21,7 +21,7 @@ UNKNOWN_COLOUR = "unknown"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Curve:
+class TransferCurve:
     """One curve: its short name, OpenColorIO's name of it, and the colour interop id of its camera's linear gamut.
 
     ``colour`` is ``unknown`` where the curve is used with several gamuts. ``on_codes``: its maker defines the curve
@@ -36,78 +36,84 @@ class Curve:
 
 
 CURVES = (
-    Curve(name="linear", source="", colour="lin_rec709_scene", also=("lin", "raw", "Linear Rec.709 (sRGB)")),
-    Curve(
+    TransferCurve(name="linear", source="", colour="lin_rec709_scene", also=("lin", "raw", "Linear Rec.709 (sRGB)")),
+    TransferCurve(
         name="srgb",
         source="sRGB - Curve",
         colour="lin_rec709_scene",
         also=("sRGB Encoded Rec.709 (sRGB)", "sRGB - Texture", "sRGB - Display"),
     ),
-    Curve(
+    TransferCurve(
         name="rec709",
         source="Rec.709 - Curve",
         colour="lin_rec709_scene",
         also=("bt709", "bt1886-oetf", "rec2020", "bt2020", "Camera Rec.709"),
     ),
-    Curve(
+    TransferCurve(
         name="gamma24",
         source="Rec.1886 - Curve",
         colour="lin_rec709_scene",
         also=("rec1886", "bt1886", "Gamma 2.4 Encoded Rec.709", "Rec.1886 Rec.709 - Display"),
     ),
-    Curve(name="gamma22", source="gamma 2.2", colour="lin_rec709_scene", also=("Gamma 2.2 Encoded Rec.709",)),
-    Curve(name="gamma18", source="gamma 1.8", colour="lin_rec709_scene", also=("Gamma 1.8 Encoded Rec.709",)),
-    Curve(name="slog3", source="S-Log3 - Curve", on_codes=True),
-    Curve(
+    TransferCurve(name="gamma22", source="gamma 2.2", colour="lin_rec709_scene", also=("Gamma 2.2 Encoded Rec.709",)),
+    TransferCurve(name="gamma18", source="gamma 1.8", colour="lin_rec709_scene", also=("Gamma 1.8 Encoded Rec.709",)),
+    TransferCurve(name="slog3", source="S-Log3 - Curve", on_codes=True),
+    TransferCurve(
         name="slog3-sgamut3",
         source="S-Log3 - Curve",
         colour="ocio:lin_sgamut3_scene",
         on_codes=True,
         also=("S-Log3 S-Gamut3",),
     ),
-    Curve(
+    TransferCurve(
         name="slog3-sgamut3cine",
         source="S-Log3 - Curve",
         colour="ocio:lin_sgamut3cine_scene",
         on_codes=True,
         also=("S-Log3 S-Gamut3.Cine",),
     ),
-    Curve(
+    TransferCurve(
         name="logc3",
         source="ARRI LogC3 - Curve (EI800)",
         colour="ocio:lin_awg3_scene",
         also=("logc", "logc3ei800", "arrilogc3", "ARRI LogC3 (EI800)"),
     ),
-    Curve(name="logc4", source="ARRI LogC4 - Curve", colour="ocio:lin_awg4_scene", also=("ARRI LogC4",)),
-    Curve(name="vlog", source="V-Log - Curve", colour="ocio:lin_vgamut_scene", on_codes=True, also=("V-Log V-Gamut",)),
-    Curve(name="clog2", source="C-Log2 - Curve", on_codes=True, also=("canonlog2", "CanonLog2 CinemaGamut D55")),
-    Curve(name="clog3", source="C-Log3 - Curve", on_codes=True, also=("canonlog3", "CanonLog3 CinemaGamut D55")),
-    Curve(
+    TransferCurve(name="logc4", source="ARRI LogC4 - Curve", colour="ocio:lin_awg4_scene", also=("ARRI LogC4",)),
+    TransferCurve(
+        name="vlog", source="V-Log - Curve", colour="ocio:lin_vgamut_scene", on_codes=True, also=("V-Log V-Gamut",)
+    ),
+    TransferCurve(
+        name="clog2", source="C-Log2 - Curve", on_codes=True, also=("canonlog2", "CanonLog2 CinemaGamut D55")
+    ),
+    TransferCurve(
+        name="clog3", source="C-Log3 - Curve", on_codes=True, also=("canonlog3", "CanonLog3 CinemaGamut D55")
+    ),
+    TransferCurve(
         name="log3g10",
         source="Log3G10 - Curve",
         colour="ocio:lin_rwg_scene",
         also=("redlog3g10", "Log3G10 REDWideGamutRGB"),
     ),
-    Curve(
+    TransferCurve(
         name="bmdfilm5",
         source="BMDFilm Gen5 Log - Curve",
         colour="ocio:lin_bmdwg5_scene",
         also=("bmdfilmgen5", "bmdfilmgen5log", "BMDFilm WideGamut Gen5"),
     ),
-    Curve(
+    TransferCurve(
         name="davinci",
         source="DaVinci Intermediate Log - Curve",
         colour="ocio:lin_dwg_scene",
         also=("davinciintermediate", "davinciintermediatelog", "DaVinci Intermediate WideGamut"),
     ),
-    Curve(name="applelog", source="Apple Log - Curve", colour="lin_rec2020_scene"),
-    Curve(name="acescct", source="CURVE - ACEScct-LOG_to_LINEAR", colour="lin_ap1_scene"),
-    Curve(name="st2084", source="ST-2084 - Curve", colour="lin_rec2020_scene", also=("pq", "smpte2084")),
-    Curve(name="hlg", source="CURVE - HLG-OETF-INVERSE", colour="lin_rec2020_scene", also=("aribstdb67",)),
+    TransferCurve(name="applelog", source="Apple Log - Curve", colour="lin_rec2020_scene"),
+    TransferCurve(name="acescct", source="CURVE - ACEScct-LOG_to_LINEAR", colour="lin_ap1_scene"),
+    TransferCurve(name="st2084", source="ST-2084 - Curve", colour="lin_rec2020_scene", also=("pq", "smpte2084")),
+    TransferCurve(name="hlg", source="CURVE - HLG-OETF-INVERSE", colour="lin_rec2020_scene", also=("aribstdb67",)),
 )
 
 
-def find_curve(name: str) -> Curve:
+def find_curve(name: str) -> TransferCurve:
     """Return the curve with this name; case, blanks and punctuation do not matter.
 
     Raises PsvideoError that names the nearest known one and lists all.
@@ -129,8 +135,8 @@ def find_curve(name: str) -> Curve:
 
 
 @functools.cache
-def _spellings() -> dict[str, Curve]:
-    spellings: dict[str, Curve] = {}
+def _spellings() -> dict[str, TransferCurve]:
+    spellings: dict[str, TransferCurve] = {}
     for curve in CURVES:
         for spelling in (curve.name, curve.source, *curve.also):
             spellings.setdefault(_letters(spelling), curve)
@@ -141,7 +147,7 @@ def _letters(name: str) -> str:
     return re.sub(r"[^a-z0-9]", "", name.lower()).removesuffix("curve")
 
 
-def to_light(curve: Curve, signal: FloatArray | NDArray[np.float32]) -> FloatArray:
+def to_light(curve: TransferCurve, signal: FloatArray | NDArray[np.float32]) -> FloatArray:
     """Return the linear light, on the curve's own scale, that a signal (fraction of the largest code) stands for."""
     if not curve.source:
         return np.array(signal, np.float64)

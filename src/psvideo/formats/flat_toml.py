@@ -13,7 +13,7 @@ from psvideo.model.falloff import POWERS, Falloff
 SCHEMA = "psvideo-flat/1"
 
 
-class _Light(Contract):
+class _FlatLight(Contract):
     name: str
     coefficients: Annotated[list[float], Field(min_length=len(POWERS), max_length=len(POWERS))]
 
@@ -23,7 +23,7 @@ class _File(Contract):
     width_px: int = Field(gt=0)
     height_px: int = Field(gt=0)
     box: Annotated[list[int], Field(min_length=4, max_length=4)]
-    light: Annotated[list[_Light], Field(min_length=1)]
+    light: Annotated[list[_FlatLight], Field(min_length=1)]
 
 
 def read_falloff(path: Path, *, width_px: int, height_px: int) -> Falloff:

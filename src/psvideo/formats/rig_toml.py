@@ -27,7 +27,7 @@ Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 Strength = Annotated[float, Field(gt=0)]
 
 
-class _Light(Contract):
+class _RigLight(Contract):
     name: str = Field(min_length=1)
     direction: Triple | None = None
     position_m: Triple | None = None
@@ -75,7 +75,7 @@ class _Surface(Contract):
 
 class _RigFile(Contract):
     schema_: str = Field(alias="schema")
-    light: list[_Light] = Field(min_length=1)
+    light: list[_RigLight] = Field(min_length=1)
     camera: _View = Field(default_factory=_View)
     surface: _Surface | None = None
 
@@ -123,7 +123,7 @@ def parse_rig(text: str, *, source: str = "rig") -> Rig:
     )
 
 
-def _light(file: _Light) -> Light:
+def _light(file: _RigLight) -> Light:
     strength = file.intensity if isinstance(file.intensity, list) else [file.intensity]
     return Light(
         name=file.name,

@@ -14,8 +14,8 @@ from psvideo.formats.timing_json import read_timing, timing_record
 from psvideo.inspect.about_output import is_plates, is_results
 from psvideo.model.quantities import QUANTITIES, Quantity
 from psvideo.page.footage import show_of_clip, with_clip
-from psvideo.page.picture import Look, Picture, shown
-from psvideo.page.show import Sequence, Show
+from psvideo.page.picture import Look, PagePicture, shown
+from psvideo.page.show import Show, ShownSequence
 
 PLATE, AMBIENT = QUANTITIES["plate"], QUANTITIES["ambient"]
 
@@ -100,13 +100,13 @@ def _plates(path: Path) -> Show:
     )
 
 
-def _sequence(folder: Path, quantity: Quantity) -> Sequence:
+def _sequence(folder: Path, quantity: Quantity) -> ShownSequence:
     files = _files(folder)
     head = _first_header(files)
     rate = float(Fraction(str(head.get("framesPerSecond", "24"))))
     numbers = tuple(sorted(files))
     first_s = float(head.get("psvideo:time_s") or 0.0)
-    return Sequence(
+    return ShownSequence(
         id=folder.name,
         label=quantity.label,
         kind=quantity.shown,
@@ -122,13 +122,13 @@ def _sequence(folder: Path, quantity: Quantity) -> Sequence:
     )
 
 
-def _read(files: Mapping[int, Path], quantity: Quantity, number: int, look: Look) -> Picture:
+def _read(files: Mapping[int, Path], quantity: Quantity, number: int, look: Look) -> PagePicture:
     found = stored(files[number])
     pixels = shown(found.planes, look, directions=quantity.shown == "normals", full=quantity.digits == "float")
     facts: dict[str, object] = {"time_s": found.attributes.get("psvideo:time_s")}
     if (matrix := found.attributes.get("psvideo:camera_to_world")) is not None:
         facts["camera_to_world"] = [float(word) for word in str(matrix).split()]
-    return Picture(pixels=pixels, facts=facts)
+    return PagePicture(pixels=pixels, facts=facts)
 
 
 def _files(folder: Path) -> dict[int, Path]:

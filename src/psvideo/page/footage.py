@@ -11,8 +11,8 @@ from psvideo.clip import Clip, demosaic, open_clip, read_frames
 from psvideo.model.camera import Camera
 from psvideo.model.choices import SplitMethod
 from psvideo.page.compared import ComparedPlates
-from psvideo.page.picture import Look, Picture, shown
-from psvideo.page.show import Sequence, Show
+from psvideo.page.picture import Look, PagePicture, shown
+from psvideo.page.show import Show, ShownSequence
 
 METHODS: tuple[tuple[SplitMethod, str], ...] = (
     ("weights", "Plates by the rows' weights"),
@@ -49,10 +49,10 @@ def with_clip(show: Show, path: Path, *, timing: Path, plan: Path | None = None)
     return replace(show, sequences=(*show.sequences, *beside), notes=notes, timing=plates.record)
 
 
-def _frames(clip: Clip) -> Sequence:
+def _frames(clip: Clip) -> ShownSequence:
     """Return the frames of a clip, each at the time of the middle of its exposures."""
     camera = clip.plan.camera
-    return Sequence(
+    return ShownSequence(
         id="frames",
         label="Frames",
         kind="light",
@@ -69,20 +69,20 @@ def _middle_s(camera: Camera) -> float:
     return (camera.exposure_s + abs(camera.readout_s or 0.0)) / 2
 
 
-def _frame(clip: Clip, number: int, look: Look) -> Picture:
+def _frame(clip: Clip, number: int, look: Look) -> PagePicture:
     image = next(iter(read_frames(clip, [number], ahead=1, threads=1))).image
     if clip.cfa is not None:
         image = demosaic(image, clip.cfa)
     return picture_of(image, look)
 
 
-def picture_of(image: np.ndarray, look: Look, **facts: object) -> Picture:
+def picture_of(image: np.ndarray, look: Look, **facts: object) -> PagePicture:
     """Return linear light (row, col[, channel]) as the page shows it."""
     planes = [image] if image.ndim == 2 else [image[..., channel] for channel in range(image.shape[2])]
-    return Picture(pixels=shown(planes, look), facts=facts)
+    return PagePicture(pixels=shown(planes, look), facts=facts)
 
 
-def _compared(clip: Clip, plates: ComparedPlates, beside: Sequence) -> chain[Sequence]:
+def _compared(clip: Clip, plates: ComparedPlates, beside: ShownSequence) -> chain[ShownSequence]:
     """Return one sequence per method and light, on the timeline of another sequence."""
     return chain.from_iterable(
         [
@@ -104,6 +104,6 @@ def _compared(clip: Clip, plates: ComparedPlates, beside: Sequence) -> chain[Seq
 
 def _plate(
     plates: ComparedPlates, method: SplitMethod, light: str, times_s: dict[int, float], number: int, look: Look
-) -> Picture:
+) -> PagePicture:
     found = plates.plate(method, light, times_s[number])
     return picture_of(found.image, look, time_s=found.time_s, round=found.number)

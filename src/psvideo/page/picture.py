@@ -21,7 +21,7 @@ Plane = NDArray[np.floating]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Picture:
+class PagePicture:
     """Pixels (row, col, channel), float16 or float32, and facts about them for the browser."""
 
     pixels: NDArray[np.floating]
@@ -75,7 +75,7 @@ def _smaller(plane: Plane, width_px: int) -> NDArray[np.float32]:
     return smaller(plane, width_px) if plane.shape[1] > width_px else plane.astype(np.float32)
 
 
-def block(picture: Picture) -> bytes:
+def block(picture: PagePicture) -> bytes:
     """Return a picture as a block of bytes."""
     pixels = picture.pixels
     facts = {

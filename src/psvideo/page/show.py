@@ -8,14 +8,14 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from psvideo.model.quantities import Shown
-from psvideo.page.picture import Look, Picture
+from psvideo.page.picture import Look, PagePicture
 
-Reader = Callable[[int, Look], Picture]
+Reader = Callable[[int, Look], PagePicture]
 """Gives the picture of a number as it is to be looked at. Raises PsvideoError where it cannot be read."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sequence:
+class ShownSequence:
     """Pictures of one quantity. ``times_s`` are the instants that the pictures show, on the camera's clock.
 
     Sequences of one ``timeline`` share their numbers; those of another are put beside them by time. ``slow``: pictures
@@ -49,7 +49,7 @@ class Show:
     fps: float
     width_px: int
     height_px: int
-    sequences: tuple[Sequence, ...]
+    sequences: tuple[ShownSequence, ...]
     verdict: str = ""
     findings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
@@ -59,7 +59,7 @@ class Show:
     timing: Callable[[], Mapping[str, object]] | None = None
     """Gives what the diagram of flashes is drawn from; None where nothing is known of them."""
 
-    def sequence(self, name: str) -> Sequence | None:
+    def sequence(self, name: str) -> ShownSequence | None:
         """Return the sequence with this id."""
         return next((sequence for sequence in self.sequences if sequence.id == name), None)
 
@@ -83,7 +83,7 @@ def index_of(show: Show) -> dict[str, object]:
     }
 
 
-def _entry(sequence: Sequence) -> dict[str, object]:
+def _entry(sequence: ShownSequence) -> dict[str, object]:
     return {
         "id": sequence.id,
         "label": sequence.label,

@@ -9,8 +9,7 @@ import hashlib
 import json
 import struct
 import zlib
-from collections.abc import Iterator, Mapping
-from collections.abc import Sequence as Items
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,7 +20,7 @@ from psvideo.errors import PsvideoError
 from psvideo.formats.whole_files import refuse_existing, whole_file
 from psvideo.page.assembled import assets
 from psvideo.page.picture import Look, block, missing_block
-from psvideo.page.show import Sequence, Show, index_of
+from psvideo.page.show import Show, ShownSequence, index_of
 
 if TYPE_CHECKING:
     from psvideo.compute.progress import Watch
@@ -30,7 +29,7 @@ MARK = "psvideo-page/1"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Held:
+class PageContents:
     """What a page that was written holds."""
 
     pictures: int
@@ -58,7 +57,7 @@ class Held:
 
 def write_page(
     show: Show, path: Path, *, width_px: int, count: int, force: bool = False, watch: "Watch | None" = None
-) -> Held:
+) -> PageContents:
     """Write a page that holds up to ``count`` pictures of each sequence, spread over it, at most ``width_px`` wide.
 
     Frames of a clip and comparisons stay out beside results or plates: they are not numbered alike, or cost minutes.
@@ -77,7 +76,7 @@ def write_page(
     text = "".join(_page(part, blocks)).encode()
     with whole_file(path) as beside:
         beside.write_bytes(text)
-    return Held(pictures=len(wanted), missing=missing, width_px=part.width_px, total_bytes=len(text))
+    return PageContents(pictures=len(wanted), missing=missing, width_px=part.width_px, total_bytes=len(text))
 
 
 def _part(show: Show, width_px: int, count: int) -> Show:
@@ -100,19 +99,19 @@ def _part(show: Show, width_px: int, count: int) -> Show:
     )
 
 
-def _spread(numbers: Items[int], count: int) -> frozenset[int]:
+def _spread(numbers: Sequence[int], count: int) -> frozenset[int]:
     places = np.linspace(0, len(numbers) - 1, min(count, len(numbers))).round().astype(int)
     return frozenset(numbers[place] for place in places)
 
 
-def _only(sequence: Sequence, chosen: frozenset[int]) -> Sequence:
+def _only(sequence: ShownSequence, chosen: frozenset[int]) -> ShownSequence:
     kept = [
         (number, time_s) for number, time_s in zip(sequence.numbers, sequence.times_s, strict=True) if number in chosen
     ]
     return replace(sequence, numbers=tuple(one for one, _ in kept), times_s=tuple(time_s for _, time_s in kept))
 
 
-def _packed(sequence: Sequence, number: int, width_px: int) -> tuple[str, bool]:
+def _packed(sequence: ShownSequence, number: int, width_px: int) -> tuple[str, bool]:
     """Return a picture's block as text, and whether it could not be read."""
     try:
         picture = sequence.read(number, Look(width_px=width_px))

@@ -8,7 +8,7 @@ from functools import partial
 
 from psvideo.errors import PsvideoError
 from psvideo.page.picture import Look, block, missing_block
-from psvideo.page.show import Sequence
+from psvideo.page.show import ShownSequence
 
 MOST_BYTES = 384_000_000
 THREADS = 2
@@ -24,7 +24,7 @@ class BlockStore:
         self._lock = threading.Lock()
         self._pool = ThreadPoolExecutor(max_workers=THREADS, thread_name_prefix="page")
 
-    def get(self, sequence: Sequence, number: int, look: Look) -> bytes:
+    def get(self, sequence: ShownSequence, number: int, look: Look) -> bytes:
         """Return the block of one picture. What will be wanted next, the page knows best, and asks for it early."""
         return self._begun(sequence, number, look).result()
 
@@ -32,7 +32,7 @@ class BlockStore:
         """Let go of everything; what was not begun is never made."""
         self._pool.shutdown(wait=True, cancel_futures=True)
 
-    def _begun(self, sequence: Sequence, number: int, look: Look) -> Future[bytes]:
+    def _begun(self, sequence: ShownSequence, number: int, look: Look) -> Future[bytes]:
         key = (sequence.id, number, look)
         with self._lock:
             if key in self._kept:
@@ -58,7 +58,7 @@ class BlockStore:
                     self._held -= len(kept.result())
 
 
-def _made(sequence: Sequence, number: int, look: Look) -> bytes:
+def _made(sequence: ShownSequence, number: int, look: Look) -> bytes:
     """Read a picture; what cannot be read becomes a block that says so."""
     try:
         return block(sequence.read(number, look))

@@ -20,7 +20,7 @@ Values = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Line:
+class ChartLine:
     """One series: ``y`` (point,), NaN where it is not known."""
 
     name: str
@@ -38,7 +38,7 @@ class Axes:
     label: str
 
 
-def line_chart(axes: Axes, lines: Sequence[Line]) -> str:
+def line_chart(axes: Axes, lines: Sequence[ChartLine]) -> str:
     """Return one chart over time. More points than a screen shows are drawn as their span, so no spike is lost."""
     right, bottom = WIDE - RIGHT, TALL - BELOW
     first, last = float(axes.x[0]), float(max(axes.x[-1], axes.x[0] + 1e-9))

@@ -18,7 +18,7 @@ from psvideo.model.shutter import frames_touched
 from psvideo.model.timing import Timing, places_in_time, timed_camera
 from psvideo.plates.gather import clip_plates
 from psvideo.plates.split import Plate
-from psvideo.sync.order_by_rig import Image, Verdict, order_by_rig, turned, why_untold
+from psvideo.sync.order_by_rig import Image, RigTurn, order_by_rig, turned, why_untold
 
 PLACES = 3
 """Cycles that are looked at, spread over the clip."""
@@ -62,24 +62,24 @@ def named_by_rig(take: Take, timing: Timing, rig: Rig) -> Timing:
     if timing.order != "guess":
         return timing
     refusal = why_untold(take.plan, rig)
-    verdict = Verdict(turn=None, why=refusal) if refusal else _agreed(list(_verdicts(take, timing, rig)))
+    verdict = RigTurn(turn=None, why=refusal) if refusal else _agreed(list(_verdicts(take, timing, rig)))
     if verdict.turn is None:
         return replace(timing, order_note=f"The rig does not tell the order of the lights: {verdict.why}.")
     note = f"The rig tells the order of the lights: {verdict.why}."
     return replace(turned(take.plan, timing, verdict.turn), order="rig", order_note=note)
 
 
-def _agreed(verdicts: list[Verdict]) -> Verdict:
+def _agreed(verdicts: list[RigTurn]) -> RigTurn:
     """Return the verdict of all places together: none may contradict another."""
     if not verdicts:
-        return Verdict(turn=None, why="the clip holds no whole cycle of complete flashes")
+        return RigTurn(turn=None, why="the clip holds no whole cycle of complete flashes")
     decided = [verdict for verdict in verdicts if verdict.turn is not None]
     if len({verdict.turn for verdict in decided}) > 1:
-        return Verdict(turn=None, why="different parts of the clip tell different orders")
+        return RigTurn(turn=None, why="different parts of the clip tell different orders")
     return decided[0] if decided else verdicts[0]
 
 
-def _verdicts(take: Take, timing: Timing, rig: Rig) -> Iterator[Verdict]:
+def _verdicts(take: Take, timing: Timing, rig: Rig) -> Iterator[RigTurn]:
     """Judge cycles at the clip's start, middle and end, as far as they do not overlap."""
     cycle = len(take.plan.cycle_slots)
     starts = [n for n in range(len(timing.flashes) - cycle + 1) if _whole(timing, n, cycle)]

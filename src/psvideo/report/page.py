@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.pictures.charts import Axes, Line, line_chart, stops_chart
+from psvideo.pictures.charts import Axes, ChartLine, line_chart, stops_chart
 from psvideo.pictures.shading import normal_colours
 from psvideo.report.judgement import Judgement, gravest_first, usable
 from psvideo.report.observe.levels import STOPS, TARGET_QUANTILE
@@ -125,12 +125,12 @@ def _over_time(report: RunReport) -> str:
     valid = np.array([np.nan if one.valid_share is None else 100 * one.valid_share for one in facts])
     unseen = np.array([100 * one.unseen_share for one in facts])
     clipped = np.array([100 * one.clipped_share for one in facts])
-    shares = [Line(name="saturated", y=clipped), Line(name="rows unseen", y=unseen)]
+    shares = [ChartLine(name="saturated", y=clipped), ChartLine(name="rows unseen", y=unseen)]
     if np.isfinite(valid).any():
-        shares.insert(0, Line(name="valid", y=valid))
+        shares.insert(0, ChartLine(name="valid", y=valid))
     axes = Axes(x=x, unit=" %", low=0, high=100, label="Valid and saturated shares of the subject, unseen rows")
     charts.append((axes, shares))
-    lines = [Line(name=name, y=100 * levels[:, n] / usual[n]) for n, name in enumerate(names)]
+    lines = [ChartLine(name=name, y=100 * levels[:, n] / usual[n]) for n, name in enumerate(names)]
     spread = max(5.0, float(np.nanmax(np.abs([line.y - 100 for line in lines]))) if np.isfinite(levels).any() else 0)
     span = min(100.0, spread)
     axes = Axes(x=x, unit=" %", low=100 - span, high=100 + span, label="Each light's level, against its own median")
@@ -140,10 +140,10 @@ def _over_time(report: RunReport) -> str:
     if np.isfinite(turn).any():
         most = max(float(np.nanmax(np.abs(change))), 0.5)
         axes = Axes(x=x, unit=" %", low=-most, high=most, label="Flicker: change of light at rest, result to result")
-        charts.append((axes, [Line(name="light", y=change)]))
+        charts.append((axes, [ChartLine(name="light", y=change)]))
         high = max(float(np.nanmax(turn)), 0.1)
         axes = Axes(x=x, unit="°", low=0, high=high, label="Noise: change of normals at rest, result to result")
-        charts.append((axes, [Line(name="normals", y=turn)]))
+        charts.append((axes, [ChartLine(name="normals", y=turn)]))
     drawn = "".join(
         f"<figure>{line_chart(axes, lines)}<figcaption>{html.escape(axes.label)}</figcaption></figure>"
         for axes, lines in charts

@@ -113,7 +113,7 @@ QUANTILES = {"p5": 0.05, "p50": 0.5, "p95": 0.95, "p99_5": TARGET_QUANTILE}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Flicker:
+class Steadiness:
     """How much results in turn differ at rest: medians over the clip, and the numbers of the worst instants."""
 
     normals_deg: float
@@ -122,13 +122,13 @@ class Flicker:
     worst: tuple[int, ...]
 
 
-def flicker(instants: Sequence[InstantFacts]) -> Flicker | None:
+def flicker(instants: Sequence[InstantFacts]) -> Steadiness | None:
     """Return the flicker of a clip; None where there are no two results in turn with anything at rest."""
     known = by_level(instants)
     if not known:
         return None
     changes = [change_of(facts) for facts in known]
-    return Flicker(
+    return Steadiness(
         normals_deg=float(np.median([one.normals_deg for one in changes])),
         albedo_percent=float(np.median([one.albedo_percent for one in changes])),
         level_percent=float(np.median([abs(one.level_percent) for one in changes])),

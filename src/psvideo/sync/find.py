@@ -20,7 +20,7 @@ from psvideo.model.shutter import frames_touched
 from psvideo.model.timing import DroppedFrames, Flash, Order, Timing
 from psvideo.sync.rowfit.beat import Beat, train_until
 from psvideo.sync.rowfit.course import window_frames
-from psvideo.sync.rowfit.fit import Found
+from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.refine import Fit
 from psvideo.sync.turns import turns
@@ -86,7 +86,7 @@ def find_timing(
     )
 
 
-def _not_found(plan: Plan, rows: Profiles, found: Found, clip: str) -> str:
+def _not_found(plan: Plan, rows: Profiles, found: ClipFit, clip: str) -> str:
     reason = why_not(plan, rows) or clock_too_far(plan, found)
     return (
         f"{clip}: no strobe like the plan's was found in the picture: the best fit explains "
@@ -111,7 +111,7 @@ def _as_profiles(
     return rows.windowed(window_frames(plan))
 
 
-def _order_of_lights(plan: Plan, found: Found, first_light: str | None) -> tuple[Beat, Order]:
+def _order_of_lights(plan: Plan, found: ClipFit, first_light: str | None) -> tuple[Beat, Order]:
     """Return the beat whose names are right, and how they are known."""
     if len(plan.cycle_slots) == 1:
         return found.fit.beat, "given"
@@ -163,7 +163,7 @@ def _fitted_camera(plan: Plan, fit: Fit) -> Camera:
 
 def _assemble(
     plan: Plan,
-    found: Found,
+    found: ClipFit,
     *,
     order: Order,
     clip: str,

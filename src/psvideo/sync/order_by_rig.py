@@ -41,7 +41,7 @@ FAINT = 0.004
 
 
 @dataclass(frozen=True, kw_only=True)
-class Verdict:
+class RigTurn:
     """By how many places in the cycle names are to be turned, None where the rig does not tell, and a sentence why."""
 
     turn: int | None
@@ -95,7 +95,7 @@ def why_untold(plan: Plan, rig: Rig) -> str | None:
     return None
 
 
-def order_by_rig(plan: Plan, rig: Rig, pictures: Mapping[int, Image]) -> Verdict:
+def order_by_rig(plan: Plan, rig: Rig, pictures: Mapping[int, Image]) -> RigTurn:
     """Return the turn of the cycle that the rig's directions tell, or why they do not tell it.
 
     ``pictures`` holds a small linear picture of the whole frame, (row, col) or (row, col, channel), ambient light taken
@@ -104,10 +104,10 @@ def order_by_rig(plan: Plan, rig: Rig, pictures: Mapping[int, Image]) -> Verdict
     """
     refusal = why_untold(plan, rig)
     if refusal is not None:
-        return Verdict(turn=None, why=refusal)
+        return RigTurn(turn=None, why=refusal)
     samples = _samples([pictures[slot] for slot in plan.lit_slots])
     if len(samples.light) < LEAST_PIXELS:
-        return Verdict(
+        return RigTurn(
             turn=None,
             why=f"only {len(samples.light)} points of the small picture are lit by every flash and not saturated "
             f"(at least {LEAST_PIXELS} are needed)",
@@ -118,11 +118,11 @@ def order_by_rig(plan: Plan, rig: Rig, pictures: Mapping[int, Image]) -> Verdict
     return _verdict(sorted(fits, key=lambda fit: fit.rig_error_deg), _own_error_deg(rig.select(plan.lights)))
 
 
-def _verdict(fits: list[_Fit], own_deg: float) -> Verdict:
+def _verdict(fits: list[_Fit], own_deg: float) -> RigTurn:
     """Believe the best turn where it fits as well as a measured rig should, and every other needs a far worse rig."""
     best, second = fits[:2]
     if best.left > MOST_LEFT or best.rig_error_deg > 2 * own_deg:
-        return Verdict(
+        return RigTurn(
             turn=None,
             why="under no order of the lights does the picture look like that of a matte surface lit by this rig (too "
             "much gloss, shadow, movement or ambient light, or a rig file that does not fit)",
@@ -130,12 +130,12 @@ def _verdict(fits: list[_Fit], own_deg: float) -> Verdict:
     compared = f"the rig's lights would be off by {best.rig_error_deg:.1f} degrees in the best order"
     doubt_deg = max(best.rig_error_deg, own_deg)
     if any(fit.rig_error_deg < doubt_deg * (1 + CLEARLY / np.sqrt(fit.freedom)) for fit in fits[1:]):
-        return Verdict(
+        return RigTurn(
             turn=None,
             why=f"{compared} and by {second.rig_error_deg:.1f} in the next best, which is no clear difference: the rig "
             "looks nearly the same when it is turned",
         )
-    return Verdict(turn=best.turn, why=f"{compared}, and by {second.rig_error_deg:.0f} in the next best")
+    return RigTurn(turn=best.turn, why=f"{compared}, and by {second.rig_error_deg:.0f} in the next best")
 
 
 def _own_error_deg(lights: tuple[Light, ...]) -> float:

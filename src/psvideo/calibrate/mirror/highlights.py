@@ -65,7 +65,7 @@ class Spot:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Found:
+class FoundHighlight:
     """What was found of one light on one sphere in one picture: the highlight or why there is none, and other spots."""
 
     light: str
@@ -75,7 +75,7 @@ class Found:
     alike: tuple[Spot, ...] = field(default=())
 
 
-def find_highlights(pictures: LightPictures, outline: Outline) -> list[Found]:
+def find_highlights(pictures: LightPictures, outline: Outline) -> list[FoundHighlight]:
     """Return what is found of every light on one sphere."""
     disc, corner = _disc(pictures, outline)
     rows, cols = disc.shape
@@ -216,11 +216,15 @@ def _judged(spot: Spot, own: NDArray[np.floating], others: Sequence[NDArray[np.f
     )
 
 
-def _chosen(name: str, spots: list[Spot], fault: str) -> Found:
+def _chosen(name: str, spots: list[Spot], fault: str) -> FoundHighlight:
     """Choose the highlight among spots, the best first."""
     fit = [spot for spot in spots if spot.score > 0]
     if not fit:
         reasons = "; ".join(dict.fromkeys(spot.why_not for spot in spots))
-        return Found(light=name, highlight=None, others=tuple(spots), fault=fault or f"no highlight: {reasons}")
+        return FoundHighlight(
+            light=name, highlight=None, others=tuple(spots), fault=fault or f"no highlight: {reasons}"
+        )
     alike = tuple(spot for spot in fit[1:] if spot.score > ALIKE * fit[0].score)
-    return Found(light=name, highlight=fit[0], others=tuple(spot for spot in spots if spot is not fit[0]), alike=alike)
+    return FoundHighlight(
+        light=name, highlight=fit[0], others=tuple(spot for spot in spots if spot is not fit[0]), alike=alike
+    )

@@ -11,10 +11,10 @@ from itertools import product
 import numpy as np
 
 from psvideo.calibrate.light_pictures import LightPictures
-from psvideo.calibrate.sphere.rim_fit import Guess, Rim, fit_rim, follow_rim, seek_rim
+from psvideo.calibrate.sphere.rim_fit import Rim, RoughOutline, fit_rim, follow_rim, seek_rim
 from psvideo.calibrate.sphere.rim_model import Surface
 from psvideo.calibrate.sphere.search import Grey, round_things
-from psvideo.calibrate.sphere.view import View
+from psvideo.calibrate.sphere.view import SphereView
 from psvideo.model.camera import FloatArray
 
 GIVEN_ERROR_PX = 0.5
@@ -39,7 +39,7 @@ class Outline:
     ``points`` (point, 2) are the edges it rests on, ``coverage`` the share of its spokes that have one, ``blur_px`` the
     standard deviation of those edges' blur. ``given``: a person marked it."""
 
-    view: View
+    view: SphereView
     place: FloatArray
     covariance: FloatArray
     points: FloatArray
@@ -63,7 +63,7 @@ class Outline:
         return 2 * float(np.hypot(*self.place[3:]))
 
 
-def given_outline(view: View, circle: tuple[float, float, float]) -> Outline:
+def given_outline(view: SphereView, circle: tuple[float, float, float]) -> Outline:
     """Return the outline that a circle (x, y, radius), marked by hand in the picture, stands for."""
     x, y, radius = circle
     turn = np.linspace(0, 2 * np.pi, 64, endpoint=False)
@@ -93,7 +93,7 @@ def rim_pictures(pictures: LightPictures, room: Grey | None = None) -> list[Grey
 
 
 def find_outlines(
-    pictures: LightPictures, view: View, *, count: int = 1, room: Grey | None = None, surface: Surface = "mirror"
+    pictures: LightPictures, view: SphereView, *, count: int = 1, room: Grey | None = None, surface: Surface = "mirror"
 ) -> list[Outline]:
     """Return up to ``count`` spheres' outlines, those that the rim speaks for most first, none over another.
 
@@ -118,9 +118,9 @@ def follow_outline(pictures: LightPictures, outline: Outline) -> FloatArray:
     return outline.place if place is None else place
 
 
-def _guesses(seen: Sequence[Grey], view: View, surface: Surface) -> list[Guess]:
+def _guesses(seen: Sequence[Grey], view: SphereView, surface: Surface) -> list[RoughOutline]:
     """Return roughly the outlines of round things."""
-    guesses: list[Guess] = []
+    guesses: list[RoughOutline] = []
     for picture in seen:
         for thing in round_things(_logarithm(picture), count=CANDIDATES):
             around = given_outline(view, (thing.x, thing.y, thing.radius)).place
@@ -130,7 +130,7 @@ def _guesses(seen: Sequence[Grey], view: View, surface: Surface) -> list[Guess]:
     return guesses
 
 
-def _bettered(guess: Guess, seen: Sequence[Grey], view: View, surface: Surface) -> Guess:
+def _bettered(guess: RoughOutline, seen: Sequence[Grey], view: SphereView, surface: Surface) -> RoughOutline:
     """Return the best of a guess and of what is found from beside it: part of a rim may have drawn it away."""
     if guess.coverage >= SURE_COVERAGE:
         return guess
@@ -152,7 +152,7 @@ def _logarithm(picture: Grey) -> Grey:
     return logarithm
 
 
-def _outline(view: View, fit: Rim) -> Outline:
+def _outline(view: SphereView, fit: Rim) -> Outline:
     return Outline(
         view=view,
         place=fit.place,
@@ -163,6 +163,6 @@ def _outline(view: View, fit: Rim) -> Outline:
     )
 
 
-def _apart(one: Guess, other: Rim) -> bool:
+def _apart(one: RoughOutline, other: Rim) -> bool:
     away = float(np.hypot(*(one.place[:2] - other.place[:2])))
     return away > 0.8 * float(one.place[2] + other.place[2])

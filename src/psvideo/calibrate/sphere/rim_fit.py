@@ -15,7 +15,7 @@ from scipy.optimize import minimize
 
 from psvideo.calibrate.sphere.rim_model import SHIFT_PX, Surface, across_rim, likely_blur, log_likelihood
 from psvideo.calibrate.sphere.search import Grey
-from psvideo.calibrate.sphere.view import View
+from psvideo.calibrate.sphere.view import SphereView
 from psvideo.model.camera import FloatArray
 
 USUAL_STRETCH = 0.005
@@ -68,7 +68,7 @@ class _Spokes:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Guess:
+class RoughOutline:
     """Roughly an outline (5,), the share of spokes that agree with it, and how much likelier they make it than chance
     (natural logarithm)."""
 
@@ -77,7 +77,9 @@ class Guess:
     evidence: float
 
 
-def seek_rim(pictures: Sequence[Grey], view: View, around: FloatArray, *, surface: Surface = "mirror") -> Guess | None:
+def seek_rim(
+    pictures: Sequence[Grey], view: SphereView, around: FloatArray, *, surface: Surface = "mirror"
+) -> RoughOutline | None:
     """Return roughly the outline near an expected one, from few spokes; None where none is near it."""
     place = around
     for share, least_px in COARSE:
@@ -87,17 +89,21 @@ def seek_rim(pictures: Sequence[Grey], view: View, around: FloatArray, *, surfac
         if not _sensible(place, around):
             return None
     agree, evidence = _agreeing(spokes, place, view.unknowns)
-    return Guess(place=place, coverage=float(agree.mean()), evidence=evidence * float(place[2]) / len(spokes.odds))
+    return RoughOutline(
+        place=place, coverage=float(agree.mean()), evidence=evidence * float(place[2]) / len(spokes.odds)
+    )
 
 
-def fit_rim(pictures: Sequence[Grey], view: View, around: FloatArray, *, surface: Surface = "mirror") -> Rim | None:
+def fit_rim(
+    pictures: Sequence[Grey], view: SphereView, around: FloatArray, *, surface: Surface = "mirror"
+) -> Rim | None:
     """Return the outline within a few pixels of an expected one; None where it is not there."""
     spokes = _spokes(pictures, view, around, surface, _fine_px(around))
     place = _likeliest(spokes, view.unknowns)
     return _measured(pictures, view, spokes, place, surface) if _sensible(place, around) else None
 
 
-def follow_rim(pictures: Sequence[Grey], view: View, around: FloatArray) -> FloatArray | None:
+def follow_rim(pictures: Sequence[Grey], view: SphereView, around: FloatArray) -> FloatArray | None:
     """Return where a mirror's outline, known from other pictures, is in these; None where too little of it shows."""
     spokes = _spokes(pictures, view, around, "mirror", _fine_px(around))
     place = _likeliest(spokes, view.unknowns, coarse=False)
@@ -121,7 +127,7 @@ def _sensible(place: FloatArray, around: FloatArray) -> bool:
 
 
 def _spokes(
-    pictures: Sequence[Grey], view: View, place: FloatArray, surface: Surface, most_px: float, *,
+    pictures: Sequence[Grey], view: SphereView, place: FloatArray, surface: Surface, most_px: float, *,
     most_spokes: int = MOST_SPOKES, blurs: Sequence[float] = BLURS_PX,
 ) -> _Spokes:  # fmt: skip
     reach_px = float(np.clip(np.ceil(REACH_SHARE * place[2]), LEAST_REACH_PX, MOST_REACH_PX))
@@ -159,7 +165,7 @@ def _spread(count: int, width_px: float) -> FloatArray:
     return spread
 
 
-def _slopes(view: View, rim: FloatArray, place: FloatArray) -> FloatArray:
+def _slopes(view: SphereView, rim: FloatArray, place: FloatArray) -> FloatArray:
     """Return how far the rim moves outward on every spoke per unit of the outline's free numbers."""
     here = view.distance_px(rim, place)
     steps = np.diag([0.5, 0.5, 0.5, 1e-4, 1e-4])[: view.unknowns]
@@ -205,7 +211,7 @@ def _looked_up(odds: FloatArray, shift_px: FloatArray, most_px: float) -> FloatA
     return np.where(beyond, np.log(MISLED), between)
 
 
-def _measured(pictures: Sequence[Grey], view: View, spokes: _Spokes, place: FloatArray, surface: Surface) -> Rim:
+def _measured(pictures: Sequence[Grey], view: SphereView, spokes: _Spokes, place: FloatArray, surface: Surface) -> Rim:
     """Return an outline with what agrees with it and its uncertainty."""
     free = view.unknowns
     agree, evidence = _agreeing(spokes, place, free)

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d  # type: ignore[attr-defined]
 
 from psvideo.calibrate.sphere.search import Grey
-from psvideo.calibrate.sphere.view import View
+from psvideo.calibrate.sphere.view import SphereView
 from psvideo.model.camera import FloatArray
 
 Surface = Literal["mirror", "matte"]
@@ -40,7 +40,7 @@ LEAST_NOISE = 0.01
 
 
 def across_rim(
-    pictures: Sequence[Grey], view: View, place: FloatArray, *, reach_px: float, spokes: int
+    pictures: Sequence[Grey], view: SphereView, place: FloatArray, *, reach_px: float, spokes: int
 ) -> tuple[FloatArray, FloatArray]:
     """Return brightness across an outline, (picture, spoke, step) from ``reach_px`` inside to outside, averaged along
     the rim between spokes, NaN outside the picture; and where the spokes cross the outline, (spoke, 2)."""

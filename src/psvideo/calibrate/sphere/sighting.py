@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.calibrate.light_pictures import LightPictures
-from psvideo.calibrate.mirror.highlights import Found, Spot, find_highlights
+from psvideo.calibrate.mirror.highlights import FoundHighlight, Spot, find_highlights
 from psvideo.calibrate.sphere.outline import Outline, find_outlines, follow_outline, given_outline
 from psvideo.calibrate.sphere.search import Grey
-from psvideo.calibrate.sphere.view import View
+from psvideo.calibrate.sphere.view import SphereView
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.model.camera import FloatArray
 
@@ -74,11 +74,11 @@ class Looking:
     focal_widths: float | None = None
     principal_px: tuple[float, float] | None = None
 
-    def view(self, *, width_px: int, height_px: int) -> View:
+    def view(self, *, width_px: int, height_px: int) -> SphereView:
         """Return the view of pictures of this size; the lens's axis goes through their middle unless it is given."""
         middle = ((width_px - 1) / 2, (height_px - 1) / 2)
         focal_px = self.focal_px if self.focal_widths is None else self.focal_widths * width_px
-        return View(focal_px=focal_px, principal_px=self.principal_px or middle)
+        return SphereView(focal_px=focal_px, principal_px=self.principal_px or middle)
 
 
 def sight_spheres(
@@ -91,7 +91,7 @@ def sight_spheres(
     """
     outlines: list[Outline] = []
     fits: list[list[FloatArray]] = []
-    found: list[list[list[Found]]] = []
+    found: list[list[list[FoundHighlight]]] = []
     shown: Grey | None = None
     for count, pictures in enumerate(sets, start=1):
         brightest = pictures.grey.max(axis=0)
@@ -166,7 +166,7 @@ def _refuse_cut(outline: Outline, where: str, shown: Grey) -> None:
 
 
 def _sighting(
-    where: str, outline: Outline, places: FloatArray, seen: Sequence[Sequence[Found]], picture: Grey
+    where: str, outline: Outline, places: FloatArray, seen: Sequence[Sequence[FoundHighlight]], picture: Grey
 ) -> Sighting:
     moved = float(np.sqrt(places[:, :2].var(axis=0).sum())) if len(places) > 2 else 0.0
     if len(places) > 1 and not outline.given:
@@ -175,7 +175,7 @@ def _sighting(
     return Sighting(where=where, outline=outline, highlights=lights, picture=picture, sets=len(places), moved_px=moved)
 
 
-def _over_sets(founds: Sequence[Found]) -> Highlight:
+def _over_sets(founds: Sequence[FoundHighlight]) -> Highlight:
     """Return the mean place of one light's highlight over sets; frames in which it is elsewhere are left out."""
     last = founds[-1]
     spots = [found.highlight for found in founds if found.highlight is not None]

@@ -22,7 +22,7 @@ from psvideo.model.rig import Vector
 
 
 @dataclass(frozen=True, kw_only=True)
-class View:
+class SphereView:
     """How pixels become rays. ``focal_px`` None: parallel rays; lengths are then in pixels."""
 
     focal_px: float | None

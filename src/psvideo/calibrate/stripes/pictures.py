@@ -18,7 +18,7 @@ from psvideo.clip.decode.decoders import decode
 from psvideo.clip.decode.movie import index_movie, read_movie
 from psvideo.clip.folder import KINDS, MOVIES, find_sequence
 from psvideo.clip.reading import looks
-from psvideo.clip.record import Picture
+from psvideo.clip.record import CodedPicture
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.model.camera import FloatArray
 
@@ -98,7 +98,7 @@ def _chosen(numbers: Sequence[int], frames: str | None) -> tuple[int, ...]:
     return tuple(numbers[:MOST_FRAMES]) if frames is None else parse_range(frames, numbers)
 
 
-def _filmed(path: Path, stamps: dict[int, int], places: Sequence[int]) -> Iterator[tuple[int, Picture]]:
+def _filmed(path: Path, stamps: dict[int, int], places: Sequence[int]) -> Iterator[tuple[int, CodedPicture]]:
     return zip(places, read_movie(path, [stamps[place] for place in places]), strict=True)
 
 
@@ -117,11 +117,11 @@ def _refuse_others(paths: Sequence[Path], frames: str | None) -> None:
             )
 
 
-def _decoded(files: Sequence[Path]) -> Iterator[tuple[str, Picture]]:
+def _decoded(files: Sequence[Path]) -> Iterator[tuple[str, CodedPicture]]:
     return ((str(file), decode(KINDS[file.suffix.lower()], file)) for file in files)
 
 
-def _profiles(pictures: Iterator[tuple[str, Picture]], columns: tuple[int, int] | None) -> tuple[FloatArray, int]:
+def _profiles(pictures: Iterator[tuple[str, CodedPicture]], columns: tuple[int, int] | None) -> tuple[FloatArray, int]:
     """Return the profiles of all pictures and their width; raise PsvideoError where they are not alike."""
     found: list[FloatArray] = []
     first: tuple[str, str] | None = None
@@ -140,7 +140,7 @@ def _profiles(pictures: Iterator[tuple[str, Picture]], columns: tuple[int, int] 
     return np.array(found), width_px
 
 
-def in_colours(picture: Picture) -> NDArray[Any]:
+def in_colours(picture: CodedPicture) -> NDArray[Any]:
     """Return codes (row, col, channel): of a mosaic the green ones, which every row has in every second column."""
     codes, cfa = picture.codes, picture.header.cfa
     if cfa is None:

@@ -50,7 +50,7 @@ MOST_ERROR = 0.005
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reading:
+class FoundStripes:
     """Stripes of one frequency, in periods per row, in the channel where they are strongest.
 
     ``explained`` is their share of what is not smooth in the profiles, ``left`` what they leave over of all change.
@@ -62,7 +62,7 @@ class Reading:
     channel: int
 
 
-def find_stripes(profiles: FloatArray, *, expected: float | None = None) -> Reading:
+def find_stripes(profiles: FloatArray, *, expected: float | None = None) -> FoundStripes:
     """Return the stripes in profiles of shape (frame, channel, block, row).
 
     ``expected`` is roughly their frequency, where the user knows it. Raises PsvideoError, without the footage's name,
@@ -86,7 +86,7 @@ def find_stripes(profiles: FloatArray, *, expected: float | None = None) -> Read
     return chosen
 
 
-def check_stripes(fit: StripeFit, reading: Reading, rows: int) -> None:
+def check_stripes(fit: StripeFit, reading: FoundStripes, rows: int) -> None:
     """Raise PsvideoError where fitted stripes are no stripes: faint, out of step across the picture, or irregular.
 
     Blocks of columns are compared up to half a period, since two lamps may take turns. A few periods are soon found in
@@ -123,7 +123,7 @@ def _candidates(whole: FloatArray, expected: float | None) -> list[float]:
     return distinct
 
 
-def _read(whole: FloatArray, frequency: float) -> Reading:
+def _read(whole: FloatArray, frequency: float) -> FoundStripes:
     """Fit one candidate in the channel where it is strongest."""
     rows = whole.shape[2]
     wave = np.exp(-2j * np.pi * frequency * np.arange(rows)) * np.hanning(rows)
@@ -132,7 +132,7 @@ def _read(whole: FloatArray, frequency: float) -> Reading:
     fit = fit_stripes(profiles, frequency, most_harmonics=HARMONICS)
     uneven = float((without(profiles, spline_basis(rows, frequency)) ** 2).sum())
     change = float((flattened(profiles) ** 2).sum())
-    return Reading(
+    return FoundStripes(
         frequency=fit.frequency,
         explained=1 - fit.unexplained / max(uneven, 1e-12),
         left=fit.unexplained / max(change, 1e-12),
@@ -140,7 +140,7 @@ def _read(whole: FloatArray, frequency: float) -> Reading:
     )
 
 
-def _refuse_wide(found: Sequence[Reading], readings: Sequence[Reading], rows: int) -> None:
+def _refuse_wide(found: Sequence[FoundStripes], readings: Sequence[FoundStripes], rows: int) -> None:
     """Raise PsvideoError where stripes too wide to be measured explain far more than any narrower ones."""
     if not found:
         return
@@ -153,7 +153,7 @@ def _refuse_wide(found: Sequence[Reading], readings: Sequence[Reading], rows: in
         )
 
 
-def _is_echo(reading: Reading, readings: Sequence[Reading]) -> bool:
+def _is_echo(reading: FoundStripes, readings: Sequence[FoundStripes]) -> bool:
     """Tell whether a reading only repeats a shorter period several times.
 
     Many periods in one are no light's doing, and thin stripes with sharp edges repeat exactly after several periods
@@ -167,7 +167,7 @@ def _is_echo(reading: Reading, readings: Sequence[Reading]) -> bool:
     return False
 
 
-def _shortest(readings: Sequence[Reading]) -> Reading:
+def _shortest(readings: Sequence[FoundStripes]) -> FoundStripes:
     """Return the best reading, or one of its harmonics where that explains as much: the shortest period that does."""
     best = min(readings, key=lambda reading: reading.left)
     enough = max(best.left / (1 - CLEAR_GAIN), best.left + FAINT_GAIN)
@@ -175,13 +175,13 @@ def _shortest(readings: Sequence[Reading]) -> Reading:
     return max(alike, key=lambda reading: reading.frequency)
 
 
-def _times(reading: Reading, other: Reading) -> int:
+def _times(reading: FoundStripes, other: FoundStripes) -> int:
     """Return how many times a reading's frequency is another's, 0 where that is no whole number."""
     ratio = reading.frequency / other.frequency
     return round(ratio) if abs(ratio - round(ratio)) < 0.02 * ratio else 0
 
 
-def _refuse_ambiguous(chosen: Reading, readings: Sequence[Reading]) -> None:
+def _refuse_ambiguous(chosen: FoundStripes, readings: Sequence[FoundStripes]) -> None:
     """Raise PsvideoError where every second stripe differs a little, or where other stripes are nearly as strong."""
     for other in readings:
         times = _times(other, chosen)

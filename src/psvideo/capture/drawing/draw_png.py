@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.capture.drawing.picture import Label, Picture, Polygon
+from psvideo.capture.drawing.picture import Drawing, Label, Polygon
 from psvideo.errors import PsvideoError
 
 Canvas = NDArray[np.uint8]
@@ -17,7 +17,7 @@ FONT_HEIGHT_PX = 30.0
 PLAIN = str.maketrans({"×": "x", "µ": "u", "°": " deg", "…": ".", "–": "-"})
 
 
-def png(picture: Picture) -> bytes:
+def png(picture: Drawing) -> bytes:
     """Return the picture as a PNG file's bytes."""
     grow = SCALE * OVERSAMPLING
     canvas = np.full((round(picture.height * grow), round(picture.width * grow), 3), 255, np.uint8)

@@ -2,12 +2,12 @@
 
 from xml.sax.saxutils import escape
 
-from psvideo.capture.drawing.picture import Label, Picture, Polygon
+from psvideo.capture.drawing.picture import Drawing, Label, Polygon
 
 FONT = "DejaVu Sans, Helvetica, Arial, sans-serif"
 
 
-def svg(picture: Picture, *, unit: str = "") -> str:
+def svg(picture: Drawing, *, unit: str = "") -> str:
     """Return the picture as an SVG file's text; ``unit`` is what one unit of the picture is on paper, such as mm."""
     width, height = f"{picture.width:g}", f"{picture.height:g}"
     size = f'width="{width}{unit}" height="{height}{unit}" viewBox="0 0 {width} {height}"'

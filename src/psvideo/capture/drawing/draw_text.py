@@ -3,7 +3,7 @@
 from rich.text import Text
 
 from psvideo.capture.drawing.picture import kind_colour
-from psvideo.capture.drawing.timeline import Frame, Timeline, timeline
+from psvideo.capture.drawing.timeline import FrameSpans, Timeline, timeline
 from psvideo.model.plan import Plan
 
 LINES = 14
@@ -50,7 +50,7 @@ def _cell(line: Timeline, row: float, column: int, columns: int) -> tuple[str, s
     return " ", ""
 
 
-def _open_cell(line: Timeline, frame: Frame, row: float) -> tuple[str, str]:
+def _open_cell(line: Timeline, frame: FrameSpans, row: float) -> tuple[str, str]:
     half = line.camera.height_px / LINES / 2
     if any(abs(dark - row) <= half for dark in frame.dark_rows):
         return "━", ""

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from psvideo.capture.drawing.timeline import Frame, Span, Timeline, timeline
+from psvideo.capture.drawing.timeline import FrameSpans, Span, Timeline, timeline
 from psvideo.model.plan import Plan
 from psvideo.model.units import show_rate, show_seconds
 
@@ -42,7 +42,7 @@ class Label:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Picture:
+class Drawing:
     """Shapes in the order in which they are painted."""
 
     width: float
@@ -50,7 +50,7 @@ class Picture:
     shapes: tuple[Polygon | Label, ...]
 
 
-def timing_picture(plan: Plan, *, phase_s: float | None = None, frames: int | None = None) -> Picture:
+def timing_picture(plan: Plan, *, phase_s: float | None = None, frames: int | None = None) -> Drawing:
     """Return the timing diagram of a plan, like the paper's figure 4: rows downwards, time to the right."""
     line = timeline(plan, phase_s=phase_s, frames=frames)
     shapes: list[Polygon | Label] = [Polygon(points=_box(0, 0, WIDTH, HEIGHT), fill="#ffffff")]
@@ -62,7 +62,7 @@ def timing_picture(plan: Plan, *, phase_s: float | None = None, frames: int | No
     shapes += _axes(line)
     shapes += _legend(line)
     shapes += _title(plan, line)
-    return Picture(width=WIDTH, height=HEIGHT, shapes=tuple(shapes))
+    return Drawing(width=WIDTH, height=HEIGHT, shapes=tuple(shapes))
 
 
 def kind_colour(place: int) -> str:
@@ -82,7 +82,7 @@ def _box(left: float, top: float, right: float, bottom: float) -> tuple[Point, .
     return ((left, top), (right, top), (right, bottom), (left, bottom))
 
 
-def _rows_of(line: Timeline, frame: Frame, top: float, bottom: float) -> tuple[Point, ...]:
+def _rows_of(line: Timeline, frame: FrameSpans, top: float, bottom: float) -> tuple[Point, ...]:
     """Return the part of a frame's parallelogram between two rows, cut at the diagram's left edge."""
     rows, exposure_s = line.camera.height_px, line.camera.exposure_s
     corners = [(frame.opens_s(row, rows) + late_s, row) for row, late_s in ((top, 0.0), (top, exposure_s))]
@@ -101,7 +101,7 @@ def _right_of_edge(points: Sequence[Point]) -> tuple[Point, ...]:
     return tuple(kept)
 
 
-def _frame_fill(line: Timeline, frame: Frame) -> Iterator[Polygon]:
+def _frame_fill(line: Timeline, frame: FrameSpans) -> Iterator[Polygon]:
     yield Polygon(points=_rows_of(line, frame, 0, line.camera.height_px), fill=PALE)
     for span in frame.spans:
         colour = kind_colour(line.flashes[span.flash].place)
@@ -123,7 +123,7 @@ def _mixed(colour: str, strength: float) -> str:
     return "#" + "".join(f"{round(g + (t - g) * strength):02x}" for g, t in zip(ground, top, strict=True))
 
 
-def _frame_outline(line: Timeline, frame: Frame) -> Iterator[Polygon | Label]:
+def _frame_outline(line: Timeline, frame: FrameSpans) -> Iterator[Polygon | Label]:
     rows = line.camera.height_px
     yield Polygon(points=_rows_of(line, frame, 0, rows), stroke=GREY, width=1.2)
     for row in frame.dark_rows:

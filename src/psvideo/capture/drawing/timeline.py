@@ -29,7 +29,7 @@ class Span:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Frame:
+class FrameSpans:
     """One frame: when its top edge and its bottom edge open, what its rows saw, and where its dark row lies."""
 
     index: int
@@ -61,7 +61,7 @@ class Timeline:
     readout_is_known: bool
     start_s: float
     end_s: float
-    frames: tuple[Frame, ...]
+    frames: tuple[FrameSpans, ...]
     flashes: tuple[FlashSpan, ...]
     kinds: tuple[str, ...]
 
@@ -126,12 +126,12 @@ def _flashes(plan: Plan, phase_s: float, end_s: float) -> tuple[FlashSpan, ...]:
     return tuple(spans)
 
 
-def _frame(camera: Camera, index: int, flashes: tuple[FlashSpan, ...]) -> Frame:
+def _frame(camera: Camera, index: int, flashes: tuple[FlashSpan, ...]) -> FrameSpans:
     start_s = index * camera.frame_period_s
     readout_s = camera.readout_s or 0.0
     lit = [(number, flash) for number, flash in enumerate(flashes) if flash.place >= 0]
     spans = [span for number, flash in lit for span in _spans(camera, start_s, flash, number)]
-    return Frame(
+    return FrameSpans(
         index=index,
         top_s=start_s + max(-readout_s, 0.0),
         bottom_s=start_s + max(readout_s, 0.0),

@@ -10,7 +10,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import TypeVar
 
-from psvideo.clip.record import Header, Picture
+from psvideo.clip.record import CodedPicture, Header
 from psvideo.errors import PsvideoError
 
 Read = TypeVar("Read")
@@ -22,9 +22,9 @@ def read_header(kind: str, file: Path) -> Header:
     return guarded(find, file)
 
 
-def decode(kind: str, file: Path) -> Picture:
+def decode(kind: str, file: Path) -> CodedPicture:
     """Decode one picture."""
-    read: Callable[[Path], Picture] = _module(kind).decode
+    read: Callable[[Path], CodedPicture] = _module(kind).decode
     return guarded(read, file)
 
 

@@ -17,7 +17,7 @@ import tifffile
 from numpy.typing import NDArray
 
 from psvideo.clip.decode.tiff import LINEAR_RAW, MOSAIC, check_places, pixels, sample_bits
-from psvideo.clip.record import Header, Levels, Picture
+from psvideo.clip.record import CodedPicture, Header, Levels
 from psvideo.errors import PsvideoError
 
 FILTERS = "RGB"  # CFAPattern counts red, green, blue as 0, 1, 2
@@ -44,7 +44,7 @@ def header(path: Path) -> Header:
         return _header(path, file, _raw_page(path, file))
 
 
-def decode(path: Path) -> Picture:
+def decode(path: Path) -> CodedPicture:
     """Decode a whole picture: linearized values of the sensor, black not yet taken off."""
     with tifffile.TiffFile(path) as file:
         page = _raw_page(path, file)
@@ -52,7 +52,7 @@ def decode(path: Path) -> Picture:
         codes = _codes(path, page)
         cut = _cut(path, page)
     codes = codes[cut.rows, cut.cols]
-    return Picture(header=head, codes=np.ascontiguousarray(codes if head.channels == 3 else codes[..., 0]))
+    return CodedPicture(header=head, codes=np.ascontiguousarray(codes if head.channels == 3 else codes[..., 0]))
 
 
 def _raw_page(path: Path, file: tifffile.TiffFile) -> tifffile.TiffPage:

@@ -7,7 +7,7 @@ import av
 import numpy as np
 
 from psvideo.clip.decode.planes import planes
-from psvideo.clip.record import Header, Picture
+from psvideo.clip.record import CodedPicture, Header
 from psvideo.errors import PsvideoError
 
 BYTE_ORDERS = {b"SDPX": ">", b"XPDS": "<"}
@@ -24,7 +24,7 @@ def header(path: Path) -> Header:
     return head
 
 
-def decode(path: Path) -> Picture:
+def decode(path: Path) -> CodedPicture:
     """Decode a whole picture."""
     head = header(path)
     try:
@@ -33,7 +33,7 @@ def decode(path: Path) -> Picture:
     except av.FFmpegError as fault:
         raise PsvideoError(f"{path}: cannot be decoded ({fault.strerror}). Copy it again.") from fault
     codes = found[0] if head.channels == 1 else np.stack(found[:3], axis=-1)
-    return Picture(header=head, codes=codes)
+    return CodedPicture(header=head, codes=codes)
 
 
 def _parse_header(path: Path, data: bytes) -> tuple[Header, int]:

@@ -16,7 +16,7 @@ import OpenEXR
 from numpy.typing import NDArray
 
 from psvideo.clip.decode.exr_chunks import is_cut_short
-from psvideo.clip.record import Header, Picture
+from psvideo.clip.record import CodedPicture, Header
 from psvideo.errors import PsvideoError
 
 GREY_NAMES = ("Y", "L", "V")
@@ -29,12 +29,12 @@ def header(path: Path) -> Header:
         return _header(file, _picture_channels(path, _names(file)))
 
 
-def decode(path: Path) -> Picture:
+def decode(path: Path) -> CodedPicture:
     """Decode a whole picture."""
     return decode_channels(path, partial(_picture_channels, path))
 
 
-def decode_channels(path: Path, choose: Callable[[list[str]], tuple[str, ...]]) -> Picture:
+def decode_channels(path: Path, choose: Callable[[list[str]], tuple[str, ...]]) -> CodedPicture:
     """Decode the channels that ``choose`` takes from the names of all, one or three."""
     with _open(path, header_only=False) as file:
         names = choose(_names(file))
@@ -42,7 +42,7 @@ def decode_channels(path: Path, choose: Callable[[list[str]], tuple[str, ...]]) 
         planes = [channels[name].pixels for name in names]
         head = _header(file, names)
         codes = np.asarray(planes[0], np.float32) if len(planes) == 1 else np.stack(planes, axis=-1, dtype=np.float32)
-        return Picture(header=head, codes=_in_display_window(codes, file.header(), head))
+        return CodedPicture(header=head, codes=_in_display_window(codes, file.header(), head))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import imagecodecs
 
-from psvideo.clip.record import Header, Picture
+from psvideo.clip.record import CodedPicture, Header
 from psvideo.errors import PsvideoError
 
 START, END = b"\xff\xd8", b"\xff\xd9"
@@ -19,10 +19,10 @@ def header(path: Path) -> Header:
     return _parse_header(path, path.read_bytes())
 
 
-def decode(path: Path) -> Picture:
+def decode(path: Path) -> CodedPicture:
     """Decode a whole picture. A truncated file is refused, which decoders fill with grey."""
     data = path.read_bytes()
-    return Picture(header=_parse_header(path, data), codes=imagecodecs.jpeg8_decode(data))
+    return CodedPicture(header=_parse_header(path, data), codes=imagecodecs.jpeg8_decode(data))
 
 
 def _parse_header(path: Path, data: bytes) -> Header:

@@ -16,7 +16,7 @@ from av.video.stream import VideoStream
 
 from psvideo.clip.decode.planes import planes
 from psvideo.clip.decode.yuv import CODES, HIGHEST, LOWEST, LUMA_WEIGHTS, signal_range, to_rgb
-from psvideo.clip.record import Header, Picture
+from psvideo.clip.record import CodedPicture, Header
 from psvideo.errors import PsvideoError
 
 VIDEO_RANGE, FULL_RANGE = 1, 2  # FFmpeg's AVCOL_RANGE_MPEG and AVCOL_RANGE_JPEG
@@ -69,7 +69,7 @@ def index_movie(path: Path) -> Movie:
     )
 
 
-def read_movie(path: Path, timestamps: Sequence[int]) -> Iterator[Picture]:
+def read_movie(path: Path, timestamps: Sequence[int]) -> Iterator[CodedPicture]:
     """Decode the frames with these timestamps, in ascending order.
 
     Raises PsvideoError where one of them cannot be decoded or does not come.
@@ -145,7 +145,7 @@ def _places(path: Path, timestamps: Sequence[int]) -> tuple[tuple[int, ...], flo
     return (0, *(int(place) for place in np.cumsum(counts))), period
 
 
-def _picture(path: Path, frame: av.VideoFrame) -> Picture:
+def _picture(path: Path, frame: av.VideoFrame) -> CodedPicture:
     """Take a decoded frame's planes and make R'G'B' codes of them."""
     if frame.interlaced_frame:
         raise PsvideoError(f"{path}: is interlaced; expected whole frames. Record progressive footage.")
@@ -166,12 +166,12 @@ def _picture(path: Path, frame: av.VideoFrame) -> Picture:
         warnings=("the movie's alpha channel is left out",) if len(found) in (2, 4) else (),
     )
     if not is_yuv:
-        return Picture(header=header, codes=found[0] if len(found) < 3 else np.stack(found[:3], axis=-1))
+        return CodedPicture(header=header, codes=found[0] if len(found) < 3 else np.stack(found[:3], axis=-1))
     matrix, warnings = _matrix(path, frame)
     codes = to_rgb(found[0], found[1], found[2], bits=bits, matrix=matrix, video_range=video_range)
     span = (HIGHEST - LOWEST) / CODES
     header = replace(header, signal_at_0=LOWEST, signal_per_code=span, warnings=header.warnings + warnings)
-    return Picture(header=header, codes=codes)
+    return CodedPicture(header=header, codes=codes)
 
 
 def _matrix(path: Path, frame: av.VideoFrame) -> tuple[int, tuple[str, ...]]:

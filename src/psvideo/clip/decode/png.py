@@ -8,7 +8,7 @@ from pathlib import Path
 
 import imagecodecs
 
-from psvideo.clip.record import Header, Picture
+from psvideo.clip.record import CodedPicture, Header
 from psvideo.errors import PsvideoError
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
@@ -26,14 +26,14 @@ def header(path: Path) -> Header:
         return _parse_header(path, first, file.read())
 
 
-def decode(path: Path) -> Picture:
+def decode(path: Path) -> CodedPicture:
     """Decode a whole picture; an alpha channel is left out."""
     data = path.read_bytes()
     head = _parse_header(path, data, data[-TAIL:])
     codes = imagecodecs.png_decode(data)
     if codes.ndim == 3:
         codes = codes[..., : head.channels] if head.channels > 1 else codes[..., 0]
-    return Picture(header=head, codes=codes)
+    return CodedPicture(header=head, codes=codes)
 
 
 def _parse_header(path: Path, data: bytes, tail: bytes) -> Header:

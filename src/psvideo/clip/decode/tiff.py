@@ -7,7 +7,7 @@ import numpy as np
 import tifffile
 from numpy.typing import NDArray
 
-from psvideo.clip.record import Header, Picture
+from psvideo.clip.record import CodedPicture, Header
 from psvideo.errors import PsvideoError
 
 # tifffile tells its own log what it thinks of odd tags; what matters of it is raised here.
@@ -22,13 +22,13 @@ def header(path: Path) -> Header:
         return _header(path, _only_page(path, file))
 
 
-def decode(path: Path) -> Picture:
+def decode(path: Path) -> CodedPicture:
     """Decode a whole picture; alpha and other extra channels are left out."""
     with tifffile.TiffFile(path) as file:
         page = _only_page(path, file)
         head = _header(path, page)
         codes = pixels(page)[..., : head.channels]
-    return Picture(header=head, codes=codes[..., 0] if head.channels == 1 else np.ascontiguousarray(codes))
+    return CodedPicture(header=head, codes=codes[..., 0] if head.channels == 1 else np.ascontiguousarray(codes))
 
 
 def pixels(page: tifffile.TiffPage) -> NDArray[np.generic]:

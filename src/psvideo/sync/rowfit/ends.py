@@ -24,7 +24,7 @@ ODD = 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Ends:
+class ClipEnds:
     """Where the frames are in time, ``index`` (frame,), and how many at either end fit no place at all."""
 
     index: IntArray
@@ -32,14 +32,14 @@ class Ends:
     lost_last: int
 
 
-def ends(plan: Plan, rows: Profiles, index: IntArray, beat: Beat) -> Ends:
+def ends(plan: Plan, rows: Profiles, index: IntArray, beat: Beat) -> ClipEnds:
     """Return the places in time (frame,) with holes beside the first and the last frames found."""
     if len(index) < MEMORY + BEFORE + AT_END:
-        return Ends(index=index, lost_first=0, lost_last=0)
+        return ClipEnds(index=index, lost_first=0, lost_last=0)
     last, lost_last = _end(plan, rows, index, beat)
     turned = replace(rows, value=np.ascontiguousarray(rows.value[::-1]))
     first, lost_first = _end(plan, turned, last[::-1], beat)
-    return Ends(index=first[::-1].copy(), lost_first=lost_first, lost_last=lost_last)
+    return ClipEnds(index=first[::-1].copy(), lost_first=lost_first, lost_last=lost_last)
 
 
 def _end(plan: Plan, rows: Profiles, index: IntArray, beat: Beat) -> tuple[IntArray, int]:

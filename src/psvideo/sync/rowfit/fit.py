@@ -46,7 +46,7 @@ OTHER_SWINGS = (-2.5, -1.5, 1.5, 2.5)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Found:
+class ClipFit:
     """The fit of a whole clip: its rows with the times that their frames truly have, and which frames are repeats.
 
     ``steps`` counts the places where frames follow otherwise than the numbering tells and repeated frames explain;
@@ -65,7 +65,7 @@ class Found:
     soft_s: float = 0.0
 
 
-def find(plan: Plan, rows: Profiles, *, measured: tuple[str, ...] = ()) -> Found:
+def find(plan: Plan, rows: Profiles, *, measured: tuple[str, ...] = ()) -> ClipFit:
     """Return the times of a clip; ``Fit.explained`` tells how well they explain it.
 
     ``measured`` names times that are fitted whatever the plan says of them, as the readout is where it is unknown.
@@ -96,7 +96,7 @@ def find(plan: Plan, rows: Profiles, *, measured: tuple[str, ...] = ()) -> Found
     known_s = max(fit.shift_error_s, shift_error_s(plan, fine, fit), slack_s)
     error_s = float(np.sqrt(known_s**2 + stray.error_s**2 + apart_s**2))
     fit = replace(fit, shift_error_s=error_s)
-    return Found(
+    return ClipFit(
         fit=fit,
         rows=fine,
         track=tracked,

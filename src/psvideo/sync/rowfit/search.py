@@ -21,7 +21,7 @@ ROBUST_STEEPNESS = 20.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Found:
+class GridPlace:
     """A place on the grid and its mean loss per sample."""
 
     beat: Beat
@@ -30,7 +30,7 @@ class Found:
 
 def search(
     plan: Plan, rows: Profiles, *, range_ppm: float, start: Beat, readout_known: bool, keep: int = 1
-) -> list[Found]:
+) -> list[GridPlace]:
     """Return the best places of a grid (a third of a flash in phase, half a flash's slip in ratio), best first.
 
     ``start`` gives exposure, tails and, where it is known, row time and direction.
@@ -46,7 +46,7 @@ def search(
     loss = loss.reshape(len(ppm), len(phases_s), -1) / len(rows.value)
     if readout_known:
         best = _best(loss.mean(axis=2)[None], keep)
-        return [Found(beat=_placed(start, clocks[a * len(phases_s) + b]), loss=value) for _, a, b, value in best]
+        return [GridPlace(beat=_placed(start, clocks[a * len(phases_s) + b]), loss=value) for _, a, b, value in best]
     return _over_readouts(plan, rows, loss, clocks, phases_s, start, keep)
 
 
@@ -93,7 +93,7 @@ def _over_readouts(
     phases_s: FloatArray,
     start: Beat,
     keep: int,
-) -> list[Found]:
+) -> list[GridPlace]:
     """Sum the rows' losses along every readout from the whole frame upward to the whole frame downward."""
     height = rows.place.max() + rows.place.min() + 1
     step_s = phases_s[1] - phases_s[0]
@@ -119,7 +119,7 @@ def _over_readouts(
             fall_s=start.fall_s,
             beat_hz=start.beat_hz,
         )
-        found.append(Found(beat=beat, loss=value))
+        found.append(GridPlace(beat=beat, loss=value))
     return found
 
 

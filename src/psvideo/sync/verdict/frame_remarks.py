@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.plan import Plan
-from psvideo.sync.rowfit.fit import Found
+from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.retime import regular_step
 
 
-def remarks_on_frames(plan: Plan, found: Found, told: NDArray[np.int64]) -> Iterator[str]:
+def remarks_on_frames(plan: Plan, found: ClipFit, told: NDArray[np.int64]) -> Iterator[str]:
     """Yield what is odd about how the frames follow one another."""
     index, rate = found.track.index, float(plan.camera.fps)
     step = regular_step(index, told)

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.course import too_many
-from psvideo.sync.rowfit.fit import Found, find
+from psvideo.sync.rowfit.fit import ClipFit, find
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import freedom, refine, robust_loss
 from psvideo.sync.rowfit.seed import gain_of
@@ -35,7 +35,7 @@ class Verdict:
     whether it is to be believed."""
 
     plan: Plan
-    found: Found
+    found: ClipFit
     believed: bool
 
 
@@ -54,7 +54,7 @@ def judged(plan: Plan, rows: Profiles) -> Verdict:
     return Verdict(plan=meant, found=found, believed=believed)
 
 
-def _as_meant(plan: Plan, rows: Profiles, found: Found) -> tuple[Plan, Found]:
+def _as_meant(plan: Plan, rows: Profiles, found: ClipFit) -> tuple[Plan, ClipFit]:
     """Return the likeliest plan with another camera and its fit, or the given ones where they are as good."""
     leaves = CLEARLY if convincing(plan, found) else BETTER
     for rivals in (camera_rivals(plan), double_rivals(plan)):
@@ -69,7 +69,7 @@ def _as_meant(plan: Plan, rows: Profiles, found: Found) -> tuple[Plan, Found]:
     return plan, found
 
 
-def convincing(plan: Plan, found: Found) -> bool:
+def convincing(plan: Plan, found: ClipFit) -> bool:
     """Tell whether a fit has found a strobe, and not merely the least bad place for one.
 
     Brightnesses alone explain some of mere noise, which counts in short clips.
@@ -87,7 +87,7 @@ def convincing(plan: Plan, found: Found) -> bool:
     )
 
 
-def doubtful(plan: Plan, found: Found) -> bool:
+def doubtful(plan: Plan, found: ClipFit) -> bool:
     """Tell whether a fit leaves so much, or had to stray so far from the plan, that the plan may be wrong by far."""
     beat, camera = found.fit.beat, plan.camera
     moved = abs(beat.exposure_s / camera.exposure_s - 1) > MOVED
@@ -103,16 +103,16 @@ def doubtful(plan: Plan, found: Found) -> bool:
     )
 
 
-def _unsure(plan: Plan, found: Found) -> bool:
+def _unsure(plan: Plan, found: ClipFit) -> bool:
     return found.slack_s == 0 and found.fit.shift_error_s > UNSURE * _shortest_s(plan)
 
 
-def _gaps_feigned(found: Found) -> bool:
+def _gaps_feigned(found: ClipFit) -> bool:
     """Tell whether holes may only stand for a strobe that drifts away from the plan's: true ones leave little."""
     return found.steps > 0 and found.fit.explained < GAPPED
 
 
-def flashes_differ(plan: Plan, found: Found) -> bool:
+def flashes_differ(plan: Plan, found: ClipFit) -> bool:
     """Tell whether flashes much longer or shorter than the plan's, in the same places and without tails, fit better."""
     rows, beat = found.rows.take(slice(0, LENGTH_FRAMES)).binned(48), found.fit.beat
     rest = unexplained(plan, rows, beat)

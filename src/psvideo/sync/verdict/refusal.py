@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from psvideo.model.plan import UNKNOWN_CLOCK_PPM, Plan
-from psvideo.sync.rowfit.fit import Found
+from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.search import search
 from psvideo.sync.rowfit.seed import SEARCH_ROWS, first_guess, gain_of
@@ -95,7 +95,7 @@ def why_not(plan: Plan, rows: Profiles) -> str:
     return _other_strobe(plan, rows)
 
 
-def clock_too_far(plan: Plan, found: Found) -> str:
+def clock_too_far(plan: Plan, found: ClipFit) -> str:
     """Return which number of the plan to doubt where the fit slipped to a clock beyond those searched; or nothing."""
     ppm = found.fit.beat.clock.mean_offset_ppm()
     if abs(ppm) < MOST_PPM or found.steps:

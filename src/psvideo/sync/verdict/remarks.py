@@ -9,7 +9,7 @@ import numpy as np
 from psvideo.model.camera import Camera, FloatArray
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
-from psvideo.sync.rowfit.fit import Found
+from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import brightnesses, predictions
 
 MISNAMED_PPM = (-1000.0, 999.0)
@@ -36,7 +36,7 @@ UNSURE = 0.05
 """Share of a flash from which on a standard error is worth a word."""
 
 
-def remarks(plan: Plan, found: Found) -> tuple[str, ...]:
+def remarks(plan: Plan, found: ClipFit) -> tuple[str, ...]:
     """Return sentences on what to distrust or to put right. ``plan`` is the one that was given, as it was given."""
     beat = found.fit.beat
     said = [
@@ -50,7 +50,7 @@ def remarks(plan: Plan, found: Found) -> tuple[str, ...]:
     return tuple(sentence for sentence in said if sentence)
 
 
-def _clock(plan: Plan, found: Found) -> str:
+def _clock(plan: Plan, found: ClipFit) -> str:
     ppm = found.fit.beat.clock.mean_offset_ppm()
     start_s = found.rows.frame_start_s
     error_ppm = 2e6 * found.fit.shift_error_s / float(start_s[-1] - start_s[0])
@@ -80,7 +80,7 @@ def _mixed(plan: Plan, beat: Beat) -> str:
     )
 
 
-def _camera(plan: Plan, found: Found) -> Iterator[str]:
+def _camera(plan: Plan, found: ClipFit) -> Iterator[str]:
     """Say what the picture tells of the shutter and the LEDs that the plan does not, or tells otherwise."""
     beat, camera, errors_s = found.fit.beat, plan.camera, found.fit.errors_s
     parts = []
@@ -136,7 +136,7 @@ def _direction(readout_s: float) -> str:
     return f"{'bottom' if readout_s < 0 else 'top'} row first"
 
 
-def _exposure(plan: Plan, found: Found) -> str:
+def _exposure(plan: Plan, found: ClipFit) -> str:
     for frames_each in GAIN_FRAMES:
         gain, share = frame_gains(plan, found, frames_each=frames_each)
         low, high = np.percentile(gain, [2, 98])
@@ -149,7 +149,7 @@ def _exposure(plan: Plan, found: Found) -> str:
     return ""
 
 
-def frame_gains(plan: Plan, found: Found, *, frames_each: int) -> tuple[FloatArray, float]:
+def frame_gains(plan: Plan, found: ClipFit, *, frames_each: int) -> tuple[FloatArray, float]:
     """Return every frame's gain (frame,) against the whole clip's brightnesses, and what gains explain of the rest."""
     rows = replace(found.rows, doubt=None)
     beat = replace(found.fit.beat, beat_hz=())
@@ -167,7 +167,7 @@ def frame_gains(plan: Plan, found: Found, *, frames_each: int) -> tuple[FloatArr
     return smooth, 1 - after / max(before, 1e-30)
 
 
-def _soft(found: Found) -> str:
+def _soft(found: ClipFit) -> str:
     if found.soft_s == 0.0:
         return ""
     return (
@@ -177,7 +177,7 @@ def _soft(found: Found) -> str:
     )
 
 
-def _sureness(plan: Plan, found: Found) -> str:
+def _sureness(plan: Plan, found: ClipFit) -> str:
     error_s = found.fit.shift_error_s
     shortest_s = min(plan.flashes[slot].duration_s for slot in plan.lit_slots)
     if found.slack_s > 0:
@@ -193,7 +193,7 @@ def _sureness(plan: Plan, found: Found) -> str:
     return ""
 
 
-def remarks_on_lights(plan: Plan, found: Found, beat: Beat, *, named: bool) -> tuple[str, ...]:
+def remarks_on_lights(plan: Plan, found: ClipFit, beat: Beat, *, named: bool) -> tuple[str, ...]:
     """Return sentences on lights that seem not to have fired, or all at once.
 
     ``beat`` is the fit's, its cycle turned to where the lights' names are; ``named`` tells that these are not a guess.
