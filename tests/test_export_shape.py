@@ -17,7 +17,7 @@ from psvideo.export.mesh import srgb_codes, write_part, write_ply
 from psvideo.export.space import CAMERA_SPACE, Space
 from psvideo.export.usd.core import require_usd
 from psvideo.export.usd.scene import write_animation
-from psvideo.runs import Output
+from psvideo.runs.output import Output
 from psvideo.solve.depth import Mesh
 
 SCENES = Path(__file__).resolve().parents[1] / "data_synth"

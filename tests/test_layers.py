@@ -21,8 +21,8 @@ FLOORS = [
     {"pictures"},
     {"report"},
     {"inspect"},
-    {"runs"},
     {"page"},
+    {"runs"},
     {"cli"},
 ]
 """Rooms from the bottom up. A room may use those below its floor, and none on its own."""

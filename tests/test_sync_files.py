@@ -12,8 +12,8 @@ from psvideo.formats.plan_toml import format_plan
 from psvideo.model.camera import Encoding
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
-from psvideo.runs.opening import open_take
 from psvideo.sync.of_take import find_take_timing
+from psvideo.sync.opening import open_take
 from psvideo.synth import Exposure, Noise, TrueClock, expose
 from psvideo.synth.camera.curves import CURVES
 from psvideo.synth.camera.dpx import dpx_bytes

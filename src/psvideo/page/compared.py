@@ -78,8 +78,8 @@ class ComparedPlates:
         return plates[light]
 
     def _timed(self) -> tuple["Take", Timing]:
-        from psvideo.runs import timing_of
-        from psvideo.runs.opening import open_take
+        from psvideo.plates.timed import timing_of
+        from psvideo.sync.opening import open_take
 
         if self._take is None:
             self._take = open_take(self._clip, plan=self._plan)

@@ -4,6 +4,8 @@ import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from psvideo.clip import Clip, Kept
+
 _LOG = logging.getLogger("psvideo")
 
 
@@ -31,3 +33,26 @@ class Caller:
 
 PYTHON = Caller()
 """Somebody's own Python."""
+
+
+def say_of_clip(clip: Clip, caller: Caller) -> None:
+    """Hand on what is odd about a clip."""
+    for warning in clip.warnings:
+        caller.warn(warning)
+    for note in clip.notes:
+        caller.detail(note)
+
+
+def say_kept(kept: Kept | None, caller: Caller) -> None:
+    """Say how much disk the decoded frames took, and which of them found no room there."""
+    if kept is None:
+        return
+    caller.detail(
+        f"{len(kept)} decoded frames ({kept.bytes_held / 1e9:.2f} GB) were kept in a temporary file beside the output "
+        "and read back; the file is gone."
+    )
+    if kept.missed:
+        caller.warn(
+            f"{kept.missed} decoded frames found no room on the output's disk, half of whose free space may be taken, "
+            "and were decoded again where they were needed. Make room there, or name an output on another disk."
+        )

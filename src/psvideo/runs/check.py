@@ -22,9 +22,9 @@ from psvideo.plates.naming import named_by_rig
 from psvideo.report.judgement import Judgement
 from psvideo.runs.caller import PYTHON, Caller
 from psvideo.runs.checked import Check, write_page
-from psvideo.runs.opening import open_take
 from psvideo.runs.reporting import judgements, observing
 from psvideo.sync.of_take import find_take_timing
+from psvideo.sync.opening import open_take
 
 LEAST_FRAMES, MOST_FRAMES = 30, 160
 ROUNDS = 4

@@ -16,9 +16,12 @@ from psvideo.model.rig import Vector
 from psvideo.model.surface import Surface
 from psvideo.pictures.contact import Strip, Tile, sheet
 from psvideo.pictures.shading import exposure_for, normal_colours, relit, srgb
-from psvideo.runs import Output, normals_run, read_lighting, timing_of
-from psvideo.runs.opening import open_take
+from psvideo.plates.timed import timing_of
+from psvideo.runs.lighting import read_lighting
+from psvideo.runs.output import Output
+from psvideo.runs.results import normals_run
 from psvideo.solve.instants import Instant
+from psvideo.sync.opening import open_take
 from psvideo.synth.scenes import builtin_scene
 from psvideo.synth.shoot import shoot
 

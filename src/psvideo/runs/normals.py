@@ -26,13 +26,13 @@ from psvideo.model.choices import (
 from psvideo.model.quantities import Aov
 from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.sequence import FIRST_NUMBER
+from psvideo.plates.timed import timing_of
 from psvideo.report.run_report import RunReport
-from psvideo.runs.caller import PYTHON, Caller
+from psvideo.runs.caller import PYTHON, Caller, say_kept, say_of_clip
 from psvideo.runs.lighting import read_lighting
-from psvideo.runs.opening import open_take, say_kept, say_of_clip
 from psvideo.runs.output import Output
 from psvideo.runs.results import OverTime, normals_run
-from psvideo.runs.timed import timing_of
+from psvideo.sync.opening import open_take
 
 MOST_AVERAGED = 64
 

@@ -10,12 +10,12 @@ from psvideo.formats.rig_toml import read_rig
 from psvideo.model.choices import Codec, PlatesPreview, SplitMethod
 from psvideo.plates.beauty import mix_of
 from psvideo.plates.sequence import FIRST_NUMBER
+from psvideo.plates.timed import timing_of
 from psvideo.report.run_report import RunReport
-from psvideo.runs.caller import PYTHON, Caller
-from psvideo.runs.opening import open_take, say_kept, say_of_clip
+from psvideo.runs.caller import PYTHON, Caller, say_kept, say_of_clip
 from psvideo.runs.output import Output
 from psvideo.runs.plates import Besides, split_run
-from psvideo.runs.timed import timing_of
+from psvideo.sync.opening import open_take
 
 
 def split(

@@ -13,9 +13,9 @@ from psvideo.formats.whole_files import PICTURE_MARK, refuse_existing, write_tex
 from psvideo.model.timing import Timing, places_in_time
 from psvideo.pictures.timing import timing_picture, write_sheet
 from psvideo.plates.naming import named_by_rig
-from psvideo.runs.caller import PYTHON, Caller
-from psvideo.runs.opening import open_take, say_of_clip
+from psvideo.runs.caller import PYTHON, Caller, say_of_clip
 from psvideo.sync.of_take import TakeProfiles, take_profiles, timing_of_profiles
+from psvideo.sync.opening import open_take
 
 MARK = "psvideo-timing/"
 """By which a file is known for a timing, which may be replaced."""

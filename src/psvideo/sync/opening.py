@@ -3,8 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
-from psvideo.clip import Clip, Kept, Take, open_clip, parse_range
-from psvideo.runs.caller import Caller
+from psvideo.clip import Clip, Take, open_clip, parse_range
 from psvideo.strobe.runlog import as_played
 
 
@@ -23,26 +22,3 @@ def _as_played(clip: Clip) -> Clip:
     warnings = clip.warnings if played.warning is None else (*clip.warnings, played.warning)
     notes = clip.notes if played.note is None else (*clip.notes, played.note)
     return replace(clip, plan=played.plan, warnings=warnings, notes=notes)
-
-
-def say_of_clip(clip: Clip, caller: Caller) -> None:
-    """Hand on what is odd about a clip."""
-    for warning in clip.warnings:
-        caller.warn(warning)
-    for note in clip.notes:
-        caller.detail(note)
-
-
-def say_kept(kept: Kept | None, caller: Caller) -> None:
-    """Say how much disk the decoded frames took, and which of them found no room there."""
-    if kept is None:
-        return
-    caller.detail(
-        f"{len(kept)} decoded frames ({kept.bytes_held / 1e9:.2f} GB) were kept in a temporary file beside the output "
-        "and read back; the file is gone."
-    )
-    if kept.missed:
-        caller.warn(
-            f"{kept.missed} decoded frames found no room on the output's disk, half of whose free space may be taken, "
-            "and were decoded again where they were needed. Make room there, or name an output on another disk."
-        )
