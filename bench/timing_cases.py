@@ -240,8 +240,8 @@ def _holes() -> dict[str, Case]:
     plain = plan_of()
     at_random = tuple(np.random.default_rng(0).choice(np.arange(1, 300), 18, replace=False).tolist())
     return {
-        "dropped, numbers tell": Case(plan=plain, dropped=(31, 32, 60), told=True),
-        "dropped, nothing tells": Case(plan=plain, dropped=(31, 32, 60)),
+        "dropped, numbers show it": Case(plan=plain, dropped=(31, 32, 60), told=True),
+        "dropped, nothing shows it": Case(plan=plain, dropped=(31, 32, 60)),
         "dropped near either end": Case(plan=plain, dropped=(5, 90)),
         "one repeated": Case(plan=plain, repeated=(50,)),
         "one repeated for one dropped": Case(plan=plain, dropped=(40,), repeated=(39,)),

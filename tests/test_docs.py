@@ -105,7 +105,7 @@ def quotes(name: str) -> list[str]:
     """Return what the page of faults says that psvideo says: the quotations in the section of a fault's picture."""
     sections = (ROOT / "docs" / "troubleshooting.md").read_text(encoding="utf-8").split("\n## ")
     section = next(" ".join(one.split()) for one in sections if f"pictures/{name}.png" in one)
-    told = section.partition("**How psvideo tells.**")[2].partition("**What to do.**")[0]
+    told = section.partition("**What psvideo reports.**")[2].partition("**What to do.**")[0]
     return QUOTE.findall(told)
 
 
