@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from psvideo.capture.drawing.draw_svg import svg
-from psvideo.capture.drawing.picture import Label, Picture, Polygon
+from psvideo.capture.drawing.picture import Drawing, Label, Polygon
 
 PAPERS_MM = {"a4": (210.0, 297.0), "letter": (215.9, 279.4)}
 CROSS_DISTANCES_MM = (160.0, 220.0)
@@ -21,12 +21,12 @@ BAR_MM = 100
 INK, SOFT = "#000000", "#888888"
 
 
-def page(width_mm: float, height_mm: float) -> Picture:
+def page(width_mm: float, height_mm: float) -> Drawing:
     """Return one page; a unit of the picture is a millimetre."""
     middle = (width_mm / 2, height_mm / 2)
     shapes = [*_crosses(middle), *_seats(middle), *_patches(middle), *_bar(middle), *_words(middle)]
     paper = Polygon(points=((0, 0), (width_mm, 0), (width_mm, height_mm), (0, height_mm)), fill="#ffffff")
-    return Picture(width=width_mm, height=height_mm, shapes=(paper, *shapes))
+    return Drawing(width=width_mm, height=height_mm, shapes=(paper, *shapes))
 
 
 def _line(x0: float, y0: float, x1: float, y1: float, *, width: float = 0.25, colour: str = INK) -> Polygon:

@@ -11,7 +11,7 @@ import pytest
 from psvideo.cli.app import main
 from psvideo.clip import abilities
 from psvideo.inspect import speed
-from psvideo.inspect.doctor_finding import Finding, is_well
+from psvideo.inspect.findings import Finding, is_well
 
 
 @pytest.fixture(autouse=True)

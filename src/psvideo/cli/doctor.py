@@ -12,7 +12,7 @@ from psvideo.cli.console import Voice
 from psvideo.cli.options import Json, Quiet, Verbose
 
 if TYPE_CHECKING:
-    from psvideo.inspect.doctor_finding import Finding
+    from psvideo.inspect.findings import Finding
 
 SHOWN = {"ok": "ok", "note": "--", "missing": "MISSING"}
 
@@ -24,11 +24,10 @@ def doctor(
     quiet: Quiet = False,
 ) -> None:
     """Say what is installed, what the machine can do and what to do about the rest: exit status 1 where work stops."""
-    from psvideo.inspect.doctor_finding import is_well
-    from psvideo.inspect.machine import machine
+    from psvideo.inspect.findings import is_well
+    from psvideo.inspect.machine import machine, strobes
     from psvideo.inspect.software import software
     from psvideo.inspect.speed import speed
-    from psvideo.inspect.strobes import strobes
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     found = list(_one_by_one(chain(software(), machine(), strobes(), speed(folder)), voice))

@@ -1,6 +1,5 @@
 """psvideo info: say what a file or folder is and whether it fits together."""
 
-import dataclasses
 from pathlib import Path
 from typing import Annotated
 
@@ -27,7 +26,7 @@ def info(
         voice.say(f"  {finding.level:5} {finding.text}")
     for name, value in found.facts.items():
         voice.detail(f"  {name} = {value}")
-    findings = [dataclasses.asdict(finding) for finding in found.findings]
+    findings = [{"level": finding.level, "text": finding.text} for finding in found.findings]
     voice.result(
         {"path": str(path), "kind": found.kind, "fits": found.fits, "facts": found.facts, "findings": findings}
     )

@@ -1,4 +1,4 @@
-"""What was found out about a file or folder, and whether it fits together: records without judgement of their own."""
+"""What was found out about a file, a folder or this machine: records without judgement of their own."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -7,16 +7,34 @@ from typing import Literal
 
 from psvideo.errors import PsvideoError
 
-Level = Literal["ok", "warn", "FAULT"]
+Level = Literal["ok", "note", "warn", "missing", "FAULT"]
+STOPS = frozenset({"missing", "FAULT"})
+"""The levels at which work stops."""
+
 Fact = str | int | float | None | list[str] | list[int]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Finding:
-    """One line: ``ok`` is as it should be, ``warn`` may cost accuracy, with a ``FAULT`` the commands would stop."""
+    """One thing that was looked at, in a footage folder (``info``) or on this machine (``doctor``), and what it means.
 
+    ``ok``: as it should be. ``warn``: may cost accuracy. ``FAULT``: does not fit, commands would stop. Of the machine,
+    ``note``: not there or slow, and only some work needs it; ``missing``: psvideo cannot do its work. ``name`` is what
+    was looked at, ``next_step`` says what to do about it, ``value`` is the figure behind it in the unit that ``unit``
+    names; each empty (None) where there is none.
+    """
+
+    name: str = ""
     level: Level
     text: str
+    next_step: str = ""
+    value: float | None = None
+    unit: str = ""
+
+
+def is_well(findings: Iterable[Finding]) -> bool:
+    """True where nothing was found that would stop work."""
+    return all(finding.level not in STOPS for finding in findings)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,7 +49,7 @@ class Description:
     @property
     def fits(self) -> bool:
         """True where nothing was found that would stop a command."""
-        return all(finding.level != "FAULT" for finding in self.findings)
+        return is_well(self.findings)
 
 
 def ok(text: str) -> Finding:

@@ -1,4 +1,4 @@
-"""Processor, memory, C library, graphics processor."""
+"""Processor, memory, C library, graphics processor, and the boards at serial ports, of which none is opened."""
 
 import os
 import platform
@@ -6,7 +6,8 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from psvideo.inspect.doctor_finding import Finding
+from psvideo.inspect.findings import Finding
+from psvideo.strobe.link.controller import serial_ports
 
 ENOUGH_MEMORY_GB = 2.0
 DRIVERS = {"nvidia": Path("/proc/driver/nvidia/version"), "amd": Path("/sys/module/amdgpu/version")}
@@ -63,3 +64,18 @@ def _graphics() -> Finding:
     what = f"{' and '.join(found)} driver" if found else f"{len(nodes)} render node(s)" if nodes else "none found"
     text = f"{what}; psvideo computes on none, and a page in the browser uses what the browser has"
     return Finding(name="GPU", level="ok", text=text)
+
+
+def strobes() -> Iterator[Finding]:
+    """Give a finding for each board that is plugged in, or one that says that there is none."""
+    boards = [port for port in serial_ports() if port.is_candidate]
+    for port in boards:
+        step = f"psvideo strobe stop --port {port.device} asks it how it is."
+        yield Finding(name="strobe board", level="ok", text=port.label, next_step=step)
+    if not boards:
+        yield Finding(
+            name="strobe board",
+            level="note",
+            text="none at a USB port",
+            next_step="Only flashing lights needs one: plug it in and look again, or try --port emulated.",
+        )

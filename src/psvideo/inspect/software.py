@@ -7,7 +7,7 @@ from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 
 from psvideo.clip import abilities
-from psvideo.inspect.doctor_finding import Finding
+from psvideo.inspect.findings import Finding
 from psvideo.strobe.stand_ins.toolchain import why_not
 
 REINSTALL = "Install psvideo again in a fresh environment: pip install ."

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from psvideo.inspect.doctor_finding import Finding, Level
+from psvideo.inspect.findings import Finding, Level
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.woodham1980 import solve
 
