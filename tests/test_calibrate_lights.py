@@ -12,7 +12,7 @@ from psvideo.calibrate.guess import guess_rig
 from psvideo.calibrate.light_pictures import LightPictures, light_pictures
 from psvideo.calibrate.matte import measure_matte_sphere, sphere_normals
 from psvideo.calibrate.sphere.outline import given_outline
-from psvideo.calibrate.sphere.view import SphereView
+from psvideo.calibrate.sphere.sphere_view import SphereView
 from psvideo.calibrate.strengths import measure_strengths
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError

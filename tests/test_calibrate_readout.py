@@ -14,9 +14,9 @@ import pytest
 from numpy.typing import NDArray
 
 from psvideo.calibrate.stripes.error import Pulls, standard_error
-from psvideo.calibrate.stripes.fit import fit_stripes
-from psvideo.calibrate.stripes.pictures import LedPictures, in_colours, read_led_pictures
+from psvideo.calibrate.stripes.led_pictures import LedPictures, in_colours, read_led_pictures
 from psvideo.calibrate.stripes.readout import Led, Readout, measure_readout
+from psvideo.calibrate.stripes.waveform import fit_stripes
 from psvideo.capture import cameras
 from psvideo.cli.app import main
 from psvideo.clip.record import CodedPicture, Header

@@ -15,7 +15,7 @@ from psvideo.calibrate.light_pictures import LightPictures, averaged, light_pict
 from psvideo.calibrate.mirror.lights import MirrorCalibration, calibrate_lights
 from psvideo.calibrate.sphere.outline import find_outlines, given_outline
 from psvideo.calibrate.sphere.sighting import Looking, SphereNotFoundError, sight_spheres
-from psvideo.calibrate.sphere.view import SphereView
+from psvideo.calibrate.sphere.sphere_view import SphereView
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
 from psvideo.formats.rig_toml import parse_rig, read_rig

@@ -7,7 +7,7 @@ from bench.mirror_scene import Ball, Lamp, Lens
 
 from psvideo.calibrate.light_pictures import light_pictures
 from psvideo.calibrate.sphere.outline import Outline, find_outlines
-from psvideo.calibrate.sphere.view import SphereView
+from psvideo.calibrate.sphere.sphere_view import SphereView
 
 LENS = Lens(width=190, height=190, focal=800.0)
 BALL = Ball(centre=(0.01, -0.006, -0.6), radius_m=0.045)

@@ -15,7 +15,7 @@ import pytest
 
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.model.plan import Plan
-from psvideo.strobe.clock import ClockReading, fit_clock
+from psvideo.strobe.clock import ClockQuery, fit_clock
 from psvideo.strobe.link.boards import BOARDS, capabilities
 from psvideo.strobe.link.controller import OpenPort
 from psvideo.strobe.link.greeting import greet
@@ -406,7 +406,7 @@ def test_the_clock_is_found_within_its_bound(ppm: float, seed: int) -> None:
         trip = Trip(*(0.001 + rng.exponential(0.003, 2)))
         at_s = 100.0 + 0.2 * n
         ticks = int((at_s - 40.0) / tick_s)
-        readings.append(ClockReading(ticks=ticks, asked_s=at_s - trip.there_s, answered_s=at_s + trip.back_s))
+        readings.append(ClockQuery(ticks=ticks, asked_s=at_s - trip.there_s, answered_s=at_s + trip.back_s))
     fit = fit_clock(readings, tick_ps=500_000)
     assert fit is not None
     assert abs(fit.offset_ppm - ppm) <= fit.gain_error_ppm < 100
@@ -419,7 +419,7 @@ def test_a_clock_that_drifts_has_a_wider_bound() -> None:
     for n in range(100):
         at_s = 0.2 * n
         ticks = int((at_s + 1e-4 * at_s**2) / 0.5e-6)
-        readings.append(ClockReading(ticks=ticks, asked_s=at_s - 1e-4, answered_s=at_s + 1e-4))
+        readings.append(ClockQuery(ticks=ticks, asked_s=at_s - 1e-4, answered_s=at_s + 1e-4))
     fit = fit_clock(readings, tick_ps=500_000)
     assert fit is not None
     assert fit.gain_error_ppm > 1000
@@ -427,7 +427,7 @@ def test_a_clock_that_drifts_has_a_wider_bound() -> None:
 
 def test_one_reading_is_no_clock() -> None:
     assert fit_clock([], tick_ps=1) is None
-    assert fit_clock([ClockReading(ticks=5, asked_s=0, answered_s=1)] * 3, tick_ps=1) is None
+    assert fit_clock([ClockQuery(ticks=5, asked_s=0, answered_s=1)] * 3, tick_ps=1) is None
 
 
 def test_rounds_and_seconds_become_whole_cycles(make_plan: Callable[..., Plan]) -> None:

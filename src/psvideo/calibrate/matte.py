@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from psvideo.calibrate.light_pictures import LightPictures
 from psvideo.calibrate.sphere.outline import Outline
-from psvideo.calibrate.sphere.view import SphereView
+from psvideo.calibrate.sphere.sphere_view import SphereView
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import FloatArray
 from psvideo.model.rig import Light, Rig

@@ -17,8 +17,8 @@ from psvideo.cli.options import Frames, Json, PlanPath, Quiet, Verbose
 from psvideo.errors import PsvideoError, UsageError
 
 if TYPE_CHECKING:
-    from psvideo.calibrate.stripes.lines import MeasuredMode
     from psvideo.calibrate.stripes.readout import Led, Readout
+    from psvideo.calibrate.stripes.records import MeasuredMode
     from psvideo.calibrate.strobed_readout import StrobedReadout
 
 CRYSTAL_PPM = 100.0
@@ -81,9 +81,9 @@ def readout(
     quiet: Quiet = False,
 ) -> None:
     """Measure a camera's readout time from the stripes of an LED of known rate, or from a strobed clip."""
-    from psvideo.calibrate.stripes.lines import MeasuredMode, camera_line, record_line
-    from psvideo.calibrate.stripes.pictures import exact_rate, parse_columns, read_led_pictures
+    from psvideo.calibrate.stripes.led_pictures import exact_rate, parse_columns, read_led_pictures
     from psvideo.calibrate.stripes.readout import Led, measure_readout
+    from psvideo.calibrate.stripes.records import MeasuredMode, camera_line, record_line
     from psvideo.cli.typed import parse_positive_seconds, parse_rate
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
@@ -129,7 +129,7 @@ def _strobed(
     plan: Path | None,
     voice: Voice,
 ) -> None:
-    from psvideo.calibrate.stripes.lines import strobed_camera_line, strobed_record_line
+    from psvideo.calibrate.stripes.records import strobed_camera_line, strobed_record_line
     from psvideo.calibrate.strobed_readout import measure_take_readout
     from psvideo.sync.opening import open_take
 

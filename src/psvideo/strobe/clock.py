@@ -16,7 +16,7 @@ MOST_READINGS = 256
 
 
 @dataclass(frozen=True, kw_only=True)
-class ClockReading:
+class ClockQuery:
     """One clock query: the board's ticks, and between which two moments of the host's clock they were taken."""
 
     ticks: int
@@ -43,7 +43,7 @@ class ClockFit:
         return self.s_per_tick * ticks + self.offset_s
 
 
-def fit_clock(readings: Sequence[ClockReading], *, tick_ps: int) -> ClockFit | None:
+def fit_clock(readings: Sequence[ClockQuery], *, tick_ps: int) -> ClockFit | None:
     """Return the line through clock queries, weighted by their round trips; None for fewer than two moments."""
     kept = _thinned(readings)
     if len(kept) < 2:
@@ -77,12 +77,12 @@ def _gain(ticks: FloatArray, asked_s: FloatArray, answered_s: FloatArray, best: 
     return min(max(best, min(low, high)), max(low, high)), low, high
 
 
-def _thinned(readings: Sequence[ClockReading]) -> list[ClockReading]:
+def _thinned(readings: Sequence[ClockQuery]) -> list[ClockQuery]:
     """Keep the best query of each stretch of time, and one of several at the same tick."""
     if not readings:
         return []
     first, last = readings[0].ticks, readings[-1].ticks
-    best: dict[int, ClockReading] = {}
+    best: dict[int, ClockQuery] = {}
     for reading in readings:
         stretch = (reading.ticks - first) * (MOST_READINGS - 1) // max(last - first, 1)
         held = best.get(stretch)

@@ -13,7 +13,7 @@ from typing import Literal
 
 from psvideo.errors import PsvideoError
 from psvideo.model.plan import Plan
-from psvideo.strobe.clock import ClockFit, ClockReading, fit_clock
+from psvideo.strobe.clock import ClockFit, ClockQuery, fit_clock
 from psvideo.strobe.link.greeting import START_WITHIN_S, greet
 from psvideo.strobe.link.link import Link
 from psvideo.strobe.link.messages import (
@@ -150,7 +150,7 @@ class _Record:
     began_s: float | None = None
     start_tick: int = 0
     cycles: int = 0
-    readings: list[ClockReading] = field(default_factory=list)
+    readings: list[ClockQuery] = field(default_factory=list)
     ended: Ended = "done"
     fault: str | None = None
     message: str | None = None
@@ -167,7 +167,7 @@ def _follow(
     began_s = time.monotonic()
     while True:
         clock, asked_s, answered_s = link.read_clock()
-        record.readings.append(ClockReading(ticks=clock.ticks, asked_s=asked_s, answered_s=answered_s))
+        record.readings.append(ClockQuery(ticks=clock.ticks, asked_s=asked_s, answered_s=answered_s))
         status = link.ask(Stat(), Status)
         if status.state == "fault":
             return f"{status.fault}: {FAULTS[status.fault]}"

@@ -13,8 +13,8 @@ import numpy as np
 from psvideo.calibrate.light_pictures import LightPictures
 from psvideo.calibrate.sphere.rim_fit import Rim, RoughOutline, fit_rim, follow_rim, seek_rim
 from psvideo.calibrate.sphere.rim_model import Surface
-from psvideo.calibrate.sphere.search import Grey, round_things
-from psvideo.calibrate.sphere.view import SphereView
+from psvideo.calibrate.sphere.round_things import Grey, round_things
+from psvideo.calibrate.sphere.sphere_view import SphereView
 from psvideo.model.camera import FloatArray
 
 GIVEN_ERROR_PX = 0.5

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from psvideo.calibrate.sphere.rim_model import SHIFT_PX, Surface, across_rim, likely_blur, log_likelihood
-from psvideo.calibrate.sphere.search import Grey
-from psvideo.calibrate.sphere.view import SphereView
+from psvideo.calibrate.sphere.round_things import Grey
+from psvideo.calibrate.sphere.sphere_view import SphereView
 from psvideo.model.camera import FloatArray
 
 USUAL_STRETCH = 0.005

@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d  # type: ignore[attr-defined]
 
-from psvideo.calibrate.sphere.search import Grey
-from psvideo.calibrate.sphere.view import SphereView
+from psvideo.calibrate.sphere.round_things import Grey
+from psvideo.calibrate.sphere.sphere_view import SphereView
 from psvideo.model.camera import FloatArray
 
 Surface = Literal["mirror", "matte"]

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from psvideo.calibrate.light_pictures import LightPictures
 from psvideo.calibrate.mirror.highlights import FoundHighlight, Spot, find_highlights
 from psvideo.calibrate.sphere.outline import Outline, find_outlines, follow_outline, given_outline
-from psvideo.calibrate.sphere.search import Grey
-from psvideo.calibrate.sphere.view import SphereView
+from psvideo.calibrate.sphere.round_things import Grey
+from psvideo.calibrate.sphere.sphere_view import SphereView
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.model.camera import FloatArray
 

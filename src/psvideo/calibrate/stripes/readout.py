@@ -10,11 +10,11 @@ from fractions import Fraction
 
 import numpy as np
 
-from psvideo.calibrate.stripes.fit import StripeFit, fit_stripes
-from psvideo.calibrate.stripes.pictures import LedPictures
-from psvideo.calibrate.stripes.search import check_stripes, find_stripes
+from psvideo.calibrate.stripes.detection import check_stripes, find_stripes
+from psvideo.calibrate.stripes.led_pictures import LedPictures
 from psvideo.calibrate.stripes.spectrum import find_fainter
 from psvideo.calibrate.stripes.steps import Direction, find_direction
+from psvideo.calibrate.stripes.waveform import StripeFit, fit_stripes
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import FloatArray
 
