@@ -19,7 +19,7 @@ from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.sequence import LightPlate, Round
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.woodham1980 import solve
-from psvideo.synth.lamps.strobe import TrueFlash
+from psvideo.synth.lamps.true_flashes import TrueFlash
 from psvideo.synth.scene import Scene
 from psvideo.synth.stage import Stage, set_stage
 from psvideo.synth.truth import true_normals

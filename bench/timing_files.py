@@ -10,7 +10,7 @@ from psvideo.clip import Frame, open_clip, read_frames
 from psvideo.formats.plan_toml import format_plan
 from psvideo.model.plan import Plan
 from psvideo.synth.camera.curves import CURVES
-from psvideo.synth.camera.dpx import dpx_bytes
+from psvideo.synth.camera.dpx_writer import dpx_bytes
 from psvideo.synth.camera.encode import Codes
 from psvideo.synth.camera.frames import write_frame
 from psvideo.synth.scene import CameraTable

@@ -15,7 +15,7 @@ from psvideo.plates.split import Plate, split
 from psvideo.synth import TrueFlash
 from psvideo.synth.camera.sensor import seen_share
 from psvideo.synth.lamps.emission import Emission
-from psvideo.synth.lamps.strobe import row_opens_s
+from psvideo.synth.lamps.true_flashes import row_opens_s
 
 Picture = np.ndarray
 LEAST_SHARE = 0.05

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from psvideo.capture.drawing.draw_svg import svg
-from psvideo.capture.drawing.picture import Drawing, Label, Polygon
+from psvideo.capture.drawing.shapes import Drawing, Label, Polygon
 
 PAPERS_MM = {"a4": (210.0, 297.0), "letter": (215.9, 279.4)}
 CROSS_DISTANCES_MM = (160.0, 220.0)

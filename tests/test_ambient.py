@@ -17,7 +17,7 @@ from psvideo.plates.split import Plate, split
 from psvideo.synth import Noise, TrueClock
 from psvideo.synth.camera.noise import NOISELESS, frame_rng
 from psvideo.synth.camera.sensor import MainsSwing, expose_frames
-from psvideo.synth.lamps.strobe import true_flashes
+from psvideo.synth.lamps.true_flashes import true_flashes
 
 PlanMaker = Callable[..., Plan]
 AmbientOf = Callable[[int, np.ndarray], np.ndarray]

@@ -13,7 +13,7 @@ import pytest
 from psvideo.capture.drawing.diagram import check_diagram_name, diagram_text, write_diagram
 from psvideo.capture.drawing.draw_png import png
 from psvideo.capture.drawing.draw_svg import svg
-from psvideo.capture.drawing.picture import HEIGHT, LIGHT_COLOURS, WIDTH, Label, Polygon, timing_picture
+from psvideo.capture.drawing.shapes import HEIGHT, LIGHT_COLOURS, WIDTH, Label, Polygon, timing_picture
 from psvideo.capture.drawing.timeline import timeline
 from psvideo.errors import UsageError
 from psvideo.model.plan import Plan

@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 from ball_delivery import NUMBERS, SIZE, ball, deliver
 
-from psvideo.export.movie import write_movie
-from psvideo.export.png import PNG_MAX, encode_normals
+from psvideo.export.png_maps import PNG_MAX, encode_normals
+from psvideo.export.preview_movie import write_movie
 from psvideo.export.space import Space
 
 CLIENTS = Path(__file__).parent / "clients"

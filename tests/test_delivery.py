@@ -15,9 +15,9 @@ from psvideo.cli.app import main
 from psvideo.cli.typed import parse_weights
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.asked import Asked, delivery_of
-from psvideo.export.movie import even, write_movie
+from psvideo.export.otio import Footage, Images, timeline_text
+from psvideo.export.preview_movie import even, write_movie
 from psvideo.export.programs import Delivered, note
-from psvideo.export.timeline import Footage, Images, timeline_text
 from psvideo.model.choices import Program
 from psvideo.plates.beauty import Mix, beauty_of, mix_of
 from psvideo.plates.sequence import LightPlate, Round

@@ -18,9 +18,9 @@ from hypothesis.extra import numpy as hnp
 from psvideo import __version__
 from psvideo.compute.threads import writing
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.export.plates import write_flash, write_plate
-from psvideo.export.png import decode_normals, encode_normals
-from psvideo.export.results import Delivery, is_written, write_surface
+from psvideo.export.plate_files import write_flash, write_plate
+from psvideo.export.png_maps import decode_normals, encode_normals
+from psvideo.export.result_files import Delivery, is_written, write_surface
 from psvideo.export.space import Space, choose_space, placed
 from psvideo.export.tags import Tags
 from psvideo.export.usd.pose import read_pose

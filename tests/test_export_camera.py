@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.export.mesh import read_part, write_part
-from psvideo.export.results import Delivery
+from psvideo.export.mesh_files import read_part, write_part
+from psvideo.export.result_files import Delivery
 from psvideo.export.space import Space, choose_space, placed, placed_points
 from psvideo.export.usd.pose import read_pose
 from psvideo.model.rig import Rig

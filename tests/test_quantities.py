@@ -7,7 +7,7 @@ import pytest
 from ball_delivery import deliver
 
 from psvideo.export.planes import PICTURES, Made, planes_of
-from psvideo.export.results import Delivery
+from psvideo.export.result_files import Delivery
 from psvideo.export.space import Space
 from psvideo.model.quantities import ALWAYS, AOVS, QUANTITIES, SOURCES
 from psvideo.model.surface import Surface

@@ -18,9 +18,9 @@ from psvideo.model.plan import Plan
 from psvideo.strobe.clock import ClockQuery, fit_clock
 from psvideo.strobe.link.boards import BOARDS, capabilities
 from psvideo.strobe.link.controller import OpenPort
+from psvideo.strobe.link.exchange import Link, NoReplyError, RefusedError
 from psvideo.strobe.link.greeting import greet
 from psvideo.strobe.link.lines import seal
-from psvideo.strobe.link.link import Link, NoReplyError, RefusedError
 from psvideo.strobe.link.messages import Capabilities, Caps, Clear, Cleared, Keep, KeepSet, Run, Slot, Started
 from psvideo.strobe.link.ports import SerialPort, choose_port
 from psvideo.strobe.program import Program, make_program

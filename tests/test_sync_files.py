@@ -16,7 +16,7 @@ from psvideo.sync.of_take import find_take_timing
 from psvideo.sync.opening import open_take
 from psvideo.synth import Exposure, Noise, TrueClock, expose
 from psvideo.synth.camera.curves import CURVES
-from psvideo.synth.camera.dpx import dpx_bytes
+from psvideo.synth.camera.dpx_writer import dpx_bytes
 from psvideo.synth.camera.encode import Codes
 from psvideo.synth.camera.frames import write_frame
 from psvideo.synth.scene import CameraTable

@@ -18,7 +18,7 @@ from psvideo.sync.rowfit.fit import find
 from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.retime import regular_step, twins
 from psvideo.sync.rowfit.seed import find_seed
-from psvideo.sync.verdict.judge import convincing
+from psvideo.sync.verdict.believed import convincing
 from psvideo.sync.verdict.refusal import clock_too_far
 from psvideo.synth import Exposure, Noise, TrueClock, expose
 

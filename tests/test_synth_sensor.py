@@ -18,7 +18,7 @@ from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.synth import MainsSwing, Noise, TrueClock, expose
 from psvideo.synth.camera.sensor import seen_share
 from psvideo.synth.lamps.emission import Emission
-from psvideo.synth.lamps.strobe import TrueFlash, row_opens_s, true_flashes
+from psvideo.synth.lamps.true_flashes import TrueFlash, row_opens_s, true_flashes
 
 PERIOD_S = 0.01
 

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from psvideo.model.plan import Plan
-from psvideo.pictures.timing import timing_picture, write_sheet
+from psvideo.pictures.timing_sheet import timing_picture, write_sheet
 from psvideo.sync.find import find_timing
 from psvideo.sync.rowfit.profiles import residuals_of
 from psvideo.synth import TrueClock, expose

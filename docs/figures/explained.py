@@ -11,7 +11,7 @@ from psvideo.formats.plan_toml import read_plan
 from psvideo.formats.timing_json import read_timing
 from psvideo.model.shutter import row_weights
 from psvideo.model.surface import Surface
-from psvideo.pictures.shading import normal_colours, relit, srgb
+from psvideo.pictures.relighting import normal_colours, relit, srgb
 
 FRAME = 5
 LAMPS = {

@@ -10,7 +10,7 @@ import numpy as np
 from docs.figures.staging import SCENE, WIDTH_PX, Figure, Image, Pixels, exr, figure, film, frames, psvideo, row
 
 from psvideo.model.surface import Surface
-from psvideo.pictures.shading import normal_colours, relit, srgb
+from psvideo.pictures.relighting import normal_colours, relit, srgb
 
 BRIGHT = 1.7
 """Exposure of all pictures of frames and plates."""

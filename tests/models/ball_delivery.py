@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from psvideo.export.results import Delivery, write_surface
+from psvideo.export.result_files import Delivery, write_surface
 from psvideo.export.space import Space
 from psvideo.export.tags import Tags
 from psvideo.model.quantities import Aov

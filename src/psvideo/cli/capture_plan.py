@@ -100,7 +100,7 @@ def _list_cameras(voice: Voice) -> None:
     from rich.console import Console
 
     from psvideo.capture.cameras import camera_modes
-    from psvideo.capture.report import camera_table
+    from psvideo.capture.tables import camera_table
 
     if voice.json:
         modes = [{**dataclasses.asdict(mode), "fps": str(mode.fps)} for mode in camera_modes()]
@@ -128,7 +128,7 @@ def _deliver(shoot: Shoot, out: Path | None, voice: Voice) -> None:
 
 def _report(shoot: Shoot, preset: CameraMode | None, console: Console, *, diagram: str | None) -> None:
     from psvideo.capture.drawing.diagram import TERMINAL, diagram_text
-    from psvideo.capture.report import shoot_report
+    from psvideo.capture.tables import shoot_report
 
     if diagram == TERMINAL or (diagram is None and console.is_terminal):
         console.print(diagram_text(shoot.plan, width=min(console.width, WIDEST_DIAGRAM)))

@@ -51,7 +51,7 @@ def matte_sphere(
     from psvideo.calibrate.sphere.sighting import Looking
     from psvideo.formats.rig_toml import SCHEMA, format_rig
     from psvideo.pictures.matte_sphere import matte_picture
-    from psvideo.pictures.timing import write_sheet
+    from psvideo.pictures.timing_sheet import write_sheet
     from psvideo.runs.light_sets import Reading
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)

@@ -59,7 +59,7 @@ def mirror_sphere(
     from psvideo.calibrate.sphere.sighting import Looking, SphereNotFoundError, sight_spheres
     from psvideo.formats.rig_toml import SCHEMA, format_rig
     from psvideo.pictures.mirror_sphere import faulty_picture, sphere_picture
-    from psvideo.pictures.timing import write_sheet
+    from psvideo.pictures.timing_sheet import write_sheet
     from psvideo.runs.light_sets import Reading, open_light_sets
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)

@@ -62,8 +62,8 @@ def check(
 ) -> None:
     """Say whether a plan can be played, and how: on the board at a port, on one of the table, or on any of them."""
     from psvideo.formats.plan_toml import read_plan
-    from psvideo.strobe.describe import program_record
     from psvideo.strobe.program import make_program
+    from psvideo.strobe.program_words import program_record
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     planned, wanted = read_plan(plan), option.parse_wiring(wiring)
@@ -78,7 +78,7 @@ def check(
 
 
 def _caps_at(port: str, board: Board | None, wiring: WiringName | None) -> Capabilities:
-    from psvideo.strobe.link.link import Link
+    from psvideo.strobe.link.exchange import Link
     from psvideo.strobe.session import prepare
 
     opened = option.open_port(port, board=board)
@@ -96,8 +96,8 @@ def _caps_of(board: Board, wiring: WiringName | None) -> Capabilities:
 
 def _check_table(voice: Voice, plan: Plan, path: Path, wanted: WiringName | None, lines: dict[str, int]) -> None:
     """Check a plan against every board of the table and each of its wirings."""
-    from psvideo.strobe.describe import program_record
     from psvideo.strobe.program import make_program
+    from psvideo.strobe.program_words import program_record
 
     found: list[dict[str, object]] = []
     for board in BOARDS.values():
@@ -120,7 +120,7 @@ def _check_table(voice: Voice, plan: Plan, path: Path, wanted: WiringName | None
 
 def _tell_program(voice: Voice, plan: Plan, program: Program, caps: Capabilities) -> list[str]:
     """Describe a program, and return what to beware of."""
-    from psvideo.strobe.describe import describe_program, program_cautions
+    from psvideo.strobe.program_words import describe_program, program_cautions
     from psvideo.strobe.seizures import flicker_warning
 
     for line in describe_program(program, caps):
@@ -150,9 +150,9 @@ def run(
 ) -> None:
     """Play a plan until Ctrl-C, or for a time; whatever happens, the lights are dark afterwards."""
     from psvideo.formats.plan_toml import read_plan
-    from psvideo.strobe.describe import describe_program, program_cautions
-    from psvideo.strobe.link.link import Link
+    from psvideo.strobe.link.exchange import Link
     from psvideo.strobe.program import make_program
+    from psvideo.strobe.program_words import describe_program, program_cautions
     from psvideo.strobe.runlog import format_log, log_record, run_log
     from psvideo.strobe.session import prepare, run_program
 
@@ -250,8 +250,8 @@ def stop(
     quiet: Quiet = False,
 ) -> None:
     """Make a board dark, and say how it is."""
+    from psvideo.strobe.link.exchange import Link
     from psvideo.strobe.link.greeting import greet
-    from psvideo.strobe.link.link import Link
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     opened = option.open_port(port, board=None)

@@ -14,7 +14,7 @@ from psvideo.strobe.link.boards import BOARDS, Board
 from psvideo.strobe.link.messages import WIRINGS, WiringName
 
 if TYPE_CHECKING:
-    from psvideo.strobe.link.link import Port
+    from psvideo.strobe.link.exchange import Port
 
 EMULATED = "emulated"
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from psvideo.errors import UsageError
 from psvideo.export.programs import NO_PRESET, PRESETS, Preset
-from psvideo.export.results import Delivery
+from psvideo.export.result_files import Delivery
 from psvideo.export.space import choose_space
 from psvideo.model.choices import (
     CameraTime,

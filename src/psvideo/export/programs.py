@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from psvideo.export.results import Delivery, result_name
+from psvideo.export.result_files import Delivery, result_name
 from psvideo.model.choices import Program, SpaceName, YDirection
 from psvideo.model.quantities import Aov
 

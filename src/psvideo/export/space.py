@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.errors import UsageError
-from psvideo.export.usd.camera import USD_SUFFIXES, UpAxis, UsdCamera, open_usd_camera
 from psvideo.export.usd.pose import Pose, read_pose
+from psvideo.export.usd.usd_camera import USD_SUFFIXES, UpAxis, UsdCamera, open_usd_camera
 from psvideo.model.camera import FloatArray
 from psvideo.model.choices import CameraTime, SpaceName, YDirection
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.pictures.shading import smaller
+from psvideo.pictures.relighting import smaller
 
 MAGIC = b"PSVB"
 HALF_MAX = 65504.0

@@ -10,7 +10,7 @@ from psvideo.calibrate.mirror.lights import MirrorCalibration
 from psvideo.calibrate.sphere.sighting import Sighting
 from psvideo.model.camera import FloatArray
 from psvideo.pictures.contact import Pixels, Strip, Tile, sheet
-from psvideo.pictures.shading import srgb
+from psvideo.pictures.relighting import srgb
 
 WIDTH_PX = 1200
 TALLEST_PX = 1000

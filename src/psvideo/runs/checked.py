@@ -7,8 +7,8 @@ from pathlib import Path
 
 from psvideo import __version__
 from psvideo.formats.whole_files import write_text
+from psvideo.report.html import MARKS, PAGE, judgement_lines
 from psvideo.report.judgement import Judgement, usable, verdict_of
-from psvideo.report.page import MARKS, PAGE, judgement_lines
 from psvideo.report.style import STYLE
 
 SCHEMA = "psvideo-check/1"

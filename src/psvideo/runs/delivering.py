@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from psvideo.clip import Clip, Take
-from psvideo.export.plates import plate_name, write_plate
-from psvideo.export.results import Delivery, write_surface
+from psvideo.export.plate_files import plate_name, write_plate
+from psvideo.export.result_files import Delivery, write_surface
 from psvideo.export.space import Space
 from psvideo.export.tags import Tags
 from psvideo.formats.exr_files import HALF_MAX

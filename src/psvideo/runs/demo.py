@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from psvideo.clip import Clip, decoded_once, read_frames
 from psvideo.compute.progress import Watch, unwatched
-from psvideo.export.results import Delivery
+from psvideo.export.result_files import Delivery
 from psvideo.export.space import Space
 from psvideo.formats.whole_files import refuse_existing, whole_file
 from psvideo.model.rig import Vector
 from psvideo.model.surface import Surface
 from psvideo.pictures.contact import Strip, Tile, sheet
-from psvideo.pictures.shading import exposure_for, normal_colours, relit, srgb
+from psvideo.pictures.relighting import exposure_for, normal_colours, relit, srgb
 from psvideo.plates.timed import timing_of
 from psvideo.runs.lighting import read_lighting
 from psvideo.runs.output import Output

@@ -12,9 +12,9 @@ from urllib.parse import quote
 from psvideo.clip import Clip
 from psvideo.clip.folder import number_of
 from psvideo.compute.progress import Watch
+from psvideo.export.otio import Footage, Images, timeline_text
 from psvideo.export.programs import Delivered, note, note_name
-from psvideo.export.results import MOVIE_SUFFIXES, Delivery
-from psvideo.export.timeline import Footage, Images, timeline_text
+from psvideo.export.result_files import MOVIE_SUFFIXES, Delivery
 from psvideo.formats.whole_files import write_text
 from psvideo.model.choices import Codec, Preview
 from psvideo.runs.caller import Caller

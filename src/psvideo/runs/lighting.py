@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from psvideo.clip import DepthMaps, Take, open_depth, read_mask
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.export.results import Delivery
+from psvideo.export.result_files import Delivery
 from psvideo.formats.flat_toml import read_falloff
 from psvideo.formats.rig_toml import read_rig
 from psvideo.model.choices import NEAR_ITERATIONS

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.pictures.contact import Strip, Tile, sheet
-from psvideo.pictures.shading import exposure_for, normal_colours, smaller, srgb
+from psvideo.pictures.relighting import exposure_for, normal_colours, smaller, srgb
 from psvideo.plates.sequence import Round
 from psvideo.solve.instants import Instant
 

@@ -10,7 +10,7 @@ from psvideo.clip import Clip, Take
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.compute.threads import writing
 from psvideo.errors import PsvideoError
-from psvideo.export.plates import plate_name, write_flash, write_plate
+from psvideo.export.plate_files import plate_name, write_flash, write_plate
 from psvideo.export.tags import Tags
 from psvideo.formats.timing_json import format_timing
 from psvideo.formats.whole_files import write_text

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from psvideo.clip.decode import exr
 from psvideo.compute.progress import Watch
 from psvideo.model.choices import Codec, Preview
-from psvideo.pictures.shading import exposure_for, normal_colours, smaller, srgb
+from psvideo.pictures.relighting import exposure_for, normal_colours, smaller, srgb
 
 Pixels = NDArray[np.uint8]
 Image = NDArray[np.float32]
@@ -53,7 +53,10 @@ def write_preview(
 
     How bright pictures are shown is set by the first instant, for the whole movie.
     """
-    from psvideo.export.movie import even, write_movie  # FFmpeg's libraries take memory: only where a movie is made
+    from psvideo.export.preview_movie import (  # FFmpeg's libraries take memory: only where a movie is made
+        even,
+        write_movie,
+    )
 
     exposure = _exposure(preview, instants[0])
 

@@ -17,13 +17,13 @@ from psvideo.formats.whole_files import write_text
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Light, Rig
 from psvideo.model.timing import Timing
+from psvideo.report.html import report_page
 from psvideo.report.judge.light import ambient, exposure, lamps
 from psvideo.report.judge.result import focus, rig, steadiness, validity
 from psvideo.report.judge.time import coverage, motion, timing_and_order
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rigpoints import rig_points
-from psvideo.report.page import report_page
 from psvideo.report.run_report import LightFacts, RunReport, report_record
 from psvideo.runs.lighting import Lighting
 from psvideo.runs.output import Output

@@ -12,10 +12,10 @@ from psvideo.clip import Take
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.compute.threads import writing
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.export.mesh import animation_name
-from psvideo.export.results import Delivery, is_written, mesh_file
+from psvideo.export.mesh_files import animation_name
+from psvideo.export.result_files import Delivery, is_written, mesh_file
 from psvideo.export.tags import Tags
-from psvideo.export.usd.scene import write_animation
+from psvideo.export.usd.usd_animation import write_animation
 from psvideo.formats.timing_json import format_timing
 from psvideo.formats.whole_files import write_text
 from psvideo.model.choices import Solver
@@ -27,13 +27,13 @@ from psvideo.plates.sequence import AMBIENT
 from psvideo.report.observe.observed import InstantFacts
 from psvideo.report.run_report import RunReport
 from psvideo.runs.delivering import check_delivery, surface_job, world_doubts, write_plates
+from psvideo.runs.depths import shape_of
 from psvideo.runs.handover import Finished, write_note, write_previews, write_timeline
 from psvideo.runs.lighting import Lighting
 from psvideo.runs.look import look
 from psvideo.runs.output import Output, folder_of, settings_of, tags_of
 from psvideo.runs.plates import nothing_complete
 from psvideo.runs.reporting import Solved, observing, run_report, write_report
-from psvideo.runs.shape import shape_of
 from psvideo.solve.depth import Shaping, reservations
 from psvideo.solve.instants import Instant, denoised, surfaces
 from psvideo.solve.normals.solving import Solving, trust_note

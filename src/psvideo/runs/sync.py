@@ -11,7 +11,7 @@ from psvideo.formats.rig_toml import read_rig
 from psvideo.formats.timing_json import format_timing
 from psvideo.formats.whole_files import PICTURE_MARK, refuse_existing, write_text
 from psvideo.model.timing import Timing, places_in_time
-from psvideo.pictures.timing import timing_picture, write_sheet
+from psvideo.pictures.timing_sheet import timing_picture, write_sheet
 from psvideo.plates.naming import named_by_rig
 from psvideo.runs.caller import PYTHON, Caller, say_of_clip
 from psvideo.sync.of_take import TakeProfiles, take_profiles, timing_of_profiles

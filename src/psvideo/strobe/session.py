@@ -14,8 +14,8 @@ from typing import Literal
 from psvideo.errors import PsvideoError
 from psvideo.model.plan import Plan
 from psvideo.strobe.clock import ClockFit, ClockQuery, fit_clock
+from psvideo.strobe.link.exchange import Link
 from psvideo.strobe.link.greeting import START_WITHIN_S, greet
-from psvideo.strobe.link.link import Link
 from psvideo.strobe.link.messages import (
     Capabilities,
     Caps,

@@ -24,8 +24,8 @@ from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.refine import Fit
 from psvideo.sync.turns import turns
+from psvideo.sync.verdict.believed import judged
 from psvideo.sync.verdict.frame_remarks import remarks_on_frames
-from psvideo.sync.verdict.judge import judged
 from psvideo.sync.verdict.refusal import clock_too_far, nothing_to_find, why_not
 from psvideo.sync.verdict.remarks import remarks, remarks_on_lights
 

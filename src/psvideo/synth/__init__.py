@@ -6,7 +6,7 @@ It never uses the code that it is there to test: how a row integrates light is c
 from psvideo.synth.camera.exposure import Exposure, expose
 from psvideo.synth.camera.noise import Noise
 from psvideo.synth.camera.sensor import MainsSwing
-from psvideo.synth.lamps.strobe import TrueClock, TrueFlash
+from psvideo.synth.lamps.true_flashes import TrueClock, TrueFlash
 from psvideo.synth.scene import Scene, read_scene
 from psvideo.synth.scenes import builtin_scene
 from psvideo.synth.shoot import VirtualTake, shoot

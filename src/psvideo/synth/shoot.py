@@ -18,8 +18,8 @@ from psvideo.synth.camera.encode import codes_of, mosaic, noise_of
 from psvideo.synth.camera.frames import SUFFIX, write_frame
 from psvideo.synth.camera.noise import frame_rng
 from psvideo.synth.camera.sensor import Image, MainsSwing, expose_frames
-from psvideo.synth.lamps.strobe import TrueClock, TrueFlash, true_flashes
 from psvideo.synth.lamps.traced import TraceOptions, traced_light
+from psvideo.synth.lamps.true_flashes import TrueClock, TrueFlash, true_flashes
 from psvideo.synth.scene import read_scene
 from psvideo.synth.scenes import scene_file
 from psvideo.synth.shotplan import claimed_plan, true_clock

@@ -9,7 +9,7 @@ from psvideo.model.camera import Camera, Encoding, exposure_of
 from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.model.rig import Light, Rig, Vector
 from psvideo.synth.camera.encode import codes_of
-from psvideo.synth.lamps.strobe import TrueClock
+from psvideo.synth.lamps.true_flashes import TrueClock
 from psvideo.synth.scene import CameraTable, Kind, LightTable, Scene
 
 

@@ -14,7 +14,7 @@ from psvideo.model.plan import Plan
 from psvideo.model.rig import Rig
 from psvideo.synth.camera.sensor import Image
 from psvideo.synth.lamps.emission import Emission
-from psvideo.synth.lamps.strobe import TrueFlash, row_opens_s
+from psvideo.synth.lamps.true_flashes import TrueFlash, row_opens_s
 from psvideo.synth.scene import Scene
 from psvideo.synth.shotplan import true_plan, true_rig
 from psvideo.synth.subject.body import Body, make_body

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from psvideo.formats.exr_files import write_exr
 from psvideo.model.plan import Plan
-from psvideo.synth.lamps.strobe import TrueClock, TrueFlash
 from psvideo.synth.lamps.traced import TracedLight
+from psvideo.synth.lamps.true_flashes import TrueClock, TrueFlash
 from psvideo.synth.scene import Scene
 from psvideo.synth.subject.render import Hits
 

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.capture.drawing.picture import Drawing, Label, Polygon
+from psvideo.capture.drawing.shapes import Drawing, Label, Polygon
 from psvideo.errors import PsvideoError
 
 Canvas = NDArray[np.uint8]

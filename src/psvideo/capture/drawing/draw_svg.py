@@ -2,7 +2,7 @@
 
 from xml.sax.saxutils import escape
 
-from psvideo.capture.drawing.picture import Drawing, Label, Polygon
+from psvideo.capture.drawing.shapes import Drawing, Label, Polygon
 
 FONT = "DejaVu Sans, Helvetica, Arial, sans-serif"
 

@@ -14,7 +14,7 @@ import numpy as np
 from av.container import InputContainer
 from av.video.stream import VideoStream
 
-from psvideo.clip.decode.planes import planes
+from psvideo.clip.decode.ffmpeg_planes import planes
 from psvideo.clip.decode.yuv import CODES, HIGHEST, LOWEST, LUMA_WEIGHTS, signal_range, to_rgb
 from psvideo.clip.record import CodedPicture, Header
 from psvideo.errors import PsvideoError

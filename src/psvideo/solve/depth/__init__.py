@@ -6,8 +6,8 @@ it a scale, ``shaping`` keeps that over a clip, and ``mesh`` makes triangles of 
 """
 
 from psvideo.solve.depth.bilateral import Height, Integration, integrate
-from psvideo.solve.depth.depth import Depth, scaled
 from psvideo.solve.depth.mesh import Mesh, mesh_of
+from psvideo.solve.depth.scale import Depth, scaled
 from psvideo.solve.depth.shaping import Shaping, begun, depth_of, reservations
 from psvideo.solve.depth.view import View, view_of
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.camera import FloatArray
-from psvideo.solve.depth.rounds import BILATERAL, SMOOTH, Held, Integration, find_height
+from psvideo.solve.depth.integration import BILATERAL, SMOOTH, Held, Integration, find_height
 from psvideo.solve.depth.view import Slopes, View, slopes_of
 
 Mask = NDArray[np.bool_]

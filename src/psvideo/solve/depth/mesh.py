@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.surface import Surface
-from psvideo.solve.depth.depth import Depth
+from psvideo.solve.depth.scale import Depth
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from psvideo.model.surface import Surface
 from psvideo.solve.depth.bilateral import BILATERAL, Before, Height, Integration, integrate
-from psvideo.solve.depth.depth import Depth, Plane, scaled
+from psvideo.solve.depth.scale import Depth, Plane, scaled
 from psvideo.solve.depth.view import View
 
 

@@ -4,7 +4,7 @@ import time
 from itertools import chain, repeat
 
 from psvideo.errors import PsvideoError
-from psvideo.strobe.link.link import Link
+from psvideo.strobe.link.exchange import Link
 from psvideo.strobe.link.messages import PROTOCOL, Id, Identity
 from psvideo.strobe.link.protocol import format_request
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from psvideo.model.plan import Plan
 from psvideo.synth.camera.noise import NOISELESS, Noise, frame_rng
 from psvideo.synth.camera.sensor import Image, MainsSwing, expose_frames, plates_by_slot
-from psvideo.synth.lamps.strobe import TrueClock, TrueFlash, true_flashes
+from psvideo.synth.lamps.true_flashes import TrueClock, TrueFlash, true_flashes
 
 
 @dataclass(frozen=True, kw_only=True)

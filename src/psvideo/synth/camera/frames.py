@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError
 from psvideo.formats.exr_files import write_exr
-from psvideo.synth.camera.dpx import dpx_bytes
+from psvideo.synth.camera.dpx_writer import dpx_bytes
 from psvideo.synth.camera.encode import Codes
 from psvideo.synth.scene import CameraTable, Kind
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from psvideo.model.camera import Camera, FloatArray
 from psvideo.model.plan import Plan
 from psvideo.synth.lamps.emission import Emission
-from psvideo.synth.lamps.strobe import TrueFlash, row_opens_s
+from psvideo.synth.lamps.true_flashes import TrueFlash, row_opens_s
 
 Image = NDArray[np.float32]
 

@@ -14,8 +14,8 @@ from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.trace_csv import Trace, merged_pulses, read_trace
 from psvideo.model.plan import Plan
 from psvideo.synth.lamps.emission import Emission
-from psvideo.synth.lamps.strobe import TrueClock, TrueFlash, clip_end_s, is_complete
 from psvideo.synth.lamps.traced_slots import Pulse, check_lines, flash_pulses, wired_lines
+from psvideo.synth.lamps.true_flashes import TrueClock, TrueFlash, clip_end_s, is_complete
 from psvideo.synth.scene import Scene
 
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.export.mesh import mesh_name, write_part, write_ply
+from psvideo.export.mesh_files import mesh_name, write_part, write_ply
 from psvideo.export.planes import Made, planes_of
-from psvideo.export.png import PNG_MAX, encode_normals, write_png16
+from psvideo.export.png_maps import PNG_MAX, encode_normals, write_png16
 from psvideo.export.space import Space
 from psvideo.export.tags import Tags
 from psvideo.formats.exr_files import write_exr, write_exr_parts

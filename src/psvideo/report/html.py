@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.pictures.charts import Axes, ChartLine, line_chart, stops_chart
-from psvideo.pictures.shading import normal_colours
+from psvideo.pictures.relighting import normal_colours
 from psvideo.report.judgement import Judgement, gravest_first, usable
 from psvideo.report.observe.levels import STOPS, TARGET_QUANTILE
 from psvideo.report.observe.observed import InstantFacts

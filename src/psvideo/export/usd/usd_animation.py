@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from psvideo import __version__
-from psvideo.export.mesh import read_part
+from psvideo.export.mesh_files import read_part
 from psvideo.export.space import CAMERA_SPACE, Space
 from psvideo.formats.whole_files import whole_file
 from psvideo.solve.depth.mesh import Mesh
