@@ -1,9 +1,12 @@
 """What share of which flash each row of each frame saw.
 
 Row i of frame n is open over ``[a, a + exposure)`` and flash k is on over ``[s, s + d)``, both on the camera's clock.
-The weight is their overlap as a share of the flash: 1 where the row saw all of it, 0 where it saw nothing. Against the
-flash's start it is a trapezoid. This is the one model that finding the timing and rebuilding the plates share.
+The weight is the share of the flash's light that the row collected: 1 where it saw all of it, 0 where it saw nothing.
+Against a square flash's start it is a trapezoid; an LED that rises and falls slowly rounds it. This is the one model
+that finding the timing and rebuilding the plates share.
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +14,52 @@ from numpy.typing import NDArray
 from psvideo.model.camera import Camera, FloatArray
 
 IntArray = NDArray[np.int64]
+REACH = 9.0
+"""After so many fall times a flash is over: e^-9 of its last light is left, a ten-thousandth."""
 
 
-def row_weights(camera: Camera, start_s: FloatArray, duration_s: FloatArray, *, frames: range) -> FloatArray:
+@dataclass(frozen=True, kw_only=True)
+class Pulse:
+    """How an LED answers its drive: 1/e rise and fall times in seconds, 0 for a square flash."""
+
+    rise_s: float = 0.0
+    fall_s: float = 0.0
+
+    @property
+    def tail_s(self) -> float:
+        """How long after its drive ends a flash still gives light."""
+        return REACH * self.fall_s
+
+    def given_off(self, since_s: FloatArray, duration_s: FloatArray) -> FloatArray:
+        """Return the share of its light, 0 to 1, that a flash has given off ``since_s`` after its drive's start.
+
+        Both are arrays that broadcast. The drive lasts ``duration_s``; the light rises as ``1 - exp(-t / rise_s)`` and
+        falls as ``exp(-t / fall_s)``.
+
+        >>> slow = Pulse(rise_s=1e-4, fall_s=1e-4)
+        >>> slow.given_off(np.array([0.0, 0.0008, 0.01]), np.array(0.0008)).round(3)
+        array([0.   , 0.875, 1.   ])
+        """
+        lit_s, after_s = np.clip(since_s, 0.0, duration_s), np.maximum(since_s - duration_s, 0.0)
+        given_s, whole_s = np.asarray(lit_s, np.float64), np.asarray(duration_s, np.float64)
+        reached: FloatArray = np.ones_like(whole_s)
+        if self.rise_s > 0:
+            given_s = lit_s + self.rise_s * np.expm1(-lit_s / self.rise_s)
+            reached = -np.expm1(-whole_s / self.rise_s)
+            whole_s = whole_s - self.rise_s * reached
+        if self.fall_s > 0:
+            given_s = given_s - reached * self.fall_s * np.expm1(-after_s / self.fall_s)
+            whole_s = whole_s + reached * self.fall_s
+        share: FloatArray = given_s / whole_s
+        return share
+
+
+SQUARE = Pulse()
+
+
+def row_weights(
+    camera: Camera, start_s: FloatArray, duration_s: FloatArray, *, frames: range, pulse: Pulse = SQUARE
+) -> FloatArray:
     """Return the fraction of each flash that each row saw in each frame, shape (flash, frame, row), 0 to 1.
 
     ``start_s`` and ``duration_s`` have shape (flash,) and are on the camera's clock; ``frames`` are frame indices.
@@ -29,12 +75,18 @@ def row_weights(camera: Camera, start_s: FloatArray, duration_s: FloatArray, *, 
     )
     on_s = np.asarray(start_s, np.float64)[:, None, None]
     length_s = np.asarray(duration_s, np.float64)[:, None, None]
+    if pulse != SQUARE:
+        since_s = opens_s - on_s
+        seen: FloatArray = pulse.given_off(since_s + camera.exposure_s, length_s) - pulse.given_off(since_s, length_s)
+        return seen
     overlap_s = np.minimum(opens_s + camera.exposure_s, on_s + length_s) - np.maximum(opens_s, on_s)
     weights: FloatArray = np.clip(overlap_s, 0.0, None) / length_s
     return weights
 
 
-def frames_touched(camera: Camera, start_s: FloatArray, duration_s: FloatArray) -> tuple[IntArray, IntArray]:
+def frames_touched(
+    camera: Camera, start_s: FloatArray, duration_s: FloatArray, *, pulse: Pulse = SQUARE
+) -> tuple[IntArray, IntArray]:
     """Return the first and the last frame of which any row sees any of each flash, each of shape (flash,).
 
     Two or three frames at 360 degrees with a long readout (§3.3), often one where the readout is short; frames before
@@ -49,5 +101,5 @@ def frames_touched(camera: Camera, start_s: FloatArray, duration_s: FloatArray) 
     offsets_s = camera.row_offsets_s()
     period_s = camera.frame_period_s
     first = np.floor((start_s - offsets_s.max() - camera.exposure_s) / period_s) + 1
-    last = np.ceil((start_s + duration_s - offsets_s.min()) / period_s) - 1
+    last = np.ceil((start_s + duration_s + pulse.tail_s - offsets_s.min()) / period_s) - 1
     return first.astype(np.int64), last.astype(np.int64)

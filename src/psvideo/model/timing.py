@@ -8,6 +8,7 @@ import numpy as np
 
 from psvideo.model.camera import Camera, FloatArray
 from psvideo.model.plan import HasLights, Plan
+from psvideo.model.shutter import Pulse
 
 Order = Literal["marker", "rig", "given", "guess"]
 
@@ -56,6 +57,8 @@ class Timing:
     dropped_frames: tuple[DroppedFrames, ...] = ()
     repeated_frames: tuple[int, ...] = ()
     order_note: str = ""
+    rise_s: float = 0.0
+    fall_s: float = 0.0
     notes: tuple[str, ...] = field(default=(), compare=False)
     row_time_error_s: float | None = field(default=None, compare=False)
     phase_error_s: float | None = field(default=None, compare=False)
@@ -74,6 +77,11 @@ class Timing:
             f"{self.phase_error_s * 1e6:.2g} us" if self.phase_error_s < 1e-3 else f"{self.phase_error_s * 1e3:.2g} ms"
         )
         return f"Flash times are sure to {times}, {rows}." if self.row_time_s else f"Flash times are sure to {times}."
+
+    @property
+    def pulse(self) -> Pulse:
+        """How the LEDs answer their drive, as it was given or found."""
+        return Pulse(rise_s=self.rise_s, fall_s=self.fall_s)
 
     @property
     def start_s(self) -> FloatArray:
