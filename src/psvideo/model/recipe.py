@@ -21,6 +21,8 @@ from psvideo.model.camera import Camera, FloatArray
 from psvideo.model.shutter import Pulse, frames_touched, row_weights
 from psvideo.model.timing import Flash, Timing
 
+Flags = NDArray[np.bool_]
+
 WHOLE = 1.0 - 1e-9
 """A row that saw this share of a square flash saw all of it; ..."""
 WHOLE_BUT_TAIL = 1.0 - 1e-3
@@ -49,7 +51,7 @@ class FlashRecipe:
 
     frames: tuple[int, ...]
     coefficients: FloatArray
-    seen: NDArray[np.bool_]
+    seen: Flags
 
     @property
     def exposures(self) -> FloatArray:
@@ -102,7 +104,7 @@ def _whole(pulse: Pulse) -> float:
     return WHOLE_BUT_TAIL if pulse.fall_s > 0 else WHOLE
 
 
-def _separated(weights: FloatArray, *, whole: float, dark: bool) -> tuple[FloatArray, NDArray[np.bool_]]:
+def _separated(weights: FloatArray, *, whole: float, dark: bool) -> tuple[FloatArray, Flags]:
     """Return the coefficients (frame, row) of the first of the flashes, and which rows are seen.
 
     ``weights`` is (flash, frame, row).
@@ -136,15 +138,15 @@ def _first(weights: FloatArray, flash: int, *, whole: float, dark: bool) -> Floa
     return coefficients
 
 
-def _taken_off(first: FloatArray, weights: FloatArray, *, dark: bool) -> tuple[FloatArray, NDArray[np.bool_]]:
+def _taken_off(first: FloatArray, weights: FloatArray, *, dark: bool) -> tuple[FloatArray, Flags]:
     """Return the first flash's coefficients (frame, row) with the others taken off, and the rows where they cannot be.
 
     A flash of which no frame there saw enough cannot be taken off where it reaches into the sum.
     """
     holds = np.einsum("jfr,kfr->rjk", first, weights)  # what the sum for flash j holds of flash k
-    known = first.any(axis=1)  # (flash, row)
+    known: Flags = np.asarray(first.any(axis=1))  # (flash, row)
     unknown = np.abs(holds[:, 0, 1:]) * ~known.T[:, 1:]
-    lost = np.asarray((unknown > MOST_LEFT).any(axis=1))
+    lost: Flags = (unknown > MOST_LEFT).max(axis=1, initial=False)
     matrix = np.where(known.T[:, :, None], holds, np.eye(len(weights)))
     if dark:
         matrix[:, :, 0], matrix[:, 0, 0] = 0.0, 1.0
