@@ -34,6 +34,8 @@ class _TimingFile(Contract):
     exposure_s: float = Field(gt=0)
     row_time_s: float
     clock_offset_ppm: float
+    rise_s: float = Field(default=0.0, ge=0)
+    fall_s: float = Field(default=0.0, ge=0)
     phase_error_rows: float = Field(ge=0)
     order: Order
     order_note: str = ""
@@ -72,6 +74,8 @@ def timing_record(timing: Timing) -> dict[str, object]:
         "exposure_s": timing.exposure_s,
         "row_time_s": timing.row_time_s,
         "clock_offset_ppm": timing.clock_offset_ppm,
+        "rise_s": timing.rise_s,
+        "fall_s": timing.fall_s,
         "phase_error_rows": timing.phase_error_rows,
         "order": timing.order,
         **order_note,

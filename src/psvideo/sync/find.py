@@ -198,6 +198,8 @@ def _assemble(
         row_time_s=row_time_s,
         clock_offset_ppm=beat.clock.mean_offset_ppm(),
         phase_error_rows=found.fit.shift_error_s / (abs(row_time_s) or camera.frame_period_s / camera.height_px),
+        rise_s=beat.rise_s,
+        fall_s=beat.fall_s,
         order=order,
         dropped_frames=dropped,
         repeated_frames=repeated,

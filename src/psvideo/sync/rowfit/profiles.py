@@ -217,7 +217,7 @@ def residuals_of(plan: Plan, timing: Timing, index: IntArray, value: FloatArray)
     unknown = slot_unknowns(plan)
     slots = [flash.slot for flash in timing.flashes]
     flashes = kernel.Flashes(
-        timing.start_s, timing.duration_s, unknown[slots], int(unknown.max()) + 1, plan.rise_s, plan.fall_s
+        timing.start_s, timing.duration_s, unknown[slots], int(unknown.max()) + 1, timing.rise_s, timing.fall_s
     )
     rest = np.empty(value.shape)
     kernel.rests(rows, flashes, np.ones(value.shape), 0, height, rest)
