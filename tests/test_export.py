@@ -7,6 +7,7 @@ import sys
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import OpenEXR
@@ -26,6 +27,7 @@ from psvideo.export.tags import Tags
 from psvideo.export.usd.pose import read_pose
 from psvideo.formats.exr_files import Crop, write_exr
 from psvideo.formats.whole_folders import whole_folder
+from psvideo.model.choices import Compression
 from psvideo.model.surface import Surface
 from psvideo.model.timing import Flash
 from psvideo.plates.sequence import LightPlate
@@ -259,6 +261,7 @@ def test_a_fault_in_a_writing_thread_reaches_the_run() -> None:
 FULL_DISK = """
 import resource, sys, numpy as np
 from pathlib import Path
+from typing import get_args
 from psvideo.errors import PsvideoError
 from psvideo.formats.exr_files import write_exr
 resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
@@ -278,3 +281,12 @@ def test_a_full_disk_is_told_and_leaves_nothing(tmp_path: Path) -> None:
     assert "cannot be written" in told
     assert not list(tmp_path.iterdir())
     assert resource.getrlimit(resource.RLIMIT_FSIZE)[0] != 4096
+
+
+@pytest.mark.parametrize("compression", get_args(Compression))
+def test_every_compression_is_without_loss(tmp_path: Path, compression: Compression) -> None:
+    noisy = np.random.default_rng(4).normal(size=(37, 53)).astype(np.float32)
+    write_exr(tmp_path / "noisy.exr", {"Y": noisy}, half=False, compression=compression)
+    read = OpenEXR.File(str(tmp_path / "noisy.exr"), separate_channels=True)
+    np.testing.assert_array_equal(read.channels()["Y"].pixels, noisy)
+    assert str(read.header()["compression"]).lower().startswith(f"compression.{compression.replace('none', 'no')}_")

@@ -13,7 +13,7 @@ from psvideo.export.png_maps import PNG_MAX, encode_normals, write_png16
 from psvideo.export.space import Space
 from psvideo.export.tags import Tags
 from psvideo.formats.exr_files import write_exr, write_exr_parts
-from psvideo.model.choices import Codec, Preview, Program
+from psvideo.model.choices import Codec, Compression, Preview, Program
 from psvideo.model.quantities import ALWAYS, AOVS, QUANTITIES, SOURCES, Aov, is_half
 from psvideo.model.surface import Surface
 from psvideo.plates.beauty import Mix
@@ -42,6 +42,7 @@ class Delivery:
     previews: tuple[Preview, ...] = ()
     codec: Codec = "vp9"
     program: Program | None = None
+    compression: Compression = "zip"
 
     @property
     def needs_depth(self) -> bool:
@@ -121,6 +122,7 @@ def write_surface(
             attributes=attributes[name],
             fps=tags.fps,
             time_code=tags.time_code(time_s),
+            compression=delivery.compression,
         )
     if delivery.multipart:
         write_exr_parts(
@@ -130,6 +132,7 @@ def write_surface(
             attributes=attributes,
             fps=tags.fps,
             time_code=tags.time_code(time_s),
+            compression=delivery.compression,
         )
     if delivery.png16:
         texts = {key: str(value) for key, value in attributes["normals"].items()}

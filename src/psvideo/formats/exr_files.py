@@ -1,4 +1,4 @@
-"""One EXR file: named channels with their attributes, losslessly compressed (ZIP), whole or not at all.
+"""One EXR file: named channels with their attributes, losslessly compressed, whole or not at all.
 
 The picture is encoded in memory and then written as bytes, so that a full disk is an ordinary error: OpenEXR itself
 swallows what goes wrong while it closes a file, and leaves a truncated one.
@@ -16,9 +16,18 @@ from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError
 from psvideo.formats.whole_files import whole_file
+from psvideo.model.choices import Compression
 
 HALF_MAX = 65504.0  # the largest finite half float
 _INT32_MAX = 2**31 - 1
+
+_COMPRESSIONS: dict[Compression, object] = {
+    "zip": OpenEXR.ZIP_COMPRESSION,
+    "zips": OpenEXR.ZIPS_COMPRESSION,
+    "piz": OpenEXR.PIZ_COMPRESSION,
+    "rle": OpenEXR.RLE_COMPRESSION,
+    "none": OpenEXR.NO_COMPRESSION,
+}
 
 Channels = Mapping[str, NDArray[np.floating]]
 Attribute = str | int | float | Fraction
@@ -43,6 +52,7 @@ def write_exr(
     fps: Fraction | None = None,
     time_code: str | None = None,
     crop: Crop | None = None,
+    compression: Compression = "zip",
 ) -> None:
     """Write one picture; the file appears under its name when it is whole, and folders are made as needed.
 
@@ -59,7 +69,7 @@ def write_exr(
     shapes = {plane.shape for plane in planes.values()}
     if len(shapes) != 1:
         raise ValueError(f"{path}: the channels' planes differ in shape or there are none: {sorted(shapes)}")
-    header = dict(attributes or {}) | _header(shapes.pop(), fps, time_code, crop)
+    header = dict(attributes or {}) | _header(shapes.pop(), fps, time_code, crop, compression)
     with whole_file(path) as beside:
         beside.write_bytes(_encoded(path, header, planes))
 
@@ -82,7 +92,11 @@ def _plane(name: str, values: NDArray[np.floating], half: bool) -> NDArray[np.fl
 
 
 def _header(
-    shape: tuple[int, ...], fps: Fraction | None, time_code: str | None, crop: Crop | None
+    shape: tuple[int, ...],
+    fps: Fraction | None,
+    time_code: str | None,
+    crop: Crop | None,
+    compression: Compression,
 ) -> dict[str, object]:
     rows, cols = shape
     whole = crop or Crop(row=0, col=0, full_height_px=rows, full_width_px=cols)
@@ -90,7 +104,7 @@ def _header(
         raise ValueError(f"a part of {rows} x {cols} pixels does not lie inside {whole}")
     header: dict[str, object] = {
         "type": OpenEXR.scanlineimage,
-        "compression": OpenEXR.ZIP_COMPRESSION,
+        "compression": _COMPRESSIONS[compression],
         "dataWindow": _box(whole.row, whole.col, rows, cols),
         "displayWindow": _box(0, 0, whole.full_height_px, whole.full_width_px),
     }
@@ -132,6 +146,7 @@ def write_exr_parts(
     attributes: Mapping[str, Mapping[str, Attribute]],
     fps: Fraction | None = None,
     time_code: str | None = None,
+    compression: Compression = "zip",
 ) -> None:
     """Write one file with a part per name; each has its own channels and ``attributes``, else as ``write_exr``.
 
@@ -141,7 +156,7 @@ def write_exr_parts(
     for name, channels in parts.items():
         short = half if isinstance(half, bool) else half[name]
         planes = {channel: _plane(channel, values, short) for channel, values in channels.items()}
-        header = dict(attributes[name]) | _header(next(iter(planes.values())).shape, fps, time_code, None)
+        header = dict(attributes[name]) | _header(next(iter(planes.values())).shape, fps, time_code, None, compression)
         built.append(OpenEXR.Part(header, planes, name))
     with whole_file(path) as beside:
         beside.write_bytes(_bytes_of(path, lambda: OpenEXR.File(built)))

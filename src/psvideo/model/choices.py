@@ -26,6 +26,9 @@ PlatesPreview = Literal["plates", "beauty"]
 """What a movie of plates shows, where nothing is solved."""
 Codec = Literal["vp9", "prores"]
 """How movies are coded."""
+Compression = Literal["zip", "zips", "piz", "rle", "none"]
+"""How pixels are packed, always without loss. ZIP is read everywhere; ZIPS (single lines) suits Nuke, RLE fast disks.
+DWAA, DWAB and B44 lose data, and which they lose depends on the channels' names: they are not offered."""
 Program = Literal["nuke", "blender", "unreal", "houdini"]
 """The programs that a delivery can be made for."""
 Prior = Literal["equal-lights", "equal-albedo"]
