@@ -33,10 +33,12 @@ NO_FOREIGN = 1e-5
 """Less of another flash in a row is below the last bit of a code."""
 MOST_FOREIGN = 0.3
 """A frame's row into which more of other flashes was mixed than this is not used."""
+CLEAN = 0.01
+"""A dark slot's exposures that saw less of other flashes are enough by themselves where there are any."""
 MOST_LEFT = 0.01
 """Of another flash that cannot be taken off so much may be left in a row; with more it is unseen."""
 MOST_GAIN = 2.5
-"""A row whose coefficients' squares sum to more would be mostly noise, and is unseen."""
+"""Taking neighbours off may raise noise (as its square) so many times at most."""
 NEIGHBOURS = 2
 """Flashes before and after that may reach into a flash's rows."""
 
@@ -78,6 +80,8 @@ def flash_recipe(camera: Camera, timing: Timing, flash: Flash, there: range | fr
     near = [one for one in _around(timing, flash) if not one.is_dark and one.index != flash.index]
     start_s, duration_s = _times((flash, *near))
     weights = row_weights(camera, start_s, duration_s, frames=frames, pulse=timing.pulse)
+    if flash.is_dark:  # nothing shines in it, so nothing has a tail
+        weights[0] = row_weights(camera, start_s[:1], duration_s[:1], frames=frames)[0]
     weights[:, ~present] = 0.0
     coefficients, seen = _separated(weights, whole=_whole(timing.pulse), dark=flash.is_dark)
     used = np.flatnonzero(coefficients.any(axis=1))
@@ -107,27 +111,31 @@ def _whole(pulse: Pulse) -> float:
 def _separated(weights: FloatArray, *, whole: float, dark: bool) -> tuple[FloatArray, Flags]:
     """Return the coefficients (frame, row) of the first of the flashes, and which rows are seen.
 
-    ``weights`` is (flash, frame, row).
+    ``weights`` is (flash, frame, row). Where a neighbour cannot be taken off, or only at the price of noise, the frames
+    that saw hardly any of it must do.
     """
     first = np.stack([_first(weights, flash, whole=whole, dark=dark and flash == 0) for flash in range(len(weights))])
     own = first[0].copy()
     mixed = np.einsum("fr,kfr->kr", own, weights[1:])  # what the first sum holds of the other flashes
     rows = np.flatnonzero((np.abs(mixed) > NO_FOREIGN).any(axis=0))
-    lost = np.zeros(own.shape[1], np.bool_)
     if rows.size:
-        own[:, rows], lost[rows] = _taken_off(first[:, :, rows], weights[:, :, rows], dark=dark)
-    seen = own.any(axis=0) & ~lost & ((own**2).sum(axis=0) <= MOST_GAIN)
-    own[:, ~seen] = 0.0
-    return own, seen
+        own[:, rows], kept = _taken_off(first[:, :, rows], weights[:, :, rows], dark=dark)
+        kept &= (own[:, rows] ** 2).sum(axis=0) <= MOST_GAIN * (first[0][:, rows] ** 2).sum(axis=0)
+        clean = _first(weights, 0, whole=whole, dark=dark, most_foreign=CLEAN)
+        own[:, rows[~kept]] = clean[:, rows[~kept]]
+    return own, np.asarray(own.any(axis=0))
 
 
-def _first(weights: FloatArray, flash: int, *, whole: float, dark: bool) -> FloatArray:
+def _first(
+    weights: FloatArray, flash: int, *, whole: float, dark: bool, most_foreign: float = MOST_FOREIGN
+) -> FloatArray:
     """Return a flash's coefficients (frame, row) as if there were no other: one whole frame alone, else all that saw
     any; of a dark slot the mean of the exposures that fell into it."""
     foreign = weights.sum(axis=0) - weights[flash]
-    seen = weights[flash] * (foreign <= MOST_FOREIGN)
+    seen = weights[flash] * (foreign <= most_foreign)
     if dark:
-        used = seen > 0
+        clean = (seen > 0) & (foreign <= CLEAN)
+        used = np.where(clean.any(axis=0), clean, seen > 0)
         mean: FloatArray = used / np.maximum(used.sum(axis=0), 1)
         return mean
     full = seen >= whole
@@ -139,17 +147,17 @@ def _first(weights: FloatArray, flash: int, *, whole: float, dark: bool) -> Floa
 
 
 def _taken_off(first: FloatArray, weights: FloatArray, *, dark: bool) -> tuple[FloatArray, Flags]:
-    """Return the first flash's coefficients (frame, row) with the others taken off, and the rows where they cannot be.
+    """Return the first flash's coefficients (frame, row) with the others taken off, and the rows where they can be.
 
     A flash of which no frame there saw enough cannot be taken off where it reaches into the sum.
     """
     holds = np.einsum("jfr,kfr->rjk", first, weights)  # what the sum for flash j holds of flash k
     known: Flags = np.asarray(first.any(axis=1))  # (flash, row)
     unknown = np.abs(holds[:, 0, 1:]) * ~known.T[:, 1:]
-    lost: Flags = (unknown > MOST_LEFT).max(axis=1, initial=False)
+    kept: Flags = ~(unknown > MOST_LEFT).max(axis=1, initial=False)
     matrix = np.where(known.T[:, :, None], holds, np.eye(len(weights)))
     if dark:
         matrix[:, :, 0], matrix[:, 0, 0] = 0.0, 1.0
     inverse = np.linalg.inv(matrix)
     own: FloatArray = np.einsum("rj,jfr->fr", inverse[:, 0, :], first)
-    return own, lost
+    return own, kept

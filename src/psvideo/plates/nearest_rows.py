@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from psvideo.model.camera import Camera, FloatArray
 from psvideo.plates.sequence import LightPlate
@@ -91,11 +92,8 @@ def _newer(known: LightPlate | None, plate: LightPlate) -> LightPlate:
     return _with_rows(plate, known, ~plate.rows_seen & known.rows_seen, copy=True)
 
 
-def _with_rows(plate: LightPlate, other: LightPlate, rows: np.ndarray, *, copy: bool) -> LightPlate:
+def _with_rows(plate: LightPlate, other: LightPlate, rows: NDArray[np.bool_], *, copy: bool) -> LightPlate:
     image = plate.image.copy() if copy else plate.image
-    scale = plate.saturation / other.saturation if plate.saturation != other.saturation else 1.0
-    if scale != 1.0:  # plates of one light are clipped at one value, except where HDR lacked a flash
-        return plate
     image[rows] = other.image[rows]
     flashed_s: FloatArray = np.where(rows, other.flashed_s, plate.flashed_s)
     return replace(plate, image=image, seen=plate.rows_seen | rows, shown_s=flashed_s)

@@ -30,6 +30,7 @@ class LightPlate:
     ``seen`` (row,) is as in a Plate, or (row, col) where motion hid parts of the plate.
 
     ``saturation`` is the value from which on a pixel is clipped: 1.0, or more where the flash was weaker than full.
+    ``shown_s`` (row,) are the instants that the rows show, None where all show ``time_s``.
     """
 
     light: str
@@ -38,6 +39,12 @@ class LightPlate:
     image: Image
     seen: NDArray[np.bool_]
     saturation: float = 1.0
+    shown_s: FloatArray | None = None
+
+    @property
+    def flashed_s(self) -> FloatArray:
+        """The instant that every row shows, shape (row,)."""
+        return np.full(len(self.image), self.time_s) if self.shown_s is None else self.shown_s
 
     @property
     def rows_seen(self) -> NDArray[np.bool_]:
