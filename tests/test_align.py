@@ -1,4 +1,4 @@
-"""Plates of one round, brought to one instant, show the surface of that instant; what cannot be told is not valid."""
+"""Plates of one round, brought to one instant, show the surface of that instant; what is unknown is not valid."""
 
 import functools
 import weakref

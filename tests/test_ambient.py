@@ -221,7 +221,7 @@ def test_a_ripple_is_found_with_its_phase() -> None:
     assert found is not None
     assert found.hz == 120.0
     assert abs(found.amplitude - true.amplitude) < 1e-6
-    assert find_ripple(seen(0.0), seen(0.025)) is None, "the same phase tells nothing"
+    assert find_ripple(seen(0.0), seen(0.025)) is None, "the same phase shows nothing"
 
 
 def test_dark_slots_are_read_no_further_ahead_than_the_next(plan: Plan) -> None:

@@ -173,7 +173,7 @@ def test_a_matte_scene_tells_the_strengths_of_lights_of_known_directions() -> No
         measure_strengths(sphere_pictures(directions[:3], strengths[:3]), directions[:3])
     flat = light_pictures(["a", "b", "c", "d"], [np.full((50, 60), 0.2 * n + 0.1, np.float32) for n in range(4)])
     noisy = [image + np.random.default_rng(9).normal(0, 0.002, image.shape).astype(np.float32) for image in flat.images]
-    with pytest.raises(PsvideoError, match="does not tell"):
+    with pytest.raises(PsvideoError, match="does not show"):
         measure_strengths(light_pictures(flat.names, noisy), directions[:4])
 
 

@@ -85,7 +85,7 @@ def test_a_tolerance_that_is_given_counts_instead_of_the_plan_s(
 def test_a_timing_that_took_the_plan_s_word_is_no_measurement(make_plan: PlanMaker) -> None:
     plan = make_plan(mode="synced", readout=0.0)
     timing = find_timing(plan, np.arange(8), np.zeros((8, plan.camera.height_px)))
-    with pytest.raises(PsvideoError, match="does not tell the readout"):
+    with pytest.raises(PsvideoError, match="does not show the readout"):
         readout_of(plan, timing, frames=8)
 
 

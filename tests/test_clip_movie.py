@@ -83,7 +83,7 @@ def plan_for(tmp_path: Path, make_plan: Callable[..., Plan]) -> Callable[..., Pa
 
 
 def grey_ramp(count: int, *, rows: int = 32, cols: int = 48) -> list[av.VideoFrame]:
-    """Frames whose luma tells their place: code 40 + 8 * place in all pixels."""
+    """Frames whose luma shows their place: code 40 + 8 * place in all pixels."""
     chroma = np.full((rows // 2, cols // 2), 128, np.uint8)
     return [
         make_frame([np.full((rows, cols), 40 + 8 * place, np.uint8), chroma, chroma], "yuv420p")

@@ -317,7 +317,7 @@ def test_lights_that_always_flash_together_are_refused(
     (copy / "plan.toml").write_text(plan.replace("{key = 1.0}", "{key = 1.0, left = 1.0}"))
     assert run("normals", copy, "--rig", copy / "rig.toml", "-o", tmp_path / "out") == 1
     told = capsys.readouterr().err
-    assert "cannot tell the lights key, left apart" in told
+    assert "cannot separate the lights key, left" in told
 
 
 def test_a_timing_of_other_footage_is_refused(clip: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

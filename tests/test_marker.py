@@ -1,4 +1,4 @@
-"""What tells the flashes of a cycle apart by time alone, on paper."""
+"""What distinguishes the flashes of a cycle by time alone, on paper."""
 
 from fractions import Fraction
 

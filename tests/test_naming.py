@@ -1,4 +1,4 @@
-"""The order of the lights through whole commands: told by the rig where it can be, by the user, or called a guess."""
+"""The order of the lights through whole commands: from the rig where it can be, by the user, or called a guess."""
 
 import json
 from pathlib import Path
@@ -103,7 +103,7 @@ def test_split_and_normals_put_right_a_timing_that_was_named_wrongly(five: Path,
     assert report["order"] == "rig"
     assert report["verdict"].startswith("This take is usable")
     assert "in the next best" in report["order_note"]
-    assert "The rig tells the order" in (tmp_path / "out" / "report.html").read_text()
+    assert "The rig shows the order" in (tmp_path / "out" / "report.html").read_text()
 
 
 def test_the_user_s_word_goes_before_the_rig_s(five: Path, tmp_path: Path) -> None:

@@ -295,7 +295,7 @@ def test_timing_is_drawn_and_told_and_leads_to_the_picture(server: PageServer, w
     page.keyboard.press("t")
     page.wait_for_selector("#timing-facts dt")
     told = page.locator("#timing-facts").inner_text()
-    for words in ("18, 18 complete", "0.012 row", "+31.2 ppm", "1 after 7", "told by the dark slot", "key", "left"):
+    for words in ("18, 18 complete", "0.012 row", "+31.2 ppm", "1 after 7", "from the dark slot", "key", "left"):
         assert words in told
     box = page.locator("#timing-diagram").bounding_box()
     assert box is not None

@@ -65,7 +65,7 @@ def test_the_page_is_whole_on_a_laptop_and_asks_for_nothing(
     assert (picture.mean() > 128) == (scheme == "light")
     if scheme == "light":
         shutil.copy(tmp_path / "report.png", PICTURE) if not PICTURE.exists() else None
-        assert PICTURE.is_file(), "docs/report.md shows it; delete it to have it made anew"
+        assert PICTURE.is_file(), "docs/report.md shows it; delete it to have it made again"
 
 
 COLOURS = """() => [...document.querySelectorAll('.verdict .word')].flatMap(one =>

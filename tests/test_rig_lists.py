@@ -67,7 +67,7 @@ def test_a_near_light_is_in_no_list_and_a_name_that_tells_no_kind_is_refused(tmp
     for name in ("a.lp", "light_directions.txt"):
         with pytest.raises(PsvideoError, match="'lamp' has a position"):
             write_rig(tmp_path / name, near)
-    with pytest.raises(UsageError, match=r"lights\.csv: tells no kind"):
+    with pytest.raises(UsageError, match=r"lights\.csv: is no known kind"):
         write_rig(tmp_path / "lights.csv", near)
     assert not list(tmp_path.iterdir())
 

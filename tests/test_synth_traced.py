@@ -189,7 +189,7 @@ UNFIT: dict[str, tuple[Change, dict[str, object], dict[str, int], type[PsvideoEr
     "a line without a light": (lambda e: [(c, 7, v) for c, _, v in e], {}, {}, PsvideoError, "line 7 is lit"),
     "a light that is not there": (lambda e: e, {}, {"kye": 0}, UsageError, "did you mean 'key'"),
     "two lights on a line": (lambda e: e, {}, {"key": 1, "left": 1}, UsageError, "same line"),
-    "jitter besides": (lambda e: e, {"jitter_s": 1e-6}, {}, UsageError, "jitter_s"),
+    "jitter as well": (lambda e: e, {"jitter_s": 1e-6}, {}, UsageError, "jitter_s"),
     "a synced scene": (lambda e: e, {"mode": "synced"}, {}, UsageError, "mode synced"),
 }
 

@@ -57,7 +57,7 @@ def guess_rig(pictures: LightPictures, *, prior: Prior | None = None) -> Guess:
     chosen: Prior = prior or ("equal-lights" if lights >= LEAST_FOR_EQUAL_LIGHTS else "equal-albedo")
     if lights < 3 or (chosen == "equal-lights" and lights < LEAST_FOR_EQUAL_LIGHTS):
         raise PsvideoError(
-            f"{lights} lights do not tell their directions by themselves: expected three or more, and six or more of "
+            f"{lights} lights do not show their directions by themselves: expected three or more, and six or more of "
             "equal strength for --prior equal-lights. Calibrate on a sphere instead."
         )
     grey = pictures.grey.astype(np.float64)

@@ -1,7 +1,7 @@
 """Where lights are and how strong, from a matte sphere whose outline is known.
 
 Every pixel of the sphere has a known normal n, and a matte surface shows ``intensity * albedo * n . l``: linear in the
-light's strength times direction, so many pixels tell it by least squares. Only the part that a light reaches well is
+light's strength times direction, so many pixels give it by least squares. Only the part that a light reaches well is
 used, and it is weighed robustly (Tukey; P. J. Huber, "Robust Statistics", 1981): near the terminator paint is not
 matte, light comes back from the surroundings, and gloss adds a spot. Errors come from leaving out one patch of the
 sphere after the other (jackknife), because what a real paint does otherwise is alike over whole patches, and from how
@@ -187,7 +187,7 @@ def _fault(sphere: _Sphere, n: int, lit: NDArray[np.bool_], intensity: FloatArra
     if intensity.min() <= 0 or lit.sum() < LEAST_PIXELS:
         clipped = 1 - sphere.usable[n].mean()
         why = f"{clipped:.0%} of the sphere is saturated" if clipped > 0.2 else "it hardly lights the sphere"
-        return f"{why}, and too few pixels are left to tell it by"
+        return f"{why}, and too few pixels are left to measure it"
     if left > MOST_LEFT:
         return (
             f"a matte sphere leaves {left:.0%} of its brightness unexplained: the sphere is not matte, the outline is "

@@ -53,12 +53,12 @@ def lit_pixels(pictures: LightPictures) -> tuple[FloatArray, NDArray[np.intp], N
 def measure_strengths(pictures: LightPictures, directions: FloatArray) -> Strengths:
     """Return the lights' intensities from a matte scene; ``directions`` (light, 3) are unit vectors.
 
-    Raises PsvideoError with fewer than four lights, too few usable pixels, or a scene that does not tell.
+    Raises PsvideoError with fewer than four lights, too few usable pixels, or a scene that does not show them.
     """
     lights = len(directions)
     if lights < 4:
         raise PsvideoError(
-            f"A scene tells the strengths of four lights or more, and here are {lights}: three explain any picture. "
+            f"A scene shows the strengths of four lights or more, and here are {lights}: three explain any picture. "
             "Use a matte sphere (psvideo calibrate matte-sphere) or a white target (flat-field)."
         )
     values, row, col = lit_pixels(pictures)
@@ -82,7 +82,7 @@ def measure_strengths(pictures: LightPictures, directions: FloatArray) -> Streng
     )
     if not np.isfinite(error).all() or error.max() > MOST_DOUBT:
         raise PsvideoError(
-            "This scene does not tell how strong the lights are (parts of it differ by more than "
+            "This scene does not show how strong the lights are (parts of it differ by more than "
             f"{MOST_DOUBT:.0%}): it faces too few ways, shines, or the rig's directions are wrong. Use a matte round "
             "thing, a matte sphere (psvideo calibrate matte-sphere) or a white target (flat-field)."
         )

@@ -1,4 +1,4 @@
-"""A camera's readout time from a strobed clip: where the dark rows lie, frame by frame, tells how fast rows open.
+"""A camera's readout time from a strobed clip: where the dark rows lie, frame by frame, shows how fast rows open.
 
 The fit measures the row time against the frame period, so as a share of the frame the readout owes nothing to any
 clock. In seconds it rests on the frame rate being what the plan names, which the strobe vouches for within its clock's
@@ -20,7 +20,7 @@ from psvideo.sync.of_take import find_take_timing
 MODEL_ERROR_SHARE = 2e-5
 """Share of the frame period by which virtual shoots were off beyond the fit's own error (240 rows and fewer)."""
 SURE_ERRORS = 3.0
-"""A readout that is no more than so many standard errors from zero does not tell which end comes first."""
+"""A readout that is no more than so many standard errors from zero does not show which end comes first."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +55,7 @@ def readout_of(plan: Plan, timing: Timing, *, frames: int, tolerance_ppm: float 
     """
     if timing.row_time_error_s is None:
         raise PsvideoError(
-            f"{timing.clip}: its timing does not tell the readout, because rows of a {plan.mode} clip do not show when "
+            f"{timing.clip}: its timing does not show the readout, because rows of a {plan.mode} clip do not show when "
             "they open. Film a subject under a rolling plan (psvideo capture-plan), or an LED's stripes and --led-hz."
         )
     rows, period_s = plan.camera.height_px, timing.frame_period_s
@@ -82,7 +82,7 @@ def readout_of(plan: Plan, timing: Timing, *, frames: int, tolerance_ppm: float 
 
 
 def measure_take_readout(take: Take, *, tolerance_ppm: float | None = None, watch: Watch = unwatched) -> StrobedReadout:
-    """Measure a camera's readout time from a strobed take, whatever its plan says of it.
+    """Measure a camera's readout time from a strobed take; the plan's own value is not used.
 
     ``tolerance_ppm`` is how far the strobe's clock may be from true seconds (left out: what the plan says of it).
     Raises PsvideoError where no strobe is found.

@@ -33,7 +33,7 @@ NOISE_WORDS = {"mark", "mk", "alpha", "camera"}
 class CameraMode:
     """One row of the table. ``readout_s`` is 0 for a global shutter, negative where the bottom row comes first.
 
-    ``sure`` tells what the readout rests on: ``measured`` (a laboratory's or a documented LED measurement),
+    ``sure`` says what the readout rests on: ``measured`` (a laboratory's or a documented LED measurement),
     ``consistent`` (several profiles agree), ``single`` (one user's or maker's profile), ``specification`` (the
     maker's data), ``assumed`` (nobody measured it).
     """

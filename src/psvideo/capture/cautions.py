@@ -83,7 +83,7 @@ def _about_the_marker(request: ShootRequest) -> Iterator[Caution]:
     if request.marker == "none" and request.mode != "synced" and len(request.lights) > 1:
         yield _warning(
             "marker",
-            "Without a marker nothing in the footage tells which light is which: note the light of the first flash for "
+            "Without a marker nothing in the footage shows which light is which: note the light of the first flash for "
             "--first-light, or leave --marker dark.",
         )
     if request.marker != "dark":

@@ -163,12 +163,12 @@ def _tell(voice: Voice, measured: Readout | StrobedReadout, words: str, lines: d
 
 
 def describe_strobed_readout(found: StrobedReadout) -> str:
-    """Return what a strobed clip told and how sure it is, for people."""
+    """Return what a strobed clip showed and how certain it is, for people."""
     ms, ppm = 1e3, found.tolerance_ppm
     direction = {
         "top-down": "The top row is read first.",
         "bottom-up": "The bottom row is read first: the readout has a minus sign.",
-        "unknown": "Which end is read first cannot be told: the readout is too short beside its error.",
+        "unknown": "Which end is read first is not known: the readout is too short beside its error.",
     }[found.direction]
     return "\n".join(
         [
@@ -187,7 +187,7 @@ def describe_readout(found: Readout, led: Led) -> str:
     """Return what was measured and how sure it is, for people."""
     ms = 1e3
     spread = "" if found.spread_s is None else f"; single frames scatter by {found.spread_s * ms:.4f} ms"
-    direction = {"unknown": "Which end is read first cannot be told", "top-down": "The top row is read first"}.get(
+    direction = {"unknown": "Which end is read first is not known", "top-down": "The top row is read first"}.get(
         found.direction, "The bottom row is read first: write the readout with a minus sign"
     )
     return "\n".join(

@@ -46,7 +46,7 @@ COMMANDS = (
     ),
     *_entries(
         LOOK,
-        view="Show a result in the browser: scrub, compare, and light it anew; only this machine can open the page.",
+        view="Show a result in the browser: scrub, compare, and relight it; only this machine can open the page.",
     ),
     *_entries(
         TRY,

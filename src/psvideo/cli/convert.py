@@ -14,7 +14,7 @@ def convert(
     out: Annotated[
         Path,
         typer.Option(
-            "-o", "--out", help="The file to write; its name tells the kind: *.toml, *.lp or light_directions.txt."
+            "-o", "--out", help="The file to write; its name sets the kind: *.toml, *.lp or light_directions.txt."
         ),
     ],
     name: Annotated[

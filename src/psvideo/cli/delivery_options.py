@@ -55,19 +55,17 @@ CameraTimeOption = Annotated[
 ]
 YOption = Annotated[YDirection | None, typer.Option("--y", help="up as in OpenGL (the default), down as in DirectX.")]
 FloatOption = Annotated[bool, typer.Option("--float", help="Store normals as 32-bit floats.")]
-AovOption = Annotated[
-    list[AovWord] | None, typer.Option("--aov", help="Write this besides; may be given several times.")
-]
+AovOption = Annotated[list[AovWord] | None, typer.Option("--aov", help="Also write this; may be given several times.")]
 MeshOption = Annotated[
     list[MeshWord] | None,
-    typer.Option("--mesh", help="Write meshes besides: ply, one per instant; usd, one animated file."),
+    typer.Option("--mesh", help="Also write meshes: ply, one per instant; usd, one animated file."),
 ]
-EncodeOption = Annotated[MapFiles | None, typer.Option("--encode", help="Write 16-bit PNG maps of 0 to 1 besides.")]
+EncodeOption = Annotated[MapFiles | None, typer.Option("--encode", help="Also write 16-bit PNG maps of 0 to 1.")]
 Separate = Annotated[bool, typer.Option("--separate", help="One sequence per quantity; this is the default.")]
 Multipart = Annotated[
-    bool | None, typer.Option("--multipart/--no-multipart", help="Write one EXR with all quantities besides.")
+    bool | None, typer.Option("--multipart/--no-multipart", help="Also write one EXR with all quantities.")
 ]
-Plates = Annotated[bool, typer.Option("--plates", help="Write the plates besides, one sequence per light.")]
+Plates = Annotated[bool, typer.Option("--plates", help="Also write the plates, one sequence per light.")]
 WithAmbient = Annotated[
     bool, typer.Option("--with-ambient", help="Leave ambient light in the beauty plate, as one exposure saw it.")
 ]

@@ -148,7 +148,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
             "only a part, with the timing found before",
             "psvideo split clip/ --frames 1-100 --timing timing.json -o part/",
         ),
-        ("the scene under all lights at once besides", "psvideo split clip/ --beauty --preview beauty -o plates/"),
+        ("and the scene under all lights at once", "psvideo split clip/ --beauty --preview beauty -o plates/"),
         ("the paper's Algorithm 1, to compare with", "psvideo split clip/ --method hudon2015 -o plates_2015/"),
     ),
     "normals": (
@@ -165,7 +165,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
             "psvideo normals clip/ --rig rig.toml --align auto --rate flash -o out/",
         ),
         (
-            "for Unreal: tangent space, green down, 16-bit PNG besides, and a note on how to load them",
+            "for Unreal: tangent space, green down, 16-bit PNG too, and a note on how to load them",
             "psvideo normals clip/ --rig rig.toml --for unreal -o out/",
         ),
         (

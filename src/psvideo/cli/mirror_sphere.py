@@ -145,7 +145,7 @@ def describe(found: MirrorCalibration) -> str:
         )
     lines += [_line(light) for light in found.lights]
     lines.append(
-        "Intensities are 1 for all lights: a mirror's highlights clip. A matte sphere or a flat field tells them."
+        "Intensities are 1 for all lights: a mirror's highlights clip. A matte sphere or a flat field measures them."
     )
     return "\n".join(lines)
 

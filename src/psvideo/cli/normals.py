@@ -63,7 +63,7 @@ def normals(
     near_iterations: Annotated[
         int | None,
         typer.Option(
-            help="Near lights only: how often their distances are taken anew from the depth of the normals found. "
+            help="Near lights only: how often their distances are taken again from the depth of the normals found. "
             f"[default: {NEAR_ITERATIONS}; 0 with --depth]",
             min=0,
             max=MOST_ITERATIONS,

@@ -20,7 +20,7 @@ FirstLight = Annotated[
 ]
 OrderRig = Annotated[
     Path | None,
-    typer.Option("--rig", help="Where the lights are, to tell their order by where no marker does."),
+    typer.Option("--rig", help="Where the lights are, to find their order where there is no marker."),
 ]
 TimingPath = Annotated[
     Path | None, typer.Option("--timing", help="timing.json of this clip; left out: found from the picture.")

@@ -38,8 +38,8 @@ def split(
     method: Annotated[
         SplitMethod, typer.Option(help="By the rows' weights, or Algorithm 1 of Hudon et al. 2015, to compare with.")
     ] = "weights",
-    flashes: Annotated[bool, typer.Option("--flashes", help="Write every flash by itself besides.")] = False,
-    beauty: Annotated[bool, typer.Option("--beauty", help="Write the sum of all lights besides.")] = False,
+    flashes: Annotated[bool, typer.Option("--flashes", help="Also write every flash by itself.")] = False,
+    beauty: Annotated[bool, typer.Option("--beauty", help="Also write the sum of all lights.")] = False,
     with_ambient: WithAmbient = False,
     weight: Weights = None,
     preview: PlatesPreviewOption = None,

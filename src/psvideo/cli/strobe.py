@@ -148,7 +148,7 @@ def run(
     verbose: Verbose = False,
     quiet: Quiet = False,
 ) -> None:
-    """Play a plan until Ctrl-C, or for a time; whatever happens, the lights are dark afterwards."""
+    """Play a plan until Ctrl-C, or for a time; in every case the lights are dark afterwards."""
     from psvideo.formats.plan_toml import read_plan
     from psvideo.strobe.link.exchange import Link
     from psvideo.strobe.program import make_program

@@ -1,4 +1,4 @@
-"""psvideo view: a page to look at a result and to light it anew."""
+"""psvideo view: a page to look at a result and to relight it."""
 
 import contextlib
 import sys
@@ -31,7 +31,7 @@ def view(
     verbose: Verbose = False,
     quiet: Quiet = False,
 ) -> None:
-    """Show a result in the browser: scrub, compare, and light it anew; only this machine can open the page."""
+    """Show a result in the browser: scrub, compare, and relight it; only this machine can open the page."""
     from psvideo.page import page_server, show_of, write_page
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)

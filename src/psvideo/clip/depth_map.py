@@ -57,7 +57,7 @@ class DepthMaps:
 
     @property
     def identity(self) -> tuple[object, ...]:
-        """What tells these files from others, without reading them again."""
+        """What distinguishes these files from others, without reading them again."""
         files = tuple(self.files.values()) or (self.path,)
         states = [file.stat() for file in files]
         return (self.metres_per_unit, *((str(f), s.st_size, s.st_mtime_ns) for f, s in zip(files, states, strict=True)))

@@ -37,7 +37,7 @@ def animation_name(clip: str) -> str:
 def in_space(mesh: Mesh, space: Space) -> Mesh:
     """Return a mesh placed in world space where that is asked for.
 
-    y stays as it is whatever ``space.y`` says: meshes are right-handed, and flipping one axis would mirror them.
+    y stays as it is for any ``space.y``: meshes are right-handed, and flipping one axis would mirror them.
     """
     kept = replace(space, y="up")
     points = placed_points(mesh.points, kept, np.ones(len(mesh.points), np.bool_))

@@ -37,7 +37,7 @@ def write_plate(folder: Path, clip: str, plate: LightPlate, tags: Tags) -> None:
 
 
 def write_flash(folder: Path, clip: str, plate: Plate, tags: Tags) -> None:
-    """Write what one flash showed by itself, whatever lights it held: ``flashes/<clip>_flash.<index>.exr``."""
+    """Write what one flash showed by itself, with one light or several: ``flashes/<clip>_flash.<index>.exr``."""
     path = folder / "flashes" / f"{clip}_flash.{plate.flash.index:04d}.exr"
     lights = " ".join(f"{name}={power:g}" for name, power in plate.flash.lights.items()) or "dark"
     attributes = tags.attributes(time_s=plate.time_s, data=not PLATE.colour) | {"psvideo:lights": lights}

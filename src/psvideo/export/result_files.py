@@ -26,8 +26,8 @@ MOVIE_SUFFIXES: dict[Codec, str] = {"vp9": "mp4", "prores": "mov"}
 class Delivery:
     """How results are written.
 
-    ``half`` False stores normals as 32-bit floats; ``aovs`` are written besides; ``meshes`` may hold "ply" and "usd".
-    ``plates`` writes the plates that were solved from besides, ``mix`` is what the beauty plate is summed with,
+    ``half`` False stores normals as 32-bit floats; ``aovs`` are written as well; ``meshes`` may hold "ply" and "usd".
+    ``plates`` also writes the plates that were solved from, ``mix`` is what the beauty plate is summed with,
     ``previews`` are movies for eyes, and ``program`` is the one that a note on loading is written for.
     """
 

@@ -41,7 +41,7 @@ class Space:
 
     For world space: ``camera_to_world`` (3, 3) is the camera's rotation and ``origin`` (3,) its place in units of
     ``unit_m`` metres; ``up`` is the world's axis that points up, ``lens`` the focal length over the picture's width
-    where the camera's file says it. ``moving`` gives rotation and place anew for every instant.
+    where the camera's file says it. ``moving`` gives rotation and place for every instant.
     """
 
     name: SpaceName = "camera"

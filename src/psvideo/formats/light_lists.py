@@ -17,14 +17,14 @@ DIRECTIONS, INTENSITIES = "light_directions.txt", "light_intensities.txt"
 
 
 def kind_of(path: Path) -> ListKind:
-    """Return the kind of a rig file by its name. Raises UsageError where the name tells none."""
+    """Return the kind of a rig file by its name. Raises UsageError where the name shows none."""
     if path.suffix == ".toml":
         return "toml"
     if path.suffix == ".lp":
         return "lp"
     if path.name == DIRECTIONS:
         return "diligent"
-    raise UsageError(f"{path}: tells no kind of rig file. Name it *.toml, *.lp or {DIRECTIONS} (DiLiGenT).")
+    raise UsageError(f"{path}: is no known kind of rig file. Name it *.toml, *.lp or {DIRECTIONS} (DiLiGenT).")
 
 
 def files_of(path: Path) -> tuple[Path, ...]:
@@ -33,7 +33,7 @@ def files_of(path: Path) -> tuple[Path, ...]:
 
 
 def write_rig(path: Path, rig: Rig) -> tuple[str, ...]:
-    """Write a rig in the kind that the file's name tells; return in whole sentences what that kind cannot hold.
+    """Write a rig in the kind that the file's name shows; return in whole sentences what that kind cannot hold.
 
     Raises PsvideoError where a light is near: lists hold directions.
     """

@@ -53,7 +53,7 @@ def marked_png(data: bytes) -> bytes:
 def refuse_existing(path: Path, *, force: bool, mark: str | None = None) -> None:
     """Raise UsageError where an output exists already and ``force`` does not allow to replace it.
 
-    ``mark`` is a word that a file of this kind holds: what does not is not replaced, whatever ``force`` says.
+    ``mark`` is a word that a file of this kind holds: what does not is not replaced, even with ``force``.
     """
     if not path.exists():
         return

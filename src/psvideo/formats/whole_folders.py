@@ -13,7 +13,7 @@ from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.whole_files import refuse_existing
 
 SETTINGS = ".settings"
-"""In a folder that is being written: what the run was told, so that only the same run resumes it."""
+"""In a folder that is being written: the run's inputs, so that only the same run resumes it."""
 
 
 @contextlib.contextmanager
@@ -67,12 +67,12 @@ def refuse_folder(path: Path, *, mark: str, force: bool) -> None:
 
 def _refuse_other_settings(path: Path, beside: Path, settings: str) -> None:
     if not beside.is_dir():
-        raise UsageError(f"{path}: there is no stopped run to resume here. Leave --resume out to begin anew.")
+        raise UsageError(f"{path}: there is no stopped run to resume here. Leave --resume out to start again.")
     noted = beside / SETTINGS
     if not noted.is_file() or noted.read_text(encoding="utf-8") != settings:
         raise UsageError(
             f"{path}: the run that was stopped here had other settings, footage, plan, rig or timing, and mixing both "
-            "would spoil the sequence. Give the same ones again, or leave --resume out to begin anew."
+            "would spoil the sequence. Give the same ones again, or leave --resume out to start again."
         )
 
 

@@ -29,7 +29,7 @@ def plan_findings(plan: Plan) -> Iterator[Finding]:
             f"{camera.exposure_s * 1e3:.4g} ms: rows near the dark row hold two flashes"
         )
     if has_marker(plan):
-        yield ok("its cycle tells which flash is which (a dark slot or a flash of another length)")
+        yield ok("its cycle shows which flash is which (a dark slot or a flash of another length)")
     else:
         yield warn("all its flashes are alike, so their names are a guess: give --first-light")
 

@@ -2,7 +2,7 @@
 
 Distant lights send the same everywhere. Near ones are taken at the rig's plane, which stands in for the surface: each
 pixel's ray is followed to it, and the light falls off with the square of the distance, and with the angle from the
-light's axis where the rig tells its anisotropy.
+light's axis where the rig gives its anisotropy.
 """
 
 from dataclasses import dataclass

@@ -1,8 +1,8 @@
-"""The marker: what tells the flashes of a cycle apart by when light comes, whatever the picture shows.
+"""The marker: what distinguishes the flashes of a cycle by when light comes, without looking at the picture.
 
 Timing sees of a flash how long it lasts and whether it is dark. A dark slot, a flash of another length, or rounds that
 skip their dark slots mark the cycle. Where turning the cycle by some flashes gives a cycle that looks the same, the
-lights' names are not in the timing: their powers, a rig's directions or a person must tell.
+lights' names are not in the timing: their powers, a rig's directions or a person must say it.
 """
 
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ def alike_turns(plan: Plan) -> tuple[int, ...]:
 
 
 def has_marker(plan: Plan) -> bool:
-    """True where no turn of the cycle looks like the cycle itself, so that timing alone tells the flashes apart."""
+    """True where no turn of the cycle looks like the cycle itself, so that timing alone distinguishes the flashes."""
     return len(alike_turns(plan)) == 1
 
 

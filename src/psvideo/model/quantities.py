@@ -18,7 +18,7 @@ SOURCES: tuple[Source, ...] = ("surface", "plates", "depth")
 
 @dataclass(frozen=True)
 class Quantity:
-    """What is fixed about one quantity, whatever the clip.
+    """What is fixed about one quantity, the same for every clip.
 
     name: in folders, file names, EXR parts and options.
     label: for people.
@@ -66,7 +66,7 @@ where the rig says how large the scene is; 11 binary digits are too few for a pl
 ALWAYS: tuple[str, ...] = tuple(name for name, row in QUANTITIES.items() if row.written == "always")
 """What every result holds."""
 AOVS: tuple[Aov, ...] = get_args(Aov)
-"""What may be asked for besides, in the table's order."""
+"""What may be asked for as well, in the table's order."""
 
 
 def is_half(name: str, *, asked: bool) -> bool:

@@ -48,7 +48,7 @@ def collect_with_doubt(
 ) -> tuple[NDArray[np.int64], FloatArray, NDArray[np.float32] | None]:
     """Return the frames' indices and profiles, and by how much every row mean (frame, row) may be wrong.
 
-    Pixels that saturate lose light that nobody can tell; the doubt is None where none did.
+    Pixels that saturate lose an unknown amount of light; the doubt is None where none did.
     """
     indices: list[int] = []
     profiles: list[FloatArray] = []

@@ -32,7 +32,7 @@ class Surface:
     valid: shape (row, col), True where the normal is to be trusted.
     residual: shape (row, col), root mean square over the measurements used of what the fit does not explain, in units
         of sensor saturation; 0 where not valid. None where it was not asked for. Three measurements of one channel
-        are always explained exactly, whatever they are.
+        are always explained exactly, right or wrong.
     error_deg: shape (row, col), the normal's standard error in degrees as the solver judges it; 0 where not valid.
         None where it was not asked for, or the solver (least squares) does not judge it.
     misfit: what is common to the picture; None where the solver does not look for it, or three lights explain all.

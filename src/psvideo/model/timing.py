@@ -41,7 +41,7 @@ class Timing:
     ``order_note`` is a sentence on how a rig's directions decided the order, or why they did not; empty where none were
     asked. ``repeated_frames`` are the numbers of frames that show the same moment as the frame before them. ``notes``
     are sentences for people on what to distrust; ``row_time_error_s`` is the row time's standard error where the
-    picture told it, None where the plan did; ``phase_error_s`` is ``phase_error_rows`` in seconds. None of these three
+    picture gave it, None where the plan did; ``phase_error_s`` is ``phase_error_rows`` in seconds. None of these three
     goes into the file. A global shutter's rows open together: its ``phase_error_rows`` are of ``frame_period_s`` /
     height each.
     """
@@ -72,11 +72,11 @@ class Timing:
         """One sentence on how sure the flashes' times are; empty where nothing was fitted."""
         rows = f"{self.phase_error_rows:.2g} row"
         if self.phase_error_s is None:
-            return f"Flash times are sure to {rows}." if self.phase_error_rows else ""
+            return f"Flash times are known to {rows}." if self.phase_error_rows else ""
         times = (
             f"{self.phase_error_s * 1e6:.2g} us" if self.phase_error_s < 1e-3 else f"{self.phase_error_s * 1e3:.2g} ms"
         )
-        return f"Flash times are sure to {times}, {rows}." if self.row_time_s else f"Flash times are sure to {times}."
+        return f"Flash times are known to {times}, {rows}." if self.row_time_s else f"Flash times are known to {times}."
 
     @property
     def pulse(self) -> Pulse:
@@ -118,6 +118,6 @@ def places_in_time(timing: Timing, numbers: Sequence[int]) -> dict[int, int]:
         if number not in repeated:
             places[number] = index
         if following is not None:
-            told = following - number - 1
-            index += 1 + max(missing.get(number, 0), told) - (following in repeated)
+            numbered = following - number - 1
+            index += 1 + max(missing.get(number, 0), numbered) - (following in repeated)
     return places

@@ -1,4 +1,4 @@
-"""The page that shows a result and lights it anew: what is shown, and a small server of it.
+"""The page that shows a result and relights it: what is shown, and a small server of it.
 
 ``show_of`` looks at a folder of results or plates and says what can be shown of it; ``serving`` answers a browser on
 this machine only; ``single_file`` writes the page and some pictures into one file. The page itself lies in ``assets``.

@@ -1,6 +1,6 @@
 """What the page can show: sequences of pictures, each picture with its place in time, and what is known of them.
 
-``index_of`` is what the browser is told. It names sequences by an id and pictures by their number, never by a path.
+``index_of`` is what the browser gets. It names sequences by an id and pictures by their number, never by a path.
 """
 
 from collections.abc import Callable, Mapping
@@ -65,7 +65,7 @@ class Show:
 
 
 def index_of(show: Show) -> dict[str, object]:
-    """Return what the browser is told of a show, as JSON's types."""
+    """Return what the browser gets to know of a show, as JSON's types."""
     return {
         "schema": "psvideo-page/1",
         "name": show.name,

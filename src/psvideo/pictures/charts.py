@@ -1,4 +1,4 @@
-"""Small charts as inline SVG: colours that colour-blind people tell apart, and dashes besides; light and dark pages."""
+"""Small charts as inline SVG: colours that colour-blind people can distinguish, dashes too; light and dark pages."""
 
 import html
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ WIDE, TALL = 560, 170
 LEFT, RIGHT, TOP, BELOW = 46, 96, 10, 26
 MOST_POINTS = 300
 DASHES = ("", "6 3", "2 3", "9 3 2 3", "12 4", "4 2 1 2", "1 4", "14 3 4 3")
-"""Series are told apart by these as well as by their colour class ``s0`` to ``s7``."""
+"""Series differ in these as well as in their colour class ``s0`` to ``s7``."""
 STOP_WIDE, STOP_TALL = 300, 130
 SHOWN_STOPS = 10
 """Darker light is drawn in the first bin."""

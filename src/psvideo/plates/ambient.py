@@ -3,8 +3,8 @@
 A flash lies between two dark slots, and its ambient light is interpolated between what they show: light that changes
 steadily is followed. Dark slots are noisy, so each is averaged with those before it, once these are brought to its
 level (a dimmer or a cloud changes a whole neighbourhood by one factor): light that does not change costs hardly any
-noise. Where the picture still differs by more than noise (someone moved, a shadow fell), the average begins anew. Mains
-light, which swings from exposure to exposure, is told apart row by row (``flicker``) and put back for each plate.
+noise. Where the picture still differs by more than noise (someone moved, a shadow fell), the average restarts. Mains
+light, which swings from exposure to exposure, is separated row by row (``flicker``) and put back for each plate.
 """
 
 from collections.abc import Iterable, Iterator
@@ -25,7 +25,7 @@ COARSE, LEVEL_SIGMA_PX = 4, 2.0
 """Levels are compared over about 7 pixels of pictures a quarter as large: the factor adds hardly any noise. The window
 is a Gaussian: a box turns some ripples of the average around, and the average would feed on them."""
 LEAST_GAIN, MOST_GAIN = 0.5, 2.0
-"""Where light changed by more than these factors between dark slots, the average begins anew."""
+"""Where light changed by more than these factors between dark slots, the average starts again."""
 SPARSE = 5
 """Noise is judged from every fifth pixel of every fifth row, which is plenty."""
 NEIGHBOURHOOD_PX = 9

@@ -3,7 +3,7 @@
 Lamps on the mains pulse at 100 or 120 Hz. An exposure of another length than whole pulses collects more or less of
 them, each row at another phase: stripes that move from frame to frame. Between two dark slots the phases of every row
 are known from the clock, so that one amplitude and phase, the same for all rows, is found from how the rows' means
-changed. Two pairs of dark slots in a row must tell the same: a shadow that crosses the rows may look like a ripple
+changed. Two pairs of dark slots in a row must agree: a shadow that crosses the rows may look like a ripple
 once, but not twice. The lamps' share of the light is taken to be the same all over the picture.
 """
 
@@ -20,7 +20,7 @@ PULSES_HZ = (100.0, 120.0)
 EXPLAINED = 0.8
 """A ripple is believed where it explains this share of the rows' changes, beyond one change of level."""
 LEAST_TURN = 0.3
-"""Dark slots must differ at least so much in phase (of 2 at most, RMS) to tell a ripple."""
+"""Dark slots must differ at least so much in phase (of 2 at most, RMS) to show a ripple."""
 LEAST_ROWS = 16
 LEAST_SWING, MOST_SWING = 1e-3, 0.9
 AGREES = 0.3
@@ -73,9 +73,9 @@ class Ripple:
 
 @dataclass(frozen=True, kw_only=True)
 class Mains:
-    """What dark slots told of mains light up to the one whose ``rows`` these are.
+    """What dark slots showed of mains light up to the one whose ``rows`` these are.
 
-    ``last`` is what the last pair of slots told, ``ripple`` what two pairs agreed on, ``unseen`` slots ago.
+    ``last`` is what the last pair of slots showed, ``ripple`` what two pairs agreed on, ``unseen`` slots ago.
     """
 
     rows: RowLight
@@ -84,7 +84,7 @@ class Mains:
     unseen: int = 0
 
     def next(self, rows: RowLight) -> "Mains":
-        """Return what is told with one more dark slot."""
+        """Return what is known with one more dark slot."""
         found = find_ripple(self.rows, rows)
         if found is not None and self.last is not None and _agree(found, self.last):
             return Mains(rows=rows, last=found, ripple=found)

@@ -1,7 +1,7 @@
 """Name the lights of a clip whose plan has no marker: by the light that the user names, or by the rig's directions.
 
 For the rig, small plates of one cycle are rebuilt at up to three places of the clip, and only their frames are decoded.
-All places that tell anything must tell the same; else the order stays a guess, and the timing says why.
+All places that give an order must give the same; else the order stays a guess, and the timing says why.
 """
 
 from collections.abc import Iterator
@@ -42,7 +42,7 @@ def named_first(take: Take, timing: Timing, first_light: str) -> Timing:
     raise PsvideoError(
         f"--first-light {first_light} does not fit the timing: its first complete flash is {_first_lights(timing)}'s, "
         f"and no turn of the cycle by which flashes stay alike makes it {first_light}'s. "
-        "Leave the option out, or leave --timing out to find the flashes anew."
+        "Leave the option out, or leave --timing out to find the flashes again."
     )
 
 
@@ -54,9 +54,9 @@ def _first_lights(timing: Timing) -> str:
 
 
 def named_by_rig(take: Take, timing: Timing, rig: Rig) -> Timing:
-    """Return the timing with the order that the rig's directions tell, where the order was a guess.
+    """Return the timing with the order that the rig's directions give, where the order was a guess.
 
-    Where they do not tell it, the names stay as they were guessed; ``order_note`` says why, either way. Raises
+    Where they do not give it, the names stay as they were guessed; ``order_note`` says why, either way. Raises
     PsvideoError where the rig lacks a light of the plan.
     """
     if timing.order != "guess":
@@ -64,8 +64,8 @@ def named_by_rig(take: Take, timing: Timing, rig: Rig) -> Timing:
     refusal = why_untold(take.plan, rig)
     verdict = RigTurn(turn=None, why=refusal) if refusal else _agreed(list(_verdicts(take, timing, rig)))
     if verdict.turn is None:
-        return replace(timing, order_note=f"The rig does not tell the order of the lights: {verdict.why}.")
-    note = f"The rig tells the order of the lights: {verdict.why}."
+        return replace(timing, order_note=f"The rig does not show the order of the lights: {verdict.why}.")
+    note = f"The rig shows the order of the lights: {verdict.why}."
     return replace(turned(take.plan, timing, verdict.turn), order="rig", order_note=note)
 
 
@@ -75,7 +75,7 @@ def _agreed(verdicts: list[RigTurn]) -> RigTurn:
         return RigTurn(turn=None, why="the clip holds no whole cycle of complete flashes")
     decided = [verdict for verdict in verdicts if verdict.turn is not None]
     if len({verdict.turn for verdict in decided}) > 1:
-        return RigTurn(turn=None, why="different parts of the clip tell different orders")
+        return RigTurn(turn=None, why="different parts of the clip give different orders")
     return decided[0] if decided else verdicts[0]
 
 

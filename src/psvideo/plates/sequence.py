@@ -48,7 +48,7 @@ class LightPlate:
 
     @property
     def rows_seen(self) -> NDArray[np.bool_]:
-        """Which rows any frame saw, whatever motion hid in them, shape (row,)."""
+        """Which rows any frame saw, also where motion hid something in them, shape (row,)."""
         return self.seen if self.seen.ndim == 1 else np.asarray(self.seen.any(axis=1))
 
     @property
@@ -78,14 +78,14 @@ class Round:
 
 
 def check_separable(plan: Plan) -> None:
-    """Raise PsvideoError where the plan's flashes cannot tell its lights apart, whatever the pictures."""
+    """Raise PsvideoError where the plan's flashes cannot separate its lights in any picture."""
     matrix = mixing_matrix(plan)
     if np.linalg.matrix_rank(matrix, tol=1e-6) == len(plan.lights):
         return
     reach = np.abs(np.linalg.svd(matrix)[2][np.linalg.matrix_rank(matrix, tol=1e-6) :]).max(axis=0)
     mixed = [light for light, share in zip(plan.lights, reach, strict=True) if share > 1e-6]
     raise PsvideoError(
-        f"The plan's flashes cannot tell the lights {', '.join(mixed)} apart: they flash together in the same "
+        f"The plan's flashes cannot separate the lights {', '.join(mixed)}: they flash together in the same "
         "mixture, or there are fewer different flashes than lights. Flash each by itself, use as many patterns as "
         "lights, or give lights that always flash together one name."
     )

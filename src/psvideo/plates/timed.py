@@ -18,7 +18,7 @@ def timing_of(
     """Return a take's timing: the file that is given, else found from the picture.
 
     ``first_light`` names the light of the first complete flash. Left out, and with no marker in the plan, the lights'
-    order is told by the ``rig`` where it can be. Raises PsvideoError where the file belongs to another clip.
+    order comes from the ``rig`` where it can. Raises PsvideoError where the file belongs to another clip.
     """
     if given is None:
         timing = find_take_timing(take, first_light=first_light, watch=watch)

@@ -49,7 +49,7 @@ def _head(report: RunReport) -> str:
     )
     items += "".join(f"<li>{html.escape(sentence)}</li>" for sentence in report.warnings)
     notes = "".join(f"<li>{html.escape(note)}</li>" for note in report.timing.notes)
-    notes = f'<p class="soft">Seen in the picture besides:</p><ul>{notes}</ul>' if notes else ""
+    notes = f'<p class="soft">Also seen in the picture:</p><ul>{notes}</ul>' if notes else ""
     rest = f"<ol>{items}</ol>" if items else "<p>Nothing was found that speaks against it.</p>"
     return (
         f'<div class="verdict {kind}"><p class="word"><i>{MARKS[kind]}</i> {html.escape(words)}</p>{rest}{notes}</div>'
@@ -72,7 +72,7 @@ def _timing(report: RunReport) -> str:
     readout_s = abs(timing.row_time_s)
     facts = {
         "Flashes": f"{len(timing.flashes)}, of which {complete} complete",
-        "Flash times sure to": f"{timing.phase_error_rows:.2g} row",
+        "Flash times known to": f"{timing.phase_error_rows:.2g} row",
         "Strobe's clock": f"{timing.clock_offset_ppm:+.1f} ppm off the camera's",
         "Order of the lights": f"{timing.order}. {timing.order_note}".strip(" ."),
         "Exposure": f"{timing.exposure_s * 1e3:.4g} ms ({360 * timing.exposure_s / timing.frame_period_s:.0f} degrees)",
@@ -105,7 +105,7 @@ def _lights(report: RunReport) -> str:
             "about so many times larger in the normals).</p>"
         )
     return (
-        '<div class="wide"><table class="figures"><tr><th>light</th><th>stands at</th><th>direction sure to</th>'
+        '<div class="wide"><table class="figures"><tr><th>light</th><th>stands at</th><th>direction known to</th>'
         f"<th>half of the subject below</th><th>95 %</th><th>99.5 %</th><th>clipped</th></tr>{rows}</table></div>"
         f"{condition}<p>Light on the subject in stops below saturation (0 is saturation, -1 half of it):</p>"
         f'<div class="grid4">{charts}</div>'

@@ -12,7 +12,7 @@ DECISIVE = ("strobe", "timing", "order", "rig")
 @dataclass(frozen=True, kw_only=True)
 class Judgement:
     """One line of a judgement. ``subject`` is a word such as ``exposure``; ``found`` a sentence with its figures;
-    ``advice`` what to change on set, empty where there is nothing to change. ``unknown``: it could not be told."""
+    ``advice`` what to change on set, empty where there is nothing to change. ``unknown``: it could not be judged."""
 
     subject: str
     grade: Grade

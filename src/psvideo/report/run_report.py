@@ -32,7 +32,7 @@ class LightFacts:
 @dataclass(frozen=True, kw_only=True)
 class RunReport:
     """One run over one clip. ``kind`` is ``normals`` or ``split``; ``trust`` says what a valid normal can be relied on
-    for; ``warnings`` are whole sentences, the gravest first, besides the ``judgements``. ``shot`` is what was filmed
+    for; ``warnings`` are whole sentences, the gravest first, beside the ``judgements``. ``shot`` is what was filmed
     and ``settings`` what the run was made with, as names and values for people; ``condition`` is the rig's."""
 
     clip: str

@@ -16,7 +16,7 @@ def as_in_python(text: str) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class Caller:
-    """What a run says besides its result, and to whom; by default to Python's log under the name ``psvideo``.
+    """What a run says beside its result, and to whom; by default to Python's log under the name ``psvideo``.
 
     ``say`` takes what people wait for, ``warn`` what a result is to be distrusted for, ``detail`` what is good to know:
     whole sentences, as they come. ``spell`` puts a sentence that names parameters (`` `first_light` ``) into the

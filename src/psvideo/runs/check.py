@@ -30,7 +30,7 @@ LEAST_FRAMES, MOST_FRAMES = 30, 160
 ROUNDS = 4
 """So many rounds are looked at, where the clip is long enough."""
 SPREAD = 6
-"""Frames besides, over the rest of the take: whether light and exposure stay."""
+"""More frames, over the rest of the take: whether light and exposure stay."""
 BRIGHTER, DARKER = 1.25, 0.4
 """Later frames that reach so many times the light of those looked at."""
 MOST_KEPT_BYTES = 1_500_000_000
@@ -51,13 +51,13 @@ def check(
 
     - ``clip``: a folder of numbered frames with plan.toml, or a movie file. ``plan`` names the plan where it does not
       lie beside the footage.
-    - ``rig``: where the lights are, to tell their order by where no marker does; the plates are held against it.
+    - ``rig``: where the lights are, to find their order where there is no marker; the plates are held against it.
       ``first_light`` names the light of the clip's first complete flash, for plans without a marker.
     - ``report``: a page (HTML) to write of the check, outside of the footage. Nothing else is written.
 
     ``watch`` is handed every long loop. Returns what was found; its ``usable`` says whether the take can be used.
     Raises UsageError where the report would lie among the footage, and PsvideoError where the footage or its plan
-    cannot be read, or where there are too few frames to tell.
+    cannot be read, or where there are too few frames to judge.
     """
     page = None if report is None else Path(report)
     refuse_inside(page, Path(clip))

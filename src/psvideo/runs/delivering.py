@@ -1,4 +1,4 @@
-"""What a delivery asks of a run: a camera that is known at every instant, the plates and their sum written besides."""
+"""What a delivery asks of a run: a camera that is known at every instant, the plates and their sum written as well."""
 
 from collections import defaultdict
 from collections.abc import Callable, Iterator
@@ -22,7 +22,7 @@ from psvideo.solve.depth import Depth
 from psvideo.solve.instants import Instant
 
 LENS_TOLERANCE = 0.01
-"""Share by which two focal lengths may differ before it is told: calibrations of one lens differ by less."""
+"""Share by which two focal lengths may differ before a warning: calibrations of one lens differ by less."""
 
 
 def check_delivery(delivery: Delivery, take: Take, timing: Timing, start_number: int) -> None:

@@ -130,7 +130,7 @@ def _of_clip(take: Take, reading: Reading, watch: Watch) -> LightSets:
 
 def _guess(take: Take, note: str) -> str:
     return (
-        f"{take.clip.path}: the plan has no marker, so which light is which is a guess ({note or 'nothing tells it'}). "
+        f"{take.clip.path}: the plan has no marker, so which light is which is a guess ({note or 'nothing shows it'}). "
         "Name the light of the first complete flash with --first-light."
     )
 

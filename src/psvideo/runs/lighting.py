@@ -23,7 +23,7 @@ from psvideo.solve.near_surface import NearSurface, near_surface_of, near_trust
 from psvideo.solve.normals.illumination import illumination
 
 UNSURE_DEG = 5.0
-"""A rig whose own standard error is so large is told of in the report; a guessed one says 20."""
+"""A rig whose own standard error is so large is named in the report; a guessed one says 20."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,7 +62,7 @@ class Lighting:
 
     @property
     def near_iterations(self) -> int:
-        """How often the surface is made anew for near lights; 0 where there are none."""
+        """How often the surface is made again for near lights; 0 where there are none."""
         return 0 if self.near is None else self.near.iterations
 
     @property
@@ -77,7 +77,7 @@ class Lighting:
         if (worst.error_deg or 0.0) < UNSURE_DEG:
             return ()
         return (
-            f"The rig file itself says that its lights are sure to {worst.error_deg:g} degrees only "
+            f"The rig file itself says that its lights are known to {worst.error_deg:g} degrees only "
             f"({worst.name!r}): normals are wrong by about as much. Calibrate on a sphere.",
         )
 
@@ -99,7 +99,7 @@ def read_lighting(
 ) -> Lighting:
     """Read rig, mask and known depth of a take, a file or a folder with one per instant.
 
-    ``near_iterations`` is how often near lights' surface is made anew; left out, once, and never where depth is known.
+    ``near_iterations`` is how often near lights' surface is made again; left out, once, and never where depth is known.
     Raises PsvideoError where they do not fit the plan, or give no normals.
     """
     clip = take.clip

@@ -77,7 +77,7 @@ def normals(
     watch: Watch = unwatched,
     caller: Caller = PYTHON,
 ) -> RunReport:
-    """Write normals, albedo and validity for every round of flashes; find the timing and rebuild the plates besides.
+    """Write normals, albedo and validity for every round of flashes; find the timing and rebuild the plates on the way.
 
     What is read:
 

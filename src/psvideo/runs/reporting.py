@@ -119,7 +119,7 @@ def write_report(folder: Path, report: RunReport, pictures: Sequence[tuple[str, 
 
 def _where(light: Light | None) -> str:
     if light is None:
-        return "not told: no rig"
+        return "not known: no rig"
     place = light.direction if light.direction is not None else light.position_m
     numbers = ", ".join(f"{value:.3f}" for value in place or ())
     return f"direction ({numbers})" if light.direction is not None else f"position ({numbers}) m"

@@ -17,7 +17,7 @@ UNCHANGED_LOOKS = 2
 
 @dataclass(frozen=True)
 class State:
-    """What tells a growing take from a whole one: its count of files, their bytes, and when any was last changed."""
+    """What shows that a take still grows: its count of files, their bytes, and when any was last changed."""
 
     files: int
     size: int
@@ -69,10 +69,10 @@ def _state(entries: list[os.DirEntry[str]]) -> State:
     size = changed_ns = 0
     for entry in entries:
         try:
-            told = entry.stat()
+            found = entry.stat()
         except OSError:
             continue
-        size, changed_ns = size + told.st_size, max(changed_ns, told.st_mtime_ns)
+        size, changed_ns = size + found.st_size, max(changed_ns, found.st_mtime_ns)
     return State(files=len(entries), size=size, changed_ns=changed_ns)
 
 

@@ -2,7 +2,7 @@
 
 Near lights need the surface's depth, and depth comes from normals. The rig's [surface] plane is a first guess that is
 off by the relief of the subject; from its normals depth is integrated, each part put onto the plane by its median, and
-serves as the next guess. What no integration can tell is how far away the whole subject is: a plane at a wrong distance
+serves as the next guess. What no integration can find is how far away the whole subject is: a plane at a wrong distance
 stays wrong. Depth that is known from elsewhere takes the plane's place, for each instant its own where there is more
 than one.
 """
@@ -29,7 +29,7 @@ LEAST_COVERED = 0.5
 
 @dataclass(frozen=True, kw_only=True)
 class NearSurface:
-    """Where near lights find the surface: the first ``ground``, and how often it is made anew from the normals.
+    """Where near lights find the surface: the first ``ground``, and how often it is made again from the normals.
 
     known_m: the depth (row, col) known of the instant with a number, 0 where unknown; it comes before the ground's.
     """

@@ -1,4 +1,4 @@
-"""Power within a flash: bursts so short that no row can tell them from a steady, weaker light.
+"""Power within a flash: bursts so short that a row sees them as a steady, weaker light.
 
 A line is on for ``on`` ticks of every ``period`` ticks: the pulse-width-modulated bursts of Hudon et al. (2015). The
 period divides the flash evenly where it can; else only the last gap is cut short, never the last burst, so that a

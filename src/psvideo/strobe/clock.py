@@ -1,7 +1,7 @@
 """The board's clock against the host's: ``host time = gain * ticks + offset``, fitted to clock queries.
 
 The host asks at ``asked_s`` and has the answer at ``answered_s``; the board took its time somewhere in between. So
-every query bounds the line, and two queries far apart bound its gain hard, whatever the cable did in between.
+every query bounds the line, and two queries far apart bound its gain hard, however slow the cable was in between.
 """
 
 from collections.abc import Sequence

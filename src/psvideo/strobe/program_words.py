@@ -48,7 +48,7 @@ def program_cautions(plan: Plan, program: Program, caps: Capabilities) -> Iterat
     if abs(rounding_ppm) >= SHOWN_PPM:
         yield (
             f"in whole ticks of {caps.tick_ps / 1e6:g} µs the cycle is {abs(rounding_ppm):.1f} ppm {way} than planned; "
-            "the log (--log) tells psvideo sync, and without it that looks like a clock offset"
+            "psvideo sync learns it from the log (--log); without it that looks like a clock offset"
         )
 
 

@@ -64,7 +64,7 @@ class RunProgress:
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """What was played. ``fault`` says what ended a run that did not end well, and ``message`` tells people of it."""
+    """What was played. ``fault`` says what ended a run that did not end well, and ``message`` explains it to people."""
 
     started_utc: str
     stopped_utc: str
@@ -102,7 +102,7 @@ def _clear(link: Link) -> list[str]:
 
 
 def cycles_for(plan: Plan, *, seconds: float | None, rounds: int | None) -> int | None:
-    """Return how many whole cycles hold so many seconds, or rounds; None for a run until told."""
+    """Return how many whole cycles hold so many seconds, or rounds; None for a run until it is stopped."""
     if rounds is not None:
         return math.ceil(rounds / plan.dark_every)
     if seconds is not None:
@@ -113,10 +113,10 @@ def cycles_for(plan: Plan, *, seconds: float | None, rounds: int | None) -> int 
 def run_program(
     link: Link, program: Program, *, cycles: int | None, seconds: float | None, watch: Callable[[RunProgress], None]
 ) -> Outcome:
-    """Upload a program and play it for ``cycles`` cycles (None: until told), at most for ``seconds``.
+    """Upload a program and play it for ``cycles`` cycles (None: until stopped), at most for ``seconds``.
 
-    Whatever happens, the board is told to stop. Ctrl-C ends a run well. Raises PsvideoError where nothing was played;
-    what goes wrong after the first flash is told by the outcome, so that it can be logged.
+    In every case the board is stopped. Ctrl-C ends a run well. Raises PsvideoError where nothing was played;
+    what goes wrong after the first flash stands in the outcome, so that it can be logged.
     """
     record = _Record()
     try:
@@ -172,7 +172,7 @@ def _follow(
         if status.state == "fault":
             return f"{status.fault}: {FAULTS[status.fault]}"
         if status.state == "idle" and (cycles is None or status.cycles < cycles):
-            return f"restarted: the board started anew in the middle of the run (reset: {status.reset})"
+            return f"restarted: the board started again in the middle of the run (reset: {status.reset})"
         record.cycles = status.cycles
         elapsed_s = time.monotonic() - began_s
         watch(RunProgress(elapsed_s=elapsed_s, cycles=status.cycles))

@@ -4,7 +4,7 @@ One global fit over many frames instead of a search for each frame's darkest row
 the ratio of the two clocks are searched, the brightness of every row under every light is eliminated. A coarse grid
 over a few dozen frames finds the place in the cycle; from there the clip is tracked, frames that were dropped or
 repeated without a word are found, and a robust fit over all frames sharpens the clock, its drift, and what the plan
-does not know exactly: readout, exposure, the LEDs' tails. The cycle's marker tells which light is which.
+does not know exactly: readout, exposure, the LEDs' tails. The cycle's marker shows which light is which.
 """
 
 from collections.abc import Sequence
@@ -50,8 +50,8 @@ def find_timing(
 ) -> Timing:
     """Return when every flash of a clip fired.
 
-    ``indices`` (frame,) are the frames' places in time as their numbering tells and ``profiles`` (frame, row) their row
-    means in linear light; ``doubt`` (frame, row) is by how much a mean may be wrong besides noise (saturated pixels).
+    ``indices`` (frame,) are the frames' places in time by their numbering and ``profiles`` (frame, row) their row
+    means in linear light; ``doubt`` (frame, row) is by how much a mean may be wrong beyond noise (saturated pixels).
     ``numbers`` (frame,) are the frames' own numbers, by which dropped and repeated ones are reported (left out: the
     indices). Raises PsvideoError where the profiles do not look like the plan's strobe.
     """

@@ -37,12 +37,12 @@ KEPT = 0.8
 AWAY_DEG = 90.0
 """The error of a turn under which the surface would face away from the camera."""
 FAINT = 0.004
-"""How little normals may vary (as their squared length in one direction) until they tell nothing of the lights."""
+"""How little normals may vary (as their squared length in one direction) until they say nothing of the lights."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RigTurn:
-    """By how many places in the cycle names are to be turned, None where the rig does not tell, and a sentence why."""
+    """By how many places in the cycle names are to be turned, None where the rig does not say, and a sentence why."""
 
     turn: int | None
     why: str
@@ -78,7 +78,7 @@ def turned(plan: Plan, timing: Timing, turn: int) -> Timing:
 
 
 def why_untold(plan: Plan, rig: Rig) -> str | None:
-    """Return why no picture could tell the order by this rig, None where one may.
+    """Return why no picture could give the order by this rig, None where one may.
 
     Raises PsvideoError where the rig lacks a light of the plan.
     """
@@ -87,7 +87,7 @@ def why_untold(plan: Plan, rig: Rig) -> str | None:
         return "the plan's cycle has a marker, and the picture does not show it clearly enough"
     if len(plan.lit_slots) < 4:
         return (
-            f"any picture fits any order of {len(plan.lit_slots)} flashes; a fourth light, or a dark slot, would tell"
+            f"any picture fits any order of {len(plan.lit_slots)} flashes; a fourth light, or a dark slot, would decide"
         )
     near = [light for light in lights if light.direction is None]
     if near and (rig.focal_px is None or rig.principal_px is None or rig.plane is None):
@@ -96,7 +96,7 @@ def why_untold(plan: Plan, rig: Rig) -> str | None:
 
 
 def order_by_rig(plan: Plan, rig: Rig, pictures: Mapping[int, Image]) -> RigTurn:
-    """Return the turn of the cycle that the rig's directions tell, or why they do not tell it.
+    """Return the turn of the cycle that the rig's directions give, or why they give none.
 
     ``pictures`` holds a small linear picture of the whole frame, (row, col) or (row, col, channel), ambient light taken
     off, for every lit slot as it is named so far; 0 where nothing was seen. Raises PsvideoError where the rig lacks a

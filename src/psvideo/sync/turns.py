@@ -1,7 +1,7 @@
 """Which flash of the cycle is which: every turn of the cycle is held against the picture.
 
-Turns that put flashes of the same length and dark slots on dark slots cannot be told apart by when light comes; where
-several flashes hold the same lights at known powers, their brightnesses tell. All other turns are fitted, and one is
+Turns that put flashes of the same length and dark slots on dark slots do not differ in when light comes; where
+several flashes hold the same lights at known powers, their brightnesses decide. All other turns are fitted, and one is
 believed only where it beats each of them clearly, frame by frame (Vuong 1989).
 """
 
@@ -25,12 +25,12 @@ PLAIN = 6.0
 """Or the sum over frames of mean losses by which it must win where hardly any frame speaks against it."""
 MOST_AGAINST = 0.1
 MIXED_WELL, MIXED_BADLY = 0.1, 4.0
-"""Powers tell the turn where one leaves less than this of the brightnesses, and all others that many times more."""
+"""Powers decide the turn where one leaves less than this of the brightnesses, and all others that many times more."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Turns:
-    """Beats that fit equally well as far as the picture tells, the likeliest first; ``sure`` where names cannot err."""
+    """Beats that fit equally well as far as the picture shows, the likeliest first; ``sure`` where names cannot err."""
 
     beats: tuple[Beat, ...]
     sure: bool
@@ -49,7 +49,7 @@ def turns(plan: Plan, rows: Profiles, beat: Beat) -> Turns:
 
 
 def _part(plan: Plan, rows: Profiles) -> Profiles:
-    """Return enough of the clip to tell turns apart, dark slots that are rare included."""
+    """Return enough of the clip to separate turns, dark slots that are rare included."""
     needed = max(TURN_FRAMES, int(2.5 * plan.cycle_s / rows.period_s))
     return rows.take(slice(0, min(needed, len(rows.value)))).binned(TURN_ROWS)
 
@@ -72,7 +72,7 @@ def _seen_slots(plan: Plan, beat: Beat, reference: Beat) -> tuple[int, ...]:
 
 
 def _fitted(plan: Plan, rows: Profiles, beat: Beat, *, period: int) -> list[Beat]:
-    """Fit every turn that timing can tell; return those that the best does not clearly beat, best first."""
+    """Fit every turn that timing can distinguish; return those that the best does not clearly beat, best first."""
     tried = [beat] + [_aligned(plan, rows, turned(plan, beat, turn)) for turn in range(1, period)]
     rests = [unexplained(plan, rows, one) for one in tried]
     noise = np.maximum(row_noise(rests[0]), 0.01 * rows.spread)

@@ -90,7 +90,7 @@ class FlashTable(Contract):
 
 
 class StrobeTable(RoundTable):
-    """The strobe: the plan that it plays, and how its clock truly runs (which the plan does not tell)."""
+    """The strobe: the plan that it plays, and how its clock truly runs (which the plan does not say)."""
 
     flash_s: Positive = 0.0008
     marker: bool = True

@@ -76,7 +76,7 @@ def _refuse_footage(out: Path, *, force: bool) -> None:
 
 @contextlib.contextmanager
 def _nothing_left(folder: Path, out: Path) -> Iterator[None]:
-    """Remove an unfinished clip where the shoot fails: it is filmed anew, never resumed."""
+    """Remove an unfinished clip where the shoot fails: it is filmed again, never resumed."""
     try:
         yield
     except OSError as fault:

@@ -16,7 +16,7 @@ from psvideo.synth.scene import CameraTable, Kind, LightTable, Scene
 def camera_of(table: CameraTable, kind: Kind) -> Camera:
     """Return the camera; EXR and DNG files carry their levels themselves, and DNG its mosaic."""
     scale = codes_of(table, kind)
-    told = Encoding(transfer=table.transfer, black_level=scale.black, white_level=scale.white, cfa=table.cfa)
+    stated = Encoding(transfer=table.transfer, black_level=scale.black, white_level=scale.white, cfa=table.cfa)
     encoding = Encoding(transfer=table.transfer, cfa=table.cfa if kind == "exr" else None)
     return Camera(
         name=table.name,
@@ -25,7 +25,7 @@ def camera_of(table: CameraTable, kind: Kind) -> Camera:
         fps=table.rate,
         exposure_s=exposure_of(table.rate, shutter_deg=table.shutter_deg, exposure_s=table.exposure_s),
         readout_s=table.readout_s,
-        encoding=encoding if kind in ("exr", "dng") else told,
+        encoding=encoding if kind in ("exr", "dng") else stated,
     )
 
 

@@ -1,6 +1,6 @@
 """A scene set up for filming: its bodies, its lights, and pictures of them at any instant.
 
-A scene that stands still is looked at once, and every slot of the plan has one plate. A moving scene is looked at anew
+A scene that stands still is looked at once, and every slot of the plan has one plate. A moving scene is looked at again
 for every flash, at the middle of the flash, and for every frame's ambient light, at the middle of the frame.
 """
 

@@ -75,7 +75,7 @@ def write_timing(folder: Path, plan: Plan, flashes: tuple[TrueFlash, ...], plate
 def write_scene_truth(
     folder: Path, scene: Scene, plan: Plan, clock: TrueClock, clipped: float, traced: TracedLight | None
 ) -> None:
-    """Write scene.json: what the plan beside the footage does not tell."""
+    """Write scene.json: what the plan beside the footage does not say."""
     data: dict[str, object] = {
         "phase_s": clock.phase_s,
         "clock_offset_ppm": clock.offset_ppm,

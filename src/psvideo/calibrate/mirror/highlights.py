@@ -1,4 +1,4 @@
-"""The highlight of a light on a mirror sphere, told from other bright spots.
+"""The highlight of a light on a mirror sphere, separated from other bright spots.
 
 Candidates are the compact bright spots inside the outline. What is as bright in most other lights' pictures at the
 same place is no highlight of this light (a window, a white object that every light lights). Of the rest, the one that
@@ -32,11 +32,11 @@ DARK_PEAK = 0.02
 LARGEST_SPOT = 0.06
 """Share of the sphere's disc that a highlight may cover; a matte sphere's shading covers far more."""
 FLOODED = 0.3
-"""From this share of the disc on that is clipped in all channels, a picture tells no highlight, nor what is static."""
+"""From this share of the disc on that is clipped in all channels, a picture shows no highlight, nor what is static."""
 SKIRT_PX = 2
-"""How far beyond the candidate's edge its light is counted: a small spot's flanks tell where it is."""
+"""How far beyond the candidate's edge its light is counted: a small spot's flanks show where it is."""
 FEW_CLIPPED = 40
-"""So many clipped pixels do not yet hide where a spot's middle is: its flanks tell it."""
+"""So many clipped pixels do not yet hide where a spot's middle is: its flanks show it."""
 ALIKE = 0.5
 """A second spot with more than this share of the first one's score makes the choice doubtful."""
 STATIC = 0.6

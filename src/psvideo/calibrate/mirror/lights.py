@@ -2,8 +2,8 @@
 
 The highlight of a light is where the sphere mirrors the viewing ray into the light's direction. What is known of the
 view decides how rays are taken (``sphere_view``); one or more sightings (frames, spheres, places) are joined: distant
-lights as a mean direction, near ones as the point where the mirrored rays meet (``mirror_law``). Lights that cannot be
-told are named with the reason, and left out of the rig. Highlights clip, so they tell no intensity: every light gets 1.
+lights as a mean direction, near ones as the point where the mirrored rays meet (``mirror_law``). Lights that are not
+found are named with the reason, and left out of the rig. Highlights clip, so they show no intensity: all lights get 1.
 """
 
 from collections.abc import Sequence
@@ -96,7 +96,7 @@ def calibrate_lights(sightings: Sequence[Sighting], *, radius_m: float | None = 
 
 
 def _measured(name: str, sightings: Sequence[Sighting], radius_m: float | None) -> MeasuredLight:
-    """Join what the sightings tell of one light."""
+    """Join what the sightings say of one light."""
     seen = [
         (sighting, one)
         for sighting in sightings
@@ -132,7 +132,7 @@ def _doubtful(one: Highlight) -> str:
 
 
 def _agreeing(sighting: Sighting, one: Highlight, rays: Sequence[Ray], radius_m: float | None) -> Ray | None:
-    """Return the ray of the spot, out of several alike ones, that agrees with what other sightings tell for sure."""
+    """Return the ray of the spot, out of several alike ones, that agrees with what other sightings say for certain."""
     mean, _, _ = mean_direction(rays)
     places = [spot.place for spot in one.alike] + ([] if one.place is None else [one.place])
     made = [ray for place in places if (ray := _ray(sighting, place, one, radius_m)) is not None]

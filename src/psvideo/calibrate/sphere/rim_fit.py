@@ -36,7 +36,7 @@ AGREES = 1.1
 FOLLOWED = 0.6
 """Share of the spokes that must agree on an outline that moved since the first picture."""
 WAVERS_PX, WAVERS_PER_BLUR = 0.3, 0.3
-"""How far what a spoke tells may be off by itself (standard deviation), in pixels and per pixel of blur."""
+"""How far the result of one spoke may be off by itself (standard deviation), in pixels and per pixel of blur."""
 BIAS_PX, BIAS_PER_BLUR = 0.1, 0.1
 """What an outline may be off in x, y and radius in any case, and per pixel of blur."""
 
@@ -56,7 +56,7 @@ class Rim:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Spokes:
-    """What spokes tell: logarithms of odds (spoke, shift), how each spoke's rim moves with the outline's numbers
+    """What the spokes show: logarithms of odds (spoke, shift), how each spoke's rim moves with the outline's numbers
     (spoke, number), where the spokes cross the outline they were taken at (spoke, 2), that outline, and the blur."""
 
     odds: FloatArray
@@ -158,7 +158,7 @@ def _odds(logs: FloatArray, wavers_px: float) -> FloatArray:
 
 
 def _spread(count: int, width_px: float) -> FloatArray:
-    """Return the matrix (shift, shift) that blurs what shifts tell by a standard deviation."""
+    """Return the matrix (shift, shift) that blurs the odds of shifts by a standard deviation."""
     away = (np.arange(count)[:, None] - np.arange(count)) * SHIFT_PX / width_px
     kernel = np.exp(-0.5 * away**2)
     spread: FloatArray = kernel / kernel.sum(axis=0)

@@ -1,10 +1,10 @@
-"""How bright a picture is across a sphere's rim, and how well that tells where the rim is.
+"""How bright a picture is across a sphere's rim, and how well that shows where the rim is.
 
 At its very rim a smooth sphere mirrors fully (Fresnel: at grazing angles everything does) what is just behind it. So a
 mirror's picture is continuous there: it only begins to change, and it does so with the cosine of incidence, which
 grows as the root of the distance from the rim. Inside, brightness is taken for a cubic in that root; outside for a
 straight line; all blurred by the lens. A matte thing may jump at its rim; its inside is a square in the root. What the
-steepest place of a mirror's edge tells lies inside of that: on a dark ball before a bright wall by several pixels.
+steepest place of a mirror's edge shows lies inside of that: on a dark ball before a bright wall by several pixels.
 
 Everything but the rim's place and the blur is linear, and eliminated by least squares (variable projection). The
 unexplained rest, as a likelihood with unknown noise, says how good a place is: pictures and radii in which nothing

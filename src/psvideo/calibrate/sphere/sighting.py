@@ -151,7 +151,7 @@ def _refuse_cut(outline: Outline, where: str, shown: Grey) -> None:
     if radius < LEAST_RADIUS_PX:
         raise SphereNotFoundError(
             f"{where}: the sphere at {x:.0f},{y:.0f} has a radius of {radius:.1f} pixels, on which a highlight's place "
-            f"tells nothing; expected {LEAST_RADIUS_PX:.0f} at least, better 100. Go nearer, or use a larger sphere.",
+            f"says nothing; expected {LEAST_RADIUS_PX:.0f} at least, better 100. Go nearer, or use a larger sphere.",
             shown,
         )
     rim = outline.view.curve(outline.place)

@@ -148,7 +148,7 @@ def _refuse_wide(found: Sequence[FoundStripes], readings: Sequence[FoundStripes]
     if best.explained > LEAST_EXPLAINED and all(best.left < WIDE_LEFT * reading.left for reading in readings):
         raise PsvideoError(
             f"shows about {best.frequency * rows:.1f} periods of stripes over its {rows} rows, and fewer than "
-            f"{FEWEST_PERIODS:g} cannot be told from the scene. Let the LED blink faster, so that 5 to 40 stripes fit "
+            f"{FEWEST_PERIODS:g} look like the scene itself. Let the LED blink faster, so that 5 to 40 stripes fit "
             "into the height, and see that it is the only light."
         )
 

@@ -18,7 +18,7 @@ MOST_SPANS = 8
 ROBUST_SCALE = 3.0
 MODEL_ERROR = 0.2
 """Share of a profile's spread by which the model may be off at edges without a row losing weight for it: without
-noise, robust weights would else throw out the edges themselves, which tell the frequency."""
+noise, robust weights would else throw out the edges themselves, which show the frequency."""
 DULLEST = 1e-3
 """What a profile without any change, a black one, is taken to be unsure by, as a share of all profiles' spread."""
 ENVELOPE_PULL = 0.01

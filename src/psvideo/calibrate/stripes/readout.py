@@ -70,7 +70,7 @@ def measure_readout(
     """Measure the readout time of a frame of ``rows`` rows (left out: those of the picture, over ``zoom``).
 
     ``zoom`` is how many rows of the picture show one row of the sensor; ``near_s`` is roughly what is expected; ``fps``
-    is the rate at which the frames were filmed, which tells the direction. Raises PsvideoError that names the pictures
+    is the rate at which the frames were filmed, which gives the direction. Raises PsvideoError that names the pictures
     where they hold no stripes, fewer than two periods, or stripes that can be read in two ways.
     """
     full = rows or round(pictures.height_px / zoom)
@@ -117,7 +117,7 @@ def _find(profiles: FloatArray, expected: float | None) -> tuple[FloatArray, Str
         try:
             return _fit(profiles - profiles.mean(axis=0), expected)
         except PsvideoError:
-            pass  # the stripes stand still, or there are none: the frames as they are will tell
+            pass  # the stripes stand still, or there are none: the frames as they are decide
     return _fit(profiles, expected)
 
 

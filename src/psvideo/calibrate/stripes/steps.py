@@ -59,7 +59,7 @@ def find_direction(
 def _steps(fundamental: NDArray[np.complex128], places: tuple[int, ...]) -> NDArray[np.complex128]:
     """Return how the phase goes on, as numbers on the unit circle, for all three frames in a row.
 
-    Differences of neighbours are compared, in which whatever stands still cancels.
+    Differences of neighbours are compared, in which everything that stands still cancels.
     """
     change = np.diff(fundamental, axis=0)
     turn = (change[1:] * change[:-1].conj()).sum(axis=1)

@@ -29,7 +29,7 @@ LONGEST_STEP_CYCLES = 0.3
 SIGNAL_TO_NOISE = 2.0
 """Harmonics are kept where their mean energy is that many times what noise alone would give them."""
 HIGHEST_HARMONIC = 0.45
-"""Periods per row: beyond half a period a row cannot tell harmonics apart."""
+"""Periods per row: beyond half a period a row cannot separate harmonics."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""Whether an OpenEXR file of scan lines is whole, told from its table of chunks, without decoding a pixel.
+"""Whether an OpenEXR file of scan lines is whole, judged by its table of chunks, without decoding a pixel.
 
 The library finds a truncated file too, but writes about it to the terminal by itself. The layout is that of the
 "OpenEXR File Layout" document: magic number, version, attributes up to an empty name, then one offset per chunk.

@@ -24,7 +24,7 @@ UNTAGGED = 2  # matrix coefficients "unspecified" (H.273)
 HD_HEIGHT_PX = 720
 UNEVEN = 0.25
 MOST_REORDERED = 16  # frames by which H.264 and H.265 may put decoding before showing
-AS_RECORDED = {"ignore_editlist": "1"}  # all frames that the camera wrote, whatever an edit list would show
+AS_RECORDED = {"ignore_editlist": "1"}  # all frames that the camera wrote, also those that an edit list would hide
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +32,7 @@ class Movie:
     """A movie's first frame's header and, in the order of time, every frame's timestamp and place.
 
     ``places`` count frames from the first; a gap of whole frames between timestamps leaves places out. ``rate_hz`` is
-    the rate at which the file plays, None where a single frame tells none; rounded timestamps leave it unsure by the
+    the rate at which the file plays, None where a single frame shows none; rounded timestamps leave it unsure by the
     share ``rate_error``.
     """
 

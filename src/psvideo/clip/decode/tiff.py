@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from psvideo.clip.record import CodedPicture, Header
 from psvideo.errors import PsvideoError
 
-# tifffile tells its own log what it thinks of odd tags; what matters of it is raised here.
+# tifffile writes to its own log what it thinks of odd tags; what matters of it is raised here.
 logging.getLogger("tifffile").addHandler(logging.NullHandler())
 
 GREY, RGB, MOSAIC, LINEAR_RAW = 1, 2, 32803, 34892  # values of the tag PhotometricInterpretation

@@ -33,7 +33,7 @@ def write_animation(
     from pxr import Usd
 
     with whole_file(path) as beside:
-        named = beside.with_name(f"{beside.name}.usdc")  # USD tells a file's kind by its ending
+        named = beside.with_name(f"{beside.name}.usdc")  # USD knows a file's kind by its ending
         try:
             stage = Usd.Stage.CreateNew(str(named))
             stage.GetRootLayer().customLayerData = {"psvideo:version": __version__, "psvideo:metric": metric}

@@ -50,7 +50,7 @@ export function listenToPointers(app) {
   listenToWipe(app);
 }
 
-// The pane under a pointer; in a wipe the two lie on each other, and the line tells them apart.
+// The pane under a pointer; in a wipe the two lie on each other, and the line separates them.
 function paneAt(app, event) {
   if (app.state.layout === "wipe") {
     const box = app.viewer.getBoundingClientRect();

@@ -86,7 +86,7 @@ class App {
     if (wanted !== this.state.at) this.run(wanted);
   }
 
-  // Go to a place: nothing is drawn anew until its pictures are there.
+  // Go to a place: nothing is drawn again until its pictures are there.
   run(at) {
     this.state.at = at;
     this.loader.update({ moving: true });

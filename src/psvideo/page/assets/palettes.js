@@ -1,4 +1,4 @@
-// Colours that people with any colour vision tell apart: false colours whose lightness only rises, and a list of inks.
+// Colours that people with any colour vision can distinguish: false colours whose lightness only rises, and a list of inks.
 
 // After cividis (Nunez, Anderton and Renslow 2018): dark blue over grey to yellow.
 export const CIVIDIS = [[0, 32, 77], [65, 77, 107], [124, 123, 120], [188, 175, 111], [255, 234, 70]];

@@ -40,7 +40,7 @@ function lightsPart(app) {
   return part("Lights", "lights", list, add);
 }
 
-// Draw the list of lights anew; called when lights are added, removed or chosen.
+// Draw the list of lights again; called when lights are added, removed or chosen.
 export function tellLights(app) {
   const list = document.getElementById("lights");
   if (!list) return;

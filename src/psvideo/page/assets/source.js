@@ -1,7 +1,7 @@
 // Where pictures come from, which of them are kept, and in what order they are fetched.
 import { missingBlock, parseBlock } from "./block.js";
 
-const GIGABYTES = navigator.deviceMemory ?? 3.2; // browsers that tell it say 8 at most
+const GIGABYTES = navigator.deviceMemory ?? 3.2; // browsers that report it say 8 at most
 export const MOST_BYTES = 0.2e9 * GIGABYTES;
 const AT_ONCE = 4;
 

@@ -32,7 +32,7 @@ export class TimingView {
       ["Flashes", `${record.flashes.length}, ${complete} complete`],
       ["Sure to", `${Number(record.phase_error_rows.toPrecision(2))} row`],
       ["Strobe's clock", `${record.clock_offset_ppm >= 0 ? "+" : ""}${record.clock_offset_ppm.toFixed(1)} ppm`],
-      ["Order", { marker: "told by the dark slot", rig: "told by the rig", given: "given", guess: "a guess" }[record.order]],
+      ["Order", { marker: "from the dark slot", rig: "from the rig", given: "given", guess: "a guess" }[record.order]],
       ["Row time", `${(record.row_time_s * 1e6).toFixed(2)} µs`],
       ["Exposure", `${(record.exposure_s * 1e3).toFixed(3)} ms`],
       ["Dropped", dropped.join(", ") || "none"],

@@ -1,6 +1,6 @@
 """A light's plate at an instant between two of its flashes: both plates moved along the flow, and blended.
 
-What was hidden in one of the plates is taken from the other; what cannot be told is not seen. Blending by time also
+What was hidden in one of the plates is taken from the other; what is unknown counts as not seen. Blending by time also
 carries shading over, which changes where a surface turns.
 """
 
@@ -25,12 +25,12 @@ LEAST_SQUARE = 1.0
 UNLIKE = 12.0
 """Plates that differ by more codes than this, after blurring, do not show the same thing."""
 REST = 3.0
-"""Where the flow does not tell, plates that differ by fewer codes are taken as they are."""
+"""Where the flow finds nothing, plates that differ by fewer codes are taken as they are."""
 BLUR_PX, WINDOW_PX, DETAIL_PX = 1.5, 9, 6.0
 REACH_PX = 17
 """Around what moved, flow is used as well: bare parts of a subject move with it."""
 SLIVER_PX = 5
-"""What is told in narrower strips between what is not lies on outlines, where flow mixes what is before and behind."""
+"""What is known in narrower strips between what is not lies on outlines, where flow mixes what is before and behind."""
 SETTLED_PX = 0.5
 """How far the place that a pixel comes from may still wander when it is looked for step by step."""
 STEPS = 6
@@ -127,7 +127,7 @@ class Ends:
 
 
 def plate_at(ends: Ends, way: Track, *, time_s: float, number: int) -> LightPlate:
-    """Return a light's plate at an instant; ``seen`` (row, col) is False where nothing tells what it showed."""
+    """Return a light's plate at an instant; ``seen`` (row, col) is False where what it showed is not known."""
     own = ends.nearer
     rows, cols = own.image.shape[:2]
     image = np.empty_like(own.image)

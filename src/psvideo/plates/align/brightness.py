@@ -24,7 +24,7 @@ def evened(before: Sketch, after: Sketch) -> Sketch:
     """Return ``after`` in the brightness of ``before`` where one factor explains most of what changed; else as it is.
 
     Both sketches are of one light and one scale. What moves changes few blocks by one factor, so that the median over
-    all lit blocks tells the exposure, and motion is left to be found.
+    all lit blocks gives the exposure, and motion is left to be found.
     """
     rows = np.linspace(0, len(before.seen) - 1, len(before.blocks)).astype(np.intp)
     seen = (before.seen & after.seen)[rows]

@@ -1,7 +1,7 @@
 """Noise taken out over time: results are averaged for as long as a pixel shows the same.
 
 Averaged is albedo * normal, in which the plates are linear, so that the mean is what the mean of the plates would give.
-A pixel whose neighbourhood changes by more than noise begins anew: what moves is never mixed with what was there.
+A pixel whose neighbourhood changes by more than noise starts again: what moves is never mixed with what was there.
 """
 
 from dataclasses import dataclass, replace
@@ -23,7 +23,7 @@ MOST_DRIFT = 0.4
 FINEST = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32) / 6
 LEVELS = 8
 LOW_SHARE, LOW_OF_MEAN = 0.25, 1.213 / 3
-"""Noise is told from the lowest quarter of squared differences, for up to three quarters of a picture may move: the
+"""Noise comes from the lowest quarter of squared differences, for up to three quarters of a picture may move: the
 quarter's border as a share of the mean, for three normal components (chi squared)."""
 
 
@@ -88,7 +88,7 @@ def _noise(apart: Planes, level: Planes, both: Flags) -> Planes:
     """Return the mean squared noise of one result by brightness; ``apart`` (3, row, col) is what differs in time.
 
     Only its finest detail is looked at (Immerkaer, "Fast noise variance estimation", CVIU 1996), which smooth surfaces
-    lack, moving or not. Brighter never is less noisy: a brightness that only what moves has tells nothing above that.
+    lack, moving or not. Brighter never is less noisy: a brightness that only moving parts have says nothing above that.
     """
     fine = [cv2.filter2D(plane, -1, FINEST) for plane in apart]
     inner = cv2.erode(both.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
@@ -104,7 +104,7 @@ def _noise(apart: Planes, level: Planes, both: Flags) -> Planes:
 
 
 def _with(surface: Surface, average: Average) -> Surface:
-    """Return the surface as its average has it; pixels that began anew stay to the bit."""
+    """Return the surface as its average has it; pixels that started again stay to the bit."""
     longer = average.count > 1
     length = np.sqrt((average.vectors**2).sum(axis=0))
     normals = np.empty((3, *longer.shape), surface.normals.dtype)

@@ -34,7 +34,7 @@ LEAST_CHANGE = 1.5
 NOISE_FACTOR = 5.0
 """... nor those that change by less than so many times what noise makes of them."""
 SOME, LEAST_LIT = 8, 8
-"""Noise is told from every so many rows, where codes are not less than this: below, it is cut off at zero."""
+"""Noise is estimated from every so many rows, where codes are not less than this: below, it is cut off at zero."""
 QUARTER_OF_NORMAL = 0.3186
 """A quarter of normal values of variance one is smaller than this."""
 
@@ -115,9 +115,9 @@ def moved(before: Sketch, after: Sketch) -> bool:
 
 
 def _noise(before: Sketch, after: Sketch) -> float:
-    """Return the noise of the change between two sketches, in codes, told from its finest detail in some of the rows.
+    """Return the noise of the change between two sketches, in codes, by its finest detail in some of the rows.
 
-    The quieter half tells it: up to half of what is lit may move and be as rich in detail as it likes.
+    The quieter half decides: up to half of what is lit may move and be as rich in detail as it likes.
     """
     some = np.flatnonzero(before.seen & after.seen)[::SOME]
     one, other = (sketch.codes[some].astype(np.int16) for sketch in (before, after))

@@ -121,7 +121,7 @@ def _complete(held: Held, how: Aligning, flows: Flows) -> Iterator[Round]:
 
 
 def _ready(held: Held, instant: Instant, how: Aligning) -> Iterator[str]:
-    """Yield the lights whose plates at an instant are not made yet and can be; what the first tell counts for the last.
+    """Yield the lights whose plates at an instant are not made yet and can be; each is judged when it is asked for.
 
     At one result per flash plates are held for other instants anyway: none is made before all can be.
     """

@@ -15,7 +15,7 @@ BEST_STOPS = -0.5
 MOST_CLIPPED, LOST_CLIPPED = 0.02, 0.1
 """Shares of the subject that one lamp may clip: more costs normals there, and with three lamps all of them."""
 SPARE_CLIPPED = 0.25
-"""With more lamps than three the others still tell the normal."""
+"""With more lamps than three the others still give the normal."""
 MOST_AMBIENT, LOST_AMBIENT = 0.1, 0.5
 NOTICED, MOST_SWING = 0.05, 0.1
 """Ambient light of more than the first share that changes from dark slot to dark slot by more than the second."""

@@ -31,7 +31,7 @@ def focus(observed: Observed) -> Judgement:
     """Judge the sharpest edges."""
     if not observed.blurs_px:
         return Judgement(
-            subject="focus", grade="unknown", found="Sharpness cannot be told: no edge stands out of the noise."
+            subject="focus", grade="unknown", found="Sharpness cannot be measured: no edge stands out of the noise."
         )
     blur_px = float(np.median(observed.blurs_px))
     found = f"The sharpest edges are blurred by {blur_px:.1f} px."

@@ -39,7 +39,7 @@ def timing_and_order(timing: Timing, mode: str) -> Iterator[Judgement]:
         yield Judgement(
             subject="timing",
             grade="bad" if rows > LOST_ROWS else "doubtful",
-            found=f"Flash times are sure to {rows:.2f} row only: plates may be torn near the dark row.",
+            found=f"Flash times are known to {rows:.2f} row only: plates may be torn near the dark row.",
             advice="Fix the exposure, switch stabilisation off, and check that plan.toml is what the strobe played.",
         )
     if timing.order == "guess":
@@ -56,7 +56,7 @@ def timing_and_order(timing: Timing, mode: str) -> Iterator[Judgement]:
 
 ORDER = {
     "marker": "Which light is which is known from the cycle's marker.",
-    "rig": "Which light is which was told by the rig's directions.",
+    "rig": "Which light is which is known from the rig's directions.",
     "given": "Which light is which was given.",
 }
 
@@ -90,7 +90,7 @@ def _mixed(plan: Plan, timing: Timing) -> Iterator[Judgement]:
             found=f"The dark time of {dark_s * 1e3:.4g} ms is shorter than the exposure of "
             f"{timing.exposure_s * 1e3:.4g} ms: about {100 * min(share, 1):.0f} % of the rows hold two flashes, and "
             "plates are cut there.",
-            advice=f"Lengthen the dark time to at least {timing.exposure_s * 1e3:.4g} ms: make the plan anew with "
+            advice=f"Lengthen the dark time to at least {timing.exposure_s * 1e3:.4g} ms: make the plan again with "
             "psvideo capture-plan.",
         )
 

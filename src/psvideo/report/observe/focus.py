@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 SCALES_PX = ((0.0, 1.5, 1.0), (1.5, 4.0, 2.5), (4.0, 9.0, np.inf))
-"""Blur before and after (standard deviations), and up to which result these two tell it: noise makes soft edges look
+"""Blur before and after (standard deviations), and up to which result these two measure it: noise makes soft edges look
 sharper, so that they are compared once both pictures are smooth."""
 TILE = (15, 15)
 """Edges are judged by what they are over so many pixels: single ones are at the mercy of noise."""

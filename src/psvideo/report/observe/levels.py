@@ -60,7 +60,7 @@ class Levels:
     def right_power(self, whole: "Sequence[Levels]" = ()) -> float:
         """By which factor to change the lamp's light so that 99.5 % of the subject lie just below saturation.
 
-        What is clipped tells no level. How much brighter the brightest parts are than those that just clip is taken
+        What is clipped shows no level. How much brighter the brightest parts are than those that just clip is taken
         from other lamps on the same subject that do not clip, ``whole``. Without any, the brightest half of what is not
         clipped is carried on in a straight line, which is the least that a rounded matte subject comes to.
         """

@@ -19,10 +19,10 @@ LEAST_CHANGE, NOISE_FACTOR = 1.5, 5.0
 LEAST_BLOCKS = 0.002
 """A share of the blocks that changed which is no more than chance."""
 FASTEST = 0.95
-"""What is told is how fast the fastest twentieth of what moves is."""
+"""The speed reported is that of the fastest twentieth of what moves."""
 RETURN_PX = 0.7
 FOLLOWED = 0.3
-"""Where there and back meet for less than this share of what changed, flow tells no speed."""
+"""Where there and back meet for less than this share of what changed, flow gives no speed."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -37,7 +37,7 @@ class InstantFacts:
     ``valid_share`` is None where no normals were solved. ``levels`` (light) is each light's mean on the subject, 1.0 =
     saturation; ``clipped`` (light) the share of it that is saturated. ``ambient`` is the ambient light's share of what
     an exposure holds. ``speed_px_s`` is how fast the fastest parts move, and ``moving_share`` how much
-    of the picture does; None where it could not be told. What changes too fast to be followed has a share and no speed.
+    of the picture does; None where it is not known. What changes too fast to be followed has a share and no speed.
     ``misfit`` is what the robust solver found common to the whole picture.
     """
 

@@ -123,7 +123,7 @@ def weighed(grids: Grids, *, pinned: bool = False) -> float:
 def solve(grids: Grids, *, stop: float, most: int, pinned: bool = False) -> tuple[float, int]:
     """Fill ``grids.sum`` with what the finest right side asks for; return what was lacking at first, and the cycles.
 
-    The right side becomes what is still lacking. Ends when its energy, as ``weighed`` tells it, is at most ``stop``,
+    The right side becomes what is still lacking. Ends when its energy, as ``weighed`` gives it, is at most ``stop``,
     after ``most`` cycles, or where 32 bits carry no further. Heights are determined up to a shift in each part that is
     tied together and not pinned.
     """

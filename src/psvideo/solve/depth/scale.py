@@ -1,10 +1,10 @@
 """Depth in metres, or relative: the scale that normals alone cannot give, the same over a clip.
 
-Normals tell a surface's shape, in perspective up to one factor, and for every part of it that hangs together a factor
+Normals give a surface's shape, in perspective up to one factor, and for every part of it that hangs together a factor
 of its own. The rig's [surface] plane gives it: each part's median depth is put onto the plane. Without a plane the
 median depth is 1. Depth that is known from elsewhere (a scan, a depth camera) comes before both. From a clip's second
 instant on, what is seen in the first instant too keeps the first one's scale, so that a flickering mask does not make
-the surface breathe; a subject that comes nearer keeps its distance as well, which normals cannot tell from one that
+the surface breathe; a subject that comes nearer keeps its distance as well, for normals see no difference to one that
 stays.
 """
 
@@ -100,7 +100,7 @@ def _anchors(
     reference: Depth | None,
     known_m: NDArray[np.float32] | None,
 ) -> list[Anchor]:
-    """What tells how far away things are, the surest first; the last one in every pixel, if any."""
+    """What gives how far away things are, the most certain first; the last one in every pixel, if any."""
     anchors = []
     everywhere = np.ones(shape, np.bool_)
     if known_m is not None and view.perspective:

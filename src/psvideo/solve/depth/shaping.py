@@ -68,6 +68,6 @@ def reservations(shaping: Shaping) -> tuple[str, ...]:
     if shaping.first is not None and shaping.first.parts > 1:
         said.append(
             f"What is valid falls into {shaping.first.parts} parts, and how they lie to each other normals cannot "
-            "tell: each was given its depth by itself."
+            "say: each was given its depth by itself."
         )
     return tuple(said)

@@ -81,7 +81,7 @@ def _loosen(ties: Any, inverse: Any, belongs: Any, row: int, k: int) -> int:
     ac, bd = _holds(ties[1, 0, row, k], a, c), _holds(ties[1, 1, row, k], b, d)
     if _torn(a, b, ab) + _torn(c, d, cd) + _torn(a, c, ac) + _torn(b, d, bd) < 2:
         return 0
-    # with at most two ties, pieces are told by their first pixel: a = 0, b = 1, c = 2, d = 3
+    # with at most two ties, pieces are named by their first pixel: a = 0, b = 1, c = 2, d = 3
     of_b = 0 if ab else 1
     of_c = 0 if ac else 2
     of_d = of_b if bd else (of_c if cd else 3)

@@ -29,7 +29,7 @@ def add_equations(matrix: Floats, w: Floats, m: Floats, weights: Floats, n: int)
 def _add_three(
     matrix: Floats, w: Floats, a: Floats, b: Floats, c: Floats, p: Floats, q: Floats, r: Floats, k: int, n: int
 ) -> None:
-    """Add three lights, from light k, with the weights p, q, r; the first three begin the equations anew."""
+    """Add three lights, from light k, with the weights p, q, r; the first three begin new equations."""
     first, second, third = of_light(matrix, k), of_light(matrix, k + 1), of_light(matrix, k + 2)
     old = ONE if k > 0 else ZERO
     for i in range(n):

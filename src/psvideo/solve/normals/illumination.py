@@ -17,7 +17,7 @@ MAX_CONDITION = 20.0  # lights within about 3 degrees of one plane; a normal's e
 class Illumination:
     """The lights. ``directions`` (light, 3) are unit vectors from the surface to the light; ``intensities`` is
     (light, channel): a plate is albedo * intensity * max(0, n . direction). With near lights both hold in the middle of
-    the surface, and ``near`` tells what they are in every pixel."""
+    the surface, and ``near`` says what they are in every pixel."""
 
     directions: FloatArray
     intensities: FloatArray

@@ -57,7 +57,7 @@ def working_memory(task: Task) -> Work:
 @compiled
 def solve_rows(task: Task, result: Result, work: Work, first: int, last: int) -> None:
     """Solve the rows from ``first`` up to ``last``; no two calls may share rows, and any number may run at once."""
-    if PLACING < 0:  # never: it is named here so that the kept function is compiled anew where that file changes
+    if PLACING < 0:  # never: it is named here so that the kept function is compiled again where that file changes
         return
     t = lent_task(task, work.matrix, work.per_strength)
     out = Result(lent(result.normals), lent(result.albedo), lent(result.valid), lent(result.residual))

@@ -29,7 +29,7 @@ USABLE = Usable(shadow_ratio=0.4)
 class Reweighting:
     """How measurements are weighed; ``noise`` and ``signal_noise`` are the least that any camera's residuals have.
 
-    rounds: how often weights are taken anew.
+    rounds: how often weights are taken again.
     loss: "cauchy" weighs everything a little, "tukey" leaves what is far off out entirely.
     width: the residual, over the pixel's own median residual as a standard deviation, where Cauchy's weight is a half
         and Tukey's becomes 0 at that times ``TUKEY_WIDTH``; narrower with the root of their number where more than nine
@@ -80,11 +80,11 @@ def solve(
 ) -> Surface:
     """Return the surface that explains most of the plates, one per light.
 
-    Arguments are those of ``woodham1980.solve``. ``error`` asks for the predicted standard error besides. ``misfit`` is
+    Arguments are those of ``woodham1980.solve``. ``error`` asks for the predicted standard error as well. ``misfit`` is
     what is typical of the picture; left out, it is found first, from a sample of the picture's rows.
 
     Of a pixel's usable measurements: five or more are reweighted; of four that contradict each other the likeliest
-    highlight is left out; three are taken as they are, and nothing tells whether one of them is a highlight.
+    highlight is left out; three are taken as they are, and nothing shows whether one of them is a highlight.
 
     A pixel is valid where the predicted standard error of its normal is at most ``reweighting.most_error_deg``, or
     ``reweighting.beside_typical`` times what is typical of the picture where that is more, and the normal turns from

@@ -56,11 +56,11 @@ MANY = np.float32(NINE)  # usable measurements beyond which the weight narrows
 SIGMA_OF_MEDIAN = np.float32(1.4826)  # of Gaussian noise
 SMALL_SAMPLE = np.float32(1.9)  # the median of few residuals of a fit that follows them falls short by so much
 SUSPICION = np.float32(0.05)  # what a highlight among four that was left out still says against the other three
-UNCHECKED = np.float32(2.5)  # three measurements are explained exactly, and nothing tells a highlight among them
+UNCHECKED = np.float32(2.5)  # three measurements are explained exactly, and nothing shows a highlight among them
 DEGREES = np.float32(180 / np.pi)
 SOUND_SQUARED = np.float32(1e4)  # while weights change, the last solution is kept where they leave a worse condition
 NO_ERROR = np.float32(180)  # what is predicted where there is no solution
-LEAST_CHECKED = 5  # usable measurements from which on residuals tell how well the lights explain a pixel
+LEAST_CHECKED = 5  # usable measurements from which on residuals show how well the lights explain a pixel
 UNEXPLAINED = LOWER  # a plane of v that is free by then
 
 
@@ -123,7 +123,7 @@ def _entry(parts: int) -> Callable[[Task, Result, Samples, Floats, Memory, Weigh
 
         Only every ``step``-th row of the picture is solved. ``error`` (pixel,) or empty takes the predicted error in
         degrees, ``misfit`` (pixel,) or empty the share of a pixel's light that its lights leave unexplained, 0 where
-        too few are usable to tell.
+        too few are usable to judge.
         """
         if parts < 0:
             return
@@ -338,8 +338,8 @@ def _predict_error(weights: Weights, checked: int, w: Floats, v: Floats, n: int)
         spread = max(across * max(count / EIGHT, ONE) / square, ZERO) if solved else ZERO
         error = DEGREES * sigma * np.sqrt(spread) if solved else NO_ERROR
         trusted = error <= weights.most_error_deg
-        told = solved & (not few) & (count > THREE)
-        v[UNEXPLAINED + i] = scale / np.sqrt(square) if told else ZERO
+        judged = solved & (not few) & (count > THREE)
+        v[UNEXPLAINED + i] = scale / np.sqrt(square) if judged else ZERO
         v[DOUBT + i] = min(error, NO_ERROR)
         w[X + i] = x if trusted else ZERO
         w[Y + i] = y if trusted else ZERO

@@ -12,13 +12,13 @@ from psvideo.solve.normals.task import Mask, Samples
 
 Method = Literal["least-squares", "robust"]
 ROBUST_FROM_LIGHTS = 5
-"""With five lights a highlight and a shadow can both be told from the rest; with fewer there is nothing to weigh."""
+"""With five lights a highlight and a shadow can both be seen; with fewer there is nothing to weigh."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Solving:
     """``solver`` "auto" is robust from ROBUST_FROM_LIGHTS lights on. ``half`` gives half floats; ``residual`` and
-    ``error`` ask for what the surface may hold besides (only the robust solver predicts an error)."""
+    ``error`` ask for what the surface may hold as well (only the robust solver predicts an error)."""
 
     solver: Solver = "auto"
     half: bool = False

@@ -1,7 +1,7 @@
 """One request, one reply, over anything that carries bytes: timeouts, checksums, retries where they are safe.
 
 Requests carry a checksum and so do their replies, so a damaged line is never taken for a whole one. After a line that
-was damaged or did not come, a clock query with a fresh nonce finds the way back: whatever comes before its answer is
+was damaged or did not come, a clock query with a fresh nonce restores the order: everything before its answer is
 old. Nothing is asked twice that must not be done twice.
 """
 
@@ -117,7 +117,7 @@ class Link:
         return False
 
     def listen(self, kind: type[Answer], *, within_s: float, nonce: Nonce | None = None) -> Answer | None:
-        """Return the first whole reply of a kind (and with a nonce), whatever comes before; None where none comes."""
+        """Return the first whole reply of a kind (and with a nonce), past what comes before; None where none comes."""
         until_s = time.monotonic() + within_s
         while time.monotonic() < until_s:
             reply = self._reply(kind, until_s - time.monotonic())

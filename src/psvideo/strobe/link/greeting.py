@@ -1,4 +1,4 @@
-"""The first words with whatever is at a port: wait for a board that restarts, and tell it from other things."""
+"""The first words with what is at a port: wait for a board that restarts, and distinguish it from other things."""
 
 import time
 from itertools import chain, repeat

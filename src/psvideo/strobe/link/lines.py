@@ -45,7 +45,7 @@ class LineError(ValueError):
 
 @dataclass(frozen=True, kw_only=True)
 class TextLine:
-    """One line without its end; ``fault`` tells that bytes were wrong or too many, and ``text`` is empty then."""
+    """One line without its end; ``fault``: bytes were wrong or too many, and ``text`` is empty then."""
 
     text: str
     fault: Error | None = None

@@ -22,7 +22,7 @@ WIRINGS: tuple[WiringName, ...] = get_args(WiringName)
 
 @dataclass(frozen=True, kw_only=True)
 class Reply:
-    """What a controller answers where it does as it was told."""
+    """What a controller answers where it does what was asked."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,7 +35,7 @@ class Refusal:
 
 @dataclass(frozen=True, kw_only=True)
 class Identity(Reply):
-    """Who answers: ``board`` is a board of the table, ``unit`` tells two boards of a kind apart."""
+    """Who answers: ``board`` is a board of the table, ``unit`` distinguishes two boards of a kind."""
 
     proto: int
     board: str
@@ -248,7 +248,7 @@ class Arm(Request):
 
 @dataclass(frozen=True, kw_only=True)
 class Run(Request):
-    """Play ``cycles`` cycles; 0 means until told."""
+    """Play ``cycles`` cycles; 0 means until it is stopped."""
 
     name = "RUN"
     reply = Started

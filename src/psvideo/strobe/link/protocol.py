@@ -21,7 +21,7 @@ REFUSAL = re.compile(r"E ([0-9]{1,3})(?: (.*))?\Z")
 
 
 def format_request(request: Request, *, sealed: bool = True) -> bytes:
-    """Return a request as the bytes of its line, with a checksum unless told otherwise.
+    """Return a request as the bytes of its line, with a checksum where it is ``sealed``.
 
     >>> from psvideo.strobe.link.messages import Lit, Slot
     >>> format_request(Slot(slot=0, duration=1600, dark=16685, period=80, lit=(Lit(line=2, on=40),)), sealed=False)

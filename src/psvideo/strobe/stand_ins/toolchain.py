@@ -18,7 +18,7 @@ AvrBoard = Literal["atmega328p", "atmega2560"]
 AVR_BOARDS: tuple[AvrBoard, ...] = ("atmega328p", "atmega2560")
 
 PACKAGES = ("gcc-avr", "avr-libc", "libsimavr-dev", "libelf-dev")
-"""Debian's names for what is needed besides make and a C compiler."""
+"""Debian's names for what is needed beside make and a C compiler."""
 
 
 @dataclass(frozen=True, kw_only=True)

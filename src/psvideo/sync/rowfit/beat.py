@@ -57,7 +57,7 @@ class FoundClock:
 
 @dataclass(frozen=True, kw_only=True)
 class Beat:
-    """All the times of a clip. ``row_time_s`` is never negative: ``upward`` tells that the bottom row comes first.
+    """All the times of a clip. ``row_time_s`` is never negative: ``upward``: the bottom row comes first.
 
     ``beat_hz`` are the frequencies at which ambient light flickers.
     """

@@ -1,4 +1,4 @@
-"""A clock that drifts: its bends as a smoothing spline whose stiffness the clip itself tells.
+"""A clock that drifts: its bends as a smoothing spline whose stiffness the clip itself decides.
 
 The bends are an integrated random walk of the clock's rate (Wahba 1978): how much the rate wanders is chosen by the
 marginal likelihood of the fit, and a clock that runs straight stays straight.
@@ -31,7 +31,7 @@ class _Knots:
 
 
 def bend(plan: Plan, rows: Profiles, fit: Fit, *, free: tuple[str, ...] = (), steps: int = 6) -> Fit:
-    """Return the fit with the clock's drift in it; unchanged where nothing tells of any."""
+    """Return the fit with the clock's drift in it; unchanged where nothing shows any."""
     if len(rows.window_start) < LEAST_WINDOWS:
         return fit
     knots = _knots(rows)
@@ -118,7 +118,7 @@ def _wandering(hessian: FloatArray, pull: FloatArray, beat: Beat, knots: _Knots)
     for strength in WANDERING:
         try:
             factor = cholesky_banded(data + stiff / strength, lower=True)
-        except np.linalg.LinAlgError:  # too stiff to be told from a straight clock in double precision
+        except np.linalg.LinAlgError:  # too stiff to differ from a straight clock in double precision
             likelihood.append(-np.inf)
             continue
         gain = 0.5 * b @ cho_solve_banded((factor, True), b)  # type: ignore[no-untyped-call]

@@ -1,4 +1,4 @@
-"""The clip's first and last frames, beyond which nothing tells where they are: a hole beside them is looked for apart.
+"""The clip's first and last frames, beyond which nothing shows where they are: a hole there gets a search of its own.
 
 Tracking believes in a hole once the frames on either side of it agree. One or two frames at an end are too few for
 that, but they still fit one place in time, or none; where they fit none, the flashes in them are not to be trusted.

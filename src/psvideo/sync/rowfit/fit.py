@@ -31,7 +31,7 @@ STILL, PLAIN = 0.95, 0.3
 """Where a fit takes away less of the robust loss than the first (a subject that moves), a time that leaves the plan's
 value must take away this share of what is left; else it is as likely that the subject feigns it."""
 SURER = 0.8
-"""Share of the standard error that must be left before brightnesses are fitted anew in windows half as long."""
+"""Share of the standard error that must be left before brightnesses are fitted again in windows half as long."""
 SOFT_ROWS, ALIKE, SOFT_GAIN = 1.5, 1.5, 0.08
 """Edges soft by less than so many rows, alike (within a factor) at a flash's start and end, may as well be rows that
 compression or scaling has blurred: flashes are moved for it only where that takes away such a share of the robust loss
@@ -42,16 +42,16 @@ FLICKERS = 0.8
 """Flicker is believed where it leaves less than this share of the squares that are left without it, and less than this
 share of what frequencies that mains do not have leave: where many rows saturate, anything that swings explains much."""
 OTHER_SWINGS = (-2.5, -1.5, 1.5, 2.5)
-"""Frequencies tried instead, as swings more or fewer in a window: near enough to be alike, far enough to be told."""
+"""Frequencies tried instead, as swings more or fewer in a window: near enough to be alike, far enough to differ."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ClipFit:
     """The fit of a whole clip: its rows with the times that their frames truly have, and which frames are repeats.
 
-    ``steps`` counts the places where frames follow otherwise than the numbering tells and repeated frames explain;
+    ``steps`` counts the places where frames follow otherwise than numbering and repeated frames explain;
     ``trusted`` are the first and the last place in time at which frames fit. ``slack_s`` is by how much all flashes
-    could come earlier or later and the picture be the same, 0 where it tells their times; ``soft_s`` is how soft the
+    could come earlier or later and the picture be the same, 0 where it shows their times; ``soft_s`` is how soft the
     edges are where that was not taken for LEDs' tails, else 0.
     """
 
@@ -66,9 +66,9 @@ class ClipFit:
 
 
 def find(plan: Plan, rows: Profiles, *, measured: tuple[str, ...] = ()) -> ClipFit:
-    """Return the times of a clip; ``Fit.explained`` tells how well they explain it.
+    """Return the times of a clip; ``Fit.explained`` says how well they explain it.
 
-    ``measured`` names times that are fitted whatever the plan says of them, as the readout is where it is unknown.
+    ``measured`` names times that are fitted even where the plan gives them, as the readout is where it is unknown.
     """
     seed = find_seed(plan, rows)
     if seed.beat.upward:
@@ -116,7 +116,7 @@ def _rows_needed(plan: Plan, rows: Profiles, beat: Beat) -> int:
 
 
 def _in_short_windows(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> tuple[Profiles, Fit, float]:
-    """Fit brightnesses anew more often where the subject moves so much that this makes the times surer.
+    """Fit brightnesses again more often where the subject moves so much that this makes the times surer.
 
     Return too how far apart the times are with and without: an error that neither of the two fits can know of.
     """
@@ -128,7 +128,7 @@ def _in_short_windows(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...
 
 
 def _with_window_errors(plan: Plan, rows: Profiles, fit: Fit) -> tuple[Fit, float]:
-    """Add to the errors of what is free how far it moves when brightnesses are fitted anew twice as often.
+    """Add to the errors of what is free how far it moves when brightnesses are fitted twice as often.
 
     Return too how far apart the flashes' times are then.
     """
@@ -150,7 +150,7 @@ def _apart_s(rows: Profiles, one: Beat, other: Beat) -> FloatArray:
 
 
 def _believed(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> tuple[Fit, float, float]:
-    """Let go of what the picture tells otherwise, but of tails only where blurred rows do not look the same.
+    """Free what the picture contradicts, but tails only where blurred rows do not look the same.
 
     Return too how unsure the times are for it, and how soft the edges are where that was not taken for tails. A tail
     moves the start of its flash by as much as it is long, a blur does not: where both would do, a wrong tail is worse.
@@ -171,7 +171,7 @@ def _believed(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> tu
 def _freed(
     plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...], may_differ: tuple[str, ...]
 ) -> tuple[Fit, float]:
-    """Let go of the plan's values where the picture clearly tells otherwise, one after another, the clearest first.
+    """Free the plan's values where the picture clearly contradicts them, one after another, the clearest first.
 
     Return too how unsure the times are where the subject moves so much that with and without both may be right.
     """

@@ -1,6 +1,6 @@
-"""What is left besides a smooth clock: flashes that each come a little early or late, and how sure all times are.
+"""What a smooth clock leaves: flashes that each come a little early or late, and how certain all times are.
 
-Rows that open during a flash and rows that close during it tell its time independently of one another. What both say
+Rows that open during a flash and rows that close during it show its time independently of one another. What both say
 alike is jitter, what they say differently is noise; so jitter is believed, and noise shrunk away, without a model of
 either (empirical Bayes).
 """
@@ -75,7 +75,7 @@ def jitter(plan: Plan, rows: Profiles, fit: Fit) -> Jitter:
 
 
 def shift_error_s(plan: Plan, rows: Profiles, fit: Fit) -> float:
-    """Return the standard error of the common shift as blocks of rows tell it, which a moving subject upsets."""
+    """Return the standard error of the common shift as blocks of rows give it, which a moving subject upsets."""
     edges = np.linspace(0, rows.value.shape[1], ROW_BLOCKS + 1).astype(int)
     if np.diff(edges).min() == 0:
         return 0.0

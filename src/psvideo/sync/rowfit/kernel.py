@@ -21,7 +21,7 @@ IntArray = NDArray[np.int64]
 RIDGE = 1e-6
 """Share of the normal matrix's diagonal that is added to it, so that a brightness nobody saw stays at zero."""
 MOST_LEVERAGE = 0.9
-"""A sample that its brightness fits all by itself tells nothing of errors; its residual is not blown up without end."""
+"""A sample that its brightness fits all by itself says nothing of errors; its residual is not blown up without end."""
 REACH = 9.0
 """After so many fall times a flash is taken to be over."""
 LEFT, RIGHT, EXPOSURE, ROW_TIME, RISE, FALL = range(6)

@@ -18,7 +18,7 @@ from psvideo.sync.rowfit.refine import Fit
 WORSE = 30.0
 """By how much the weighted sum of squares may grow: noise feigns as much at the best of all edges of a plateau."""
 PROBE = 6.0
-"""Standard errors from the fit at which the picture must look otherwise if it tells the time."""
+"""Standard errors from the fit at which the picture must differ if it shows the time."""
 FIRST_STEP, LONGEST_STEP = 1e-3, 0.5
 """Of the shortest flash: the first step outwards, and the longest, which leaps over no edge."""
 BISECTIONS = 7
@@ -29,9 +29,9 @@ Move = Callable[[float], Beat]
 
 
 def centred(plan: Plan, rows: Profiles, fit: Fit) -> tuple[Fit, float]:
-    """Return the fit in the middle of what the picture leaves open, and half of that in seconds; 0 where it is told.
+    """Return the fit in the middle of what the picture leaves open, and half of that in seconds; 0 for none.
 
-    Where the picture tells a time but by less than the fit claims, as in very short clips, its error grows to that.
+    Where the picture decides a time less closely than the fit claims, as in very short clips, its error grows to that.
     """
     shortest_s = min(plan.flashes[slot].duration_s for slot in plan.lit_slots)
     least_s = max(fit.shift_error_s, FIRST_STEP * shortest_s)

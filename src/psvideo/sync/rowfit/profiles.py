@@ -22,7 +22,7 @@ class Profiles:
 
     ``place`` (row,) counts sensor rows from the one that opens first; ``window_start`` (window,) are the frames at
     which windows begin, in each of which a row has brightnesses of its own. ``doubt`` (frame, row) is by how much a
-    value may be wrong besides noise, as where pixels saturate.
+    value may be wrong beyond noise, as where pixels saturate.
     """
 
     value: FloatArray
@@ -163,7 +163,7 @@ def equations(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return residuals (frame, row), normal matrices (window, signal, signal) and scores (frame, signal).
 
-    With ``steepness`` (frame, row), how fast residuals' pulls grow with them, they tell of errors and not of steps: it
+    With ``steepness`` (frame, row), how fast residuals' pulls grow with them, they are errors and not steps: it
     stands in the matrices for the weight, and residuals count in the scores as if no brightness were fitted to them.
     """
     seen, flashes = compiled_rows(rows, beat), compiled_flashes(plan, rows, beat)

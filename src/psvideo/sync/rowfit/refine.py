@@ -14,7 +14,7 @@ CAUCHY = 2.4
 """Residuals of this many standard deviations are trusted half as much (95 % efficiency for Gaussian noise)."""
 FIRST_SCALE, LAST_SCALE = 0.3, 2e-3
 """The robust fit's residual scale as a share of each row's spread: it shrinks from step to step down to the noise, so
-that the few rows that a flash splits, which tell the time, are not taken for outliers before the fit is near."""
+that the few rows that a flash splits, which show the time, are not taken for outliers before the fit is near."""
 WIDE_SCALE = 0.05
 """The scale at which a time that is off is looked for: rows that it spoils must not count as outliers then."""
 LEAST_STEEP = -0.1
@@ -22,9 +22,9 @@ LEAST_STEEP = -0.1
 LAG = 3
 """Residuals of frames so far apart may still err together (a subject that moves): Newey and West 1987."""
 CLUSTER, LEAST_CLUSTERS = 12, 8
-"""Or whole stretches of frames err together; that needs so many of them to tell."""
+"""Or whole stretches of frames err together; that needs so many of them to be seen."""
 GLOBALS = {"exposure_s": EXPOSURE, "row_time_s": ROW_TIME, "rise_s": RISE, "fall_s": FALL}
-"""The times besides the clock's that can be set free, and the signal of each."""
+"""The times, beside the clock's, that can be set free, and the signal of each."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -195,7 +195,7 @@ def believable(
     """Return the covariance of the unknowns at the end of a robust fit.
 
     ``weight`` is each sample's, ``trust`` (0 to 1) the part of it that is owed to its residual: a residual whose trust
-    falls as it grows pulls less than its weight tells (Huber 1981, section 7.6).
+    falls as it grows pulls less than its weight says (Huber 1981, section 7.6).
     """
     steepness = weight * np.maximum(2.0 * trust - 1.0, LEAST_STEEP)
     _, hessian, scores = projected(plan, rows, beat, weight, basis, tails=True, steepness=steepness)
@@ -280,7 +280,7 @@ def row_noise(rest: FloatArray) -> FloatArray:
 
 
 def robust_loss(rows: Profiles, rest: FloatArray, reference: FloatArray) -> float:
-    """Return Cauchy's loss of residuals against the noise that ``reference`` residuals tell of."""
+    """Return Cauchy's loss of residuals against the noise of ``reference`` residuals."""
     return float(np.log1p((rest / (CAUCHY * scaled(rows, reference, 0.0))) ** 2).sum())
 
 

@@ -2,7 +2,7 @@
 
 A movie has no numbering, so one that was conformed (30 to 25 frames a second by leaving frames out, 24 to 60 by
 repeating them) shows it only in the picture. Under the right numbering, frames that lie close together within the cycle
-look alike, whatever the subject and the lights' brightnesses; under a wrong one they do not. So every regular numbering
+look alike, for any subject and any brightness of the lights; under a wrong one they do not. So every regular numbering
 is scored by how much neighbours differ once the frames are folded to the cycle (phase dispersion: Stellingwerf 1978;
 string length: Dworetsky 1983), and only the few best are worth a fit.
 """
@@ -54,8 +54,8 @@ TOGETHER_FRAMES = 30
 class Numbering:
     """How a clip's frames may follow one another: which of them count, ``kept`` (frame,), and where those are in time.
 
-    ``index`` has shape (kept frame,); ``plain`` is what it would be if nothing were missing besides what the files'
-    numbers tell and what repeated frames stand for.
+    ``index`` has shape (kept frame,); ``plain`` is what it would be if nothing were missing beyond what the files'
+    numbers show and what repeated frames stand for.
     """
 
     kept: Mask
@@ -96,8 +96,8 @@ def inserted(rows: Profiles, twin: Mask) -> Numbering:
 def regular(base: Numbering, step: Fraction, lead: int) -> Numbering:
     """Return a numbering in which every frame takes ``step`` frames, rounded down; ``lead`` shifts the pattern.
 
-    >>> told = np.arange(7)
-    >>> plain = Numbering(kept=np.ones(7, bool), index=told, plain=told)
+    >>> numbers = np.arange(7)
+    >>> plain = Numbering(kept=np.ones(7, bool), index=numbers, plain=numbers)
     >>> regular(plain, Fraction(4, 3), 0).index.tolist(), regular(plain, Fraction(4, 5), 0).index.tolist()
     ([0, 1, 2, 4, 5, 6, 8], [0, 1, 2, 3, 4])
     """
@@ -193,7 +193,7 @@ def _folded(difference: FloatArray, place: IntArray, cycle_frames: FloatArray) -
 
 
 def regular_step(index: Sequence[int] | IntArray, told: Sequence[int] | IntArray) -> Fraction:
-    """Return by how many frames a clip goes on per frame that its numbering tells, where that is regular; 1 elsewhere.
+    """Return by how many frames a clip goes on per frame of its numbering, where that is regular; 1 elsewhere.
 
     >>> regular_step([0, 1, 2, 4, 5, 6, 8, 9, 10, 12, 13], range(11)), regular_step([0, 1, 2, 3, 5, 6, 7], range(7))
     (Fraction(4, 3), Fraction(1, 1))

@@ -185,7 +185,7 @@ def seeded(plan: Plan, rows: Profiles, guess: Beat, range_ppm: float) -> tuple[B
 
 
 def first_guess(plan: Plan) -> Beat:
-    """Return the shutter's times and the LEDs' tails as the plan tells them, with a clock that starts at 0."""
+    """Return the shutter's times and the LEDs' tails as the plan gives them, with a clock that starts at 0."""
     camera = plan.camera
     readout_s = camera.readout_s or 0.0
     return Beat(

@@ -2,7 +2,7 @@
 
 Block by block away from frames that fit, the brightnesses found so far foretell the next frames at every place in time
 that they may have; a Viterbi search picks the cheapest course, in which a step between frames other than the one that
-the numbering tells costs something. Then the clock is sharpened on the latest frames and the next block follows.
+the numbering gives costs something. Then the clock is sharpened on the latest frames and the next block follows.
 """
 
 from dataclasses import dataclass, replace
@@ -29,12 +29,12 @@ TWIN_COST = 0.2
 SUSPICIOUS = 0.25
 """A frame's loss by which it must exceed what is usual before other places in time are tried for it."""
 HOLDS = 1.0
-"""A step is believed where it takes away so much of the frames' losses once brightnesses are fitted anew."""
+"""A step is believed where it takes away so much of the frames' losses once brightnesses are fitted again."""
 NATURAL = 0.1
 """A frame that looks like the one before it is repeated only where its own place in time fits worse by so much."""
 LEAST_ANCHOR = 12
 MEMORY, NEAR = 24, 10
-"""Frames on either side of a hole that tell where it is, and how far from where it was found it may be."""
+"""Frames on either side of a hole that show where it is, and how far from where it was found it may be."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,7 +121,7 @@ def frame_losses(rows: Profiles, rest: FloatArray) -> FloatArray:
 
 
 def _course(plan: Plan, rows: Profiles, beat: Beat, known: slice, block: slice, twins: Mask, sign: int) -> IntArray:
-    """Return by how many frames more than the numbering tells the next frames lie away, shape (frame,).
+    """Return by how many frames more than the numbering says the next frames are away, shape (frame,).
 
     Where all is as usual, this is for the whole block; where not, for its nearer half, so that the other half is looked
     at again with more known.
@@ -147,7 +147,7 @@ def _course(plan: Plan, rows: Profiles, beat: Beat, known: slice, block: slice, 
 
 
 def _holds(plan: Plan, rows: Profiles, beat: Beat, known: slice, block: slice, course: IntArray, sign: int) -> bool:
-    """Tell whether a course still wins when brightnesses are fitted anew to all frames from the known ones on.
+    """Return whether a course still wins when brightnesses are fitted again to all frames from the known ones on.
 
     Frames that move are foretold badly; fitted along a wrong course they stay bad, along the right one they do not.
     """
@@ -200,7 +200,7 @@ def _cheapest(table: FloatArray, twin: Mask) -> IntArray:
 
 
 def _sharpened(plan: Plan, rows: Profiles, now: Beat, base: Beat, frames: slice) -> tuple[Beat, tuple[float, float]]:
-    """Fit the clock anew to the latest frames, and return how late it is there against the base's clock."""
+    """Fit the clock again to the latest frames, and return how late it is there against the base's clock."""
     part = rows.take(frames).one_window()
     now = refine(plan, part, now, steps=2, first_scale=0.03).beat
     return now, _lateness(base, now, float(part.frame_start_s.mean()))
@@ -217,9 +217,9 @@ def settled(plan: Plan, rows: Profiles, index: IntArray, beat: Beat) -> IntArray
     While tracking, frames beside a hole are judged by brightnesses from one side only; here from both.
     """
     index = index.copy()
-    told = np.diff(rows.index)
-    for place in np.flatnonzero(np.diff(index) > told).tolist():
-        extra = int(index[place + 1] - index[place] - told[place])
+    numbered = np.diff(rows.index)
+    for place in np.flatnonzero(np.diff(index) > numbered).tolist():
+        extra = int(index[place + 1] - index[place] - numbered[place])
         first, last = max(place + 1 - MEMORY, 0), min(place + 1 + MEMORY, len(index))
         tried = {}
         for start in range(max(place + 1 - NEAR, first + 1), min(place + 1 + NEAR, last - 1) + 1):

@@ -14,7 +14,7 @@ from psvideo.sync.verdict.rivals import BETTER, CLEARLY, FAIR, camera_rivals, do
 MIN_EXPLAINED, MIN_GAIN = 0.5, 0.3
 """A fit that explains less of the rows' changes, or takes less of the robust loss away, has not found a strobe."""
 LUCK = 0.25
-"""Share of noise that the best place of a search explains besides what brightnesses do anywhere."""
+"""Share of noise that the best place of a search explains beyond what brightnesses do anywhere."""
 LOST = 0.5
 """Times whose standard error is more than this share of the shortest flash are not found."""
 UNSURE_GAIN, UNSURE = 0.7, 0.1

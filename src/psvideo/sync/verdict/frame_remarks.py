@@ -17,7 +17,7 @@ def remarks_on_frames(plan: Plan, found: ClipFit, told: NDArray[np.int64]) -> It
     shown = f"{rate / float(step):.6g} frames a second" if step != 1 else ""
     if step.denominator == 1 and step > 1:
         yield (
-            f"The clip holds one of every {step} frames that the plan's {rate:.6g} frames a second tell: it was "
+            f"The clip holds one of every {step} frames that the plan's {rate:.6g} frames a second ask for: it was "
             f"thinned to {shown}, or fps in the plan is {step} times too high."
         )
     elif step > 1:

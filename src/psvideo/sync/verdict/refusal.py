@@ -51,7 +51,7 @@ def nothing_to_find(plan: Plan, rows: Profiles) -> str:
 
 
 def least_frames(plan: Plan) -> int:
-    """Return how many frames tell more than the brightnesses that are fitted to them."""
+    """Return how many frames hold more than the brightnesses that are fitted to them."""
     return len(plan.lit_slots) + 3
 
 

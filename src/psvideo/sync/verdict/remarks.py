@@ -18,13 +18,13 @@ NEAR_PPM = 150.0
 CHANGED, GROSS = 1e-3, 0.08
 """Shares by which an exposure or a readout must be off to be worth a word, and to make the plan's value a mistake."""
 SURE = 5.0
-"""Standard errors by which it must be off besides to be called a mistake."""
+"""Standard errors by which it must also be off to be called a mistake."""
 GAIN_RANGE, GAIN_EXPLAINS = 0.06, 0.6
 """Exposure is called automatic where frames' gains differ by so much and explain such a share of what is left."""
 GAIN_FRAMES = (9, 1)
 """Frames over which a gain is taken to be the same: exposures creep, and some jump."""
 DIM = 0.05
-"""Frames with less than this share of the usual light tell no gain."""
+"""Frames with less than this share of the usual light show no gain."""
 MIXED_ROWS = 0.02
 """Share of the rows that may hold two flashes before it is worth a word."""
 UNFIRED = 0.01
@@ -81,7 +81,7 @@ def _mixed(plan: Plan, beat: Beat) -> str:
 
 
 def _camera(plan: Plan, found: ClipFit) -> Iterator[str]:
-    """Say what the picture tells of the shutter and the LEDs that the plan does not, or tells otherwise."""
+    """Say what the picture shows of the shutter and the LEDs where the plan is silent or differs."""
     beat, camera, errors_s = found.fit.beat, plan.camera, found.fit.errors_s
     parts = []
     exposure = f"{_ms(beat.exposure_s, errors_s.get('exposure_s'))} ({_degrees(camera, beat.exposure_s)} degrees)"
@@ -98,7 +98,7 @@ def _camera(plan: Plan, found: ClipFit) -> Iterator[str]:
     if abs(readout_s) < 3 * error_s:
         readout_s = 0.0
     if camera.readout_s is None and found.slack_s > 0:
-        yield "The readout cannot be told from this clip: no row opens or closes during a flash."
+        yield "The readout cannot be measured from this clip: no row opens or closes during a flash."
     elif camera.readout_s is None:
         yield f"The readout was found to take {_ms(abs(readout_s), error_s)}, {_direction(readout_s)}."
     elif abs(readout_s - camera.readout_s) > GROSS * max(abs(camera.readout_s), abs(readout_s)):
@@ -108,7 +108,7 @@ def _camera(plan: Plan, found: ClipFit) -> Iterator[str]:
     if beat.fall_s > plan.fall_s + 1e-6 or beat.rise_s > plan.rise_s + 1e-6:
         parts.append(f"the LEDs rise in {beat.rise_s * 1e6:.1f} us and fall in {beat.fall_s * 1e6:.1f} us")
     if parts:
-        yield f"The picture tells otherwise than the plan: {'; '.join(parts)}."
+        yield f"The picture differs from the plan: {'; '.join(parts)}."
 
 
 def _wrong_readout(planned_s: float, readout_s: float, error_s: float) -> str:
@@ -188,7 +188,7 @@ def _sureness(plan: Plan, found: ClipFit) -> str:
     if error_s > UNSURE * shortest_s:
         return (
             f"The flashes' times are known to +- {error_s * 1e6:.2g} us only, and flashes last {shortest_s * 1e6:.3g} "
-            "us: the clip is too short or too noisy, or its subject moves too much, to tell them better."
+            "us: the clip is too short or too noisy, or its subject moves too much, to measure them better."
         )
     return ""
 
@@ -196,7 +196,7 @@ def _sureness(plan: Plan, found: ClipFit) -> str:
 def remarks_on_lights(plan: Plan, found: ClipFit, beat: Beat, *, named: bool) -> tuple[str, ...]:
     """Return sentences on lights that seem not to have fired, or all at once.
 
-    ``beat`` is the fit's, its cycle turned to where the lights' names are; ``named`` tells that these are not a guess.
+    ``beat`` is the fit's, its cycle turned to where the lights' names are; ``named``: these are not a guess.
     """
     lit = plan.lit_slots
     drive_s = np.array([sum(plan.flashes[slot].lights.values()) * plan.flashes[slot].duration_s for slot in lit])

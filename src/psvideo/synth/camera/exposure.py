@@ -46,7 +46,7 @@ def expose(
 
     ``plates`` holds one image per slot of the plan's round (None or missing = dark), as one whole flash of that slot
     lights the scene; for a scene that moves it is a function that gives the image of any one flash. ``ambient`` is what
-    one whole exposure collects besides. ``gain`` is what the camera multiplies each frame by before it saturates, as an
+    one whole exposure collects as well. ``gain`` is what the camera multiplies each frame by before it saturates, as an
     automatic exposure does. Frames saturate at 1.0 and come in steps of a converter where ``bits`` is given; below
     black they may be slightly negative through noise.
 

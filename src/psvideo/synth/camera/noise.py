@@ -33,5 +33,5 @@ NOISELESS = Noise()
 
 
 def frame_rng(seed: int, frame: int) -> np.random.Generator:
-    """Return the random numbers of one frame: the same whatever frames were made before it."""
+    """Return the random numbers of one frame: the same for any frames that were made before it."""
     return np.random.default_rng([seed, 2, frame])

@@ -1,6 +1,6 @@
 """Light from the traced edges of a strobe controller, instead of a plan's ideal train: what was really switched.
 
-The edges come in cycles of the controller's clock; ``traced_slots`` tells which belong to which flash of the plan. Here
+The edges come in cycles of the controller's clock; ``traced_slots`` says which belong to which flash of the plan. Here
 they become flashes in camera time, with their bursts as they are.
 """
 
@@ -154,7 +154,7 @@ def _with_dark_slots(plan: Plan, clock: TrueClock, flashes: Sequence[TrueFlash])
 
 
 def _seen(plan: Plan, scene: Scene, flashes: Sequence[TrueFlash]) -> tuple[TrueFlash, ...]:
-    """Number the flashes that give light while the clip records, and tell which are complete."""
+    """Number the flashes that give light while the clip records, and say which are complete."""
     emission = Emission(rise_s=plan.rise_s, fall_s=plan.fall_s)
     end_s = clip_end_s(plan.camera, scene.frames)
     recorded = np.array([n for n in range(scene.frames) if n not in scene.dropped], np.intp)

@@ -48,7 +48,7 @@ class TrueClock:
 class TrueFlash(HasLights):
     """One flash as it happened: ``index`` from 0 for the clip's first, times on the camera's clock.
 
-    ``complete`` tells that no light of it was lost before the clip's first frame, after its last, or in a dropped one.
+    ``complete``: no light of it was lost before the clip's first frame, after its last, or in a dropped one.
     ``bursts_s`` are starts (after the flash's) and lengths where the light is not on throughout.
     """
 

@@ -76,7 +76,7 @@ def load_shape(path: Path) -> Shape:
         raise PsvideoError(f"{path}: there is no such mesh file. Paths in a scene count from the scene file's folder.")
     try:
         mesh = trimesh.load_scene(path, process=False).to_mesh()
-    except Exception as fault:  # trimesh's loaders raise whatever their parsers do
+    except Exception as fault:  # trimesh's loaders raise what their parsers do
         raise PsvideoError(
             f"{path}: cannot be read as a mesh ({fault}). Export it again as OBJ, PLY, STL or GLB."
         ) from fault
