@@ -61,9 +61,9 @@ def write_preview(
     exposure = _exposure(preview, instants[0])
 
     def pictures() -> Iterator[Pixels]:
-        shown = watch(instants, total=len(instants), what=f"movie of {preview}", unit="pictures")
+        watched = watch(instants, total=len(instants), what=f"movie of {preview}", unit="pictures")
         last = instants[-1].number + 1
-        for place, one in enumerate(shown):
+        for place, one in enumerate(watched):
             shown = even(_picture(preview, one, exposure, fps))
             after = instants[place + 1].number if place + 1 < len(instants) else last
             for _ in range(one.number, after):
