@@ -107,7 +107,7 @@ def readout(
         "camera_line": camera_line(measured, camera, led),
         "record_line": record_line(measured, camera, led, date=date.today().isoformat()),
     }
-    _tell(voice, measured, describe_readout(measured, led), lines)
+    _print_readout(voice, measured, describe_readout(measured, led), lines)
 
 
 def _refuse_led_options(**options: object) -> None:
@@ -150,10 +150,10 @@ def _strobed(
         "camera_line": strobed_camera_line(measured, camera),
         "record_line": strobed_record_line(measured, camera, date=date.today().isoformat()),
     }
-    _tell(voice, measured, describe_strobed_readout(measured), lines)
+    _print_readout(voice, measured, describe_strobed_readout(measured), lines)
 
 
-def _tell(voice: Voice, measured: Readout | StrobedReadout, words: str, lines: dict[str, str]) -> None:
+def _print_readout(voice: Voice, measured: Readout | StrobedReadout, words: str, lines: dict[str, str]) -> None:
     for warning in measured.warnings:
         voice.warn(warning)
     voice.say(words)

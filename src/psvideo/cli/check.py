@@ -64,7 +64,7 @@ def check(
             watch=voice.track,
             caller=voice.caller(),
         )
-        _tell(voice, found)
+        _print_check(voice, found)
         if not found.usable:
             raise typer.Exit(1)
     elif watch is not None:
@@ -93,10 +93,10 @@ def _follow(voice: Voice, checks: "Iterator[Check | Unread]") -> None:
         for found in checks:
             if isinstance(found, Check):
                 last[found.path] = found.usable
-                _tell(voice, found)
+                _print_check(voice, found)
             else:
                 last[found.path] = None
-                _tell_fault(voice, found.path, found.fault)
+                _print_fault(voice, found.path, found.fault)
     except KeyboardInterrupt:
         read = [usable for usable in last.values() if usable is not None]
         _note(
@@ -114,7 +114,7 @@ def _note(voice: Voice, text: str) -> None:
         print(text, flush=True)
 
 
-def _tell(voice: Voice, check: "Check") -> None:
+def _print_check(voice: Voice, check: "Check") -> None:
     if voice.json:
         from psvideo.runs.checked import check_record
 
@@ -129,7 +129,7 @@ def _tell(voice: Voice, check: "Check") -> None:
     sys.stdout.flush()
 
 
-def _tell_fault(voice: Voice, path: Path, fault: str) -> None:
+def _print_fault(voice: Voice, path: Path, fault: str) -> None:
     if voice.json:
         print(json_text.dumps({"schema": "psvideo-check/1", "path": str(path), "usable": False, "error": fault}))
     else:

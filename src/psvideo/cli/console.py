@@ -72,7 +72,7 @@ def command_line(context: "typer.Context") -> str:
     return shlex.join(["psvideo", *words]) if isinstance(words, list) else ""
 
 
-def tell_report(voice: Voice, report: "RunReport") -> None:
+def print_report(voice: Voice, report: "RunReport") -> None:
     """Say whether the take is usable, and warn of all that speaks against it."""
     from psvideo.report.run_report import findings, verdict
 

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from psvideo.cli.console import Voice, counted, plain, tell_report
+from psvideo.cli.console import Voice, counted, plain, print_report
 from psvideo.cli.delivery_options import (
     AovOption,
     CameraName,
@@ -162,5 +162,5 @@ def normals(
     )
     voice.result(report_record(report))
     voice.say(describe_timing(report.timing))
-    tell_report(voice, report)
+    print_report(voice, report)
     voice.say(f"{out}: {counted(len(report.instants), 'instant')} written; see {out / 'report.html'}.")

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from psvideo.cli.console import Voice, counted, plain, tell_report
+from psvideo.cli.console import Voice, counted, plain, print_report
 from psvideo.cli.delivery_options import CodecOption, PlatesPreviewOption, Weights, WithAmbient
 from psvideo.cli.options import (
     ClipPath,
@@ -79,6 +79,6 @@ def split(
     )
     voice.result(timing_record(report.timing))
     voice.say(describe_timing(report.timing))
-    tell_report(voice, report)
+    print_report(voice, report)
     plates = sum(flash.plate is not None for flash in report.timing.flashes)
     voice.say(f"{out}: {counted(plates, 'plate')} written; see {out / 'report.html'}.")

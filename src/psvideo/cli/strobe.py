@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from psvideo.strobe.program import Program
     from psvideo.strobe.session import Outcome
 
-TELLING_PPM = 1000.0
+WORTH_SAYING_PPM = 1000.0
 """A clock that was measured less exactly is not worth a line: the run was short."""
 
 strobe = typer.Typer(no_args_is_help=True, help="Make lights flash as planned: on a board, or on an emulated one.")
@@ -73,7 +73,7 @@ def check(
         return
     caps = _caps_at(port, known, wanted) if port else _caps_of(known or BOARDS["atmega328p"], wanted)
     program = make_program(planned, caps, lines=lines, source=str(plan))
-    warnings = _tell_program(voice, planned, program, caps)
+    warnings = _print_program(voice, planned, program, caps)
     voice.result({**program_record(program, caps), "warnings": warnings})
 
 
@@ -118,7 +118,7 @@ def _check_table(voice: Voice, plan: Plan, path: Path, wanted: WiringName | None
         raise PsvideoError(f"{path}: no board of the table can play it (--board NAME says more).")
 
 
-def _tell_program(voice: Voice, plan: Plan, program: Program, caps: Capabilities) -> list[str]:
+def _print_program(voice: Voice, plan: Plan, program: Program, caps: Capabilities) -> list[str]:
     """Describe a program, and return what to beware of."""
     from psvideo.strobe.program_words import describe_program, program_cautions
     from psvideo.strobe.seizures import flicker_warning
@@ -183,7 +183,7 @@ def run(
     if log is not None:
         write_text(log, format_log(record))
     voice.result({**log_record(record), "warnings": warnings})
-    _tell_outcome(voice, planned, outcome, log)
+    _print_outcome(voice, planned, outcome, log)
     if outcome.message is not None:
         raise PsvideoError(outcome.message)
 
@@ -229,14 +229,14 @@ def _lines(program: Program) -> str:
     return ", ".join(f"{name} on line {line}" for name, line in program.lines.items())
 
 
-def _tell_outcome(voice: Voice, plan: Plan, outcome: Outcome, log: Path | None) -> None:
+def _print_outcome(voice: Voice, plan: Plan, outcome: Outcome, log: Path | None) -> None:
     how = {"done": "Played", "stopped": "Stopped after"}.get(outcome.ended, "Broken off after")
     voice.say(f"{how} {outcome.cycles} whole cycles of {plan.dark_every} round(s) each.")
-    if outcome.clock is not None and outcome.clock.gain_error_ppm <= TELLING_PPM:
+    if outcome.clock is not None and outcome.clock.gain_error_ppm <= WORTH_SAYING_PPM:
         clock = outcome.clock
         voice.say(
             f"The board's seconds are {clock.offset_ppm:+.0f} ppm long by this machine's clock, "
-            f"sure to {clock.gain_error_ppm:.0f} ppm."
+            f"known to {clock.gain_error_ppm:.0f} ppm."
         )
     if log is not None:
         voice.say(f"{log}: written. Put it beside plan.toml in the clip's folder.")

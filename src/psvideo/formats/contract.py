@@ -91,8 +91,8 @@ def check_schema(found: object, expected: str, *, source: str) -> None:
 
 def _sentence(source: str, model: type[BaseModel], fault: ValidationError) -> str:
     """Put every mistake of a validation into one paragraph."""
-    told = f"{source}: " + "; ".join(_mistake(model, error) for error in _one_a_key(fault.errors()))
-    return told if told.endswith("?") else told + "."
+    text = f"{source}: " + "; ".join(_mistake(model, error) for error in _one_a_key(fault.errors()))
+    return text if text.endswith("?") else text + "."
 
 
 def _one_a_key(errors: Sequence[Any]) -> list[Any]:
@@ -100,11 +100,11 @@ def _one_a_key(errors: Sequence[Any]) -> list[Any]:
     by_key: dict[str, list[Any]] = {}
     for error in errors:
         by_key.setdefault(f"{_key_path(error['loc'])} {error['type'] == 'extra_forbidden'}", []).append(error)
-    told = []
+    kept = []
     for same in by_key.values():
         kinds = [_expected(error["msg"]) for error in same]
-        told.append(same[0] if len(same) == 1 else same[0] | {"msg": f"expected {' or '.join(dict.fromkeys(kinds))}"})
-    return told
+        kept.append(same[0] if len(same) == 1 else same[0] | {"msg": f"expected {' or '.join(dict.fromkeys(kinds))}"})
+    return kept
 
 
 def _expected(message: str) -> str:

@@ -1,7 +1,7 @@
 """What of which frame's rows makes up a flash's plate: coefficients from timing and camera alone, never from pixels.
 
 ``plate[i] = sum_n coefficients[n, i] * frame[n, i]`` shows what row i would have recorded of the whole flash, and holds
-the ambient light of ``exposures[i]`` exposures besides. Flash by flash, never frame by frame: where one frame holds all
+the ambient light of ``exposures[i]`` exposures. Flash by flash, never frame by frame: where one frame holds all
 of a flash in a row, that frame is taken alone, because others would add only noise; where a row is split over two
 frames, they are summed (Hudon et al. 2015, eq. 10), which is the best estimate under photon noise, and divided by the
 share that they saw together, which is 1 at 360 degrees.

@@ -59,9 +59,10 @@ class ComparedPlates:
         with self._lock:
             take, timing = self._timed()
         numbers = take.clip.numbers
-        told = {after for after, following in itertools.pairwise(numbers) if following - after > 1}
+        in_numbers = {after for after, following in itertools.pairwise(numbers) if following - after > 1}
         dropped = [
-            {"after": hole.after, "count": hole.count, "numbered": hole.after in told} for hole in timing.dropped_frames
+            {"after": hole.after, "count": hole.count, "numbered": hole.after in in_numbers}
+            for hole in timing.dropped_frames
         ]
         return timing_record(timing) | {"first_number": numbers[0], "dropped_frames": dropped}
 

@@ -68,11 +68,11 @@ def update(ambient: Ambient | None, dark: Plate) -> Ambient:
     new = image if mains.ripple is None else _times_rows(image, 1 / mains.ripple.swing(rows))
     blended, slots = np.empty_like(new), np.empty_like(ambient.slots)
     change = _Change.between(ambient.image, new, ambient.known & dark.seen)
-    anew = change.anew | ~ambient.known[:, None] | _first_ripple(ambient.mains, mains)
+    restarts = change.restarts | ~ambient.known[:, None] | _first_ripple(ambient.mains, mains)
     old, now, gain, out = (
         picture.reshape(*new.shape[:2], -1) for picture in (ambient.image, new, change.gain, blended)
     )
-    _blend(old, now, gain, ambient.slots, anew, dark.seen, out, slots)
+    _blend(old, now, gain, ambient.slots, restarts, dark.seen, out, slots)
     return Ambient(
         image=blended,
         slots=slots,
@@ -96,10 +96,10 @@ def _times_rows(image: Image, factor: NDArray[np.floating]) -> Image:
 @dataclass(frozen=True, kw_only=True)
 class _Change:
     """From one dark slot to the next: the ``gain`` of each neighbourhood, of the image's shape, and where (row, col)
-    it does not explain what is seen, so that the average begins ``anew``."""
+    it does not explain what is seen, so that the average ``restarts``."""
 
     gain: Image
-    anew: NDArray[np.bool_]
+    restarts: NDArray[np.bool_]
 
     @classmethod
     def between(cls, old: Image, new: Image, both: NDArray[np.bool_]) -> "_Change":
@@ -111,10 +111,10 @@ class _Change:
         local = np.asarray(cv2.blur(rest, (NEIGHBOURHOOD_PX, NEIGHBOURHOOD_PX)), np.float32)
         some = np.flatnonzero(both[::SPARSE]) * SPARSE
         variance, per_level = _noise(rest[some, ::SPARSE].ravel(), level[some, ::SPARSE].ravel())
-        anew = np.empty(rest.shape, np.bool_)
+        restarts = np.empty(rest.shape, np.bool_)
         most = np.float32((CHANGED / NEIGHBOURHOOD_PX) ** 2)
-        _beyond(local, level, factor, most * variance, most * per_level, anew)
-        return cls(gain=gain, anew=anew)
+        _beyond(local, level, factor, most * variance, most * per_level, restarts)
+        return cls(gain=gain, restarts=restarts)
 
 
 def _gain(old: Image, new: Image, both: NDArray[np.bool_]) -> Image:
@@ -170,7 +170,7 @@ def _beyond(
     gain: Image,
     variance: np.float32,
     per_level: np.float32,
-    anew: NDArray[np.bool_],
+    restarts: NDArray[np.bool_],
 ) -> None:
     """Mark where a neighbourhood changed by more than noise, or by a factor beyond its limits."""
     rows, cols, channels = gain.shape
@@ -181,7 +181,7 @@ def _beyond(
             for channel in range(channels):
                 factor = gain[row, col, channel]
                 far = far or factor <= np.float32(LEAST_GAIN) or factor >= np.float32(MOST_GAIN)
-            anew[row, col] = far
+            restarts[row, col] = far
 
 
 @compiled
@@ -190,17 +190,17 @@ def _blend(
     new: Image,
     gain: Image,
     old_slots: Image,
-    anew: NDArray[np.bool_],
+    restarts: NDArray[np.bool_],
     seen: NDArray[np.bool_],
     blended: Image,
     slots: Image,
 ) -> None:
-    """Average at the new level, begin anew where that explains nothing, and keep what was where nothing was seen."""
+    """Average at the new level, start again where that explains nothing, and keep what was where nothing was seen."""
     rows, cols, channels = old.shape
     for row in range(rows):
         for col in range(cols):
             spanned = min(old_slots[row, col] + np.float32(1), np.float32(LONGEST_MEMORY))
-            count = np.float32(1) if anew[row, col] else spanned
+            count = np.float32(1) if restarts[row, col] else spanned
             slots[row, col] = count if seen[row] else old_slots[row, col]
             for channel in range(channels):
                 before = old[row, col, channel]

@@ -18,7 +18,7 @@ from psvideo.model.shutter import frames_touched
 from psvideo.model.timing import Timing, places_in_time, timed_camera
 from psvideo.plates.gather import clip_plates
 from psvideo.plates.split import Plate
-from psvideo.sync.order_by_rig import Image, RigTurn, order_by_rig, turned, why_untold
+from psvideo.sync.order_by_rig import Image, RigTurn, order_by_rig, turned, why_undecided
 
 PLACES = 3
 """Cycles that are looked at, spread over the clip."""
@@ -61,7 +61,7 @@ def named_by_rig(take: Take, timing: Timing, rig: Rig) -> Timing:
     """
     if timing.order != "guess":
         return timing
-    refusal = why_untold(take.plan, rig)
+    refusal = why_undecided(take.plan, rig)
     verdict = RigTurn(turn=None, why=refusal) if refusal else _agreed(list(_verdicts(take, timing, rig)))
     if verdict.turn is None:
         return replace(timing, order_note=f"The rig does not show the order of the lights: {verdict.why}.")

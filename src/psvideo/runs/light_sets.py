@@ -1,4 +1,4 @@
-"""Pictures of a scene, one per light, from whatever a user names: stills, plates, or a synced or strobed clip.
+"""Pictures of a scene, one per light, from what a user names: stills, plates, or a synced or strobed clip.
 
 ``open_light_sets`` gives one set per round, which shows the scatter between frames; ``read_light_pictures`` their mean.
 """

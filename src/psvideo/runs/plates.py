@@ -41,8 +41,8 @@ class SplitResult:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Besides:
-    """What a split writes besides the plates: every flash by itself, their sum as the ``mix`` says, movies."""
+class Extras:
+    """What a split writes beside the plates: every flash by itself, their sum as the ``mix`` says, movies."""
 
     flashes: bool = False
     mix: Mix | None = None
@@ -66,7 +66,7 @@ def split_run(
     output: Output,
     *,
     method: SplitMethod = "weights",
-    besides: Besides = Besides(),
+    extras: Extras = Extras(),
     known: Rig | None = None,
     watch: Watch = unwatched,
 ) -> SplitResult:
@@ -77,16 +77,16 @@ def split_run(
     clip = take.clip
     observed, picture = observing(take, known), None
     tags = tags_of(clip)
-    besides.check(clip.plan)
+    extras.check(clip.plan)
     written: set[str] = set()
     times_s: list[float] = []
-    settings = settings_of(take, timing, output, method, besides)
+    settings = settings_of(take, timing, output, method, extras)
     with (
         folder_of(output, settings) as folder,
-        _at_the_end(folder, take, output, times_s, besides, tags, watch),
+        _at_the_end(folder, take, output, times_s, extras, tags, watch),
         writing() as write,
     ):
-        flashes, mix = besides.flashes, besides.mix
+        flashes, mix = extras.flashes, extras.mix
         each = (lambda plate: write(partial(write_flash, folder, clip.name, plate, tags))) if flashes else None
         gathered = clip_rounds(
             take, timing, method=method, start_number=output.start_number, watch=watch, each_flash=each
@@ -117,13 +117,13 @@ def split_run(
 
 @contextmanager
 def _at_the_end(
-    folder: Path, take: Take, output: Output, times_s: list[float], besides: Besides, tags: Tags, watch: Watch
+    folder: Path, take: Take, output: Output, times_s: list[float], extras: Extras, tags: Tags, watch: Watch
 ) -> Iterator[None]:
     """At the end of a block that wrote all plates, make of them what needs them all."""
     yield
     if times_s:
         run = Finished(folder=folder, target=output.folder, clip=take.clip, fps=tags.fps, first_time_s=times_s[0])
-        write_previews(run, besides.previews, besides.codec, take.plan.lights, watch)
+        write_previews(run, extras.previews, extras.codec, take.plan.lights, watch)
         write_timeline(run)
 
 

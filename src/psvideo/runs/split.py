@@ -14,7 +14,7 @@ from psvideo.plates.timed import timing_of
 from psvideo.report.run_report import RunReport
 from psvideo.runs.caller import PYTHON, Caller, say_kept, say_of_clip
 from psvideo.runs.output import Output
-from psvideo.runs.plates import Besides, split_run
+from psvideo.runs.plates import Extras, split_run
 from psvideo.sync.opening import open_take
 
 
@@ -48,7 +48,7 @@ def split(
       light of the clip's first complete flash, for plans without a marker; ``rig``, where the lights are, tells their
       order too, and is held against the plates in the report.
     - ``method``: by the rows' "weights", or Algorithm 1 of Hudon et al. ("hudon2015"), to compare with.
-    - ``flashes``: every flash by itself besides. ``beauty``: the sum of all lights besides, each as strong as
+    - ``flashes``: every flash by itself too. ``beauty``: the sum of all lights too, each as strong as
       ``weight`` says (by name; 1 where not named), with ambient light where ``with_ambient``. ``preview``: movies for
       eyes, coded as ``preview_codec``.
     - ``start_number``: the number of the first round's files. ``force`` replaces an ``out`` that exists; ``resume``
@@ -65,16 +65,16 @@ def split(
     if mix.weights and not summed:
         raise UsageError("--with-ambient and --weight: belong to the beauty plate. Add --beauty, or leave them out.")
     previews = tuple(dict.fromkeys(preview))
-    besides = Besides(flashes=flashes, mix=mix if summed else None, previews=previews, codec=preview_codec)
+    extras = Extras(flashes=flashes, mix=mix if summed else None, previews=previews, codec=preview_codec)
     take = open_take(Path(clip), plan=None if plan is None else Path(plan), frames=frames)
     say_of_clip(take.clip, caller)
-    besides.check(take.plan)
+    extras.check(take.plan)
     known = None if rig is None else read_rig(Path(rig), plan_lights=take.plan.lights)
     given = None if timing is None else Path(timing)
     with decoded_once(take, output=output.folder) as kept:
         found = timing_of(kept, given, first_light=first_light, rig=known, watch=watch).spelled(caller.spell)
         for note in found.notes:
             caller.warn(note)
-        done = split_run(kept, found, output, method=method, besides=besides, known=known, watch=watch)
+        done = split_run(kept, found, output, method=method, extras=extras, known=known, watch=watch)
         say_kept(kept.kept, caller)
     return done.report

@@ -39,7 +39,7 @@ def sync(
     - ``clip``: a folder of numbered frames with plan.toml, or a movie file. ``plan`` names the plan where it does not
       lie beside the footage. ``frames``: file numbers to use, such as ``"1-100"`` or ``"1-100x2"``; left out, all.
     - ``first_light`` names the light of the clip's first complete flash, for plans without a marker; ``rig``, where the
-      lights are, tells their order by where no marker does.
+      lights are, gives their order where there is no marker.
     - ``out``: a timing.json to write. ``picture``: a PNG to write that shows how well the flashes were found. ``force``
       replaces either where it exists.
 

@@ -143,10 +143,10 @@ def _first_complete_light(plan: Plan, rows: Profiles, beat: Beat) -> str:
 
 
 def _all_dropped(
-    told: Sequence[DroppedFrames], numbers: NDArray[np.int64], indices: NDArray[np.int64], index: NDArray[np.int64]
+    holes: Sequence[DroppedFrames], numbers: NDArray[np.int64], indices: NDArray[np.int64], index: NDArray[np.int64]
 ) -> tuple[DroppedFrames, ...]:
     """Return the holes that the numbering shows with those that only the picture shows."""
-    counts = {hole.after: hole.count for hole in told}
+    counts = {hole.after: hole.count for hole in holes}
     for n in np.flatnonzero(np.diff(index) > np.maximum(np.diff(indices), 1)):
         more = int(index[n + 1] - index[n] - max(indices[n + 1] - indices[n], 1))
         counts[int(numbers[n])] = counts.get(int(numbers[n]), 0) + more
@@ -154,7 +154,7 @@ def _all_dropped(
 
 
 def _fitted_camera(plan: Plan, fit: Fit) -> Camera:
-    """Return the plan's camera with the shutter that was found; a readout that may as well be none is none."""
+    """Return the plan's camera with the shutter that was found; a readout within its error of 0 becomes 0."""
     beat = fit.beat
     may_be_none = beat.row_time_s < NO_READOUT * fit.errors_s.get("row_time_s", 0.0)
     readout_s = 0.0 if may_be_none else beat.row_time_s * plan.camera.height_px * (-1 if beat.upward else 1)

@@ -77,7 +77,7 @@ def turned(plan: Plan, timing: Timing, turn: int) -> Timing:
     return replace(timing, flashes=flashes)
 
 
-def why_untold(plan: Plan, rig: Rig) -> str | None:
+def why_undecided(plan: Plan, rig: Rig) -> str | None:
     """Return why no picture could give the order by this rig, None where one may.
 
     Raises PsvideoError where the rig lacks a light of the plan.
@@ -102,7 +102,7 @@ def order_by_rig(plan: Plan, rig: Rig, pictures: Mapping[int, Image]) -> RigTurn
     off, for every lit slot as it is named so far; 0 where nothing was seen. Raises PsvideoError where the rig lacks a
     light of the plan.
     """
-    refusal = why_untold(plan, rig)
+    refusal = why_undecided(plan, rig)
     if refusal is not None:
         return RigTurn(turn=None, why=refusal)
     samples = _samples([pictures[slot] for slot in plan.lit_slots])

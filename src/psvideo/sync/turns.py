@@ -41,7 +41,7 @@ def turns(plan: Plan, rows: Profiles, beat: Beat) -> Turns:
     same = alike_turns(plan)
     part = _part(plan, rows)
     best = _fitted(plan, part, beat, period=same[1] if len(same) > 1 else len(plan.cycle_slots))
-    alike = [turned(plan, one, turn) for one in best for turn in _told_by_power(plan, rows, one, same)]
+    alike = [turned(plan, one, turn) for one in best for turn in _decided_by_power(plan, rows, one, same)]
     names = {
         tuple(tuple(sorted(plan.flashes[s].lights.items())) for s in _seen_slots(plan, one, beat)) for one in alike
     }
@@ -100,7 +100,7 @@ def _beaten(gain: FloatArray) -> bool:
     return plainly or (total / error > SURE and total / len(gain) > 0.02)
 
 
-def _told_by_power(plan: Plan, rows: Profiles, beat: Beat, same: Sequence[int]) -> Sequence[int]:
+def _decided_by_power(plan: Plan, rows: Profiles, beat: Beat, same: Sequence[int]) -> Sequence[int]:
     """Return the turns that the slots' brightnesses allow: flashes of one light at known powers are proportional."""
     lit = plan.lit_slots
     duration_s = np.array([plan.flashes[slot].duration_s for slot in lit])

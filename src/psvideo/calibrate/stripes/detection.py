@@ -32,7 +32,7 @@ FAINT_GAIN = 0.01
 much more of the stripes altogether."""
 THIN_ROWS = 8.0
 MOST_TIMES = 3
-HALF_TOLD = 0.8
+HALF_EXPLAINED = 0.8
 """Where a shorter period explains this share of what the longer one does, only every second stripe differs a little."""
 MOST_RIVAL = 0.75
 """Other stripes that explain more than this share of what the chosen ones do: a scene, or two lamps."""
@@ -162,7 +162,7 @@ def _is_echo(reading: FoundStripes, readings: Sequence[FoundStripes]) -> bool:
     for other in readings:
         times = _times(other, reading)
         is_thin = other.frequency > 1 / THIN_ROWS
-        if times >= 2 and other.explained > HALF_TOLD * reading.explained and (is_thin or times > MOST_TIMES):
+        if times >= 2 and other.explained > HALF_EXPLAINED * reading.explained and (is_thin or times > MOST_TIMES):
             return True
     return False
 
@@ -185,9 +185,9 @@ def _refuse_ambiguous(chosen: FoundStripes, readings: Sequence[FoundStripes]) ->
     """Raise PsvideoError where every second stripe differs a little, or where other stripes are nearly as strong."""
     for other in readings:
         times = _times(other, chosen)
-        is_half_told = times >= 2 and other.explained > HALF_TOLD * chosen.explained
+        is_half_explained = times >= 2 and other.explained > HALF_EXPLAINED * chosen.explained
         is_rival = not times and not _times(chosen, other) and other.explained > MOST_RIVAL * chosen.explained
-        if chosen.explained > LEAST_EXPLAINED and (is_half_told or is_rival):
+        if chosen.explained > LEAST_EXPLAINED and (is_half_explained or is_rival):
             raise PsvideoError(
                 f"holds stripes that can be read in two ways: one period in {1 / chosen.frequency:.2f} rows, or one in "
                 f"{1 / other.frequency:.2f} rows. The light flickers in two rates, blinks unevenly, or lights a scene "

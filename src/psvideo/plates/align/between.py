@@ -70,8 +70,8 @@ def track(before: Sketch, after: Sketch, flow: Flow, time_s: float) -> Track:
         np.where((square_at_rest < REST**2) & compared, AT_REST, NOWHERE),
     )
     source = np.where(moves, flowing, source).astype(np.uint8)
-    told = cv2.morphologyEx((source != NOWHERE).astype(np.uint8), cv2.MORPH_OPEN, np.ones((SLIVER_PX, SLIVER_PX)))
-    source[(told == 0) & moves] = NOWHERE
+    known = cv2.morphologyEx((source != NOWHERE).astype(np.uint8), cv2.MORPH_OPEN, np.ones((SLIVER_PX, SLIVER_PX)))
+    source[(known == 0) & moves] = NOWHERE
     return Track(from_before=from_before, from_after=from_after, source=source)
 
 

@@ -74,12 +74,12 @@ def motion(before: Glimpse, after: Glimpse) -> Motion | None:
     forward, backward = (
         search.calc(*pair, None) for pair in ((before.codes, after.codes), (after.codes, before.codes))
     )
-    told = changed & _returns(forward, backward)
-    if told.sum() < FOLLOWED * changed.sum():
+    followed = changed & _returns(forward, backward)
+    if followed.sum() < FOLLOWED * changed.sum():
         return Motion(speed_px_s=None, share=float(changed.mean()))
-    way = np.hypot(forward[..., 0], forward[..., 1])[told] * before.scale
+    way = np.hypot(forward[..., 0], forward[..., 1])[followed] * before.scale
     speed = float(np.quantile(way, FASTEST)) / abs(after.time_s - before.time_s)
-    return Motion(speed_px_s=speed, share=float(told.mean()))
+    return Motion(speed_px_s=speed, share=float(followed.mean()))
 
 
 def _changed(one: NDArray[np.float32], other: NDArray[np.float32]) -> NDArray[np.bool_]:

@@ -79,13 +79,13 @@ class OpenPort:
 
 
 def _cannot_open(device: str, fault: Exception) -> str:
-    told = str(fault)
-    if "exclusively lock" in told or "Resource busy" in told or "in use" in told:
+    reason = str(fault)
+    if "exclusively lock" in reason or "Resource busy" in reason or "in use" in reason:
         return f"{device}: is in use by another program. End that one first (another psvideo, a serial monitor)."
-    if "Permission" in told or "Access is denied" in told:
+    if "Permission" in reason or "Access is denied" in reason:
         why = "may not be opened by this user; on Linux join the group that owns it (dialout), then log in again"
-    elif "No such file" in told or "FileNotFound" in told or "could not open port" in told:
+    elif "No such file" in reason or "FileNotFound" in reason or "could not open port" in reason:
         why = "there is no such port, or it cannot be opened; psvideo strobe list shows what there is"
     else:
         why = "cannot be opened as a serial port"
-    return f"{device}: {why} ({told})."
+    return f"{device}: {why} ({reason})."

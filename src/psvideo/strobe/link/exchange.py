@@ -93,7 +93,7 @@ class Link:
         self.repaired += 1
         if isinstance(request, Stop):
             self.port.write(b"\n" + format_request(request))
-        self.find_the_way_back()
+        self.resynchronise()
 
     def read_clock(self) -> tuple[ClockReading, float, float]:
         """Return the controller's clock, and the host's (time.monotonic) before asking and after the answer."""
@@ -106,7 +106,7 @@ class Link:
                 return reading, asked_s, answered_s
         raise NoReplyError(f"{self.port.name}: the controller answers clock queries with those of others.")
 
-    def find_the_way_back(self, *, within_s: float = 2.0) -> bool:
+    def resynchronise(self, *, within_s: float = 2.0) -> bool:
         """Throw away what is under way, until a clock query is answered with its own nonce; False where none is."""
         until_s = time.monotonic() + within_s
         while time.monotonic() < until_s:

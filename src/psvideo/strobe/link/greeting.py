@@ -24,7 +24,7 @@ def greet(link: Link, *, within_s: float = START_WITHIN_S) -> Identity:
         identity = link.listen(Identity, within_s=min(pause_s, max(until_s - time.monotonic(), 0.0)))
         if identity is not None or time.monotonic() >= until_s:
             break
-    if identity is None or not link.find_the_way_back():
+    if identity is None or not link.resynchronise():
         raise PsvideoError(_other(link.port.name, link.heard))
     if identity.proto != PROTOCOL:
         raise PsvideoError(
@@ -36,17 +36,17 @@ def greet(link: Link, *, within_s: float = START_WITHIN_S) -> Identity:
 
 def _other(name: str, heard: bytes) -> str:
     """Say what is at a port that is no controller, by what came from it."""
-    told = "".join(chr(byte) if 0x20 <= byte <= 0x7E else " " for byte in heard[:60]).strip()
+    said = "".join(chr(byte) if 0x20 <= byte <= 0x7E else " " for byte in heard[:60]).strip()
     if not heard:
         found = "nothing answers there: no board, a board without the strobe firmware, or one that is not powered"
     elif format_request(Id()).strip() in heard:
         found = "what is there sends back what it gets (a modem, or a plug that joins its two data wires)"
     elif b"$GP" in heard or b"$GN" in heard:
-        found = f"a satellite receiver is there (it says {told!r})"
-    elif not told:
+        found = f"a satellite receiver is there (it says {said!r})"
+    elif not said:
         found = "what is there sends bytes that are no text: another device, or another speed than 115,200 baud"
     else:
-        found = f"what is there is no strobe controller (it says {told!r})"
+        found = f"what is there is no strobe controller (it says {said!r})"
     return (
         f"{name}: {found}. Name the controller's port with --port (psvideo strobe list shows those that are likely), "
         "or put the firmware onto the board (lights/)."

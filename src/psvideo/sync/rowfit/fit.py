@@ -33,7 +33,7 @@ value must take away this share of what is left; else it is as likely that the s
 SURER = 0.8
 """Share of the standard error that must be left before brightnesses are fitted again in windows half as long."""
 SOFT_ROWS, ALIKE, SOFT_GAIN = 1.5, 1.5, 0.08
-"""Edges soft by less than so many rows, alike (within a factor) at a flash's start and end, may as well be rows that
+"""Edges soft by less than so many rows, alike (within a factor) at a flash's start and end, may also be rows that
 compression or scaling has blurred: flashes are moved for it only where that takes away such a share of the robust loss
 (H.264 makes up 0.02 to 0.05 of it, tails of a row 0.1 to 0.5)."""
 MOST_WINDOWS = 400

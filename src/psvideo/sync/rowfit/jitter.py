@@ -53,10 +53,10 @@ def jitter(plan: Plan, rows: Profiles, fit: Fit) -> Jitter:
     kernel.edges(seen, flashes, weight, 0, rows.value.shape[1], pull, stiff)
     seen_at_all = stiff[stiff > 0]
     enough = 0.1 * float(np.median(seen_at_all)) if len(seen_at_all) else 1.0
-    told = np.logical_and(stiff[:, 0] > enough, stiff[:, 1] > enough)
-    if told.sum() < LEAST_FLASHES:
+    timed = np.logical_and(stiff[:, 0] > enough, stiff[:, 1] > enough)
+    if timed.sum() < LEAST_FLASHES:
         return STEADY
-    apart = pull[told] / stiff[told]
+    apart = pull[timed] / stiff[timed]
     apart -= np.median(apart, axis=0)
     bound = 6.0 * 1.4826 * float(np.median(np.abs(apart))) + 1e-15
     apart = np.clip(apart, -bound, bound)
@@ -66,11 +66,11 @@ def jitter(plan: Plan, rows: Profiles, fit: Fit) -> Jitter:
         return STEADY
     share = common / (common + noise)
     seen_by_clip = (flashes.start_s > rows.frame_start_s[0]) & (flashes.start_s < rows.frame_start_s[-1])
-    untold = 1.0 - float(told[seen_by_clip].mean())
+    untimed = 1.0 - float(timed[seen_by_clip].mean())
     return Jitter(
-        start_s=flashes.start_s[told],
+        start_s=flashes.start_s[timed],
         late_s=share * apart.mean(axis=1),
-        error_s=float(np.sqrt((1 - untold) * share * noise + untold * common)),
+        error_s=float(np.sqrt((1 - untimed) * share * noise + untimed * common)),
     )
 
 

@@ -77,7 +77,7 @@ def twins(rows: Profiles) -> Mask:
     return np.append(False, change < (ordered[few - 1] * (1 + 1e-9) + 1e-12 if few else 0.0))
 
 
-def as_told(rows: Profiles) -> Numbering:
+def as_numbered(rows: Profiles) -> Numbering:
     """Return the numbering of the files."""
     return Numbering(kept=np.ones(len(rows.value), np.bool_), index=rows.index, plain=rows.index)
 
@@ -192,17 +192,17 @@ def _folded(difference: FloatArray, place: IntArray, cycle_frames: FloatArray) -
     return mean
 
 
-def regular_step(index: Sequence[int] | IntArray, told: Sequence[int] | IntArray) -> Fraction:
+def regular_step(index: Sequence[int] | IntArray, numbered: Sequence[int] | IntArray) -> Fraction:
     """Return by how many frames a clip goes on per frame of its numbering, where that is regular; 1 elsewhere.
 
     >>> regular_step([0, 1, 2, 4, 5, 6, 8, 9, 10, 12, 13], range(11)), regular_step([0, 1, 2, 3, 5, 6, 7], range(7))
     (Fraction(4, 3), Fraction(1, 1))
     """
-    at, told_at = np.asarray(index, np.int64), np.asarray(told, np.int64)
-    odd = int((np.diff(at) != np.diff(told_at)).sum())
-    mean = float(at[-1] - at[0]) / max(float(told_at[-1] - told_at[0]), 1.0)
+    at, numbered_at = np.asarray(index, np.int64), np.asarray(numbered, np.int64)
+    odd = int((np.diff(at) != np.diff(numbered_at)).sum())
+    mean = float(at[-1] - at[0]) / max(float(numbered_at[-1] - numbered_at[0]), 1.0)
     for q in range(1, LONGEST_EVERY + 1):
         p = round(mean * q)
-        if odd >= LEAST_REGULAR and p != q and np.ptp(at * q - told_at * p) < q:
+        if odd >= LEAST_REGULAR and p != q and np.ptp(at * q - numbered_at * p) < q:
             return Fraction(p, q)
     return Fraction(1)

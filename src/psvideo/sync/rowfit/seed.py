@@ -10,7 +10,7 @@ from psvideo.model.plan import UNKNOWN_CLOCK_PPM, Plan
 from psvideo.sync.rowfit.beat import Beat, FoundClock
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import refine
-from psvideo.sync.rowfit.retime import Mask, Numbering, as_told, fold_frames, inserted, likeliest, stood_in, twins
+from psvideo.sync.rowfit.retime import Mask, Numbering, as_numbered, fold_frames, inserted, likeliest, stood_in, twins
 from psvideo.sync.rowfit.search import search
 from psvideo.sync.rowfit.track import frame_losses
 
@@ -62,7 +62,7 @@ def find_seed(plan: Plan, rows: Profiles) -> Seed:
     """Return the best seed that the files' own numbering allows, or that another one makes clearly better."""
     reach_ppm = max(plan.clock_range_ppm, MISNAMED_PPM)
     coarse = rows.binned(SEED_ROWS)
-    seed = _best(plan, coarse, as_told(rows), _stretches(plan, coarse), reach_ppm)
+    seed = _best(plan, coarse, as_numbered(rows), _stretches(plan, coarse), reach_ppm)
     twin = twins(coarse)
     if seed.share < GOOD_SEED or twin.mean() > OFTEN:
         for other in _retimed(plan, coarse, twin, reach_ppm):
@@ -71,7 +71,7 @@ def find_seed(plan: Plan, rows: Profiles) -> Seed:
             if other.share > GOOD_SEED:
                 break
     if seed.share <= FAIR_SEED and reach_ppm < UNKNOWN_CLOCK_PPM:
-        wide = _best(plan, coarse, as_told(rows), _stretches(plan, coarse), UNKNOWN_CLOCK_PPM)
+        wide = _best(plan, coarse, as_numbered(rows), _stretches(plan, coarse), UNKNOWN_CLOCK_PPM)
         seed = max(seed, wide, key=lambda one: one.share)
     return seed
 
@@ -83,7 +83,7 @@ def other_seeds(plan: Plan, rows: Profiles) -> Iterator[Seed]:
     """
     reach_ppm = max(plan.clock_range_ppm, MISNAMED_PPM)
     coarse = rows.binned(SEED_ROWS)
-    runs = [_best(plan, coarse, as_told(rows), [run], reach_ppm) for run in _runs(plan, rows)]
+    runs = [_best(plan, coarse, as_numbered(rows), [run], reach_ppm) for run in _runs(plan, rows)]
     yield max(runs, key=lambda seed: seed.share)
     yield max(_retimed(plan, coarse, twins(coarse), reach_ppm), key=lambda seed: seed.share)
 
@@ -93,7 +93,7 @@ def _retimed(plan: Plan, rows: Profiles, twin: Mask, reach_ppm: float) -> Iterat
     if twin.mean() > OFTEN:
         for numbering in (stood_in(rows, twin), inserted(rows, twin)):
             yield _best(plan, rows, numbering, _stretches(plan, renumbered(rows, numbering)), reach_ppm)
-    bases = (as_told(rows), inserted(rows, twin)) if twin.mean() > OFTEN else (as_told(rows),)
+    bases = (as_numbered(rows), inserted(rows, twin)) if twin.mean() > OFTEN else (as_numbered(rows),)
     length = min(fold_frames(plan, rows), len(rows.value))
     for start in dict.fromkeys((0, (len(rows.value) - length) // 2)):
         for base in bases:

@@ -10,10 +10,10 @@ from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.retime import regular_step
 
 
-def remarks_on_frames(plan: Plan, found: ClipFit, told: NDArray[np.int64]) -> Iterator[str]:
+def remarks_on_frames(plan: Plan, found: ClipFit, numbered: NDArray[np.int64]) -> Iterator[str]:
     """Yield what is odd about how the frames follow one another."""
     index, rate = found.track.index, float(plan.camera.fps)
-    step = regular_step(index, told)
+    step = regular_step(index, numbered)
     shown = f"{rate / float(step):.6g} frames a second" if step != 1 else ""
     if step.denominator == 1 and step > 1:
         yield (

@@ -84,7 +84,7 @@ def why_not(plan: Plan, rows: Profiles) -> str:
         )
     meant = likeliest(plan, rows, list(strobe_rivals(plan)))
     if meant is not None:
-        return _told(plan, meant)
+        return _described(plan, meant)
     whole = rows.value.mean(axis=1)
     alone = float(((rows.value - whole[:, None]) - (rows.value - whole[:, None]).mean(axis=0)).std())
     if alone < ALONE * float((whole - whole.mean()).std()) and plan.camera.readout_s != 0:
@@ -120,7 +120,7 @@ def _repeats(plan: Plan, rows: Profiles) -> bool:
     return left * frames / (frames - cycle) < REPEATS * float((change**2).sum())
 
 
-def _told(plan: Plan, rival: Rival) -> str:
+def _described(plan: Plan, rival: Rival) -> str:
     if rival.fault == "rate":
         rate, planned = float(rival.plan.camera.fps), float(plan.camera.fps)
         return (
