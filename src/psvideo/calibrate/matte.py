@@ -34,7 +34,7 @@ MOST_PIXELS = 40_000
 MOST_LEFT = 0.1
 """Share of a light's brightness that may stay unexplained (median) before the sphere is called not matte."""
 MOST_ERROR_DEG = 8.0
-"""A light whose direction is less sure is left out: its patches contradict each other, and the thing is no sphere."""
+"""A light whose direction is less known is left out: its patches contradict each other, and the thing is no sphere."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,6 +1,6 @@
 """The table of camera modes that come with the package: how big, how fast, how long a frame takes to read.
 
-``cameras.csv`` has one row per mode, each with the source of its readout time and how sure it is; where the figures
+``cameras.csv`` has one row per mode, each with the source of its readout time and how certain it is; where the figures
 come from, and how to measure one's own camera, stands in ``calibration/README.md``.
 """
 

@@ -108,7 +108,7 @@ def _about_flicker(figures: ShootFigures) -> Iterator[Caution]:
             "flicker",
             f"{names} by itself flashes at {' to '.join(rates[:: max(len(rates) - 1, 1)])} Hz, between {low:g} and "
             f"{high:g} Hz: "
-            f"whoever sees one light more than the others sees that, though the scene as a whole is lit "
+            f"a person who sees one light more than the others sees that, though the scene as a whole is lit "
             f"{figures.flash_rate_hz:.1f} times a second. {care}",
         )
     if low <= figures.dark_slot_rate_hz <= high:

@@ -184,7 +184,7 @@ def describe_strobed_readout(found: StrobedReadout) -> str:
 
 
 def describe_readout(found: Readout, led: Led) -> str:
-    """Return what was measured and how sure it is, for people."""
+    """Return what was measured and how certain it is, for people."""
     ms = 1e3
     spread = "" if found.spread_s is None else f"; single frames scatter by {found.spread_s * ms:.4f} ms"
     direction = {"unknown": "Which end is read first is not known", "top-down": "The top row is read first"}.get(

@@ -138,7 +138,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("any file that psvideo wrote or reads", "psvideo info clip/rig.toml"),
     ),
     "sync": (
-        ("when did every flash fire, and how sure is that?", "psvideo sync clip/"),
+        ("when did every flash fire, and how certain is that?", "psvideo sync clip/"),
         ("kept for later, with a picture to look at", "psvideo sync clip/ -o timing.json --picture timing.png"),
         ("a plan without a marker: say which light flashed first", "psvideo sync clip/ --first-light key"),
     ),

@@ -57,7 +57,7 @@ def sync(
 
 
 def describe_timing(timing: "Timing") -> str:
-    """Return what was found and how sure it is, in a few lines for people."""
+    """Return what was found and how certain it is, in a few lines for people."""
     complete = sum(flash.complete for flash in timing.flashes)
     lines = [f"{len(timing.flashes)} flashes, {complete} of them complete."]
     if timing.how_sure:

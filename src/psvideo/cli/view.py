@@ -46,7 +46,7 @@ def view(
     with page_server(show, port=port) as server:
         voice.say(f"{path}: {server.url} (this machine only; Ctrl-C ends it)")
         voice.result({"url": server.url, "port": server.server_port})
-        sys.stdout.flush()  # whoever reads a pipe wants the address now
+        sys.stdout.flush()  # a program that reads a pipe wants the address now
         if not no_browser:
             webbrowser.open(server.url)
         with contextlib.suppress(KeyboardInterrupt):

@@ -1,8 +1,8 @@
-"""Decoded pictures put by in a temporary file, so that a clip that is gone over twice is decoded once.
+"""Decoded pictures kept in a temporary file, so that a clip that is read twice is decoded once.
 
 Codes are written as they were decoded, and linear light is made of them again: nothing is lost, and 16-bit footage
 takes half of what its light would. The file has no name from the moment it is made, so however a run ends, nothing of
-it stays behind. What does not fit is not kept, and is decoded again by whoever asks for it.
+it stays behind. What does not fit is not kept, and is decoded again where it is asked for.
 """
 
 import contextlib
@@ -56,7 +56,7 @@ class Kept:
         return len(self._places)
 
     def close(self) -> None:
-        """Give the disk back; whoever still wants to keep a picture finds no room."""
+        """Give the disk back; from then on there is no room for pictures."""
         with self._lock:
             self._most_bytes = 0
             self._places.clear()

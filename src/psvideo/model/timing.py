@@ -1,4 +1,4 @@
-"""When every flash fired, on the camera's clock, and how sure that is: what ``sync`` finds and ``split`` uses."""
+"""When every flash fired, on the camera's clock, and how certain that is: what ``sync`` finds and ``split`` uses."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -69,7 +69,7 @@ class Timing:
 
     @property
     def how_sure(self) -> str:
-        """One sentence on how sure the flashes' times are; empty where nothing was fitted."""
+        """One sentence on how certain the flashes' times are; empty where nothing was fitted."""
         rows = f"{self.phase_error_rows:.2g} row"
         if self.phase_error_s is None:
             return f"Flash times are known to {rows}." if self.phase_error_rows else ""

@@ -50,7 +50,7 @@ class PageServer(ThreadingHTTPServer):
         return tuple(f"{name}:{self.server_port}" for name in (ADDRESS, "localhost"))
 
     def server_close(self) -> None:
-        """Close the port and let go of all pictures."""
+        """Close the port and release all pictures."""
         super().server_close()
         self.store.close()
 

@@ -88,7 +88,7 @@ class _Window:
         self._held: deque[LinearFrame] = deque()
 
     def between(self, indices: range) -> dict[int, Image]:
-        """Return the frames with these indices, as far as the stream has them; frames before are let go."""
+        """Return the frames with these indices, as far as the stream has them; frames before are released."""
         while self._held and self._held[0].index < indices.start:
             self._held.popleft()
         while not self._held or self._held[-1].index < indices.stop - 1:

@@ -32,7 +32,7 @@ from psvideo.sync.of_take import find_take_timing
 from psvideo.sync.opening import open_take
 
 MOST_SETS = 12
-"""Rounds that are read where the user names no frames: more would hardly make a calibration surer."""
+"""Rounds that are read where the user names no frames: more would hardly make a calibration better."""
 PLAN = "plan.toml"
 
 

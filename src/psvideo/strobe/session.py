@@ -93,7 +93,7 @@ def _clear(link: Link) -> list[str]:
     if status.interlock == "open":
         raise PsvideoError(
             f"{link.port.name}: the interlock is open, so the board lights nothing. Close the door or the switch "
-            "that it watches (or mend its wire), then run the command again."
+            "that it watches (or repair its wire), then run the command again."
         )
     if status.state != "fault":
         return []

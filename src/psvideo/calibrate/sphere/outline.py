@@ -23,7 +23,7 @@ LEAST_COVERAGE, LEAST_EVIDENCE = 0.6, 8.0
 """Share of the spokes that must agree on an outline, and how much likelier than chance they must make it (natural
 logarithm); noise and boxes reach 0.58."""
 MOST_PICTURES = 4
-"""Lights are averaged to so many pictures: what misleads a rim is alike under all of them, so more are no more sure."""
+"""Lights are averaged to so many pictures: what misleads a rim is alike under all of them, so more do not help."""
 SAME = 0.02
 """Round things nearer to an outline that was tried than this share of its radius are the same one."""
 SURE_COVERAGE, RESTART_SHARE = 0.95, 0.04

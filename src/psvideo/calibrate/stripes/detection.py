@@ -46,7 +46,7 @@ LEAST_EXPLAINED_BY_FEW = 0.95
 LEAST_IN_STEP = 0.9
 FEWEST_BLOCKS = 4
 MOST_ERROR = 0.005
-"""Real stripes are regular; where the period is less sure than this share, it is a scene that repeats by chance."""
+"""Real stripes are regular; where the period is less certain than this share, it is a scene that repeats by chance."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""How sure a fitted frequency is: from what the residuals did, not from an assumption that they are independent.
+"""How certain a fitted frequency is: from what the residuals did, not from an assumption that they are independent.
 
 Texture, lines of the sensor and a model that is not quite right make residuals alike from row to row, from frame to
 frame or along a block of columns. The error of the estimate is the spread of the sum of all rows' pulls on it, and that

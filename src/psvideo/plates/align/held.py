@@ -1,6 +1,6 @@
 """What is held of each light while plates come in: sketches of the last rounds, and plates as long as they are needed.
 
-Plates are most of a run's memory: one is let go as soon as no instant, of those that wait and those to come, can be
+Plates are most of a run's memory: one is released as soon as no instant, of those that wait and those to come, can be
 made from it, and packed once it was found to move. Sketches are a fiftieth of that, and stay a round longer.
 """
 

@@ -102,7 +102,7 @@ def _instants(number: int, times_s: list[float], how: Aligning, first: int) -> l
 
 
 def _complete(held: Held, how: Aligning, flows: Flows) -> Iterator[Round]:
-    """Make what can be made by now, let go of what that needed, and yield the instants that are complete, in order."""
+    """Make what can be made by now, release what that needed, and yield the instants that are complete, in order."""
     held.let_go()
     while held.waiting:
         instant = held.waiting[0]

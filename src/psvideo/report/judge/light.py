@@ -93,7 +93,7 @@ def _percent(power: float) -> str:
 
 
 def lamps(observed: Observed, *, timed: bool = True) -> Iterator[Judgement]:
-    """Judge whether every lamp gives light, always, and steadily; where flash times are not sure (``timed``), only
+    """Judge whether every lamp gives light, always, and steadily; where flash times are not known (``timed``), only
     whether it does at all."""
     facts = [one for one in observed.facts if len(one.levels) == len(observed.lights)]
     if not facts:

@@ -23,7 +23,7 @@ NAMED = 3
 
 
 def timing_and_order(timing: Timing, mode: str) -> Iterator[Judgement]:
-    """Judge how sure the flashes' times and names are."""
+    """Judge how certain the flashes' times and names are."""
     rows = timing.phase_error_rows
     if mode == "synced":
         yield Judgement(

@@ -116,7 +116,7 @@ def _rows_needed(plan: Plan, rows: Profiles, beat: Beat) -> int:
 
 
 def _in_short_windows(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> tuple[Profiles, Fit, float]:
-    """Fit brightnesses again more often where the subject moves so much that this makes the times surer.
+    """Fit brightnesses again more often where the subject moves so much that this makes the times better.
 
     Return too how far apart the times are with and without: an error that neither of the two fits can know of.
     """

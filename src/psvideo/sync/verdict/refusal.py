@@ -33,7 +33,7 @@ def nothing_to_find(plan: Plan, rows: Profiles) -> str:
     if len(rows.value) < least:
         return (
             f"holds {len(rows.value)} frame(s); finding the timing of a strobe with {len(plan.lit_slots)} lit "
-            f"flash(es) a round needs at least {least}, and 50 or more make it sure."
+            f"flash(es) a round needs at least {least}, and 50 or more make it certain."
         )
     changes = _changes(rows)
     if float(np.abs(changes).max()) < 1e-9:
