@@ -1,0 +1,83 @@
+"""A take in, the surface at one instant after the other out: decoding, plates, alignment and solving in one stream."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.clip import Take
+from psvideo.compute.progress import Watch, unwatched
+from psvideo.model.rig import Rig
+from psvideo.model.timing import Timing
+from psvideo.plates.align.rounds import Align, Aligning, aligned
+from psvideo.plates.gather import clip_light_plates
+from psvideo.plates.naming import named_by_rig
+from psvideo.plates.sequence import FIRST_NUMBER
+from psvideo.solve.instants import Instant, lights_as_planned, surfaces
+from psvideo.solve.near_limits import NEAR_ITERATIONS
+from psvideo.solve.near_surface import near_surface_of
+from psvideo.solve.normals.solving import Solver, Solving
+from psvideo.sync.of_take import find_take_timing
+
+
+def solve(
+    take: Take,
+    rig: Rig,
+    timing: Timing | None = None,
+    *,
+    mask: NDArray[np.bool_] | None = None,
+    solver: Solver = "auto",
+    align: Align = "auto",
+    watch: Watch = unwatched,
+) -> Iterator[Instant]:
+    """Solve a take round by round, in constant memory: one surface for every round of flashes.
+
+    Parameters
+    ----------
+    take
+        What ``open_take`` gives.
+    rig
+        Where the lights are, by the names of the take's plan.
+    timing
+        When every flash fired; found from the picture where it is left out. Where the plan has no marker, the rig tells
+        the order of the lights, as far as it can.
+    mask
+        Shape (row, col), bool: True where to solve; everywhere left out.
+    solver
+        "robust" weighs highlights and shadows down, "least-squares" takes the surface as matte, "auto" is robust from
+        five lights on.
+    align
+        "auto" brings the plates of a round to one instant where something moves, "flow" looks for motion everywhere,
+        "none" leaves them as they are.
+    watch
+        Is handed every long loop, to show progress.
+
+    Yields
+    ------
+    Instant
+        ``surface``, a Surface with ``residual`` and, from the robust solver, ``error_deg``; and ``round``, the plates
+        that it was solved from: ``round.number`` counts from 1001 as the files do, ``round.time_s`` is the instant on
+        the camera's clock in seconds, ``round.plates`` hold ``light`` and ``image`` (row, col[, 3]).
+
+    Raises
+    ------
+    PsvideoError
+        Where no strobe is found, the rig lacks a light of the plan, or its lights give no normals.
+
+    Examples
+    --------
+    >>> import psvideo as ps
+    >>> take = ps.open_take("take3/")  # doctest: +SKIP
+    >>> for instant in ps.solve(take, ps.read_rig("rig.toml")):  # doctest: +SKIP
+    ...     print(instant.round.number, instant.surface.normals.shape)
+    """
+    plan, clip = take.plan, take.clip
+    lights = lights_as_planned(rig, plan)
+    near = near_surface_of(
+        rig, lights, height_px=clip.height_px, width_px=clip.width_px, iterations=NEAR_ITERATIONS
+    )
+    found = named_by_rig(take, timing or find_take_timing(take, watch=watch), rig)
+    plates = clip_light_plates(take, found, watch=watch)
+    rounds = aligned(plates, plan.lights, Aligning(align=align), first=FIRST_NUMBER)
+    return surfaces(rounds, plan, rig, mask=mask, solving=Solving(solver=solver, residual=True, error=True), near=near)
