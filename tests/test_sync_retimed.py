@@ -14,6 +14,7 @@ from psvideo.errors import PsvideoError
 from psvideo.model.plan import Plan
 from psvideo.model.timing import DroppedFrames, Timing, places_in_time
 from psvideo.sync.find import find_timing
+from psvideo.sync.rowfit import seed as seed_module
 from psvideo.sync.rowfit.fit import find
 from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.retime import regular_step, twins
@@ -178,8 +179,8 @@ def test_a_clock_within_1100_ppm_is_found_at_once_whatever_the_plan_tolerates(
 
     Over a stretch as long as those of plans with many lights, short flashes slip by more than their length.
     """
-    monkeypatch.setattr("psvideo.sync.rowfit.seed.SEED_FRAMES", 120)
-    monkeypatch.setattr("psvideo.sync.rowfit.seed.UNKNOWN_CLOCK_PPM", 100.0)  # the widest search finds it too, late
+    monkeypatch.setattr(seed_module, "SEED_FRAMES", 120)
+    monkeypatch.setattr(seed_module, "UNKNOWN_CLOCK_PPM", 100.0)  # the widest search finds it too, late
     plan = make_plan(height_px=160, width_px=12, duration_s=0.00025, clock_tolerance_ppm=100)
     seed = find_seed(plan, profiles_of(plan, shot_of(plan, 120, 999.0)))
     assert seed.frames == slice(0, 120)

@@ -11,7 +11,7 @@ from psvideo.formats.plan_toml import read_plan
 from psvideo.formats.timing_json import read_timing
 from psvideo.model.shutter import row_weights
 from psvideo.model.surface import Surface
-from psvideo.pictures.relighting import normal_colours, relit, srgb
+from psvideo.pictures.relighting import normal_colours, relight, srgb
 
 FRAME = 5
 LAMPS = {
@@ -109,7 +109,7 @@ def _lit(out: Path, light: tuple[float, float, float], colour: tuple[float, floa
     normals, albedo = exr(out / "normals"), exr(out / "albedo")
     valid = exr(out / "valid") > 0
     plain = Surface(normals=normals, albedo=albedo, residual=np.zeros(valid.shape, np.float32), valid=valid)
-    return srgb(relit(plain, light, colour=colour), exposure=BRIGHT)
+    return srgb(relight(plain, light, colour=colour), exposure=BRIGHT)
 
 
 EXPLAINED: dict[str, Callable[[Path], Figure]] = {

@@ -10,7 +10,7 @@ import numpy as np
 from docs.figures.staging import SCENE, WIDTH_PX, Figure, Image, Pixels, exr, figure, film, frames, psvideo, row
 
 from psvideo.model.surface import Surface
-from psvideo.pictures.relighting import normal_colours, relit, srgb
+from psvideo.pictures.relighting import normal_colours, relight, srgb
 
 BRIGHT = 1.7
 """Exposure of all pictures of frames and plates."""
@@ -126,7 +126,7 @@ def _relit(normals: Image, albedo: Image, light: tuple[float, float, float] = (0
     valid = np.linalg.norm(normals, axis=-1) > 0.5
     nothing = np.zeros(valid.shape, np.float32)
     surface = Surface(normals=normals, albedo=albedo, residual=nothing, valid=valid)
-    return srgb(relit(surface, light), exposure=1.3)
+    return srgb(relight(surface, light), exposure=1.3)
 
 
 def wrong_y(folder: Path) -> Figure:

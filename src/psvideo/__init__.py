@@ -1,6 +1,93 @@
-"""psvideo: normals and albedo for every instant, from strobed rolling-shutter video."""
+"""psvideo: normals and albedo for every instant, from strobed rolling-shutter video.
 
-from typing import Any
+This is the front door: what ``import psvideo as ps`` offers, each name loaded when it is first used.
+"""
+
+import sys
+from importlib import import_module
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:  # what editors and type checkers see; _HOMES is the same for Python
+    from psvideo.clip.mask import read_mask as read_mask
+    from psvideo.errors import PsvideoError as PsvideoError
+    from psvideo.formats.plan_toml import read_plan as read_plan
+    from psvideo.formats.rig_toml import read_rig as read_rig
+    from psvideo.formats.timing_json import read_timing as read_timing
+    from psvideo.model.plan import Plan as Plan
+    from psvideo.model.rig import Light as Light
+    from psvideo.model.rig import Rig as Rig
+    from psvideo.model.surface import Surface as Surface
+    from psvideo.model.timing import Timing as Timing
+    from psvideo.pictures.quantity import picture_of as picture_of
+    from psvideo.pictures.relighting import relight as relight
+    from psvideo.plates.gather import clip_rounds as rounds
+    from psvideo.runs.check import check as check
+    from psvideo.runs.light_sets import read_images as read_images
+    from psvideo.runs.normals import normals as normals
+    from psvideo.runs.split import split as split
+    from psvideo.runs.sync import sync as sync
+    from psvideo.solve.depth.shaping import find_depth as find_depth
+    from psvideo.solve.images import solve_images as solve_images
+    from psvideo.solve.of_take import solve as solve
+    from psvideo.sync.of_take import find_take_timing as find_timing
+    from psvideo.sync.opening import open_take as open_take
+    from psvideo.synth.shoot import shoot as shoot
+
+_HOMES = {
+    "Light": "psvideo.model.rig",
+    "Plan": "psvideo.model.plan",
+    "PsvideoError": "psvideo.errors",
+    "Rig": "psvideo.model.rig",
+    "Surface": "psvideo.model.surface",
+    "Timing": "psvideo.model.timing",
+    "check": "psvideo.runs.check",
+    "find_depth": "psvideo.solve.depth.shaping",
+    "find_timing": "psvideo.sync.of_take:find_take_timing",
+    "normals": "psvideo.runs.normals",
+    "open_take": "psvideo.sync.opening",
+    "picture_of": "psvideo.pictures.quantity",
+    "read_images": "psvideo.runs.light_sets",
+    "read_mask": "psvideo.clip.mask",
+    "read_plan": "psvideo.formats.plan_toml",
+    "read_rig": "psvideo.formats.rig_toml",
+    "read_timing": "psvideo.formats.timing_json",
+    "relight": "psvideo.pictures.relighting",
+    "rounds": "psvideo.plates.gather:clip_rounds",
+    "shoot": "psvideo.synth.shoot",
+    "solve": "psvideo.solve.of_take",
+    "solve_images": "psvideo.solve.images",
+    "split": "psvideo.runs.split",
+    "sync": "psvideo.runs.sync",
+}
+"""Where each name lives; after a colon, its name there where it has another one."""
+
+__all__ = [  # noqa: RUF022  (in the order of the work)
+    "open_take",
+    "read_plan",
+    "read_rig",
+    "read_timing",
+    "read_images",
+    "read_mask",
+    "find_timing",
+    "rounds",
+    "solve",
+    "solve_images",
+    "find_depth",
+    "relight",
+    "picture_of",
+    "sync",
+    "split",
+    "normals",
+    "check",
+    "shoot",
+    "Plan",
+    "Timing",
+    "Rig",
+    "Light",
+    "Surface",
+    "PsvideoError",
+]
 
 
 def __getattr__(name: str) -> Any:
@@ -8,4 +95,23 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         return version("psvideo")
-    raise AttributeError(f"module 'psvideo' has no attribute {name!r}")
+    if name not in _HOMES:
+        raise AttributeError(f"module 'psvideo' has no attribute {name!r}")
+    module, _, other = _HOMES[name].partition(":")
+    found = globals()[name] = getattr(import_module(module), other or name)
+    return found
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]
+
+
+class _FrontDoor(ModuleType):
+    """Keeps ``solve`` and ``sync`` the functions: importing a room of the same name would put the room there."""
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if not (name in _HOMES and isinstance(value, ModuleType)):
+            super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _FrontDoor

@@ -22,11 +22,34 @@ def _codes(kind: str, path: Path) -> NDArray[Any]:
     return decode(kind, path).codes
 
 
-def read_mask(path: Path, *, width_px: int, height_px: int) -> NDArray[np.bool_]:
-    """Return where a mask is white (brighter than half of its range), shape (row, col).
+def read_mask(path: Path | str, *, width_px: int | None = None, height_px: int | None = None) -> NDArray[np.bool_]:
+    """Read a mask that somebody painted: white where to solve.
 
-    Raises PsvideoError where the file cannot be read, has another size than the frames, or is black everywhere.
+    Parameters
+    ----------
+    path
+        A picture of any kind that frames may be.
+    width_px, height_px
+        The size that it must have; any where they are left out.
+
+    Returns
+    -------
+    numpy.ndarray
+        Shape (row, col), bool, True where the picture is brighter than half of its range.
+
+    Raises
+    ------
+    PsvideoError
+        Where the file cannot be read, has another size than expected, or is black everywhere.
+
+    Examples
+    --------
+    >>> import psvideo as ps
+    >>> mask = ps.read_mask("take3/truth/mask.exr")
+    >>> mask.shape, mask.dtype
+    ((120, 160), dtype('bool'))
     """
+    path = Path(path)
     kind = KINDS.get(path.suffix.lower())
     if kind is None:
         raise PsvideoError(f"{path}: is no picture that can be a mask; expected one of {', '.join(KINDS)}.")
@@ -34,8 +57,8 @@ def read_mask(path: Path, *, width_px: int, height_px: int) -> NDArray[np.bool_]
         raise PsvideoError(f"{path}: there is no such mask. Check the name.")
     codes = _codes(kind, path)
     brightest = codes if codes.ndim == 2 else codes.max(axis=2)
-    if brightest.shape != (height_px, width_px):
-        rows, cols = brightest.shape
+    rows, cols = brightest.shape
+    if (height_px, width_px) not in ((rows, cols), (None, None)):
         raise PsvideoError(
             f"{path}: the mask is {cols} x {rows} pixels, and the frames are {width_px} x {height_px}. "
             "Paint it over a frame or a plate of this clip."

@@ -131,9 +131,32 @@ def parse_fps(fps: float | str) -> Fraction:
     return rate
 
 
-def read_plan(path: Path) -> Plan:
-    """Read plan.toml. Raises PsvideoError that names file, key, what was found and what was expected."""
-    return parse_plan(read_text(path), source=str(path))
+def read_plan(path: Path | str) -> Plan:
+    """Read plan.toml: the camera, and which lights the strobe flashes when.
+
+    Parameters
+    ----------
+    path
+        The file; the keys are those of "The plan" in formats.md.
+
+    Returns
+    -------
+    Plan
+        ``lights``, ``camera``, ``flashes`` and what follows from them, times in seconds.
+
+    Raises
+    ------
+    PsvideoError
+        Names file, key, what was found and what was expected.
+
+    Examples
+    --------
+    >>> import psvideo as ps
+    >>> plan = ps.read_plan("take3/plan.toml")
+    >>> plan.lights, plan.camera.height_px, plan.flashes[0].duration_s
+    (('key', 'left', 'top'), 120, 0.001)
+    """
+    return parse_plan(read_text(Path(path)), source=str(path))
 
 
 def parse_plan(text: str, *, source: str = "plan") -> Plan:

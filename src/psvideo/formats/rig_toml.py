@@ -88,8 +88,38 @@ class _RigFile(Contract):
         return self
 
 
-def read_rig(path: Path, *, plan_lights: Sequence[str] = ()) -> Rig:
-    """Read a rig file of any of the known kinds; ``plan_lights`` names the lights of lists that carry no names."""
+def read_rig(path: Path | str, *, plan_lights: Sequence[str] = ()) -> Rig:
+    """Read where the lights are and how strong.
+
+    Parameters
+    ----------
+    path
+        rig.toml, an .lp list (RTI), DiLiGenT's light_directions.txt with light_intensities.txt beside it, or a plain
+        list of unit vectors with its count on the first line.
+    plan_lights
+        Names for the lights of lists that carry none, in order; left out, they are numbered.
+
+    Returns
+    -------
+    Rig
+        ``lights``, each with ``name``, ``direction`` (unit vector from the surface, camera's frame) or ``position_m``,
+        and ``intensity``; the lens and the subject's plane where the file gives them.
+
+    Raises
+    ------
+    PsvideoError
+        Names the file, what was found and what was expected.
+
+    Examples
+    --------
+    >>> import psvideo as ps
+    >>> rig = ps.read_rig("take3/rig.toml")
+    >>> rig.names
+    ('key', 'left', 'top')
+    >>> [round(part, 3) for part in rig.lights[0].direction]
+    [0.488, 0.39, 0.781]
+    """
+    path = Path(path)
     text = read_text(path)
     if path.suffix == ".toml":
         return parse_rig(text, source=str(path))

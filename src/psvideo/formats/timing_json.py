@@ -44,8 +44,32 @@ class _TimingFile(Contract):
     flashes: list[_FlashFile]
 
 
-def read_timing(path: Path) -> Timing:
-    """Read timing.json. Raises PsvideoError that names the file, the key and what was expected."""
+def read_timing(path: Path | str) -> Timing:
+    """Read timing.json: when every flash of a clip fired.
+
+    Parameters
+    ----------
+    path
+        The file, as ``sync`` and whole runs write it.
+
+    Returns
+    -------
+    Timing
+        As ``find_timing`` gives it.
+
+    Raises
+    ------
+    PsvideoError
+        Names the file, the key and what was expected.
+
+    Examples
+    --------
+    >>> import psvideo as ps
+    >>> found = ps.sync("take3/", out="timing.json")
+    >>> ps.read_timing("timing.json").flashes[0].lights == found.flashes[0].lights
+    True
+    """
+    path = Path(path)
     try:
         data = json.loads(read_text(path))
         check_schema(data.get("schema"), SCHEMA, source=str(path))

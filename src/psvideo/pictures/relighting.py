@@ -4,6 +4,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.errors import UsageError
 from psvideo.model.rig import Vector
 from psvideo.model.surface import Surface
 
@@ -11,7 +12,7 @@ Image = NDArray[np.float32]
 Pixels = NDArray[np.uint8]
 
 
-def relit(
+def relight(
     surface: Surface,
     direction: Vector,
     *,
@@ -20,11 +21,45 @@ def relit(
     gloss: float = 0.0,
     shininess: float = 30.0,
 ) -> Image:
-    """Return the surface under a new distant light, linear, shape (row, col, 3): albedo * strength * max(0, n . l).
+    """Return the surface under a new distant light: albedo * strength * max(0, n . l).
 
-    ``gloss`` adds a highlight (Blinn 1977) of that strength; the camera looks along -z.
+    Parameters
+    ----------
+    surface
+        What was solved, or read.
+    direction
+        From the surface to the light, of any length, in the camera's frame: x right, y up, z towards the camera.
+    strength, colour
+        Of the light; 1 and white give back what the rig's lights of intensity 1 showed.
+    gloss, shininess
+        Add a highlight (Blinn 1977) of that strength; the larger the exponent, the smaller the highlight. The camera
+        looks along -z.
+
+    Returns
+    -------
+    numpy.ndarray
+        Shape (row, col, 3), float32, linear light; 0 where the surface is not valid. Pictures under several lights add
+        up.
+
+    Raises
+    ------
+    PsvideoError
+        Where the direction is not three numbers, or has no length.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import psvideo as ps
+    >>> normals = np.zeros((2, 2, 3), np.float32)
+    >>> normals[..., 2] = 1
+    >>> surface = ps.Surface(normals=normals, albedo=np.full((2, 2), 0.5), valid=np.ones((2, 2), bool))
+    >>> ps.relight(surface, (0, 0.6, 0.8), colour=(1.0, 0.5, 0.25))[0, 0].round(3).tolist()
+    [0.4000000059604645, 0.20000000298023224, 0.10000000149011612]
     """
-    light = (np.asarray(direction) / np.linalg.norm(direction)).astype(np.float32)
+    length = float(np.linalg.norm(direction)) if np.shape(direction) == (3,) else 0.0
+    if not 0 < length < np.inf:
+        raise UsageError(f"`direction` is {direction!r}; expected (x, y, z) from the surface to the light.")
+    light = (np.asarray(direction) / length).astype(np.float32)
     normals = surface.normals.astype(np.float32)
     facing = np.maximum(normals @ light, 0.0)[..., None]
     shade = three_channels(surface.albedo.astype(np.float32)) * facing

@@ -32,9 +32,42 @@ def clip_rounds(
     watch: Watch = unwatched,
     each_flash: Callable[[Plate], None] | None = None,
 ) -> Iterator[Round]:
-    """Decode a take once and yield its rounds: one plate per light at its full flash, ambient light taken off.
+    """Yield a take's rounds: one plate per light at its full flash, ambient light taken off. The take is decoded once.
 
-    ``each_flash`` is shown every single plate on its way, demosaiced.
+    Parameters
+    ----------
+    take, timing
+        What ``open_take`` and ``find_timing`` give.
+    method
+        "weights", or "hudon2015": Algorithm 1 of that paper, to compare with.
+    start_number
+        The number of the first round.
+    watch
+        Is handed the loop over the frames, to show progress.
+    each_flash
+        Is shown every single plate on its way, demosaiced.
+
+    Yields
+    ------
+    Round
+        ``number``; ``time_s``, its instant on the camera's clock; ``lights``, fewer than the plan's at the clip's ends;
+        ``plates``, each with ``light``, ``time_s`` and ``image`` (row, col[, 3]), float32, linear light, 1.0 = sensor
+        saturation; ``ambient``, such a plate where the plan has dark slots, else None.
+
+    Raises
+    ------
+    PsvideoError
+        Where the plan's patterns of lights cannot be told apart, or a frame cannot be read.
+
+    Examples
+    --------
+    >>> import psvideo as ps
+    >>> take = ps.open_take("take3/")
+    >>> for one in ps.rounds(take, ps.find_timing(take)):
+    ...     print(one.number, one.lights, one.plates[0].image.shape)
+    1001 ('left', 'top') (120, 160, 3)
+    1002 ('key', 'left', 'top') (120, 160, 3)
+    1003 ('key', 'left', 'top') (120, 160, 3)
     """
     check_separable(take.plan)
     shown = _shown(clip_plates(take, timing, method=method, watch=watch), each_flash)

@@ -55,9 +55,27 @@ def check(
       ``first_light`` names the light of the clip's first complete flash, for plans without a marker.
     - ``report``: a page (HTML) to write of the check, outside of the footage. Nothing else is written.
 
-    ``watch`` is handed every long loop. Returns what was found; its ``usable`` says whether the take can be used.
-    Raises UsageError where the report would lie among the footage, and PsvideoError where the footage or its plan
-    cannot be read, or where there are too few frames to judge.
+    ``watch`` is handed every long loop, and ``caller`` says how parameters are spelled.
+
+    Returns
+    -------
+    Check
+        What was found: ``judgements``, each with ``subject``, ``grade``, ``found`` and ``advice``; ``usable`` says
+        whether the take can be used, ``verdict`` is the sentence that sums the lines up.
+
+    Raises
+    ------
+    UsageError
+        Where the report would lie among the footage.
+    PsvideoError
+        Where the footage or its plan cannot be read, or there are too few frames to judge.
+
+    Examples
+    --------
+    >>> import psvideo as ps
+    >>> found = ps.check("take3/")
+    >>> [line.subject for line in found.judgements if line.grade == "bad"]
+    []
     """
     page = None if report is None else Path(report)
     refuse_inside(page, Path(clip))

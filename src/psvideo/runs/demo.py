@@ -15,7 +15,8 @@ from psvideo.formats.whole_files import refuse_existing, whole_file
 from psvideo.model.rig import Vector
 from psvideo.model.surface import Surface
 from psvideo.pictures.contact import Strip, Tile, sheet
-from psvideo.pictures.relighting import exposure_for, normal_colours, relit, srgb
+from psvideo.pictures.quantity import picture_of
+from psvideo.pictures.relighting import exposure_for, relight, srgb
 from psvideo.plates.timed import timing_of
 from psvideo.runs.lighting import read_lighting
 from psvideo.runs.output import Output
@@ -74,11 +75,11 @@ def demo_sheet(clip: Clip, sample: Instant) -> NDArray[np.uint8]:
 def _surface_tiles(surface: Surface) -> list[Tile]:
     albedo = surface.albedo.astype(np.float32)
     exposure = exposure_for(albedo)
-    warm = relit(surface, RELIT_FROM[0], colour=WARM, gloss=0.06)
-    cool = relit(surface, RELIT_FROM[1], colour=COOL, gloss=0.06)
+    warm = relight(surface, RELIT_FROM[0], colour=WARM, gloss=0.06)
+    cool = relight(surface, RELIT_FROM[1], colour=COOL, gloss=0.06)
     return [
-        Tile("normals", normal_colours(surface.normals)),
-        Tile("albedo", srgb(albedo, exposure=exposure)),
+        Tile("normals", picture_of("normals", surface.normals)),
+        Tile("albedo", picture_of("albedo", albedo)),
         Tile("relit, warm from the right", srgb(warm, exposure=exposure)),
         Tile("relit, warm and cool together", srgb(0.7 * warm + 0.6 * cool, exposure=exposure)),
     ]

@@ -66,6 +66,46 @@ class Reading:
     most: int = MOST_SETS
 
 
+def read_images(path: Path | str, *, transfer: str | None = None, plan: Path | str | None = None) -> LightPictures:
+    """Read pictures of one still scene, one per light, into linear light.
+
+    Parameters
+    ----------
+    path
+        A folder of still photographs, one per light, in the order of their names (L2 before L10): PNG, TIFF, EXR, DNG,
+        DPX or JPEG. A picture named ambient or dark shows the scene with every light off and is taken off the others;
+        one named room is left aside, and so is one of another name beside many numbered ones (a mask). Or a folder with
+        one folder of pictures per light, as ``split`` writes it, or a clip, whose flashes are found first; of these,
+        the mean over up to twelve rounds.
+    transfer
+        How the files code light: "linear", "srgb", "rec709", "slog3" and others by OpenColorIO's names. Left out: as
+        the plan says; without a plan sRGB for JPEG, else linear.
+    plan
+        The plan, where it does not lie beside the pictures: names the lights, and says how the files code light.
+
+    Returns
+    -------
+    LightPictures
+        ``images`` (light, row, col) or (light, row, col, 3), float32, linear, 1.0 = the largest code; ``names`` of the
+        lights, in the same order; ``saturated``, of the images' shape, True where a value was clipped; ``ambient``, or
+        None.
+
+    Raises
+    ------
+    PsvideoError
+        Where there are no pictures, two of one light, or pictures that differ in size, or one cannot be read.
+
+    Examples
+    --------
+    >>> import psvideo as ps
+    >>> pictures = ps.read_images("stills/")
+    >>> pictures.names, pictures.images.shape
+    (('key', 'left', 'top'), (3, 120, 160, 3))
+    """
+    reading = Reading(transfer=transfer, plan=None if plan is None else Path(plan))
+    return read_light_pictures(Path(path), reading)
+
+
 def read_light_pictures(path: Path, reading: Reading = Reading(), *, watch: Watch = unwatched) -> LightPictures:
     """Return the mean picture of the scene under each light. Raises as ``open_light_sets``."""
     return averaged(open_light_sets(path, reading, watch=watch).sets)

@@ -4,7 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.pictures.contact import Strip, Tile, sheet
-from psvideo.pictures.relighting import exposure_for, normal_colours, smaller, srgb
+from psvideo.pictures.quantity import picture_of
+from psvideo.pictures.relighting import exposure_for, smaller, srgb
 from psvideo.plates.sequence import Round
 from psvideo.solve.instants import Instant
 
@@ -16,7 +17,7 @@ def look(instant: Instant) -> Pixels:
     """Return a picture of one instant for eyes: its plates, its normals and its albedo."""
     albedo = smaller(instant.surface.albedo, SHOWN_WIDTH_PX)
     normals = smaller(instant.surface.normals, SHOWN_WIDTH_PX)
-    surface = [Tile("normals", normal_colours(normals)), Tile("albedo", srgb(albedo, exposure=exposure_for(albedo)))]
+    surface = [Tile(name, picture_of(name, image)) for name, image in (("normals", normals), ("albedo", albedo))]
     return sheet([_plates(instant.round), Strip("Surface", surface)], width_px=WIDE_PX)
 
 

@@ -113,9 +113,26 @@ def normals(
       ambient light in it. ``preview``: movies for eyes, coded as ``preview_codec``.
     - ``force`` replaces an ``out`` that exists; ``resume`` goes on where a run that was stopped left off.
 
-    ``watch`` is handed every long loop, and ``caller`` the sentences that come on the way. Returns the report that lies
-    in the folder too, with the timing in it. Raises UsageError where parameters do not fit together, before any work is
-    done, and PsvideoError where files cannot be used or hold no complete round.
+    ``watch`` is handed every long loop, and ``caller`` the sentences that come on the way.
+
+    Returns
+    -------
+    RunReport
+        What lies in the folder as report.json too: ``verdict``, ``findings``, ``instants``, and ``timing``.
+
+    Raises
+    ------
+    UsageError
+        Where parameters do not fit together, or ``out`` exists, before any work is done.
+    PsvideoError
+        Where files cannot be used or hold no complete round.
+
+    Examples
+    --------
+    >>> import psvideo as ps
+    >>> report = ps.normals("take3/", rig="take3/rig.toml", out="results/", aov=["residual"])
+    >>> len(report.instants)
+    2
     """
     output = Output(folder=Path(out), force=force, resume=resume, start_number=start_number, caller=caller)
     output.check()

@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 from psvideo.clip.decode import exr
 from psvideo.compute.progress import Watch
 from psvideo.model.choices import Codec, Preview
-from psvideo.pictures.relighting import exposure_for, normal_colours, smaller, srgb
+from psvideo.model.quantities import QUANTITIES
+from psvideo.pictures.quantity import picture_of
+from psvideo.pictures.relighting import exposure_for, smaller, srgb
 
 Pixels = NDArray[np.uint8]
 Image = NDArray[np.float32]
@@ -81,10 +83,8 @@ def _exposure(preview: Preview, first: Shown) -> float:
 
 
 def _picture(preview: Preview, one: Shown, exposure: float, fps: Fraction) -> Pixels:
-    if preview == "normals":
-        return normal_colours(_read(one.files["normals"], WIDTH_PX))
-    if preview == "beauty":
-        return srgb(_read(one.files["beauty"], WIDTH_PX), exposure=exposure)
+    if preview in QUANTITIES:
+        return picture_of(preview, _read(one.files[preview], WIDTH_PX), exposure=exposure)
     return _relit(one, exposure, fps) if preview == "relit" else _sheet(one, exposure)
 
 

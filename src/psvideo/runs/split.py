@@ -54,9 +54,26 @@ def split(
     - ``start_number``: the number of the first round's files. ``force`` replaces an ``out`` that exists; ``resume``
       goes on where a run that was stopped left off.
 
-    ``watch`` is handed every long loop, and ``caller`` the sentences that come on the way. Returns the report that lies
-    in the folder too; its ``timing`` names every flash's plate. Raises UsageError where parameters do not fit together,
-    before any work is done, and PsvideoError where files cannot be used or hold no complete round.
+    ``watch`` is handed every long loop, and ``caller`` the sentences that come on the way.
+
+    Returns
+    -------
+    RunReport
+        What lies in the folder as report.json too; its ``timing`` names every flash's plate.
+
+    Raises
+    ------
+    UsageError
+        Where parameters do not fit together, or ``out`` exists, before any work is done.
+    PsvideoError
+        Where files cannot be used or hold no complete round.
+
+    Examples
+    --------
+    >>> import psvideo as ps
+    >>> report = ps.split("take3/", out="plates/")
+    >>> report.timing.flashes[1].plate
+    'left/take3_left.1001.exr'
     """
     output = Output(folder=Path(out), force=force, resume=resume, start_number=start_number, caller=caller)
     output.check()

@@ -43,9 +43,26 @@ def sync(
     - ``out``: a timing.json to write. ``picture``: a PNG to write that shows how well the flashes were found. ``force``
       replaces either where it exists.
 
-    ``watch`` is handed every long loop, and ``caller`` the sentences that come on the way. Returns when every flash
-    fired, in seconds on the camera's clock. Raises UsageError where an output exists or is no PNG, NoStrobeError where
-    no strobe is found, and PsvideoError where files cannot be used.
+    ``watch`` is handed every long loop, and ``caller`` the sentences that come on the way.
+
+    Returns
+    -------
+    Timing
+        When every flash fired, in seconds on the camera's clock; see ``find_timing``.
+
+    Raises
+    ------
+    UsageError
+        Where an output exists or is no PNG.
+    PsvideoError
+        Where no strobe is found (NoStrobeError), or files cannot be used.
+
+    Examples
+    --------
+    >>> import psvideo as ps
+    >>> timing = ps.sync("take3/", out="found.json")
+    >>> timing.phase_error_rows < 0.05
+    True
     """
     timing_path, picture_path = (None if path is None else Path(path) for path in (out, picture))
     if timing_path is not None:

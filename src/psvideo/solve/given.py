@@ -42,7 +42,9 @@ def _stacked(images: ArrayLike | Sequence[ArrayLike]) -> NDArray[np.generic]:
     if isinstance(images, np.ndarray):
         return images
     if not isinstance(images, Sequence) or not images:
-        raise UsageError(f"`images` are {images!r:.60}; expected an array (light, row, col[, 3]) or a list of pictures.")
+        raise UsageError(
+            f"`images` are {images!r:.60}; expected an array (light, row, col[, 3]) or a list of pictures."
+        )
     pictures = [np.asarray(image) for image in images]
     shapes = [picture.shape for picture in pictures]
     other = next((n for n, shape in enumerate(shapes) if shape != shapes[0]), None)
@@ -168,7 +170,7 @@ def checked_mask(mask: ArrayLike, shape: tuple[int, int]) -> Mask:
 def checked_saturation(saturation: float, stack: Images, mask: Mask | None) -> np.float32:
     """Return the unit in which images are solved, so that samples are clipped from 1.0 on."""
     if not saturation > 0:
-        raise UsageError(f"`saturation` is {saturation}; expected the value from which on samples are clipped, above 0.")
+        raise UsageError(f"`saturation` is {saturation}; expected the value above 0 from which on samples are clipped.")
     if np.isinf(saturation):
         return np.float32(max(2 * float(stack.max(initial=0.0)), 1e-6))
     least = stack.min(axis=0) if stack.ndim == 3 else stack.max(axis=3).min(axis=0)

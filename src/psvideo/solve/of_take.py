@@ -1,23 +1,22 @@
 """A take in, the surface at one instant after the other out: decoding, plates, alignment and solving in one stream."""
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.clip import Take
 from psvideo.compute.progress import Watch, unwatched
+from psvideo.model.choices import NEAR_ITERATIONS, Align, Solver
 from psvideo.model.rig import Rig
 from psvideo.model.timing import Timing
-from psvideo.plates.align.rounds import Align, Aligning, aligned
+from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.gather import clip_light_plates
 from psvideo.plates.naming import named_by_rig
 from psvideo.plates.sequence import FIRST_NUMBER
 from psvideo.solve.instants import Instant, lights_as_planned, surfaces
-from psvideo.solve.near_limits import NEAR_ITERATIONS
 from psvideo.solve.near_surface import near_surface_of
-from psvideo.solve.normals.solving import Solver, Solving
+from psvideo.solve.normals.solving import Solving
 from psvideo.sync.of_take import find_take_timing
 
 
@@ -68,15 +67,15 @@ def solve(
     Examples
     --------
     >>> import psvideo as ps
-    >>> take = ps.open_take("take3/")  # doctest: +SKIP
-    >>> for instant in ps.solve(take, ps.read_rig("rig.toml")):  # doctest: +SKIP
-    ...     print(instant.round.number, instant.surface.normals.shape)
+    >>> take, rig = ps.open_take("take3/"), ps.read_rig("take3/rig.toml")
+    >>> for instant in ps.solve(take, rig, ps.find_timing(take)):
+    ...     print(instant.round.number, instant.surface.normals.shape, instant.surface.valid.any())
+    1002 (120, 160, 3) True
+    1003 (120, 160, 3) True
     """
     plan, clip = take.plan, take.clip
     lights = lights_as_planned(rig, plan)
-    near = near_surface_of(
-        rig, lights, height_px=clip.height_px, width_px=clip.width_px, iterations=NEAR_ITERATIONS
-    )
+    near = near_surface_of(rig, lights, height_px=clip.height_px, width_px=clip.width_px, iterations=NEAR_ITERATIONS)
     found = named_by_rig(take, timing or find_take_timing(take, watch=watch), rig)
     plates = clip_light_plates(take, found, watch=watch)
     rounds = aligned(plates, plan.lights, Aligning(align=align), first=FIRST_NUMBER)

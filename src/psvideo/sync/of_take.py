@@ -54,5 +54,34 @@ def timing_of_profiles(take: Take, profiles: TakeProfiles, *, first_light: str |
 
 
 def find_take_timing(take: Take, *, first_light: str | None = None, watch: Watch = unwatched) -> Timing:
-    """Decode a take once and return when every flash fired. Raises PsvideoError where no strobe is found."""
+    """Find when every flash fired, from the picture alone; the take is decoded once.
+
+    Parameters
+    ----------
+    take
+        What ``open_take`` gives.
+    first_light
+        The light of the clip's first complete flash, for plans without a marker (a dark slot).
+    watch
+        Is handed the loop over the frames, to show progress.
+
+    Returns
+    -------
+    Timing
+        ``flashes``, each with ``start_s`` and ``duration_s`` on the camera's clock (0 is when row 0 of the first frame
+        begins to expose), ``lights`` and whether it is ``complete``; ``row_time_s``, ``clock_offset_ppm``,
+        ``phase_error_rows``, ``order`` (how it is known which light is which) and ``notes`` on what to distrust.
+
+    Raises
+    ------
+    PsvideoError
+        Where no strobe is found (NoStrobeError), or the plan has no such light.
+
+    Examples
+    --------
+    >>> import psvideo as ps
+    >>> timing = ps.find_timing(ps.open_take("take3/"))
+    >>> timing.order, [dict(flash.lights) for flash in timing.flashes if flash.complete][:2]
+    ('marker', [{'left': 1.0}, {'top': 1.0}])
+    """
     return timing_of_profiles(take, take_profiles(take, watch=watch), first_light=first_light)

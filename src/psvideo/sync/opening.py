@@ -7,12 +7,38 @@ from psvideo.clip import Clip, Take, open_clip, parse_range
 from psvideo.strobe.runlog import as_played
 
 
-def open_take(path: Path, *, plan: Path | None = None, frames: str | None = None) -> Take:
-    """Open a clip; ``frames`` is a range of file numbers such as ``1-100``.
+def open_take(path: Path | str, *, plan: Path | str | None = None, frames: str | None = None) -> Take:
+    """Open a clip with its plan; frames are decoded later, when something looks at them.
 
-    Where the strobe's log (strobe.json) lies beside the plan, the plan takes the times and powers that were played.
+    Parameters
+    ----------
+    path
+        A folder of numbered frames with plan.toml, or a movie file.
+    plan
+        The plan, where it does not lie beside the footage. Where the strobe's log (strobe.json) lies beside it, the
+        plan takes the times and powers that were played.
+    frames
+        File numbers to use, such as ``"1-100"`` or ``"1-100x2"``; left out, all.
+
+    Returns
+    -------
+    Take
+        ``plan``, a Plan; ``clip``, with ``width_px``, ``height_px`` and ``warnings`` about the footage; ``numbers`` of
+        the frames to use.
+
+    Raises
+    ------
+    PsvideoError
+        Where there is no footage or no plan, or they do not fit together.
+
+    Examples
+    --------
+    >>> import psvideo as ps
+    >>> take = ps.open_take("take3/")
+    >>> take.plan.lights, take.clip.width_px, len(take.numbers)
+    (('key', 'left', 'top'), 160, 12)
     """
-    clip = _as_played(open_clip(path, plan=plan))
+    clip = _as_played(open_clip(Path(path), plan=None if plan is None else Path(plan)))
     numbers = clip.numbers if frames is None else parse_range(frames, clip.numbers)
     return Take(clip=clip, numbers=numbers)
 

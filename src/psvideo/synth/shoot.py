@@ -47,15 +47,44 @@ class VirtualTake:
 
 
 def shoot(
-    scene: Path, out: Path, *, force: bool = False, track: Track = iter, trace: TraceOptions | None = None
+    scene: Path | str, out: Path | str, *, force: bool = False, track: Track = iter, trace: TraceOptions | None = None
 ) -> VirtualTake:
-    """Film a scene, given as a file or by its name, and write the clip folder ``out``, whole or not at all.
+    """Film a virtual scene: a clip folder as a camera would leave it, and the truth beside it.
 
-    The folder holds frames/, plan.toml and rig.toml as a camera and its crew would leave them, and truth/ with what
-    only the virtual shoot knows. ``track`` passes frame indices through, for showing progress; ``trace`` lets the
-    traced edges of a strobe controller light the scene instead of the plan's ideal train. Raises UsageError where
-    ``out`` exists and ``force`` is not given, PsvideoError for a faulty scene or mesh or where writing fails.
+    Parameters
+    ----------
+    scene
+        A scene file, or the name of one that comes with psvideo: bust, fan, gloss, sphere, still_life.
+    out
+        The clip folder to write, whole or not at all: frames/, plan.toml and rig.toml as a camera and its crew would
+        leave them, and truth/ with what only the virtual shoot knows.
+    force
+        Replaces an earlier virtual clip of that name.
+    track
+        Passes frame indices through, for showing progress.
+    trace
+        Lets the traced edges of a strobe controller light the scene instead of the plan's ideal train.
+
+    Returns
+    -------
+    VirtualTake
+        ``path``, how many ``frames`` and ``flashes`` there are and how many of these are ``complete``, the strobe's
+        true ``clock``, ``warnings``.
+
+    Raises
+    ------
+    UsageError
+        Where ``out`` exists and ``force`` is not given.
+    PsvideoError
+        For a faulty scene or mesh, or where writing fails.
+
+    Examples
+    --------
+    >>> import psvideo as ps
+    >>> ps.shoot("sphere", "another_take/").frames
+    12
     """
+    scene, out = Path(scene), Path(out)
     _refuse_footage(out, force=force)
     file = scene_file(scene)
     stage = set_stage(read_scene(file), file.parent)

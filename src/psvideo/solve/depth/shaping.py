@@ -76,7 +76,9 @@ def find_depth(surface: Surface, rig: Rig | None = None) -> Depth:
     >>> round(float(depth[0, 16] - depth[31, 16]) * 32, 2)
     31.0
     """
-    return depth_of(Shaping(view=View() if rig is None else view_of(rig), plane=None if rig is None else rig.plane), surface)
+    return depth_of(
+        Shaping(view=View() if rig is None else view_of(rig), plane=None if rig is None else rig.plane), surface
+    )
 
 
 def _scaled(shaping: Shaping, height: Height) -> Depth:
