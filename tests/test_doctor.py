@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from psvideo.cli.app import main
-from psvideo.clip import abilities
+from psvideo.clip.decode import decoders
 from psvideo.inspect import speed
 from psvideo.inspect.findings import Finding, is_well
 
@@ -32,7 +32,7 @@ def test_a_whole_machine_is_well_and_every_part_is_told(capsys: pytest.CaptureFi
     assert (status, well) == (0, True)
     assert found["numpy"]["text"] == importlib.metadata.version("numpy")
     assert str(os.cpu_count()) in str(found["processor"]["text"])
-    assert {f"movies: {name}" for name in abilities.MOVIE_CODECS} <= set(found)
+    assert {f"movies: {name}" for name in decoders.MOVIE_CODECS} <= set(found)
     assert {"memory", "C library", "GPU", "strobe board", "least squares", "disk", "usd-core"} <= set(found)
     assert list(tmp_path.iterdir()) == [], "measuring leaves nothing behind"
 
@@ -40,7 +40,7 @@ def test_a_whole_machine_is_well_and_every_part_is_told(capsys: pytest.CaptureFi
 def test_what_lacks_is_missing_with_the_next_step_and_exit_status_1(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(abilities.MOVIE_CODECS, "ProRes", "no_such_decoder")
+    monkeypatch.setitem(decoders.MOVIE_CODECS, "ProRes", "no_such_decoder")
     monkeypatch.setattr("psvideo.inspect.software.version", _without("scipy", "usd-core"))
     status, found, well = asked(capsys)
     assert (status, well) == (1, False)

@@ -15,7 +15,7 @@ from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
 from psvideo.export.mesh_files import srgb_codes, write_part, write_ply
 from psvideo.export.space import CAMERA_SPACE, Space
-from psvideo.export.usd.core import require_usd
+from psvideo.export.usd import require_usd
 from psvideo.export.usd.usd_animation import write_animation
 from psvideo.runs.output import Output
 from psvideo.solve.depth import Mesh

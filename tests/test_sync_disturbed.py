@@ -18,7 +18,7 @@ from psvideo.model.timing import DroppedFrames, Timing, places_in_time
 from psvideo.plates.gather import clip_rounds
 from psvideo.sync.find import find_timing
 from psvideo.sync.of_take import find_take_timing
-from psvideo.sync.opening import open_take
+from psvideo.sync.open_take import open_take
 from psvideo.sync.rowfit.beat import FoundClock
 from psvideo.synth import Exposure, MainsSwing, Noise, TrueClock, TrueFlash, expose
 

@@ -13,7 +13,7 @@ from psvideo.model.camera import Encoding
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.sync.of_take import find_take_timing
-from psvideo.sync.opening import open_take
+from psvideo.sync.open_take import open_take
 from psvideo.synth import Exposure, Noise, TrueClock, expose
 from psvideo.synth.camera.curves import CURVES
 from psvideo.synth.camera.dpx_writer import dpx_bytes

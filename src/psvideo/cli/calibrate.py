@@ -131,7 +131,7 @@ def _strobed(
 ) -> None:
     from psvideo.calibrate.stripes.records import strobed_camera_line, strobed_record_line
     from psvideo.calibrate.strobed_readout import measure_take_readout
-    from psvideo.sync.opening import open_take
+    from psvideo.sync.open_take import open_take
 
     if len(pictures) > 1:
         raise UsageError(

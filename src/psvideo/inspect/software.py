@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 
-from psvideo.clip import abilities
+from psvideo.clip.decode import decoders
 from psvideo.inspect.findings import Finding
 from psvideo.strobe.stand_ins.toolchain import why_not
 
@@ -28,9 +28,9 @@ def software() -> Iterator[Finding]:
     yield from (_library(name) for name in LIBRARIES)
     yield _compiler()
     yield from (
-        _loaded("OpenEXR", abilities.exr_library, "EXR"),
-        _loaded("LibRaw (rawpy)", abilities.raw_library, "DNG"),
-        _loaded("OpenColorIO", abilities.curve_library, "log curves"),
+        _loaded("OpenEXR", decoders.exr_library, "EXR"),
+        _loaded("LibRaw (rawpy)", decoders.raw_library, "DNG"),
+        _loaded("OpenColorIO", decoders.curve_library, "log curves"),
     )
     yield from _movies()
     yield from (_extra(name, *words) for name, words in EXTRAS.items())
@@ -79,7 +79,7 @@ def _loaded(name: str, ask: Callable[[], str], reads: str) -> Finding:
 
 def _movies() -> Iterator[Finding]:
     try:
-        found = abilities.movie_decoders()
+        found = decoders.movie_decoders()
     except ImportError as fault:
         yield Finding(name="movies (PyAV)", level="missing", text=str(fault), next_step=REINSTALL)
         return

@@ -80,7 +80,7 @@ class ComparedPlates:
 
     def _timed(self) -> tuple["Take", Timing]:
         from psvideo.plates.timed import timing_of
-        from psvideo.sync.opening import open_take
+        from psvideo.sync.open_take import open_take
 
         if self._take is None:
             self._take = open_take(self._clip, plan=self._plan)

@@ -24,7 +24,7 @@ from psvideo.runs.caller import PYTHON, Caller
 from psvideo.runs.checked import Check, write_page
 from psvideo.runs.reporting import judgements, observing
 from psvideo.sync.of_take import find_take_timing
-from psvideo.sync.opening import open_take
+from psvideo.sync.open_take import open_take
 
 LEAST_FRAMES, MOST_FRAMES = 30, 160
 ROUNDS = 4

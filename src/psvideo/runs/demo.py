@@ -22,7 +22,7 @@ from psvideo.runs.lighting import read_lighting
 from psvideo.runs.output import Output
 from psvideo.runs.results import normals_run
 from psvideo.solve.instants import Instant
-from psvideo.sync.opening import open_take
+from psvideo.sync.open_take import open_take
 from psvideo.synth.scenes import builtin_scene
 from psvideo.synth.shoot import shoot
 

@@ -29,7 +29,7 @@ from psvideo.model.camera import Encoding
 from psvideo.plates.gather import clip_rounds
 from psvideo.plates.sequence import Round
 from psvideo.sync.of_take import find_take_timing
-from psvideo.sync.opening import open_take
+from psvideo.sync.open_take import open_take
 
 MOST_SETS = 12
 """Rounds that are read where the user names no frames: more would hardly make a calibration better."""

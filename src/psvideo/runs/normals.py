@@ -8,7 +8,7 @@ from psvideo.clip import decoded_once
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import UsageError
 from psvideo.export.asked import Asked, delivery_of
-from psvideo.export.usd.core import require_usd
+from psvideo.export.usd import require_usd
 from psvideo.model.choices import (
     MOST_ITERATIONS,
     Align,
@@ -32,7 +32,7 @@ from psvideo.runs.caller import PYTHON, Caller, say_kept, say_of_clip
 from psvideo.runs.lighting import read_lighting
 from psvideo.runs.output import Output
 from psvideo.runs.results import OverTime, normals_run
-from psvideo.sync.opening import open_take
+from psvideo.sync.open_take import open_take
 
 MOST_AVERAGED = 64
 

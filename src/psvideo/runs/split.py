@@ -15,7 +15,7 @@ from psvideo.report.run_report import RunReport
 from psvideo.runs.caller import PYTHON, Caller, say_kept, say_of_clip
 from psvideo.runs.output import Output
 from psvideo.runs.plates import Extras, split_run
-from psvideo.sync.opening import open_take
+from psvideo.sync.open_take import open_take
 
 
 def split(

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from psvideo.calibrate.stripes.equations import spline_basis
 from psvideo.calibrate.stripes.spectrum import find_peaks, flattened, without
+from psvideo.calibrate.stripes.stripe_model import spline_basis
 from psvideo.calibrate.stripes.waveform import StripeFit, fit_stripes
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import FloatArray

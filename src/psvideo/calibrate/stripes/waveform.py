@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.calibrate.stripes.equations import Equations, Nuisance, equations, spline_basis, start, waves_of
 from psvideo.calibrate.stripes.error import Pulls, standard_error
+from psvideo.calibrate.stripes.stripe_model import Equations, Nuisance, equations, spline_basis, start, waves_of
 from psvideo.model.camera import FloatArray
 
 STAGES = (1, 3, 8, 16)

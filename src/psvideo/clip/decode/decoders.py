@@ -1,7 +1,8 @@
 """The decoders by kind of file. Each is a module with ``header(path)`` and ``decode(path)``.
 
 Only the one that is needed is imported: the libraries behind them take time and memory.
-Whatever goes wrong inside a decoder becomes a PsvideoError that names the file.
+Whatever goes wrong inside a decoder becomes a PsvideoError that names the file. What the libraries that are installed
+here can read is asked here too.
 """
 
 from collections.abc import Callable
@@ -14,6 +15,9 @@ from psvideo.clip.record import CodedPicture, Header
 from psvideo.errors import PsvideoError
 
 Read = TypeVar("Read")
+
+MOVIE_CODECS = {"ProRes": "prores", "H.264": "h264", "H.265 (HEVC)": "hevc", "DNxHD and DNxHR": "dnxhd", "FFV1": "ffv1"}
+"""What cameras and recorders write, by FFmpeg's names of the decoders."""
 
 
 def read_header(kind: str, file: Path) -> Header:
@@ -51,3 +55,24 @@ def guarded(read: Callable[[Path], Read], file: Path) -> Read:
             f"{file}: cannot be decoded; it is truncated, damaged or of another kind than its name says ({fault}). "
             "Copy it again from the camera's card."
         ) from fault
+
+
+def movie_decoders() -> dict[str, bool]:
+    """Tell of each kind of movie whether it can be decoded. Raises ImportError where PyAV cannot be loaded."""
+    codec = import_module("av.codec")
+    return {name: decoder in codec.codecs_available for name, decoder in MOVIE_CODECS.items()}
+
+
+def raw_library() -> str:
+    """Return the version of LibRaw that decodes DNG. Raises ImportError where rawpy cannot be loaded."""
+    return ".".join(str(part) for part in import_module("rawpy").libraw_version)
+
+
+def curve_library() -> str:
+    """Return OpenColorIO's version. Raises ImportError where it cannot be loaded."""
+    return str(import_module("PyOpenColorIO").GetVersion())
+
+
+def exr_library() -> str:
+    """Return OpenEXR's version. Raises ImportError where it cannot be loaded."""
+    return str(import_module("OpenEXR").OPENEXR_VERSION)

@@ -13,7 +13,7 @@ import numpy as np
 
 from psvideo.errors import PsvideoError
 from psvideo.export.tags import sha256_of
-from psvideo.export.usd.core import require_usd
+from psvideo.export.usd import require_usd
 from psvideo.export.usd.pose import Pose, pose_of
 
 USD_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.camera import FloatArray
-from psvideo.solve.depth.integration import BILATERAL, SMOOTH, Held, Integration, find_height
+from psvideo.solve.depth.integration import BILATERAL, SMOOTH, Integration, TakenOver, find_height
 from psvideo.solve.depth.view import Slopes, View, slopes_of
 
 Mask = NDArray[np.bool_]
@@ -111,7 +111,7 @@ def _box(valid: Mask) -> Box:
     return slice(int(rows[0]), int(rows[-1]) + 1), slice(int(cols[0]), int(cols[-1]) + 1)
 
 
-def _held(before: Before, normals: NDArray[np.floating], valid: Mask, box: Box) -> Held:
+def _held(before: Before, normals: NDArray[np.floating], valid: Mask, box: Box) -> TakenOver:
     both = valid[box] & before.height.valid[box]
     cosine = sum(
         normals[box][..., axis].astype(np.float32) * before.normals[box][..., axis].astype(np.float32)
@@ -119,7 +119,7 @@ def _held(before: Before, normals: NDArray[np.floating], valid: Mask, box: Box) 
     )
     alike = cv2.blur((both & (cosine > SAME_COSINE)).astype(np.float32), (AROUND_PX, AROUND_PX))
     there = cv2.blur(both.astype(np.float32), (AROUND_PX, AROUND_PX))
-    return Held(
+    return TakenOver(
         same=both & (alike > SAME_SHARE * there),
         rightward=before.height.rightward[box],
         downward=before.height.downward[box],

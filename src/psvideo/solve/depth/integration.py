@@ -46,7 +46,7 @@ camera: 3000 such pixels weigh as much as one tie, and the shape within some 40 
 
 
 @dataclass(frozen=True, kw_only=True)
-class Held:
+class TakenOver:
     """What an instant takes over from another: where it looks the same, and shares and height there."""
 
     same: NDArray[np.bool_]
@@ -67,7 +67,9 @@ class _Work:
     grids: Grids
 
 
-def find_height(slopes: Slopes, how: Integration, *, held: Held | None = None) -> tuple[FloatArray, Floats, Floats]:
+def find_height(
+    slopes: Slopes, how: Integration, *, held: TakenOver | None = None
+) -> tuple[FloatArray, Floats, Floats]:
     """Return the height, and the shares of the steps to the right and down, all (row, col)."""
     work = _begun(slopes)
     whole = bool((slopes.facing > 0).all())
@@ -127,7 +129,7 @@ def _wanted(work: _Work) -> float:
     return weighed(work.grids)
 
 
-def _settle(work: _Work, stop: float, *, most: int, held: Held | None = None) -> None:
+def _settle(work: _Work, stop: float, *, most: int, held: TakenOver | None = None) -> None:
     """Solve the equations for the shares as far as 32 bits of a correction carry, up to ``most`` times over.
 
     What looks the same as in ``held`` is held to its height there.
@@ -148,7 +150,7 @@ def _settle(work: _Work, stop: float, *, most: int, held: Held | None = None) ->
         lacked = first
 
 
-def _pins(held: Held, work: _Work) -> Board:
+def _pins(held: TakenOver, work: _Work) -> Board:
     pins = empty_board(*work.height.shape)
     write_board(np.where(held.same, np.float32(HOLD), np.float32(0)), pins)
     return pins

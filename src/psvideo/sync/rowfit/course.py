@@ -9,7 +9,7 @@ from psvideo.sync.rowfit.beat import FoundClock
 from psvideo.sync.rowfit.ends import ends
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.seed import CLEARER, Seed, gain_of, other_seeds, renumbered
-from psvideo.sync.rowfit.track import Track, from_first_frame, settled, track, with_repeats
+from psvideo.sync.rowfit.track import FrameTrack, from_first_frame, settled, track, with_repeats
 
 GOOD_COURSE = 0.9
 """A course through the clip that takes away this share of the robust loss is not tried again from elsewhere."""
@@ -24,7 +24,7 @@ class Course:
     ``trusted`` are the first and the last place in time at which frames fit; ``share`` of the robust loss goes with it.
     """
 
-    track: Track
+    track: FrameTrack
     trusted: tuple[int, int]
     steps: int
     share: float
@@ -72,7 +72,7 @@ def window_frames(plan: Plan) -> int:
     return max(24, 6 * (len(plan.lit_slots) + 1))
 
 
-def _clock_of(plan: Plan, tracked: Track) -> FoundClock:
+def _clock_of(plan: Plan, tracked: FrameTrack) -> FoundClock:
     """Return a straight clock through the track's anchors, or a bent one where they stray from it."""
     clock = tracked.beat.clock
     if len(tracked.at_s) < 2:

@@ -14,7 +14,7 @@ from psvideo.sync.rowfit.plateau import centred
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import Fit, clearest, explained, refine, robust_loss, scaled
 from psvideo.sync.rowfit.seed import find_seed, gain_of
-from psvideo.sync.rowfit.track import Track
+from psvideo.sync.rowfit.track import FrameTrack
 
 TRACK_ROWS = 60
 COARSE_ROWS = 288
@@ -57,7 +57,7 @@ class ClipFit:
 
     fit: Fit
     rows: Profiles
-    track: Track
+    track: FrameTrack
     jitter: Jitter
     steps: int
     trusted: tuple[int, int]

@@ -38,7 +38,7 @@ MEMORY, NEAR = 24, 10
 
 
 @dataclass(frozen=True, kw_only=True)
-class Track:
+class FrameTrack:
     """Where a clip's frames are in time, ``index`` (frame,), and by how much flashes come later than ``beat`` says.
 
     ``late_s`` (anchor,) stands at the times ``at_s`` (anchor,) on the camera's clock.
@@ -55,7 +55,7 @@ class Track:
         return np.append(False, np.diff(self.index) == 0)
 
 
-def track(plan: Plan, rows: Profiles, beat: Beat, seed: slice, *, memory: int) -> Track:
+def track(plan: Plan, rows: Profiles, beat: Beat, seed: slice, *, memory: int) -> FrameTrack:
     """Follow the strobe through the whole clip from the frames ``seed``, most of which ``beat`` fits.
 
     The latest ``memory`` frames foretell the next ones.
@@ -85,10 +85,10 @@ def track(plan: Plan, rows: Profiles, beat: Beat, seed: slice, *, memory: int) -
         now, point = _sharpened(plan, replace(rows, index=index), now, beat, slice(low, min(low + memory, high)))
         late.append(point)
     points = np.array(sorted(late), np.float64)
-    return from_first_frame(rows, Track(index=index, beat=beat, at_s=points[:, 0], late_s=points[:, 1]))
+    return from_first_frame(rows, FrameTrack(index=index, beat=beat, at_s=points[:, 0], late_s=points[:, 1]))
 
 
-def from_first_frame(rows: Profiles, tracked: Track) -> Track:
+def from_first_frame(rows: Profiles, tracked: FrameTrack) -> FrameTrack:
     """Count time from the clip's first frame again, wherever frames after it turned out to be missing."""
     shift = int(tracked.index[0] - rows.index[0])
     shift_s, clock = shift * rows.period_s, tracked.beat.clock
@@ -233,7 +233,7 @@ def settled(plan: Plan, rows: Profiles, index: IntArray, beat: Beat) -> IntArray
     return index
 
 
-def with_repeats(plan: Plan, rows: Profiles, tracked: Track, kept: Mask) -> Track:
+def with_repeats(plan: Plan, rows: Profiles, tracked: FrameTrack, kept: Mask) -> FrameTrack:
     """Return the track of all frames from that of those that were ``kept`` (frame,).
 
     A frame that was left out takes the place of the one before it, unless its own place is free and fits as well: dark
@@ -255,7 +255,7 @@ def with_repeats(plan: Plan, rows: Profiles, tracked: Track, kept: Mask) -> Trac
     return replace(tracked, index=index)
 
 
-def _fits(plan: Plan, rows: Profiles, tracked: Track, kept: Mask, block: slice, places: IntArray) -> FloatArray:
+def _fits(plan: Plan, rows: Profiles, tracked: FrameTrack, kept: Mask, block: slice, places: IntArray) -> FloatArray:
     """Return how badly frames fit at some places in time, shape (frame of the block,), by the frames around them."""
     near = slice(max(block.start - MEMORY, 0), min(block.stop + MEMORY, len(kept)))
     known = np.cumsum(kept)[near][kept[near]] - 1
