@@ -30,6 +30,14 @@ FLOORS = [
 BESIDE_THE_ROAD = {"strobe", "capture", "synth"}
 """What stands beside clip, and knows no more than model, formats and compute."""
 
+TWO_OF_A_NAME = {
+    # The record of a camera, and the virtual camera, which takes one.
+    "camera",
+    # The solver's loops, and the row model's.
+    "kernel",
+}
+"""Module names that two rooms have, because the room makes the meaning plain."""
+
 SYNTH_NEVER_USES = ("psvideo.model.shutter", "psvideo.model.recipe")
 """The rooms under test are above it, or beside; of the model, it has a shutter of its own."""
 
@@ -117,3 +125,23 @@ def test_only_one_module_knows_serial_ports() -> None:
         names |= {node.module for node in nodes if isinstance(node, ast.ImportFrom) and node.module}
         knows = any(name.split(".")[0] == "serial" for name in names)
         assert knows == (path == PACKAGE / "strobe" / "link" / "controller.py"), path
+
+
+def test_no_two_classes_have_one_name() -> None:
+    homes: dict[str, list[str]] = {}
+    for path in MODULES:
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                homes.setdefault(node.name, []).append(str(path.relative_to(PACKAGE)))
+    assert not {name: paths for name, paths in homes.items() if len(paths) > 1}
+
+
+def test_no_two_modules_have_one_name() -> None:
+    """Modules of cli and runs are named after their command, which may be a room's name as well."""
+    homes: dict[str, list[str]] = {}
+    for path in MODULES:
+        if _room(path) not in {"cli", "runs"}:
+            name = path.parent.name if path.name == "__init__.py" else path.stem
+            homes.setdefault(name, []).append(str(path.relative_to(PACKAGE)))
+    twice = {name: paths for name, paths in homes.items() if len(paths) > 1}
+    assert set(twice) <= TWO_OF_A_NAME, twice

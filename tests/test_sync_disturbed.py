@@ -17,9 +17,9 @@ from psvideo.model.row_profiles import collect_with_doubt
 from psvideo.model.timing import DroppedFrames, Timing, places_in_time
 from psvideo.plates.gather import clip_rounds
 from psvideo.sync.find import find_timing
-from psvideo.sync.of_take import find_take_timing
 from psvideo.sync.open_take import open_take
 from psvideo.sync.rowfit.beat import FoundClock
+from psvideo.sync.take_timing import find_take_timing
 from psvideo.synth import Exposure, MainsSwing, Noise, TrueClock, TrueFlash, expose
 
 PlanMaker = Callable[..., Plan]

@@ -12,8 +12,8 @@ from psvideo.formats.plan_toml import format_plan
 from psvideo.model.camera import Encoding
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
-from psvideo.sync.of_take import find_take_timing
 from psvideo.sync.open_take import open_take
+from psvideo.sync.take_timing import find_take_timing
 from psvideo.synth import Exposure, Noise, TrueClock, expose
 from psvideo.synth.camera.curves import CURVES
 from psvideo.synth.camera.dpx_writer import dpx_bytes

@@ -15,7 +15,7 @@ from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import PsvideoError
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
-from psvideo.sync.of_take import find_take_timing
+from psvideo.sync.take_timing import find_take_timing
 
 MODEL_ERROR_SHARE = 2e-5
 """Share of the frame period by which virtual shoots were off beyond the fit's own error (240 rows and fewer)."""

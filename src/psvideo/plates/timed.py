@@ -9,7 +9,7 @@ from psvideo.formats.timing_json import read_timing
 from psvideo.model.rig import Rig
 from psvideo.model.timing import Timing
 from psvideo.plates.naming import named_by_rig, named_first
-from psvideo.sync.of_take import find_take_timing
+from psvideo.sync.take_timing import find_take_timing
 
 
 def timing_of(

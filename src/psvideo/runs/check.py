@@ -23,8 +23,8 @@ from psvideo.report.judgement import Judgement
 from psvideo.runs.caller import PYTHON, Caller
 from psvideo.runs.checked import Check, write_page
 from psvideo.runs.reporting import judgements, observing
-from psvideo.sync.of_take import find_take_timing
 from psvideo.sync.open_take import open_take
+from psvideo.sync.take_timing import find_take_timing
 
 LEAST_FRAMES, MOST_FRAMES = 30, 160
 ROUNDS = 4

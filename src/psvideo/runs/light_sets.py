@@ -28,8 +28,8 @@ from psvideo.formats.plan_toml import read_plan
 from psvideo.model.camera import Encoding
 from psvideo.plates.gather import clip_rounds
 from psvideo.plates.sequence import Round
-from psvideo.sync.of_take import find_take_timing
 from psvideo.sync.open_take import open_take
+from psvideo.sync.take_timing import find_take_timing
 
 MOST_SETS = 12
 """Rounds that are read where the user names no frames: more would hardly make a calibration better."""

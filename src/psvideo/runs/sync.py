@@ -14,8 +14,8 @@ from psvideo.model.timing import Timing, places_in_time
 from psvideo.pictures.timing_sheet import timing_picture, write_sheet
 from psvideo.plates.naming import named_by_rig
 from psvideo.runs.caller import PYTHON, Caller, say_of_clip
-from psvideo.sync.of_take import TakeProfiles, take_profiles, timing_of_profiles
 from psvideo.sync.open_take import open_take
+from psvideo.sync.take_timing import TakeProfiles, take_profiles, timing_of_profiles
 
 MARK = "psvideo-timing/"
 """By which a file is known for a timing, which may be replaced."""

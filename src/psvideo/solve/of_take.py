@@ -17,7 +17,7 @@ from psvideo.plates.sequence import FIRST_NUMBER
 from psvideo.solve.instants import Instant, lights_as_planned, surfaces
 from psvideo.solve.near_surface import near_surface_of
 from psvideo.solve.normals.solving import Solving
-from psvideo.sync.of_take import find_take_timing
+from psvideo.sync.take_timing import find_take_timing
 
 
 def solve(

@@ -46,7 +46,7 @@ class Around:
 
 
 @dataclass(kw_only=True)
-class Instant:
+class DueInstant:
     """An instant that is to be shown, of a round, and the lights' plates at it that are made already; ``moves`` once
     any of them was found to move."""
 
@@ -73,7 +73,7 @@ class Held:
     with_ambient: bool
     whites: dict[str, float] = field(default_factory=dict)
     shots: dict[str, dict[int, Shot]] = field(default_factory=dict)
-    waiting: deque[Instant] = field(default_factory=deque)
+    waiting: deque[DueInstant] = field(default_factory=deque)
     ambient: dict[int, LightPlate] = field(default_factory=dict)
     newest: int = 0
     whole: int = 0
@@ -103,7 +103,7 @@ class Held:
         self.whole, self.middle_s = plate.number, float(np.mean(list(times_s.values())))
         return times_s
 
-    def around(self, light: str, instant: Instant) -> Around | None:
+    def around(self, light: str, instant: DueInstant) -> Around | None:
         """Return what a light's plate at an instant is made from; None where that is still to come."""
         before, own, after = (self.shots[light].get(instant.round + step) for step in (-1, 0, 1))
         if own is None or own.plate is None:
@@ -118,7 +118,7 @@ class Held:
             return None
         return Around(before=before or own, after=own)
 
-    def _rests(self, instant: Instant) -> bool:
+    def _rests(self, instant: DueInstant) -> bool:
         """Tell whether all lights before an instant, one at least, were compared with the next round, and none moves.
 
         The lights after it, of which the round before lacks plates, need not wait for the next round then.
@@ -127,7 +127,7 @@ class Held:
         seen = self.newest > instant.round and all(light in instant.made for light in early)
         return self.trusts_rest and bool(early) and seen and not instant.moves
 
-    def lacks_ambient(self, instant: Instant) -> bool:
+    def lacks_ambient(self, instant: DueInstant) -> bool:
         """Tell whether a round's dark slot is wanted and may still come."""
         return self.with_ambient and not (self.ended or self.newest > instant.round or instant.round in self.ambient)
 
@@ -144,7 +144,7 @@ class Held:
                 elif shot.plate is not None and number not in near and not self._is_for_later(shot):
                     shots[number] = replace(shot, plate=None)
 
-    def _rounds_of(self, light: str, instant: Instant) -> tuple[int, int]:
+    def _rounds_of(self, light: str, instant: DueInstant) -> tuple[int, int]:
         """Return the rounds whose plates of a light an instant is made from; at the clip's end the first is enough."""
         late = self.shots[light][instant.round].time_s > instant.time_s
         before = late and instant.round - 1 in self.shots[light]

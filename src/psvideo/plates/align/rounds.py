@@ -13,7 +13,7 @@ from psvideo.model.choices import Align, Rate
 from psvideo.plates.align.between import Ends, plate_at, track
 from psvideo.plates.align.brightness import evened
 from psvideo.plates.align.flow import Flow, flow_between, moved
-from psvideo.plates.align.held import Around, Held, Instant
+from psvideo.plates.align.held import Around, DueInstant, Held
 from psvideo.plates.sequence import AMBIENT, LightPlate, Round
 
 Flows = dict[tuple[str, int], Flow | None]
@@ -93,12 +93,12 @@ def _slid(
     yield from _complete(held, how, flows)
 
 
-def _instants(number: int, times_s: list[float], how: Aligning, first: int) -> list[Instant]:
+def _instants(number: int, times_s: list[float], how: Aligning, first: int) -> list[DueInstant]:
     """Return the instants that are shown of a complete round."""
     if how.rate == "round":
-        return [Instant(number=number, time_s=float(np.mean(times_s)), round=number)]
+        return [DueInstant(number=number, time_s=float(np.mean(times_s)), round=number)]
     start = first + (number - first) * len(times_s)
-    return [Instant(number=start + n, time_s=time_s, round=number) for n, time_s in enumerate(sorted(times_s))]
+    return [DueInstant(number=start + n, time_s=time_s, round=number) for n, time_s in enumerate(sorted(times_s))]
 
 
 def _complete(held: Held, how: Aligning, flows: Flows) -> Iterator[Round]:
@@ -120,7 +120,7 @@ def _complete(held: Held, how: Aligning, flows: Flows) -> Iterator[Round]:
         yield _handed_over(instant.made, instant.number, held.lights)
 
 
-def _ready(held: Held, instant: Instant, how: Aligning) -> Iterator[str]:
+def _ready(held: Held, instant: DueInstant, how: Aligning) -> Iterator[str]:
     """Yield the lights whose plates at an instant are not made yet and can be; each is judged when it is asked for.
 
     At one result per flash plates are held for other instants anyway: none is made before all can be.
@@ -132,7 +132,7 @@ def _ready(held: Held, instant: Instant, how: Aligning) -> Iterator[str]:
     return (light for light in undone if held.around(light, instant) is not None)
 
 
-def _make(held: Held, light: str, instant: Instant, how: Aligning, flows: Flows) -> None:
+def _make(held: Held, light: str, instant: DueInstant, how: Aligning, flows: Flows) -> None:
     """Make a light's plate at an instant."""
     around = held.around(light, instant)
     if around is None:
