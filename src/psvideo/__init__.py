@@ -30,7 +30,7 @@ if TYPE_CHECKING:  # what editors and type checkers see; _HOMES is the same for 
     from psvideo.solve.depth.shaping import find_depth as find_depth
     from psvideo.solve.images import solve_images as solve_images
     from psvideo.solve.of_take import solve as solve
-    from psvideo.sync.opening import open_take as open_take
+    from psvideo.sync.open_take import open_take as open_take
     from psvideo.sync.take_timing import find_take_timing as find_timing
     from psvideo.synth.shoot import shoot as shoot
 
@@ -45,7 +45,7 @@ _HOMES = {
     "find_depth": "psvideo.solve.depth.shaping",
     "find_timing": "psvideo.sync.take_timing:find_take_timing",
     "normals": "psvideo.runs.normals",
-    "open_take": "psvideo.sync.opening",
+    "open_take": "psvideo.sync.open_take",
     "picture_of": "psvideo.pictures.quantity",
     "read_images": "psvideo.runs.light_sets",
     "read_mask": "psvideo.clip.mask",
