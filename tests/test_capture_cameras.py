@@ -103,7 +103,7 @@ def test_an_unknown_camera_gets_the_nearest_names_and_how_to_measure() -> None:
     message = str(refusal.value)
     assert "'Sony F65'" in message
     assert "calibration/README.md" in message
-    assert "--readout" in message
+    assert "`readout_s`" in message
 
 
 def test_a_mode_is_found_by_its_rate_whether_120_or_119_88_is_typed() -> None:

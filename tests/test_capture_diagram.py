@@ -138,7 +138,7 @@ def test_a_diagram_is_written_by_the_name_that_is_given(make_plan: MakePlan, tmp
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.svg", "b.PNG"]
     assert check_diagram_name("-") is None
     for name in ("a.pdf", "a", ""):
-        with pytest.raises(UsageError, match="--diagram"):
+        with pytest.raises(UsageError, match="`diagram`"):
             check_diagram_name(name)
 
 

@@ -8,6 +8,7 @@ import typer
 from typer.testing import CliRunner, Result
 
 from psvideo.cli.capture_plan import capture_plan
+from psvideo.cli.spelling import spelled
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.plan_toml import parse_plan, read_plan
 
@@ -65,7 +66,7 @@ def test_what_exists_is_replaced_only_by_force(tmp_path: Path) -> None:
     out.write_text(mine)
     refusal = run(*README, "-o", out)
     assert isinstance(refusal.exception, UsageError)
-    assert "--force" in str(refusal.exception)
+    assert "--force" in spelled(str(refusal.exception))
     assert out.read_text() == mine
     assert run(*README, "-o", out, "--force").exit_code == 0
     assert read_plan(out).camera.name == "Sony F65"
@@ -108,7 +109,7 @@ def test_the_cameras_are_listed_for_people_and_for_machines() -> None:
 def test_bad_numbers_get_one_paragraph_that_names_option_and_value(arguments: list[str], named: str) -> None:
     fault = run(*arguments).exception
     assert isinstance(fault, UsageError)
-    assert named in str(fault)
+    assert named in spelled(str(fault))
     assert "\n" not in str(fault)
 
 

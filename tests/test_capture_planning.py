@@ -12,6 +12,7 @@ from psvideo.capture.planning import Shoot, make_plan, plan_shoot
 from psvideo.capture.request import CameraWish, Limits, ShootRequest, choose_camera
 from psvideo.capture.wish import LONG_MARKER, longest_flash
 from psvideo.cli.shoot_words import ShootWords, parse_request
+from psvideo.cli.spelling import spelled
 from psvideo.errors import UsageError
 from psvideo.formats.plan_toml import format_plan, parse_plan
 from psvideo.model.camera import Camera
@@ -138,7 +139,7 @@ def test_wishes_that_exclude_each_other_are_explained_with_the_numbers() -> None
     with pytest.raises(UsageError) as refusal:
         planned(flash=None, max_blur=1, speed="20000", max_stops=5)
     for figure in ("50 us", "7.6 stops", "--max-stops 5", "0.3125 ms", "6.25 px"):
-        assert figure in str(refusal.value)
+        assert figure in spelled(str(refusal.value))
     assert planned(flash=None, max_blur=1, speed="20000", max_stops=8).chosen
 
 
@@ -178,7 +179,7 @@ def test_wishes_that_exclude_each_other_are_explained_with_the_numbers() -> None
 def test_what_cannot_be_is_refused_by_name_with_exit_status_2(given_words: dict[str, object], named: str) -> None:
     with pytest.raises(UsageError) as refusal:
         planned(**given_words)
-    assert named in str(refusal.value)
+    assert named in spelled(str(refusal.value))
     assert "\n" not in str(refusal.value)
     assert refusal.value.exit_status == 2
 

@@ -303,9 +303,9 @@ def test_a_camera_beside_a_preset_puts_the_delivery_into_its_world(tmp_path: Pat
     delivery, at_odds = delivery_of(replace(NOTHING, preset="nuke", camera_to_world=matrix))
     assert (delivery.space.name, at_odds) == ("world", ())
     assert delivery.multipart
-    with pytest.raises(UsageError, match="belongs to --space world"):
+    with pytest.raises(UsageError, match='belongs to `space="world"`'):
         delivery_of(replace(NOTHING, preset="unreal", camera_to_world=matrix))
-    with pytest.raises(UsageError, match="belongs to --space world"):
+    with pytest.raises(UsageError, match='belongs to `space="world"`'):
         delivery_of(replace(NOTHING, camera_to_world=matrix))
 
 
@@ -313,4 +313,4 @@ def test_options_that_go_against_a_preset_win_and_are_told_of() -> None:
     asked = replace(NOTHING, preset="nuke", y="down", space="tangent", multipart=False)
     delivery, at_odds = delivery_of(asked)
     assert (delivery.space.y, delivery.space.name, delivery.multipart) == ("down", "tangent", False)
-    assert [sentence.split()[0] for sentence in at_odds] == ["--y", "--space", "--no-multipart"]
+    assert [sentence.split()[0] for sentence in at_odds] == ["`y='down'`", "`space='tangent'`", "`multipart=False`"]

@@ -211,7 +211,7 @@ def test_what_is_no_rotation_is_refused(text: str, tmp_path: Path) -> None:
 def test_spaces_that_do_not_fit_their_options_are_refused() -> None:
     with pytest.raises(UsageError, match="needs the camera's rotation"):
         choose_space("world", "up", None)
-    with pytest.raises(UsageError, match="belongs to --space world"):
+    with pytest.raises(UsageError, match='belongs to `space="world"`'):
         choose_space("camera", "up", Path("camera.txt"))
 
 

@@ -97,7 +97,7 @@ def test_a_lens_that_is_not_the_rigs_and_depth_without_scale_are_told_of(tmp_pat
 
 def test_one_of_several_cameras_is_named(tmp_path: Path) -> None:
     path = stage_with_cameras(tmp_path / "shot.usda", names=3)
-    with pytest.raises(PsvideoError, match=r"3 cameras .*/rig/shot1.*--camera"):
+    with pytest.raises(PsvideoError, match=r"3 cameras .*/rig/shot1.*`camera`"):
         choose_space("world", "up", path)
     with pytest.raises(PsvideoError, match="no camera named 'shot9'"):
         choose_space("world", "up", path, camera="shot9")
@@ -117,7 +117,7 @@ def test_a_file_that_is_no_stage_or_has_no_camera_is_refused(tmp_path: Path) -> 
     (tmp_path / "camera.txt").write_text("1 0 0 0 1 0 0 0 1")
     with pytest.raises(UsageError, match="belongs to a USD camera"):
         choose_space("world", "up", tmp_path / "camera.txt", camera="a")
-    with pytest.raises(UsageError, match="--camera-time: belongs to --space world"):
+    with pytest.raises(UsageError, match='`camera_time`: belongs to `space="world"`'):
         choose_space("camera", "up", None, camera_time="frames")
 
 

@@ -130,7 +130,7 @@ WARNINGS: dict[str, tuple[Callable[[Path, Plan], Any], str]] = {
     "white level too low": (lambda shot, plan: put_plan(shot, plan, white_level=4095), "does not fit the files' codes"),
     "no marker": (
         lambda shot, plan: put_plan(shot, dataclasses.replace(plan, flashes=plan.flashes[:3])),
-        "their names are a guess: give --first-light",
+        "their names are a guess: give `first_light`",
     ),
     "short dark time": (
         lambda shot, plan: put_plan(shot, dataclasses.replace(plan, dark_s=0.9 * plan.dark_s)),

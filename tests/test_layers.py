@@ -1,6 +1,7 @@
 """Imports go one way through the house, and nothing circular stands in it."""
 
 import ast
+import re
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -116,6 +117,23 @@ def test_only_the_clip_room_knows_decoders_and_only_export_knows_writers() -> No
             assert not names & (decoders | {"OpenEXR", "tifffile"}), path
         froms = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module}
         assert _room(path) == "export" or "pxr" not in froms, path
+
+
+NOT_OURS = {"strobe/stand_ins/simulated.py", "report/style.py"}
+"""Arguments of another program, and variables of a style sheet."""
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_only_the_command_line_writes_flags(path: Path) -> None:
+    if _room(path) == "cli" or path.relative_to(PACKAGE).as_posix() in NOT_OURS:
+        return
+    texts = [
+        node.value
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+    ]
+    flags = [text for text in texts if re.search(r"(^|[\s`(])--[a-z]", text)]
+    assert not flags, "name the parameter in backticks; the command line spells it as its option"
 
 
 def test_only_one_module_knows_serial_ports() -> None:

@@ -151,7 +151,7 @@ def test_a_corrupt_picture_is_missing_and_says_why_while_others_are_there(server
 
 
 def test_a_port_in_use_is_named_with_what_to_do(server: PageServer) -> None:
-    with pytest.raises(UsageError, match=f"--port {server.server_port}: .*leave --port out"):
+    with pytest.raises(UsageError, match=f"`port` {server.server_port}: .*leave `port` out"):
         page_server(server.show, port=server.server_port)
 
 

@@ -78,7 +78,7 @@ def _flat(light: Light, n: int, pictures: LightPictures, target: Target, ground:
     if usable.mean() < LEAST_SHARE:
         raise PsvideoError(
             f"Light {light.name!r}: {1 - usable.mean():.0%} of the white target is saturated or was not seen; at most "
-            f"{1 - LEAST_SHARE:.0%} may be. Expose less, dim the light, or name a part of the picture with --box."
+            f"{1 - LEAST_SHARE:.0%} may be. Expose less, dim the light, or name a part of the picture with `box`."
         )
     shade = field_of(light, ground, part) @ target.normal
     if np.min(shade) <= LEAST_COSINE * np.max(np.abs(shade)):

@@ -58,7 +58,7 @@ def guess_rig(pictures: LightPictures, *, prior: Prior | None = None) -> Guess:
     if lights < 3 or (chosen == "equal-lights" and lights < LEAST_FOR_EQUAL_LIGHTS):
         raise PsvideoError(
             f"{lights} lights do not show their directions by themselves: expected three or more, and six or more of "
-            "equal strength for --prior equal-lights. Calibrate on a sphere instead."
+            "equal strength for `prior='equal-lights'`. Calibrate on a sphere instead."
         )
     grey = pictures.grey.astype(np.float64)
     mask = _lit_by_all(pictures, grey)
@@ -82,8 +82,8 @@ def guess_rig(pictures: LightPictures, *, prior: Prior | None = None) -> Guess:
     spread = float(equal.std() / equal.mean())
     if spread > MOST_SPREAD:
         raise PsvideoError(
-            f"What --prior {chosen} takes for equal comes out unequal by {spread:.0%}, so directions cannot be "
-            "guessed. Try the other --prior, take out gloss and shadow, or calibrate on a sphere."
+            f"What `prior` {chosen} takes for equal comes out unequal by {spread:.0%}, so directions cannot be "
+            "guessed. Try the other `prior`, take out gloss and shadow, or calibrate on a sphere."
         )
     strengths = lengths / lengths.mean()
     rig = Rig(
@@ -139,7 +139,7 @@ def _metric(vectors: FloatArray) -> FloatArray:
     if sizes[-1] < LEAST_SINGULAR * sizes[0]:
         raise PsvideoError(
             "These pictures leave the lights' directions open under this prior: lights in a regular ring are alike, "
-            "and so is a surface that faces few ways. Try the other --prior, or calibrate on a sphere."
+            "and so is a surface that faces few ways. Try the other `prior`, or calibrate on a sphere."
         )
     return np.array([[a, d, e], [d, b, f], [e, f, c]])
 
@@ -149,7 +149,7 @@ def _root(square: FloatArray) -> FloatArray:
     if sizes[0] <= 0:
         raise PsvideoError(
             "No lights of equal strength (or no surface of equal albedo) explain these pictures, so directions cannot "
-            "be guessed. Try the other --prior, take out gloss and shadow, or calibrate on a sphere."
+            "be guessed. Try the other `prior`, take out gloss and shadow, or calibrate on a sphere."
         )
     root: FloatArray = ways * np.sqrt(sizes)
     return root

@@ -164,4 +164,4 @@ def _checked(light: str, source: Path) -> str:
     try:
         return check_light_name(light)
     except ValueError as fault:
-        raise UsageError(f"{source}: {fault}. Rename it, or give the plan with --plan.") from None
+        raise UsageError(f"{source}: {fault}. Rename it, or give the plan with `plan`.") from None

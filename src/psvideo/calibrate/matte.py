@@ -75,7 +75,7 @@ def measure_matte_sphere(pictures: LightPictures, outline: Outline, *, albedo: f
     if len(sphere.normals) < LEAST_PIXELS:
         raise PsvideoError(
             f"The sphere shows {len(sphere.normals)} usable pixels; expected {LEAST_PIXELS} or more. Film it larger, "
-            "or check its outline (--circle x,y,radius)."
+            "or check its outline (`circle` x,y,radius)."
         )
     moved = [_pixels(pictures, outline.view, place) for place in _outlines_off(outline)]
     found = [_light(name, n, sphere, moved) for n, name in enumerate(pictures.names)]

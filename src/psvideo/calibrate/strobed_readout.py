@@ -56,7 +56,7 @@ def readout_of(plan: Plan, timing: Timing, *, frames: int, tolerance_ppm: float 
     if timing.row_time_error_s is None:
         raise PsvideoError(
             f"{timing.clip}: its timing does not show the readout, because rows of a {plan.mode} clip do not show when "
-            "they open. Film a subject under a rolling plan (psvideo capture-plan), or an LED's stripes and --led-hz."
+            "they open. Film a subject under a rolling plan (psvideo capture-plan), or an LED's stripes and `led_hz`."
         )
     rows, period_s = plan.camera.height_px, timing.frame_period_s
     readout_s = timing.row_time_s * rows

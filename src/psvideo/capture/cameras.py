@@ -23,7 +23,7 @@ RATE_TOLERANCE = Fraction(15, 10_000)
 
 HOW_TO_MEASURE = (
     "Measure it with an LED that blinks at a known rate (calibration/README.md: readout = height in rows / rows per "
-    "stripe period / LED rate), or give --readout unknown, and always the mode itself: --fps 120 --size 1920x1080."
+    "stripe period / LED rate), or give `readout_s` unknown, and always the mode itself: `fps` 120 `size_px` 1920x1080."
 )
 FAMILIES = {"EOS", "Lumix"}
 NOISE_WORDS = {"mark", "mk", "alpha", "camera"}
@@ -112,7 +112,7 @@ def find_mode(wanted: str, *, fps: Fraction | None, size_px: tuple[int, int] | N
     if not modes:
         names = ", ".join(repr(name) for name in nearest_names(wanted))
         raise UsageError(
-            f"--camera {wanted!r} is not in the table; the nearest are {names} (all: --list-cameras). For a camera "
+            f"`camera` {wanted!r} is not in the table; the nearest are {names} (all: `list_cameras`). For a camera "
             f"that is not there the readout time is needed. {HOW_TO_MEASURE}"
         )
     fitting = [mode for mode in modes if fits(mode, fps=fps, size_px=size_px)]
@@ -120,8 +120,8 @@ def find_mode(wanted: str, *, fps: Fraction | None, size_px: tuple[int, int] | N
         return fitting[0]
     what = "has several modes" if fitting else "is in the table, but not in this mode"
     raise UsageError(
-        f"--camera {wanted!r}: {modes[0].name} {what}. In the table: {_listed(modes)}. Say which with --fps and "
-        "--size, or give --fps, --size and --readout of the mode that you use."
+        f"`camera` {wanted!r}: {modes[0].name} {what}. In the table: {_listed(modes)}. Say which with `fps` and "
+        "`size_px`, or give `fps`, `size_px` and `readout_s` of the mode that you use."
     )
 
 

@@ -55,7 +55,7 @@ def _about_the_readout(request: ShootRequest) -> Iterator[Caution]:
             "readout",
             f"The readout of {show_seconds(abs(preset.readout_s))} for the {preset.name} rests on little "
             f"({preset.source}). "
-            "Measure yours (calibration/README.md) and give it as --readout.",
+            "Measure yours (calibration/README.md) and give it as `readout_s`.",
         )
 
 
@@ -68,14 +68,14 @@ def _about_the_rate(request: ShootRequest) -> Iterator[Caution]:
             "fps",
             f"{asked} fps is what this mode is called; the plan says {show_rate(fps)}, which it records. If yours "
             "truly "
-            f"records {asked}, give --size and --readout with --fps.",
+            f"records {asked}, give `size_px` and `readout_s` with `fps`.",
         )
     elif fps.denominator == 1 and fps % 6 == 0 and fps >= 24:
         exact: Fraction = fps * NTSC
         yield _note(
             "fps",
             f"Many cameras that say {fps} fps record {float(exact):.5g}, 999 ppm slower, which is more than a crystal "
-            f"clock is off. If yours does, write --fps {exact}.",
+            f"clock is off. If yours does, write `fps` {exact}.",
         )
 
 
@@ -84,7 +84,7 @@ def _about_the_marker(request: ShootRequest) -> Iterator[Caution]:
         yield _warning(
             "marker",
             "Without a marker nothing in the footage shows which light is which: note the light of the first flash for "
-            "--first-light, or leave --marker dark.",
+            "`first_light`, or leave `marker` dark.",
         )
     if request.marker != "dark":
         yield _note("ambient", "Without a dark slot ambient light cannot be taken off: the room must be dark.")
@@ -116,7 +116,7 @@ def _about_flicker(figures: ShootFigures) -> Iterator[Caution]:
             "flicker",
             f"Dark slots come {figures.dark_slot_rate_hz:.1f} times a second, a flicker of the whole scene between "
             f"{low:g} and "
-            f"{high:g} Hz. {care} A larger --dark-every makes them rarer; two a second are enough.",
+            f"{high:g} Hz. {care} A larger `dark_every` makes them rarer; two a second are enough.",
         )
 
 
@@ -131,7 +131,7 @@ def _about_the_margin(plan: Plan, figures: ShootFigures) -> Iterator[Caution]:
         "margin",
         f"The dark time leaves a margin of {margin:.4g} ppm, and the clocks may be {plan.clock_range_ppm:g} ppm "
         "apart: then two "
-        f"flashes mix near the dark row{rows}. Leave --dark out, or give at least {needed_s * 1e3:.6g}ms.",
+        f"flashes mix near the dark row{rows}. Leave `dark_s` out, or give at least {needed_s * 1e3:.6g}ms.",
     )
 
 
@@ -220,6 +220,6 @@ def _about_synced_rows(plan: Plan, figures: ShootFigures) -> Iterator[Caution]:
             "synced",
             f"All rows are open together for only {show_seconds(max(open_s, 0.0))} of each frame, so a triggered "
             "flash of "
-            f"{show_seconds(longest_s)} is cut in some rows. Use --mode rolling, a slower frame rate or a global "
+            f'{show_seconds(longest_s)} is cut in some rows. Use `mode="rolling"`, a slower frame rate or a global '
             "shutter.",
         )

@@ -77,7 +77,7 @@ def _refuse_overfull(request: ShootRequest, longest_s: float) -> None:
         raise UsageError(
             f"A flash of {show_seconds(longest_s)} is longer than the exposure of {show_seconds(exposure_s)}, so no "
             "row can "
-            "hold all of it. Give a shorter --flash, or a slower --fps."
+            "hold all of it. Give a shorter `flash_s`, or a slower `fps`."
         )
 
 
@@ -88,6 +88,6 @@ def _refuse_short_dark(request: ShootRequest, dark_s: float) -> None:
         raise UsageError(
             f"A dark time of {show_seconds(dark_s)} is shorter than the exposure of {show_seconds(exposure_s)}: some "
             "rows "
-            f"would hold two flashes, which nothing can part again (eq. 1). Leave --dark out, or give at least "
+            f"would hold two flashes, which nothing can part again (eq. 1). Leave `dark_s` out, or give at least "
             f"{exposure_s / (1 - ppm * 1e-6) * 1e3:.5g}ms, the exposure and the clocks' margin."
         )

@@ -81,7 +81,7 @@ def choose_camera(wish: CameraWish, *, mode: Mode) -> tuple[Camera, CameraMode |
     fps = _truest_rate(wish.fps, preset)
     size_px = (preset.width_px, preset.height_px) if preset else wish.size_px
     if fps is None or size_px is None:
-        raise UsageError("The camera needs its frame rate and size: add --fps and --size, or --camera NAME.")
+        raise UsageError("The camera needs its frame rate and size: add `fps` and `size_px`, or `camera` NAME.")
     readout_s = wish.readout_s if readout_given else preset.readout_s if preset else 0.0
     known = find_model(wish.name) if wish.name else ()
     camera = Camera(
@@ -106,12 +106,12 @@ def _truest_rate(asked: Fraction | None, preset: CameraMode | None) -> Fraction 
 
 def _preset(wish: CameraWish, mode: Mode) -> CameraMode:
     if wish.name is None:
-        lacking = ["--fps"] * (wish.fps is None) + ["--size"] * (wish.size_px is None)
+        lacking = ["`fps`"] * (wish.fps is None) + ["`size_px`"] * (wish.size_px is None)
         if wish.readout_s is None and wish.readout_known and mode != "synced":
-            lacking.append("--readout")
+            lacking.append("`readout_s`")
         raise UsageError(
-            f"{' and '.join(lacking)}: missing. Name a camera of the table (--camera, see --list-cameras), or describe "
-            f"its mode: --fps 120 --size 1920x1080 --readout 8.1ms. {HOW_TO_MEASURE}"
+            f"{' and '.join(lacking)}: missing. Name a camera of the table (`camera`, see `list_cameras`), or describe "
+            f"its mode: `fps` 120 `size_px` 1920x1080 `readout_s` 8.1ms. {HOW_TO_MEASURE}"
         )
     return find_mode(wish.name, fps=wish.fps, size_px=wish.size_px)
 
@@ -119,17 +119,19 @@ def _preset(wish: CameraWish, mode: Mode) -> CameraMode:
 def _exposure_s(wish: CameraWish, fps: Fraction) -> float:
     period_s = float(1 / fps)
     if wish.exposure_s is not None and wish.shutter_deg is not None:
-        raise UsageError("--shutter and --exposure are both given. Give one of the two: they say the same thing.")
+        raise UsageError("`shutter_deg` and `exposure_s` are both given. Give one of the two: they say the same thing.")
     if wish.exposure_s is not None:
         if wish.exposure_s > period_s * (1 + 1e-6):
             raise UsageError(
-                f"--exposure of {show_seconds(wish.exposure_s)} is longer than the frame period of "
-                f"{show_seconds(period_s)} at {show_rate(fps)}. Give at most that, or --shutter 360."
+                f"`exposure_s` of {show_seconds(wish.exposure_s)} is longer than the frame period of "
+                f"{show_seconds(period_s)} at {show_rate(fps)}. Give at most that, or `shutter_deg` 360."
             )
         return wish.exposure_s
     shutter_deg = 360.0 if wish.shutter_deg is None else wish.shutter_deg
     if not 0 < shutter_deg <= 360:
-        raise UsageError(f"--shutter {shutter_deg:g} is no shutter angle. Give more than 0 and at most 360 degrees.")
+        raise UsageError(
+            f"`shutter_deg` {shutter_deg:g} is no shutter angle. Give more than 0 and at most 360 degrees."
+        )
     return exposure_of(fps, shutter_deg=shutter_deg)
 
 
@@ -137,6 +139,7 @@ def _refuse_impossible_readout(camera: Camera) -> None:
     readout_s, period_s = abs(camera.readout_s or 0.0), camera.frame_period_s
     if readout_s > period_s * (1 + READOUT_SLACK):
         raise UsageError(
-            f"--readout of {show_seconds(readout_s)} is impossible at {show_rate(camera.fps)}: a frame is read within "
-            f"its period of {show_seconds(period_s)}. Check the unit and the mode that the figure was measured in."
+            f"`readout_s` of {show_seconds(readout_s)} is impossible at {show_rate(camera.fps)}: a frame is read "
+            f"within its period of {show_seconds(period_s)}. Check the unit and the mode that the figure was measured "
+            "in."
         )

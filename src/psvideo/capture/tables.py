@@ -24,7 +24,7 @@ def shoot_report(shoot: Shoot, *, preset: CameraMode | None) -> Iterator[Rendera
 
 
 def camera_table(modes: Sequence[CameraMode]) -> Table:
-    """Return the table of camera modes for ``--list-cameras``."""
+    """Return the table of camera modes, for people."""
     table = Table(box=None, pad_edge=False)
     for name in ("camera", "mode", "size", "fps", "readout", "rests on"):
         table.add_column(name, no_wrap=name != "mode", justify="right" if name in ("fps", "readout") else "left")

@@ -9,7 +9,7 @@ from psvideo.model.plan import default_dark_s
 from psvideo.model.units import show_seconds
 
 LONG_MARKER = 1.5
-"""The marker flash of ``--marker long`` is this much longer than the others: plainly so, and still cheap."""
+"""The marker flash of ``marker="long"`` is this much longer than the others: plainly so, and still cheap."""
 
 LONGEST_SHARE_OF_EXPOSURE = 0.25
 """Unless the user says so, no flash is longer: a quarter of the exposure already costs a fifth of the rate (eq. 6)."""
@@ -31,11 +31,11 @@ def longest_flash(request: ShootRequest) -> Bound:
     """
     limits = request.limits
     if (limits.max_blur_px is None) != (limits.speed_px_s is None):
-        raise UsageError("--max-blur needs --speed, and the reverse: blur = speed x flash duration. Give both.")
+        raise UsageError("`max_blur_px` needs `speed_px_s`, and the reverse: blur = speed x flash duration. Give both.")
     if limits.max_blur_px is None and limits.max_duty is None and limits.max_pulse_s is None:
         raise UsageError(
-            "Nothing says how long a flash should be. Give --flash 0.8ms, or what limits it: --max-blur 1 --speed 800 "
-            "(px/s), --max-duty 0.1, --max-pulse 1ms."
+            "Nothing says how long a flash should be. Give `flash_s` 0.8ms, or what limits it: `max_blur_px` 1 "
+            "`speed_px_s` 800 (px/s), `max_duty` 0.1, `max_pulse_s` 1ms."
         )
     tightest = min(_bounds(request), key=lambda bound: bound.flash_s)
     flash_s = _rounded_down(tightest.flash_s / (LONG_MARKER if request.marker == "long" else 1.0))
@@ -88,7 +88,7 @@ def _refuse_too_dark(request: ShootRequest, flash_s: float, tightest: Bound) -> 
     raise UsageError(
         f"These wishes exclude each other: {tightest.why} allows a flash of {show_seconds(flash_s)}, which is "
         f"{stops:.1f} "
-        f"stops darker than the same light left on; --max-stops {request.limits.max_stops:g} needs "
+        f"stops darker than the same light left on; `max_stops` {request.limits.max_stops:g} needs "
         f"{show_seconds(needed_s)}{blur}. Allow more blur or more stops, slow the subject down, or bring "
         f"{2 ** (stops - request.limits.max_stops):.1f} times the light."
     )

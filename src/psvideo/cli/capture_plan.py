@@ -16,6 +16,7 @@ import typer
 import psvideo.cli.capture_options as option
 from psvideo.cli.console import Voice
 from psvideo.cli.options import Force, Json, Quiet, Verbose
+from psvideo.cli.spelling import spelled
 from psvideo.formats.whole_files import PICTURE_MARK, refuse_existing, write_text
 
 if TYPE_CHECKING:
@@ -137,4 +138,4 @@ def _report(shoot: Shoot, preset: CameraMode | None, console: Console, *, diagra
         console.print()
     for caution in shoot.cautions:
         if caution.level == "note":
-            console.print(f"note: {caution.text}", markup=False)
+            console.print(f"note: {spelled(caution.text)}", markup=False)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from psvideo.report.run_report import RunReport
     from psvideo.runs.caller import Caller
 
-from psvideo.cli.spelling import spelled
+from psvideo.cli.spelling import spelled, spelled_within
 
 Item = TypeVar("Item")
 PLAIN_PROGRESS_EVERY_S = 5.0
@@ -23,7 +23,7 @@ PLAIN_PROGRESS_EVERY_S = 5.0
 
 @dataclass(frozen=True, kw_only=True)
 class Voice:
-    """How much a command says, and to whom."""
+    """How much a command says, and to whom; parameters in sentences are spelled as options."""
 
     json: bool = False
     verbose: bool = False
@@ -32,22 +32,22 @@ class Voice:
     def say(self, text: str) -> None:
         """Print a line for people: on stdout, or nowhere where machines read stdout."""
         if not (self.json or self.quiet):
-            print(text)
+            print(spelled(text))
 
     def detail(self, text: str) -> None:
         """Print a line that only -v asks for."""
         if self.verbose:
-            print(text, file=sys.stderr)
+            print(spelled(text), file=sys.stderr)
 
     def warn(self, text: str) -> None:
         """Print a warning on stderr, for people and machines alike."""
         if not self.quiet:
-            print(f"psvideo: warning: {text}", file=sys.stderr)
+            print(f"psvideo: warning: {spelled(text)}", file=sys.stderr)
 
     def result(self, data: Mapping[str, object]) -> None:
         """Print the machine-readable result, where --json asked for it: one object, all that stdout gets."""
         if self.json:
-            print(json.dumps(data, indent=1), flush=True)
+            print(json.dumps(spelled_within(data), indent=1), flush=True)
 
     def track(self, items: Iterable[Item], *, total: int, what: str, unit: str = "frames") -> Iterator[Item]:
         """Pass items through and show progress with rate and time left: a bar on a terminal, plain lines elsewhere."""

@@ -1,11 +1,25 @@
 """Parameters in sentences of the library, spelled as the options that they are on the command line."""
 
 import re
+from collections.abc import Mapping
 
 PARAMETER = re.compile(r"`([a-z][a-z0-9_]*)(?:=([^`]*))?`")
-"""How the library names a parameter: `` `first_light` ``, or with a value, `` `solver="robust"` ``."""
-OTHERWISE = {"preset": "for", "float32": "float"}
-"""Options that are not called as their parameters are."""
+"""How the library names a parameter: `` `first_light` ``, or with a value, `` `solver='robust'` ``."""
+OTHERWISE = {
+    "preset": "for",
+    "float32": "float",
+    "size_px": "size",
+    "readout_s": "readout",
+    "shutter_deg": "shutter",
+    "exposure_s": "exposure",
+    "flash_s": "flash",
+    "max_blur_px": "max-blur",
+    "speed_px_s": "speed",
+    "max_pulse_s": "max-pulse",
+    "dark_s": "dark",
+    "near_s": "near",
+}
+"""Options that are not called as their parameters are: most of these take their unit along."""
 
 
 def spelled(text: str) -> str:
@@ -19,10 +33,20 @@ def spelled(text: str) -> str:
     return PARAMETER.sub(_option, text)
 
 
+def spelled_within(data: object) -> object:
+    """Return a record as JSON takes it, its sentences with parameters as options."""
+    if isinstance(data, str):
+        return spelled(data)
+    if isinstance(data, Mapping):
+        return {key: spelled_within(value) for key, value in data.items()}
+    return [spelled_within(value) for value in data] if isinstance(data, list | tuple) else data
+
+
 def _option(found: re.Match[str]) -> str:
     word = OTHERWISE.get(found[1], found[1]).replace("_", "-")
     if found[2] in (None, "True"):
         return f"--{word}"
     if found[2] == "False":
         return f"--no-{word}"
-    return f"--{word} {found[2].strip('[]()').strip(chr(34))}"
+    value = found[2].strip("[]()'\"")
+    return f"--{word} {value}"

@@ -45,7 +45,7 @@ class DepthMaps:
         if number not in self.files:
             raise PsvideoError(
                 f"{self.path}: has no depth for instant {number}; its files are numbered {min(self.files)} to "
-                f"{max(self.files)}. Expected one per result, numbered as the results are (see --start-number), or a "
+                f"{max(self.files)}. Expected one per result, numbered as the results are (see `start_number`), or a "
                 "single file that holds for all."
             )
         return _read(self.files[number], self)
@@ -111,7 +111,7 @@ def _read(path: Path, maps: DepthMaps) -> Floats:
     if not NEAREST_M < middle_m < FARTHEST_M:
         raise PsvideoError(
             f"{path}: its median depth would be {middle_m:.4g} m, which cannot be meant. Say how many metres one unit "
-            "of the file is: --depth-scale 0.001 for millimetres, 0.01 for centimetres."
+            "of the file is: `depth_scale=0.001` for millimetres, 0.01 for centimetres."
         )
     return values * np.float32(scale)
 

@@ -55,10 +55,10 @@ def parse_range(text: str, numbers: Iterable[int]) -> tuple[int, ...]:
     try:
         wanted = set(FrameSet(text if text.strip() else "none"))
     except (ParseException, ValueError):
-        raise UsageError(f"--frames {text}: is no frame range. Write for example 1-100 or 1-100x2.") from None
+        raise UsageError(f"`frames` {text}: is no frame range. Write for example 1-100 or 1-100x2.") from None
     chosen = tuple(number for number in present if number in wanted)
     if not chosen:
-        raise UsageError(f"--frames {text}: names none of the clip's frames; {_span(present)}.")
+        raise UsageError(f"`frames` {text}: names none of the clip's frames; {_span(present)}.")
     return chosen
 
 

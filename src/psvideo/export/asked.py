@@ -59,7 +59,7 @@ def delivery_of(asked: Asked) -> tuple[Delivery, tuple[str, ...]]:
     aovs = tuple(name for name in AOVS if name in wanted)
     if mix.weights and "beauty" not in aovs:
         raise UsageError(
-            "--with-ambient and --weight: belong to the beauty plate. Add --aov beauty, or leave them out."
+            '`with_ambient` and `weight`: belong to the beauty plate. Add `aov=["beauty"]`, or leave them out.'
         )
     delivery = Delivery(
         space=choose_space(space, y, asked.camera_to_world, camera=asked.camera, camera_time=asked.camera_time),
@@ -82,11 +82,13 @@ def _at_odds(program: Program | None, preset: Preset, *, space: str, y: str, mul
         return ()
     said = []
     if y != preset.y:
-        said.append(f"--y {y} goes against --for {program}: {preset.reasons['y']}. It is written as you say.")
+        said.append(f"`y={y!r}` goes against `preset={program!r}`: {preset.reasons['y']}. It is written as you say.")
     if space != preset.space and not (space == "world" and preset.space == "camera"):
         said.append(
-            f"--space {space} goes against --for {program}: {preset.reasons['space']}. It is written as you say."
+            f"`space={space!r}` goes against `preset={program!r}`: {preset.reasons['space']}. It is written as you say."
         )
     if preset.multipart and not multipart:
-        said.append(f"--no-multipart goes against --for {program}, which reads all parts of one file as layers.")
+        said.append(
+            f"`multipart=False` goes against `preset={program!r}`, which reads all parts of one file as layers."
+        )
     return tuple(said)

@@ -121,7 +121,7 @@ def _nuke(made: Delivered) -> tuple[Sequence[str], Sequence[str]]:
     files = bundle if made.delivery.multipart else f"normals/{made.clip}_normals.####.exr (and the others, one each)"
     world = made.delivery.space.name == "world"
     camera = (
-        "the camera whose file --camera-to-world named"
+        "the camera whose file `camera_to_world` named"
         if world
         else "a Camera at the origin without rotation (camera space is its own), with the shot's focal length"
     )
@@ -166,7 +166,7 @@ def _blender(made: Delivered) -> tuple[Sequence[str], Sequence[str]]:
         ],
         [
             "sRGB as Color Space (Blender's choice for every PNG): off by 0.3 to 0.4 of n.l on average.",
-            "y the wrong way (--y down): light comes from below when it stands above.",
+            'y the wrong way (`y="down"`): light comes from below when it stands above.',
             "A Normal Map node on the EXR: it expects 0 to 1 (off by 0.5). It takes the PNG, in Tangent space.",
             "The multipart file: Image Texture shows nothing of it. Use the folders, one sequence each.",
         ],

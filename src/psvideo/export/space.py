@@ -88,18 +88,20 @@ def choose_space(
     is_usd = camera_to_world is not None and camera_to_world.suffix.lower() in USD_SUFFIXES
     if name == "world" and camera_to_world is None:
         raise UsageError(
-            "--space world: needs the camera's rotation. Give --camera-to-world FILE: a USD file with the camera, or a "
+            '`space="world"`: needs the camera\'s rotation. Give `camera_to_world`: a USD file with the camera, or a '
             "text file with the 3 x 3 or 4 x 4 camera-to-world matrix, row by row."
         )
-    for option, value in {
-        "--camera-to-world": camera_to_world,
-        "--camera": camera,
-        "--camera-time": camera_time,
+    for name_given, value in {
+        "camera_to_world": camera_to_world,
+        "camera": camera,
+        "camera_time": camera_time,
     }.items():
         if name != "world" and value is not None:
-            raise UsageError(f"{option}: belongs to --space world, and --space is {name}.")
-        if option != "--camera-to-world" and value is not None and not is_usd:
-            raise UsageError(f"{option}: belongs to a USD camera, and {camera_to_world} is a text file. Leave it out.")
+            raise UsageError(f'`{name_given}`: belongs to `space="world"`, and `space` is {name}.')
+        if name_given != "camera_to_world" and value is not None and not is_usd:
+            raise UsageError(
+                f"`{name_given}`: belongs to a USD camera, and {camera_to_world} is a text file. Leave it out."
+            )
     if camera_to_world is None:
         return Space(name=name, y=y)
     if not is_usd:

@@ -237,6 +237,6 @@ def find_plan(path: Path, *, given: Path | None = None) -> Path:
     if not plan.is_file():
         raise PsvideoError(
             f"{folder}: there is no plan.toml here. Put the plan that the strobe played beside the footage, "
-            "name it with --plan FILE, or write one with psvideo capture-plan."
+            "name it with `plan`, or write one with psvideo capture-plan."
         )
     return plan

@@ -57,7 +57,7 @@ def read_trace(path: Path) -> Trace:
     if head is None or lines[1:2] != [COLUMNS]:
         raise PsvideoError(
             f"{path}: is not the trace of an emulated run: expected '# {SCHEMA} board=… hz=… wiring=…' and a line "
-            f"{COLUMNS!r} at its top. Make one with psvideo strobe emulate --trace FILE."
+            f"{COLUMNS!r} at its top. Make one with psvideo strobe emulate and its `trace`."
         )
     if head[1] != "1":
         raise PsvideoError(f"{path}: was written as psvideo-trace/{head[1]}; this psvideo reads {SCHEMA}. Update it.")

@@ -37,7 +37,7 @@ def write_text(path: Path, text: str) -> None:
 
 
 PICTURE_MARK = "psvideo-picture"
-"""What pictures that commands draw hold near their start, so that --force replaces these and nobody else's."""
+"""What pictures that commands draw hold near their start, so that ``force`` replaces these and nobody else's."""
 _PNG_HEAD_BYTES = 33
 """A PNG's signature and its first chunk, IHDR, whose size is fixed (PNG specification, 5.2 and 11.2.1)."""
 
@@ -58,9 +58,9 @@ def refuse_existing(path: Path, *, force: bool, mark: str | None = None) -> None
     if not path.exists():
         return
     if not force:
-        raise UsageError(f"{path}: exists already. Name another output, or give --force to replace it.")
+        raise UsageError(f"{path}: exists already. Name another output, or give `force` to replace it.")
     if mark is not None and not (path.is_file() and mark.encode() in path.read_bytes()[:4096]):
         raise UsageError(
             f"{path}: exists and is nothing that this command wrote (no {mark!r} in it), so it is not replaced, not "
-            "even with --force. Name another output."
+            "even with `force`. Name another output."
         )

@@ -60,19 +60,19 @@ def refuse_folder(path: Path, *, mark: str, force: bool) -> None:
     if not empty and (footage or not (path / mark).is_file()):
         found = "holds a plan.toml" if footage else f"holds no {mark}"
         raise UsageError(
-            f"{path}: {found}, so it is nothing that this command wrote, and is not replaced, not even with --force. "
+            f"{path}: {found}, so it is nothing that this command wrote, and is not replaced, not even with `force`. "
             "Name another output."
         )
 
 
 def _refuse_other_settings(path: Path, beside: Path, settings: str) -> None:
     if not beside.is_dir():
-        raise UsageError(f"{path}: there is no stopped run to resume here. Leave --resume out to start again.")
+        raise UsageError(f"{path}: there is no stopped run to resume here. Leave `resume` out to start again.")
     noted = beside / SETTINGS
     if not noted.is_file() or noted.read_text(encoding="utf-8") != settings:
         raise UsageError(
             f"{path}: the run that was stopped here had other settings, footage, plan, rig or timing, and mixing both "
-            "would spoil the sequence. Give the same ones again, or leave --resume out to start again."
+            "would spoil the sequence. Give the same ones again, or leave `resume` out to start again."
         )
 
 

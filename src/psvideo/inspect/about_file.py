@@ -99,7 +99,7 @@ def _timing(path: Path) -> tuple[dict[str, Fact], list[Finding]]:
     complete = sum(flash.complete for flash in timing.flashes)
     findings = [ok(f"clip {timing.clip}: {len(timing.flashes)} flashes, {complete} of them complete")]
     findings.append(
-        warn("the order of the lights is a guess: give --first-light")
+        warn("the order of the lights is a guess: give `first_light`")
         if timing.order == "guess"
         else ok(f"the order of the lights was found by {timing.order}")
     )

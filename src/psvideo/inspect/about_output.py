@@ -59,7 +59,7 @@ def _results_go_together(sequences: dict[str, list[Path]]) -> Iterator[Finding]:
             differ = len(numbers[name] ^ numbers["normals"])
             yield fault(
                 f"{name}/ and normals/ do not hold the same numbers ({differ} differ): "
-                "the run was stopped; run it again with --resume"
+                "the run was stopped; run it again with `resume`"
             )
 
 

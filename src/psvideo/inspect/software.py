@@ -16,7 +16,7 @@ LIBRARIES = (
     *("pillow", "fileseq", "pydantic", "tomlkit", "typer", "rich", "embreex"),
 )
 EXTRAS = {
-    "usd-core": ("meshes and cameras as USD (--mesh usd, --camera-to-world shot.usd)", "pip install 'psvideo[usd]'"),
+    "usd-core": ('meshes and cameras as USD (`mesh=["usd"]`, `camera_to_world`)', "pip install 'psvideo[usd]'"),
 }
 LEAST_PYTHON = (3, 11)
 
@@ -39,7 +39,7 @@ def software() -> Iterator[Finding]:
         name="emulated board",
         level="ok" if reason is None else "note",
         text="the strobe's real firmware can be emulated" if reason is None else reason,
-        next_step="" if reason is None else "Only strobe emulate needs it; --board python does without.",
+        next_step="" if reason is None else 'Only strobe emulate needs it; `board="python"` does without.',
     )
 
 
@@ -84,7 +84,7 @@ def _movies() -> Iterator[Finding]:
         yield Finding(name="movies (PyAV)", level="missing", text=str(fault), next_step=REINSTALL)
         return
     for name, there in found.items():
-        step = "" if there else "Install PyAV from its wheel (pip install --force-reinstall av), or shoot frames."
+        step = "" if there else "Install PyAV from its wheel (pip uninstall av, then pip install av), or shoot frames."
         text = "decoded" if there else "no decoder"
         yield Finding(name=f"movies: {name}", level="ok" if there else "missing", text=text, next_step=step)
 

@@ -71,7 +71,7 @@ def _disk(folder: Path) -> Finding:
             os.fsync(file.fileno())
             rate = DISK_MB * 1.048576 / (time.perf_counter() - began)
     except OSError as fault:
-        step = "Run psvideo doctor with --folder and a folder that you may write to."
+        step = "Run psvideo doctor with `folder` and a folder that you may write to."
         text = f"{folder} cannot be written ({fault.strerror or fault})"
         return Finding(name="disk", level="missing", text=text, next_step=step)
     slow = rate < SLOW_DISK_MB_S

@@ -1,8 +1,8 @@
 """How the light of each lamp falls off over the picture, beyond what the rig explains: lens vignetting, narrow lamps.
 
-``psvideo calibrate flat-field --flat FILE`` measures it on a white target; ``psvideo normals --flat FILE`` divides it
-out. A light's falloff is ``exp(polynomial)`` of degree DEGREE in column and row over half the picture's width, 1 where
-its intensity in the rig was measured. Beyond the target, where nothing was measured, it stays as at the edge.
+``psvideo calibrate flat-field`` measures it on a white target; ``psvideo normals`` divides it out where it is given. A
+light's falloff is ``exp(polynomial)`` of degree DEGREE in column and row over half the picture's width, 1 where its
+intensity in the rig was measured. Beyond the target, where nothing was measured, it stays as at the edge.
 """
 
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ class Falloff:
         if light not in known:
             raise PsvideoError(
                 f"The flat field holds no light {light!r}; it holds {', '.join(known)}. Measure it with all lights of "
-                "the plan (psvideo calibrate flat-field --flat)."
+                "the plan (psvideo calibrate flat-field and its `flat`)."
             )
         left, top, right, bottom = self.box
         cols = np.clip(np.arange(self.width_px), left, right - 1)

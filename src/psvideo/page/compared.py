@@ -1,7 +1,7 @@
 """The plates of one round by either method of splitting, computed from the few frames that the round touches.
 
-Algorithm 1 follows the dark row from frame to frame, so it starts at the clip's first frame, as ``split --method
-hudon2015`` does; in long clips it starts a few hundred frames before the round.
+Algorithm 1 follows the dark row from frame to frame, so it starts at the clip's first frame, as ``split`` does
+by this method; in long clips it starts a few hundred frames before the round.
 """
 
 import itertools

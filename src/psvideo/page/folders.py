@@ -31,7 +31,7 @@ def show_of(path: Path, *, clip: Path | None = None, plan: Path | None = None) -
         raise PsvideoError(f"{path}: there is no such file or folder. Name a folder of results or plates, or a clip.")
     if not path.is_dir() or not (is_results(path) or is_plates(path)):
         if clip is not None:
-            raise UsageError(f"--clip: goes with a folder of results or plates, and {path} is none. Leave it out.")
+            raise UsageError(f"`clip`: goes with a folder of results or plates, and {path} is none. Leave it out.")
         return _clip(path, plan)
     show = _results(path) if is_results(path) else _plates(path)
     if clip is not None:

@@ -66,8 +66,8 @@ def page_server(show: Show, *, port: int | None = None) -> PageServer:
         except (OSError, OverflowError) as fault:
             reason = getattr(fault, "strerror", None) or str(fault)
             raise UsageError(
-                f"--port {port}: cannot be used ({reason}). Another program listens there, or it is not allowed: "
-                "name another port, or leave --port out and a free one is taken."
+                f"`port` {port}: cannot be used ({reason}). Another program listens there, or it is not allowed: "
+                "name another port, or leave `port` out and a free one is taken."
             ) from None
     for candidate in (USUAL_PORT, 0):
         try:

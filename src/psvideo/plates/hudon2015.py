@@ -1,4 +1,4 @@
-"""The published baseline: Algorithm 1 of the paper, faithful, to compare with (``psvideo split --method hudon2015``).
+"""The published baseline: Algorithm 1 of the paper, faithful, to compare with (``method="hudon2015"`` of ``split``).
 
 It follows each frame's darkest row and joins the rows below it with the rows above the next frame's. It knows of no
 weights, so black bands, a void background, ambient light, a short readout or a wrap of the dark row mislead it.

@@ -33,16 +33,16 @@ def named_first(take: Take, timing: Timing, first_light: str) -> Timing:
     """
     if first_light not in take.plan.lights:
         raise UsageError(
-            f"--first-light {first_light}: no such light in the plan; its lights are {', '.join(take.plan.lights)}."
+            f"`first_light` {first_light}: no such light in the plan; its lights are {', '.join(take.plan.lights)}."
         )
     for turn in alike_turns(take.plan):
         named = turned(take.plan, timing, turn)
         if first_light == _first_lights(named):
             return replace(named, order="given", order_note="")
     raise PsvideoError(
-        f"--first-light {first_light} does not fit the timing: its first complete flash is {_first_lights(timing)}'s, "
+        f"`first_light` {first_light} does not fit the timing: its first complete flash is {_first_lights(timing)}'s, "
         f"and no turn of the cycle by which flashes stay alike makes it {first_light}'s. "
-        "Leave the option out, or leave --timing out to find the flashes again."
+        "Leave the option out, or leave `timing` out to find the flashes again."
     )
 
 

@@ -26,7 +26,7 @@ def timing_of(
         timing = read_timing(given)
         wrong = _misfit(timing, take)
         if wrong:
-            raise PsvideoError(f"{given}: {wrong}. Leave --timing out, or make it again with psvideo sync.")
+            raise PsvideoError(f"{given}: {wrong}. Leave `timing` out, or make it again with psvideo sync.")
         if first_light is not None:
             timing = named_first(take, timing, first_light)
     return timing if rig is None else named_by_rig(take, timing, rig)

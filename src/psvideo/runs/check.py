@@ -96,7 +96,7 @@ def refuse_inside(report: Path | None, footage: Path) -> None:
     """Raise UsageError where a page of checks would lie among footage: nothing is ever written there."""
     folder = footage if footage.is_dir() else footage.parent
     if report is not None and report.resolve().is_relative_to(folder.resolve()):
-        raise UsageError(f"--report {report}: lies among the footage of {folder}. Name a file somewhere else.")
+        raise UsageError(f"`report` {report}: lies among the footage of {folder}. Name a file somewhere else.")
 
 
 def judged(

@@ -144,7 +144,7 @@ def _of_files(files: LightFiles, encoding: Encoding, reading: Reading) -> LightS
     notes = []
     aside = tuple(f"{file}: is taken for no light's picture and left aside" for file in files.left_aside)
     if files.is_jpeg and reading.transfer is None:
-        notes.append(f"JPEG pictures are read by the curve {transfer!r}; --transfer names another")
+        notes.append(f"JPEG pictures are read by the curve {transfer!r}; `transfer` names another")
     read = Encoding(transfer=transfer, black_level=encoding.black_level, white_level=encoding.white_level)
     sets = read_sets(files, encoding=read, frames=reading.frames, most=None if reading.frames else reading.most)
     room = None if files.room is None else read_picture(files.room, read)[0]
@@ -171,7 +171,7 @@ def _of_clip(take: Take, reading: Reading, watch: Watch) -> LightSets:
 def _guess(take: Take, note: str) -> str:
     return (
         f"{take.clip.path}: the plan has no marker, so which light is which is a guess ({note or 'nothing shows it'}). "
-        "Name the light of the first complete flash with --first-light."
+        "Name the light of the first complete flash with `first_light`."
     )
 
 

@@ -55,8 +55,8 @@ class Lighting:
         """Raise UsageError where depth is known and nothing of the run would use it."""
         if self.depths is not None and self.near is None and not delivery.needs_depth:
             raise UsageError(
-                f"--depth {self.depths.path}: nothing would use it. All lights of this rig are distant, so that "
-                "normals do not depend on depth; add --aov depth, --aov position or --mesh, or leave it "
+                f"`depth` {self.depths.path}: nothing would use it. All lights of this rig are distant, so that "
+                'normals do not depend on depth; add `aov=["depth"]`, `aov=["position"]` or `mesh`, or leave it '
                 "out."
             )
 
@@ -131,7 +131,7 @@ def _read_falloff(path: Path, take: Take, lights: Sequence[Light]) -> Falloff:
 def _read_depth(take: Take, rig: Rig, path: Path, metres_per_unit: float | None) -> DepthMaps:
     if rig.focal_px is None:
         raise PsvideoError(
-            f"--depth {path}: needs the camera's perspective. Add to the rig file: [camera] focal_px = [f, f] (the "
+            f"`depth` {path}: needs the camera's perspective. Add to the rig file: [camera] focal_px = [f, f] (the "
             "focal length in mm times pixels per mm of the sensor)."
         )
     clip = take.clip

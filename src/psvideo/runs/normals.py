@@ -203,7 +203,7 @@ def _check_numbers(
 ) -> None:
     if depth_scale is not None and (depth is None or not 0 < depth_scale < inf):
         raise UsageError(
-            f"--depth-scale {depth_scale:g}: expected metres per unit, above 0, of the file given as --depth."
+            f"`depth_scale` {depth_scale:g}: expected metres per unit, above 0, of the file given as `depth`."
         )
     if near_iterations is not None and not 0 <= near_iterations <= MOST_ITERATIONS:
         raise UsageError(f"`near_iterations` {near_iterations}: expected a number from 0 to {MOST_ITERATIONS}.")

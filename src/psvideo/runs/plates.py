@@ -56,7 +56,7 @@ class Extras:
             if BEAUTY in plan.lights:
                 raise PsvideoError(
                     f"A light of the plan is named {BEAUTY!r}, and so is the folder of the lights' sum: both cannot be "
-                    "written. Rename the light in plan and rig, or leave --beauty out."
+                    "written. Rename the light in plan and rig, or leave `beauty` out."
                 )
 
 

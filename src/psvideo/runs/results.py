@@ -55,7 +55,7 @@ class OverTime:
         alone = all(len(plan.flashes[slot].lit) == 1 for slot in plan.lit_slots)
         if self.aligning.rate == "flash" and not (alone and len(plan.lit_slots) == len(plan.lights)):
             raise UsageError(
-                "--rate flash needs a plan in which every light flashes once a round, by itself; in this one lights "
+                '`rate="flash"` needs a plan in which every light flashes once a round, by itself; in this one lights '
                 "flash together, or several times. Leave it out: one result per round is given."
             )
 
@@ -75,8 +75,8 @@ def _solving(plan: Plan, solver: Solver, delivery: Delivery) -> Solving:
     method = solving.method(len(plan.lights))
     if solving.error and method != "robust":
         raise UsageError(
-            f"--aov error is what the robust solver predicts, and this run of {len(plan.lights)} lights uses "
-            f"{method}. Add --solver robust, or leave --aov error out."
+            f'`aov=["error"]` is what the robust solver predicts, and this run of {len(plan.lights)} lights uses '
+            f'{method}. Add `solver="robust"`, or leave `aov=["error"]` out.'
         )
     return solving
 

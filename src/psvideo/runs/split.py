@@ -80,7 +80,7 @@ def split(
     mix = mix_of(weight or {}, with_ambient=with_ambient)
     summed = beauty or "beauty" in preview
     if mix.weights and not summed:
-        raise UsageError("--with-ambient and --weight: belong to the beauty plate. Add --beauty, or leave them out.")
+        raise UsageError("`with_ambient` and `weight`: belong to the beauty plate. Add `beauty`, or leave them out.")
     previews = tuple(dict.fromkeys(preview))
     extras = Extras(flashes=flashes, mix=mix if summed else None, previews=previews, codec=preview_codec)
     take = open_take(Path(clip), plan=None if plan is None else Path(plan), frames=frames)

@@ -70,7 +70,7 @@ def sync(
     if picture_path is not None:
         if picture_path.suffix.lower() != ".png":
             such = picture_path.with_suffix(".png")
-            raise UsageError(f"--picture {picture_path}: expected the name of a PNG, such as {such}.")
+            raise UsageError(f"`picture` {picture_path}: expected the name of a PNG, such as {such}.")
         refuse_existing(picture_path, force=force, mark=PICTURE_MARK)
     take = open_take(Path(clip), plan=None if plan is None else Path(plan), frames=frames)
     say_of_clip(take.clip, caller)

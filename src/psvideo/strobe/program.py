@@ -81,8 +81,8 @@ def make_program(
     if plan.mode == "synced":
         raise PsvideoError(
             f"{source}: is a synced plan, one flash per frame in step with the camera, and this controller has no wire "
-            "from the camera: it keeps a clock of its own. Plan with --mode rolling or --mode half-rate; psvideo finds "
-            "the flashes from the picture."
+            'from the camera: it keeps a clock of its own. Plan with `mode="rolling"` or `mode="half-rate"`; psvideo '
+            "finds the flashes from the picture."
         )
     wired = wire(plan, caps, lines or {})
     faults = list(_lack_of_room(plan, caps))
@@ -125,15 +125,15 @@ def wire(plan: Plan, caps: Capabilities, given: Mapping[str, int]) -> dict[str, 
     """Return the line of every light of the plan. Raises UsageError where the wiring given cannot be."""
     for name, line in given.items():
         if name not in plan.lights:
-            raise UsageError(f"--line {name}={line}: the plan has no such light: {nearest(name, plan.lights)}")
+            raise UsageError(f"`line` {name}={line}: the plan has no such light: {nearest(name, plan.lights)}")
         if not 0 <= line < caps.lines:
             raise UsageError(
-                f"--line {name}={line}: this board has {caps.lines} lines with {caps.wiring} wiring, numbered 0 to "
+                f"`line` {name}={line}: this board has {caps.lines} lines with {caps.wiring} wiring, numbered 0 to "
                 f"{caps.lines - 1}."
             )
         twin = next((other for other, taken in given.items() if taken == line and other != name), None)
         if twin is not None:
-            raise UsageError(f"--line {name}={line}: {twin} has line {line} already. Give every light its own line.")
+            raise UsageError(f"`line` {name}={line}: {twin} has line {line} already. Give every light its own line.")
     if len(plan.lights) > caps.lines:
         raise PsvideoError(
             f"The plan has {len(plan.lights)} lights and this board has {caps.lines} lines with {caps.wiring} wiring. "
@@ -183,7 +183,8 @@ def _power_fault(name: str, lit: Mapping[str, float], duration: int, caps: Capab
     if len(powers) > caps.powers:
         return (
             f"{name} has {len(powers)} different powers ({', '.join(f'{power:g}' for power in powers)}), and "
-            f"{caps.wiring} wiring plays {caps.powers} in a flash (give its lights one power, or take --wiring direct)"
+            f"{caps.wiring} wiring plays {caps.powers} in a flash (give its lights one power, or take "
+            '`wiring="direct"`)'
         )
     for light, power in lit.items():
         if find_bursts([power], duration, caps) is None:

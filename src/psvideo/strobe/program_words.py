@@ -40,7 +40,7 @@ def program_cautions(plan: Plan, program: Program, caps: Capabilities) -> Iterat
     if plan.mode == "rolling" and margin_ppm is not None and margin_ppm < caps.tolerance_ppm:
         yield (
             f"the board's clock may be {caps.tolerance_ppm:g} ppm off, and the dark time leaves a margin of "
-            f"{margin_ppm:.0f} ppm: if it runs fast, two flashes mix near the dark row. Plan with --strobe-clock-ppm "
+            f"{margin_ppm:.0f} ppm: if it runs fast, two flashes mix near the dark row. Plan with `strobe_clock_ppm` "
             f"{caps.tolerance_ppm:g}, or take a board with a crystal"
         )
     rounding_ppm = (program.played.cycle_s / plan.cycle_s - 1) * 1e6
@@ -48,7 +48,7 @@ def program_cautions(plan: Plan, program: Program, caps: Capabilities) -> Iterat
     if abs(rounding_ppm) >= SHOWN_PPM:
         yield (
             f"in whole ticks of {caps.tick_ps / 1e6:g} µs the cycle is {abs(rounding_ppm):.1f} ppm {way} than planned; "
-            "psvideo sync learns it from the log (--log); without it that looks like a clock offset"
+            "psvideo sync learns it from the log (`log`); without it that looks like a clock offset"
         )
 
 

@@ -57,7 +57,7 @@ def find_timing(
     """
     if first_light is not None and first_light not in plan.lights:
         raise UsageError(
-            f"--first-light {first_light}: no such light in the plan; its lights are {', '.join(plan.lights)}."
+            f"`first_light` {first_light}: no such light in the plan; its lights are {', '.join(plan.lights)}."
         )
     if plan.mode == "synced":
         return _synced_timing(plan, indices, clip=clip, dropped=dropped)
@@ -127,7 +127,7 @@ def _given_order(plan: Plan, rows: Profiles, alike: Sequence[Beat], first_light:
             return beat
     seen = _first_complete_light(plan, rows, alike[0])
     raise PsvideoError(
-        f"--first-light {first_light} does not fit the footage: by the cycle's marker the clip's first complete flash "
+        f"`first_light` {first_light} does not fit the footage: by the cycle's marker the clip's first complete flash "
         f"is {seen}'s. Leave the option out, or check that plan.toml is the plan that the strobe played."
     )
 

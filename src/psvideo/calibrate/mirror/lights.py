@@ -89,7 +89,7 @@ def calibrate_lights(sightings: Sequence[Sighting], *, radius_m: float | None = 
         raise PsvideoError(
             f"{sightings[0].where}: no light could be measured on the sphere ({reasons}). Expected a small bright "
             "highlight of each light on a shiny sphere; a matte sphere is for psvideo calibrate matte-sphere. "
-            "Look at where the sphere was taken to be, and mark it with --circle where that was wrong."
+            "Look at where the sphere was taken to be, and mark it with `circle` where that was wrong."
         )
     warnings = (*_about_view(sightings), *_about_spheres(sightings), *_about_lights(lights, sightings, radius_m))
     return MirrorCalibration(lights=lights, sightings=tuple(sightings), warnings=warnings)
@@ -168,8 +168,8 @@ def _joined(name: str, rays: Sequence[Ray], *, can_cross: bool) -> MeasuredLight
 
 def _apart(spread_deg: float) -> str:
     return (
-        f"the spheres' directions differ by up to {spread_deg:.1f} degrees: the light is near (give --radius-mm and "
-        "--focal-px for its position), or one highlight is a wrong one"
+        f"the spheres' directions differ by up to {spread_deg:.1f} degrees: the light is near (give `radius_mm` and "
+        "`focal_px` for its position), or one highlight is a wrong one"
     )
 
 
@@ -199,7 +199,7 @@ def _about_view(sightings: Sequence[Sighting]) -> list[str]:
         "the focal length is not known, so the view is taken for orthographic, and all directions are wrong by about "
         f"the angle by which the sphere stands off the lens's axis: {long_deg:.1f} degrees with a lens of "
         f"{USUAL_FIELDS_DEG[0]:.0f} degrees field of view, {normal_deg:.1f} with {USUAL_FIELDS_DEG[1]:.0f}.{seen} Give "
-        "--focal-px, or --focal-mm and --sensor-mm. The standard errors leave this out."
+        "`focal_px`, or `focal_mm` and `sensor_mm`. The standard errors leave this out."
     ]
 
 
@@ -229,7 +229,7 @@ def _about_lights(lights: Sequence[MeasuredLight], sightings: Sequence[Sighting]
         cause = (
             "their rays do not cross well enough for a position: put the spheres further apart"
             if radius_m is not None and sightings[0].outline.view.focal_px is not None
-            else "they stand near: give --radius-mm and the focal length to get positions"
+            else "they stand near: give `radius_mm` and the focal length to get positions"
         )
         said.append(f"the spheres see the lights {', '.join(distant)} in different directions; {cause}")
     large = [

@@ -141,7 +141,7 @@ def _not_found(where: str, found: int, wanted: int) -> str:
     return (
         f"{where}: {what} found: no round outline stands out from its background on a third of its length. Put "
         "something lighter or darker behind the sphere, keep all of it in the picture, add a picture with the room "
-        "light on (--outline-picture), or mark the outline by hand with --circle x,y,radius."
+        "light on (`outline_picture`), or mark the outline by hand with `circle` x,y,radius."
     )
 
 
@@ -160,7 +160,7 @@ def _refuse_cut(outline: Outline, where: str, shown: Grey) -> None:
         raise SphereNotFoundError(
             f"{where}: the sphere (centre {x:.0f},{y:.0f}, radius {radius:.0f} pixels) is cut by the frame of {cols} x "
             f"{rows} pixels: {outside:.0%} of its outline lies outside. Frame the whole sphere with some room around "
-            "it; or, if that is not the sphere, mark it with --circle x,y,radius.",
+            "it; or, if that is not the sphere, mark it with `circle` x,y,radius.",
             shown,
         )
 

@@ -104,7 +104,7 @@ def check_stripes(fit: StripeFit, reading: FoundStripes, rows: int) -> None:
 NO_STRIPES = (
     f"holds no stripes that go evenly over the whole width with at least {FEWEST_PERIODS:g} periods over the height. "
     "Either the LED did not blink, or its light was too weak beside other light; or the exposure was a whole number of "
-    "blinks; or the shutter is global; or drawn text and panels lie over the picture (use clean --columns). Film a "
+    "blinks; or the shutter is global; or drawn text and panels lie over the picture (use clean `columns`). Film a "
     "white sheet that only the LED lights, with the shortest exposure, and choose the LED's rate so that 5 to 40 "
     "stripes fit into the height."
 )
@@ -191,6 +191,6 @@ def _refuse_ambiguous(chosen: FoundStripes, readings: Sequence[FoundStripes]) ->
             raise PsvideoError(
                 f"holds stripes that can be read in two ways: one period in {1 / chosen.frequency:.2f} rows, or one in "
                 f"{1 / other.frequency:.2f} rows. The light flickers in two rates, blinks unevenly, or lights a scene "
-                "that repeats. Say roughly which readout time you expect (--near 16ms), use clean --columns, or film "
+                "that repeats. Say roughly which readout time you expect (`near_s` 16ms), use clean `columns`, or film "
                 "again with the LED alone."
             )

@@ -79,7 +79,7 @@ def parse_columns(text: str) -> tuple[int, int]:
     """Return the first column and one past the last one from ``0-80``; raises UsageError where that is no range."""
     first, dash, end = text.partition("-")
     if not (dash and first.strip().isdecimal() and end.strip().isdecimal() and int(first) < int(end)):
-        raise UsageError(f"--columns {text!r} is no range. Write the first column and one past the last one, as 0-80.")
+        raise UsageError(f"`columns` {text!r} is no range. Write the first column and one past the last one, as 0-80.")
     return int(first), int(end)
 
 
@@ -105,7 +105,7 @@ def _filmed(path: Path, stamps: dict[int, int], places: Sequence[int]) -> Iterat
 def _refuse_others(paths: Sequence[Path], frames: str | None) -> None:
     """Refuse what is neither a folder, nor a movie, nor only image files."""
     if frames is not None:
-        raise UsageError("--frames chooses from a folder's or a movie's frames; name the image files that are meant.")
+        raise UsageError("`frames` chooses from a folder's or a movie's frames; name the image files that are meant.")
     for path in paths:
         if not path.exists():
             raise PsvideoError(f"{path}: is not there. Name a movie, a folder of numbered frames, or image files.")
@@ -135,7 +135,7 @@ def _profiles(pictures: Iterator[tuple[str, CodedPicture]], columns: tuple[int, 
             )
         begin, end = columns or (0, width_px)
         if end > width_px:
-            raise UsageError(f"--columns {begin}-{end}: {name} has columns 0-{width_px} only.")
+            raise UsageError(f"`columns` {begin}-{end}: {name} has columns 0-{width_px} only.")
         found.append(_blocks(in_colours(picture), begin, end))
     return np.array(found), width_px
 

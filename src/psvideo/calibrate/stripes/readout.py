@@ -161,6 +161,6 @@ def _refuse_impossible(pictures: LedPictures, readout_s: float, fps: Fraction | 
     if fps is not None and readout_s * float(fps) > 1.01:
         raise PsvideoError(
             f"{pictures.name}: its stripes mean a readout of {readout_s * 1e3:.3f} ms, longer than the "
-            f"{1e3 / float(fps):.3f} ms of a frame. Either the LED blinks faster than --led-hz says, or the frame rate "
-            "(--fps), --rows or --zoom is another."
+            f"{1e3 / float(fps):.3f} ms of a frame. Either the LED blinks faster than `led_hz` says, or the frame rate "
+            "(`fps`), `rows` or `zoom` is another."
         )

@@ -16,7 +16,7 @@ TERMINAL = "-"
 """The name that asks for the diagram as text."""
 
 
-def check_diagram_name(name: str | None, *, option: str = "--diagram") -> Path | None:
+def check_diagram_name(name: str | None, *, option: str = "`diagram`") -> Path | None:
     """Return the picture file that a name means, None for text or nothing; raises UsageError for other kinds."""
     if name is None or name == TERMINAL:
         return None

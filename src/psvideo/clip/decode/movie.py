@@ -89,7 +89,7 @@ def read_movie(path: Path, timestamps: Sequence[int]) -> Iterator[CodedPicture]:
                 return
     raise PsvideoError(
         f"{path}: the frame with timestamp {wanted[0]} cannot be decoded; the movie is truncated or damaged there. "
-        "Copy it again, or choose other frames with --frames."
+        "Copy it again, or choose other frames with `frames`."
     )
 
 

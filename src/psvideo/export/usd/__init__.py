@@ -5,7 +5,7 @@ import importlib.util
 from psvideo.errors import PsvideoError
 
 
-def require_usd(what: str = "--mesh usd", *, otherwise: str = "--mesh ply") -> None:
+def require_usd(what: str = '`mesh=["usd"]`', *, otherwise: str = '`mesh=["ply"]`') -> None:
     """Raise PsvideoError where the package that reads and writes USD is not installed; ``what`` asks for it."""
     if importlib.util.find_spec("pxr") is None:
         raise PsvideoError(

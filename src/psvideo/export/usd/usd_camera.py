@@ -48,8 +48,8 @@ class UsdCamera:
         if self.codes and not self.codes[0] - CODE_TOLERANCE <= code <= self.codes[1] + CODE_TOLERANCE:
             raise PsvideoError(
                 f"{self.path}: the camera {self.prim} moves from time code {self.codes[0]:g} to {self.codes[1]:g}, and "
-                f"the clip needs it at {code:.6g}. Say with --camera-time how time codes count (frames of the clip, "
-                "numbers of the results, or seconds), export the whole range, or use fewer frames with --frames."
+                f"the clip needs it at {code:.6g}. Say with `camera_time` how time codes count (frames of the clip, "
+                "numbers of the results, or seconds), export the whole range, or use fewer frames with `frames`."
             )
         held = min(max(code, self.codes[0]), self.codes[1]) if self.codes else 0.0
         prim = UsdGeom.Xformable(self.stage.GetPrimAtPath(self.prim))
@@ -62,7 +62,7 @@ def open_usd_camera(path: Path, name: str | None = None) -> UsdCamera:
 
     Raises PsvideoError where the file is no stage, holds no camera, or several of which none is named.
     """
-    require_usd("--camera-to-world with a USD file", otherwise="a text file with the matrix")
+    require_usd("`camera_to_world` with a USD file", otherwise="a text file with the matrix")
     from pxr import Tf, Usd, UsdGeom
 
     if not path.is_file():
@@ -95,7 +95,7 @@ def _chosen(path: Path, found: list[str], name: str | None) -> str:
     listed = ", ".join(found[:8]) + (", ..." if len(found) > 8 else "")
     if name is None:
         if len(found) > 1:
-            raise PsvideoError(f"{path}: holds {len(found)} cameras ({listed}). Name one with --camera.")
+            raise PsvideoError(f"{path}: holds {len(found)} cameras ({listed}). Name one with `camera`.")
         return found[0]
     fitting = [prim for prim in found if name == prim or prim.endswith("/" + name.lstrip("/"))]
     if len(fitting) != 1:

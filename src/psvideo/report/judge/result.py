@@ -74,7 +74,7 @@ def _explained(fit: RigFit) -> Judgement:
         grade="doubtful",
         found=f"{left:.0f} % of the light does not come from a matte surface under this rig "
         f"({100 * fit.own_misfit:.0f} % under any rig): gloss, soft shadows, or directions a few degrees off.",
-        advice="Measure the lights again on a sphere; --solver robust leaves out highlights.",
+        advice='Measure the lights again on a sphere; `solver="robust"` leaves out highlights.',
     )
 
 
@@ -185,7 +185,7 @@ def steadiness(facts: Sequence[InstantFacts]) -> Iterator[Judgement]:
             subject="noise",
             grade="bad" if noise_deg > LOST_NOISY_DEG else "doubtful",
             found=f"Normals at rest change by {noise_deg:.1f} degrees from one result to the next.",
-            advice="Give more light or open the lens; --denoise averages what stands still.",
+            advice="Give more light or open the lens; `denoise` averages what stands still.",
         )
     elif level <= MOST_FLICKER_PERCENT:
         yield Judgement(

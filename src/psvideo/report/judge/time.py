@@ -48,7 +48,7 @@ def timing_and_order(timing: Timing, mode: str) -> Iterator[Judgement]:
             grade="doubtful",
             found="Which light is which is a guess, so normals may be wrong everywhere."
             + (f" {timing.order_note}" if timing.order_note else ""),
-            advice="Shoot with a dark slot as marker, or name the first light with --first-light.",
+            advice="Shoot with a dark slot as marker, or name the first light with `first_light`.",
         )
     else:
         yield Judgement(subject="order", grade="good", found=ORDER[timing.order])
@@ -72,7 +72,7 @@ def coverage(plan: Plan, timing: Timing, observed: Observed) -> Iterator[Judgeme
                 subject="rows",
                 grade="bad" if unseen > LOST_UNSEEN else "doubtful",
                 found=f"Up to {100 * unseen:.0f} % of a round's rows were seen by no frame.",
-                advice="Use all frames (no steps in --frames), and shoot at 360 degrees.",
+                advice="Use all frames (no steps in `frames`), and shoot at 360 degrees.",
             )
         )
     yield from said
@@ -162,9 +162,9 @@ def motion(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = Fa
         grade="bad" if grave else "doubtful",
         found=f"{100 * share:.0f} % of the picture moves, by up to {step_px:.1f} px from flash to flash "
         f"({blur_px:.1f} px of blur within one): normals there are off by about {_cost_deg(step_px):.0f} degrees"
-        + (" less what --align made good." if aligned else "."),
+        + (" less what `align` made good." if aligned else "."),
         advice="Move slower, raise the frame rate or flash fewer lights"
-        + (", or let --align flow bring the plates together." if not aligned else "."),
+        + (', or let `align="flow"` bring the plates together.' if not aligned else "."),
     )
 
 

@@ -48,6 +48,6 @@ def _other(name: str, heard: bytes) -> str:
     else:
         found = f"what is there is no strobe controller (it says {said!r})"
     return (
-        f"{name}: {found}. Name the controller's port with --port (psvideo strobe list shows those that are likely), "
+        f"{name}: {found}. Name the controller's port with `port` (psvideo strobe list shows those that are likely), "
         "or put the firmware onto the board (lights/)."
     )

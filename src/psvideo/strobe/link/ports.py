@@ -64,10 +64,10 @@ def choose_port(ports: Sequence[SerialPort]) -> SerialPort:
         return candidates[0]
     if candidates:
         listed = "; ".join(port.label for port in candidates)
-        raise UsageError(f"--port auto: several boards are here ({listed}). Name one with --port.")
+        raise UsageError(f'`port="auto"`: several boards are here ({listed}). Name one with `port`.')
     others = "; ".join(port.label for port in ports)
     found = f"none that is known to belong to one (there are: {others})" if others else "no serial port at all"
     raise PsvideoError(
-        f"--port auto: found {found}. Plug the controller in (a cable with data wires), check the permission to use "
-        "serial ports (on Linux the group dialout), or name the port with --port. Without a board: --port emulated."
+        f'`port="auto"`: found {found}. Plug the controller in (a cable with data wires), check the permission to use '
+        'serial ports (on Linux the group dialout), or name the port with `port`. Without a board: `port="emulated"`.'
     )

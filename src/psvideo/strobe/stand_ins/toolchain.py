@@ -85,7 +85,7 @@ def build(board: AvrBoard) -> Built:
     reason, lights = why_not(), lights_folder()
     if reason is not None or lights is None:
         advice = "Install them (lights/emulator/install.sh)" if lights else "Run it from a checkout"
-        raise PsvideoError(f"--board {board}: {reason}. {advice}, or take --board python, which needs neither.")
+        raise PsvideoError(f'`board={board!r}`: {reason}. {advice}, or take `board="python"`, which needs neither.')
     with _alone(lights / "emulator"):
         for folder in (lights / "firmware", lights / "emulator"):
             _make(folder)

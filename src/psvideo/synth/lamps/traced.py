@@ -77,10 +77,10 @@ def traced_light(scene: Scene, plan: Plan, clock: TrueClock, options: TraceOptio
 
 def _refuse_unfit(scene: Scene, plan: Plan) -> None:
     if plan.mode == "synced":
-        raise UsageError("--trace: this scene's camera triggers its flashes (mode synced), so no trace can drive them.")
+        raise UsageError("`trace`: this scene's camera triggers its flashes (mode synced), so no trace can drive them.")
     if scene.strobe.jitter_s > 0:
         raise UsageError(
-            f"--trace: the scene has jitter_s = {scene.strobe.jitter_s:g}, but a trace says itself when every flash "
+            f"`trace`: the scene has jitter_s = {scene.strobe.jitter_s:g}, but a trace says itself when every flash "
             "comes. Leave jitter_s out of the scene."
         )
 

@@ -23,11 +23,11 @@ def wired_lines(plan: Plan, given: Mapping[str, int]) -> dict[int, str]:
     """Return which light hangs on which line: the plan's order, but for those that are given."""
     for name in given:
         if name not in plan.lights:
-            raise UsageError(f"--line {name}={given[name]}: the plan has no such light; {nearest(name, plan.lights)}")
+            raise UsageError(f"`line` {name}={given[name]}: the plan has no such light; {nearest(name, plan.lights)}")
     free = iter(n for n in range(len(plan.lights) + max(given.values(), default=0) + 1) if n not in given.values())
     wired = {given[name] if name in given else next(free): name for name in plan.lights}
     if len(wired) < len(plan.lights):
-        raise UsageError("--line: two lights have the same line. Give every light a line of its own.")
+        raise UsageError("`line`: two lights have the same line. Give every light a line of its own.")
     return wired
 
 
@@ -38,7 +38,7 @@ def check_lines(path: Path, trace: Trace, wired: Mapping[int, str]) -> None:
         shown = ", ".join(f"{name} on line {line}" for line, name in sorted(wired.items()))
         raise PsvideoError(
             f"{path}: line {unknown[0]} is lit, and no light of the plan hangs on it ({shown}). Name the lines with "
-            "--line NAME=NUMBER, or take the trace of this plan."
+            "`line` NAME=NUMBER, or take the trace of this plan."
         )
 
 
@@ -68,7 +68,7 @@ def flash_pulses(
         if fault:
             raise PsvideoError(
                 f"{path}: flash {number} of the trace {fault}. Take the trace of this plan, or name the lines with "
-                "--line NAME=NUMBER."
+                "`line` NAME=NUMBER."
             )
         yield slot, group
         place, before_s = (place + 1) % len(lit), begin_s
