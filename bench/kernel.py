@@ -13,7 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from bench.table import Row
-from psvideo.compute.inlined import compiled
+from psvideo.compute.compiled import FUSED
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.kernel import solve_rows, working_memory
 from psvideo.solve.normals.task import Usable, empty_result, task
@@ -101,7 +101,7 @@ def _kernel(sets: list[list[np.ndarray]], pool: ThreadPoolExecutor) -> Callable[
     return run
 
 
-@compiled
+@FUSED.kept
 def _move(source: np.ndarray, target: np.ndarray) -> None:
     for i in range(len(source)):
         target[i] = source[i]

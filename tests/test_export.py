@@ -18,7 +18,7 @@ from hypothesis.extra import numpy as hnp
 
 from psvideo import __version__
 from psvideo.compute.threads import writing
-from psvideo.errors import PsvideoError, UsageError
+from psvideo.errors import AllDoneError, PsvideoError, UsageError
 from psvideo.export.plate_files import write_flash, write_plate
 from psvideo.export.png_maps import decode_normals, encode_normals
 from psvideo.export.result_files import Delivery, is_written, write_surface
@@ -229,10 +229,23 @@ def test_a_folder_appears_whole_or_not_at_all(tmp_path: Path) -> None:
     with whole_folder(out, mark="timing.json", force=True) as folder:
         (folder / "new.txt").write_text("y")
     assert [path.name for path in out.iterdir()] == ["new.txt"]
-    with (
-        pytest.raises(UsageError, match="no stopped run"),
-        whole_folder(tmp_path / "other", mark="timing.json", resume=True),
-    ):
+    with whole_folder(tmp_path / "other", mark="timing.json", resume=True) as folder:
+        assert not any(folder.iterdir()), "where nothing was begun, it begins"
+
+
+def test_a_folder_is_resumed_only_with_the_settings_it_was_begun_with(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    with contextlib.suppress(RuntimeError), whole_folder(out, mark="a", settings="one") as folder:
+        (folder / ".a.7.partial").write_text("half a file")
+        raise RuntimeError
+    with pytest.raises(UsageError, match="other settings"), whole_folder(out, mark="a", resume=True, settings="two"):
+        pass
+    with whole_folder(out, mark="a", resume=True, settings="one") as folder:
+        (folder / "a").write_text("x")
+    assert sorted(path.name for path in out.iterdir()) == [".settings", "a"]
+    with pytest.raises(AllDoneError, match="all done"), whole_folder(out, mark="a", resume=True, settings="one"):
+        pass
+    with pytest.raises(UsageError, match="exists"), whole_folder(out, mark="a", resume=True, settings="two"):
         pass
 
 

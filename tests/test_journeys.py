@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 import shutil
 from pathlib import Path
 
@@ -138,6 +139,25 @@ def test_a_stopped_run_goes_on_where_it_stopped_and_only_as_it_began(
     assert (out / "albedo" / kept[1].name).stat().st_mtime_ns == before, "what was whole is not written again"
 
 
+def test_resume_begins_where_nothing_was_begun_and_says_when_all_is_done(
+    clip: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    copy, out = spoilt(clip, tmp_path), tmp_path / "out"
+    command = ("split", copy, "-q", "-o", out, "--resume")
+    assert run(*command) == 0
+    before = digest(out)
+    capsys.readouterr()
+    assert run(*command) == 0
+    assert "all done" in capsys.readouterr().err
+    assert run(*command, "--start-number", "5") == 2
+    assert "exists already" in capsys.readouterr().err
+    assert digest(out) == before
+    frame = a_frame(copy)
+    os.utime(frame, ns=(0, frame.stat().st_mtime_ns + 10**9))
+    assert run(*command) == 2, "other footage"
+    assert run(*command, "--force") == 0
+
+
 def test_force_replaces_results_and_never_footage(
     clip: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -261,7 +281,6 @@ BROKEN = {
     "a range outside": (["sync", "{clip}", "--frames", "900-910"], 2, "--frames"),
     "too few frames": (["split", "{clip}", "-o", "{tmp}/o", "--frames", "1-2"], 1, "needs at least"),
     "an unknown first light": (["sync", "{clip}", "--first-light", "lamp"], 2, "lamp"),
-    "nothing to resume": (["split", "{clip}", "-o", "{tmp}/o", "--resume"], 2, "no stopped run"),
     "a plan with an unknown key": (["sync", "{clip}", "--plan", "{tmp}/plan.toml"], 1, "did you mean"),
     "a mask of another size": (
         ["normals", "{clip}", "--rig", "{clip}/rig.toml", "--mask", "{tmp}/mask.png", "-o", "{tmp}/o"],

@@ -23,6 +23,12 @@ class UsageError(PsvideoError):
     exit_status = 2
 
 
+class AllDoneError(PsvideoError):
+    """A run was to be resumed that had ended well, with the same inputs: nothing was left to do."""
+
+    exit_status = 0
+
+
 def nearest(word: str, known: Iterable[str]) -> str:
     """Return the advice that ends a message about an unknown name: the nearest known one, else all of them.
 

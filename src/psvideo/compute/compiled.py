@@ -1,20 +1,136 @@
-"""How hot loops are compiled: by numba, without the interpreter's lock, and kept on disk for the next run."""
+"""How hot loops are compiled: by numba, without the interpreter's lock, and kept on disk for the next run.
 
+Loops are never shared between numba's own threads (docs/decisions/threads.md). What is kept is used again only while
+the source of everything that was compiled into it is the same: numba itself looks at the called function's file alone.
+"""
+
+import contextlib
+import functools
+import hashlib
+import numbers
+import pickle
+import sys
 from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
 from typing import Any, TypeVar
 
 import numba
+from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.dispatcher import Dispatcher
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+_Cache: Any = FunctionCache
+_PART: dict[str, Any] = {"nogil": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+_UNREADABLE = (OSError, EOFError, pickle.UnpicklingError)
 
 
-def compiled(function: Function, **options: Any) -> Function:
-    """Compile a function when it is first called; where no folder can be written, without keeping it for next time.
+class _Kept(_Cache):  # type: ignore[misc]
+    """Compiled code on disk, which is stale once a module changes whose code or numbers are in it.
 
-    ``options`` are numba's. Loops are never shared between numba's own threads (see docs/decisions/threads.md).
+    A disk that is full, or a folder that is gone, never stops what was compiled: it is compiled again next time.
     """
-    try:
-        kept: Function = numba.njit(cache=True, nogil=True, **options)(function)
-    except RuntimeError:  # numba found neither a folder beside the module nor one of the user's to write to
-        kept = numba.njit(nogil=True, **options)(function)
-    return kept
+
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+        super().__init__(function)
+        self._cache_file = IndexDataCacheFile(  # type: ignore[no-untyped-call]
+            cache_path=self._cache_path,
+            filename_base=self._impl.filename_base,
+            source_stamp=(
+                self._impl.locator.get_source_stamp(),
+                sources_digest(sys.modules[function.__module__]),
+                repr(sorted(options.get("fastmath", ()))),
+            ),
+        )
+
+    def load_overload(self, signature: Any, target: Any) -> Any:
+        with contextlib.suppress(*_UNREADABLE):
+            return super().load_overload(signature, target)
+        return None
+
+    def save_overload(self, signature: Any, data: Any) -> None:
+        with contextlib.suppress(*_UNREADABLE):
+            super().save_overload(signature, data)
+
+
+@dataclass(frozen=True)
+class Arithmetic:
+    """What the compiler may do with floating-point numbers, and functions compiled so.
+
+    ``fastmath`` are LLVM's flags; empty: every operation as it is written. NaN and infinity keep their meaning.
+    """
+
+    fastmath: frozenset[str] = frozenset()
+
+    def kept(self, function: Function) -> Function:
+        """Compile a function that Python calls, and keep it on disk where there is a folder to keep it in."""
+        compiled: Any = numba.njit(nogil=True, **self._options)(function)
+        with contextlib.suppress(RuntimeError):  # neither beside the module nor in the user's folder can be written
+            compiled._cache = _Kept(function, self._options)
+        result: Function = compiled
+        return result
+
+    def called(self, function: Function) -> Function:
+        """Compile a function that only compiled ones call, once for all of them."""
+        part: Function = numba.njit(**_PART, **self._options)(function)
+        return part
+
+    def inlined(self, function: Function) -> Function:
+        """Compile a function into the compiled functions that call it."""
+        part: Function = numba.njit(**_PART, forceinline=True, **self._options)(function)
+        return part
+
+    @property
+    def _options(self) -> dict[str, Any]:
+        return {"fastmath": set(self.fastmath), "error_model": "numpy"} if self.fastmath else {}
+
+
+EXACT = Arithmetic()
+"""Every operation rounds as it does in Python; division by zero raises."""
+FUSED = Arithmetic(frozenset({"contract", "nsz", "arcp"}))
+"""Products may be fused and divisions shared; sums keep their order."""
+REORDERED = Arithmetic(FUSED.fastmath | {"reassoc"})
+"""Sums may change their order too, always to the same one."""
+
+
+def sources_digest(module: ModuleType) -> str:
+    """Return a digest of a module's source and of the modules of its package that compiled code in it is made of.
+
+    Those are the modules that it names, and that define what it names; where these have compiled functions, so go on.
+    Numbers that such a module imports count by their value.
+    """
+    parts: dict[str, bytes] = {}
+    waiting = [module]
+    while waiting:
+        one = waiting.pop()
+        path = getattr(one, "__file__", None)
+        if path is None or path in parts:
+            continue
+        parts[path] = _source(path)
+        if one is module or any(isinstance(value, Dispatcher) for value in vars(one).values()):
+            parts[path] += repr(_numbers(one)).encode()
+            waiting += _named(one)
+    return hashlib.sha256(b"".join(parts[path] for path in sorted(parts))).hexdigest()
+
+
+def _numbers(module: ModuleType) -> list[tuple[str, Any]]:
+    return sorted((name, value) for name, value in vars(module).items() if isinstance(value, (numbers.Number, tuple)))
+
+
+def _named(module: ModuleType) -> list[ModuleType]:
+    """Return the modules of the same package that a module names, or from which it has functions and classes."""
+    package = module.__name__.partition(".")[0]
+    names = {
+        value.__name__ if isinstance(value, ModuleType) else getattr(getattr(value, "_defn", value), "__module__", None)
+        for value in vars(module).values()  # numba's intrinsics keep what defines them as _defn
+    }
+    ours = (name for name in names if isinstance(name, str) and name.partition(".")[0] == package)
+    return [sys.modules[name] for name in ours if name in sys.modules]
+
+
+@functools.cache
+def _source(path: str) -> bytes:
+    with contextlib.suppress(OSError):  # in an archive, of which numba looks at the whole
+        return Path(path).read_bytes()
+    return b""

@@ -1,6 +1,7 @@
 """Output folders appear whole: written as a hidden folder beside their name, and renamed at the end.
 
-A run that was stopped leaves its hidden folder behind; ``resume`` goes on in it, and every file in it is whole.
+A run that was stopped leaves its hidden folder behind; ``resume`` goes on in it, and every file in it is whole. What
+the run was given is noted in both, so that a run with other inputs neither goes on nor is taken for done.
 """
 
 import contextlib
@@ -9,11 +10,13 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
-from psvideo.errors import PsvideoError, UsageError
+from psvideo.errors import AllDoneError, PsvideoError, UsageError
 from psvideo.formats.whole_files import refuse_existing
 
 SETTINGS = ".settings"
-"""In a folder that is being written: the run's inputs, so that only the same run resumes it."""
+"""In a folder that is or was written: a digest of what the run was given, so that only the same run resumes it."""
+UNFINISHED = ".*.partial"
+"""Files that a run was writing when it was killed (``whole_files``)."""
 
 
 @contextlib.contextmanager
@@ -23,22 +26,23 @@ def whole_folder(
     """Give a folder to write into; when the block ends well it gets the name ``path``, replacing what ``force`` allows.
 
     ``mark`` is the file by which a folder of this kind is known. A block that fails leaves nothing under ``path``; what
-    it had finished stays in the hidden folder for ``resume``, which goes on only with the same ``settings``, and is
-    removed by the next run that does not resume. Raises UsageError where the output exists, or where there is nothing
-    to resume; PsvideoError where the folder cannot be written.
+    it had finished stays in the hidden folder for ``resume``, which goes on only with the same ``settings``, begins
+    where nothing was begun, and is removed by the next run that does not resume. Raises UsageError where the output
+    exists or was begun with other settings, AllDoneError where ``resume`` finds it finished; PsvideoError where the
+    folder cannot be written.
     """
-    refuse_folder(path, mark=mark, force=force)
+    refuse_folder(path, mark=mark, force=force, resume=resume, settings=settings)
     path = path.resolve()
-    beside = path.with_name(f".{path.name}.partial")
-    if resume:
-        _refuse_other_settings(path, beside, settings)
+    beside = _beside(path)
     try:
         if not resume:
             shutil.rmtree(beside, ignore_errors=True)
         beside.mkdir(parents=True, exist_ok=True)
-        (beside / SETTINGS).write_text(settings, encoding="utf-8")
+        for unfinished in [*beside.rglob(UNFINISHED)]:
+            unfinished.unlink()
+        if settings:
+            (beside / SETTINGS).write_text(settings, encoding="utf-8")
         yield beside
-        (beside / SETTINGS).unlink()
         _replace(beside, path)
     except OSError as fault:
         raise PsvideoError(
@@ -47,11 +51,20 @@ def whole_folder(
         ) from fault
 
 
-def refuse_folder(path: Path, *, mark: str, force: bool) -> None:
-    """Raise UsageError where an output folder exists and may not be replaced.
+def refuse_folder(path: Path, *, mark: str, force: bool, resume: bool = False, settings: str = "") -> None:
+    """Raise UsageError where an output folder exists and may not be replaced, or a stopped run not be resumed.
 
     ``force`` replaces only what a run like this wrote: a folder that holds ``mark`` and no footage, or nothing at all.
+    ``resume`` goes on with a stopped run of the same ``settings``; where there is none, and the folder was finished
+    with these, AllDoneError is raised.
     """
+    stopped = _beside(path.resolve()).is_dir()
+    if resume and stopped:
+        _refuse_other_settings(path, settings)
+    elif resume and settings and _noted(path) == settings:
+        raise AllDoneError(
+            f"{path}: all done. The run ended well, with the same footage and settings, so nothing was written."
+        )
     refuse_existing(path, force=force)
     if not path.exists():
         return
@@ -65,11 +78,19 @@ def refuse_folder(path: Path, *, mark: str, force: bool) -> None:
         )
 
 
-def _refuse_other_settings(path: Path, beside: Path, settings: str) -> None:
-    if not beside.is_dir():
-        raise UsageError(f"{path}: there is no stopped run to resume here. Leave `resume` out to start again.")
-    noted = beside / SETTINGS
-    if not noted.is_file() or noted.read_text(encoding="utf-8") != settings:
+def _beside(path: Path) -> Path:
+    """Return the hidden folder in which a folder is written."""
+    return path.with_name(f".{path.name}.partial")
+
+
+def _noted(folder: Path) -> str:
+    """Return the digest of what a folder's run was given, empty where none is noted."""
+    noted = folder / SETTINGS
+    return noted.read_text(encoding="utf-8") if noted.is_file() else ""
+
+
+def _refuse_other_settings(path: Path, settings: str) -> None:
+    if _noted(_beside(path.resolve())) != settings:
         raise UsageError(
             f"{path}: the run that was stopped here had other settings, footage, plan, rig or timing, and mixing both "
             "would spoil the sequence. Give the same ones again, or leave `resume` out to start again."

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.compute.compiled import compiled
+from psvideo.compute.compiled import EXACT
 from psvideo.model.camera import FloatArray
 from psvideo.plates.mains import Mains, RowLight
 from psvideo.plates.split import CLIPPED, Image, Plate
@@ -148,7 +148,7 @@ def _noise(rest: Image, level: Image) -> tuple[np.float32, np.float32]:
     return np.float32(max(variance, variances.min(), 1e-12)), np.float32(max(per_level, 0.0))
 
 
-@compiled
+@EXACT.kept
 def _rest(old: Image, new: Image, gain: Image, both: NDArray[np.bool_], rest: Image, level: Image) -> None:
     """Average over channels what the gain leaves unexplained, and the light itself; 0 where a row was not shown."""
     rows, cols, channels = old.shape
@@ -163,7 +163,7 @@ def _rest(old: Image, new: Image, gain: Image, both: NDArray[np.bool_], rest: Im
             level[row, col] = light / np.float32(channels)
 
 
-@compiled
+@EXACT.kept
 def _beyond(
     local: Image,
     level: Image,
@@ -184,7 +184,7 @@ def _beyond(
             restarts[row, col] = far
 
 
-@compiled
+@EXACT.kept
 def _blend(
     old: Image,
     new: Image,
@@ -268,7 +268,7 @@ def _without(plate: Plate, before: Ambient, after: Ambient) -> Plate:
     return replace(plate, image=lit, shares=np.zeros_like(plate.shares), seen=seen)
 
 
-@compiled
+@EXACT.kept
 def _subtract_rows(image: Image, before: Image, after: Image, lit: Image, early: Image, late: Image) -> None:
     for row in range(image.shape[0]):
         for col in range(image.shape[1]):

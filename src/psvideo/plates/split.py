@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.compute.compiled import compiled
+from psvideo.compute.compiled import EXACT
 from psvideo.model.camera import Camera, FloatArray
 from psvideo.model.recipe import flash_recipe, frames_of
 from psvideo.model.row_profiles import LinearFrame
@@ -118,7 +118,7 @@ def _opens_s(camera: Camera, frames: Sequence[int]) -> FloatArray:
     return opens_s
 
 
-@compiled
+@EXACT.kept
 def _add_rows(plate: Image, frame: Image, coefficient: Image, saturated: np.float32) -> None:
     """Add a frame's rows, each times its coefficient, and CLIPPED where a sample was clipped."""
     for row in range(plate.shape[0]):

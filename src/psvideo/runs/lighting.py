@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from psvideo.clip import DepthMaps, Take, open_depth, read_mask
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.result_files import Delivery
+from psvideo.export.tags import sha256_of
 from psvideo.formats.flat_toml import read_falloff
 from psvideo.formats.rig_toml import read_rig
 from psvideo.model.choices import NEAR_ITERATIONS
@@ -59,6 +60,12 @@ class Lighting:
                 'normals do not depend on depth; add `aov=["depth"]`, `aov=["position"]` or `mesh`, or leave it '
                 "out."
             )
+
+    @property
+    def identity(self) -> tuple[object, ...]:
+        """What tells this lighting from others: the rig's bytes and lights, mask, depth and falloff."""
+        depths = () if self.depths is None else self.depths.identity
+        return sha256_of(self.rig_path), self.rig, self.mask_sha256, self.falloff, self.near_iterations, *depths
 
     @property
     def near_iterations(self) -> int:

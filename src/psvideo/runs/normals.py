@@ -111,7 +111,8 @@ def normals(
       PNG maps too. ``multipart``: one EXR with all quantities too. ``plates``: the plates too.
     - ``weight``: how strong a light is in the beauty plate, by name (1 where not named); ``with_ambient`` leaves
       ambient light in it. ``preview``: movies for eyes, coded as ``preview_codec``.
-    - ``force`` replaces an ``out`` that exists; ``resume`` goes on where a run that was stopped left off.
+    - ``force`` replaces an ``out`` that exists; ``resume`` goes on where a run that was stopped
+      left off, and raises AllDoneError where none was and ``out`` is finished.
 
     ``watch`` is handed every long loop, and ``caller`` the sentences that come on the way.
 
@@ -174,6 +175,7 @@ def normals(
         flat_path=_path(flat),
     )
     lighting.check(delivery)
+    output = output.given(take, _path(timing), first_light, solver, over_time, delivery, *lighting.identity)
     with decoded_once(take, output=output.folder) as kept:
         found = timing_of(kept, _path(timing), first_light=first_light, rig=lighting.rig, watch=watch).spelled(
             caller.spell

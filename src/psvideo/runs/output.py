@@ -2,7 +2,7 @@
 
 import hashlib
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -10,11 +10,9 @@ from psvideo import __version__
 from psvideo.clip import Clip, Take
 from psvideo.export.space import CAMERA_SPACE, Space
 from psvideo.export.tags import Tags, sha256_of
-from psvideo.formats.timing_json import format_timing
 from psvideo.formats.whole_folders import refuse_folder, whole_folder
 from psvideo.model.choices import Rate
 from psvideo.model.plan import Plan
-from psvideo.model.timing import Timing
 from psvideo.plates.sequence import FIRST_NUMBER
 from psvideo.runs.caller import PYTHON, Caller
 
@@ -24,30 +22,45 @@ MARK = "timing.json"
 
 @dataclass(frozen=True, kw_only=True)
 class Output:
-    """Where a run writes, what it may do there, and who called it."""
+    """Where a run writes, what it may do there, and who called it.
+
+    ``settings`` is a digest of what the run is given: a stopped run is resumed only under the same.
+    """
 
     folder: Path
     force: bool = False
     resume: bool = False
     start_number: int = FIRST_NUMBER
     caller: Caller = PYTHON
+    settings: str = ""
 
     def check(self) -> None:
         """Raise UsageError where the folder exists and may not be replaced, before any work is done."""
-        refuse_folder(self.folder, mark=MARK, force=self.force)
+        if not self.resume:
+            refuse_folder(self.folder, mark=MARK, force=self.force)
+
+    def given(self, take: Take, timing: Path | None, *what: object) -> "Output":
+        """Return the same with the digest of what the run is given: footage, plan, a timing file, and ``what`` else.
+
+        Raises AllDoneError or UsageError where a run that is to be resumed has ended, or was another.
+        """
+        parts = [__version__, self.start_number, *_identity(take), None if timing is None else sha256_of(timing), *what]
+        settings = hashlib.sha256("\n".join(map(str, parts)).encode()).hexdigest()
+        refuse_folder(self.folder, mark=MARK, force=self.force, resume=self.resume, settings=settings)
+        return replace(self, settings=settings)
 
 
-def settings_of(take: Take, timing: Timing, output: Output, *what: object) -> str:
-    """Return what a run depends on as a digest; a stopped run is resumed only under the same."""
-    numbers = f"{take.numbers[0]}-{take.numbers[-1]} ({len(take.numbers)})"
-    plan = sha256_of(take.clip.plan_path)
-    parts = [__version__, take.clip.path.resolve(), numbers, plan, format_timing(timing), output.start_number, *what]
-    return hashlib.sha256("\n".join(map(str, parts)).encode()).hexdigest()
+def _identity(take: Take) -> list[object]:
+    """Return what tells a take from others, and from itself once its plan or a file of it was changed."""
+    clip = take.clip
+    files = clip.files if clip.is_movie else [clip.file_of(number) for number in take.numbers]
+    facts = [(path.name, path.stat().st_size, path.stat().st_mtime_ns) for path in files]
+    return [clip.path.resolve(), sha256_of(clip.plan_path), take.numbers, facts]
 
 
-def folder_of(output: Output, settings: str) -> AbstractContextManager[Path]:
+def folder_of(output: Output) -> AbstractContextManager[Path]:
     """Return the block that writes the folder whole or not at all."""
-    return whole_folder(output.folder, mark=MARK, force=output.force, resume=output.resume, settings=settings)
+    return whole_folder(output.folder, mark=MARK, force=output.force, resume=output.resume, settings=output.settings)
 
 
 def sequence_fps(plan: Plan, rate: Rate = "round") -> Fraction:

@@ -25,7 +25,7 @@ from psvideo.report.run_report import RunReport
 from psvideo.runs.delivering import plates_of
 from psvideo.runs.handover import Finished, write_previews, write_timeline
 from psvideo.runs.look import look_at_plates
-from psvideo.runs.output import Output, folder_of, settings_of, tags_of
+from psvideo.runs.output import Output, folder_of, tags_of
 from psvideo.runs.reporting import observing, run_report, write_report
 
 SAMPLE_ROUND = 3
@@ -80,9 +80,8 @@ def split_run(
     extras.check(clip.plan)
     written: set[str] = set()
     times_s: list[float] = []
-    settings = settings_of(take, timing, output, method, extras)
     with (
-        folder_of(output, settings) as folder,
+        folder_of(output) as folder,
         _at_the_end(folder, take, output, times_s, extras, tags, watch),
         writing() as write,
     ):

@@ -31,7 +31,7 @@ from psvideo.runs.depths import shape_of
 from psvideo.runs.handover import Finished, write_note, write_previews, write_timeline
 from psvideo.runs.lighting import Lighting
 from psvideo.runs.look import look
-from psvideo.runs.output import Output, folder_of, settings_of, tags_of
+from psvideo.runs.output import Output, folder_of, tags_of
 from psvideo.runs.plates import nothing_complete
 from psvideo.runs.reporting import Solved, observing, run_report, write_report
 from psvideo.solve.depth import Shaping, reservations
@@ -107,11 +107,8 @@ def normals_run(
     picture: Pixels | None = None
     solving = _solving(clip.plan, solver, delivery)
     method = solving.method(len(clip.plan.lights))
-    known = () if lighting.depths is None else lighting.depths.identity
-    light = (lighting.mask_sha256, lighting.falloff, method, lighting.near_iterations, *known)
-    settings = settings_of(take, timing, output, tags, delivery, over_time, *light)
     with (
-        folder_of(output, settings) as folder,
+        folder_of(output) as folder,
         _at_the_end(folder, take, output, observed.facts, delivery, tags, shaping, watch),
         writing() as write,
     ):

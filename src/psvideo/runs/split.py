@@ -52,7 +52,7 @@ def split(
       ``weight`` says (by name; 1 where not named), with ambient light where ``with_ambient``. ``preview``: movies for
       eyes, coded as ``preview_codec``.
     - ``start_number``: the number of the first round's files. ``force`` replaces an ``out`` that exists; ``resume``
-      goes on where a run that was stopped left off.
+      goes on where a run that was stopped left off, and raises AllDoneError where none was and ``out`` is finished.
 
     ``watch`` is handed every long loop, and ``caller`` the sentences that come on the way.
 
@@ -88,6 +88,7 @@ def split(
     extras.check(take.plan)
     known = None if rig is None else read_rig(Path(rig), plan_lights=take.plan.lights)
     given = None if timing is None else Path(timing)
+    output = output.given(take, given, first_light, known, method, extras)
     with decoded_once(take, output=output.folder) as kept:
         found = timing_of(kept, given, first_light=first_light, rig=known, watch=watch).spelled(caller.spell)
         for note in found.notes:

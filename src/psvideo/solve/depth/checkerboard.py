@@ -8,39 +8,17 @@ right side says), and are read only where ``pinned``. Sweeps over the rows follo
 so that a grid larger than the cache is read once for all of them.
 """
 
-from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.compute.compiled import compiled
+from psvideo.compute.compiled import REORDERED
 
 Board = NDArray[np.float32]
 """Of shape (2, row + 2, half a row + 2)."""
-Function = TypeVar("Function", bound=Callable[..., Any])
 
 ZERO, HALF, ONE = np.float32(0), np.float32(0.5), np.float32(1)
-_OPTIONS: dict[str, Any] = {"fastmath": {"contract", "nsz", "arcp", "reassoc"}, "error_model": "numpy"}
-_PART: dict[str, Any] = _OPTIONS | {"nogil": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-
-
-def loop(function: Function) -> Function:
-    """Compile a function that Python calls, and keep it on disk."""
-    return compiled(function, **_OPTIONS)
-
-
-def called(function: Function) -> Function:
-    """Compile a function that only compiled ones call, once for all of them."""
-    part: Function = numba.njit(**_PART)(function)
-    return part
-
-
-def inlined(function: Function) -> Function:
-    """Compile a few lines into the compiled functions that call them."""
-    part: Function = numba.njit(forceinline=True, **_PART)(function)
-    return part
 
 
 def empty_board(rows: int, cols: int) -> Board:
@@ -48,7 +26,7 @@ def empty_board(rows: int, cols: int) -> Board:
     return np.zeros((2, rows + 2, (cols + 1) // 2 + 2), np.float32)
 
 
-@inlined
+@REORDERED.inlined
 def ties_about(ties: Any, colour: int, row: int, k: int) -> Any:
     """A pixel's weights with its neighbours to the west, east, north and south."""
     west = k if (row - 1 + colour) % 2 == 1 else k - 1
@@ -56,7 +34,7 @@ def ties_about(ties: Any, colour: int, row: int, k: int) -> Any:
     return ties[0, other, row, west], ties[0, colour, row, k], ties[1, other, row - 1, k], ties[1, colour, row, k]
 
 
-@called
+@REORDERED.called
 def _relax(ties: Any, inverse: Any, right: Any, height: Any, line: Any, colour: int, row: int) -> None:
     """Give every pixel of a row and colour the height that solves its own equation."""
     other, last = 1 - colour, height.shape[2] - 1
@@ -74,7 +52,7 @@ def _relax(ties: Any, inverse: Any, right: Any, height: Any, line: Any, colour: 
             out[k] = (line[k] + east[k] * beside[k] + west[k - 1] * beside[k - 1]) * per[k]
 
 
-@called
+@REORDERED.called
 def pull(ties: Any, height: Any, line: Any, colour: int, row: int) -> None:
     """Fill a line with what a row's neighbours pull it up by: the sum of weight times (neighbour - pixel)."""
     other, last = 1 - colour, height.shape[2] - 1
@@ -91,7 +69,7 @@ def pull(ties: Any, height: Any, line: Any, colour: int, row: int) -> None:
             line[k] += east[k] * (beside[k] - own[k]) + west[k - 1] * (beside[k - 1] - own[k])
 
 
-@called
+@REORDERED.called
 def _start(inverse: Any, right: Any, height: Any, row: int) -> None:
     """Relax a row of colour 0 while all other heights are 0."""
     wanted, per, out = right[0, row], inverse[0, row], height[0, row]
@@ -99,7 +77,7 @@ def _start(inverse: Any, right: Any, height: Any, row: int) -> None:
         out[k] = wanted[k] * per[k]
 
 
-@called
+@REORDERED.called
 def _add_lack(right: Any, height: Any, pins: Any, pinned: bool, line: Any, sums: Any, row: int) -> None:
     """Add to ``sums`` what row ``row``'s equations of colour 0 lack, ``line`` being what its neighbours pull."""
     wanted, own = right[0, row], height[0, row]
@@ -112,7 +90,7 @@ def _add_lack(right: Any, height: Any, pins: Any, pinned: bool, line: Any, sums:
             sums[k] -= pin[k] * own[k]
 
 
-@called
+@REORDERED.called
 def _write_blocks(sums: Any, coarse: Any, block_row: int, count: int) -> None:
     """Write a line of blocks onto a coarser board."""
     even, odd = coarse[block_row % 2, block_row + 1], coarse[1 - block_row % 2, block_row + 1]
@@ -122,7 +100,7 @@ def _write_blocks(sums: Any, coarse: Any, block_row: int, count: int) -> None:
         odd[k + 1] = sums[2 + 2 * k]
 
 
-@loop
+@REORDERED.kept
 def descend(
     ties: Any, inverse: Any, pins: Any, pinned: bool, right: Any, height: Any, coarse: Any, line: Any, sums: Any
 ) -> None:
@@ -148,7 +126,7 @@ def descend(
                 _write_blocks(sums, coarse, (row - 1) // 2, count)
 
 
-@called
+@REORDERED.called
 def _add_blocks(coarse: Any, height: Any, line: Any, row: int) -> None:
     """Add to a row the correction of its blocks."""
     last = height.shape[2] - 1
@@ -165,7 +143,7 @@ def _add_blocks(coarse: Any, height: Any, line: Any, row: int) -> None:
         second[k] += line[k]
 
 
-@loop
+@REORDERED.kept
 def ascend(ties: Any, inverse: Any, right: Any, height: Any, coarse: Any, line: Any) -> None:
     """Add the blocks' corrections, and sweep twice, colours 1 and 0 in turn: ``descend`` in a mirror."""
     rows = height.shape[1] - 2
@@ -182,7 +160,7 @@ def ascend(ties: Any, inverse: Any, right: Any, height: Any, coarse: Any, line: 
             _relax(ties, inverse, right, height, line, 0, step - 4)
 
 
-@loop
+@REORDERED.kept
 def settle(ties: Any, inverse: Any, right: Any, height: Any, line: Any, sweeps: int) -> None:
     """Sweep a small board from its height so often that it is solved, there and back."""
     for count in range(2 * sweeps):
@@ -192,7 +170,7 @@ def settle(ties: Any, inverse: Any, right: Any, height: Any, line: Any, sweeps: 
                 _relax(ties, inverse, right, height, line, colour, row)
 
 
-@loop
+@REORDERED.kept
 def invert(ties: Any, pins: Any, pinned: bool, inverse: Any) -> None:
     """Fill 1 / (the sum of every pixel's weights and its pin), 0 where it has no neighbour."""
     for colour in range(2):

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.solve.depth.checkerboard import Board, ascend, called, descend, empty_board, invert, loop, pull, settle
+from psvideo.compute.compiled import REORDERED
+from psvideo.solve.depth.checkerboard import Board, ascend, descend, empty_board, invert, pull, settle
 from psvideo.solve.depth.torn_blocks import OWN, coarsen, coarsen_pins, mend, part, prolong_moved, restrict_moved
 
 COARSEST_PIXELS = 64
@@ -145,7 +146,7 @@ def solve(grids: Grids, *, stop: float, most: int, pinned: bool = False) -> tupl
     return first, most
 
 
-@called
+@REORDERED.called
 def _line_product(one: Any, other: Any) -> Any:
     total = np.float32(0)
     for k in range(1, len(one) - 1):
@@ -153,7 +154,7 @@ def _line_product(one: Any, other: Any) -> Any:
     return total
 
 
-@loop
+@REORDERED.kept
 def _product(one: Any, other: Any) -> float:
     """The inner product of two boards: rows in 32 bits, their sum in 64."""
     total = 0.0
@@ -163,7 +164,7 @@ def _product(one: Any, other: Any) -> float:
     return total
 
 
-@loop
+@REORDERED.kept
 def _step(ties: Any, pins: Any, pinned: bool, towards: Any, share: Any, step: Any, spread: Any, line: Any) -> float:
     """Make the next step of ``towards`` and a share of the last, spread it, and return the two's inner product."""
     rows, last = step.shape[1] - 2, step.shape[2] - 1
@@ -189,7 +190,7 @@ def _step(ties: Any, pins: Any, pinned: bool, towards: Any, share: Any, step: An
     return total
 
 
-@loop
+@REORDERED.kept
 def _move(length: Any, step: Any, spread: Any, place: Any, lacking: Any) -> None:
     """Go a length along a step, and take what it brought off what is lacking."""
     for colour in range(2):

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from psvideo.solve.depth.checkerboard import HALF, ONE, ZERO, called, inlined, loop
+from psvideo.compute.compiled import REORDERED
+from psvideo.solve.depth.checkerboard import HALF, ONE, ZERO
 
 LEAST_SHARE = np.float32(1e-6)
 """A part held by less would float away on rounding errors."""
@@ -28,7 +29,7 @@ Q = tuple(
 )
 
 
-@inlined
+@REORDERED.inlined
 def logistic(evidence: Any) -> Any:
     """The logistic function, between LEAST_SHARE and 1 less that, in operations that run on whole vectors."""
     x = min(max(HALF * evidence, -STEEPEST), STEEPEST)
@@ -38,7 +39,7 @@ def logistic(evidence: Any) -> Any:
     return min(max(HALF + HALF * over / under, LEAST_SHARE), ONE - LEAST_SHARE)
 
 
-@called
+@REORDERED.called
 def _weigh(ahead: Any, behind: Any, slope: Any, sharpness: Any, share: Any) -> Any:
     """Fill a line of shares of the step ahead; return the line's energy."""
     energy = ZERO
@@ -50,7 +51,7 @@ def _weigh(ahead: Any, behind: Any, slope: Any, sharpness: Any, share: Any) -> A
     return energy
 
 
-@called
+@REORDERED.called
 def _row_steps(height: Any, facing: Any, slope: Any, ahead: Any, behind: Any) -> None:
     """Fill a line's steps ahead and behind, along the row."""
     cols = len(slope)
@@ -61,7 +62,7 @@ def _row_steps(height: Any, facing: Any, slope: Any, ahead: Any, behind: Any) ->
     ahead[cols - 1], behind[0] = slope[cols - 1], slope[0]
 
 
-@called
+@REORDERED.called
 def _col_steps(height: Any, facing: Any, slope: Any, aspect: Any, row: int, to: int, out: Any) -> None:
     """Fill a line's steps towards the next row, or from the one before."""
     sign = np.float32(to - row)
@@ -75,7 +76,7 @@ def _col_steps(height: Any, facing: Any, slope: Any, aspect: Any, row: int, to: 
         out[c] = aspect * own[c] * step if other[c] > ZERO else wanted[c]
 
 
-@loop
+@REORDERED.kept
 def weigh_sides(
     height: Any,
     facing: Any,
@@ -102,7 +103,7 @@ def weigh_sides(
     return energy
 
 
-@inlined
+@REORDERED.inlined
 def _tie(share: Any, facing: Any, slope: Any, next_share: Any, next_facing: Any, next_slope: Any) -> Any:
     """The tie of two neighbours, and the flow between them that their slopes ask for; 0 where one is not valid."""
     if facing <= ZERO or next_facing <= ZERO:
@@ -111,7 +112,7 @@ def _tie(share: Any, facing: Any, slope: Any, next_share: Any, next_facing: Any,
     return ahead * facing + behind * next_facing, ahead * slope + behind * next_slope
 
 
-@loop
+@REORDERED.kept
 def equations(
     height: Any,
     facing: Any,
@@ -148,7 +149,7 @@ def equations(
                 lacking[1 - colour, r + 2, k] -= lack
 
 
-@loop
+@REORDERED.kept
 def add_board(board: Any, height: Any) -> None:
     """Add a board to a height (row, col)."""
     for r in range(height.shape[0]):
@@ -156,7 +157,7 @@ def add_board(board: Any, height: Any) -> None:
             height[r, c] += board[(r + c) % 2, r + 1, c // 2 + 1]
 
 
-@loop
+@REORDERED.kept
 def write_board(values: Any, board: Any) -> None:
     """Put a picture (row, col) onto a board."""
     for r in range(values.shape[0]):
@@ -164,7 +165,7 @@ def write_board(values: Any, board: Any) -> None:
             board[(r + c) % 2, r + 1, c // 2 + 1] = values[r, c]
 
 
-@loop
+@REORDERED.kept
 def pull_to_pins(pins: Any, height: Any, wanted: Any, lacking: Any) -> None:
     """Add to what equations lack what pins pull a height (row, col) towards the wanted one."""
     for r in range(height.shape[0]):

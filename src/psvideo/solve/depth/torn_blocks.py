@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from psvideo.solve.depth.checkerboard import HALF, ONE, ZERO, called, inlined, loop, ties_about
+from psvideo.compute.compiled import REORDERED
+from psvideo.solve.depth.checkerboard import HALF, ONE, ZERO, ties_about
 
 TORN = np.float32(0.05)
 """A tie weaker than this share of all ties of either pixel does not hold them together."""
@@ -18,19 +19,19 @@ OWN, WEST, EAST, NORTH, SOUTH, NOWHERE, LOOSE = 0, 1, 2, 3, 4, 5, 9
 """Where a pixel belongs: its own block, one beside it, none; not decided yet."""
 
 
-@inlined
+@REORDERED.inlined
 def _holds(tie: Any, one: Any, other: Any) -> bool:
     """Whether a tie holds two pixels together, of which the inverse sums of ties are given."""
     return bool(tie * max(one, other) >= TORN)
 
 
-@inlined
+@REORDERED.inlined
 def _torn(one: Any, other: Any, held: bool) -> bool:
     """Whether two valid pixels do not hold together."""
     return one > ZERO and other > ZERO and not held
 
 
-@inlined
+@REORDERED.inlined
 def coarse_tie(tie: Any, one: Any, other: Any) -> Any:
     """What a tie between two blocks' pixels is worth between the blocks.
 
@@ -40,7 +41,7 @@ def coarse_tie(tie: Any, one: Any, other: Any) -> Any:
     return tie * (HALF if tie * max(one, other) >= TORN else ONE)
 
 
-@loop
+@REORDERED.kept
 def coarsen(ties: Any, inverse: Any, belongs: Any, coarse: Any) -> None:
     """Fill the weights between blocks with those of the ties that cross their borders, of pixels that stay."""
     rows, count = ties.shape[2] - 2, ties.shape[3] - 2
@@ -62,7 +63,7 @@ def coarsen(ties: Any, inverse: Any, belongs: Any, coarse: Any) -> None:
             coarse[1, colour, block_row + 1, at] = south
 
 
-@loop
+@REORDERED.kept
 def coarsen_pins(pins: Any, coarse: Any) -> None:
     """Fill the pins of blocks (0 before) with the sums of their pixels'."""
     for row in range(1, pins.shape[1] - 1):
@@ -72,7 +73,7 @@ def coarsen_pins(pins: Any, coarse: Any) -> None:
             coarse[(block_row + k - 1) % 2, block_row + 1, (k - 1) // 2 + 1] += both
 
 
-@called
+@REORDERED.called
 def _loosen(ties: Any, inverse: Any, belongs: Any, row: int, k: int) -> int:
     """Mark the pixels of one block that do not hang together with most of it; return their count."""
     low = row + 1
@@ -105,7 +106,7 @@ def _loosen(ties: Any, inverse: Any, belongs: Any, row: int, k: int) -> int:
     return count
 
 
-@loop
+@REORDERED.kept
 def part(ties: Any, inverse: Any, belongs: Any, moved: Any) -> int:
     """Fill where every pixel belongs (OWN before), and list those that are moved; return their count."""
     rows, last = inverse.shape[1] - 2, inverse.shape[2] - 1
@@ -135,7 +136,7 @@ def part(ties: Any, inverse: Any, belongs: Any, moved: Any) -> int:
     return listed
 
 
-@called
+@REORDERED.called
 def _move_out(ties: Any, inverse: Any, belongs: Any, colour: int, row: int, k: int) -> None:
     """Move a loose pixel to the block across its border, if it hangs together with a pixel there that stays."""
     west, east, north, south = ties_about(ties, colour, row, k)
@@ -151,7 +152,7 @@ def _move_out(ties: Any, inverse: Any, belongs: Any, colour: int, row: int, k: i
         belongs[colour, row, k] = NORTH if top else SOUTH
 
 
-@called
+@REORDERED.called
 def _follow(ties: Any, inverse: Any, belongs: Any, colour: int, row: int, k: int) -> None:
     """Move a pixel that is still loose where the one of its block goes that it hangs together with."""
     if belongs[colour, row, k] != LOOSE:
@@ -167,7 +168,7 @@ def _follow(ties: Any, inverse: Any, belongs: Any, colour: int, row: int, k: int
         belongs[colour, row, k] = stacked
 
 
-@called
+@REORDERED.called
 def _block(belongs: Any, colour: int, row: int, k: int) -> Any:
     """Row and column, among the blocks, of the one that a pixel belongs to; row -9 where to none."""
     block_row, block_col, where = (row - 1) // 2, k - 1, belongs[colour, row, k]
@@ -184,7 +185,7 @@ def _block(belongs: Any, colour: int, row: int, k: int) -> Any:
     return block_row, block_col
 
 
-@called
+@REORDERED.called
 def _add_tie(coarse: Any, one_row: int, one_col: int, row: int, col: int, tie: Any) -> None:
     """Add to the weight between two blocks; between blocks that touch in a corner there is none."""
     if min(one_row, row) < 0:
@@ -197,7 +198,7 @@ def _add_tie(coarse: Any, one_row: int, one_col: int, row: int, col: int, tie: A
         coarse[1, (top + col) % 2, top + 1, col // 2 + 1] += tie
 
 
-@loop
+@REORDERED.kept
 def mend(ties: Any, inverse: Any, belongs: Any, moved: Any, coarse: Any) -> None:
     """Add the ties of moved pixels to those between the blocks where they belong, after ``coarsen``."""
     for n in range(len(moved)):
@@ -215,7 +216,7 @@ def mend(ties: Any, inverse: Any, belongs: Any, moved: Any, coarse: Any) -> None
             _add_tie(coarse, here[0], here[1], there[0], there[1], tie)
 
 
-@loop
+@REORDERED.kept
 def restrict_moved(
     ties: Any, pins: Any, pinned: bool, right: Any, height: Any, belongs: Any, moved: Any, coarse: Any
 ) -> None:
@@ -236,13 +237,13 @@ def restrict_moved(
         _add(coarse, block_row, block_col, lack)
 
 
-@called
+@REORDERED.called
 def _add(coarse: Any, block_row: int, block_col: int, value: Any) -> None:
     if block_row >= 0:
         coarse[(block_row + block_col) % 2, block_row + 1, block_col // 2 + 1] += value
 
 
-@loop
+@REORDERED.kept
 def prolong_moved(height: Any, belongs: Any, moved: Any, coarse: Any) -> None:
     """Correct moved pixels as the blocks are where they belong; ``ascend`` will add their own block's correction."""
     for n in range(len(moved)):

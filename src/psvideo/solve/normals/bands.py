@@ -39,14 +39,7 @@ def check_arrays(plates: Sequence[Samples], lit: Illumination, seen: Mask | None
 
 def in_bands(run: Callable[[int, int], None], *, rows: int, cols: int, threads: int | None) -> None:
     """Call ``run(first, last)`` for bands of rows side by side. (Numba's own thread pool may abort when two use it.)"""
-
-    def once(first: int, last: int) -> None:
-        try:
-            run(first, last)
-        except OSError:  # the compiled code could not be kept on disk for the next run; it is there all the same
-            run(first, last)
-
-    over_ranges(once, rows, each=BAND_PIXELS // cols, threads=threads)
+    over_ranges(run, rows, each=BAND_PIXELS // cols, threads=threads)
 
 
 def surface_of(result: Result, error: Samples | None, shape: tuple[int, ...], *, half: bool) -> Surface:

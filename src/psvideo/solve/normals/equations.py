@@ -5,8 +5,9 @@ Planes lie in two flat working arrays, ``w`` (those of ``kernel.py``) and ``v`` 
 
 import numpy as np
 
-from psvideo.compute.inlined import apart, at, inlined, of_light
+from psvideo.compute.compiled import FUSED
 from psvideo.solve.normals.kernel import BLOCK, COUNT, HIGH, LOW, ONE, SUM, THREE, XX, XY, XZ, YY, YZ, ZERO, ZZ, X, Y, Z
+from psvideo.solve.normals.near_kernel import at, of_light
 from psvideo.solve.normals.task import Floats
 
 HALF = np.float32(0.5)
@@ -18,14 +19,14 @@ FROM, TO, RANK, COUNTED, LOWER, UPPER, SCALE, ODD, DOUBT = (BLOCK * plane for pl
 RIGHT_X, RIGHT_Y, RIGHT_Z = LOW, HIGH, SUM  # the equations' right sides, in planes of w that are free by now
 
 
-@inlined
+@FUSED.inlined
 def add_equations(matrix: Floats, w: Floats, m: Floats, weights: Floats, n: int) -> None:
     """The normal equations of every pixel; ``m`` and ``weights`` are (light, pixel), of whole threes of lights."""
     for k in range(0, len(m), 3):
         _add_three(matrix, w, m[k], m[k + 1], m[k + 2], weights[k], weights[k + 1], weights[k + 2], k, n)
 
 
-@inlined
+@FUSED.inlined
 def _add_three(
     matrix: Floats, w: Floats, a: Floats, b: Floats, c: Floats, p: Floats, q: Floats, r: Floats, k: int, n: int
 ) -> None:
@@ -50,7 +51,7 @@ def _add_three(
         w[ZZ + i] = old * w[ZZ + i] + p[i] * za * za + q[i] * zb * zb + r[i] * zc * zc
 
 
-@apart
+@FUSED.called
 def solve_equations(w: Floats, n: int, condition_squared: np.float32, keep: bool) -> None:
     """g from the normal equations; where they are badly conditioned what was there stays (``keep``), or 0."""
     for i in range(n):
@@ -69,7 +70,7 @@ def solve_equations(w: Floats, n: int, condition_squared: np.float32, keep: bool
         w[Z + i] = w[Z + i] if kept else z * scale
 
 
-@apart
+@FUSED.called
 def halve(v: Floats, e: Floats, n: int) -> None:
     """Narrow FROM, TO around the RANK-th smallest of e (light, pixel): fewer than RANK lie up to FROM, RANK up to TO.
 

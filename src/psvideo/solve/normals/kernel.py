@@ -6,20 +6,16 @@ saturated, not a number or unseen becomes MISSING, far below every threshold.
 
 Symbols: m = L g per pixel, with the measurements m, L = intensity * direction (light, 3) and g = albedo * normal.
 
-The loops are in this one file because numba's cache notices a change only in the file of the function that is called;
-where near lights are placed (``near_kernel.py``) is taken in by its checksum. For distant lights the matrix is one for
-all pixels, for near ones each pixel of a block has its own: the same loops are compiled for both.
+For distant lights the matrix is one for all pixels, for near ones each pixel of a block has its own: the same loops are
+compiled for both.
 """
-
-import zlib
-from pathlib import Path
 
 import numpy as np
 from numba.np.numpy_support import carray
 
-from psvideo.compute.inlined import at, compiled, encoded, inlined, lent, of_light, pointer
-from psvideo.solve.normals import near_kernel
-from psvideo.solve.normals.near_kernel import place_lights
+from psvideo.compute.compiled import FUSED
+from psvideo.compute.memory import encoded, lent, pointer
+from psvideo.solve.normals.near_kernel import at, of_light, place_lights
 from psvideo.solve.normals.task import Bytes, Floats, Near, Result, Samples, Task, Work
 
 # Pixels of one block; not a power of two, whose planes would all fall on the same lines of the processor's cache.
@@ -35,8 +31,6 @@ SLIGHTLY_MORE = np.float32(1.000001)
 X, Y, Z, ALBEDO, LIMIT, LOW, HIGH, SUM, COUNT = (BLOCK * plane for plane in range(9))
 XX, XY, XZ, YY, YZ, ZZ = (BLOCK * plane for plane in range(9, 15))
 PLANES = 15
-
-PLACING = zlib.crc32(Path(near_kernel.__file__).read_bytes())
 
 
 def working_memory(task: Task) -> Work:
@@ -54,11 +48,9 @@ def working_memory(task: Task) -> Work:
     )
 
 
-@compiled
+@FUSED.kept
 def solve_rows(task: Task, result: Result, work: Work, first: int, last: int) -> None:
     """Solve the rows from ``first`` up to ``last``; no two calls may share rows, and any number may run at once."""
-    if PLACING < 0:  # never: it is named here so that the kept function is compiled again where that file changes
-        return
     t = lent_task(task, work.matrix, work.per_strength)
     out = Result(lent(result.normals), lent(result.albedo), lent(result.valid), lent(result.residual))
     w, values, m = lent(work.planes), lent(work.values), lent(work.measurements)
@@ -72,7 +64,7 @@ def solve_rows(task: Task, result: Result, work: Work, first: int, last: int) ->
             _store_block(t, out, w, values, m, row * t.cols + col, n)
 
 
-@inlined
+@FUSED.inlined
 def lent_task(task: Task, matrix: Floats, per_strength: Floats) -> Task:
     """The task without reference counts, with the memory that takes every pixel's lights where they are near."""
     near = task.near
@@ -87,7 +79,7 @@ def lent_task(task: Task, matrix: Floats, per_strength: Floats) -> Task:
     )  # fmt: skip
 
 
-@inlined
+@FUSED.inlined
 def _solve_block(
     task: Task, w: Floats, values: Floats, m: Floats, row: int, col: int, n: int, keep_measurements: bool
 ) -> None:
@@ -112,7 +104,7 @@ def _solve_block(
             w[X + i], w[Y + i], w[Z + i] = w[X + i] * kept, w[Y + i] * kept, w[Z + i] * kept
 
 
-@inlined
+@FUSED.inlined
 def _plate(task: Task, light: int, start: int, n: int) -> Samples:
     """The samples of n pixels of one light's plate."""
     channels = task.tone.shape[1]
@@ -121,7 +113,7 @@ def _plate(task: Task, light: int, start: int, n: int) -> Samples:
     return plate[start * channels : end]
 
 
-@inlined
+@FUSED.inlined
 def _solve_all_usable(task: Task, w: Floats, start: int, n: int) -> bool:
     """Solve a block of one channel as if all measurements were usable; False where one is not, or hardly is.
 
@@ -146,7 +138,7 @@ def _solve_all_usable(task: Task, w: Floats, start: int, n: int) -> bool:
     return bool(unusable == 0)
 
 
-@inlined
+@FUSED.inlined
 def _add_three(w: Floats, n: int, a: Samples, b: Samples, c: Samples, inverse: Floats, k: int, begun: bool) -> None:
     """Add three lights' samples, from light k, to g; beside it the lowest and the highest sample."""
     (xp, yp, zp), (xq, yq, zq), (xr, yr, zr) = inverse[k], inverse[k + 1], inverse[k + 2]
@@ -163,7 +155,7 @@ def _add_three(w: Floats, n: int, a: Samples, b: Samples, c: Samples, inverse: F
         w[HIGH + i] = max(w[HIGH + i], high) if begun else high
 
 
-@inlined
+@FUSED.inlined
 def _gather_one(task: Task, values: Floats, start: int, n: int) -> None:
     """Raw samples of one channel to measurements, a plane per light."""
     for light in range(task.lights):
@@ -174,7 +166,7 @@ def _gather_one(task: Task, values: Floats, start: int, n: int) -> None:
             plane[i] = value if (value < ceiling) & (value > ABSENT) else MISSING
 
 
-@inlined
+@FUSED.inlined
 def _gather_three(task: Task, values: Floats, start: int, n: int) -> None:
     """Raw samples of three channels to measurements, a plane per light and channel; a light counts whole or not."""
     for light in range(task.lights):
@@ -193,7 +185,7 @@ def _gather_three(task: Task, values: Floats, start: int, n: int) -> None:
             blue[i] = b if here else MISSING
 
 
-@inlined
+@FUSED.inlined
 def _combine(task: Task, w: Floats, values: Floats, m: Floats, n: int) -> None:
     """One measurement per light from three channels, each weighted by its own brightness over the lights.
 
@@ -217,14 +209,14 @@ def _combine(task: Task, w: Floats, values: Floats, m: Floats, n: int) -> None:
             m[light, i] = value if red[i] > ABSENT else MISSING
 
 
-@inlined
+@FUSED.inlined
 def _all_seen(seen: Bytes, row: int, col: int, n: int) -> bool:
     """Whether every light was seen in n pixels; one entry may stand for the whole row."""
     first, last = (0, 1) if seen.shape[2] == 1 else (col, col + n)
     return not seen.size or bool(seen[:, row, first:last].all())
 
 
-@inlined
+@FUSED.inlined
 def _hide_unseen(task: Task, values: Floats, row: int, col: int, n: int) -> None:
     channels, seen = task.tone.shape[1], task.seen
     for plane in range(channels * seen.shape[0]):
@@ -236,7 +228,7 @@ def _hide_unseen(task: Task, values: Floats, row: int, col: int, n: int) -> None
             values[plane, :n] = MISSING
 
 
-@inlined
+@FUSED.inlined
 def _solve_usable(task: Task, w: Floats, m: Floats, n: int) -> None:
     """Solve every pixel from its own usable measurements; those in shadow become MISSING too."""
     w[SUM : SUM + n], w[COUNT : COUNT + n] = ZERO, ZERO
@@ -254,7 +246,7 @@ def _solve_usable(task: Task, w: Floats, m: Floats, n: int) -> None:
     _solve_normal_equations(w, n, task.condition_squared)
 
 
-@inlined
+@FUSED.inlined
 def _add_equations(
     w: Floats, n: int, a: Floats, b: Floats, c: Floats, matrix: Floats, per_strength: Floats, k: int, begun: bool
 ) -> None:
@@ -292,7 +284,7 @@ def _add_equations(
         w[ZZ + i] = w[ZZ + i] + zz if begun else zz
 
 
-@inlined
+@FUSED.inlined
 def _solve_normal_equations(w: Floats, n: int, condition_squared: np.float32) -> None:
     """g = adj(A) b / det(A), or 0 where A is badly conditioned or of fewer than three lights."""
     for i in range(n):
@@ -309,7 +301,7 @@ def _solve_normal_equations(w: Floats, n: int, condition_squared: np.float32) ->
         w[X + i], w[Y + i], w[Z + i] = x * scale, y * scale, z * scale
 
 
-@inlined
+@FUSED.inlined
 def _store_block(task: Task, result: Result, w: Floats, values: Floats, m: Floats, start: int, n: int) -> None:
     end = start + n
     x, y, z = result.normals[0, start:end], result.normals[1, start:end], result.normals[2, start:end]
@@ -327,7 +319,7 @@ def _store_block(task: Task, result: Result, w: Floats, values: Floats, m: Float
         residual[i] = encoded(error if abs(w[X + i]) + abs(w[Y + i]) + abs(w[Z + i]) > ZERO else ZERO, residual)
 
 
-@inlined
+@FUSED.inlined
 def _store_normals(
     w: Floats, n: int, x: Samples, y: Samples, z: Samples, albedo: Samples, valid: Bytes, albedo_scale: np.float32
 ) -> None:
@@ -348,7 +340,7 @@ def _store_normals(
         valid[i] = trusted
 
 
-@inlined
+@FUSED.inlined
 def _albedo_given_normal(task: Task, w: Floats, values: Floats, m: Floats, channel: int, n: int, out: Samples) -> None:
     """One channel's least squares albedo over the usable measurements, the normal being known."""
     w[SUM : SUM + n], w[COUNT : COUNT + n] = ZERO, ZERO
@@ -369,7 +361,7 @@ def _albedo_given_normal(task: Task, w: Floats, values: Floats, m: Floats, chann
         out[i] = encoded(max(albedo, ZERO) * scale, out)
 
 
-@inlined
+@FUSED.inlined
 def _add_residual(task: Task, w: Floats, values: Floats, m: Floats, channel: int, n: int) -> None:
     """Add one channel's squared residuals in plate units to the plane XX, and their count to XY."""
     for light in range(task.lights):

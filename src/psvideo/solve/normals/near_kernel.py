@@ -1,23 +1,25 @@
-"""Compiled part of all solvers: what near lights send to every pixel of a block, so that no field is ever kept.
+"""Compiled part of all solvers: what lights send to every pixel of a block; near ones are placed as it is solved.
 
 A near light at P sends ``intensity * max(0, cos)^mu / r^2`` to a point X at the distance r, from the direction
 (P - X) / r; cos is taken from the light's axis (Y. Queau et al., "LED-based photometric stereo: modeling, calibration
 and numerical solution", Journal of Mathematical Imaging and Vision 60, 2018, section 2).
 """
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from numba import types
 from numba.extending import overload
 
-from psvideo.compute.inlined import inlined
+from psvideo.compute.compiled import FUSED
 from psvideo.solve.normals.task import Floats, Near
 
 LEAST_COSINE = np.float32(1e-3)  # nothing is behind an LED; what is there keeps a little light, and so no division by 0
 ONE = np.float32(1)
 
 
-@inlined
+@FUSED.inlined
 def _place_one(matrix: Floats, per_strength: Floats, near: Near, light: int, row: int, col: int, n: int) -> None:
     """Fill one near light's planes."""
     (px, py, pz), (ax, ay, az) = near.positions[light], near.axes[light]
@@ -44,7 +46,7 @@ def _place_one(matrix: Floats, per_strength: Floats, near: Near, light: int, row
         per[i] = ONE / np.sqrt(x_plane[i] ** 2 + y_plane[i] ** 2 + z_plane[i] ** 2)
 
 
-@inlined
+@FUSED.inlined
 def _place_all(matrix: Floats, per_strength: Floats, near: Near, row: int, col: int, n: int) -> None:
     """Fill the planes of all lights; a distant one sends the same everywhere, and a copy nothing."""
     for light in range(len(near.strengths)):
@@ -70,3 +72,25 @@ def _place_lights(matrix: Any, per_strength: Any, near: Any, row: Any, col: Any,
     if matrix.ndim == 2:
         return lambda matrix, per_strength, near, row, col, n: None
     return lambda matrix, per_strength, near, row, col, n: _place_all(matrix, per_strength, near, row, col, n)
+
+
+def at(numbers: Any, pixel: int) -> Any:
+    """What ``of_light`` or one light's 1 / strength, for all pixels or as planes, is in a pixel. Compiled only."""
+    raise NotImplementedError
+
+
+@overload(at, jit_options={"forceinline": True}, strict=False)
+def _at(numbers: Any, pixel: Any) -> Callable[[Any, int], Any]:
+    if isinstance(numbers, types.Float) or (
+        isinstance(numbers, types.UniTuple) and isinstance(numbers.dtype, types.Float)
+    ):
+        return lambda numbers, pixel: numbers
+    if isinstance(numbers, types.UniTuple):
+        return lambda numbers, pixel: (numbers[0][pixel], numbers[1][pixel], numbers[2][pixel])
+    return lambda numbers, pixel: numbers[pixel]
+
+
+@FUSED.inlined
+def of_light(matrix: Any, light: int) -> Any:
+    """One light's three numbers: the same for all pixels (matrix (light, 3)), or planes ((light, 3, pixel))."""
+    return matrix[light, 0], matrix[light, 1], matrix[light, 2]

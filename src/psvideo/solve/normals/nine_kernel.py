@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from numba.extending import overload
 
-from psvideo.compute.inlined import apart, inlined, of_light
+from psvideo.compute.compiled import FUSED
 from psvideo.solve.normals.equations import HALF, OUT, RIGHT_X, RIGHT_Y, RIGHT_Z, SCALE
 from psvideo.solve.normals.kernel import ABSENT, BLOCK, COUNT, ONE, THREE, XX, XY, XZ, YY, YZ, ZERO, ZZ, X, Y, Z
+from psvideo.solve.normals.near_kernel import of_light
 from psvideo.solve.normals.task import Floats
 
 Numbers = tuple[np.float32, ...]
@@ -21,12 +22,12 @@ LITTLE = np.float32(0.02)  # the weight of what the start leaves out, so that no
 FOUR, EIGHT = np.float32(4), np.float32(8)
 
 
-@inlined
+@FUSED.inlined
 def _in_order(a: np.float32, b: np.float32) -> tuple[np.float32, np.float32]:
     return (a if a < b else b), (b if a < b else a)
 
 
-@inlined
+@FUSED.inlined
 def _sorted_nine(values: Any) -> Any:
     """Nine numbers in rising order: the best network known for nine (25 exchanges; D. E. Knuth, TAOCP 3, 5.3.4)."""
     a, b, c, d, e, f, g, h, k = values
@@ -58,7 +59,7 @@ def _sorted_nine(values: Any) -> Any:
     return a, b, c, d, e, f, g, h, k
 
 
-@inlined
+@FUSED.inlined
 def _ranked(ordered: Numbers, rank: np.float32) -> np.float32:
     """The rank-th smallest, from 1."""
     a, b, c, d, e, f, g, h, k = ordered
@@ -72,7 +73,7 @@ def _ranked(ordered: Numbers, rank: np.float32) -> np.float32:
     return k if rank > np.float32(8.5) else value
 
 
-@inlined
+@FUSED.inlined
 def _middle_ranked(ordered: Numbers, rank: np.float32) -> np.float32:
     """The rank-th smallest, of ranks from 3 to 6, which is where the median of what is not fitted lies."""
     value = ordered[2] if rank < np.float32(3.5) else ordered[3]
@@ -80,7 +81,7 @@ def _middle_ranked(ordered: Numbers, rank: np.float32) -> np.float32:
     return ordered[5] if rank > np.float32(5.5) else value
 
 
-@inlined
+@FUSED.inlined
 def _of_nine(planes: Floats, i: int) -> Any:
     return (
         planes[i], planes[BLOCK + i], planes[2 * BLOCK + i], planes[3 * BLOCK + i], planes[4 * BLOCK + i],
@@ -88,14 +89,14 @@ def _of_nine(planes: Floats, i: int) -> Any:
     )  # fmt: skip
 
 
-@inlined
+@FUSED.inlined
 def _of_lights(numbers: Floats) -> Any:
     return (
         numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5], numbers[6], numbers[7], numbers[8],
     )  # fmt: skip
 
 
-@inlined
+@FUSED.inlined
 def _lamps(matrix: Floats) -> Any:
     return (
         of_light(matrix, 0), of_light(matrix, 1), of_light(matrix, 2), of_light(matrix, 3), of_light(matrix, 4),
@@ -103,7 +104,7 @@ def _lamps(matrix: Floats) -> Any:
     )  # fmt: skip
 
 
-@inlined
+@FUSED.inlined
 def _begun(lamp: Any, weight: np.float32, m: np.float32) -> Any:
     """The normal equations of one light: the matrix's six numbers, then the right side's three."""
     x, y, z = lamp
@@ -111,7 +112,7 @@ def _begun(lamp: Any, weight: np.float32, m: np.float32) -> Any:
     return wx * x, wx * y, wx * z, wy * y, wy * z, weight * (z * z), wm * x, wm * y, wm * z
 
 
-@inlined
+@FUSED.inlined
 def _added(sums: Any, lamp: Any, weight: np.float32, m: np.float32) -> Any:
     a, b, c, d, e, f, p, q, r = sums
     x, y, z = lamp
@@ -122,7 +123,7 @@ def _added(sums: Any, lamp: Any, weight: np.float32, m: np.float32) -> Any:
     )  # fmt: skip
 
 
-@inlined
+@FUSED.inlined
 def _store_equations(w: Floats, i: int, lamps: Any, weights: Any, m: Any) -> None:
     sums = _begun(lamps[0], weights[0], m[0])
     sums = _added(sums, lamps[1], weights[1], m[1])
@@ -137,14 +138,14 @@ def _store_equations(w: Floats, i: int, lamps: Any, weights: Any, m: Any) -> Non
     w[RIGHT_X + i], w[RIGHT_Y + i], w[RIGHT_Z + i] = sums[6:]
 
 
-@inlined
+@FUSED.inlined
 def _error(m: np.float32, lamp: Any, x: np.float32, y: np.float32, z: np.float32) -> np.float32:
     """The residual without its sign; of what is MISSING OUT."""
     error: np.float32 = abs(m - (lamp[0] * x + lamp[1] * y + lamp[2] * z))
     return error if m > ABSENT else OUT
 
 
-@inlined
+@FUSED.inlined
 def _errors(m: Any, lamps: Any, x: np.float32, y: np.float32, z: np.float32) -> Any:
     return (
         _error(m[0], lamps[0], x, y, z), _error(m[1], lamps[1], x, y, z), _error(m[2], lamps[2], x, y, z),
@@ -153,7 +154,7 @@ def _errors(m: Any, lamps: Any, x: np.float32, y: np.float32, z: np.float32) -> 
     )  # fmt: skip
 
 
-@inlined
+@FUSED.inlined
 def _weight(error: np.float32, per_width: np.float32, tukey: bool) -> np.float32:
     square = (error * per_width) ** 2  # of what is OUT: infinite
     inside = max(ONE - square, ZERO)
@@ -161,7 +162,7 @@ def _weight(error: np.float32, per_width: np.float32, tukey: bool) -> np.float32
     return weight
 
 
-@inlined
+@FUSED.inlined
 def _weights(errors: Any, per_width: np.float32, tukey: bool) -> Any:
     return (
         _weight(errors[0], per_width, tukey), _weight(errors[1], per_width, tukey),
@@ -172,18 +173,18 @@ def _weights(errors: Any, per_width: np.float32, tukey: bool) -> Any:
     )  # fmt: skip
 
 
-@inlined
+@FUSED.inlined
 def _trimmed(bright: np.float32, lower: np.float32, upper: np.float32) -> np.float32:
     weight = ONE if (bright >= lower) & (bright <= upper) else LITTLE
     return weight if bright < OUT else ZERO
 
 
-@inlined
+@FUSED.inlined
 def _bright(m: np.float32, per: np.float32) -> np.float32:
     return m * per if m > ABSENT else OUT
 
 
-@inlined
+@FUSED.inlined
 def _brights(m: Any, per: Floats) -> Any:
     return (
         _bright(m[0], per[0]), _bright(m[1], per[1]), _bright(m[2], per[2]), _bright(m[3], per[3]),
@@ -192,7 +193,7 @@ def _brights(m: Any, per: Floats) -> Any:
     )  # fmt: skip
 
 
-@apart
+@FUSED.called
 def _begin(
     matrix: Floats, per_strength: Floats, darkest: np.float32, brightest: np.float32, w: Floats, m: Floats, n: int
 ) -> None:
@@ -213,7 +214,7 @@ def _begin(
         _store_equations(w, i, lamps, weights, here)
 
 
-@apart
+@FUSED.called
 def _reweigh(
     matrix: Floats, tukey: bool, width: np.float32, noise: np.float32, signal_noise: np.float32,
     sigma_of_median: np.float32, w: Floats, v: Floats, m: Floats, n: int,

@@ -7,9 +7,10 @@ are linearly dependent, and so must be the four brightnesses of a matte surface 
 
 import numpy as np
 
-from psvideo.compute.inlined import at, inlined, of_light
+from psvideo.compute.compiled import FUSED
 from psvideo.solve.normals.equations import DOUBT, LOWER, ODD, RANK, add_equations, solve_equations
 from psvideo.solve.normals.kernel import ABSENT, COUNT, MISSING, ONE, XX, XY, XZ, YY, YZ, ZERO, ZZ, X, Y, Z
+from psvideo.solve.normals.near_kernel import at, of_light
 from psvideo.solve.normals.task import Floats, Task
 
 TWO, FOUR = np.float32(2), np.float32(4)
@@ -17,7 +18,7 @@ TINIEST = np.float32(1e-18)
 BEST, SQUARES = LOWER, RANK  # planes of v that are free at this step
 
 
-@inlined
+@FUSED.inlined
 def drop_odd_of_four(
     task: Task,
     noise: np.float32,
@@ -61,7 +62,7 @@ def drop_odd_of_four(
     _solve_again(task, w, v, m, e, n)
 
 
-@inlined
+@FUSED.inlined
 def _some_contradict(
     task: Task,
     noise: np.float32,
@@ -89,7 +90,7 @@ def _some_contradict(
     return some > 0
 
 
-@inlined
+@FUSED.inlined
 def _find_errors(task: Task, w: Floats, v: Floats, m: Floats, e: Floats, n: int) -> None:
     """Residuals, 0 where MISSING, and the sum of their squares in SQUARES."""
     v[SQUARES : SQUARES + n] = ZERO
@@ -103,7 +104,7 @@ def _find_errors(task: Task, w: Floats, v: Floats, m: Floats, e: Floats, n: int)
             v[SQUARES + i] += error * error
 
 
-@inlined
+@FUSED.inlined
 def _nearness_without(
     w: Floats, v: Floats, i: int, x: np.float32, y: np.float32, z: np.float32, error: np.float32,
     half_x: np.float32, half_y: np.float32, half_z: np.float32,
@@ -124,7 +125,7 @@ def _nearness_without(
     return cosine
 
 
-@inlined
+@FUSED.inlined
 def _solve_again(task: Task, w: Floats, v: Floats, m: Floats, e: Floats, n: int) -> None:
     """Solve with what is left, only where one of four was dropped."""
     for light in range(len(e)):

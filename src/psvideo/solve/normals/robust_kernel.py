@@ -4,15 +4,13 @@ Blocks, planes and symbols are those of ``kernel.py``, whose parts are used here
 add lies in a second working array ``v`` and in ``e`` (light, pixel): brightnesses first, then residuals.
 """
 
-import zlib
-from collections.abc import Callable
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from psvideo.compute.inlined import apart, at, compiled, encoded, inlined, lent, of_light
-from psvideo.solve.normals import equations, kernel, near_kernel, nine_kernel, odd_of_four
+from psvideo.compute.compiled import FUSED
+from psvideo.compute.memory import encoded, lent
+from psvideo.solve.normals import kernel
 from psvideo.solve.normals.equations import (
     DOUBT,
     FROM,
@@ -46,6 +44,7 @@ from psvideo.solve.normals.kernel import (
     Y,
     Z,
 )
+from psvideo.solve.normals.near_kernel import at, of_light, place_lights
 from psvideo.solve.normals.nine_kernel import LITTLE, NINE, begin_nine, reweigh_nine
 from psvideo.solve.normals.odd_of_four import FOUR, TWO, drop_odd_of_four
 from psvideo.solve.normals.task import Floats, Result, Samples, Task
@@ -111,47 +110,40 @@ def working_memory(task: Task) -> Memory:
     )
 
 
-def _entry(parts: int) -> Callable[[Task, Result, Samples, Floats, Memory, Weights, int, int, int], None]:
-    """Return the compiled function. Numba's cache does not see other files change, but values that are captured."""
+@FUSED.kept
+def solve_rows(
+    task: Task, result: Result, error: Samples, misfit: Floats, memory: Memory, weights: Weights,
+    first: int, last: int, step: int,
+) -> None:  # fmt: skip
+    """Solve the rows from ``first`` up to ``last``; no two calls may share rows, and any number may run at once.
 
-    @compiled
-    def solve_rows(
-        task: Task, result: Result, error: Samples, misfit: Floats, memory: Memory, weights: Weights,
-        first: int, last: int, step: int,
-    ) -> None:  # fmt: skip
-        """Solve the rows from ``first`` up to ``last``; no two calls may share rows, and any number may run at once.
-
-        Only every ``step``-th row of the picture is solved. ``error`` (pixel,) or empty takes the predicted error in
-        degrees, ``misfit`` (pixel,) or empty the share of a pixel's light that its lights leave unexplained, 0 where
-        too few are usable to judge.
-        """
-        if parts < 0:
-            return
-        t = kernel.lent_task(task, memory.matrix, memory.per_strength)
-        out = Result(lent(result.normals), lent(result.albedo), lent(result.valid), lent(result.residual))
-        predicted, unexplained = lent(error), lent(misfit)
-        w, v, values = lent(memory.planes), lent(memory.more), lent(memory.values)
-        m, e = lent(memory.measurements), lent(memory.errors)
-        flat = lent(memory.flat)
-        for row in range(-(-first // step) * step, last, step):
-            for col in range(0, t.cols, STEP):
-                n = min(STEP, t.cols - col)
-                if t.mask.size and not t.mask[row, col : col + n].any():
-                    w[X : X + n], w[Y : Y + n], w[Z : Z + n] = ZERO, ZERO, ZERO
-                    v[DOUBT : DOUBT + n], v[UNEXPLAINED : UNEXPLAINED + n] = NO_ERROR, ZERO
-                else:
-                    _solve_block(t, weights, w, v, values, m, e, flat, row, col, n)
-                start = row * t.cols + col
-                kernel._store_block(t, out, w, values, m, start, n)
-                for i in range(min(n, len(predicted))):
-                    predicted[start + i] = encoded(v[DOUBT + i] if out.valid[start + i] else ZERO, predicted)
-                for i in range(min(n, len(unexplained))):
-                    unexplained[start + i] = v[UNEXPLAINED + i] if out.valid[start + i] else ZERO
-
-    return solve_rows
+    Only every ``step``-th row of the picture is solved. ``error`` (pixel,) or empty takes the predicted error in
+    degrees, ``misfit`` (pixel,) or empty the share of a pixel's light that its lights leave unexplained, 0 where
+    too few are usable to judge.
+    """
+    t = kernel.lent_task(task, memory.matrix, memory.per_strength)
+    out = Result(lent(result.normals), lent(result.albedo), lent(result.valid), lent(result.residual))
+    predicted, unexplained = lent(error), lent(misfit)
+    w, v, values = lent(memory.planes), lent(memory.more), lent(memory.values)
+    m, e = lent(memory.measurements), lent(memory.errors)
+    flat = lent(memory.flat)
+    for row in range(-(-first // step) * step, last, step):
+        for col in range(0, t.cols, STEP):
+            n = min(STEP, t.cols - col)
+            if t.mask.size and not t.mask[row, col : col + n].any():
+                w[X : X + n], w[Y : Y + n], w[Z : Z + n] = ZERO, ZERO, ZERO
+                v[DOUBT : DOUBT + n], v[UNEXPLAINED : UNEXPLAINED + n] = NO_ERROR, ZERO
+            else:
+                _solve_block(t, weights, w, v, values, m, e, flat, row, col, n)
+            start = row * t.cols + col
+            kernel._store_block(t, out, w, values, m, start, n)
+            for i in range(min(n, len(predicted))):
+                predicted[start + i] = encoded(v[DOUBT + i] if out.valid[start + i] else ZERO, predicted)
+            for i in range(min(n, len(unexplained))):
+                unexplained[start + i] = v[UNEXPLAINED + i] if out.valid[start + i] else ZERO
 
 
-@inlined
+@FUSED.inlined
 def _solve_block(
     task: Task,
     weights: Weights,
@@ -167,7 +159,7 @@ def _solve_block(
 ) -> None:
     """Leave g in the planes X, Y, Z, all 0 where the normal is not to be trusted, and the error in DOUBT."""
     start, channels = row * task.cols + col, task.tone.shape[1]
-    near_kernel.place_lights(task.matrix, task.per_strength, task.near, row, col, n)
+    place_lights(task.matrix, task.per_strength, task.near, row, col, n)
     if channels == 1:
         kernel._gather_one(task, values, start, n)
     else:
@@ -195,7 +187,7 @@ def _solve_block(
             w[X + i], w[Y + i], w[Z + i] = w[X + i] * kept, w[Y + i] * kept, w[Z + i] * kept
 
 
-@inlined
+@FUSED.inlined
 def _reweigh(
     task: Task, weights: Weights, tukey: bool, width: np.float32, last: bool, nine: bool,
     w: Floats, v: Floats, m: Floats, e: Floats, flat: Floats, n: int,
@@ -208,7 +200,7 @@ def _reweigh(
         _add_weighted(task, tukey, width, last, w, v, m, e, n)
 
 
-@inlined
+@FUSED.inlined
 def _hide_shadows(task: Task, w: Floats, m: Floats, n: int) -> None:
     """What is dark beside the pixel's own mean becomes MISSING; COUNT is what remains."""
     w[SUM : SUM + n], w[COUNT : COUNT + n] = ZERO, ZERO
@@ -228,7 +220,7 @@ def _hide_shadows(task: Task, w: Floats, m: Floats, n: int) -> None:
             w[COUNT + i] += ONE if lit else ZERO
 
 
-@inlined
+@FUSED.inlined
 def _choose_start(task: Task, weights: Weights, w: Floats, v: Floats, m: Floats, e: Floats, n: int) -> None:
     """Between which brightnesses (LOWER, UPPER) the start looks: all but the darkest and brightest few, four at least.
 
@@ -257,7 +249,7 @@ def _choose_start(task: Task, weights: Weights, w: Floats, v: Floats, m: Floats,
         v[UPPER + i] = v[TO + i]
 
 
-@inlined
+@FUSED.inlined
 def _add_start(task: Task, w: Floats, v: Floats, m: Floats, e: Floats, n: int) -> None:
     """The normal equations of the start's measurements, with a little of the others."""
     for light in range(len(e)):
@@ -269,7 +261,7 @@ def _add_start(task: Task, w: Floats, v: Floats, m: Floats, e: Floats, n: int) -
     add_equations(task.matrix, w, m, e, n)
 
 
-@inlined
+@FUSED.inlined
 def _find_scale(task: Task, weights: Weights, w: Floats, v: Floats, m: Floats, e: Floats, n: int) -> None:
     """Residuals without their sign, and in SCALE their median as a standard deviation, at least a camera's noise.
 
@@ -294,7 +286,7 @@ def _find_scale(task: Task, weights: Weights, w: Floats, v: Floats, m: Floats, e
         v[SCALE + i] = max(SIGMA_OF_MEDIAN * HALF * (v[FROM + i] + v[TO + i]), least)
 
 
-@inlined
+@FUSED.inlined
 def _add_weighted(
     task: Task, tukey: bool, width: np.float32, last: bool, w: Floats, v: Floats, m: Floats, e: Floats, n: int
 ) -> None:
@@ -314,7 +306,7 @@ def _add_weighted(
     add_equations(task.matrix, w, m, e, n)
 
 
-@apart
+@FUSED.called
 def _predict_error(weights: Weights, checked: int, w: Floats, v: Floats, n: int) -> None:
     """The normal's standard error in degrees into DOUBT, and g = 0 where it is too large to be trusted.
 
@@ -344,9 +336,3 @@ def _predict_error(weights: Weights, checked: int, w: Floats, v: Floats, n: int)
         w[X + i] = x if trusted else ZERO
         w[Y + i] = y if trusted else ZERO
         w[Z + i] = z if trusted else ZERO
-
-
-_PARTS = b"".join(
-    Path(str(module.__file__)).read_bytes() for module in (equations, kernel, near_kernel, nine_kernel, odd_of_four)
-)
-solve_rows = _entry(zlib.crc32(_PARTS))

@@ -10,10 +10,10 @@ explain (Kaufman 1975), which gives the normal equations of a Gauss-Newton step 
 
 from typing import NamedTuple
 
-import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.compiled import EXACT
 from psvideo.model.camera import FloatArray
 
 IntArray = NDArray[np.int64]
@@ -55,8 +55,8 @@ class Flashes(NamedTuple):
     fall_s: float
 
 
-@nb.njit(cache=True, nogil=True)
-def given_off(since_s, duration_s, rise_s, fall_s):  # type: ignore[no-untyped-def]
+@EXACT.kept
+def given_off(since_s: float, duration_s: float, rise_s: float, fall_s: float) -> tuple[float, float]:
     """Return the share of its light that a flash has given off, and the rate at which it does so now."""
     if since_s <= 0.0:
         return 0.0, 0.0
@@ -76,14 +76,14 @@ def given_off(since_s, duration_s, rise_s, fall_s):  # type: ignore[no-untyped-d
     return 1.0 - fall_s * left / whole, left / whole
 
 
-@nb.njit(cache=True, nogil=True)
-def width(rows, flashes):  # type: ignore[no-untyped-def]
+@EXACT.kept
+def width(rows: Rows, flashes: Flashes) -> int:
     """Return how many numbers a row has in a window: brightnesses, and flicker's two phases."""
     return flashes.unknowns + 2 * len(rows.beat_hz)
 
 
-@nb.njit(cache=True, nogil=True)
-def see(rows, flashes, frame, row, k, design):  # type: ignore[no-untyped-def]
+@EXACT.kept
+def see(rows: Rows, flashes: Flashes, frame: int, row: int, k: int, design: FloatArray) -> int:
     """Fill ``design`` (unknown,) with what a row saw in a frame; return the first flash that may matter to the next."""
     design[:] = 0.0
     design[0] = 1.0
@@ -111,8 +111,10 @@ def see(rows, flashes, frame, row, k, design):  # type: ignore[no-untyped-def]
     return k
 
 
-@nb.njit(cache=True, nogil=True)
-def _slopes(rows, flashes, frame, row, k, brightness, tails, signals):  # type: ignore[no-untyped-def]
+@EXACT.kept
+def _slopes(
+    rows: Rows, flashes: Flashes, frame: int, row: int, k: int, brightness: FloatArray, tails: bool, signals: FloatArray
+) -> float:
     """Fill ``signals`` (SIGNALS,) with how the model's value changes with each unknown time."""
     open_s = rows.frame_start_s[frame] + rows.row_place[row] * rows.row_time_s
     close_s = open_s + rows.exposure_s
@@ -146,8 +148,8 @@ def _slopes(rows, flashes, frame, row, k, brightness, tails, signals):  # type: 
     return opening - closing
 
 
-@nb.njit(cache=True, nogil=True)
-def factor(matrix, size):  # type: ignore[no-untyped-def]
+@EXACT.kept
+def factor(matrix: FloatArray, size: int) -> None:
     """Replace the lower half of a symmetric positive definite matrix by its Cholesky factor."""
     for i in range(size):
         matrix[i, i] += RIDGE * matrix[i, i] + 1e-30
@@ -158,8 +160,8 @@ def factor(matrix, size):  # type: ignore[no-untyped-def]
             matrix[i, j] = np.sqrt(max(rest, 1e-30)) if i == j else rest / matrix[j, j]
 
 
-@nb.njit(cache=True, nogil=True)
-def solve_factored(matrix, right, size):  # type: ignore[no-untyped-def]
+@EXACT.kept
+def solve_factored(matrix: FloatArray, right: FloatArray, size: int) -> None:
     """Solve with a Cholesky factor; the answer stands in ``right``."""
     for i in range(size):
         for m in range(i):
@@ -171,8 +173,16 @@ def solve_factored(matrix, right, size):  # type: ignore[no-untyped-def]
         right[i] /= matrix[i, i]
 
 
-@nb.njit(cache=True, nogil=True)
-def _fit_window(value, weight, design, first, last, normal, right):  # type: ignore[no-untyped-def]
+@EXACT.kept
+def _fit_window(
+    value: FloatArray,
+    weight: FloatArray,
+    design: FloatArray,
+    first: int,
+    last: int,
+    normal: FloatArray,
+    right: FloatArray,
+) -> None:
     """Fit one row's brightnesses over some frames: ``normal`` ends as a Cholesky factor, ``right`` as the answer."""
     size = design.shape[1]
     normal[:] = 0.0
@@ -188,8 +198,8 @@ def _fit_window(value, weight, design, first, last, normal, right):  # type: ign
     solve_factored(normal, right, size)
 
 
-@nb.njit(cache=True, nogil=True)
-def row_rest(rows, flashes, weight, row, design, rest):  # type: ignore[no-untyped-def]
+@EXACT.kept
+def row_rest(rows: Rows, flashes: Flashes, weight: FloatArray, row: int, design: FloatArray, rest: FloatArray) -> None:
     """Fill ``rest`` (frame,) with what one row's own brightnesses, fitted window by window, leave unexplained."""
     size = design.shape[1]
     normal, right = np.empty((size, size)), np.empty(size)
@@ -206,16 +216,16 @@ def row_rest(rows, flashes, weight, row, design, rest):  # type: ignore[no-untyp
             rest[n] = rows.value[n, row] - explained
 
 
-@nb.njit(cache=True, nogil=True)
-def rests(rows, flashes, weight, first, last, rest):  # type: ignore[no-untyped-def]
+@EXACT.kept
+def rests(rows: Rows, flashes: Flashes, weight: FloatArray, first: int, last: int, rest: FloatArray) -> None:
     """Fill the columns ``first`` to ``last`` of ``rest`` (frame, row)."""
     design = np.empty((len(rows.value), width(rows, flashes)))
     for row in range(first, last):
         row_rest(rows, flashes, weight, row, design, rest[:, row])
 
 
-@nb.njit(cache=True, nogil=True)
-def leverage(normal, design, weight, size, solved):  # type: ignore[no-untyped-def]
+@EXACT.kept
+def leverage(normal: FloatArray, design: FloatArray, weight: float, size: int, solved: FloatArray) -> float:
     """Return which share of a sample's own error the brightnesses that are fitted to it take up."""
     taken = 0.0
     for i in range(size):
@@ -227,8 +237,20 @@ def leverage(normal, design, weight, size, solved):  # type: ignore[no-untyped-d
     return min(weight * taken, MOST_LEVERAGE)
 
 
-@nb.njit(cache=True, nogil=True)
-def equations(rows, flashes, weight, steepness, tails, honest, first, last, rest, hessian, score):  # type: ignore[no-untyped-def]
+@EXACT.kept
+def equations(
+    rows: Rows,
+    flashes: Flashes,
+    weight: FloatArray,
+    steepness: FloatArray,
+    tails: bool,
+    honest: bool,
+    first: int,
+    last: int,
+    rest: FloatArray,
+    hessian: FloatArray,
+    score: FloatArray,
+) -> None:
     """Fill ``rest``; add the rows' normal matrices to ``hessian`` (window, SIGNALS, SIGNALS), their ``weight * signal *
     rest`` to ``score`` (frame, SIGNALS), which keeps the frames apart. The normal matrices hold ``steepness`` (frame,
     row): how fast a residual's pull grows with it, which is its weight but in robust fits. Where ``honest``, residuals
@@ -280,8 +302,18 @@ def equations(rows, flashes, weight, steepness, tails, honest, first, last, rest
                         hessian[window, p, q] += steepness[n, row] * signals[n, p] * signals[n, q]
 
 
-@nb.njit(cache=True, nogil=True)
-def losses_by_row(rows, flashes, phase_s, rate, spread, steepness, first, last, found):  # type: ignore[no-untyped-def]
+@EXACT.kept
+def losses_by_row(
+    rows: Rows,
+    flashes: Flashes,
+    phase_s: FloatArray,
+    rate: FloatArray,
+    spread: FloatArray,
+    steepness: float,
+    first: int,
+    last: int,
+    found: FloatArray,
+) -> None:
     """Fill ``found`` (clock, row) with the robust loss of every clock in every row."""
     frames, height = rows.value.shape
     design = np.empty((frames, width(rows, flashes)))
@@ -305,8 +337,8 @@ def losses_by_row(rows, flashes, phase_s, rate, spread, steepness, first, last, 
             found[clock, row] = total
 
 
-@nb.njit(cache=True, nogil=True)
-def brightnesses(rows, flashes, weight, first, last, found):  # type: ignore[no-untyped-def]
+@EXACT.kept
+def brightnesses(rows: Rows, flashes: Flashes, weight: FloatArray, first: int, last: int, found: FloatArray) -> None:
     """Fill ``found`` (row, unknown) with the brightnesses fitted over all frames as one window."""
     size = flashes.unknowns + 2 * len(rows.beat_hz)
     design = np.empty((len(rows.value), size))
@@ -318,8 +350,8 @@ def brightnesses(rows, flashes, weight, first, last, found):  # type: ignore[no-
         _fit_window(rows.value[:, row], weight[:, row], design, 0, len(rows.value), normal, found[row])
 
 
-@nb.njit(cache=True, nogil=True)
-def predictions(rows, flashes, brightness, first, last, found):  # type: ignore[no-untyped-def]
+@EXACT.kept
+def predictions(rows: Rows, flashes: Flashes, brightness: FloatArray, first: int, last: int, found: FloatArray) -> None:
     """Fill ``found`` (frame, row) with what known brightnesses (row, unknown) give."""
     size = flashes.unknowns + 2 * len(rows.beat_hz)
     design = np.empty(size)
@@ -333,8 +365,10 @@ def predictions(rows, flashes, brightness, first, last, found):  # type: ignore[
             found[n, row] = total
 
 
-@nb.njit(cache=True, nogil=True)
-def edges(rows, flashes, weight, first, last, pull, stiff):  # type: ignore[no-untyped-def]
+@EXACT.kept
+def edges(
+    rows: Rows, flashes: Flashes, weight: FloatArray, first: int, last: int, pull: FloatArray, stiff: FloatArray
+) -> None:
     """Add to ``pull`` and ``stiff`` (flash, 2) how strongly rows that open (0) or close (1) during a flash shift it."""
     frames = len(rows.value)
     design = np.empty((frames, width(rows, flashes)))

@@ -1,0 +1,54 @@
+"""Memory as compiled loops see it: arrays elsewhere, half floats as they are stored, arrays lent to threads."""
+
+from typing import Any
+
+import llvmlite.ir
+from numba import types
+from numba.extending import intrinsic
+from numba.np.numpy_support import carray
+
+from psvideo.compute.compiled import FUSED
+
+_HALF_MAX = 65504.0
+_ir: Any = llvmlite.ir
+
+
+def _pointer(typing_context: Any, address: Any, like: Any) -> Any:
+    """The address (an integer) as a pointer to elements of the array ``like``."""
+    target: Any = types.CPointer(like.dtype)  # type: ignore[no-untyped-call]
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.inttoptr(arguments[0], context.get_value_type(target))
+
+    return target(types.intp, like), generate
+
+
+def _encoded(typing_context: Any, value: Any, like: Any) -> Any:
+    """A float32 as the array ``like`` stores it: as it is, or rounded to a half float's 16 bits where it is uint16.
+
+    Values beyond the largest half float become that one. A vector takes one instruction, where numpy takes a pass.
+    """
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        if like.dtype != types.uint16:
+            return arguments[0]
+        largest = _ir.Constant(_ir.FloatType(), _HALF_MAX)
+        fits = builder.fcmp_ordered("<", arguments[0], largest)
+        return builder.bitcast(
+            builder.fptrunc(builder.select(fits, arguments[0], largest), _ir.HalfType()), _ir.IntType(16)
+        )
+
+    return like.dtype(types.float32, like), generate
+
+
+pointer: Any = intrinsic(_pointer)
+encoded: Any = intrinsic(_encoded)
+
+
+@FUSED.inlined
+def lent(array: Any) -> Any:
+    """The same (C-contiguous) array without its reference count, which every slice and call would count up and down.
+
+    Threads that do so with one array wait for each other. The caller's own reference keeps the array alive.
+    """
+    return carray(pointer(array.ctypes.data, array), array.shape)

@@ -1,0 +1,178 @@
+"""Compiled code is kept for the next run where that is possible, used only while its sources are the same, and runs
+where nothing can be kept."""
+
+import importlib
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numba.core.caching
+import numpy as np
+import pytest
+
+from psvideo.compute.compiled import EXACT, FUSED, REORDERED, sources_digest
+from psvideo.solve.normals import kernel, near_kernel, robust_kernel
+from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.woodham1980 import solve
+
+SOURCE = Path(kernel.__file__).parents[2]
+SCENE = Path(__file__).resolve().parents[1] / "data_synth" / "sphere.toml"
+
+
+def twice(value: float) -> float:
+    return 2 * value
+
+
+def test_without_a_folder_to_keep_it_in_code_is_compiled_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(numba.core.caching.CacheImpl, "_locator_classes", [])
+    with pytest.raises(RuntimeError, match="no locator"):
+        numba.njit(cache=True)(twice)
+    for arithmetic in (EXACT, FUSED, REORDERED):
+        assert arithmetic.kept(twice)(21.0) == 42.0
+
+
+def full(*_: Any) -> None:
+    raise OSError(28, "No space left on device")
+
+
+def test_a_full_disk_under_the_cache_leaves_compiled_code_usable(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(numba.core.caching.IndexDataCacheFile, "save", full)
+    assert FUSED.kept(lambda value: 3 * value)(14) == 42
+
+
+def test_a_cache_that_cannot_be_read_is_no_cache(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(numba.core.caching.IndexDataCacheFile, "load", full)
+    assert FUSED.kept(lambda value: 4 * value)(10) == 40
+
+
+def test_the_arithmetic_is_as_it_says() -> None:
+    def over(a: float, b: float) -> float:
+        return a / b
+
+    with pytest.raises(ZeroDivisionError):
+        EXACT.kept(over)(1.0, 0.0)
+    assert FUSED.kept(over)(1.0, 0.0) == np.inf
+    tiny = np.float64(1e-30)
+    assert FUSED.kept(lambda a, b: (a + b) - a)(1.0, tiny) == 0.0, "sums keep their order"
+
+
+def test_kept_code_depends_on_every_module_that_is_compiled_into_it() -> None:
+    digests = {sources_digest(module) for module in (kernel, near_kernel, robust_kernel)}
+    assert len(digests) == 3
+    for name in ("kernel", "near_kernel", "equations", "odd_of_four"):
+        assert hasattr(importlib.import_module(f"psvideo.solve.normals.{name}"), "FUSED")
+
+
+PARTS = {
+    "__init__.py": "",
+    "numbers_.py": "FACTOR = 2\n",
+    "inner.py": (
+        "from house.numbers_ import FACTOR\n"
+        "from psvideo.compute.compiled import FUSED\n"
+        "@FUSED.inlined\n"
+        "def part(x):\n    return FACTOR * x + 1\n"
+    ),
+    "between.py": (
+        "from house import inner\n"
+        "from psvideo.compute.compiled import FUSED\n"
+        "@FUSED.called\n"
+        "def passed(x):\n    return inner.part(x)\n"
+    ),
+    "outer.py": (
+        "from house.between import passed\n"
+        "from psvideo.compute.compiled import FUSED\n"
+        "@FUSED.kept\n"
+        "def whole(x):\n    return passed(x)\n"
+    ),
+    "run.py": "from house.outer import whole\nprint(whole(10), sum(whole.stats.cache_hits.values()))\n",
+}
+
+
+def test_a_change_in_a_module_that_is_compiled_in_makes_kept_code_stale(tmp_path: Path) -> None:
+    house = tmp_path / "house"
+    house.mkdir()
+    for name, text in PARTS.items():
+        (house / name).write_text(text)
+    paths = os.pathsep.join([str(tmp_path), str(SOURCE.parent)])
+    environment = os.environ | {"PYTHONPATH": paths, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+
+    def run() -> tuple[int, int]:
+        done = subprocess.run(
+            [sys.executable, "-B", "-m", "house.run"], env=environment, capture_output=True, text=True, check=True
+        )
+        value, hits = done.stdout.split()
+        return int(value), int(hits)
+
+    assert run() == (21, 0)
+    assert run() == (21, 1), "kept"
+    (house / "inner.py").write_text(PARTS["inner.py"].replace("+ 1", "+ 3"))
+    assert run() == (23, 0), "another line in a module that is inlined two modules away"
+    (house / "numbers_.py").write_text("FACTOR = 5\n")
+    assert run() == (53, 0), "another number that it imports"
+    assert run() == (53, 1)
+
+
+@pytest.fixture
+def copy(tmp_path: Path) -> Path:
+    """A copy of the package beside which nothing can be kept: where numba would make a folder lies a file."""
+    package = tmp_path / "there" / "psvideo"
+    shutil.copytree(SOURCE, package, ignore=shutil.ignore_patterns("__pycache__"))
+    for folder in [package, *(path for path in package.rglob("*") if path.is_dir())]:
+        (folder / "__pycache__").write_text("no folder")
+    return package
+
+
+NO_FOLDER = """
+import importlib, pkgutil, sys
+import numpy as np
+import psvideo
+for module in pkgutil.walk_packages(psvideo.__path__, "psvideo."):
+    if module.name not in ("psvideo.cli.app", "psvideo.__main__"):
+        importlib.import_module(module.name)
+from psvideo.cli.app import main
+from psvideo.sync.rowfit import kernel
+assert kernel.width._cache.cache_path is None, "nothing is kept"
+scene, clip, out = sys.argv[1:]
+assert main(["synth", scene, "-o", clip, "-q"]) == 0
+assert main(["normals", clip, "--rig", clip + "/rig.toml", "-o", out, "-q"]) == 0
+"""
+
+
+def test_all_of_it_works_where_no_folder_can_be_written_for_compiled_code(copy: Path, tmp_path: Path) -> None:
+    nowhere = dict.fromkeys(("HOME", "NUMBA_CACHE_DIR", "XDG_CACHE_HOME", "LOCALAPPDATA"), "/dev/null/nowhere")
+    environment = os.environ | nowhere | {"PYTHONPATH": str(copy.parent), "PYTHONDONTWRITEBYTECODE": "1"}
+    command = [sys.executable, "-c", NO_FOLDER, str(SCENE), str(tmp_path / "clip"), str(tmp_path / "out")]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert list((tmp_path / "out" / "normals").iterdir())
+
+
+COMPILE = """
+import numpy as np
+from psvideo.solve.depth.checkerboard import empty_board, settle
+from psvideo.sync.rowfit.kernel import factor
+factor(np.eye(3), 3)
+boards = [empty_board(8, 8) for _ in range(3)]
+settle(np.zeros((2, *boards[0].shape), np.float32), *boards, np.zeros(9, np.float32), 1)
+"""
+
+
+def test_two_processes_compile_into_one_folder_at_a_time(tmp_path: Path) -> None:
+    environment = os.environ | {"PYTHONPATH": str(SOURCE.parent), "NUMBA_CACHE_DIR": str(tmp_path)}
+    command = [sys.executable, "-c", COMPILE]
+    at_once = [subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True) for _ in range(2)]
+    said = [process.communicate()[1] for process in at_once]
+    assert [process.returncode for process in at_once] == [0, 0], said
+    assert list(tmp_path.rglob("*.nbc")), "kept"
+    subprocess.run(command, env=environment, check=True)
+
+
+def test_a_full_disk_under_the_cache_does_not_stop_a_solution(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(numba.core.caching.IndexDataCacheFile, "save", full)
+    directions = np.array([[0.6, 0.0, 0.8], [-0.6, 0.0, 0.8], [0.0, 0.6, 0.8]])
+    lit = Illumination(directions=directions, intensities=np.ones((3, 1)))
+    surface = solve([np.full((2, 2), 0.5, np.float32)] * 3, lit)
+    assert surface.valid.all()

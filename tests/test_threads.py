@@ -1,0 +1,196 @@
+"""The same command gives the same bytes, whatever the number of threads, the load, and whether it was stopped."""
+
+import hashlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from psvideo.cli.app import main
+from psvideo.compute.threads import THREADS, in_order, over_ranges, thread_count, writing
+from psvideo.errors import UsageError
+from psvideo.model.plan import Plan
+from psvideo.sync.rowfit.beat import Beat, FoundClock
+from psvideo.sync.rowfit.profiles import WORTH_A_THREAD, Profiles, equations
+
+COUNTS = (1, 2, 3, 8)
+TALL = """
+schema = "psvideo-scene/1"
+name = "tall"
+frames = 44
+seed = 5
+[camera]
+width_px = 64
+height_px = 1080
+fps = 100
+readout_s = 0.01
+width_m = 0.2
+[strobe]
+flash_s = 0.001
+clock_offset_ppm = 40.0
+[[light]]
+name = "key"
+direction = [0.5, 0.4, 0.8]
+[[light]]
+name = "left"
+direction = [-0.6, 0.2, 0.8]
+[[light]]
+name = "top"
+direction = [0.1, -0.5, 0.8]
+[[object]]
+mesh = "sphere"
+albedo = 0.8
+"""
+"""Enough samples for several parts of the fit and several bands of the solution, in pictures that cost little."""
+BUSY = "while True: pass"
+PER_RUN = ("report.json", "report.html")
+"""They hold the command, and with it the output's name and --resume."""
+
+
+def test_ranges_follow_the_work_and_results_their_order() -> None:
+    def late_first(first: int, last: int) -> tuple[int, int]:
+        time.sleep(0.02 if first == 0 else 0.0)
+        return first, last
+
+    found = [over_ranges(late_first, 10, each=3, threads=threads) for threads in COUNTS]
+    assert found == [[(0, 3), (3, 6), (6, 9), (9, 10)]] * len(COUNTS)
+    assert over_ranges(late_first, 0, each=3) == []
+    assert over_ranges(late_first, 2, each=0, threads=2) == [(0, 1), (1, 2)]
+
+
+def test_jobs_give_their_results_in_order_and_their_errors() -> None:
+    def job(number: int) -> Callable[[], int]:
+        def run() -> int:
+            time.sleep(0.01 * (number % 3))
+            return 1 // (5 - number)
+
+        return run
+
+    given = in_order((job(number) for number in range(9)), ahead=4, threads=3, name="test")
+    assert [next(given) for _ in range(5)] == [0, 0, 0, 0, 1]
+    with pytest.raises(ZeroDivisionError):
+        next(given)
+    with pytest.raises(ZeroDivisionError), writing(most_waiting=1) as write:
+        write(lambda: print(1 // 0))
+
+
+def test_the_number_of_threads_is_set_in_one_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(THREADS, raising=False)
+    assert thread_count() == (os.cpu_count() or 1)
+    monkeypatch.setenv(THREADS, "3")
+    assert thread_count() == 3
+    for wrong in ("0", "-1", "two", "1.5", "²"):
+        monkeypatch.setenv(THREADS, wrong)
+        with pytest.raises(UsageError, match=r"PSVIDEO_THREADS=.* expected a whole number"):
+            thread_count()
+
+
+def test_the_fit_adds_its_parts_in_order(make_plan: Callable[..., Plan], monkeypatch: pytest.MonkeyPatch) -> None:
+    plan, rng = make_plan(height_px=1080), np.random.default_rng(0)
+    frames = 4 * WORTH_A_THREAD // 1080
+    rows = Profiles(
+        value=rng.random((frames, 1080)),
+        index=np.arange(frames),
+        period_s=plan.camera.frame_period_s,
+        place=np.arange(1080.0),
+        window_start=np.zeros(1, np.int64),
+    )
+    beat = Beat(
+        clock=FoundClock(phase_s=0.001, offset_ppm=0.0),
+        row_time_s=plan.camera.readout_s / 1080,
+        exposure_s=plan.camera.exposure_s,
+    )
+    found = []
+    for threads in (*COUNTS, *COUNTS):
+        monkeypatch.setenv(THREADS, str(threads))
+        found.append([part.tobytes() for part in equations(plan, rows, beat, np.ones_like(rows.value), tails=False)])
+    assert all(before == after for before, after in pairwise(found))
+
+
+@pytest.fixture(scope="module")
+def clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("shoot")
+    (folder / "tall.toml").write_text(TALL)
+    assert main(["synth", str(folder / "tall.toml"), "-o", str(folder / "clip"), "-q"]) == 0
+    return folder / "clip"
+
+
+def begun(*arguments: object, threads: int) -> "subprocess.Popen[str]":
+    """Begin a command in a process of its own, with so many threads for numpy's and OpenCV's libraries too."""
+    count = dict.fromkeys((THREADS, "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "OPENCV_FOR_THREADS_NUM"), str(threads))
+    command = [sys.executable, "-m", "psvideo.cli.app", *map(str, arguments), "-q"]
+    return subprocess.Popen(command, env=os.environ | count, stderr=subprocess.PIPE, text=True)
+
+
+def ended(process: "subprocess.Popen[str]") -> None:
+    _, said = process.communicate(timeout=600)
+    assert process.returncode == 0, said
+
+
+def digest(out: Path) -> dict[str, str]:
+    """Return a checksum of every file of a run but what depends on its name."""
+    files = [path for path in sorted(out.rglob("*")) if path.is_file() and path.name not in PER_RUN]
+    assert files or out.is_file()
+    return {str(path.relative_to(out)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files or [out]}
+
+
+@contextmanager
+def load() -> Iterator[None]:
+    """Keep the machine busy with two endless loops."""
+    loops = [subprocess.Popen([sys.executable, "-c", BUSY]) for _ in range(2)]
+    try:
+        yield
+    finally:
+        for one in loops:
+            one.kill()
+            one.wait()
+
+
+COMMANDS: dict[str, tuple[str, ...]] = {
+    "sync": ("sync",),
+    "split": ("split", "--flashes"),
+    "normals": ("normals", "--rig", "{clip}/rig.toml", "--align", "flow", "--aov", "residual", "--solver", "robust"),
+    "depth": ("normals", "--rig", "{clip}/rig.toml", "--aov", "depth", "--mesh", "ply"),
+}
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_any_number_of_threads_gives_the_same_bytes_also_under_load(name: str, clip: Path, tmp_path: Path) -> None:
+    command, *options = (word.format(clip=clip) for word in COMMANDS[name])
+    digests = []
+    for count in COUNTS:
+        out = tmp_path / str(count) / "out"
+        out.parent.mkdir()
+        if count == 3:
+            with load():
+                ended(begun(command, clip, *options, "-o", out, threads=count))
+        else:
+            ended(begun(command, clip, *options, "-o", out, threads=count))
+        digests.append(digest(out))
+    assert all(before == after for before, after in pairwise(digests))
+
+
+@pytest.mark.parametrize("name", ["split", "normals"])
+def test_a_run_that_was_killed_goes_on_to_the_same_bytes(name: str, clip: Path, tmp_path: Path) -> None:
+    command, *options = (word.format(clip=clip) for word in COMMANDS[name])
+    whole, out = tmp_path / "whole", tmp_path / "out"
+    ended(begun(command, clip, *options, "-o", whole, threads=1))
+    process = begun(command, clip, *options, "-o", out, threads=2)
+    partial = tmp_path / ".out.partial"
+    while process.poll() is None and not list(partial.rglob("[!.]*.exr")):
+        time.sleep(0.002)
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
+    assert partial.is_dir()
+    assert not out.exists(), "killed in the middle"
+    (partial / ".left.exr.1.partial").write_bytes(b"half a file")
+    ended(begun(command, clip, *options, "-o", out, "--resume", threads=8))
+    assert digest(out) == digest(whole)
