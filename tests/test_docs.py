@@ -1,5 +1,6 @@
 """The pages: links that lead somewhere, pictures that their scripts still make, commands as they are, one site."""
 
+import ast
 import re
 import subprocess
 import sys
@@ -78,6 +79,18 @@ def test_contributing_has_a_line_for_every_room() -> None:
     lines = re.findall(r"^\| `(\w+)` \|", (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"), flags=re.MULTILINE)
     assert set(lines) == rooms
     assert len(lines) == len(rooms)
+
+
+def test_contributing_names_the_rooms_in_the_order_of_their_imports() -> None:
+    tree = ast.parse((ROOT / "tests" / "test_layers.py").read_text(encoding="utf-8"))
+    assigned = next(
+        node.value
+        for node in tree.body
+        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name) and node.targets[0].id == "FLOORS"
+    )
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    order = text.partition("from bottom to top: ")[2].partition(".")[0]
+    assert [set(re.findall(r"`(\w+)`", floor)) for floor in order.split(";")] == ast.literal_eval(assigned)
 
 
 def test_the_newest_version_of_the_changelog_is_the_package_s() -> None:
