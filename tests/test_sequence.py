@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from psvideo.model.plan import Plan, PlannedFlash, mixing_matrix, reference_duration_s
 from psvideo.model.shutter import frames_touched, row_weights
 from psvideo.model.timing import Flash, Timing
-from psvideo.plates import ambient
-from psvideo.plates.sequence import Round, rounds
+from psvideo.plates import ambient, sequence
+from psvideo.plates.sequence import Round, coming, light_plates
 from psvideo.plates.split import split
 from psvideo.synth import Exposure, Noise, TrueClock, expose
 from psvideo.synth.camera.noise import NOISELESS
@@ -92,7 +92,9 @@ def gathered(plan: Plan, shot: Exposure, timing: Timing) -> list[Round]:
 
     held = list(split(frames(), plan.camera, timing))
     plates = ambient.subtract(held, darks=[plate for plate in held if not plate.flash.lights])
-    return list(rounds(plates, plan, timing.flashes))
+    expected = coming(plan, timing.flashes)
+    single = light_plates(plates, plan, timing.flashes)
+    return list(sequence.gathered(single, plan.lights, expected=expected.__getitem__))
 
 
 @settings(

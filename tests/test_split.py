@@ -15,7 +15,8 @@ from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.model.row_profiles import collect
 from psvideo.model.shutter import frames_touched, row_weights
 from psvideo.model.timing import Flash, Timing
-from psvideo.plates import ambient, hudon2015, sequence
+from psvideo.plates import ambient, hudon2015
+from psvideo.plates.sequence import Round, coming, gathered, light_plates
 from psvideo.plates.split import Plate, split
 from psvideo.sync.find import find_timing
 from psvideo.synth import Exposure, Noise, TrueClock, expose
@@ -36,6 +37,12 @@ def frames_of(shot: Exposure) -> Iterator[MemoryFrame]:
 def without_ambient(plates: Iterable[Plate]) -> Iterator[Plate]:
     held = list(plates)
     return ambient.subtract(held, darks=[plate for plate in held if not plate.flash.lights])
+
+
+def rounds_of(plates: Iterable[Plate], plan: Plan, timing: Timing) -> list[Round]:
+    """All rounds of the plates of single flashes, as far as they are complete."""
+    expected = coming(plan, timing.flashes)
+    return list(gathered(light_plates(plates, plan, timing.flashes), plan.lights, expected=expected.__getitem__))
 
 
 def plates_for(plan: Plan, *, colour: bool = False, seed: int = 3) -> dict[int, np.ndarray]:
@@ -282,7 +289,7 @@ def test_patterns_of_several_lights_are_taken_apart(make_plan: PlanMaker) -> Non
     }
     truth = {slot: sum(lights[name] for name in plan.flashes[slot].lights) for slot in plan.lit_slots}
     shot, timing = shoot(plan, truth)  # type: ignore[arg-type]
-    whole = list(sequence.rounds(split(frames_of(shot), plan.camera, timing), plan, timing.flashes))
+    whole = rounds_of(split(frames_of(shot), plan.camera, timing), plan, timing)
     assert len(whole) >= 5
     for one in whole[1:-1]:
         assert one.lights == ("a", "b", "c")
@@ -296,7 +303,7 @@ def test_rounds_are_numbered_from_the_first_with_a_complete_flash_and_hold_each_
     plan = make_plan(dark_every=3)
     truth = plates_for(plan)
     shot, timing = shoot(plan, truth, frames=60)
-    gathered = list(sequence.rounds(split(frames_of(shot), plan.camera, timing), plan, timing.flashes))
+    gathered = rounds_of(split(frames_of(shot), plan.camera, timing), plan, timing)
     numbers = [one.number for one in gathered]
     assert numbers == list(range(1001, 1001 + len(numbers)))
     assert all(one.lights == plan.lights for one in gathered[1:-1])
@@ -309,7 +316,7 @@ def test_a_light_flashed_at_half_power_is_delivered_at_full_power(make_plan: Pla
     plan = lit(make_plan(), {"a": 0.5}, {"b": 1.0}, {"c": 1.0}, {})
     truth = plates_for(plan)
     shot, timing = shoot(plan, truth)
-    gathered = list(sequence.rounds(split(frames_of(shot), plan.camera, timing), plan, timing.flashes))
+    gathered = rounds_of(split(frames_of(shot), plan.camera, timing), plan, timing)
     np.testing.assert_allclose(gathered[2].plates[0].image, 2 * truth[0], atol=1e-4)
 
 
@@ -328,7 +335,7 @@ def test_hdr_flashes_of_one_light_are_merged_without_what_is_clipped(make_plan: 
     other = np.full(shape, 0.3, np.float32)
     shot, timing = shoot(plan, {0: scene, 1: scene / 8, 2: other, 3: other})
     plates = without_ambient(split(frames_of(shot), plan.camera, timing))
-    one = list(sequence.rounds(plates, plan, timing.flashes))[2]
+    one = rounds_of(plates, plan, timing)[2]
     merged = one.plates[0]
     assert merged.light == "a"
     assert merged.saturation == pytest.approx(8.0)
@@ -343,7 +350,7 @@ def test_merging_is_as_good_as_the_best_of_the_exposures(make_plan: PlanMaker) -
     other = np.full(shape, 0.3, np.float32)
     noise = Noise(full_well_e=20_000, read_e=0)
     shot, timing = shoot(plan, {0: scene, 1: scene / 8, 2: other, 3: other}, noise=noise)
-    rounds = list(sequence.rounds(split(frames_of(shot), plan.camera, timing), plan, timing.flashes))[1:-1]
+    rounds = rounds_of(split(frames_of(shot), plan.camera, timing), plan, timing)[1:-1]
     error = np.std([one.plates[0].image - scene for one in rounds])
     assert error < 1.02 * np.sqrt(0.6 / 20_000 / (1 + 1 / 8))
 
@@ -354,5 +361,5 @@ def test_what_is_clipped_in_every_exposure_is_held_at_the_weakest_ones_limit(mak
     bright, other = np.full(shape, 20.0, np.float32), np.full(shape, 0.3, np.float32)
     shot, timing = shoot(plan, {0: bright, 1: bright / 8, 2: other, 3: other})
     plates = without_ambient(split(frames_of(shot), plan.camera, timing))
-    one = list(sequence.rounds(plates, plan, timing.flashes))[2]
+    one = rounds_of(plates, plan, timing)[2]
     assert (one.plates[0].image[5:-5] >= one.plates[0].saturation).mean() > 0.8

@@ -15,7 +15,7 @@ from psvideo.formats.timing_json import format_timing, read_timing
 from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.model.row_profiles import collect_with_doubt
 from psvideo.model.timing import DroppedFrames, Timing, places_in_time
-from psvideo.plates.gather import clip_rounds
+from psvideo.plates.gather import gather
 from psvideo.sync.find import find_timing
 from psvideo.sync.open_take import open_take
 from psvideo.sync.rowfit.beat import FoundClock
@@ -432,6 +432,6 @@ def test_plates_of_a_clip_with_frames_missing_unseen_are_those_of_the_whole_clip
     take = open_take(tmp_path)
     timing = find_take_timing(take)
     assert timing.dropped_frames == (DroppedFrames(after=20, count=1),)
-    last = list(clip_rounds(take, timing))[-1]
+    last = list(gather(take, timing))[-1]
     for plate, slot in zip(last.plates, plan.lit_slots, strict=True):
         np.testing.assert_allclose(plate.image, plates(plan)[slot], atol=5e-3)

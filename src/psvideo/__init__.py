@@ -21,7 +21,7 @@ if TYPE_CHECKING:  # what editors and type checkers see; _HOMES is the same for 
     from psvideo.model.timing import Timing as Timing
     from psvideo.pictures.quantity import picture_of as picture_of
     from psvideo.pictures.relighting import relight as relight
-    from psvideo.plates.gather import clip_rounds as rounds
+    from psvideo.plates.gather import gather as rounds
     from psvideo.runs.check import check as check
     from psvideo.runs.light_sets import read_images as read_images
     from psvideo.runs.normals import normals as normals
@@ -53,7 +53,7 @@ _HOMES = {
     "read_rig": "psvideo.formats.rig_toml",
     "read_timing": "psvideo.formats.timing_json",
     "relight": "psvideo.pictures.relighting",
-    "rounds": "psvideo.plates.gather:clip_rounds",
+    "rounds": "psvideo.plates.gather:gather",
     "shoot": "psvideo.synth.shoot",
     "solve": "psvideo.solve.of_take",
     "solve_images": "psvideo.solve.images",

@@ -107,7 +107,7 @@ def _plates(take: "Take", timing: Timing, method: SplitMethod, number: int) -> M
     """Rebuild one round from the frames that it touches, and those before them that the method follows."""
     from psvideo.model.shutter import frames_touched
     from psvideo.model.timing import timed_camera
-    from psvideo.plates.gather import clip_rounds
+    from psvideo.plates.gather import gather
     from psvideo.plates.sequence import round_numbers
 
     flashes = [place for place, found in enumerate(round_numbers(timing.flashes)) if found == number]
@@ -117,7 +117,7 @@ def _plates(take: "Take", timing: Timing, method: SplitMethod, number: int) -> M
     near = tuple(one for one in take.numbers if one in places and begin <= places[one] <= end)
     if len(near) < 2:
         raise PsvideoError(f"Round {number} lies where frames are missing, so its plates cannot be rebuilt.")
-    for one in clip_rounds(replace(take, numbers=near), timing, method=method):
+    for one in gather(replace(take, numbers=near), timing, method=method):
         if one.number == number:
             return {plate.light: _kept(plate) for plate in one.plates}
     return {}

@@ -6,6 +6,7 @@ A clip of any length streams through in constant memory.
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
+from typing import TypeVar
 
 from psvideo.clip import Clip, Frame, Take, demosaic, read_frames
 from psvideo.compute.progress import Watch, unwatched
@@ -15,22 +16,37 @@ from psvideo.model.choices import SplitMethod
 from psvideo.model.shutter import frames_touched
 from psvideo.model.timing import Timing, places_in_time, timed_camera
 from psvideo.plates import hudon2015
+from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.ambient import subtract, update
-from psvideo.plates.sequence import FIRST_NUMBER, LightPlate, Round, check_separable, light_plates, rounds
+from psvideo.plates.sequence import (
+    AMBIENT,
+    FIRST_NUMBER,
+    LightPlate,
+    Round,
+    check_separable,
+    coming,
+    gathered,
+    light_plates,
+)
 from psvideo.plates.split import Plate, plate_of, split
+
+AnyPlate = TypeVar("AnyPlate", Plate, LightPlate)
 
 AHEAD = 2
 """Frames that are decoded in advance while plates are rebuilt; each costs memory."""
 
 
-def clip_rounds(
+def gather(
     take: Take,
     timing: Timing,
     *,
+    aligning: Aligning | None = None,
+    with_ambient: bool = True,
     method: SplitMethod = "weights",
     start_number: int = FIRST_NUMBER,
     watch: Watch = unwatched,
     each_flash: Callable[[Plate], None] | None = None,
+    each_plate: Callable[[LightPlate], None] | None = None,
 ) -> Iterator[Round]:
     """Yield a take's rounds: one plate per light at its full flash, ambient light taken off. The take is decoded once.
 
@@ -38,6 +54,11 @@ def clip_rounds(
     ----------
     take, timing
         What ``open_take`` and ``find_timing`` give.
+    aligning
+        How plates are brought to one instant; then only complete rounds come. Left out, all rounds in which any light
+        is complete come as they are.
+    with_ambient
+        Whether rounds wait for their dark slots, and hold them.
     method
         "weights", or "hudon2015": Algorithm 1 of that paper, to compare with.
     start_number
@@ -46,6 +67,8 @@ def clip_rounds(
         Is handed the loop over the frames, to show progress.
     each_flash
         Is shown every single plate on its way, demosaiced.
+    each_plate
+        Is shown every light's plate, and every dark slot's, before any is moved.
 
     Yields
     ------
@@ -69,26 +92,16 @@ def clip_rounds(
     1002 ('key', 'left', 'top') (120, 160, 3)
     1003 ('key', 'left', 'top') (120, 160, 3)
     """
-    check_separable(take.plan)
-    shown = _shown(clip_plates(take, timing, method=method, watch=watch), each_flash)
-    return rounds(shown, take.plan, timing.flashes, start=start_number)
-
-
-def clip_light_plates(
-    take: Take,
-    timing: Timing,
-    *,
-    start_number: int = FIRST_NUMBER,
-    with_ambient: bool = False,
-    watch: Watch = unwatched,
-) -> Iterator[LightPlate]:
-    """Decode a take once and yield the plates of its lights as ``clip_rounds`` has them, each as soon as it is there.
-
-    Dark slots come only where they are wanted. Nothing is held but what a light still waits for.
-    """
-    check_separable(take.plan)
-    plates, flashes = clip_plates(take, timing, watch=watch), timing.flashes
-    return light_plates(plates, take.plan, flashes, start=start_number, with_ambient=with_ambient)
+    plan, flashes = take.plan, timing.flashes
+    check_separable(plan)
+    single = _shown(clip_plates(take, timing, method=method, watch=watch), each_flash)
+    plates = _shown(light_plates(single, plan, flashes, start=start_number), each_plate)
+    if not with_ambient:
+        plates = filter(lambda plate: plate.light != AMBIENT, plates)
+    if aligning is not None:
+        return aligned(plates, plan.lights, aligning, first=start_number, with_ambient=with_ambient)
+    names = coming(plan, flashes, start=start_number)
+    return gathered(plates, plan.lights, expected=names.__getitem__)
 
 
 def clip_plates(
@@ -170,8 +183,9 @@ def _colour_of(clip: Clip) -> Callable[[Plate], Plate]:
     return lambda plate: replace(plate, image=demosaic(plate.image, pattern))
 
 
-def _shown(plates: Iterable[Plate], show: Callable[[Plate], None] | None) -> Iterator[Plate]:
+def _shown(plates: Iterable[AnyPlate], show: Callable[[AnyPlate], None] | None) -> Iterator[AnyPlate]:
     for plate in plates:
         if show is not None:
             show(plate)
         yield plate
+        del plate  # nothing holds it while the next one is made

@@ -6,7 +6,7 @@ or durations (HDR), is merged: what is saturated is left out and the rest is sum
 light's full flash is power 1 for its longest planned duration.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Set
 from dataclasses import dataclass
 
 import numpy as np
@@ -102,81 +102,8 @@ def round_numbers(flashes: tuple[Flash, ...], *, start: int = FIRST_NUMBER) -> t
     return tuple(number + shift for number in numbers)
 
 
-def rounds(
-    plates: Iterable[Plate], plan: Plan, flashes: tuple[Flash, ...], *, start: int = FIRST_NUMBER
-) -> Iterator[Round]:
-    """Yield one set of light plates per round in which any light is complete; ``start`` numbers the first."""
-    numbers = round_numbers(flashes, start=start)
-    last = {numbers[flash.index]: flash.index for flash in flashes if flash.complete}
-    held: list[Plate] = []
-    for plate in plates:
-        number = numbers[plate.flash.index]
-        if held and numbers[held[0].flash.index] != number:
-            yield from _gathered(held, plan, numbers[held[0].flash.index])
-            held = []
-        held.append(plate)
-        del plate  # nothing but the list holds it now, so that a round is gone once it is used
-        if held[-1].flash.index == last[number]:
-            yield from _gathered(held, plan, number)
-            held = []
-    if held:
-        yield from _gathered(held, plan, numbers[held[0].flash.index])
-
-
-def light_plates(
-    plates: Iterable[Plate],
-    plan: Plan,
-    flashes: tuple[Flash, ...],
-    *,
-    start: int = FIRST_NUMBER,
-    with_ambient: bool = False,
-) -> Iterator[LightPlate]:
-    """Yield every light's plate as soon as the flashes that it is made of are there; dark slots if they are wanted.
-
-    Numbers are those of ``rounds``. Only flashes are held that a light still waits for.
-    """
-    numbers = round_numbers(flashes, start=start)
-    recipes = _recipes(plan)
-    waiting: list[_Recipe] = []
-    lit: dict[int, Plate] = {}
-    number: int | None = None
-    for plate in plates:
-        now = numbers[plate.flash.index]
-        if now != number:
-            number, waiting, lit = now, recipes, {}
-        if any(plate.flash.lights.values()):
-            lit[plate.flash.slot] = plate
-        elif with_ambient:
-            yield _of_dark(plate, now)
-        del plate
-        for recipe in waiting:
-            if recipe.slots <= lit.keys():
-                yield _of_light(recipe, lit, now)
-        waiting = [recipe for recipe in waiting if not recipe.slots <= lit.keys()]
-        needed = {slot for recipe in waiting for slot in recipe.slots}
-        lit = {slot: held for slot, held in lit.items() if slot in needed}
-
-
-def _gathered(held: list[Plate], plan: Plan, number: int) -> Iterator[Round]:
-    lit = {plate.flash.slot: plate for plate in held if any(plate.flash.lights.values())}
-    dark = [plate for plate in held if not any(plate.flash.lights.values())]
-    plates = _demultiplexed(lit, plan, number)
-    if not plates:
-        return
-    yield Round(number=number, plates=tuple(plates), ambient=_of_dark(dark[0], number) if dark else None)
-
-
-def _of_dark(plate: Plate, number: int) -> LightPlate:
-    return LightPlate(light=AMBIENT, number=number, time_s=plate.time_s, image=plate.image, seen=plate.seen)
-
-
-def _demultiplexed(lit: dict[int, Plate], plan: Plan, number: int) -> list[LightPlate]:
-    """Solve the round's mixture for the lights; a light is there once every flash that it depends on is."""
-    return [_of_light(recipe, lit, number) for recipe in _recipes(plan) if recipe.slots <= lit.keys()]
-
-
 @dataclass(frozen=True, kw_only=True)
-class _Recipe:
+class _Making:
     """How a light is had from the flashes of a round: ``shares`` by slot of what holds ``exposure`` of it (by slot);
     ``alone`` where no other light is in these flashes."""
 
@@ -191,29 +118,116 @@ class _Recipe:
         return set(self.shares)
 
 
-def _recipes(plan: Plan) -> list[_Recipe]:
+def _makings(plan: Plan) -> list[_Making]:
     matrix = mixing_matrix(plan)
     inverse = np.linalg.pinv(matrix)
     inverse[np.abs(inverse) < 1e-12] = 0.0
-    recipes = []
+    makings = []
     for light, column, shares in zip(plan.lights, matrix.T, inverse, strict=True):
         needed = [row for row, share in enumerate(shares) if share]
-        recipes.append(
-            _Recipe(
+        makings.append(
+            _Making(
                 light=light,
                 shares={plan.lit_slots[row]: float(shares[row]) for row in needed},
                 exposures={plan.lit_slots[row]: float(column[row]) for row in needed},
                 alone=all(np.count_nonzero(matrix[row]) == 1 for row in needed),
             )
         )
-    return recipes
+    return makings
 
 
-def _of_light(recipe: _Recipe, lit: dict[int, Plate], number: int) -> LightPlate:
-    parts = [lit[slot] for slot in recipe.shares]
-    if recipe.alone:
-        return _merged(parts, np.array(list(recipe.exposures.values())), recipe.light, number)
-    return _mixed(parts, np.array(list(recipe.shares.values())), recipe.light, number)
+def light_plates(
+    plates: Iterable[Plate], plan: Plan, flashes: tuple[Flash, ...], *, start: int = FIRST_NUMBER
+) -> Iterator[LightPlate]:
+    """Yield every light's plate as soon as the flashes that it is made of are there, and every round's first dark slot.
+
+    Plates are numbered by ``round_numbers``. Only flashes are held that a light still waits for.
+    """
+    numbers = round_numbers(flashes, start=start)
+    makings = _makings(plan)
+    waiting: list[_Making] = []
+    lit: dict[int, Plate] = {}
+    number: int | None = None
+    shown_dark: int | None = None
+    for plate in plates:
+        now = numbers[plate.flash.index]
+        if now != number:
+            number, waiting, lit = now, makings, {}
+        if plate.flash.lit:
+            lit[plate.flash.slot] = plate
+        elif now != shown_dark:
+            shown_dark = now
+            yield _of_dark(plate, now)
+        del plate
+        for making in waiting:
+            if making.slots <= lit.keys():
+                yield _of_light(making, lit, now)
+        waiting = [making for making in waiting if not making.slots <= lit.keys()]
+        needed = {slot for making in waiting for slot in making.slots}
+        lit = {slot: held for slot, held in lit.items() if slot in needed}
+
+
+def coming(plan: Plan, flashes: tuple[Flash, ...], *, start: int = FIRST_NUMBER) -> dict[int, frozenset[str]]:
+    """Return by number which lights every round will have a plate of, AMBIENT among them where it has a dark slot."""
+    complete: dict[int, list[Flash]] = {}
+    for flash, number in zip(flashes, round_numbers(flashes, start=start), strict=True):
+        complete.setdefault(number, []).extend([flash] if flash.complete else [])
+    makings = _makings(plan)
+    return {number: frozenset(_names(makings, held)) for number, held in complete.items()}
+
+
+def _names(makings: list[_Making], flashes: list[Flash]) -> Iterator[str]:
+    slots = {flash.slot for flash in flashes}
+    yield from (making.light for making in makings if making.slots <= slots)
+    if not all(flash.lit for flash in flashes):
+        yield AMBIENT
+
+
+def gathered(
+    plates: Iterable[LightPlate],
+    lights: tuple[str, ...],
+    *,
+    expected: Callable[[int], Set[str]],
+    whole: bool = False,
+) -> Iterator[Round]:
+    """Yield the rounds of a stream of plates as they are, each as soon as it holds what is expected of its number.
+
+    A round that lacks some of that comes when the next one begins. ``whole`` leaves rounds out that lack any of the
+    ``lights``; without it one plate of a light is enough.
+    """
+    least = len(lights) if whole else 1
+    held: dict[str, LightPlate] = {}
+    number = 0
+    for plate in plates:
+        if plate.number != number:
+            if len(held.keys() & set(lights)) >= least:
+                yield handed_over(held, number, lights)
+            held.clear()
+        number = plate.number
+        held[plate.light] = plate
+        del plate  # nothing but the round holds it now, so that it is gone once that is used
+        if held.keys() >= expected(number) and len(held.keys() & set(lights)) >= least:
+            yield handed_over(held, number, lights)
+    if len(held.keys() & set(lights)) >= least:
+        yield handed_over(held, number, lights)
+
+
+def handed_over(held: dict[str, LightPlate], number: int, lights: tuple[str, ...]) -> Round:
+    """Return a round of what is held by light, in the order of ``lights``, and hold nothing of it any more."""
+    plates, ambient = tuple(held.pop(light) for light in lights if light in held), held.pop(AMBIENT, None)
+    held.clear()
+    return Round(number=number, plates=plates, ambient=ambient)
+
+
+def _of_dark(plate: Plate, number: int) -> LightPlate:
+    return LightPlate(light=AMBIENT, number=number, time_s=plate.time_s, image=plate.image, seen=plate.seen)
+
+
+def _of_light(making: _Making, lit: dict[int, Plate], number: int) -> LightPlate:
+    parts = [lit[slot] for slot in making.shares]
+    if making.alone:
+        return _merged(parts, np.array(list(making.exposures.values())), making.light, number)
+    return _mixed(parts, np.array(list(making.shares.values())), making.light, number)
 
 
 def _merged(parts: list[Plate], exposures: FloatArray, light: str, number: int) -> LightPlate:

@@ -17,7 +17,7 @@ from psvideo.formats.rig_toml import read_rig
 from psvideo.model.plan import Plan
 from psvideo.model.row_profiles import SATURATED
 from psvideo.model.timing import DroppedFrames, Timing
-from psvideo.plates.gather import clip_rounds
+from psvideo.plates.gather import gather
 from psvideo.plates.naming import named_by_rig
 from psvideo.report.judgement import Judgement
 from psvideo.runs.caller import PYTHON, Caller
@@ -128,7 +128,7 @@ def judged(
             timing = timing if known is None else named_by_rig(take, timing, known)
             timing = _with_later_holes(timing, clip, window)
             observed = observing(take, known)
-            for one in clip_rounds(take, timing, watch=watch):
+            for one in gather(take, timing, watch=watch):
                 observed.add(one)
                 del one
             if not observed.facts:

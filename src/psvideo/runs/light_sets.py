@@ -26,7 +26,8 @@ from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.plan_toml import read_plan
 from psvideo.model.camera import Encoding
-from psvideo.plates.gather import clip_rounds
+from psvideo.plates.align.rounds import UNMOVED
+from psvideo.plates.gather import gather
 from psvideo.plates.sequence import Round
 from psvideo.sync.open_take import open_take
 from psvideo.sync.take_timing import find_take_timing
@@ -156,7 +157,7 @@ def _of_files(files: LightFiles, encoding: Encoding, reading: Reading) -> LightS
 def _of_clip(take: Take, reading: Reading, watch: Watch) -> LightSets:
     timing = find_take_timing(take, first_light=reading.first_light, watch=watch)
     plan = take.plan
-    whole = (one for one in clip_rounds(take, timing, watch=watch) if one.lights == plan.lights)
+    whole = gather(take, timing, aligning=UNMOVED, watch=watch)
     sets = map(_as_pictures, islice(whole, None if reading.frames else reading.most))
     guessed = (_guess(take, timing.order_note),) if timing.order == "guess" else ()
     return LightSets(

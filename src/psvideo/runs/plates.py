@@ -19,7 +19,7 @@ from psvideo.model.plan import Plan
 from psvideo.model.rig import Rig
 from psvideo.model.timing import Timing
 from psvideo.plates.beauty import BEAUTY, Mix, beauty_of
-from psvideo.plates.gather import clip_rounds, first_ambient
+from psvideo.plates.gather import first_ambient, gather
 from psvideo.plates.sequence import AMBIENT, round_numbers
 from psvideo.report.run_report import RunReport
 from psvideo.runs.delivering import plates_of
@@ -87,9 +87,7 @@ def split_run(
     ):
         flashes, mix = extras.flashes, extras.mix
         each = (lambda plate: write(partial(write_flash, folder, clip.name, plate, tags))) if flashes else None
-        gathered = clip_rounds(
-            take, timing, method=method, start_number=output.start_number, watch=watch, each_flash=each
-        )
+        gathered = gather(take, timing, method=method, start_number=output.start_number, watch=watch, each_flash=each)
         ambient = first_ambient(take, timing) if mix is not None and mix.of(AMBIENT) else None
         for one in gathered:
             times_s.append(one.time_s)

@@ -21,8 +21,8 @@ from psvideo.formats.whole_files import write_text
 from psvideo.model.choices import Solver
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
-from psvideo.plates.align.rounds import Aligning, aligned
-from psvideo.plates.gather import clip_light_plates, first_ambient
+from psvideo.plates.align.rounds import Aligning
+from psvideo.plates.gather import first_ambient, gather
 from psvideo.plates.sequence import AMBIENT
 from psvideo.report.observe.observed import InstantFacts
 from psvideo.report.run_report import RunReport
@@ -113,12 +113,16 @@ def normals_run(
         writing() as write,
     ):
         mixed = delivery.mix.of(AMBIENT) > 0
-        with_ambient = mixed or delivery.plates
-        plates = clip_light_plates(take, timing, start_number=output.start_number, with_ambient=True, watch=watch)
-        plates = observed.passing(plates, with_ambient=with_ambient)
+        rounds = gather(
+            take,
+            timing,
+            aligning=over_time.aligning,
+            with_ambient=mixed or delivery.plates,
+            start_number=output.start_number,
+            watch=watch,
+            each_plate=observed.look,
+        )
         ambient = first_ambient(take, timing) if mixed else None
-        how = over_time.aligning
-        rounds = aligned(plates, clip.plan.lights, how, first=output.start_number, with_ambient=with_ambient)
         found = surfaces(
             rounds, clip.plan, lighting.rig, mask=mask, solving=solving, near=lighting.near, falloff=lighting.falloff
         )

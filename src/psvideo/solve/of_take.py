@@ -10,10 +10,9 @@ from psvideo.compute.progress import Watch, unwatched
 from psvideo.model.choices import NEAR_ITERATIONS, Align, Solver
 from psvideo.model.rig import Rig
 from psvideo.model.timing import Timing
-from psvideo.plates.align.rounds import Aligning, aligned
-from psvideo.plates.gather import clip_light_plates
+from psvideo.plates.align.rounds import Aligning
+from psvideo.plates.gather import gather
 from psvideo.plates.naming import named_by_rig
-from psvideo.plates.sequence import FIRST_NUMBER
 from psvideo.solve.instants import Instant, lights_as_planned, surfaces
 from psvideo.solve.near_surface import near_surface_of
 from psvideo.solve.normals.solving import Solving
@@ -77,6 +76,5 @@ def solve(
     lights = lights_as_planned(rig, plan)
     near = near_surface_of(rig, lights, height_px=clip.height_px, width_px=clip.width_px, iterations=NEAR_ITERATIONS)
     found = named_by_rig(take, timing or find_take_timing(take, watch=watch), rig)
-    plates = clip_light_plates(take, found, watch=watch)
-    rounds = aligned(plates, plan.lights, Aligning(align=align), first=FIRST_NUMBER)
+    rounds = gather(take, found, aligning=Aligning(align=align), with_ambient=False, watch=watch)
     return surfaces(rounds, plan, rig, mask=mask, solving=Solving(solver=solver, residual=True, error=True), near=near)

@@ -14,7 +14,7 @@ from psvideo.plates.align.between import Ends, plate_at, track
 from psvideo.plates.align.brightness import evened
 from psvideo.plates.align.flow import Flow, flow_between, moved
 from psvideo.plates.align.held import Around, DueInstant, Held
-from psvideo.plates.sequence import AMBIENT, LightPlate, Round
+from psvideo.plates.sequence import AMBIENT, LightPlate, Round, gathered, handed_over
 
 Flows = dict[tuple[str, int], Flow | None]
 """Flow from the plate of a light in a round (its number) to the next one; None where nothing moved."""
@@ -31,6 +31,10 @@ class Aligning:
     rate: Rate = "round"
 
 
+UNMOVED = Aligning(align="none")
+"""Complete rounds, their plates as they are."""
+
+
 def aligned(
     plates: Iterable[LightPlate], lights: tuple[str, ...], how: Aligning, *, first: int, with_ambient: bool = False
 ) -> Iterator[Round]:
@@ -42,34 +46,11 @@ def aligned(
     and two where all does or at one result per flash. ``with_ambient`` says that dark slots come as well: every round
     waits for its own, and takes it along as it is.
     """
-    if how.align == "none" and how.rate == "round":
-        return _gathered(plates, lights, with_ambient)
+    if how == UNMOVED:
+        return gathered(
+            plates, lights, expected=lambda _: {*lights, AMBIENT} if with_ambient else {*lights}, whole=True
+        )
     return _slid(plates, lights, how, first, with_ambient)
-
-
-def _gathered(plates: Iterable[LightPlate], lights: tuple[str, ...], with_ambient: bool) -> Iterator[Round]:
-    """Yield complete rounds as they are."""
-    held: dict[str, LightPlate] = {}
-    number = 0
-    for plate in plates:
-        if plate.number != number:
-            if with_ambient and held.keys() >= set(lights):
-                yield _handed_over(held, number, lights)
-            held.clear()
-        number = plate.number
-        held[plate.light] = plate
-        del plate
-        if held.keys() >= {*lights, AMBIENT} if with_ambient else len(held) == len(lights):
-            yield _handed_over(held, number, lights)
-    if held.keys() >= set(lights):
-        yield _handed_over(held, number, lights)
-
-
-def _handed_over(held: dict[str, LightPlate], number: int, lights: tuple[str, ...]) -> Round:
-    """Return a round, and hold nothing of it any more."""
-    plates, ambient = tuple(held.pop(light) for light in lights), held.pop(AMBIENT, None)
-    held.clear()
-    return Round(number=number, plates=plates, ambient=ambient)
 
 
 def _slid(
@@ -117,7 +98,7 @@ def _complete(held: Held, how: Aligning, flows: Flows) -> Iterator[Round]:
         held.let_go()
         for key in [key for key in flows if key[1] < instant.round - 1]:
             del flows[key]
-        yield _handed_over(instant.made, instant.number, held.lights)
+        yield handed_over(instant.made, instant.number, held.lights)
 
 
 def _ready(held: Held, instant: DueInstant, how: Aligning) -> Iterator[str]:

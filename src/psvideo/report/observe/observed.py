@@ -5,7 +5,6 @@ rounds 1, 2, 4, 8 and so on, so that ten thousand rounds cost hardly more than a
 """
 
 import functools
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -144,18 +143,14 @@ class Observed:
     _moving: Motion | None = None
     _passed: bool = False
 
-    def passing(self, plates: Iterable[LightPlate], *, with_ambient: bool) -> Iterator[LightPlate]:
-        """Pass plates on before they are moved to one instant: motion is seen in them, and ambient light in the dark
-        slots, which go no further unless they are wanted."""
+    def look(self, plate: LightPlate) -> None:
+        """Look at a plate before it is moved to one instant: motion is seen in the first light's, and ambient light in
+        the dark slots."""
         self._passed = True
-        for plate in plates:
-            if plate.light == self.lights[0]:
-                self._look_for_motion(plate)
-            if plate.light == AMBIENT:
-                self._look_at_dark(plate)
-            if plate.light != AMBIENT or with_ambient:
-                yield plate
-            del plate  # nothing holds it while the next one is made
+        if plate.light == self.lights[0]:
+            self._look_for_motion(plate)
+        if plate.light == AMBIENT:
+            self._look_at_dark(plate)
 
     def _look_at_dark(self, plate: LightPlate) -> None:
         self._dark = np.array(_brightest(plate.image[::STRIDE, ::STRIDE]))
