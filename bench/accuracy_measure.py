@@ -134,8 +134,8 @@ def turned(case: Case, wrong_deg: float) -> Case:
     across = np.random.default_rng(2).normal(size=true.shape)
     across -= np.sum(across * true, axis=1, keepdims=True) * true
     across /= np.linalg.norm(across, axis=1, keepdims=True)
-    told = np.cos(np.radians(wrong_deg)) * true + np.sin(np.radians(wrong_deg)) * across
-    return case._replace(lit=Illumination(directions=told, intensities=case.lit.intensities))
+    claimed = np.cos(np.radians(wrong_deg)) * true + np.sin(np.radians(wrong_deg)) * across
+    return case._replace(lit=Illumination(directions=claimed, intensities=case.lit.intensities))
 
 
 def diligent_ball() -> Case:

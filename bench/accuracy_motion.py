@@ -90,8 +90,10 @@ class Filmed:
             disc = np.ones((2 * EDGE_PX + 1, 2 * EDGE_PX + 1), np.uint8)
             wide, narrow = (way(where.astype(np.uint8), disc) > 0 for way in (cv2.dilate, cv2.erode))
             where = wide & ~narrow
-        told = surface.valid & where
-        return Seen(float(angles_deg(surface.normals[told], normals[told]).mean()), float(told.sum() / where.sum()))
+        chosen = surface.valid & where
+        return Seen(
+            float(angles_deg(surface.normals[chosen], normals[chosen]).mean()), float(chosen.sum() / where.sum())
+        )
 
 
 def filmed(

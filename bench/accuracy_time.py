@@ -1,6 +1,6 @@
 """Time per 1080p frame, 8 lights, 16-bit codes: plain numpy least squares (before), the solvers, and a per-pixel L1.
 
-Best of several runs taken in turn; processor time tells what other work on the machine hides. The L1 reference is timed
+Best of several runs taken in turn; processor time shows what other work on the machine hides. The L1 reference is timed
 over a few pixels and scaled to the frame.
 """
 

@@ -124,7 +124,7 @@ def _copy(count: int, pool: ThreadPoolExecutor) -> Callable[[], None]:
 
 
 def _plain_numpy(plates: list[np.ndarray], directions: np.ndarray) -> np.ndarray:
-    """The L2 of RobustPhotometricStereo, written anew: one lstsq over all pixels in float64, then unit length."""
+    """The L2 of RobustPhotometricStereo, written again: one lstsq over all pixels in float64, then unit length."""
     measurements = np.stack([plate.reshape(-1) for plate in plates], axis=1).astype(np.float64)
     scaled = np.linalg.lstsq(directions, measurements.T, rcond=None)[0].T
     return scaled / np.linalg.norm(scaled, axis=1, keepdims=True)

@@ -54,12 +54,12 @@ def sliding_bust() -> Filmed:
 def _error_map(clip: Filmed, one: Round) -> np.ndarray:
     surface = clip.solved(one)
     normals, _ = clip.truth(one.time_s)
-    told = surface.valid & (np.linalg.norm(normals, axis=-1) > 0.5)
-    errors = np.zeros(told.shape)
-    errors[told] = angles_deg(surface.normals[told], normals[told])
+    chosen = surface.valid & (np.linalg.norm(normals, axis=-1) > 0.5)
+    errors = np.zeros(chosen.shape)
+    errors[chosen] = angles_deg(surface.normals[chosen], normals[chosen])
     codes = (np.clip(errors / FULL_DEG, 0, 1) * 255).astype(np.uint8)
     coloured = cv2.applyColorMap(codes, cv2.COLORMAP_INFERNO)[..., ::-1]
-    return np.where(told[..., None], coloured, np.uint8(GREY)).astype(np.uint8)
+    return np.where(chosen[..., None], coloured, np.uint8(GREY)).astype(np.uint8)
 
 
 if __name__ == "__main__":

@@ -109,14 +109,14 @@ def summary(lines: list[Line]) -> Iterator[Short]:
     """Return every group's span from its best case to its worst."""
     starts = [n for n, line in enumerate(lines) if line.disturbance.startswith("**")] + [len(lines)]
     for start, stop in pairwise(starts):
-        told = [line for line in lines[start + 1 : stop] if line.over_oracle]
+        measured = [line for line in lines[start + 1 : stop] if line.over_oracle]
         met = sum(line.met == "yes" for line in lines[start + 1 : stop])
         yield Short(
             lines[start].disturbance.strip("*"),
             f"{met} of {stop - start - 1}",
-            _span([line.phase_error_in_rows for line in told]),
-            _span([line.over_oracle for line in told]),
-            _span([line.by_algorithm_1 for line in told]),
+            _span([line.phase_error_in_rows for line in measured]),
+            _span([line.over_oracle for line in measured]),
+            _span([line.by_algorithm_1 for line in measured]),
         )
 
 

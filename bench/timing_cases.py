@@ -52,7 +52,7 @@ class Filmed:
 class Case:
     """One virtual shoot: ``plan`` is what happened, ``claimed`` what plan.toml says of it (the same if None).
 
-    ``told`` says that the numbering shows the dropped frames, ``recorder`` what kind of file the clip goes through. The
+    ``numbered`` says that the numbering shows the dropped frames, ``recorder`` what kind of file the clip goes through. The
     clip goes on by ``step`` frames a frame, rounded down; ``recoded`` is what encoding it again adds to each row's
     mean, in standard deviations of the picture.
     """
@@ -68,7 +68,7 @@ class Case:
     repeated: tuple[int, ...] = ()
     step: Fraction = Fraction(1)
     recoded: float = 0.0
-    told: bool = False
+    numbered: bool = False
     marker: bool = True
     recorder: Recorder | None = None
     bar_rows: float = 0.05
@@ -95,7 +95,7 @@ class Case:
         shown = np.arange(int(len(pictures) / self.step)) * self.step.numerator // self.step.denominator
         order = np.sort(np.concatenate([shown, np.array(self.repeated, np.int64)]))
         added = self.recoded * float(np.std(pictures[0])) * rng.standard_normal((len(order), len(pictures[0]), 1))
-        numbers = np.array(shot.indices) if self.told else np.arange(len(order))
+        numbers = np.array(shot.indices) if self.numbered else np.arange(len(order))
         again = np.append(False, np.diff(order) == 0)
         return Filmed(
             exposure=shot,
@@ -240,7 +240,7 @@ def _holes() -> dict[str, Case]:
     plain = plan_of()
     at_random = tuple(np.random.default_rng(0).choice(np.arange(1, 300), 18, replace=False).tolist())
     return {
-        "dropped, numbers show it": Case(plan=plain, dropped=(31, 32, 60), told=True),
+        "dropped, numbers show it": Case(plan=plain, dropped=(31, 32, 60), numbered=True),
         "dropped, nothing shows it": Case(plan=plain, dropped=(31, 32, 60)),
         "dropped near either end": Case(plan=plain, dropped=(5, 90)),
         "one repeated": Case(plan=plain, repeated=(50,)),

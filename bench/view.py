@@ -1,7 +1,7 @@
 """The page of `psvideo view` on 240 results at 1080p: how soon it is ready, and how fast it scrubs.
 
 Normals, albedo and validity of a bumpy surface with noise (which takes longer to decode than one without), drawn 960
-pixels wide by Chromium with software rendering (SwiftShader), which shares the cores with the server and with whatever
+pixels wide by Chromium with software rendering (SwiftShader), which shares the cores with the server and with what
 else runs. A scrub sets the slider sixty times a second to the next picture and counts the pictures that came onto the
 screen, relit. The best of some tries counts.
 Processor time, of the server and of all of the browser, depends less on what else runs.
@@ -90,11 +90,11 @@ def _tried(browser: Browser, out: Path) -> tuple[float, float, tuple[Scrub, Scru
     began = time.perf_counter()
     with subprocess.Popen(call, stdout=subprocess.PIPE, text=True) as server:
         assert server.stdout is not None
-        told = "".join(server.stdout.readline() for _ in range(4))
+        answer = "".join(server.stdout.readline() for _ in range(4))
         answers_s = time.perf_counter() - began
         page = browser.new_page(viewport=VIEWPORT)
         began = time.perf_counter()
-        page.goto(json.loads(told)["url"])
+        page.goto(json.loads(answer)["url"])
         page.wait_for_selector("body[data-ready=true]", timeout=120_000)
         ready_s = time.perf_counter() - began
         page.keyboard.press("s")

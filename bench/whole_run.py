@@ -1,7 +1,7 @@
 """A whole `normals` run against the larger of decoding alone and encoding alone, and its memory over clip length.
 
 The clips are 1080p colour in 16-bit PNG, three lights or eight, noise and all. Decoding and encoding alone use the same
-functions as the run does: decoding once with the threads that a caller gets unless told, and once with all cores, as in
+functions as the run does: decoding once with the threads that a caller gets by default, and once with all cores, as in
 the run. Every command is a process of its own, in turn; the lesser of two times counts, because others use the machine
 too.
 """
@@ -119,10 +119,10 @@ def _peak_mb(clip: Path, frames: int) -> float:
     out, rig = clip.with_name("out"), clip / "rig.toml"
     command = [sys.executable, "-m", "psvideo.cli.app", "normals", clip, "--rig", rig, "-o", out]
     command += ["--frames", f"0-{frames - 1}", "--force", "-q"]
-    told = subprocess.run(
+    done = subprocess.run(
         [sys.executable, "-c", measure, *map(str, command)], capture_output=True, text=True, check=True
     )
-    return float(told.stdout)
+    return float(done.stdout)
 
 
 def _timed(*arguments: object) -> float:

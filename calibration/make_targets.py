@@ -62,7 +62,7 @@ def _seats(middle: tuple[float, float]) -> Iterator[Polygon | Label]:
 
 
 def _patches(middle: tuple[float, float]) -> Iterator[Polygon | Label]:
-    """Two rows of greys in opposite order: what the same grey reads above and below tells how the light falls off."""
+    """Two rows of greys in opposite order: what the same grey reads above and below shows how the light falls off."""
     left = middle[0] - len(REFLECTANCES) * PATCH_MM / 2
     for top, order in ((middle[1] - 88, REFLECTANCES), (middle[1] + 68, REFLECTANCES[::-1])):
         for place, reflectance in enumerate(order):

@@ -62,7 +62,7 @@ def chromium() -> str:
 
 @pytest.fixture(scope="session")
 def make_plan() -> Callable[..., Plan]:
-    """Make a small plan: three lights and a dark slot, full shutter, readout as long as the frame, unless told."""
+    """Make a small plan: three lights and a dark slot, full shutter, readout as long as the frame, unless said."""
     return _make_plan
 
 

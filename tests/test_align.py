@@ -59,8 +59,8 @@ class Filmed:
         """Return the mean error over the subject, and which share of it is valid."""
         hits = self.stage.view(time_s).hits
         subject = hits.image((hits.point_m[:, 2] > WALL_M + 0.01).astype(np.float32)) > 0.5
-        told = surface.valid & subject
-        return float(angle_deg(surface.normals, true_normals(hits))[told].mean()), float(told.sum() / subject.sum())
+        said = surface.valid & subject
+        return float(angle_deg(surface.normals, true_normals(hits))[said].mean()), float(said.sum() / subject.sum())
 
     def solved(self, one: Round) -> Surface:
         seen = np.stack([plate.pixels_seen for plate in one.plates])
@@ -143,11 +143,11 @@ def brought(clip: Filmed, how: Aligning = Aligning(), rounds: Plates | None = No
 def test_flow_takes_the_error_of_motion_away(lights: int, motion: str, before_deg: float) -> None:
     clip = filmed(lights, motion)
     middle = clip.rounds[1]
-    error_deg, told = clip.error_deg(clip.solved(middle), middle.time_s)
+    error_deg, said = clip.error_deg(clip.solved(middle), middle.time_s)
     assert error_deg > before_deg
     error_deg, told_after = clip.error_deg(clip.solved(brought(clip)[1]), middle.time_s)
     assert error_deg < 1.0
-    assert told_after > 0.9 * told
+    assert told_after > 0.9 * said
 
 
 @pytest.mark.parametrize("lights", [3, 8])
@@ -165,10 +165,10 @@ def test_a_scene_at_rest_stays_as_it_is(lights: int, noise: float) -> None:
     middle = clip.rounds[1]
     for given, shown in zip(middle.plates, brought(clip)[1].plates, strict=True):
         assert shown.image is given.image
-    error_deg, told = clip.error_deg(clip.solved(middle), middle.time_s)
+    error_deg, said = clip.error_deg(clip.solved(middle), middle.time_s)
     forced_deg, told_forced = clip.error_deg(clip.solved(brought(clip, Aligning(align="flow"))[1]), middle.time_s)
     assert forced_deg < error_deg + 0.05
-    assert told_forced > 0.99 * told
+    assert told_forced > 0.99 * said
 
 
 @pytest.mark.parametrize("rate", ["round", "flash"])
@@ -387,7 +387,7 @@ def test_what_moves_while_the_exposure_changes_is_still_followed(gain: float) ->
         for n, one in enumerate(clip.rounds)
     )
     time_s = clip.rounds[1].plates[1].time_s
-    told = [clip.error_deg(clip.solved(brought(clip, rounds=rounds)[1]), time_s) for rounds in (None, breathing)]
-    (_, share), (error_deg, share_breathing) = told
+    said = [clip.error_deg(clip.solved(brought(clip, rounds=rounds)[1]), time_s) for rounds in (None, breathing)]
+    (_, share), (error_deg, share_breathing) = said
     assert share_breathing > 0.9 * share
     assert error_deg < 4.6

@@ -160,7 +160,7 @@ def test_a_lamp_switched_on_costs_the_plates_around_it_only(plan: Plan) -> None:
     assert 1 <= wrong.sum() <= 6, "two rounds: the lamp may go on in the middle of a dark slot"
 
 
-def test_where_someone_moves_the_average_begins_anew_and_elsewhere_it_goes_on(plan: Plan) -> None:
+def test_where_someone_moves_the_average_starts_again_and_elsewhere_it_goes_on(plan: Plan) -> None:
     def walking(n: int, scene: np.ndarray) -> np.ndarray:
         light = LEVEL * scene
         light[40:80, 10 + n : 34 + n] = 0.3
@@ -177,7 +177,7 @@ def test_where_someone_moves_the_average_begins_anew_and_elsewhere_it_goes_on(pl
 
 @pytest.mark.parametrize("hz", [100.0, 120.0, 100.2])
 @pytest.mark.parametrize("depth", [0.3, 1.0])
-def test_mains_light_is_told_apart_row_by_row(hz: float, depth: float, make_plan: PlanMaker) -> None:
+def test_mains_light_is_separated_row_by_row(hz: float, depth: float, make_plan: PlanMaker) -> None:
     plan = make_plan(width_px=160, height_px=120, fps=Fraction(110))
     take = shoot(plan, dimmed, flicker=MainsSwing(hz=hz, depth=depth))
     assert rms(shoot(plan, held).errors()) < 1e-5

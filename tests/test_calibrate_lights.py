@@ -56,7 +56,7 @@ def off_deg(found: Array, true: Array) -> Array:
 
 
 @pytest.mark.parametrize("focal_px", [None, 300.0])
-def test_a_matte_sphere_tells_directions_and_intensities_per_channel(focal_px: float | None) -> None:
+def test_a_matte_sphere_shows_directions_and_intensities_per_channel(focal_px: float | None) -> None:
     view = SphereView(focal_px=focal_px, principal_px=(99.5, 74.5))
     directions, strengths = ways(5), np.random.default_rng(2).uniform(0.5, 1.3, (5, 3))
     found = measure_matte_sphere(
@@ -123,7 +123,7 @@ def test_a_real_matte_sphere_agrees_with_the_chrome_one(
 
 
 @pytest.mark.parametrize("near", [False, True], ids=["distant", "near"])
-def test_a_white_target_tells_intensities_and_leaves_only_falloff_that_the_rig_does_not_explain(near: bool) -> None:
+def test_a_white_target_shows_intensities_and_leaves_only_falloff_that_the_rig_does_not_explain(near: bool) -> None:
     directions, strengths = ways(4), np.random.default_rng(4).uniform(0.2, 0.5, (4, 3))
     normal = np.array([0.2, 0.0, 1.0]) / np.hypot(0.2, 1.0)
     rig = Rig(
@@ -163,7 +163,7 @@ def test_a_white_target_tells_intensities_and_leaves_only_falloff_that_the_rig_d
     assert min(light.falloff for light in measure_flat_field(vignetted, rig, target, ground=ground)) > 0.05
 
 
-def test_a_matte_scene_tells_the_strengths_of_lights_of_known_directions() -> None:
+def test_a_matte_scene_shows_the_strengths_of_lights_of_known_directions() -> None:
     directions, strengths = ways(6), np.random.default_rng(5).uniform(0.5, 1.4, (6, 3))
     pictures = sphere_pictures(directions, strengths)
     found = measure_strengths(pictures, directions)

@@ -142,7 +142,7 @@ def test_no_readout_is_read_into_a_scene(shared_data: Path, scene: str) -> None:
     ],
     ids=str,
 )
-def test_the_period_is_found_whatever_duty_exposure_curve_and_noise(kind: dict[str, float]) -> None:
+def test_the_period_is_found_for_any_duty_exposure_curve_and_noise(kind: dict[str, float]) -> None:
     rng = np.random.default_rng(5)
     options = {"rows": ROWS, "period": 40.3, **kind}
     found = measured(film(rng, **options))
@@ -274,7 +274,7 @@ def test_the_way_of_reading_shows_in_the_stripes_steps(
     assert (found.direction, reason in found.direction_reason) == (direction, True)
 
 
-def test_a_wrong_frame_rate_tells_no_direction() -> None:
+def test_a_wrong_frame_rate_shows_no_direction() -> None:
     frames = clip(np.random.default_rng(13), 4, fps=Fraction(60))
     assert "not quite what was given" in measured(*frames, fps=Fraction(59)).direction_reason
     assert "frame rate" in measured(*frames).direction_reason
@@ -284,16 +284,16 @@ def test_a_wrong_frame_rate_tells_no_direction() -> None:
 def test_the_standard_error_of_a_sum_of_independent_pulls_and_of_alike_ones() -> None:
     rng = np.random.default_rng(14)
     rows = 4000
-    told = []
+    reported = []
     for alike in (1, 5):
         errors = []
         for _ in range(40):
             noise = np.convolve(rng.normal(size=rows + alike - 1), np.ones(alike), "valid")
             pulls = Pulls(rows=noise, information=np.ones(rows), frames=noise[:1], groups=noise[:1])
             errors.append(standard_error(pulls, 40.0))
-        told.append(np.mean(errors))
-    assert told[0] == pytest.approx(rows**-0.5, rel=0.15)
-    assert told[1] == pytest.approx(5 * rows**-0.5, rel=0.2)
+        reported.append(np.mean(errors))
+    assert reported[0] == pytest.approx(rows**-0.5, rel=0.15)
+    assert reported[1] == pytest.approx(5 * rows**-0.5, rel=0.2)
 
 
 def test_the_green_of_a_mosaic_is_taken_row_by_row() -> None:

@@ -23,7 +23,7 @@ def paper_plan(
     dark_slot_s: float | None = None,
     dark_every: int = 1,
 ) -> Plan:
-    """The paper's case unless told: 360 degrees, readout as long as the frame, dark time = exposure."""
+    """The paper's case unless said: 360 degrees, readout as long as the frame, dark time = exposure."""
     period_s = 1 / fps
     exposure_s = shutter * period_s
     camera = Camera(

@@ -102,7 +102,7 @@ def test_lights_that_did_not_flash_are_a_strobe_that_is_not_seen(
     assert re.search(r"(good|bad) +exposure", out)
 
 
-def test_the_blur_of_sharp_shapes_is_told_and_that_of_noise_is_not() -> None:
+def test_the_blur_of_sharp_shapes_is_reported_and_that_of_noise_is_not() -> None:
     rng = np.random.default_rng(4)
     shapes = np.full((300, 420), 0.1, np.float32)
     for _ in range(40):
@@ -110,9 +110,9 @@ def test_the_blur_of_sharp_shapes_is_told_and_that_of_noise_is_not() -> None:
         cv2.rectangle(shapes, middle, (middle[0] + size[0], middle[1] + size[1]), float(rng.uniform(0.1, 0.9)), -1)
     for sigma_px in (1.0, 2.0, 4.0, 8.0):
         noise = rng.normal(0, 0.004, shapes.shape).astype(np.float32)
-        told = sharpest_blur_px(np.asarray(cv2.GaussianBlur(shapes, (0, 0), sigma_px), np.float32) + noise)
-        assert told is not None
-        assert 0.45 * sigma_px < told < 1.2 * sigma_px, "corners look sharper: it is a lower bound"
+        reported = sharpest_blur_px(np.asarray(cv2.GaussianBlur(shapes, (0, 0), sigma_px), np.float32) + noise)
+        assert reported is not None
+        assert 0.45 * sigma_px < reported < 1.2 * sigma_px, "corners look sharper: it is a lower bound"
     assert sharpest_blur_px(rng.normal(0.2, 0.004, shapes.shape).astype(np.float32)) is None
 
 
@@ -268,7 +268,7 @@ def test_hidden_files_and_other_folders_are_no_takes(tmp_path: Path) -> None:
     assert takes_in(tmp_path) == {}
 
 
-def test_watching_tells_of_every_take_and_ends_well_with_ctrl_c(shot: Callable[[str], Path], tmp_path: Path) -> None:
+def test_watching_reports_every_take_and_ends_well_with_ctrl_c(shot: Callable[[str], Path], tmp_path: Path) -> None:
     folder, page = tmp_path / "takes", tmp_path / "checks.html"
     folder.mkdir()
     command = [sys.executable, "-m", "psvideo.cli.app", "check", "--watch", str(folder), "--interval", "0.2"]

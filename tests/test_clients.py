@@ -64,16 +64,16 @@ def test_openimageio_finds_in_every_file_what_was_put_there(out: Path, tmp_path:
         (path,) = (out / name).glob(f"*.{NUMBER}.*")
         oiio.ImageBuf(np.ascontiguousarray(true, np.float32)).write(str(tmp_path / "true.exr"), "float")
         within = SINGLE if name in ("depth", "position") else CODE if "png16" in name else HALF
-        told = tool("idiff", "-fail", f"{within:g}", "-warn", f"{within:g}", tmp_path / "true.exr", path)
-        assert "PASS" in told
+        said = tool("idiff", "-fail", f"{within:g}", "-warn", f"{within:g}", tmp_path / "true.exr", path)
+        assert "PASS" in said
         seen += 1
     assert seen + 1 == len(list(out.rglob(f"*.{NUMBER}.*"))), "all there is, and the bundle"
 
 
 def test_openimageio_finds_a_part_for_every_quantity_in_a_bundle(out: Path) -> None:
     bundle = out / f"ball.{NUMBER}.exr"
-    told = tool("oiiotool", "--info", "-v", "-a", bundle)
-    parts = [line.split('"')[1] for line in told.splitlines() if line.strip().startswith("oiio:subimagename")]
+    said = tool("oiiotool", "--info", "-v", "-a", bundle)
+    parts = [line.split('"')[1] for line in said.splitlines() if line.strip().startswith("oiio:subimagename")]
     assert set(parts) == {path.parent.name for path in out.rglob(f"*/*.{NUMBER}.exr")}
     for place, name in enumerate(parts):
         (alone,) = (out / name).glob(f"*.{NUMBER}.exr")
@@ -81,14 +81,14 @@ def test_openimageio_finds_a_part_for_every_quantity_in_a_bundle(out: Path) -> N
 
 
 def test_openimageio_reads_rate_colour_space_and_conventions(out: Path) -> None:
-    told = tool("oiiotool", "--info", "-v", out / "normals" / "ball_normals.1001.exr")
+    said = tool("oiiotool", "--info", "-v", out / "normals" / "ball_normals.1001.exr")
     for words in ('oiio:ColorSpace: "data"', "framesPerSecond: 24000/1001", 'psvideo:y: "up"', 'compression: "zip"'):
-        assert words in told
-    told = tool("oiiotool", "--info", "-v", out / "albedo" / "ball_albedo.1001.exr")
-    assert 'oiio:ColorSpace: "lin_rec709_scene"' in told
-    told = tool("oiiotool", "--info", "-v", out / "normals_png16" / "ball_normals.1001.png")
+        assert words in said
+    said = tool("oiiotool", "--info", "-v", out / "albedo" / "ball_albedo.1001.exr")
+    assert 'oiio:ColorSpace: "lin_rec709_scene"' in said
+    said = tool("oiiotool", "--info", "-v", out / "normals_png16" / "ball_normals.1001.png")
     for words in ("uint16", "CICP: 1, 8, 0, 1", 'oiio:ColorSpace: "lin_rec709_scene"', 'psvideo:space: "camera"'):
-        assert words in told
+        assert words in said
 
 
 def test_a_png_without_its_tags_is_bent_where_colours_are_managed_and_with_them_it_is_not(
@@ -134,8 +134,8 @@ def test_three_js_reads_signed_normals_from_exr(out: Path, tmp_path: Path) -> No
     for path in (out / "normals" / "ball_normals.1002.exr", out / "ball.1002.exr"):
         raw = tmp_path / "raw"
         words = [node, CLIENTS / "read_exr.mjs", path, raw]
-        told = json.loads(subprocess.run(words, capture_output=True, text=True, check=True).stdout)
-        assert (told["width"], told["height"]) == (SIZE, SIZE)
+        said = json.loads(subprocess.run(words, capture_output=True, text=True, check=True).stdout)
+        assert (said["width"], said["height"]) == (SIZE, SIZE)
         read = np.frombuffer(raw.read_bytes(), np.float32).reshape(SIZE, SIZE, 4)[::-1, :, :3]  # rows from the bottom
         assert np.abs(read - ball(1002)[0]).max() < HALF
 

@@ -67,10 +67,10 @@ def lit(tmp_path_factory: pytest.TempPathFactory) -> dict[str, float]:
     (folder / "jobs.json").write_text(json.dumps(jobs), encoding="utf-8")
     ran = subprocess.run([PYTHON, RELIGHT, folder / "jobs.json"], capture_output=True, text=True, check=False)
     assert ran.returncode == 0, ran.stderr
-    told = json.loads(ran.stdout.splitlines()[-1])
+    said = json.loads(ran.stdout.splitlines()[-1])
     errors = {str(one["name"]): mean_error(one, rotation) for one in jobs}
-    print(json.dumps({"blender": told[0]["version"], "errors": errors}, indent=1))
-    assert told[0]["colour_space"] == "Non-Color" or told[0]["version"] < "5", "the EXR says that it is data"
+    print(json.dumps({"blender": said[0]["version"], "errors": errors}, indent=1))
+    assert said[0]["colour_space"] == "Non-Color" or said[0]["version"] < "5", "the EXR says that it is data"
     return errors
 
 

@@ -198,7 +198,7 @@ def test_dpx_grey_of_ten_bits_is_filled_from_the_low_end(tmp_path: Path) -> None
     assert np.array_equal(decode("dpx", tmp_path / "x.dpx").codes, codes)
 
 
-def test_dpx_tells_its_time_code(tmp_path: Path) -> None:
+def test_dpx_shows_its_time_code(tmp_path: Path) -> None:
     write_dpx(16)(tmp_path / "x.dpx", random(16, 3))
     assert read_header("dpx", tmp_path / "x.dpx").time_code == "01:02:03:04"
 

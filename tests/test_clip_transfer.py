@@ -71,7 +71,7 @@ def test_unknown_curve_names_the_nearest_and_all_others() -> None:
         find_curve("slogg3")
 
 
-def test_colour_is_named_only_where_the_curve_tells_the_gamut() -> None:
+def test_colour_is_named_only_where_the_curve_shows_the_gamut() -> None:
     assert find_curve("srgb").colour == "lin_rec709_scene"
     assert find_curve("S-Log3 S-Gamut3.Cine").colour == "ocio:lin_sgamut3cine_scene"
     assert find_curve("slog3").colour == "unknown"

@@ -216,7 +216,7 @@ def test_a_stopped_run_goes_on_to_the_same_delivery(clip: Path, whole: Path, mon
     assert digest(out) == digest(whole)
 
 
-def test_a_preset_sets_what_its_program_wants_and_tells_how_to_load_it(
+def test_a_preset_sets_what_its_program_wants_and_says_how_to_load_it(
     clip: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
@@ -224,11 +224,11 @@ def test_a_preset_sets_what_its_program_wants_and_tells_how_to_load_it(
     header = OpenEXR.File(str(min((out / "normals").iterdir()))).header()
     assert (header["psvideo:space"], header["psvideo:y"]) == ("tangent", "down")
     assert list((out / "normals_png16").iterdir())
-    told = (out / "README-unreal.txt").read_text(encoding="utf-8")
-    assert "Flip Green Channel off" in told
-    assert "green channel is flipped" in told
+    said = (out / "README-unreal.txt").read_text(encoding="utf-8")
+    assert "Flip Green Channel off" in said
+    assert "green channel is flipped" in said
     number = min((out / "normals").iterdir()).name.split(".")[1]
-    assert f"clip_normals.{number}.png" in told
+    assert f"clip_normals.{number}.png" in said
     command = ["normals", str(clip), "--rig", str(clip / "rig.toml"), "-o", str(tmp_path / "up"), "--frames", "1-20"]
     assert main([*command, "--for", "unreal", "--y", "up"]) == 0
     assert "--y up goes against --for unreal" in capsys.readouterr().err
@@ -276,9 +276,9 @@ def test_a_camera_that_is_known_for_a_part_of_the_clip_is_refused_before_any_wor
 ) -> None:
     short = moving_camera(tmp_path / "short.usda", range(1, 5))
     assert normals(clip, tmp_path / "out", "--space", "world", "--camera-to-world", str(short)) == 1
-    told = capsys.readouterr().err
-    assert "moves from time code 1 to 4" in told
-    assert "--camera-time" in told
+    said = capsys.readouterr().err
+    assert "moves from time code 1 to 4" in said
+    assert "--camera-time" in said
     assert not (tmp_path / "out").exists()
     assert not (tmp_path / ".out.partial").exists()
 
@@ -291,10 +291,10 @@ def test_every_program_has_a_note_with_numbers_rate_colour_and_wrong_ways(name: 
     delivery, at_odds = delivery_of(replace(NOTHING, preset=name))
     assert at_odds == ()
     made = Delivered(clip="take7", first=1001, last=1100, fps=Fraction(24000, 1001), metric=True, delivery=delivery)
-    told = note(name, made)
+    said = note(name, made)
     for words in ("1001", "1100", "23.976", "Known wrong ways", "take7", "sRGB" if delivery.png16 else "Raw"):
-        assert words in told
-    assert ("position" in delivery.aovs) == ("Positions are" in told)
+        assert words in said
+    assert ("position" in delivery.aovs) == ("Positions are" in said)
 
 
 def test_a_camera_beside_a_preset_puts_the_delivery_into_its_world(tmp_path: Path) -> None:
@@ -309,7 +309,7 @@ def test_a_camera_beside_a_preset_puts_the_delivery_into_its_world(tmp_path: Pat
         delivery_of(replace(NOTHING, camera_to_world=matrix))
 
 
-def test_options_that_go_against_a_preset_win_and_are_told_of() -> None:
+def test_options_that_go_against_a_preset_win_and_are_reported() -> None:
     asked = replace(NOTHING, preset="nuke", y="down", space="tangent", multipart=False)
     delivery, at_odds = delivery_of(asked)
     assert (delivery.space.y, delivery.space.name, delivery.multipart) == ("down", "tangent", False)

@@ -112,7 +112,7 @@ def test_half_floats_and_colour_keep_their_form() -> None:
     np.testing.assert_allclose(shown.albedo, half.albedo, atol=1e-3)
 
 
-def test_flicker_is_told_from_noise_and_from_motion() -> None:
+def test_flicker_is_separated_from_noise_and_from_motion() -> None:
     rng = np.random.default_rng(6)
     first = sample_of(surface(rng, bump_at=40))
     steady = change(first, sample_of(surface(rng, bump_at=60)))

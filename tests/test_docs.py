@@ -105,9 +105,9 @@ def test_the_page_of_commands_is_what_the_commands_say() -> None:
 
 
 def test_every_picture_of_a_script_is_shown_small_and_has_words_for_those_who_cannot_see_it() -> None:
-    told = "\n".join(page.read_text(encoding="utf-8") for page in PAGES)
+    reported = "\n".join(page.read_text(encoding="utf-8") for page in PAGES)
     for name in FIGURES:
-        assert re.search(r"!\[[^\]]{10,}\]\(pictures/" + name + r"\.png\)", told), name
+        assert re.search(r"!\[[^\]]{10,}\]\(pictures/" + name + r"\.png\)", reported), name
         assert (PICTURES / f"{name}.png").stat().st_size < LARGEST_PICTURE, name
 
 
@@ -118,8 +118,8 @@ def quotes(name: str) -> list[str]:
     """Return what the page of faults says that psvideo says: the quotations in the section of a fault's picture."""
     sections = (ROOT / "docs" / "troubleshooting.md").read_text(encoding="utf-8").split("\n## ")
     section = next(" ".join(one.split()) for one in sections if f"pictures/{name}.png" in one)
-    told = section.partition("**What psvideo reports.**")[2].partition("**What to do.**")[0]
-    return QUOTE.findall(told)
+    reported = section.partition("**What psvideo reports.**")[2].partition("**What to do.**")[0]
+    return QUOTE.findall(reported)
 
 
 @pytest.fixture(scope="module")

@@ -23,8 +23,8 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def asked(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, dict[str, dict[str, object]], bool]:
     status = main(["doctor", "--json", *words])
-    told = json.loads(capsys.readouterr().out)
-    return status, {finding["name"]: finding for finding in told["findings"]}, told["well"]
+    said = json.loads(capsys.readouterr().out)
+    return status, {finding["name"]: finding for finding in said["findings"]}, said["well"]
 
 
 def test_a_whole_machine_is_well_and_every_part_is_told(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -67,12 +67,12 @@ def test_a_folder_that_cannot_be_written_is_told(capsys: pytest.CaptureFixture[s
 
 def test_the_verdict_closes_what_people_read(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["doctor"]) == 0
-    told = capsys.readouterr().out
-    assert "All that psvideo needs is here." in told
-    assert "\x1b" not in told
+    said = capsys.readouterr().out
+    assert "All that psvideo needs is here." in said
+    assert "\x1b" not in said
 
 
-def test_nothing_missing_is_well_whatever_is_noted() -> None:
+def test_nothing_missing_is_well_beside_any_notes() -> None:
     fine = Finding(name="a", level="note", text="slow")
     assert is_well([fine])
     assert not is_well([fine, Finding(name="b", level="missing", text="gone")])

@@ -285,13 +285,13 @@ except PsvideoError as fault:
 """
 
 
-def test_a_full_disk_is_told_and_leaves_nothing(tmp_path: Path) -> None:
+def test_a_full_disk_is_reported_and_leaves_nothing(tmp_path: Path) -> None:
     path = tmp_path / "plate.exr"
-    told = subprocess.run(
+    said = subprocess.run(
         [sys.executable, "-c", FULL_DISK, str(path)], capture_output=True, text=True, check=True
     ).stdout
-    assert str(path) in told
-    assert "cannot be written" in told
+    assert str(path) in said
+    assert "cannot be written" in said
     assert not list(tmp_path.iterdir())
     assert resource.getrlimit(resource.RLIMIT_FSIZE)[0] != 4096
 

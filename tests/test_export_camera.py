@@ -80,7 +80,7 @@ def test_a_camera_that_stands_still_is_where_it_is_at_any_instant(tmp_path: Path
     assert space.at(1e6, 5, FPS) is space
 
 
-def test_a_lens_that_is_not_the_rigs_and_depth_without_scale_are_told_of(tmp_path: Path) -> None:
+def test_a_lens_that_is_not_the_rigs_and_depth_without_scale_are_reported(tmp_path: Path) -> None:
     space = choose_space("world", "up", stage_with_cameras(tmp_path / "shot.usda"))
     lens_px = 1000 * 50 / 20.955  # USD's own focal length and aperture, at 1000 pixels
     delivery = Delivery(space=space, aovs=("position",))

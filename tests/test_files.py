@@ -1,4 +1,4 @@
-"""Plan, rig and timing files: what is written reads back equal, and what breaks the contract is told in a paragraph."""
+"""Plan, rig and timing files: what is written reads back equal, and what breaks the contract is said in a paragraph."""
 
 import tempfile
 from collections.abc import Callable
@@ -116,17 +116,17 @@ BROKEN_PLANS = {
 
 
 @pytest.mark.parametrize("case", BROKEN_PLANS)
-def test_a_broken_plan_is_told_by_file_key_and_remedy(case: str, tmp_path: Path) -> None:
+def test_a_broken_plan_is_reported_by_file_key_and_remedy(case: str, tmp_path: Path) -> None:
     line, expected = BROKEN_PLANS[case]
     key = line.split("=")[0].strip()
     lines = [row for row in MINIMAL.splitlines() if not row.startswith(key)]
     path = tmp_path / "plan.toml"
     path.write_text("\n".join(lines).replace("[camera]", f"[camera]\n{line}"))
-    with pytest.raises(PsvideoError) as told:
+    with pytest.raises(PsvideoError) as said:
         read_plan(path)
-    assert str(path) in str(told.value)
-    assert expected in str(told.value)
-    assert "\n" not in str(told.value)
+    assert str(path) in str(said.value)
+    assert expected in str(said.value)
+    assert "\n" not in str(said.value)
 
 
 def test_a_newer_major_version_is_refused_plainly() -> None:
@@ -189,12 +189,12 @@ BROKEN_RIGS = {
 
 
 @pytest.mark.parametrize("case", BROKEN_RIGS)
-def test_a_broken_rig_is_told_by_file_key_and_remedy(case: str) -> None:
+def test_a_broken_rig_is_reported_by_file_key_and_remedy(case: str) -> None:
     text, expected = BROKEN_RIGS[case]
-    with pytest.raises(PsvideoError) as told:
+    with pytest.raises(PsvideoError) as said:
         parse_rig(f'schema = "psvideo-rig/1"\n[[light]]\n{text}\n', source="shoot/rig.toml")
-    assert "shoot/rig.toml" in str(told.value)
-    assert expected in str(told.value)
+    assert "shoot/rig.toml" in str(said.value)
+    assert expected in str(said.value)
 
 
 def test_a_light_that_the_rig_lacks_is_named_with_the_nearest() -> None:
@@ -237,7 +237,7 @@ def test_a_timing_reads_back_as_it_was_written(rows: list[tuple[float, float, bo
 
 
 @pytest.mark.parametrize("text", ["", "[]", '{"schema": "psvideo-timing/1"}', '{"schema": "psvideo-plan/1"}', "{"])
-def test_a_broken_timing_file_is_told_with_what_to_do(text: str, tmp_path: Path) -> None:
+def test_a_broken_timing_file_is_reported_with_what_to_do(text: str, tmp_path: Path) -> None:
     path = tmp_path / "timing.json"
     path.write_text(text)
     with pytest.raises(PsvideoError, match=str(path)):

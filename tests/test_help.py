@@ -76,23 +76,23 @@ def test_the_first_screen_says_of_each_command_what_its_own_help_says() -> None:
 
 def test_the_first_screen_stands_in_the_order_of_the_work(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--help"]) == 0
-    told = capsys.readouterr().out
+    reported = capsys.readouterr().out
     steps = ["Plan and light", "Measure cameras", "From footage to plates", "From plates to normals"]
-    places = [told.index(step) for step in steps]
+    places = [reported.index(step) for step in steps]
     assert places == sorted(places)
-    assert told.rstrip().endswith("psvideo normals clip/ --rig rig.toml -o out/"), "it ends with lines to copy"
+    assert reported.rstrip().endswith("psvideo normals clip/ --rig rig.toml -o out/"), "it ends with lines to copy"
 
 
 @pytest.mark.parametrize("path", EVERY)
 def test_help_shows_every_option_and_its_examples_unwrapped(path: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([*path.split(), "--help"]) == 0
-    told = capsys.readouterr().out
-    assert "<bool>" not in told, "a flag takes no value"
+    reported = capsys.readouterr().out
+    assert "<bool>" not in reported, "a flag takes no value"
     for _, line in EXAMPLES[path]:
-        assert f"   {line}\n" in told
+        assert f"   {line}\n" in reported
     for parameter in EVERY[path].params:
         if path and parameter.param_type_name == "option":
-            assert parameter.opts[0] in told
+            assert parameter.opts[0] in reported
             assert parameter.help, f"{path} {parameter.opts[0]} says nothing"
             assert "[" not in parameter.help.replace("[default", ""), "brackets are swallowed as markup"
     assert "[" not in (EVERY[path].help or "")
@@ -159,7 +159,7 @@ NOT_HERE = (
 """What the examples' folder has not: a board, other footage, more lights, a plan without a marker."""
 
 
-def test_the_examples_that_cost_little_do_what_they_say_and_tell_machines_in_one_object(
+def test_the_examples_that_cost_little_do_what_they_say_and_answer_machines_in_one_object(
     shoot: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(shoot)

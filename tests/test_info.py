@@ -209,7 +209,7 @@ def put_exr(file: Path, names: str = "RGB") -> None:
     OpenEXR.File(header, {name: np.zeros((ROWS, COLS), np.float16) for name in names}).write(str(file))
 
 
-def test_an_exr_tells_its_attributes(tmp_path: Path) -> None:
+def test_an_exr_shows_its_attributes(tmp_path: Path) -> None:
     put_exr(tmp_path / "a.1001.exr")
     found = describe(tmp_path / "a.1001.exr")
     assert (found.facts["psvideo:space"], found.facts["psvideo:time_s"]) == ("camera", 1.25)

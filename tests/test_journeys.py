@@ -232,9 +232,9 @@ def test_a_truncated_frame_is_named_and_nothing_is_written(
     frame = a_frame(copy)
     frame.write_bytes(frame.read_bytes()[:2000])
     assert run("normals", copy, "--rig", copy / "rig.toml", "-o", tmp_path / "out") == 1
-    told = capsys.readouterr().err
-    assert frame.name in told
-    assert "Traceback" not in told
+    reported = capsys.readouterr().err
+    assert frame.name in reported
+    assert "Traceback" not in reported
     assert not (tmp_path / "out").exists()
 
 
@@ -246,7 +246,7 @@ def test_a_frame_of_another_size_is_named(clip: Path, tmp_path: Path, capsys: py
     assert frame.name in capsys.readouterr().err
 
 
-def test_a_missing_frame_is_a_dropped_frame_that_is_told_and_marked(
+def test_a_missing_frame_is_a_dropped_frame_that_is_reported_and_marked(
     clip: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     copy = spoilt(clip, tmp_path)
@@ -297,7 +297,7 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("case", BROKEN)
-def test_a_mistake_is_told_in_one_paragraph(
+def test_a_mistake_is_reported_in_one_paragraph(
     case: str, clip: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "rig.toml").write_text(
@@ -307,10 +307,10 @@ def test_a_mistake_is_told_in_one_paragraph(
     cv2.imwrite(str(tmp_path / "mask.png"), np.full((2, 3), 255, np.uint8))
     arguments, status, words = BROKEN[case]
     assert main([word.format(clip=clip, tmp=tmp_path) for word in arguments]) == status
-    told = capsys.readouterr().err
-    assert words in told
-    assert "Traceback" not in told
-    assert told.count("psvideo: ") <= 1
+    reported = capsys.readouterr().err
+    assert words in reported
+    assert "Traceback" not in reported
+    assert reported.count("psvideo: ") <= 1
     assert not (tmp_path / "o").exists()
 
 
@@ -335,8 +335,8 @@ def test_lights_that_always_flash_together_are_refused(
     plan = (copy / "plan.toml").read_text().replace("{left = 1.0}", "{left = 1.0, key = 1.0}")
     (copy / "plan.toml").write_text(plan.replace("{key = 1.0}", "{key = 1.0, left = 1.0}"))
     assert run("normals", copy, "--rig", copy / "rig.toml", "-o", tmp_path / "out") == 1
-    told = capsys.readouterr().err
-    assert "cannot separate the lights key, left" in told
+    reported = capsys.readouterr().err
+    assert "cannot separate the lights key, left" in reported
 
 
 def test_a_timing_of_other_footage_is_refused(clip: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -355,6 +355,6 @@ def test_frames_taken_in_steps_are_called_what_they_are(
     assert run("sync", clip, "-o", tmp_path / "timing.json", "-q") == 0
     given = ("--timing", tmp_path / "timing.json", "--frames", "1-12x2")
     assert run("normals", clip, "--rig", clip / "rig.toml", "-o", tmp_path / "out", *given) == 0
-    told = capsys.readouterr()
-    assert "usable." not in told.out.replace("not usable", "")
-    assert "seen by no frame" in told.err
+    reported = capsys.readouterr()
+    assert "usable." not in reported.out.replace("not usable", "")
+    assert "seen by no frame" in reported.err

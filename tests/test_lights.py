@@ -24,11 +24,11 @@ def test_the_example_rigs_fit_every_board(rig: str, board: str, capsys: pytest.C
     lights = {light["name"] for light in tomllib.loads((LIGHTS / "rigs" / f"{rig}.toml").read_text("utf-8"))["light"]}
     assert set(read_plan(plan).lights) == lights
     assert main(["strobe", "check", str(plan), "--board", board]) == 0
-    told = "".join(capsys.readouterr())
+    said = "".join(capsys.readouterr())
     readme = (LIGHTS / "rigs" / "README.md").read_text(encoding="utf-8")
     row = next(line for line in readme.splitlines() if line.startswith(f"| {rig} |"))
-    assert all(number in told for number in re.findall(r"\d+ flashes of \d+|\d+ different ones|[\d.]+ %", row))
-    assert ("5000 ppm" in told) == (board != "rp2040")
+    assert all(number in said for number in re.findall(r"\d+ flashes of \d+|\d+ different ones|[\d.]+ %", row))
+    assert ("5000 ppm" in said) == (board != "rp2040")
 
 
 def test_the_schematic_is_what_its_script_draws() -> None:

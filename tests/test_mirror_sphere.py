@@ -50,7 +50,7 @@ def calibrated(off_axis_deg: float, noise: float, focal: float | None) -> Mirror
 
 
 @pytest.mark.parametrize(("off_axis_deg", "noise"), [(0.0, 0.0), (10.0, 0.0), (10.0, 0.003)])
-def test_with_the_focal_length_a_sphere_off_the_axis_tells_directions(off_axis_deg: float, noise: float) -> None:
+def test_with_the_focal_length_a_sphere_off_the_axis_shows_directions(off_axis_deg: float, noise: float) -> None:
     found = calibrated(off_axis_deg, noise, WIDE.focal)
     outline = found.sightings[0].outline
     x = WIDE.middle[0] + WIDE.focal * np.tan(np.radians(off_axis_deg))
@@ -69,7 +69,7 @@ def test_without_it_the_bias_is_as_large_as_the_angle_off_the_axis_and_is_said()
     assert not any("orthographic" in warning for warning in calibrated(10.0, 0.0, WIDE.focal).warnings)
 
 
-def test_two_spheres_tell_where_near_lights_are() -> None:
+def test_two_spheres_show_where_near_lights_are() -> None:
     lens = Lens(width=480, height=220, focal=800.0)
     balls = [Ball(centre=(-0.12, 0.0, -0.6), radius_m=0.04), Ball(centre=(0.1, 0.01, -0.55), radius_m=0.04)]
     pictures = shoot(lens, balls, {name: Lamp(position=place) for name, place in NEAR.items()})
@@ -87,7 +87,7 @@ def test_two_spheres_tell_where_near_lights_are() -> None:
         calibrate_lights(sightings)
 
 
-def test_a_second_reflection_is_told_by_its_strength_or_the_light_is_left_out() -> None:
+def test_a_second_reflection_is_found_by_its_strength_or_the_light_is_left_out() -> None:
     def with_second(strength: float) -> MirrorCalibration:
         lens, second = Lens(width=300, height=300, focal=900.0), Lamp(direction=(-0.6, -0.3, 0.7), strength=strength)
         images = [

@@ -1,4 +1,4 @@
-"""Mistakes that new users make: each is told in one paragraph that says what to do, and nothing of theirs is lost."""
+"""Mistakes that new users make: each is answered in one paragraph that says what to do, and nothing is lost."""
 
 from pathlib import Path
 
@@ -21,7 +21,7 @@ def clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def told(capsys: pytest.CaptureFixture[str], *words: object, status: int) -> str:
+def reported(capsys: pytest.CaptureFixture[str], *words: object, status: int) -> str:
     """Return what a command says that must end with ``status``."""
     assert main([str(word) for word in words]) == status
     said = capsys.readouterr().err
@@ -33,7 +33,7 @@ def told(capsys: pytest.CaptureFixture[str], *words: object, status: int) -> str
 def test_a_folder_where_a_file_is_meant_names_the_files_in_it(
     words: list[str], clip: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    said = told(capsys, *(word.format(clip=clip) for word in words), status=1)
+    said = reported(capsys, *(word.format(clip=clip) for word in words), status=1)
     assert f"{clip}: is a folder, and a file is expected. Name the file in it: {clip / 'plan.toml'} or" in said
 
 
@@ -50,13 +50,13 @@ def test_a_folder_where_a_file_is_meant_names_the_files_in_it(
         ('mode = "rolling"', 'mode = "roling"', "key 'strobe.mode' is 'roling': expected 'rolling', 'half-rate' or"),
     ],
 )
-def test_a_wrong_value_in_a_plan_is_told_once_with_all_that_it_may_be(
+def test_a_wrong_value_in_a_plan_is_reported_once_with_all_that_it_may_be(
     found: str, written: str, expected: str, clip: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     text = (clip / "plan.toml").read_text()
     assert found in text
     (tmp_path / "plan.toml").write_text(text.replace(found, written))
-    said = told(capsys, "sync", clip, "--plan", tmp_path / "plan.toml", status=1)
+    said = reported(capsys, "sync", clip, "--plan", tmp_path / "plan.toml", status=1)
     assert expected in said
     assert said.count("key '") == 1
 
@@ -82,12 +82,12 @@ def test_force_replaces_a_diagram_that_psvideo_drew_and_no_other_picture(
     picture, plan = tmp_path / name, tmp_path / "plan.toml"
     theirs = cv2.imencode(".png", np.zeros((9, 9, 3), np.uint8))[1].tobytes()
     picture.write_bytes(theirs)
-    assert "not replaced" in told(capsys, *PLAN, "-o", plan, "--diagram", picture, status=2)
+    assert "not replaced" in reported(capsys, *PLAN, "-o", plan, "--diagram", picture, status=2)
     assert picture.read_bytes() == theirs
     assert not plan.exists()
     picture.unlink()
-    told(capsys, *PLAN, "-o", plan, "--diagram", picture, status=0)
-    told(capsys, *PLAN, "-o", plan, "--diagram", picture, status=0)
+    reported(capsys, *PLAN, "-o", plan, "--diagram", picture, status=0)
+    reported(capsys, *PLAN, "-o", plan, "--diagram", picture, status=0)
 
 
 def test_force_replaces_no_picture_of_the_crew_beside_a_rig_or_a_timing(
@@ -100,7 +100,7 @@ def test_force_replaces_no_picture_of_the_crew_beside_a_rig_or_a_timing(
         ("sync", clip, "--picture", theirs),
         ("calibrate", "matte-sphere", clip, "-o", tmp_path / "rig.toml"),
     ):
-        assert "not replaced" in told(capsys, *words, "--force", "-q", status=2)
+        assert "not replaced" in reported(capsys, *words, "--force", "-q", status=2)
     assert theirs.read_bytes() == before
 
 
@@ -112,17 +112,17 @@ def test_a_marked_png_is_a_png_with_the_same_pixels() -> None:
 
 
 def test_a_picture_of_timing_is_a_png(clip: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert "such as" in told(capsys, "sync", clip, "--picture", tmp_path / "timing.jpg", status=2)
+    assert "such as" in reported(capsys, "sync", clip, "--picture", tmp_path / "timing.jpg", status=2)
     assert not (tmp_path / "timing.jpg").exists()
 
 
-def test_a_board_that_is_not_in_the_table_is_told_what_usual_boards_have(
+def test_a_board_that_is_not_in_the_table_hears_what_usual_boards_have(
     clip: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert "Uno" in told(capsys, "strobe", "check", clip / "plan.toml", "--board", "uno", status=2)
+    assert "Uno" in reported(capsys, "strobe", "check", clip / "plan.toml", "--board", "uno", status=2)
 
 
-def test_what_to_distrust_in_the_timing_is_told_by_the_commands_that_find_it_for_themselves(
+def test_what_to_distrust_in_the_timing_is_reported_by_the_commands_that_find_it_for_themselves(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     scene = (ROOT / "data_synth/sphere.toml").read_text()
@@ -133,5 +133,5 @@ def test_what_to_distrust_in_the_timing_is_told_by_the_commands_that_find_it_for
     clip = tmp_path / "clip"
     assert main(["synth", str(tmp_path / "scene.toml"), "-o", str(clip), "-q"]) == 0
     capsys.readouterr()
-    said = told(capsys, "split", clip, "-o", tmp_path / "plates", status=0)
+    said = reported(capsys, "split", clip, "-o", tmp_path / "plates", status=0)
     assert "which is what a frame rate misnamed by 1.001 looks like" in said

@@ -77,12 +77,12 @@ def test_sync_takes_the_order_from_the_rig(five: Path, tmp_path: Path, capsys: p
     assert json.loads((tmp_path / "guess.json").read_text())["order"] == "guess"
     assert "order_note" not in json.loads((tmp_path / "guess.json").read_text())
     capsys.readouterr()
-    assert run("sync", five, "--rig", five / "rig.toml", "-o", tmp_path / "told.json") == 0
+    assert run("sync", five, "--rig", five / "rig.toml", "-o", tmp_path / "reported.json") == 0
     assert "found from the rig's directions" in capsys.readouterr().out
-    told = json.loads((tmp_path / "told.json").read_text())
-    assert told["order"] == "rig"
-    assert "in the next best" in told["order_note"]
-    assert names_of(tmp_path / "told.json") == names_of(five / "truth" / "timing.json")
+    reported = json.loads((tmp_path / "reported.json").read_text())
+    assert reported["order"] == "rig"
+    assert "in the next best" in reported["order_note"]
+    assert names_of(tmp_path / "reported.json") == names_of(five / "truth" / "timing.json")
 
 
 def test_split_and_normals_put_right_a_timing_that_was_named_wrongly(five: Path, tmp_path: Path) -> None:

@@ -156,7 +156,7 @@ def test_a_channel_in_which_the_surface_is_black_adds_no_noise() -> None:
     assert error_deg(solve(list(white), coloured), normals, inside).mean() == pytest.approx(alone / 3**0.5, rel=0.05)
 
 
-def test_albedo_keeps_one_scale_whatever_the_picture_holds() -> None:
+def test_albedo_keeps_one_scale_for_any_picture() -> None:
     normals, _ = ball(48)
     lit = lit_by(ring(4, 40), np.full((4, 1), 0.5))
     dim = solve(list(shoot(normals, lit, 0.1)), lit)

@@ -1,4 +1,4 @@
-"""The order of the lights from a rig's directions: told where the rig tells it, refused where it cannot."""
+"""The order of the lights from a rig's directions: given where the rig shows it, refused where it cannot."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -87,13 +87,13 @@ def disturbed(rng: np.random.Generator, plan: Plan, rig: Rig, turn: int) -> dict
 
 
 @pytest.mark.parametrize("turn", range(5))
-def test_an_irregular_rig_tells_the_turn(turn: int, make_plan: PlanMaker) -> None:
+def test_an_irregular_rig_shows_the_turn(turn: int, make_plan: PlanMaker) -> None:
     plan = make_plan(lights=NAMES[:5], dark=False)
     rig = ring([0, 50, 130, 200, 300], [0.8, 0.6, 0.9, 0.7, 0.75])
     assert order_by_rig(plan, rig, pictures(plan, rig, turn)).turn == turn
 
 
-def test_a_regular_ring_tells_nothing(make_plan: PlanMaker) -> None:
+def test_a_regular_ring_shows_nothing(make_plan: PlanMaker) -> None:
     plan = make_plan(lights=NAMES[:5], dark=False)
     rig = ring([0, 72, 144, 216, 288], [0.8] * 5)
     verdict = order_by_rig(plan, rig, pictures(plan, rig, 2))
@@ -109,7 +109,7 @@ def test_three_lights_fit_any_picture(make_plan: PlanMaker) -> None:
     assert "3 flashes" in verdict.why
 
 
-def test_strengths_tell_the_turn_of_a_regular_ring(make_plan: PlanMaker) -> None:
+def test_strengths_show_the_turn_of_a_regular_ring(make_plan: PlanMaker) -> None:
     plan = make_plan(lights=NAMES[:5], dark=False)
     rig = ring([0, 72, 144, 216, 288], [0.8] * 5)
     uneven = Rig(lights=tuple(replace(light, intensity=(s,)) for light, s in zip(rig.lights, STRONG, strict=True)))
@@ -127,7 +127,7 @@ def test_a_calibrated_rig_needs_less_of_a_difference(make_plan: PlanMaker) -> No
     assert order_by_rig(plan, measured, shown).turn == 1
 
 
-def test_near_lights_are_taken_at_the_plane_and_tell_the_turn_of_a_regular_ring(make_plan: PlanMaker) -> None:
+def test_near_lights_are_taken_at_the_plane_and_show_the_turn_of_a_regular_ring(make_plan: PlanMaker) -> None:
     plan = make_plan(lights=NAMES[:5], dark=False, width_px=24, height_px=24)
     rig = near_ring(radius_m=0.6)
     shown = near_pictures(plan, rig, 2)

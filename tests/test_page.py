@@ -285,18 +285,18 @@ def test_the_pixel_under_the_pointer_is_read_out(server: PageServer, watched: Wa
     box = page.locator("#viewer").bounding_box()
     assert box is not None
     page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-    told = page.locator("#pixel").inner_text()
-    assert f"{small.COLS // 2}, {small.ROWS // 2}" in told
-    assert "0.505 0.5 0.1" in told
+    said = page.locator("#pixel").inner_text()
+    assert f"{small.COLS // 2}, {small.ROWS // 2}" in said
+    assert "0.505 0.5 0.1" in said
 
 
-def test_timing_is_drawn_and_told_and_leads_to_the_picture(server: PageServer, watched: Watched) -> None:
+def test_timing_is_drawn_and_listed_and_leads_to_the_picture(server: PageServer, watched: Watched) -> None:
     page = watched.open(server.url)
     page.keyboard.press("t")
     page.wait_for_selector("#timing-facts dt")
-    told = page.locator("#timing-facts").inner_text()
+    said = page.locator("#timing-facts").inner_text()
     for words in ("18, 18 complete", "0.012 row", "+31.2 ppm", "1 after 7", "from the dark slot", "key", "left"):
-        assert words in told
+        assert words in said
     box = page.locator("#timing-diagram").bounding_box()
     assert box is not None
     page.mouse.click(box["x"] + box["width"] - 3, box["y"] + 8)

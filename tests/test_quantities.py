@@ -57,7 +57,7 @@ def test_depth_is_integrated_where_a_quantity_is_computed_from_it() -> None:
     assert [name for name in AOVS if Delivery(space=Space(), aovs=(name,)).needs_depth] == ["depth", "position"]
 
 
-def test_files_are_written_as_they_are_made_whatever_the_order_asked() -> None:
+def test_files_are_written_as_they_are_made_in_any_order_asked() -> None:
     written = Delivery(space=Space(), aovs=AOVS[::-1]).quantities
     assert written == ("normals", "albedo", "valid", "residual", "error", "beauty", "depth", "position")
     assert [QUANTITIES[name].of for name in written] == sorted(

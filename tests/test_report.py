@@ -95,7 +95,7 @@ def reported(shot: Callable[[str], Path], tmp_path_factory: pytest.TempPathFacto
     return report
 
 
-def told(report: dict[str, Any], subject: str) -> dict[str, str]:
+def said(report: dict[str, Any], subject: str) -> dict[str, str]:
     """Return the first line on a subject that is not good."""
     return next(line for line in report["judgements"] if line["subject"] == subject and line["grade"] != "good")
 
@@ -133,7 +133,7 @@ def test_the_first_lines_say_what_spoils_a_take_and_what_to_change(
     report = reported(name)
     assert verdict in report["verdict"]
     assert report["usable"] == ("not usable" not in verdict)
-    line = told(report, subject)
+    line = said(report, subject)
     assert re.search(words, f"{line['found']} {line['advice']}")
     assert f"{line['found']} {line['advice']}".strip() in report["findings"]
     others = {one["subject"] for one in report["judgements"] if one["grade"] in ("bad", "doubtful")} - {subject}
@@ -141,7 +141,7 @@ def test_the_first_lines_say_what_spoils_a_take_and_what_to_change(
 
 
 def test_the_power_that_is_advised_no_longer_clips(reported: Callable[..., dict[str, Any]]) -> None:
-    line = told(reported("key_clips"), "clipping")
+    line = said(reported("key_clips"), "clipping")
     power = float(re.findall(r"(\d+) %", line["advice"])[0]) / 100
     assert 0.6 < power * 2.5 * 0.8 < 1.05, "the brightest paint under the key at that power, of saturation"
 
@@ -181,7 +181,7 @@ def test_a_wrong_rig_is_not_believed(
     assert any(re.search(words, line["found"]) for line in report["judgements"] if line["subject"] == "rig")
 
 
-def test_photographs_named_in_another_order_than_the_rig_are_told_from_those_in_order(
+def test_photographs_named_in_another_order_than_the_rig_are_separated_from_those_in_order(
     shared_data: Path, tmp_path: Path
 ) -> None:
     cat = shared_data / "uw_psm" / "cat"
@@ -195,19 +195,19 @@ def test_photographs_named_in_another_order_than_the_rig_are_told_from_those_in_
     mixed.mkdir()
     for number, file in enumerate(sorted(cat.glob("cat.[0-9]*.png"))):  # 0, 1, 10, 11, 2 …
         (mixed / f"cat.{number}.png").symlink_to(file)
-    told, usable = [], []
+    said, usable = [], []
     for clip in (cat, mixed):
-        out = tmp_path / f"out{len(told)}"
+        out = tmp_path / f"out{len(said)}"
         rig, mask = shared_data / "uw_psm" / "lights.txt", cat / "cat.mask.png"
         assert run("normals", clip, "--plan", plan, "--rig", rig, "--mask", mask, "-o", out, "-q") == 0
         report = json.loads((out / "report.json").read_text())
         usable.append(report["usable"])
-        told.append(" ".join(line["found"] for line in report["judgements"] if line["subject"] == "rig"))
+        said.append(" ".join(line["found"] for line in report["judgements"] if line["subject"] == "rig"))
     assert usable[0]
-    assert "do not explain the plates within" in told[0], "the directions are known to be degrees off"
+    assert "do not explain the plates within" in said[0], "the directions are known to be degrees off"
     order = re.compile("does not fit the plates|cannot be those of one surface")
-    assert not order.search(told[0])
-    assert len(order.findall(told[1])) == 2
+    assert not order.search(said[0])
+    assert len(order.findall(said[1])) == 2
 
 
 @pytest.mark.parametrize("name", ["plain", "ambient"])
@@ -217,7 +217,7 @@ def test_clips_of_another_simulator_are_usable(shared_data: Path, tmp_path: Path
     assert json.loads((tmp_path / "out" / "report.json").read_text())["verdict"] == "This take is usable."
 
 
-def test_a_page_asks_for_nothing_and_tells_all(shot: Callable[[str], Path], tmp_path: Path) -> None:
+def test_a_page_asks_for_nothing_and_shows_all(shot: Callable[[str], Path], tmp_path: Path) -> None:
     clip = shot("dropped")
     command = ("normals", clip, "--rig", clip / "rig.toml", "-o", tmp_path / "out", "-q")
     assert run(*command) == 0
@@ -237,6 +237,6 @@ def test_split_reports_too_without_a_rig(shot: Callable[[str], Path], tmp_path: 
     assert run("split", shot("key_clips"), "-o", tmp_path / "plates", "-q") == 0
     report = json.loads((tmp_path / "plates" / "report.json").read_text())
     assert report["kind"] == "split"
-    assert "'key' is clipped" in told(report, "clipping")["found"]
+    assert "'key' is clipped" in said(report, "clipping")["found"]
     assert report["instants"][0]["valid_share"] is None
     assert "<svg" in (tmp_path / "plates" / "report.html").read_text()

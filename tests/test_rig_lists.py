@@ -1,4 +1,4 @@
-"""Light lists of other programs: what is written is read back to the last digit, and what they cannot hold is told."""
+"""Light lists of other programs: what is written is read back to the last digit, and what they cannot hold is said."""
 
 from pathlib import Path
 
@@ -62,7 +62,7 @@ def test_an_lp_file_is_a_count_and_a_line_for_each_light(tmp_path: Path) -> None
     assert "differ in theirs" in lost[0]
 
 
-def test_a_near_light_is_in_no_list_and_a_name_that_tells_no_kind_is_refused(tmp_path: Path) -> None:
+def test_a_near_light_is_in_no_list_and_a_name_that_shows_no_kind_is_refused(tmp_path: Path) -> None:
     near = Rig(lights=(Light(name="lamp", position_m=(1.0, 0.0, 0.0)),))
     for name in ("a.lp", "light_directions.txt"):
         with pytest.raises(PsvideoError, match="'lamp' has a position"):

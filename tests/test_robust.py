@@ -98,7 +98,7 @@ def test_a_matte_ball_comes_out_exactly(lights: int, channels: int, loss: str) -
     assert np.isfinite(surface.normals).all()
 
 
-def test_one_normal_from_three_channels_whatever_their_colours() -> None:
+def test_one_normal_from_three_channels_of_any_colours() -> None:
     normals, inside = ball(reach_deg=60)
     lit = lit_by(ring(8, 40), channels=3)
     red = shoot(normals, lit, np.array([0.6, 0.0, 0.0]))
@@ -201,8 +201,8 @@ def turned(lit: Illumination, wrong_deg: float) -> Illumination:
     across = np.random.default_rng(2).normal(size=lit.directions.shape)
     across -= np.sum(across * lit.directions, axis=1, keepdims=True) * lit.directions
     across /= np.linalg.norm(across, axis=1, keepdims=True)
-    told = np.cos(np.radians(wrong_deg)) * lit.directions + np.sin(np.radians(wrong_deg)) * across
-    return Illumination(directions=told, intensities=lit.intensities)
+    said = np.cos(np.radians(wrong_deg)) * lit.directions + np.sin(np.radians(wrong_deg)) * across
+    return Illumination(directions=said, intensities=lit.intensities)
 
 
 def two_rings() -> Illumination:

@@ -51,7 +51,7 @@ def normals_error(subject: Path, rig: Path, out: Path) -> float:
     return float(np.degrees(np.arccos(np.clip((found * true).sum(axis=-1), -1, 1)))[where].mean())
 
 
-def test_a_chrome_ball_in_a_strobed_clip_tells_the_lights_with_which_normals_come_out_right(
+def test_a_chrome_ball_in_a_strobed_clip_shows_the_lights_with_which_normals_come_out_right(
     subject: Path, tmp_path: Path
 ) -> None:
     ball, rig = shot(tmp_path, SCENE.read_text().replace(MATTE, CHROME)), tmp_path / "rig.toml"
@@ -62,7 +62,7 @@ def test_a_chrome_ball_in_a_strobed_clip_tells_the_lights_with_which_normals_com
     assert normals_error(subject, rig, tmp_path / "out") < 1.0
 
 
-def test_a_matte_ball_in_a_strobed_clip_tells_directions_and_strengths(subject: Path, tmp_path: Path) -> None:
+def test_a_matte_ball_in_a_strobed_clip_shows_directions_and_strengths(subject: Path, tmp_path: Path) -> None:
     rig = tmp_path / "rig.toml"
     words = ["calibrate", "matte-sphere", str(subject), "-o", str(rig), "--albedo", "0.8", "-q"]
     assert main(words) == 0
@@ -93,7 +93,7 @@ flash_s = 0.001
 """
 
 
-def test_two_chrome_balls_in_a_strobed_clip_tell_where_near_lights_are(tmp_path: Path) -> None:
+def test_two_chrome_balls_in_a_strobed_clip_show_where_near_lights_are(tmp_path: Path) -> None:
     lights = "".join(
         f'[[light]]\nname = "{name}"\nposition_m = {list(place)}\nintensity = 0.4\n' for name, place in NEAR.items()
     )

@@ -72,7 +72,7 @@ def test_the_table_of_boards_says_who_plays_a_plan(plan_file: Path, capsys: pyte
     }
 
 
-def test_a_check_tells_ticks_wiring_and_what_to_beware_of(plan_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_check_shows_ticks_wiring_and_what_to_beware_of(plan_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("strobe", "check", plan_file, "--board", "atmega328p") == 0
     said = capsys.readouterr()
     assert "flash 1: key at 1, 0.8 ms = 1600 ticks" in said.out

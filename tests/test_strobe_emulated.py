@@ -37,13 +37,13 @@ def armed() -> EmulatedController:
 
 
 def running(cycles: int = 0) -> EmulatedController:
-    """Return a controller that was told to run at tick 0; its first flash starts at 10 ms."""
+    """Return a controller that was asked to run at tick 0; its first flash starts at 10 ms."""
     controller = armed()
     assert tell(controller, b"RUN %d\n" % cycles, now=0) == b"OK start=20000\n"
     return controller
 
 
-def test_it_plays_what_it_was_told_and_is_idle_afterwards() -> None:
+def test_it_plays_what_it_was_sent_and_is_idle_afterwards() -> None:
     controller = running(2)
     controller.feed(b"ID\n", 50 * MS)
     controller.advance(100 * MS)
@@ -52,8 +52,8 @@ def test_it_plays_what_it_was_told_and_is_idle_afterwards() -> None:
         for n in range(4)
         for after, level in ((0, 1), (1600, 0))
     ]
-    told = b"OK state=idle fault=none reset=power interlock=closed cycle=2 step=0 cycles=2\n"
-    assert controller.feed(b"STAT\n", 100 * MS) == told
+    said = b"OK state=idle fault=none reset=power interlock=closed cycle=2 step=0 cycles=2\n"
+    assert controller.feed(b"STAT\n", 100 * MS) == said
     assert tell(controller, ARM, now=101 * MS).startswith(b"OK")
 
 
@@ -111,13 +111,13 @@ def test_an_open_interlock_forbids_arming() -> None:
 
 
 @pytest.mark.parametrize("cause", ["power", "external", "brownout", "watchdog", "other"])
-def test_a_reset_is_dark_forgets_everything_and_tells_its_cause(cause: Reset) -> None:
+def test_a_reset_is_dark_forgets_everything_and_shows_its_cause(cause: Reset) -> None:
     controller = running()
     controller.restart(cause, 20_100)
     assert not controller.lit
     state, fault = ("fault", "watchdog") if cause == "watchdog" else ("idle", "none")
-    told = f"OK state={state} fault={fault} reset={cause} interlock=closed cycle=0 step=0 cycles=0\n"
-    assert controller.feed(b"STAT\n", 20_200) == told.encode()
+    said = f"OK state={state} fault={fault} reset={cause} interlock=closed cycle=0 step=0 cycles=0\n"
+    assert controller.feed(b"STAT\n", 20_200) == said.encode()
     assert controller.feed(b"CLK a\n", 20_200) == b"OK nonce=a cycle=0 ticks=100\n"
     assert controller.feed(ARM, 20_300).startswith(b"E 12 watchdog\n" if cause == "watchdog" else b"E 10 ")
 
@@ -234,7 +234,7 @@ CHUNK = st.one_of(st.binary(max_size=120), TALK, st.sampled_from([*LOADED, ARM, 
 
 @settings(max_examples=200, deadline=None, suppress_health_check=BUSY)
 @given(board=st.sampled_from(list(BOARDS)), talk=st.lists(st.tuples(CHUNK, st.integers(0, 10**6)), max_size=20))
-def test_whatever_comes_it_answers_line_by_line_and_is_dark_in_the_end(
+def test_after_any_input_it_answers_line_by_line_and_is_dark_in_the_end(
     board: str, talk: list[tuple[bytes, int]]
 ) -> None:
     controller = EmulatedController(BOARDS[board])
@@ -256,7 +256,7 @@ def test_whatever_comes_it_answers_line_by_line_and_is_dark_in_the_end(
 
 @settings(max_examples=100, deadline=None, suppress_health_check=BUSY)
 @given(talk=st.lists(st.tuples(CHUNK, st.integers(0, 10**6)), max_size=20))
-def test_whatever_comes_a_host_that_falls_silent_leaves_the_dark(talk: list[tuple[bytes, int]]) -> None:
+def test_after_any_input_a_host_that_falls_silent_leaves_the_dark(talk: list[tuple[bytes, int]]) -> None:
     controller = running()
     now = 0
     for data, pause in talk:

@@ -209,8 +209,8 @@ def test_stop_and_an_open_interlock_darken_in_the_middle_of_a_flash(
     assert not is_on
     assert cycle_of(out, "state=idle") - edge < AT_ONCE_MS * MS  # the reply's bytes, mostly
 
-    told = ["send STAT", "send RUN 0", "send CLEAR", "close", "send CLEAR"]
-    out = emulate([*run, "open", "wait 200", *told], board=board, trace=tmp_path / "t.csv")
+    reported = ["send STAT", "send RUN 0", "send CLEAR", "close", "send CLEAR"]
+    out = emulate([*run, "open", "wait 200", *reported], board=board, trace=tmp_path / "t.csv")
     edge, is_on = last_edge(tmp_path / "t.csv")
     started = cycle_of(out, "start=")
     assert not is_on

@@ -30,7 +30,7 @@ def in_order(edges: list[Edge]) -> list[Edge]:
 
 
 def running(cycles: int = 0) -> Pico:
-    """Return a Pico that was told to run at tick 0; its first flash starts at 10 ms."""
+    """Return a Pico that was asked to run at tick 0; its first flash starts at 10 ms."""
     pico = Pico()
     assert pico.feed(LOADED + ARM, 0).splitlines()[-1].startswith(b"OK check=")
     assert pico.feed(b"RUN %d\n" % cycles, 0) == b"OK start=1250000\n"
@@ -113,7 +113,7 @@ def test_each_limit_has_its_number(line: bytes, code: Error | None) -> None:
     assert answer.endswith(b"\n")
 
 
-def test_it_plays_what_it_was_told_and_is_idle_afterwards() -> None:
+def test_it_plays_what_it_was_sent_and_is_idle_afterwards() -> None:
     pico = running(2)
     pico.feed(b"ID\n", 20 * MS)
     pico.advance(100 * MS)
@@ -122,8 +122,8 @@ def test_it_plays_what_it_was_told_and_is_idle_afterwards() -> None:
         for n in range(4)
         for after, level in ((0, 1), (100_000, 0))
     ]
-    told = b"OK state=idle fault=none reset=power interlock=closed cycle=2 step=0 cycles=2\n"
-    assert pico.feed(b"STAT\n", 100 * MS) == told
+    said = b"OK state=idle fault=none reset=power interlock=closed cycle=2 step=0 cycles=2\n"
+    assert pico.feed(b"STAT\n", 100 * MS) == said
     assert pico.feed(ARM, 101 * MS).startswith(b"OK")
 
 
@@ -218,14 +218,14 @@ def test_a_state_machine_that_runs_dry_is_a_fault(cycles: int) -> None:
         (1 << 20, 0, 0, "other"),
     ],
 )
-def test_it_tells_why_it_was_reset(chip: int, reason: int, scratch: int, cause: str) -> None:
+def test_it_says_why_it_was_reset(chip: int, reason: int, scratch: int, cause: str) -> None:
     assert PROGRAM.reset_cause(chip, reason, scratch) == cause
 
 
 def test_after_a_watchdog_reset_it_is_in_fault() -> None:
     pico = Pico("watchdog")
-    told = b"OK state=fault fault=watchdog reset=watchdog interlock=closed cycle=0 step=0 cycles=0\n"
-    assert pico.feed(b"STAT\n", 0) == told
+    said = b"OK state=fault fault=watchdog reset=watchdog interlock=closed cycle=0 step=0 cycles=0\n"
+    assert pico.feed(b"STAT\n", 0) == said
     assert pico.feed(LOADED, 0) == b"E 12 watchdog\n" * 2
 
 
@@ -275,7 +275,7 @@ def same_answer(pico: bytes, python: bytes) -> bool:
 
 @settings(max_examples=100, deadline=None, suppress_health_check=BUSY)
 @given(first=st.sampled_from([b"", RUN]), talk=st.lists(st.tuples(CHUNK, st.integers(0, 8000)), max_size=20))
-def test_whatever_comes_it_answers_and_lights_as_the_controller_in_python(
+def test_after_any_input_it_answers_and_lights_as_the_controller_in_python(
     first: bytes, talk: list[tuple[bytes, int]]
 ) -> None:
     pico, python = Pico(), EmulatedController(BOARDS["rp2040"])
@@ -312,10 +312,10 @@ def test_random_cycles_are_played_to_the_tick(seed: int) -> None:
 def test_the_largest_program_fits_into_the_table() -> None:
     pico = Pico()
     lit = " ".join(f"{line}:{on}" for line, on in enumerate([125, 134, 143, 152] * 2))
-    told = [f"SLOT {place} 6249951 12500000 277 {lit}" for place in range(32)]
-    assert len(told[-1]) < LONGEST_REQUEST
-    told += [f"STEPS {first} {' '.join(str((first + n) % 32) for n in range(20))}" for first in range(0, 240, 20)]
-    for line in told:
+    said = [f"SLOT {place} 6249951 12500000 277 {lit}" for place in range(32)]
+    assert len(said[-1]) < LONGEST_REQUEST
+    said += [f"STEPS {first} {' '.join(str((first + n) % 32) for n in range(20))}" for first in range(0, 240, 20)]
+    for line in said:
         assert pico.feed(f"{line}\n".encode(), 0).startswith(b"OK"), line
     assert pico.controller.feed(b"ARM 0\n").startswith(b"E 11 ")
     check = PROGRAM.check_of([pico.controller.slots[step] for step in pico.controller.steps])

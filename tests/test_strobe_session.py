@@ -271,21 +271,21 @@ def test_an_answer_that_comes_late_is_not_taken_for_the_next_one() -> None:
         assert [link.ask(Keep(ms=ms), KeepSet).keep_ms for ms in (200, 300)] == [200, 300]
 
 
-def test_a_run_whose_answer_is_lost_is_never_told_twice(board: Board, program: Program) -> None:
+def test_a_run_whose_answer_is_lost_is_never_sent_twice(board: Board, program: Program) -> None:
     link = opened(board.device)
     prepare(link)
     for request in program.upload():
         link.ask(request, request.reply)
-    told: list[bytes] = []
+    said: list[bytes] = []
     write = link.port.write
-    link.port.write = lambda data: told.append(data) or write(data)  # type: ignore[method-assign,func-returns-value]
+    link.port.write = lambda data: said.append(data) or write(data)  # type: ignore[method-assign,func-returns-value]
     board.spoil = lambda data: b""
     with pytest.raises(NoReplyError, match="no whole answer to RUN"):
         link.ask(Run(cycles=0), Started)
-    assert sum(data.startswith(b"RUN") for data in told) == 1
+    assert sum(data.startswith(b"RUN") for data in said) == 1
 
 
-def test_what_the_board_refuses_is_told_with_its_number(board: Board) -> None:
+def test_what_the_board_refuses_is_reported_with_its_number(board: Board) -> None:
     link = opened(board.device)
     greet(link)
     with pytest.raises(RefusedError, match=r"refused SLOT: duration 0 \(E 7\)") as caught:

@@ -61,9 +61,9 @@ def shoot(plan: Plan, *, frames: int = 72, ppm: float = 30.0, drift: float = 0.0
 
 
 def timing_of(plan: Plan, shot: Exposure, *, indices: object = None, **options: object) -> Timing:
-    """Time the shot by its frames' true indices, unless others are told."""
-    told = np.arange(len(shot.frames)) if indices is None else np.asarray(indices)
-    return find_timing(plan, told, shot.frames.mean(axis=2, dtype=np.float64), **options)  # type: ignore[arg-type]
+    """Time the shot by its frames' true indices, unless others are said."""
+    said = np.arange(len(shot.frames)) if indices is None else np.asarray(indices)
+    return find_timing(plan, said, shot.frames.mean(axis=2, dtype=np.float64), **options)  # type: ignore[arg-type]
 
 
 def rms_rows(timing: Timing, shot: Exposure, plan: Plan, scale: float = 1.0) -> float:
@@ -148,7 +148,7 @@ def test_a_misnamed_frame_rate_is_found_and_said(make_plan: PlanMaker) -> None:
 
 
 @pytest.mark.parametrize("hz", [100.0, 120.0])
-def test_flickering_ambient_light_is_told_from_the_strobe(hz: float, make_plan: PlanMaker) -> None:
+def test_flickering_ambient_light_is_separated_from_the_strobe(hz: float, make_plan: PlanMaker) -> None:
     plan = make_plan(height_px=ROWS, width_px=COLUMNS, shutter=0.5, readout=0.6, fps=Fraction(90))
     shot = shoot(plan, ambient=0.15, flicker=MainsSwing(hz=hz, depth=0.8))
     timing = timing_of(plan, shot)
@@ -199,9 +199,9 @@ def test_frames_missing_near_either_end_are_found(plan: Plan) -> None:
 
 def test_a_hole_that_the_numbering_shows_is_reported_once(plan: Plan) -> None:
     shot = shoot(plan, dropped=(30,))
-    told = (DroppedFrames(after=29, count=1),)
-    timing = timing_of(plan, shot, indices=shot.indices, dropped=told)
-    assert timing.dropped_frames == told
+    said = (DroppedFrames(after=29, count=1),)
+    timing = timing_of(plan, shot, indices=shot.indices, dropped=said)
+    assert timing.dropped_frames == said
     assert rms_rows(timing, shot, plan) < 0.05
 
 

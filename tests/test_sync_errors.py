@@ -17,13 +17,13 @@ ROWS, COLUMNS, FRAMES = 48, 4, 32
 CAMERA_NOISE, HEAVY_NOISE = Noise(full_well_e=20_000, read_e=8), Noise(full_well_e=400, read_e=8)
 
 
-def timed(plan: Plan, told: Plan, seed: int, noise: Noise) -> tuple[Timing, float]:
-    """Film a textured scene and time it by what the plan ``told`` says; return too the RMS error in seconds."""
+def timed(plan: Plan, stated: Plan, seed: int, noise: Noise) -> tuple[Timing, float]:
+    """Film a textured scene and time it by the plan ``stated``; return too the RMS error in seconds."""
     rng = np.random.default_rng(seed)
     plates = {slot: 0.2 + 0.5 * rng.random((ROWS, COLUMNS)) for slot in plan.lit_slots}
     clock = TrueClock(phase_s=rng.uniform(0, plan.cycle_s), offset_ppm=rng.uniform(-100, 100))
     shot = expose(plates, plan, frames=FRAMES, clock=clock, noise=noise, bits=12, seed=seed)
-    timing = find_timing(told, np.arange(FRAMES), shot.frames.mean(axis=2, dtype=np.float64))
+    timing = find_timing(stated, np.arange(FRAMES), shot.frames.mean(axis=2, dtype=np.float64))
     true_s = np.array([flash.start_s for flash in shot.flashes])
     off_s = timing.start_s - true_s[np.abs(true_s[:, None] - timing.start_s).argmin(axis=0)]
     return timing, float(np.sqrt(np.mean(off_s**2)))
@@ -40,8 +40,8 @@ KINDS = {
 def test_errors_made_are_those_that_are_claimed(kind: str, make_plan: PlanMaker) -> None:
     options, noise, unknown = KINDS[kind]
     plan = make_plan(height_px=ROWS, width_px=COLUMNS, **options)
-    told = replace(plan, camera=replace(plan.camera, readout_s=None)) if unknown else plan
-    found = [timed(plan, told, seed, noise) for seed in range(SEEDS)]
+    stated = replace(plan, camera=replace(plan.camera, readout_s=None)) if unknown else plan
+    found = [timed(plan, stated, seed, noise) for seed in range(SEEDS)]
     ratios = np.array([error_s / (timing.phase_error_rows * timing.row_time_s) for timing, error_s in found])
     assert 0.7 < np.sqrt(np.mean(ratios**2)) < 1.4
     if unknown:

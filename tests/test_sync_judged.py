@@ -44,25 +44,25 @@ def with_camera(plan: Plan, **changes: object) -> Plan:
     return replace(plan, camera=replace(plan.camera, **changes))  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(("true", "told"), [(0.5, 1.0), (1.0, 0.5), (0.25, 0.5)])
-def test_a_shutter_wrong_by_a_factor_is_found_and_named(true: float, told: float, plan: Plan) -> None:
+@pytest.mark.parametrize(("true", "planned"), [(0.5, 1.0), (1.0, 0.5), (0.25, 0.5)])
+def test_a_shutter_wrong_by_a_factor_is_found_and_named(true: float, planned: float, plan: Plan) -> None:
     period_s = plan.camera.frame_period_s
     film = with_camera(plan, exposure_s=true * period_s)
-    timing = timing_of(with_camera(plan, exposure_s=told * period_s), filmed(film))
+    timing = timing_of(with_camera(plan, exposure_s=planned * period_s), filmed(film))
     assert timing.exposure_s == pytest.approx(true * period_s, rel=3e-4)
     assert timing.phase_error_rows < 0.02
     assert timing.order == "marker"
-    assert any("shutter is wrong" in note and f"({360 * told:g} degrees)" in note for note in timing.notes)
+    assert any("shutter is wrong" in note and f"({360 * planned:g} degrees)" in note for note in timing.notes)
 
 
 @pytest.mark.parametrize(
-    ("true", "told", "words"),
+    ("true", "planned", "words"),
     [(-1.0, 1.0, "wrong way"), (0.5, 1.0, "readout is wrong"), (0.8, 0.0, "global shutter"), (0.0, 0.8, "all rows")],
 )
-def test_a_readout_wrong_by_far_is_found_and_named(true: float, told: float, words: str, plan: Plan) -> None:
+def test_a_readout_wrong_by_far_is_found_and_named(true: float, planned: float, words: str, plan: Plan) -> None:
     period_s = plan.camera.frame_period_s
     timing = timing_of(
-        with_camera(plan, readout_s=told * period_s), filmed(with_camera(plan, readout_s=true * period_s))
+        with_camera(plan, readout_s=planned * period_s), filmed(with_camera(plan, readout_s=true * period_s))
     )
     assert timing.row_time_s * ROWS == pytest.approx(true * period_s, abs=1e-3 * period_s)
     assert timing.order == "marker"
@@ -84,12 +84,12 @@ def test_durations_halved_or_doubled_are_named(factor: float, plan: Plan) -> Non
         timing_of(replace(plan, flashes=flashes, dark_s=kept_s), filmed(plan))
 
 
-@pytest.mark.parametrize(("true", "told"), [(24, 25), (60, 120)])
-def test_a_frame_rate_mixed_up_is_named(true: int, told: int, make_plan: PlanMaker) -> None:
+@pytest.mark.parametrize(("true", "planned"), [(24, 25), (60, 120)])
+def test_a_frame_rate_mixed_up_is_named(true: int, planned: int, make_plan: PlanMaker) -> None:
     film = make_plan(height_px=ROWS, width_px=COLUMNS, fps=Fraction(true), duration_s=0.003)
-    angle = film.camera.exposure_s * true / told
+    angle = film.camera.exposure_s * true / planned
     with pytest.raises(PsvideoError, match=f"ran at {true} frames a second"):
-        timing_of(with_camera(film, fps=Fraction(told), exposure_s=angle), filmed(film))
+        timing_of(with_camera(film, fps=Fraction(planned), exposure_s=angle), filmed(film))
 
 
 def test_a_clip_triggered_by_the_camera_is_recognised(plan: Plan) -> None:

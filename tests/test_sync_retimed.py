@@ -172,7 +172,7 @@ def test_an_end_that_fits_no_place_gives_no_whole_flash(end: str, plan: Plan) ->
     assert not clean.notes
 
 
-def test_a_clock_within_1100_ppm_is_found_at_once_whatever_the_plan_tolerates(
+def test_a_clock_within_1100_ppm_is_found_at_once_for_any_tolerance_of_the_plan(
     make_plan: PlanMaker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A frame rate misnamed by 1.001 puts the clock 1,000 ppm off; a plan for crystals tolerates 100.

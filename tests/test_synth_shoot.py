@@ -143,10 +143,10 @@ def test_a_clip_lies_as_a_camera_would_leave_it_and_the_truth_fits(tmp_path):
     assert {row["light"] for row in truth["flashes"]} == {"key", "left", None}
     assert all((clip / "truth" / row["plate"]).is_file() for row in truth["flashes"] if "plate" in row)
     assert all("plate" in row for row in truth["flashes"] if row["complete"] and row["light"])
-    told = json.loads((clip / "truth" / "scene.json").read_text())
-    assert told["clock_offset_ppm"] == 60.0
-    assert told["phase_s"] == true_clock(scene).phase_s
-    assert told["dropped_frames"] == [3]
+    said = json.loads((clip / "truth" / "scene.json").read_text())
+    assert said["clock_offset_ppm"] == 60.0
+    assert said["phase_s"] == true_clock(scene).phase_s
+    assert said["dropped_frames"] == [3]
 
 
 def test_true_plates_are_albedo_times_intensity_times_the_cosine(tmp_path):
@@ -245,8 +245,8 @@ def test_the_plan_may_claim_other_than_the_truth(tmp_path):
     plan = read_plan(clip / "plan.toml")
     assert (plan.camera.fps, plan.camera.readout_s, plan.fall_s) == (101, None, 0.0)
     assert plan.camera.shutter_deg == pytest.approx(360.0)
-    told = json.loads((clip / "truth" / "scene.json").read_text())
-    assert (told["fps"], told["readout_s"], told["fall_s"]) == ("100", 0.008, 5e-5)
+    said = json.loads((clip / "truth" / "scene.json").read_text())
+    assert (said["fps"], said["readout_s"], said["fall_s"]) == ("100", 0.008, 5e-5)
 
 
 def test_too_bright_a_scene_is_warned_of(tmp_path, capsys):
@@ -263,8 +263,8 @@ def test_an_existing_clip_is_replaced_only_by_force(tmp_path, capsys):
     assert main(["synth", str(tmp_path / "scene.toml"), "-o", str(clip)]) == 2
     assert (clip / "mine.txt").read_text() == "precious"
     assert main(["synth", str(tmp_path / "scene.toml"), "-o", str(clip), "--force", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert (told["frames"], told["path"]) == (8, str(clip))
+    said = json.loads(capsys.readouterr().out)
+    assert (said["frames"], said["path"]) == (8, str(clip))
     assert not (clip / "mine.txt").exists()
 
 

@@ -157,7 +157,7 @@ def test_lights_hang_on_the_lines_that_are_named(tmp_path: Path) -> None:
     assert wired_lines(plan, {"top": 0}) == {1: "key", 2: "left", 0: "top"}
 
 
-def test_a_run_that_was_stopped_and_begun_again_starts_its_cycle_anew(tmp_path: Path) -> None:
+def test_a_run_that_was_stopped_and_begun_again_starts_its_cycle_again(tmp_path: Path) -> None:
     scene = scene_file(tmp_path)
     plan = true_plan(read_scene(scene))
     first = ideal_edges(plan, 2)

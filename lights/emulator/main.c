@@ -17,7 +17,7 @@
 #include "trace.h"
 
 #define LOOK_EVERY 1400        /* cycles between looks at the port: about a byte */
-#define BOOTS_WITHIN 8000000   /* cycles until the port is told even if the firmware does not listen */
+#define BOOTS_WITHIN 8000000   /* cycles until the port is announced even if the firmware does not listen */
 #define FORGIVE_NS 20000000ll  /* virtual time that lags further behind is not made up for */
 
 static const char USAGE[] =

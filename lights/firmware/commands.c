@@ -34,7 +34,7 @@ static bool refuse_number(const char *word, uint32_t *value) {
     return true;
 }
 
-/* A name that its owner may write into the first bytes of the EEPROM, to tell one board from another. */
+/* A name that its owner may write into the first bytes of the EEPROM, to distinguish boards. */
 static void read_unit(char name[UNIT_LENGTH + 1]) {
     uint8_t length = 0;
     for (; length < UNIT_LENGTH; length++) {

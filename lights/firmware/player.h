@@ -8,7 +8,7 @@
 /* Pins to outputs, all dark. */
 void player_boot(void);
 
-/* Begin `ticks` after `from`, which is not long ago; `cycles` 0: until told. */
+/* Begin `ticks` after `from`, which is not long ago; `cycles` 0: until stopped. */
 void player_start(uint64_t from, uint32_t ticks, uint32_t cycles);
 
 /* Dark at once, in the middle of a flash too. */

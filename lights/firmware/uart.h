@@ -7,7 +7,7 @@
 
 void uart_start(void);
 
-/* Take a byte that has arrived. Returns false where there is none; `spoiled` tells that it, or one before it, was lost. */
+/* Take a byte that has arrived. Returns false where there is none; `spoiled`: it, or one before it, was lost. */
 bool uart_take(uint8_t *byte, bool *spoiled);
 
 /* Give a byte to be sent. Returns false where the port is still busy. */

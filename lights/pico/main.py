@@ -527,13 +527,13 @@ class Controller:
         return (len(self.steps),)
 
     def _answer_arm(self, word):
-        told = number(word)
+        claimed = number(word)
         cycle = [self.slots[step] for step in self.steps]
         if not cycle or None in cycle:
             raise RefusedError("incomplete", f"{len(cycle)} steps, or one names an empty slot")
         check = check_of(cycle)
-        if check != told:
-            raise RefusedError("check", f"check {told}, expected {check}")
+        if check != claimed:
+            raise RefusedError("check", f"check {claimed}, expected {check}")
         self.cycle_ticks = check_cycle(cycle)
         if self.hardware.interlock_open():
             raise RefusedError("interlock", "interlock open")

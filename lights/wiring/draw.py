@@ -180,7 +180,7 @@ def supply(at: Sheet) -> None:
     at.diode(390, 870, "1N4007", up=True)
     at.wire((390, 930), (390, 940), (310, 940))
     notes = (
-        "S1 has two contacts: S1a tells the controller and disables U1, S1b drops K1 and so the lights' supply.",
+        "S1 has two contacts: S1a signals the controller and disables U1, S1b drops K1 and so the lights' supply.",
         "The second does not trust firmware, logic or a transistor. K1 switches direct current: 24 V DC, peak current.",
         "One star point joins the grounds of supply, logic and controller; no LED current through the controller.",
         "The logic's 5 V comes from the controller's USB, and must be there before S1 is closed.",

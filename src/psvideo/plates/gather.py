@@ -80,7 +80,7 @@ def gather(
     Raises
     ------
     PsvideoError
-        Where the plan's patterns of lights cannot be told apart, or a frame cannot be read.
+        Where the plan's patterns of lights cannot be separated, or a frame cannot be read.
 
     Examples
     --------

@@ -63,7 +63,7 @@ class Lighting:
 
     @property
     def identity(self) -> tuple[object, ...]:
-        """What tells this lighting from others: the rig's bytes and lights, mask, depth and falloff."""
+        """What distinguishes this lighting from others: the rig's bytes and lights, mask, depth and falloff."""
         depths = () if self.depths is None else self.depths.identity
         return sha256_of(self.rig_path), self.rig, self.mask_sha256, self.falloff, self.near_iterations, *depths
 

@@ -51,7 +51,7 @@ class Output:
 
 
 def _identity(take: Take) -> list[object]:
-    """Return what tells a take from others, and from itself once its plan or a file of it was changed."""
+    """Return what distinguishes a take from others, and from itself once its plan or a file of it was changed."""
     clip = take.clip
     files = clip.files if clip.is_movie else [clip.file_of(number) for number in take.numbers]
     facts = [(path.name, path.stat().st_size, path.stat().st_mtime_ns) for path in files]

@@ -38,7 +38,7 @@ def solve(
     rig
         Where the lights are, by the names of the take's plan.
     timing
-        When every flash fired; found from the picture where it is left out. Where the plan has no marker, the rig tells
+        When every flash fired; found from the picture where it is left out. Where the plan has no marker, the rig shows
         the order of the lights, as far as it can.
     mask
         Shape (row, col), bool: True where to solve; everywhere left out.
