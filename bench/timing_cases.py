@@ -52,7 +52,7 @@ class Filmed:
 class Case:
     """One virtual shoot: ``plan`` is what happened, ``claimed`` what plan.toml says of it (the same if None).
 
-    ``numbered`` says that the numbering shows the dropped frames, ``recorder`` what kind of file the clip goes through. The
+    ``numbered``: the numbering shows the dropped frames. ``recorder``: what kind of file the clip goes through. The
     clip goes on by ``step`` frames a frame, rounded down; ``recoded`` is what encoding it again adds to each row's
     mean, in standard deviations of the picture.
     """
