@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,14 +13,12 @@ from psvideo.cli.convert import convert
 from psvideo.cli.lights import flat_field, guess, intensities, matte_sphere
 from psvideo.cli.mirror_sphere import mirror_sphere
 from psvideo.cli.options import Frames, Json, PlanPath, Quiet, Verbose
-from psvideo.errors import PsvideoError, UsageError
 
 if TYPE_CHECKING:
     from psvideo.calibrate.stripes.readout import Led, Readout
-    from psvideo.calibrate.stripes.records import MeasuredMode
     from psvideo.calibrate.strobed_readout import StrobedReadout
+    from psvideo.runs.calibrate.readout import MeasuredReadout
 
-CRYSTAL_PPM = 100.0
 calibrate = typer.Typer(help="Measure cameras and lights before a shoot.", no_args_is_help=True)
 
 
@@ -81,85 +78,42 @@ def readout(
     quiet: Quiet = False,
 ) -> None:
     """Measure a camera's readout time from the stripes of an LED of known rate, or from a strobed clip."""
-    from psvideo.calibrate.stripes.led_pictures import exact_rate, parse_columns, read_led_pictures
-    from psvideo.calibrate.stripes.readout import Led, measure_readout
-    from psvideo.calibrate.stripes.records import MeasuredMode, camera_line, record_line
-    from psvideo.cli.typed import parse_positive_seconds, parse_rate
+    from psvideo.cli.typed import parse_columns, parse_positive_seconds, parse_rate
+    from psvideo.runs.calibrate.readout import readout as measure
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
-    made = MeasuredMode(make=make, model=model, mode=mode)
-    if led_hz is None:
-        _refuse_led_options(rows=rows, zoom=zoom, columns=columns, near=near, fps=fps)
-        _strobed(pictures, made, tolerance_ppm=led_tolerance_ppm, frames=frames, plan=plan, voice=voice)
-        return
-    if plan is not None:
-        raise UsageError("--plan: belongs to a strobed clip, which is measured without --led-hz. Leave one out.")
-    led = Led(rate_hz=led_hz, tolerance_ppm=CRYSTAL_PPM if led_tolerance_ppm is None else led_tolerance_ppm)
-    near_s = None if near is None else parse_positive_seconds(near, option="--near")
-    given = None if fps is None else parse_rate(fps)
-    span = None if columns is None else parse_columns(columns)
-    found = read_led_pictures(pictures, columns=span, frames=frames)
-    rate = given or (exact_rate(found.rate_hz) if found.rate_hz else None)
-    measured = measure_readout(found, led, rows=rows, zoom=zoom, near_s=near_s, fps=rate)
-    is_whole = measured.rows == found.height_px
-    camera = dataclasses.replace(made, width_px=found.width_px if is_whole else None, fps=rate)
-    lines = {
-        "camera_line": camera_line(measured, camera, led),
-        "record_line": record_line(measured, camera, led, date=date.today().isoformat()),
-    }
-    _print_readout(voice, measured, describe_readout(measured, led), lines)
+    found = measure(
+        pictures,
+        led_hz=led_hz,
+        led_tolerance_ppm=led_tolerance_ppm,
+        rows=rows,
+        zoom=zoom,
+        columns=None if columns is None else parse_columns(columns),
+        near_s=None if near is None else parse_positive_seconds(near, option="--near"),
+        fps=None if fps is None else parse_rate(fps),
+        frames=frames,
+        plan=plan,
+        make=make,
+        model=model,
+        mode=mode,
+        watch=voice.track,
+        caller=voice.caller(),
+    )
+    voice.say(describe(found))
+    voice.say(f"\nFor the table of cameras (fill in what stands in capitals):\n{found.camera_line}")
+    voice.say(f"For calibration/records/readout.csv:\n{found.record_line}")
+    lines = {"camera_line": found.camera_line, "record_line": found.record_line}
+    voice.result({**dataclasses.asdict(found.measured), **lines})
 
 
-def _refuse_led_options(**options: object) -> None:
-    """Raise UsageError where options were given that only an LED's stripes have."""
-    given = [name for name, value in options.items() if value is not None and (name, value) != ("zoom", 1.0)]
-    if given:
-        raise UsageError(
-            f"--{given[0]}: belongs to the stripes of a blinking LED. Give its rate with --led-hz, or, where the "
-            "pictures are a strobed clip with plan.toml, leave the option out."
-        )
+def describe(found: MeasuredReadout) -> str:
+    """Return what was measured and how certain it is, for people."""
+    from psvideo.calibrate.strobed_readout import StrobedReadout
 
-
-def _strobed(
-    pictures: list[Path],
-    made: MeasuredMode,
-    *,
-    tolerance_ppm: float | None,
-    frames: str | None,
-    plan: Path | None,
-    voice: Voice,
-) -> None:
-    from psvideo.calibrate.stripes.records import strobed_camera_line, strobed_record_line
-    from psvideo.calibrate.strobed_readout import measure_take_readout
-    from psvideo.sync.open_take import open_take
-
-    if len(pictures) > 1:
-        raise UsageError(
-            f"{len(pictures)} files without --led-hz: for an LED's stripes give its rate with --led-hz, for a strobed "
-            "clip name one clip, a folder of numbered frames with plan.toml or a movie."
-        )
-    try:
-        take = open_take(pictures[0], plan=plan, frames=frames)
-    except PsvideoError as fault:
-        raise type(fault)(f"{fault} (Without --led-hz a strobed clip is expected.)") from None
-    for warning in take.clip.warnings:
-        voice.warn(warning)
-    measured = measure_take_readout(take, tolerance_ppm=tolerance_ppm, watch=voice.track)
-    camera = dataclasses.replace(made, width_px=take.plan.camera.width_px, fps=take.plan.camera.fps)
-    lines = {
-        "camera_line": strobed_camera_line(measured, camera),
-        "record_line": strobed_record_line(measured, camera, date=date.today().isoformat()),
-    }
-    _print_readout(voice, measured, describe_strobed_readout(measured), lines)
-
-
-def _print_readout(voice: Voice, measured: Readout | StrobedReadout, words: str, lines: dict[str, str]) -> None:
-    for warning in measured.warnings:
-        voice.warn(warning)
-    voice.say(words)
-    voice.say(f"\nFor the table of cameras (fill in what stands in capitals):\n{lines['camera_line']}")
-    voice.say(f"For calibration/records/readout.csv:\n{lines['record_line']}")
-    voice.result({**dataclasses.asdict(measured), **lines})
+    measured = found.measured
+    if isinstance(measured, StrobedReadout):
+        return describe_strobed_readout(measured)
+    return describe_readout(measured, found.led) if found.led is not None else ""
 
 
 def describe_strobed_readout(found: StrobedReadout) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,14 +9,12 @@ import typer
 
 from psvideo.cli.console import Voice, counted
 from psvideo.cli.options import FirstLight, Force, Frames, Json, PlanPath, Quiet, Verbose
-from psvideo.errors import PsvideoError, UsageError
-from psvideo.formats.whole_files import PICTURE_MARK, refuse_existing, write_text
+from psvideo.cli.typed import parse_box, parse_circle
+from psvideo.model.choices import Prior
 
 if TYPE_CHECKING:
-    from psvideo.calibrate.light_pictures import LightPictures
+    from psvideo.calibrate.flat_field import FlatLight
     from psvideo.calibrate.matte import MatteLight
-    from psvideo.model.choices import Prior
-    from psvideo.runs.light_sets import Reading
 
 Pictures = Annotated[Path, typer.Argument(help="A folder of stills (one per light), of plates, or a clip.")]
 RigOut = Annotated[Path, typer.Option("-o", "--out", help="The rig file to write.")]
@@ -46,52 +43,31 @@ def matte_sphere(
     quiet: Quiet = False,
 ) -> None:
     """Measure directions and intensities of lights from a matte sphere; writes rig.toml and a picture beside it."""
-    from psvideo.calibrate.matte import matte_rig, measure_matte_sphere
-    from psvideo.calibrate.sphere.outline import find_outlines, given_outline
-    from psvideo.calibrate.sphere.sighting import Looking
-    from psvideo.formats.rig_toml import SCHEMA, format_rig
-    from psvideo.pictures.matte_sphere import matte_picture
-    from psvideo.pictures.timing_sheet import write_sheet
-    from psvideo.runs.light_sets import Reading
+    from psvideo.runs.calibrate.matte_sphere import matte_sphere as measure
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
-    refuse_existing(out, force=force, mark=SCHEMA)
-    refuse_existing(out.with_suffix(".png"), force=force, mark=PICTURE_MARK)
-    found = _read(pictures, Reading(plan=plan, frames=frames, first_light=first_light, transfer=transfer), voice)
-    view = Looking(focal_px=focal_px).view(width_px=found.width_px, height_px=found.height_px)
-    if circle is None:
-        outlines = find_outlines(found, view, surface="matte")
-        if not outlines:
-            raise PsvideoError(
-                f"{pictures}: no sphere was found. Give its outline with --circle x,y,radius in pixels, counted from "
-                "the centre of the top left one."
-            )
-        outline = outlines[0]
-    else:
-        x, y, radius = _numbers(circle, 3, "--circle", "x,y,radius")
-        outline = given_outline(view, (x, y, radius))
-    lights = measure_matte_sphere(found, outline, albedo=albedo)
-    rig = matte_rig(lights, view)
-    write_sheet(out.with_suffix(".png"), matte_picture(found, outline, lights))
-    if not rig.lights:
-        faults = "; ".join(f"{light.name}: {light.fault}" for light in lights[:3])
-        raise PsvideoError(f"{pictures}: no light could be measured ({faults}). See {out.with_suffix('.png')}.")
-    write_text(out, format_rig(rig))
-    x, y, radius = outline.place[:3]
-    voice.say(f"sphere at {x:.1f}, {y:.1f} with radius {radius:.1f} px (+- {outline.error_px:.2f})")
-    for light in lights:
+    found = measure(
+        pictures,
+        out=out,
+        circle=None if circle is None else parse_circle(circle),
+        albedo=albedo,
+        focal_px=focal_px,
+        transfer=transfer,
+        plan=plan,
+        frames=frames,
+        first_light=first_light,
+        force=force,
+        watch=voice.track,
+        caller=voice.caller(),
+    )
+    x, y, radius = found.outline.place[:3]
+    voice.say(f"sphere at {x:.1f}, {y:.1f} with radius {radius:.1f} px (+- {found.outline.error_px:.2f})")
+    for light in found.lights:
         voice.say(_matte_line(light))
-        if light.fault:
-            voice.warn(f"light {light.name!r} is left out of the rig: {light.fault}")
-    if focal_px is None:
-        voice.warn(
-            "the focal length is not known, so the view is taken for orthographic, and all directions are wrong by "
-            "about the angle by which the sphere stands off the lens's axis: give --focal-px"
-        )
     if albedo is None:
         voice.say("Intensities are relative, their mean 1: give the sphere's --albedo to tie albedo to it.")
-    voice.say(f"{out}: {len(rig.lights)} of {counted(len(lights), 'light')} written; see {out.with_suffix('.png')}.")
-    voice.result({"lights": [_matte_record(light) for light in lights]})
+    voice.say(f"{out}: {len(found.rig.lights)} of {counted(len(found.lights), 'light')} written; see {found.picture}.")
+    voice.result({"lights": [_matte_record(light) for light in found.lights]})
 
 
 def flat_field(
@@ -116,61 +92,35 @@ def flat_field(
 ) -> None:
     """Measure every light's intensity, per channel, from a matte white target that faces the camera (or lies in the
     plane that the rig gives); writes the rig with intensities."""
-    import numpy as np
-
-    from psvideo.calibrate.flat_field import Target, falloff_of, measure_flat_field, with_intensities
-    from psvideo.formats.flat_toml import SCHEMA as FLAT_SCHEMA
-    from psvideo.formats.flat_toml import format_falloff
-    from psvideo.formats.rig_toml import SCHEMA, format_rig, read_rig
-    from psvideo.runs.light_sets import Reading
-    from psvideo.solve.normals.near_light import ground_of, is_near
+    from psvideo.runs.calibrate.flat_field import flat_field as measure
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
-    refuse_existing(out, force=force, mark=SCHEMA)
-    if flat is not None:
-        refuse_existing(flat, force=force, mark=FLAT_SCHEMA)
-    if not 0 < albedo <= 1:
-        raise UsageError(f"--albedo {albedo:g}: expected a share above 0 and up to 1.")
-    found = _read(pictures, Reading(plan=plan, frames=frames, first_light=first_light, transfer=transfer), voice)
-    known = read_rig(rig, plan_lights=found.names)
-    near = is_near(known.select(found.names))
-    ground = ground_of(known, height_px=found.height_px, width_px=found.width_px) if near else None
-    normal = np.array([0.0, 0.0, 1.0] if known.plane is None else known.plane[:3])
-    rows, cols = _box(box, found)
-    target = Target(albedo=albedo, normal=normal / np.linalg.norm(normal), rows=rows, cols=cols)
-    lights = measure_flat_field(found, known, target, ground=ground)
-    write_text(out, format_rig(with_intensities(known, lights)))
-    if flat is not None:
-        write_text(flat, format_falloff(falloff_of(lights, target, found)))
-    for light in lights:
+    found = measure(
+        pictures,
+        rig=rig,
+        out=out,
+        albedo=albedo,
+        box=None if box is None else parse_box(box),
+        flat=flat,
+        transfer=transfer,
+        plan=plan,
+        frames=frames,
+        first_light=first_light,
+        force=force,
+        watch=voice.track,
+        caller=voice.caller(),
+    )
+    for light in found.lights:
         strengths = ", ".join(f"{value:.4g}" for value in light.intensity)
         voice.say(
             f"  {light.name:12} intensity {strengths}  +- {light.intensity_error:.1%}; the target differs by "
             f"{light.falloff:.0%} beyond what the rig explains"
         )
     if flat is not None:
-        left = max(light.left for light in lights)
+        left = max(light.left for light in found.lights)
         voice.say(f"{flat}: falloff written, which leaves {left:.1%}; give it to psvideo normals with --flat.")
-    elif max(light.falloff for light in lights) > 0.1:
-        voice.warn(
-            "the target is not evenly lit (lens falloff, or lamps that are narrow or near): the rig file holds one "
-            "intensity per light, not a map. Write the map with --flat flat.toml, and give it to psvideo normals"
-        )
-    voice.say(f"{out}: {counted(len(lights), 'light')} written.")
-    voice.result(
-        {
-            "lights": [
-                {
-                    "name": light.name,
-                    "intensity": light.intensity.tolist(),
-                    "intensity_error": light.intensity_error,
-                    "falloff": light.falloff,
-                    "left": light.left,
-                }
-                for light in lights
-            ]
-        }
-    )
+    voice.say(f"{out}: {counted(len(found.lights), 'light')} written.")
+    voice.result({"lights": [_flat_record(light) for light in found.lights]})
 
 
 def intensities(
@@ -187,35 +137,35 @@ def intensities(
     quiet: Quiet = False,
 ) -> None:
     """Measure the relative intensities of four or more distant lights of known directions from any matte scene."""
-    from psvideo.calibrate.strengths import measure_strengths
-    from psvideo.formats.rig_toml import SCHEMA, format_rig, read_rig
-    from psvideo.model.rig import directions
-    from psvideo.runs.light_sets import Reading
+    from psvideo.runs.calibrate.intensities import intensities as measure
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
-    refuse_existing(out, force=force, mark=SCHEMA)
-    found = _read(pictures, Reading(plan=plan, frames=frames, first_light=first_light, transfer=transfer), voice)
-    known = read_rig(rig, plan_lights=found.names)
-    lights = known.select(found.names)
-    strengths = measure_strengths(found, directions(lights))
-    measured = tuple(
-        replace(light, intensity=tuple(float(f"{value:.6g}") for value in values))
-        for light, values in zip(lights, strengths.intensity.tolist(), strict=True)
+    found = measure(
+        pictures,
+        rig=rig,
+        out=out,
+        transfer=transfer,
+        plan=plan,
+        frames=frames,
+        first_light=first_light,
+        force=force,
+        watch=voice.track,
+        caller=voice.caller(),
     )
-    write_text(out, format_rig(replace(known, lights=measured)))
-    for light, error in zip(measured, strengths.error, strict=True):
+    lights = found.rig.lights
+    for light, error in zip(lights, found.error, strict=True):
         voice.say(f"  {light.name:12} intensity {', '.join(f'{x:.4g}' for x in light.intensity)}  +- {error:.1%}")
     voice.say(
-        f"{out}: {counted(len(measured), 'light')} written; intensities are relative, their mean 1 in every channel."
+        f"{out}: {counted(len(lights), 'light')} written; intensities are relative, their mean 1 in every channel."
     )
-    voice.result({"lights": [{"name": light.name, "intensity": light.intensity} for light in measured]})
+    voice.result({"lights": [{"name": light.name, "intensity": light.intensity} for light in lights]})
 
 
 def guess(
     pictures: Pictures,
     out: RigOut,
     prior: Annotated[
-        str | None,
+        Prior | None,
         typer.Option(
             help="equal-lights (six or more of one strength) or equal-albedo; left out: by how many there are."
         ),
@@ -230,62 +180,29 @@ def guess(
     quiet: Quiet = False,
 ) -> None:
     """Guess directions of distant lights from pictures of a matte, rounded subject, where nothing was calibrated."""
-    from psvideo.calibrate.guess import ERROR_DEG, guess_rig
-    from psvideo.formats.rig_toml import SCHEMA, format_rig
-    from psvideo.runs.light_sets import Reading
+    from psvideo.runs.calibrate.guess import guess as guess_lights
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
-    refuse_existing(out, force=force, mark=SCHEMA)
-    if prior not in (None, "equal-lights", "equal-albedo"):
-        raise UsageError(f"--prior {prior!r}: expected equal-lights or equal-albedo.")
-    chosen: Prior | None = "equal-lights" if prior == "equal-lights" else "equal-albedo" if prior else None
-    found = _read(pictures, Reading(plan=plan, frames=frames, first_light=first_light, transfer=transfer), voice)
-    made = guess_rig(found, prior=chosen)
-    said = (
-        f"A GUESS: directions from the pictures alone ({made.prior}, and a subject that bulges to the camera). Expect "
-        f"them to be wrong by {ERROR_DEG:g} degrees, and hollow may stand for bulging. Calibrate on a sphere."
+    made = guess_lights(
+        pictures,
+        out=out,
+        prior=prior,
+        transfer=transfer,
+        plan=plan,
+        frames=frames,
+        first_light=first_light,
+        force=force,
+        watch=voice.track,
+        caller=voice.caller(),
     )
-    write_text(out, f"# {said}\n{format_rig(made.rig)}")
     for light in made.rig.lights:
         where = ", ".join(f"{value:+.2f}" for value in light.direction or ())
         voice.say(f"  {light.name:12} direction {where}  intensity {light.intensity[0]:.3f}")
     voice.say(
         f"A matte surface explains {made.explained:.1%} of the pictures; {made.prior} holds to {made.spread:.1%}."
     )
-    voice.warn(said)
     voice.say(f"{out}: {counted(len(made.rig.lights), 'light')} written.")
     voice.result({"guess": True, "prior": made.prior, "explained": made.explained, "spread": made.spread})
-
-
-def _read(path: Path, reading: Reading, voice: Voice) -> LightPictures:
-    from psvideo.calibrate.light_pictures import averaged
-    from psvideo.runs.light_sets import open_light_sets
-
-    opened = open_light_sets(path, reading, watch=voice.track)
-    for warning in opened.warnings:
-        voice.warn(warning)
-    for note in opened.notes:
-        voice.detail(note)
-    return averaged(opened.sets)
-
-
-def _box(text: str | None, pictures: LightPictures) -> tuple[slice, slice]:
-    if text is None:
-        return slice(0, pictures.height_px), slice(0, pictures.width_px)
-    left, top, right, bottom = (int(value) for value in _numbers(text, 4, "--box", "left,top,right,bottom"))
-    if not (0 <= left < right <= pictures.width_px and 0 <= top < bottom <= pictures.height_px):
-        raise UsageError(f"--box {text!r}: is not inside the picture of {pictures.width_px} x {pictures.height_px}.")
-    return slice(top, bottom), slice(left, right)
-
-
-def _numbers(text: str, count: int, option: str, form: str) -> tuple[float, ...]:
-    try:
-        values = tuple(float(word) for word in text.split(","))
-    except ValueError:
-        values = ()
-    if len(values) != count or (count == 3 and values[2] <= 0):
-        raise UsageError(f"{option} {text!r}: expected {form}, numbers in pixels with commas between them.")
-    return values
 
 
 def _matte_line(light: MatteLight) -> str:
@@ -307,4 +224,14 @@ def _matte_record(light: MatteLight) -> dict[str, object]:
         "intensity": light.intensity.tolist(),
         "intensity_error": light.intensity_error,
         "fault": light.fault or None,
+    }
+
+
+def _flat_record(light: FlatLight) -> dict[str, object]:
+    return {
+        "name": light.name,
+        "intensity": light.intensity.tolist(),
+        "intensity_error": light.intensity_error,
+        "falloff": light.falloff,
+        "left": light.left,
     }

@@ -9,14 +9,10 @@ import typer
 
 from psvideo.cli.console import Voice
 from psvideo.cli.options import FirstLight, Force, Frames, Json, PlanPath, Quiet, Verbose
-from psvideo.errors import PsvideoError, UsageError
-from psvideo.formats.whole_files import PICTURE_MARK, refuse_existing, write_text
+from psvideo.cli.typed import parse_circle, parse_point
 
 if TYPE_CHECKING:
     from psvideo.calibrate.mirror.lights import MeasuredLight, MirrorCalibration
-    from psvideo.calibrate.sphere.sighting import Sighting
-
-LEAST_RADIUS_MM, LARGEST_RADIUS_MM = 1.0, 1000.0
 
 
 def mirror_sphere(
@@ -54,84 +50,31 @@ def mirror_sphere(
     quiet: Quiet = False,
 ) -> None:
     """Measure where the lights are from their highlights on one or more mirror spheres; writes rig.toml."""
-    from psvideo.calibrate.light_pictures import read_picture
-    from psvideo.calibrate.mirror.lights import calibrate_lights
-    from psvideo.calibrate.sphere.sighting import Looking, SphereNotFoundError, sight_spheres
-    from psvideo.formats.rig_toml import SCHEMA, format_rig
-    from psvideo.pictures.mirror_sphere import faulty_picture, sphere_picture
-    from psvideo.pictures.timing_sheet import write_sheet
-    from psvideo.runs.light_sets import Reading, open_light_sets
+    from psvideo.runs.calibrate.mirror_sphere import mirror_sphere as measure
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
-    refuse_existing(out, force=force, mark=SCHEMA)
-    picture_path = _picture_path(out, force=force)
-    circles = tuple(_numbers(text, 3, "--circle", "x,y,radius") for text in circle or ())
-    middle = None if principal_px is None else _numbers(principal_px, 2, "--principal-px", "x,y")
-    looking = Looking(
+    found = measure(
+        pictures,
+        out=out,
+        circle=[parse_circle(text) for text in circle or ()],
         spheres=spheres,
-        circles=tuple((x, y, radius) for x, y, radius in circles),
         focal_px=focal_px,
-        focal_widths=_focal_widths(focal_px, focal_mm, sensor_mm),
-        principal_px=None if middle is None else (middle[0], middle[1]),
+        focal_mm=focal_mm,
+        sensor_mm=sensor_mm,
+        principal_px=None if principal_px is None else parse_point(principal_px, option="--principal-px"),
+        radius_mm=radius_mm,
+        outline_picture=outline_picture,
+        transfer=transfer,
+        plan=plan,
+        frames=frames,
+        first_light=first_light,
+        force=force,
+        watch=voice.track,
+        caller=voice.caller(),
     )
-    reading = Reading(plan=plan, frames=frames, first_light=first_light, transfer=transfer)
-    sightings: list[Sighting] = []
-    try:
-        for path in pictures:
-            opened = open_light_sets(path, reading, watch=voice.track)
-            for warning in opened.warnings:
-                voice.warn(warning)
-            for note in opened.notes:
-                voice.detail(note)
-            room = opened.room if outline_picture is None else read_picture(outline_picture)[0]
-            sightings += sight_spheres(opened.sets, looking, where=str(path), room=room)
-    except SphereNotFoundError as fault:
-        write_sheet(picture_path, faulty_picture(fault.picture))
-        raise PsvideoError(f"{fault} See {picture_path}.") from None
-    found = calibrate_lights(sightings, radius_m=_radius_m(radius_mm))
-    write_sheet(picture_path, sphere_picture(found))
-    write_text(out, format_rig(found.rig))
-    for warning in found.warnings:
-        voice.warn(warning)
     voice.say(describe(found))
-    voice.say(f"{out}: {len(found.rig.lights)} of {len(found.lights)} lights written; see {picture_path}.")
+    voice.say(f"{out}: {len(found.rig.lights)} of {len(found.lights)} lights written; see {out.with_suffix('.png')}.")
     voice.result(record(found))
-
-
-def _picture_path(out: Path, *, force: bool) -> Path:
-    path = out.with_suffix(".png")
-    refuse_existing(path, force=force, mark=PICTURE_MARK)
-    return path
-
-
-def _numbers(text: str, count: int, option: str, form: str) -> tuple[float, ...]:
-    try:
-        values = tuple(float(word) for word in text.split(","))
-    except ValueError:
-        values = ()
-    if len(values) != count or (count == 3 and values[2] <= 0):
-        raise UsageError(f"{option} {text!r}: expected {form}, numbers in pixels with commas between them.")
-    return values
-
-
-def _focal_widths(focal_px: float | None, focal_mm: float | None, sensor_mm: float | None) -> float | None:
-    """Return the focal length in widths of the picture, where it is given in millimetres."""
-    if focal_px is not None and focal_mm is not None:
-        raise UsageError("--focal-px and --focal-mm both say the focal length; give one of them.")
-    if (focal_mm is None) != (sensor_mm is None):
-        raise UsageError("--focal-mm and --sensor-mm go together: the focal length, and the width of the sensor.")
-    return None if focal_mm is None or sensor_mm is None else focal_mm / sensor_mm
-
-
-def _radius_m(radius_mm: float | None) -> float | None:
-    if radius_mm is None:
-        return None
-    if not LEAST_RADIUS_MM <= radius_mm <= LARGEST_RADIUS_MM:
-        raise UsageError(
-            f"--radius-mm {radius_mm:g}: no such sphere; expected the radius in millimetres, from {LEAST_RADIUS_MM:g} "
-            f"to {LARGEST_RADIUS_MM:g}. (Metres? Then multiply by 1000.)"
-        )
-    return radius_mm / 1000
 
 
 def describe(found: MirrorCalibration) -> str:

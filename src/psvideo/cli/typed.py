@@ -165,3 +165,44 @@ def parse_weights(words: Sequence[str] | None) -> dict[str, float]:
             raise UsageError(f"--weight {text}: expected a light's name and how strong it is to be, such as key=0.5.")
         found[name] = weight
     return found
+
+
+def parse_columns(text: str) -> tuple[int, int]:
+    """Return the first column and one past the last one from ``0-80``; raises UsageError where that is no range."""
+    first, dash, end = text.partition("-")
+    if not (dash and first.strip().isdecimal() and end.strip().isdecimal() and int(first) < int(end)):
+        raise UsageError(f"--columns {text!r} is no range. Write the first column and one past the last one, as 0-80.")
+    return int(first), int(end)
+
+
+def parse_numbers(text: str, count: int, *, option: str, form: str) -> tuple[float, ...]:
+    """Return so many numbers in pixels from ``10,20,5``; the third of three is a length above 0.
+
+    >>> parse_numbers("10,20,5", 3, option="--circle", form="x,y,radius")
+    (10.0, 20.0, 5.0)
+    """
+    try:
+        values = tuple(float(word) for word in text.split(","))
+    except ValueError:
+        values = ()
+    if len(values) != count or (count == 3 and values[2] <= 0):
+        raise UsageError(f"{option} {text!r}: expected {form}, numbers in pixels with commas between them.")
+    return values
+
+
+def parse_circle(text: str) -> tuple[float, float, float]:
+    """Return a circle's x, y and radius in pixels from ``10,20,5``."""
+    x, y, radius = parse_numbers(text, 3, option="--circle", form="x,y,radius")
+    return x, y, radius
+
+
+def parse_box(text: str) -> tuple[int, int, int, int]:
+    """Return left, top, right and bottom in pixels from ``0,0,64,48``."""
+    left, top, right, bottom = map(int, parse_numbers(text, 4, option="--box", form="left,top,right,bottom"))
+    return left, top, right, bottom
+
+
+def parse_point(text: str, *, option: str) -> tuple[float, float]:
+    """Return x and y in pixels from ``320,240``."""
+    x, y = parse_numbers(text, 2, option=option, form="x,y")
+    return x, y

@@ -75,14 +75,6 @@ def read_led_pictures(
     return LedPictures(name=name, profiles=profiles, width_px=width_px, places=places, rate_hz=rate_hz)
 
 
-def parse_columns(text: str) -> tuple[int, int]:
-    """Return the first column and one past the last one from ``0-80``; raises UsageError where that is no range."""
-    first, dash, end = text.partition("-")
-    if not (dash and first.strip().isdecimal() and end.strip().isdecimal() and int(first) < int(end)):
-        raise UsageError(f"`columns` {text!r} is no range. Write the first column and one past the last one, as 0-80.")
-    return int(first), int(end)
-
-
 def exact_rate(rate_hz: float) -> Fraction:
     """Return the broadcast or whole rate that a movie's timestamps mean.
 

@@ -1,0 +1,92 @@
+"""The whole of ``psvideo calibrate flat-field``."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from psvideo.calibrate.flat_field import FlatLight, Target, falloff_of, measure_flat_field, with_intensities
+from psvideo.calibrate.light_pictures import LightPictures
+from psvideo.compute.progress import Watch, unwatched
+from psvideo.errors import UsageError
+from psvideo.formats.flat_toml import SCHEMA as FLAT_SCHEMA
+from psvideo.formats.flat_toml import format_falloff
+from psvideo.formats.rig_toml import format_rig, read_rig
+from psvideo.formats.whole_files import refuse_existing, write_text
+from psvideo.model.rig import Rig
+from psvideo.runs.calibrate.reading import pictures_of, reading_of, rig_out
+from psvideo.runs.caller import PYTHON, Caller
+from psvideo.solve.normals.near_light import ground_of, is_near
+
+UNEVEN = 0.1
+"""A target that is lit less evenly, beyond what the rig explains, wants a map."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlatFieldCalibration:
+    """What a flat field showed: every light, and the rig with their intensities."""
+
+    lights: tuple[FlatLight, ...]
+    rig: Rig
+
+
+def flat_field(
+    pictures: Path | str,
+    *,
+    rig: Path | str,
+    out: Path | str,
+    albedo: float = 0.9,
+    box: tuple[int, int, int, int] | None = None,
+    flat: Path | str | None = None,
+    transfer: str | None = None,
+    plan: Path | str | None = None,
+    frames: str | None = None,
+    first_light: str | None = None,
+    force: bool = False,
+    watch: Watch = unwatched,
+    caller: Caller = PYTHON,
+) -> FlatFieldCalibration:
+    """Measure every light's intensity, per channel, from a matte white target; write the rig with intensities.
+
+    - ``pictures``: a folder of stills (one per light), of plates, or a clip: the target faces the camera, or lies in
+      the plane that the rig gives. ``transfer``, ``plan``, ``frames``, ``first_light``: as for ``matte_sphere``.
+    - ``rig``: whose directions or positions are known. ``out``: the rig file to write. ``flat``: a file to write how
+      light falls off over the target, for ``normals``. ``force`` replaces either where it exists.
+    - ``albedo``: the target's, above 0 and up to 1: white paper 0.85, a white card 0.9.
+    - ``box``: the target's part of the picture: left, top, right, bottom in pixels.
+
+    Raises UsageError where outputs exist or values cannot be, and PsvideoError where the target shows too little.
+    """
+    rig_path, flat_path = rig_out(out, force=force), None if flat is None else Path(flat)
+    if flat_path is not None:
+        refuse_existing(flat_path, force=force, mark=FLAT_SCHEMA)
+    if not 0 < albedo <= 1:
+        raise UsageError(f"`albedo` {albedo:g}: expected a share above 0 and up to 1.")
+    found = pictures_of(Path(pictures), reading_of(plan, frames, first_light, transfer), watch=watch, caller=caller)
+    known = read_rig(Path(rig), plan_lights=found.names)
+    near = is_near(known.select(found.names))
+    ground = ground_of(known, height_px=found.height_px, width_px=found.width_px) if near else None
+    normal = np.array([0.0, 0.0, 1.0] if known.plane is None else known.plane[:3])
+    rows, cols = _part(box, found)
+    target = Target(albedo=albedo, normal=normal / np.linalg.norm(normal), rows=rows, cols=cols)
+    lights = measure_flat_field(found, known, target, ground=ground)
+    measured = with_intensities(known, lights)
+    write_text(rig_path, format_rig(measured))
+    if flat_path is not None:
+        write_text(flat_path, format_falloff(falloff_of(lights, target, found)))
+    elif max(light.falloff for light in lights) > UNEVEN:
+        caller.warn(
+            "the target is not evenly lit (lens falloff, or lamps that are narrow or near): the rig file holds one "
+            "intensity per light, not a map. Write the map with `flat` flat.toml, and give it to psvideo normals"
+        )
+    return FlatFieldCalibration(lights=tuple(lights), rig=measured)
+
+
+def _part(box: tuple[int, int, int, int] | None, pictures: LightPictures) -> tuple[slice, slice]:
+    if box is None:
+        return slice(0, pictures.height_px), slice(0, pictures.width_px)
+    left, top, right, bottom = box
+    if not (0 <= left < right <= pictures.width_px and 0 <= top < bottom <= pictures.height_px):
+        words = ",".join(map(str, box))
+        raise UsageError(f"`box` {words}: is not inside the picture of {pictures.width_px} x {pictures.height_px}.")
+    return slice(top, bottom), slice(left, right)

@@ -1,0 +1,52 @@
+"""The whole of ``psvideo calibrate intensities``."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from psvideo.calibrate.strengths import measure_strengths
+from psvideo.compute.progress import Watch, unwatched
+from psvideo.formats.rig_toml import format_rig, read_rig
+from psvideo.formats.whole_files import write_text
+from psvideo.model.rig import Rig, directions
+from psvideo.runs.calibrate.reading import pictures_of, reading_of, rig_out
+from psvideo.runs.caller import PYTHON, Caller
+
+
+@dataclass(frozen=True, kw_only=True)
+class Intensities:
+    """The rig with relative intensities, their mean 1 in every channel, and each light's relative standard error."""
+
+    rig: Rig
+    error: tuple[float, ...]
+
+
+def intensities(
+    pictures: Path | str,
+    *,
+    rig: Path | str,
+    out: Path | str,
+    transfer: str | None = None,
+    plan: Path | str | None = None,
+    frames: str | None = None,
+    first_light: str | None = None,
+    force: bool = False,
+    watch: Watch = unwatched,
+    caller: Caller = PYTHON,
+) -> Intensities:
+    """Measure the relative intensities of four or more distant lights of known directions from any matte scene.
+
+    ``rig`` is the file whose directions are known, ``out`` the rig file to write; the other parameters are those of
+    ``matte_sphere``. Raises UsageError where the output exists, and PsvideoError where the scene shows too little.
+    """
+    rig_path = rig_out(out, force=force)
+    found = pictures_of(Path(pictures), reading_of(plan, frames, first_light, transfer), watch=watch, caller=caller)
+    known = read_rig(Path(rig), plan_lights=found.names)
+    lights = known.select(found.names)
+    strengths = measure_strengths(found, directions(lights))
+    measured = tuple(
+        replace(light, intensity=tuple(float(f"{value:.6g}") for value in values))
+        for light, values in zip(lights, strengths.intensity.tolist(), strict=True)
+    )
+    made = replace(known, lights=measured)
+    write_text(rig_path, format_rig(made))
+    return Intensities(rig=made, error=tuple(float(error) for error in strengths.error))

@@ -1,0 +1,90 @@
+"""The whole of ``psvideo calibrate matte-sphere``."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from psvideo.calibrate.light_pictures import LightPictures
+from psvideo.calibrate.matte import MatteLight, matte_rig, measure_matte_sphere
+from psvideo.calibrate.sphere.outline import Outline, find_outlines, given_outline
+from psvideo.calibrate.sphere.sighting import Looking
+from psvideo.calibrate.sphere.sphere_view import SphereView
+from psvideo.compute.progress import Watch, unwatched
+from psvideo.errors import PsvideoError
+from psvideo.formats.rig_toml import format_rig
+from psvideo.formats.whole_files import write_text
+from psvideo.model.rig import Rig
+from psvideo.pictures.matte_sphere import matte_picture
+from psvideo.pictures.timing_sheet import write_sheet
+from psvideo.runs.calibrate.reading import picture_beside, pictures_of, reading_of, rig_out
+from psvideo.runs.caller import PYTHON, Caller
+
+
+@dataclass(frozen=True, kw_only=True)
+class MatteCalibration:
+    """What a matte sphere showed: its outline, every light (those with a ``fault`` are left out of the rig), the rig,
+    and the picture of it all."""
+
+    outline: Outline
+    lights: tuple[MatteLight, ...]
+    rig: Rig
+    picture: Path
+
+
+def matte_sphere(
+    pictures: Path | str,
+    *,
+    out: Path | str,
+    circle: tuple[float, float, float] | None = None,
+    albedo: float | None = None,
+    focal_px: float | None = None,
+    transfer: str | None = None,
+    plan: Path | str | None = None,
+    frames: str | None = None,
+    first_light: str | None = None,
+    force: bool = False,
+    watch: Watch = unwatched,
+    caller: Caller = PYTHON,
+) -> MatteCalibration:
+    """Measure directions and intensities of lights from a matte sphere; write the rig and a picture beside it (.png).
+
+    - ``pictures``: a folder of stills (one per light), of plates, or a clip. ``transfer``: how stills code light
+      ("linear", "srgb", "slog3", ...). ``plan``, ``frames``, ``first_light``: as for ``normals``.
+    - ``out``: the rig file to write; ``force`` replaces it where it exists.
+    - ``circle``: the sphere's outline found by hand: x, y and radius in pixels, from the centre of the top left one.
+    - ``albedo``: the sphere's, above 0 and up to 1; left out, intensities are relative, their mean 1.
+    - ``focal_px``: the focal length in pixels; left out, the view is taken for orthographic.
+
+    Raises UsageError where an output exists, and PsvideoError where no sphere is found or no light can be measured.
+    """
+    rig_path = rig_out(out, force=force)
+    picture = picture_beside(rig_path, force=force)
+    reading = reading_of(plan, frames, first_light, transfer)
+    found = pictures_of(Path(pictures), reading, watch=watch, caller=caller)
+    view = Looking(focal_px=focal_px).view(width_px=found.width_px, height_px=found.height_px)
+    outline = _found(Path(pictures), found, view) if circle is None else given_outline(view, circle)
+    lights = measure_matte_sphere(found, outline, albedo=albedo)
+    rig = matte_rig(lights, view)
+    write_sheet(picture, matte_picture(found, outline, lights))
+    if not rig.lights:
+        faults = "; ".join(f"{light.name}: {light.fault}" for light in lights[:3])
+        raise PsvideoError(f"{pictures}: no light could be measured ({faults}). See {picture}.")
+    write_text(rig_path, format_rig(rig))
+    for light in lights:
+        if light.fault:
+            caller.warn(f"light {light.name!r} is left out of the rig: {light.fault}")
+    if focal_px is None:
+        caller.warn(
+            "the focal length is not known, so the view is taken for orthographic, and all directions are wrong by "
+            "about the angle by which the sphere stands off the lens's axis: give `focal_px`"
+        )
+    return MatteCalibration(outline=outline, lights=tuple(lights), rig=rig, picture=picture)
+
+
+def _found(path: Path, pictures: LightPictures, view: SphereView) -> Outline:
+    outlines = find_outlines(pictures, view, surface="matte")
+    if not outlines:
+        raise PsvideoError(
+            f"{path}: no sphere was found. Give its outline with `circle` x,y,radius in pixels, counted from the "
+            "centre of the top left one."
+        )
+    return outlines[0]

@@ -1,0 +1,109 @@
+"""The whole of ``psvideo calibrate mirror-sphere``."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from psvideo.calibrate.light_pictures import read_picture
+from psvideo.calibrate.mirror.lights import MirrorCalibration, calibrate_lights
+from psvideo.calibrate.sphere.sighting import Looking, Sighting, SphereNotFoundError, sight_spheres
+from psvideo.compute.progress import Watch, unwatched
+from psvideo.errors import PsvideoError, UsageError
+from psvideo.formats.rig_toml import format_rig
+from psvideo.formats.whole_files import write_text
+from psvideo.pictures.mirror_sphere import faulty_picture, sphere_picture
+from psvideo.pictures.timing_sheet import write_sheet
+from psvideo.runs.calibrate.reading import picture_beside, reading_of, rig_out, sets_of
+from psvideo.runs.caller import PYTHON, Caller
+from psvideo.runs.light_sets import Reading
+
+LEAST_RADIUS_MM, LARGEST_RADIUS_MM = 1.0, 1000.0
+
+
+def mirror_sphere(
+    pictures: Sequence[Path | str],
+    *,
+    out: Path | str,
+    circle: Sequence[tuple[float, float, float]] = (),
+    spheres: int = 1,
+    focal_px: float | None = None,
+    focal_mm: float | None = None,
+    sensor_mm: float | None = None,
+    principal_px: tuple[float, float] | None = None,
+    radius_mm: float | None = None,
+    outline_picture: Path | str | None = None,
+    transfer: str | None = None,
+    plan: Path | str | None = None,
+    frames: str | None = None,
+    first_light: str | None = None,
+    force: bool = False,
+    watch: Watch = unwatched,
+    caller: Caller = PYTHON,
+) -> MirrorCalibration:
+    """Measure where the lights are from their highlights on mirror spheres; write the rig and a picture (.png).
+
+    - ``pictures``: one folder of stills (one per light), of plates, or clip, for each place of the sphere.
+      ``transfer``, ``plan``, ``frames``, ``first_light``: as for ``matte_sphere``.
+    - ``out``: the rig file to write; ``force`` replaces it and the picture where they exist.
+    - ``circle``: outlines found by hand: x, y and radius in pixels. ``spheres``: how many each picture holds.
+      ``outline_picture``: a picture from the same camera, room light on, on which the outline shows.
+    - ``focal_px``: the focal length in pixels; or ``focal_mm`` with ``sensor_mm``, the width of the sensor's part that
+      the picture shows. ``principal_px``: where the lens's axis meets the picture; left out: its middle.
+    - ``radius_mm``: the spheres' radius, 1 to 1000: with two or more, near lights get positions.
+
+    Raises UsageError where parameters do not fit together or an output exists, and PsvideoError where no sphere is
+    found (the picture shows what was looked at) or nothing can be measured.
+    """
+    rig_path = rig_out(out, force=force)
+    picture = picture_beside(rig_path, force=force)
+    looking = Looking(
+        spheres=spheres,
+        circles=tuple(circle),
+        focal_px=focal_px,
+        focal_widths=_focal_widths(focal_px, focal_mm, sensor_mm),
+        principal_px=principal_px,
+    )
+    radius_m = _radius_m(radius_mm)
+    reading = reading_of(plan, frames, first_light, transfer)
+    room = None if outline_picture is None else Path(outline_picture)
+    try:
+        sightings = _sightings([Path(path) for path in pictures], reading, looking, room, watch, caller)
+    except SphereNotFoundError as fault:
+        write_sheet(picture, faulty_picture(fault.picture))
+        raise PsvideoError(f"{fault} See {picture}.") from None
+    found = calibrate_lights(sightings, radius_m=radius_m)
+    write_sheet(picture, sphere_picture(found))
+    write_text(rig_path, format_rig(found.rig))
+    for warning in found.warnings:
+        caller.warn(warning)
+    return found
+
+
+def _sightings(
+    pictures: Sequence[Path], reading: Reading, looking: Looking, room: Path | None, watch: Watch, caller: Caller
+) -> list[Sighting]:
+    sightings: list[Sighting] = []
+    for path in pictures:
+        opened = sets_of(path, reading, watch=watch, caller=caller)
+        lit = opened.room if room is None else read_picture(room)[0]
+        sightings += sight_spheres(opened.sets, looking, where=str(path), room=lit)
+    return sightings
+
+
+def _focal_widths(focal_px: float | None, focal_mm: float | None, sensor_mm: float | None) -> float | None:
+    """Return the focal length in widths of the picture, where it is given in millimetres."""
+    if focal_px is not None and focal_mm is not None:
+        raise UsageError("`focal_px` and `focal_mm` both say the focal length; give one of them.")
+    if (focal_mm is None) != (sensor_mm is None):
+        raise UsageError("`focal_mm` and `sensor_mm` go together: the focal length, and the width of the sensor.")
+    return None if focal_mm is None or sensor_mm is None else focal_mm / sensor_mm
+
+
+def _radius_m(radius_mm: float | None) -> float | None:
+    if radius_mm is None:
+        return None
+    if not LEAST_RADIUS_MM <= radius_mm <= LARGEST_RADIUS_MM:
+        raise UsageError(
+            f"`radius_mm` {radius_mm:g}: no such sphere; expected the radius in millimetres, from {LEAST_RADIUS_MM:g} "
+            f"to {LARGEST_RADIUS_MM:g}. (Metres? Then multiply by 1000.)"
+        )
+    return radius_mm / 1000

@@ -1,0 +1,44 @@
+"""What calibrations of lights begin with: which outputs may be written, and the pictures, one per light."""
+
+from pathlib import Path
+
+from psvideo.calibrate.light_pictures import LightPictures, averaged
+from psvideo.compute.progress import Watch
+from psvideo.formats.rig_toml import SCHEMA
+from psvideo.formats.whole_files import PICTURE_MARK, refuse_existing
+from psvideo.runs.caller import Caller
+from psvideo.runs.light_sets import LightSets, Reading, open_light_sets
+
+
+def rig_out(out: Path | str, *, force: bool) -> Path:
+    """Return where the rig goes. Raises UsageError where something is there that may not be replaced."""
+    refuse_existing(Path(out), force=force, mark=SCHEMA)
+    return Path(out)
+
+
+def picture_beside(out: Path, *, force: bool) -> Path:
+    """Return where the picture beside a rig goes. Raises UsageError where it may not be replaced."""
+    path = out.with_suffix(".png")
+    refuse_existing(path, force=force, mark=PICTURE_MARK)
+    return path
+
+
+def reading_of(plan: Path | str | None, frames: str | None, first_light: str | None, transfer: str | None) -> Reading:
+    """Return how pictures are to be read."""
+    given = None if plan is None else Path(plan)
+    return Reading(plan=given, frames=frames, first_light=first_light, transfer=transfer)
+
+
+def sets_of(path: Path, reading: Reading, *, watch: Watch, caller: Caller) -> LightSets:
+    """Open pictures of a scene, one per light, and hand on what is odd about them."""
+    opened = open_light_sets(path, reading, watch=watch)
+    for warning in opened.warnings:
+        caller.warn(warning)
+    for note in opened.notes:
+        caller.detail(note)
+    return opened
+
+
+def pictures_of(path: Path, reading: Reading, *, watch: Watch, caller: Caller) -> LightPictures:
+    """Return the mean picture of a scene under each light, and hand on what is odd about the pictures."""
+    return averaged(sets_of(path, reading, watch=watch, caller=caller).sets)
