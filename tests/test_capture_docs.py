@@ -8,7 +8,7 @@ import pytest
 from typer import Typer
 from typer.testing import CliRunner
 
-from psvideo.cli.capture_plan import capture_plan
+from psvideo.cli.commands.capture_plan import capture_plan
 
 ROOT = Path(__file__).resolve().parents[1]
 TEXT = (ROOT / "docs" / "shoot.md").read_text(encoding="utf-8")

@@ -7,7 +7,7 @@ import pytest
 import typer
 from typer.testing import CliRunner, Result
 
-from psvideo.cli.capture_plan import capture_plan
+from psvideo.cli.commands.capture_plan import capture_plan
 from psvideo.cli.spelling import spelled
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.plan_toml import parse_plan, read_plan

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from psvideo.cli.typed import (
+from psvideo.cli.options.typed import (
     parse_fraction,
     parse_lights,
     parse_metres,

@@ -9,7 +9,7 @@ import pytest
 from typer import Typer
 from typer.testing import CliRunner
 
-from psvideo.cli.capture_plan import capture_plan
+from psvideo.cli.commands.capture_plan import capture_plan
 from psvideo.formats.plan_toml import read_plan
 from psvideo.formats.rig_toml import read_rig
 

@@ -15,8 +15,8 @@ import pytest
 import typer
 
 from psvideo.cli.app import application, main
-from psvideo.cli.commands import COMMANDS
 from psvideo.cli.examples import EXAMPLES
+from psvideo.cli.first_screen import COMMANDS
 
 ROOT = Path(__file__).resolve().parents[1]
 SOLVERS_AND_DECODERS = ("numba", "scipy", "cv2", "av", "OpenEXR", "rawpy", "trimesh", "PyOpenColorIO", "pxr", "serial")
@@ -69,7 +69,7 @@ def test_every_command_speaks_to_machines() -> None:
 
 def test_the_first_screen_says_of_each_command_what_its_own_help_says() -> None:
     for entry in COMMANDS:
-        held = getattr(import_module(f"psvideo.cli.{entry.word}"), entry.word)
+        held = getattr(import_module(f"psvideo.cli.commands.{entry.word}"), entry.word)
         said = held.info.help if isinstance(held, typer.Typer) else " ".join(held.__doc__.split())
         assert entry.summary == said, entry.name
 

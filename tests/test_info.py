@@ -14,7 +14,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from psvideo.cli.info import info
+from psvideo.cli.commands.info import info
 from psvideo.errors import PsvideoError
 from psvideo.formats.plan_toml import format_plan
 from psvideo.formats.rig_toml import format_rig

@@ -7,8 +7,8 @@ from typing import Any
 import typer
 
 from psvideo.cli.app import application
-from psvideo.cli.commands import COMMANDS
 from psvideo.cli.examples import EXAMPLES
+from psvideo.cli.first_screen import COMMANDS
 
 PAGE = Path(__file__).resolve().parents[1] / "commands.md"
 HEAD = """# Commands

@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from psvideo.cli.commands import COMMANDS, Entry
+from psvideo.cli.first_screen import COMMANDS, Entry
 from psvideo.cli.spelling import spelled
 from psvideo.cli.teaching import PROGRAM, command_called, teach, words_typed
 from psvideo.errors import PsvideoError
@@ -42,7 +42,9 @@ def application(arguments: Sequence[str]) -> typer.Typer:
 
 
 def _loaded(entry: Entry) -> Callable[..., None] | typer.Typer:
-    command: Callable[..., None] | typer.Typer = getattr(import_module(f"psvideo.cli.{entry.word}"), entry.word)
+    command: Callable[..., None] | typer.Typer = getattr(
+        import_module(f"psvideo.cli.commands.{entry.word}"), entry.word
+    )
     return command
 
 

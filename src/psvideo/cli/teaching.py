@@ -8,7 +8,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from psvideo.cli.examples import EXAMPLES
-from psvideo.cli.panels import MANY, panel_of
+from psvideo.cli.options.panels import MANY, panel_of
 
 PROGRAM = "psvideo"
 

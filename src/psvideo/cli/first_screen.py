@@ -17,7 +17,7 @@ class Entry:
 
     @property
     def word(self) -> str:
-        """The command's module under ``psvideo.cli``, and the name of what it holds."""
+        """The command's module under ``psvideo.cli.commands``, and the name of what it holds."""
         return self.name.replace("-", "_")
 
 

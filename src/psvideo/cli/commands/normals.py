@@ -5,8 +5,22 @@ from typing import Annotated
 
 import typer
 
+from psvideo.cli.commands.sync import describe_timing
 from psvideo.cli.console import Voice, counted, plain, print_report
-from psvideo.cli.delivery_options import (
+from psvideo.cli.options.common import (
+    ClipPath,
+    FirstLight,
+    Force,
+    Frames,
+    Json,
+    PlanPath,
+    Quiet,
+    Resume,
+    StartNumber,
+    TimingPath,
+    Verbose,
+)
+from psvideo.cli.options.delivery import (
     AovOption,
     CameraName,
     CameraTimeOption,
@@ -25,21 +39,7 @@ from psvideo.cli.delivery_options import (
     WithAmbient,
     YOption,
 )
-from psvideo.cli.options import (
-    ClipPath,
-    FirstLight,
-    Force,
-    Frames,
-    Json,
-    PlanPath,
-    Quiet,
-    Resume,
-    StartNumber,
-    TimingPath,
-    Verbose,
-)
-from psvideo.cli.sync import describe_timing
-from psvideo.cli.typed import parse_weights
+from psvideo.cli.options.typed import parse_weights
 from psvideo.model.choices import MOST_ITERATIONS, NEAR_ITERATIONS, Align, Rate, Solver
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from psvideo.cli.completing import offer_boards, offer_lines, offer_ports
+from psvideo.cli.options.completing import offer_boards, offer_lines, offer_ports
 from psvideo.errors import UsageError, nearest
 from psvideo.strobe.link.boards import BOARDS, Board
 from psvideo.strobe.link.messages import WIRINGS, WiringName

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from psvideo.cli.completing import offer_lights
+from psvideo.cli.options.completing import offer_lights
 
 ClipPath = Annotated[Path, typer.Argument(help="A clip: a folder of numbered frames with plan.toml, or a movie file.")]
 PlanPath = Annotated[Path | None, typer.Option("--plan", help="The plan, where it does not lie beside the footage.")]

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from psvideo.cli.completing import offer_cameras, offer_transfers
+from psvideo.cli.options.completing import offer_cameras, offer_transfers
 
 CAMERA, LIGHTS, LIMITS = "Camera", "Lights", "What limits the flash"
 STROBE, ENCODING = "Strobe", "How the files encode light"

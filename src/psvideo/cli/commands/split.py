@@ -5,9 +5,9 @@ from typing import Annotated
 
 import typer
 
+from psvideo.cli.commands.sync import describe_timing
 from psvideo.cli.console import Voice, counted, plain, print_report
-from psvideo.cli.delivery_options import CodecOption, PlatesPreviewOption, Weights, WithAmbient
-from psvideo.cli.options import (
+from psvideo.cli.options.common import (
     ClipPath,
     FirstLight,
     Force,
@@ -21,8 +21,8 @@ from psvideo.cli.options import (
     TimingPath,
     Verbose,
 )
-from psvideo.cli.sync import describe_timing
-from psvideo.cli.typed import parse_weights
+from psvideo.cli.options.delivery import CodecOption, PlatesPreviewOption, Weights, WithAmbient
+from psvideo.cli.options.typed import parse_weights
 from psvideo.model.choices import SplitMethod
 
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from psvideo.cli.console import Voice, counted
-from psvideo.cli.options import FirstLight, Force, Frames, Json, PlanPath, Quiet, Verbose
-from psvideo.cli.typed import parse_box, parse_circle
+from psvideo.cli.options.common import FirstLight, Force, Frames, Json, PlanPath, Quiet, Verbose
+from psvideo.cli.options.typed import parse_box, parse_circle
 from psvideo.model.choices import Prior
 
 if TYPE_CHECKING:

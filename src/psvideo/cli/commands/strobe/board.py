@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 import typer
 
-import psvideo.cli.strobe_options as option
+import psvideo.cli.options.strobe as option
+from psvideo.cli.commands.strobe.emulate import emulate
+from psvideo.cli.commands.strobe.progress import watching
 from psvideo.cli.console import Voice
-from psvideo.cli.options import Force, Json, Quiet, Verbose
-from psvideo.cli.strobe_emulate import emulate
-from psvideo.cli.strobe_progress import watching
+from psvideo.cli.options.common import Force, Json, Quiet, Verbose
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.whole_files import refuse_existing, write_text
 from psvideo.strobe.link.boards import BOARDS, Board, capabilities

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import TypeVar, get_args
 
 from psvideo.capture.request import CameraWish, Limits, Marker, ShootRequest, choose_camera
-from psvideo.cli.typed import (
+from psvideo.cli.options.typed import (
     parse_fraction,
     parse_lights,
     parse_metres,

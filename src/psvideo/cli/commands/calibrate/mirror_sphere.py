@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from psvideo.cli.console import Voice
-from psvideo.cli.options import FirstLight, Force, Frames, Json, PlanPath, Quiet, Verbose
-from psvideo.cli.typed import parse_circle, parse_point
+from psvideo.cli.options.common import FirstLight, Force, Frames, Json, PlanPath, Quiet, Verbose
+from psvideo.cli.options.typed import parse_circle, parse_point
 
 if TYPE_CHECKING:
     from psvideo.calibrate.mirror.lights import MeasuredLight, MirrorCalibration

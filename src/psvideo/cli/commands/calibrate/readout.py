@@ -1,4 +1,4 @@
-"""psvideo calibrate: measure cameras and lights before a shoot."""
+"""psvideo calibrate readout: how long a camera takes to read a frame."""
 
 from __future__ import annotations
 
@@ -9,33 +9,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from psvideo.cli.console import Voice
-from psvideo.cli.convert import convert
-from psvideo.cli.lights import flat_field, guess, intensities, matte_sphere
-from psvideo.cli.mirror_sphere import mirror_sphere
-from psvideo.cli.options import Frames, Json, PlanPath, Quiet, Verbose
+from psvideo.cli.options.common import Frames, Json, PlanPath, Quiet, Verbose
 
 if TYPE_CHECKING:
     from psvideo.calibrate.stripes.readout import Led, Readout
     from psvideo.calibrate.strobed_readout import StrobedReadout
     from psvideo.runs.calibrate.readout import MeasuredReadout
 
-calibrate = typer.Typer(help="Measure cameras and lights before a shoot.", no_args_is_help=True)
 
-
-calibrate.command("mirror-sphere")(mirror_sphere)
-calibrate.command("matte-sphere")(matte_sphere)
-calibrate.command("flat-field")(flat_field)
-calibrate.command("intensities")(intensities)
-calibrate.command("guess")(guess)
-calibrate.command("convert")(convert)
-
-
-@calibrate.callback()
-def _calibrate() -> None:
-    """Measure cameras and lights before a shoot."""
-
-
-@calibrate.command()
 def readout(
     pictures: Annotated[
         list[Path],
@@ -78,7 +59,7 @@ def readout(
     quiet: Quiet = False,
 ) -> None:
     """Measure a camera's readout time from the stripes of an LED of known rate, or from a strobed clip."""
-    from psvideo.cli.typed import parse_columns, parse_positive_seconds, parse_rate
+    from psvideo.cli.options.typed import parse_columns, parse_positive_seconds, parse_rate
     from psvideo.runs.calibrate.readout import readout as measure
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)

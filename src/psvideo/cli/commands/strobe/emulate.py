@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from psvideo.cli.console import Voice
-from psvideo.cli.options import Force, Json, Quiet
+from psvideo.cli.options.common import Force, Json, Quiet
 from psvideo.errors import UsageError
 from psvideo.formats.whole_files import refuse_existing, whole_file
 from psvideo.strobe.link.boards import BOARDS

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 
 import typer
 
-import psvideo.cli.capture_options as option
+import psvideo.cli.options.capture as option
 from psvideo.cli.console import Voice
-from psvideo.cli.options import Force, Json, Quiet, Verbose
+from psvideo.cli.options.common import Force, Json, Quiet, Verbose
 from psvideo.cli.spelling import spelled
 from psvideo.formats.whole_files import PICTURE_MARK, refuse_existing, write_text
 
@@ -70,7 +70,7 @@ def capture_plan(
 
     from psvideo.capture.drawing.diagram import check_diagram_name, write_diagram
     from psvideo.capture.planning import plan_shoot
-    from psvideo.cli.shoot_words import ShootWords, parse_request
+    from psvideo.cli.options.shoot_words import ShootWords, parse_request
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     if list_cameras:
