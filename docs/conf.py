@@ -3,12 +3,18 @@
 The source folder is the whole project, so that links between pages are those that work in any viewer of the repository.
 """
 
+import ast
+import dataclasses
+import inspect
+import textwrap
 from pathlib import Path
 from typing import Any
 
 project = "psvideo"
 copyright = "the psvideo authors, Apache 2.0"  # noqa: A001 (Sphinx reads this name)
-extensions = ["myst_parser"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+napoleon_google_docstring = False
+napoleon_use_ivar = True
 source_suffix = {".md": "markdown"}
 root_doc = "docs/index"
 include_patterns = [
@@ -24,6 +30,18 @@ html_show_sphinx = False
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
 nitpicky = True
+nitpick_ignore_regex = [("py:.*", ".*")]  # types of other packages: nothing from the net, so no inventories
+
+
+def _signature(app: Any, what: str, name: str, obj: Any, *_: Any) -> tuple[str, str | None] | None:
+    """Give signatures as they stand in the source: numpy's ArrayLike and our own choices by their names."""
+    source = ast.parse(textwrap.dedent(inspect.getsource(obj))).body[0]
+    if isinstance(source, ast.FunctionDef):
+        return f"({ast.unparse(source.args)})", ast.unparse(source.returns) if source.returns else None
+    if isinstance(source, ast.ClassDef) and dataclasses.is_dataclass(obj):
+        fields = [ast.unparse(node) for node in source.body if isinstance(node, ast.AnnAssign)]
+        return f"(*, {', '.join(fields)})", None
+    return None
 
 
 def _list_decisions(app: Any, page: str, source: list[str]) -> None:
@@ -45,5 +63,6 @@ def _list_other_pages(app: Any, page: str, source: list[str]) -> None:
 
 def setup(app: Any) -> None:
     """Called by Sphinx."""
+    app.connect("autodoc-process-signature", _signature)
     app.connect("source-read", _list_decisions)
     app.connect("source-read", _list_other_pages)

@@ -7,9 +7,10 @@ from pathlib import Path
 import cv2
 from docs.figures.explained import EXPLAINED
 from docs.figures.faults import FAULTS
+from docs.figures.python_page import PYTHON
 from docs.figures.staging import PICTURES
 
-FIGURES = EXPLAINED | FAULTS
+FIGURES = EXPLAINED | FAULTS | PYTHON
 
 
 def main(names: list[str]) -> None:
