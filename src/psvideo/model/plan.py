@@ -56,7 +56,25 @@ class FlashTrain:
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """What the strobe plays and the camera records. ``clock_tolerance_ppm`` is None where it is unknown."""
+    """What the strobe plays and the camera records.
+
+    Attributes
+    ----------
+    camera
+        Size, rate, exposure, readout and how its files code light.
+    flashes
+        One round, in order: of each flash the lights with their power, 0 to 1, and its duration. No light: a dark slot.
+    dark_s
+        From a flash's end to the next one's start, in seconds.
+    mode
+        "rolling", "half-rate" or "synced" (one flash per frame).
+    rise_s, fall_s
+        The LEDs' 1/e times in seconds.
+    clock_tolerance_ppm
+        How far the strobe's and the camera's clocks may be apart; None where that is unknown.
+    dark_every
+        Dark slots are kept only in every Nth round.
+    """
 
     camera: Camera
     flashes: tuple[PlannedFlash, ...]

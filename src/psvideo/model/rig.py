@@ -19,8 +19,22 @@ Vector = tuple[float, float, float]
 class Light:
     """One light. ``plate = albedo * intensity * max(0, n . direction)`` at power 1 and the reference duration.
 
-    ``intensity`` has one entry or one per channel; for a near light it is the irradiance at 1 m.
-    ``reference_duration_s`` None means the duration with which the plan flashes this light.
+    Attributes
+    ----------
+    name
+        As in the plan.
+    intensity
+        One number or one per channel, above 0; for a near light the irradiance at 1 m.
+    direction
+        Of a distant light: the unit vector from the surface to it, in the camera's frame.
+    position_m
+        Of a near light, instead of a direction: where it is in metres, the origin at the optical centre.
+    error_deg
+        The direction's standard error in degrees, where calibration gave one.
+    reference_duration_s
+        For how long the light shone when its intensity was measured; None means as long as the plan flashes it.
+    anisotropy, axis
+        Of a near light: it falls off with this power of the cosine from its axis, the unit vector the way it shines.
     """
 
     name: str
@@ -35,7 +49,17 @@ class Light:
 
 @dataclass(frozen=True, kw_only=True)
 class Rig:
-    """The lights, with the camera's perspective and a first guess of the surface where near lights need them."""
+    """The lights, with the camera's perspective and a first guess of the surface where near lights need them.
+
+    Attributes
+    ----------
+    lights
+        One Light each; near and distant ones may stand side by side.
+    focal_px, principal_px
+        The lens: focal lengths (x, y) and principal point (col, row) in pixels; None where it is not known.
+    plane
+        (a, b, c, d) of the plane a x + b y + c z + d = 0 in which the subject stands, camera's frame, in metres.
+    """
 
     lights: tuple[Light, ...]
     focal_px: tuple[float, float] | None = None

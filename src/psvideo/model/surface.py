@@ -25,18 +25,28 @@ class Misfit:
 class Surface:
     """Normals, albedo and what to think of them, per pixel; all arrays are finite everywhere.
 
-    normals: shape (row, col, 3), unit vectors in the camera frame (x right, y up, z to the camera); (0, 0, 0) where
-        not valid.
-    albedo: shape (row, col) or (row, col, channel), linear light: a plate is albedo * intensity * max(0, n . l). One
-        fixed scale, never stretched to its own maximum; 0 where not valid.
-    valid: shape (row, col), True where the normal is to be trusted.
-    residual: shape (row, col), root mean square over the measurements used of what the fit does not explain, in units
-        of sensor saturation; 0 where not valid. None where it was not asked for. Three measurements of one channel
-        are always explained exactly, right or wrong.
-    error_deg: shape (row, col), the normal's standard error in degrees as the solver judges it; 0 where not valid.
-        None where it was not asked for, or the solver (least squares) does not judge it.
-    misfit: what is common to the picture; None where the solver does not look for it, or three lights explain all.
+    Attributes
+    ----------
+    normals
+        Shape (row, col, 3), unit vectors in the camera frame (x right, y up, z to the camera); (0, 0, 0) where not
+        valid.
+    albedo
+        Shape (row, col) or (row, col, channel), linear light: a plate is albedo * intensity * max(0, n . l). One fixed
+        scale, never stretched to its own maximum; 0 where not valid.
+    valid
+        Shape (row, col), True where the normal is to be trusted.
+    residual
+        Shape (row, col), root mean square over the measurements used of what the fit does not explain, in units of
+        sensor saturation; 0 where not valid. None where it was not asked for. Three measurements of one channel are
+        always explained exactly, right or wrong.
+    error_deg
+        Shape (row, col), the normal's standard error in degrees as the solver judges it; 0 where not valid. None where
+        it was not asked for, or the solver (least squares) does not judge it.
+    misfit
+        What is common to the picture; None where the solver does not look for it, or three lights explain all.
 
+    Notes
+    -----
     Arrays are float32, or float16 where a solver was asked for half floats. Channels lie in separate planes in memory,
     so ``normals[..., 0]`` is contiguous.
     """

@@ -36,14 +36,35 @@ class DroppedFrames:
 
 @dataclass(frozen=True, kw_only=True)
 class Timing:
-    """The flashes of a clip in order. ``order`` says how the lights' names were found: a guess is called ``guess``.
+    """The flashes of a clip in order, and what was found besides. Times are seconds on the camera's clock.
 
-    ``order_note`` is a sentence on how a rig's directions decided the order, or why they did not; empty where none were
-    asked. ``repeated_frames`` are the numbers of frames that show the same moment as the frame before them. ``notes``
-    are sentences for people on what to distrust; ``row_time_error_s`` is the row time's standard error where the
-    picture gave it, None where the plan did; ``phase_error_s`` is ``phase_error_rows`` in seconds. None of these three
-    goes into the file. A global shutter's rows open together: its ``phase_error_rows`` are of ``frame_period_s`` /
-    height each.
+    Attributes
+    ----------
+    clip
+        The clip's name.
+    frame_period_s, exposure_s, row_time_s
+        Of the camera; the row time is negative where the bottom row comes first.
+    clock_offset_ppm
+        By how much the strobe's seconds are longer than the camera's.
+    phase_error_rows
+        The standard error of the flashes' times, in row times; a global shutter's rows open together, and its error is
+        in shares of ``frame_period_s`` / height.
+    order
+        How the lights' names were found: "marker", "rig", "given" or "guess".
+    flashes
+        Of each flash ``start_s``, ``duration_s``, its ``lights`` with their power, and whether it is ``complete``.
+    dropped_frames, repeated_frames
+        Holes in the clip, and the numbers of frames that show the same moment as the frame before them.
+    order_note
+        A sentence on how a rig's directions decided the order, or why they did not; empty where none were asked.
+    rise_s, fall_s
+        The LEDs' 1/e times, given or found.
+    notes
+        Sentences on what to distrust. Not in the file, like the next two.
+    row_time_error_s
+        The row time's standard error where the picture gave it, None where the plan did.
+    phase_error_s
+        ``phase_error_rows`` in seconds.
     """
 
     clip: str
