@@ -16,7 +16,7 @@ def shelf(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ps.shoot("sphere", folder / "take3")
     take = ps.open_take(folder / "take3")
     (folder / "stills").mkdir()
-    whole = next(one for one in ps.rounds(take, ps.find_timing(take)) if one.lights == take.plan.lights)
+    whole = next(one for one in ps.gather(take, ps.find_timing(take)) if one.lights == take.plan.lights)
     for plate in whole.plates:
         channels = {name: plate.image[..., place] for place, name in enumerate("RGB")}
         write_exr(folder / "stills" / f"{plate.light}.exr", channels, half=False)

@@ -13,7 +13,7 @@ from psvideo.plates.sequence import LightPlate, Round
 from psvideo.report.judge.result import steadiness
 from psvideo.report.observe.observed import instant_facts
 from psvideo.report.observe.steadiness import change, sample_of
-from psvideo.report.run_report import RunReport, findings, flicker, report_record
+from psvideo.report.run_report import RunReport, flicker, report_record
 
 ROWS, COLS = 96, 128
 
@@ -151,7 +151,7 @@ def test_the_report_names_the_worst_instants() -> None:
     assert found is not None
     assert found.worst[0] == 1003
     assert found.level_percent < 0.5
-    assert any(re.search(r"[45]\.\d % as a whole \(number 1003\)", sentence) for sentence in findings(report))
+    assert any(re.search(r"[45]\.\d % as a whole \(number 1003\)", sentence) for sentence in report.findings)
     steady = replace(report, judgements=tuple(steadiness(facts[:2])))
-    assert not any("flickers" in sentence for sentence in findings(steady))
+    assert not any("flickers" in sentence for sentence in steady.findings)
     assert report_record(replace(report, instants=report.instants[:1]))["flicker"] is None

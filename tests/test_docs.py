@@ -2,6 +2,7 @@
 
 import ast
 import re
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -14,7 +15,10 @@ import pytest
 from docs.figures.__main__ import FIGURES
 from docs.figures.commands import PAGE, commands_page
 from docs.figures.faults import FAULTS
+from docs.figures.python_page import run_blocks
 from docs.figures.staging import PICTURES
+
+import psvideo as ps
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted(
@@ -140,6 +144,22 @@ def test_a_picture_is_what_its_script_makes_and_psvideo_says_what_the_page_quote
     if name in FAULTS:
         for quote in quotes(name):
             assert quote in made.said, made.said
+
+
+def test_the_code_of_the_page_on_python_runs_as_it_stands(shelf: Path, tmp_path: Path) -> None:
+    shutil.copytree(shelf, tmp_path, dirs_exist_ok=True)
+    names, said = run_blocks(tmp_path)
+    assert names["surface"].valid.any()
+    assert np.median(names["error_deg"]) < 1.5
+    assert (tmp_path / "relit.png").is_file()
+    assert "order by marker" in said
+    assert len(list((tmp_path / "out" / "depth").iterdir())) == len(names["report"].instants)
+
+
+def test_the_api_page_describes_every_name_of_the_front_door() -> None:
+    page = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    described = re.findall(r"^\.\. auto\w+:: (\w+)$", page, flags=re.MULTILINE)
+    assert sorted(described) == sorted(ps.__all__)
 
 
 def test_the_site_builds_without_a_warning_and_needs_nothing_from_the_net(tmp_path: Path) -> None:

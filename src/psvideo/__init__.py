@@ -21,7 +21,7 @@ if TYPE_CHECKING:  # what editors and type checkers see; _HOMES is the same for 
     from psvideo.model.timing import Timing as Timing
     from psvideo.pictures.quantity import picture_of as picture_of
     from psvideo.pictures.relighting import relight as relight
-    from psvideo.plates.gather import gather as rounds
+    from psvideo.plates.gather import gather as gather
     from psvideo.runs.check import check as check
     from psvideo.runs.light_sets import read_images as read_images
     from psvideo.runs.normals import normals as normals
@@ -44,6 +44,7 @@ _HOMES = {
     "check": "psvideo.runs.check",
     "find_depth": "psvideo.solve.depth.shaping",
     "find_timing": "psvideo.sync.take_timing:find_take_timing",
+    "gather": "psvideo.plates.gather",
     "normals": "psvideo.runs.normals",
     "open_take": "psvideo.sync.open_take",
     "picture_of": "psvideo.pictures.quantity",
@@ -53,7 +54,6 @@ _HOMES = {
     "read_rig": "psvideo.formats.rig_toml",
     "read_timing": "psvideo.formats.timing_json",
     "relight": "psvideo.pictures.relighting",
-    "rounds": "psvideo.plates.gather:gather",
     "shoot": "psvideo.synth.shoot",
     "solve": "psvideo.solve.of_take",
     "solve_images": "psvideo.solve.images",
@@ -70,7 +70,7 @@ __all__ = [  # noqa: RUF022  (in the order of the work)
     "read_images",
     "read_mask",
     "find_timing",
-    "rounds",
+    "gather",
     "solve",
     "solve_images",
     "find_depth",

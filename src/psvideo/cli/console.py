@@ -74,10 +74,8 @@ def command_line(context: "typer.Context") -> str:
 
 def print_report(voice: Voice, report: "RunReport") -> None:
     """Say whether the take is usable, and warn of all that speaks against it."""
-    from psvideo.report.run_report import findings, verdict
-
-    voice.say(verdict(report))
-    for sentence in findings(report):
+    voice.say(report.verdict)
+    for sentence in report.findings:
         voice.warn(sentence)
 
 

@@ -86,7 +86,7 @@ def gather(
     --------
     >>> import psvideo as ps
     >>> take = ps.open_take("take3/")
-    >>> for one in ps.rounds(take, ps.find_timing(take)):
+    >>> for one in ps.gather(take, ps.find_timing(take)):
     ...     print(one.number, one.lights, one.plates[0].image.shape)
     1001 ('left', 'top') (120, 160, 3)
     1002 ('key', 'left', 'top') (120, 160, 3)

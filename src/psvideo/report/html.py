@@ -14,7 +14,7 @@ from psvideo.report.judgement import Judgement, gravest_first, usable
 from psvideo.report.observe.levels import STOPS, TARGET_QUANTILE
 from psvideo.report.observe.observed import InstantFacts
 from psvideo.report.observe.worst import Thumbnail, badness
-from psvideo.report.run_report import RunReport, flicker, verdict
+from psvideo.report.run_report import RunReport, flicker
 from psvideo.report.style import STYLE
 
 Pixels = NDArray[np.uint8]
@@ -41,7 +41,7 @@ def report_page(report: RunReport, pictures: Sequence[tuple[str, Pixels]]) -> st
 
 
 def _head(report: RunReport) -> str:
-    words = verdict(report)
+    words = report.verdict
     kind = "bad" if not usable(report.judgements) else "good" if words == "This take is usable." else "doubtful"
     found = gravest_first(report.judgements)
     items = "".join(

@@ -50,16 +50,16 @@ class RunReport:
     settings: Facts
     thumbnails: tuple[Thumbnail, ...] = ()
 
+    @property
+    def verdict(self) -> str:
+        """The sentence that the report begins with."""
+        word = verdict_of(self.judgements)
+        return "This take is usable, with reservations." if self.warnings and word == "This take is usable." else word
 
-def verdict(report: RunReport) -> str:
-    """Return the sentence that the report begins with."""
-    word = verdict_of(report.judgements)
-    return "This take is usable, with reservations." if report.warnings and word == "This take is usable." else word
-
-
-def findings(report: RunReport) -> tuple[str, ...]:
-    """Return what to distrust and what to change on set, the gravest first; empty where nothing is wrong."""
-    return (*(one.sentence for one in gravest_first(report.judgements)), *report.warnings)
+    @property
+    def findings(self) -> tuple[str, ...]:
+        """What to distrust and what to change on set, the gravest first; empty where nothing is wrong."""
+        return (*(one.sentence for one in gravest_first(self.judgements)), *self.warnings)
 
 
 def report_record(report: RunReport) -> dict[str, object]:
@@ -70,9 +70,9 @@ def report_record(report: RunReport) -> dict[str, object]:
         "kind": report.kind,
         "clip": report.clip,
         "version": report.version,
-        "verdict": verdict(report),
+        "verdict": report.verdict,
         "usable": usable(report.judgements),
-        "findings": list(findings(report)),
+        "findings": list(report.findings),
         "judgements": [asdict(one) for one in report.judgements],
         "shot": dict(report.shot),
         "settings": dict(report.settings),
