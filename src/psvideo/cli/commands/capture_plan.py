@@ -17,7 +17,6 @@ import psvideo.cli.options.capture as option
 from psvideo.cli.console import Voice
 from psvideo.cli.options.common import Force, Json, Quiet, Verbose
 from psvideo.cli.spelling import spelled
-from psvideo.formats.whole_files import PICTURE_MARK, refuse_existing, write_text
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -68,30 +67,24 @@ def capture_plan(
     """Plan a shoot: write plan.toml, and print what decides the shoot and what to beware of."""
     from rich.console import Console
 
-    from psvideo.capture.drawing.diagram import check_diagram_name, write_diagram
-    from psvideo.capture.planning import plan_shoot
     from psvideo.cli.options.shoot_words import ShootWords, parse_request
+    from psvideo.runs.capture_plan import capture_plan as plan_it
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     if list_cameras:
         _list_cameras(voice)
         return
-    picture = check_diagram_name(diagram)
-    outputs = [path for path in (out, picture) if path is not None]
-    for path in outputs:
-        refuse_existing(path, force=force, mark="psvideo-plan/" if path == out else PICTURE_MARK)
     words = {field.name: context.params[field.name] for field in dataclasses.fields(ShootWords)}
     request = parse_request(ShootWords(**words))
-    shoot = plan_shoot(request)
-    if picture is not None:
-        write_diagram(shoot.plan, picture)
+    shoot = plan_it(request, out=out, diagram=diagram, force=force)
     _deliver(shoot, out, voice)
     if request.preset is not None:
         voice.detail(f"readout of the {request.preset.name}: {request.preset.source}")
     if not (json or quiet):
         _report(shoot, request.preset, Console(stderr=out is None, highlight=False), diagram=diagram)
-    for path in outputs if out is not None else ():
-        voice.say(f"{path}: written.")
+    if out is not None:
+        for path in (out, *([] if diagram in (None, "-") else [diagram])):
+            voice.say(f"{path}: written.")
     for caution in shoot.cautions:
         if caution.level == "warning":
             voice.warn(caution.text)
@@ -113,13 +106,11 @@ def _list_cameras(voice: Voice) -> None:
 
 
 def _deliver(shoot: Shoot, out: Path | None, voice: Voice) -> None:
-    """Write the plan where it was asked for, or to standard output, which --json takes for its own."""
-    from psvideo.formats.plan_toml import format_plan
+    """Print the plan where no file was asked for and --json does not take standard output for its own."""
+    from psvideo.runs.capture_plan import plan_text
 
-    text = format_plan(shoot.plan).rstrip("\n") + "\n"
-    if out is not None:
-        write_text(out, text)
-    elif not voice.json:
+    text = plan_text(shoot)
+    if out is None and not voice.json:
         print(text, end="")
         sys.stdout.flush()
     result = {"figures": dataclasses.asdict(shoot.figures), "chosen": shoot.chosen}
