@@ -17,8 +17,8 @@ from psvideo.strobe.link.boards import BOARDS, capabilities
 from psvideo.strobe.link.messages import WiringName
 from psvideo.strobe.link.protocol import format_request
 from psvideo.strobe.program import Program, make_program
+from psvideo.strobe.stand_ins.emulated import play_script
 from psvideo.strobe.stand_ins.playing import moments
-from psvideo.strobe.stand_ins.simulated import play_script
 from psvideo.strobe.stand_ins.toolchain import AVR_BOARDS, AvrBoard
 
 FLASHES = 10_000

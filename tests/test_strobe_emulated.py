@@ -11,8 +11,8 @@ from psvideo.strobe.limits import cycle_check
 from psvideo.strobe.link.boards import BOARDS
 from psvideo.strobe.link.lines import LONGEST_REPLY, Error, LineReader, seal
 from psvideo.strobe.link.messages import Lit, Reset, Slot
-from psvideo.strobe.stand_ins.emulated import EmulatedController
 from psvideo.strobe.stand_ins.playing import Edge
+from psvideo.strobe.stand_ins.python_board import PythonBoard
 
 MS = 2000
 """Ticks of an AVR board in a millisecond."""
@@ -23,20 +23,20 @@ LOADED = [b"SLOT 0 1600 16000 1600 2:1600\n", b"STEPS 0 0 0\n"]
 ARM = f"ARM {cycle_check([FLASH, FLASH])}\n".encode()
 
 
-def tell(controller: EmulatedController, *lines: bytes, now: int) -> bytes:
+def tell(controller: PythonBoard, *lines: bytes, now: int) -> bytes:
     """Send lines one after the other and return the last answer."""
     answers = [controller.feed(line, now) for line in lines]
     return answers[-1]
 
 
-def armed() -> EmulatedController:
+def armed() -> PythonBoard:
     """Return a controller that is armed at tick 0 with two flashes of line 2."""
-    controller = EmulatedController(BOARDS["atmega328p"])
+    controller = PythonBoard(BOARDS["atmega328p"])
     assert tell(controller, *LOADED, ARM, now=0).startswith(b"OK check=")
     return controller
 
 
-def running(cycles: int = 0) -> EmulatedController:
+def running(cycles: int = 0) -> PythonBoard:
     """Return a controller that was asked to run at tick 0; its first flash starts at 10 ms."""
     controller = armed()
     assert tell(controller, b"RUN %d\n" % cycles, now=0) == b"OK start=20000\n"
@@ -105,7 +105,7 @@ def test_an_open_interlock_darkens_and_latches() -> None:
 
 
 def test_an_open_interlock_forbids_arming() -> None:
-    controller = EmulatedController(BOARDS["atmega328p"])
+    controller = PythonBoard(BOARDS["atmega328p"])
     controller.set_interlock("open", 0)
     assert tell(controller, *LOADED, ARM, now=0) == b"E 13 interlock open\n"
 
@@ -169,13 +169,13 @@ def test_a_missed_edge_is_a_fault() -> None:
     ],
 )
 def test_each_limit_has_its_number(line: bytes, code: Error | None) -> None:
-    answer = EmulatedController(BOARDS["atmega328p"]).feed(line, 0)
+    answer = PythonBoard(BOARDS["atmega328p"]).feed(line, 0)
     assert answer.startswith(b"OK" if code is None else b"E %d " % code), answer
     assert answer.endswith(b"\n")
 
 
 def test_a_wrong_check_and_too_much_light_are_refused_when_arming() -> None:
-    controller = EmulatedController(BOARDS["atmega328p"])
+    controller = PythonBoard(BOARDS["atmega328p"])
     bright = Slot(slot=0, duration=1600, dark=1599, period=1600, lit=(Lit(line=0, on=1600),))
     tell(controller, b"SLOT 0 1600 1599 1600 0:1600\n", b"STEPS 0 0\n", now=0)
     assert controller.feed(b"ARM 1\n", 0).startswith(b"E 11 ")
@@ -188,25 +188,25 @@ def test_a_wrong_check_and_too_much_light_are_refused_when_arming() -> None:
 
 
 def test_the_pico_has_direct_wiring_only_and_the_uno_both() -> None:
-    assert EmulatedController(BOARDS["rp2040"]).feed(b"WIRING gated\n", 0).startswith(b"E 7 ")
-    uno = EmulatedController(BOARDS["atmega328p"])
+    assert PythonBoard(BOARDS["rp2040"]).feed(b"WIRING gated\n", 0).startswith(b"E 7 ")
+    uno = PythonBoard(BOARDS["atmega328p"])
     assert b"wiring=gated lines=8 powers=1" in uno.feed(b"CAPS\n", 0)
     assert uno.feed(b"WIRING direct\n", 0) == b"OK wiring=direct\n"
     assert b"wiring=direct lines=2 powers=2" in uno.feed(b"CAPS\n", 0)
 
 
 def test_an_answer_has_a_checksum_where_the_request_had_one() -> None:
-    controller = EmulatedController(BOARDS["atmega328p"])
+    controller = PythonBoard(BOARDS["atmega328p"])
     assert (
         controller.feed(b"ID*A21B\n", 0)
-        == (seal("OK proto=1 board=atmega328p firmware=emulated-1 unit=emulated") + "\n").encode()
+        == (seal("OK proto=1 board=atmega328p firmware=python-1 unit=emulated") + "\n").encode()
     )
     assert controller.feed(b"ID*A21C\n", 0) == (seal("E 3 checksum behind ID") + "\n").encode()
 
 
 @pytest.mark.parametrize("cut", range(len(ARM) + 1))
 def test_a_request_cut_anywhere_is_understood_once_the_rest_is_there(cut: int) -> None:
-    controller = EmulatedController(BOARDS["atmega328p"])
+    controller = PythonBoard(BOARDS["atmega328p"])
     tell(controller, *LOADED, now=0)
     assert (controller.feed(ARM[:cut], 0) + controller.feed(ARM[cut:], 1)).startswith(b"OK check=")
 
@@ -237,7 +237,7 @@ CHUNK = st.one_of(st.binary(max_size=120), TALK, st.sampled_from([*LOADED, ARM, 
 def test_after_any_input_it_answers_line_by_line_and_is_dark_in_the_end(
     board: str, talk: list[tuple[bytes, int]]
 ) -> None:
-    controller = EmulatedController(BOARDS[board])
+    controller = PythonBoard(BOARDS[board])
     reader = LineReader(LONGEST_REPLY)
     now, was_armed = 0, False
     for data, pause in talk:
@@ -268,7 +268,7 @@ def test_after_any_input_a_host_that_falls_silent_leaves_the_dark(talk: list[tup
 
 
 def test_nothing_lights_before_it_is_run() -> None:
-    steps: list[Callable[[], EmulatedController]] = [lambda: EmulatedController(BOARDS["rp2040"]), armed]
+    steps: list[Callable[[], PythonBoard]] = [lambda: PythonBoard(BOARDS["rp2040"]), armed]
     for make in steps:
         controller = make()
         controller.advance(10**9)

@@ -1,4 +1,4 @@
-"""The real firmware and its imitation in Python answer alike and switch alike, and nothing lights that must not.
+"""The real firmware and the Python board answer alike and switch alike, and nothing lights that must not.
 
 The firmware runs on emulated chips (lights/emulator), as fast as it goes; both play the same scripts. Where the tools
 to build it are missing these tests fail and name the packages: they are never skipped.
@@ -20,8 +20,8 @@ from psvideo.strobe.link.boards import BOARDS, capabilities
 from psvideo.strobe.link.protocol import format_request
 from psvideo.strobe.program import Program, make_program
 from psvideo.strobe.stand_ins import toolchain
-from psvideo.strobe.stand_ins.emulated import EmulatedController
-from psvideo.strobe.stand_ins.simulated import play_script
+from psvideo.strobe.stand_ins.emulated import play_script
+from psvideo.strobe.stand_ins.python_board import PythonBoard
 from psvideo.strobe.stand_ins.toolchain import AVR_BOARDS, AvrBoard
 
 TICKS_PER_MS = 2000
@@ -31,11 +31,11 @@ TICKS_PER_BYTE = 170
 Play = Callable[..., tuple[list[str], Trace]]
 
 
-class Imitation:
+class PythonPlayer:
     """Plays scripts of lights/emulator/script.h on the controller in Python, in virtual time."""
 
     def __init__(self, board: str) -> None:
-        self.controller = EmulatedController(BOARDS[board])
+        self.controller = PythonBoard(BOARDS[board])
         self.now = 0
         self.said: list[str] = []
 
@@ -92,11 +92,11 @@ def play(request: pytest.FixtureRequest, tmp_path: Path) -> Play:
         return [reply.removeprefix("< ") for reply in replies if reply[0] == "<"], read_trace(tmp_path / "trace.csv")
 
     def in_python(script: str, *, wiring: str = "gated") -> tuple[list[str], Trace]:
-        imitation = Imitation(board)
-        said = imitation.play(f"wait 20\n{script}")
+        python = PythonPlayer(board)
+        said = python.play(f"wait 20\n{script}")
         with (tmp_path / "trace.csv").open("w") as file:
             TraceWriter(file, board=board, hz=16_000_000, wiring=wiring).write(
-                (CYCLES_PER_TICK * edge.tick, edge.line, edge.level) for edge in imitation.controller.edges
+                (CYCLES_PER_TICK * edge.tick, edge.line, edge.level) for edge in python.controller.edges
             )
         return said, read_trace(tmp_path / "trace.csv")
 
@@ -110,10 +110,10 @@ def codes(replies: Sequence[str]) -> list[str]:
 
 
 def both(script: str, *, board: AvrBoard) -> tuple[list[str], list[str]]:
-    """Return what firmware and imitation answer to the same script."""
+    """Return what firmware and Python board answer to the same script."""
     said = play_script(f"wait 20\n{script}", board=board)
     chip = [line.partition(" < ")[2] for line in said if " < " in line]
-    return codes(chip), codes(Imitation(board).play(f"wait 20\n{script}"))
+    return codes(chip), codes(PythonPlayer(board).play(f"wait 20\n{script}"))
 
 
 def plan_of(*flashes: tuple[dict[str, float], float], dark_s: float = 0.002) -> Plan:
@@ -327,10 +327,10 @@ STAT*12345
 
 
 @pytest.mark.parametrize("board", AVR_BOARDS)
-def test_firmware_and_imitation_answer_alike(board: AvrBoard) -> None:
+def test_firmware_and_python_board_answer_alike(board: AvrBoard) -> None:
     lines = REQUESTS.strip("\n").splitlines()
-    chip, imitation = both("\n".join(f"send {line}" for line in lines), board=board)
-    assert [*zip(lines, chip, strict=True)] == [*zip(lines, imitation, strict=True)]
+    chip, python = both("\n".join(f"send {line}" for line in lines), board=board)
+    assert [*zip(lines, chip, strict=True)] == [*zip(lines, python, strict=True)]
 
 
 WORDS = (
@@ -378,8 +378,8 @@ def test_they_answer_alike_to_what_nobody_should_send(board: AvrBoard) -> None:
     lines = [" ".join(rng.choice(WORDS, rng.integers(1, 9))) for _ in range(400)]
     lines += [f"SLOT {' '.join(rng.choice(WORDS[15:30], 4))} {rng.choice(WORDS[30:35])}" for _ in range(400)]
     sendable = [line for line in lines if line.strip("\r") and not line.startswith("RUN")]
-    chip, imitation = both("\n".join(f"send {line}" for line in sendable), board=board)
-    assert [*zip(sendable, chip, strict=True)] == [*zip(sendable, imitation, strict=True)]
+    chip, python = both("\n".join(f"send {line}" for line in sendable), board=board)
+    assert [*zip(sendable, chip, strict=True)] == [*zip(sendable, python, strict=True)]
 
 
 BAD_BYTES = {
@@ -399,8 +399,8 @@ BAD_BYTES = {
 @pytest.mark.parametrize("board", AVR_BOARDS)
 def test_they_answer_alike_to_bytes_that_are_no_line(board: AvrBoard) -> None:
     script = "\n".join(f"bytes {digits.strip()}\nwait 120\nsend STAT" for digits in BAD_BYTES.values())
-    chip, imitation = both(script, board=board)
-    assert chip == imitation
+    chip, python = both(script, board=board)
+    assert chip == python
 
 
 @pytest.mark.parametrize("board", AVR_BOARDS)

@@ -15,7 +15,7 @@ from psvideo.strobe.link.boards import BOARDS, capabilities
 from psvideo.strobe.link.lines import LONGEST_REPLY, LONGEST_REQUEST, Error, seal
 from psvideo.strobe.link.messages import Caps, Lit, Slot, WiringName
 from psvideo.strobe.link.protocol import format_reply
-from psvideo.strobe.stand_ins.emulated import EmulatedController
+from psvideo.strobe.stand_ins.python_board import PythonBoard
 from psvideo.strobe.stand_ins.toolchain import AvrBoard
 
 LIGHTS = Path(__file__).resolve().parents[1] / "lights"
@@ -149,7 +149,7 @@ def requests(seed: int, count: int) -> list[str]:
 def test_it_answers_as_the_controller_in_python_does(emulate: Emulate, board: AvrBoard) -> None:
     asked = requests(seed=7, count=900)
     said = replies(emulate([f"send {line}" for line in asked], board=board))
-    python = EmulatedController(BOARDS[board])
+    python = PythonBoard(BOARDS[board])
     assert len(said) == len(asked)
     for now, (line, answer) in enumerate(zip(asked, said, strict=True)):
         expected = python.feed(f"{line}\n".encode(), now).decode().strip()

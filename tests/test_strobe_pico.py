@@ -17,8 +17,8 @@ from psvideo.strobe.link.boards import BOARDS, capabilities
 from psvideo.strobe.link.lines import LONGEST_REPLY, LONGEST_REQUEST, Error, LineReader, seal
 from psvideo.strobe.link.messages import Lit, Slot
 from psvideo.strobe.link.protocol import format_reply
-from psvideo.strobe.stand_ins.emulated import EmulatedController
 from psvideo.strobe.stand_ins.playing import Edge
+from psvideo.strobe.stand_ins.python_board import PythonBoard
 
 LIGHTS = Path(__file__).resolve().parents[1] / "lights"
 BUSY = [HealthCheck.too_slow]
@@ -270,7 +270,7 @@ def same_answer(pico: bytes, python: bytes) -> bool:
     """Compare replies, of refusals the code only."""
     if python.startswith(b"E "):
         return pico.split()[:2] == python.split()[:2]
-    return pico == python.replace(b"emulated-1", b"pico-1.0")
+    return pico == python.replace(b"python-1", b"pico-1.0")
 
 
 @settings(max_examples=100, deadline=None, suppress_health_check=BUSY)
@@ -278,7 +278,7 @@ def same_answer(pico: bytes, python: bytes) -> bool:
 def test_after_any_input_it_answers_and_lights_as_the_controller_in_python(
     first: bytes, talk: list[tuple[bytes, int]]
 ) -> None:
-    pico, python = Pico(), EmulatedController(BOARDS["rp2040"])
+    pico, python = Pico(), PythonBoard(BOARDS["rp2040"])
     now = 0
     for data, pause_us in [(b"KEEP 100\n" + first, 0), *talk, (b"\nSTAT\n", 0)]:
         now += pause_us * US
@@ -299,7 +299,7 @@ def test_after_any_input_it_answers_and_lights_as_the_controller_in_python(
 def test_random_cycles_are_played_to_the_tick(seed: int) -> None:
     lines = upload(random.Random(seed))
     lines.append(f"RUN {random.Random(seed).choice([1, 2, 5])}")
-    pico, python = Pico(), EmulatedController(BOARDS["rp2040"])
+    pico, python = Pico(), PythonBoard(BOARDS["rp2040"])
     for line in lines:
         assert pico.feed(f"{line}\n".encode(), 0).startswith(b"OK"), line
         python.feed(f"{line}\n".encode(), 0)

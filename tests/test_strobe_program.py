@@ -19,8 +19,8 @@ from psvideo.strobe.link.lines import LONGEST_REQUEST
 from psvideo.strobe.link.messages import Armed, Run, Started, Wiring, WiringName
 from psvideo.strobe.link.protocol import format_request, parse_reply
 from psvideo.strobe.program import Program, make_program, to_ticks
-from psvideo.strobe.stand_ins.emulated import EmulatedController
 from psvideo.strobe.stand_ins.playing import Edge
+from psvideo.strobe.stand_ins.python_board import PythonBoard
 
 MakePlan = Callable[..., Plan]
 UNO = capabilities(BOARDS["atmega328p"], "gated")
@@ -33,7 +33,7 @@ WIRED: list[tuple[str, WiringName]] = [(name, wiring) for name, board in BOARDS.
 
 def play(program: Program, board: str, wiring: WiringName, *, cycles: int) -> tuple[list[Edge], int]:
     """Upload a program to the emulation, run it, and return its edges and the tick at which the run starts."""
-    controller = EmulatedController(BOARDS[board])
+    controller = PythonBoard(BOARDS[board])
     replies = [controller.feed(format_request(Wiring(wiring=wiring)), 0)]
     replies += [controller.feed(format_request(request), 10) for request in program.upload()]
     assert all(reply.startswith(b"OK") for reply in replies), replies

@@ -25,8 +25,8 @@ from psvideo.strobe.link.messages import Capabilities, Caps, Clear, Cleared, Kee
 from psvideo.strobe.link.ports import SerialPort, choose_port
 from psvideo.strobe.program import Program, make_program
 from psvideo.strobe.session import Outcome, RunProgress, cycles_for, prepare, run_program
-from psvideo.strobe.stand_ins.emulated import EmulatedController
-from psvideo.strobe.stand_ins.emulated_port import EmulatedPort
+from psvideo.strobe.stand_ins.python_board import PythonBoard
+from psvideo.strobe.stand_ins.python_board_port import PythonBoardPort
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="needs pseudo-terminals")
 Answer = Callable[[bytes], bytes]
@@ -71,7 +71,7 @@ class Board:
     """An emulated controller in real time behind a pseudo-terminal; ``spoil`` may damage what it sends."""
 
     def __init__(self, *, spoil: Answer | None = None, silent_first: int = 0) -> None:
-        self.controller = EmulatedController(UNO)
+        self.controller = PythonBoard(UNO)
         self.spoil, self._deaf = spoil or (lambda data: data), silent_first
         self._began_s = time.monotonic()
         self.device = Device(self._answer)
@@ -318,7 +318,7 @@ def test_something_else_at_the_port_is_named(answer: Answer, unasked: bytes, say
 
 
 def test_a_controller_of_another_protocol_is_refused(board: Board) -> None:
-    ours, other = (seal(f"OK proto={n} board=atmega328p firmware=emulated-1 unit=emulated").encode() for n in (1, 2))
+    ours, other = (seal(f"OK proto={n} board=atmega328p firmware=python-1 unit=emulated").encode() for n in (1, 2))
     board.spoil = lambda data: data.replace(ours, other)
     with pytest.raises(PsvideoError, match="speaks protocol 2, and this psvideo 1"):
         greet(opened(board.device))
@@ -342,7 +342,7 @@ def test_a_port_that_cannot_be_opened_is_one_paragraph(name: str, says: str) -> 
 
 def test_pyserial_urls_are_ports_too() -> None:
     server = socket.create_server(("127.0.0.1", 0))
-    controller = EmulatedController(UNO)
+    controller = PythonBoard(UNO)
 
     def serve() -> None:
         connection, _ = server.accept()
@@ -360,7 +360,7 @@ def test_pyserial_urls_are_ports_too() -> None:
 
 
 def test_the_emulated_port_needs_nothing_else(program: Program) -> None:
-    link = Link(EmulatedPort(UNO))
+    link = Link(PythonBoardPort(UNO))
     prepare(link)
     outcome, _ = play(link, program, cycles=3)
     assert (outcome.ended, outcome.cycles) == ("done", 3)

@@ -28,9 +28,9 @@ from psvideo.strobe.link.boards import BOARDS, capabilities
 from psvideo.strobe.link.messages import Lit, Slot
 from psvideo.strobe.link.protocol import format_request
 from psvideo.strobe.program import make_program
-from psvideo.strobe.stand_ins import imitation, toolchain
-from psvideo.strobe.stand_ins.emulated import EmulatedController
-from psvideo.strobe.stand_ins.simulated import play_script
+from psvideo.strobe.stand_ins import python_board_server, toolchain
+from psvideo.strobe.stand_ins.emulated import play_script
+from psvideo.strobe.stand_ins.python_board import PythonBoard
 from psvideo.synth import read_scene
 from psvideo.synth.shotplan import true_plan
 
@@ -206,11 +206,11 @@ def test_a_host_that_goes_away_in_the_middle_leaves_it_dark(tmp_path: Path) -> N
 
 def test_systems_without_pseudo_terminals_get_a_socket(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delattr(os, "openpty")
-    with contextlib.closing(imitation.open_port()) as port:
+    with contextlib.closing(python_board_server.open_port()) as port:
         over: list[bool] = []
         server = Thread(
-            target=imitation.serve,
-            args=(EmulatedController(BOARDS["atmega328p"]), port),
+            target=python_board_server.serve,
+            args=(PythonBoard(BOARDS["atmega328p"]), port),
             kwargs={"stopped": lambda: bool(over)},
         )
         server.start()
@@ -222,7 +222,7 @@ def test_systems_without_pseudo_terminals_get_a_socket(monkeypatch: pytest.Monke
         assert not server.is_alive()
 
 
-def test_without_the_tools_the_imitation_answers_and_says_so(tmp_path: Path) -> None:
+def test_without_the_tools_the_python_board_answers_and_says_so(tmp_path: Path) -> None:
     with emulation(path=str(tmp_path)) as (process, port):
         with serial.serial_for_url(port, 115200, timeout=10) as line:
             assert "firmware=emulated" in ask(line, "ID")

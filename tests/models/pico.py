@@ -24,7 +24,7 @@ ARM = f"ARM {cycle_check([FLASH, FLASH])}\n".encode()
 
 
 class Pico:
-    """The program on a chip, under the same handle as EmulatedController."""
+    """The program on a chip, under the same handle as PythonBoard."""
 
     def __init__(self, reset: str = "power") -> None:
         self.chip = Chip()

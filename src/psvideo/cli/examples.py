@@ -50,7 +50,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     ),
     "strobe emulate": (
         ("the real firmware on an emulated chip, its edges in a file", "psvideo strobe emulate --trace edges.csv"),
-        ("an imitation in Python, on every system", "psvideo strobe emulate --board python"),
+        ("a board in plain Python, on every system", "psvideo strobe emulate --board python"),
     ),
     "check": (
         ("can this take be used, and if not, what is to change on set?", "psvideo check clip/"),

@@ -1,4 +1,4 @@
-"""What a controller refuses to play: the same rules for the host, before anything is sent, and for the emulation.
+"""What a controller refuses to play: the same rules for the host, before anything is sent, and for the Python board.
 
 They stand in lights/protocol.md; the firmware has them once more by itself.
 """

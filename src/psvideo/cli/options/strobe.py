@@ -93,10 +93,10 @@ def parse_board(word: str | None) -> Board | None:
 def open_port(name: str, *, board: Board | None) -> Port:
     """Open a port by what --port says."""
     from psvideo.strobe.link.controller import OpenPort
-    from psvideo.strobe.stand_ins.emulated_port import EmulatedPort
+    from psvideo.strobe.stand_ins.python_board_port import PythonBoardPort
 
     if name == EMULATED:
-        return EmulatedPort(board or next(iter(BOARDS.values())))
+        return PythonBoardPort(board or next(iter(BOARDS.values())))
     if board is not None:
         raise UsageError(f"--board {board.name}: the board at {name} says itself what it is; leave --board out.")
     return OpenPort(name)

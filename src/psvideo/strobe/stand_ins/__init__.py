@@ -1,1 +1,1 @@
-"""Boards that are not there: the firmware in an emulator, and an imitation of it in Python."""
+"""Boards that are not there: an emulated one, which runs the real firmware, and one in plain Python."""

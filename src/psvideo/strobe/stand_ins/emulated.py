@@ -1,161 +1,117 @@
-"""A strobe controller in plain Python: bytes in, bytes out, edges as a list. Keeps no time of its own.
+"""The controller's real firmware in emulation, as a serial port: started, steered and stopped.
 
-Whoever owns it says what tick it is: ``feed`` bytes when they arrive, ``advance`` in between. It has the limits,
-errors, states and faults of lights/protocol.md (``rules``), for any board of the table, and serves where there is no
-board.
+The emulator (lights/emulator) is a process of its own that plays an ATmega328P or ATmega2560 and its pins. Its clock
+keeps pace with the wall's, or runs as fast as it goes; its trace counts virtual time only.
 """
 
+import contextlib
+import subprocess
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
 
-from psvideo.strobe.link.boards import Board
-from psvideo.strobe.link.lines import LONGEST_REQUEST, Error, LineError, LineReader, TextLine, unseal
-from psvideo.strobe.link.messages import Fault, Interlock, Refusal, Reply, Reset, Run, State, Stop
-from psvideo.strobe.link.protocol import find_command, format_reply, parse_words
-from psvideo.strobe.stand_ins.playing import Edge, Moment, moments
-from psvideo.strobe.stand_ins.rules import after_reset, answer
+from psvideo.errors import PsvideoError
+from psvideo.formats.whole_files import whole_file
+from psvideo.strobe.link.messages import WiringName
+from psvideo.strobe.stand_ins.toolchain import AvrBoard, Built, build
 
-START_DELAY_MS = 10
-PS_PER_MS = 10**9
-SPOILED = {Error.BYTES: "bytes that are not printable", Error.LONG: f"line of more than {LONGEST_REQUEST} bytes"}
+STOPS_WITHIN_S = 10.0
+
+Outside = Literal["open", "close", "hang", "reset"]
+"""What can happen to a board from outside: its interlock opens or closes, its program hangs, its reset is pressed."""
 
 
-class EmulatedController:
-    """One controller. ``edges`` are all edges so far; take them away in long runs with ``take_edges``."""
+@dataclass(frozen=True, kw_only=True)
+class Emulation:
+    """Which board to emulate, how the lights hang on it, and where its edges go (None = nowhere)."""
 
-    def __init__(self, board: Board, *, unit: str = "emulated") -> None:
-        self.board = board
-        self.edges: list[Edge] = []
-        self._now = 0
-        self._born = 0
-        self._heard = 0
-        self._lit: set[int] = set()
-        self._moments: Iterator[Moment] = iter(())
-        self._next: Moment | None = None
-        self._reader = LineReader(LONGEST_REQUEST)
-        self._memory = after_reset(board, unit, cause="power")
+    board: AvrBoard
+    wiring: WiringName = "gated"
+    trace: Path | None = None
+    fast: bool = False
+
+
+class EmulatedBoard:
+    """A board that is running; ``port`` is the serial port's name."""
+
+    def __init__(self, process: subprocess.Popen[str], port: str) -> None:
+        self._process = process
+        self.port = port
+
+    def let(self, what: Outside) -> None:
+        """Let something happen to the board."""
+        if self._process.stdin is None or self._process.poll() is not None:
+            raise PsvideoError("The emulated board has stopped; start it again.")
+        self._process.stdin.write(what + "\n")
+        self._process.stdin.flush()
 
     @property
-    def state(self) -> State:
-        """The state it is in."""
-        return self._memory.state
+    def is_running(self) -> bool:
+        """False once the board ended by itself, which it does only where its program breaks."""
+        return self._process.poll() is None
 
-    @property
-    def fault(self) -> Fault:
-        """The fault that is latched."""
-        return self._memory.fault
 
-    @property
-    def lit(self) -> frozenset[int]:
-        """The lines that are on now."""
-        return frozenset(self._lit)
+@contextlib.contextmanager
+def emulated_board(wish: Emulation) -> Iterator[EmulatedBoard]:
+    """Run a board until the block ends; the trace is whole then, however the block ended.
 
-    def take_edges(self) -> list[Edge]:
-        """Return the edges since this was last called, and forget them."""
-        taken, self.edges = self.edges, []
-        return taken
-
-    def feed(self, data: bytes, now: int) -> bytes:
-        """Let bytes arrive at tick ``now`` (counted by the owner, never falling) and return what is answered."""
-        self.advance(now)
-        return b"".join(map(self._answer, self._reader.feed(data)))
-
-    def advance(self, now: int) -> None:
-        """Let time pass until tick ``now``."""
-        now = max(now, self._now)
-        while self._happens(now):
-            pass
-        self._now = now
-
-    def set_interlock(self, interlock: Interlock, now: int) -> None:
-        """Open or close the interlock; opened while armed or running, it latches a fault."""
-        self.advance(now)
-        self._memory = replace(self._memory, interlock=interlock)
-        if interlock == "open" and self.state in ("armed", "running"):
-            self._fail("interlock")
-
-    def miss_an_edge(self, now: int) -> None:
-        """Fail as a controller does that could not arm an edge in time."""
-        self.advance(now)
-        if self.state == "running":
-            self._fail("late")
-
-    def restart(self, cause: Reset, now: int) -> None:
-        """Reset: dark, nothing uploaded, idle, or in fault after a watchdog reset. Its ticks begin again at 0."""
-        self.advance(now)
-        self._darken()
-        self._born = self._heard = self._now
-        self._reader = LineReader(LONGEST_REQUEST)
-        memory = self._memory
-        self._memory = after_reset(self.board, memory.unit, cause=cause, interlock=memory.interlock)
-
-    def _happens(self, until: int) -> bool:
-        """Let the next thing happen that is due; False where nothing is left to do until then."""
-        if self.state not in ("armed", "running"):
-            return False
-        silent = self._heard + self._ticks(self._memory.keep_ms)
-        moment = self._next if self.state == "running" else None
-        if moment is not None and moment.tick <= min(silent, until):
-            self._now = moment.tick
-            self._play(moment)
-            return True
-        if silent <= until:
-            self._now = silent
-            self._fail("silent")
-            return True
-        return False
-
-    def _play(self, moment: Moment) -> None:
-        self._next = next(self._moments, None)
-        if moment.edge is not None:
-            self._switch(moment.edge)
-            return
-        self._memory = replace(self._memory, cycle=moment.cycle, step=moment.step, cycles=moment.cycle)
-        if self._next is None:
-            self._memory = replace(self._memory, state="idle")
-
-    def _switch(self, edge: Edge) -> None:
-        self.edges.append(edge)
-        if edge.level:
-            self._lit.add(edge.line)
-        else:
-            self._lit.discard(edge.line)
-
-    def _darken(self) -> None:
-        for line in sorted(self._lit):
-            self._switch(Edge(tick=self._now, line=line, level=0))
-        self._moments, self._next = iter(()), None
-
-    def _fail(self, fault: Fault) -> None:
-        self._darken()
-        self._memory = replace(self._memory, state="fault", fault=fault)
-
-    def _answer(self, line: TextLine) -> bytes:
-        if line.fault is not None:
-            return format_reply(Refusal(code=line.fault, text=SPOILED[line.fault]), sealed=False)
+    Raises PsvideoError where it cannot be built or started, or where the chip stopped by itself.
+    """
+    built = build(wish.board)
+    with contextlib.ExitStack() as stack:
+        trace = None if wish.trace is None else stack.enter_context(whole_file(wish.trace))
+        process = _start(built, wish, trace)
         try:
-            reply = self._act(unseal(line.text)[0])
-        except LineError as fault:
-            reply = Refusal(code=fault.code, text=str(fault))
-        return format_reply(reply, sealed="*" in line.text)
+            yield EmulatedBoard(process, _port_of(process))
+        finally:
+            _stop(process)
+        if process.returncode:
+            raise PsvideoError(f"The emulated {wish.board} stopped by itself (status {process.returncode}).")
 
-    def _act(self, body: str) -> Reply | Refusal:
-        kind, words = find_command(body)
-        if self.state == "fault" and self.state not in kind.states:
-            return Refusal(code=Error.FAULT, text=self.fault)
-        if self.state not in kind.states:
-            return Refusal(code=Error.STATE, text=self.state)
-        start = self._now + self._ticks(START_DELAY_MS)
-        request = parse_words(kind, words)
-        self._memory, reply = answer(self._memory, request, ticks=self._now - self._born, start=start - self._born)
-        if isinstance(request, Stop):
-            self._darken()
-        if isinstance(request, Run):
-            self._moments = moments(self._memory.sequence or (), start=start, cycles=request.cycles)
-            self._next = next(self._moments)
-        if isinstance(reply, Reply):
-            self._heard = self._now
-        return reply
 
-    def _ticks(self, time_ms: int) -> int:
-        return time_ms * PS_PER_MS // self.board.tick_ps
+def _start(built: Built, wish: Emulation, trace: Path | None) -> subprocess.Popen[str]:
+    words = [str(built.emulator), "--board", wish.board, "--wiring", wish.wiring]
+    words += ["--trace", str(trace)] if trace else []
+    words += ["--fast"] if wish.fast else []
+    return subprocess.Popen(
+        [*words, str(built.firmware)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        start_new_session=True,  # a Ctrl-C is for us, who then stop it
+    )
+
+
+def _port_of(process: subprocess.Popen[str]) -> str:
+    port = process.stdout.readline().strip() if process.stdout else ""
+    if not port:
+        raise PsvideoError("The emulated board did not start; what it said stands above.")
+    return port
+
+
+def _stop(process: subprocess.Popen[str]) -> None:
+    """End the process by ending its stdin, at which it finishes its trace; by force where it does not listen."""
+    for pipe in (process.stdin, process.stdout):
+        if pipe is not None:
+            with contextlib.suppress(OSError):
+                pipe.close()
+    try:
+        process.wait(STOPS_WITHIN_S)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+
+
+def play_script(script: str, *, board: AvrBoard, wiring: WiringName = "gated", trace: Path | None = None) -> list[str]:
+    """Play a script (lights/emulator/script.h) on a fresh board as fast as it goes; return what was printed, by line.
+
+    Raises PsvideoError where the board cannot be built or the script cannot be played.
+    """
+    built = build(board)
+    words = [str(built.emulator), "--board", board, "--wiring", wiring, "--script", "-"]
+    words += ["--trace", str(trace)] if trace else []
+    run = subprocess.run([*words, str(built.firmware)], input=script, capture_output=True, text=True, check=False)
+    if run.returncode:
+        raise PsvideoError(f"The script cannot be played: {run.stderr.strip()}")
+    return run.stdout.splitlines()

@@ -1,4 +1,4 @@
-"""A cycle of slots as edges, lazily: what an emulated controller's outputs do from the start of a run on."""
+"""A cycle of slots as edges, lazily: what the outputs of the Python board do from the start of a run on."""
 
 import heapq
 from collections.abc import Iterator, Sequence

@@ -1,6 +1,6 @@
 """What a controller answers: from its memory and a request to its memory afterwards and the reply. Pure functions.
 
-Time, edges and bytes are ``emulated``'s; what is right stands in lights/protocol.md.
+Time, edges and bytes are ``python_board``'s; what is right stands in lights/protocol.md.
 """
 
 from dataclasses import dataclass, replace
@@ -10,7 +10,7 @@ from psvideo.strobe.link import messages as m
 from psvideo.strobe.link.boards import KEEP_AFTER_RESET_MS, KEEP_MS, Board, capabilities
 from psvideo.strobe.link.lines import Error
 
-FIRMWARE = "emulated-1"
+FIRMWARE = "python-1"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -79,7 +79,7 @@ def why_not() -> str | None:
 def build(board: AvrBoard) -> Built:
     """Build what changed and return the programs.
 
-    Raises PsvideoError where the checkout or packages are missing (named, with the other way: the Python emulation), or
+    Raises PsvideoError where the checkout or packages are missing (named, with the other way: the Python board), or
     where make fails.
     """
     reason, lights = why_not(), lights_folder()

@@ -22,11 +22,11 @@ from psvideo.strobe.link.messages import WiringName
 from psvideo.strobe.stand_ins.toolchain import AvrBoard
 
 if TYPE_CHECKING:
-    from psvideo.strobe.stand_ins.simulated import Simulation
+    from psvideo.strobe.stand_ins.emulated import Emulation
 
 LOOK_EVERY_S = 0.2
-IMITATED: AvrBoard = "atmega328p"
-"""The board whose limits the Python emulation has."""
+PYTHON_LIMITS: AvrBoard = "atmega328p"
+"""The board whose limits the Python board has."""
 
 BoardChoice = Literal["atmega328p", "atmega2560", "python"]
 
@@ -35,8 +35,8 @@ def emulate(
     board: Annotated[
         BoardChoice | None,
         typer.Option(
-            help="The chip that runs the real firmware, or python, which imitates it. Left out: atmega328p where it "
-            "can be built, else python."
+            help="The chip that runs the real firmware, or python, a board in plain Python. Left out: atmega328p where "
+            "it can be built, else python."
         ),
     ] = None,
     wiring: Annotated[
@@ -54,7 +54,7 @@ def emulate(
 ) -> None:
     """Emulate a strobe controller: print its port, run until stopped (Ctrl-C). Other commands take it with --port."""
     from psvideo.formats.trace_csv import SCHEMA
-    from psvideo.strobe.stand_ins.simulated import Simulation
+    from psvideo.strobe.stand_ins.emulated import Emulation
     from psvideo.strobe.stand_ins.toolchain import why_not
 
     voice = Voice(json=json, quiet=quiet)
@@ -62,38 +62,38 @@ def emulate(
         refuse_existing(trace, force=force, mark=SCHEMA)
     reason = None if board is not None else why_not()
     if reason is not None:
-        voice.warn(f"{reason}; the Python emulation answers instead.")
-    chosen: BoardChoice = board or (IMITATED if reason is None else "python")
+        voice.warn(f"{reason}; the Python board answers instead.")
+    chosen: BoardChoice = board or (PYTHON_LIMITS if reason is None else "python")
     if chosen == "python":
         if fast:
-            raise UsageError("--fast: the Python emulation keeps the wall's time; --fast is for the real firmware.")
-        _imitate(voice, wiring, trace)
+            raise UsageError("--fast: the Python board keeps the wall's time; --fast is for the real firmware.")
+        _run_python(voice, wiring, trace)
     else:
-        _run_firmware(voice, Simulation(board=chosen, wiring=wiring, trace=trace, fast=fast))
+        _run_firmware(voice, Emulation(board=chosen, wiring=wiring, trace=trace, fast=fast))
 
 
-def _run_firmware(voice: Voice, wish: Simulation) -> None:
-    from psvideo.strobe.stand_ins.simulated import simulated_board
+def _run_firmware(voice: Voice, wish: Emulation) -> None:
+    from psvideo.strobe.stand_ins.emulated import emulated_board
 
-    with _until_stopped() as stopped, simulated_board(wish) as simulated:
-        _introduce(voice, simulated.port, f"the real firmware on an emulated {wish.board}", wish.trace)
-        while simulated.is_running and not stopped.wait(LOOK_EVERY_S):
+    with _until_stopped() as stopped, emulated_board(wish) as board:
+        _introduce(voice, board.port, f"the real firmware on an emulated {wish.board}", wish.trace)
+        while board.is_running and not stopped.wait(LOOK_EVERY_S):
             pass
 
 
-def _imitate(voice: Voice, wiring: WiringName, trace: Path | None) -> None:
+def _run_python(voice: Voice, wiring: WiringName, trace: Path | None) -> None:
     from psvideo.formats.trace_csv import TraceWriter
-    from psvideo.strobe.stand_ins.emulated import EmulatedController
-    from psvideo.strobe.stand_ins.imitation import TRACE_HZ, open_port, serve
+    from psvideo.strobe.stand_ins.python_board import PythonBoard
+    from psvideo.strobe.stand_ins.python_board_server import TRACE_HZ, open_port, serve
 
     with _until_stopped() as stopped, contextlib.ExitStack() as stack:
         writer = None
         if trace is not None:
             file = stack.enter_context(stack.enter_context(whole_file(trace)).open("w", encoding="ascii"))
-            writer = TraceWriter(file, board=IMITATED, hz=TRACE_HZ, wiring=wiring)
+            writer = TraceWriter(file, board=PYTHON_LIMITS, hz=TRACE_HZ, wiring=wiring)
         port = stack.enter_context(contextlib.closing(open_port()))
-        _introduce(voice, port.name, f"a Python emulation of an {IMITATED}", trace)
-        serve(EmulatedController(BOARDS[IMITATED]), port, stopped=stopped.is_set, trace=writer)
+        _introduce(voice, port.name, f"a Python board with the limits of an {PYTHON_LIMITS}", trace)
+        serve(PythonBoard(BOARDS[PYTHON_LIMITS]), port, stopped=stopped.is_set, trace=writer)
 
 
 def _introduce(voice: Voice, port: str, what: str, trace: Path | None) -> None:

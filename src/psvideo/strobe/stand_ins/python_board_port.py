@@ -1,21 +1,21 @@
-"""A port with an emulated controller behind it, in this program and in real time: works without any board."""
+"""The controller in plain Python as a port, in this program and in real time: works without any board."""
 
 import time
 
 from psvideo.strobe.link.boards import Board
-from psvideo.strobe.stand_ins.emulated import EmulatedController
+from psvideo.strobe.stand_ins.python_board import PythonBoard
 
 WAIT_S = 0.02
 
 
-class EmulatedPort:
-    """Carries bytes to and from an emulated controller whose clock is this machine's.
+class PythonBoardPort:
+    """Carries bytes to and from a Python board whose clock is this machine's.
 
     Edges are forgotten as they come, so that a run may last for ever.
     """
 
     def __init__(self, board: Board) -> None:
-        self._controller = EmulatedController(board)
+        self._controller = PythonBoard(board)
         self._began_ns = time.monotonic_ns()
         self._waiting = b""
 

@@ -1,4 +1,4 @@
-"""The controller in plain Python behind a port: a pseudo-terminal, or a loopback socket where the system has none.
+"""The Python board behind a port: a pseudo-terminal, or a loopback socket where the system has none.
 
 It keeps the wall's time: a tick has passed when the wall's clock says so.
 """
@@ -12,14 +12,14 @@ from collections.abc import Callable
 from typing import Protocol
 
 from psvideo.formats.trace_csv import TraceWriter
-from psvideo.strobe.stand_ins.emulated import EmulatedController
 from psvideo.strobe.stand_ins.playing import Edge
+from psvideo.strobe.stand_ins.python_board import PythonBoard
 
 LOOK_EVERY_S = 0.002
 AT_ONCE = 4096
 PS_PER_NS = 1000
 TRACE_HZ = 16_000_000
-"""The traces of both emulations count the same cycles."""
+"""The traces of the Python board and of the emulated one count the same cycles."""
 
 
 class StandInPort(Protocol):
@@ -99,7 +99,7 @@ def open_port() -> StandInPort:
 
 
 def serve(
-    controller: EmulatedController, port: StandInPort, *, stopped: Callable[[], bool], trace: TraceWriter | None = None
+    controller: PythonBoard, port: StandInPort, *, stopped: Callable[[], bool], trace: TraceWriter | None = None
 ) -> None:
     """Let a controller live behind a port, in the wall's time, until ``stopped`` says so; then it goes dark."""
     began_ns, answer, now = time.monotonic_ns(), b"", 0
@@ -112,7 +112,7 @@ def serve(
     _write(controller, trace, controller.take_edges())
 
 
-def _write(controller: EmulatedController, trace: TraceWriter | None, edges: list[Edge]) -> None:
+def _write(controller: PythonBoard, trace: TraceWriter | None, edges: list[Edge]) -> None:
     if trace is not None:
         per_tick = controller.board.tick_ps * TRACE_HZ // 10**12
         trace.write((edge.tick * per_tick, edge.line, edge.level) for edge in edges)
