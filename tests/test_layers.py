@@ -119,7 +119,7 @@ def test_only_the_clip_room_knows_decoders_and_only_export_knows_writers() -> No
         assert _room(path) == "export" or "pxr" not in froms, path
 
 
-NOT_OURS = {"strobe/stand_ins/simulated.py", "report/style.py"}
+NOT_OURS = {"strobe/stand_ins/emulated.py", "report/style.py"}
 """Arguments of another program, and variables of a style sheet."""
 
 
