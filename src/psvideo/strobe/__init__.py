@@ -9,6 +9,6 @@ last); ``link.ports`` and ``link.controller`` (what carries it); ``runlog`` (wha
 
 ``stand_ins`` are boards that are not there, of two kinds: *emulated* is the real firmware on a simulated chip
 (``emulated``, ``toolchain``); the *Python board* answers and switches as the firmware does and runs on every system
-(``python_board`` with ``rules`` and ``playing``; ``python_board_port`` inside this program, which is what the port named
-``emulated`` opens, ``python_board_server`` for other programs).
+(``python_board`` with ``rules`` and ``playing``; ``python_board_port`` inside this program, opened as the port
+named ``emulated``, and ``python_board_server`` for other programs).
 """
