@@ -95,7 +95,7 @@ def _without_ambient(plates: list[Plate]) -> list[Plate]:
 
 def oracle(plan: Plan, flashes: Sequence[TrueFlash], frames: Mapping[int, Picture]) -> tuple[np.ndarray, np.ndarray]:
     """Solve all plates of a clip by least squares with the true timing, one constant ambient picture where dark slots
-    tell it; return what share of each flash each row saw, (flash, row), and the plates, (flash, row, col)."""
+    show it; return what share of each flash each row saw, (flash, row), and the plates, (flash, row, col)."""
     weights, first = _true_weights(plan, flashes, frames)
     indices = np.array(sorted(frames))
     pictures = np.stack([frames[n] for n in indices]).astype(np.float64)

@@ -36,7 +36,7 @@ class DroppedFrames:
 
 @dataclass(frozen=True, kw_only=True)
 class Timing:
-    """The flashes of a clip in order, and what was found besides. Times are seconds on the camera's clock.
+    """The flashes of a clip in order, and what else was found. Times are seconds on the camera's clock.
 
     Attributes
     ----------

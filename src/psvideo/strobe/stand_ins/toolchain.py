@@ -69,8 +69,8 @@ def why_not() -> str | None:
     """Return in one sentence why the real firmware cannot be run here, or None where it can."""
     if lights_folder() is None:
         return (
-            "the real firmware is built from psvideo's own checkout (lights/firmware), and this psvideo is installed "
-            "without one"
+            "the real firmware is built from its sources in psvideo's repository (lights/firmware), and an installed "
+            "package does not hold them"
         )
     lacking = missing_packages()
     return f"building the firmware and its emulator needs the Debian packages {' '.join(lacking)}" if lacking else None
