@@ -18,9 +18,10 @@ from psvideo.clip.linear import linear_light
 from psvideo.clip.reading import looks
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import Encoding
+from psvideo.model.clipping import LOSSY_MARGIN, SATURATED
 
-SATURATED = 0.98
-"""From this share of the sensor's range on a pixel counts as clipped (lossy files blur the very end)."""
+CLIPPED_FROM = SATURATED - LOSSY_MARGIN
+"""From this share of the sensor's range on a pixel of a picture, which may be a JPEG, counts as clipped."""
 AMBIENT_NAMES = ("ambient", "dark")
 """A picture or a folder of this name shows the scene with every light off; it is taken off the others."""
 ROOM_NAMES = ("room", "outline", "ref")
@@ -77,7 +78,7 @@ def light_pictures(
     stacked = np.stack(images).astype(np.float32, copy=False)
     level = np.ones(len(names)) if saturation is None else np.asarray(saturation)
     whole = stacked + ambient if ambient is not None and ambient_is_off else stacked
-    clipped = whole >= (SATURATED * level).reshape(-1, *[1] * (stacked.ndim - 1)).astype(np.float32)
+    clipped = whole >= (CLIPPED_FROM * level).reshape(-1, *[1] * (stacked.ndim - 1)).astype(np.float32)
     return LightPictures(
         names=tuple(names),
         images=stacked - ambient if ambient is not None and not ambient_is_off else stacked,

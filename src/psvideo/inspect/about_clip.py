@@ -12,6 +12,7 @@ from psvideo.clip.record import Clip, holes
 from psvideo.errors import PsvideoError
 from psvideo.inspect.about_plan import length_finding, plan_findings, rig_findings
 from psvideo.inspect.findings import Description, Fact, Finding, caught, fault, ok, warn
+from psvideo.model.clipping import SATURATED
 
 MANY = 3
 SATURATED_SHARE = 0.01
@@ -103,7 +104,7 @@ def _level_findings(clip: Clip) -> Iterator[Finding]:
     frames = (frame for number in chosen for frame in read_frames(clip, [number]))  # one by one: a movie seeks
     light = np.concatenate([frame.image.ravel() for frame in frames])
     low, high = (float(value) for value in np.percentile(light, (1, 99.9)))
-    saturated = float(np.mean(light >= 1.0))
+    saturated = float(np.mean(light >= SATURATED))
     levels = f"light from {low:.3g} to {high:.3g} (1st and 99.9th percentile; 0 is black, 1 saturation)"
     if low < -DIM or high > 1.2:
         yield warn(f"{levels}: the plan's black_level or white_level does not fit the files' codes")

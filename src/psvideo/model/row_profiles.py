@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.camera import FloatArray
+from psvideo.model.clipping import SATURATED
 
-SATURATED = 0.998
-"""A sample from here on is clipped."""
 LOST = 1.0
 """Light, as a share of saturation, that a clipped sample may well have lost: one that two lights clip loses as much."""
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from psvideo.compute.compiled import EXACT
 from psvideo.model.camera import FloatArray
 from psvideo.plates.mains import Mains, RowLight
-from psvideo.plates.split import CLIPPED, Image, Plate
+from psvideo.plates.split import Image, Plate
 
 LONGEST_MEMORY = 16
 """Dark slots that the average spans at most."""
@@ -53,7 +53,7 @@ class Ambient:
 
 def update(ambient: Ambient | None, dark: Plate) -> Ambient:
     """Return the ambient light with one more dark slot in it."""
-    rows, image = RowLight.of(dark), held(dark.image)
+    rows, image = RowLight.of(dark), held(dark)
     if ambient is None:
         slots = np.broadcast_to(dark.seen[:, None], image.shape[:2]).astype(np.float32)
         return Ambient(
@@ -231,19 +231,18 @@ def subtract(plates: Iterable[Plate], *, darks: Iterable[Plate] = ()) -> Iterato
             after = later
             del dark, later  # pictures are held only as long as they are needed
         if after is None:
-            plate = replace(plate, image=held(plate.image))
+            plate = replace(plate, image=held(plate), clipped=None)
         elif any(plate.flash.lights.values()):
             plate = _without(plate, before or after, after)
         else:
-            plate = replace(plate, image=after.image, seen=after.known)
+            plate = replace(plate, image=after.image, seen=after.known, clipped=None)
         yield plate
         del plate
 
 
-def held(image: Image) -> Image:
-    """Return a picture with 1.0 where samples were clipped."""
-    held: Image = np.where(image >= CLIPPED / 2, np.float32(1), image)
-    return held
+def held(plate: Plate) -> Image:
+    """Return a plate's picture with 1.0 where samples were clipped."""
+    return plate.image if plate.clipped is None else np.where(plate.clipped, np.float32(1), plate.image)
 
 
 def _without(plate: Plate, before: Ambient, after: Ambient) -> Plate:
@@ -263,9 +262,11 @@ def _without(plate: Plate, before: Ambient, after: Ambient) -> Plate:
     )
     weights = ((1 - late) * exposures).astype(np.float32), (late * exposures).astype(np.float32)
     _subtract_rows(image, early_image, late_image, out, *weights)
+    if plate.clipped is not None:
+        lit[plate.clipped] = 1.0
     seen = plate.seen & (before.known | after.known)
     lit[~seen] = 0
-    return replace(plate, image=lit, shares=np.zeros_like(plate.shares), seen=seen)
+    return replace(plate, image=lit, shares=np.zeros_like(plate.shares), seen=seen, clipped=None)
 
 
 @EXACT.kept
@@ -274,5 +275,4 @@ def _subtract_rows(image: Image, before: Image, after: Image, lit: Image, early:
         for col in range(image.shape[1]):
             value = image[row, col]
             light = early[row] * before[row, col] + late[row] * after[row, col]
-            clipped = value >= np.float32(CLIPPED / 2)
-            lit[row, col] = np.float32(1.0) if clipped else value - light
+            lit[row, col] = value - light

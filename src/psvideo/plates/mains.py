@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from psvideo.model.camera import FloatArray
 from psvideo.model.row_profiles import row_profile
-from psvideo.plates.split import CLIPPED, Plate
+from psvideo.plates.split import Plate
 
 PULSES_HZ = (100.0, 120.0)
 EXPLAINED = 0.8
@@ -43,7 +43,9 @@ class RowLight:
     def of(cls, plate: Plate) -> "RowLight":
         """Return the rows of a plate that still holds its ambient light."""
         mean = row_profile(plate.image)
-        good = plate.seen & (mean > 0) & (mean < CLIPPED / plate.image[0].size)
+        good = plate.seen & (mean > 0)
+        if plate.clipped is not None:
+            good &= ~plate.clipped.reshape(len(mean), -1).any(axis=1)
         return cls(mean=mean, shares=plate.shares, middles_s=plate.middles_s, good=good)
 
     @property

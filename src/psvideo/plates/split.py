@@ -13,15 +13,11 @@ from numpy.typing import NDArray
 
 from psvideo.compute.compiled import EXACT
 from psvideo.model.camera import Camera, FloatArray
+from psvideo.model.clipping import SATURATED
 from psvideo.model.recipe import flash_recipe, frames_of
 from psvideo.model.row_profiles import LinearFrame
 from psvideo.model.timing import Flash, Timing
 
-SATURATED = 0.998
-"""A sample from here on is clipped."""
-CLIPPED = 1e6
-"""Where any sample of a plate's pixel was clipped, this is added: no sum of light reaches it, and ``ambient.subtract``
-makes 1.0 of it, by which every later step knows saturation."""
 COUNTS = 0.02
 """A clipped sample clips the plate where so much of it counts; less is a neighbour's tail that is taken off."""
 
@@ -32,7 +28,8 @@ Image = NDArray[np.float32]
 class Plate:
     """The scene as one flash showed it: linear light, 1.0 = sensor saturation, (row, col) or (row, col, channel).
 
-    Pixels of which a sample was clipped are ``CLIPPED`` or more until ambient light is taken off, 1.0 from then on.
+    ``clipped``, of the image's shape, marks the pixels of which a sample was clipped, None where there is none. They
+    lack that sample's light until ``ambient.subtract`` makes 1.0 of them, by which every later step knows saturation.
     ``shares`` (frame, row) is what the image holds of the rows of every frame that the flash touched, and with it of
     the ambient light of their exposures, whose middles are ``middles_s`` (frame, row). ``seen`` (row,) is False where
     no frame saw enough of the flash (the image is 0 there).
@@ -43,6 +40,7 @@ class Plate:
     shares: FloatArray
     middles_s: FloatArray
     seen: NDArray[np.bool_]
+    clipped: NDArray[np.bool_] | None = None
 
     @property
     def time_s(self) -> float:
@@ -105,11 +103,21 @@ def _rebuild(camera: Camera, timing: Timing, flash: Flash, images: dict[int, Ima
     recipe = flash_recipe(camera, timing, flash, frozenset(images))
     shape = next(iter(images.values())).shape
     plate = np.zeros(shape, np.float32)
-    flat = plate.reshape(shape[0], -1)
+    clipped = np.zeros(shape, np.bool_)
+    flat, flat_clipped = plate.reshape(shape[0], -1), clipped.reshape(shape[0], -1)
+    any_clipped = False
     for index, coefficient in zip(recipe.frames, recipe.coefficients, strict=True):
-        _add_rows(flat, images[index].reshape(shape[0], -1), coefficient.astype(np.float32), np.float32(SATURATED))
+        frame = images[index].reshape(shape[0], -1)
+        any_clipped |= _add_rows(flat, flat_clipped, frame, coefficient.astype(np.float32))
     middles_s = _opens_s(camera, recipe.frames) + camera.exposure_s / 2
-    return Plate(flash=flash, image=plate, shares=recipe.coefficients, middles_s=middles_s, seen=recipe.seen)
+    return Plate(
+        flash=flash,
+        image=plate,
+        shares=recipe.coefficients,
+        middles_s=middles_s,
+        seen=recipe.seen,
+        clipped=clipped if any_clipped else None,
+    )
 
 
 def _opens_s(camera: Camera, frames: Sequence[int]) -> FloatArray:
@@ -119,12 +127,20 @@ def _opens_s(camera: Camera, frames: Sequence[int]) -> FloatArray:
 
 
 @EXACT.kept
-def _add_rows(plate: Image, frame: Image, coefficient: Image, saturated: np.float32) -> None:
-    """Add a frame's rows, each times its coefficient, and CLIPPED where a sample was clipped."""
+def _add_rows(plate: Image, clipped: NDArray[np.bool_], frame: Image, coefficient: Image) -> bool:
+    """Add a frame's rows, each times its coefficient; mark what is clipped, and return whether anything is."""
+    any_clipped = False
     for row in range(plate.shape[0]):
         share = coefficient[row]
         if share != 0:
-            counts = share > np.float32(COUNTS)
             for col in range(plate.shape[1]):
-                value = frame[row, col]
-                plate[row, col] += np.float32(CLIPPED) if counts and value >= saturated else share * value
+                plate[row, col] += share * frame[row, col]
+            if share > np.float32(COUNTS):
+                brightest = frame[row, 0]
+                for col in range(plate.shape[1]):
+                    brightest = max(brightest, frame[row, col])
+                if brightest >= np.float32(SATURATED):
+                    any_clipped = True
+                    for col in range(plate.shape[1]):
+                        clipped[row, col] |= frame[row, col] >= np.float32(SATURATED)
+    return any_clipped

@@ -14,8 +14,8 @@ from psvideo.clip import Clip, Kept, Take, holes, keeping_near, read_frames
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import NoStrobeError, PsvideoError, UsageError
 from psvideo.formats.rig_toml import read_rig
+from psvideo.model.clipping import SATURATED
 from psvideo.model.plan import Plan
-from psvideo.model.row_profiles import SATURATED
 from psvideo.model.timing import DroppedFrames, Timing
 from psvideo.plates.gather import gather
 from psvideo.plates.naming import named_by_rig

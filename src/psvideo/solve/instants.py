@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.model.clipping import at_saturation
 from psvideo.model.falloff import Falloff
 from psvideo.model.plan import Plan, reference_duration_s
 from psvideo.model.rig import Light, Rig
@@ -37,10 +38,6 @@ def _at_full_flash(light: Light, duration_s: float) -> Light:
         intensity=tuple(strength * factor for strength in light.intensity),
         reference_duration_s=duration_s,
     )
-
-
-CLIPPED_WITHIN = 1e-5
-"""The largest code may come out a rounding below 1.0."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,7 +114,7 @@ def _evened(image: Image, share: NDArray[np.float32]) -> Image:
     """Return a plate as if everywhere as little light arrived as where least does; what is clipped stays clipped."""
     factor = share.min() / share
     even = image * (factor if image.ndim == 2 else factor[..., None])
-    return np.where(image >= 1 - CLIPPED_WITHIN, image, even).astype(image.dtype, copy=False)
+    return np.where(at_saturation(image), image, even).astype(image.dtype, copy=False)
 
 
 def _until_saturation(plate: LightPlate) -> Image:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.camera import FloatArray
+from psvideo.model.clipping import SATURATED, SMALL_PLATE_MARGIN
 from psvideo.model.light_field import Points, light_vectors
 from psvideo.model.marker import alike_turns, has_marker, turned_slot
 from psvideo.model.plan import Plan
@@ -29,8 +30,8 @@ CLEARLY = 3.5
 """By how many standard deviations of itself every other turn's error must be above the best turn's and a rig's own."""
 MOST_LEFT = 0.1
 """The share of a pixel's light that may stay unexplained, as its median: gloss, interreflection, movement."""
-LIT, SATURATED = 0.05, 0.95
-"""Pixels count that every flash lights at least so much of the brightest one, and none of them saturates."""
+LIT, CLEAR_OF_CLIPPING = 0.05, SATURATED - SMALL_PLATE_MARGIN
+"""Pixels count that every flash lights at least so much of the brightest one, and none brings near saturation."""
 LEAST_PIXELS, MOST_PIXELS = 50, 1500
 KEPT = 0.8
 """The share of pixels, those that fit best, by which a turn is judged: the others may lie in shadow or be glossy."""
@@ -161,7 +162,7 @@ def _samples(pictures: list[Image]) -> _Samples:
     """Pick the pixels that every flash lights, at most MOST_PIXELS, evenly over the picture."""
     stack = np.stack([picture.reshape(*picture.shape[:2], -1) for picture in pictures]).astype(np.float64)
     least, most = stack.min(axis=0), stack.max(axis=0)
-    shown = (least > LIT * most) & (most.max(axis=2, keepdims=True) < SATURATED) & (most > 0)
+    shown = (least > LIT * most) & (most.max(axis=2, keepdims=True) < CLEAR_OF_CLIPPING) & (most > 0)
     if shown.any():
         shown &= most > 0.1 * np.percentile(most[shown], 99)
     row, col, channel = np.nonzero(shown)

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from psvideo.plates.align.flow import TOE, Sketch, Vectors
 
-LIT, CLIPPED = 32, 250
-"""Codes between which brightness is compared: below is mostly black, above may be clipped."""
+LIT, NEAR_WHITE = 32, 250
+"""Codes between which brightness is compared: below is mostly black, above may be cut off at a sketch's white."""
 FEWEST = 64
 """Blocks that are compared, at least."""
 EXPLAINED = 0.5
@@ -29,7 +29,7 @@ def evened(before: Sketch, after: Sketch) -> Sketch:
     rows = np.linspace(0, len(before.seen) - 1, len(before.blocks)).astype(np.intp)
     seen = (before.seen & after.seen)[rows]
     one, other = before.blocks[seen], after.blocks[seen]
-    lit = (np.minimum(one, other) > LIT) & (np.maximum(one, other) < CLIPPED)
+    lit = (np.minimum(one, other) > LIT) & (np.maximum(one, other) < NEAR_WHITE)
     if np.count_nonzero(lit) < FEWEST:
         return after
     gain = float(np.median(_light(one[lit]) / _light(other[lit])))
@@ -39,7 +39,7 @@ def evened(before: Sketch, after: Sketch) -> Sketch:
         return after
     table = np.rint(_brightened(np.arange(256, dtype=np.float32), gain)).astype(np.uint8)
     codes = table[after.codes]
-    codes = np.where(after.codes < CLIPPED, codes, np.maximum(codes, before.codes))  # clipped: so bright at least
+    codes = np.where(after.codes < NEAR_WHITE, codes, np.maximum(codes, before.codes))  # clipped: so bright at least
     codes = np.where(np.maximum(codes, before.codes) < LIT, before.codes, codes)  # nearly black: noise cut off at zero
     size = after.blocks.shape[1], after.blocks.shape[0]
     blocks = cv2.resize(codes.astype(np.float32), size, interpolation=cv2.INTER_AREA)

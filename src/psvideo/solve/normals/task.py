@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.camera import FloatArray
+from psvideo.model.clipping import ROUNDING
 from psvideo.solve.normals.illumination import Illumination
 
 Floats = NDArray[np.float32]
@@ -111,7 +112,7 @@ def task(
     unit = strength.mean()
     to_strength = strength[:, None] / lit.intensities
     gain = scale * to_strength
-    ceiling = usable.saturation * (1 - 1e-5) * to_strength  # the largest code may come out a rounding below 1.0
+    ceiling = usable.saturation * (1 - ROUNDING) * to_strength
     tone = np.stack([gain, -black_level * gain, ceiling, 1 / to_strength], axis=-1)
     matrix = lit.directions * (strength / unit)[:, None]
     inverse = np.linalg.pinv(matrix)
