@@ -31,6 +31,7 @@ seed = 5
 width_px = 64
 height_px = 1080
 fps = 100
+shutter_deg = 360.0
 readout_s = 0.01
 width_m = 0.2
 [strobe]
