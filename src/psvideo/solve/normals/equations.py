@@ -6,8 +6,9 @@ Planes lie in two flat working arrays, ``w`` (those of ``kernel.py``) and ``v`` 
 import numpy as np
 
 from psvideo.compute.compiled import FUSED
-from psvideo.solve.normals.kernel import BLOCK, COUNT, HIGH, LOW, ONE, SUM, THREE, XX, XY, XZ, YY, YZ, ZERO, ZZ, X, Y, Z
+from psvideo.compute.symmetric import adjugate
 from psvideo.solve.normals.near_kernel import at, of_light
+from psvideo.solve.normals.planes import BLOCK, COUNT, HIGH, LOW, ONE, SUM, THREE, XX, XY, XZ, YY, YZ, ZERO, ZZ, X, Y, Z
 from psvideo.solve.normals.task import Floats
 
 HALF = np.float32(0.5)
@@ -56,10 +57,8 @@ def solve_equations(w: Floats, n: int, condition_squared: np.float32, keep: bool
     """g from the normal equations; where they are badly conditioned what was there stays (``keep``), or 0."""
     for i in range(n):
         a, b, c, d, e, f = w[XX + i], w[XY + i], w[XZ + i], w[YY + i], w[YZ + i], w[ZZ + i]
-        xx, xy, xz = d * f - e * e, c * e - b * f, b * e - c * d
-        yy, yz, zz = a * f - c * c, b * c - a * e, a * d - b * b
+        xx, xy, xz, yy, yz, zz, determinant = adjugate(a, b, c, d, e, f)
         p, q, r = w[RIGHT_X + i], w[RIGHT_Y + i], w[RIGHT_Z + i]
-        determinant = a * xx + b * xy + c * xz
         sound = (a + d + f) * (xx + yy + zz) <= condition_squared * determinant
         sound = sound & (determinant > ZERO) & (w[COUNT + i] >= THREE)
         scale = ONE / determinant if sound else ZERO

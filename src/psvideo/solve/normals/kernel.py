@@ -1,8 +1,6 @@
 """The fused least-squares kernel: from raw samples to stored normals in one pass over memory.
 
-Plain loops over contiguous planes, which the compiler turns into vectors. A block's planes lie one after another in one
-flat working array ``w``, BLOCK apart, so that the compiler sees that they do not overlap. A measurement that is
-saturated, not a number or unseen becomes MISSING, far below every threshold.
+Plain loops over contiguous planes (``planes.py``), which the compiler turns into vectors.
 
 Symbols: m = L g per pixel, with the measurements m, L = intensity * direction (light, 3) and g = albedo * normal.
 
@@ -11,26 +9,40 @@ compiled for both.
 """
 
 import numpy as np
-from numba.np.numpy_support import carray
 
 from psvideo.compute.compiled import FUSED
-from psvideo.compute.memory import encoded, lent, pointer
+from psvideo.compute.memory import encoded, lent
+from psvideo.compute.symmetric import adjugate
+from psvideo.solve.normals.measuring import all_seen, combine, gather_one, gather_three, hide_unseen, samples_of
 from psvideo.solve.normals.near_kernel import at, of_light, place_lights
+from psvideo.solve.normals.planes import (
+    ABSENT,
+    ALBEDO,
+    BLOCK,
+    COUNT,
+    HIGH,
+    LEAST_Z,
+    LIMIT,
+    LOW,
+    MISSING,
+    ONE,
+    PLANES,
+    SLIGHTLY_MORE,
+    SUM,
+    THREE,
+    TINY,
+    XX,
+    XY,
+    XZ,
+    YY,
+    YZ,
+    ZERO,
+    ZZ,
+    X,
+    Y,
+    Z,
+)
 from psvideo.solve.normals.task import Bytes, Floats, Near, Result, Samples, Task, Work
-
-# Pixels of one block; not a power of two, whose planes would all fall on the same lines of the processor's cache.
-BLOCK = 480
-MISSING = np.float32(-1e30)
-ABSENT = np.float32(-1e29)  # what is below this is MISSING
-ZERO, ONE, THREE, TINY = np.float32(0), np.float32(1), np.float32(3), np.float32(1e-9)
-# In perspective what is seen may turn from the camera's axis by more than 90 degrees: by half the view (here 20).
-LEAST_Z = np.float32(-0.342)
-SLIGHTLY_MORE = np.float32(1.000001)
-
-# The planes of the working array: g, later the normal; what deciding on measurements needs; the normal equations.
-X, Y, Z, ALBEDO, LIMIT, LOW, HIGH, SUM, COUNT = (BLOCK * plane for plane in range(9))
-XX, XY, XZ, YY, YZ, ZZ = (BLOCK * plane for plane in range(9, 15))
-PLANES = 15
 
 
 def working_memory(task: Task) -> Work:
@@ -61,7 +73,7 @@ def solve_rows(task: Task, result: Result, work: Work, first: int, last: int) ->
                 w[X : X + n], w[Y : Y + n], w[Z : Z + n] = ZERO, ZERO, ZERO
             else:
                 _solve_block(t, w, values, m, row, col, n, out.residual.size > 0)
-            _store_block(t, out, w, values, m, row * t.cols + col, n)
+            store_block(t, out, w, values, m, row * t.cols + col, n)
 
 
 @FUSED.inlined
@@ -87,30 +99,21 @@ def _solve_block(
     start, channels = row * task.cols + col, task.tone.shape[1]
     place_lights(task.matrix, task.per_strength, task.near, row, col, n)
     distant = task.near.depth.size == 0
-    done = distant and channels == 1 and _all_seen(task.seen, row, col, n) and _solve_all_usable(task, w, start, n)
+    done = distant and channels == 1 and all_seen(task.seen, row, col, n) and _solve_all_usable(task, w, start, n)
     if not done or keep_measurements:
         if channels == 1:
-            _gather_one(task, values, start, n)
+            gather_one(task, values, start, n)
         else:
-            _gather_three(task, values, start, n)
-        _hide_unseen(task, values, row, col, n)
+            gather_three(task, values, start, n)
+        hide_unseen(task, values, row, col, n)
         if channels > 1:
-            _combine(task, w, values, m, n)
+            combine(task, w, values, m, n)
     if not done:
         _solve_usable(task, w, m, n)
     if task.mask.size:
         for i in range(n):
             kept = ONE if task.mask[row, col + i] else ZERO
             w[X + i], w[Y + i], w[Z + i] = w[X + i] * kept, w[Y + i] * kept, w[Z + i] * kept
-
-
-@FUSED.inlined
-def _plate(task: Task, light: int, start: int, n: int) -> Samples:
-    """The samples of n pixels of one light's plate."""
-    channels = task.tone.shape[1]
-    end = (start + n) * channels
-    plate: Samples = carray(pointer(task.plates[light], task.like), end)
-    return plate[start * channels : end]
 
 
 @FUSED.inlined
@@ -121,7 +124,7 @@ def _solve_all_usable(task: Task, w: Floats, start: int, n: int) -> bool:
     or the weakest, and the shadow limit follows the largest instead of the mean. Who fails it is solved by the rule.
     """
     for k in range(0, len(task.plates), 3):
-        a, b, c = _plate(task, k, start, n), _plate(task, k + 1, start, n), _plate(task, k + 2, start, n)
+        a, b, c = samples_of(task, k, start, n), samples_of(task, k + 1, start, n), samples_of(task, k + 2, start, n)
         if k == 0:
             _add_three(w, n, a, b, c, task.inverse, 0, False)
         else:
@@ -153,79 +156,6 @@ def _add_three(w: Floats, n: int, a: Samples, b: Samples, c: Samples, inverse: F
         w[Z + i] = w[Z + i] + z if begun else z
         w[LOW + i] = min(w[LOW + i], low) if begun else low
         w[HIGH + i] = max(w[HIGH + i], high) if begun else high
-
-
-@FUSED.inlined
-def _gather_one(task: Task, values: Floats, start: int, n: int) -> None:
-    """Raw samples of one channel to measurements, a plane per light."""
-    for light in range(task.lights):
-        samples, plane = _plate(task, light, start, n), values[light]
-        gain, offset, ceiling, _ = task.tone[light, 0]
-        for i in range(n):
-            value = np.float32(samples[i]) * gain + offset
-            plane[i] = value if (value < ceiling) & (value > ABSENT) else MISSING
-
-
-@FUSED.inlined
-def _gather_three(task: Task, values: Floats, start: int, n: int) -> None:
-    """Raw samples of three channels to measurements, a plane per light and channel; a light counts whole or not."""
-    for light in range(task.lights):
-        samples = _plate(task, light, start, n)
-        red, green, blue = values[3 * light], values[3 * light + 1], values[3 * light + 2]
-        gain_r, offset_r, ceiling_r, _ = task.tone[light, 0]
-        gain_g, offset_g, ceiling_g, _ = task.tone[light, 1]
-        gain_b, offset_b, ceiling_b, _ = task.tone[light, 2]
-        for i in range(n):
-            r = np.float32(samples[3 * i]) * gain_r + offset_r
-            g = np.float32(samples[3 * i + 1]) * gain_g + offset_g
-            b = np.float32(samples[3 * i + 2]) * gain_b + offset_b
-            here = (r < ceiling_r) & (g < ceiling_g) & (b < ceiling_b) & (min(r, min(g, b)) > ABSENT)
-            red[i] = r if here else MISSING
-            green[i] = g if here else MISSING
-            blue[i] = b if here else MISSING
-
-
-@FUSED.inlined
-def _combine(task: Task, w: Floats, values: Floats, m: Floats, n: int) -> None:
-    """One measurement per light from three channels, each weighted by its own brightness over the lights.
-
-    That is the matched filter for noise alike in all channels: a channel in which the surface is black adds nothing.
-    """
-    for plane in (XX, YY, ZZ):
-        w[plane : plane + n] = ZERO
-    for light in range(task.lights):
-        red, green, blue = values[3 * light], values[3 * light + 1], values[3 * light + 2]
-        for i in range(n):
-            w[XX + i] += max(red[i], ZERO)
-            w[YY + i] += max(green[i], ZERO)
-            w[ZZ + i] += max(blue[i], ZERO)
-    for i in range(n):
-        total = w[XX + i] + w[YY + i] + w[ZZ + i]
-        w[SUM + i] = ONE / total if total > ZERO else ZERO
-    for light in range(task.lights):
-        red, green, blue = values[3 * light], values[3 * light + 1], values[3 * light + 2]
-        for i in range(n):
-            value = (w[XX + i] * red[i] + w[YY + i] * green[i] + w[ZZ + i] * blue[i]) * w[SUM + i]
-            m[light, i] = value if red[i] > ABSENT else MISSING
-
-
-@FUSED.inlined
-def _all_seen(seen: Bytes, row: int, col: int, n: int) -> bool:
-    """Whether every light was seen in n pixels; one entry may stand for the whole row."""
-    first, last = (0, 1) if seen.shape[2] == 1 else (col, col + n)
-    return not seen.size or bool(seen[:, row, first:last].all())
-
-
-@FUSED.inlined
-def _hide_unseen(task: Task, values: Floats, row: int, col: int, n: int) -> None:
-    channels, seen = task.tone.shape[1], task.seen
-    for plane in range(channels * seen.shape[0]):
-        light = plane // channels
-        if seen.shape[2] > 1:
-            for i in range(n):
-                values[plane, i] = values[plane, i] if seen[light, row, col + i] else MISSING
-        elif not seen[light, row, 0]:
-            values[plane, :n] = MISSING
 
 
 @FUSED.inlined
@@ -289,9 +219,7 @@ def _solve_normal_equations(w: Floats, n: int, condition_squared: np.float32) ->
     """g = adj(A) b / det(A), or 0 where A is badly conditioned or of fewer than three lights."""
     for i in range(n):
         a, b, c, d, e, f = w[XX + i], w[XY + i], w[XZ + i], w[YY + i], w[YZ + i], w[ZZ + i]
-        xx, xy, xz = d * f - e * e, c * e - b * f, b * e - c * d
-        yy, yz, zz = a * f - c * c, b * c - a * e, a * d - b * b
-        determinant = a * xx + b * xy + c * xz
+        xx, xy, xz, yy, yz, zz, determinant = adjugate(a, b, c, d, e, f)
         x = xx * w[X + i] + xy * w[Y + i] + xz * w[Z + i]
         y = xy * w[X + i] + yy * w[Y + i] + yz * w[Z + i]
         z = xz * w[X + i] + yz * w[Y + i] + zz * w[Z + i]
@@ -302,7 +230,7 @@ def _solve_normal_equations(w: Floats, n: int, condition_squared: np.float32) ->
 
 
 @FUSED.inlined
-def _store_block(task: Task, result: Result, w: Floats, values: Floats, m: Floats, start: int, n: int) -> None:
+def store_block(task: Task, result: Result, w: Floats, values: Floats, m: Floats, start: int, n: int) -> None:
     end = start + n
     x, y, z = result.normals[0, start:end], result.normals[1, start:end], result.normals[2, start:end]
     _store_normals(w, n, x, y, z, result.albedo[0, start:end], result.valid[start:end], task.albedo_scale)

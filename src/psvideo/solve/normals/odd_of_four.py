@@ -8,9 +8,10 @@ are linearly dependent, and so must be the four brightnesses of a matte surface 
 import numpy as np
 
 from psvideo.compute.compiled import FUSED
+from psvideo.compute.symmetric import adjugate
 from psvideo.solve.normals.equations import DOUBT, LOWER, ODD, RANK, add_equations, solve_equations
-from psvideo.solve.normals.kernel import ABSENT, COUNT, MISSING, ONE, XX, XY, XZ, YY, YZ, ZERO, ZZ, X, Y, Z
 from psvideo.solve.normals.near_kernel import at, of_light
+from psvideo.solve.normals.planes import ABSENT, COUNT, MISSING, ONE, XX, XY, XZ, YY, YZ, ZERO, ZZ, X, Y, Z
 from psvideo.solve.normals.task import Floats, Task
 
 TWO, FOUR = np.float32(2), np.float32(4)
@@ -114,9 +115,7 @@ def _nearness_without(
     With four measurements 1 - leverage is error squared / the sum of squares.
     """
     a, b, c, d, q, f = w[XX + i], w[XY + i], w[XZ + i], w[YY + i], w[YZ + i], w[ZZ + i]
-    xx, xy, xz = d * f - q * q, c * q - b * f, b * q - c * d
-    yy, yz, zz = a * f - c * c, b * c - a * q, a * d - b * b
-    determinant = a * xx + b * xy + c * xz
+    xx, xy, xz, yy, yz, zz, determinant = adjugate(a, b, c, d, q, f)
     step = v[SQUARES + i] / (error * determinant) if error * determinant != ZERO else ZERO
     gx = w[X + i] - (xx * x + xy * y + xz * z) * step
     gy = w[Y + i] - (xy * x + yy * y + yz * z) * step

@@ -15,12 +15,11 @@ import numpy as np
 from psvideo.model.surface import Misfit, Surface
 from psvideo.solve.normals.bands import check_arrays, in_bands, surface_of
 from psvideo.solve.normals.illumination import Illumination
-from psvideo.solve.normals.task import Floats, Mask, Samples, Task, Usable, empty_result, task
+from psvideo.solve.normals.task import FEW, Floats, Mask, Samples, Task, Usable, Weights, empty_result, task
 
 if TYPE_CHECKING:
-    from psvideo.solve.normals import robust_kernel as kernel
+    pass
 
-NINE = 9
 USABLE = Usable(shadow_ratio=0.4)
 """Least squares needs every measurement; here one that is dark beside the others may go sooner."""
 
@@ -103,7 +102,7 @@ def solve(
     predicted = np.zeros(rows * cols, np.uint16 if half else np.float32)
     given = _balanced(task(samples, lit, seen, mask, usable, black_level, scale))
 
-    def run(into: Samples, unexplained: Floats, how: kernel.Weights, step: int) -> None:
+    def run(into: Samples, unexplained: Floats, how: Weights, step: int) -> None:
         def band(first: int, last: int) -> None:
             kernel.solve_rows(given, result, into, unexplained, kernel.working_memory(given), how, first, last, step)
 
@@ -125,11 +124,9 @@ def _limit_deg(reweighting: Reweighting, misfit: Misfit) -> float:
     return min(reweighting.beside_typical * misfit.error_deg, MOST_TYPICAL_DEG)
 
 
-def _weights(reweighting: Reweighting, *, limit_deg: float, common: float) -> "kernel.Weights":
-    from psvideo.solve.normals import robust_kernel as kernel
-
+def _weights(reweighting: Reweighting, *, limit_deg: float, common: float) -> Weights:
     tukey = reweighting.loss == "tukey"
-    return kernel.Weights(
+    return Weights(
         rounds=reweighting.rounds,
         tukey=tukey,
         width=np.float32(reweighting.width * (TUKEY_WIDTH if tukey else 1.0)),
@@ -164,7 +161,7 @@ def _balanced(given: Task) -> Task:
 
     Photon noise grows with the root of a light's strength, highlights and shadows with the strength itself: dividing
     by the root is right for the first, and between noise that is alike in all plates and the second. From four distant
-    lights on, up to NINE are filled up with lights that weigh nothing, for which there is a faster way.
+    lights on, up to FEW are filled up with lights that weigh nothing, for which there is a faster way.
     """
     factor = np.sqrt(given.per_strength)[: given.lights, None]
     tone = given.tone.copy()
@@ -176,7 +173,7 @@ def _balanced(given: Task) -> Task:
     strengths = given.near.strengths.copy()  # empty where all lights are distant
     strengths[: given.lights] *= factor[: len(strengths), 0]
     near = given.near._replace(strengths=strengths)
-    more = max(NINE - len(tone), 0) if given.lights > 3 and not given.near.depth.size else 0
+    more = max(FEW - len(tone), 0) if given.lights > 3 and not given.near.depth.size else 0
     return given._replace(
         tone=np.pad(tone, ((0, more), (0, 0), (0, 0)), mode="edge"),
         matrix=np.pad(matrix, ((0, more), (0, 0))),

@@ -18,6 +18,9 @@ Mask = NDArray[np.bool_]
 
 PIXEL_CONDITION = 12.0  # beyond it, with the lights that shadow leaves, albedo begins to burst in real creases
 
+FEW = 9
+"""Up to so many distant lights a pixel's measurements stay in registers (``few_lights.py``)."""
+
 _NO_LIMIT = -1e9
 
 
@@ -85,6 +88,25 @@ class Result(NamedTuple):
     albedo: Samples  # (channel, pixel)
     valid: Bytes  # (pixel,)
     residual: Samples  # (pixel,), or empty
+
+
+class Weights(NamedTuple):
+    """How measurements are weighed, and which normals are trusted; the fields are described in robust.Reweighting.
+
+    ``most_error_deg`` is the limit for this picture, and ``common`` the share of a pixel's light that its lights
+    usually leave unexplained.
+    """
+
+    rounds: int
+    tukey: bool
+    width: np.float32
+    noise: np.float32
+    signal_noise: np.float32
+    darkest: np.float32
+    brightest: np.float32
+    contradiction: np.float32
+    most_error_deg: np.float32
+    common: np.float32
 
 
 class Work(NamedTuple):

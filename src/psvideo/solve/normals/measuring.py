@@ -1,0 +1,95 @@
+"""From raw samples to measurements, a plane per light: the part of every kernel that reads plates.
+
+A measurement that is saturated, not a number or unseen becomes MISSING, far below every threshold.
+"""
+
+import numpy as np
+from numba.np.numpy_support import carray
+
+from psvideo.compute.compiled import FUSED
+from psvideo.compute.memory import pointer
+from psvideo.solve.normals.planes import ABSENT, MISSING, ONE, SUM, XX, YY, ZERO, ZZ
+from psvideo.solve.normals.task import Bytes, Floats, Samples, Task
+
+
+@FUSED.inlined
+def samples_of(task: Task, light: int, start: int, n: int) -> Samples:
+    """The samples of n pixels of one light's plate."""
+    channels = task.tone.shape[1]
+    end = (start + n) * channels
+    plate: Samples = carray(pointer(task.plates[light], task.like), end)
+    return plate[start * channels : end]
+
+
+@FUSED.inlined
+def gather_one(task: Task, values: Floats, start: int, n: int) -> None:
+    """Raw samples of one channel to measurements, a plane per light."""
+    for light in range(task.lights):
+        samples, plane = samples_of(task, light, start, n), values[light]
+        gain, offset, ceiling, _ = task.tone[light, 0]
+        for i in range(n):
+            value = np.float32(samples[i]) * gain + offset
+            plane[i] = value if (value < ceiling) & (value > ABSENT) else MISSING
+
+
+@FUSED.inlined
+def gather_three(task: Task, values: Floats, start: int, n: int) -> None:
+    """Raw samples of three channels to measurements, a plane per light and channel; a light counts whole or not."""
+    for light in range(task.lights):
+        samples = samples_of(task, light, start, n)
+        red, green, blue = values[3 * light], values[3 * light + 1], values[3 * light + 2]
+        gain_r, offset_r, ceiling_r, _ = task.tone[light, 0]
+        gain_g, offset_g, ceiling_g, _ = task.tone[light, 1]
+        gain_b, offset_b, ceiling_b, _ = task.tone[light, 2]
+        for i in range(n):
+            r = np.float32(samples[3 * i]) * gain_r + offset_r
+            g = np.float32(samples[3 * i + 1]) * gain_g + offset_g
+            b = np.float32(samples[3 * i + 2]) * gain_b + offset_b
+            here = (r < ceiling_r) & (g < ceiling_g) & (b < ceiling_b) & (min(r, min(g, b)) > ABSENT)
+            red[i] = r if here else MISSING
+            green[i] = g if here else MISSING
+            blue[i] = b if here else MISSING
+
+
+@FUSED.inlined
+def combine(task: Task, w: Floats, values: Floats, m: Floats, n: int) -> None:
+    """One measurement per light from three channels, each weighted by its own brightness over the lights.
+
+    That is the matched filter for noise alike in all channels: a channel in which the surface is black adds nothing.
+    """
+    for plane in (XX, YY, ZZ):
+        w[plane : plane + n] = ZERO
+    for light in range(task.lights):
+        red, green, blue = values[3 * light], values[3 * light + 1], values[3 * light + 2]
+        for i in range(n):
+            w[XX + i] += max(red[i], ZERO)
+            w[YY + i] += max(green[i], ZERO)
+            w[ZZ + i] += max(blue[i], ZERO)
+    for i in range(n):
+        total = w[XX + i] + w[YY + i] + w[ZZ + i]
+        w[SUM + i] = ONE / total if total > ZERO else ZERO
+    for light in range(task.lights):
+        red, green, blue = values[3 * light], values[3 * light + 1], values[3 * light + 2]
+        for i in range(n):
+            value = (w[XX + i] * red[i] + w[YY + i] * green[i] + w[ZZ + i] * blue[i]) * w[SUM + i]
+            m[light, i] = value if red[i] > ABSENT else MISSING
+
+
+@FUSED.inlined
+def all_seen(seen: Bytes, row: int, col: int, n: int) -> bool:
+    """Whether every light was seen in n pixels; one entry may stand for the whole row."""
+    first, last = (0, 1) if seen.shape[2] == 1 else (col, col + n)
+    return not seen.size or bool(seen[:, row, first:last].all())
+
+
+@FUSED.inlined
+def hide_unseen(task: Task, values: Floats, row: int, col: int, n: int) -> None:
+    """What was not seen becomes MISSING."""
+    channels, seen = task.tone.shape[1], task.seen
+    for plane in range(channels * seen.shape[0]):
+        light = plane // channels
+        if seen.shape[2] > 1:
+            for i in range(n):
+                values[plane, i] = values[plane, i] if seen[light, row, col + i] else MISSING
+        elif not seen[light, row, 0]:
+            values[plane, :n] = MISSING

@@ -1,0 +1,20 @@
+"""Planes of a block of pixels, one after another in a flat working array, BLOCK apart, and the numbers of all kernels.
+
+The compiler so sees that planes do not overlap.
+"""
+
+import numpy as np
+
+# Pixels of one block; not a power of two, whose planes would all fall on the same lines of the processor's cache.
+BLOCK = 480
+MISSING = np.float32(-1e30)
+ABSENT = np.float32(-1e29)  # what is below this is MISSING
+ZERO, ONE, THREE, TINY = np.float32(0), np.float32(1), np.float32(3), np.float32(1e-9)
+# In perspective what is seen may turn from the camera's axis by more than 90 degrees: by half the view (here 20).
+LEAST_Z = np.float32(-0.342)
+SLIGHTLY_MORE = np.float32(1.000001)
+
+# The planes of the working array: g, later the normal; what deciding on measurements needs; the normal equations.
+X, Y, Z, ALBEDO, LIMIT, LOW, HIGH, SUM, COUNT = (BLOCK * plane for plane in range(9))
+XX, XY, XZ, YY, YZ, ZZ = (BLOCK * plane for plane in range(9, 15))
+PLANES = 15
