@@ -7,8 +7,8 @@ import numpy as np
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.symmetric import adjugate
+from psvideo.solve.normals.blocks import BLOCK, COUNT, HIGH, LOW, ONE, SUM, THREE, XX, XY, XZ, YY, YZ, ZERO, ZZ, X, Y, Z
 from psvideo.solve.normals.near_kernel import at, of_light
-from psvideo.solve.normals.planes import BLOCK, COUNT, HIGH, LOW, ONE, SUM, THREE, XX, XY, XZ, YY, YZ, ZERO, ZZ, X, Y, Z
 from psvideo.solve.normals.task import Floats
 
 HALF = np.float32(0.5)

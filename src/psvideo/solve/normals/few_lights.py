@@ -14,9 +14,9 @@ import numpy as np
 from numba.extending import overload
 
 from psvideo.compute.compiled import FUSED
+from psvideo.solve.normals.blocks import ABSENT, BLOCK, COUNT, ONE, THREE, XX, XY, XZ, YY, YZ, ZERO, ZZ, X, Y, Z
 from psvideo.solve.normals.equations import HALF, OUT, RIGHT_X, RIGHT_Y, RIGHT_Z, SCALE
 from psvideo.solve.normals.near_kernel import of_light  # noqa: F401 (in a text below)
-from psvideo.solve.normals.planes import ABSENT, BLOCK, COUNT, ONE, THREE, XX, XY, XZ, YY, YZ, ZERO, ZZ, X, Y, Z
 from psvideo.solve.normals.task import FEW, Floats
 
 LITTLE = np.float32(0.02)  # the weight of what the start leaves out, so that no start is singular

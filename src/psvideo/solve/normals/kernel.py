@@ -1,6 +1,6 @@
 """The fused least-squares kernel: from raw samples to stored normals in one pass over memory.
 
-Plain loops over contiguous planes (``planes.py``), which the compiler turns into vectors.
+Plain loops over contiguous planes (``blocks.py``), which the compiler turns into vectors.
 
 Symbols: m = L g per pixel, with the measurements m, L = intensity * direction (light, 3) and g = albedo * normal.
 
@@ -13,9 +13,7 @@ import numpy as np
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import encoded, lent
 from psvideo.compute.symmetric import adjugate
-from psvideo.solve.normals.measuring import all_seen, combine, gather_one, gather_three, hide_unseen, samples_of
-from psvideo.solve.normals.near_kernel import at, of_light, place_lights
-from psvideo.solve.normals.planes import (
+from psvideo.solve.normals.blocks import (
     ABSENT,
     ALBEDO,
     BLOCK,
@@ -42,6 +40,8 @@ from psvideo.solve.normals.planes import (
     Y,
     Z,
 )
+from psvideo.solve.normals.measuring import all_seen, combine, gather_one, gather_three, hide_unseen, samples_of
+from psvideo.solve.normals.near_kernel import at, of_light, place_lights
 from psvideo.solve.normals.task import Bytes, Floats, Near, Result, Samples, Task, Work
 
 

@@ -8,7 +8,7 @@ from numba.np.numpy_support import carray
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import pointer
-from psvideo.solve.normals.planes import ABSENT, MISSING, ONE, SUM, XX, YY, ZERO, ZZ
+from psvideo.solve.normals.blocks import ABSENT, MISSING, ONE, SUM, XX, YY, ZERO, ZZ
 from psvideo.solve.normals.task import Bytes, Floats, Samples, Task
 
 

@@ -13,12 +13,7 @@ from psvideo.compute.memory import encoded, lent
 from psvideo.compute.symmetric import adjugate
 from psvideo.solve.normals import kernel
 from psvideo.solve.normals.any_lights import add_start, add_weighted, choose_start, find_scale
-from psvideo.solve.normals.equations import DOUBT, LOWER, OUT, SCALE, solve_equations
-from psvideo.solve.normals.few_lights import EIGHT, FOUR, begin_few, reweigh_few
-from psvideo.solve.normals.measuring import combine, gather_one, gather_three, hide_unseen
-from psvideo.solve.normals.near_kernel import at, place_lights
-from psvideo.solve.normals.odd_of_four import TWO, drop_odd_of_four
-from psvideo.solve.normals.planes import (
+from psvideo.solve.normals.blocks import (
     ABSENT,
     BLOCK,
     COUNT,
@@ -39,6 +34,11 @@ from psvideo.solve.normals.planes import (
     Y,
     Z,
 )
+from psvideo.solve.normals.equations import DOUBT, LOWER, OUT, SCALE, solve_equations
+from psvideo.solve.normals.few_lights import EIGHT, FOUR, begin_few, reweigh_few
+from psvideo.solve.normals.measuring import combine, gather_one, gather_three, hide_unseen
+from psvideo.solve.normals.near_kernel import at, place_lights
+from psvideo.solve.normals.odd_of_four import TWO, drop_odd_of_four
 from psvideo.solve.normals.task import FEW, Floats, Result, Samples, Task, Weights
 
 STEP = 128  # pixels that are solved together: few enough that all of their planes stay in the nearest cache
