@@ -63,7 +63,7 @@ class Case:
     frames: int = 96
     clock: TrueClock = field(default_factory=lambda: TrueClock(phase_s=0.0123, offset_ppm=40.0))
     ambient: float = 0.0
-    flicker: MainsSwing | None = None
+    mains: MainsSwing | None = None
     dropped: tuple[int, ...] = ()
     repeated: tuple[int, ...] = ()
     step: Fraction = Fraction(1)
@@ -85,7 +85,7 @@ class Case:
             frames=self.frames,
             clock=clock,
             ambient=self.ambient,
-            flicker=self.flicker,
+            mains=self.mains,
             noise=NOISE,
             bits=0 if self.recorder else 12,
             dropped=self.dropped,
@@ -212,10 +212,10 @@ def _other_light() -> dict[str, Case]:
     plain, half = plan_of(), plan_of(shutter=0.5, readout=0.6)
     return {
         "ambient": Case(plan=plain, ambient=0.15),
-        "ambient at 100 Hz": Case(plan=plain, ambient=0.15, flicker=MainsSwing(hz=100, depth=0.6)),
-        "ambient at 120 Hz": Case(plan=plain, ambient=0.15, flicker=MainsSwing(hz=120, depth=0.6)),
-        "ambient at 100 Hz, 180 degrees": Case(plan=half, ambient=0.15, flicker=MainsSwing(hz=100, depth=0.6)),
-        "ambient at 120 Hz, 180 degrees": Case(plan=half, ambient=0.15, flicker=MainsSwing(hz=120, depth=0.6)),
+        "ambient at 100 Hz": Case(plan=plain, ambient=0.15, mains=MainsSwing(hz=100, depth=0.6)),
+        "ambient at 120 Hz": Case(plan=plain, ambient=0.15, mains=MainsSwing(hz=120, depth=0.6)),
+        "ambient at 100 Hz, 180 degrees": Case(plan=half, ambient=0.15, mains=MainsSwing(hz=100, depth=0.6)),
+        "ambient at 120 Hz, 180 degrees": Case(plan=half, ambient=0.15, mains=MainsSwing(hz=120, depth=0.6)),
     }
 
 
@@ -306,7 +306,7 @@ def _combined() -> dict[str, Case]:
             scene=tumbling,
             clock=drift,
             ambient=0.05,
-            flicker=MainsSwing(hz=100, depth=0.4),
+            mains=MainsSwing(hz=100, depth=0.4),
             frames=300,
             dropped=(120,),
             bar_rows=ALL_AT_ONCE,

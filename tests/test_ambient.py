@@ -63,7 +63,7 @@ def shoot(
     ambient_of: AmbientOf,
     *,
     noise: Noise = NOISELESS,
-    flicker: MainsSwing | None = None,
+    mains: MainsSwing | None = None,
     frames: int = 120,
     dropped: tuple[int, ...] = (),
 ) -> Take:
@@ -78,7 +78,7 @@ def shoot(
         lambda flash: truth.get(flash.slot),
         frames=kept,
         ambient_of=lambda n: ambient_of(n, scene).astype(np.float32),
-        flicker=flicker,
+        mains=mains,
     )
 
     def read() -> Iterator[MemoryFrame]:
@@ -179,14 +179,14 @@ def test_where_someone_moves_the_average_starts_again_and_elsewhere_it_goes_on(p
 @pytest.mark.parametrize("depth", [0.3, 1.0])
 def test_mains_light_is_separated_row_by_row(hz: float, depth: float, make_plan: PlanMaker) -> None:
     plan = make_plan(width_px=160, height_px=120, fps=Fraction(110))
-    take = shoot(plan, dimmed, flicker=MainsSwing(hz=hz, depth=depth))
+    take = shoot(plan, dimmed, mains=MainsSwing(hz=hz, depth=depth))
     assert rms(shoot(plan, held).errors()) < 1e-5
     assert rms(take.errors()[8:]) < 1e-4 + (2e-3 if hz == 100.2 else 0) * depth
 
 
 def test_exposures_of_whole_pulses_show_none(make_plan: PlanMaker) -> None:
     even = make_plan(width_px=160, height_px=120, fps=Fraction(100))
-    assert rms(shoot(even, held, flicker=MainsSwing(hz=100, depth=1.0)).errors()) < 1e-5
+    assert rms(shoot(even, held, mains=MainsSwing(hz=100, depth=1.0)).errors()) < 1e-5
 
 
 def test_a_change_that_looks_like_a_ripple_once_is_not_believed() -> None:

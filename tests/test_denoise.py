@@ -13,7 +13,7 @@ from psvideo.plates.sequence import LightPlate, Round
 from psvideo.report.judge.result import steadiness
 from psvideo.report.observe.observed import instant_facts
 from psvideo.report.observe.steadiness import change, sample_of
-from psvideo.report.run_report import RunReport, flicker, report_record
+from psvideo.report.run_report import RunReport, report_record, steadiness_of
 
 ROWS, COLS = 96, 128
 
@@ -147,7 +147,7 @@ def test_the_report_names_the_worst_instants() -> None:
                     order="given", flashes=())  # fmt: skip
     report = RunReport(clip="c", version="0", timing=timing, lights=(), shot={}, settings={}, instants=tuple(facts),
                        judgements=tuple(steadiness(facts)))  # fmt: skip
-    found = flicker(report.instants)
+    found = steadiness_of(report.instants)
     assert found is not None
     assert found.worst[0] == 1003
     assert found.level_percent < 0.5

@@ -13,7 +13,7 @@ from psvideo.formats.plan_toml import format_plan, read_plan
 from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.strobe.confirmed import is_confirmed, remember, state_folder
 from psvideo.strobe.runlog import as_played, format_log, plan_sha256, read_log
-from psvideo.strobe.seizures import flash_rates, flicker_warning
+from psvideo.strobe.seizures import flash_rates, seizure_warning
 
 RIGS = Path(__file__).resolve().parents[1] / "lights" / "rigs"
 SCENES = Path(__file__).resolve().parents[1] / "data_synth"
@@ -148,11 +148,11 @@ def test_a_flash_rate_that_is_dangerous_is_named_light_by_light(make_plan: Calla
     plan = make_plan(dark=False)
     rates = {rate.what: rate.hz for rate in flash_rates(plan)}
     assert rates["all flashes together"] == pytest.approx(3 * rates["light key"])
-    warning = flicker_warning(plan)
+    warning = seizure_warning(plan)
     assert warning is not None
     assert "light key, light left, light right at 36.5 Hz" in warning
     assert "all flashes together at 109.4 Hz" in warning
-    assert flicker_warning(make_plan(lights=("key",), dark=False)) is None
+    assert seizure_warning(make_plan(lights=("key",), dark=False)) is None
 
 
 def test_a_synced_plan_is_refused_with_the_reason(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -150,7 +150,7 @@ def test_a_misnamed_frame_rate_is_found_and_said(make_plan: PlanMaker) -> None:
 @pytest.mark.parametrize("hz", [100.0, 120.0])
 def test_flickering_ambient_light_is_separated_from_the_strobe(hz: float, make_plan: PlanMaker) -> None:
     plan = make_plan(height_px=ROWS, width_px=COLUMNS, shutter=0.5, readout=0.6, fps=Fraction(90))
-    shot = shoot(plan, ambient=0.15, flicker=MainsSwing(hz=hz, depth=0.8))
+    shot = shoot(plan, ambient=0.15, mains=MainsSwing(hz=hz, depth=0.8))
     timing = timing_of(plan, shot)
     assert rms_rows(timing, shot, plan) < 0.02
 
@@ -337,7 +337,7 @@ def test_everything_at_once_is_borne(make_plan: PlanMaker) -> None:
         drift=2.0,
         scene=tumbling(plan),
         ambient=0.05,
-        flicker=MainsSwing(hz=100, depth=0.4),
+        mains=MainsSwing(hz=100, depth=0.4),
         dropped=(120,),
     )
     timing = timing_of(unknown_readout(replace(plan, clock_tolerance_ppm=None)), shot)

@@ -209,8 +209,8 @@ def test_jitter_has_the_given_spread_and_comes_from_the_seed():
 
 def test_ambient_light_adds_to_every_row_and_flickers_as_its_mean_over_the_exposure():
     cam = camera(shutter=0.4)
-    flicker = MainsSwing(hz=130.0, depth=0.6)
-    shot = expose({0: np.zeros((60, 3), np.float32)}, plan_of(cam), frames=3, ambient=0.2, flicker=flicker)
+    mains = MainsSwing(hz=130.0, depth=0.6)
+    shot = expose({0: np.zeros((60, 3), np.float32)}, plan_of(cam), frames=3, ambient=0.2, mains=mains)
     for n, row in ((0, 0), (1, 31), (2, 59)):
         opens_s = (n + row / 60) * PERIOD_S
         time_s = opens_s + (np.arange(20_000) + 0.5) / 20_000 * cam.exposure_s

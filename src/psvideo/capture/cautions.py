@@ -8,7 +8,7 @@ from typing import Literal
 
 from psvideo.capture.request import Limits, ShootRequest
 from psvideo.model.plan import Plan
-from psvideo.model.shoot_figures import FLICKER_HZ, LightFigures, ShootFigures, SlotFigures
+from psvideo.model.shoot_figures import SEIZURE_HZ, LightFigures, ShootFigures, SlotFigures
 from psvideo.model.units import NTSC, show_rate, show_seconds
 
 
@@ -29,7 +29,7 @@ def request_cautions(request: ShootRequest) -> tuple[Caution, ...]:
 def shoot_cautions(plan: Plan, figures: ShootFigures, *, limits: Limits | None = None) -> tuple[Caution, ...]:
     """Return what is to be said about the plan itself, whoever wrote it."""
     return (
-        *_about_flicker(figures),
+        *_about_seizures(figures),
         *_about_the_margin(plan, figures),
         *_about_blind_time(plan, figures),
         *_about_three_frames(plan, figures),
@@ -90,8 +90,8 @@ def _about_the_marker(request: ShootRequest) -> Iterator[Caution]:
         yield _note("ambient", "Without a dark slot ambient light cannot be taken off: the room must be dark.")
 
 
-def _about_flicker(figures: ShootFigures) -> Iterator[Caution]:
-    low, high = FLICKER_HZ
+def _about_seizures(figures: ShootFigures) -> Iterator[Caution]:
+    low, high = SEIZURE_HZ
     care = "Warn everybody on the set, let no photosensitive person stay, and keep eyes off the lights."
     if low <= figures.flash_rate_hz <= high:
         yield _warning(

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from psvideo.model.plan import Plan, PlannedFlash
 
-FLICKER_HZ = (3.0, 65.0)
+SEIZURE_HZ = (3.0, 65.0)
 """Flashes at these rates can harm people with photosensitive epilepsy (about 3 to 70 Hz: IEEE 1789-2015)."""
 
 

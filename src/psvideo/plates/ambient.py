@@ -4,7 +4,7 @@ A flash lies between two dark slots, and its ambient light is interpolated betwe
 steadily is followed. Dark slots are noisy, so each is averaged with those before it, once these are brought to its
 level (a dimmer or a cloud changes a whole neighbourhood by one factor): light that does not change costs hardly any
 noise. Where the picture still differs by more than noise (someone moved, a shadow fell), the average restarts. Mains
-light, which swings from exposure to exposure, is separated row by row (``flicker``) and put back for each plate.
+light, which swings from exposure to exposure, is separated row by row (``mains``) and put back for each plate.
 """
 
 from collections.abc import Iterable, Iterator

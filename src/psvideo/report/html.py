@@ -14,7 +14,7 @@ from psvideo.report.judgement import Judgement, gravest_first, usable
 from psvideo.report.observe.levels import STOPS, TARGET_QUANTILE
 from psvideo.report.observe.observed import InstantFacts
 from psvideo.report.observe.worst import Thumbnail, badness
-from psvideo.report.run_report import RunReport, flicker
+from psvideo.report.run_report import RunReport, steadiness_of
 from psvideo.report.style import STYLE
 
 Pixels = NDArray[np.uint8]
@@ -148,7 +148,7 @@ def _over_time(report: RunReport) -> str:
         f"<figure>{line_chart(axes, lines)}<figcaption>{html.escape(axes.label)}</figcaption></figure>"
         for axes, lines in charts
     )
-    steady = flicker(facts)
+    steady = steadiness_of(facts)
     words = (
         ""
         if steady is None

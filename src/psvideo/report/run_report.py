@@ -90,7 +90,7 @@ def report_record(report: RunReport) -> dict[str, object]:
         "condition": report.condition,
         "solver": report.solver,
         "trust": report.trust,
-        "flicker": None if (steady := flicker(report.instants)) is None else asdict(steady),
+        "flicker": None if (steady := steadiness_of(report.instants)) is None else asdict(steady),
         "worst": [{"number": one.number, "why": one.why} for one in report.thumbnails],
         "instants": [asdict(facts) for facts in report.instants],
     }
@@ -122,8 +122,8 @@ class Steadiness:
     worst: tuple[int, ...]
 
 
-def flicker(instants: Sequence[InstantFacts]) -> Steadiness | None:
-    """Return the flicker of a clip; None where there are no two results in turn with anything at rest."""
+def steadiness_of(instants: Sequence[InstantFacts]) -> Steadiness | None:
+    """Return how steady the results of a clip are at rest; None where there are no two results in turn with anything at rest."""
     known = by_level(instants)
     if not known:
         return None

@@ -6,7 +6,7 @@ Light that flashes at 3 to 65 Hz can cause seizures in photosensitive people (IE
 from dataclasses import dataclass
 
 from psvideo.model.plan import Plan
-from psvideo.model.shoot_figures import FLICKER_HZ, shoot_figures
+from psvideo.model.shoot_figures import SEIZURE_HZ, shoot_figures
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,7 +19,7 @@ class Rate:
     @property
     def is_dangerous(self) -> bool:
         """True between 3 and 65 Hz."""
-        return FLICKER_HZ[0] <= self.hz <= FLICKER_HZ[1]
+        return SEIZURE_HZ[0] <= self.hz <= SEIZURE_HZ[1]
 
 
 def flash_rates(plan: Plan) -> tuple[Rate, ...]:
@@ -34,17 +34,17 @@ def flash_rates(plan: Plan) -> tuple[Rate, ...]:
     )
 
 
-def flicker_warning(plan: Plan) -> str | None:
+def seizure_warning(plan: Plan) -> str | None:
     """Return the warning that people must read before the first flash; None where no rate is dangerous."""
     rates = flash_rates(plan)
     dangerous = [rate for rate in rates if rate.is_dangerous]
     if not dangerous:
         return None
-    higher = [rate for rate in rates if rate.hz > FLICKER_HZ[1]]
+    higher = [rate for rate in rates if rate.hz > SEIZURE_HZ[1]]
     above = f" Higher, and seen less: {_list(higher)}." if higher else ""
     return (
-        f"FLASHING LIGHT, dangerous for photosensitive people: {_list(dangerous)}, between {FLICKER_HZ[0]:g} and "
-        f"{FLICKER_HZ[1]:g} Hz.{above} It can cause seizures in people who do not know that they are photosensitive. "
+        f"FLASHING LIGHT, dangerous for photosensitive people: {_list(dangerous)}, between {SEIZURE_HZ[0]:g} and "
+        f"{SEIZURE_HZ[1]:g} Hz.{above} It can cause seizures in people who do not know that they are photosensitive. "
         "Warn everybody in the room, let no photosensitive person stay, and look away from the lights. Ctrl-C, or "
         "pulling the board's cable, makes it dark."
     )

@@ -136,7 +136,7 @@ def _film(stage: Stage, folder: Path, out: Path, track: Track, trace: TraceOptio
         truth.plate,
         frames=track(kept),
         ambient_of=stage.ambient(),
-        flicker=MainsSwing(hz=scene.ambient.flicker_hz, depth=scene.ambient.flicker_depth),
+        mains=MainsSwing(hz=scene.ambient.flicker_hz, depth=scene.ambient.flicker_depth),
         channels=scene.camera.channels,
     )
     clipped = [_record(stage, folder, n, image) for n, image in zip(kept, light, strict=True)]

@@ -38,7 +38,7 @@ compression or scaling has blurred: flashes are moved for it only where that tak
 (H.264 makes up 0.02 to 0.05 of it, tails of a row 0.1 to 0.5)."""
 MOST_WINDOWS = 400
 MAINS_HZ = (100.0, 120.0)
-FLICKERS = 0.8
+MAINS_EXPLAINS = 0.8
 """Flicker is believed where it leaves less than this share of the squares that are left without it, and less than this
 share of what frequencies that mains do not have leave: where many rows saturate, anything that swings explains much."""
 OTHER_SWINGS = (-2.5, -1.5, 1.5, 2.5)
@@ -85,7 +85,7 @@ def find(plan: Plan, rows: Profiles, *, measured: tuple[str, ...] = ()) -> ClipF
         doubt=None if rows.doubt is None else np.ascontiguousarray(rows.doubt[keep]),
     ).windowed(window)
     free = measured if plan.camera.readout_s is not None else ("row_time_s", *measured)
-    fit = _with_flicker(plan, fine, _fit(plan, fine, tracked.beat, free), free)
+    fit = _with_mains(plan, fine, _fit(plan, fine, tracked.beat, free), free)
     fine, fit, apart_s = _in_short_windows(plan, fine, fit, free)
     freed, unsure_s, soft_s = _believed(plan, fine, fit, free)
     if freed.errors_s:
@@ -225,7 +225,7 @@ def _may_differ(plan: Plan) -> tuple[str, ...]:
     return names if plan.camera.readout_s != 0 else tuple(name for name in names if name != "row_time_s")
 
 
-def _with_flicker(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> Fit:
+def _with_mains(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> Fit:
     """Try ambient light that flickers with the mains, and keep it where it explains much of what is left."""
 
     def left(hz: float) -> float:
@@ -234,9 +234,9 @@ def _with_flicker(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -
 
     hz = min(MAINS_HZ, key=left)
     least = left(hz)
-    if least > FLICKERS * fit.loss:
+    if least > MAINS_EXPLAINS * fit.loss:
         return fit
     window_s = float(np.median(np.diff(rows.ends_s)))
-    if least > FLICKERS * float(np.median([left(hz + swings / window_s) for swings in OTHER_SWINGS])):
+    if least > MAINS_EXPLAINS * float(np.median([left(hz + swings / window_s) for swings in OTHER_SWINGS])):
         return fit
     return _fit(plan, rows, replace(fit.beat, beat_hz=(hz,)), free)

@@ -35,7 +35,7 @@ def expose(
     frames: int,
     clock: TrueClock | None = None,
     ambient: Image | float = 0.0,
-    flicker: MainsSwing | None = None,
+    mains: MainsSwing | None = None,
     noise: Noise = NOISELESS,
     bits: int = 0,
     dropped: Sequence[int] = (),
@@ -73,7 +73,7 @@ def expose(
         plate_of,
         frames=kept,
         ambient_of=(lambda _: steady) if np.any(steady) else None,
-        flicker=flicker,
+        mains=mains,
         channels=shape[2] if len(shape) == 3 else 0,
     )
     gains = np.ones(frames) if gain is None else np.asarray(gain, np.float64)

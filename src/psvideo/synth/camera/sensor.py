@@ -26,7 +26,7 @@ class MainsSwing:
     depth: float = 0.0
 
     def mean(self, opens_s: FloatArray, exposure_s: float) -> FloatArray:
-        """Return each row's mean ambient level over its exposure, 1 without flicker."""
+        """Return each row's mean ambient level over its exposure, 1 without mains."""
         if self.hz <= 0 or self.depth == 0:
             return np.ones_like(opens_s)
         turn = 2 * np.pi * self.hz
@@ -47,7 +47,7 @@ def expose_frames(
     *,
     frames: Iterable[int],
     ambient_of: Callable[[int], Image] | None = None,
-    flicker: MainsSwing | None = None,
+    mains: MainsSwing | None = None,
     channels: int = 0,
 ) -> Iterator[Image]:
     """Yield what the sensor collects in each frame, linear, 1.0 = saturation, not yet clipped and without noise.
@@ -75,7 +75,7 @@ def expose_frames(
         live = [(flash, plate) for flash, plate in live if flash.start_s + emission.lasts_s(flash.duration_s) > begin_s]
         image = np.zeros(shape, np.float32)
         if ambient_of is not None:
-            level = (flicker or MainsSwing()).mean(begin_s + opens_s, camera.exposure_s)
+            level = (mains or MainsSwing()).mean(begin_s + opens_s, camera.exposure_s)
             image += _per_row(level, shape) * ambient_of(frame)
         for flash, plate in live:
             _collect(image, plate, seen_share(camera, emission, flash, frame))

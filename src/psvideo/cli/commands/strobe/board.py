@@ -121,12 +121,12 @@ def _check_table(voice: Voice, plan: Plan, path: Path, wanted: WiringName | None
 def _print_program(voice: Voice, plan: Plan, program: Program, caps: Capabilities) -> list[str]:
     """Describe a program, and return what to beware of."""
     from psvideo.strobe.program_words import describe_program, program_cautions
-    from psvideo.strobe.seizures import flicker_warning
+    from psvideo.strobe.seizures import seizure_warning
 
     for line in describe_program(program, caps):
         voice.say(line)
-    flicker = flicker_warning(program.played)
-    warnings = [*program_cautions(plan, program, caps), *([flicker] if flicker else [])]
+    seizures = seizure_warning(program.played)
+    warnings = [*program_cautions(plan, program, caps), *([seizures] if seizures else [])]
     for warning in warnings:
         voice.warn(warning)
     return warnings
@@ -204,9 +204,9 @@ def _confirm(voice: Voice, plan: Plan, path: Path, *, yes: bool, emulated: bool)
     """Warn of the flashing before the first flash, and have it confirmed once for each plan."""
     from psvideo.strobe.confirmed import is_confirmed, remember, state_folder
     from psvideo.strobe.runlog import plan_sha256
-    from psvideo.strobe.seizures import flicker_warning
+    from psvideo.strobe.seizures import seizure_warning
 
-    warning = flicker_warning(plan) if plan.mode != "synced" else None
+    warning = seizure_warning(plan) if plan.mode != "synced" else None
     if warning is None:
         return
     sha256, folder = plan_sha256(path), state_folder()
