@@ -123,7 +123,7 @@ class Steadiness:
 
 
 def steadiness_of(instants: Sequence[InstantFacts]) -> Steadiness | None:
-    """Return how steady the results of a clip are at rest; None where there are no two results in turn with anything at rest."""
+    """Return how steady a clip's results are; None where there are no two results in turn with anything at rest."""
     known = by_level(instants)
     if not known:
         return None
