@@ -5,18 +5,31 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test blender check bench docs clean
+.PHONY: demo test campaigns test-all coverage checks blender bench docs clean
 
 demo: $(VENV)/.installed
 	$(BIN)/psvideo demo --force
 
-test: $(VENV)/.installed-test
+PYTEST = $(BIN)/python -m pytest -n auto --dist worksteal --durations 15
+
+# The suite without its campaigns; the campaigns (errors over many seeds, long grids: minutes each); both
+test: checks
+	$(PYTEST) -m "not campaign"
+
+campaigns: $(VENV)/.installed-test
+	$(PYTEST) -m campaign
+
+test-all: test campaigns
+
+coverage: checks
+	$(PYTEST) -m "not campaign" --cov --cov-report term:skip-covered --cov-report html
+
+checks: $(VENV)/.installed-test
 	@lights/emulator/install.sh || echo "Going on; the tests of the strobe's firmware will fail." >&2
 	@tests/install.sh || echo "Going on; the tests of the page in a browser will fail." >&2
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/python -m pytest -n auto --dist worksteal --durations 15
 
 # Blender fits one version of Python (bpy 5.0: 3.11; 5.1 and newer: 3.13) and takes about 1 GB: an environment of its own
 blender: $(VENV)/.installed-test .venv-blender/.installed

@@ -23,7 +23,7 @@ BLACK_12_BIT = 256
 def as_h264(folder: Path, plan: Plan, frames: np.ndarray) -> list[Frame]:
     """An 8-bit sRGB movie, 4:2:0 in video range."""
     write_h264(folder / "clip.mp4", plan, frames)
-    return _read(folder / "clip.mp4", folder, plan)
+    return read_back(folder / "clip.mp4", plan)
 
 
 def write_h264(
@@ -57,7 +57,7 @@ def as_slog3(folder: Path, plan: Plan, frames: np.ndarray) -> list[Frame]:
     for number, picture in enumerate(frames):
         coded = np.repeat(codes.from_light(picture)[..., None], 3, axis=2)
         (folder / f"frame.{number:05d}.dpx").write_bytes(dpx_bytes(coded, 10))
-    return _read(folder, folder, plan)
+    return read_back(folder, plan)
 
 
 def as_bayer(folder: Path, plan: Plan, frames: np.ndarray) -> list[Frame]:
@@ -71,9 +71,11 @@ def as_bayer(folder: Path, plan: Plan, frames: np.ndarray) -> list[Frame]:
         write_frame(
             folder / f"frame.{number:05d}.dng", codes.from_light(picture), kind="dng", camera=camera, scale=codes
         )
-    return _read(folder, folder, plan)
+    return read_back(folder, plan)
 
 
-def _read(path: Path, folder: Path, plan: Plan) -> list[Frame]:
+def read_back(path: Path, plan: Plan) -> list[Frame]:
+    """Write a clip's plan beside it and return its frames as psvideo reads them."""
+    folder = path if path.is_dir() else path.parent
     (folder / "plan.toml").write_text(format_plan(plan), encoding="utf-8")
     return list(read_frames(open_clip(path)))

@@ -268,28 +268,41 @@ def test_hidden_files_and_other_folders_are_no_takes(tmp_path: Path) -> None:
     assert takes_in(tmp_path) == {}
 
 
+def heeds_ctrl_c() -> None:
+    """Shells start what runs in the background deaf to Ctrl-C, and children inherit that."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def test_watching_reports_every_take_and_ends_well_with_ctrl_c(shot: Callable[[str], Path], tmp_path: Path) -> None:
     folder, page = tmp_path / "takes", tmp_path / "checks.html"
     folder.mkdir()
     command = [sys.executable, "-m", "psvideo.cli.app", "check", "--watch", str(folder), "--interval", "0.2"]
-    watching = subprocess.Popen(
-        [*command, "--report", str(page)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, bufsize=1
-    )
-    assert watching.stdout is not None
-    assert "Ctrl-C ends" in watching.stdout.readline()
-    time.sleep(0.5)  # its first look must come before the takes
-    shutil.copytree(shot("good"), folder / "good")
-    add_frames(folder / "broken", 1, 30)
-    said = ""
-    while not ("good: This take" in said and "broken: cannot" in said):
-        line = watching.stdout.readline()
-        assert line, said
-        said += line
-    until = time.monotonic() + 60
-    while time.monotonic() < until and not (page.is_file() and page.read_text().count('class="verdict') == 2):
-        time.sleep(0.1)
-    watching.send_signal(signal.SIGINT)
-    rest, _ = watching.communicate(timeout=120)
+    command.append("--existing")  # its first look may come late
+    with subprocess.Popen(
+        [*command, "--report", str(page)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        bufsize=1,
+        preexec_fn=heeds_ctrl_c,
+    ) as watching:
+        try:
+            assert watching.stdout is not None
+            assert "Ctrl-C ends" in watching.stdout.readline()
+            shutil.copytree(shot("good"), folder / "good")
+            add_frames(folder / "broken", 1, 30)
+            said = ""
+            while not ("good: This take" in said and "broken: cannot" in said):
+                line = watching.stdout.readline()
+                assert line, said
+                said += line
+            until = time.monotonic() + 120
+            while time.monotonic() < until and not (page.is_file() and page.read_text().count('class="verdict') == 2):
+                time.sleep(0.1)
+            watching.send_signal(signal.SIGINT)
+            rest, _ = watching.communicate(timeout=120)
+        finally:
+            watching.kill()
     assert watching.returncode == 0
     assert "2 take(s) checked: 1 usable, 0 not, 1 could not be read." in rest
     assert re.search(r"good: This take is usable\.", said)

@@ -4,16 +4,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.bend import LEAST_WINDOWS, bend
 from psvideo.sync.rowfit.course import followed, window_frames
-from psvideo.sync.rowfit.jitter import Jitter, jitter, shift_error_s
+from psvideo.sync.rowfit.jitter import STEADY, Jitter, disagreement_s, jitter, shift_error_s
 from psvideo.sync.rowfit.plateau import centred
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import Fit, clearest, explained, refine, robust_loss, scaled
 from psvideo.sync.rowfit.seed import find_seed, gain_of
+from psvideo.sync.rowfit.softness import BELIEVED, BLURRED, cleared, misfit
 from psvideo.sync.rowfit.track import FrameTrack
 
 TRACK_ROWS = 60
@@ -32,10 +32,7 @@ STILL, PLAIN = 0.95, 0.3
 value must take away this share of what is left; else it is as likely that the subject feigns it."""
 SURER = 0.8
 """Share of the standard error that must be left before brightnesses are fitted again in windows half as long."""
-SOFT_ROWS, ALIKE, SOFT_GAIN = 1.5, 1.5, 0.08
-"""Edges soft by less than so many rows, alike (within a factor) at a flash's start and end, may also be rows that
-compression or scaling has blurred: flashes are moved for it only where that takes away such a share of the robust loss
-(H.264 makes up 0.02 to 0.05 of it, tails of a row 0.1 to 0.5)."""
+TAILS = {"rise_s", "fall_s"}
 MOST_WINDOWS = 400
 MAINS_HZ = (100.0, 120.0)
 MAINS_EXPLAINS = 0.8
@@ -90,10 +87,12 @@ def find(plan: Plan, rows: Profiles, *, measured: tuple[str, ...] = ()) -> ClipF
     freed, unsure_s, soft_s = _believed(plan, fine, fit, free)
     if freed.errors_s:
         freed, apart_s = _with_window_errors(plan, fine, freed)
-        apart_s = float(np.hypot(unsure_s, apart_s))
+    apart_s = float(np.hypot(unsure_s, apart_s))
     fit, slack_s = centred(plan, fine, freed)
     stray = jitter(plan, fine, fit)
     known_s = max(fit.shift_error_s, shift_error_s(plan, fine, fit), slack_s)
+    if stray is STEADY:
+        known_s = float(np.hypot(known_s * misfit(plan, fine, fit), disagreement_s(plan, fine, fit)))
     error_s = float(np.sqrt(known_s**2 + stray.error_s**2 + apart_s**2))
     fit = replace(fit, shift_error_s=error_s)
     return ClipFit(
@@ -122,7 +121,7 @@ def _in_short_windows(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...
     """
     short = rows.windowed(max(window_frames(plan) // 2, len(rows.value) // MOST_WINDOWS))
     other = _fit(plan, short, fit.beat, free)
-    apart_s = float(np.sqrt(np.mean(_apart_s(rows, fit.beat, other.beat) ** 2)))
+    apart_s = _rms_apart_s(rows, fit.beat, other.beat)
     taken, better = (short, other) if other.shift_error_s < SURER * fit.shift_error_s else (rows, fit)
     return taken, better, apart_s
 
@@ -138,34 +137,37 @@ def _with_window_errors(plan: Plan, rows: Profiles, fit: Fit) -> tuple[Fit, floa
         name: float(np.hypot(error_s, getattr(other.beat, name) - getattr(fit.beat, name)))
         for name, error_s in fit.errors_s.items()
     }
-    return replace(fit, errors_s=errors_s), float(np.sqrt(np.mean(_apart_s(rows, fit.beat, other.beat) ** 2)))
+    return replace(fit, errors_s=errors_s), _rms_apart_s(rows, fit.beat, other.beat)
 
 
-def _apart_s(rows: Profiles, one: Beat, other: Beat) -> FloatArray:
-    """Return how far two clocks are apart at the windows' ends, shape (window + 1,)."""
+def _rms_apart_s(rows: Profiles, one: Beat, other: Beat) -> float:
+    """Return how far two clocks are apart at the windows' ends."""
     strobe_s = (rows.ends_s - one.clock.phase_s) / one.clock.rate
     straight_s = other.clock.phase_s + strobe_s * other.clock.rate
-    apart_s: FloatArray = straight_s + other.clock.bend(straight_s) - rows.ends_s - one.clock.bend(rows.ends_s)
-    return apart_s
+    apart_s = straight_s + other.clock.bend(straight_s) - rows.ends_s - one.clock.bend(rows.ends_s)
+    return float(np.sqrt(np.mean(apart_s**2)))
 
 
 def _believed(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> tuple[Fit, float, float]:
-    """Free what the picture contradicts, but tails only where blurred rows do not look the same.
+    """Free what the picture contradicts, but only where blurred rows do not look the same.
 
     Return too how unsure the times are for it, and how soft the edges are where that was not taken for tails. A tail
     moves the start of its flash by as much as it is long, a blur does not: where both would do, a wrong tail is worse.
     """
     names = _may_differ(plan)
     freed, unsure_s = _freed(plan, rows, fit, free, names)
-    short_s, long_s = sorted((freed.beat.rise_s, freed.beat.fall_s))
-    given = plan.rise_s > 0 or plan.fall_s > 0
-    if given or short_s == 0 or long_s > min(ALIKE * short_s, SOFT_ROWS * freed.beat.row_time_s):
-        return freed, unsure_s, 0.0
-    before = robust_loss(rows, fit.rest, fit.rest)
-    if before - robust_loss(rows, freed.rest, fit.rest) > SOFT_GAIN * before:
-        return freed, unsure_s, 0.0
-    others = tuple(name for name in names if name not in ("rise_s", "fall_s"))
-    return *_freed(plan, rows, fit, free, others), long_s
+    soft_s = 0.0
+    if TAILS & set(freed.errors_s) and not (plan.rise_s > 0 or plan.fall_s > 0):
+        without, without_s = _freed(plan, rows, fit, free, tuple(name for name in names if name not in TAILS))
+        share = cleared(plan, rows, without, freed)
+        if share < BELIEVED:
+            soft_s = max(freed.beat.rise_s, freed.beat.fall_s)
+            freed, unsure_s = without, float(np.hypot(without_s, BLURRED * soft_s))
+        else:
+            unsure_s = float(np.hypot(unsure_s, (1 - share) * _rms_apart_s(rows, without.beat, freed.beat)))
+    if set(freed.errors_s) > set(free) and cleared(plan, rows, fit, freed) < BELIEVED:
+        return fit, BLURRED * soft_s, soft_s
+    return freed, unsure_s, soft_s
 
 
 def _freed(
@@ -192,8 +194,7 @@ def _freed(
             refused.add(name)
             continue
         if gain < PLAIN * before and gain_of(rows, tried.rest) < STILL:
-            apart_s = float(np.sqrt(np.mean(_apart_s(rows, fit.beat, tried.beat) ** 2)))
-            unsure_s = float(np.hypot(unsure_s, apart_s / np.sqrt(2)))
+            unsure_s = float(np.hypot(unsure_s, _rms_apart_s(rows, fit.beat, tried.beat) / np.sqrt(2)))
             wider_s[name] = off_s / np.sqrt(2)
         fit, free = tried, (*free, name)
 

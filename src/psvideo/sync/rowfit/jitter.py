@@ -19,6 +19,8 @@ from psvideo.sync.rowfit.refine import CAUCHY, WIDE_SCALE, Fit, scaled
 LEAST_FLASHES = 12
 SURE = 5.0
 """Standard errors by which openings and closings must agree before single flashes are moved."""
+CHANCE = 2.0
+"""Standard errors by which openings and closings may disagree by chance."""
 ROW_BLOCKS = 8
 """Blocks of rows whose errors are taken as independent."""
 
@@ -46,11 +48,7 @@ STEADY = Jitter(start_s=np.empty(0), late_s=np.empty(0), error_s=0.0)
 
 def jitter(plan: Plan, rows: Profiles, fit: Fit) -> Jitter:
     """Return how single flashes stray from the clock; none at all where openings and closings do not agree on it."""
-    seen, flashes = compiled_rows(rows, fit.beat), compiled_flashes(plan, rows, fit.beat)
-    pull, stiff = np.zeros((len(flashes.start_s), 2)), np.zeros((len(flashes.start_s), 2))
-    scale = scaled(rows, fit.rest, WIDE_SCALE)
-    weight = 1.0 / (1.0 + (fit.rest / (CAUCHY * scale)) ** 2) / scale**2
-    kernel.edges(seen, flashes, weight, 0, rows.value.shape[1], pull, stiff)
+    flashes, pull, stiff = _pulls(plan, rows, fit)
     seen_at_all = stiff[stiff > 0]
     enough = 0.1 * float(np.median(seen_at_all)) if len(seen_at_all) else 1.0
     timed = np.logical_and(stiff[:, 0] > enough, stiff[:, 1] > enough)
@@ -72,6 +70,29 @@ def jitter(plan: Plan, rows: Profiles, fit: Fit) -> Jitter:
         late_s=share * apart.mean(axis=1),
         error_s=float(np.sqrt((1 - untimed) * share * noise + untimed * common)),
     )
+
+
+def _pulls(plan: Plan, rows: Profiles, fit: Fit) -> tuple[kernel.Flashes, FloatArray, FloatArray]:
+    """Return the flashes and how strongly rows that open and rows that close shift each, shape (flash, 2) twice."""
+    seen, flashes = compiled_rows(rows, fit.beat), compiled_flashes(plan, rows, fit.beat)
+    pull, stiff = np.zeros((len(flashes.start_s), 2)), np.zeros((len(flashes.start_s), 2))
+    scale = scaled(rows, fit.rest, WIDE_SCALE)
+    weight = 1.0 / (1.0 + (fit.rest / (CAUCHY * scale)) ** 2) / scale**2
+    kernel.edges(seen, flashes, weight, 0, rows.value.shape[1], pull, stiff)
+    return flashes, pull, stiff
+
+
+def disagreement_s(plan: Plan, rows: Profiles, fit: Fit) -> float:
+    """Return by how much rows that open and rows that close disagree on the flashes' times, beyond chance.
+
+    Half their distance is as large as the standard error where noise is all that parts them; blurred rows part them
+    further, and that much the times are in doubt.
+    """
+    _, pull, stiff = _pulls(plan, rows, fit)
+    if stiff.sum(axis=0).min() <= 0.0:
+        return 0.0
+    opening_s, closing_s = pull.sum(axis=0) / stiff.sum(axis=0)
+    return float(np.sqrt(max((0.5 * (opening_s - closing_s)) ** 2 - (CHANCE * fit.shift_error_s) ** 2, 0.0)))
 
 
 def shift_error_s(plan: Plan, rows: Profiles, fit: Fit) -> float:

@@ -1,0 +1,63 @@
+"""Edges in the picture that are softer than the plan's: times that are otherwise, or rows that compression blurs.
+
+A time that truly is otherwise (LEDs that rise and fall slowly, another exposure) leaves no more at the flashes' edges
+than elsewhere once it is right. Compression and scaling blur edges too, but not in the way of any time: a fit that
+takes them for one removes a small part of what the edges leave (``bench/compression.py`` measures how much).
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.model.camera import FloatArray
+from psvideo.model.plan import Plan
+from psvideo.sync.rowfit.beat import Beat
+from psvideo.sync.rowfit.profiles import Profiles, brightnesses, predictions
+from psvideo.sync.rowfit.refine import CAUCHY, Fit, scaled
+
+NEAR_ROWS = 1.0
+"""Samples that tails of so many rows would change lie at an edge,"""
+CHANGED = 0.02
+"""where they would change by more than this share of what the row sees at most."""
+BELIEVED = 0.4
+"""A time is believed where it takes away this share of what the edges leave: H.264 at any rate feigned 0.25 at most,
+tails and exposures gave 0.98 to 1.02 uncompressed, and through H.264 0.3 to 0.8."""
+BLURRED = 0.05
+"""Edges that are blurred put the times in doubt by this share of how soft they are."""
+OUTLIER = 6.0
+"""Residuals count as no more standard deviations than this."""
+FEW = 50
+"""Fewer samples at edges, or elsewhere, tell nothing."""
+
+
+def at_edges(plan: Plan, rows: Profiles, beat: Beat) -> NDArray[np.bool_]:
+    """Return which samples (frame, row) soft edges would change."""
+    brightness = brightnesses(plan, rows.one_window(), beat)
+    plain = predictions(plan, rows, beat, brightness)
+    more_s = NEAR_ROWS * (beat.row_time_s or rows.period_s / len(rows.place))
+    softer = replace(beat, rise_s=beat.rise_s + more_s, fall_s=beat.fall_s + more_s)
+    change = np.abs(predictions(plan, rows, softer, brightness) - plain)
+    near: NDArray[np.bool_] = change > CHANGED * np.ptp(plain, axis=0)
+    return near
+
+
+def cleared(plan: Plan, rows: Profiles, before: Fit, after: Fit) -> float:
+    """Return which share of what one fit leaves at edges, beyond what is left elsewhere, another fit takes away."""
+    edges = at_edges(plan, rows, before.beat) | at_edges(plan, rows, after.beat)
+    if min(edges.sum(), (~edges).sum()) < FEW:
+        return 1.0
+    scale = CAUCHY * scaled(rows, before.rest, 0.0)
+    first, last = (np.log1p((rest / scale) ** 2) for rest in (before.rest, after.rest))
+    excess = float(first[edges].mean() - last[~edges].mean())
+    gain = float(first[edges].mean() - last[edges].mean())
+    return 1.0 if excess <= gain else max(gain / excess, 0.0)
+
+
+def misfit(plan: Plan, rows: Profiles, fit: Fit) -> float:
+    """Return how many times larger residuals at edges are than elsewhere, 1 or more."""
+    edges = at_edges(plan, rows, fit.beat)
+    if min(edges.sum(), (~edges).sum()) < FEW:
+        return 1.0
+    squares: FloatArray = np.minimum((fit.rest / scaled(rows, fit.rest, 0.0)) ** 2, OUTLIER**2)
+    return max(float(np.sqrt(squares[edges].mean() / max(squares[~edges].mean(), 1e-30))), 1.0)
