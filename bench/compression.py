@@ -21,7 +21,7 @@ from psvideo.errors import PsvideoError
 from psvideo.model.camera import Encoding
 from psvideo.model.row_profiles import collect_with_doubt
 from psvideo.sync.find import find_timing
-from psvideo.synth import Noise, StrobeClock, expose
+from psvideo.synth import Noise, TrueClock, expose
 
 TRIALS = 240
 ROWS, COLS, FRAMES = 160, 64, 150
@@ -82,7 +82,7 @@ def tried(trial: Trial) -> Outcome:
         {slot: (0.1 + 0.5 * rng.random((ROWS, COLS))).astype(np.float32) for slot in plan.lit_slots},
         plan,
         frames=FRAMES,
-        clock=StrobeClock(phase_s=rng.uniform(0, plan.cycle_s), offset_ppm=trial.offset_ppm),
+        clock=TrueClock(phase_s=rng.uniform(0, plan.cycle_s), offset_ppm=trial.offset_ppm),
         ambient=0.1,
         noise=Noise(full_well_e=20_000, read_e=8),
         seed=trial.seed,
