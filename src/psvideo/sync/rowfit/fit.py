@@ -13,7 +13,7 @@ from psvideo.sync.rowfit.plateau import centred
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import Fit, clearest, explained, refine, robust_loss, scaled
 from psvideo.sync.rowfit.seed import find_seed, gain_of
-from psvideo.sync.rowfit.softness import BELIEVED, BLURRED, cleared, misfit
+from psvideo.sync.rowfit.softness import BELIEVED, BLURRED, cleared, misfit, within_blur
 from psvideo.sync.rowfit.track import FrameTrack
 
 TRACK_ROWS = 60
@@ -165,7 +165,8 @@ def _believed(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> tu
             freed, unsure_s = without, float(np.hypot(without_s, BLURRED * soft_s))
         else:
             unsure_s = float(np.hypot(unsure_s, (1 - share) * _rms_apart_s(rows, without.beat, freed.beat)))
-    if set(freed.errors_s) > set(free) and cleared(plan, rows, fit, freed) < BELIEVED:
+    blurred = set(freed.errors_s) > set(free) and within_blur(rows, fit.beat, freed.beat)
+    if blurred and cleared(plan, rows, fit, freed) < BELIEVED:
         return fit, BLURRED * soft_s, soft_s
     return freed, unsure_s, soft_s
 

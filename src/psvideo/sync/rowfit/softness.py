@@ -25,6 +25,8 @@ BELIEVED = 0.4
 tails and exposures gave 0.98 to 1.02 uncompressed, and through H.264 0.3 to 0.8."""
 BLURRED = 0.05
 """Edges that are blurred put the times in doubt by this share of how soft they are."""
+REACHES_ROWS = 3.0
+"""A blur reaches so many rows: what differs by more is no blur."""
 OUTLIER = 6.0
 """Residuals count as no more standard deviations than this."""
 FEW = 50
@@ -52,6 +54,13 @@ def cleared(plan: Plan, rows: Profiles, before: Fit, after: Fit) -> float:
     excess = float(first[edges].mean() - last[~edges].mean())
     gain = float(first[edges].mean() - last[edges].mean())
     return 1.0 if excess <= gain else max(gain / excess, 0.0)
+
+
+def within_blur(rows: Profiles, one: Beat, other: Beat) -> bool:
+    """Report whether two shutters differ by so little that a blur could be taken for the difference."""
+    exposure_s = abs(other.exposure_s - one.exposure_s)
+    readout_s = abs(other.row_time_s - one.row_time_s) * float(rows.place.max())
+    return max(exposure_s, readout_s) < REACHES_ROWS * one.row_time_s
 
 
 def misfit(plan: Plan, rows: Profiles, fit: Fit) -> float:
