@@ -30,7 +30,7 @@ def picture_of(quantity: str, image: NDArray[np.generic], *, exposure: float | N
     Returns
     -------
     numpy.ndarray
-        Shape (row, col, 3), uint8, R, G, B.
+        Shape (row, col, 3), uint8, R, G, B; Pillow's ``Image.fromarray(...).save("name.png")`` writes it.
 
     Raises
     ------
