@@ -10,6 +10,7 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -105,7 +106,7 @@ def tried(trial: Trial) -> Outcome:
 
 def outcomes(seeds: Sequence[int], *, workers: int | None = None) -> Iterator[Outcome]:
     """Try every seed, in processes."""
-    with ProcessPoolExecutor(workers) as pool:
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
         yield from pool.map(tried, map(trial_of, seeds))
 
 

@@ -76,6 +76,7 @@ def test_gloss_and_saturation_are_weighed_out_of_a_matte_sphere() -> None:
     np.testing.assert_allclose([light.intensity for light in found], 1.0, rtol=0.01)
 
 
+@pytest.mark.campaign
 def test_a_wrong_outline_costs_what_the_standard_error_says() -> None:
     directions, strengths = ways(6), np.ones((6, 3))
     pictures = sphere_pictures(directions, strengths)

@@ -152,6 +152,7 @@ def test_the_period_is_found_for_any_duty_exposure_curve_and_noise(kind: dict[st
     assert found.readout_s == pytest.approx(true_s, rel=0.0015)
 
 
+@pytest.mark.campaign
 def test_claimed_errors_are_the_errors_that_are_made() -> None:
     off = []
     for seed in range(40):

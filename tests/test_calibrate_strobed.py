@@ -54,6 +54,7 @@ def test_the_readout_is_found_to_its_own_error_with_its_sign(share: float, make_
     assert found.frame_share == pytest.approx(abs(share), abs=3 * found.frame_share_error)
 
 
+@pytest.mark.campaign
 def test_claimed_errors_are_those_that_are_made(make_plan: PlanMaker) -> None:
     plan = make_plan(readout=0.6, height_px=80)
     assert plan.camera.readout_s is not None

@@ -105,6 +105,7 @@ def test_plates_show_every_light_and_the_ambient_last(shoot: Path) -> None:
     assert {entry["family"] for entry in index_of(show)["sequences"]} == {"camera"}  # type: ignore[attr-defined]
 
 
+@pytest.mark.campaign
 def test_the_pictures_of_the_documentation_can_be_taken(shoot: Path, tmp_path: Path) -> None:
     """In a process of its own: a browser may be open in this one."""
     call = [sys.executable, "-m", "bench.view_pictures", str(shoot), str(tmp_path)]

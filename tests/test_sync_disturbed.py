@@ -401,7 +401,12 @@ def test_a_dark_time_shorter_than_the_exposure_is_said(plan: Plan) -> None:
 
 
 @pytest.mark.parametrize(
-    ("factor", "words"), [(0.55, "flashes mixed"), (0.9, "taking many frames for missing"), (1.4, "and not every")]
+    ("factor", "words"),
+    [
+        (0.55, "flashes mixed"),
+        pytest.param(0.9, "taking many frames for missing", marks=pytest.mark.campaign),
+        pytest.param(1.4, "and not every", marks=pytest.mark.campaign),
+    ],
 )
 def test_a_strobe_that_flashes_at_another_rate_is_not_timed_but_told(factor: float, words: str, plan: Plan) -> None:
     shot = shoot(replace(plan, dark_s=factor * plan.dark_s), frames=96)

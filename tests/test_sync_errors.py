@@ -36,7 +36,9 @@ KINDS = {
 }
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    "kind", [kind if kind == "clean" else pytest.param(kind, marks=pytest.mark.campaign) for kind in KINDS]
+)
 def test_errors_made_are_those_that_are_claimed(kind: str, make_plan: PlanMaker) -> None:
     options, noise, unknown = KINDS[kind]
     plan = make_plan(height_px=ROWS, width_px=COLUMNS, **options)

@@ -44,7 +44,9 @@ def with_camera(plan: Plan, **changes: object) -> Plan:
     return replace(plan, camera=replace(plan.camera, **changes))  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(("true", "planned"), [(0.5, 1.0), (1.0, 0.5), (0.25, 0.5)])
+@pytest.mark.parametrize(
+    ("true", "planned"), [pytest.param(0.5, 1.0, marks=pytest.mark.campaign), (1.0, 0.5), (0.25, 0.5)]
+)
 def test_a_shutter_wrong_by_a_factor_is_found_and_named(true: float, planned: float, plan: Plan) -> None:
     period_s = plan.camera.frame_period_s
     film = with_camera(plan, exposure_s=true * period_s)
@@ -76,7 +78,7 @@ def test_shutter_and_direction_both_wrong_are_found(plan: Plan) -> None:
     assert timing.row_time_s < 0
 
 
-@pytest.mark.parametrize("factor", [0.5, 2.0])
+@pytest.mark.parametrize("factor", [pytest.param(0.5, marks=pytest.mark.campaign), 2.0])
 def test_durations_halved_or_doubled_are_named(factor: float, plan: Plan) -> None:
     flashes = tuple(replace(flash, duration_s=factor * flash.duration_s) for flash in plan.flashes)
     kept_s = plan.dark_s - (factor - 1) * plan.flashes[0].duration_s
@@ -84,7 +86,7 @@ def test_durations_halved_or_doubled_are_named(factor: float, plan: Plan) -> Non
         timing_of(replace(plan, flashes=flashes, dark_s=kept_s), filmed(plan))
 
 
-@pytest.mark.parametrize(("true", "planned"), [(24, 25), (60, 120)])
+@pytest.mark.parametrize(("true", "planned"), [pytest.param(24, 25, marks=pytest.mark.campaign), (60, 120)])
 def test_a_frame_rate_mixed_up_is_named(true: int, planned: int, make_plan: PlanMaker) -> None:
     film = make_plan(height_px=ROWS, width_px=COLUMNS, fps=Fraction(true), duration_s=0.003)
     angle = film.camera.exposure_s * true / planned
