@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.camera import FloatArray
-from psvideo.model.plan import Plan, reference_duration_s
+from psvideo.model.intensity import measured_duration_s
+from psvideo.model.plan import Plan
 from psvideo.model.rig import Light, Rig
 
 
@@ -37,7 +38,7 @@ def light_vectors(plan: Plan, rig: Rig, points: Points) -> FloatArray:
     middle_m = points_on_plane(plan, rig, down=np.array([0.5]), across=np.array([0.5]))[0] if near else None
     of_light = {}
     for light in lights:
-        per_s = _strength(light, points) / (light.reference_duration_s or reference_duration_s(plan, light.name))
+        per_s = _strength(light, points) / measured_duration_s(light, plan)
         of_light[light.name] = per_s[:, None] * _field(light, points_m, middle_m)
     slots = []
     for slot in plan.lit_slots:

@@ -16,10 +16,10 @@ from psvideo.formats.flat_toml import read_falloff
 from psvideo.formats.rig_toml import read_rig
 from psvideo.model.choices import NEAR_ITERATIONS
 from psvideo.model.falloff import Falloff
+from psvideo.model.intensity import lights_as_planned
 from psvideo.model.rig import Light, Rig
 from psvideo.plates.sequence import check_separable
 from psvideo.solve.depth import Shaping, view_of
-from psvideo.solve.instants import lights_as_planned
 from psvideo.solve.near_surface import NearSurface, near_surface_of, near_trust
 from psvideo.solve.normals.illumination import illumination
 

@@ -8,12 +8,13 @@ from numpy.typing import NDArray
 from psvideo.clip import Take
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.model.choices import NEAR_ITERATIONS, Align, Solver
+from psvideo.model.intensity import lights_as_planned
 from psvideo.model.rig import Rig
 from psvideo.model.timing import Timing
 from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.gather import gather
 from psvideo.plates.naming import named_by_rig
-from psvideo.solve.instants import Instant, lights_as_planned, surfaces
+from psvideo.solve.instants import Instant, surfaces
 from psvideo.solve.near_surface import near_surface_of
 from psvideo.solve.normals.solving import Solving
 from psvideo.sync.take_timing import find_take_timing
