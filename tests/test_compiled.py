@@ -133,8 +133,8 @@ for module in pkgutil.walk_packages(psvideo.__path__, "psvideo."):
     if module.name not in ("psvideo.cli.app", "psvideo.__main__"):
         importlib.import_module(module.name)
 from psvideo.cli.app import main
-from psvideo.sync.rowfit import kernel
-assert kernel.width._cache.cache_path is None, "nothing is kept"
+from psvideo.sync.rowfit import row_model
+assert row_model.width._cache.cache_path is None, "nothing is kept"
 scene, clip, out = sys.argv[1:]
 assert main(["synth", scene, "-o", clip, "-q"]) == 0
 assert main(["normals", clip, "--rig", clip + "/rig.toml", "-o", out, "-q"]) == 0

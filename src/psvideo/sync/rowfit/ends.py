@@ -11,8 +11,8 @@ import numpy as np
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
-from psvideo.sync.rowfit.kernel import IntArray
 from psvideo.sync.rowfit.profiles import Profiles, brightnesses
+from psvideo.sync.rowfit.row_model import IntArray
 from psvideo.sync.rowfit.track import MEMORY, MOST, SUSPICIOUS, losses_of
 
 AT_END = 2

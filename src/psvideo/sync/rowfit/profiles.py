@@ -8,9 +8,9 @@ from psvideo.compute.threads import over_ranges
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
-from psvideo.sync.rowfit import kernel
+from psvideo.sync.rowfit import kernel, row_model
 from psvideo.sync.rowfit.beat import Beat, train_between
-from psvideo.sync.rowfit.kernel import IntArray
+from psvideo.sync.rowfit.row_model import IntArray
 
 WORTH_A_THREAD = 40_000
 """Samples of one part of the work; with fewer, starting a thread costs more than it saves."""
@@ -114,9 +114,9 @@ def slot_unknowns(plan: Plan) -> IntArray:
     return number
 
 
-def compiled_rows(rows: Profiles, beat: Beat) -> kernel.Rows:
+def compiled_rows(rows: Profiles, beat: Beat) -> row_model.Rows:
     """Return the profiles as compiled code takes them."""
-    return kernel.Rows(
+    return row_model.Rows(
         rows.value,
         rows.frame_start_s,
         rows.place,
@@ -128,13 +128,13 @@ def compiled_rows(rows: Profiles, beat: Beat) -> kernel.Rows:
     )
 
 
-def compiled_flashes(plan: Plan, rows: Profiles, beat: Beat) -> kernel.Flashes:
+def compiled_flashes(plan: Plan, rows: Profiles, beat: Beat) -> row_model.Flashes:
     """Return the flashes that the profiles may show as compiled code takes them."""
     start_s = rows.frame_start_s
     until_s = float(start_s[-1] + rows.place.max() * beat.row_time_s + beat.exposure_s)
     train = train_between(plan, beat.clock, float(start_s[0]), until_s)
     unknown = slot_unknowns(plan)
-    return kernel.Flashes(
+    return row_model.Flashes(
         train.start_s, train.duration_s, unknown[train.slot], int(unknown.max()) + 1, beat.rise_s, beat.fall_s
     )
 
@@ -171,8 +171,8 @@ def equations(
     rest = np.empty_like(rows.value)
 
     def run(first: int, last: int) -> tuple[FloatArray, FloatArray]:
-        hessian = np.zeros((len(rows.window_start), kernel.SIGNALS, kernel.SIGNALS))
-        score = np.zeros((len(rows.value), kernel.SIGNALS))
+        hessian = np.zeros((len(rows.window_start), row_model.SIGNALS, row_model.SIGNALS))
+        score = np.zeros((len(rows.value), row_model.SIGNALS))
         kernel.equations(seen, flashes, weight, growth, tails, honest, first, last, rest, hessian, score)
         return hessian, score
 
@@ -195,7 +195,7 @@ def predictions(plan: Plan, rows: Profiles, beat: Beat, brightness: FloatArray) 
     """Return the profiles (frame, row) that known brightnesses (row, unknown) give at the times of ``rows``."""
     found = np.empty_like(rows.value)
     seen, flashes = compiled_rows(rows, beat), compiled_flashes(plan, rows, beat)
-    kernel.predictions(seen, flashes, brightness, 0, rows.value.shape[1], found)
+    row_model.predictions(seen, flashes, brightness, 0, rows.value.shape[1], found)
     return found
 
 
@@ -204,7 +204,7 @@ def residuals_of(plan: Plan, timing: Timing, index: IntArray, value: FloatArray)
     height = value.shape[1]
     upward = timing.row_time_s < 0
     place = np.arange(height, dtype=np.float64)
-    rows = kernel.Rows(
+    rows = row_model.Rows(
         np.ascontiguousarray(value, np.float64),
         np.asarray(index, np.float64) * timing.frame_period_s,
         height - 1 - place if upward else place,
@@ -216,7 +216,7 @@ def residuals_of(plan: Plan, timing: Timing, index: IntArray, value: FloatArray)
     )
     unknown = slot_unknowns(plan)
     slots = [flash.slot for flash in timing.flashes]
-    flashes = kernel.Flashes(
+    flashes = row_model.Flashes(
         timing.start_s, timing.duration_s, unknown[slots], int(unknown.max()) + 1, timing.rise_s, timing.fall_s
     )
     rest = np.empty(value.shape)

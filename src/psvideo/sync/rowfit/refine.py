@@ -7,8 +7,8 @@ import numpy as np
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
-from psvideo.sync.rowfit.kernel import EXPOSURE, FALL, RISE, ROW_TIME
 from psvideo.sync.rowfit.profiles import Profiles, equations, unexplained
+from psvideo.sync.rowfit.row_model import EXPOSURE, FALL, RISE, ROW_TIME
 
 CAUCHY = 2.4
 """Residuals of this many standard deviations are trusted half as much (95 % efficiency for Gaussian noise)."""

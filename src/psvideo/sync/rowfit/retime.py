@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
-from psvideo.sync.rowfit.kernel import IntArray
 from psvideo.sync.rowfit.profiles import Profiles
+from psvideo.sync.rowfit.row_model import IntArray
 
 Mask = NDArray[np.bool_]
 

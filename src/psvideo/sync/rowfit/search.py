@@ -12,7 +12,7 @@ import numpy as np
 from psvideo.compute.threads import over_ranges
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
-from psvideo.sync.rowfit import kernel
+from psvideo.sync.rowfit import kernel, row_model
 from psvideo.sync.rowfit.beat import Beat, FoundClock
 from psvideo.sync.rowfit.profiles import Profiles, compiled_rows, rows_of_a_part, slot_unknowns
 
@@ -70,7 +70,7 @@ def _losses(plan: Plan, rows: Profiles, clocks: list[FoundClock], start: Beat, *
     end = int(np.ceil((last_s + 3 * rows.period_s - earliest_s) / plan.cycle_s)) + 1
     train = plan.train(begin * cycle, (end - begin) * cycle)
     unknown = slot_unknowns(plan)
-    flashes = kernel.Flashes(
+    flashes = row_model.Flashes(
         train.start_s, train.duration_s, unknown[train.slot], int(unknown.max()) + 1, start.rise_s, start.fall_s
     )
     seen = compiled_rows(rows, start)._replace(row_place=place)

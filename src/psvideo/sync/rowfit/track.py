@@ -12,11 +12,11 @@ import numpy as np
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
-from psvideo.sync.rowfit.kernel import IntArray
 from psvideo.sync.rowfit.profiles import Profiles, brightnesses, predictions, unexplained
 from psvideo.sync.rowfit.refine import refine
 from psvideo.sync.rowfit.retime import Mask
 from psvideo.sync.rowfit.retime import twins as twin_frames
+from psvideo.sync.rowfit.row_model import IntArray
 from psvideo.sync.rowfit.search import ROBUST_STEEPNESS
 
 BLOCK, LONG_BLOCK = 16, 64

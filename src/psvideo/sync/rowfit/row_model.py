@@ -1,0 +1,156 @@
+"""The row model, compiled: what each row of a frame saw of the flashes, and how that changes with the times.
+
+A row's mean in frame n is ``ambient + sum_k (F(close - s_k) - F(open - s_k)) * brightness[slot of k]``, F being the
+share of its light that a flash has given off (an exponential rise and fall, 1/e times, round a square pulse). The
+flashes' weights equal ``shutter.row_weights`` where there are no tails; a test holds the two together.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.compute.compiled import EXACT
+from psvideo.model.camera import FloatArray
+
+IntArray = NDArray[np.int64]
+
+REACH = 9.0
+"""After so many fall times a flash is taken to be over."""
+LEFT, RIGHT, EXPOSURE, ROW_TIME, RISE, FALL = range(6)
+"""The signals of a step: the shift at a window's left and right end, exposure, row time, rise and fall time."""
+SIGNALS = 6
+
+
+class Rows(NamedTuple):
+    """Profiles as compiled code takes them. ``row_place`` counts rows from the first that opens."""
+
+    value: FloatArray
+    frame_start_s: FloatArray
+    row_place: FloatArray
+    row_time_s: float
+    exposure_s: float
+    bounds: IntArray
+    ends_s: FloatArray
+    """Where each window begins and the last one ends, on the camera's clock: the shift is linear in between."""
+    beat_hz: FloatArray
+    """Frequencies at which ambient light may flicker."""
+
+
+class Flashes(NamedTuple):
+    """A train of flashes. ``unknown`` numbers each flash's brightness from 1, 0 for a dark slot."""
+
+    start_s: FloatArray
+    duration_s: FloatArray
+    unknown: IntArray
+    unknowns: int
+    rise_s: float
+    fall_s: float
+
+
+@EXACT.kept
+def given_off(since_s: float, duration_s: float, rise_s: float, fall_s: float) -> tuple[float, float]:
+    """Return the share of its light that a flash has given off, and the rate at which it does so now."""
+    if since_s <= 0.0:
+        return 0.0, 0.0
+    reached, whole = 1.0, duration_s
+    if rise_s > 0.0:
+        reached = 1.0 - np.exp(-duration_s / rise_s)
+        whole -= rise_s * reached
+    whole += reached * fall_s
+    if since_s < duration_s:
+        if rise_s > 0.0:
+            lit = 1.0 - np.exp(-since_s / rise_s)
+            return (since_s - rise_s * lit) / whole, lit / whole
+        return since_s / whole, 1.0 / whole
+    if fall_s <= 0.0:
+        return 1.0, 0.0
+    left = reached * np.exp(-(since_s - duration_s) / fall_s)
+    return 1.0 - fall_s * left / whole, left / whole
+
+
+@EXACT.kept
+def width(rows: Rows, flashes: Flashes) -> int:
+    """Return how many numbers a row has in a window: brightnesses, and flicker's two phases."""
+    return flashes.unknowns + 2 * len(rows.beat_hz)
+
+
+@EXACT.kept
+def see(rows: Rows, flashes: Flashes, frame: int, row: int, k: int, design: FloatArray) -> int:
+    """Fill ``design`` (unknown,) with what a row saw in a frame; return the first flash that may matter to the next."""
+    design[:] = 0.0
+    design[0] = 1.0
+    open_s = rows.frame_start_s[frame] + rows.row_place[row] * rows.row_time_s
+    close_s = open_s + rows.exposure_s
+    tail_s = REACH * flashes.fall_s
+    while k < len(flashes.start_s) and flashes.start_s[k] + flashes.duration_s[k] + tail_s <= open_s:
+        k += 1
+    j = k
+    while j < len(flashes.start_s) and flashes.start_s[j] < close_s:
+        u = flashes.unknown[j]
+        if u > 0:
+            start_s, duration_s = flashes.start_s[j], flashes.duration_s[j]
+            if flashes.rise_s == 0.0 and flashes.fall_s == 0.0:
+                design[u] += max(min(close_s, start_s + duration_s) - max(open_s, start_s), 0.0) / duration_s
+            else:
+                after, _ = given_off(close_s - start_s, duration_s, flashes.rise_s, flashes.fall_s)
+                before, _ = given_off(open_s - start_s, duration_s, flashes.rise_s, flashes.fall_s)
+                design[u] += after - before
+        j += 1
+    for b in range(len(rows.beat_hz)):
+        turn = 2 * np.pi * rows.beat_hz[b] * (open_s + 0.5 * rows.exposure_s)
+        design[flashes.unknowns + 2 * b] = np.cos(turn)
+        design[flashes.unknowns + 2 * b + 1] = np.sin(turn)
+    return k
+
+
+@EXACT.kept
+def slopes(
+    rows: Rows, flashes: Flashes, frame: int, row: int, k: int, brightness: FloatArray, tails: bool, signals: FloatArray
+) -> float:
+    """Fill ``signals`` (SIGNALS,) with how the model's value changes with each unknown time."""
+    open_s = rows.frame_start_s[frame] + rows.row_place[row] * rows.row_time_s
+    close_s = open_s + rows.exposure_s
+    rise_s, fall_s = flashes.rise_s, flashes.fall_s
+    probe_s = 0.01 * flashes.duration_s[0]
+    tail_s = REACH * fall_s
+    signals[:] = 0.0
+    j = k
+    while j > 0 and flashes.start_s[j - 1] + flashes.duration_s[j - 1] + tail_s + REACH * probe_s > open_s:
+        j -= 1
+    closing = opening = 0.0
+    while j < len(flashes.start_s) and flashes.start_s[j] < close_s:
+        u = flashes.unknown[j]
+        if u > 0:
+            d = flashes.duration_s[j]
+            since_close, since_open = close_s - flashes.start_s[j], open_s - flashes.start_s[j]
+            after, after_rate = given_off(since_close, d, rise_s, fall_s)
+            before, before_rate = given_off(since_open, d, rise_s, fall_s)
+            closing += brightness[u] * after_rate
+            opening += brightness[u] * before_rate
+            if tails:
+                a, _ = given_off(since_close, d, rise_s + probe_s, fall_s)
+                b, _ = given_off(since_open, d, rise_s + probe_s, fall_s)
+                signals[RISE] += brightness[u] * (a - b - after + before) / probe_s
+                a, _ = given_off(since_close, d, rise_s, fall_s + probe_s)
+                b, _ = given_off(since_open, d, rise_s, fall_s + probe_s)
+                signals[FALL] += brightness[u] * (a - b - after + before) / probe_s
+        j += 1
+    signals[EXPOSURE] = closing
+    signals[ROW_TIME] = (closing - opening) * rows.row_place[row]
+    return opening - closing
+
+
+@EXACT.kept
+def predictions(rows: Rows, flashes: Flashes, brightness: FloatArray, first: int, last: int, found: FloatArray) -> None:
+    """Fill ``found`` (frame, row) with what known brightnesses (row, unknown) give."""
+    size = flashes.unknowns + 2 * len(rows.beat_hz)
+    design = np.empty(size)
+    for row in range(first, last):
+        k = 0
+        for n in range(len(rows.value)):
+            k = see(rows, flashes, n, row, k, design)
+            total = 0.0
+            for i in range(size):
+                total += design[i] * brightness[row, i]
+            found[n, row] = total
