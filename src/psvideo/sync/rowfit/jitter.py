@@ -12,7 +12,7 @@ import numpy as np
 
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
-from psvideo.sync.rowfit import kernel
+from psvideo.sync.rowfit import kernel, row_model
 from psvideo.sync.rowfit.profiles import Profiles, compiled_flashes, compiled_rows, equations
 from psvideo.sync.rowfit.refine import CAUCHY, WIDE_SCALE, Fit, scaled
 
@@ -72,7 +72,7 @@ def jitter(plan: Plan, rows: Profiles, fit: Fit) -> Jitter:
     )
 
 
-def _pulls(plan: Plan, rows: Profiles, fit: Fit) -> tuple[kernel.Flashes, FloatArray, FloatArray]:
+def _pulls(plan: Plan, rows: Profiles, fit: Fit) -> tuple[row_model.Flashes, FloatArray, FloatArray]:
     """Return the flashes and how strongly rows that open and rows that close shift each, shape (flash, 2) twice."""
     seen, flashes = compiled_rows(rows, fit.beat), compiled_flashes(plan, rows, fit.beat)
     pull, stiff = np.zeros((len(flashes.start_s), 2)), np.zeros((len(flashes.start_s), 2))
