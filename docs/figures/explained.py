@@ -80,7 +80,7 @@ def how_normals(folder: Path) -> Figure:
         ("normals", normal_colours(exr(out / "normals"))),
         ("albedo", paint(exr(out / "albedo"))),
         ("valid is white", white(exr(out / "valid"))),
-        ("lit anew", _lit(out, *LAMPS["from the left"])),
+        ("relit", _lit(out, *LAMPS["from the left"])),
     ]
     return figure([row("What the plates say about the surface", *surface)], said)
 
