@@ -27,7 +27,7 @@ mode = "synced"
 
 
 def vignette(light: str) -> np.ndarray:
-    """The lens darkens the corners by half; the key lamp is narrower besides, and falls off to the right."""
+    """The lens darkens the corners by half; the key lamp is narrower, too, and falls off to the right."""
     x, y = np.meshgrid((np.arange(WIDE) - 59.5) / 60, (np.arange(HIGH) - 44.5) / 60)
     lens = 1 / (1 + 0.32 * (x**2 + y**2)) ** 2
     return lens * (1 - 0.2 * x) if light == "key" else lens

@@ -133,7 +133,7 @@ def test_a_stopped_run_goes_on_where_it_stopped_and_only_as_it_began(
     assert commands[0] == commands[1].replace(str(whole), str(out)) + " --resume"
     assert reports[0] == reports[1]
     for folder in (out, whole):
-        for name in ("report.json", "report.html"):  # they tell the command, and so the folder and --resume
+        for name in ("report.json", "report.html"):  # they name the command, and so the folder and --resume
             (folder / name).unlink()
     assert digest(out) == digest(whole)
     assert (out / "albedo" / kept[1].name).stat().st_mtime_ns == before, "what was whole is not written again"

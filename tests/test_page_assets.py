@@ -1,4 +1,4 @@
-"""The page's own files: scripts that can be joined, and colours that every eye tells apart."""
+"""The page's own files: scripts that can be joined, and colours that every eye can distinguish."""
 
 import re
 from pathlib import Path

@@ -316,7 +316,7 @@ def test_under_a_global_shutter_flashes_are_timed_within_the_frame(make_plan: Pl
 
 @pytest.mark.parametrize("dark", [True, False])
 def test_flashes_of_different_lengths_are_timed_and_named(dark: bool, make_plan: PlanMaker) -> None:
-    """Two lights, each long and short; without a dark slot the lengths alone tell which is which, up to the light."""
+    """Two lights, each long and short; without a dark slot the lengths alone show which is which, up to the light."""
     plan = make_plan(height_px=ROWS, width_px=COLUMNS, dark=dark)
     each = [("key", 0.0008), ("key", 0.0002), ("left", 0.0008), ("left", 0.0004)]
     lit = tuple(PlannedFlash(lights={name: 1.0}, duration_s=duration_s) for name, duration_s in each)

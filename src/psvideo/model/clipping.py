@@ -1,7 +1,7 @@
-"""When a sample is clipped: it tells no light any more, only that there was at least so much.
+"""When a sample is clipped: it shows no light any more, only that there was at least so much.
 
 Light is linear, 1.0 = sensor saturation. A camera's sample is clipped from SATURATED on. A plate's pixel of which any
-sample was clipped holds the plate's own saturation, to the bit; whoever scales plates besides allows for ROUNDING.
+sample was clipped holds the plate's own saturation, to the bit; code that scales plates also allows for ROUNDING.
 """
 
 from typing import Any

@@ -30,7 +30,7 @@ REACHES_ROWS = 3.0
 OUTLIER = 6.0
 """Residuals count as no more standard deviations than this."""
 FEW = 50
-"""Fewer samples at edges, or elsewhere, tell nothing."""
+"""Fewer samples at edges, or elsewhere, say nothing."""
 
 
 def at_edges(plan: Plan, rows: Profiles, beat: Beat) -> NDArray[np.bool_]:
