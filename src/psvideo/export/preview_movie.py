@@ -23,6 +23,8 @@ from psvideo.model.choices import Codec
 
 Pixels = NDArray[np.uint8]
 MOST_RATE = 1_000_000
+ENCODING_THREADS = 2
+"""Fixed, because what libvpx writes depends on it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,6 +70,7 @@ def _stream(container: av.container.OutputContainer, coding: _Coding, picture: P
     rate = fps.limit_denominator(MOST_RATE)
     stream = cast(VideoStream, container.add_stream(coding.encoder, rate=rate, options=coding.options))
     stream.thread_type = "AUTO"
+    stream.codec_context.thread_count = ENCODING_THREADS
     stream.height, stream.width = picture.shape[:2]
     stream.pix_fmt = coding.pixels
     context = stream.codec_context
