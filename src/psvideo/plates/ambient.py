@@ -232,7 +232,7 @@ def subtract(plates: Iterable[Plate], *, darks: Iterable[Plate] = ()) -> Iterato
             del dark, later  # pictures are held only as long as they are needed
         if after is None:
             plate = replace(plate, image=held(plate), clipped=None)
-        elif any(plate.flash.lights.values()):
+        elif not plate.flash.is_dark:
             plate = _without(plate, before or after, after)
         else:
             plate = replace(plate, image=after.image, seen=after.known, clipped=None)

@@ -28,7 +28,7 @@ class Mix:
         for light, _ in self.weights:
             if light not in known:
                 raise UsageError(f"`weight` {light}: the plan has no such light; {nearest(light, known)}")
-        if self.of(AMBIENT) and all(any(flash.lights.values()) for flash in plan.flashes):
+        if self.of(AMBIENT) and all(not flash.is_dark for flash in plan.flashes):
             raise UsageError(
                 "`with_ambient`: the plan has no dark slot, so that ambient light was never seen alone; it is in every "
                 "plate already. Leave the option out."

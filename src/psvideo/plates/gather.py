@@ -165,7 +165,7 @@ def _dark_plates(take: Take, camera: Camera, timing: Timing, places: Mapping[int
     first, last = frames_touched(camera, timing.start_s, timing.duration_s)
     number_at = {places[number]: number for number in take.numbers if number in places}
     for dark in timing.flashes:
-        if dark.complete and not any(dark.lights.values()):
+        if dark.complete and dark.is_dark:
             touched = range(first[dark.index], last[dark.index] + 1)
             near = tuple(number_at[place] for place in touched if place in number_at)
             frames = _placed(read_frames(take.clip, near, kept=take.kept), places)

@@ -97,7 +97,7 @@ def round_numbers(flashes: tuple[Flash, ...], *, start: int = FIRST_NUMBER) -> t
     for flash, before in zip(flashes, (None, *flashes), strict=False):
         begins = before is not None and flash.slot <= before.slot
         numbers.append((numbers[-1] if numbers else 0) + begins)
-    whole = [n for n, flash in zip(numbers, flashes, strict=True) if flash.complete and any(flash.lights.values())]
+    whole = [n for n, flash in zip(numbers, flashes, strict=True) if flash.complete and not flash.is_dark]
     shift = start - whole[0] if whole else start
     return tuple(number + shift for number in numbers)
 
