@@ -15,6 +15,9 @@ from psvideo.model.intensity import measured_duration_s
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Light, Rig
 
+LEAST_COSINE = 1e-3
+"""Nothing is behind an LED; what is there keeps a little light, and so no division by 0."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Points:
@@ -78,13 +81,26 @@ def _field(light: Light, points_m: FloatArray | None, middle_m: FloatArray | Non
     if points_m is None or middle_m is None:
         raise ValueError(f"light {light.name!r} is near: it needs points in space")
     position_m = np.array(light.position_m)
-    away_m = position_m - points_m
-    distance_m = np.linalg.norm(away_m, axis=1, keepdims=True)
-    direction: FloatArray = away_m / distance_m
-    shine: FloatArray = np.ones_like(distance_m)
+    axis: FloatArray | None = None
     if light.anisotropy:
         axis = np.array(light.axis) if light.axis is not None else middle_m - position_m
-        cosine = -(direction @ axis) / np.linalg.norm(axis)
-        shine = np.clip(cosine, 1e-3, None)[:, None] ** light.anisotropy
-    vectors: FloatArray = shine * direction / distance_m**2
+        axis = axis / np.linalg.norm(axis)
+    return near_vectors(points_m, position_m, axis=axis, anisotropy=light.anisotropy or 0.0)
+
+
+def near_vectors(
+    points_m: FloatArray, position_m: FloatArray, *, axis: FloatArray | None, anisotropy: float
+) -> FloatArray:
+    """Return what a near light of intensity 1 sends to points (..., 3): direction times irradiance, (..., 3).
+
+    That is ``cos^mu / r^2`` along the unit vector to the light; cos is taken from the light's axis, a unit vector
+    (Y. Queau et al., "LED-based photometric stereo", Journal of Mathematical Imaging and Vision 60, 2018, section 2).
+    """
+    away_m = position_m - points_m
+    distance_m = np.linalg.norm(away_m, axis=-1, keepdims=True)
+    towards = away_m / distance_m
+    sent = distance_m**-2
+    if axis is not None and anisotropy:
+        sent = sent * np.maximum(-(towards @ axis), LEAST_COSINE)[..., None] ** anisotropy
+    vectors: FloatArray = towards * sent
     return vectors

@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import FloatArray
+from psvideo.model.light_field import LEAST_COSINE, near_vectors
 from psvideo.model.rig import Light, Rig
 
 FARTHEST_M = 50.0
 """No light or surface is farther: beyond it numbers are taken for millimetres (and a light there is a distant one)."""
 FARTHEST_SHARE = 1e-3
 """A plane that runs past the horizon is followed to a thousand times its nearest depth."""
-LEAST_COSINE = 1e-3
 LEAST_DISTANCE_M = 0.01
 
 
@@ -224,12 +224,5 @@ def field_of(light: Light, ground: Ground | None, part: tuple[slice, slice]) -> 
     x, y = _rays(ground.focal_px, ground.principal_px, *ground.depth_m.shape)
     depth_m = ground.depth_m[part].astype(np.float64)
     points_m = np.stack([x[:, part[1]] * depth_m, y[part[0]] * depth_m, -depth_m], axis=-1)
-    away_m = np.array(light.position_m) - points_m
-    distance_m = np.linalg.norm(away_m, axis=-1, keepdims=True)
-    towards = away_m / distance_m
-    sent = distance_m**-2
-    if light.anisotropy:
-        axis = near_field([light], ground).axes[0]
-        sent = sent * np.maximum(-(towards @ axis), LEAST_COSINE)[..., None] ** light.anisotropy
-    field: FloatArray = towards * sent
-    return field
+    axis = near_field([light], ground).axes[0] if light.anisotropy else None
+    return near_vectors(points_m, np.array(light.position_m), axis=axis, anisotropy=light.anisotropy or 0.0)
