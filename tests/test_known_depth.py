@@ -172,7 +172,7 @@ def test_depth_is_found_among_channels_and_what_is_no_distance_is_unknown(
         ({"Z": np.zeros((ROWS, COLS))}, "no depth above 0"),
         ({"Z": -true_depth()}, "Negative ones are there"),
         ({"Z": np.full((ROWS, COLS), np.nan)}, "no depth above 0"),
-        ({"Z": true_depth() * 1000}, "--depth-scale 0.001"),
+        ({"Z": true_depth() * 1000}, "`depth_scale=0.001`"),
         ({"Z": true_depth()[:-1]}, "80 x 59 pixels, and the frames are 80 x 60"),
         ({"R": true_depth(), "G": true_depth() + 1, "B": true_depth()}, "in colour"),
         ({"A": true_depth()}, "not clear which channel"),

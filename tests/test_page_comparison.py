@@ -123,7 +123,7 @@ def test_the_pictures_of_the_documentation_can_be_taken(shoot: Path, tmp_path: P
 
 
 def test_a_clip_that_cannot_be_used_is_said_to_be_so(shoot: Path, tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="--clip"):
+    with pytest.raises(UsageError, match="`clip`"):
         show_of(shoot / "clip", clip=shoot / "clip")
     shutil.copytree(shoot / "out", tmp_path / "out")
     (tmp_path / "clip").mkdir()

@@ -236,10 +236,10 @@ def test_without_the_tools_the_python_board_answers_and_says_so(tmp_path: Path) 
 def test_what_lacks_is_named_where_the_firmware_was_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(toolchain, "_has", lambda program: program != "avr-gcc")
     assert toolchain.missing_packages() == ("gcc-avr", "avr-libc")
-    with pytest.raises(PsvideoError, match=r"needs the Debian packages gcc-avr avr-libc\. .*--board python"):
+    with pytest.raises(PsvideoError, match=r'needs the Debian packages gcc-avr avr-libc\. .*`board="python"`'):
         toolchain.build("atmega328p")
     monkeypatch.setattr(toolchain, "lights_folder", lambda: None)
-    with pytest.raises(PsvideoError, match=r"without one\. Run it from a checkout, or take --board python"):
+    with pytest.raises(PsvideoError, match=r'without one\. Run it from a checkout, or take `board="python"`'):
         toolchain.build("atmega328p")
 
 
