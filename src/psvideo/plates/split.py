@@ -136,10 +136,10 @@ def _add_rows(plate: Image, clipped: NDArray[np.bool_], frame: Image, coefficien
             for col in range(plate.shape[1]):
                 plate[row, col] += share * frame[row, col]
             if share > np.float32(COUNTS):
-                brightest = frame[row, 0]
+                count = 0
                 for col in range(plate.shape[1]):
-                    brightest = max(brightest, frame[row, col])
-                if brightest >= np.float32(SATURATED):
+                    count += frame[row, col] >= np.float32(SATURATED)
+                if count:
                     any_clipped = True
                     for col in range(plate.shape[1]):
                         clipped[row, col] |= frame[row, col] >= np.float32(SATURATED)
