@@ -9,7 +9,7 @@ TABLES = ("kernel", "reconstruction", "whole_run", "view", "timing", "compressio
 
 for name in sys.argv[1:] or TABLES:
     module = import_module(f"bench.{name}")
-    print(f"\n## {module.__doc__.splitlines()[0]}\n", flush=True)
+    print(f"\n## {(module.__doc__ or name).splitlines()[0]}\n", flush=True)
     lines = list(module.rows())
     print(table(lines), flush=True)
     if hasattr(module, "summary"):

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from bench.accuracy_measure import read_image
 from psvideo.solve.depth import Integration, View, integrate, scaled
 from psvideo.solve.depth.bilateral import BILATERAL, SMOOTH
 
@@ -48,8 +49,8 @@ def rows() -> Iterator[DepthRow]:
 
 def _object(name: str, how: Integration) -> tuple[float, float]:
     """Mean absolute depth error in mm, and seconds."""
-    codes = cv2.imread(str(DATA / name / "normal_map.png"), cv2.IMREAD_UNCHANGED)[..., ::-1]
-    mask = cv2.imread(str(DATA / name / "mask.png"), cv2.IMREAD_GRAYSCALE) > 0
+    codes = read_image(DATA / name / "normal_map.png", cv2.IMREAD_UNCHANGED)[..., ::-1]
+    mask = read_image(DATA / name / "mask.png", cv2.IMREAD_GRAYSCALE) > 0
     k = np.loadtxt(DATA / name / "K.txt")
     true = np.load(DATA / name / "depth_gt.npz")["depth_gt"]
     view = View(focal_px=(k[0, 0], k[1, 1]), principal_px=(k[0, 2], k[1, 2]))
@@ -78,7 +79,7 @@ def _hills() -> tuple[np.ndarray, np.ndarray]:
 
 def _disc() -> np.ndarray:
     r, c = np.mgrid[: FRAME[0], : FRAME[1]]
-    return (r - 540) ** 2 + (c - 960) ** 2 < 520**2
+    return np.asarray((r - 540) ** 2 + (c - 960) ** 2 < 520**2)
 
 
 def _hill(normals: np.ndarray, height: np.ndarray, mask: np.ndarray, how: Integration) -> tuple[float, float]:

@@ -21,7 +21,7 @@ def l1_normals(case: Case, pixels: np.ndarray) -> np.ndarray:
         equations += (1e-12 + 1e-10 * np.trace(equations, axis1=1, axis2=2))[:, None, None] * np.eye(3)
         g = np.linalg.solve(equations, np.einsum("pl,li,pl->pi", weights, rows, measured)[..., None])[..., 0]
         weights = usable / np.maximum(np.abs(measured - g @ rows.T), 1e-7)
-    return g / np.maximum(np.linalg.norm(g, axis=1, keepdims=True), 1e-12)
+    return np.asarray(g / np.maximum(np.linalg.norm(g, axis=1, keepdims=True), 1e-12))
 
 
 def measurements(case: Case, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -41,4 +41,4 @@ def usable_of(case: Case, pixels: np.ndarray) -> np.ndarray:
     seen = (plates < USABLE.saturation * (1 - 1e-5)).all(axis=2).T
     bright = measured / case.lit.intensities.mean(axis=1) * case.lit.intensities.mean()
     mean = (np.maximum(bright, 0) * seen).sum(axis=1, keepdims=True) / np.maximum(seen.sum(axis=1, keepdims=True), 1)
-    return seen & (bright > np.maximum(USABLE.dark_level, USABLE.shadow_ratio * mean))
+    return np.asarray(seen & (bright > np.maximum(USABLE.dark_level, USABLE.shadow_ratio * mean)))

@@ -52,12 +52,20 @@ def errors_deg(surface: Surface, case: Case, where: np.ndarray | None = None) ->
     return angles_deg(surface.normals[both], case.truth[both])
 
 
+def read_image(path: Path, how: int = cv2.IMREAD_COLOR) -> np.ndarray:
+    """Return a picture as OpenCV reads it. Raises FileNotFoundError where there is none."""
+    image = cv2.imread(str(path), how)
+    if image is None:
+        raise FileNotFoundError(path)
+    return np.asarray(image)
+
+
 def angles_deg(found: np.ndarray, truth: np.ndarray) -> np.ndarray:
     """Angles between unit normals, good to small fractions of a degree."""
     found = found.astype(np.float64)
     found = found / np.linalg.norm(found, axis=-1, keepdims=True)
     apart = np.linalg.norm(found - truth, axis=-1)
-    return np.degrees(2 * np.arcsin(np.clip(apart / 2, 0, 1)))
+    return np.asarray(np.degrees(2 * np.arcsin(np.clip(apart / 2, 0, 1))))
 
 
 def described(errors: np.ndarray) -> str:
@@ -144,9 +152,9 @@ def diligent_ball() -> Case:
     with (folder / "lights.csv").open() as file:
         listed = [row for row in csv.reader(file) if row[0].endswith(".png")]
     numbers = np.array([[float(word) for word in row[1:7]] for row in listed])
-    plates = [cv2.imread(str(folder / row[0]), cv2.IMREAD_UNCHANGED)[..., ::-1] / np.float32(65535) for row in listed]
+    plates = [read_image(folder / row[0], cv2.IMREAD_UNCHANGED)[..., ::-1] / np.float32(65535) for row in listed]
     strengths = numbers[:, 3:] / numbers[:, 3:].mean()
-    mask = cv2.imread(str(folder / "mask.png"), cv2.IMREAD_GRAYSCALE) > 127
+    mask = read_image(folder / "mask.png", cv2.IMREAD_GRAYSCALE) > 127
     lit = Illumination(directions=numbers[:, :3], intensities=strengths)
     plates = [np.ascontiguousarray(plate, np.float32) for plate in plates]
     return Case("DiLiGenT ball", plates, lit, np.load(folder / "normal_gt.npy").astype(np.float64), mask)
@@ -170,14 +178,14 @@ def washington(thing: str) -> Case:
     directions = np.array(words[1:], np.float64).reshape(int(words[0]), 3)
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     paths = [folder / thing / f"{thing}.{n}.png" for n in range(len(directions))]
-    plates = [(cv2.imread(str(path))[..., ::-1] / 255).astype(np.float32) for path in paths]
+    plates = [(read_image(path)[..., ::-1] / 255).astype(np.float32) for path in paths]
     rows, cols = np.mgrid[: plates[0].shape[0], : plates[0].shape[1]]
     x, y = (cols - 244.5) / 108.0, (144.5 - rows) / 108.0
     truth = np.stack([x, y, np.sqrt(np.maximum(1 - x * x - y * y, 0))], axis=-1)
     mask = x * x + y * y < 0.95**2
     if thing != "gray":
         truth = np.full_like(truth, np.nan)
-        mask = cv2.imread(str(folder / thing / f"{thing}.mask.png"), cv2.IMREAD_GRAYSCALE) > 127
+        mask = read_image(folder / thing / f"{thing}.mask.png", cv2.IMREAD_GRAYSCALE) > 127
     lit = Illumination(directions=directions, intensities=np.ones((len(directions), 3)))
     return Case(f"Washington's {thing}", plates, lit, truth, mask)
 
@@ -189,7 +197,8 @@ def washington_sphere() -> Case:
 
 def spread_subsets(directions: np.ndarray, lights: int, count: int, *, most_condition: float = 4.0) -> list[np.ndarray]:
     """Random sets of lights whose directions' condition number shows that they are well spread."""
-    rng, found = np.random.default_rng(0), []
+    rng = np.random.default_rng(0)
+    found: list[np.ndarray] = []
     while len(found) < count:
         chosen = np.sort(rng.choice(len(directions), lights, replace=False))
         values = np.linalg.svd(directions[chosen], compute_uv=False)

@@ -53,7 +53,7 @@ def _grey_frame() -> Case:
 def _numpy(codes: list[np.ndarray], directions: np.ndarray) -> np.ndarray:
     measured = np.stack([plate.reshape(-1) for plate in codes], axis=1).astype(np.float64)
     scaled = np.linalg.lstsq(directions, measured.T, rcond=None)[0].T
-    return scaled / np.maximum(np.linalg.norm(scaled, axis=1, keepdims=True), 1e-12)
+    return np.asarray(scaled / np.maximum(np.linalg.norm(scaled, axis=1, keepdims=True), 1e-12))
 
 
 def _timed(action: Callable[[], object]) -> float:

@@ -127,7 +127,7 @@ def _plain_numpy(plates: list[np.ndarray], directions: np.ndarray) -> np.ndarray
     """The L2 of RobustPhotometricStereo, written again: one lstsq over all pixels in float64, then unit length."""
     measurements = np.stack([plate.reshape(-1) for plate in plates], axis=1).astype(np.float64)
     scaled = np.linalg.lstsq(directions, measurements.T, rcond=None)[0].T
-    return scaled / np.linalg.norm(scaled, axis=1, keepdims=True)
+    return np.asarray(scaled / np.linalg.norm(scaled, axis=1, keepdims=True))
 
 
 def _timed(action: Callable[[], object]) -> float:

@@ -5,7 +5,7 @@ metal or glass and on the room. What is drawn here is seen and mirrored alike: o
 away. Written from the laws of reflection and Fresnel alone (Schlick's approximation); nothing under test is used.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import cv2
@@ -120,23 +120,27 @@ def _panel(directions: np.ndarray, panel: Panel) -> np.ndarray:
     for axis, half in ((right, panel.half_deg[0]), (above, panel.half_deg[1])):
         away = np.abs(np.degrees(np.arcsin(np.clip(directions @ axis, -1, 1))))
         inside = inside * np.clip((half + panel.soft_deg / 2 - away) / panel.soft_deg, 0, 1)
-    return inside
+    return np.asarray(inside)
 
 
 def _stand(rays: np.ndarray, ball: Ball) -> np.ndarray:
     """Return which rays see a stand: a post under the ball, two thirds of its radius wide, that hides its foot."""
     centre = np.array(ball.centre)
     at_depth = rays * (centre[2] / rays[..., 2:3])
-    return (np.abs(at_depth[..., 0] - centre[0]) < 0.65 * ball.radius_m) & (
-        at_depth[..., 1] < centre[1] - 0.86 * ball.radius_m
-    )
+    narrow = np.abs(at_depth[..., 0] - centre[0]) < 0.65 * ball.radius_m
+    return np.asarray(narrow & (at_depth[..., 1] < centre[1] - 0.86 * ball.radius_m))
+
+
+def _three(values: Iterable[float]) -> tuple[float, float, float]:
+    first, second, third = map(float, values)
+    return first, second, third
 
 
 def random_room(rng: np.random.Generator, *, lights: int) -> Room:
     """Return a room such as people film in: any wall, a sheet of paper or none, windows and furniture, a stand."""
     panels = tuple(
         Panel(
-            towards=tuple(float(value) for value in unit(rng.standard_normal(3) * [1, 0.6, 1])),
+            towards=_three(unit(rng.standard_normal(3) * [1, 0.6, 1])),
             half_deg=(float(rng.uniform(3, 25)), float(rng.uniform(3, 25))),
             brightness=float(10 ** rng.uniform(-2.5, -0.8)),
             soft_deg=float(rng.uniform(1, 8)),
@@ -146,7 +150,7 @@ def random_room(rng: np.random.Generator, *, lights: int) -> Room:
     step = (float(rng.uniform(0, 360)), float(rng.uniform(-6, 6)), float(10 ** rng.uniform(-0.7, 0.7)))
     return Room(
         wall=float(10 ** rng.uniform(-2.2, -0.3)),
-        washes=tuple((float(rng.uniform(0.2, 1)), *map(float, rng.uniform(-0.8, 0.8, 2))) for _ in range(lights)),
+        washes=tuple(_three([rng.uniform(0.2, 1), *rng.uniform(-0.8, 0.8, 2)]) for _ in range(lights)),
         step=step if rng.random() < 0.4 else None,
         floor=float(10 ** rng.uniform(-2.5, -1)),
         behind_camera=float(10 ** rng.uniform(-3, -1.5)),

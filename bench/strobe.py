@@ -1,7 +1,7 @@
 """Strobe edges of the real firmware in emulation, against the ticks that the plan asks for."""
 
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -24,7 +24,7 @@ from psvideo.strobe.stand_ins.toolchain import AVR_BOARDS, AvrBoard
 FLASHES = 10_000
 BAR_CYCLES = 4
 CYCLES_PER_TICK = 8
-LOADS = {
+LOADS: dict[str, Callable[[int], list[str]]] = {
     "a STAT a second": lambda ms: [line for _ in range(ms // 1000 + 1) for line in ("wait 1000", "send STAT")],
     "requests without a pause": lambda ms: [f"poll {ms} CLK 0123abcd"],
 }

@@ -138,9 +138,9 @@ def _solve_row(
     bands[0] += 1e-9
     right = np.einsum("ka,kac->kc", weights, values[at])
     if not with_ambient:
-        return solveh_banded(bands, right, lower=True)
+        return np.asarray(solveh_banded(bands, right, lower=True))
     border = weights.sum(axis=1)
     both = solveh_banded(bands, np.column_stack([right, border]), lower=True)
     rest = len(values) - border @ both[:, cols]
     ambient = (values.sum(axis=0) - border @ both[:, :cols]) / rest
-    return both[:, :cols] - both[:, cols:] * ambient
+    return np.asarray(both[:, :cols] - both[:, cols:] * ambient)

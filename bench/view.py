@@ -20,14 +20,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page, ViewportSize, sync_playwright
 
 from bench.table import Row
 from psvideo.formats.exr_files import write_exr
 
 COUNT, DIFFERENT = 240, 8
 ROWS, COLS = 1080, 1920
-VIEWPORT = {"width": 960 + 268, "height": 540 + 90}
+VIEWPORT: ViewportSize = {"width": 960 + 268, "height": 540 + 90}
 """The page beside its panel, so that one pane is 960 pixels wide."""
 TRIES = 3
 SCRUB_MS = 4000

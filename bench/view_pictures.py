@@ -6,12 +6,12 @@ import threading
 from pathlib import Path
 
 from PIL import Image
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page, ViewportSize, sync_playwright
 
 from bench.view import FLAGS
 from psvideo.page import page_server, show_of
 
-LAPTOP = {"width": 1366, "height": 768}
+LAPTOP: ViewportSize = {"width": 1366, "height": 768}
 IN_DOCS = (928, 522)
 WARM = {"place": 0, "name": "Light 1", "direction": [0.72, 0.42, 0.55], "colour": "#ffd9a8", "intensity": 1.3}
 COOL = {"place": 1, "name": "Light 2", "direction": [-0.88, 0.18, 0.44], "colour": "#8fc2ff", "intensity": 1.1}
