@@ -1,0 +1,197 @@
+"""Ambient light where the plan has no dark slot: told from rows that saw a part of a flash only.
+
+Every row of every frame sees some flash, but a share of about d / (Te + d) of them sees only a part of one. Where the
+scene stands, ``frame = A + sum_s w[s] * L[s]``, with the shares w that timing gives and one unknown L for every slot of
+the plan: a regression over a window of frames. Its weights are the same for all pixels of a row, so that the ambient
+picture A is one linear combination of the frames, and is gathered while they pass. Whether the scene stood is judged on
+small pictures of every frame, kept for the window. What moved, or is clipped, takes its ambient light from an earlier
+window where it stood, else from what stands around it; how much that is, is said.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.model.camera import Camera, FloatArray
+from psvideo.model.plan import Plan
+from psvideo.model.shutter import row_weights
+from psvideo.model.timing import Timing
+
+Image = NDArray[np.float32]
+Flags = NDArray[np.bool_]
+
+EVERY_ROW, BLOCK_PX = 8, 16
+"""Whether the scene stood is judged in every eighth row, whose shares are exact, over the means of so many columns."""
+TRUSTS_DIM = 0.25
+"""Rows count by 1 / (this + the share of a flash that they saw): what is dim has less photon noise."""
+MOST_NOISE = 2.0
+"""A row is known where the ambient picture's noise variance is at most so many times a frame's."""
+MOVED = 4.0
+"""A block moved whose residuals are so many times what noise leaves of blocks as bright."""
+SATURATED = 0.98
+"""Small pictures' light from which on a block may hold clipped samples."""
+WINDOW_PX = 5
+"""Detail of the ambient picture is judged against its noise over windows of this width (Lee 1980)."""
+AROUND_BLOCKS = 3.0
+"""What moved takes the light of blocks around it, weighted by a Gaussian of this standard deviation."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Design:
+    """How a window's frames tell the ambient light.
+
+    frames: their indices, ascending. shares: (slot, frame, row), what each row saw of each lit slot's flashes. takes:
+    (frame, row), the weights with which frames sum to the ambient light of one exposure. known: (row,), False where the
+    window does not tell it.
+    """
+
+    frames: tuple[int, ...]
+    shares: FloatArray
+    takes: FloatArray
+    known: Flags
+
+
+@dataclass(frozen=True, kw_only=True)
+class Separated:
+    """What a window of frames tells of the ambient light of one exposure.
+
+    image: as a frame. stood: (block row, block col), True where it was measured, False where it was guessed from
+    around. known: (row,).
+    """
+
+    image: Image
+    stood: Flags
+    known: Flags
+
+
+def design_of(plan: Plan, camera: Camera, timing: Timing, frames: Iterable[int]) -> Design:
+    """Return how frames (indices) tell the ambient light under a plan that has no dark slot."""
+    numbers = tuple(frames)
+    slots = plan.lit_slots
+    shares = np.zeros((len(slots), len(numbers), camera.height_px))
+    start_s, duration_s = timing.start_s, timing.duration_s
+    place = np.array([slots.index(flash.slot) for flash in timing.flashes])
+    spread_s = abs(camera.row_offsets_s()).max() + camera.exposure_s
+    for n, number in enumerate(numbers):
+        begins_s = number * camera.frame_period_s
+        near = (start_s + duration_s + timing.pulse.tail_s > begins_s - spread_s) & (start_s < begins_s + 2 * spread_s)
+        seen = row_weights(
+            camera, start_s[near], duration_s[near], frames=range(number, number + 1), pulse=timing.pulse
+        )
+        np.add.at(shares[:, n], place[near], seen[:, 0])
+    takes, known = _takes(shares)
+    return Design(frames=numbers, shares=shares, takes=takes, known=known)
+
+
+def _takes(shares: FloatArray) -> tuple[FloatArray, Flags]:
+    """Return the weights (frame, row) of the regression's constant, and the rows where it is told."""
+    trust = 1.0 / (TRUSTS_DIM + shares.sum(axis=0))
+    terms = np.concatenate([np.ones((1, *shares.shape[1:])), shares])
+    equations = np.einsum("anr,nr,bnr->rab", terms, trust, terms)
+    scale = np.trace(equations, axis1=1, axis2=2)[:, None, None]
+    inverse = np.linalg.inv(equations + 1e-9 * scale * np.eye(len(terms)))
+    takes: FloatArray = np.einsum("rb,bnr->nr", inverse[:, 0, :], terms) * trust
+    known: Flags = np.asarray((takes**2).sum(axis=0) <= MOST_NOISE)
+    takes[:, ~known] = 0.0
+    return takes, known
+
+
+def separated(design: Design, images: Iterable[Image], *, before: Separated | None = None) -> Separated:
+    """Return the ambient light that a window's frames tell; ``images`` are in linear light, in the design's order.
+
+    ``before`` is an earlier window's, for what moves in this one.
+    """
+    total: Image | None = None
+    small = []
+    for image, takes in zip(images, design.takes, strict=True):
+        if total is None:
+            total = np.zeros(image.shape, np.float32)
+        total += takes.astype(np.float32).reshape(-1, *[1] * (image.ndim - 1)) * image
+        small.append(_small(image))
+    if total is None:
+        raise ValueError("a window holds at least one frame")
+    stood, variance = _judged(design, np.stack(small))
+    averaged = BLOCK_PX * (1 if total.ndim == 2 else total.shape[2])
+    noise = averaged * cv2.resize(variance, total.shape[1::-1], interpolation=cv2.INTER_LINEAR)
+    smooth = _without_noise(total, noise * (design.takes**2).sum(axis=0).astype(np.float32)[:, None])
+    return Separated(image=_guessed(smooth, stood, before), stood=stood, known=design.known)
+
+
+def _small(image: Image) -> Image:
+    some = image[EVERY_ROW // 2 :: EVERY_ROW]
+    some = np.ascontiguousarray(some if some.ndim == 2 else some.mean(axis=2))
+    size = (max(some.shape[1] // BLOCK_PX, 1), len(some))
+    return np.asarray(cv2.resize(some, size, interpolation=cv2.INTER_AREA), np.float32)
+
+
+def _judged(design: Design, series: Image) -> tuple[Flags, Image]:
+    """Return which blocks (row, col) the regression explains to their noise in all frames, and what that noise's
+    variance is; ``series`` is (frame, row, col)."""
+    shares = design.shares[:, :, EVERY_ROW // 2 :: EVERY_ROW]
+    terms = np.concatenate([np.ones((1, *shares.shape[1:])), shares])
+    rest = np.empty(series.shape, np.float32)
+    for row in range(series.shape[1]):
+        basis, _ = np.linalg.qr(terms[:, :, row].T)
+        rest[:, row] = series[:, row] - basis @ (basis.T @ series[:, row])
+    variance = (rest**2).mean(axis=0)
+    level = series.mean(axis=0)
+    expected = _noise_by_level(variance, level)
+    largest = np.abs(rest).max(axis=0)
+    clipped = series.max(axis=0) > SATURATED
+    stood = (variance < MOVED * expected) & (largest**2 < 16 * MOVED * expected) & ~clipped
+    around = cv2.erode(stood.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0  # the rows between are not judged
+    return np.asarray(around), expected
+
+
+def _noise_by_level(variance: Image, level: Image) -> Image:
+    """Return what noise leaves of a block as bright: read noise and photon noise, from the quieter blocks."""
+    order = np.array_split(np.argsort(level.ravel()), 8)
+    levels = np.array([level.ravel()[part].mean() for part in order])
+    quiet = np.array([np.percentile(variance.ravel()[part], 30) for part in order])
+    slope, offset = np.polyfit(levels, quiet, 1) if np.ptp(levels) > 1e-4 else (0.0, float(quiet.mean()))
+    floor = max(float(quiet.min()), 1e-12)
+    return np.asarray(np.maximum(max(slope, 0.0) * level + offset, floor), np.float32)
+
+
+def _without_noise(image: Image, noise: Image) -> Image:
+    """Keep as much of the local detail as its variance exceeds ``noise``'s (row, col), plane by plane (Lee 1980)."""
+    if image.ndim == 2:
+        return _lee(image, noise)
+    planes = [np.ascontiguousarray(image[..., channel]) for channel in range(image.shape[2])]
+    return np.stack([_lee(plane, noise) for plane in planes], axis=2)
+
+
+def _lee(plane: Image, noise: Image) -> Image:
+    bend = plane[:, 2:] - 2 * plane[:, 1:-1] + plane[:, :-2]
+    most = float((1.4826 * np.median(np.abs(bend[::3]))) ** 2 / 6) if bend.size else 0.0  # with fine detail in it
+    window = (WINDOW_PX, WINDOW_PX)
+    mean = cv2.blur(plane, window)
+    spread = np.maximum(cv2.blur(plane * plane, window) - mean * mean, 0)
+    kept = np.maximum(spread - np.minimum(noise, np.float32(most)), 0) / np.maximum(spread, 1e-12)
+    return np.asarray(mean + kept * (plane - mean), np.float32)
+
+
+def _guessed(image: Image, stood: Flags, before: Separated | None) -> Image:
+    """Return the picture with what did not stand taken from an earlier window, else from around."""
+    if stood.all():
+        return image
+    rows, cols = image.shape[:2]
+    known = stood.astype(np.float32)
+    flat = image.reshape(rows, cols, -1)
+    small = np.asarray(cv2.resize(flat, known.shape[::-1], interpolation=cv2.INTER_AREA), np.float32)
+    small = small.reshape(*known.shape, -1) * known[..., None]
+    weight = cv2.GaussianBlur(known, (0, 0), AROUND_BLOCKS) + 1e-6 * float(known.mean()) + 1e-12
+    around = cv2.GaussianBlur(small, (0, 0), AROUND_BLOCKS).reshape(small.shape) / weight[..., None]
+    guess = np.asarray(cv2.resize(around, (cols, rows), interpolation=cv2.INTER_LINEAR)).reshape(flat.shape)
+    if before is not None:
+        earlier = _enlarged(before.stood, rows, cols)
+        guess = np.where(earlier[..., None], before.image.reshape(flat.shape), guess)
+    found = np.where(_enlarged(stood, rows, cols)[..., None], flat, np.maximum(guess, 0))
+    return found.reshape(image.shape).astype(np.float32)
+
+
+def _enlarged(flags: Flags, rows: int, cols: int) -> Flags:
+    return np.asarray(cv2.resize(flags.astype(np.uint8), (cols, rows), interpolation=cv2.INTER_NEAREST) > 0)
