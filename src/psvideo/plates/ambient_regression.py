@@ -27,6 +27,8 @@ EVERY_ROW, BLOCK_PX = 8, 16
 """Whether the scene stood is judged in every eighth row, whose shares are exact, over the means of so many columns."""
 TRUSTS_DIM = 0.25
 """Rows count by 1 / (this + the share of a flash that they saw): what is dim has less photon noise."""
+MOSAIC = 2
+"""A colour filter mosaic repeats after so many pixels."""
 MOST_NOISE = 2.0
 """A row is known where the ambient picture's noise variance is at most so many times a frame's."""
 MOVED = 4.0
@@ -99,10 +101,13 @@ def _takes(shares: FloatArray) -> tuple[FloatArray, Flags]:
     return takes, known
 
 
-def separated(design: Design, images: Iterable[Image], *, before: Separated | None = None) -> Separated:
+def separated(
+    design: Design, images: Iterable[Image], *, before: Separated | None = None, mosaic: bool = False
+) -> Separated:
     """Return the ambient light that a window's frames tell; ``images`` are in linear light, in the design's order.
 
-    ``before`` is an earlier window's, for what moves in this one.
+    ``before`` is an earlier window's, for what moves in this one. ``mosaic``: the frames are colour filter mosaics, of
+    two by two pixels, and only samples behind the same filter are compared.
     """
     total: Image | None = None
     small = []
@@ -116,8 +121,14 @@ def separated(design: Design, images: Iterable[Image], *, before: Separated | No
     stood, variance = _judged(design, np.stack(small))
     averaged = BLOCK_PX * (1 if total.ndim == 2 else total.shape[2])
     noise = averaged * cv2.resize(variance, total.shape[1::-1], interpolation=cv2.INTER_LINEAR)
-    smooth = _without_noise(total, noise * (design.takes**2).sum(axis=0).astype(np.float32)[:, None])
-    return Separated(image=_guessed(smooth, stood, before), stood=stood, known=design.known)
+    noise = noise * (design.takes**2).sum(axis=0).astype(np.float32)[:, None]
+    step = MOSAIC if mosaic else 1
+    for row, col in np.ndindex(step, step):
+        own = np.s_[row::step, col::step]
+        plane = _without_noise(np.ascontiguousarray(total[own]), np.ascontiguousarray(noise[own]))
+        earlier = None if before is None else (before.image[own], before.stood)
+        total[own] = _guessed(plane, stood, earlier)
+    return Separated(image=total, stood=stood, known=design.known)
 
 
 def _small(image: Image) -> Image:
@@ -174,8 +185,9 @@ def _lee(plane: Image, noise: Image) -> Image:
     return np.asarray(mean + kept * (plane - mean), np.float32)
 
 
-def _guessed(image: Image, stood: Flags, before: Separated | None) -> Image:
-    """Return the picture with what did not stand taken from an earlier window, else from around."""
+def _guessed(image: Image, stood: Flags, before: tuple[Image, Flags] | None) -> Image:
+    """Return the picture with what did not stand taken from an earlier window (what it gave, where it stood), else from
+    around."""
     if stood.all():
         return image
     rows, cols = image.shape[:2]
@@ -187,8 +199,8 @@ def _guessed(image: Image, stood: Flags, before: Separated | None) -> Image:
     around = cv2.GaussianBlur(small, (0, 0), AROUND_BLOCKS).reshape(small.shape) / weight[..., None]
     guess = np.asarray(cv2.resize(around, (cols, rows), interpolation=cv2.INTER_LINEAR)).reshape(flat.shape)
     if before is not None:
-        earlier = _enlarged(before.stood, rows, cols)
-        guess = np.where(earlier[..., None], before.image.reshape(flat.shape), guess)
+        earlier = _enlarged(before[1], rows, cols)
+        guess = np.where(earlier[..., None], before[0].reshape(flat.shape), guess)
     found = np.where(_enlarged(stood, rows, cols)[..., None], flat, np.maximum(guess, 0))
     return found.reshape(image.shape).astype(np.float32)
 
