@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.export.space import Space, placed, placed_points
+from psvideo.model.camera import FloatArray
 from psvideo.model.quantities import QUANTITIES
 from psvideo.model.surface import Surface
 from psvideo.solve.depth import Depth
@@ -17,12 +18,21 @@ Planes = dict[str, Image]
 
 @dataclass(frozen=True, kw_only=True)
 class Made:
-    """What an instant's files are written from; ``beauty`` and ``depth`` are None where nothing asks for them."""
+    """What an instant's files are written from; ``beauty``, ``depth`` and ``age_s`` are None where nothing asks
+    for them. ``age_s`` (row,) is how far in time from the instant what a row shows was lit."""
 
     surface: Surface
     space: Space
     beauty: Image | None = None
     depth: Depth | None = None
+    age_s: FloatArray | None = None
+
+    @property
+    def age(self) -> Image | None:
+        """The age of every pixel in seconds, (row, col)."""
+        if self.age_s is None:
+            return None
+        return np.broadcast_to(self.age_s.astype(np.float32)[:, None], self.surface.valid.shape)
 
     @property
     def position(self) -> Image | None:
@@ -42,6 +52,7 @@ PICTURES: Mapping[str, Callable[[Made], Image | None]] = {
     "beauty": lambda made: made.beauty,
     "depth": lambda made: None if made.depth is None else made.depth.depth,
     "position": lambda made: made.position,
+    "age": lambda made: made.age,
 }
 """What computes the picture of each quantity that belongs to an instant; None where it was not made."""
 

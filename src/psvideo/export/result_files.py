@@ -98,6 +98,7 @@ def write_surface(
     tags: Tags,
     depth: Callable[[], Depth] | None = None,
     beauty: NDArray[np.floating] | None = None,
+    age_s: NDArray[np.float64] | None = None,
 ) -> None:
     """Write one instant: normals as signed unit vectors, linear albedo, validity, and the AOVs and meshes asked for.
 
@@ -109,7 +110,7 @@ def write_surface(
             raise ValueError("depth is to be written and was not integrated")
         shape = depth()
         _write_meshes(folder, clip, number, surface, shape, delivery)
-    made = Made(surface=surface, space=delivery.space, beauty=beauty, depth=shape)
+    made = Made(surface=surface, space=delivery.space, beauty=beauty, depth=shape, age_s=age_s)
     planes = {name: planes_of(name, made) for name in delivery.quantities}
     halves = {name: is_half(name, asked=delivery.half) for name in planes}
     world = delivery.space.attributes()

@@ -72,6 +72,12 @@ class Round:
         return float(np.mean([plate.time_s for plate in self.plates]))
 
     @property
+    def age_s(self) -> FloatArray:
+        """How far from the instant, before or after, the farthest of the flashes is that a row shows, shape (row,)."""
+        away_s: FloatArray = np.max([np.abs(plate.flashed_s - self.time_s) for plate in self.plates], axis=0)
+        return away_s
+
+    @property
     def lights(self) -> tuple[str, ...]:
         """The lights that this round has a plate of, in the plan's order."""
         return tuple(plate.light for plate in self.plates)

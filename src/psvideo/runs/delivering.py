@@ -102,4 +102,5 @@ def surface_job(
         image = np.clip(beauty_of(one, delivery.mix, ambient).image, -HALF_MAX, HALF_MAX)
         beauty = np.asarray(image, np.float16)
     job = partial(write_surface, folder, clip.name, one.number, one.time_s, instant.surface)
-    return partial(job, delivery=there, tags=tags, depth=depth, beauty=beauty)
+    age_s = one.age_s if "age" in delivery.aovs else None
+    return partial(job, delivery=there, tags=tags, depth=depth, beauty=beauty, age_s=age_s)

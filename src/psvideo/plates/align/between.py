@@ -136,7 +136,15 @@ def plate_at(ends: Ends, way: Track, *, time_s: float, number: int) -> LightPlat
     for top in range(0, rows, BAND_ROWS):
         band = slice(top, min(top + BAND_ROWS, rows))
         _fill(band, image, seen, ends, sides, way)
-    return LightPlate(light=own.light, number=number, time_s=time_s, image=image, seen=seen, saturation=own.saturation)
+    return LightPlate(
+        light=own.light,
+        number=number,
+        time_s=time_s,
+        image=image,
+        seen=seen,
+        saturation=own.saturation,
+        shown_s=own.flashed_s,
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

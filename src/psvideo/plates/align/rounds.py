@@ -126,7 +126,7 @@ def _make(held: Held, light: str, instant: DueInstant, how: Aligning, flows: Flo
         instant.moves = True
         held.pack(light, around)
         plate = _moved_to(around, flow, time_s)
-    instant.made[light] = replace(plate, number=instant.number, time_s=time_s)
+    instant.made[light] = replace(plate, number=instant.number, time_s=time_s, shown_s=plate.flashed_s)
 
 
 def _flow(around: Around, light: str, how: Aligning, flows: Flows) -> Flow | None:
