@@ -8,8 +8,9 @@ small pictures of every frame, kept for the window. What moved, or is clipped, t
 window where it stood, else from what stands around it; how much that is, is said.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -23,6 +24,8 @@ from psvideo.model.timing import Timing
 Image = NDArray[np.float32]
 Flags = NDArray[np.bool_]
 
+WINDOW_FRAMES = 128
+"""Frames that one regression takes together: enough for plates within a few per cent of the best."""
 EVERY_ROW, BLOCK_PX = 8, 16
 """Whether the scene stood is judged in every eighth row, whose shares are exact, over the means of so many columns."""
 TRUSTS_DIM = 0.25
@@ -67,6 +70,17 @@ class Separated:
     image: Image
     stood: Flags
     known: Flags
+
+
+def windows_of(numbers: Sequence[int]) -> list[tuple[int, ...]]:
+    """Return a clip's frames in windows of about WINDOW_FRAMES, none much shorter than the others.
+
+    >>> [len(window) for window in windows_of(range(300))]
+    [150, 150]
+    """
+    count = max(round(len(numbers) / WINDOW_FRAMES), 1)
+    edges = [round(n * len(numbers) / count) for n in range(count + 1)]
+    return [tuple(numbers[first:last]) for first, last in pairwise(edges)]
 
 
 def design_of(plan: Plan, camera: Camera, timing: Timing, frames: Iterable[int]) -> Design:

@@ -8,16 +8,21 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import TypeVar
 
+import numpy as np
+
 from psvideo.clip import Clip, Frame, Take, demosaic, read_frames
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.compute.threads import thread_count
 from psvideo.model.camera import Camera
 from psvideo.model.choices import SplitMethod
+from psvideo.model.recipe import frames_of
 from psvideo.model.shutter import frames_touched
-from psvideo.model.timing import Timing, places_in_time, timed_camera
+from psvideo.model.timing import Flash, Timing, places_in_time, timed_camera
 from psvideo.plates import hudon2015
 from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.ambient import subtract, update
+from psvideo.plates.ambient_regression import Design, Separated, design_of, separated, windows_of
+from psvideo.plates.nearest_rows import has_blind_time, with_nearest_rows
 from psvideo.plates.sequence import (
     AMBIENT,
     FIRST_NUMBER,
@@ -47,6 +52,7 @@ def gather(
     watch: Watch = unwatched,
     each_flash: Callable[[Plate], None] | None = None,
     each_plate: Callable[[LightPlate], None] | None = None,
+    each_window: Callable[[Separated], None] | None = None,
 ) -> Iterator[Round]:
     """Yield a take's rounds: one plate per light at its full flash, ambient light taken off. The take is decoded once.
 
@@ -94,18 +100,26 @@ def gather(
     """
     plan, flashes = take.plan, timing.flashes
     check_separable(plan)
-    single = _shown(clip_plates(take, timing, method=method, watch=watch), each_flash)
+    made = clip_plates(take, timing, method=method, watch=watch, each_window=each_window)
+    single = _shown(made, each_flash)
     plates = _shown(light_plates(single, plan, flashes, start=start_number), each_plate)
     if not with_ambient:
         plates = filter(lambda plate: plate.light != AMBIENT, plates)
     if aligning is not None:
+        if has_blind_time(timed_camera(plan, timing)):
+            plates = with_nearest_rows(plates)
         return aligned(plates, plan.lights, aligning, first=start_number, with_ambient=with_ambient)
     names = coming(plan, flashes, start=start_number)
     return gathered(plates, plan.lights, expected=names.__getitem__)
 
 
 def clip_plates(
-    take: Take, timing: Timing, *, method: SplitMethod = "weights", watch: Watch = unwatched
+    take: Take,
+    timing: Timing,
+    *,
+    method: SplitMethod = "weights",
+    watch: Watch = unwatched,
+    each_window: Callable[[Separated], None] | None = None,
 ) -> Iterator[Plate]:
     """Decode a take once and yield the plate of every flash that it holds, ambient light taken off, demosaiced."""
     _decode_ahead(take, watch)
@@ -115,7 +129,11 @@ def clip_plates(
     decoded = read_frames(clip, take.numbers, ahead=AHEAD, threads=thread_count(), kept=take.kept)
     frames = _placed(watch(decoded, total=len(take.numbers), what="rebuilding flashes"), places)
     rebuild = split if method == "weights" else hudon2015.split
-    plates = subtract(rebuild(frames, camera, used), darks=_dark_plates(take, camera, used, places))
+    if len(take.plan.lit_slots) < len(take.plan.flashes):
+        ambient_plates = _dark_plates(take, camera, used, places)
+    else:
+        ambient_plates = _separated_plates(take, camera, used, places, each_window)
+    plates = subtract(rebuild(frames, camera, used), darks=ambient_plates)
     return map(_colour_of(clip), plates)
 
 
@@ -133,10 +151,9 @@ def first_ambient(take: Take, timing: Timing) -> LightPlate | None:
 
 
 def _decode_ahead(take: Take, watch: Watch) -> None:
-    """Decode all frames into the take's store, unless the fit did: dark slots are read ahead, out of order."""
+    """Decode all frames into the take's store, unless the fit did: what shows ambient light is read ahead."""
     clip, kept = take.clip, take.kept
-    dark = len(take.plan.lit_slots) < len(take.plan.flashes)
-    if kept is not None and dark and not (len(kept) or kept.missed):
+    if kept is not None and take.plan.mode != "synced" and not (len(kept) or kept.missed):
         frames = read_frames(clip, take.numbers, ahead=thread_count(), threads=thread_count(), kept=kept, keep=True)
         deque(watch(frames, total=len(take.numbers), what="decoding"), maxlen=0)
 
@@ -162,17 +179,55 @@ def _within(timing: Timing, camera: Camera, take: Take, places: Mapping[int, int
 
 def _dark_plates(take: Take, camera: Camera, timing: Timing, places: Mapping[int, int]) -> Iterator[Plate]:
     """Read ahead, from the few frames that they touch, the dark slots, between which ambient light is interpolated."""
-    first, last = frames_touched(camera, timing.start_s, timing.duration_s)
     number_at = {places[number]: number for number in take.numbers if number in places}
     for dark in timing.flashes:
         if dark.complete and dark.is_dark:
-            touched = range(first[dark.index], last[dark.index] + 1)
-            near = tuple(number_at[place] for place in touched if place in number_at)
+            near = tuple(number_at[place] for place in frames_of(camera, timing, dark) if place in number_at)
             frames = _placed(read_frames(take.clip, near, kept=take.kept), places)
             plate = plate_of(dark, frames, camera, timing) if near else None
             if plate is not None:
                 yield plate
             del plate
+
+
+def _separated_plates(
+    take: Take,
+    camera: Camera,
+    timing: Timing,
+    places: Mapping[int, int],
+    show: Callable[[Separated], None] | None,
+) -> Iterator[Plate]:
+    """Read windows of frames ahead, and give the ambient light of each as if a dark slot in its middle had shown it.
+
+    A triggered clip has no rows that saw a part of a flash, and nothing is told.
+    """
+    if take.plan.mode == "synced":
+        return
+    numbers = [number for number in take.numbers if number in places]
+    before: Separated | None = None
+    for window in windows_of(numbers):
+        design = design_of(take.plan, camera, timing, [places[number] for number in window])
+        if not design.known.any():
+            continue
+        frames = _placed(read_frames(take.clip, window, ahead=AHEAD, threads=thread_count(), kept=take.kept), places)
+        images = (frame.image for frame in frames)
+        before = separated(design, images, before=before, mosaic=take.clip.cfa is not None)
+        if show is not None:
+            show(before)
+        yield _as_dark_slot(before, design, camera, timing)
+
+
+def _as_dark_slot(found: Separated, design: Design, camera: Camera, timing: Timing) -> Plate:
+    begin_s, end_s = (index * camera.frame_period_s for index in (design.frames[0], design.frames[-1] + 1))
+    middle_s = (begin_s + end_s) / 2
+    last = max((flash.index for flash in timing.flashes if flash.start_s < end_s), default=0)
+    return Plate(
+        flash=Flash(index=last, slot=0, lights={}, start_s=middle_s, duration_s=0.0, complete=True),
+        image=found.image,
+        shares=np.ones((1, camera.height_px)),
+        middles_s=np.full((1, camera.height_px), middle_s),
+        seen=found.known,
+    )
 
 
 def _colour_of(clip: Clip) -> Callable[[Plate], Plate]:

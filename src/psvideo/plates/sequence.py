@@ -52,6 +52,11 @@ class LightPlate:
         return self.seen if self.seen.ndim == 1 else np.asarray(self.seen.any(axis=1))
 
     @property
+    def rows_own(self) -> NDArray[np.bool_]:
+        """Which rows the plate's own flash showed, shape (row,); the others come from flashes before or after."""
+        return self.rows_seen if self.shown_s is None else self.rows_seen & (self.shown_s == self.time_s)
+
+    @property
     def pixels_seen(self) -> NDArray[np.bool_]:
         """What is known of the plate, shape (row, col)."""
         known = self.seen if self.seen.ndim == 2 else self.seen[:, None]

@@ -128,7 +128,7 @@ def judged(
             timing = timing if known is None else named_by_rig(take, timing, known)
             timing = _with_later_holes(timing, clip, window)
             observed = observing(take, known)
-            for one in gather(take, timing, watch=watch):
+            for one in gather(take, timing, watch=watch, each_window=observed.look_at_window):
                 observed.add(one)
                 del one
             if not observed.facts:

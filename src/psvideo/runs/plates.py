@@ -87,7 +87,15 @@ def split_run(
     ):
         flashes, mix = extras.flashes, extras.mix
         each = (lambda plate: write(partial(write_flash, folder, clip.name, plate, tags))) if flashes else None
-        gathered = gather(take, timing, method=method, start_number=output.start_number, watch=watch, each_flash=each)
+        gathered = gather(
+            take,
+            timing,
+            method=method,
+            start_number=output.start_number,
+            watch=watch,
+            each_flash=each,
+            each_window=observed.look_at_window,
+        )
         ambient = first_ambient(take, timing) if mix is not None and mix.of(AMBIENT) else None
         for one in gathered:
             times_s.append(one.time_s)

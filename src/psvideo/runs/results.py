@@ -121,6 +121,7 @@ def normals_run(
             start_number=output.start_number,
             watch=watch,
             each_plate=observed.look,
+            each_window=observed.look_at_window,
         )
         ambient = first_ambient(take, timing) if mixed else None
         found = surfaces(

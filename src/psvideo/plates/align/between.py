@@ -160,7 +160,7 @@ class _Side:
         if plate is None:
             return None
         clipped = (_brightest(plate.image) >= plate.saturation).astype(np.uint8)
-        within = cv2.erode(plate.seen.astype(np.uint8)[:, None], np.ones((5, 1), np.uint8))[:, 0] > 0
+        within = cv2.erode(plate.rows_own.astype(np.uint8)[:, None], np.ones((5, 1), np.uint8))[:, 0] > 0
         wider = np.asarray(cv2.dilate(clipped, np.ones((5, 5), np.uint8)), np.uint8) if clipped.any() else None
         return cls(plate=plate, clipped=wider, within=within)
 

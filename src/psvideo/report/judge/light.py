@@ -16,6 +16,8 @@ MOST_CLIPPED, LOST_CLIPPED = 0.02, 0.1
 """Shares of the subject that one lamp may clip: more costs normals there, and with three lamps all of them."""
 SPARE_CLIPPED = 0.25
 """With more lamps than three the others still give the normal."""
+MEASURED, FAINT_AMBIENT = 0.8, 0.02
+"""Without a dark slot: the share of the picture that must stand still, unless there is less ambient light than this."""
 MOST_AMBIENT, LOST_AMBIENT = 0.1, 0.5
 NOTICED, MOST_SWING = 0.05, 0.1
 """Ambient light of more than the first share that changes from dark slot to dark slot by more than the second."""
@@ -192,6 +194,18 @@ def ambient(observed: Observed) -> Judgement:
         )
     share = float(np.median(shares))
     found = f"Ambient light is {100 * share:.0f} % of the signal."
+    if observed.ambient_measured:
+        measured = min(observed.ambient_measured)
+        found = (
+            f"{found[:-1]}, found without a dark slot in the {100 * measured:.0f} % of the picture that stood still."
+        )
+        if measured < MEASURED and share > FAINT_AMBIENT:
+            return Judgement(
+                subject="ambient",
+                grade="doubtful",
+                found=f"{found} Elsewhere it is a guess from what is around.",
+                advice="Add a dark slot to the plan, which measures it everywhere.",
+            )
     if share > NOTICED and swing > MOST_SWING:
         found = f"{found[:-1]} and flickers or changes by {100 * swing:.0f} % (mains light, a screen, the sun)."
     elif share <= MOST_AMBIENT:

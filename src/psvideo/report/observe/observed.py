@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.surface import Misfit, Surface
+from psvideo.plates.ambient_regression import Separated
 from psvideo.plates.sequence import AMBIENT, LightPlate, Round
 from psvideo.report.observe.focus import sharpest_blur_px
 from psvideo.report.observe.levels import BINS, Counts, Levels, count_levels
@@ -126,6 +127,7 @@ class Observed:
     """What was seen of a take so far; ``add`` takes in one round after the other.
 
     ``mask`` is where to look, None for all that is lit; ``points`` is where the rig is held against the plates.
+    ``ambient_measured`` (window) is in which share of the picture ambient light could be measured without a dark slot.
     """
 
     lights: tuple[str, ...]
@@ -136,6 +138,7 @@ class Observed:
     blurs_px: list[float] = field(default_factory=list)
     slopes: list[float] = field(default_factory=list)
     light_at_points: list[NDArray[np.float64]] = field(default_factory=list)
+    ambient_measured: list[float] = field(default_factory=list)
     worst: Worst = field(default_factory=Worst)
     _glimpse: Glimpse | None = None
     _sample: Sample | None = None
@@ -151,6 +154,11 @@ class Observed:
             self._look_for_motion(plate)
         if plate.light == AMBIENT:
             self._look_at_dark(plate)
+
+    def look_at_window(self, found: Separated) -> None:
+        """Look at the ambient light that a window of frames told without a dark slot."""
+        self._dark = np.array(_brightest(found.image[::STRIDE, ::STRIDE]))
+        self.ambient_measured.append(float(found.stood.mean()))
 
     def _look_at_dark(self, plate: LightPlate) -> None:
         self._dark = np.array(_brightest(plate.image[::STRIDE, ::STRIDE]))
