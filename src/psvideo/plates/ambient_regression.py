@@ -36,6 +36,8 @@ MOST_NOISE = 2.0
 """A row is known where the ambient picture's noise variance is at most so many times a frame's."""
 MOVED = 4.0
 """A block moved whose residuals are so many times what noise leaves of blocks as bright."""
+AT_LEAST, AT_LEAST_SHARE = 1e-4, 3e-3
+"""Residuals of less than this, and this share of the block's light, are no motion, however little noise there is."""
 SATURATED = 0.98
 """Small pictures' light from which on a block may hold clipped samples."""
 WINDOW_PX = 5
@@ -163,12 +165,13 @@ def _judged(design: Design, series: Image) -> tuple[Flags, Image]:
         rest[:, row] = series[:, row] - basis @ (basis.T @ series[:, row])
     variance = (rest**2).mean(axis=0)
     level = series.mean(axis=0)
-    expected = _noise_by_level(variance, level)
+    noise = _noise_by_level(variance, level)
+    expected = np.maximum(noise, (AT_LEAST + AT_LEAST_SHARE * level) ** 2 / MOVED)
     largest = np.abs(rest).max(axis=0)
     clipped = series.max(axis=0) > SATURATED
     stood = (variance < MOVED * expected) & (largest**2 < 16 * MOVED * expected) & ~clipped
     around = cv2.erode(stood.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0  # the rows between are not judged
-    return np.asarray(around), expected
+    return np.asarray(around), noise
 
 
 def _noise_by_level(variance: Image, level: Image) -> Image:
