@@ -11,6 +11,7 @@ from psvideo.export.space import choose_space
 from psvideo.model.choices import (
     CameraTime,
     Codec,
+    Compression,
     MapFiles,
     MeshKind,
     Preview,
@@ -36,6 +37,7 @@ class Asked:
     aov: Sequence[Aov] = ()
     mesh: Sequence[MeshKind] = ()
     encode: MapFiles | None = None
+    compression: Compression = "zip"
     multipart: bool | None = None
     plates: bool = False
     with_ambient: bool = False
@@ -73,6 +75,7 @@ def delivery_of(asked: Asked) -> tuple[Delivery, tuple[str, ...]]:
         previews=tuple(dict.fromkeys(asked.preview)),
         codec=asked.preview_codec,
         program=program,
+        compression=asked.compression,
     )
     return delivery, _at_odds(program, preset, space=space, y=y, multipart=delivery.multipart)
 

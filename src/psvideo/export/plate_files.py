@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from psvideo.export.tags import Tags
 from psvideo.formats.exr_files import write_exr
+from psvideo.model.choices import Compression
 from psvideo.model.quantities import QUANTITIES
 from psvideo.plates.sequence import LightPlate
 from psvideo.plates.split import Plate
@@ -23,7 +24,7 @@ def plate_name(clip: str, light: str, number: int) -> str:
     return f"{light}/{clip}_{light}.{number:04d}.exr"
 
 
-def write_plate(folder: Path, clip: str, plate: LightPlate, tags: Tags) -> None:
+def write_plate(folder: Path, clip: str, plate: LightPlate, tags: Tags, *, compression: Compression = "zip") -> None:
     """Write one plate: channels R, G, B or Y, and ``valid`` where rows are missing."""
     path = folder / plate_name(clip, plate.light, plate.number)
     channels = _with_validity(plate.image, plate.pixels_seen)
@@ -33,10 +34,11 @@ def write_plate(folder: Path, clip: str, plate: LightPlate, tags: Tags) -> None:
         attributes=tags.attributes(time_s=plate.time_s, data=not PLATE.colour),
         fps=tags.fps,
         time_code=tags.time_code(plate.time_s),
+        compression=compression,
     )
 
 
-def write_flash(folder: Path, clip: str, plate: Plate, tags: Tags) -> None:
+def write_flash(folder: Path, clip: str, plate: Plate, tags: Tags, *, compression: Compression = "zip") -> None:
     """Write what one flash showed by itself, with one light or several: ``flashes/<clip>_flash.<index>.exr``."""
     path = folder / "flashes" / f"{clip}_flash.{plate.flash.index:04d}.exr"
     lights = " ".join(f"{name}={power:g}" for name, power in plate.flash.lights.items()) or "dark"
@@ -47,6 +49,7 @@ def write_flash(folder: Path, clip: str, plate: Plate, tags: Tags) -> None:
         attributes=attributes,
         fps=tags.fps,
         time_code=tags.time_code(plate.time_s),
+        compression=compression,
     )
 
 

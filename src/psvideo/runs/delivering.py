@@ -14,6 +14,7 @@ from psvideo.export.result_files import Delivery, write_surface
 from psvideo.export.space import Space
 from psvideo.export.tags import Tags
 from psvideo.formats.exr_files import HALF_MAX
+from psvideo.model.choices import Compression
 from psvideo.model.rig import Rig
 from psvideo.model.timing import Timing
 from psvideo.plates.beauty import beauty_of
@@ -73,12 +74,19 @@ def plates_of(one: Round) -> Iterator[LightPlate]:
 
 
 def write_plates(
-    folder: Path, clip: str, one: Round, tags: Tags, *, resume: bool, write: Callable[[Callable[[], None]], None]
+    folder: Path,
+    clip: str,
+    one: Round,
+    tags: Tags,
+    *,
+    compression: Compression,
+    resume: bool,
+    write: Callable[[Callable[[], None]], None],
 ) -> None:
     """Hand a round's plates to the writing threads, which let only few wait, so that memory is bounded."""
     for plate in plates_of(one):
         if not (resume and (folder / plate_name(clip, plate.light, plate.number)).is_file()):
-            write(partial(write_plate, folder, clip, plate, tags))
+            write(partial(write_plate, folder, clip, plate, tags, compression=compression))
 
 
 def surface_job(

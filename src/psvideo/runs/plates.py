@@ -14,7 +14,7 @@ from psvideo.export.plate_files import plate_name, write_flash, write_plate
 from psvideo.export.tags import Tags
 from psvideo.formats.timing_json import format_timing
 from psvideo.formats.whole_files import write_text
-from psvideo.model.choices import Codec, Preview, SplitMethod
+from psvideo.model.choices import Codec, Compression, Preview, SplitMethod
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Rig
 from psvideo.model.timing import Timing
@@ -48,6 +48,7 @@ class Extras:
     mix: Mix | None = None
     previews: tuple[Preview, ...] = ()
     codec: Codec = "vp9"
+    compression: Compression = "zip"
 
     def check(self, plan: Plan) -> None:
         """Raise UsageError or PsvideoError where the plan does not have what is asked for."""
@@ -86,7 +87,8 @@ def split_run(
         writing() as write,
     ):
         flashes, mix = extras.flashes, extras.mix
-        each = (lambda plate: write(partial(write_flash, folder, clip.name, plate, tags))) if flashes else None
+        one_flash = partial(write_flash, folder, clip.name, tags=tags, compression=extras.compression)
+        each = (lambda plate: write(partial(one_flash, plate))) if flashes else None
         gathered = gather(
             take,
             timing,
@@ -106,7 +108,7 @@ def split_run(
                 name = plate_name(clip.name, plate.light, plate.number)
                 written.add(name)
                 if not (output.resume and (folder / name).is_file()):
-                    write(partial(write_plate, folder, clip.name, plate, tags))
+                    write(partial(write_plate, folder, clip.name, plate, tags, compression=extras.compression))
             observed.add(one)
             if len(observed.facts) in (1, SAMPLE_ROUND):
                 picture = look_at_plates(one)

@@ -131,7 +131,15 @@ def normals_run(
             shaping, shaped = shape_of(shaping, lighting, instant)
             ambient = (instant.round.ambient or ambient) if mixed else None
             if delivery.plates:
-                write_plates(folder / "plates", clip.name, instant.round, tags, resume=output.resume, write=write)
+                write_plates(
+                    folder / "plates",
+                    clip.name,
+                    instant.round,
+                    tags,
+                    compression=delivery.compression,
+                    resume=output.resume,
+                    write=write,
+                )
             if not (output.resume and is_written(folder, clip.name, instant.round.number, delivery)):
                 # the surface only: plates are many times larger, and must not wait for the files
                 write(surface_job(folder, clip, instant, delivery, tags, depth=shaped, ambient=ambient))

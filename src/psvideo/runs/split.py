@@ -7,7 +7,7 @@ from psvideo.clip import decoded_once
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import UsageError
 from psvideo.formats.rig_toml import read_rig
-from psvideo.model.choices import Codec, PlatesPreview, SplitMethod
+from psvideo.model.choices import Codec, Compression, PlatesPreview, SplitMethod
 from psvideo.plates.beauty import mix_of
 from psvideo.plates.sequence import FIRST_NUMBER
 from psvideo.plates.timed import timing_of
@@ -34,6 +34,7 @@ def split(
     weight: Mapping[str, float] | None = None,
     preview: Sequence[PlatesPreview] = (),
     preview_codec: Codec = "vp9",
+    compression: Compression = "zip",
     start_number: int = FIRST_NUMBER,
     force: bool = False,
     resume: bool = False,
@@ -50,7 +51,8 @@ def split(
     - ``method``: by the rows' "weights", or Algorithm 1 of Hudon et al. ("hudon2015"), to compare with.
     - ``flashes``: every flash by itself too. ``beauty``: the sum of all lights too, each as strong as
       ``weight`` says (by name; 1 where not named), with ambient light where ``with_ambient``. ``preview``: movies for
-      eyes, coded as ``preview_codec``.
+      eyes, coded as ``preview_codec``. ``compression``: how EXR files are packed,
+      always without loss: "zip", "zips", "piz", "rle" or "none".
     - ``start_number``: the number of the first round's files. ``force`` replaces an ``out`` that exists; ``resume``
       goes on where a run that was stopped left off, and raises AllDoneError where none was and ``out`` is finished.
 
@@ -82,7 +84,9 @@ def split(
     if mix.weights and not summed:
         raise UsageError("`with_ambient` and `weight`: belong to the beauty plate. Add `beauty`, or leave them out.")
     previews = tuple(dict.fromkeys(preview))
-    extras = Extras(flashes=flashes, mix=mix if summed else None, previews=previews, codec=preview_codec)
+    extras = Extras(
+        flashes=flashes, mix=mix if summed else None, previews=previews, codec=preview_codec, compression=compression
+    )
     take = open_take(Path(clip), plan=None if plan is None else Path(plan), frames=frames)
     say_of_clip(take.clip, caller)
     extras.check(take.plan)

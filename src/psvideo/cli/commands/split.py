@@ -21,7 +21,7 @@ from psvideo.cli.options.common import (
     TimingPath,
     Verbose,
 )
-from psvideo.cli.options.delivery import CodecOption, PlatesPreviewOption, Weights, WithAmbient
+from psvideo.cli.options.delivery import CodecOption, CompressionOption, PlatesPreviewOption, Weights, WithAmbient
 from psvideo.cli.options.typed import parse_weights
 from psvideo.model.choices import SplitMethod
 
@@ -44,6 +44,7 @@ def split(
     weight: Weights = None,
     preview: PlatesPreviewOption = None,
     preview_codec: CodecOption = "vp9",
+    compression: CompressionOption = "zip",
     start_number: StartNumber = 1001,
     force: Force = False,
     resume: Resume = False,
@@ -71,6 +72,7 @@ def split(
         weight=parse_weights(weight),
         preview=plain(preview),
         preview_codec=preview_codec,
+        compression=compression,
         start_number=start_number,
         force=force,
         resume=resume,

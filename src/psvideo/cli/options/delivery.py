@@ -9,6 +9,7 @@ import typer
 from psvideo.model.choices import (
     CameraTime,
     Codec,
+    Compression,
     MapFiles,
     MeshKind,
     PlatesPreview,
@@ -59,6 +60,10 @@ AovOption = Annotated[list[AovWord] | None, typer.Option("--aov", help="Also wri
 MeshOption = Annotated[
     list[MeshWord] | None,
     typer.Option("--mesh", help="Also write meshes: ply, one per instant; usd, one animated file."),
+]
+CompressionOption = Annotated[
+    Compression,
+    typer.Option("--compression", help="How EXR files are packed, without loss: zips suits Nuke, rle fast disks."),
 ]
 EncodeOption = Annotated[MapFiles | None, typer.Option("--encode", help="Also write 16-bit PNG maps of 0 to 1.")]
 Separate = Annotated[bool, typer.Option("--separate", help="One sequence per quantity; this is the default.")]

@@ -5,7 +5,7 @@ PANELS = {
     "How normals are solved": ("solver", "near_iterations", "max_gap"),
     "Motion and time": ("align", "rate", "denoise"),
     "What is written, and in which convention": (
-        *("space", "camera_to_world", "camera", "camera_time", "y", "float32", "aov", "mesh", "encode"),
+        *("space", "camera_to_world", "camera", "camera_time", "y", "float32", "aov", "mesh", "encode", "compression"),
         *("separate", "multipart", "preset", "plates", "with_ambient", "weight", "beauty"),
         *("preview", "preview_codec"),
     ),
