@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from psvideo.model.camera import Camera
-from psvideo.plates.nearest_rows import LATER, has_blind_time, with_nearest_rows
+from psvideo.plates.nearest_rows import LATER, MOST_LATER, has_blind_time, with_nearest_rows
 from psvideo.plates.sequence import LightPlate
 
 ROWS = 8
@@ -71,17 +71,19 @@ def test_lights_do_not_help_each_other() -> None:
     assert [one.seen[2] for one in found] == [False, True, False]
 
 
-def test_a_plate_waits_for_no_more_than_two_of_its_light() -> None:
+@pytest.mark.parametrize(("missing_first", "waits"), [([5], MOST_LATER), ([], LATER)])
+def test_a_plate_waits_for_a_few_of_its_light_and_longer_at_the_start(missing_first: list[int], waits: int) -> None:
     given: list[int] = []
 
     def coming() -> Iterator[LightPlate]:
-        for number in range(1, 10):
+        for number in range(1, 20):
             given.append(number)
-            yield plate(number, [5])
+            yield plate(number, missing_first if number == 1 else [5])
 
-    first = next(iter(with_nearest_rows(coming())))
-    assert first.number == 1
-    assert given == list(range(1, LATER + 2))
+    found = with_nearest_rows(coming())
+    first = next(found) if missing_first else (next(found), next(found))[1]
+    assert first.number == (1 if missing_first else 2)
+    assert given[-1] == first.number + waits
 
 
 def test_only_shutters_below_360_degrees_are_blind() -> None:

@@ -8,7 +8,7 @@ such rows is a matter for alignment, which goes by the rows that a plate's own f
 
 from collections import deque
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +16,13 @@ from numpy.typing import NDArray
 from psvideo.model.camera import Camera, FloatArray
 from psvideo.plates.sequence import LightPlate
 
-LATER = 2
-"""A plate waits for so many later ones of its light at most: each that waits costs memory."""
+LATER, MOST_LATER = 2, 8
+"""A plate waits for so many later ones of its light: for the first number where earlier ones showed what it lacks, and
+for the second, at a clip's start, where none did."""
 BLIND = 1e-3
 """Share of the frame period for which rows must be blind to be worth the wait."""
+
+Flags = NDArray[np.bool_]
 
 
 def has_blind_time(camera: Camera) -> bool:
@@ -30,70 +33,91 @@ def has_blind_time(camera: Camera) -> bool:
 def with_nearest_rows(plates: Iterable[LightPlate]) -> Iterator[LightPlate]:
     """Yield plates in their order, the rows that they lack taken from the nearest plates of the same light.
 
-    Held are the plates that wait, two rounds of them at most, and for every light the latest that is known of each row.
-    Rows that no flash around showed stay unseen.
+    Held are the rows that the waiting plates' own flashes showed, and the latest that is known of each row of every
+    light. Rows that no flash within reach showed stay unseen.
     """
     waiting: deque[_Waiting] = deque()
-    latest: dict[str, LightPlate] = {}
+    known: dict[str, LightPlate] = {}
     for plate in plates:
-        for one in waiting:
-            one.offer(plate)
-        known = latest.get(plate.light)
-        now = _Waiting(plate=plate)
-        if known is not None:
-            now.fill(known)
-        latest[plate.light] = _newer(known, plate)
-        waiting.append(now)
-        del plate, now
-        while waiting and waiting[0].done:
-            yield waiting.popleft().result
+        waiting.append(_Waiting.of(plate))
+        del plate
+        while _can_go(waiting, known):
+            yield _released(waiting, known)
     while waiting:
-        yield waiting.popleft().result
+        yield _released(waiting, known)
 
 
-@dataclass(kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class _Waiting:
-    """A plate with what was found so far of the rows that it lacks; ``later`` counts the plates of its light since."""
+    """A plate of which only the rows are held that its own flash showed, ``rows``; ``plate`` has no image."""
 
     plate: LightPlate
-    filled: LightPlate | None = None
-    later: int = field(default=0)
+    rows: NDArray[np.float32]
+    shape: tuple[int, ...]
 
-    @property
-    def done(self) -> bool:
-        """True where nothing better can come."""
-        return self.later >= LATER or bool(self.plate.rows_seen.all())
+    @classmethod
+    def of(cls, plate: LightPlate) -> "_Waiting":
+        """Hold a plate."""
+        whole = bool(plate.rows_seen.all())
+        rows = plate.image if whole else plate.image[plate.rows_seen]
+        return cls(plate=replace(plate, image=plate.image[:0]), rows=rows, shape=plate.image.shape)
 
-    @property
-    def result(self) -> LightPlate:
-        """The plate as far as it is known."""
-        return self.plate if self.filled is None else self.filled
+    def given(self) -> LightPlate:
+        """Return the plate with its own rows, the others 0."""
+        seen = self.plate.rows_seen
+        if seen.all():
+            return replace(self.plate, image=self.rows)
+        image = np.zeros(self.shape, np.float32)
+        image[seen] = self.rows
+        return replace(self.plate, image=image)
 
-    def offer(self, later: LightPlate) -> None:
-        """Take the rows that a later plate shows and nothing nearer did."""
-        if later.light == self.plate.light and not self.done:
-            self.later += 1
-            self.fill(later)
-
-    def fill(self, other: LightPlate) -> None:
-        """Take the rows of another plate of this light that are missing here, or nearer in time than what is held."""
-        held = self.result
-        away_s = np.abs(other.flashed_s - self.plate.time_s)
-        nearer = ~held.rows_seen | (away_s < np.abs(held.flashed_s - self.plate.time_s))
-        taken = ~self.plate.rows_seen & other.rows_seen & nearer
-        if taken.any():
-            self.filled = _with_rows(held, other, taken, copy=self.filled is None)
+    def put(self, image: NDArray[np.float32], wanted: Flags) -> None:
+        """Write those of its rows that are wanted."""
+        image[wanted] = self.rows[wanted[self.plate.rows_seen]]
 
 
-def _newer(known: LightPlate | None, plate: LightPlate) -> LightPlate:
-    """Return the latest that is known of every row of a light."""
-    if known is None or plate.rows_seen.all():
+def _later(waiting: deque[_Waiting]) -> list[_Waiting]:
+    """Return the later plates of the first one's light, in order."""
+    first = waiting[0].plate.light
+    return [one for n, one in enumerate(waiting) if n and one.plate.light == first]
+
+
+def _can_go(waiting: deque[_Waiting], known: dict[str, LightPlate]) -> bool:
+    """Tell whether nothing nearer can come for the first plate, or it has waited enough."""
+    if not waiting:
+        return False
+    seen, later = waiting[0].plate.rows_seen.copy(), _later(waiting)
+    for one in later:
+        seen |= one.plate.rows_seen
+    earlier = known.get(waiting[0].plate.light)
+    if earlier is not None and len(later) >= LATER:
+        seen |= earlier.rows_seen
+    return bool(seen.all()) or len(later) >= MOST_LATER
+
+
+def _released(waiting: deque[_Waiting], known: dict[str, LightPlate]) -> LightPlate:
+    """Return the first plate with the rows that it lacks from the nearest others, and note what it showed itself."""
+    later, first = _later(waiting), waiting.popleft()
+    own = first.given()
+    earlier = known.get(own.light)
+    known[own.light] = own if earlier is None else _filled(own, earlier, ~own.rows_seen & earlier.rows_seen)
+    if own.rows_seen.all():
+        return own
+    found = known[own.light]
+    image, shown_s, seen = found.image.copy(), found.flashed_s.copy(), found.rows_seen.copy()
+    for one in later:
+        nearer = ~seen | (abs(one.plate.time_s - own.time_s) < np.abs(shown_s - own.time_s))
+        wanted = one.plate.rows_seen & ~own.rows_seen & nearer
+        one.put(image, wanted)
+        shown_s[wanted], seen[wanted] = one.plate.time_s, True
+    return replace(own, image=image, seen=seen, shown_s=shown_s)
+
+
+def _filled(plate: LightPlate, other: LightPlate, rows: Flags) -> LightPlate:
+    """Return a plate with some rows of another."""
+    if not rows.any():
         return plate
-    return _with_rows(plate, known, ~plate.rows_seen & known.rows_seen, copy=True)
-
-
-def _with_rows(plate: LightPlate, other: LightPlate, rows: NDArray[np.bool_], *, copy: bool) -> LightPlate:
-    image = plate.image.copy() if copy else plate.image
+    image = plate.image.copy()
     image[rows] = other.image[rows]
-    flashed_s: FloatArray = np.where(rows, other.flashed_s, plate.flashed_s)
-    return replace(plate, image=image, seen=plate.rows_seen | rows, shown_s=flashed_s)
+    shown_s: FloatArray = np.where(rows, other.flashed_s, plate.flashed_s)
+    return replace(plate, image=image, seen=plate.rows_seen | rows, shown_s=shown_s)
