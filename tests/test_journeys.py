@@ -164,12 +164,13 @@ def test_force_replaces_results_and_never_footage(
     copy = spoilt(clip, tmp_path)
     before = digest(copy)
     rig = ("--rig", copy / "rig.toml", "-q", "--force")
+    shoot = ("--camera", "Sony F65", "--fps", "120", "--flash", "1ms")
     assert run("normals", copy, *rig, "-o", copy) == 2
     assert run("normals", copy, *rig, "-o", copy / "frames") == 2
     assert run("split", copy, "-q", "--force", "-o", copy / "frames") == 2
     assert run("sync", copy, "-q", "--force", "-o", a_frame(copy)) == 2
     assert run("sync", copy, "-q", "--force", "-o", copy / "plan.toml") == 2
-    assert run("capture-plan", "--camera", "Sony F65", "--flash", "1ms", "-q", "--force", "-o", a_frame(copy)) == 2
+    assert run("capture-plan", *shoot, "-q", "--force", "-o", a_frame(copy)) == 2
     assert capsys.readouterr().err.count("not replaced, not even with --force") == 6
     assert digest(copy) == before
     out = tmp_path / "out"
