@@ -102,13 +102,16 @@ def _rebuild(camera: Camera, timing: Timing, flash: Flash, images: dict[int, Ima
     """Combine the frames that saw one flash, each row with its own coefficients."""
     recipe = flash_recipe(camera, timing, flash, frozenset(images))
     shape = next(iter(images.values())).shape
-    plate = np.zeros(shape, np.float32)
-    clipped = np.zeros(shape, np.bool_)
-    flat, flat_clipped = plate.reshape(shape[0], -1), clipped.reshape(shape[0], -1)
-    any_clipped = False
-    for index, coefficient in zip(recipe.frames, recipe.coefficients, strict=True):
-        frame = images[index].reshape(shape[0], -1)
-        any_clipped |= _add_rows(flat, flat_clipped, frame, coefficient.astype(np.float32))
+    plate = np.empty(shape, np.float32)
+    rows = len(plate)
+    begun, holds_clipped = np.zeros(rows, np.bool_), np.zeros(rows, np.bool_)
+    parts = [
+        (images[index].reshape(rows, -1), share.astype(np.float32))
+        for index, share in zip(recipe.frames, recipe.coefficients, strict=True)
+    ]
+    for frame, share in parts:
+        _add_rows(plate.reshape(rows, -1), frame, share, begun, holds_clipped)
+    plate[~begun] = 0
     middles_s = _opens_s(camera, recipe.frames) + camera.exposure_s / 2
     return Plate(
         flash=flash,
@@ -116,8 +119,17 @@ def _rebuild(camera: Camera, timing: Timing, flash: Flash, images: dict[int, Ima
         shares=recipe.coefficients,
         middles_s=middles_s,
         seen=recipe.seen,
-        clipped=clipped if any_clipped else None,
+        clipped=_clipped(parts, shape) if holds_clipped.any() else None,
     )
+
+
+def _clipped(parts: Sequence[tuple[Image, Image]], shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Return where any sample that counts was clipped; ``parts`` are frames (row, sample) and their shares (row,)."""
+    clipped = np.zeros(shape, np.bool_)
+    for frame, share in parts:
+        counts = share > COUNTS
+        clipped[counts] |= (frame[counts] >= np.float32(SATURATED)).reshape(-1, *shape[1:])
+    return clipped
 
 
 def _opens_s(camera: Camera, frames: Sequence[int]) -> FloatArray:
@@ -127,20 +139,28 @@ def _opens_s(camera: Camera, frames: Sequence[int]) -> FloatArray:
 
 
 @EXACT.kept
-def _add_rows(plate: Image, clipped: NDArray[np.bool_], frame: Image, coefficient: Image) -> bool:
-    """Add a frame's rows, each times its coefficient; mark what is clipped, and return whether anything is."""
-    any_clipped = False
+def _add_rows(
+    plate: Image, frame: Image, share: Image, begun: NDArray[np.bool_], holds_clipped: NDArray[np.bool_]
+) -> None:
+    """Add a frame's rows, each times its share, and note which rows have begun and which hold a clipped sample.
+
+    One loop over memory: a row that has not begun is written and not read.
+    """
     for row in range(plate.shape[0]):
-        share = coefficient[row]
-        if share != 0:
-            for col in range(plate.shape[1]):
-                plate[row, col] += share * frame[row, col]
-            if share > np.float32(COUNTS):
-                count = 0
-                for col in range(plate.shape[1]):
-                    count += frame[row, col] >= np.float32(SATURATED)
-                if count:
-                    any_clipped = True
-                    for col in range(plate.shape[1]):
-                        clipped[row, col] |= frame[row, col] >= np.float32(SATURATED)
-    return any_clipped
+        factor = share[row]
+        if factor == 0:
+            continue
+        clipped = np.int32(0)
+        if begun[row]:
+            for sample in range(plate.shape[1]):
+                value = frame[row, sample]
+                plate[row, sample] += factor * value
+                clipped += np.int32(value >= np.float32(SATURATED))
+        else:
+            for sample in range(plate.shape[1]):
+                value = frame[row, sample]
+                plate[row, sample] = factor * value
+                clipped += np.int32(value >= np.float32(SATURATED))
+            begun[row] = True
+        if clipped > 0 and factor > np.float32(COUNTS):
+            holds_clipped[row] = True
