@@ -1,5 +1,6 @@
 """Near lights: every pixel has lights of its own, and their normals are as exact as the surface's place is known."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,14 +10,18 @@ import scipy.io
 from numpy.typing import NDArray
 
 from psvideo.cli.app import main
+from psvideo.compute.compiled import EXACT
 from psvideo.errors import PsvideoError
+from psvideo.model.light_field import near_vectors
 from psvideo.model.rig import Light, Rig
 from psvideo.solve import near_surface
 from psvideo.solve.depth import Shaping, View
 from psvideo.solve.near_surface import NearSurface, solve_near
 from psvideo.solve.normals import robust, woodham1980
 from psvideo.solve.normals.illumination import Illumination, illumination
-from psvideo.solve.normals.near_light import ground_of
+from psvideo.solve.normals.near_kernel import place_lights
+from psvideo.solve.normals.near_light import ground_of, near_field
+from psvideo.solve.normals.task import Floats, Near
 
 Array = NDArray[np.float64]
 SIZE, WIDTH_M, FAR_M = 96, 0.4, 1.6
@@ -319,3 +324,34 @@ def picture(path: Path) -> NDArray[np.float32]:
     channels = OpenEXR.File(str(path)).channels()
     planes = channels["RGB"].pixels if "RGB" in channels else next(iter(channels.values())).pixels
     return planes.astype(np.float32)
+
+
+@EXACT.kept
+def _placed(matrix: Floats, per_strength: Floats, near: Near, row: int, n: int) -> None:
+    place_lights(matrix, per_strength, near, row, 0, n)
+
+
+@pytest.mark.parametrize("anisotropy", [0.0, 1.0, 2.5])
+def test_the_compiled_lights_are_those_of_the_model(anisotropy: float) -> None:
+    rig = replace(
+        ring_rig(4, 3.0),
+        lights=tuple(replace(light, anisotropy=anisotropy) for light in ring_rig(4, 3.0).lights),
+    )
+    ground = ground_of(rig, height_px=SIZE, width_px=SIZE)
+    ground = ground.with_depth(relief(*np.mgrid[:SIZE, :SIZE][::-1].astype(float)))
+    field = near_field(rig.lights, ground)
+    short = np.float32
+    near = Near(
+        positions=field.positions_m.astype(short), is_near=field.is_near.astype(np.uint8), axes=field.axes.astype(short),
+        anisotropy=field.anisotropy.astype(short), strengths=np.ones(4, short), depth=ground.depth_m,
+        pinhole=np.array([1 / FOCAL_PX, 1 / FOCAL_PX, MIDDLE, MIDDLE], short),
+    )  # fmt: skip
+    row = 17
+    matrix, per = np.zeros((4, 3, SIZE), short), np.zeros((4, SIZE), short)
+    _placed(matrix, per, near, row, SIZE)
+    col = np.arange(SIZE, dtype=float)
+    points = rays(col, np.full(SIZE, float(row))) * ground.depth_m[row][:, None].astype(float)
+    for light in range(4):
+        wanted = near_vectors(points, field.positions_m[light], axis=field.axes[light], anisotropy=anisotropy)
+        np.testing.assert_allclose(matrix[light].T, wanted, rtol=2e-5)
+        np.testing.assert_allclose(1 / per[light], np.linalg.norm(wanted, axis=1), rtol=2e-5)

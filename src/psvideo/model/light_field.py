@@ -57,12 +57,27 @@ def points_on_plane(plan: Plan, rig: Rig, *, down: FloatArray, across: FloatArra
         raise ValueError("near lights need the rig's camera and plane")
     col = across * plan.camera.width_px - 0.5
     row = down * plan.camera.height_px - 0.5
-    x = (col - rig.principal_px[0]) / rig.focal_px[0]
-    y = -(row - rig.principal_px[1]) / rig.focal_px[1]
-    ray = np.stack([x, y, -np.ones_like(x)], axis=1)
-    normal, offset_m = np.array(rig.plane[:3]), rig.plane[3]
-    points: FloatArray = ray * (-offset_m / (ray @ normal))[:, None]
+    x, y = rays(rig.focal_px, rig.principal_px, col=col, row=row)
+    points: FloatArray = np.stack([x, y, -np.ones_like(x)], axis=1) / inverse_depth(rig.plane, x, y)[:, None]
     return points
+
+
+def rays(
+    focal_px: tuple[float, float], principal_px: tuple[float, float], *, col: FloatArray, row: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return x and y of the ray (x, y, -1) through places of the picture, of the shapes of ``col`` and ``row``."""
+    return (col - principal_px[0]) / focal_px[0], -(row - principal_px[1]) / focal_px[1]
+
+
+def inverse_depth(plane: tuple[float, float, float, float], x: FloatArray, y: FloatArray) -> FloatArray:
+    """Return 1 / depth in 1/m at which rays (x, y, -1) meet a plane (a, b, c, d); 0 or less: nowhere in front.
+
+    >>> inverse_depth((0.0, 0.0, 1.0, 1.25), np.array([0.0, 0.3]), np.array([0.0, -0.2]))
+    array([0.8, 0.8])
+    """
+    a, b, c, d = plane
+    towards: FloatArray = c - a * x - b * y
+    return towards / d if d else np.zeros_like(towards)
 
 
 def _strength(light: Light, points: Points) -> FloatArray:

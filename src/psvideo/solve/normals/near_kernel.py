@@ -13,9 +13,10 @@ from numba import types
 from numba.extending import overload
 
 from psvideo.compute.compiled import FUSED
+from psvideo.model import light_field
 from psvideo.solve.normals.task import Floats, Near
 
-LEAST_COSINE = np.float32(1e-3)  # nothing is behind an LED; what is there keeps a little light, and so no division by 0
+LEAST_COSINE = np.float32(light_field.LEAST_COSINE)
 ONE = np.float32(1)
 
 

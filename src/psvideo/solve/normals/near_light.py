@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import FloatArray
-from psvideo.model.light_field import LEAST_COSINE, near_vectors
+from psvideo.model.light_field import LEAST_COSINE, inverse_depth, near_vectors, rays
 from psvideo.model.rig import Light, Rig
 
 FARTHEST_M = 50.0
@@ -108,9 +108,7 @@ def _plane_depth_m(rig: Rig, height_px: int, width_px: int) -> FloatArray:
     if rig.focal_px is None or rig.principal_px is None or rig.plane is None:
         raise ValueError("a rig with camera and plane expected")
     x, y = _rays(rig.focal_px, rig.principal_px, height_px, width_px)
-    a, b, c, d = rig.plane
-    toward = c - a * x - b * y
-    inverse_m = toward / d if d else np.zeros_like(toward)  # 1 / depth along the ray (x, y, -1)
+    inverse_m = inverse_depth(rig.plane, x, y)
     row, col = height_px // 2, width_px // 2
     if inverse_m[row, col] <= 0:
         raise PsvideoError(
@@ -131,9 +129,8 @@ def _rays(
     focal_px: tuple[float, float], principal_px: tuple[float, float], height_px: int, width_px: int
 ) -> tuple[FloatArray, FloatArray]:
     """Return x (1, col) and y (row, 1) of the ray (x, y, -1) through every pixel's centre."""
-    x = (np.arange(width_px, dtype=np.float64)[None, :] - principal_px[0]) / focal_px[0]
-    y = -(np.arange(height_px, dtype=np.float64)[:, None] - principal_px[1]) / focal_px[1]
-    return x, y
+    cols, rows = np.arange(width_px, dtype=np.float64), np.arange(height_px, dtype=np.float64)
+    return rays(focal_px, principal_px, col=cols[None, :], row=rows[:, None])
 
 
 def _what_is_lacking(rig: Rig, *, height_px: int, width_px: int, known: bool) -> str:
