@@ -342,8 +342,9 @@ def test_the_compiled_lights_are_those_of_the_model(anisotropy: float) -> None:
     field = near_field(rig.lights, ground)
     short = np.float32
     near = Near(
-        positions=field.positions_m.astype(short), is_near=field.is_near.astype(np.uint8), axes=field.axes.astype(short),
-        anisotropy=field.anisotropy.astype(short), strengths=np.ones(4, short), depth=ground.depth_m,
+        positions=field.positions_m.astype(short), is_near=field.is_near.astype(np.uint8),
+        axes=field.axes.astype(short), anisotropy=field.anisotropy.astype(short),
+        strengths=np.ones(4, short), depth=ground.depth_m,
         pinhole=np.array([1 / FOCAL_PX, 1 / FOCAL_PX, MIDDLE, MIDDLE], short),
     )  # fmt: skip
     row = 17

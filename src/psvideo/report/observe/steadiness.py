@@ -13,6 +13,8 @@ LEAST_PIXELS = 100
 MOST_TURNED_DEG = 5.0
 """Where the mean normal of a neighbourhood turns by more than this from one result to the next, something moved."""
 WINDOW = 5
+ENOUGH = 8192
+"""Medians are taken over so many pixels, spread evenly: more would not change them."""
 
 Values = NDArray[np.float32]
 
@@ -52,15 +54,26 @@ def change(before: Sample, after: Sample) -> Change | None:
     both = before.valid & after.valid & (before.albedo > 0)
     window = (WINDOW, WINDOW)
     early, late = (np.asarray(cv2.blur(one.normals * both[..., None], window), np.float32) for one in (before, after))
-    rest = both & (_angle_deg(early, late) <= MOST_TURNED_DEG)
+    rest = both & _points_alike(early, late)
     if rest.sum() < LEAST_PIXELS:
         return None
-    relative = after.albedo[rest] / before.albedo[rest] - 1
+    some = np.flatnonzero(rest)
+    some = some[:: max(len(some) // ENOUGH, 1)]
+    one, other = (sample.normals.reshape(-1, 3)[some] for sample in (before, after))
+    relative = after.albedo.ravel()[some] / before.albedo.ravel()[some] - 1
     return Change(
-        normals_deg=float(np.median(_angle_deg(before.normals[rest], after.normals[rest]))),
+        normals_deg=float(np.median(_angle_deg(one, other))),
         albedo_percent=float(100 * np.median(np.abs(relative))),
         level_percent=float(100 * np.median(relative)),
     )
+
+
+def _points_alike(one: Values, other: Values) -> NDArray[np.bool_]:
+    """Return where vectors of any length (row, col, 3) are turned by no more than MOST_TURNED_DEG."""
+    cosine, lengths = np.einsum("...i,...i", one, other), np.zeros(one.shape[:2], np.float32)
+    np.multiply(np.einsum("...i,...i", one, one), np.einsum("...i,...i", other, other), out=lengths)
+    least = np.float32(np.cos(np.deg2rad(MOST_TURNED_DEG)))
+    return np.asarray(cosine >= least * np.sqrt(lengths))
 
 
 def _angle_deg(one: Values, other: Values) -> NDArray[np.float64]:
