@@ -123,7 +123,7 @@ def test_a_good_take_is_called_usable_and_every_line_good(reported: Callable[...
         ("passing", "usable, with reservations", "motion", r"by up to 1\.[34] px from flash to flash"),
         ("dropped", "usable, with reservations", "frames", r"2 frame\(s\) are missing \(2 after number 9\)"),
         ("cut", "not usable as it is: rows", "rows", r"dark time of 7 ms is shorter.*plates are cut.*at least 10 ms"),
-        ("half_open", "not usable as it is: rows", "rows", r"180 degrees only.*Shoot at 360 degrees"),
+        ("half_open", "usable, with reservations", "rows", r"180 degrees only.*other rounds.*Shoot at 360 degrees"),
         ("noisy", "usable, with reservations", "noise", r"Normals at rest change by [45]\.\d degrees"),
     ],
 )  # fmt: skip

@@ -225,7 +225,7 @@ def test_systems_without_pseudo_terminals_get_a_socket(monkeypatch: pytest.Monke
 def test_without_the_tools_the_python_board_answers_and_says_so(tmp_path: Path) -> None:
     with emulation(path=str(tmp_path)) as (process, port):
         with serial.serial_for_url(port, 115200, timeout=10) as line:
-            assert "firmware=emulated" in ask(line, "ID")
+            assert "firmware=python-1" in ask(line, "ID")
         process.send_signal(signal.SIGTERM)
         _, said = process.communicate(timeout=STARTS_WITHIN_S)
     assert process.returncode == 0
@@ -239,7 +239,7 @@ def test_what_lacks_is_named_where_the_firmware_was_asked_for(monkeypatch: pytes
     with pytest.raises(PsvideoError, match=r'needs the Debian packages gcc-avr avr-libc\. .*`board="python"`'):
         toolchain.build("atmega328p")
     monkeypatch.setattr(toolchain, "lights_folder", lambda: None)
-    with pytest.raises(PsvideoError, match=r'without one\. Run it from a checkout, or take `board="python"`'):
+    with pytest.raises(PsvideoError, match=r'does not hold them\. Run it from a checkout, or take `board="python"`'):
         toolchain.build("atmega328p")
 
 

@@ -163,7 +163,10 @@ COMMANDS: dict[str, tuple[str, ...]] = {
 }
 
 
-@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=pytest.mark.campaign) if name in ("split", "depth") else name for name in COMMANDS],
+)
 def test_any_number_of_threads_gives_the_same_bytes_also_under_load(name: str, clip: Path, tmp_path: Path) -> None:
     command, *options = (word.format(clip=clip) for word in COMMANDS[name])
     digests = []
@@ -179,7 +182,7 @@ def test_any_number_of_threads_gives_the_same_bytes_also_under_load(name: str, c
     assert all(before == after for before, after in pairwise(digests))
 
 
-@pytest.mark.parametrize("name", ["split", "normals"])
+@pytest.mark.parametrize("name", [pytest.param("split", marks=pytest.mark.campaign), "normals"])
 def test_a_run_that_was_killed_goes_on_to_the_same_bytes(name: str, clip: Path, tmp_path: Path) -> None:
     command, *options = (word.format(clip=clip) for word in COMMANDS[name])
     whole, out = tmp_path / "whole", tmp_path / "out"

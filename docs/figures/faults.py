@@ -96,7 +96,16 @@ def half_shutter(folder: Path) -> Figure:
     psvideo("split", clip, "-o", folder / "plates")
     seen = [("frame: a wide black band", shown(frames(clip)[5])), ("plate", _plate(folder / "plates"))]
     left = [("normals", normal_colours(_normals(out))), ("valid is white", white(exr(out / "valid")))]
-    return figure([row("Shutter of 180 degrees: rows that no frame saw", *seen, *left)], said)
+    return figure(
+        [
+            row(
+                "Shutter of 180 degrees: what one flash showed, and normals with rows of other rounds",
+                *seen,
+                *left,
+            )
+        ],
+        said,
+    )
 
 
 def led_tails(folder: Path) -> Figure:

@@ -75,6 +75,8 @@ def gather(
         Is shown every single plate on its way, demosaiced.
     each_plate
         Is shown every light's plate, and every dark slot's, before any is moved.
+    each_window
+        Is shown what every window of frames gives of ambient light, where the plan has no dark slot.
 
     Yields
     ------

@@ -64,7 +64,8 @@ ORDER = {
 def coverage(plan: Plan, timing: Timing, observed: Observed) -> Iterator[Judgement]:
     """Judge which rows were seen by nobody, or under two flashes, and why."""
     unseen = max((one.unseen_share for one in observed.facts), default=0.0)
-    said = [] if plan.mode == "synced" else [*_mixed(plan, timing), *_blind(timing, unseen)]
+    borrowed = max((one.borrowed_share for one in observed.facts), default=0.0)
+    said = [] if plan.mode == "synced" else [*_mixed(plan, timing), *_blind(timing, unseen, borrowed)]
     said += _dropped(timing, observed)
     if unseen > MOST_UNSEEN and not said:
         said.append(
@@ -95,9 +96,17 @@ def _mixed(plan: Plan, timing: Timing) -> Iterator[Judgement]:
         )
 
 
-def _blind(timing: Timing, unseen: float) -> Iterator[Judgement]:
+def _blind(timing: Timing, unseen: float, borrowed: float) -> Iterator[Judgement]:
     share = timing.exposure_s / timing.frame_period_s
-    if share < BLIND and unseen > MOST_UNSEEN:
+    if share < BLIND and borrowed > MOST_UNSEEN and unseen <= LOST_UNSEEN:
+        yield Judgement(
+            subject="rows",
+            grade="doubtful",
+            found=f"The shutter is open for {360 * share:.0f} degrees only: up to {100 * borrowed:.0f} % of a round's "
+            "rows come from other rounds. What stands still loses nothing by it, what moves in them is left out.",
+            advice="Shoot at 360 degrees.",
+        )
+    elif share < BLIND and unseen > MOST_UNSEEN:
         yield Judgement(
             subject="rows",
             grade="bad" if unseen > LOST_UNSEEN else "doubtful",

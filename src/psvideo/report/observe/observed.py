@@ -32,7 +32,8 @@ STRIDE = 4
 @dataclass(frozen=True, kw_only=True)
 class InstantFacts:
     """What one round gave: which shares of what is lit (or masked) are valid or saturated, and which share of rows no
-    frame saw. A void background counts as neither. ``change`` is what differs from the result before, at rest.
+    frame saw; ``borrowed_share`` is that of rows that other rounds showed. A void background counts as neither.
+    ``change`` is what differs from the result before, at rest.
 
     ``valid_share`` is None where no normals were solved. ``levels`` (light) is each light's mean on the subject, 1.0 =
     saturation; ``clipped`` (light) the share of it that is saturated. ``ambient`` is the ambient light's share of what
@@ -46,6 +47,7 @@ class InstantFacts:
     valid_share: float | None
     clipped_share: float
     unseen_share: float
+    borrowed_share: float = 0.0
     change: Change | None = None
     levels: tuple[float, ...] = ()
     clipped: tuple[float, ...] = ()
@@ -99,6 +101,7 @@ def instant_facts(
         valid_share=None if surface is None else float((surface.valid[::STRIDE, ::STRIDE] & subject).sum() / count),
         clipped_share=float(np.mean(shares)),
         unseen_share=float(np.mean([1 - plate.rows_seen.mean() for plate in one.plates])),
+        borrowed_share=float(np.mean([_borrowed(plate) for plate in one.plates])),
         change=change,
         levels=tuple(level / plate.saturation for level, plate in zip(levels, one.plates, strict=True)),
         clipped=tuple(shares),
@@ -107,6 +110,14 @@ def instant_facts(
         moving_share=None if moving is None else moving.share,
         misfit=None if surface is None else surface.misfit,
     )
+
+
+def _borrowed(plate: LightPlate) -> float:
+    """Return the share of a plate's rows that come from another round: half a round away and more."""
+    if plate.shown_s is None:
+        return 0.0
+    times_s, counts = np.unique(plate.shown_s[plate.rows_seen], return_counts=True)
+    return float(1 - counts[np.abs(times_s - plate.time_s).argmin()] / len(plate.shown_s)) if len(times_s) > 1 else 0.0
 
 
 def _ambient_share(dark: NDArray[np.float32] | None, subject: NDArray[np.bool_], levels: list[float]) -> float | None:
