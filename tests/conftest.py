@@ -120,7 +120,7 @@ def emulate() -> Callable[..., list[str]]:
     ) -> list[str]:
         """``breakable``: the build that knows HANG (lights/firmware/hang.h)."""
         firmware = built[board].firmware
-        words = [built[board].emulator, "--board", board, "--wiring", wiring, "--script", "-"]
+        words: list[str | Path] = [built[board].emulator, "--board", board, "--wiring", wiring, "--script", "-"]
         words += ["--trace", trace] if trace else []
         words.append(firmware.with_name(f"{board}-hang.elf") if breakable else firmware)
         text = "\n".join(["wait 5", *script, ""])

@@ -124,7 +124,8 @@ def dimmed(n: int, scene: np.ndarray) -> np.ndarray:
 
 
 def clouded(n: int, scene: np.ndarray) -> np.ndarray:
-    return LEVEL * scene * (1 + 0.3 * np.sin(2 * np.pi * n / 120) * np.linspace(0, 1, scene.shape[1]))
+    light: np.ndarray = LEVEL * scene * (1 + 0.3 * np.sin(2 * np.pi * n / 120) * np.linspace(0, 1, scene.shape[1]))
+    return light
 
 
 def shadow_down_the_rows(n: int, scene: np.ndarray) -> np.ndarray:
@@ -190,7 +191,7 @@ def test_exposures_of_whole_pulses_show_none(make_plan: PlanMaker) -> None:
 
 
 def test_a_change_that_looks_like_a_ripple_once_is_not_believed() -> None:
-    rows = np.arange(200)
+    rows = np.arange(200, dtype=np.float64)
     light = [
         RowLight(
             mean=0.1 * (1 + 0.1 * n * rows / 200),
@@ -209,7 +210,7 @@ def test_a_change_that_looks_like_a_ripple_once_is_not_believed() -> None:
 
 def test_a_ripple_is_found_with_its_phase() -> None:
     rng = np.random.default_rng(0)
-    rows, true = np.arange(300), Ripple(hz=120.0, amplitude=0.2 * np.exp(0.7j))
+    rows, true = np.arange(300, dtype=np.float64), Ripple(hz=120.0, amplitude=0.2 * np.exp(0.7j))
     surface = rng.uniform(0.05, 0.4, 300)
 
     def seen(time_s: float) -> RowLight:
@@ -268,7 +269,7 @@ def test_ripples_of_an_average_of_hundreds_of_dark_slots_die_out() -> None:
     rng = np.random.default_rng(4)
     size, row = (240, 64), np.ones((1, 240))
 
-    def dark(index: int, light: np.ndarray) -> Plate:
+    def dark(index: int, light: np.ndarray | float) -> Plate:
         flash = Flash(index=index, slot=0, lights={}, start_s=index / 30, duration_s=1e-3, complete=True)
         image = (light + 2e-3 * rng.standard_normal(size)).astype(np.float32)
         return Plate(flash=flash, image=image, shares=row, middles_s=row * index / 30, seen=np.ones(240, bool))

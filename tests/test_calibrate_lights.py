@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from picture_file import read_picture
 
 from psvideo.calibrate.flat_field import Target, measure_flat_field
 from psvideo.calibrate.guess import guess_rig
@@ -17,6 +18,7 @@ from psvideo.calibrate.strengths import measure_strengths
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
 from psvideo.formats.rig_toml import read_rig
+from psvideo.model.choices import Prior
 from psvideo.model.rig import Light, Rig
 from psvideo.solve.normals.near_light import ground_of
 
@@ -52,7 +54,8 @@ def sphere_pictures(
 
 
 def off_deg(found: Array, true: Array) -> Array:
-    return np.degrees(np.arccos(np.clip((found * true).sum(axis=-1), -1, 1)))
+    angles: Array = np.degrees(np.arccos(np.clip((found * true).sum(axis=-1), -1, 1)))
+    return angles
 
 
 @pytest.mark.parametrize("focal_px", [None, 300.0])
@@ -120,7 +123,7 @@ def test_a_real_matte_sphere_agrees_with_the_chrome_one(
     assert np.median(off / np.array([light.error_deg for light in lights])) < 1.5
     strengths = np.array([light.intensity for light in lights]).mean(axis=1)
     assert np.sort(np.abs(strengths - 1))[-2] < 0.013, "eleven of twelve within 1.3 %"
-    assert cv2.imread(str(out.with_suffix(".png"))).shape[1] == 1200
+    assert read_picture(out.with_suffix(".png")).shape[1] == 1200
 
 
 @pytest.mark.parametrize("near", [False, True], ids=["distant", "near"])
@@ -179,7 +182,7 @@ def test_a_matte_scene_shows_the_strengths_of_lights_of_known_directions() -> No
 
 
 @pytest.mark.parametrize(("lights", "prior"), [(8, "equal-lights"), (8, "equal-albedo"), (4, None)])
-def test_a_guess_is_right_where_its_priors_hold(lights: int, prior) -> None:
+def test_a_guess_is_right_where_its_priors_hold(lights: int, prior: Prior | None) -> None:
     directions = ways(lights)
     guessed = guess_rig(sphere_pictures(directions, np.ones((lights, 3))), prior=prior)
     found = np.array([light.direction for light in guessed.rig.lights])

@@ -144,7 +144,7 @@ def test_no_readout_is_read_into_a_scene(shared_data: Path, scene: str) -> None:
 )
 def test_the_period_is_found_for_any_duty_exposure_curve_and_noise(kind: dict[str, float]) -> None:
     rng = np.random.default_rng(5)
-    options = {"rows": ROWS, "period": 40.3, **kind}
+    options: dict[str, Any] = {"rows": ROWS, "period": 40.3, **kind}
     found = measured(film(rng, **options))
     true_s = options["rows"] / options["period"] / LED_HZ
     assert abs(found.readout_s - true_s) < 4 * found.error_s
@@ -167,7 +167,7 @@ def test_claimed_errors_are_the_errors_that_are_made() -> None:
 
 def test_a_textured_scene_under_daylight_cancels_where_stripes_move_over_it() -> None:
     rng = np.random.default_rng(3)
-    options = {"ambient": 1.0, "scene": texture(rng, ROWS, COLS, 1.0), "fps": Fraction(60)}
+    options: dict[str, Any] = {"ambient": 1.0, "scene": texture(rng, ROWS, COLS, 1.0), "fps": Fraction(60)}
     found = measured(*clip(rng, 5, **options))
     assert found.rows_per_period == pytest.approx(40.3, rel=5e-4)
     assert abs(found.rows_per_period - 40.3) < 4 * found.rows_per_period_error
@@ -193,7 +193,8 @@ def test_crops_and_zoomed_views_count_rows_of_the_sensor() -> None:
     whole = measured(frame)
     assert measured(frame, rows=2 * ROWS).readout_s == pytest.approx(2 * whole.readout_s)
     zoomed = measured(frame, zoom=2.0)
-    assert (zoomed.readout_s, zoomed.rows) == (pytest.approx(whole.readout_s), ROWS // 2)
+    assert zoomed.readout_s == pytest.approx(whole.readout_s)
+    assert zoomed.rows == ROWS // 2
     assert measured(frame, zoom=0.5, rows=2 * ROWS).readout_s == pytest.approx(whole.readout_s)
 
 

@@ -32,7 +32,9 @@ def measured(plan: Plan, *, seed: int = 0, frames: int = 60) -> StrobedReadout:
     """Film a textured scene under the plan and measure with a plan that does not know the readout."""
     camera = plan.camera
     rng = np.random.default_rng(seed)
-    plates = {slot: 0.1 + 0.6 * rng.random((camera.height_px, camera.width_px)) for slot in plan.lit_slots}
+    plates: dict[int, np.ndarray] = {
+        slot: 0.1 + 0.6 * rng.random((camera.height_px, camera.width_px)) for slot in plan.lit_slots
+    }
     clock = TrueClock(phase_s=0.0123 + 0.001 * seed, offset_ppm=30.0)
     noise = Noise(full_well_e=20_000, read_e=8)
     shot = expose(plates, plan, frames=frames, clock=clock, noise=noise, bits=12, seed=seed)

@@ -15,6 +15,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from picture_file import read_picture
 
 from psvideo.cli.app import main
 from psvideo.report.observe.focus import sharpest_blur_px
@@ -93,7 +94,7 @@ def test_lights_that_did_not_flash_are_a_strobe_that_is_not_seen(
     clip = tmp_path / "clip"
     shutil.copytree(shot("good"), clip)
     files = sorted((clip / "frames").iterdir())
-    lit = cv2.imread(str(files[4]), cv2.IMREAD_UNCHANGED)
+    lit = read_picture(files[4], cv2.IMREAD_UNCHANGED)
     for file in files:
         cv2.imwrite(str(file), lit)
     assert run("check", clip) == 1
@@ -156,7 +157,7 @@ def test_a_movie_is_not_decoded_to_its_end(
     from psvideo.clip.decode import movie
 
     clip = shot("good")
-    frames = [cv2.imread(str(file), cv2.IMREAD_UNCHANGED) for file in sorted((clip / "frames").iterdir())]
+    frames = [read_picture(file, cv2.IMREAD_UNCHANGED) for file in sorted((clip / "frames").iterdir())]
     write_movie(tmp_path / "take.mkv", frames * 8)
     shutil.copy(clip / "plan.toml", tmp_path / "plan.toml")
     decoded: list[int] = []

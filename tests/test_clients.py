@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 import pytest
 from ball_delivery import NUMBERS, SIZE, ball, deliver
+from picture_file import read_picture
 
 from psvideo.export.png_maps import PNG_MAX, encode_normals
 from psvideo.export.preview_movie import write_movie
@@ -96,14 +97,14 @@ def test_a_png_without_its_tags_is_bent_where_colours_are_managed_and_with_them_
 ) -> None:
     tagged = out / "normals_png16" / "ball_normals.1001.png"
     bare = tmp_path / "bare.png"
-    cv2.imwrite(str(bare), cv2.imread(str(tagged), cv2.IMREAD_UNCHANGED))
+    cv2.imwrite(str(bare), read_picture(tagged, cv2.IMREAD_UNCHANGED))
     true = ball(1001)[0]
 
     def managed(path: Path) -> np.ndarray:
         """Return the normals of a picture that is brought to the linear working space on reading."""
         linear = tmp_path / "linear.tif"
         tool("oiiotool", "--autocc", path, "-d", "float", "--tocolorspace", "lin_rec709_scene", "-o", linear)
-        read = cv2.imread(str(linear), cv2.IMREAD_UNCHANGED)[..., ::-1]
+        read = read_picture(linear, cv2.IMREAD_UNCHANGED)[..., ::-1]
         assert read.dtype == np.float32
         return np.asarray(2 * read - 1)
 
@@ -118,7 +119,7 @@ def test_ffmpeg_reads_signed_normals_from_exr_and_codes_from_png(out: Path) -> N
             with av.open(str(path)) as container:
                 frame = next(container.decode(video=0))
             assert frame.format.name == "gbrpf16le"
-            planes = [np.frombuffer(plane, np.float16).reshape(SIZE, -1)[:, :SIZE] for plane in frame.planes]
+            planes = [np.frombuffer(bytes(plane), np.float16).reshape(SIZE, -1)[:, :SIZE] for plane in frame.planes]
             read = np.stack([planes[2], planes[0], planes[1]], axis=-1).astype(np.float32)
             assert np.abs(read - true).max() < HALF
         with av.open(str(out / "normals_png16" / f"ball_normals.{number}.png")) as container:
@@ -133,7 +134,7 @@ def test_three_js_reads_signed_normals_from_exr(out: Path, tmp_path: Path) -> No
         pytest.skip("needs node and three.js: tests/install.sh installs three.js where npm is there")
     for path in (out / "normals" / "ball_normals.1002.exr", out / "ball.1002.exr"):
         raw = tmp_path / "raw"
-        words = [node, CLIENTS / "read_exr.mjs", path, raw]
+        words: list[str | Path] = [node, CLIENTS / "read_exr.mjs", path, raw]
         said = json.loads(subprocess.run(words, capture_output=True, text=True, check=True).stdout)
         assert (said["width"], said["height"]) == (SIZE, SIZE)
         read = np.frombuffer(raw.read_bytes(), np.float32).reshape(SIZE, SIZE, 4)[::-1, :, :3]  # rows from the bottom

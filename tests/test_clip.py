@@ -14,6 +14,8 @@ import pytest
 from numpy.typing import NDArray
 
 from psvideo.clip import holes, open_clip, parse_range, read_frames, reading
+from psvideo.clip.decode.decoders import decode
+from psvideo.clip.record import CodedPicture
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.plan_toml import format_plan
 from psvideo.model.camera import Encoding
@@ -54,7 +56,7 @@ def test_frames_come_in_the_order_of_their_numbers_and_holes_count_as_time(shot:
     assert [(frame.index, frame.number) for frame in frames] == [(0, 8), (1, 9), (3, 11), (4, 12)]
     assert [float(frame.image[0, 0, 0]) for frame in frames] == pytest.approx([0.8, 0.9, 1.1, 1.2])
     assert holes(clip.numbers) == ((9, 1),)
-    assert (frames[0].image.shape, frames[0].image.dtype) == ((ROWS, COLS, 3), np.float32)
+    assert (frames[0].image.shape, frames[0].image.dtype) == ((ROWS, COLS, 3), np.dtype(np.float32))
 
 
 @pytest.mark.parametrize("ahead", [1, 2, 5])
@@ -81,7 +83,11 @@ def test_images_without_a_number_are_left_aside_and_named(shot: Path) -> None:
 
 
 def touch(*names: str) -> Callable[[Path], None]:
-    return lambda shot: [write_png(shot / name) for name in names] and None
+    def put(shot: Path) -> None:
+        for name in names:
+            write_png(shot / name)
+
+    return put
 
 
 UNCLEAR = {
@@ -148,7 +154,12 @@ def cut(file: Path) -> None:
     file.write_bytes(file.read_bytes()[:-30])
 
 
-BROKEN_LATER = {
+def become_a_folder(file: Path) -> None:
+    file.unlink()
+    file.mkdir()
+
+
+BROKEN_LATER: dict[str, tuple[Callable[[Path], object], str]] = {
     "missing": (Path.unlink, "is not there any more"),
     "empty": (lambda file: file.write_bytes(b""), "empty"),
     "truncated": (cut, "truncated"),
@@ -157,7 +168,7 @@ BROKEN_LATER = {
         lambda file: write_png(file, dtype=np.uint8),
         r"8 bits.*first frame, shot\.8\.png, is .* 16 bits",
     ),
-    "a folder": (lambda file: (file.unlink(), file.mkdir()), "cannot be read"),
+    "a folder": (become_a_folder, "cannot be read"),
 }
 
 
@@ -166,7 +177,7 @@ def test_a_broken_frame_is_named_after_the_good_ones_before_it(shot: Path, fault
     clip = open_clip(shot)
     spoil, message = BROKEN_LATER[fault]
     spoil(shot / "frames" / "shot.11.png")
-    seen = []
+    seen: list[int] = []
     with pytest.raises(PsvideoError, match=rf"shot\.11\.png: .*{message}") as raised:
         seen.extend(frame.number for frame in read_frames(clip))
     assert seen == [8, 9]
@@ -203,9 +214,13 @@ def test_threads_end_when_reading_is_broken_off(shot: Path) -> None:
 
 
 def test_no_more_than_the_frames_asked_for_are_decoded_ahead(shot: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    decoded = []
-    decode = reading.decode
-    monkeypatch.setattr(reading, "decode", lambda kind, file: (decoded.append(file.name), decode(kind, file))[1])
+    decoded: list[str] = []
+
+    def counted(kind: str, file: Path) -> CodedPicture:
+        decoded.append(file.name)
+        return decode(kind, file)
+
+    monkeypatch.setattr(reading, "decode", counted)
     for number in range(13, 33):
         write_png(shot / "frames" / f"shot.{number}.png")
     frames = read_frames(open_clip(shot), ahead=2)

@@ -15,7 +15,7 @@ from psvideo.clip.linear import linear_light
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import Encoding
 
-LOSSLESS_JPEG = {"compression": 7, "compressionargs": {"lossless": True, "bitspersample": 16}}
+LOSSLESS_JPEG: dict[str, Any] = {"compression": 7, "compressionargs": {"lossless": True, "bitspersample": 16}}
 Tag = tuple[int, str, int, object, bool]
 RGGB = bytes([0, 1, 1, 2])
 

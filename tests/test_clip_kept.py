@@ -1,6 +1,7 @@
 """Decoded pictures come back from their temporary file as they were, within the room that they may take."""
 
 import io
+import shutil
 import tempfile
 from pathlib import Path
 
@@ -11,7 +12,6 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from psvideo.clip import Kept, keeping_near
-from psvideo.clip import kept as room
 from psvideo.clip.record import CodedPicture, Header
 from psvideo.errors import PsvideoError
 
@@ -49,7 +49,7 @@ def test_no_more_room_is_taken_than_is_allowed(tmp_path: Path, monkeypatch: pyte
     class Usage:
         free = 1000
 
-    monkeypatch.setattr(room.shutil, "disk_usage", lambda folder: Usage)
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: Usage)
     with keeping_near(tmp_path / "out") as kept:
         for number in range(5):
             kept.put(number, picture(codes))
@@ -116,6 +116,6 @@ def test_a_folder_that_cannot_be_written_is_said_before_any_work(
     def refused(**_: object) -> None:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(room.tempfile, "TemporaryFile", refused)
+    monkeypatch.setattr(tempfile, "TemporaryFile", refused)
     with pytest.raises(PsvideoError, match="no file can be made here"), keeping_near(tmp_path / "out"):
         pass

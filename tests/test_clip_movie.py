@@ -1,7 +1,7 @@
 """Movies: depth, matrix and range against BT.709's own arithmetic; timestamps, holes, seeking, damage."""
 
 import dataclasses
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from psvideo.clip import keeping_near, open_clip, read_frames
 from psvideo.clip.decode import movie
 from psvideo.clip.decode.yuv import CODES, HIGHEST, LOWEST, to_rgb
+from psvideo.clip.record import CodedPicture
 from psvideo.errors import PsvideoError
 from psvideo.formats.plan_toml import format_plan
 from psvideo.model.camera import Encoding
@@ -208,7 +209,12 @@ def test_frames_of_a_movie_that_are_kept_are_not_decoded_again(
     clip = open_clip(tmp_path / "x.mp4", plan=plan_for(rows=32, cols=48))
     asked: list[int] = []
     read = movie.read_movie
-    monkeypatch.setattr(movie, "read_movie", lambda path, stamps: (asked.extend(stamps), read(path, stamps))[1])
+
+    def watched(path: Path, stamps: Sequence[int]) -> Iterator[CodedPicture]:
+        asked.extend(stamps)
+        return read(path, stamps)
+
+    monkeypatch.setattr(movie, "read_movie", watched)
     with keeping_near(tmp_path / "out") as kept:
         early = list(read_frames(clip, range(3, 8), kept=kept, keep=True))
         frames = list(read_frames(clip, kept=kept))

@@ -17,22 +17,22 @@ from psvideo.clip.decode.decoders import decode, read_header
 from psvideo.clip.decode.exr_chunks import is_cut_short
 from psvideo.errors import PsvideoError
 
-Write = Callable[[Path, NDArray], None]  # type: ignore[type-arg]
+Write = Callable[[Path, NDArray[Any]], None]
 RNG = np.random.default_rng(7)
 
 
-def random(bits: int, channels: int, *, rows: int = 11, cols: int = 17) -> NDArray:  # type: ignore[type-arg]
+def random(bits: int, channels: int, *, rows: int = 11, cols: int = 17) -> NDArray[Any]:
     shape = (rows, cols) if channels == 1 else (rows, cols, channels)
     return RNG.integers(0, 2**bits, shape).astype(np.uint8 if bits == 8 else np.uint16)
 
 
-def write_png(path: Path, codes: NDArray) -> None:  # type: ignore[type-arg]
+def write_png(path: Path, codes: NDArray[Any]) -> None:
     swapped = codes if codes.ndim == 2 else codes[..., [2, 1, 0, 3][: codes.shape[2]]]
     path.write_bytes(cv2.imencode(".png", swapped)[1].tobytes())
 
 
 def write_tiff(**options: Any) -> Write:
-    def write(path: Path, codes: NDArray) -> None:  # type: ignore[type-arg]
+    def write(path: Path, codes: NDArray[Any]) -> None:
         planar = options.get("planarconfig") == "separate"
         stored = np.moveaxis(codes, -1, 0) if planar else codes
         tifffile.imwrite(path, stored, photometric="rgb" if codes.ndim == 3 else "minisblack", **options)
@@ -40,7 +40,7 @@ def write_tiff(**options: Any) -> Write:
     return write
 
 
-def write_exr(path: Path, codes: NDArray, names: str = "RGB", layer: str = "") -> None:  # type: ignore[type-arg]
+def write_exr(path: Path, codes: NDArray[Any], names: str = "RGB", layer: str = "") -> None:
     channels = {f"{layer}{name}": np.ascontiguousarray(codes[..., place]) for place, name in enumerate(names)}
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     OpenEXR.File(header, channels if codes.ndim == 3 else {f"{layer}Y": codes}).write(str(path))
@@ -49,7 +49,7 @@ def write_exr(path: Path, codes: NDArray, names: str = "RGB", layer: str = "") -
 def write_dpx(bits: int, *, order: str = ">", packing: int = 1) -> Write:
     """Pack a DPX file byte by byte, as SMPTE 268M lays it out."""
 
-    def write(path: Path, codes: NDArray) -> None:  # type: ignore[type-arg]
+    def write(path: Path, codes: NDArray[Any]) -> None:
         rows, cols = codes.shape[:2]
         head = bytearray(b"\xff" * 2048)
         head[:4] = b"SDPX" if order == ">" else b"XPDS"
@@ -64,16 +64,26 @@ def write_dpx(bits: int, *, order: str = ">", packing: int = 1) -> Write:
     return write
 
 
-def _dpx_data(samples: NDArray, bits: int, order: str, packing: int) -> bytes:  # type: ignore[type-arg]
+def _dpx_data(samples: NDArray[np.uint32], bits: int, order: str, packing: int) -> bytes:
     if bits == 8:
         return samples.astype("u1").tobytes()
     if bits in (12, 16):
         return (samples << (4 if bits == 12 and packing == 1 else 0)).astype(order + "u2").tobytes()
     padded = np.pad(samples, ((0, 0), (0, -samples.shape[1] % 3))).reshape(len(samples), -1, 3)
     words = padded[..., 0] << 20 | padded[..., 1] << 10 | padded[..., 2]
-    return (words << (2 if packing == 1 else 0)).astype(order + "u4").tobytes()
+    packed: bytes = (words << (2 if packing == 1 else 0)).astype(order + "u4").tobytes()
+    return packed
 
 
+LAYOUTS: dict[str, dict[str, Any]] = {
+    "plain": {},
+    "strips": {"rowsperstrip": 4},
+    "tiles": {"tile": (16, 16)},
+    "zip": {"compression": "zlib", "predictor": True},
+    "lzw": {"compression": "lzw"},
+    "planes": {"planarconfig": "separate"},
+    "big-endian": {"byteorder": ">"},
+}
 EXACT = [
     pytest.param("png", 8, 3, write_png, id="png-8-rgb"),
     pytest.param("png", 16, 3, write_png, id="png-16-rgb"),
@@ -81,15 +91,7 @@ EXACT = [
     pytest.param("png", 16, 1, write_png, id="png-16-grey"),
     *(
         pytest.param("tiff", bits, channels, write_tiff(**options), id=f"tiff-{bits}-{channels}-{name}")
-        for name, options in {
-            "plain": {},
-            "strips": {"rowsperstrip": 4},
-            "tiles": {"tile": (16, 16)},
-            "zip": {"compression": "zlib", "predictor": True},
-            "lzw": {"compression": "lzw"},
-            "planes": {"planarconfig": "separate"},
-            "big-endian": {"byteorder": ">"},
-        }.items()
+        for name, options in LAYOUTS.items()
         for bits in (8, 16)
         for channels in (1, 3)
         if (name, channels) != ("planes", 1)
@@ -129,7 +131,7 @@ def test_integer_pictures_come_out_with_every_bit(
 @pytest.mark.parametrize("dtype", [np.float16, np.float32])
 @pytest.mark.parametrize("channels", [1, 3])
 def test_floating_point_pictures_come_out_as_they_are(tmp_path: Path, kind: str, dtype: type, channels: int) -> None:
-    codes = (random(16, channels) / 9000 - 0.1).astype(dtype)
+    codes: NDArray[Any] = (random(16, channels) / 9000 - 0.1).astype(dtype)
     (write_exr if kind == "exr" else write_tiff())(tmp_path / "x.1", codes)
     picture = decode(kind, tmp_path / "x.1")
     assert np.array_equal(picture.codes, codes)
@@ -216,7 +218,7 @@ def test_jpeg_is_read_with_a_warning(tmp_path: Path, channels: int) -> None:
     assert "lossy" in picture.header.warnings[0]
 
 
-def write_jpeg(path: Path, codes: NDArray) -> None:  # type: ignore[type-arg]
+def write_jpeg(path: Path, codes: NDArray[Any]) -> None:
     path.write_bytes(imagecodecs.jpeg8_encode((codes >> 8).astype(np.uint8)))
 
 
@@ -264,7 +266,7 @@ def test_damage_inside_a_picture_is_refused_where_the_kind_can_tell(tmp_path: Pa
 def test_a_strip_of_no_bytes_is_not_taken_for_black(tmp_path: Path) -> None:
     write_tiff(rowsperstrip=5)(tmp_path / "x.tif", random(16, 1, rows=20))
     with tifffile.TiffFile(tmp_path / "x.tif", mode="r+") as file:
-        counts = file.pages[0].tags["StripByteCounts"]
+        counts = file.pages.first.tags["StripByteCounts"]
         counts.overwrite([*counts.value[:2], 0, counts.value[3]])
     with pytest.raises(PsvideoError, match="1 of its 4 strips"):
         decode("tiff", tmp_path / "x.tif")

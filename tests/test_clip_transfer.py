@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from psvideo.clip.linear import linear_light
 from psvideo.clip.record import CodedPicture, Header
-from psvideo.clip.transfer import CURVES, find_curve, to_light
+from psvideo.clip.transfer import CURVES, TransferCurve, find_curve, to_light
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import Encoding
 
@@ -51,7 +51,7 @@ def test_curve_goes_through_its_published_points(name: str, signal: float, light
 
 
 @pytest.mark.parametrize("curve", CURVES, ids=lambda curve: curve.name)
-def test_every_curve_rises_from_black_to_white_without_a_step(curve) -> None:  # type: ignore[no-untyped-def]
+def test_every_curve_rises_from_black_to_white_without_a_step(curve: TransferCurve) -> None:
     light = to_light(curve, np.linspace(0, 1, 4096))
     assert np.all(np.diff(light.astype(np.float64)) >= -1e-7)
     assert light[-1] > light[0]
@@ -77,11 +77,11 @@ def test_colour_is_named_only_where_the_curve_shows_the_gamut() -> None:
     assert find_curve("slog3").colour == "unknown"
 
 
-def picture(codes: list[int] | np.ndarray, *, bits: int = 16, **header: Any) -> CodedPicture:  # type: ignore[type-arg]
+def picture(codes: list[int] | np.ndarray, *, bits: int = 16, **header: Any) -> CodedPicture:
     values = np.array([codes], np.uint8 if bits == 8 else np.uint16)
     return CodedPicture(
         header=Header(width_px=values.shape[1], height_px=1, channels=1, bits=bits, **header), codes=values
-    )  # type: ignore[arg-type]
+    )
 
 
 @given(black=st.integers(0, 5000), white=st.integers(6000, 65535), code=st.integers(0, 65535))

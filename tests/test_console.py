@@ -94,7 +94,9 @@ def test_elsewhere_progress_is_a_plain_line_now_and_then(
 
 def test_quiet_says_nothing_and_machines_get_no_text_on_standard_output(capsys: pytest.CaptureFixture[str]) -> None:
     quiet, machines = Voice(quiet=True), Voice(json=True)
-    quiet.say("a"), quiet.warn("b"), list(quiet.track([1], total=1, what="c"))
+    quiet.say("a")
+    quiet.warn("b")
+    list(quiet.track([1], total=1, what="c"))
     said = capsys.readouterr()
     assert said.out + said.err == ""
     machines.say("a")

@@ -34,7 +34,16 @@ def clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-EVERYTHING = ("--plates", "--aov", "beauty", "--with-ambient", "--weight", "key=0.5", "--encode", "png16")
+EVERYTHING: tuple[str, ...] = (
+    "--plates",
+    "--aov",
+    "beauty",
+    "--with-ambient",
+    "--weight",
+    "key=0.5",
+    "--encode",
+    "png16",
+)
 EVERYTHING += ("--multipart", *(word for name in ("relit", "normals", "plates") for word in ("--preview", name)))
 
 

@@ -11,8 +11,8 @@ from psvideo.model.timing import Timing
 from psvideo.plates.align.denoise import Average, averaged
 from psvideo.plates.sequence import LightPlate, Round
 from psvideo.report.judge.result import steadiness
-from psvideo.report.observe.observed import instant_facts
-from psvideo.report.observe.steadiness import change, sample_of
+from psvideo.report.observe.observed import InstantFacts, instant_facts
+from psvideo.report.observe.steadiness import Change, Sample, change, sample_of
 from psvideo.report.run_report import RunReport, report_record, steadiness_of
 
 ROWS, COLS = 96, 128
@@ -41,7 +41,8 @@ def surface(
 
 def angle_deg(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     across = np.linalg.norm(np.cross(one, other), axis=-1)
-    return np.rad2deg(np.arctan2(across, (one * other).sum(axis=-1)))
+    angles: np.ndarray = np.rad2deg(np.arctan2(across, (one * other).sum(axis=-1)))
+    return angles
 
 
 def run(surfaces: list[Surface], results: int) -> list[Surface]:
@@ -135,12 +136,13 @@ def test_flicker_is_separated_from_noise_and_from_motion() -> None:
 def test_the_report_names_the_worst_instants() -> None:
     rng = np.random.default_rng(7)
     gains = [1.0, 1.0, 1.05, 1.05, 1.05]
-    facts, before = [], None
+    facts: list[InstantFacts] = []
+    before: Sample | None = None
     for n, gain in enumerate(gains):
         one = surface(rng, gain=gain)
         plate = LightPlate(light="a", number=n, time_s=float(n), image=one.albedo, seen=np.ones(ROWS, np.bool_))
         now = sample_of(one)
-        changed = None if before is None else change(before, now)
+        changed: Change | None = None if before is None else change(before, now)
         facts.append(instant_facts(Round(number=1001 + n, plates=(plate,)), one, None, changed))
         before = now
     timing = Timing(clip="c", frame_period_s=1, exposure_s=1, row_time_s=0, clock_offset_ppm=0, phase_error_rows=0,

@@ -9,7 +9,6 @@ import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 from docs.figures.__main__ import FIGURES
@@ -17,6 +16,7 @@ from docs.figures.commands import PAGE, commands_page
 from docs.figures.faults import FAULTS
 from docs.figures.python_page import run_blocks
 from docs.figures.staging import PICTURES
+from picture_file import read_picture
 
 import psvideo as ps
 
@@ -138,7 +138,7 @@ SLOW = {"how_frames", "how_plates", "how_normals", "gallery_depth", "fault_colou
 @pytest.mark.parametrize("name", sorted(set(FIGURES) - SLOW))
 def test_a_picture_is_what_its_script_makes_and_psvideo_says_what_the_page_quotes(name: str, films: Path) -> None:
     made = FIGURES[name](films / name)
-    shown = cv2.imread(str(PICTURES / f"{name}.png"))[..., ::-1]
+    shown = read_picture(PICTURES / f"{name}.png")[..., ::-1]
     assert shown.shape == made.picture.shape
     assert np.abs(shown.astype(int) - made.picture.astype(int)).mean() < 1.0, "stale: python -m docs.figures"
     if name in FAULTS:

@@ -39,7 +39,8 @@ TAGS = Tags(fps=Fraction(30000, 1001), colour="lin_rec709_scene", plan_sha256="a
 def unit_normals(seed: int = 0, shape: tuple[int, int] = (9, 7)) -> np.ndarray:
     vectors = np.random.default_rng(seed).standard_normal((*shape, 3))
     vectors[..., 2] = np.abs(vectors[..., 2])
-    return (vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)).astype(np.float32)
+    normals: np.ndarray = (vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)).astype(np.float32)
+    return normals
 
 
 def surface() -> Surface:
@@ -142,8 +143,8 @@ def test_a_flash_by_itself_says_which_lights_it_held(tmp_path: Path) -> None:
         Plate(
             flash=flash,
             image=np.zeros((4, 3), np.float32),
-            shares=rows[None] * 1.0,
-            middles_s=rows[None] * 0.0,
+            shares=rows[None].astype(np.float64),
+            middles_s=np.zeros((1, 4)),
             seen=rows,
         ),
         TAGS,

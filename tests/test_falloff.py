@@ -54,7 +54,8 @@ def waves() -> np.ndarray:
     """A surface of slopes up to half, over all of the picture."""
     x, y = np.meshgrid(np.arange(WIDE) / 9, np.arange(HIGH) / 7)
     slopes = np.stack([0.5 * np.sin(x), 0.5 * np.cos(y), np.ones_like(x)], axis=-1)
-    return slopes / np.linalg.norm(slopes, axis=-1, keepdims=True)
+    normals: np.ndarray = slopes / np.linalg.norm(slopes, axis=-1, keepdims=True)
+    return normals
 
 
 def rig_file(path: Path) -> Path:

@@ -67,7 +67,7 @@ def test_a_room_of_the_same_name_does_not_take_a_functions_place() -> None:
 
 def test_an_unknown_name_is_an_attribute_error() -> None:
     with pytest.raises(AttributeError, match="no attribute 'solv'"):
-        ps.solv  # type: ignore[attr-defined]  # noqa: B018
+        ps.solv  # noqa: B018
 
 
 FUNCTIONS = [name for name in ps.__all__ if inspect.isfunction(getattr(ps, name))]
@@ -89,7 +89,8 @@ def test_every_function_has_sections_and_an_example_that_runs_as_it_stands(name:
 def pictures(normal: tuple[float, float, float], *, albedo: float = 0.5, colour: bool = False) -> np.ndarray:
     shade = albedo * np.maximum(DIRECTIONS @ np.array(normal), 0)
     shape = (1, 3, 5, 3) if colour else (1, 3, 5)
-    return (shade.reshape(-1, *[1] * (len(shape) - 1)) * np.ones(shape)).astype(np.float64)
+    images: np.ndarray = (shade.reshape(-1, *[1] * (len(shape) - 1)) * np.ones(shape)).astype(np.float64)
+    return images
 
 
 NORMAL = (0.1, -0.2, float(np.sqrt(0.95)))
@@ -174,7 +175,7 @@ MISTAKES: dict[str, tuple[Callable[[], object], str]] = {
     "NaN": (lambda: ps.solve_images(np.where(GOOD > 0.4, np.nan, GOOD), DIRECTIONS), "values that are no numbers"),
     "two lights": (lambda: ps.solve_images(GOOD[:2], DIRECTIONS[:2]), "at least three lights, and here are 2"),
     "a light more": (lambda: ps.solve_images(GOOD[:3], DIRECTIONS), "3 images .* and 4 lights"),
-    "in a plane": (lambda: ps.solve_images(GOOD[:3], [[0.6, 0, 0.8], [0, 0, 1], [-0.6, 0, 0.8]]), "in one plane"),
+    "in a plane": (lambda: ps.solve_images(GOOD[:3], [[0.6, 0, 0.8], [0.0, 0, 1], [-0.6, 0, 0.8]]), "in one plane"),
     "turned": (lambda: ps.solve_images(GOOD, DIRECTIONS.T), "give directions.T"),
     "no unit": (lambda: ps.solve_images(GOOD, 2 * DIRECTIONS), "number 0 has length 2"),
     "not numbers": (lambda: ps.solve_images(GOOD, "lights.txt"), "not an array of numbers"),
@@ -226,7 +227,7 @@ def test_every_quantity_becomes_a_picture(name: str) -> None:
     image = images[name]
     assert image is not None
     picture = ps.picture_of(name, image)
-    assert (picture.shape, picture.dtype) == ((3, 5, 3), np.uint8)
+    assert (picture.shape, picture.dtype) == ((3, 5, 3), np.dtype(np.uint8))
 
 
 def test_a_take_solved_in_python_is_what_the_whole_run_writes(shelf: Path, tmp_path: Path) -> None:

@@ -28,7 +28,8 @@ def commands(path: tuple[str, ...] = (), command: Any = None) -> Iterator[tuple[
     if command is None:
         yield "", typer.main.get_command(application([]))
         for entry in COMMANDS:
-            yield from commands((entry.name,), typer.main.get_command(application([entry.name])).commands[entry.name])
+            group: Any = typer.main.get_command(application([entry.name]))
+            yield from commands((entry.name,), group.commands[entry.name])
         return
     yield " ".join(path), command
     for name, below in getattr(command, "commands", {}).items():

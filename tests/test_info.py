@@ -87,6 +87,11 @@ def no_change(shot: Path, plan: Plan) -> None:
     pass
 
 
+def keep_two_frames(shot: Path, plan: Plan) -> None:
+    for n in range(3, 41):
+        (shot / f"frames/shot.{n:04d}.png").unlink()
+
+
 FAULTS: dict[str, tuple[Callable[[Path, Plan], Any], str]] = {
     "size": (lambda shot, plan: put_frames(shot / "frames", range(1, 41), rows=9), "is 16 x 9 pixels, and"),
     "one frame's size": (
@@ -95,7 +100,7 @@ FAULTS: dict[str, tuple[Callable[[Path, Plan], Any], str]] = {
     ),
     "one frame's depth": (lambda shot, plan: put_frames(shot / "frames", range(7, 8), dtype=np.uint8), "8 bits"),
     "an empty frame": (lambda shot, plan: (shot / "frames/shot.0009.png").write_bytes(b""), "shot.0009.png: is empty"),
-    "too short": (lambda shot, plan: [(shot / f"frames/shot.{n:04d}.png").unlink() for n in range(3, 41)], "too short"),
+    "too short": (keep_two_frames, "too short"),
     "no plan": (lambda shot, plan: (shot / "plan.toml").unlink(), "there is no plan.toml"),
     "a bad plan": (lambda shot, plan: (shot / "plan.toml").write_text("schema ="), "not a TOML file"),
     "a light not in the rig": (

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from picture_file import read_picture
 from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import lsqr
 
@@ -31,7 +33,8 @@ Floats = NDArray[np.float64]
 
 def disc(radius: float = 30.0) -> NDArray[np.bool_]:
     r, c = np.mgrid[:ROWS, :COLS]
-    return (r - 36.2) ** 2 + (c - 44.7) ** 2 < radius**2
+    inside: NDArray[np.bool_] = (r - 36.2) ** 2 + (c - 44.7) ** 2 < radius**2
+    return inside
 
 
 def with_holes() -> NDArray[np.bool_]:
@@ -44,7 +47,8 @@ def with_holes() -> NDArray[np.bool_]:
 def normals_of_points(points: Floats) -> Floats:
     """Normals by brute force: the cross product of central differences of the points themselves."""
     n = np.cross(np.gradient(points, axis=1), -np.gradient(points, axis=0))
-    return n / np.linalg.norm(n, axis=2, keepdims=True)
+    normals: Floats = n / np.linalg.norm(n, axis=2, keepdims=True)
+    return normals
 
 
 def plane(view: View, normal: tuple[float, float, float]) -> tuple[Floats, Floats]:
@@ -117,8 +121,8 @@ def test_finer_pixels_bring_the_ball_nearer_to_the_truth() -> None:
 
 def test_depth_to_normals_to_depth_is_the_identity() -> None:
     rng = np.random.default_rng(5)
-    bumps = cv2.GaussianBlur(rng.normal(size=(ROWS, COLS)), (0, 0), 7)
-    depth = 1.5 + 0.8 * bumps
+    bumps: NDArray[Any] = cv2.GaussianBlur(rng.normal(size=(ROWS, COLS)), (0, 0), 7)
+    depth: Floats = 1.5 + 0.8 * bumps
     normals = normals_of_points(PINHOLE.points(depth))
     found = scaled(integrate(normals, EVERYWHERE, PINHOLE), PINHOLE)
     assert error(found, depth) < 2e-3
@@ -183,8 +187,8 @@ def test_the_solver_is_a_sparse_least_squares_solver(seed: int) -> None:
         return
     at = [(n, col, value) for n, row in enumerate(rows) for col, value in row]
     n, col, value = zip(*at, strict=True)
-    matrix = coo_matrix((value, (n, col)), shape=(len(rows), int(mask.sum()))).tocsr()
-    best = lsqr(matrix, right, atol=1e-13, btol=1e-13, iter_lim=5000)[0]
+    matrix: Any = coo_matrix((value, (n, col)), shape=(len(rows), int(mask.sum()))).tocsr()  # type: ignore[no-untyped-call]
+    best = lsqr(matrix, right, atol=1e-13, btol=1e-13, iter_lim=5000)[0]  # type: ignore[no-untyped-call]
     mine = matrix @ height[mask] - right
     assert np.linalg.norm(mine) <= np.linalg.norm(matrix @ best - right) * (1 + 1e-6) + 1e-9
 
@@ -334,9 +338,9 @@ def area(depth: Depth) -> tuple[int, float]:
 
 def test_triangles_cover_what_is_valid_once_and_leave_holes() -> None:
     valid = np.ones((6, 8), np.bool_)
-    assert area(flat(valid)) == (2 * 35, pytest.approx(35))
+    assert area(flat(valid)) == pytest.approx((2 * 35, 35))
     valid[3, 4] = False  # four squares lose a corner: half of each remains
-    assert area(flat(valid)) == (2 * 31 + 4, pytest.approx(33))
+    assert area(flat(valid)) == pytest.approx((2 * 31 + 4, 33))
     assert area(flat(np.zeros((4, 4), np.bool_))) == (0, 0)
 
 
@@ -344,11 +348,11 @@ def test_triangles_stop_at_cuts() -> None:
     valid = np.ones((6, 8), np.bool_)
     east = np.zeros_like(valid)
     east[:, 3] = True
-    assert area(flat(valid, cut_east=east)) == (2 * 30, pytest.approx(30))
+    assert area(flat(valid, cut_east=east)) == pytest.approx((2 * 30, 30))
     one = np.zeros_like(valid)
     one[2, 3] = True  # a single cut side takes the triangles that it bounds, and no more
-    assert area(flat(valid, cut_east=one)) == (2 * 33 + 2, pytest.approx(34))
-    assert area(flat(valid, cut_south=one)) == (2 * 33 + 2, pytest.approx(34))
+    assert area(flat(valid, cut_east=one)) == pytest.approx((2 * 33 + 2, 34))
+    assert area(flat(valid, cut_south=one)) == pytest.approx((2 * 33 + 2, 34))
 
 
 PUBLISHED_MM = {"cat": 0.074, "bear": 0.334, "pot2": 0.220}
@@ -358,9 +362,9 @@ PUBLISHED_MM = {"cat": 0.074, "bear": 0.334, "pot2": 0.220}
 @pytest.mark.parametrize("name", ["cat", "bear", "pot2"])
 def test_real_shapes_come_out_as_near_as_published(name: str, shared_data: Path) -> None:
     folder = shared_data / "diligent_gt" / name
-    codes = cv2.imread(str(folder / "normal_map.png"), cv2.IMREAD_UNCHANGED)[..., ::-1]
+    codes = read_picture(folder / "normal_map.png", cv2.IMREAD_UNCHANGED)[..., ::-1]
     normals = codes.astype(np.float64) / 65535 * 2 - 1
-    mask = cv2.imread(str(folder / "mask.png"), cv2.IMREAD_GRAYSCALE) > 0
+    mask = read_picture(folder / "mask.png", cv2.IMREAD_GRAYSCALE) > 0
     k = np.loadtxt(folder / "K.txt")
     true = np.load(folder / "depth_gt.npz")["depth_gt"]
     view = View(focal_px=(k[0, 0], k[1, 1]), principal_px=(k[0, 2], k[1, 2]))

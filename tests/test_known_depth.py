@@ -1,6 +1,7 @@
 """Depth that is known from elsewhere: near lights find the surface there, and integrated depth its scale."""
 
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -64,7 +65,8 @@ def write_exr(path: Path, channels: dict[str, NDArray[np.float32]]) -> Path:
 def picture(path: Path) -> NDArray[np.float32]:
     channels = OpenEXR.File(str(path)).channels()
     planes = channels["RGB"].pixels if "RGB" in channels else next(iter(channels.values())).pixels
-    return planes.astype(np.float32)
+    values: NDArray[np.float32] = planes.astype(np.float32)
+    return values
 
 
 @pytest.fixture(scope="module")
@@ -224,7 +226,7 @@ def test_unknown_pixels_take_the_plane_or_the_nearest_known_depth() -> None:
     known = np.zeros((40, 60), np.float32)
     known[10:20, 10:20], known[30:35, 50:55] = 1.5, 2.0
     light = Light(name="a", position_m=(0.5, 0.5, -0.5))
-    camera = {"focal_px": (100.0, 100.0), "principal_px": (29.5, 19.5)}
+    camera: dict[str, Any] = {"focal_px": (100.0, 100.0), "principal_px": (29.5, 19.5)}
     alone = ground_of(Rig(lights=(light,), **camera), height_px=40, width_px=60, known_m=known).depth_m
     assert set(np.unique(alone)) == {np.float32(1.5), np.float32(2.0)}
     assert alone[0, 0] == np.float32(1.5)

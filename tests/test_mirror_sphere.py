@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 import pytest
 from bench.mirror_scene import Ball, Lamp, Lens, photograph, unit
+from picture_file import read_picture
 
 from psvideo.calibrate.light_pictures import LightPictures, averaged, light_pictures
 from psvideo.calibrate.mirror.lights import MirrorCalibration, calibrate_lights
@@ -220,7 +221,7 @@ def test_the_psbox_outline_lies_where_the_ball_ends_before_white_paper(shared_da
 def test_the_chrome_sphere_of_washington(shared_data: Path, tmp_path: Path) -> None:
     out = tmp_path / "rig.toml"
     assert main(["calibrate", "mirror-sphere", str(shared_data / "uw_psm" / "chrome"), "-o", str(out), "-q"]) == 0
-    assert cv2.imread(str(out.with_suffix(".png"))).shape[1] == 1200
+    assert read_picture(out.with_suffix(".png")).shape[1] == 1200
     truth = np.loadtxt(shared_data / "uw_psm" / "lights.txt", skiprows=1)
     lights = read_rig(out).lights
     errors = np.array([angle_deg(light.direction, vector) for light, vector in zip(lights, truth, strict=True)])

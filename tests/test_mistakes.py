@@ -107,7 +107,9 @@ def test_force_replaces_no_picture_of_the_crew_beside_a_rig_or_a_timing(
 def test_a_marked_png_is_a_png_with_the_same_pixels() -> None:
     pixels = np.random.default_rng(1).integers(0, 256, (7, 5, 3), dtype=np.uint8)
     marked = marked_png(cv2.imencode(".png", pixels)[1].tobytes())
-    assert np.array_equal(cv2.imdecode(np.frombuffer(marked, np.uint8), cv2.IMREAD_COLOR), pixels)
+    read = cv2.imdecode(np.frombuffer(marked, np.uint8), cv2.IMREAD_COLOR)
+    assert read is not None
+    assert np.array_equal(read, pixels)
     assert PICTURE_MARK.encode() in marked[:80]
 
 

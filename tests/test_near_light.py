@@ -1,19 +1,23 @@
 """Near lights: every pixel has lights of its own, and their normals are as exact as the surface's place is known."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 import numpy as np
 import OpenEXR
 import pytest
-import scipy.io
 from numpy.typing import NDArray
+from scipy.io import loadmat  # type: ignore[attr-defined]
 
 from psvideo.cli.app import main
 from psvideo.compute.compiled import EXACT
 from psvideo.errors import PsvideoError
 from psvideo.model.light_field import near_vectors
 from psvideo.model.rig import Light, Rig
+from psvideo.model.surface import Surface
 from psvideo.solve import near_surface
 from psvideo.solve.depth import Shaping, View
 from psvideo.solve.near_surface import NearSurface, solve_near
@@ -49,10 +53,13 @@ def bulge(u: Array, v: Array) -> Array:
     return np.minimum(depth, FAR_M)
 
 
-def surface(depth) -> tuple[Array, Array]:
+def surface(depth: Callable[[Array, Array], Array]) -> tuple[Array, Array]:
     """Points and normals of every pixel, by fine differences."""
     v, u = np.mgrid[:SIZE, :SIZE].astype(float)
-    at = lambda u, v: depth(u, v)[..., None] * rays(u, v)  # noqa: E731
+
+    def at(u: Array, v: Array) -> Array:
+        return depth(u, v)[..., None] * rays(u, v)
+
     step = 1e-3
     normals = np.cross(at(u, v + step) - at(u, v - step), at(u + step, v) - at(u - step, v))
     return at(u, v), normals / np.linalg.norm(normals, axis=-1, keepdims=True)
@@ -95,7 +102,7 @@ def lit_by(rig: Rig, channels: int = 1) -> Illumination:
     return illumination(rig.lights, channels=channels, ground=ground_of(rig, height_px=SIZE, width_px=SIZE))
 
 
-def mean_error_deg(found, normals: Array, where: NDArray[np.bool_] | None = None) -> float:
+def mean_error_deg(found: Surface, normals: Array, where: NDArray[np.bool_] | None = None) -> float:
     both = found.valid if where is None else found.valid & where
     assert both.mean() > 0.5
     apart = np.linalg.norm(found.normals[both] - normals[both], axis=-1)
@@ -104,7 +111,7 @@ def mean_error_deg(found, normals: Array, where: NDArray[np.bool_] | None = None
 
 @pytest.mark.parametrize("solver", [woodham1980, robust], ids=["least squares", "robust"])
 @pytest.mark.parametrize("lights", [3, 4, 8])
-def test_where_the_plane_is_the_surface_normals_and_albedo_are_exact(lights: int, solver) -> None:
+def test_where_the_plane_is_the_surface_normals_and_albedo_are_exact(lights: int, solver: ModuleType) -> None:
     rig = ring_rig(lights, 1.5)
     tilted = Rig(lights=rig.lights, focal_px=rig.focal_px, principal_px=rig.principal_px, plane=(0.1, -0.2, 1.0, FAR_M))
     toward = np.array([0.1, -0.2, 1.0])
@@ -189,7 +196,7 @@ def test_distant_lights_may_stand_among_near_ones_and_a_far_light_is_a_distant_o
 
 def led_rig(folder: Path) -> Rig:
     """The real rig of eight LEDs in our axes (it has x right, y down, z forward, mm), its surface 0.75 m away."""
-    lights = scipy.io.loadmat(folder / "light.mat")
+    lights: Any = loadmat(folder / "light.mat")  # type: ignore[no-untyped-call]
     ours = np.array([1.0, -1.0, -1.0])
     strengths = 0.06 * lights["Phi"] / lights["Phi"].mean()
     return Rig(
@@ -226,14 +233,21 @@ def test_a_real_rig_of_leds_with_axes_and_unequal_strengths(shared_data: Path) -
 def test_an_led_without_an_axis_shines_at_the_surface_s_middle(mu: float) -> None:
     points, normals = surface(relief)
     bare = ring_rig(4, 2)
-    middle = lit_by(bare).near.ground.middle_m
+    near = lit_by(bare).near
+    assert near is not None
+    middle = near.ground.middle_m
     aimed, unaimed = [], []
     for light in bare.lights:
         axis = middle - np.array(light.position_m)
-        common = {"name": light.name, "position_m": light.position_m, "intensity": light.intensity, "anisotropy": mu}
+        common: dict[str, Any] = {
+            "name": light.name,
+            "position_m": light.position_m,
+            "intensity": light.intensity,
+            "anisotropy": mu,
+        }
         aimed.append(Light(**common, axis=tuple(axis / np.linalg.norm(axis))))
         unaimed.append(Light(**common))
-    view = {"focal_px": bare.focal_px, "principal_px": bare.principal_px, "plane": bare.plane}
+    view: dict[str, Any] = {"focal_px": bare.focal_px, "principal_px": bare.principal_px, "plane": bare.plane}
     found = woodham1980.solve(
         filmed(Rig(lights=tuple(aimed), **view), points, normals), lit_by(Rig(lights=tuple(unaimed), **view))
     )
@@ -250,9 +264,11 @@ def test_an_led_without_an_axis_shines_at_the_surface_s_middle(mu: float) -> Non
         ({"plane": (0.0, 0.0, 1.0, -1.6)}, "lies nowhere before the camera"),
     ],
 )
-def test_a_rig_that_does_not_say_where_the_surface_is_is_refused_with_what_to_add(change: dict, words: str) -> None:
+def test_a_rig_that_does_not_say_where_the_surface_is_is_refused_with_what_to_add(
+    change: dict[str, Any], words: str
+) -> None:
     rig = ring_rig(3, 2)
-    known = {"focal_px": rig.focal_px, "principal_px": rig.principal_px, "plane": rig.plane} | change
+    known: dict[str, Any] = {"focal_px": rig.focal_px, "principal_px": rig.principal_px, "plane": rig.plane} | change
     with pytest.raises(PsvideoError, match=words):
         ground_of(Rig(lights=rig.lights, **known), height_px=SIZE, width_px=SIZE)
 
@@ -265,7 +281,9 @@ def test_a_rig_that_does_not_say_where_the_surface_is_is_refused_with_what_to_ad
         ((0.3, 0.0, -2 * FAR_M), "behind the surface"),
     ],
 )
-def test_a_light_that_cannot_stand_where_it_is_said_to_is_refused(position_m, words: str) -> None:
+def test_a_light_that_cannot_stand_where_it_is_said_to_is_refused(
+    position_m: tuple[float, float, float], words: str
+) -> None:
     rig = ring_rig(3, 2)
     wrong = (*rig.lights[:2], Light(name="odd", position_m=position_m))
     with pytest.raises(PsvideoError, match=f"'odd'.*{words}"):
@@ -323,7 +341,8 @@ def test_a_clip_lit_by_a_real_rig_of_leds_becomes_normals(
 def picture(path: Path) -> NDArray[np.float32]:
     channels = OpenEXR.File(str(path)).channels()
     planes = channels["RGB"].pixels if "RGB" in channels else next(iter(channels.values())).pixels
-    return planes.astype(np.float32)
+    values: NDArray[np.float32] = planes.astype(np.float32)
+    return values
 
 
 @EXACT.kept

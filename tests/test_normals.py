@@ -44,8 +44,10 @@ def shoot(normals: Array, lit: Illumination, albedo: Array | float = 0.43) -> ND
     """Plates (light, row, col[, channel]) of a matte surface with attached shadows."""
     shade = np.maximum(0, np.einsum("rcx,lx->lrc", normals, lit.directions))
     if lit.intensities.shape[1] == 1:
-        return (shade * lit.intensities[:, 0, None, None] * np.asarray(albedo)).astype(np.float32)
-    return (shade[..., None] * lit.intensities[:, None, None, :] * albedo).astype(np.float32)
+        grey: NDArray[np.float32] = (shade * lit.intensities[:, 0, None, None] * np.asarray(albedo)).astype(np.float32)
+        return grey
+    coloured: NDArray[np.float32] = (shade[..., None] * lit.intensities[:, None, None, :] * albedo).astype(np.float32)
+    return coloured
 
 
 def error_deg(surface: Surface, truth: Array, where: NDArray[np.bool_] | None = None) -> Array:
@@ -53,7 +55,8 @@ def error_deg(surface: Surface, truth: Array, where: NDArray[np.bool_] | None = 
     both = surface.valid if where is None else surface.valid & where
     found = surface.normals[both].astype(np.float64)
     found /= np.linalg.norm(found, axis=-1, keepdims=True)
-    return np.degrees(2 * np.arcsin(np.clip(np.linalg.norm(found - truth[both], axis=-1) / 2, 0, 1)))
+    angles: Array = np.degrees(2 * np.arcsin(np.clip(np.linalg.norm(found - truth[both], axis=-1) / 2, 0, 1)))
+    return angles
 
 
 @pytest.mark.parametrize("channels", [1, 3])
@@ -141,7 +144,8 @@ def _turned(directions: Array, angle_deg: float, rng: np.random.Generator) -> Ar
     """Every direction turned by so much, each its own way."""
     across = np.cross(directions, rng.normal(size=directions.shape))
     across /= np.linalg.norm(across, axis=1, keepdims=True)
-    return directions * np.cos(np.radians(angle_deg)) + across * np.sin(np.radians(angle_deg))
+    turned: Array = directions * np.cos(np.radians(angle_deg)) + across * np.sin(np.radians(angle_deg))
+    return turned
 
 
 def test_a_channel_in_which_the_surface_is_black_adds_no_noise() -> None:
@@ -179,7 +183,7 @@ def test_lights_nearly_in_one_plane_are_refused_with_their_condition_number() ->
     line = [Light(name=f"L{n}", direction=(np.sin(a), 0.01 * n, np.cos(a))) for n, a in enumerate((-0.6, 0.0, 0.7))]
     with pytest.raises(PsvideoError, match=r"L0, L1, L2.*one plane.*condition\s+number is \d+.*singular values"):
         illumination(line, channels=1)
-    good = [Light(name=f"L{n}", direction=tuple(d)) for n, d in enumerate(ring(3, 5.0))]  # type: ignore[arg-type]
+    good = [Light(name=f"L{n}", direction=tuple(d)) for n, d in enumerate(ring(3, 5.0))]
     assert 10 < illumination(good, channels=3).condition < MAX_CONDITION
 
 

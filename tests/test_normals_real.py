@@ -9,6 +9,7 @@ import numpy as np
 import OpenEXR
 import pytest
 from numpy.typing import NDArray
+from picture_file import read_picture
 
 from psvideo.formats.rig_toml import read_rig
 from psvideo.model.surface import Surface
@@ -19,7 +20,8 @@ from psvideo.solve.normals.woodham1980 import EVERYTHING, Usable, solve
 def error_deg(surface: Surface, truth: NDArray[np.floating], mask: NDArray[np.bool_]) -> NDArray[np.float64]:
     both = surface.valid & mask
     cosine = np.sum(surface.normals[both].astype(np.float64) * truth[both], axis=-1)
-    return np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+    angles: NDArray[np.float64] = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+    return angles
 
 
 def test_the_ball_of_diligent_with_48_lights(shared_data: Path) -> None:
@@ -29,8 +31,8 @@ def test_the_ball_of_diligent_with_48_lights(shared_data: Path) -> None:
     numbers = np.array([[float(word) for word in row[1:7]] for row in rows])
     strengths = numbers[:, 3:] / numbers[:, 3:].mean()
     lit = Illumination(directions=numbers[:, :3], intensities=strengths)
-    plates = [cv2.imread(str(folder / row[0]), cv2.IMREAD_UNCHANGED)[..., ::-1] for row in rows]
-    mask = cv2.imread(str(folder / "mask.png"), cv2.IMREAD_GRAYSCALE) > 127
+    plates = [read_picture(folder / row[0], cv2.IMREAD_UNCHANGED)[..., ::-1] for row in rows]
+    mask = read_picture(folder / "mask.png", cv2.IMREAD_GRAYSCALE) > 127
     truth = np.load(folder / "normal_gt.npy")
 
     plain = solve(plates, lit, scale=1 / 65535, usable=EVERYTHING)
@@ -61,7 +63,7 @@ def test_the_matte_sphere_of_washington(shared_data: Path) -> None:
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     lit = Illumination(directions=directions, intensities=np.ones((len(directions), 3)))
     paths = [folder / "gray" / f"gray.{n}.png" for n in range(len(directions))]
-    plates = [(cv2.imread(str(path))[..., ::-1] / 255).astype(np.float32) for path in paths]
+    plates = [(read_picture(path)[..., ::-1] / 255).astype(np.float32) for path in paths]
     rows, cols = np.mgrid[: plates[0].shape[0], : plates[0].shape[1]]
     x, y = (cols - 244.5) / 108.0, (144.5 - rows) / 108.0
     inner = x * x + y * y < 0.95**2

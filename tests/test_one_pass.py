@@ -12,8 +12,11 @@ import pytest
 
 from psvideo.cli.app import main
 from psvideo.clip import kept, reading
+from psvideo.clip.decode.decoders import decode
+from psvideo.clip.record import CodedPicture
 from psvideo.report.observe.observed import Observed
 from psvideo.runs import results as runs
+from psvideo.solve.instants import surfaces
 
 SCENES = Path(__file__).resolve().parents[1] / "data_synth"
 
@@ -40,8 +43,12 @@ def run(*arguments: object) -> int:
 def decoded(monkeypatch: pytest.MonkeyPatch) -> collections.Counter[str]:
     """How often each file was decoded since the test began."""
     count: collections.Counter[str] = collections.Counter()
-    decode = reading.decode
-    monkeypatch.setattr(reading, "decode", lambda kind, file: (count.update([file.name]), decode(kind, file))[1])
+
+    def counted(kind: str, file: Path) -> CodedPicture:
+        count.update([file.name])
+        return decode(kind, file)
+
+    monkeypatch.setattr(reading, "decode", counted)
     return count
 
 
@@ -113,7 +120,6 @@ def test_plates_are_let_go_while_their_surface_waits_to_be_written(
     plates: list[weakref.ref[Any]] = []
     jobs: list[Callable[[], None]] = []
     alive: list[int] = []
-    surfaces = runs.surfaces
 
     def watched(*given: Any, **named: Any) -> Iterator[Any]:
         for instant in surfaces(*given, **named):

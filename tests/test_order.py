@@ -75,7 +75,7 @@ def disturbed(rng: np.random.Generator, plan: Plan, rig: Rig, turn: int) -> dict
     gloss, shadow, ambient = rng.choice([0, 0, 0.2]), rng.choice([0, 0.4]), rng.choice([0, 0, 0.02, 0.1])
     shown = []
     for light in rig.lights:
-        half = np.add(light.direction, (0, 0, 1))
+        half = np.add(np.array(light.direction), (0, 0, 1))
         lit = albedo * np.clip(normals @ np.array(light.direction), 0, None)
         lit += gloss * np.clip(normals @ (half / np.linalg.norm(half)), 0, 1) ** 60
         middle = rng.uniform(-1, 1, 2)

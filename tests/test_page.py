@@ -16,7 +16,7 @@ from psvideo.page import page_server, show_of, write_page
 from psvideo.page.serving import PageServer
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page, Playwright
+    from playwright.sync_api import Browser, Page, Playwright, ViewportSize
 
 ALONE = [
     "--no-sandbox",
@@ -29,8 +29,8 @@ ALONE = [
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
 ]
-LAPTOP = {"width": 1366, "height": 768}
-SMALL = {"width": 760, "height": 480}
+LAPTOP: ViewportSize = {"width": 1366, "height": 768}
+SMALL: ViewportSize = {"width": 760, "height": 480}
 """Software rendering takes its time over every pixel."""
 PATIENCE_MS = 60_000
 KEY, RIM = (0.3, 0.8, 0.5), (-0.9, -0.2, 0.1)
@@ -125,7 +125,8 @@ def albedo() -> np.ndarray:
 def lambert(direction: tuple[float, float, float]) -> np.ndarray:
     """Return n . l, and 0 on the far side, (row, col, 1), from the ball's equation."""
     unit = np.array(direction) / np.linalg.norm(direction)
-    return np.maximum(small.ball()[0].astype(np.float64) @ unit, 0)[..., None]
+    light: np.ndarray = np.maximum(small.ball()[0].astype(np.float64) @ unit, 0)[..., None]
+    return light
 
 
 @pytest.mark.parametrize(("y", "world"), [("up", False), ("down", False), ("up", True), ("down", True)])

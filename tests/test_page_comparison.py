@@ -5,10 +5,10 @@ import subprocess
 import sys
 from pathlib import Path
 
-import cv2
 import numpy as np
 import OpenEXR
 import pytest
+from picture_file import read_picture
 
 from psvideo.cli.app import main
 from psvideo.errors import UsageError
@@ -115,7 +115,7 @@ def test_the_pictures_of_the_documentation_can_be_taken(shoot: Path, tmp_path: P
         path.name for path in (ROOT / "docs" / "pictures").glob("view_*.png")
     )
     for path in taken:
-        picture = cv2.imread(str(path))
+        picture = read_picture(path)
         assert picture is not None
         assert picture.shape == (522, 928, 3)
         assert picture[70:280, 70:640].std() > 10, "something is shown"

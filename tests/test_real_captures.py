@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import OpenEXR
 import pytest
+from picture_file import read_picture
 
 from psvideo.cli.app import main
 
@@ -31,7 +32,8 @@ def write_stills_plan(path: Path, *, width_px: int, height_px: int, lights: int)
 def errors_deg(found: np.ndarray, true: np.ndarray) -> np.ndarray:
     """Return the angles between vectors; atan2, because half floats are not of unit length."""
     cross = np.linalg.norm(np.cross(found, true), axis=-1)
-    return np.degrees(np.arctan2(cross, (found * true).sum(axis=-1)))
+    angles: np.ndarray = np.degrees(np.arctan2(cross, (found * true).sum(axis=-1)))
+    return angles
 
 
 @pytest.mark.parametrize("thing", ["cat", "horse", "gray"])
@@ -48,7 +50,7 @@ def test_the_photographs_of_the_university_of_washington_are_solved(
         == 0
     )
     normals = planes(out / "normals" / f"{thing}_normals.1001.exr")
-    inside = cv2.imread(str(mask), cv2.IMREAD_GRAYSCALE) > 127
+    inside = read_picture(mask, cv2.IMREAD_GRAYSCALE) > 127
     solved = np.linalg.norm(normals, axis=-1) > 0.5
     assert not solved[~inside].any()
     assert solved[inside].mean() > 0.9  # what is left out lies at the outlines, where fewer than three lights reach
@@ -79,7 +81,7 @@ def test_the_ball_of_48_lights_reaches_the_published_least_squares(shared_data: 
     assert run("normals", stills, "--rig", tmp_path / "rig.toml", "--mask", mask, "-o", out, "-q") == 0
     normals = planes(out / "normals" / "ball_normals.1001.exr")
     true = np.load(folder / "normal_gt.npy")
-    inside = cv2.imread(str(mask), cv2.IMREAD_GRAYSCALE) > 127
+    inside = read_picture(mask, cv2.IMREAD_GRAYSCALE) > 127
     solved = inside & (np.linalg.norm(normals, axis=-1) > 0.5)
     assert solved.sum() > 0.97 * inside.sum()
     assert errors_deg(normals, true)[solved].mean() <= 4.2

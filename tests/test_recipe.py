@@ -51,7 +51,8 @@ def frames_seen(camera: Camera, timing: Timing, plates: FloatArray, ambient: Flo
 
 
 def made(recipe: FlashRecipe, frames: FloatArray) -> FloatArray:
-    return np.sum([c * frames[n] for n, c in zip(recipe.frames, recipe.coefficients, strict=True)], axis=0)
+    total: FloatArray = np.sum([c * frames[n] for n, c in zip(recipe.frames, recipe.coefficients, strict=True)], axis=0)
+    return total
 
 
 @settings(max_examples=60, deadline=None, derandomize=True)

@@ -195,7 +195,8 @@ def test_photographs_named_in_another_order_than_the_rig_are_separated_from_thos
     mixed.mkdir()
     for number, file in enumerate(sorted(cat.glob("cat.[0-9]*.png"))):  # 0, 1, 10, 11, 2 …
         (mixed / f"cat.{number}.png").symlink_to(file)
-    said, usable = [], []
+    said: list[str] = []
+    usable: list[bool] = []
     for clip in (cat, mixed):
         out = tmp_path / f"out{len(said)}"
         rig, mask = shared_data / "uw_psm" / "lights.txt", cat / "cat.mask.png"

@@ -6,19 +6,19 @@ import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import cv2
 import pytest
+from picture_file import read_picture
 
 from psvideo.cli.app import main
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Playwright
+    from playwright.sync_api import Playwright, ViewportSize
 
 ROOT = Path(__file__).resolve().parents[1]
 PICTURE = ROOT / "docs" / "pictures" / "report.png"
 ALONE = ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
          "--disable-component-update", "--disable-sync"]  # fmt: skip
-LAPTOP = {"width": 1366, "height": 768}
+LAPTOP: ViewportSize = {"width": 1366, "height": 768}
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +61,7 @@ def test_the_page_is_whole_on_a_laptop_and_asks_for_nothing(
     shown = page.screenshot(path=tmp_path / "report.png")
     assert len(shown) > 20_000
     browser.close()
-    picture = cv2.imread(str(tmp_path / "report.png"))
+    picture = read_picture(tmp_path / "report.png")
     assert (picture.mean() > 128) == (scheme == "light")
     if scheme == "light":
         shutil.copy(tmp_path / "report.png", PICTURE) if not PICTURE.exists() else None

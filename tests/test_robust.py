@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.optimize import linprog
+from scipy.optimize import linprog  # type: ignore[attr-defined]
 
 from psvideo.cli.app import main
 from psvideo.model.surface import Misfit, Surface
@@ -67,7 +67,8 @@ def error_deg(surface: Surface, truth: Array, where: NDArray[np.bool_] | None = 
 def angles_deg(found: NDArray[np.floating], truth: Array) -> Array:
     found = found.astype(np.float64)
     found = found / np.linalg.norm(found, axis=-1, keepdims=True)
-    return np.degrees(2 * np.arcsin(np.clip(np.linalg.norm(found - truth, axis=-1) / 2, 0, 1)))
+    angles: Array = np.degrees(2 * np.arcsin(np.clip(np.linalg.norm(found - truth, axis=-1) / 2, 0, 1)))
+    return angles
 
 
 @pytest.fixture(scope="module")
@@ -112,7 +113,8 @@ def test_one_normal_from_three_channels_of_any_colours() -> None:
 
 def _halves(directions: Array) -> Array:
     halves = directions + np.array([0.0, 0.0, 1.0])
-    return halves / np.linalg.norm(halves, axis=1, keepdims=True)
+    unit: Array = halves / np.linalg.norm(halves, axis=1, keepdims=True)
+    return unit
 
 
 def test_noise_on_a_matte_surface_costs_at_most_a_third_more_than_least_squares() -> None:
@@ -140,7 +142,7 @@ def linear_program(measured: Array, directions: Array) -> float:
     lights = len(measured)
     block = np.block([[directions, -np.eye(lights)], [-directions, -np.eye(lights)]])
     cost = np.concatenate([np.zeros(3), np.ones(lights)])
-    found = linprog(
+    found = linprog(  # type: ignore[no-untyped-call]
         cost, A_ub=block, b_ub=np.concatenate([measured, -measured]), bounds=[(None, None)] * 3 + [(0, None)] * lights
     )
     return float(found.fun)

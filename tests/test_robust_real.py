@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from picture_file import read_picture
 
 from psvideo.model.surface import Surface
 from psvideo.solve.normals import robust, woodham1980
@@ -39,7 +40,8 @@ class Subject(NamedTuple):
     def errors_deg(self, surface: Surface) -> NDArray[np.float64]:
         both = surface.valid & self.mask
         cosine = np.sum(surface.normals[both].astype(np.float64) * self.truth[both], axis=-1)
-        return np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+        angles: NDArray[np.float64] = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+        return angles
 
 
 @pytest.fixture(scope="module")
@@ -49,8 +51,8 @@ def ball(shared_data: Path) -> Subject:
         rows = [row for row in csv.reader(file) if row[0].endswith(".png")]
     numbers = np.array([[float(word) for word in row[1:7]] for row in rows])
     lit = Illumination(directions=numbers[:, :3], intensities=numbers[:, 3:] / numbers[:, 3:].mean())
-    plates = [cv2.imread(str(folder / row[0]), cv2.IMREAD_UNCHANGED)[..., ::-1] for row in rows]
-    mask = cv2.imread(str(folder / "mask.png"), cv2.IMREAD_GRAYSCALE) > 127
+    plates = [read_picture(folder / row[0], cv2.IMREAD_UNCHANGED)[..., ::-1] for row in rows]
+    mask = read_picture(folder / "mask.png", cv2.IMREAD_GRAYSCALE) > 127
     return Subject(plates, lit, np.load(folder / "normal_gt.npy"), mask, 1 / 65535)
 
 
@@ -66,7 +68,8 @@ def test_the_ball_of_diligent_with_48_lights(ball: Subject) -> None:
 
 def test_the_ball_of_diligent_with_twelve_lights_that_are_well_spread(ball: Subject) -> None:
     rng = np.random.default_rng(20)
-    ours, plain = [], []
+    ours: list[float] = []
+    plain: list[float] = []
     while len(ours) < 10:
         lights = np.sort(rng.choice(48, 12, replace=False))
         if np.linalg.cond(ball.lit.directions[lights]) <= 4:
@@ -105,7 +108,7 @@ def test_the_matte_sphere_of_washington_is_not_worse(shared_data: Path) -> None:
     directions = np.array(words[1:], np.float64).reshape(int(words[0]), 3)
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     paths = [folder / "gray" / f"gray.{n}.png" for n in range(len(directions))]
-    plates = [(cv2.imread(str(path))[..., ::-1] / 255).astype(np.float32) for path in paths]
+    plates = [(read_picture(path)[..., ::-1] / 255).astype(np.float32) for path in paths]
     rows, cols = np.mgrid[: plates[0].shape[0], : plates[0].shape[1]]
     x, y = (cols - 244.5) / 108.0, (144.5 - rows) / 108.0
     truth = np.stack([x, y, np.sqrt(np.maximum(1 - x * x - y * y, 0))], axis=-1)

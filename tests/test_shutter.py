@@ -24,7 +24,8 @@ def camera(*, exposure: float = 1.0, readout: float = 1.0, height_px: int = 23) 
 
 
 def weights_of_one(shot: Camera, start_s: float, duration_s: float) -> np.ndarray:
-    return row_weights(shot, np.array([start_s]), np.array([duration_s]), frames=range(-3, 12))[0]
+    weights: np.ndarray = row_weights(shot, np.array([start_s]), np.array([duration_s]), frames=range(-3, 12))[0]
+    return weights
 
 
 @given(readout=st.floats(-1, 1), start=st.floats(0, 8), duration=st.floats(0.001, 0.9))

@@ -8,11 +8,12 @@ import pytest
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.symmetric import adjugate
 from psvideo.solve.normals import few_lights
+from psvideo.solve.normals.task import FEW
 
 
 @FUSED.kept
 def inverse_of(a: float, b: float, c: float, d: float, e: float, f: float) -> tuple[float, ...]:
-    return adjugate(a, b, c, d, e, f)
+    return adjugate(a, b, c, d, e, f)  # type: ignore[arg-type, return-value]  # in doubles
 
 
 def test_the_adjugate_over_the_determinant_is_the_inverse() -> None:
@@ -43,7 +44,8 @@ def test_few_lights_sort_and_choose_in_registers() -> None:
 
     @FUSED.kept
     def chosen(values: tuple[np.float32, ...], rank: np.float32) -> np.float32:
-        return ranked(in_order(values), rank)
+        one: np.float32 = ranked(in_order(values), rank)
+        return one
 
-    values = np.random.default_rng(2).permutation(few_lights.FEW).astype(np.float32)
+    values = np.random.default_rng(2).permutation(FEW).astype(np.float32)
     assert [chosen(tuple(values), np.float32(rank + 1)) for rank in range(len(values))] == sorted(values.tolist())

@@ -37,7 +37,7 @@ def errors_of(rig: Path, truth: Path) -> tuple[np.ndarray, np.ndarray]:
     found = {light.name: light for light in read_rig(rig).lights}
     true = read_rig(truth).lights
     assert set(found) == {light.name for light in true}
-    cosine = [np.dot(found[light.name].direction, light.direction) for light in true]
+    cosine = [np.dot(np.array(found[light.name].direction), np.array(light.direction)) for light in true]
     return np.degrees(np.arccos(np.clip(cosine, -1, 1))), np.array([found[light.name].error_deg for light in true])
 
 
@@ -109,5 +109,5 @@ def test_two_chrome_balls_in_a_strobed_clip_show_where_near_lights_are(tmp_path:
     found = {light.name: light.position_m for light in read_rig(rig).lights}
     assert set(found) == set(NEAR)
     for name, place in NEAR.items():
-        assert np.linalg.norm(np.subtract(found[name], place)) < 0.025, name  # 0.021 m at worst, as measured
+        assert np.linalg.norm(np.subtract(np.array(found[name]), place)) < 0.025, name  # 0.021 m at worst, as measured
     assert read_rig(rig).focal_px == (500.0, 500.0)

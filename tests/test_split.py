@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 import OpenEXR
 import pytest
+from picture_file import read_picture
 
 from psvideo.formats.plan_toml import read_plan
 from psvideo.model.plan import Plan, PlannedFlash
@@ -193,8 +194,8 @@ def test_rows_that_hold_two_flashes_are_rebuilt_from_other_frames_or_marked(
 def test_what_is_clipped_in_a_frame_stays_at_one_in_the_plate(make_plan: PlanMaker) -> None:
     plan = make_plan()
     truth = plates_for(plan)
-    for plate in truth.values():
-        plate[:, :5] = 1.7
+    for picture in truth.values():
+        picture[:, :5] = 1.7
     shot, timing = shoot(plan, truth, ambient=0.05)
     plates = without_ambient(split(frames_of(shot), plan.camera, timing))
     for plate in plates:
@@ -261,7 +262,7 @@ def test_the_clips_of_another_simulator_give_its_true_plates(clip: str, shared_d
     assert black is not None
     assert white is not None
     files = sorted((folder / "frames").glob("*.png"))
-    codes = [cv2.imread(str(file), cv2.IMREAD_UNCHANGED)[..., ::-1].astype(np.float32) for file in files]
+    codes = [read_picture(file, cv2.IMREAD_UNCHANGED)[..., ::-1].astype(np.float32) for file in files]
     frames = [MemoryFrame(n, np.ascontiguousarray((code - black) / (white - black))) for n, code in enumerate(codes)]
     timing = find_timing(plan, *collect(frames))
     plates = list(split(iter(frames), plan.camera, timing))

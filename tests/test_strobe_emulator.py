@@ -17,6 +17,7 @@ from psvideo.formats.trace_csv import Trace, TraceWriter, read_trace
 from psvideo.model.camera import Camera
 from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.strobe.link.boards import BOARDS, capabilities
+from psvideo.strobe.link.messages import WiringName
 from psvideo.strobe.link.protocol import format_request
 from psvideo.strobe.program import Program, make_program
 from psvideo.strobe.stand_ins import toolchain
@@ -86,12 +87,12 @@ def play(request: pytest.FixtureRequest, tmp_path: Path) -> Play:
     """Play a script on one of the contenders; give what was answered (without cycles) and the trace of its lights."""
     board = request.param.removeprefix("python as ")
 
-    def on_chip(script: str, *, wiring: str = "gated") -> tuple[list[str], Trace]:
+    def on_chip(script: str, *, wiring: WiringName = "gated") -> tuple[list[str], Trace]:
         said = play_script(f"wait 20\n{script}", board=board, wiring=wiring, trace=tmp_path / "trace.csv")
         replies = [line.partition(" ")[2] for line in said]
         return [reply.removeprefix("< ") for reply in replies if reply[0] == "<"], read_trace(tmp_path / "trace.csv")
 
-    def in_python(script: str, *, wiring: str = "gated") -> tuple[list[str], Trace]:
+    def in_python(script: str, *, wiring: WiringName = "gated") -> tuple[list[str], Trace]:
         python = PythonPlayer(board)
         said = python.play(f"wait 20\n{script}")
         with (tmp_path / "trace.csv").open("w") as file:
@@ -127,13 +128,13 @@ BURSTS = plan_of(({"a": 0.5, "b": 0.25}, 0.0008), ({"b": 1.0}, 0.0003), ({"a": 0
 GATED_BURSTS = plan_of(({"a": 0.5, "b": 0.5}, 0.0008), ({"c": 0.2}, 0.0013), ({"h": 1.0}, 0.00002), dark_s=0.0001)
 
 
-def upload(program: Program, wiring: str = "gated") -> str:
+def upload(program: Program, wiring: WiringName = "gated") -> str:
     lines = [format_request(request, sealed=False).decode().strip() for request in program.upload()]
     return "\n".join(f"send {line}" for line in (f"WIRING {wiring}", "KEEP 2000", *lines))
 
 
-def program_of(plan: Plan, wiring: str = "gated", board: str = "atmega328p") -> Program:
-    return make_program(plan, capabilities(BOARDS[board], wiring))  # type: ignore[arg-type]
+def program_of(plan: Plan, wiring: WiringName = "gated", board: str = "atmega328p") -> Program:
+    return make_program(plan, capabilities(BOARDS[board], wiring))
 
 
 def wanted_edges(program: Program, cycles: int) -> dict[int, NDArray[np.int64]]:
@@ -164,7 +165,7 @@ def test_the_tools_to_run_the_real_firmware_are_here() -> None:
     ids=["three", "bursts", "short"],
 )
 @pytest.mark.parametrize("load", ["wait {ms}", "poll {ms} STAT"])
-def test_every_edge_is_where_the_program_has_it(play: Play, plan: Plan, wiring: str, load: str) -> None:
+def test_every_edge_is_where_the_program_has_it(play: Play, plan: Plan, wiring: WiringName, load: str) -> None:
     program = program_of(plan, wiring)
     cycles = 50
     ms = cycles * program.cycle_ticks // TICKS_PER_MS + 50

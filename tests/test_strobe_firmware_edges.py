@@ -10,7 +10,7 @@ import pytest
 from psvideo.formats.trace_csv import Trace, read_trace
 from psvideo.strobe.limits import cycle_refusal, cycle_ticks, slot_refusal
 from psvideo.strobe.link.boards import BOARDS, capabilities
-from psvideo.strobe.link.messages import Capabilities, Lit, Slot, WiringName
+from psvideo.strobe.link.messages import WIRINGS, Capabilities, Lit, Slot, WiringName
 from psvideo.strobe.stand_ins.playing import moments
 from psvideo.strobe.stand_ins.toolchain import AvrBoard
 
@@ -163,7 +163,7 @@ def test_any_cycle_that_is_taken_is_played_to_the_tick(
     emulate: Callable[..., list[str]], upload: Callable[..., list[str]], tmp_path: Path, seed: int
 ) -> None:
     dice = random.Random(seed)
-    board, wiring = dice.choice(BOTH), dice.choice(["gated", "direct"])
+    board, wiring = dice.choice(BOTH), dice.choice(WIRINGS)
     caps = capabilities(BOARDS[board], wiring)
     slots: list[Slot] = []
     while not slots or cycle_refusal(slots, caps) or not any(each.lit for each in slots):

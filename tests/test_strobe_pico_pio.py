@@ -4,6 +4,7 @@ import random
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from types import FunctionType
 from typing import Any
@@ -11,7 +12,7 @@ from typing import Any
 import adafruit_pioasm
 import pytest
 from pico import PROGRAM, random_slot
-from pioemu import State, emulate
+from pioemu import State, emulate  # type: ignore[attr-defined]
 from rp2040 import MOV_PINS_NULL, Chip, board_of
 
 from psvideo.strobe.link.messages import Lit, Slot
@@ -44,7 +45,7 @@ def words_of(cycle: Sequence[Slot], rounds: int) -> list[list[int]]:
         table.lay_out(slots, range(len(slots)))
         table.wind(rounds)
     board.start([table.lead_address for table in tables])
-    words = [list(iter(lambda group=group: chip.take_word(group), None)) for group in (0, 1)]
+    words = [list(iter(partial(chip.take_word, group), None)) for group in (0, 1)]
     assert all(of_group[:2] == [0, LEAD - 10] for of_group in words)
     return [of_group[2:] for of_group in words]
 

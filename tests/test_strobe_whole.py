@@ -126,7 +126,8 @@ def _true_offset_ppm(plan: Path, trace: Path) -> float:
     """Return the offset that is in the light: the camera's against the board's, and ticks against the plan's times."""
     played = read_trace(trace)
     cycle_s = np.diff(played.pulses(0)[::2, 0]).mean() / played.hz  # two rounds, of which the first holds the marker
-    return ((1 + CAMERA_SECOND_PPM * 1e-6) * cycle_s / read_plan(plan).cycle_s - 1) * 1e6
+    ppm: float = ((1 + CAMERA_SECOND_PPM * 1e-6) * cycle_s / read_plan(plan).cycle_s - 1) * 1e6
+    return ppm
 
 
 @contextlib.contextmanager
@@ -144,13 +145,19 @@ def emulation(*words: str, path: str | None = None) -> Iterator[tuple[subprocess
             process.kill()
 
 
+def open_port(port: str) -> serial.SerialBase:
+    line: serial.SerialBase = serial.serial_for_url(port, 115200, timeout=10)  # type: ignore[no-untyped-call]
+    return line
+
+
 def ask(line: serial.SerialBase, request: str) -> str:
     line.write(f"{request}\n".encode())
-    return line.read_until(b"\n").decode().strip()
+    reply: str = line.read_until(b"\n").decode().strip()  # type: ignore[no-untyped-call]
+    return reply
 
 
 def flash_on(port: str, flashes: int) -> None:
-    with serial.serial_for_url(port, 115200, timeout=10) as line:
+    with open_port(port) as line:
         assert ask(line, "ID").startswith("OK proto=1 board=atmega")
         for request in ("KEEP 2000", "SLOT 0 2000 4000 2000 0:2000", "STEPS 0 0"):
             assert ask(line, request).startswith("OK ")
@@ -184,18 +191,18 @@ def test_the_port_comes_first_and_the_trace_is_whole_when_it_is_stopped(
 
 
 def test_the_real_firmware_answers_where_nothing_is_said() -> None:
-    with emulation("--fast") as (_, port), serial.serial_for_url(port, 115200, timeout=10) as line:
+    with emulation("--fast") as (_, port), open_port(port) as line:
         assert ask(line, "ID").startswith("OK proto=1 board=atmega328p firmware=1")
 
 
 def test_a_host_that_goes_away_in_the_middle_leaves_it_dark(tmp_path: Path) -> None:
     trace = tmp_path / "trace.csv"
     with emulation("--board", "python", "--trace", str(trace)) as (process, port):
-        with serial.serial_for_url(port, 115200, timeout=10) as line:
+        with open_port(port) as line:
             for request in ("KEEP 500", "SLOT 0 2000 4000 2000 0:2000", "STEPS 0 0", f"ARM {CHECK}", "RUN 0"):
                 assert ask(line, request).startswith("OK")
         time.sleep(1.2)
-        with serial.serial_for_url(port, 115200, timeout=10) as line:
+        with open_port(port) as line:
             assert "state=fault fault=silent" in ask(line, "STAT")
         process.send_signal(signal.SIGTERM)
         assert process.wait(STARTS_WITHIN_S) == 0
@@ -224,7 +231,7 @@ def test_systems_without_pseudo_terminals_get_a_socket(monkeypatch: pytest.Monke
 
 def test_without_the_tools_the_python_board_answers_and_says_so(tmp_path: Path) -> None:
     with emulation(path=str(tmp_path)) as (process, port):
-        with serial.serial_for_url(port, 115200, timeout=10) as line:
+        with open_port(port) as line:
             assert "firmware=python-1" in ask(line, "ID")
         process.send_signal(signal.SIGTERM)
         _, said = process.communicate(timeout=STARTS_WITHIN_S)

@@ -8,6 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from picture_file import read_picture
 
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.plan_toml import read_plan
@@ -57,7 +58,8 @@ def errors_rows(timing: Timing, shot: Exposure) -> FloatArray:
     """Return by how many rows every flash found is off the true flash nearest to it."""
     true_s = np.array([flash.start_s for flash in shot.flashes])
     nearest = np.abs(true_s[:, None] - timing.start_s).argmin(axis=0)
-    return (timing.start_s - true_s[nearest]) / abs(timing.row_time_s)
+    off: FloatArray = (timing.start_s - true_s[nearest]) / abs(timing.row_time_s)
+    return off
 
 
 def names_right(timing: Timing, shot: Exposure) -> bool:
@@ -124,7 +126,7 @@ def test_the_clips_of_another_simulator_are_timed_and_named(clip: str, shared_da
     black, white = plan.camera.encoding.black_level, plan.camera.encoding.white_level
     assert black is not None
     assert white is not None
-    pictures = [cv2.imread(str(file), cv2.IMREAD_UNCHANGED) for file in sorted((folder / "frames").glob("*.png"))]
+    pictures = [read_picture(file, cv2.IMREAD_UNCHANGED) for file in sorted((folder / "frames").glob("*.png"))]
     profiles = np.array(
         [row_profile(((p.astype(np.float32) - black) / (white - black)).astype(np.float32)) for p in pictures]
     )

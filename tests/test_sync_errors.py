@@ -20,7 +20,7 @@ CAMERA_NOISE, HEAVY_NOISE = Noise(full_well_e=20_000, read_e=8), Noise(full_well
 def timed(plan: Plan, stated: Plan, seed: int, noise: Noise) -> tuple[Timing, float]:
     """Film a textured scene and time it by the plan ``stated``; return too the RMS error in seconds."""
     rng = np.random.default_rng(seed)
-    plates = {slot: 0.2 + 0.5 * rng.random((ROWS, COLUMNS)) for slot in plan.lit_slots}
+    plates: dict[int, np.ndarray] = {slot: 0.2 + 0.5 * rng.random((ROWS, COLUMNS)) for slot in plan.lit_slots}
     clock = TrueClock(phase_s=rng.uniform(0, plan.cycle_s), offset_ppm=rng.uniform(-100, 100))
     shot = expose(plates, plan, frames=FRAMES, clock=clock, noise=noise, bits=12, seed=seed)
     timing = find_timing(stated, np.arange(FRAMES), shot.frames.mean(axis=2, dtype=np.float64))

@@ -33,7 +33,8 @@ def filmed(plan: Plan, *, frames: int = FRAMES, phase_s: float = 0.0123, **optio
         plates = dict.fromkeys(plan.lit_slots, plates[plan.lit_slots[0]])
     clock = TrueClock(phase_s=phase_s, offset_ppm=float(options.pop("ppm", 30.0)))  # type: ignore[arg-type]
     shot = expose(plates, plan, frames=frames, clock=clock, noise=NOISE, bits=12, **options)  # type: ignore[arg-type]
-    return shot.frames.mean(axis=2, dtype=np.float64)
+    profiles: np.ndarray = shot.frames.mean(axis=2, dtype=np.float64)
+    return profiles
 
 
 def timing_of(plan: Plan, profiles: np.ndarray) -> Timing:

@@ -1,7 +1,9 @@
 """The virtual renderer against geometry that is known in closed form."""
 
+from collections.abc import Mapping
 from fractions import Fraction
 from pathlib import Path
+from typing import Literal
 
 import cv2
 import numpy as np
@@ -30,7 +32,7 @@ def camera(**keys: object) -> CameraTable:
     return CameraTable.model_validate(base | keys)
 
 
-def see(*objects: dict[str, object], time_s: float = 0.0, **keys: object) -> SeenScene:
+def see(*objects: Mapping[str, object], time_s: float = 0.0, **keys: object) -> SeenScene:
     bodies = [make_body(ObjectTable.model_validate(table), HERE) for table in objects]
     return look(bodies, camera(**keys), time_s)
 
@@ -53,7 +55,7 @@ def sphere_normals(rows: int, cols: int, width_m: float) -> tuple[np.ndarray, np
     return np.stack([x, y, np.sqrt(np.maximum(1 - x**2 - y**2, 0))], axis=-1), inside
 
 
-def test_a_spheres_normals_are_the_closed_forms():
+def test_a_spheres_normals_are_the_closed_forms() -> None:
     view = see({"mesh": "sphere", "albedo": 0.8})
     normals, inside = sphere_normals(48, 64, 1.6)
     error_deg = np.rad2deg(np.arccos(np.clip((true_normals(view.hits) * normals).sum(axis=-1), -1, 1)))
@@ -64,7 +66,7 @@ def test_a_spheres_normals_are_the_closed_forms():
     np.testing.assert_array_equal(true_mask(view.hits)[outside], 0)
 
 
-def test_a_plate_is_albedo_times_intensity_times_cosine_exactly():
+def test_a_plate_is_albedo_times_intensity_times_cosine_exactly() -> None:
     view = see({"mesh": "sphere", "albedo": [0.8, 0.5, 0.2]})
     light = Light(name="key", direction=unit(0.4, -0.3, 0.8), intensity=(0.9, 0.7, 0.5))
     cosine = true_normals(view.hits).astype(float) @ np.array(light.direction)
@@ -72,7 +74,7 @@ def test_a_plate_is_albedo_times_intensity_times_cosine_exactly():
     np.testing.assert_allclose(plate(view, light), expected, atol=2e-6)
 
 
-def test_power_and_duration_scale_a_plate_from_the_reference():
+def test_power_and_duration_scale_a_plate_from_the_reference() -> None:
     from psvideo.model.rig import Rig
 
     view = see({"mesh": "plane", "albedo": 0.5})
@@ -84,7 +86,7 @@ def test_power_and_duration_scale_a_plate_from_the_reference():
     assert flash_plate(view, rig, {"a": 1.0}, 0.003, tails)[24, 32, 0] == pytest.approx(0.5 * ratio)
 
 
-def test_an_attached_shadow_is_dark_and_follows_the_terminator():
+def test_an_attached_shadow_is_dark_and_follows_the_terminator() -> None:
     view = see({"mesh": "sphere"})
     shaded = plate(view, Light(name="side", direction=(1.0, 0.0, 0.0)))
     normals, inside = sphere_normals(48, 64, 1.6)
@@ -92,7 +94,7 @@ def test_an_attached_shadow_is_dark_and_follows_the_terminator():
     assert (shaded[inside & (normals[..., 0] > 0.05)] > 0).all()
 
 
-def test_a_cast_shadow_falls_where_the_light_says():
+def test_a_cast_shadow_falls_where_the_light_says() -> None:
     """A bar 0.2 m over a wall, lit from 45 degrees: its shadow lies 0.2 m to the other side."""
     bar = {"mesh": "box", "stretch": [0.1, 0.6, 0.02], "position_m": [0.0, 0.0, 0.21], "shading": "flat"}
     wall = {"mesh": "plane", "scale": 4.0, "albedo": 0.5}
@@ -108,7 +110,7 @@ def test_a_cast_shadow_falls_where_the_light_says():
     assert (plate(ghost, Light(name="a", direction=unit(1, 0, 1)))[60, :, 0] > 0).all()
 
 
-def test_a_near_light_falls_off_with_distance_and_beyond_it_nothing_shadows():
+def test_a_near_light_falls_off_with_distance_and_beyond_it_nothing_shadows() -> None:
     light = Light(name="near", position_m=(0.0, 0.0, 0.5), intensity=(0.4,))
     view = see({"mesh": "plane", "scale": 4.0, "albedo": 1.0})
     y, x = np.mgrid[:48, :64].astype(float)
@@ -119,7 +121,7 @@ def test_a_near_light_falls_off_with_distance_and_beyond_it_nothing_shadows():
     np.testing.assert_allclose(plate(behind, light)[:, :40], plate(view, light)[:, :40], rtol=1e-5)
 
 
-def test_an_led_shines_along_its_axis_by_the_power_of_its_cosine():
+def test_an_led_shines_along_its_axis_by_the_power_of_its_cosine() -> None:
     light = Light(name="led", position_m=(0.0, 0.0, 1.0), intensity=(1.0,), anisotropy=2.0, axis=(0.0, 0.0, -1.0))
     direction, distance_m, strength = irradiance(light, np.array([[0.0, 0, 0], [1.0, 0, 0]]))
     np.testing.assert_allclose(distance_m, [1, np.sqrt(2)])
@@ -127,14 +129,14 @@ def test_an_led_shines_along_its_axis_by_the_power_of_its_cosine():
     np.testing.assert_allclose(strength[:, 0], [1.0, 0.5 * 0.5], rtol=1e-6)
 
 
-def test_a_perspective_camera_sees_points_where_they_project():
+def test_a_perspective_camera_sees_points_where_they_project() -> None:
     ball_at = {"mesh": "sphere", "scale": 0.02, "position_m": [0.3, -0.2, -2.0]}
     view = see(ball_at, view="perspective", focal_px=100.0, principal_px=[20.0, 10.0])
     row, col = np.argwhere(true_mask(view.hits) > 0).mean(axis=0)
     assert (col, row) == (pytest.approx(20 + 100 * 0.15, abs=0.6), pytest.approx(10 + 100 * 0.1, abs=0.6))
 
 
-def test_more_rays_per_pixel_soften_the_edge_and_keep_the_normals():
+def test_more_rays_per_pixel_soften_the_edge_and_keep_the_normals() -> None:
     one, four = (see({"mesh": "sphere"}, rays=rays) for rays in (1, 4))
     assert set(np.unique(true_mask(one.hits))) == {0.0, 1.0}
     assert 0.1 < np.mean((true_mask(four.hits) > 0) & (true_mask(four.hits) < 1)) * 64 * 48 / 126 < 3
@@ -142,19 +144,18 @@ def test_more_rays_per_pixel_soften_the_edge_and_keep_the_normals():
     assert ((true_normals(one.hits) * true_normals(four.hits)).sum(axis=-1)[inside] > 0.9995).all()
 
 
-def test_the_highlight_lies_between_light_and_camera_and_only_adds_light():
+def test_the_highlight_lies_between_light_and_camera_and_only_adds_light() -> None:
     light = Light(name="a", direction=unit(1, 0, 1))
-    dull, glossy = (
-        plate(see({"mesh": "sphere", "albedo": 0.5} | more), light)[..., 0] for more in ({}, {"specular": {}})
-    )
+    ball_at: dict[str, object] = {"mesh": "sphere", "albedo": 0.5}
+    dull, glossy = (plate(see(one), light)[..., 0] for one in (ball_at, ball_at | {"specular": {}}))
     gained = glossy - dull
     assert gained.min() >= 0
     row, col = np.unravel_index(gained.argmax(), gained.shape)
     assert (row, col) == (pytest.approx(23.5, abs=1), pytest.approx(31.5 + 20 * np.sin(np.pi / 8), abs=1))
 
 
-def test_a_spin_turns_an_object_about_its_own_axis_through_its_position():
-    bar = {"mesh": "box", "stretch": [0.8, 0.1, 0.1], "position_m": [0.1, 0.0, 0.0]}
+def test_a_spin_turns_an_object_about_its_own_axis_through_its_position() -> None:
+    bar: dict[str, object] = {"mesh": "box", "stretch": [0.8, 0.1, 0.1], "position_m": [0.1, 0.0, 0.0]}
     bar["motion"] = {"axis": [0.0, 0.0, 1.0], "spin_deg_per_s": 900.0}
     flat, upright = (true_mask(see(bar, time_s=t).hits) for t in (0.0, 0.1))
     np.testing.assert_array_equal(flat.any(axis=0).sum(), 32)
@@ -162,15 +163,15 @@ def test_a_spin_turns_an_object_about_its_own_axis_through_its_position():
     np.testing.assert_allclose(np.argwhere(flat).mean(axis=0), np.argwhere(upright).mean(axis=0), atol=0.5)
 
 
-def test_a_turned_object_spins_about_the_axis_that_turned_with_it():
-    bar = {"mesh": "box", "stretch": [0.1, 0.8, 0.1], "rotate_deg": [0.0, 90.0, 0.0]}
+def test_a_turned_object_spins_about_the_axis_that_turned_with_it() -> None:
+    bar: dict[str, object] = {"mesh": "box", "stretch": [0.1, 0.8, 0.1], "rotate_deg": [0.0, 90.0, 0.0]}
     bar["motion"] = {"axis": [0.0, 0.0, 1.0], "spin_deg_per_s": 900.0}
     upright, end_on = (true_mask(see(bar, time_s=t).hits) for t in (0.0, 0.1))
     assert (upright.any(axis=1).sum(), upright.any(axis=0).sum()) == (32, 4)
     assert (end_on.any(axis=1).sum(), end_on.any(axis=0).sum()) == (4, 4)
 
 
-def test_a_stretched_spheres_normals_are_an_ellipsoids():
+def test_a_stretched_spheres_normals_are_an_ellipsoids() -> None:
     view = see({"mesh": "sphere", "stretch": [1.0, 0.5, 1.0]})
     y, x = np.mgrid[:48, :64].astype(float)
     x, y = (x - 31.5) * 0.025 / 0.5, -(y - 23.5) * 0.025 / 0.25
@@ -180,7 +181,7 @@ def test_a_stretched_spheres_normals_are_an_ellipsoids():
     np.testing.assert_allclose(true_normals(view.hits)[inside], normal[inside], atol=4e-3)
 
 
-def test_travel_and_sway_move_an_object_as_the_clock_says():
+def test_travel_and_sway_move_an_object_as_the_clock_says() -> None:
     thing = {
         "mesh": "sphere",
         "scale": 0.2,
@@ -191,7 +192,7 @@ def test_travel_and_sway_move_an_object_as_the_clock_says():
     assert row == pytest.approx(23.5 - 0.3 / 0.025, abs=0.2)
 
 
-def test_ambient_light_is_albedo_times_level_and_less_in_a_corner():
+def test_ambient_light_is_albedo_times_level_and_less_in_a_corner() -> None:
     floor = {"mesh": "plane", "scale": 4.0, "albedo": 0.5}
     wall = {"mesh": "box", "stretch": [0.1, 4.0, 2.0], "position_m": [0.05, 0.0, 1.0]}
     flat = ambient_plate(see(floor), AmbientTable(level=0.2))
@@ -202,7 +203,9 @@ def test_ambient_light_is_albedo_times_level_and_less_in_a_corner():
 
 
 @pytest.mark.parametrize("pattern", ["noise", "marble", "stripes", "checker", "bands"])
-def test_patterns_lie_between_their_two_colours_and_use_both(pattern):
+def test_patterns_lie_between_their_two_colours_and_use_both(
+    pattern: Literal["noise", "marble", "stripes", "checker", "bands"],
+) -> None:
     table = AlbedoTable(pattern=pattern, colour=0.6, second=[0.1, 0.2, 0.3], size_m=0.1, bands_m=[[-0.2, 0.0]])
     points = np.random.default_rng(0).uniform(-0.5, 0.5, (20_000, 3))
     albedo = pattern_albedo(table, points)
@@ -211,13 +214,13 @@ def test_patterns_lie_between_their_two_colours_and_use_both(pattern):
     assert 0.02 < np.mean(albedo[:, 0] < 0.35) < 0.9
 
 
-def test_noise_is_smooth_and_the_same_everywhere_and_always():
+def test_noise_is_smooth_and_the_same_everywhere_and_always() -> None:
     points = np.array([[0.3, -2.7, 11.2], [1e4, 5.5, -3.25]])
     np.testing.assert_allclose(layered_noise(points), layered_noise(points + 1e-7), atol=1e-4)
     np.testing.assert_allclose(layered_noise(points), [-0.6001675, -0.2267946], atol=1e-6)
 
 
-def test_surface_nets_find_spheres_and_cuts_with_their_volume_and_outward_faces():
+def test_surface_nets_find_spheres_and_cuts_with_their_volume_and_outward_faces() -> None:
     def field(p: np.ndarray) -> np.ndarray:
         return cut(ball(p, (0, 0, 0), 0.5), ellipsoid(p, (0, 0, 0.5), (0.2, 0.2, 0.2)), 0.0)
 
@@ -230,7 +233,7 @@ def test_surface_nets_find_spheres_and_cuts_with_their_volume_and_outward_faces(
     np.testing.assert_allclose(np.linalg.norm(vertices[smooth], axis=1), 0.5, atol=2e-4)
 
 
-def test_soft_unions_and_cuts_change_the_field_only_near_the_seam():
+def test_soft_unions_and_cuts_change_the_field_only_near_the_seam() -> None:
     a, b = np.array([-1.0, 0.02, 3.0]), np.array([2.0, 0.03, -1.0])
     np.testing.assert_array_equal(join(a, b, 0.1)[[0, 2]], [-1.0, -1.0])
     assert join(a, b, 0.1)[1] < 0.02
@@ -238,7 +241,7 @@ def test_soft_unions_and_cuts_change_the_field_only_near_the_seam():
 
 
 @pytest.mark.parametrize("name", [name for name in builtin_names() if name != "bust"])
-def test_built_in_meshes_are_sound_and_their_normals_point_with_their_faces(name):
+def test_built_in_meshes_are_sound_and_their_normals_point_with_their_faces(name: str) -> None:
     shape = builtin_shape(name)
     assert np.isfinite(shape.vertices).all()
     a, b, c = (shape.vertices[shape.faces[:, k]] for k in range(3))
@@ -252,7 +255,7 @@ def test_built_in_meshes_are_sound_and_their_normals_point_with_their_faces(name
         assert shape.colours.max() <= 1
 
 
-def test_the_bust_is_one_closed_body_with_a_face_in_front():
+def test_the_bust_is_one_closed_body_with_a_face_in_front() -> None:
     shape = builtin_shape("bust")
     mesh = trimesh.Trimesh(shape.vertices, shape.faces, process=False)
     edges, counts = np.unique(mesh.edges_sorted, axis=0, return_counts=True)
@@ -264,7 +267,7 @@ def test_the_bust_is_one_closed_body_with_a_face_in_front():
     assert -0.05 < tip[1] < -0.02
 
 
-def test_a_users_mesh_comes_with_its_texture(shared_data):
+def test_a_users_mesh_comes_with_its_texture(shared_data: Path) -> None:
     cow = {"mesh": str(shared_data / "meshes" / "spot.obj"), "height_m": 1.0, "rotate_deg": [0.0, 150.0, 0.0]}
     plain = true_albedo(see(cow).hits, 3)
     assert set(np.unique(plain)) == {0.0, np.float32(0.7)}
@@ -274,7 +277,7 @@ def test_a_users_mesh_comes_with_its_texture(shared_data):
     assert np.mean(albedo[:, 0] > 0.5) > 0.2
 
 
-def test_a_texture_needs_coordinates_and_a_picture(tmp_path):
+def test_a_texture_needs_coordinates_and_a_picture(tmp_path: Path) -> None:
     for mesh, name, message in (
         ("sphere", "a.png", "has no texture coordinates"),
         ("spot.obj", "a.png", "as a texture"),
@@ -285,7 +288,7 @@ def test_a_texture_needs_coordinates_and_a_picture(tmp_path):
             make_body(table, tmp_path)
 
 
-def test_a_texture_lies_upright_and_its_codes_are_taken_for_srgb(tmp_path):
+def test_a_texture_lies_upright_and_its_codes_are_taken_for_srgb(tmp_path: Path) -> None:
     corners = ((0, 0), (1, 0), (1, 1), (0, 1))
     lines = [f"v {u - 0.5} {v - 0.5} 0\nvt {u} {v}" for u, v in corners] + ["f 1/1 2/2 3/3", "f 1/1 3/3 4/4"]
     (tmp_path / "square.obj").write_text("\n".join(lines))
@@ -299,7 +302,7 @@ def test_a_texture_lies_upright_and_its_codes_are_taken_for_srgb(tmp_path):
 
 
 @pytest.mark.parametrize("suffix", [".ply", ".stl", ".obj", ".glb"])
-def test_mesh_files_of_every_kind_give_the_same_picture(tmp_path, suffix):
+def test_mesh_files_of_every_kind_give_the_same_picture(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"ball{suffix}"
     trimesh.creation.icosphere(subdivisions=4, radius=0.5).export(path)
     view = see({"mesh": str(path), "albedo": 0.8})
@@ -316,7 +319,7 @@ def test_mesh_files_of_every_kind_give_the_same_picture(tmp_path, suffix):
         ("empty.obj", b"v 0 0 0\nv 1 0 0\n", "cannot be read as a mesh|holds no triangles"),
     ],
 )
-def test_a_mesh_that_cannot_be_used_is_named(tmp_path, name, content, message):
+def test_a_mesh_that_cannot_be_used_is_named(tmp_path: Path, name: str, content: bytes | None, message: str) -> None:
     if content is not None:
         (tmp_path / name).write_bytes(content)
     with pytest.raises(PsvideoError, match=message) as fault:
@@ -324,5 +327,5 @@ def test_a_mesh_that_cannot_be_used_is_named(tmp_path, name, content, message):
     assert name in str(fault.value)
 
 
-def test_camera_rates_are_exact_ratios():
+def test_camera_rates_are_exact_ratios() -> None:
     assert camera(fps="120000/1001", readout_s=0.0).rate == Fraction(120_000, 1001)

@@ -3,6 +3,7 @@
 import json
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -10,6 +11,7 @@ import OpenEXR
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from picture_file import read_picture
 
 from psvideo.errors import PsvideoError
 from psvideo.formats.plan_toml import read_plan
@@ -33,9 +35,10 @@ def camera(*, shutter: float = 1.0, readout: float = 1.0, height_px: int = 60, w
     )
 
 
-def plan_of(cam: Camera, durations_s: tuple[float, ...] = (0.001,), **more: object) -> Plan:
+def plan_of(cam: Camera, durations_s: tuple[float, ...] = (0.001,), **more: Any) -> Plan:
     flashes = tuple(PlannedFlash(lights={f"L{k}": 1.0}, duration_s=d) for k, d in enumerate(durations_s))
-    return Plan(**{"camera": cam, "flashes": flashes, "dark_s": cam.exposure_s, **more})
+    options: dict[str, Any] = {"camera": cam, "flashes": flashes, "dark_s": cam.exposure_s, **more}
+    return Plan(**options)
 
 
 def ramp_plates(cam: Camera, count: int) -> list[np.ndarray]:
@@ -51,7 +54,9 @@ def ramp_plates(cam: Camera, count: int) -> list[np.ndarray]:
     rise_s=st.sampled_from([0.0, 4e-5]),
     fall_s=st.sampled_from([0.0, 9e-5]),
 )
-def test_at_360_degrees_a_rows_frames_share_every_flash_without_loss(readout, start_s, duration_s, rise_s, fall_s):
+def test_at_360_degrees_a_rows_frames_share_every_flash_without_loss(
+    readout: float, start_s: float, duration_s: float, rise_s: float, fall_s: float
+) -> None:
     flash = TrueFlash(index=0, slot=0, lights={"a": 1.0}, start_s=start_s, duration_s=duration_s, complete=True)
     emission = Emission(rise_s=rise_s, fall_s=fall_s)
     shares = sum(seen_share(camera(readout=readout), emission, flash, n) for n in range(12))
@@ -67,7 +72,9 @@ def test_at_360_degrees_a_rows_frames_share_every_flash_without_loss(readout, st
     rise_s=st.sampled_from([0.0, 6e-5]),
     fall_s=st.sampled_from([0.0, 2e-4]),
 )
-def test_a_rows_share_is_the_emission_summed_up_while_it_is_open(shutter, readout, start_s, duration_s, rise_s, fall_s):
+def test_a_rows_share_is_the_emission_summed_up_while_it_is_open(
+    shutter: float, readout: float, start_s: float, duration_s: float, rise_s: float, fall_s: float
+) -> None:
     cam = camera(shutter=shutter, readout=readout, height_px=7)
     time_s = (np.arange(600_000) + 0.5) * 1e-7
     light = np.where((time_s >= start_s) & (time_s < start_s + duration_s), 1.0, 0.0)
@@ -87,7 +94,7 @@ def test_a_rows_share_is_the_emission_summed_up_while_it_is_open(shutter, readou
             assert found[row] == pytest.approx(seen, abs=2e-3)
 
 
-def test_the_dark_row_lies_where_the_flash_ended_and_moves_by_the_next_flash():
+def test_the_dark_row_lies_where_the_flash_ended_and_moves_by_the_next_flash() -> None:
     """physics.md: behind flash k it is at row (s_k + d_k - n * Tc) / tr where the dark time is exactly the exposure."""
     cam = camera(height_px=1000, width_px=1)
     duration_s = 0.0004
@@ -106,7 +113,7 @@ def test_the_dark_row_lies_where_the_flash_ended_and_moves_by_the_next_flash():
     np.testing.assert_allclose(np.diff(rows), duration_s / tr, atol=1e-6)
 
 
-def test_no_row_sees_two_flashes_under_the_rolling_rule_and_some_do_when_it_is_broken():
+def test_no_row_sees_two_flashes_under_the_rolling_rule_and_some_do_when_it_is_broken() -> None:
     cam = camera()
     plates = [np.ones((60, 3), np.float32), np.ones((60, 3), np.float32)]
     kept = expose(plates, plan_of(cam, (0.001, 0.002)), frames=12, clock=TrueClock(phase_s=0.0021))
@@ -116,7 +123,7 @@ def test_no_row_sees_two_flashes_under_the_rolling_rule_and_some_do_when_it_is_b
     assert broken.frames.max() == pytest.approx(0.8, abs=1e-6)
 
 
-def test_half_rate_flashes_are_whole_in_the_sum_of_two_frames():
+def test_half_rate_flashes_are_whole_in_the_sum_of_two_frames() -> None:
     cam = camera()
     plates = ramp_plates(cam, 2)
     plan = plan_of(cam, (0.001, 0.001), dark_s=2 * PERIOD_S - 0.001, mode="half-rate")
@@ -129,14 +136,14 @@ def test_half_rate_flashes_are_whole_in_the_sum_of_two_frames():
     assert sum(flash.complete for flash in shot.flashes) >= 4
 
 
-def test_a_global_shutter_gives_every_row_the_same_share():
+def test_a_global_shutter_gives_every_row_the_same_share() -> None:
     cam = camera(readout=0.0)
     shot = expose([np.ones((60, 3), np.float32)], plan_of(cam), frames=6, clock=TrueClock(phase_s=0.0096))
     assert np.ptp(shot.frames, axis=(1, 2)).max() == 0.0
     np.testing.assert_allclose(shot.frames[:2, 0, 0], [0.4, 0.6], atol=1e-6)
 
 
-def test_a_bottom_up_camera_is_a_top_down_one_upside_down():
+def test_a_bottom_up_camera_is_a_top_down_one_upside_down() -> None:
     plates = ramp_plates(camera(), 2)
     clock = TrueClock(phase_s=0.0043, offset_ppm=80)
     down = expose(plates, plan_of(camera(readout=0.8), (0.001, 0.002)), frames=7, clock=clock)
@@ -146,7 +153,7 @@ def test_a_bottom_up_camera_is_a_top_down_one_upside_down():
     assert row_opens_s(camera(readout=-0.8)).argmin() == 59
 
 
-def test_a_synced_clip_holds_one_whole_flash_per_frame_in_order():
+def test_a_synced_clip_holds_one_whole_flash_per_frame_in_order() -> None:
     cam = camera(readout=0.3)
     plates = ramp_plates(cam, 3)
     plan = plan_of(cam, (0.001, 0.004, 0.002), dark_s=0.006, mode="synced")
@@ -157,14 +164,14 @@ def test_a_synced_clip_holds_one_whole_flash_per_frame_in_order():
         expose(plates, plan_of(camera(), mode="synced"), frames=2)
 
 
-def test_below_360_degrees_a_flash_in_the_blind_time_is_lost():
+def test_below_360_degrees_a_flash_in_the_blind_time_is_lost() -> None:
     cam = camera(shutter=0.5, readout=0.0)
     shot = expose([np.ones((60, 3), np.float32)], plan_of(cam, dark_s=1.0), frames=3, clock=TrueClock(phase_s=0.0147))
     np.testing.assert_allclose(shot.frames[:, 0, 0], [0, 0.3, 0], atol=1e-6)
 
 
 @pytest.mark.parametrize("fall_s", [0.0, 1e-4])
-def test_a_flash_is_complete_exactly_when_the_recorded_frames_hold_all_its_light(fall_s):
+def test_a_flash_is_complete_exactly_when_the_recorded_frames_hold_all_its_light(fall_s: float) -> None:
     cam = camera(readout=-0.7)
     plan = plan_of(cam, (0.001, 0.003), fall_s=fall_s)
     lost = frozenset({7})
@@ -173,12 +180,12 @@ def test_a_flash_is_complete_exactly_when_the_recorded_frames_hold_all_its_light
         clock = TrueClock(phase_s=float(phase_s), offset_ppm=-300, drift_ppm_per_s=40, jitter_s=1e-5, seed=2)
         flashes = true_flashes(plan, clock, frames=12, dropped=lost)
         held = [sum(seen_share(cam, emission, flash, n) for n in range(12) if n not in lost) for flash in flashes]
-        assert [flash.complete for flash in flashes] == [bool((share >= kept).all()) for share in held]
+        assert [flash.complete for flash in flashes] == [bool(np.all(share >= kept)) for share in held]
         assert [flash.index for flash in flashes] == list(range(len(flashes)))
         assert {False, True} == {flash.complete for flash in flashes[1:-1]}
 
 
-def test_an_leds_tail_reaches_into_the_next_frame_and_nothing_of_it_is_lost():
+def test_an_leds_tail_reaches_into_the_next_frame_and_nothing_of_it_is_lost() -> None:
     """The flash ends with frame 0; with equal rise and fall an LED gives off as much as a square pulse."""
     cam = camera(readout=0.0)
     plan = plan_of(cam, (0.0005,), dark_s=1.0, rise_s=2e-4, fall_s=2e-4)
@@ -187,7 +194,7 @@ def test_an_leds_tail_reaches_into_the_next_frame_and_nothing_of_it_is_lost():
     np.testing.assert_allclose(shot.frames[:, 0, 0], [1 - late, late, 0.0], atol=1e-6)
 
 
-def test_drift_and_offset_stretch_the_strobes_seconds():
+def test_drift_and_offset_stretch_the_strobes_seconds() -> None:
     plan = plan_of(camera(), (0.001,), dark_s=0.099)
     clock = TrueClock(phase_s=0.02, offset_ppm=1000, drift_ppm_per_s=50)
     flashes = true_flashes(plan, clock, frames=1000)
@@ -197,7 +204,7 @@ def test_drift_and_offset_stretch_the_strobes_seconds():
     np.testing.assert_allclose(flashes[50].duration_s, 0.001 * (1.001 + 50e-6 * 5.0), rtol=1e-12)
 
 
-def test_jitter_has_the_given_spread_and_comes_from_the_seed():
+def test_jitter_has_the_given_spread_and_comes_from_the_seed() -> None:
     plan = plan_of(camera(), (0.001,))
     even, late, again = (
         np.array([f.start_s for f in true_flashes(plan, TrueClock(phase_s=0.004, jitter_s=j, seed=3), frames=3000)])
@@ -207,7 +214,7 @@ def test_jitter_has_the_given_spread_and_comes_from_the_seed():
     np.testing.assert_array_equal(late, again)
 
 
-def test_ambient_light_adds_to_every_row_and_flickers_as_its_mean_over_the_exposure():
+def test_ambient_light_adds_to_every_row_and_flickers_as_its_mean_over_the_exposure() -> None:
     cam = camera(shutter=0.4)
     mains = MainsSwing(hz=130.0, depth=0.6)
     shot = expose({0: np.zeros((60, 3), np.float32)}, plan_of(cam), frames=3, ambient=0.2, mains=mains)
@@ -218,7 +225,7 @@ def test_ambient_light_adds_to_every_row_and_flickers_as_its_mean_over_the_expos
         assert shot.frames[n, row, 0] == pytest.approx(mean, abs=1e-6)
 
 
-def test_noise_has_the_variance_of_the_electrons_and_the_seed_decides_it():
+def test_noise_has_the_variance_of_the_electrons_and_the_seed_decides_it() -> None:
     cam = camera(readout=0.0, height_px=200, width_px=200)
     plan = plan_of(cam, mode="synced")
     noise = Noise(full_well_e=4000.0, read_e=12.0)
@@ -233,7 +240,7 @@ def test_noise_has_the_variance_of_the_electrons_and_the_seed_decides_it():
     np.testing.assert_array_equal(later, shots[0][1:])
 
 
-def test_frames_saturate_and_come_in_the_converters_steps():
+def test_frames_saturate_and_come_in_the_converters_steps() -> None:
     cam = camera(readout=0.0)
     plate = [np.linspace(0, 1.5, 180, dtype=np.float32).reshape(60, 3)]
     shot = expose(plate, plan_of(cam, mode="synced"), frames=1, bits=8)
@@ -242,7 +249,7 @@ def test_frames_saturate_and_come_in_the_converters_steps():
 
 
 @pytest.mark.parametrize("clip", ["plain", "ambient"])
-def test_another_simulators_frames_come_out_of_its_plates_and_timing(shared_data, clip):
+def test_another_simulators_frames_come_out_of_its_plates_and_timing(shared_data: Path, clip: str) -> None:
     folder = shared_data / "clips" / clip
     plan = read_plan(folder / "plan.toml")
     truth = json.loads((folder / "truth" / "timing.json").read_text())["flashes"]
@@ -254,7 +261,7 @@ def test_another_simulators_frames_come_out_of_its_plates_and_timing(shared_data
     strobe_s = float(plan.train(slots[first["light"]], 1).start_s[0])
     clock = TrueClock(phase_s=first["start_s"] - strobe_s * (1 + ppm * 1e-6), offset_ppm=ppm)
     files = sorted((folder / "frames").iterdir())
-    codes = np.stack([cv2.imread(str(file), cv2.IMREAD_UNCHANGED)[..., ::-1] for file in files]).astype(np.float32)
+    codes = np.stack([read_picture(file, cv2.IMREAD_UNCHANGED)[..., ::-1] for file in files]).astype(np.float32)
     light = (codes - 4097) / (65535 - 4097)
     shot = expose(plates, plan, frames=len(files), clock=clock)
     for flash, row in zip(shot.flashes, truth, strict=True):

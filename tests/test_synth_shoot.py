@@ -6,7 +6,9 @@ import re
 import runpy
 import subprocess
 import sys
+from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import OpenEXR
@@ -17,6 +19,7 @@ import tomlkit
 from psvideo.cli.app import main
 from psvideo.clip import open_clip, read_frames
 from psvideo.errors import PsvideoError, UsageError
+from psvideo.formats.contract import Contract
 from psvideo.formats.plan_toml import read_plan
 from psvideo.formats.rig_toml import read_rig
 from psvideo.synth import expose, read_scene, shoot
@@ -111,7 +114,9 @@ def expected_frames(clip: Path) -> np.ndarray:
         ("png16", {"transfer": "logc3", "bits": 16}, 1 / 5_000),
     ],
 )
-def test_footage_of_every_kind_reads_back_as_the_light_that_fell(tmp_path, kind, camera, step):
+def test_footage_of_every_kind_reads_back_as_the_light_that_fell(
+    tmp_path: Path, kind: str, camera: dict[str, Any], step: float
+) -> None:
     clip = film(tmp_path, output__kind=kind, **{f"camera__{key}": value for key, value in camera.items()})
     opened = open_clip(clip)
     light = expected_frames(clip)
@@ -129,7 +134,7 @@ def test_footage_of_every_kind_reads_back_as_the_light_that_fell(tmp_path, kind,
         np.testing.assert_allclose(image, expected, atol=step)
 
 
-def test_a_clip_lies_as_a_camera_would_leave_it_and_the_truth_fits(tmp_path):
+def test_a_clip_lies_as_a_camera_would_leave_it_and_the_truth_fits(tmp_path: Path) -> None:
     clip = film(tmp_path, output__dropped=[3], output__first_number=118)
     scene = read_scene(tmp_path / "scene.toml")
     assert sorted(path.name for path in clip.iterdir()) == ["frames", "plan.toml", "rig.toml", "truth"]
@@ -149,7 +154,7 @@ def test_a_clip_lies_as_a_camera_would_leave_it_and_the_truth_fits(tmp_path):
     assert said["dropped_frames"] == [3]
 
 
-def test_true_plates_are_albedo_times_intensity_times_the_cosine(tmp_path):
+def test_true_plates_are_albedo_times_intensity_times_the_cosine(tmp_path: Path) -> None:
     clip = film(tmp_path)
     normals, albedo = exr(clip / "truth" / "normals.exr"), exr(clip / "truth" / "albedo.exr")
     assert exr(clip / "truth" / "mask.exr").min() == 1.0
@@ -164,7 +169,7 @@ def test_true_plates_are_albedo_times_intensity_times_the_cosine(tmp_path):
             assert lit.mean() > 0.75
 
 
-def test_a_moving_scene_has_its_surface_at_every_flash(tmp_path):
+def test_a_moving_scene_has_its_surface_at_every_flash(tmp_path: Path) -> None:
     text = SCENE.replace("albedo = [0.8, 0.5, 0.3]", "albedo = 0.8\nmotion = { velocity_m_per_s = [3.0, 0.0, 0.0] }")
     (tmp_path / "scene.toml").write_text(text)
     clip = shoot(tmp_path / "scene.toml", tmp_path / "clip").path
@@ -181,7 +186,7 @@ def test_a_moving_scene_has_its_surface_at_every_flash(tmp_path):
     np.testing.assert_allclose(middles, 23.5 + np.multiply(time_s, 3.0) / (1.4 / 48), atol=0.5)
 
 
-def test_ambient_light_shows_a_moving_scene_at_the_middle_of_the_frame(tmp_path):
+def test_ambient_light_shows_a_moving_scene_at_the_middle_of_the_frame(tmp_path: Path) -> None:
     text = SCENE.replace("albedo = [0.8, 0.5, 0.3]", "albedo = 0.8\nmotion = { velocity_m_per_s = [3.0, 0.0, 0.0] }")
     text = text[: text.rindex("[[object]]")] + "[ambient]\nlevel = 0.2\n"
     (tmp_path / "scene.toml").write_text(text)
@@ -194,7 +199,7 @@ def test_ambient_light_shows_a_moving_scene_at_the_middle_of_the_frame(tmp_path)
         )
 
 
-def test_a_light_that_flashes_twice_has_its_intensity_at_its_first_length(tmp_path):
+def test_a_light_that_flashes_twice_has_its_intensity_at_its_first_length(tmp_path: Path) -> None:
     flashes = [{"lights": {"key": 1.0}, "duration_s": d} for d in (0.0006, 0.0018)] + [
         {"lights": {"left": 0.5}, "duration_s": 0.001}
     ]
@@ -205,7 +210,7 @@ def test_a_light_that_flashes_twice_has_its_intensity_at_its_first_length(tmp_pa
     np.testing.assert_allclose(plates[1], 3.0 * plates[0], rtol=1e-6)
 
 
-def test_motion_inside_a_flash_blurs_it_over_the_way_it_goes_where_asked(tmp_path):
+def test_motion_inside_a_flash_blurs_it_over_the_way_it_goes_where_asked(tmp_path: Path) -> None:
     """A white square of 0.4 m that goes 0.1 m while the flash lasts: its plate's edges are ramps of 0.1 m."""
     square = 'mesh = "plane"\nscale = 0.4\nalbedo = 0.8\nmotion = { velocity_m_per_s = [100.0, 0.0, 0.0] }'
     text = SCENE.replace('mesh = "sphere"\nalbedo = [0.8, 0.5, 0.3]', square + "\nposition_m = [-2.0, 0.0, 0.0]")
@@ -225,7 +230,7 @@ def test_motion_inside_a_flash_blurs_it_over_the_way_it_goes_where_asked(tmp_pat
     np.testing.assert_allclose(ramps_px[1], 0.1 / (2.4 / 48), atol=1.0)
 
 
-def test_the_seed_decides_every_byte(tmp_path):
+def test_the_seed_decides_every_byte(tmp_path: Path) -> None:
     keys = {"camera__full_well_e": 5000.0, "camera__read_e": 4.0, "strobe__jitter_s": 1e-6, "strobe__phase_s": 0.002}
     contents = []
     for k, seed in enumerate((5, 5, 6)):
@@ -239,23 +244,28 @@ def test_the_seed_decides_every_byte(tmp_path):
     assert contents[0] != contents[2]
 
 
-def test_the_plan_may_claim_other_than_the_truth(tmp_path):
-    keys = {"plan__fps": 101, "plan__readout_s": "unknown", "plan__tails": False, "strobe__fall_s": 5e-5}
+def test_the_plan_may_claim_other_than_the_truth(tmp_path: Path) -> None:
+    keys: dict[str, object] = {
+        "plan__fps": 101,
+        "plan__readout_s": "unknown",
+        "plan__tails": False,
+        "strobe__fall_s": 5e-5,
+    }
     clip = film(tmp_path, **keys)
     plan = read_plan(clip / "plan.toml")
-    assert (plan.camera.fps, plan.camera.readout_s, plan.fall_s) == (101, None, 0.0)
+    assert (plan.camera.fps, plan.camera.readout_s, plan.fall_s) == (Fraction(101), None, 0.0)
     assert plan.camera.shutter_deg == pytest.approx(360.0)
     said = json.loads((clip / "truth" / "scene.json").read_text())
     assert (said["fps"], said["readout_s"], said["fall_s"]) == ("100", 0.008, 5e-5)
 
 
-def test_too_bright_a_scene_is_warned_of(tmp_path, capsys):
+def test_too_bright_a_scene_is_warned_of(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = write_scene(tmp_path, ambient={"level": 1.5})
     assert main(["synth", str(path), "-o", str(tmp_path / "clip")]) == 0
     assert "samples saturate" in capsys.readouterr().err
 
 
-def test_an_existing_clip_is_replaced_only_by_force(tmp_path, capsys):
+def test_an_existing_clip_is_replaced_only_by_force(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     clip = film(tmp_path)
     (clip / "mine.txt").write_text("precious")
     with pytest.raises(UsageError, match="exists already"):
@@ -268,7 +278,7 @@ def test_an_existing_clip_is_replaced_only_by_force(tmp_path, capsys):
     assert not (clip / "mine.txt").exists()
 
 
-def test_footage_is_never_replaced_by_a_virtual_clip(tmp_path):
+def test_footage_is_never_replaced_by_a_virtual_clip(tmp_path: Path) -> None:
     clip = film(tmp_path)
     (clip / "truth" / "scene.json").unlink()
     with pytest.raises(UsageError, match="was not written by psvideo synth"):
@@ -276,7 +286,7 @@ def test_footage_is_never_replaced_by_a_virtual_clip(tmp_path):
     assert len(list((clip / "frames").iterdir())) == 8
 
 
-def test_a_full_disk_is_one_paragraph_and_leaves_nothing(tmp_path):
+def test_a_full_disk_is_one_paragraph_and_leaves_nothing(tmp_path: Path) -> None:
     path = write_scene(tmp_path, camera__width_px=400, camera__height_px=300)
     limited = (
         "import resource, signal, sys; signal.signal(signal.SIGXFSZ, signal.SIG_IGN); "
@@ -290,7 +300,7 @@ def test_a_full_disk_is_one_paragraph_and_leaves_nothing(tmp_path):
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["scene.toml"]
 
 
-def test_a_shoot_that_fails_leaves_nothing_behind(tmp_path):
+def test_a_shoot_that_fails_leaves_nothing_behind(tmp_path: Path) -> None:
     path = write_scene(tmp_path, strobe__mode="synced", strobe__flash_s=0.005)
     with pytest.raises(PsvideoError, match="all rows of 'virtual camera' are open together"):
         shoot(path, tmp_path / "clip")
@@ -323,7 +333,9 @@ def test_a_shoot_that_fails_leaves_nothing_behind(tmp_path):
         ("seed = 5", "seed = five", "not a TOML file"),
     ],
 )
-def test_a_faulty_scene_is_one_paragraph_that_names_the_key(tmp_path, capsys, old, new, message):
+def test_a_faulty_scene_is_one_paragraph_that_names_the_key(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], old: str, new: str, message: str
+) -> None:
     assert old in SCENE
     path = tmp_path / "bad.toml"
     text = SCENE.replace(old, new, 1)
@@ -339,7 +351,7 @@ def test_a_faulty_scene_is_one_paragraph_that_names_the_key(tmp_path, capsys, ol
 
 
 @pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
-def test_shipped_scenes_are_sound(path):
+def test_shipped_scenes_are_sound(path: Path) -> None:
     scene = read_scene(path)
     plan, rig = true_plan(scene), true_rig(scene)
     assert plan.lights == rig.names
@@ -348,7 +360,7 @@ def test_shipped_scenes_are_sound(path):
     assert np.linalg.cond(directions) < 4
 
 
-def test_the_shipped_scenes_are_found_by_name(tmp_path, monkeypatch):
+def test_the_shipped_scenes_are_found_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     for path in SCENES:
         assert scene_file(Path(path.stem)) == builtin_scene(path.stem)
@@ -358,7 +370,7 @@ def test_the_shipped_scenes_are_found_by_name(tmp_path, monkeypatch):
         scene_file(Path("bist"))
 
 
-def test_a_file_goes_before_a_shipped_scene_of_its_name(tmp_path, monkeypatch):
+def test_a_file_goes_before_a_shipped_scene_of_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("bust").write_text(SCENE)
     assert scene_file(Path("bust")) == Path("bust")
@@ -366,9 +378,9 @@ def test_a_file_goes_before_a_shipped_scene_of_its_name(tmp_path, monkeypatch):
     assert scene_file(Path("bust.toml")) == Path("bust.toml")
 
 
-def test_a_built_package_holds_the_scenes_of_the_repository(tmp_path, monkeypatch):
+def test_a_built_package_holds_the_scenes_of_the_repository(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
-    ran = {}
+    ran: dict[str, Any] = {}
     monkeypatch.setattr(setuptools, "setup", lambda **given: ran.update(given))
     runpy.run_path(str(ROOT / "setup.py"))
     built = setuptools.Distribution(
@@ -384,14 +396,14 @@ def test_a_built_package_holds_the_scenes_of_the_repository(tmp_path, monkeypatc
 
 
 @pytest.mark.parametrize("name", sorted(CURVES))
-def test_transfer_curves_are_undone_by_their_inverse(name):
+def test_transfer_curves_are_undone_by_their_inverse(name: str) -> None:
     curve = CURVES[name]
     light = np.linspace(-0.005, 1.0, 4001)
     np.testing.assert_allclose(curve.decode(curve.encode(light)), light, atol=2e-6)
     assert (np.diff(curve.encode(light)) > 0).all()
 
 
-def test_transfer_curves_meet_their_makers_figures():
+def test_transfer_curves_meet_their_makers_figures() -> None:
     code = {name: float(curve.encode(np.array(0.18))) for name, curve in CURVES.items()}
     assert code["slog3"] * 1023 == pytest.approx(420, abs=0.01)
     assert code["logc3"] == pytest.approx(0.391, abs=5e-4)
@@ -400,12 +412,12 @@ def test_transfer_curves_meet_their_makers_figures():
     assert CURVES["slog3"].zero * 1023 == pytest.approx(95, abs=0.01)
 
 
-def test_every_key_of_the_scene_file_is_documented():
+def test_every_key_of_the_scene_file_is_documented() -> None:
     text = (ROOT / "docs" / "synth.md").read_text()
-    tables = [Scene]
+    tables: list[type[Contract]] = [Scene]
     while tables:
         table = tables.pop()
         for key, field in table.model_fields.items():
             assert re.search(rf"[`\[{{ ,]{field.alias or key}[`\] =]", text), key
             inner = [field.annotation, *getattr(field.annotation, "__args__", ())]
-            tables += [kind for kind in inner if isinstance(kind, type) and issubclass(kind, Scene.__base__)]
+            tables += [kind for kind in inner if isinstance(kind, type) and issubclass(kind, Contract)]

@@ -104,6 +104,7 @@ def test_the_fit_adds_its_parts_in_order(make_plan: Callable[..., Plan], monkeyp
         place=np.arange(1080.0),
         window_start=np.zeros(1, np.int64),
     )
+    assert plan.camera.readout_s is not None
     beat = Beat(
         clock=FoundClock(phase_s=0.001, offset_ppm=0.0),
         row_time_s=plan.camera.readout_s / 1080,

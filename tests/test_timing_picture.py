@@ -4,8 +4,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-import cv2
 import numpy as np
+from picture_file import read_picture
 
 from psvideo.model.plan import Plan
 from psvideo.pictures.timing_sheet import timing_picture, write_sheet
@@ -30,4 +30,4 @@ def test_right_times_leave_nothing_and_wrong_ones_leave_red_and_blue(
     coloured = [(np.ptp(picture, axis=2) > 60).mean() for picture in (right, wrong)]
     assert coloured[1] > coloured[0] + 0.01
     write_sheet(tmp_path / "timing.png", right.astype(np.uint8))
-    np.testing.assert_array_equal(cv2.imread(str(tmp_path / "timing.png"))[..., ::-1], right)
+    np.testing.assert_array_equal(read_picture(tmp_path / "timing.png")[..., ::-1], right)

@@ -7,7 +7,20 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from docs.figures.staging import SCENE, WIDTH_PX, Figure, Image, Pixels, exr, figure, film, frames, psvideo, row
+from docs.figures.staging import (
+    SCENE,
+    WIDTH_PX,
+    Figure,
+    Image,
+    Pixels,
+    exr,
+    figure,
+    film,
+    frames,
+    psvideo,
+    read_picture,
+    row,
+)
 
 from psvideo.model.surface import Surface
 from psvideo.pictures.relighting import normal_colours, relight, srgb
@@ -179,7 +192,7 @@ def flicker(folder: Path) -> Figure:
     """A camera whose automatic exposure follows the flashes."""
     clip = film(folder)
     for count, file in enumerate(sorted((clip / "frames").iterdir())):
-        codes = cv2.imread(str(file), cv2.IMREAD_UNCHANGED).astype(np.float64)
+        codes = read_picture(file, cv2.IMREAD_UNCHANGED).astype(np.float64)
         gained = 4096 + (codes - 4096) * (1 + 0.25 * np.sin(0.55 * count))
         cv2.imwrite(str(file), np.clip(gained, 0, 65535).astype(np.uint16))
     out, said = solved(clip)
@@ -203,7 +216,7 @@ def misnamed_rate(folder: Path) -> Figure:
     rates = {"camera": {"fps": "100000/1001"}, "plan": {"fps": 100}, "strobe": {"clock_offset_ppm": 3.0}}
     clip = film(folder, {**rates, "frames": 40})
     said = psvideo("sync", clip, "--picture", folder / "timing.png")
-    picture = cv2.imread(str(folder / "timing.png"))[..., ::-1]
+    picture = read_picture(folder / "timing.png")[..., ::-1]
     rows, cols = picture.shape[:2]
     small = cv2.resize(picture, (WIDTH_PX, rows * WIDTH_PX // cols), interpolation=cv2.INTER_AREA)
     return Figure(picture=small[: len(small) // 2].astype(np.uint8), said=said)

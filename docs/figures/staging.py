@@ -68,10 +68,18 @@ def psvideo(*words: object) -> str:
     return " ".join(heard.getvalue().split())
 
 
+def read_picture(path: Path, how: int = cv2.IMREAD_COLOR) -> NDArray[Any]:
+    """Return a picture as OpenCV reads it. Raises FileNotFoundError where none can be read."""
+    picture = cv2.imread(str(path), how)
+    if picture is None:
+        raise FileNotFoundError(path)
+    return picture
+
+
 def frames(clip: Path) -> list[Image]:
     """Return the frames' codes in their order, 0 at the black level and 1 at the largest."""
     files = sorted((clip / "frames").iterdir())
-    codes = [cv2.imread(str(file), cv2.IMREAD_UNCHANGED)[..., ::-1].astype(np.float32) for file in files]
+    codes = [read_picture(file, cv2.IMREAD_UNCHANGED)[..., ::-1].astype(np.float32) for file in files]
     return [np.maximum((one - BLACK) / (65535 - BLACK), 0) for one in codes]
 
 

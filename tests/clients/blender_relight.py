@@ -10,15 +10,19 @@ Blender made of each.
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 import bpy
 
+Job = dict[str, Any]
+Factor = tuple[int, int, int]
 
-def link(tree, source, target):
+
+def link(tree: Any, source: Any, target: Any) -> None:
     tree.links.new(source, target)
 
 
-def material(job, image):
+def material(job: Job, image: Any) -> Any:
     """A diffuse card whose normal is what the texture says."""
     made = bpy.data.materials.new("card")
     made.use_nodes = True
@@ -36,7 +40,9 @@ def material(job, image):
         node = tree.nodes.new("ShaderNodeNormalMap")
         link(tree, vector, node.inputs["Color"])
         return with_normal(made, node.outputs[0])
-    steps = [("MULTIPLY_ADD", (2, 2, 2), (-1, -1, -1))] if job["kind"] == "png" else []
+    steps: list[tuple[str, Factor, Factor | None]] = (
+        [("MULTIPLY_ADD", (2, 2, 2), (-1, -1, -1))] if job["kind"] == "png" else []
+    )
     if job["flip_y"]:
         steps.append(("MULTIPLY", (1, -1, 1), None))
     if job["space"] == "camera":
@@ -57,7 +63,7 @@ def material(job, image):
     return with_normal(made, vector)
 
 
-def with_normal(made, vector):
+def with_normal(made: Any, vector: Any) -> Any:
     """Give a material a white diffuse surface with this normal."""
     tree = made.node_tree
     diffuse = tree.nodes.new("ShaderNodeBsdfDiffuse")
@@ -68,7 +74,7 @@ def with_normal(made, vector):
     return made
 
 
-def scene(job):
+def scene(job: Job) -> tuple[Any, Any]:
     """A card that fills an orthographic camera's view, a sun of strength pi, and nothing else."""
     from mathutils import Quaternion, Vector
 
@@ -100,7 +106,7 @@ def scene(job):
     return here, image
 
 
-def render(job):
+def render(job: Job) -> dict[str, str]:
     here, image = scene(job)
     width, height = job["size"]
     here.render.engine = "CYCLES"

@@ -62,7 +62,8 @@ def points() -> np.ndarray:
     """Return the ball's points (row, col, 3) in the camera's frame, in metres; (0, 0, 0) around it."""
     normals, inside = ball()
     radius_m = 0.45 * ROWS / COLS * SCALE_M
-    return (normals * radius_m + np.array([0, 0, -4.0])) * inside[..., None]
+    points: np.ndarray = (normals * radius_m + np.array([0, 0, -4.0])) * inside[..., None]
+    return points
 
 
 def placed(vectors: np.ndarray, *, y: str, world: bool, inside: np.ndarray, shift: bool = False) -> np.ndarray:
@@ -70,7 +71,8 @@ def placed(vectors: np.ndarray, *, y: str, world: bool, inside: np.ndarray, shif
     found = vectors
     if world:
         found = (vectors @ CAMERA[:3, :3].T + (CAMERA[:3, 3] if shift else 0)) * inside[..., None]
-    return (found * np.array([1, -1 if y == "down" else 1, 1])).astype(np.float32)
+    turned: np.ndarray = (found * np.array([1, -1 if y == "down" else 1, 1])).astype(np.float32)
+    return turned
 
 
 def results(folder: Path, *, y: str = "up", world: bool = False, position: bool = False) -> Path:
