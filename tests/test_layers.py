@@ -136,6 +136,64 @@ def test_only_the_command_line_writes_flags(path: Path) -> None:
     assert not flags, "name the parameter in backticks; the command line spells it as its option"
 
 
+FOR_COMMANDS = ("psvideo.runs.", "psvideo.cli.", "psvideo.model.", "psvideo.errors.")
+"""What every command may call: one whole run; what parses and prints; records and choices; errors."""
+
+ONE_CALL = {
+    "info.py": {"psvideo.inspect.describe.describe"},
+    "synth.py": {"psvideo.synth.shoot.shoot", "psvideo.synth.lamps.traced.TraceOptions"},
+    "strobe/board.py": {"psvideo.strobe.link.controller.serial_ports"},
+    "capture_plan.py": {"psvideo.capture.cameras.camera_modes"},
+}
+"""Commands that call one function of another room, which does it all (the options of synth are a record of it)."""
+
+PRINTED_WITH = {
+    "psvideo.capture.drawing.diagram.TERMINAL",
+    "psvideo.capture.drawing.diagram.diagram_text",
+    "psvideo.capture.tables.camera_table",
+    "psvideo.capture.tables.shoot_report",
+    "psvideo.formats.timing_json.timing_record",
+    "psvideo.report.run_report.report_record",
+    "psvideo.strobe.program_words.describe_program",
+    "psvideo.strobe.program_words.program_record",
+    "psvideo.strobe.runlog.log_record",
+    # Distinguishes the two kinds of record that a readout is printed from.
+    "psvideo.calibrate.strobed_readout.StrobedReadout",
+    # An option's default.
+    "psvideo.strobe.link.ports.AUTO",
+}
+"""What turns a record into words or JSON."""
+
+
+def _names_called(path: Path) -> set[str]:
+    """Return the dotted names of psvideo that a file imports anywhere, but for annotations alone."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
+            node.body = []
+    froms = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+    plain = [node for node in ast.walk(tree) if isinstance(node, ast.Import)]
+    names = {f"{node.module}.{alias.name}" for node in froms for alias in node.names}
+    names |= {alias.name for node in plain for alias in node.names}
+    return {name for name in names if name.split(".")[0] == "psvideo"}
+
+
+COMMANDS = sorted((PACKAGE / "cli" / "commands").rglob("*.py"))
+
+
+@pytest.mark.parametrize("path", COMMANDS, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_a_command_parses_calls_one_function_and_prints(path: Path) -> None:
+    name = path.relative_to(PACKAGE / "cli" / "commands").as_posix()
+    others = {one for one in _names_called(path) if not one.startswith(FOR_COMMANDS)} - PRINTED_WITH
+    assert others <= ONE_CALL.get(name, set()), "move the work into a function of runs/"
+
+
+def test_what_commands_may_call_is_called() -> None:
+    called = {path.relative_to(PACKAGE / "cli" / "commands").as_posix(): _names_called(path) for path in COMMANDS}
+    assert all(names <= called[name] for name, names in ONE_CALL.items())
+    assert set().union(*called.values()) >= PRINTED_WITH
+
+
 def test_only_one_module_knows_serial_ports() -> None:
     for path in MODULES:
         nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))

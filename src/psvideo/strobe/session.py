@@ -56,10 +56,13 @@ class Ready:
 
 @dataclass(frozen=True, kw_only=True)
 class RunProgress:
-    """How a run goes: seconds since it began, and whole cycles played."""
+    """How a run goes: seconds since it began, whole cycles played, flashes a second that light something, and how many
+    seconds are left; None for a run until it is stopped."""
 
     elapsed_s: float
     cycles: int
+    flash_rate_hz: float
+    left_s: float | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,7 +127,7 @@ def run_program(
             link.ask(request, request.reply)
         record.start_tick = link.ask(Run(cycles=cycles or 0), Started).start
         record.began_s = time.monotonic()
-        record.fault = _follow(link, record, cycles=cycles, seconds=seconds, watch=watch)
+        record.fault = _follow(link, record, program.played, cycles=cycles, seconds=seconds, watch=watch)
         if record.fault is not None:
             record.ended, record.message = "fault", _went_dark(link.port.name, record)
     except KeyboardInterrupt:
@@ -161,9 +164,17 @@ class _Record:
 
 
 def _follow(
-    link: Link, record: _Record, *, cycles: int | None, seconds: float | None, watch: Callable[[RunProgress], None]
+    link: Link,
+    record: _Record,
+    played: Plan,
+    *,
+    cycles: int | None,
+    seconds: float | None,
+    watch: Callable[[RunProgress], None],
 ) -> str | None:
     """Ask for clock and status again and again until the run is over; return what fault ended it, if one did."""
+    lasts_s = cycles * played.cycle_s if seconds is None and cycles is not None else seconds
+    rate_hz = sum(not played.flashes[slot].is_dark for slot in played.cycle_slots) / played.cycle_s
     began_s = time.monotonic()
     while True:
         clock, asked_s, answered_s = link.read_clock()
@@ -175,11 +186,12 @@ def _follow(
             return f"restarted: the board started again in the middle of the run (reset: {status.reset})"
         record.cycles = status.cycles
         elapsed_s = time.monotonic() - began_s
-        watch(RunProgress(elapsed_s=elapsed_s, cycles=status.cycles))
+        left_s = None if lasts_s is None else max(lasts_s - elapsed_s, 0.0)
+        watch(RunProgress(elapsed_s=elapsed_s, cycles=status.cycles, flash_rate_hz=rate_hz, left_s=left_s))
         if status.state == "idle" or (seconds is not None and elapsed_s >= seconds):
             return None
-        left_s = ASK_EVERY_S if seconds is None else min(ASK_EVERY_S, seconds - elapsed_s)
-        time.sleep(max(left_s, 0.0))
+        pause_s = ASK_EVERY_S if seconds is None else min(ASK_EVERY_S, seconds - elapsed_s)
+        time.sleep(max(pause_s, 0.0))
 
 
 def _went_dark(name: str, record: _Record) -> str:

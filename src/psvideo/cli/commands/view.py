@@ -32,18 +32,26 @@ def view(
     quiet: Quiet = False,
 ) -> None:
     """Show a result in the browser: scrub, compare, and relight it; only this machine can open the page."""
-    from psvideo.page import page_server, show_of, write_page
+    from psvideo.runs.view import export_view
+    from psvideo.runs.view import view as serve
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
-    show = show_of(path, clip=clip, plan=plan)
-    for note in show.notes:
-        voice.detail(note)
     if export is not None:
-        held = write_page(show, export, width_px=export_width, count=export_count, force=force, watch=voice.track)
+        held = export_view(
+            path,
+            out=export,
+            clip=clip,
+            plan=plan,
+            width_px=export_width,
+            count=export_count,
+            force=force,
+            watch=voice.track,
+            caller=voice.caller(),
+        )
         voice.result({"page": str(export), **held.record})
         voice.say(f"{export}: {held.words}")
         return
-    with page_server(show, port=port) as server:
+    with serve(path, clip=clip, plan=plan, port=port, caller=voice.caller()) as server:
         voice.say(f"{path}: {server.url} (this machine only; Ctrl-C ends it)")
         voice.result({"url": server.url, "port": server.server_port})
         sys.stdout.flush()  # a program that reads a pipe wants the address now

@@ -4,19 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from psvideo.cli.options.completing import offer_boards, offer_lines, offer_ports
 from psvideo.errors import UsageError, nearest
-from psvideo.strobe.link.boards import BOARDS, Board
+from psvideo.strobe.link.boards import BOARDS
 from psvideo.strobe.link.messages import WIRINGS, WiringName
-
-if TYPE_CHECKING:
-    from psvideo.strobe.link.exchange import Port
-
-EMULATED = "emulated"
+from psvideo.strobe.stand_ins.toolchain import StandIn
 
 PlanFile = Annotated[Path, typer.Argument(help="The plan to play: plan.toml.")]
 PortName = Annotated[
@@ -52,6 +48,23 @@ Rounds = Annotated[int | None, typer.Option("--rounds", help="Stop after so many
 LogPath = Annotated[
     Path | None, typer.Option("--log", help="Where to write what was played: strobe.json, for the clip's folder.")
 ]
+StandInName = Annotated[
+    StandIn | None,
+    typer.Option(
+        "--board",
+        help="The chip that runs the real firmware, or python, a board in plain Python. Left out: atmega328p where "
+        "it can be built, else python.",
+    ),
+]
+StandInWiring = Annotated[
+    WiringName, typer.Option("--wiring", help="How the lights hang on the board (lights/protocol.md).")
+]
+TraceOut = Annotated[
+    Path | None, typer.Option("--trace", help="Write every edge to this file, for psvideo synth --trace.")
+]
+Fast = Annotated[
+    bool, typer.Option("--fast", help="As fast as it goes; then only virtual time counts, keep-alive included.")
+]
 Yes = Annotated[bool, typer.Option("--yes", help="Everybody has been warned of the flashing; do not ask.")]
 
 
@@ -80,23 +93,3 @@ def parse_wiring(word: str | None) -> WiringName | None:
     if word is None:
         return None
     raise UsageError(f"--wiring {word}: {nearest(word, WIRINGS)}")
-
-
-def parse_board(word: str | None) -> Board | None:
-    """Return the board of the table that was asked for."""
-    if word is None or word in BOARDS:
-        return None if word is None else BOARDS[word]
-    usual = "An Uno or Nano has an atmega328p, a Mega an atmega2560, a Pico an rp2040."
-    raise UsageError(f"--board {word}: {nearest(word, BOARDS)} {usual}")
-
-
-def open_port(name: str, *, board: Board | None) -> Port:
-    """Open a port by what --port says."""
-    from psvideo.strobe.link.controller import OpenPort
-    from psvideo.strobe.stand_ins.python_board_port import PythonBoardPort
-
-    if name == EMULATED:
-        return PythonBoardPort(board or next(iter(BOARDS.values())))
-    if board is not None:
-        raise UsageError(f"--board {board.name}: the board at {name} says itself what it is; leave --board out.")
-    return OpenPort(name)

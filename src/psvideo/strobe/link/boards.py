@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from psvideo.errors import UsageError, nearest
 from psvideo.strobe.link.messages import Capabilities, WiringName
 
 MAX_FLASH_US = 50_000
@@ -80,6 +81,14 @@ BOARDS: Mapping[str, Board] = {
         ),
     )
 }
+
+
+def board_called(name: str | None) -> Board | None:
+    """Return the board of the table by its name; None for None. Raises UsageError where there is none of that name."""
+    if name is None or name in BOARDS:
+        return None if name is None else BOARDS[name]
+    usual = "An Uno or Nano has an atmega328p, a Mega an atmega2560, a Pico an rp2040."
+    raise UsageError(f"`board` {name}: {nearest(name, BOARDS)} {usual}")
 
 
 def capabilities(board: Board, wiring: WiringName, *, keep_ms: int = KEEP_AFTER_RESET_MS) -> Capabilities:

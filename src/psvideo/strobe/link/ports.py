@@ -7,6 +7,8 @@ from psvideo.errors import PsvideoError, UsageError
 
 AUTO = "auto"
 """The name that stands for whichever port a board is found at."""
+EMULATED = "emulated"
+"""The name that stands for a board in plain Python, in this program."""
 BOARD_MAKERS = {0x2341: "Arduino", 0x2A03: "Arduino", 0x2E8A: "Raspberry Pi Pico"}
 """USB vendors whose serial ports are microcontroller boards."""
 BRIDGES = {

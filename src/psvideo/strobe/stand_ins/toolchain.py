@@ -15,6 +15,8 @@ from typing import Literal
 from psvideo.errors import PsvideoError
 
 AvrBoard = Literal["atmega328p", "atmega2560"]
+StandIn = Literal[AvrBoard, "python"]
+"""What answers where no board is: the real firmware on an emulated chip, or a board in plain Python."""
 AVR_BOARDS: tuple[AvrBoard, ...] = ("atmega328p", "atmega2560")
 
 PACKAGES = ("gcc-avr", "avr-libc", "libsimavr-dev", "libelf-dev")

@@ -27,15 +27,10 @@ def convert(
     quiet: Quiet = False,
 ) -> None:
     """Write a rig as rig.toml, as an .lp file (RTI), or as DiLiGenT's two lists of directions and intensities."""
-    from psvideo.formats.light_lists import files_of, write_rig
-    from psvideo.formats.rig_toml import read_rig
-    from psvideo.formats.whole_files import refuse_existing
+    from psvideo.runs.calibrate.convert import convert as convert_rig
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
-    for file in files_of(out):
-        refuse_existing(file, force=force)
-    found = read_rig(rig, plan_lights=tuple(name or ()))
-    for sentence in write_rig(out, found):
-        voice.warn(sentence)
-    voice.say(f"{out}: {counted(len(found.lights), 'light')} written ({', '.join(found.names)}).")
-    voice.result({"files": [str(file) for file in files_of(out)], "lights": list(found.names)})
+    made = convert_rig(rig, out=out, name=name or (), force=force, caller=voice.caller())
+    names = made.rig.names
+    voice.say(f"{out}: {counted(len(names), 'light')} written ({', '.join(names)}).")
+    voice.result({"files": [str(file) for file in made.files], "lights": list(names)})

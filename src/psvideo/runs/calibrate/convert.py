@@ -1,0 +1,44 @@
+"""The whole of ``psvideo calibrate convert``: a rig in, the file of lights that another program reads out."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from psvideo.formats.light_lists import files_of, write_rig
+from psvideo.formats.rig_toml import read_rig
+from psvideo.formats.whole_files import refuse_existing
+from psvideo.model.rig import Rig
+from psvideo.runs.caller import PYTHON, Caller
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConvertedRig:
+    """The rig that was read, and the files that hold it now: two for DiLiGenT."""
+
+    rig: Rig
+    files: tuple[Path, ...]
+
+
+def convert(
+    rig: Path | str,
+    *,
+    out: Path | str,
+    name: Sequence[str] = (),
+    force: bool = False,
+    caller: Caller = PYTHON,
+) -> ConvertedRig:
+    """Write a rig as rig.toml, as an .lp file (RTI), or as DiLiGenT's two lists of directions and intensities.
+
+    ``rig`` is a rig.toml, an .lp file, or a DiLiGenT or UW list; the name of ``out`` sets the kind: *.toml, *.lp or
+    light_directions.txt. ``name``: for a list without names, the lights' names in order; ``force`` replaces what
+    exists. ``caller`` is warned of what the kind cannot hold. Raises UsageError where an output exists or its name
+    shows no kind, and PsvideoError where the rig cannot be read, or a light is near and lists hold directions only.
+    """
+    path = Path(out)
+    files = files_of(path)
+    for file in files:
+        refuse_existing(file, force=force)
+    found = read_rig(Path(rig), plan_lights=tuple(name))
+    for sentence in write_rig(path, found):
+        caller.warn(sentence)
+    return ConvertedRig(rig=found, files=files)
