@@ -8,9 +8,10 @@ from pathlib import Path
 import pytest
 
 from psvideo.cli.app import main
-from psvideo.errors import PsvideoError
+from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.plan_toml import format_plan, read_plan
 from psvideo.model.plan import Plan, PlannedFlash
+from psvideo.runs.strobe.run import run as play
 from psvideo.strobe.confirmed import is_confirmed, remember, state_folder
 from psvideo.strobe.runlog import as_played, format_log, plan_sha256, read_log
 from psvideo.strobe.seizures import flash_rates, seizure_warning
@@ -129,6 +130,29 @@ def test_nothing_flashes_unless_the_warning_was_confirmed(
     assert run("strobe", "run", plan_file, "--port", "/dev/ttyNOT0") == 1
     plan_file.write_text(plan_file.read_text().replace("0.0008", "0.0009"))
     assert run("strobe", "run", plan_file, "--port", "/dev/ttyNOT0") == 2
+
+
+def test_a_run_asks_its_caller_with_the_warning_and_remembers_a_yes(plan_file: Path, state: Path) -> None:
+    asked: list[str] = []
+
+    def yes(warning: str) -> bool:
+        asked.append(warning)
+        return True
+
+    def no(warning: str) -> bool:
+        return not yes(warning)
+
+    with pytest.raises(UsageError, match=r"35\.8 Hz.*give `yes` when everybody has been warned"):
+        play(plan_file, port="/dev/ttyNOT0")
+    with pytest.raises(PsvideoError, match="Not confirmed, so nothing flashed"):
+        play(plan_file, port="/dev/ttyNOT0", confirm=no)
+    assert not is_confirmed(plan_sha256(plan_file), folder=state)
+    for _ in range(2):
+        with pytest.raises(PsvideoError, match="no such port"):
+            play(plan_file, port="/dev/ttyNOT0", confirm=yes)
+    assert is_confirmed(plan_sha256(plan_file), folder=state)
+    assert len(asked) == 2, "once yes, it is not asked again"
+    assert all("FLASHING LIGHT" in warning for warning in asked)
 
 
 def test_what_was_confirmed_is_remembered_plan_by_plan(tmp_path: Path) -> None:
