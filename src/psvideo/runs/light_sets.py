@@ -29,6 +29,7 @@ from psvideo.model.camera import Encoding
 from psvideo.plates.align.rounds import UNMOVED
 from psvideo.plates.gather import gather
 from psvideo.plates.sequence import Round
+from psvideo.runs.caller import PYTHON
 from psvideo.sync.open_take import open_take
 from psvideo.sync.take_timing import find_take_timing
 
@@ -75,7 +76,8 @@ def read_images(path: Path | str, *, transfer: str | None = None, plan: Path | s
     path
         A folder of still photographs, one per light, in the order of their names (L2 before L10): PNG, TIFF, EXR, DNG,
         DPX or JPEG. A picture named ambient or dark shows the scene with every light off and is taken off the others;
-        one named room is left aside, and so is one of another name beside many numbered ones (a mask). Or a folder with
+        one named room is left aside, and so is one of another name beside many numbered ones (a mask): the log
+        (``psvideo``) names what was. Or a folder with
         one folder of pictures per light, as ``split`` writes it, or a clip, whose flashes are found first; of these,
         the mean over up to twelve rounds.
     transfer
@@ -104,7 +106,12 @@ def read_images(path: Path | str, *, transfer: str | None = None, plan: Path | s
     (('key', 'left', 'top'), (3, 120, 160, 3))
     """
     reading = Reading(transfer=transfer, plan=None if plan is None else Path(plan))
-    return read_light_pictures(Path(path), reading)
+    found = open_light_sets(Path(path), reading)
+    for warning in found.warnings:
+        PYTHON.warn(warning)
+    for note in found.notes:
+        PYTHON.detail(note)
+    return averaged(found.sets)
 
 
 def read_light_pictures(path: Path, reading: Reading = Reading(), *, watch: Watch = unwatched) -> LightPictures:

@@ -38,7 +38,8 @@ def solve_images(
         light taken off. Integer codes are taken where ``white_level`` says what they mean.
     lights
         Shape (light, 3): for each image the unit vector from the surface to its light, in the camera's frame (x right,
-        y up, z towards the camera). Or a Rig, whose lights stand in the order of the images.
+        y up, z towards the camera). Or a Rig, whose lights stand in the order of the images
+        (``rig.ordered(names)`` puts them so).
     intensities
         Shape (light,) or (light, channel): how strong each light is, above 0; 1 left out. A Rig has its own.
     mask
@@ -86,6 +87,7 @@ def solve_images(
     if rig is lights:
         _refuse_second_strengths(intensities)
         check_count(len(rig.lights), stack)
+    _refuse_behind(rig)
     where = None if mask is None else checked_mask(mask, (rows, cols))
     unit = checked_saturation(saturation, stack, where)
     plates = [image / unit for image in stack]
@@ -100,6 +102,15 @@ def solve_images(
     near = near_surface_of(rig, rig.lights, height_px=rows, width_px=cols, iterations=NEAR_ITERATIONS)
     surface = solve(light()) if near is None else solve_near(near, light, solve)
     return _in_units(surface, unit)
+
+
+def _refuse_behind(rig: Rig) -> None:
+    """Raise UsageError where all lights lie behind what the camera sees: the sign of z is another."""
+    if all(light.direction is not None and light.direction[2] < 0 for light in rig.lights):
+        raise UsageError(
+            "`lights` all have z < 0, behind what the camera sees. Expected unit vectors from the surface to the "
+            "light, x right, y up, z towards the camera: change the sign of z."
+        )
 
 
 def _refuse_second_strengths(intensities: ArrayLike | None) -> None:
