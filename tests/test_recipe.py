@@ -129,6 +129,21 @@ def test_below_360_degrees_what_is_seen_is_whole_and_what_is_not_is_said_to_be(s
         assert not made(recipe, frames)[~recipe.seen].any()
 
 
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(gap=st.floats(0.5, 1.0), first=st.floats(0.012, 0.04), fall=st.sampled_from([0.0, 6e-5]))
+def test_however_short_the_dark_time_what_is_called_seen_is_the_flash_alone(
+    gap: float, first: float, fall: float
+) -> None:
+    camera, random = camera_of(), np.random.default_rng(4)
+    timing = timing_of(camera, gap=gap, first_s=first, fall_s=fall, dark=9)
+    plates = random.uniform(0.2, 1.0, (8, ROWS))
+    frames = frames_seen(camera, timing, plates, np.zeros(ROWS))
+    for flash in timing.flashes[2:6]:
+        recipe = flash_recipe(camera, timing, flash, range(FRAMES))
+        found = made(recipe, frames)
+        np.testing.assert_allclose(found[recipe.seen], plates[flash.index][recipe.seen], atol=2e-2)
+
+
 def test_a_neighbour_whose_frames_are_missing_hides_the_rows_that_it_reaches_into() -> None:
     camera, timing = camera_of(), timing_of(camera_of(), gap=0.97, dark=9)
     flash = timing.flashes[3]

@@ -1,4 +1,4 @@
-"""What of which frame's rows makes up a flash's plate: coefficients from timing and camera alone, never from pixels.
+"""How rows of frames add up to a flash's plate: coefficients from timing and camera alone, never from pixels.
 
 ``plate[i] = sum_n coefficients[n, i] * frame[n, i]`` shows what row i would have recorded of the whole flash, and holds
 the ambient light of ``exposures[i]`` exposures. Flash by flash, never frame by frame: where one frame holds all
@@ -39,6 +39,8 @@ MOST_LEFT = 0.01
 """Of another flash that cannot be taken off so much may be left in a row; with more it is unseen."""
 MOST_GAIN = 2.5
 """Taking neighbours off may raise noise (as its square) so many times at most."""
+LEAST_DETERMINANT = 1e-3
+"""Sums that hold the same mixture of flashes cannot be taken apart."""
 NEIGHBOURS = 2
 """Flashes before and after that may reach into a flash's rows."""
 
@@ -73,7 +75,8 @@ def frames_of(camera: Camera, timing: Timing, flash: Flash) -> range:
 def flash_recipe(camera: Camera, timing: Timing, flash: Flash, there: range | frozenset[int]) -> FlashRecipe:
     """Return how to make a flash's plate of the frames that are ``there`` (indices); dark slots are averaged.
 
-    A neighbour whose own frames are not there cannot be taken off: rows that it reaches into are unseen.
+    A neighbour whose own frames are not there cannot be taken off: where it reaches into a row, only frames that saw
+    hardly any of it are used, and the row is unseen where there are none.
     """
     frames = frames_of(camera, timing, flash)
     present = np.array([index in there for index in frames])
@@ -158,6 +161,8 @@ def _taken_off(first: FloatArray, weights: FloatArray, *, dark: bool) -> tuple[F
     matrix = np.where(known.T[:, :, None], holds, np.eye(len(weights)))
     if dark:
         matrix[:, :, 0], matrix[:, 0, 0] = 0.0, 1.0
+    separable = np.abs(np.linalg.det(matrix)) > LEAST_DETERMINANT
+    matrix[~separable] = np.eye(len(weights))
     inverse = np.linalg.inv(matrix)
     own: FloatArray = np.einsum("rj,jfr->fr", inverse[:, 0, :], first)
-    return own, kept
+    return own, kept & separable

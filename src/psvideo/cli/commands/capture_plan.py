@@ -15,7 +15,7 @@ import typer
 
 import psvideo.cli.options.capture as option
 from psvideo.cli.console import Voice
-from psvideo.cli.options.common import Force, Json, Quiet, Verbose
+from psvideo.cli.options.clip_and_run import Force, Json, Quiet, Verbose
 from psvideo.cli.spelling import spelled
 
 if TYPE_CHECKING:

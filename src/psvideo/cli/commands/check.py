@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from psvideo.cli.console import Voice
-from psvideo.cli.options.common import FirstLight, Json, OrderRig, PlanPath, Quiet, Verbose
+from psvideo.cli.options.clip_and_run import FirstLight, Json, OrderRig, PlanPath, Quiet, Verbose
 from psvideo.errors import UsageError
 
 if TYPE_CHECKING:

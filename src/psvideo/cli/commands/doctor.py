@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from psvideo.cli.console import Voice
-from psvideo.cli.options.common import Json, Quiet, Verbose
+from psvideo.cli.options.clip_and_run import Json, Quiet, Verbose
 
 if TYPE_CHECKING:
     from psvideo.inspect.findings import Finding

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from psvideo.cli.console import Voice
-from psvideo.cli.options.common import Json, PlanPath, Quiet, Verbose
+from psvideo.cli.options.clip_and_run import Json, PlanPath, Quiet, Verbose
 
 
 def info(

@@ -7,7 +7,7 @@ import typer
 
 from psvideo.cli.commands.sync import describe_timing
 from psvideo.cli.console import Voice, counted, plain, print_report
-from psvideo.cli.options.common import (
+from psvideo.cli.options.clip_and_run import (
     ClipPath,
     FirstLight,
     Force,

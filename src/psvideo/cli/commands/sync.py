@@ -6,7 +6,17 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from psvideo.cli.console import Voice
-from psvideo.cli.options.common import ClipPath, FirstLight, Force, Frames, Json, OrderRig, PlanPath, Quiet, Verbose
+from psvideo.cli.options.clip_and_run import (
+    ClipPath,
+    FirstLight,
+    Force,
+    Frames,
+    Json,
+    OrderRig,
+    PlanPath,
+    Quiet,
+    Verbose,
+)
 
 if TYPE_CHECKING:
     from psvideo.model.timing import Timing

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from psvideo.cli.console import Voice
-from psvideo.cli.options.common import Force, Json, Quiet, Verbose
+from psvideo.cli.options.clip_and_run import Force, Json, Quiet, Verbose
 from psvideo.errors import UsageError
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from psvideo.cli.console import Voice
-from psvideo.cli.options.common import Force, Json, PlanPath, Quiet, Verbose
+from psvideo.cli.options.clip_and_run import Force, Json, PlanPath, Quiet, Verbose
 
 
 def view(

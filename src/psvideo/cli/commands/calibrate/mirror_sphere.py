@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from psvideo.cli.console import Voice
-from psvideo.cli.options.common import FirstLight, Force, Frames, Json, PlanPath, Quiet, Verbose
+from psvideo.cli.options.clip_and_run import FirstLight, Force, Frames, Json, PlanPath, Quiet, Verbose
 from psvideo.cli.options.typed import parse_circle, parse_point
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from psvideo.cli.console import Voice
-from psvideo.cli.options.common import Frames, Json, PlanPath, Quiet, Verbose
+from psvideo.cli.options.clip_and_run import Frames, Json, PlanPath, Quiet, Verbose
 
 if TYPE_CHECKING:
     from psvideo.calibrate.stripes.readout import Led, Readout

@@ -14,7 +14,7 @@ import psvideo.cli.options.strobe as option
 from psvideo.cli.commands.strobe.emulate import emulate
 from psvideo.cli.commands.strobe.progress import watching
 from psvideo.cli.console import Voice
-from psvideo.cli.options.common import Force, Json, Quiet, Verbose
+from psvideo.cli.options.clip_and_run import Force, Json, Quiet, Verbose
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.strobe.link.ports import AUTO
 

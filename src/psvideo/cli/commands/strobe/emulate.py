@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import psvideo.cli.options.strobe as option
 from psvideo.cli.console import Voice
-from psvideo.cli.options.common import Force, Json, Quiet
+from psvideo.cli.options.clip_and_run import Force, Json, Quiet
 
 if TYPE_CHECKING:
     from psvideo.runs.strobe.emulate import EmulatedPort
