@@ -12,12 +12,12 @@ from psvideo.calibrate.light_pictures import light_pictures
 from psvideo.calibrate.matte import measure_matte_sphere
 from psvideo.calibrate.sphere.outline import given_outline
 from psvideo.calibrate.sphere.sphere_view import SphereView
+from psvideo.model.ground import ground_of
 from psvideo.model.rig import Light, Rig
 from psvideo.solve.depth import Shaping, View
 from psvideo.solve.near_surface import NearSurface, solve_near
 from psvideo.solve.normals import woodham1980
 from psvideo.solve.normals.illumination import Illumination, illumination
-from psvideo.solve.normals.near_light import ground_of
 
 SIZE, WIDTH_M, FAR_M = 128, 0.4, 1.6
 FOCAL_PX, MIDDLE = SIZE * FAR_M / WIDTH_M, (SIZE - 1) / 2

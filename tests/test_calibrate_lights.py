@@ -19,8 +19,8 @@ from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
 from psvideo.formats.rig_toml import read_rig
 from psvideo.model.choices import Prior
+from psvideo.model.ground import ground_of
 from psvideo.model.rig import Light, Rig
-from psvideo.solve.normals.near_light import ground_of
 
 Array = NDArray[np.float64]
 HIGH, WIDE = 150, 200

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from psvideo.cli.app import main
 from psvideo.clip import open_depth
 from psvideo.errors import PsvideoError
+from psvideo.model.ground import ground_of
 from psvideo.model.rig import Light, Rig
 from psvideo.solve.depth import View, integrate, scaled
-from psvideo.solve.normals.near_light import ground_of
 
 ROWS, COLS, FOCAL_PX = 60, 80, 120.0
 CENTRE, RADIUS_M = np.array([0.02, 0.0, -0.85]), 0.2

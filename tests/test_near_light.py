@@ -15,7 +15,8 @@ from scipy.io import loadmat  # type: ignore[attr-defined]
 from psvideo.cli.app import main
 from psvideo.compute.compiled import EXACT
 from psvideo.errors import PsvideoError
-from psvideo.model.light_field import near_vectors
+from psvideo.model.ground import ground_of
+from psvideo.model.near_light import near_field, near_vectors
 from psvideo.model.rig import Light, Rig
 from psvideo.model.surface import Surface
 from psvideo.solve import near_surface
@@ -24,7 +25,6 @@ from psvideo.solve.near_surface import NearSurface, solve_near
 from psvideo.solve.normals import robust, woodham1980
 from psvideo.solve.normals.illumination import Illumination, illumination
 from psvideo.solve.normals.near_kernel import place_lights
-from psvideo.solve.normals.near_light import ground_of, near_field
 from psvideo.solve.normals.task import Floats, Near
 
 Array = NDArray[np.float64]

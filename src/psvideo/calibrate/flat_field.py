@@ -14,8 +14,9 @@ from psvideo.calibrate.light_pictures import LightPictures
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import FloatArray
 from psvideo.model.falloff import POWERS, Falloff, terms
+from psvideo.model.ground import Ground
+from psvideo.model.near_light import field_of
 from psvideo.model.rig import Light, Rig
-from psvideo.solve.normals.near_light import Ground, field_of
 
 LEAST_SHARE = 0.5
 """Share of the target's pixels that must be unsaturated and seen."""

@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.clip import DepthMaps
+from psvideo.model.ground import Ground, ground_of
+from psvideo.model.near_light import is_near
 from psvideo.model.rig import Light, Rig
 from psvideo.model.surface import Surface
 from psvideo.solve.depth import Shaping, View, depth_of, view_of
 from psvideo.solve.normals.illumination import Illumination
-from psvideo.solve.normals.near_light import Ground, ground_of, is_near
 
 ROUGH_PX = 480
 """Depth for the lights' sake is integrated on a picture of at most so many pixels along its longer side."""

@@ -13,10 +13,10 @@ from numba import types
 from numba.extending import overload
 
 from psvideo.compute.compiled import FUSED
-from psvideo.model import light_field
+from psvideo.model import near_light
 from psvideo.solve.normals.task import Floats, Near
 
-LEAST_COSINE = np.float32(light_field.LEAST_COSINE)
+LEAST_COSINE = np.float32(near_light.LEAST_COSINE)
 ONE = np.float32(1)
 
 

@@ -1,13 +1,9 @@
-"""Near lights: where they stand, where the surface is taken to be, and what that gives in the surface's middle.
+"""Where the surface is taken to be under near lights, in a pinhole camera's view: at a plane, or at a known depth.
 
-A near light's direction and strength differ from pixel to pixel: it sends ``intensity * max(0, cos)^mu / r^2`` to a
-point at the distance r, cos being taken from the light's axis (Y. Queau et al., "LED-based photometric stereo:
-modeling, calibration and numerical solution", JMIV 60, 2018, section 2). The point of a pixel is found by following
-its ray to the surface's depth: at first a plane's, later perhaps a depth map's. What holds for a pixel is worked out by
-the compiled solvers, block by block (``near_kernel.py``), so that no field of vectors is ever held.
+The point of a pixel is found by following its ray to the surface's depth: at first a plane's, later perhaps that of a
+depth map.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import cv2
@@ -16,14 +12,12 @@ from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import FloatArray
-from psvideo.model.light_field import LEAST_COSINE, inverse_depth, near_vectors, rays
-from psvideo.model.rig import Light, Rig
+from psvideo.model.rig import Rig
 
 FARTHEST_M = 50.0
 """No light or surface is farther: beyond it numbers are taken for millimetres (and a light there is a distant one)."""
 FARTHEST_SHARE = 1e-3
 """A plane that runs past the horizon is followed to a thousand times its nearest depth."""
-LEAST_DISTANCE_M = 0.01
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,26 +41,22 @@ class Ground:
         return replace(self, depth_m=np.where(depth_m > 0, depth_m, self.depth_m).astype(np.float32))
 
 
-@dataclass(frozen=True, kw_only=True)
-class NearField:
-    """Lights of which at least one is near, over a ground.
+def rays(
+    focal_px: tuple[float, float], principal_px: tuple[float, float], *, col: FloatArray, row: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return x and y of the ray (x, y, -1) through places of the picture, of the shapes of ``col`` and ``row``."""
+    return (col - principal_px[0]) / focal_px[0], -(row - principal_px[1]) / focal_px[1]
 
-    positions_m: (light, 3); of a distant light its direction. is_near: (light,).
-    axes: (light, 3), unit vectors the way the lights shine; anisotropy: (light,), mu, 0 where all ways are alike.
-    middle_gain: (light,), irradiance at the ground's middle over that at 1 m, 1 for a distant light.
+
+def inverse_depth(plane: tuple[float, float, float, float], x: FloatArray, y: FloatArray) -> FloatArray:
+    """Return 1 / depth in 1/m at which rays (x, y, -1) meet a plane (a, b, c, d); 0 or less: nowhere in front.
+
+    >>> inverse_depth((0.0, 0.0, 1.0, 1.25), np.array([0.0, 0.3]), np.array([0.0, -0.2]))
+    array([0.8, 0.8])
     """
-
-    positions_m: FloatArray
-    is_near: NDArray[np.bool_]
-    axes: FloatArray
-    anisotropy: FloatArray
-    middle_gain: FloatArray
-    ground: Ground
-
-
-def is_near(lights: Sequence[Light]) -> bool:
-    """Return whether any of the lights is near."""
-    return any(light.position_m is not None for light in lights)
+    a, b, c, d = plane
+    towards: FloatArray = c - a * x - b * y
+    return towards / d if d else np.zeros_like(towards)
 
 
 def ground_of(rig: Rig, *, height_px: int, width_px: int, known_m: NDArray[np.floating] | None = None) -> Ground:
@@ -83,7 +73,7 @@ def ground_of(rig: Rig, *, height_px: int, width_px: int, known_m: NDArray[np.fl
         depth_m = _spread(known_m) if depth_m is None else np.where(known_m > 0, known_m, depth_m)
     if depth_m is None or depth_m.shape != (height_px, width_px):
         raise ValueError(f"known depth for a picture of {height_px} x {width_px} expected")
-    x, y = _rays(rig.focal_px, rig.principal_px, height_px, width_px)
+    x, y = every_ray(rig.focal_px, rig.principal_px, height_px, width_px)
     row, col = height_px // 2, width_px // 2
     return Ground(
         depth_m=depth_m.astype(np.float32),
@@ -107,7 +97,7 @@ def _plane_depth_m(rig: Rig, height_px: int, width_px: int) -> FloatArray:
     """Return the depth of the rig's plane in every pixel."""
     if rig.focal_px is None or rig.principal_px is None or rig.plane is None:
         raise ValueError("a rig with camera and plane expected")
-    x, y = _rays(rig.focal_px, rig.principal_px, height_px, width_px)
+    x, y = every_ray(rig.focal_px, rig.principal_px, height_px, width_px)
     inverse_m = inverse_depth(rig.plane, x, y)
     row, col = height_px // 2, width_px // 2
     if inverse_m[row, col] <= 0:
@@ -125,7 +115,7 @@ def _plane_depth_m(rig: Rig, height_px: int, width_px: int) -> FloatArray:
     return depth_m
 
 
-def _rays(
+def every_ray(
     focal_px: tuple[float, float], principal_px: tuple[float, float], height_px: int, width_px: int
 ) -> tuple[FloatArray, FloatArray]:
     """Return x (1, col) and y (row, 1) of the ray (x, y, -1) through every pixel's centre."""
@@ -148,78 +138,3 @@ def _what_is_lacking(rig: Rig, *, height_px: int, width_px: int, known: bool) ->
         f"say where the surface is. Add to the rig file: {'; '.join(lacking)}. Or give the light a direction, the unit "
         "vector from the middle of the surface to it, where it is ten times as far away as the subject is wide."
     )
-
-
-def near_field(lights: Sequence[Light], ground: Ground) -> NearField:
-    """Return near lights, distant ones among them, over a ground.
-
-    Raises PsvideoError where a position cannot be meant: in millimetres, in the surface, or behind it.
-    """
-    positions_m = np.array([light.position_m or light.direction for light in lights], np.float64)
-    near = np.array([light.position_m is not None for light in lights])
-    for light in lights:
-        if light.position_m is not None:
-            _check_position(light, np.array(light.position_m), ground)
-    away_m = ground.middle_m - positions_m
-    distance_m = np.linalg.norm(away_m, axis=1)
-    to_middle = away_m / distance_m[:, None]
-    axes = np.array([axis if light.axis is None else light.axis for light, axis in zip(lights, to_middle, strict=True)])
-    mu = np.array([light.anisotropy or 0.0 for light in lights])
-    cosine = np.maximum((axes * to_middle).sum(axis=1), LEAST_COSINE)
-    return NearField(
-        positions_m=positions_m,
-        is_near=near,
-        axes=axes,
-        anisotropy=mu,
-        middle_gain=np.where(near, cosine**mu / distance_m**2, 1.0),
-        ground=ground,
-    )
-
-
-def middle_directions(field: NearField) -> FloatArray:
-    """Return the unit directions to the lights from the ground's middle, shape (light, 3)."""
-    away_m = np.where(field.is_near[:, None], field.positions_m - field.ground.middle_m, field.positions_m)
-    directions: FloatArray = away_m / np.linalg.norm(away_m, axis=1, keepdims=True)
-    return directions
-
-
-def _check_position(light: Light, position_m: FloatArray, ground: Ground) -> None:
-    said = f"Light {light.name!r} has position_m = {[float(f'{value:g}') for value in position_m]}"
-    if np.abs(position_m).max() > FARTHEST_M:
-        raise PsvideoError(
-            f"{said}, which is more than {FARTHEST_M:g} m from the camera and looks like millimetres. Expected metres: "
-            "divide by 1000 (and the [surface] plane's last number with it). A light that really is so far is distant: "
-            "give it a direction instead."
-        )
-    if np.linalg.norm(position_m - ground.middle_m) < LEAST_DISTANCE_M:
-        raise PsvideoError(
-            f"{said}, which is in the surface itself ({[float(f'{value:.3g}') for value in ground.middle_m]} in the "
-            "picture's middle). Expected metres in camera coordinates, origin at the lens, the scene at negative z."
-        )
-    ray = -ground.middle_m / np.linalg.norm(ground.middle_m)
-    if (position_m - ground.middle_m) @ ray <= 0 and position_m[2] < ground.middle_m[2]:
-        raise PsvideoError(
-            f"{said}, which is behind the surface (z = {ground.middle_m[2]:.3g} m in the picture's middle). Expected "
-            "metres in camera coordinates: x right, y up, z towards the camera, the scene at negative z. Check the "
-            "sign of z, and the [surface] plane."
-        )
-
-
-def field_of(light: Light, ground: Ground | None, part: tuple[slice, slice]) -> FloatArray:
-    """Return what a light of intensity 1 sends to a part of the picture: direction times irradiance, (row, col, 3).
-
-    Of a distant light one vector, (1, 1, 3). Made for calibration; the solvers place lights by themselves. Raises
-    PsvideoError where the light is near and there is no ground.
-    """
-    if light.direction is not None:
-        return np.array(light.direction, np.float64)[None, None]
-    if ground is None or light.position_m is None:
-        raise PsvideoError(
-            f"Light {light.name!r} is near, and the rig does not say where the surface is: add [camera] focal_px and "
-            "principal_px, and [surface] plane."
-        )
-    x, y = _rays(ground.focal_px, ground.principal_px, *ground.depth_m.shape)
-    depth_m = ground.depth_m[part].astype(np.float64)
-    points_m = np.stack([x[:, part[1]] * depth_m, y[part[0]] * depth_m, -depth_m], axis=-1)
-    axis = near_field([light], ground).axes[0] if light.anisotropy else None
-    return near_vectors(points_m, np.array(light.position_m), axis=axis, anisotropy=light.anisotropy or 0.0)
