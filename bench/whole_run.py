@@ -1,45 +1,44 @@
-"""A whole `normals` run against the larger of decoding alone and encoding alone, and its memory over clip length.
+"""A whole `normals` run at 1080p: what each further frame costs, beside its files alone.
 
-The clips are 1080p colour in 16-bit PNG, three lights or eight, noise and all. Decoding and encoding alone use the same
-functions as the run does: decoding once with the threads that a caller gets by default, and once with all cores, as in
-the run. Every command is a process of its own, in turn; the lesser of two times counts, because others use the machine
-too.
+``python -m bench.whole_run [WORDS ...] [--against FOLDER] [--cache FOLDER]``: words choose rows ("tiff", "3", "moving";
+one of several words of a kind), FOLDER is a checkout of an earlier state, which is run in the same turns. Figures are
+differences between a long and a short run of whole processes, over the frames between them: starting up, compiling and
+the report do not count. Processor seconds are the user's and the system's together, the least of so many turns.
 """
 
-import math
+import argparse
+import json
 import os
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple, get_args
 
-import cv2
 import numpy as np
 
-from bench.table import Row
-from psvideo.compute.threads import thread_count
-from psvideo.formats.plan_toml import format_plan, parse_fps
-from psvideo.formats.rig_toml import format_rig
-from psvideo.model.camera import Camera
-from psvideo.model.plan import Plan, PlannedFlash
-from psvideo.model.rig import Light, Rig
-from psvideo.synth import Noise, TrueClock, expose
+from bench.table import table
+from bench.whole_run_clips import COLS, ROWS, ClipOf, Kind, filmed
 
-SHORT, LONG = 40, 100
-REPEATS = 2
-REPEATED = 8
-THREE = {"key": (0.5, 0.4, 0.768), "left": (-0.6, 0.2, 0.775), "right": (0.1, -0.5, 0.86)}
-RING = {f"l{k}": (0.5 * math.cos(0.3 + k * math.pi / 4), 0.5 * math.sin(0.3 + k * math.pi / 4), 0.86) for k in range(8)}
-Directions = dict[str, tuple[float, float, float]]
+SHORT_ROUNDS = 2
+FURTHER_FRAMES = 40
+"""A long clip has about so many frames more than a short one, in whole rounds."""
+TURNS = 2
+LIGHTS = (3, 4, 8)
+HERE = Path(__file__).resolve().parents[1]
+Job = tuple[Path, list[object], list[object]]
+"""A checkout whose package is used, and what Python is called with for a short and for a long run."""
+CACHE = Path(tempfile.gettempdir()) / "psvideo-bench-clips"
 
 DECODE = """
 import sys
 from pathlib import Path
 from psvideo.clip import open_clip, read_frames
-clip, count, threads = open_clip(Path(sys.argv[1])), int(sys.argv[2]), {"threads": int(n) for n in sys.argv[3:]}
-print(sum(1 for _ in read_frames(clip, clip.numbers[:count], **threads)))
+clip = open_clip(Path(sys.argv[1]))
+print(sum(1 for _ in read_frames(clip, clip.numbers[: int(sys.argv[2])])))
 """
 ENCODE = """
 import sys
@@ -61,110 +60,146 @@ with writing() as write:
 """
 
 
-def rows() -> Iterator[Row]:
-    """Film two clips, and run decoding, encoding and everything on them."""
-    with tempfile.TemporaryDirectory(prefix="psvideo-bench-") as folder:
-        for directions in (THREE, RING):
-            clip = Path(folder) / f"clip{len(directions)}"
-            _film(clip, LONG, directions)
-            yield from _time_rows(clip, len(directions))
-            yield from _memory_rows(clip, len(directions))
+class Cost(NamedTuple):
+    """What a process took: processor seconds, wall seconds, and its most memory in MB."""
+
+    processor_s: float
+    wall_s: float
+    peak_mb: float
 
 
-def _time_rows(clip: Path, lights: int) -> Iterator[Row]:
-    timing, out, spare = clip.with_name("timing.json"), clip.with_name("out"), clip.with_name("encoded")
-    _psvideo("sync", clip, "-o", timing, "--force", "-q")
-    normals = ("-m", "psvideo.cli.app", "normals", clip, "--rig", clip / "rig.toml", "-o", out, "--force", "-q")
-    _timed(*normals)  # the first run compiles
-    rounds = len(list((out / "normals").iterdir()))
-    jobs = {
-        "once": normals,
-        "timed": (*normals, "--timing", timing),
-        "usual": ("-c", DECODE, clip, LONG),
-        "all": ("-c", DECODE, clip, LONG, thread_count()),
-        "encode": ("-c", ENCODE, out, spare, rounds),
-    }
-    found: dict[str, float] = {}
-    for _ in range(REPEATS):
-        for name, job in jobs.items():
-            found[name] = min(_timed(*job), found.get(name, math.inf))
-    yield Row(
-        f"{lights} lights: decoding {LONG} frames alone, threads as by default", f"{found['usual']:.2f} s", "", None
+class Whole(NamedTuple):
+    """One clip and one state of the program; processor and wall times are in milliseconds per further frame."""
+
+    clip: str
+    state: str
+    normals: str
+    decoding: str
+    encoding: str
+    beyond_both: str
+    in_copies: str
+    wall_over_larger: str
+    peak_memory: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Further:
+    """A short and a long run: each further frame's processor and wall time in seconds, and the long one's peak."""
+
+    processor_s: float
+    wall_s: float
+    peak_mb: float
+
+    def __str__(self) -> str:
+        return f"{1e3 * self.processor_s:.0f} / {1e3 * self.wall_s:.0f}"
+
+
+def rows(words: Sequence[str] = (), *, against: Path | None = None, cache: Path = CACHE) -> Iterator[Whole]:
+    """Measure the clips that words choose, all where there are none; ``against`` as in the module's sentence."""
+    for lights in LIGHTS:
+        for kind in get_args(Kind):
+            for moving in (False, True):
+                clip = ClipOf(kind=kind, lights=lights, moving=moving)
+                if chosen(clip, words):
+                    yield from _rows_of(clip, against, cache)
+
+
+def chosen(clip: ClipOf, words: Sequence[str]) -> bool:
+    """Tell whether a clip is meant: of the words for kinds, lights and motion that are given, one of each fits."""
+    of_a_kind = (get_args(Kind), tuple(map(str, LIGHTS)), ("still", "moving"))
+    named = clip.name.split()
+    return all(own in words or not set(every) & set(words) for own, every in zip(named, of_a_kind, strict=True))
+
+
+def _rows_of(clip: ClipOf, against: Path | None, cache: Path) -> Iterator[Whole]:
+    rounds = round(FURTHER_FRAMES * clip.plan.camera.frame_period_s / clip.plan.cycle_s)
+    short, long = (clip.frames_of(count) for count in (SHORT_ROUNDS, SHORT_ROUNDS + rounds))
+    path, rig = filmed(clip, cache, frames=long)
+    states = {"before": against, "now": HERE} if against else {"now": HERE}
+    with tempfile.TemporaryDirectory(prefix="psvideo-bench-", dir=cache) as folder:
+        spare = Path(folder)
+        jobs: dict[str, Job] = {}
+        for state, root in states.items():
+            out, timing = spare / state, spare / f"{state}.json"
+            _run(root or HERE, ["-m", "psvideo.cli.app", "sync", path, "-o", timing, "-q"])
+            call = ["-m", "psvideo.cli.app", "normals", path, "--rig", rig, "--timing", timing, "-o", out, "-q"]
+            _run(root or HERE, call)  # compiles
+            ends = [["--force", "--frames", f"0-{count - 1}"] for count in (short, long)]
+            jobs[state] = root or HERE, [*call, *ends[0]], [*call, *ends[1]]
+        jobs["decoding"] = HERE, ["-c", DECODE, path, short], ["-c", DECODE, path, long]
+        encode = ["-c", ENCODE, spare / "now", spare / "encoded"]
+        jobs["encoding"] = HERE, [*encode, SHORT_ROUNDS], [*encode, SHORT_ROUNDS + rounds]
+        found = all_further(jobs, long - short)
+    copy_s = _copy_s(clip)
+    for state in states:
+        yield _row(clip.name, state, found, copy_s)
+
+
+def _row(clip: str, state: str, found: dict[str, Further], copy_s: float) -> Whole:
+    run, decoding, encoding = found[state], found["decoding"], found["encoding"]
+    beyond_s = run.processor_s - decoding.processor_s - encoding.processor_s
+    return Whole(
+        clip=clip,
+        state=state,
+        normals=str(run),
+        decoding=str(decoding),
+        encoding=str(encoding),
+        beyond_both=f"{1e3 * beyond_s:.0f}",
+        in_copies=f"{beyond_s / copy_s:.1f}",
+        wall_over_larger=f"{run.wall_s / max(decoding.wall_s, encoding.wall_s):.2f}",
+        peak_memory=f"{run.peak_mb:.0f} MB",
     )
-    yield Row(
-        f"{lights} lights: decoding {LONG} frames alone, all {thread_count()} cores", f"{found['all']:.2f} s", "", None
+
+
+def all_further(jobs: dict[str, Job], frames: int) -> dict[str, Further]:
+    """Run every job's short and long process, all in turn, and return what each of the frames between them took."""
+    costs: dict[str, list[tuple[Cost, Cost]]] = {name: [] for name in jobs}
+    for _ in range(TURNS):
+        for name, (root, short, long) in jobs.items():
+            costs[name].append((_run(root, short), _run(root, long)))
+    return {name: _further(*zip(*taken, strict=True), frames=frames) for name, taken in costs.items()}
+
+
+def _further(short: Sequence[Cost], long: Sequence[Cost], *, frames: int) -> Further:
+    less, more = (Cost(*(min(values) for values in zip(*one, strict=True))) for one in (short, long))
+    return Further(
+        processor_s=(more.processor_s - less.processor_s) / frames,
+        wall_s=(more.wall_s - less.wall_s) / frames,
+        peak_mb=more.peak_mb,
     )
-    yield Row(f"{lights} lights: encoding {rounds} rounds alone", f"{found['encode']:.2f} s", "", None)
-    for name, what in (("timed", "normals with timing.json"), ("once", "normals, timing found")):
-        yield Row(f"{lights} lights: {what}", f"{found[name]:.2f} s", "", None)
-        for base, of in (("usual", "the larger, decoding as by default"), ("all", "the larger, decoding on all cores")):
-            ratio = found[name] / max(found[base], found["encode"])
-            yield Row(f"{lights} lights: {what} / {of}", f"{ratio:.2f}", "<= 1.2", ratio <= 1.2)
 
 
-def _memory_rows(clip: Path, lights: int) -> Iterator[Row]:
-    peaks = {frames: _peak_mb(clip, frames) for frames in (SHORT, LONG)}
-    for frames, peak in peaks.items():
-        yield Row(f"{lights} lights: peak memory, {frames} frames", f"{peak:.0f} MB", "<= 600 MB", peak <= 600)
-    growth = peaks[LONG] / peaks[SHORT]
-    yield Row(f"{lights} lights: peak memory of {LONG} frames / of {SHORT}", f"{growth:.2f}", "<= 1.1", growth <= 1.1)
-
-
-def _peak_mb(clip: Path, frames: int) -> float:
-    """Return the largest resident memory of one run over a clip's first frames, in a process with no other child."""
-    measure = (
-        "import resource, subprocess, sys; subprocess.run(sys.argv[1:], check=True);"
-        "print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024)"
-    )
-    out, rig = clip.with_name("out"), clip / "rig.toml"
-    command = [sys.executable, "-m", "psvideo.cli.app", "normals", clip, "--rig", rig, "-o", out]
-    command += ["--frames", f"0-{frames - 1}", "--force", "-q"]
-    done = subprocess.run(
-        [sys.executable, "-c", measure, *map(str, command)], capture_output=True, text=True, check=True
-    )
-    return float(done.stdout)
-
-
-def _timed(*arguments: object) -> float:
+def _run(root: Path, arguments: Sequence[object]) -> Cost:
+    """Run Python with a checkout's package, and return what the process took."""
+    environment = os.environ | {"PYTHONPATH": str(root / "src")}
     began = time.perf_counter()
-    subprocess.run([sys.executable, *map(str, arguments)], check=True, stdout=subprocess.DEVNULL, env=dict(os.environ))
-    return time.perf_counter() - began
+    process = subprocess.Popen(
+        [sys.executable, *map(str, arguments)], stdout=subprocess.DEVNULL, env=environment, cwd=root
+    )
+    _, status, used = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        raise RuntimeError(f"{root}: status {process.returncode} from {json.dumps([*map(str, arguments)])[:300]}")
+    return Cost(used.ru_utime + used.ru_stime, time.perf_counter() - began, used.ru_maxrss / 1024)
 
 
-def _psvideo(*arguments: object) -> None:
-    subprocess.run([sys.executable, "-m", "psvideo.cli.app", *map(str, arguments)], check=True)
+def _copy_s(clip: ClipOf) -> float:
+    """Return the processor time of copying one frame's codes, as they are in memory."""
+    channels = () if clip.kind == "dng" else (3,)
+    frames = np.ones((8, ROWS, COLS, *channels), np.uint8 if clip.kind == "h264" else np.uint16)
+    copies = np.ones_like(frames)
+    times_s = []
+    for _ in range(5):
+        began = time.thread_time()
+        np.copyto(copies, frames)
+        times_s.append(time.thread_time() - began)
+    return min(times_s) / len(frames)
 
 
-def _film(folder: Path, frames: int, directions: Directions) -> None:
-    """Write a 1080p clip of a smooth relief, repeated to the full width, with a camera's noise."""
-    fps = parse_fps("120000/1001")
-    period_s = float(1 / fps)
-    camera = Camera(width_px=1920, height_px=1080, fps=fps, exposure_s=period_s, readout_s=0.97 * period_s)
-    flashes = [PlannedFlash(lights={name: 1.0}, duration_s=0.0008) for name in directions]
-    flashes.append(PlannedFlash(lights={}, duration_s=0.0008))
-    plan = Plan(camera=camera, flashes=tuple(flashes), dark_s=1.0002 * period_s)
-    y, x = np.mgrid[0:1080, 0:240].astype(np.float32) / 240
-    normals = np.stack([0.4 * np.sin(9 * x), 0.4 * np.cos(7 * y), np.ones_like(x)], -1)
-    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-    shades = [0.7 * np.maximum(normals @ np.array(d, np.float32), 0) for d in directions.values()]
-    plates = [np.tile(np.repeat(shade[..., None], 3, axis=2), (1, REPEATED, 1)).astype(np.float32) for shade in shades]
-    clock = TrueClock(phase_s=0.0123, offset_ppm=20.0)
-    (folder / "frames").mkdir(parents=True)
-    for first in range(0, frames, 10):
-        shot = expose(
-            plates, plan, frames=min(first + 10, frames), clock=clock, dropped=tuple(range(first)),
-            noise=Noise(full_well_e=20_000, read_e=6),
-        )  # fmt: skip
-        for number, image in zip(shot.indices, shot.frames, strict=True):
-            codes = (np.clip(image, 0, 1) * 65535).astype(np.uint16)
-            cv2.imwrite(str(folder / "frames" / f"relief.{number:05d}.png"), codes, [cv2.IMWRITE_PNG_COMPRESSION, 1])
-    (folder / "plan.toml").write_text(format_plan(plan))
-    (folder / "rig.toml").write_text(format_rig(_rig(directions)))
-
-
-def _rig(directions: Directions) -> Rig:
-    lights = []
-    for name, direction in directions.items():
-        x, y, z = (float(value) for value in np.array(direction) / np.linalg.norm(direction))
-        lights.append(Light(name=name, direction=(x, y, z)))
-    return Rig(lights=tuple(lights))
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("words", nargs="*")
+    parser.add_argument("--against", type=Path)
+    parser.add_argument("--cache", type=Path, default=CACHE)
+    given = parser.parse_args()
+    print(table(rows(given.words, against=given.against, cache=given.cache)))
