@@ -1,9 +1,13 @@
 """What the examples in docstrings and on the page "psvideo from Python" run in: a folder with a take and stills."""
 
+import os
 import shutil
 from pathlib import Path
 
 import pytest
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+"""Before numpy is loaded: tests share the cores as processes, and threads that wait for each other spin for nothing."""
 
 
 @pytest.fixture(scope="session")

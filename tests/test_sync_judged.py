@@ -14,7 +14,7 @@ from psvideo.sync.find import find_timing
 from psvideo.synth import Noise, TrueClock, expose
 
 PlanMaker = Callable[..., Plan]
-ROWS, COLUMNS, FRAMES = 96, 8, 60
+ROWS, COLUMNS, FRAMES = 64, 12, 48
 NOISE = Noise(full_well_e=20_000, read_e=8)
 
 

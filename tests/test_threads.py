@@ -25,11 +25,11 @@ COUNTS = (1, 2, 3, 8)
 TALL = """
 schema = "psvideo-scene/1"
 name = "tall"
-frames = 44
+frames = 28
 seed = 5
 [camera]
-width_px = 64
-height_px = 1080
+width_px = 44
+height_px = 1600
 fps = 100
 shutter_deg = 360.0
 readout_s = 0.01
