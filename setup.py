@@ -1,5 +1,9 @@
-"""Copies the scenes of data_synth/ into the package when it is built; everything else stands in pyproject.toml."""
+"""What building the package does beside pyproject.toml: it copies the scenes of data_synth/ into it, and a wheel gets
+loops that are compiled for the processor it is built on (docs/decisions/first-run.md)."""
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 from setuptools import setup
@@ -7,7 +11,7 @@ from setuptools.command.build_py import build_py
 
 
 class BuildWithScenes(build_py):
-    """Build the package, with data_synth/*.toml as psvideo/synth/scenes/*.toml."""
+    """Build the package, with data_synth/*.toml as psvideo/synth/scenes/*.toml; for a wheel, with compiled loops."""
 
     def run(self) -> None:
         super().run()
@@ -16,9 +20,19 @@ class BuildWithScenes(build_py):
         for scene, copy in self._scenes().items():
             self.mkpath(str(Path(copy).parent))
             self.copy_file(scene, copy)
+        if self.distribution.get_command_obj("bdist_wheel", create=False):
+            self._compile_loops()
 
     def get_outputs(self, include_bytecode: bool = True) -> list[str]:
         return [*super().get_outputs(include_bytecode), *self._scenes().values()]
+
+    def _compile_loops(self) -> None:
+        """Compile loops beside their modules; where this Python cannot run psvideo, the first run does it."""
+        there = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"}
+        library = {"PYTHONPATH": str(Path(self.build_lib).resolve())}
+        command = [sys.executable, "-B", "-m", "psvideo.runs.compiling"]
+        if subprocess.run(command, env=there | library, check=False).returncode:
+            self.warn("loops could not be compiled here, and will be by the first run (psvideo doctor --compile)")
 
     def _scenes(self) -> dict[str, str]:
         """Return the copy of every scene by its file."""

@@ -13,10 +13,13 @@ import numba.core.caching
 import numpy as np
 import pytest
 
+from psvideo.cli.console import compiling_said
 from psvideo.compute.compiled import EXACT, FUSED, REORDERED, sources_digest
+from psvideo.runs.compiling import USUAL, SmallTake, run_small
 from psvideo.solve.normals import kernel, near_kernel, robust_kernel
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.woodham1980 import solve
+from psvideo.synth import read_scene
 
 SOURCE = Path(kernel.__file__).parents[2]
 SCENE = Path(__file__).resolve().parents[1] / "data_synth" / "sphere.toml"
@@ -115,6 +118,52 @@ def test_a_change_in_a_module_that_is_compiled_in_makes_kept_code_stale(tmp_path
     assert run() == (53, 1)
 
 
+def test_code_kept_beside_its_module_is_found_whatever_folder_is_set_for_keeping(tmp_path: Path) -> None:
+    house = tmp_path / "house"
+    house.mkdir()
+    for name, text in PARTS.items():
+        (house / name).write_text(text)
+    paths = os.pathsep.join([str(tmp_path), str(SOURCE.parent)])
+    plain = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"} | {"PYTHONPATH": paths}
+
+    def hits(**set_: str) -> int:
+        command = [sys.executable, "-B", "-m", "house.run"]
+        done = subprocess.run(command, env=plain | set_, capture_output=True, text=True, check=True)
+        return int(done.stdout.split()[1])
+
+    assert hits() == 0, "compiled as an installation does it"
+    assert hits(NUMBA_CACHE_DIR=str(tmp_path / "other")) == 1
+    os.utime(house / "outer.py", (1, 1))
+    assert hits(NUMBA_CACHE_DIR=str(tmp_path / "other")) == 1, "installing changes the dates of files"
+    (house / "numbers_.py").write_text("FACTOR = 5\n")
+    assert hits(NUMBA_CACHE_DIR=str(tmp_path / "other")) == 0, "stale, wherever it lies"
+
+
+def test_compiling_is_said_once_and_not_where_quiet_is_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
+    for quiet, lines in ((False, 1), (True, 0)):
+        with compiling_said(quiet=quiet):
+            FUSED.kept(lambda value: 5 * value)(10)
+            FUSED.kept(lambda value: 6 * value)(10)
+        assert capsys.readouterr().err.count("compiling, once") == lines
+    FUSED.kept(lambda value: 7 * value)(10)
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize("take", USUAL, ids=lambda take: f"{take.kind} {take.lights}")
+def test_every_small_take_that_is_compiled_with_is_a_scene(take: SmallTake, tmp_path: Path) -> None:
+    (tmp_path / "small.toml").write_text(take.scene)
+    scene = read_scene(tmp_path / "small.toml")
+    assert (len(scene.light), scene.output.kind, scene.moves) == (take.lights, take.kind, bool(take.motion))
+
+
+def test_a_small_take_is_run_whole_and_leaves_nothing_but_compiled_code(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    run_small(USUAL[-1])
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.fixture
 def copy(tmp_path: Path) -> Path:
     """A copy of the package beside which nothing can be kept: where numba would make a folder lies a file."""
@@ -161,7 +210,9 @@ settle(np.zeros((2, *boards[0].shape), np.float32), *boards, np.zeros(9, np.floa
 
 
 def test_two_processes_compile_into_one_folder_at_a_time(tmp_path: Path) -> None:
-    environment = os.environ | {"PYTHONPATH": str(SOURCE.parent), "NUMBA_CACHE_DIR": str(tmp_path)}
+    package = tmp_path / "there" / "psvideo"
+    shutil.copytree(SOURCE, package, ignore=shutil.ignore_patterns("__pycache__"))
+    environment = os.environ | {"PYTHONPATH": str(package.parent), "NUMBA_CACHE_DIR": str(tmp_path)}
     command = [sys.executable, "-c", COMPILE]
     at_once = [subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True) for _ in range(2)]
     said = [process.communicate()[1] for process in at_once]

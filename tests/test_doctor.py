@@ -72,6 +72,15 @@ def test_the_verdict_closes_what_people_read(capsys: pytest.CaptureFixture[str])
     assert "\x1b" not in said
 
 
+def test_compiling_ahead_comes_first_where_it_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[str] = []
+    monkeypatch.setattr("psvideo.runs.compiling.compile_ahead", lambda *, watch: calls.append("compiled"))
+    assert main(["doctor", "-q"]) == 0
+    assert calls == []
+    assert main(["doctor", "--compile", "-q"]) == 0
+    assert calls == ["compiled"]
+
+
 def test_nothing_missing_is_well_beside_any_notes() -> None:
     fine = Finding(name="a", level="note", text="slow")
     assert is_well([fine])

@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from psvideo.cli.console import compiling_said
 from psvideo.cli.first_screen import COMMANDS, Entry
 from psvideo.cli.spelling import spelled
 from psvideo.cli.teaching import PROGRAM, command_called, teach, words_typed
@@ -75,6 +76,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     _share_one_heap()
     words = words_typed(sys.argv[1:] if arguments is None else arguments, os.environ)
+    with compiling_said(quiet="-q" in words or "--quiet" in words):
+        return _ended(words)
+
+
+def _ended(words: Sequence[str]) -> int:
     try:
         application(words)(args=words, prog_name=PROGRAM, obj=words)
     except PsvideoError as fault:

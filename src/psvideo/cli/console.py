@@ -1,6 +1,8 @@
 """What commands print: plain text or JSON on stdout; notes, warnings and progress on stderr."""
 
+import contextlib
 import json
+import logging
 import os
 import shlex
 import sys
@@ -19,6 +21,8 @@ from psvideo.cli.spelling import spelled, spelled_within
 
 Item = TypeVar("Item")
 PLAIN_PROGRESS_EVERY_S = 5.0
+COMPILING = logging.getLogger("psvideo.compiling")
+"""Where ``compute.compiled`` says that it compiles; got by name, because loading that loads the compiler."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,6 +68,34 @@ class Voice:
 
         command = "" if context is None else command_line(context)
         return Caller(say=self.say, warn=self.warn, detail=self.detail, spell=spelled, command=command)
+
+
+class _Once(logging.Handler):
+    """Says once that loops are being compiled, however many there are."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        print(
+            "psvideo: compiling, once: this run's loops for this processor, which takes up to a minute. They are kept "
+            "for all later runs; psvideo doctor --compile does it ahead.",
+            file=sys.stderr,
+        )
+        self.setLevel(logging.CRITICAL)
+
+
+@contextlib.contextmanager
+def compiling_said(*, quiet: bool) -> Iterator[None]:
+    """In this block, say on stderr when loops are compiled rather than loaded: that takes long, and shows nothing."""
+    if quiet:
+        yield
+        return
+    once, before = _Once(), COMPILING.level
+    COMPILING.addHandler(once)
+    COMPILING.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        COMPILING.removeHandler(once)
+        COMPILING.setLevel(before)
 
 
 def command_line(context: "typer.Context") -> str:

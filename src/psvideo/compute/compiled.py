@@ -2,11 +2,14 @@
 
 Loops are never shared between numba's own threads (docs/decisions/threads.md). What is kept is used again only while
 the source of everything that was compiled into it is the same: numba itself looks at the called function's file alone.
+What lies beside the modules, from installing the package, is found whatever folder is set for keeping
+(docs/decisions/first-run.md).
 """
 
 import contextlib
 import functools
 import hashlib
+import logging
 import numbers
 import pickle
 import sys
@@ -22,7 +25,10 @@ from numba.core.dispatcher import Dispatcher
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 _Cache: Any = FunctionCache
+_Files: Any = IndexDataCacheFile
 _PART: dict[str, Any] = {"nogil": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+LOG = logging.getLogger("psvideo.compiling")
+"""Says, as information, when a loop was kept nowhere and is being compiled."""
 _UNREADABLE = (OSError, EOFError, pickle.UnpicklingError)
 
 
@@ -34,19 +40,26 @@ class _Kept(_Cache):  # type: ignore[misc]
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         super().__init__(function)
-        self._cache_file = IndexDataCacheFile(  # type: ignore[no-untyped-call]
-            cache_path=self._cache_path,
-            filename_base=self._impl.filename_base,
-            source_stamp=(
-                self._impl.locator.get_source_stamp(),
-                sources_digest(sys.modules[function.__module__]),
-                repr(sorted(options.get("fastmath", ()))),
-            ),
+        module = sys.modules[function.__module__]
+        stamp = (
+            self._impl.locator.get_source_stamp(),
+            sources_digest(module),
+            repr(sorted(options.get("fastmath", ()))),
+        )
+        installed = Path(module.__file__ or "").parent / "__pycache__"
+        self._cache_file, self._installed = (
+            _Files(cache_path=str(folder), filename_base=self._impl.filename_base, source_stamp=stamp)
+            for folder in (self._cache_path, installed)
         )
 
     def load_overload(self, signature: Any, target: Any) -> Any:
-        with contextlib.suppress(*_UNREADABLE):
-            return super().load_overload(signature, target)
+        for place in (self._cache_file, self._installed):
+            with contextlib.suppress(*_UNREADABLE):
+                target.refresh()
+                data = place.load(self._index_key(signature, target.codegen()))
+                if data is not None:
+                    return self._impl.rebuild(target, data)
+        LOG.info("compiling %s", self._name)
         return None
 
     def save_overload(self, signature: Any, data: Any) -> None:

@@ -18,6 +18,9 @@ SHOWN = {"ok": "ok", "note": "--", "missing": "MISSING"}
 
 def doctor(
     folder: Annotated[Path, typer.Option("--folder", help="The folder whose disk is measured, in MB/s.")] = Path(),
+    ahead: Annotated[
+        bool, typer.Option("--compile", help="First compile and keep what usual runs need, so that none has to wait.")
+    ] = False,
     json: Json = False,
     verbose: Verbose = False,
     quiet: Quiet = False,
@@ -26,6 +29,10 @@ def doctor(
     from psvideo.runs.doctor import doctor as examine
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
+    if ahead:
+        from psvideo.runs.compiling import compile_ahead
+
+        compile_ahead(watch=voice.track)
     found = examine(folder, show=partial(_print_finding, voice))
     voice.result({"well": found.well, "findings": [asdict(finding) for finding in found.findings]})
     missing = sum(finding.level == "missing" for finding in found.findings)

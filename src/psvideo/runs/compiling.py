@@ -1,0 +1,91 @@
+"""Compiling ahead what usual runs need: a few small virtual takes are run once, each in a process of its own.
+
+Nobody lists loops and types: whatever a run of them compiles is kept for all later runs (docs/decisions/first-run.md).
+"""
+
+import tempfile
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+
+from psvideo.compute.progress import Watch, unwatched
+from psvideo.compute.threads import thread_count
+from psvideo.model.quantities import Aov
+from psvideo.runs.caller import Caller
+
+SCENE = """
+schema = "psvideo-scene/1"
+name = "small"
+frames = {frames}
+camera = {{ width_px = 96, height_px = 120, fps = 100, shutter_deg = 360, readout_s = 0.0097, width_m = 1.0, {camera} }}
+output = {{ kind = "{kind}" }}
+ambient = {{ level = 0.02 }}
+object = [{{ mesh = "sphere", albedo = {{ pattern = "noise" }}{motion} }}]
+light = [{lights}]
+"""
+RING = [(0.5, 0.0), (-0.5, 0.1), (0.1, 0.5), (-0.1, -0.5), (0.4, 0.4), (-0.4, 0.4), (-0.4, -0.4), (0.4, -0.4)]
+"""The lights' x and y; z is 0.8."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SmallTake:
+    """A take that makes loops compile: how many lights it has, its files and camera, and what is asked of it."""
+
+    lights: int
+    kind: str = "png16"
+    camera: str = "full_well_e = 30000"
+    motion: str = ""
+    aov: tuple[Aov, ...] = ()
+
+    @property
+    def scene(self) -> str:
+        """The scene as its file would hold it."""
+        lights = [f'{{ name = "l{n}", direction = [{x}, {y}, 0.8] }}' for n, (x, y) in enumerate(RING[: self.lights])]
+        return SCENE.format(
+            frames=6 * (self.lights + 1),
+            camera=self.camera,
+            kind=self.kind,
+            motion=self.motion,
+            lights=", ".join(lights),
+        )
+
+
+USUAL = (
+    SmallTake(lights=8, aov=("residual", "error", "depth")),
+    SmallTake(lights=4, motion=", motion = { velocity_m_per_s = [0.4, 0.0, 0.0] }"),
+    SmallTake(lights=3, kind="png8", camera='bits = 8, transfer = "srgb"'),
+    SmallTake(lights=4, kind="dng", camera='cfa = "RGGB"'),
+    SmallTake(lights=3, kind="exr"),
+)
+"""What usual footage runs through: 16 and 8 bits, mosaics, floats; few lights and many; at rest and moving."""
+
+
+def compile_ahead(*, watch: Watch = unwatched) -> None:
+    """Compile and keep what usual runs need, takes side by side; what is kept already is only loaded.
+
+    Raises PsvideoError where a small take cannot be run.
+    """
+    with ProcessPoolExecutor(min(thread_count(), len(USUAL)), mp_context=get_context("spawn")) as pool:
+        for _ in watch(pool.map(run_small, USUAL), total=len(USUAL), what="compiling, once", unit="takes"):
+            pass
+
+
+def run_small(take: SmallTake) -> None:
+    """Film a small take and run the whole of ``normals`` on it, timing and all, in a folder that is gone afterwards."""
+    from psvideo.runs.normals import normals
+    from psvideo.synth.shoot import shoot
+
+    quiet = Caller(say=_unsaid, warn=_unsaid, detail=_unsaid)
+    with tempfile.TemporaryDirectory(prefix="psvideo-compiling-") as folder:
+        scene, clip = Path(folder) / "small.toml", Path(folder) / "clip"
+        scene.write_text(take.scene, encoding="utf-8")
+        shoot(scene, clip)
+        normals(clip, rig=clip / "rig.toml", out=Path(folder) / "out", aov=take.aov, caller=quiet)
+
+
+def _unsaid(_: str) -> None: ...
+
+
+if __name__ == "__main__":  # what building the package calls
+    compile_ahead()
