@@ -29,6 +29,7 @@ html_copy_source = False
 html_show_sphinx = False
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
+python_maximum_signature_line_length = 88  # longer ones: a parameter a line
 nitpicky = True
 nitpick_ignore_regex = [("py:.*", ".*")]  # types of other packages: nothing from the net, so no inventories
 
@@ -40,7 +41,8 @@ def _signature(app: Any, what: str, name: str, obj: Any, *_: Any) -> tuple[str, 
         return f"({ast.unparse(source.args)})", ast.unparse(source.returns) if source.returns else None
     if isinstance(source, ast.ClassDef) and dataclasses.is_dataclass(obj):
         fields = [ast.unparse(node) for node in source.body if isinstance(node, ast.AnnAssign)]
-        return f"(*, {', '.join(fields)})", None
+        fields = fields if "_: KW_ONLY" in fields else ["_: KW_ONLY", *fields]
+        return f"({', '.join('*' if field == '_: KW_ONLY' else field for field in fields)})", None
     return None
 
 

@@ -8,6 +8,7 @@ import sys
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -154,6 +155,16 @@ def test_the_code_of_the_page_on_python_runs_as_it_stands(shelf: Path, tmp_path:
     assert (tmp_path / "relit.png").is_file()
     assert "order by marker" in said
     assert len(list((tmp_path / "out" / "depth").iterdir())) == len(names["report"].instants)
+
+
+def test_the_code_in_the_readme_runs_as_it_stands(shelf: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shutil.copytree(shelf / "stills", tmp_path / "stills")
+    shutil.copy(shelf / "take3" / "rig.toml", tmp_path)
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, Any] = {}
+    for code in re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), flags=re.DOTALL):
+        exec(code, names)
+    assert names["surface"].valid.any()
 
 
 def test_the_api_page_describes_every_name_of_the_front_door() -> None:

@@ -156,6 +156,10 @@ def test_near_lights_of_a_rig_are_solved_where_its_plane_lies() -> None:
 
 
 GOOD = pictures(NORMAL)
+SURFACE = ps.Surface(normals=np.ones((3, 5, 3)), albedo=np.ones((3, 5)), valid=np.ones((3, 5), bool))
+LIGHTS = tuple(ps.Light(name=str(n), direction=(x, y, z)) for n, (x, y, z) in enumerate(DIRECTIONS.tolist()))
+NOT_TYPED: Any = ps
+"""The front door as callers without a type checker use it."""
 MISTAKES: dict[str, tuple[Callable[[], object], str]] = {
     "codes": (lambda: ps.solve_images((GOOD * 255).astype(np.uint8), DIRECTIONS), "integer codes .uint8.*white_level"),
     "floats of codes": (lambda: ps.solve_images(GOOD * 255, DIRECTIONS), "100% of the pixels are at or above 1"),
@@ -190,6 +194,46 @@ MISTAKES: dict[str, tuple[Callable[[], object], str]] = {
     "empty mask": (lambda: ps.solve_images(GOOD, DIRECTIONS, mask=np.zeros((3, 5), bool)), "False everywhere"),
     "saturation": (lambda: ps.solve_images(GOOD, DIRECTIONS, saturation=0), "above 0 from which on"),
     "solver": (lambda: ps.solve_images(GOOD, DIRECTIONS, solver="robst"), "did you mean 'robust'"),  # type: ignore[arg-type]
+    "ragged": (lambda: ps.solve_images([[[1.0, 2.0], [3.0]], GOOD[0]], DIRECTIONS), "number 0 of type list"),
+    "names": (lambda: ps.solve_images(["a.png", "b.png"], DIRECTIONS), r"number 0 of type str.*ps.read_images"),
+    "one name": (lambda: ps.solve_images("stills/", DIRECTIONS), r"ps.read_images\(folder\)"),
+    "a list of Lights": (lambda: NOT_TYPED.solve_images(GOOD, LIGHTS), r"ps.Rig\(lights="),
+    "a rig's name": (lambda: ps.solve_images(GOOD, "rig.toml"), r"ps.read_rig\(path\)"),
+    "saturation's type": (
+        lambda: NOT_TYPED.solve_images(GOOD, DIRECTIONS, saturation="1"),
+        "`saturation` is '1' .str.",
+    ),
+    "level's type": (lambda: NOT_TYPED.solve_images(GOOD, DIRECTIONS, white_level="9"), "`white_level` is '9' .str."),
+    "normals for a surface": (
+        lambda: NOT_TYPED.relight(GOOD[0], (0, 0, 1)),
+        "`surface` is of type ndarray; expected a S",
+    ),
+    "a number of colour": (lambda: NOT_TYPED.relight(SURFACE, (0, 0, 1), colour=0.5), "`colour` is 0.5; expected .red"),
+    "a colour's name": (
+        lambda: NOT_TYPED.relight(SURFACE, (0, 0, 1), colour="red"),
+        "`colour` is 'red'; expected .red",
+    ),
+    "two strengths": (lambda: NOT_TYPED.relight(SURFACE, (0, 0, 1), strength=[1, 2]), "`strength` is of type list"),
+    "depth of normals": (lambda: NOT_TYPED.find_depth(SURFACE.normals), "`surface` is of type ndarray"),
+    "depth by a name": (lambda: NOT_TYPED.find_depth(SURFACE, "rig.toml"), "`rig` is 'rig.toml' .str.; expected a Rig"),
+    "picture of a surface": (lambda: NOT_TYPED.picture_of("normals", SURFACE), "`image` is of type Surface"),
+    "surface of lists": (lambda: NOT_TYPED.Surface(normals=[], albedo=[], valid=[]), "`normals` is of type list"),
+    "a rig of directions": (lambda: NOT_TYPED.Rig(DIRECTIONS), "`lights` of a Rig are of type ndarray"),
+    "a rig of one light": (lambda: NOT_TYPED.Rig(lights=LIGHTS[0]), "`lights` of a Rig are of type Light"),
+    "an intensity": (lambda: NOT_TYPED.Light(name="a", direction=(0, 0, 1), intensity=0.8), "one number in a tuple"),
+    "half a direction": (lambda: NOT_TYPED.Light(name="a", direction=(0, 1)), "`direction` is .0, 1.; expected three"),
+    "a light nowhere": (lambda: ps.Light(name="a"), "neither of `direction` and `position_m`"),
+    "timing of a path": (
+        lambda: NOT_TYPED.find_timing("take3/"),
+        r"`take` is 'take3/' .str.; expected a Take: ps.open_",
+    ),
+    "a path solved": (lambda: NOT_TYPED.solve("take3/", ps.Rig(LIGHTS)), "`take` is 'take3/'"),
+    "a path gathered": (lambda: next(NOT_TYPED.gather("take3/", "timing.json")), "`take` is 'take3/'"),
+    "no path": (lambda: NOT_TYPED.read_rig(None), "`path` is of type NoneType; expected a path"),
+    "a rig for a path": (
+        lambda: NOT_TYPED.normals("a/", rig=ps.Rig(LIGHTS), out="new/"),
+        "`rig` is of type Rig; expected a",
+    ),
     "direction": (lambda: ps.relight(ps.solve_images(GOOD, DIRECTIONS), (0, 0, 0)), "from the surface to the light"),
     "quantity": (lambda: ps.picture_of("normal", GOOD[0]), "did you mean 'normals'"),
     "picture": (lambda: ps.picture_of("normals", GOOD[0]), r"normals is expected as \(row, col, 3\)"),

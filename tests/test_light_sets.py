@@ -9,7 +9,7 @@ import pytest
 from psvideo.calibrate.light_pictures import averaged, light_pictures
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
-from psvideo.runs.light_sets import Reading, open_light_sets, read_light_pictures
+from psvideo.runs.light_sets import Reading, open_light_sets, read_images, read_light_pictures
 
 SCENES = Path(__file__).resolve().parents[1] / "data_synth"
 
@@ -40,6 +40,26 @@ def test_a_folder_per_light_holds_several_frames(tmp_path: Path) -> None:
     assert found.images[:, 0, 0] == pytest.approx([0.2, 0.6], abs=1e-4)
     second = read_light_pictures(tmp_path, Reading(frames="2"))
     assert second.images[:, 0, 0] == pytest.approx([0.3, 0.7], abs=1e-4)
+
+
+def test_a_mask_beside_the_pictures_is_no_light(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    for name, value in (("L1", 0.3), ("L2", 0.5), ("mask", 1.0)):
+        still(tmp_path / f"{name}.png", value)
+    assert read_images(tmp_path).names == ("L1", "L2")
+    assert "mask.png: is taken for no light's picture" in caplog.text
+
+
+def test_folders_that_are_scenes_and_not_lights_are_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """A folder of scenes, each with one picture per light, looks like a folder of lights with several pictures each."""
+    for folder, values in (("cat", (0.5, 0.5, 0.5)), ("horse", (0.5, 0.505, 0.35))):
+        for number, value in enumerate(values):
+            still(tmp_path / folder / f"photo.{number}.png", value)
+    read_images(tmp_path)
+    assert "pictures 1 and 3 of light 'horse' differ by 35% of their light" in caplog.text
+    caplog.clear()
+    still(tmp_path / "horse" / "photo.2.png", 0.49)
+    read_images(tmp_path)
+    assert not caplog.text
 
 
 def test_rows_that_no_frame_saw_do_not_count_in_the_mean() -> None:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from psvideo.errors import UsageError
 from psvideo.model.surface import Surface
 
 
@@ -32,5 +33,5 @@ def test_grey_and_coloured_surfaces_are_made_of_planes_of_one_size() -> None:
     ids=str,
 )
 def test_planes_of_different_sizes_are_a_mistake_of_the_program(changed: dict[str, np.ndarray]) -> None:
-    with pytest.raises(ValueError, match="do not match"):
+    with pytest.raises(UsageError, match="do not match"):
         surface(**changed)

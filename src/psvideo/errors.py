@@ -29,6 +29,18 @@ class AllDoneError(PsvideoError):
     exit_status = 0
 
 
+def check_kind(name: str, given: object, kind: type | tuple[type, ...], expected: str) -> None:
+    """Raise UsageError where a parameter is not of the kind that ``expected`` describes.
+
+    >>> check_kind("rig", "rig.toml", float, "a number")
+    Traceback (most recent call last):
+    psvideo.errors.UsageError: `rig` is 'rig.toml' (str); expected a number.
+    """
+    if not isinstance(given, kind):
+        shown = f"{given!r:.60} ({type(given).__name__})" if isinstance(given, (str, int, float)) else None
+        raise UsageError(f"`{name}` is {shown or f'of type {type(given).__name__}'}; expected {expected}.")
+
+
 def nearest(word: str, known: Iterable[str]) -> str:
     """Return the advice that ends a message about an unknown name: the nearest known one, else all of them.
 

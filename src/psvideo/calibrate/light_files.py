@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from psvideo.calibrate.light_pictures import AMBIENT_NAMES, ROOM_NAMES, LightFiles
+from psvideo.calibrate.light_pictures import AMBIENT_NAMES, MASK_NAMES, ROOM_NAMES, LightFiles
 from psvideo.clip.folder import KINDS, number_of
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.contract import check_light_name
@@ -53,7 +53,7 @@ def find_stills(path: Path | Sequence[Path], *, lights: Sequence[str] = ()) -> L
 
     A file belongs to the light whose name it bears; where none bears one of ``lights``, the numbered files belong to
     the lights in order; without ``lights`` every file is a light of the file's name. A file named ambient or dark shows
-    the scene with every light off, one named room, outline or ref with the room light on.
+    the scene with every light off, one named room, outline or ref with the room light on; one named mask is left aside.
 
     Raises PsvideoError where there are no pictures, two of one light, or not as many as ``lights``.
     """
@@ -61,7 +61,8 @@ def find_stills(path: Path | Sequence[Path], *, lights: Sequence[str] = ()) -> L
     files = pictures_in(path) if isinstance(path, Path) else list(path)
     dark = [file for file in files if file.stem.lower() in AMBIENT_NAMES]
     room = [file for file in files if file.stem.lower() in ROOM_NAMES]
-    files = [file for file in files if file not in dark and file not in room]
+    masks = [file for file in files if file.stem.lower() in MASK_NAMES and file.stem not in lights]
+    files = [file for file in files if file not in dark and file not in room and file not in masks]
     if not files:
         kinds = ", ".join(sorted(KINDS))
         raise PsvideoError(
@@ -83,7 +84,7 @@ def find_stills(path: Path | Sequence[Path], *, lights: Sequence[str] = ()) -> L
         by_light={_checked(light, found[0]): tuple(found) for light, found in chosen.items()},
         ambient=tuple(dark[:1]),
         room=room[0] if room else None,
-        left_aside=tuple(file for file in files if file not in used),
+        left_aside=(*(file for file in files if file not in used), *masks),
     )
 
 

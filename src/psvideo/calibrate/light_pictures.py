@@ -26,17 +26,27 @@ AMBIENT_NAMES = ("ambient", "dark")
 """A picture or a folder of this name shows the scene with every light off; it is taken off the others."""
 ROOM_NAMES = ("room", "outline", "ref")
 """A picture of this name shows the scene with the room light on: on it outlines show best."""
+MASK_NAMES = ("mask",)
+"""A picture of this name says where the subject is; it shows no light."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class LightPictures:
     """One picture per light of a scene that stood still.
 
-    images: shape (light, row, col) or (light, row, col, 3), float32, linear, 1.0 = sensor saturation; ambient light is
-        off where ``ambient`` (same shape without the light) could be measured.
-    saturated: same shape as images, True where a value was clipped (in any of the frames that were averaged).
-    seen: shape (light, row), False where no frame saw a row; the pictures are 0 there.
-    frames: how many pictures of each light were averaged.
+    Attributes
+    ----------
+    names
+        Of the lights, in the images' order.
+    images
+        Shape (light, row, col) or (light, row, col, 3), float32, linear, 1.0 = sensor saturation; ambient light is off
+        where ``ambient`` (same shape without the light) could be measured.
+    saturated
+        Same shape as images, True where a value was clipped (in any of the frames that were averaged).
+    seen
+        Shape (light, row), False where no frame saw a row; the pictures are 0 there.
+    frames
+        How many pictures of each light were averaged.
     """
 
     names: tuple[str, ...]

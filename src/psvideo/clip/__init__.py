@@ -12,7 +12,7 @@ from psvideo.clip.mask import read_mask
 from psvideo.clip.opening import open_clip
 from psvideo.clip.reading import parse_range, read_frames
 from psvideo.clip.record import Clip, Frame, holes
-from psvideo.clip.take import Take, decoded_once
+from psvideo.clip.take import Take, check_take, decoded_once
 
 __all__ = [
     "Clip",
@@ -20,6 +20,7 @@ __all__ = [
     "Frame",
     "Kept",
     "Take",
+    "check_take",
     "decoded_once",
     "demosaic",
     "holes",

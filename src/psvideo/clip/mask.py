@@ -11,6 +11,7 @@ from PIL import Image
 from psvideo.clip.decode.decoders import decode
 from psvideo.clip.folder import KINDS
 from psvideo.errors import PsvideoError
+from psvideo.formats.paths import path_of
 
 
 def _codes(kind: str, path: Path) -> NDArray[Any]:
@@ -49,7 +50,7 @@ def read_mask(path: Path | str, *, width_px: int | None = None, height_px: int |
     >>> mask.shape, mask.dtype
     ((120, 160), dtype('bool'))
     """
-    path = Path(path)
+    path = path_of("path", path)
     kind = KINDS.get(path.suffix.lower())
     if kind is None:
         raise PsvideoError(f"{path}: is no picture that can be a mask; expected one of {', '.join(KINDS)}.")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from psvideo.clip.kept import Kept, keeping_near
 from psvideo.clip.record import Clip
+from psvideo.errors import check_kind
 from psvideo.model.plan import Plan
 
 
@@ -14,7 +15,14 @@ from psvideo.model.plan import Plan
 class Take:
     """A clip that is open, and the numbers of its frames that are to be used.
 
-    ``kept`` holds pictures that are decoded already, and takes those that will be looked at again.
+    Attributes
+    ----------
+    clip
+        The footage: its size, and what is odd about it (``warnings``, ``notes``).
+    numbers
+        Of the frames to use.
+    kept
+        Holds pictures that are decoded already, and takes those that will be looked at again.
     """
 
     clip: Clip
@@ -25,6 +33,11 @@ class Take:
     def plan(self) -> Plan:
         """The plan that the strobe played."""
         return self.clip.plan
+
+
+def check_take(take: object) -> None:
+    """Raise UsageError where ``take`` is something else, such as a path."""
+    check_kind("take", take, Take, "a Take: ps.open_take(path) opens one")
 
 
 @contextmanager

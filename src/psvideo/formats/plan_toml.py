@@ -10,6 +10,7 @@ from pydantic import Field, field_validator, model_validator
 
 from psvideo.errors import PsvideoError
 from psvideo.formats.contract import Contract, check_light_name, parse_toml, read_text
+from psvideo.formats.paths import path_of
 from psvideo.model.camera import Camera, Encoding, exposure_of
 from psvideo.model.plan import Mode, Plan, PlannedFlash, assemble_plan
 
@@ -156,7 +157,7 @@ def read_plan(path: Path | str) -> Plan:
     >>> plan.lights, plan.camera.height_px, plan.flashes[0].duration_s
     (('key', 'left', 'top'), 120, 0.001)
     """
-    return parse_plan(read_text(Path(path)), source=str(path))
+    return parse_plan(read_text(path_of("path", path)), source=str(path))
 
 
 def parse_plan(text: str, *, source: str = "plan") -> Plan:

@@ -15,6 +15,7 @@ from pydantic import Field, field_validator, model_validator
 
 from psvideo.errors import PsvideoError
 from psvideo.formats.contract import Contract, check_light_name, parse_toml, read_text
+from psvideo.formats.paths import path_of
 from psvideo.model.rig import Light, Rig, Vector
 
 SCHEMA = "psvideo-rig/1"
@@ -119,7 +120,7 @@ def read_rig(path: Path | str, *, plan_lights: Sequence[str] = ()) -> Rig:
     >>> [round(part, 3) for part in rig.lights[0].direction]
     [0.488, 0.39, 0.781]
     """
-    path = Path(path)
+    path = path_of("path", path)
     text = read_text(path)
     if path.suffix == ".toml":
         return parse_rig(text, source=str(path))

@@ -7,6 +7,7 @@ from pydantic import Field, ValidationError
 
 from psvideo.errors import PsvideoError
 from psvideo.formats.contract import Contract, check_schema, read_text
+from psvideo.formats.paths import path_of
 from psvideo.model.timing import DroppedFrames, Flash, Order, Timing
 
 SCHEMA = "psvideo-timing/1"
@@ -69,7 +70,7 @@ def read_timing(path: Path | str) -> Timing:
     >>> ps.read_timing("timing.json").flashes[0].lights == found.flashes[0].lights
     True
     """
-    path = Path(path)
+    path = path_of("path", path)
     try:
         data = json.loads(read_text(path))
         check_schema(data.get("schema"), SCHEMA, source=str(path))

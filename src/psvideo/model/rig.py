@@ -5,14 +5,25 @@ from the surface to the light; a near light has a position in metres, origin at 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 
 import numpy as np
 
-from psvideo.errors import PsvideoError, nearest
+from psvideo.errors import PsvideoError, UsageError, check_kind, nearest
 from psvideo.model.camera import FloatArray
 
 Vector = tuple[float, float, float]
+
+
+def three_numbers(name: str, given: object, expected: str) -> FloatArray:
+    """Return a parameter as three numbers, shape (3,); raises UsageError where it is anything else."""
+    try:
+        numbers = np.asarray(given, np.float64)
+    except (TypeError, ValueError):
+        numbers = np.empty(0)
+    if numbers.shape != (3,):
+        raise UsageError(f"`{name}` is {given!r:.60}; expected {expected}.")
+    return numbers
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,8 +57,25 @@ class Light:
     anisotropy: float | None = None
     axis: Vector | None = None
 
+    def __post_init__(self) -> None:
+        if np.ndim(self.intensity) != 1:
+            raise UsageError(
+                f"`intensity` of light {self.name!r} is {self.intensity!r:.60}; expected one number in a tuple, "
+                "(0.8,), or one per channel, (0.8, 0.7, 0.5)."
+            )
+        for name in ("direction", "position_m", "axis"):
+            given = getattr(self, name)
+            if given is not None:
+                three_numbers(name, given, "three numbers (x, y, z): x right, y up, z towards the camera")
+        if (self.direction is None) == (self.position_m is None):
+            both = "neither" if self.direction is None else "both"
+            raise UsageError(
+                f"Light {self.name!r} has {both} of `direction` and `position_m`; expected a direction of a distant "
+                "light, or the position of a near one."
+            )
 
-@dataclass(frozen=True, kw_only=True)
+
+@dataclass(frozen=True)
 class Rig:
     """The lights, with the camera's perspective and a first guess of the surface where near lights need them.
 
@@ -62,9 +90,19 @@ class Rig:
     """
 
     lights: tuple[Light, ...]
+    _: KW_ONLY
     focal_px: tuple[float, float] | None = None
     principal_px: tuple[float, float] | None = None
     plane: tuple[float, float, float, float] | None = None
+
+    def __post_init__(self) -> None:
+        given: object = self.lights
+        if not (isinstance(given, Sequence) and all(isinstance(one, Light) for one in given)):
+            raise UsageError(
+                f"`lights` of a Rig are of type {type(given).__name__}; expected a tuple of Lights, each "
+                "ps.Light(name=..., direction=(x, y, z)). Directions as an array (light, 3) go to ps.solve_images as "
+                "they are."
+            )
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -90,6 +128,11 @@ class Rig:
         ('left', 'key')
         """
         return replace(self, lights=self.select(names))
+
+
+def check_rig(rig: object) -> None:
+    """Raise UsageError where ``rig`` is something else, such as a path or directions."""
+    check_kind("rig", rig, Rig, "a Rig: ps.read_rig(path) reads one, ps.Rig(lights=[...]) holds Lights")
 
 
 def directions(lights: Sequence[Light]) -> FloatArray:

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.errors import UsageError, check_kind
+
 Pixels = NDArray[np.floating]
 
 
@@ -59,9 +61,20 @@ class Surface:
     misfit: Misfit | None = None
 
     def __post_init__(self) -> None:
-        """Raise ValueError where the arrays' shapes do not belong together."""
+        """Raise UsageError where these are no arrays, or their shapes do not belong together."""
+        for name in ("normals", "albedo", "valid"):
+            check_kind(name, getattr(self, name), np.ndarray, "a numpy array")
         size = self.valid.shape
         shapes = [self.normals.shape[:2], self.albedo.shape[:2]]
         shapes += [plane.shape for plane in (self.residual, self.error_deg) if plane is not None]
         if len(size) != 2 or any(shape != size for shape in shapes) or self.normals.shape != (*size, 3):
-            raise ValueError(f"normals {self.normals.shape}, albedo {self.albedo.shape} and valid {size} do not match")
+            raise UsageError(
+                f"`normals` {self.normals.shape}, `albedo` {self.albedo.shape} and `valid` {size} do not match; "
+                "expected (row, col, 3), (row, col) or (row, col, 3), and (row, col) of one picture."
+            )
+
+
+def check_surface(surface: object) -> None:
+    """Raise UsageError where ``surface`` is something else, such as its normals alone."""
+    made = "ps.solve_images gives one, ps.Surface(normals=..., albedo=..., valid=...) holds arrays"
+    check_kind("surface", surface, Surface, f"a Surface: {made}")

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.errors import UsageError, nearest
+from psvideo.errors import UsageError, check_kind, nearest
 from psvideo.model.quantities import QUANTITIES, Quantity
 from psvideo.pictures.relighting import exposure_for, normal_colours, srgb, three_channels
 
@@ -46,11 +46,15 @@ def picture_of(quantity: str, image: NDArray[np.generic], *, exposure: float | N
     >>> ps.picture_of("normals", facing)[0, 0].tolist()
     [128, 128, 255]
     """
+    check_kind("quantity", quantity, str, "the name of a quantity")
     if quantity not in QUANTITIES:
         raise UsageError(f"`quantity` is {quantity!r}; {nearest(quantity, QUANTITIES)}")
-    row = QUANTITIES[quantity]
-    _check_shape(row, image)
-    values = image.astype(np.float32)
+    row, array = QUANTITIES[quantity], np.asarray(image)
+    if array.dtype.kind not in "fiub":
+        kind = type(image).__name__
+        raise UsageError(f"`image` is of type {kind}, which holds no numbers; expected an array of {row.name}.")
+    _check_shape(row, array)
+    values = array.astype(np.float32)
     if row.shown == "normals":
         return normal_colours(values)
     if row.shown == "light":

@@ -1,12 +1,14 @@
 """Relighting a surface, and how linear light, normals and masks become pixels that a screen shows."""
 
+from numbers import Real
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.errors import UsageError
-from psvideo.model.rig import Vector
-from psvideo.model.surface import Surface
+from psvideo.errors import UsageError, check_kind
+from psvideo.model.rig import Vector, three_numbers
+from psvideo.model.surface import Surface, check_surface
 
 Image = NDArray[np.float32]
 Pixels = NDArray[np.uint8]
@@ -44,7 +46,7 @@ def relight(
     Raises
     ------
     PsvideoError
-        Where the direction is not three numbers, or has no length.
+        Where ``surface`` is none, the direction is not three numbers or has no length, or the colour is not three.
 
     Examples
     --------
@@ -56,10 +58,15 @@ def relight(
     >>> ps.relight(surface, (0, 0.6, 0.8), colour=(1.0, 0.5, 0.25))[0, 0].round(3).tolist()
     [0.4000000059604645, 0.20000000298023224, 0.10000000149011612]
     """
-    length = float(np.linalg.norm(direction)) if np.shape(direction) == (3,) else 0.0
+    check_surface(surface)
+    towards = three_numbers("direction", direction, "(x, y, z) from the surface to the light")
+    length = float(np.linalg.norm(towards))
     if not 0 < length < np.inf:
         raise UsageError(f"`direction` is {direction!r}; expected (x, y, z) from the surface to the light.")
-    light = (np.asarray(direction) / length).astype(np.float32)
+    tint = three_numbers("colour", colour, "(red, green, blue) of the light, 1.0 each for white").astype(np.float32)
+    for name, number in (("strength", strength), ("gloss", gloss), ("shininess", shininess)):
+        check_kind(name, number, Real, "a number")
+    light = (towards / length).astype(np.float32)
     normals = surface.normals.astype(np.float32)
     facing = np.maximum(normals @ light, 0.0)[..., None]
     shade = three_channels(surface.albedo.astype(np.float32)) * facing
@@ -67,7 +74,7 @@ def relight(
         half = (light + np.array([0, 0, 1])).astype(np.float32)
         half /= np.float32(np.linalg.norm(half))
         shade = shade + gloss * np.maximum(normals @ half, 0.0)[..., None] ** shininess * (facing > 0)
-    lit: Image = (np.float32(strength) * shade * np.asarray(colour, np.float32)).astype(np.float32)
+    lit: Image = (np.float32(strength) * shade * tint).astype(np.float32)
     return lit
 
 

@@ -10,9 +10,10 @@ from typing import TypeVar
 
 import numpy as np
 
-from psvideo.clip import Clip, Frame, Take, demosaic, read_frames
+from psvideo.clip import Clip, Frame, Take, check_take, demosaic, read_frames
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.compute.threads import thread_count
+from psvideo.errors import check_kind
 from psvideo.model.camera import Camera
 from psvideo.model.choices import SplitMethod
 from psvideo.model.recipe import frames_of
@@ -100,6 +101,8 @@ def gather(
     1002 ('key', 'left', 'top') (120, 160, 3)
     1003 ('key', 'left', 'top') (120, 160, 3)
     """
+    check_take(take)
+    check_kind("timing", timing, Timing, "a Timing: ps.find_timing(take) or ps.read_timing(path) gives one")
     plan, flashes = take.plan, timing.flashes
     check_separable(plan)
     made = clip_plates(take, timing, method=method, watch=watch, each_window=each_window)

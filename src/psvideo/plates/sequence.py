@@ -65,7 +65,18 @@ class LightPlate:
 
 @dataclass(frozen=True, kw_only=True)
 class Round:
-    """What one pass through the plan's flashes showed: the plates of the lights that are complete in it."""
+    """What one pass through the plan's flashes showed: the plates of the lights that are complete in it.
+
+    Attributes
+    ----------
+    number
+        Counts from 1001, as files do.
+    plates
+        One for each light: ``light``, its name; ``time_s``, the middle of its flash on the camera's clock; ``image``
+        (row, col[, 3]), float32, linear light.
+    ambient
+        Such a plate of the dark slot, None where there is none.
+    """
 
     number: int
     plates: tuple[LightPlate, ...]

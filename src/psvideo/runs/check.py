@@ -13,6 +13,7 @@ import numpy as np
 from psvideo.clip import Clip, Kept, Take, holes, keeping_near, read_frames
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import NoStrobeError, PsvideoError, UsageError
+from psvideo.formats.paths import path_if_given, path_of
 from psvideo.formats.rig_toml import read_rig
 from psvideo.model.clipping import SATURATED
 from psvideo.model.plan import Plan
@@ -77,12 +78,12 @@ def check(
     >>> [line.subject for line in found.judgements if line.grade == "bad"]
     []
     """
-    page = None if report is None else Path(report)
-    refuse_inside(page, Path(clip))
+    page, path = path_if_given("report", report), path_of("clip", clip)
+    refuse_inside(page, path)
     found = judged(
-        Path(clip),
-        plan=None if plan is None else Path(plan),
-        rig=None if rig is None else Path(rig),
+        path,
+        plan=path_if_given("plan", plan),
+        rig=path_if_given("rig", rig),
         first_light=first_light,
         watch=watch,
         caller=caller,

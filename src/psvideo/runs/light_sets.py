@@ -4,7 +4,7 @@
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 
@@ -24,17 +24,21 @@ from psvideo.clip import Take
 from psvideo.clip.folder import MOVIES
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import PsvideoError, UsageError
+from psvideo.formats.paths import path_if_given, path_of
 from psvideo.formats.plan_toml import read_plan
 from psvideo.model.camera import Encoding
 from psvideo.plates.align.rounds import UNMOVED
 from psvideo.plates.gather import gather
 from psvideo.plates.sequence import Round
-from psvideo.runs.caller import PYTHON
+from psvideo.runs.caller import PYTHON, Caller
 from psvideo.sync.open_take import open_take
 from psvideo.sync.take_timing import find_take_timing
 
 MOST_SETS = 12
 """Rounds that are read where the user names no frames: more would hardly make a calibration better."""
+MOST_DIFFERENT = 0.2
+"""Share of its light by which a light's pictures may differ. Noise and motion at the edges of a subject stay below, an
+exposure wrong by a quarter of a stop reaches it, and so do, of twelve photographs under other lights, some two."""
 PLAN = "plan.toml"
 
 
@@ -76,10 +80,9 @@ def read_images(path: Path | str, *, transfer: str | None = None, plan: Path | s
     path
         A folder of still photographs, one per light, in the order of their names (L2 before L10): PNG, TIFF, EXR, DNG,
         DPX or JPEG. A picture named ambient or dark shows the scene with every light off and is taken off the others;
-        one named room is left aside, and so is one of another name beside many numbered ones (a mask): the log
-        (``psvideo``) names what was. Or a folder with
-        one folder of pictures per light, as ``split`` writes it, or a clip, whose flashes are found first; of these,
-        the mean over up to twelve rounds.
+        those named room or mask are left aside, and so is one of another name beside many numbered ones: the
+        log (``psvideo``) names what was. Or a folder with one folder of pictures per light, as ``split`` writes it, or
+        a clip, whose flashes are found first; of these, the mean over up to twelve rounds.
     transfer
         How the files code light: "linear", "srgb", "rec709", "slog3" and others by OpenColorIO's names. Left out: as
         the plan says; without a plan sRGB for JPEG, else linear.
@@ -105,13 +108,40 @@ def read_images(path: Path | str, *, transfer: str | None = None, plan: Path | s
     >>> pictures.names, pictures.images.shape
     (('key', 'left', 'top'), (3, 120, 160, 3))
     """
-    reading = Reading(transfer=transfer, plan=None if plan is None else Path(plan))
-    found = open_light_sets(Path(path), reading)
-    for warning in found.warnings:
-        PYTHON.warn(warning)
-    for note in found.notes:
-        PYTHON.detail(note)
-    return averaged(found.sets)
+    reading = Reading(transfer=transfer, plan=path_if_given("plan", plan))
+    return averaged(sets_of(path_of("path", path), reading, watch=unwatched, caller=PYTHON).sets)
+
+
+def sets_of(path: Path, reading: Reading, *, watch: Watch, caller: Caller) -> LightSets:
+    """Open pictures of a scene, one per light, and hand on what is odd about them."""
+    opened = open_light_sets(path, reading, watch=watch)
+    for warning in opened.warnings:
+        caller.warn(warning)
+    for note in opened.notes:
+        caller.detail(note)
+    return replace(opened, sets=_compared(opened.sets, path, caller))
+
+
+def _compared(sets: Iterator[LightPictures], where: Path, caller: Caller) -> Iterator[LightPictures]:
+    """Hand on sets as they come, and say at the end which light's pictures differ from its first one."""
+    first: LightPictures | None = None
+    worst, light, at = 0.0, "", 0
+    for number, one in enumerate(sets, start=1):
+        first = first or one
+        both = (first.seen & one.seen).reshape(*one.seen.shape, *[1] * (one.images.ndim - 2))
+        axes = tuple(range(1, one.images.ndim))
+        away = np.abs(one.images - first.images).sum(axis=axes, where=both)
+        shares = away / np.maximum(np.abs(one.images + first.images).sum(axis=axes, where=both) / 2, 1e-9)
+        if shares.max() > worst:
+            worst, light, at = float(shares.max()), one.names[int(shares.argmax())], number
+        yield one
+    if worst > MOST_DIFFERENT:
+        caller.warn(
+            f"{where}: pictures 1 and {at} of light {light!r} differ by {worst:.0%} of their light. Expected pictures "
+            "of one still scene, each light in a folder of its own with one exposure: the mean is taken. Where the "
+            "folders are scenes of their own, name one of them; where the subject or the exposure changed, choose "
+            "pictures with `frames`, or take them again."
+        )
 
 
 def read_light_pictures(path: Path, reading: Reading = Reading(), *, watch: Watch = unwatched) -> LightPictures:

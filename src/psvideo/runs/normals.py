@@ -9,6 +9,7 @@ from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import UsageError
 from psvideo.export.asked import Asked, delivery_of
 from psvideo.export.usd import require_usd
+from psvideo.formats.paths import path_if_given, path_of
 from psvideo.model.choices import (
     MOST_ITERATIONS,
     Align,
@@ -139,12 +140,13 @@ def normals(
     >>> len(report.instants)
     2
     """
-    output = Output(folder=Path(out), force=force, resume=resume, start_number=start_number, caller=caller)
+    clip_path, rig_path = path_of("clip", clip), path_of("rig", rig)
+    output = Output(folder=path_of("out", out), force=force, resume=resume, start_number=start_number, caller=caller)
     output.check()
     asked = Asked(
         preset=preset,
         space=space,
-        camera_to_world=_path(camera_to_world),
+        camera_to_world=path_if_given("camera_to_world", camera_to_world),
         camera=camera,
         camera_time=camera_time,
         y=y,
@@ -167,22 +169,23 @@ def normals(
         require_usd()
     _check_numbers(near_iterations=near_iterations, depth=depth, depth_scale=depth_scale, denoise=denoise)
     over_time = OverTime(aligning=Aligning(align=align, rate=rate), denoise=denoise)
-    take = open_take(Path(clip), plan=_path(plan), frames=frames)
+    take = open_take(clip_path, plan=path_if_given("plan", plan), frames=frames)
     say_of_clip(take.clip, caller)
     over_time.check(take.plan)
     lighting = read_lighting(
         take,
-        Path(rig),
-        _path(mask),
+        rig_path,
+        path_if_given("mask", mask),
         near_iterations=near_iterations,
-        depth_path=_path(depth),
+        depth_path=path_if_given("depth", depth),
         metres_per_unit=depth_scale,
-        flat_path=_path(flat),
+        flat_path=path_if_given("flat", flat),
     )
     lighting.check(delivery)
-    output = output.given(take, _path(timing), first_light, solver, over_time, delivery, *lighting.identity)
+    timing_path = path_if_given("timing", timing)
+    output = output.given(take, timing_path, first_light, solver, over_time, delivery, *lighting.identity)
     with decoded_once(take, output=output.folder) as kept:
-        found = timing_of(kept, _path(timing), first_light=first_light, rig=lighting.rig, watch=watch).spelled(
+        found = timing_of(kept, timing_path, first_light=first_light, rig=lighting.rig, watch=watch).spelled(
             caller.spell
         )
         for note in found.notes:
@@ -199,10 +202,6 @@ def normals(
         )
         say_kept(kept.kept, caller)
     return done.report
-
-
-def _path(given: Path | str | None) -> Path | None:
-    return None if given is None else Path(given)
 
 
 def _check_numbers(

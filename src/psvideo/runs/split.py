@@ -6,6 +6,7 @@ from pathlib import Path
 from psvideo.clip import decoded_once
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import UsageError
+from psvideo.formats.paths import path_if_given, path_of
 from psvideo.formats.rig_toml import read_rig
 from psvideo.model.choices import Codec, Compression, PlatesPreview, SplitMethod
 from psvideo.plates.beauty import mix_of
@@ -77,7 +78,7 @@ def split(
     >>> report.timing.flashes[1].plate
     'left/take3_left.1001.exr'
     """
-    output = Output(folder=Path(out), force=force, resume=resume, start_number=start_number, caller=caller)
+    output = Output(folder=path_of("out", out), force=force, resume=resume, start_number=start_number, caller=caller)
     output.check()
     mix = mix_of(weight or {}, with_ambient=with_ambient)
     summed = beauty or "beauty" in preview
@@ -87,11 +88,11 @@ def split(
     extras = Extras(
         flashes=flashes, mix=mix if summed else None, previews=previews, codec=preview_codec, compression=compression
     )
-    take = open_take(Path(clip), plan=None if plan is None else Path(plan), frames=frames)
+    take = open_take(path_of("clip", clip), plan=path_if_given("plan", plan), frames=frames)
     say_of_clip(take.clip, caller)
     extras.check(take.plan)
-    known = None if rig is None else read_rig(Path(rig), plan_lights=take.plan.lights)
-    given = None if timing is None else Path(timing)
+    known = None if rig is None else read_rig(path_of("rig", rig), plan_lights=take.plan.lights)
+    given = path_if_given("timing", timing)
     output = output.given(take, given, first_light, known, method, extras)
     with decoded_once(take, output=output.folder) as kept:
         found = timing_of(kept, given, first_light=first_light, rig=known, watch=watch).spelled(caller.spell)

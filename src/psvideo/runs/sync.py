@@ -7,6 +7,7 @@ import numpy as np
 from psvideo.clip import Take
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import UsageError
+from psvideo.formats.paths import path_if_given, path_of
 from psvideo.formats.rig_toml import read_rig
 from psvideo.formats.timing_json import format_timing
 from psvideo.formats.whole_files import PICTURE_MARK, refuse_existing, write_text
@@ -64,7 +65,7 @@ def sync(
     >>> timing.phase_error_rows < 0.05
     True
     """
-    timing_path, picture_path = (None if path is None else Path(path) for path in (out, picture))
+    timing_path, picture_path = path_if_given("out", out), path_if_given("picture", picture)
     if timing_path is not None:
         refuse_existing(timing_path, force=force, mark=MARK)
     if picture_path is not None:
@@ -72,9 +73,9 @@ def sync(
             such = picture_path.with_suffix(".png")
             raise UsageError(f"`picture` {picture_path}: expected the name of a PNG, such as {such}.")
         refuse_existing(picture_path, force=force, mark=PICTURE_MARK)
-    take = open_take(Path(clip), plan=None if plan is None else Path(plan), frames=frames)
+    take = open_take(path_of("clip", clip), plan=path_if_given("plan", plan), frames=frames)
     say_of_clip(take.clip, caller)
-    known = None if rig is None else read_rig(Path(rig), plan_lights=take.plan.lights)
+    known = None if rig is None else read_rig(path_of("rig", rig), plan_lights=take.plan.lights)
     profiles = take_profiles(take, watch=watch)
     timing = timing_of_profiles(take, profiles, first_light=first_light)
     if picture_path is not None and take.plan.mode != "synced":

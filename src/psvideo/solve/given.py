@@ -1,11 +1,12 @@
 """Arrays that somebody hands over, checked: what came and what was expected, in words that help."""
 
 from collections.abc import Sequence
+from numbers import Real
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from psvideo.errors import PsvideoError, UsageError
+from psvideo.errors import PsvideoError, UsageError, check_kind
 from psvideo.model.camera import FloatArray
 from psvideo.model.rig import Light
 
@@ -22,6 +23,9 @@ def checked_images(
     images: ArrayLike | Sequence[ArrayLike], *, black_level: float | None, white_level: float | None
 ) -> Images:
     """Return images as float32 (light, row, col) or (light, row, col, 3), 1.0 = white level where that is given."""
+    for name, level in (("black_level", black_level), ("white_level", white_level)):
+        if level is not None:
+            check_kind(name, level, Real, "a code, a number")
     stack = _stacked(images)
     _check_shape(stack)
     if np.issubdtype(stack.dtype, np.integer):
@@ -41,11 +45,13 @@ def _stacked(images: ArrayLike | Sequence[ArrayLike]) -> NDArray[np.generic]:
     """Return pictures as one array, the light first."""
     if isinstance(images, np.ndarray):
         return images
-    if not isinstance(images, Sequence) or not images:
+    if not isinstance(images, Sequence) or not images or isinstance(images, str):
+        more = " Give its `images`." if hasattr(images, "images") else ""
         raise UsageError(
-            f"`images` are {images!r:.60}; expected an array (light, row, col[, 3]) or a list of pictures."
+            f"`images` are {images!r:.60}; expected an array (light, row, col[, 3]) or a list of pictures.{more} "
+            "Files are read by ps.read_images(folder)."
         )
-    pictures = [np.asarray(image) for image in images]
+    pictures = [_picture(n, image) for n, image in enumerate(images)]
     shapes = [picture.shape for picture in pictures]
     other = next((n for n, shape in enumerate(shapes) if shape != shapes[0]), None)
     if other is not None:
@@ -54,6 +60,19 @@ def _stacked(images: ArrayLike | Sequence[ArrayLike]) -> NDArray[np.generic]:
             "of one camera in one place and one mode, all of one size and all in colour or all grey."
         )
     return np.stack(pictures)
+
+
+def _picture(place: int, image: ArrayLike) -> NDArray[np.generic]:
+    try:
+        picture = np.asarray(image)
+    except ValueError:  # rows of different lengths
+        picture = np.asarray(None)
+    if picture.dtype.kind not in "fiubc":
+        raise UsageError(
+            f"`images` hold number {place} of type {type(image).__name__}, which is no picture; expected an array "
+            "(row, col[, 3]) of numbers each. Files are read by ps.read_images(folder)."
+        )
+    return picture
 
 
 def _check_shape(stack: NDArray[np.generic]) -> None:
@@ -147,7 +166,9 @@ def _floats(name: str, given: ArrayLike) -> FloatArray:
     try:
         values = np.asarray(given, np.float64)
     except (TypeError, ValueError):
-        raise UsageError(f"`{name}` are not an array of numbers ({type(given).__name__}).") from None
+        more = " A file is read by ps.read_rig(path)." if isinstance(given, str) else ""
+        more = " Lights go into ps.Rig(lights=[...])." if isinstance(given, (Light, list, tuple)) else more
+        raise UsageError(f"`{name}` are not an array of numbers ({type(given).__name__}).{more}") from None
     if not np.isfinite(values).all():
         raise UsageError(f"`{name}` hold values that are no numbers (NaN or infinity).")
     return values
@@ -169,6 +190,7 @@ def checked_mask(mask: ArrayLike, shape: tuple[int, int]) -> Mask:
 
 def checked_saturation(saturation: float, stack: Images, mask: Mask | None) -> np.float32:
     """Return the unit in which images are solved, so that samples are clipped from 1.0 on."""
+    check_kind("saturation", saturation, Real, "the value from which on samples are clipped, a number")
     if not saturation > 0:
         raise UsageError(f"`saturation` is {saturation}; expected the value above 0 from which on samples are clipped.")
     if np.isinf(saturation):

@@ -27,7 +27,15 @@ from psvideo.solve.normals.solving import Solving
 
 @dataclass(frozen=True, kw_only=True)
 class Instant:
-    """The surface at one instant, and the round of plates that it was solved from."""
+    """The surface at one instant, and the round of plates that it was solved from.
+
+    Attributes
+    ----------
+    round
+        Its ``number``, ``time_s`` and ``plates``.
+    surface
+        Normals, albedo and validity of that instant.
+    """
 
     round: Round
     surface: Surface

@@ -5,11 +5,11 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.clip import Take
+from psvideo.clip import Take, check_take
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.model.choices import NEAR_ITERATIONS, Align, Solver
 from psvideo.model.intensity import lights_as_planned
-from psvideo.model.rig import Rig
+from psvideo.model.rig import Rig, check_rig
 from psvideo.model.timing import Timing
 from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.gather import gather
@@ -73,6 +73,8 @@ def solve(
     1002 (120, 160, 3) True
     1003 (120, 160, 3) True
     """
+    check_take(take)
+    check_rig(rig)
     plan, clip = take.plan, take.clip
     lights = lights_as_planned(rig, plan)
     near = near_surface_of(rig, lights, height_px=clip.height_px, width_px=clip.width_px, iterations=NEAR_ITERATIONS)

@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from psvideo.clip import Clip, Take, open_clip, parse_range
+from psvideo.formats.paths import path_if_given, path_of
 from psvideo.strobe.runlog import as_played
 
 
@@ -38,7 +39,7 @@ def open_take(path: Path | str, *, plan: Path | str | None = None, frames: str |
     >>> take.plan.lights, take.clip.width_px, len(take.numbers)
     (('key', 'left', 'top'), 160, 12)
     """
-    clip = _as_played(open_clip(Path(path), plan=None if plan is None else Path(plan)))
+    clip = _as_played(open_clip(path_of("path", path), plan=path_if_given("plan", plan)))
     numbers = clip.numbers if frames is None else parse_range(frames, clip.numbers)
     return Take(clip=clip, numbers=numbers)
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.clip import Take, holes, read_frames
+from psvideo.clip import Take, check_take, holes, read_frames
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.compute.threads import thread_count
 from psvideo.model.camera import FloatArray
@@ -84,4 +84,5 @@ def find_take_timing(take: Take, *, first_light: str | None = None, watch: Watch
     >>> timing.order, [dict(flash.lights) for flash in timing.flashes if flash.complete][:2]
     ('marker', [{'left': 1.0}, {'top': 1.0}])
     """
+    check_take(take)
     return timing_of_profiles(take, take_profiles(take, watch=watch), first_light=first_light)

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from psvideo.errors import PsvideoError, UsageError
+from psvideo.formats.paths import path_of
 from psvideo.formats.plan_toml import format_plan
 from psvideo.formats.rig_toml import format_rig
 from psvideo.formats.whole_files import refuse_existing
@@ -84,7 +85,7 @@ def shoot(
     >>> ps.shoot("sphere", "another_take/").frames
     12
     """
-    scene, out = Path(scene), Path(out)
+    scene, out = path_of("scene", scene), path_of("out", out)
     _refuse_footage(out, force=force)
     file = scene_file(scene)
     stage = set_stage(read_scene(file), file.parent)

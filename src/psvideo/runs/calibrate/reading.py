@@ -7,7 +7,7 @@ from psvideo.compute.progress import Watch
 from psvideo.formats.rig_toml import SCHEMA
 from psvideo.formats.whole_files import PICTURE_MARK, refuse_existing
 from psvideo.runs.caller import Caller
-from psvideo.runs.light_sets import LightSets, Reading, open_light_sets
+from psvideo.runs.light_sets import Reading, sets_of
 
 
 def rig_out(out: Path | str, *, force: bool) -> Path:
@@ -27,16 +27,6 @@ def reading_of(plan: Path | str | None, frames: str | None, first_light: str | N
     """Return how pictures are to be read."""
     given = None if plan is None else Path(plan)
     return Reading(plan=given, frames=frames, first_light=first_light, transfer=transfer)
-
-
-def sets_of(path: Path, reading: Reading, *, watch: Watch, caller: Caller) -> LightSets:
-    """Open pictures of a scene, one per light, and hand on what is odd about them."""
-    opened = open_light_sets(path, reading, watch=watch)
-    for warning in opened.warnings:
-        caller.warn(warning)
-    for note in opened.notes:
-        caller.detail(note)
-    return opened
 
 
 def pictures_of(path: Path, reading: Reading, *, watch: Watch, caller: Caller) -> LightPictures:

@@ -33,9 +33,18 @@ Plane = tuple[float, float, float, float]
 class Depth:
     """Depth along the optical axis at one instant, and where the surface breaks.
 
-    depth: (row, col) float32, in metres where ``metric``, else relative; 0 where not valid.
-    cut_east, cut_south: (row, col), True where the surface jumps to the right or lower neighbour.
-    parts: how many pieces the mask falls into; each has a scale of its own.
+    Attributes
+    ----------
+    depth
+        Shape (row, col), float32, in metres where ``metric``, else relative; 0 where not valid.
+    cut_east, cut_south
+        Shape (row, col), True where the surface jumps to the right or lower neighbour.
+    parts
+        How many pieces the mask falls into; each has a scale of its own.
+    metric
+        Whether depth is in metres.
+    view
+        The lens; ``view.points(depth)`` gives the points (row, col, 3) in the camera's frame.
     """
 
     depth: NDArray[np.float32]

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.rig import Rig
-from psvideo.model.surface import Surface
+from psvideo.model.rig import Rig, check_rig
+from psvideo.model.surface import Surface, check_surface
 from psvideo.solve.depth.bilateral import BILATERAL, Before, Height, Integration, integrate
 from psvideo.solve.depth.scale import Depth, Plane, scaled
 from psvideo.solve.depth.view import View, view_of
@@ -61,7 +61,7 @@ def find_depth(surface: Surface, rig: Rig | None = None) -> Depth:
     Raises
     ------
     PsvideoError
-        Where the rig's plane lies nowhere before the camera.
+        Where ``surface`` is no Surface or ``rig`` no Rig, or the rig's plane lies nowhere before the camera.
 
     Examples
     --------
@@ -76,6 +76,9 @@ def find_depth(surface: Surface, rig: Rig | None = None) -> Depth:
     >>> round(float(depth[0, 16] - depth[31, 16]) * 32, 2)
     31.0
     """
+    check_surface(surface)
+    if rig is not None:
+        check_rig(rig)
     return depth_of(
         Shaping(view=View() if rig is None else view_of(rig), plane=None if rig is None else rig.plane), surface
     )
