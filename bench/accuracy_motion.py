@@ -16,6 +16,7 @@ from bench.accuracy_measure import Accuracy, angles_deg, ring
 from psvideo.model.surface import Surface
 from psvideo.plates.align.denoise import Average, averaged
 from psvideo.plates.align.rounds import Aligning, aligned
+from psvideo.plates.mixture import made
 from psvideo.plates.sequence import LightPlate, Round
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.woodham1980 import solve
@@ -132,7 +133,7 @@ def shoot(stage: Stage, names: tuple[str, ...], *, rounds: int = ROUNDS, noise: 
             image = stage.plate(flash, still or stage.view(time_s))
             noisy = np.asarray(image + rng.normal(0, noise, image.shape), np.float32)
             seen = np.ones(len(image), np.bool_)
-            plates.append(LightPlate(light=name, number=1001 + index, time_s=time_s, image=noisy, seen=seen))
+            plates.append(LightPlate(light=name, number=1001 + index, time_s=time_s, picture=made(noisy), seen=seen))
         gathered.append(Round(number=1001 + index, plates=tuple(plates)))
     return tuple(gathered)
 

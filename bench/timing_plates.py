@@ -7,6 +7,7 @@ import numpy as np
 from scipy.linalg import solveh_banded
 
 from psvideo.model.camera import Camera
+from psvideo.model.coded import Coded
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.plates import hudon2015
@@ -32,6 +33,11 @@ class HeldFrame:
 
     index: int
     image: Picture
+
+    @property
+    def coded(self) -> Coded:
+        """The picture in codes: light as it is."""
+        return Coded(codes=np.ascontiguousarray(self.image, np.float32))
 
 
 @dataclass(frozen=True, kw_only=True)

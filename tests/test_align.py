@@ -12,8 +12,9 @@ import pytest
 
 from psvideo.model.surface import Surface
 from psvideo.plates.align import held
-from psvideo.plates.align.packed import Packed, packed, unpacked
+from psvideo.plates.align.packed import packed
 from psvideo.plates.align.rounds import Aligning, aligned
+from psvideo.plates.mixture import Mixture, made
 from psvideo.plates.sequence import LightPlate, Round
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.woodham1980 import solve
@@ -80,7 +81,9 @@ def filmed(lights: int, motion: str, noise: float = 0.0) -> Filmed:
     rng = np.random.default_rng(5)
 
     def noisy(plate: LightPlate) -> LightPlate:
-        return replace(plate, image=np.asarray(plate.image + rng.normal(0, noise, plate.image.shape), np.float32))
+        return replace(
+            plate, picture=made(np.asarray(plate.image + rng.normal(0, noise, plate.image.shape), np.float32))
+        )
 
     return replace(clip, rounds=tuple(replace(one, plates=tuple(map(noisy, one.plates))) for one in clip.rounds))
 
@@ -125,7 +128,11 @@ def noiseless(lights: int, motion: str, wider: float = 1.0) -> Filmed:
                 still[n] = image
             plates.append(
                 LightPlate(
-                    light=f"l{n}", number=1001 + index, time_s=time_s, image=image, seen=np.ones(len(image), np.bool_)
+                    light=f"l{n}",
+                    number=1001 + index,
+                    time_s=time_s,
+                    picture=made(image),
+                    seen=np.ones(len(image), np.bool_),
                 )
             )
         rounds.append(Round(number=1001 + index, plates=tuple(plates)))
@@ -231,15 +238,15 @@ def test_no_more_plates_are_held_than_instants_need(
         nonlocal most
         for one in clip.rounds:
             for plate in one.plates:
-                own = replace(plate, image=plate.image.copy())
+                own = replace(plate, picture=made(plate.image.copy()))
                 count(own.image)
                 most = max(most, sum(sizes.values()))
                 yield own
                 del own
 
-    def watched(plate: LightPlate) -> Packed:
-        small = packed(plate)
-        count(small.codes)
+    def watched(picture: Mixture, saturation: float) -> Mixture:
+        small = packed(picture, saturation)
+        count(small.frames[0].codes)
         return small
 
     monkeypatch.setattr(held, "packed", watched)
@@ -281,14 +288,13 @@ def test_a_packed_plate_is_good_to_its_16_bits_and_what_is_clipped_stays_so() ->
     for saturation in (1.0, 1.37, 3.0):
         clipped = np.minimum(image, saturation).astype(np.float32)
         plate = LightPlate(
-            light="a", number=1, time_s=0.0, image=clipped, seen=np.ones(60, np.bool_), saturation=saturation
+            light="a", number=1, time_s=0.0, picture=made(clipped), seen=np.ones(60, np.bool_), saturation=saturation
         )
-        small = packed(plate)
-        assert small.codes.nbytes == image.nbytes / 2
-        again = unpacked(small)
-        assert np.abs(again.image - clipped).max() < 2e-5
-        assert ((again.image >= saturation) == (clipped >= saturation - 2e-5)).all()
-        assert replace(again, image=image) == replace(plate, image=image)
+        small = packed(plate.picture, saturation)
+        assert small.frames[0].codes.nbytes == image.nbytes / 2
+        again = small.image()
+        assert np.abs(again - clipped).max() < 2e-5
+        assert ((again >= saturation) == (clipped >= saturation - 2e-5)).all()
 
 
 def test_one_result_per_flash_takes_numbers_of_its_own() -> None:
@@ -330,7 +336,7 @@ def at_once(clip: Filmed, time_s: float) -> Round:
     plates = []
     for n, plate in enumerate(clip.rounds[1].plates):
         flash = TrueFlash(index=0, slot=n, lights={plate.light: 1.0}, start_s=time_s, duration_s=1e-9, complete=True)
-        plates.append(replace(plate, image=clip.stage.plate(flash, view), time_s=time_s))
+        plates.append(replace(plate, picture=made(clip.stage.plate(flash, view)), time_s=time_s))
     return Round(number=1, plates=tuple(plates))
 
 
@@ -346,7 +352,7 @@ def test_rows_that_no_frame_saw_stay_unseen_and_do_not_look_like_motion() -> Non
     seen = (rows < 70) | (rows >= 110)
 
     def cut(plate: LightPlate) -> LightPlate:
-        return replace(plate, seen=seen, image=plate.image * seen[:, None].astype(np.float32))
+        return replace(plate, seen=seen, picture=made(plate.image * seen[:, None].astype(np.float32)))
 
     rounds = changed(clip, cut)
     for shown, given in zip(brought(clip, rounds=rounds)[1].plates, rounds[1].plates, strict=True):
@@ -363,7 +369,7 @@ def test_clipped_light_stays_clipped_where_it_moves() -> None:
     clip = filmed(3, "4 px")
 
     def brighter(one: Round) -> Round:
-        bright = tuple(replace(p, image=np.minimum(2.2 * p.image, 1).astype(np.float32)) for p in one.plates)
+        bright = tuple(replace(p, picture=made(np.minimum(2.2 * p.image, 1).astype(np.float32))) for p in one.plates)
         return replace(one, plates=bright)
 
     shown = brought(clip, rounds=tuple(map(brighter, clip.rounds)))[1]
@@ -384,11 +390,19 @@ def test_a_round_that_lacks_a_light_is_not_shown_but_helps_its_neighbours() -> N
     assert clip.error_deg(clip.solved(results[1]), results[1].time_s)[0] < 1.5
 
 
+def brightened(one: Round, gain: float) -> Round:
+    """The round as another exposure shows it."""
+    plates = (replace(plate, picture=made(plate.image * np.float32(gain))) for plate in one.plates)
+    return replace(one, plates=tuple(plates))
+
+
 @pytest.mark.parametrize("gain", [0.7, 1.02, 1.4])
 def test_an_exposure_that_changes_from_round_to_round_is_no_motion(gain: float) -> None:
     clip = filmed(3, "at rest", 0.004)
     breathing = tuple(
-        replace(one, plates=tuple(replace(plate, image=plate.image * np.float32(gain**n)) for plate in one.plates))
+        replace(
+            one, plates=tuple(replace(plate, picture=made(plate.image * np.float32(gain**n))) for plate in one.plates)
+        )
         for n, one in enumerate(clip.rounds)
     )
     for given, shown in zip(breathing[1].plates, brought(clip, rounds=breathing)[1].plates, strict=True):
@@ -399,7 +413,9 @@ def test_an_exposure_that_changes_from_round_to_round_is_no_motion(gain: float) 
 def test_what_moves_while_the_exposure_changes_is_still_followed(gain: float) -> None:
     clip = filmed(3, "4 px", 0.004)
     breathing = tuple(
-        replace(one, plates=tuple(replace(plate, image=plate.image * np.float32(gain**n)) for plate in one.plates))
+        replace(
+            one, plates=tuple(replace(plate, picture=made(plate.image * np.float32(gain**n))) for plate in one.plates)
+        )
         for n, one in enumerate(clip.rounds)
     )
     time_s = clip.rounds[1].plates[1].time_s

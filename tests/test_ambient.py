@@ -8,11 +8,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from psvideo.model.coded import Coded
 from psvideo.model.plan import Plan
 from psvideo.model.shutter import frames_touched
 from psvideo.model.timing import Flash, Timing
 from psvideo.plates import ambient
-from psvideo.plates.mains import Mains, Ripple, RowLight, find_ripple
+from psvideo.plates.mains import Exposures, Mains, Ripple, RowLight, find_ripple
+from psvideo.plates.mixture import made
 from psvideo.plates.split import Plate, split
 from psvideo.synth import Noise, TrueClock
 from psvideo.synth.camera.noise import NOISELESS, frame_rng
@@ -29,6 +31,11 @@ NOISE = Noise(full_well_e=20_000, read_e=12)
 class MemoryFrame:
     index: int
     image: np.ndarray
+
+    @property
+    def coded(self) -> Coded:
+        """The picture in codes: light as it is."""
+        return Coded(codes=np.ascontiguousarray(self.image, np.float32))
 
 
 def texture(plan: Plan) -> np.ndarray:
@@ -195,8 +202,7 @@ def test_a_change_that_looks_like_a_ripple_once_is_not_believed() -> None:
     light = [
         RowLight(
             mean=0.1 * (1 + 0.1 * n * rows / 200),
-            shares=np.ones((1, 200)),
-            middles_s=(0.0334 * n + 4e-5 * rows)[None],
+            opened=Exposures(shares=np.ones((1, 200)), middles_s=(0.0334 * n + 4e-5 * rows)[None]),
             good=np.ones(200, np.bool_),
         )
         for n in range(8)
@@ -214,9 +220,8 @@ def test_a_ripple_is_found_with_its_phase() -> None:
     surface = rng.uniform(0.05, 0.4, 300)
 
     def seen(time_s: float) -> RowLight:
-        middles_s = (time_s + 2e-5 * rows)[None]
-        light = RowLight(mean=surface, shares=np.ones((1, 300)), middles_s=middles_s, good=np.ones(300, np.bool_))
-        return replace(light, mean=surface * true.swing(light))
+        opened = Exposures(shares=np.ones((1, 300)), middles_s=(time_s + 2e-5 * rows)[None])
+        return RowLight(mean=surface * true.swing(opened), opened=opened, good=np.ones(300, np.bool_))
 
     found = find_ripple(seen(0.0), seen(0.0303))
     assert found is not None
@@ -259,7 +264,7 @@ def test_dark_slots_that_are_torn_or_seen_in_part_do_no_harm(make_plan: PlanMake
 def test_colour_and_mosaics_are_followed_alike(plan: Plan) -> None:
     take = shoot(plan, dimmed)
     tint = np.array([1.0, 0.6, 0.3], np.float32)
-    coloured = [replace(plate, image=plate.image[..., None] * tint) for plate in take.plates]
+    coloured = [replace(plate, picture=made(plate.image[..., None] * tint)) for plate in take.plates]
     grey = {plate.flash.index: plate.image for plate in take.without_ambient()}
     for plate in replace(take, plates=coloured).without_ambient():
         assert np.abs(plate.image - grey[plate.flash.index][..., None] * tint).max() < 2e-4
@@ -272,7 +277,7 @@ def test_ripples_of_an_average_of_hundreds_of_dark_slots_die_out() -> None:
     def dark(index: int, light: np.ndarray | float) -> Plate:
         flash = Flash(index=index, slot=0, lights={}, start_s=index / 30, duration_s=1e-3, complete=True)
         image = (light + 2e-3 * rng.standard_normal(size)).astype(np.float32)
-        return Plate(flash=flash, image=image, shares=row, middles_s=row * index / 30, seen=np.ones(240, bool))
+        return Plate(flash=flash, picture=made(image), shares=row, middles_s=row * index / 30, seen=np.ones(240, bool))
 
     waves = 1 + 0.05 * np.sin(np.arange(240)[:, None] * np.linspace(0.1, 0.6, 64))  # every length that a window turns
     averaged = None

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from psvideo.model.camera import FloatArray
+from psvideo.model.coded import Coded
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Flash, Timing
 from psvideo.plates.ambient_regression import Separated, design_of, separated
@@ -22,6 +23,11 @@ NOISE = Noise(full_well_e=20_000, read_e=6)
 class HeldFrame:
     index: int
     image: np.ndarray
+
+    @property
+    def coded(self) -> Coded:
+        """The picture in codes: light as it is."""
+        return Coded(codes=np.ascontiguousarray(self.image, np.float32))
 
 
 def texture(grain_px: int) -> np.ndarray:

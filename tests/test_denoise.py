@@ -9,6 +9,7 @@ import pytest
 from psvideo.model.surface import Surface
 from psvideo.model.timing import Timing
 from psvideo.plates.align.denoise import Average, averaged
+from psvideo.plates.mixture import made
 from psvideo.plates.sequence import LightPlate, Round
 from psvideo.report.judge.result import steadiness
 from psvideo.report.observe.observed import InstantFacts, instant_facts
@@ -140,7 +141,7 @@ def test_the_report_names_the_worst_instants() -> None:
     before: Sample | None = None
     for n, gain in enumerate(gains):
         one = surface(rng, gain=gain)
-        plate = LightPlate(light="a", number=n, time_s=float(n), image=one.albedo, seen=np.ones(ROWS, np.bool_))
+        plate = LightPlate(light="a", number=n, time_s=float(n), picture=made(one.albedo), seen=np.ones(ROWS, np.bool_))
         now = sample_of(one)
         changed: Change | None = None if before is None else change(before, now)
         facts.append(instant_facts(Round(number=1001 + n, plates=(plate,)), one, None, changed))

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from psvideo.model.coded import Coded
 from psvideo.model.plan import Plan, PlannedFlash, mixing_matrix, reference_duration_s
 from psvideo.model.shutter import frames_touched, row_weights
 from psvideo.model.timing import Flash, Timing
@@ -25,6 +26,11 @@ AMBIENT = 0.05
 class MemoryFrame:
     index: int
     image: np.ndarray
+
+    @property
+    def coded(self) -> Coded:
+        """The picture in codes: light as it is."""
+        return Coded(codes=np.ascontiguousarray(self.image, np.float32))
 
 
 def patterned(plan: Plan, flashes: list[tuple[dict[str, float], float]]) -> Plan:

@@ -12,6 +12,7 @@ import pytest
 from picture_file import read_picture
 
 from psvideo.formats.plan_toml import read_plan
+from psvideo.model.coded import Coded
 from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.model.row_profiles import collect
 from psvideo.model.shutter import frames_touched, row_weights
@@ -29,6 +30,11 @@ PlanMaker = Callable[..., Plan]
 class MemoryFrame:
     index: int
     image: np.ndarray
+
+    @property
+    def coded(self) -> Coded:
+        """The picture in codes: light as it is."""
+        return Coded(codes=np.ascontiguousarray(self.image, np.float32))
 
 
 def frames_of(shot: Exposure) -> Iterator[MemoryFrame]:

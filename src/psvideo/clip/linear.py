@@ -6,7 +6,6 @@
 import functools
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,28 +14,54 @@ from psvideo.clip.record import CodedPicture, Header, Levels
 from psvideo.clip.transfer import find_curve, to_light
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import Encoding
+from psvideo.model.coded import IDENTITY, Coded, Tone
 
 
 def linear_light(picture: CodedPicture, encoding: Encoding) -> NDArray[np.float32]:
     """Return a picture in linear light, same shape. The plan's levels, where it gives them, override the file's."""
-    head, codes = picture.header, picture.codes
+    return in_codes(picture, encoding).light()
+
+
+def in_codes(picture: CodedPicture, encoding: Encoding) -> Coded:
+    """Return a picture as it was read, and what light its codes stand for; only curves on single floats are undone.
+
+    The plan's levels, where it gives them, override the file's.
+    """
+    head, codes = picture.header, np.ascontiguousarray(picture.codes)
     white = head.white if encoding.white_level is None else encoding.white_level
     black = head.black if encoding.black_level is None else ((encoding.black_level,),)
-    if head.bits is None:
-        return _float_light(codes, encoding.transfer, black, white)
-    scale = _scale(head, encoding)
-    tables = {
-        level: light_table(scale, encoding.transfer, level, white, codes.dtype.itemsize)
-        for level in ({level for row in black for level in row} if black else {None})
-    }
-    if black is None or len(tables) == 1:
-        return np.asarray(cv2.LUT(codes, next(iter(tables.values()))), np.float32).reshape(codes.shape)
-    light = np.empty(codes.shape, np.float32)
-    for row, levels in enumerate(black):
-        for col, level in enumerate(levels):
-            place = np.s_[row :: len(black), col :: len(levels)]
-            light[place] = cv2.LUT(np.ascontiguousarray(codes[place]), tables[level]).reshape(light[place].shape)
-    return light
+    if head.bits is not None:
+        return Coded(codes=codes, tone=_tone(_scale(head, encoding), encoding.transfer, black, white, codes.itemsize))
+    if codes.dtype == np.float16:
+        return Coded(codes=codes.view(np.uint16), tone=_half_tone(encoding.transfer, black, white))
+    if black is None and white is None and not find_curve(encoding.transfer).source:
+        return Coded(codes=np.asarray(codes, np.float32), tone=IDENTITY)
+    return Coded(codes=_float_light(codes, encoding.transfer, black, white))
+
+
+@functools.lru_cache(maxsize=32)
+def _tone(scale: "Scale", transfer: str, black: Levels | None, white: float | None, bytes_per_code: int) -> Tone:
+    """Return what the codes of an integer picture stand for; a curve is looked up, linear codes are computed with."""
+    levels: Levels = black or ((None,),)  # type: ignore[assignment]
+    if find_curve(transfer).source:
+        tables = {level: light_table(scale, transfer, level, white, bytes_per_code) for row in levels for level in row}
+        if len(tables) == 1:
+            return Tone(table=next(iter(tables.values())))
+    ends = [[_ends(scale, transfer, level, white) for level in row] for row in levels]
+    zero, one = (np.array([[pair[end] for pair in row] for row in ends]) for end in (0, 1))
+    most = float(scale.largest) if scale.clamped and scale.largest < 256**bytes_per_code - 1 else np.inf
+    if find_curve(transfer).source:
+        return Tone(
+            table=np.asarray(_curved(scale, transfer, bytes_per_code), np.float32), zero=zero, gain=1 / (one - zero)
+        )
+    zero, one = ((end - scale.signal_at_0) / scale.signal_per_code for end in (zero, one))
+    return Tone(zero=zero, gain=1 / (one - zero), most=most)
+
+
+@functools.lru_cache(maxsize=4)
+def _half_tone(transfer: str, black: Levels | None, white: float | None) -> Tone:
+    values = np.arange(65536, dtype=np.uint16).view(np.float16).astype(np.float32)
+    return Tone(table=_float_light(values, transfer, black, white))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,21 +102,30 @@ def light_table(
 
     Left out, black is the code that the curve decodes to 0, and white the largest code.
     """
+    zero, one = _ends(scale, transfer, black, white)
+    return np.asarray((_curved(scale, transfer, bytes_per_code) - zero) / (one - zero), np.float32)
+
+
+def _ends(scale: Scale, transfer: str, black: float | None, white: float | None) -> tuple[float, float]:
+    """Return what black and white decode to on the curve's own scale."""
     curve = find_curve(transfer)
     levels = np.array([0.0 if black is None else black, scale.largest if white is None else white])
-    level_light = to_light(curve, levels / scale.largest)
-    black_light = 0.0 if black is None else level_light[0]
-    span = level_light[1] - black_light
-    if span <= 0:
+    zero, one = (float(light) for light in to_light(curve, levels / scale.largest))
+    zero = 0.0 if black is None else zero
+    if one <= zero:
         raise PsvideoError(
             f"white_level {levels[1]:g} is no brighter than black_level {levels[0]:g} under the curve {curve.name!r}, "
             f"whose codes run from 0 to {scale.largest} in these files. Give the plan levels counted in these codes."
         )
+    return zero, one
+
+
+def _curved(scale: Scale, transfer: str, bytes_per_code: int) -> NDArray[np.float64]:
+    """Return what every code decodes to on the curve's own scale."""
     codes = np.arange(256**bytes_per_code, dtype=np.float64)
     if scale.clamped:
         codes = np.minimum(codes, scale.largest)
-    light = to_light(curve, scale.signal_at_0 + codes * scale.signal_per_code)
-    return np.asarray((light - black_light) / span, np.float32)
+    return to_light(find_curve(transfer), scale.signal_at_0 + codes * scale.signal_per_code)
 
 
 def _float_light(

@@ -4,14 +4,16 @@ import contextlib
 from bisect import bisect_left
 from collections.abc import Callable, Generator, Iterable, Iterator
 from functools import partial
+from typing import Any
 
 import numpy as np
 from fileseq.exceptions import ParseException
 from fileseq.frameset import FrameSet
+from numpy.typing import NDArray
 
 from psvideo.clip.decode.decoders import decode
 from psvideo.clip.kept import Kept
-from psvideo.clip.linear import linear_light
+from psvideo.clip.linear import in_codes
 from psvideo.clip.record import Clip, CodedPicture, Frame, Header
 from psvideo.compute.threads import in_order, thread_count
 from psvideo.errors import PsvideoError, UsageError
@@ -26,7 +28,7 @@ def read_frames(
     kept: Kept | None = None,
     keep: bool = False,
 ) -> Iterator[Frame]:
-    """Give the clip's frames in linear light, in ascending order, each decoded once; ``numbers`` chooses some of them.
+    """Give the clip's frames in their codes, in ascending order, each decoded once; ``numbers`` chooses some of them.
 
     Up to ``ahead`` frames are decoded in advance by ``threads``, left out by half of those that compute: rebuilding,
     solving and encoding want the others. So memory does not grow with the clip. The threads end when the iterator is
@@ -43,7 +45,7 @@ def read_frames(
     decoded = _decoder(clip, [number for number in chosen if kept is None or number not in kept])
     jobs = (partial(_picture, clip, number, decoded, kept, keep) for number in chosen)
     workers = 1 if clip.is_movie else threads or max(thread_count() // 2, 1)
-    return _in_linear_light(clip, in_order(jobs, ahead=ahead, threads=workers, name="decode"))
+    return _as_frames(clip, in_order(jobs, ahead=ahead, threads=workers, name="decode"))
 
 
 def parse_range(text: str, numbers: Iterable[int]) -> tuple[int, ...]:
@@ -84,26 +86,36 @@ def _picture(
         return number, kept.get(number)
     picture = decoded(number)
     _check_like_first(clip, picture.header, _name(clip, number))
+    _check_finite(picture, _name(clip, number))
     if kept is not None and keep:
         kept.put(number, picture)
     return number, picture
 
 
-def _in_linear_light(clip: Clip, pictures: Generator[tuple[int, CodedPicture]]) -> Iterator[Frame]:
-    """Make light of pictures as late as can be: codes take half of its memory or less."""
+def _as_frames(clip: Clip, pictures: Generator[tuple[int, CodedPicture]]) -> Iterator[Frame]:
     with contextlib.closing(pictures):
         yield from map(partial(_frame, clip), pictures)  # holds no picture while its frame is worked on
 
 
 def _frame(clip: Clip, numbered: tuple[int, CodedPicture]) -> Frame:
     number, picture = numbered
-    image = linear_light(picture, clip.encoding)
-    if picture.header.bits is None and not np.isfinite(image.sum(dtype=np.float64)):
+    return Frame(index=clip.index_of(number), number=number, coded=in_codes(picture, clip.encoding))
+
+
+def _check_finite(picture: CodedPicture, name: str) -> None:
+    """Refuse a picture that holds values that are no numbers."""
+    codes = picture.codes
+    if picture.header.bits is None and not _is_finite(codes):
         raise PsvideoError(
-            f"{_name(clip, number)}: holds {int((~np.isfinite(image)).sum())} values that are no numbers (NaN or "
+            f"{name}: holds {int((~np.isfinite(codes)).sum())} values that are no numbers (NaN or "
             "infinity). Write the frame again with finite pixels."
         )
-    return Frame(index=clip.index_of(number), number=number, image=image)
+
+
+def _is_finite(codes: NDArray[Any]) -> bool:
+    if codes.dtype == np.float16:  # numpy has no fast sum of halves; beyond these bits they are no numbers
+        return bool((np.ascontiguousarray(codes).view(np.int16) & 0x7FFF).max() < 0x7C00)
+    return bool(np.isfinite(codes.sum(dtype=np.float64)))
 
 
 def _name(clip: Clip, number: int) -> str:

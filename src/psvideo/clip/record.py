@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.camera import Encoding
+from psvideo.model.coded import Coded
 from psvideo.model.plan import Plan
 
 Levels = tuple[tuple[float, ...], ...]
@@ -52,16 +53,24 @@ class CodedPicture:
 
 @dataclass(frozen=True, kw_only=True)
 class Frame:
-    """One frame in linear light.
+    """One frame, in the codes in which it was read.
 
     ``index`` is its place in time, counted from the clip's first frame, dropped frames included; ``number`` is its
-    file's number (a movie's: the index). ``image`` is (row, col) for grey or mosaiced footage, (row, col, 3) for
-    colour; 0 is the black level, 1.0 is saturation; noise below black is kept, so values may be slightly negative.
+    file's number (a movie's: the index). ``coded`` is (row, col) for grey or mosaiced footage, (row, col, 3) for
+    colour.
     """
 
     index: int
     number: int
-    image: NDArray[np.float32]
+    coded: Coded
+
+    @property
+    def image(self) -> NDArray[np.float32]:
+        """The frame in linear light, made when it is asked for.
+
+        0 is the black level, 1.0 is saturation; noise below black is kept, so values may be slightly negative.
+        """
+        return self.coded.light()
 
 
 @dataclass(frozen=True, kw_only=True)

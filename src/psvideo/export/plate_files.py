@@ -45,7 +45,7 @@ def write_flash(folder: Path, clip: str, plate: Plate, tags: Tags, *, compressio
     attributes = tags.attributes(time_s=plate.time_s, data=not PLATE.colour) | {"psvideo:lights": lights}
     write_exr(
         path,
-        _with_validity(plate.image, np.broadcast_to(plate.seen[:, None], plate.image.shape[:2])),
+        _with_validity(plate.image, np.broadcast_to(plate.seen[:, None], plate.picture.shape[:2])),
         attributes=attributes,
         fps=tags.fps,
         time_code=tags.time_code(plate.time_s),

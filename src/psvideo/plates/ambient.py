@@ -16,8 +16,10 @@ from numpy.typing import NDArray
 
 from psvideo.compute.compiled import EXACT
 from psvideo.model.camera import FloatArray
-from psvideo.plates.mains import Mains, RowLight
-from psvideo.plates.split import Image, Plate
+from psvideo.model.coded import Image
+from psvideo.plates.mains import Exposures, Mains, RowLight
+from psvideo.plates.mixture import made
+from psvideo.plates.split import Plate
 
 LONGEST_MEMORY = 16
 """Dark slots that the average spans at most."""
@@ -53,19 +55,20 @@ class Ambient:
 
 def update(ambient: Ambient | None, dark: Plate) -> Ambient:
     """Return the ambient light with one more dark slot in it."""
-    rows, image = RowLight.of(dark), held(dark)
+    image = dark.image
+    rows = RowLight.of(dark, image)
     if ambient is None:
         slots = np.broadcast_to(dark.seen[:, None], image.shape[:2]).astype(np.float32)
         return Ambient(
             image=image,
             slots=slots,
-            middle_s=rows.middle_s,
+            middle_s=rows.opened.middle_s,
             known=dark.seen,
             mains=Mains(rows=rows),
             index=dark.flash.index,
         )
     mains = ambient.mains.next(rows)
-    new = image if mains.ripple is None else _times_rows(image, 1 / mains.ripple.swing(rows))
+    new = image if mains.ripple is None else _times_rows(image, 1 / mains.ripple.swing(rows.opened))
     blended, slots = np.empty_like(new), np.empty_like(ambient.slots)
     change = _Change.between(ambient.image, new, ambient.known & dark.seen)
     restarts = change.restarts | ~ambient.known[:, None] | _first_ripple(ambient.mains, mains)
@@ -76,7 +79,7 @@ def update(ambient: Ambient | None, dark: Plate) -> Ambient:
     return Ambient(
         image=blended,
         slots=slots,
-        middle_s=np.where(dark.seen, rows.middle_s, ambient.middle_s),
+        middle_s=np.where(dark.seen, rows.opened.middle_s, ambient.middle_s),
         known=ambient.known | dark.seen,
         mains=mains,
         index=dark.flash.index,
@@ -214,8 +217,7 @@ def subtract(plates: Iterable[Plate], *, darks: Iterable[Plate] = ()) -> Iterato
     """Yield the plates with ambient light taken off the lit ones; dark slots pass as the average at their moment.
 
     ``darks`` are the clip's dark slots, read ahead of the plates: no further than the one after the current plate.
-    Before the first and after the last, its light is taken as it is. Without any, plates keep theirs. What is clipped
-    comes out as 1.0.
+    Before the first and after the last, its light is taken as it is. Without any, plates keep theirs.
     """
     coming = iter(darks)
     before = after = None
@@ -230,49 +232,28 @@ def subtract(plates: Iterable[Plate], *, darks: Iterable[Plate] = ()) -> Iterato
             before = later if after is None or _first_ripple(after.mains, later.mains) else after
             after = later
             del dark, later  # pictures are held only as long as they are needed
-        if after is None:
-            plate = replace(plate, image=held(plate), clipped=None)
-        elif not plate.flash.is_dark:
+        if after is not None and not plate.flash.is_dark:
             plate = _without(plate, before or after, after)
-        else:
-            plate = replace(plate, image=after.image, seen=after.known, clipped=None)
+        elif after is not None:
+            plate = replace(plate, picture=made(after.image), seen=after.known)
         yield plate
         del plate
 
 
-def held(plate: Plate) -> Image:
-    """Return a plate's picture with 1.0 where samples were clipped."""
-    return plate.image if plate.clipped is None else np.where(plate.clipped, np.float32(1), plate.image)
-
-
 def _without(plate: Plate, before: Ambient, after: Ambient) -> Plate:
-    """Take the ambient light of every exposure off, interpolated in time; what is clipped becomes 1.0.
+    """Take the ambient light of every exposure off, interpolated in time.
 
     Rows in which the ambient light is not known are no longer seen.
     """
-    rows = RowLight.of(plate)
+    opened = Exposures(shares=plate.shares, middles_s=plate.middles_s)
     gap_s = after.middle_s - before.middle_s
-    late = np.clip((rows.middle_s - before.middle_s) / np.where(gap_s > 0, gap_s, np.inf), 0, 1)
+    late = np.clip((opened.middle_s - before.middle_s) / np.where(gap_s > 0, gap_s, np.inf), 0, 1)
     late = np.where(before.known, np.where(after.known, late, 0.0), 1.0)
     ripple = after.mains.ripple
-    exposures = plate.exposures * (1.0 if ripple is None else ripple.swing(rows))
-    lit = np.empty_like(plate.image)
-    image, early_image, late_image, out = (
-        picture.reshape(len(late), -1) for picture in (plate.image, before.image, after.image, lit)
-    )
-    weights = ((1 - late) * exposures).astype(np.float32), (late * exposures).astype(np.float32)
-    _subtract_rows(image, early_image, late_image, out, *weights)
-    if plate.clipped is not None:
-        lit[plate.clipped] = 1.0
+    exposures = plate.exposures * (1.0 if ripple is None else ripple.swing(opened))
     seen = plate.seen & (before.known | after.known)
-    lit[~seen] = 0
-    return replace(plate, image=lit, shares=np.zeros_like(plate.shares), seen=seen, clipped=None)
-
-
-@EXACT.kept
-def _subtract_rows(image: Image, before: Image, after: Image, lit: Image, early: Image, late: Image) -> None:
-    for row in range(image.shape[0]):
-        for col in range(image.shape[1]):
-            value = image[row, col]
-            light = early[row] * before[row, col] + late[row] * after[row, col]
-            lit[row, col] = value - light
+    if before is after:
+        picture = plate.picture.without((after.image,), exposures[None])
+    else:
+        picture = plate.picture.without((before.image, after.image), np.stack([1 - late, late]) * exposures)
+    return replace(plate, picture=picture.within(seen), shares=np.zeros_like(plate.shares), seen=seen)

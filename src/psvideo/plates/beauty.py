@@ -7,6 +7,7 @@ import numpy as np
 
 from psvideo.errors import UsageError, nearest
 from psvideo.model.plan import Plan
+from psvideo.plates.mixture import made
 from psvideo.plates.sequence import AMBIENT, LightPlate, Round
 
 BEAUTY = "beauty"
@@ -58,11 +59,11 @@ def beauty_of(one: Round, mix: Mix, ambient: LightPlate | None = None) -> LightP
         AMBIENT: one.ambient or ambient
     }
     used = [(plate, mix.of(name)) for name, plate in parts.items() if plate is not None and mix.of(name)]
-    image = np.zeros_like(one.plates[0].image)
+    image = np.zeros(one.plates[0].shape, np.float32)
     for plate, weight in used:
         image += np.float32(weight) * plate.image
     by_row = all(plate.seen.ndim == 1 for plate, _ in used)
     known = [plate.seen if by_row else plate.pixels_seen for plate, _ in used]
     seen = np.all(known, axis=0) if used else np.ones(image.shape[0], np.bool_)
     image[~seen] = 0
-    return LightPlate(light=BEAUTY, number=one.number, time_s=one.time_s, image=image, seen=seen)
+    return LightPlate(light=BEAUTY, number=one.number, time_s=one.time_s, picture=made(image), seen=seen)

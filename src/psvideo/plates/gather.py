@@ -23,6 +23,7 @@ from psvideo.plates import hudon2015
 from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.ambient import subtract, update
 from psvideo.plates.ambient_regression import Design, Separated, design_of, separated, windows_of
+from psvideo.plates.mixture import made
 from psvideo.plates.nearest_rows import has_blind_time, with_nearest_rows
 from psvideo.plates.sequence import (
     AMBIENT,
@@ -151,8 +152,8 @@ def first_ambient(take: Take, timing: Timing) -> LightPlate | None:
     dark = next(_dark_plates(take, camera, _within(timing, camera, take, places), places), None)
     if dark is None:
         return None
-    plate = _colour_of(take.clip)(replace(dark, image=update(None, dark).image))
-    return LightPlate(light="ambient", number=0, time_s=plate.time_s, image=plate.image, seen=plate.seen)
+    plate = _colour_of(take.clip)(replace(dark, picture=made(update(None, dark).image)))
+    return LightPlate(light=AMBIENT, number=0, time_s=plate.time_s, picture=plate.picture, seen=plate.seen)
 
 
 def _decode_ahead(take: Take, watch: Watch) -> None:
@@ -228,7 +229,7 @@ def _as_dark_slot(found: Separated, design: Design, camera: Camera, timing: Timi
     last = max((flash.index for flash in timing.flashes if flash.start_s < end_s), default=0)
     return Plate(
         flash=Flash(index=last, slot=0, lights={}, start_s=middle_s, duration_s=0.0, complete=True),
-        image=found.image,
+        picture=made(found.image),
         shares=np.ones((1, camera.height_px)),
         middles_s=np.full((1, camera.height_px), middle_s),
         seen=found.known,
@@ -240,7 +241,7 @@ def _colour_of(clip: Clip) -> Callable[[Plate], Plate]:
     if clip.cfa is None:
         return lambda plate: plate
     pattern = clip.cfa
-    return lambda plate: replace(plate, image=demosaic(plate.image, pattern))
+    return lambda plate: replace(plate, picture=made(demosaic(plate.image, pattern)))
 
 
 def _shown(plates: Iterable[AnyPlate], show: Callable[[AnyPlate], None] | None) -> Iterator[AnyPlate]:

@@ -10,9 +10,11 @@ from itertools import pairwise
 import numpy as np
 
 from psvideo.model.camera import Camera, FloatArray
+from psvideo.model.coded import Image
 from psvideo.model.row_profiles import LinearFrame
 from psvideo.model.timing import Flash, Timing
-from psvideo.plates.split import Image, Plate
+from psvideo.plates.mixture import made
+from psvideo.plates.split import Plate
 
 REC709_LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 
@@ -41,7 +43,7 @@ def split(frames: Iterable[LinearFrame], camera: Camera, timing: Timing) -> Iter
             done = flash.index
             middles_s = current.index * camera.frame_period_s + camera.row_offsets_s() + camera.exposure_s / 2
             shares, seen = np.ones((1, rows)), np.ones(rows, np.bool_)
-            yield Plate(flash=flash, image=image, shares=shares, middles_s=middles_s[None], seen=seen)
+            yield Plate(flash=flash, picture=made(image), shares=shares, middles_s=middles_s[None], seen=seen)
 
 
 def luminance_energy(image: Image) -> FloatArray:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.camera import FloatArray
+from psvideo.model.coded import Image
 from psvideo.model.row_profiles import row_profile
 from psvideo.plates.split import Plate
 
@@ -30,23 +31,11 @@ LONGEST_UNSEEN = 4
 
 
 @dataclass(frozen=True, kw_only=True)
-class RowLight:
-    """The rows of a plate: their means (row,), and whose exposures went into them, ``shares`` and ``middles_s``
-    (frame, row). ``good`` (row,) is False where a row was not seen, holds no light or is clipped."""
+class Exposures:
+    """Whose exposures went into a plate's rows: ``shares`` and ``middles_s`` (frame, row)."""
 
-    mean: FloatArray
     shares: FloatArray
     middles_s: FloatArray
-    good: NDArray[np.bool_]
-
-    @classmethod
-    def of(cls, plate: Plate) -> "RowLight":
-        """Return the rows of a plate that still holds its ambient light."""
-        mean = row_profile(plate.image)
-        good = plate.seen & (mean > 0)
-        if plate.clipped is not None:
-            good &= ~plate.clipped.reshape(len(mean), -1).any(axis=1)
-        return cls(mean=mean, shares=plate.shares, middles_s=plate.middles_s, good=good)
 
     @property
     def middle_s(self) -> FloatArray:
@@ -62,15 +51,32 @@ class RowLight:
 
 
 @dataclass(frozen=True, kw_only=True)
+class RowLight:
+    """The rows of a plate: their means (row,), and whose exposures went into them, ``opened``. ``good`` (row,) is False
+    where a row was not seen, holds no light or is clipped."""
+
+    mean: FloatArray
+    opened: Exposures
+    good: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, plate: Plate, image: Image) -> "RowLight":
+        """Return the rows of a plate that still holds its ambient light, and of its picture."""
+        mean = row_profile(image)
+        good = plate.seen & (mean > 0) & (image.reshape(len(mean), -1).max(axis=1) < 1.0)
+        return cls(mean=mean, opened=Exposures(shares=plate.shares, middles_s=plate.middles_s), good=good)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Ripple:
     """The swing of the ambient light's exposures: of ``abs(amplitude)`` of their mean, ``hz`` times a second."""
 
     hz: float
     amplitude: complex
 
-    def swing(self, rows: RowLight) -> FloatArray:
+    def swing(self, opened: Exposures) -> FloatArray:
         """Return by which factor the rows' exposures were off the mean, shape (row,)."""
-        return _swing(self.amplitude, rows.phasor(self.hz))
+        return _swing(self.amplitude, opened.phasor(self.hz))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,7 +128,7 @@ def _fitted(
     weight: FloatArray,
 ) -> tuple[float, Ripple] | None:
     """Fit one change of level and one ripple (Gauss-Newton); return the share of the change explained, and it."""
-    early, late = before.phasor(hz)[good], after.phasor(hz)[good]
+    early, late = before.opened.phasor(hz)[good], after.opened.phasor(hz)[good]
     if np.sqrt(np.mean(np.abs(late - early) ** 2)) < LEAST_TURN:
         return None
     amplitude = 0j

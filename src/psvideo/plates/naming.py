@@ -111,15 +111,16 @@ def _small_plates(take: Take, timing: Timing, flashes: range) -> dict[int, Image
 
 def _small(plate: Plate) -> Image:
     """Return a small picture of a plate: 0 where any of it was unseen, 1.0 where any of it was saturated."""
-    rows, cols = plate.image.shape[:2]
+    shown = plate.image
+    rows, cols = shown.shape[:2]
     shrink = max(max(rows, cols) / SMALL_PX, 1.0)
     size = (max(round(cols / shrink), 1), max(round(rows / shrink), 1))
 
     def smaller(image: Image) -> Image:
         return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.float32)
 
-    small = smaller(plate.image)
-    small[smaller((plate.image >= 1.0).astype(np.float32)) > 0] = 1.0
+    small = smaller(shown)
+    small[smaller((shown >= 1.0).astype(np.float32)) > 0] = 1.0
     seen = np.repeat(plate.seen[:, None], cols, axis=1).astype(np.float32)
     small[smaller(seen) < 1.0 - 1e-4] = 0.0
     return small

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.camera import Camera, FloatArray
+from psvideo.plates.mixture import made
 from psvideo.plates.sequence import LightPlate
 
 LATER, MOST_LATER = 2, 8
@@ -59,17 +60,18 @@ class _Waiting:
     def of(cls, plate: LightPlate) -> "_Waiting":
         """Hold a plate."""
         whole = bool(plate.rows_seen.all())
-        rows = plate.image if whole else plate.image[plate.rows_seen]
-        return cls(plate=replace(plate, image=plate.image[:0]), rows=rows, shape=plate.image.shape)
+        image = plate.image
+        rows = image if whole else image[plate.rows_seen]
+        return cls(plate=replace(plate, picture=made(image[:0])), rows=rows, shape=plate.shape)
 
     def given(self) -> LightPlate:
         """Return the plate with its own rows, the others 0."""
         seen = self.plate.rows_seen
         if seen.all():
-            return replace(self.plate, image=self.rows)
+            return replace(self.plate, picture=made(self.rows))
         image = np.zeros(self.shape, np.float32)
         image[seen] = self.rows
-        return replace(self.plate, image=image)
+        return replace(self.plate, picture=made(image))
 
     def put(self, image: NDArray[np.float32], wanted: Flags) -> None:
         """Write those of its rows that are wanted."""
@@ -110,14 +112,14 @@ def _released(waiting: deque[_Waiting], known: dict[str, LightPlate]) -> LightPl
         wanted = one.plate.rows_seen & ~own.rows_seen & nearer
         one.put(image, wanted)
         shown_s[wanted], seen[wanted] = one.plate.time_s, True
-    return replace(own, image=image, seen=seen, shown_s=shown_s)
+    return replace(own, picture=made(image), seen=seen, shown_s=shown_s)
 
 
 def _filled(plate: LightPlate, other: LightPlate, rows: Flags) -> LightPlate:
     """Return a plate with some rows of another."""
     if not rows.any():
         return plate
-    image = plate.image.copy()
+    image = np.array(plate.image)
     image[rows] = other.image[rows]
     shown_s: FloatArray = np.where(rows, other.flashed_s, plate.flashed_s)
-    return replace(plate, image=image, seen=plate.rows_seen | rows, shown_s=shown_s)
+    return replace(plate, picture=made(image), seen=plate.rows_seen | rows, shown_s=shown_s)

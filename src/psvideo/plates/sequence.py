@@ -14,9 +14,11 @@ from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import FloatArray
+from psvideo.model.coded import Image
 from psvideo.model.plan import Plan, mixing_matrix
 from psvideo.model.timing import Flash
-from psvideo.plates.split import Image, Plate
+from psvideo.plates.mixture import Mixture, made
+from psvideo.plates.split import Plate
 
 FIRST_NUMBER = 1001
 AMBIENT = "ambient"
@@ -36,15 +38,25 @@ class LightPlate:
     light: str
     number: int
     time_s: float
-    image: Image
+    picture: Mixture
     seen: NDArray[np.bool_]
     saturation: float = 1.0
     shown_s: FloatArray | None = None
 
     @property
+    def image(self) -> Image:
+        """The picture, (row, col) or (row, col, channel), in linear light; made when it is asked for."""
+        return self.picture.image()
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The picture's shape."""
+        return self.picture.shape
+
+    @property
     def flashed_s(self) -> FloatArray:
         """The instant that every row shows, shape (row,)."""
-        return np.full(len(self.image), self.time_s) if self.shown_s is None else self.shown_s
+        return np.full(self.shape[0], self.time_s) if self.shown_s is None else self.shown_s
 
     @property
     def rows_seen(self) -> NDArray[np.bool_]:
@@ -60,7 +72,7 @@ class LightPlate:
     def pixels_seen(self) -> NDArray[np.bool_]:
         """What is known of the plate, shape (row, col)."""
         known = self.seen if self.seen.ndim == 2 else self.seen[:, None]
-        return np.broadcast_to(known, self.image.shape[:2])
+        return np.broadcast_to(known, self.shape[:2])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -242,7 +254,7 @@ def handed_over(held: dict[str, LightPlate], number: int, lights: tuple[str, ...
 
 
 def _of_dark(plate: Plate, number: int) -> LightPlate:
-    return LightPlate(light=AMBIENT, number=number, time_s=plate.time_s, image=plate.image, seen=plate.seen)
+    return LightPlate(light=AMBIENT, number=number, time_s=plate.time_s, picture=plate.picture, seen=plate.seen)
 
 
 def _of_light(making: _Making, lit: dict[int, Plate], number: int) -> LightPlate:
@@ -261,33 +273,39 @@ def _merged(parts: list[Plate], exposures: FloatArray, light: str, number: int) 
     """
     seen = np.any([part.seen for part in parts], axis=0)
     if len(parts) == 1 and exposures[0] == 1.0:
-        image = parts[0].image
+        picture = parts[0].picture
     else:
-        light_sum, exposure_sum = np.zeros_like(parts[0].image), np.zeros_like(parts[0].image)
+        shape = parts[0].picture.shape
+        light_sum, exposure_sum = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
         for part, exposure in zip(parts, exposures, strict=True):
-            good = (part.image < 1.0) & part.seen.reshape(-1, *[1] * (part.image.ndim - 1))
-            light_sum += np.where(good, part.image, 0)
+            image = part.image
+            good = (image < 1.0) & part.seen.reshape(-1, *[1] * (image.ndim - 1))
+            light_sum += np.where(good, image, 0)
             exposure_sum += np.where(good, np.float32(exposure), 0)
         least = np.float32(1 / exposures.min())
-        image = np.where(exposure_sum > 0, light_sum / np.maximum(exposure_sum, 1e-6), least).astype(np.float32)
-        image[~seen] = 0
+        merged = np.where(exposure_sum > 0, light_sum / np.maximum(exposure_sum, 1e-6), least).astype(np.float32)
+        merged[~seen] = 0
+        picture = made(merged)
     time_s = _time_s(parts, exposures)
     return LightPlate(
-        light=light, number=number, time_s=time_s, image=image, seen=seen, saturation=float(1 / exposures.min())
+        light=light, number=number, time_s=time_s, picture=picture, seen=seen, saturation=float(1 / exposures.min())
     )
 
 
 def _mixed(parts: list[Plate], shares: FloatArray, light: str, number: int) -> LightPlate:
     """Take a light out of patterns of several; ``shares`` (part,) are what of each pattern makes up the light."""
     saturation = max(float(shares[shares > 0].sum()), 1.0)
-    image = np.zeros_like(parts[0].image)
+    image = np.zeros(parts[0].picture.shape, np.float32)
+    clipped = np.zeros(image.shape, np.bool_)
     for part, share in zip(parts, shares, strict=True):
-        image += np.float32(share) * part.image
-    image[np.any([part.image >= 1.0 for part in parts], axis=0)] = np.float32(saturation)
+        shown = part.image
+        image += np.float32(share) * shown
+        clipped |= shown >= 1.0
+    image[clipped] = np.float32(saturation)
     seen = np.all([part.seen for part in parts], axis=0)
     image[~seen] = 0
     time_s = _time_s(parts, shares)
-    return LightPlate(light=light, number=number, time_s=time_s, image=image, seen=seen, saturation=saturation)
+    return LightPlate(light=light, number=number, time_s=time_s, picture=made(image), seen=seen, saturation=saturation)
 
 
 def _time_s(parts: list[Plate], shares: FloatArray) -> float:

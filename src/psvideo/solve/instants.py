@@ -63,7 +63,7 @@ def surfaces(
 
     def solved(one: Round) -> Instant:
         scaled = [per_saturation(light, plate.saturation) for light, plate in zip(lights, one.plates, strict=True)]
-        light = partial(illumination, scaled, channels=1 if one.plates[0].image.ndim == 2 else 3)
+        light = partial(illumination, scaled, channels=1 if len(one.plates[0].shape) == 2 else 3)
         whole = all(plate.seen.ndim == 1 for plate in one.plates)
         seen = np.stack([plate.seen if whole else plate.pixels_seen for plate in one.plates])
         plates = [image_per_saturation(plate.image, plate.saturation) for plate in one.plates]

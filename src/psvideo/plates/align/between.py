@@ -11,9 +11,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.model.coded import Image
 from psvideo.plates.align.flow import Codes, Flags, Flow, Sketch, Vectors, comparable, places
+from psvideo.plates.mixture import made
 from psvideo.plates.sequence import LightPlate
-from psvideo.plates.split import Image
 
 AT_REST, BEFORE, AFTER, BOTH, NOWHERE = range(5)
 """What a pixel is taken from: the nearer plate as it is, one plate moved along the flow, both, none."""
@@ -129,10 +130,10 @@ class Ends:
 def plate_at(ends: Ends, way: Track, *, time_s: float, number: int) -> LightPlate:
     """Return a light's plate at an instant; ``seen`` (row, col) is False where what it showed is not known."""
     own = ends.nearer
-    rows, cols = own.image.shape[:2]
-    image = np.empty_like(own.image)
-    seen = np.empty((rows, cols), np.bool_)
+    rows, cols = own.shape[:2]
     sides = [_Side.of(ends.before), _Side.of(ends.after)]
+    image = np.array(next(side.image for side in sides if side is not None and side.plate is own))
+    seen = np.empty((rows, cols), np.bool_)
     for top in range(0, rows, BAND_ROWS):
         band = slice(top, min(top + BAND_ROWS, rows))
         _fill(band, image, seen, ends, sides, way)
@@ -140,7 +141,7 @@ def plate_at(ends: Ends, way: Track, *, time_s: float, number: int) -> LightPlat
         light=own.light,
         number=number,
         time_s=time_s,
-        image=image,
+        picture=made(image),
         seen=seen,
         saturation=own.saturation,
         shown_s=own.flashed_s,
@@ -149,9 +150,10 @@ def plate_at(ends: Ends, way: Track, *, time_s: float, number: int) -> LightPlat
 
 @dataclass(frozen=True, kw_only=True)
 class _Side:
-    """A plate with where it is clipped (None: nowhere) and which rows lie well within what was seen."""
+    """A plate, its picture, where it is clipped (None: nowhere) and which rows lie well within what was seen."""
 
     plate: LightPlate
+    image: Image
     clipped: NDArray[np.uint8] | None
     within: Flags
 
@@ -159,14 +161,15 @@ class _Side:
     def of(cls, plate: LightPlate | None) -> "_Side | None":
         if plate is None:
             return None
-        clipped = (_brightest(plate.image) >= plate.saturation).astype(np.uint8)
+        image = plate.image
+        clipped = (_brightest(image) >= plate.saturation).astype(np.uint8)
         within = cv2.erode(plate.rows_own.astype(np.uint8)[:, None], np.ones((5, 1), np.uint8))[:, 0] > 0
         wider = np.asarray(cv2.dilate(clipped, np.ones((5, 5), np.uint8)), np.uint8) if clipped.any() else None
-        return cls(plate=plate, clipped=wider, within=within)
+        return cls(plate=plate, image=image, clipped=wider, within=within)
 
     def moved(self, x: Vectors, y: Vectors) -> tuple[Image, Flags]:
         """Return the plate at places of its own, and where it was seen there; clipped light stays clipped."""
-        image = cv2.remap(self.plate.image, x, y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+        image = cv2.remap(self.image, x, y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
         if self.clipped is not None:
             touched = cv2.remap(self.clipped, x, y, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE) > 0
             image[touched] = self.plate.saturation
@@ -189,7 +192,6 @@ def _fill(band: slice, image: Image, seen: Flags, ends: Ends, sides: list[_Side 
     scale_x, scale_y = np.float32(cols / small_cols), np.float32(rows / small_rows)
     at = (x + 0.5) / scale_x - np.float32(0.5), (y + 0.5) / scale_y - np.float32(0.5)
     source = cv2.remap(way.source, *at, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)
-    image[band] = own.image[band]
     seen[band] = (source != NOWHERE) & own.seen[band, None]
     if not ((source == BEFORE) | (source == AFTER) | (source == BOTH)).any():
         return

@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.model.coded import Image
 from psvideo.plates.sequence import LightPlate
-from psvideo.plates.split import Image
 
 Codes = NDArray[np.uint8]
 Vectors = NDArray[np.float32]
@@ -67,16 +67,15 @@ class Flow:
 
 def white_of(plate: LightPlate) -> float:
     """Return the light that becomes the brightest code, from a light's first plate."""
-    return float(np.clip(1.2 * np.percentile(_grey(plate.image[::4, ::4]), 99.5), LEAST_WHITE, plate.saturation))
+    return float(np.clip(1.2 * np.percentile(_grey(plate.picture.thinned(4)), 99.5), LEAST_WHITE, plate.saturation))
 
 
 def sketch_of(plate: LightPlate, *, white: float) -> Sketch:
     """Return what flow needs of a plate: a few hundred kilobytes; ``white`` becomes code 255."""
-    rows, cols = plate.image.shape[:2]
-    shrink = 2 if rows * cols > LARGEST_PX else 1
-    seen, grey = plate.seen, _grey(plate.image)
-    if shrink > 1:
-        grey = np.asarray(cv2.resize(grey, (cols // 2, rows // 2), interpolation=cv2.INTER_AREA), np.float32)
+    rows, cols = plate.shape[:2]
+    halved = rows * cols > LARGEST_PX
+    seen, grey = plate.seen, plate.picture.halved() if halved else _grey(plate.image)
+    if halved:
         seen = np.asarray(seen[: rows // 2 * 2].reshape(-1, 2).all(axis=1))
     light = np.clip(grey * np.float32(1 / white), 0, 1) + np.float32(TOE)
     scale = np.float32(255 / (np.sqrt(1 + TOE) - np.sqrt(TOE)))

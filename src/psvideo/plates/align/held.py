@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from psvideo.plates.align.flow import Sketch, sketch_of, white_of
-from psvideo.plates.align.packed import Packed, packed, unpacked
+from psvideo.plates.align.packed import packed
 from psvideo.plates.sequence import LightPlate
 
 
@@ -21,11 +21,7 @@ class Shot:
     round: int
     time_s: float
     sketch: Sketch | None
-    plate: LightPlate | Packed | None
-
-    def given(self) -> LightPlate | None:
-        """Return the plate, if it is held."""
-        return unpacked(self.plate) if isinstance(self.plate, Packed) else self.plate
+    plate: LightPlate | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,7 +35,7 @@ class Around:
     def nearest(self, time_s: float) -> LightPlate:
         """Return the plate that is nearest in time, of those that are held."""
         held = [shot for shot in (self.before, self.after) if shot.plate is not None]
-        plate = min(held, key=lambda shot: abs(shot.time_s - time_s)).given()
+        plate = min(held, key=lambda shot: abs(shot.time_s - time_s)).plate
         if plate is None:
             raise ValueError("an instant needs at least one of its two plates")
         return plate
@@ -154,8 +150,9 @@ class Held:
         """Hold the plates around an instant, which moved, in less memory: none of them will pass as it is."""
         shots = self.shots[light]
         for shot in (around.before, around.after):
-            if isinstance(shot.plate, LightPlate):
-                shots[shot.round] = replace(shot, plate=packed(shot.plate))
+            if (plate := shot.plate) is not None:
+                smaller = replace(plate, picture=packed(plate.picture, plate.saturation))
+                shots[shot.round] = replace(shot, plate=smaller)
 
     def _is_for_later(self, shot: Shot) -> bool:
         """Tell whether a plate may serve an instant of a round that is not complete yet."""

@@ -1,56 +1,31 @@
-"""Plates that wait for the next round, held in half the memory: 16-bit codes over the range of what they show."""
-
-from dataclasses import dataclass, replace
+"""Pictures that wait for the next round, held in half the memory: 16-bit codes over the range of what they show."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from psvideo.plates.sequence import LightPlate
+from psvideo.model.coded import Coded, Tone
+from psvideo.plates.mixture import Mixture
 
 MOST_CODE = 65535
 
 
-@dataclass(frozen=True, kw_only=True)
-class Packed:
-    """A plate whose light is ``least + step * codes``, good to half a step; codes from ``clipped`` on are saturated.
+def packed(picture: Mixture, saturation: float) -> Mixture:
+    """Return a picture in half its memory, good to half a step of its codes; what is saturated is so still.
 
-    ``plate`` holds all else, and no image.
+    One that is not made yet is held by its frames, and comes back as it is.
     """
-
-    plate: LightPlate
-    codes: NDArray[np.uint16]
-    least: float
-    step: float
-    clipped: int
-
-
-def packed(plate: LightPlate) -> Packed:
-    """Return a plate in half its memory."""
-    least, most = float(plate.image.min()), float(plate.image.max())
+    if not picture.is_made:
+        return picture
+    image = picture.image()
+    least, most = float(image.min()), float(image.max())
     step = max((most - least) / MOST_CODE, 1e-12)
-    codes = _codes(plate.image, least, step)
-    clipped = (
-        int(_codes(np.full(1, plate.saturation, np.float32), least, step)[0])
-        if most >= plate.saturation
-        else MOST_CODE + 1
+    codes = image - np.float32(least)
+    codes *= np.float32(1 / step)
+    codes += np.float32(0.5)
+    tone = Tone(zero=np.full((1, 1), -least / step), gain=np.full((1, 1), step))
+    coded = Coded(codes=np.clip(codes, 0, MOST_CODE, out=codes).astype(np.uint16), tone=tone)
+    return Mixture(
+        frames=(coded,),
+        coefficients=np.ones((1, len(image))),
+        ceiling=saturation,
+        clips_from=saturation - step if most >= saturation else np.inf,
     )
-    empty = np.empty((0, 0), np.float32)
-    return Packed(plate=replace(plate, image=empty), codes=codes, least=least, step=step, clipped=clipped)
-
-
-def _codes(image: NDArray[np.float32], least: float, step: float) -> NDArray[np.uint16]:
-    code = image - np.float32(least)
-    code *= np.float32(1 / step)
-    code += np.float32(0.5)
-    return np.asarray(np.clip(code, 0, MOST_CODE, out=code).astype(np.uint16))
-
-
-def unpacked(held: Packed) -> LightPlate:
-    """Return the plate; what was saturated is so still."""
-    image = held.codes.astype(np.float32)
-    image *= np.float32(held.step)
-    image += np.float32(held.least)
-    if held.clipped <= MOST_CODE:
-        saturation = np.float32(held.plate.saturation)
-        image[held.codes >= held.clipped] = saturation
-    return replace(held.plate, image=image)

@@ -146,7 +146,5 @@ def _moved_to(around: Around, flow: Flow, time_s: float) -> LightPlate:
     if before.sketch is None or after.sketch is None:
         raise ValueError("there is no flow without sketches")
     way = track(before.sketch, evened(before.sketch, after.sketch), flow, time_s)
-    ends = Ends(
-        before=before.given(), after=after.given(), share=(time_s - before.time_s) / (after.time_s - before.time_s)
-    )
+    ends = Ends(before=before.plate, after=after.plate, share=(time_s - before.time_s) / (after.time_s - before.time_s))
     return plate_at(ends, way, time_s=time_s, number=after.round)

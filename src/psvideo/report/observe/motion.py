@@ -47,9 +47,9 @@ class Motion:
 
 def glimpse(plate: LightPlate, white: float | None = None) -> Glimpse:
     """Return what to keep of a plate; ``white`` is the light of the brightest code, left out: the plate's own."""
-    image = plate.image if plate.image.ndim == 2 else plate.image[..., 1]
-    step = max(round(image.shape[1] / (2 * WIDTH_PX)), 1)
-    grey = np.ascontiguousarray(image[::step, ::step])
+    step = max(round(plate.shape[1] / (2 * WIDTH_PX)), 1)
+    thin = plate.picture.thinned(step)
+    grey = np.ascontiguousarray(thin if thin.ndim == 2 else thin[..., 1])
     if grey.shape[1] > WIDTH_PX:
         size = (grey.shape[1] // 2, grey.shape[0] // 2)
         grey = np.asarray(cv2.resize(grey, size, interpolation=cv2.INTER_AREA), np.float32)
@@ -58,7 +58,7 @@ def glimpse(plate: LightPlate, white: float | None = None) -> Glimpse:
     scale = np.float32(255 / (np.sqrt(1 + TOE) - np.sqrt(TOE)))
     codes = ((np.sqrt(light) - np.float32(np.sqrt(TOE))) * scale + np.float32(0.5)).astype(np.uint8)
     whole = bool(plate.rows_seen.all())
-    return Glimpse(codes=codes, scale=image.shape[1] / grey.shape[1], time_s=plate.time_s, white=white, seen=whole)
+    return Glimpse(codes=codes, scale=plate.shape[1] / grey.shape[1], time_s=plate.time_s, white=white, seen=whole)
 
 
 def motion(before: Glimpse, after: Glimpse) -> Motion | None:

@@ -68,7 +68,7 @@ class Seen:
 
 def seen_of(one: Round, mask: NDArray[np.bool_] | None) -> Seen:
     """Return a round thinned out, and where its subject is."""
-    bright = np.stack([_brightest(plate.image[::STRIDE, ::STRIDE]) for plate in one.plates])
+    bright = np.stack([_brightest(plate.picture.thinned(STRIDE)) for plate in one.plates])
     if mask is not None:
         return Seen(bright=bright, subject=mask[::STRIDE, ::STRIDE])
     most = bright.max(axis=0)
@@ -172,7 +172,7 @@ class Observed:
         self.ambient_measured.append(float(found.stood.mean()))
 
     def _look_at_dark(self, plate: LightPlate) -> None:
-        self._dark = np.array(_brightest(plate.image[::STRIDE, ::STRIDE]))
+        self._dark = np.array(_brightest(plate.picture.thinned(STRIDE)))
 
     def add(self, one: Round, surface: Surface | None = None) -> None:
         """Take in one round, and the surface that was solved from it, if any."""

@@ -30,8 +30,10 @@ class RigPoints:
         """Return the light of a round at the points, (point, light); 0 where a plate is clipped or was not seen."""
         columns = []
         for plate in one.plates:
-            image = plate.image if plate.image.ndim == 2 else plate.image[..., CHANNEL]
-            value = image[self.rows, self.cols].astype(np.float64)
+            needed, place = np.unique(self.rows, return_inverse=True)
+            image = plate.picture.rows(needed)
+            image = image if image.ndim == 2 else image[..., CHANNEL]
+            value = image[place, self.cols].astype(np.float64)
             known = plate.pixels_seen[self.rows, self.cols] & (value < plate.saturation)
             columns.append(np.where(known, value, 0.0))
         return np.stack(columns, axis=1)

@@ -1,0 +1,71 @@
+"""Pictures in the codes in which they were read, and what light their codes stand for.
+
+Codes take half the memory of their light or less, and a recipe's coefficients reach them as they are:
+``light = gain * (curve(code) - zero)``, where black and white levels make zero and gain, and the transfer curve is a
+table.
+"""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+Image = NDArray[np.float32]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Tone:
+    """What light codes stand for: 0 at the black level, 1.0 = sensor saturation.
+
+    table: what every code that its type can hold becomes first; empty where light is linear in the code. zero, gain:
+    (row, col), by position, a pattern that repeats from the picture's top left on: each filter colour of a mosaic may
+    have its own black level. most: codes above this count as it.
+    """
+
+    table: Image = field(default_factory=lambda: np.empty(0, np.float32))
+    zero: NDArray[np.float64] = field(default_factory=lambda: np.zeros((1, 1)))
+    gain: NDArray[np.float64] = field(default_factory=lambda: np.ones((1, 1)))
+    most: float = np.inf
+
+    @property
+    def is_identity(self) -> bool:
+        """Whether codes are light already."""
+        return not self.table.size and bool((self.gain == 1).all() and (self.zero == 0).all() and self.most == np.inf)
+
+
+IDENTITY = Tone()
+"""Codes that are light."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Coded:
+    """A picture in codes: (row, col) or (row, col, channel); uint8, uint16 or float32, C-contiguous.
+
+    Half floats are held as their 16 bits, and the tone's table says what each stands for.
+    """
+
+    codes: NDArray[Any]
+    tone: Tone = IDENTITY
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The picture's shape."""
+        return self.codes.shape
+
+    def light(self, rows: slice = slice(None)) -> Image:
+        """Return linear light, same shape; ``rows`` chooses some."""
+        codes, tone = self.codes[rows], self.tone
+        if tone.is_identity:
+            return np.asarray(codes, np.float32)
+        if tone.table.size:
+            light = np.asarray(cv2.LUT(np.ascontiguousarray(codes), tone.table), np.float32).reshape(codes.shape)
+        else:
+            light = np.minimum(codes, tone.most, dtype=np.float32) if tone.most < np.inf else codes.astype(np.float32)
+        first = range(len(self.codes))[rows].start
+        for row, gains in enumerate(tone.gain):
+            for col, gain in enumerate(gains):
+                place = np.s_[(row - first) % len(tone.gain) :: len(tone.gain), col :: len(gains)]
+                light[place] = (light[place] - np.float32(tone.zero[row, col])) * np.float32(gain)
+        return light

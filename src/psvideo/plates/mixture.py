@@ -1,0 +1,140 @@
+"""A picture as a recipe bound to what it is made of: made where and as far as somebody wants it, and held by nobody.
+
+    picture[row] = sum_n coefficients[n, row] * frames[n][row]  -  sum_m taken[m, row] * levels[m][row]
+
+Frames stay in the codes in which they were read, which several pictures share: a picture that is not made costs nothing
+beside them. Levels are what is known of the ambient light, in linear light.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.compute.threads import over_ranges
+from psvideo.model.camera import FloatArray
+from psvideo.model.clipping import SATURATED
+from psvideo.model.coded import IDENTITY, Coded, Image
+from psvideo.plates.mixing_kernel import COUNTS, Mix, mix_halved, mix_rows
+
+BAND_SAMPLES = 1 << 18
+"""Samples of one band of rows, which a thread makes at a time."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Mixture:
+    """A picture, (row, col) or (row, col, channel), in linear light.
+
+    frames: pictures in codes, all of one shape and type. coefficients: (frame, row). levels: pictures in light, of the
+    same shape; taken: (level, row). A sample becomes ``ceiling`` where any that counts was
+    ``clips_from`` or more. Rows without coefficients are 0.
+    """
+
+    frames: tuple[Coded, ...]
+    coefficients: FloatArray
+    levels: tuple[Image, ...] = ()
+    taken: FloatArray | None = None
+    ceiling: float = 1.0
+    clips_from: float = SATURATED
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The picture's shape."""
+        return self.frames[0].shape
+
+    @property
+    def is_made(self) -> bool:
+        """Whether the picture lies in memory as it is."""
+        first = self.frames[0]
+        plain = not self.levels and len(self.frames) == 1 and first.tone is IDENTITY and first.codes.dtype == np.float32
+        return plain and bool((self.coefficients == 1).all()) and self.clips_from == np.inf
+
+    def image(self) -> Image:
+        """Return the picture."""
+        if self.is_made:
+            return np.asarray(self.frames[0].codes, np.float32)
+        image = np.empty(self.shape, np.float32)
+        self._into(image, range(self.shape[0]))
+        return image
+
+    def rows(self, rows: range | NDArray[np.intp]) -> Image:
+        """Return some rows of the picture, shape (row, col[, channel])."""
+        if self.is_made:
+            codes: Image = self.frames[0].codes[np.array(rows, np.intp)]
+            return codes
+        image = np.empty((len(rows), *self.shape[1:]), np.float32)
+        self._into(image, rows)
+        return image
+
+    def thinned(self, stride: int) -> Image:
+        """Return every so many rows and columns of the picture."""
+        return self.rows(range(0, self.shape[0], stride))[:, ::stride]
+
+    def halved(self) -> Image:
+        """Return the picture's mean over two by two pixels and over channels, shape (row // 2, col // 2)."""
+        rows, cols = self.shape[0] // 2, self.shape[1] // 2
+        grey = np.empty((rows, cols), np.float32)
+        mix = self.bound()
+        channels = 1 if len(self.shape) == 2 else self.shape[2]
+        _in_bands(lambda first, last: mix_halved(mix, first, last, channels, grey), rows, 2 * mix.samples)
+        return grey
+
+    def without(self, levels: tuple[Image, ...], taken: FloatArray) -> "Mixture":
+        """Return the picture with levels taken off, each row with its own share; ``taken`` is (level, row)."""
+        return replace(self, levels=(*self.levels, *levels), taken=_joined(self.taken, taken))
+
+    def within(self, rows: NDArray[np.bool_]) -> "Mixture":
+        """Return the picture with 0 in all but some rows."""
+        return self if rows.all() else replace(self, coefficients=self.coefficients * rows)
+
+    def clipped(self) -> NDArray[np.bool_]:
+        """Return where any sample that counts was clipped, of the picture's shape."""
+        clipped = np.zeros(self.shape, np.bool_)
+        for frame, share in zip(self.frames, self.coefficients, strict=True):
+            counts = share > COUNTS
+            clipped[counts] |= frame.light()[counts] >= np.float32(self.clips_from)
+        return clipped
+
+    def bound(self) -> Mix:
+        """Return what a compiled loop needs; valid as long as this picture is held."""
+        frames = self.frames
+        tables = {id(frame.tone.table): frame.tone.table for frame in frames if frame.tone.table.size}
+        if len(tables) > 1 or (tables and any(not frame.tone.table.size for frame in frames)):
+            frames = tuple(Coded(codes=frame.light()) for frame in frames)
+            return replace(self, frames=frames).bound()
+        first = frames[0]
+        taken = np.zeros((0, self.shape[0])) if self.taken is None else self.taken
+        return Mix(
+            frames=np.array([frame.codes.ctypes.data for frame in frames], np.intp),
+            like=first.codes.reshape(-1)[:0],
+            samples=int(np.prod(self.shape[1:])),
+            coefficients=np.ascontiguousarray(self.coefficients, np.float32),
+            table=first.tone.table,
+            zero=np.stack([frame.tone.zero for frame in frames]).astype(np.float32),
+            gain=np.stack([frame.tone.gain for frame in frames]).astype(np.float32),
+            most=np.float32(min(frame.tone.most for frame in frames)),
+            levels=np.array([level.ctypes.data for level in self.levels], np.intp),
+            taken=np.ascontiguousarray(taken, np.float32),
+            ceiling=np.float32(self.ceiling),
+            clips_from=np.float32(self.clips_from),
+        )
+
+    def _into(self, image: Image, rows: range | NDArray[np.intp]) -> None:
+        mix, places = self.bound(), np.array(rows, np.intp)
+        flat = image.reshape(len(rows), -1)
+        _in_bands(lambda first, last: mix_rows(mix, places[first:last], flat[first:last]), len(rows), mix.samples)
+
+
+def made(image: Image) -> Mixture:
+    """Return a picture that lies in memory already."""
+    coded = Coded(codes=np.ascontiguousarray(image, np.float32))
+    return Mixture(frames=(coded,), coefficients=np.ones((1, len(image))), clips_from=np.inf)
+
+
+def _joined(before: FloatArray | None, more: FloatArray) -> FloatArray:
+    return more if before is None else np.concatenate([before, more])
+
+
+def _in_bands(run: Callable[[int, int], None], rows: int, samples: int) -> None:
+    over_ranges(run, rows, each=max(BAND_SAMPLES // samples, 1))
