@@ -10,7 +10,7 @@ from psvideo.clip.depth_map import DepthMaps, open_depth
 from psvideo.clip.kept import Kept, keeping_near
 from psvideo.clip.mask import read_mask
 from psvideo.clip.opening import open_clip
-from psvideo.clip.reading import parse_range, read_frames
+from psvideo.clip.reading import holds_plain_codes, parse_range, read_frames
 from psvideo.clip.record import Clip, Frame, holes
 from psvideo.clip.take import Take, check_take, decoded_once
 
@@ -23,6 +23,7 @@ __all__ = [
     "check_take",
     "decoded_once",
     "demosaic",
+    "holds_plain_codes",
     "holes",
     "keeping_near",
     "open_clip",

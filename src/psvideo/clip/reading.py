@@ -33,8 +33,8 @@ def read_frames(
     Up to ``ahead`` frames are decoded in advance by ``threads``, left out by half of those that compute: rebuilding,
     solving and encoding want the others. So memory does not grow with the clip. The threads end when the iterator is
     used up, closed, or ends in an error. Frames that are in ``kept`` are read back from there; with ``keep`` the others
-    are put into it once they are decoded. Raises PsvideoError that names the file where a frame is missing, damaged, or
-    of another size or depth than the first.
+    are put into it once they are decoded, unless their files hold plain codes themselves. Raises PsvideoError that
+    names the file where a frame is missing, damaged, or of another size or depth than the first.
     """
     chosen = clip.numbers if numbers is None else tuple(sorted(set(numbers)))
     absent = set(chosen) - set(clip.numbers)
@@ -43,9 +43,18 @@ def read_frames(
     if not chosen:
         return iter(())
     decoded = _decoder(clip, [number for number in chosen if kept is None or number not in kept])
+    keep = keep and not holds_plain_codes(clip)
     jobs = (partial(_picture, clip, number, decoded, kept, keep) for number in chosen)
     workers = 1 if clip.is_movie else threads or max(thread_count() // 2, 1)
     return _as_frames(clip, in_order(jobs, ahead=ahead, threads=workers, name="decode"))
+
+
+def holds_plain_codes(clip: Clip) -> bool:
+    """Return whether the frames' files hold their codes as they are, so that reading them again is decoding enough."""
+    head = clip.header
+    bytes_per_code = 2 if head.bits is None else -(-head.bits // 8)
+    size = head.width_px * head.height_px * head.channels * bytes_per_code
+    return not clip.is_movie and clip.files[0].stat().st_size >= size
 
 
 def parse_range(text: str, numbers: Iterable[int]) -> tuple[int, ...]:

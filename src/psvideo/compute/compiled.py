@@ -29,7 +29,8 @@ _Files: Any = IndexDataCacheFile
 _PART: dict[str, Any] = {"nogil": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 LOG = logging.getLogger("psvideo.compiling")
 """Says, as information, when a loop was kept nowhere and is being compiled."""
-_UNREADABLE = (OSError, EOFError, pickle.UnpicklingError)
+_UNREADABLE = (OSError, EOFError, pickle.UnpicklingError, AttributeError, ImportError)
+"""What a kept file raises that is cut off, or that names what an earlier version of the package had."""
 
 
 class _Kept(_Cache):  # type: ignore[misc]
@@ -63,8 +64,11 @@ class _Kept(_Cache):  # type: ignore[misc]
         return None
 
     def save_overload(self, signature: Any, data: Any) -> None:
-        with contextlib.suppress(*_UNREADABLE):
+        try:
             super().save_overload(signature, data)
+        except _UNREADABLE:
+            with contextlib.suppress(OSError):  # what an earlier version kept there would stand in the way for ever
+                Path(self._cache_file._index_path).unlink()
 
 
 @dataclass(frozen=True)

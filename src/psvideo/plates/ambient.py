@@ -7,6 +7,7 @@ noise. Where the picture still differs by more than noise (someone moved, a shad
 light, which swings from exposure to exposure, is separated row by row (``mains``) and put back for each plate.
 """
 
+from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
@@ -15,21 +16,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.compiled import EXACT
+from psvideo.compute.threads import over_ranges
 from psvideo.model.camera import FloatArray
 from psvideo.model.coded import Image
+from psvideo.model.row_profiles import row_profile
+from psvideo.model.timing import Timing
 from psvideo.plates.mains import Exposures, Mains, RowLight
 from psvideo.plates.mixture import made
 from psvideo.plates.split import Plate
 
 LONGEST_MEMORY = 16
 """Dark slots that the average spans at most."""
-COARSE, LEVEL_SIGMA_PX = 4, 2.0
-"""Levels are compared over about 7 pixels of pictures a quarter as large: the factor adds hardly any noise. The window
+COARSE, LEVEL_SIGMA_PX = 2, 4.0
+"""Levels are compared over about 14 blocks of so many pixels a side: the factor adds hardly any noise. The window
 is a Gaussian: a box turns some ripples of the average around, and the average would feed on them."""
+SMALL_PX = 100
+"""Pictures of fewer rows or columns are compared as they are."""
 LEAST_GAIN, MOST_GAIN = 0.5, 2.0
 """Where light changed by more than these factors between dark slots, the average starts again."""
-SPARSE = 5
-"""Noise is judged from every fifth pixel of every fifth row, which is plenty."""
+SPARSE, MOST_JUDGED = 5, 20_000
+"""Noise is judged from every fifth pixel of every fifth row, or so many pixels, which is plenty."""
+BAND_ROWS = 64
+"""Rows that are worked on at a time: a whole number of blocks, that fit into a core's second cache."""
 NEIGHBOURHOOD_PX = 9
 """What the level does not explain is judged over a square of this width, which averages noise away."""
 CHANGED = 4.0
@@ -40,12 +48,13 @@ CHANGED = 4.0
 class Ambient:
     """What one exposure collects of the ambient light, from the dark slots up to one of them.
 
-    ``image`` is averaged over ``slots`` (row, col) and holds for the moments ``middle_s`` (row,). ``known`` (row,) is
-    False where no dark slot was seen yet: nothing can be taken off there. The image is free of the ripple of ``mains``,
-    where one is known.
+    ``image`` is averaged over ``slots`` (row, block) and holds for the moments ``middle_s`` (row,); ``coarse`` is its
+    mean over blocks. ``known`` (row,) is False where no dark slot was seen yet: nothing can be taken off there. The
+    image is free of the ripple of ``mains``, where one is known.
     """
 
     image: Image
+    coarse: Image
     slots: Image
     middle_s: FloatArray
     known: NDArray[np.bool_]
@@ -55,12 +64,12 @@ class Ambient:
 
 def update(ambient: Ambient | None, dark: Plate) -> Ambient:
     """Return the ambient light with one more dark slot in it."""
-    image = dark.image
-    rows = RowLight.of(dark, image)
+    rows, coarse = _looked_at(dark)
     if ambient is None:
-        slots = np.broadcast_to(dark.seen[:, None], image.shape[:2]).astype(np.float32)
+        slots = np.broadcast_to(dark.seen[:, None], (len(dark.seen), coarse.shape[1])).astype(np.float32)
         return Ambient(
-            image=image,
+            image=dark.image,
+            coarse=coarse,
             slots=slots,
             middle_s=rows.opened.middle_s,
             known=dark.seen,
@@ -68,16 +77,17 @@ def update(ambient: Ambient | None, dark: Plate) -> Ambient:
             index=dark.flash.index,
         )
     mains = ambient.mains.next(rows)
-    new = image if mains.ripple is None else _times_rows(image, 1 / mains.ripple.swing(rows.opened))
-    blended, slots = np.empty_like(new), np.empty_like(ambient.slots)
-    change = _Change.between(ambient.image, new, ambient.known & dark.seen)
-    restarts = change.restarts | ~ambient.known[:, None] | _first_ripple(ambient.mains, mains)
-    old, now, gain, out = (
-        picture.reshape(*new.shape[:2], -1) for picture in (ambient.image, new, change.gain, blended)
-    )
-    _blend(old, now, gain, ambient.slots, restarts, dark.seen, out, slots)
+    factor = np.ones(len(dark.seen)) if mains.ripple is None else 1 / mains.ripple.swing(rows.opened)
+    blocks = _block_rows(len(dark.seen), len(coarse))
+    coarse = _times_rows(coarse, np.bincount(blocks, factor) / np.bincount(blocks))
+    whole = np.bincount(blocks, ~(ambient.known & dark.seen)) == 0
+    change = _Change.between(ambient.coarse, coarse, whole, sparse=_is_coarse(dark.picture.shape))
+    again = ~ambient.known | _first_ripple(ambient.mains, mains)
+    restarts = change.restarts[blocks] | again[:, None]
+    image, slots = _blended(ambient, dark, change.gain, restarts, factor)
     return Ambient(
-        image=blended,
+        image=image,
+        coarse=_reduced(image),
         slots=slots,
         middle_s=np.where(dark.seen, rows.opened.middle_s, ambient.middle_s),
         known=ambient.known | dark.seen,
@@ -86,62 +96,143 @@ def update(ambient: Ambient | None, dark: Plate) -> Ambient:
     )
 
 
+def _looked_at(dark: Plate) -> tuple[RowLight, Image]:
+    """Return a dark slot's rows and the means over its blocks, of which the image itself is not held."""
+    shape = dark.picture.shape
+    size = _coarse_size(shape)
+    each = BAND_ROWS if _is_coarse(shape) and shape[0] % COARSE == 0 else shape[0]
+
+    read = dark.picture.reader()
+
+    def look(first: int, last: int) -> tuple[FloatArray, FloatArray, Image]:
+        band = read(first, last)
+        most = band.reshape(last - first, -1).max(axis=1).astype(np.float64)
+        rows = (last - first) // COARSE if each < shape[0] else size[0]
+        small = cv2.resize(band, (size[1], rows), interpolation=cv2.INTER_AREA)
+        return row_profile(band), most, np.asarray(small, np.float32).reshape(rows, size[1], *shape[2:])
+
+    means, peaks, smalls = zip(*over_ranges(look, shape[0], each=each), strict=True)
+    rows = RowLight.of(dark, np.concatenate(means), np.concatenate(peaks))
+    return rows, np.concatenate(smalls)
+
+
+def _is_coarse(shape: tuple[int, ...]) -> bool:
+    """Whether levels are compared over blocks; small pictures are compared as they are."""
+    return min(shape[:2]) >= SMALL_PX
+
+
+def _coarse_size(shape: tuple[int, ...]) -> tuple[int, int]:
+    shrink = COARSE if _is_coarse(shape) else 1
+    return shape[0] // shrink, shape[1] // shrink
+
+
+def _reduced(image: Image) -> Image:
+    rows, cols = _coarse_size(image.shape)
+    small = cv2.resize(image, (cols, rows), interpolation=cv2.INTER_AREA)
+    return np.asarray(small, np.float32).reshape(rows, cols, *image.shape[2:])
+
+
+def _block_rows(rows: int, blocks: int) -> NDArray[np.intp]:
+    """Return the block in which each row lies, shape (row,)."""
+    return np.arange(rows) * blocks // rows
+
+
+def _blended(
+    ambient: Ambient, dark: Plate, gain: Image, restarts: NDArray[np.bool_], factor: FloatArray
+) -> tuple[Image, Image]:
+    """Return the average with one more dark slot, its rows times a factor, and how many slots it spans then."""
+    image, slots = np.empty_like(ambient.image), np.empty_like(ambient.slots)
+    rows, cols = image.shape[:2]
+    blocks = _block_rows(cols, slots.shape[1])
+
+    read = dark.picture.reader()
+
+    def blend(first: int, last: int) -> None:
+        band = slice(first, last)
+        new = _times_rows(read(first, last), factor[band])
+        old, now, level, out = (
+            picture.reshape(last - first, cols, -1)
+            for picture in (ambient.image[band], new, _enlarged_rows(gain, image.shape, first, last), image[band])
+        )
+        _blend(old, now, level, ambient.slots[band], restarts[band], dark.seen[band], blocks, out, slots[band])
+
+    over_ranges(blend, rows, each=BAND_ROWS)
+    return image, slots
+
+
+def _enlarged_rows(gain: Image, shape: tuple[int, ...], first: int, last: int) -> Image:
+    """Return some rows of what is known of blocks, between whose middles it changes steadily."""
+    if gain.shape[:2] == shape[:2]:
+        return gain[first:last]
+    place = np.clip((np.arange(first, last) + 0.5) * len(gain) / shape[0] - 0.5, 0, len(gain) - 1)
+    upper = np.minimum(place.astype(np.intp), len(gain) - 2)
+    share = (place - upper).astype(np.float32).reshape(-1, *[1] * (gain.ndim - 1))
+    between = gain[upper] + share * (gain[upper + 1] - gain[upper])
+    wide = cv2.resize(between, (shape[1], last - first), interpolation=cv2.INTER_LINEAR)
+    return np.ascontiguousarray(wide, np.float32)
+
+
 def _first_ripple(before: Mains, after: Mains) -> bool:
     """Tell whether a ripple is known that is still in the earlier picture."""
     return before.ripple is None and after.ripple is not None
 
 
 def _times_rows(image: Image, factor: NDArray[np.floating]) -> Image:
+    if (factor == 1).all():
+        return image
     scaled: Image = image * factor.astype(np.float32).reshape(-1, *[1] * (image.ndim - 1))
     return scaled
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Change:
-    """From one dark slot to the next: the ``gain`` of each neighbourhood, of the image's shape, and where (row, col)
-    it does not explain what is seen, so that the average ``restarts``."""
+    """From one dark slot to the next: the ``gain`` of each neighbourhood, (row, col[, channel]) of blocks, and where
+    (row, col) it does not explain what is seen, so that the average ``restarts``."""
 
     gain: Image
     restarts: NDArray[np.bool_]
 
     @classmethod
-    def between(cls, old: Image, new: Image, both: NDArray[np.bool_]) -> "_Change":
-        """Compare two pictures in the rows that both show."""
-        gain = _gain(old, new, both)
+    def between(cls, old: Image, new: Image, both: NDArray[np.bool_], *, sparse: bool) -> "_Change":
+        """Compare two pictures in the rows that both show; ``sparse``: they are means over blocks."""
+        gain = _gain(old, new, both, sparse=sparse)
+        width = max(NEIGHBOURHOOD_PX // COARSE | 1, 3) if sparse else NEIGHBOURHOOD_PX
         before, now, factor = (picture.reshape(*old.shape[:2], -1) for picture in (old, new, gain))
-        rest, level = np.empty(old.shape[:2], np.float32), np.empty(old.shape[:2], np.float32)
-        _rest(before, now, factor, both, rest, level)
-        local = np.asarray(cv2.blur(rest, (NEIGHBOURHOOD_PX, NEIGHBOURHOOD_PX)), np.float32)
-        some = np.flatnonzero(both[::SPARSE]) * SPARSE
-        variance, per_level = _noise(rest[some, ::SPARSE].ravel(), level[some, ::SPARSE].ravel())
-        restarts = np.empty(rest.shape, np.bool_)
-        most = np.float32((CHANGED / NEIGHBOURHOOD_PX) ** 2)
-        _beyond(local, level, factor, most * variance, most * per_level, restarts)
-        return cls(gain=gain, restarts=restarts)
+        rest, level = (
+            np.where(both[:, None], _mean(picture), np.float32(0)) for picture in (now - factor * before, now)
+        )
+        local = np.asarray(cv2.blur(rest, (width, width)), np.float32)
+        variance, per_level = _noise(rest[both].ravel(), level[both].ravel())
+        most = np.float32((CHANGED / width) ** 2) * (variance + per_level * np.maximum(level, 0))
+        restarts = local * local > most
+        limited = (factor <= np.float32(LEAST_GAIN)) | (factor >= np.float32(MOST_GAIN))
+        return cls(gain=gain, restarts=restarts | limited.any(axis=2) if limited.any() else restarts)
 
 
-def _gain(old: Image, new: Image, both: NDArray[np.bool_]) -> Image:
-    """Return by which factor each neighbourhood's light changed, of the image's shape; 1 where it is dark."""
-    rows, cols = old.shape[:2]
-    shrink = COARSE if min(rows, cols) >= 50 * LEVEL_SIGMA_PX else 1
+def _mean(picture: Image) -> Image:
+    """Return the mean over channels; numpy is slow along a short last axis."""
+    channels = picture.shape[2]
+    return np.asarray(cv2.transform(picture, np.full((1, channels), 1 / channels, np.float32)), np.float32)
+
+
+def _gain(old: Image, new: Image, both: NDArray[np.bool_], *, sparse: bool) -> Image:
+    """Return by which factor each neighbourhood's light changed, of the pictures' shape; 1 where it is dark."""
     shown = both.astype(np.float32)
-    coarse = [_coarse(picture if both.all() else _times_rows(picture, shown), shrink) for picture in (old, new)]
-    small = [cv2.GaussianBlur(picture, (0, 0), LEVEL_SIGMA_PX) for picture in coarse]
-    across = np.diff(new[::SPARSE, ::SPARSE] - old[::SPARSE, ::SPARSE], axis=1)
-    floor = np.float32(2 * float(np.median(np.abs(across))) + 1e-5) if across.size else np.float32(1e-5)
+    small = [
+        cv2.GaussianBlur(picture if both.all() else _times_rows(picture, shown), (0, 0), LEVEL_SIGMA_PX)
+        for picture in (old, new)
+    ]
+    across = np.abs(np.diff(new[::SPARSE] - old[::SPARSE], axis=1))  # its quieter half, which texture spares
+    noise = 2.1 * float(np.percentile(across, 25)) * (COARSE if sparse else 1) if across.size else 0.0
+    floor = np.float32(2 * noise + 1e-5)
     gain = (np.maximum(small[1], 0) + floor) / (np.maximum(small[0], 0) + floor)
-    gain = np.clip(gain, LEAST_GAIN, MOST_GAIN)
-    full = cv2.resize(gain, (cols, rows), interpolation=cv2.INTER_LINEAR) if shrink > 1 else gain
-    return np.ascontiguousarray(full, np.float32).reshape(old.shape)
-
-
-def _coarse(image: Image, shrink: int) -> Image:
-    rows, cols = image.shape[:2]
-    return np.asarray(cv2.resize(image, (cols // shrink, rows // shrink), interpolation=cv2.INTER_AREA), np.float32)
+    return np.clip(gain, LEAST_GAIN, MOST_GAIN).reshape(old.shape).astype(np.float32, copy=False)
 
 
 def _noise(rest: Image, level: Image) -> tuple[np.float32, np.float32]:
     """Return the variance of what is left without light, and per unit of light: read noise and photon noise."""
+    step = max(len(rest) // MOST_JUDGED, 1)
+    rest, level = rest[::step], level[::step]
     if len(rest) < 64:
         return np.float32(1e-12), np.float32(0)
     order = np.array_split(np.argsort(level), 8)
@@ -152,42 +243,6 @@ def _noise(rest: Image, level: Image) -> tuple[np.float32, np.float32]:
 
 
 @EXACT.kept
-def _rest(old: Image, new: Image, gain: Image, both: NDArray[np.bool_], rest: Image, level: Image) -> None:
-    """Average over channels what the gain leaves unexplained, and the light itself; 0 where a row was not shown."""
-    rows, cols, channels = old.shape
-    for row in range(rows):
-        for col in range(cols):
-            total, light = np.float32(0), np.float32(0)
-            if both[row]:
-                for channel in range(channels):
-                    total += new[row, col, channel] - gain[row, col, channel] * old[row, col, channel]
-                    light += new[row, col, channel]
-            rest[row, col] = total / np.float32(channels)
-            level[row, col] = light / np.float32(channels)
-
-
-@EXACT.kept
-def _beyond(
-    local: Image,
-    level: Image,
-    gain: Image,
-    variance: np.float32,
-    per_level: np.float32,
-    restarts: NDArray[np.bool_],
-) -> None:
-    """Mark where a neighbourhood changed by more than noise, or by a factor beyond its limits."""
-    rows, cols, channels = gain.shape
-    for row in range(rows):
-        for col in range(cols):
-            light = max(level[row, col], np.float32(0))
-            far = local[row, col] * local[row, col] > variance + per_level * light
-            for channel in range(channels):
-                factor = gain[row, col, channel]
-                far = far or factor <= np.float32(LEAST_GAIN) or factor >= np.float32(MOST_GAIN)
-            restarts[row, col] = far
-
-
-@EXACT.kept
 def _blend(
     old: Image,
     new: Image,
@@ -195,22 +250,54 @@ def _blend(
     old_slots: Image,
     restarts: NDArray[np.bool_],
     seen: NDArray[np.bool_],
+    blocks: NDArray[np.intp],
     blended: Image,
     slots: Image,
 ) -> None:
     """Average at the new level, start again where that explains nothing, and keep what was where nothing was seen."""
     rows, cols, channels = old.shape
     for row in range(rows):
+        for block in range(slots.shape[1]):
+            spanned = min(old_slots[row, block] + np.float32(1), np.float32(LONGEST_MEMORY))
+            count = np.float32(1) if restarts[row, block] else spanned
+            slots[row, block] = count if seen[row] else old_slots[row, block]
         for col in range(cols):
-            spanned = min(old_slots[row, col] + np.float32(1), np.float32(LONGEST_MEMORY))
-            count = np.float32(1) if restarts[row, col] else spanned
-            slots[row, col] = count if seen[row] else old_slots[row, col]
+            share = np.float32(1) / max(slots[row, blocks[col]], np.float32(1))
             for channel in range(channels):
                 before = old[row, col, channel]
                 if seen[row]:
                     before *= gain[row, col, channel]
-                    before += (new[row, col, channel] - before) / count
+                    before += (new[row, col, channel] - before) * share
                 blended[row, col, channel] = before
+
+
+def with_darks_ahead(plates: Iterator[Plate], timing: Timing) -> tuple[Iterator[Plate], Iterator[Plate]]:
+    """Return a clip's plates, and the dark slots among them ahead of the others, which wait meanwhile.
+
+    No plate is made for waiting: it holds the frames that it will be made of.
+    """
+    waiting: deque[Plate] = deque()
+    complete = [flash.index for flash in timing.flashes if flash.is_dark and flash.complete]
+    last = max(complete, default=-1)
+
+    def coming() -> Iterator[Plate]:
+        while waiting:
+            yield waiting.popleft()
+        for plate in plates:
+            yield plate
+            del plate
+            while waiting:
+                yield waiting.popleft()
+
+    def darks() -> Iterator[Plate]:
+        found = -1
+        while found < last and (plate := next(plates, None)) is not None:
+            waiting.append(plate)
+            if plate.flash.is_dark:
+                found = plate.flash.index
+                yield plate
+
+    return coming(), darks()
 
 
 def subtract(plates: Iterable[Plate], *, darks: Iterable[Plate] = ()) -> Iterator[Plate]:

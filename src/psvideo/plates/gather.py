@@ -6,11 +6,12 @@ A clip of any length streams through in constant memory.
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
+from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
 
-from psvideo.clip import Clip, Frame, Take, check_take, demosaic, read_frames
+from psvideo.clip import Clip, Frame, Take, check_take, demosaic, holds_plain_codes, read_frames
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.compute.threads import thread_count
 from psvideo.errors import check_kind
@@ -21,7 +22,7 @@ from psvideo.model.shutter import frames_touched
 from psvideo.model.timing import Flash, Timing, places_in_time, timed_camera
 from psvideo.plates import hudon2015
 from psvideo.plates.align.rounds import Aligning, aligned
-from psvideo.plates.ambient import subtract, update
+from psvideo.plates.ambient import subtract, update, with_darks_ahead
 from psvideo.plates.ambient_regression import Design, Separated, design_of, separated, windows_of
 from psvideo.plates.mixture import made
 from psvideo.plates.nearest_rows import has_blind_time, with_nearest_rows
@@ -39,6 +40,8 @@ from psvideo.plates.split import Plate, plate_of, split
 
 AnyPlate = TypeVar("AnyPlate", Plate, LightPlate)
 
+MOST_WAITING = 24
+"""Plates that may wait for the next dark slot; frames are held for them, and farther ones are read before."""
 AHEAD = 2
 """Frames that are decoded in advance while plates are rebuilt; each costs memory."""
 
@@ -128,19 +131,23 @@ def clip_plates(
     each_window: Callable[[Separated], None] | None = None,
 ) -> Iterator[Plate]:
     """Decode a take once and yield the plate of every flash that it holds, ambient light taken off, demosaiced."""
-    _decode_ahead(take, watch)
     clip, camera = take.clip, timed_camera(take.plan, timing)
     places = places_in_time(timing, clip.numbers)
     used = _within(timing, camera, take, places)
+    has_dark = not all(flash.lit for flash in take.plan.flashes)
+    waits = has_dark and _come_often(used)
+    if not waits:
+        _decode_ahead(take, watch)
     decoded = read_frames(clip, take.numbers, ahead=AHEAD, threads=thread_count(), kept=take.kept)
     frames = _placed(watch(decoded, total=len(take.numbers), what="rebuilding flashes"), places)
-    rebuild = split if method == "weights" else hudon2015.split
-    if len(take.plan.lit_slots) < len(take.plan.flashes):
-        ambient_plates = _dark_plates(take, camera, used, places)
+    single = (split if method == "weights" else hudon2015.split)(frames, camera, used)
+    if waits:
+        single, darks = with_darks_ahead(single, used)
+    elif has_dark:
+        darks = _dark_plates(take, camera, used, places)
     else:
-        ambient_plates = _separated_plates(take, camera, used, places, each_window)
-    plates = subtract(rebuild(frames, camera, used), darks=ambient_plates)
-    return map(_colour_of(clip), plates)
+        darks = _separated_plates(take, camera, used, places, each_window)
+    return map(_colour_of(clip), subtract(single, darks=darks))
 
 
 def first_ambient(take: Take, timing: Timing) -> LightPlate | None:
@@ -157,9 +164,11 @@ def first_ambient(take: Take, timing: Timing) -> LightPlate | None:
 
 
 def _decode_ahead(take: Take, watch: Watch) -> None:
-    """Decode all frames into the take's store, unless the fit did: what shows ambient light is read ahead."""
+    """Decode all frames into the take's store, unless the fit did, where what shows ambient light is read before."""
     clip, kept = take.clip, take.kept
-    if kept is not None and take.plan.mode != "synced" and not (len(kept) or kept.missed):
+    if kept is None or take.plan.mode == "synced" or holds_plain_codes(clip):
+        return
+    if not (len(kept) or kept.missed):
         frames = read_frames(clip, take.numbers, ahead=thread_count(), threads=thread_count(), kept=kept, keep=True)
         deque(watch(frames, total=len(take.numbers), what="decoding"), maxlen=0)
 
@@ -181,6 +190,12 @@ def _within(timing: Timing, camera: Camera, take: Take, places: Mapping[int, int
         for n, flash in enumerate(timing.flashes)
     )
     return replace(timing, flashes=flashes)
+
+
+def _come_often(timing: Timing) -> bool:
+    """Tell whether no more than so many flashes lie between complete dark slots that plates can wait for the next."""
+    dark = [flash.index for flash in timing.flashes if flash.is_dark and flash.complete]
+    return all(after - before <= MOST_WAITING for before, after in pairwise(dark))
 
 
 def _dark_plates(take: Take, camera: Camera, timing: Timing, places: Mapping[int, int]) -> Iterator[Plate]:

@@ -13,8 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.camera import FloatArray
-from psvideo.model.coded import Image
-from psvideo.model.row_profiles import row_profile
 from psvideo.plates.split import Plate
 
 PULSES_HZ = (100.0, 120.0)
@@ -60,10 +58,9 @@ class RowLight:
     good: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, plate: Plate, image: Image) -> "RowLight":
-        """Return the rows of a plate that still holds its ambient light, and of its picture."""
-        mean = row_profile(image)
-        good = plate.seen & (mean > 0) & (image.reshape(len(mean), -1).max(axis=1) < 1.0)
+    def of(cls, plate: Plate, mean: FloatArray, most: FloatArray) -> "RowLight":
+        """Return the rows of a plate that still holds its ambient light, of their means and their largest samples."""
+        good = plate.seen & (mean > 0) & (most < 1.0)
         return cls(mean=mean, opened=Exposures(shares=plate.shares, middles_s=plate.middles_s), good=good)
 
 

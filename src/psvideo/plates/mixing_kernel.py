@@ -19,7 +19,7 @@ COUNTS = np.float32(0.02)
 """A clipped sample clips the plate where so much of it counts; less is a neighbour's tail that is taken off."""
 
 
-class Mix(NamedTuple):
+class MixtureArrays(NamedTuple):
     """What to add up, in plain arrays; addresses are those of pictures' first samples.
 
     like: any array of the codes' type. samples: of a row. zero, gain: (frame, row, col) patterns, of the tone.
@@ -40,7 +40,7 @@ class Mix(NamedTuple):
 
 
 @FUSED.kept
-def mix_rows(mix: Mix, rows: Places, out: Floats) -> None:
+def mix_rows(mix: MixtureArrays, rows: Places, out: Floats) -> None:
     """Make some rows: ``out`` is (row, sample), one for each of ``rows``."""
     given = lent_mix(mix)
     made, wanted = lent(out), lent(rows)
@@ -49,7 +49,7 @@ def mix_rows(mix: Mix, rows: Places, out: Floats) -> None:
 
 
 @FUSED.kept
-def mix_halved(mix: Mix, first: int, last: int, channels: int, out: Floats) -> None:
+def mix_halved(mix: MixtureArrays, first: int, last: int, channels: int, out: Floats) -> None:
     """Make pairs of rows, and of them the mean over two by two pixels and all channels: ``out`` (row // 2, col // 2).
 
     ``first`` and ``last`` count rows of ``out``.
@@ -68,16 +68,16 @@ def mix_halved(mix: Mix, first: int, last: int, channels: int, out: Floats) -> N
 
 
 @FUSED.inlined
-def lent_mix(mix: Mix) -> Mix:
+def lent_mix(mix: MixtureArrays) -> MixtureArrays:
     """The same without reference counts."""
-    return Mix(
+    return MixtureArrays(
         lent(mix.frames), lent(mix.like), mix.samples, lent(mix.coefficients), lent(mix.table), lent(mix.zero),
         lent(mix.gain), mix.most, lent(mix.levels), lent(mix.taken), mix.ceiling, mix.clips_from,
     )  # fmt: skip
 
 
 @FUSED.called
-def mix_row(mix: Mix, row: int, out: Floats) -> None:
+def mix_row(mix: MixtureArrays, row: int, out: Floats) -> None:
     """Make one row: frames added, levels taken off, the ceiling where a sample that counts was clipped."""
     begun, holds_clipped = False, False
     for frame in range(mix.frames.shape[0]):
@@ -99,14 +99,14 @@ def mix_row(mix: Mix, row: int, out: Floats) -> None:
 
 
 @FUSED.inlined
-def _row_of(mix: Mix, frame: int, row: int) -> Any:
+def _row_of(mix: MixtureArrays, frame: int, row: int) -> Any:
     end = (row + 1) * mix.samples
     return carray(pointer(mix.frames[frame], mix.like), end)[row * mix.samples : end]
 
 
 @FUSED.inlined
 def _add_row(
-    mix: Mix, frame: int, row: int, codes: NDArray[Any], factor: np.float32, out: Floats, begun: bool
+    mix: MixtureArrays, frame: int, row: int, codes: NDArray[Any], factor: np.float32, out: Floats, begun: bool
 ) -> np.int32:
     """Add a frame's row times its coefficient; return how many samples are clipped."""
     rows, cols = mix.zero.shape[1:]
@@ -157,7 +157,7 @@ def _add_linear(
 
 
 @FUSED.inlined
-def _take_off(mix: Mix, level: int, row: int, share: np.float32, out: Floats) -> None:
+def _take_off(mix: MixtureArrays, level: int, row: int, share: np.float32, out: Floats) -> None:
     end = (row + 1) * mix.samples
     picture = carray(pointer(mix.levels[level], mix.taken), end)[row * mix.samples : end]
     for sample in range(out.shape[0]):
@@ -165,7 +165,7 @@ def _take_off(mix: Mix, level: int, row: int, share: np.float32, out: Floats) ->
 
 
 @FUSED.inlined
-def _mark_clipped(mix: Mix, row: int, out: Floats) -> None:
+def _mark_clipped(mix: MixtureArrays, row: int, out: Floats) -> None:
     rows, cols = mix.zero.shape[1:]
     for frame in range(mix.frames.shape[0]):
         if mix.coefficients[frame, row] > COUNTS:

@@ -8,6 +8,7 @@ beside them. Levels are what is known of the ambient light, in linear light.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +17,17 @@ from psvideo.compute.threads import over_ranges
 from psvideo.model.camera import FloatArray
 from psvideo.model.clipping import SATURATED
 from psvideo.model.coded import IDENTITY, Coded, Image
-from psvideo.plates.mixing_kernel import COUNTS, Mix, mix_halved, mix_rows
+from psvideo.plates.mixing_kernel import COUNTS, MixtureArrays, mix_halved, mix_rows
 
-BAND_SAMPLES = 1 << 18
+BAND_SAMPLES = 1 << 20
 """Samples of one band of rows, which a thread makes at a time."""
+
+
+class Reader(Protocol):
+    """Makes rows of a picture, from the first up to the last; see ``Mixture.reader``."""
+
+    def __call__(self, first: int, last: int, into: Image | None = None) -> Image:
+        """Return the rows."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -57,6 +65,20 @@ class Mixture:
         image = np.empty(self.shape, np.float32)
         self._into(image, range(self.shape[0]))
         return image
+
+    def reader(self) -> Reader:
+        """Return what makes rows of the picture in the thread that calls it: from the first up to the last, into an
+        array, if one is given, else into a new one."""
+        if self.is_made:
+            return _copying(self.image())
+        mix = self.bound()
+
+        def read(first: int, last: int, into: Image | None = None) -> Image:
+            band = np.empty((last - first, *self.shape[1:]), np.float32) if into is None else into
+            mix_rows(mix, np.arange(first, last), band.reshape(last - first, -1))
+            return band
+
+        return read
 
     def rows(self, rows: range | NDArray[np.intp]) -> Image:
         """Return some rows of the picture, shape (row, col[, channel])."""
@@ -96,7 +118,7 @@ class Mixture:
             clipped[counts] |= frame.light()[counts] >= np.float32(self.clips_from)
         return clipped
 
-    def bound(self) -> Mix:
+    def bound(self) -> MixtureArrays:
         """Return what a compiled loop needs; valid as long as this picture is held."""
         frames = self.frames
         tables = {id(frame.tone.table): frame.tone.table for frame in frames if frame.tone.table.size}
@@ -105,7 +127,7 @@ class Mixture:
             return replace(self, frames=frames).bound()
         first = frames[0]
         taken = np.zeros((0, self.shape[0])) if self.taken is None else self.taken
-        return Mix(
+        return MixtureArrays(
             frames=np.array([frame.codes.ctypes.data for frame in frames], np.intp),
             like=first.codes.reshape(-1)[:0],
             samples=int(np.prod(self.shape[1:])),
@@ -123,7 +145,21 @@ class Mixture:
     def _into(self, image: Image, rows: range | NDArray[np.intp]) -> None:
         mix, places = self.bound(), np.array(rows, np.intp)
         flat = image.reshape(len(rows), -1)
-        _in_bands(lambda first, last: mix_rows(mix, places[first:last], flat[first:last]), len(rows), mix.samples)
+
+        def band(first: int, last: int) -> None:
+            mix_rows(mix, places[first:last], flat[first:last])
+
+        _in_bands(band, len(rows), mix.samples)
+
+
+def _copying(image: Image) -> Reader:
+    def read(first: int, last: int, into: Image | None = None) -> Image:
+        if into is None:
+            return image[first:last]
+        into[:] = image[first:last]
+        return into
+
+    return read
 
 
 def made(image: Image) -> Mixture:

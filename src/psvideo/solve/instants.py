@@ -1,6 +1,6 @@
 """Rounds of plates in, the surface at every instant out."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -19,10 +19,12 @@ from psvideo.model.plan import Plan
 from psvideo.model.rig import Rig
 from psvideo.model.surface import Surface
 from psvideo.plates.align.denoise import Average, averaged
+from psvideo.plates.mixture import Mixture
 from psvideo.plates.sequence import Round
 from psvideo.solve.near_surface import NearSurface, solve_near
 from psvideo.solve.normals.illumination import Illumination, illumination
 from psvideo.solve.normals.solving import Solving
+from psvideo.solve.normals.task import Samples
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,9 +68,7 @@ def surfaces(
         light = partial(illumination, scaled, channels=1 if len(one.plates[0].shape) == 2 else 3)
         whole = all(plate.seen.ndim == 1 for plate in one.plates)
         seen = np.stack([plate.seen if whole else plate.pixels_seen for plate in one.plates])
-        plates = [image_per_saturation(plate.image, plate.saturation) for plate in one.plates]
-        if shares is not None:
-            plates = [image_evened(plate, share) for plate, share in zip(plates, shares, strict=True)]
+        plates = _pictures(one, shares)
         shown = None if seen.all() else seen
 
         def solve(lit: Illumination) -> Surface:
@@ -81,6 +81,16 @@ def surfaces(
 
     # map and filter hold no round while the next one gathers, as a loop's variable would
     return map(solved, filter(lambda one: one.lights == plan.lights, gathered))
+
+
+def _pictures(one: Round, shares: Sequence[NDArray[np.float32]] | None) -> Sequence[Samples] | Sequence[Mixture]:
+    """Return a round's plates on a scale on which they are clipped at 1.0, and evened; made only where that asks it."""
+    if shares is None and all(plate.saturation == 1.0 for plate in one.plates):
+        return [plate.picture for plate in one.plates]
+    plates = [image_per_saturation(plate.image, plate.saturation) for plate in one.plates]
+    if shares is None:
+        return plates
+    return [image_evened(plate, share) for plate, share in zip(plates, shares, strict=True)]
 
 
 def denoised(instants: Iterable[Instant], results: int) -> Iterator[Instant]:

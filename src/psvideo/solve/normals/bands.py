@@ -7,11 +7,14 @@ import numpy as np
 
 from psvideo.compute.threads import over_ranges
 from psvideo.model.surface import Surface
+from psvideo.plates.mixture import Reader
 from psvideo.solve.normals.illumination import Illumination
-from psvideo.solve.normals.task import Mask, Result, Samples
+from psvideo.solve.normals.task import Mask, Result, Samples, Task
 
 BAND_PIXELS = 1 << 16
 """Pixels of one band; fewer are solved before a thread has started."""
+MADE_PIXELS = 1 << 15
+"""Pixels of one band of plates that are made for it: those of a few lights stay in a core's second cache."""
 
 
 def check_arrays(plates: Sequence[Samples], lit: Illumination, seen: Mask | None, mask: Mask | None) -> None:
@@ -40,6 +43,27 @@ def check_arrays(plates: Sequence[Samples], lit: Illumination, seen: Mask | None
 def in_bands(run: Callable[[int, int], None], *, rows: int, cols: int, threads: int | None) -> None:
     """Call ``run(first, last)`` for bands of rows side by side. (Numba's own thread pool may abort when two use it.)"""
     over_ranges(run, rows, each=BAND_PIXELS // cols, threads=threads)
+
+
+def shown_in_bands(
+    run: Callable[[Task, int, int], None], given: Task, readers: Sequence[Reader], shape: tuple[int, ...]
+) -> None:
+    """Call ``run(task, first, last)`` for bands of rows side by side, of plates of which only these rows are made.
+
+    The task finds the rows where they would lie if the whole plates did.
+    """
+    rows, cols = shape[:2]
+
+    def band(first: int, last: int) -> None:
+        held = np.empty((len(readers), last - first, *shape[1:]), np.float32)
+        for read, into in zip(readers, held, strict=True):
+            read(first, last, into)
+        row_bytes = held.strides[1]
+        begins = np.array([plate.ctypes.data - first * row_bytes for plate in held], np.intp)
+        copies = len(given.plates) - len(readers)
+        run(given._replace(plates=np.pad(begins, (0, copies), mode="edge")), first, last)
+
+    over_ranges(band, rows, each=MADE_PIXELS // cols)
 
 
 def surface_of(result: Result, error: Samples | None, shape: tuple[int, ...], *, half: bool) -> Surface:

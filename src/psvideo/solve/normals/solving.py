@@ -6,6 +6,7 @@ from typing import Literal
 
 from psvideo.model.choices import Solver
 from psvideo.model.surface import Surface
+from psvideo.plates.mixture import Mixture
 from psvideo.solve.normals import robust, woodham1980
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.task import Mask, Samples
@@ -32,12 +33,18 @@ class Solving:
         return self.solver
 
     def solve(
-        self, plates: Sequence[Samples], lit: Illumination, *, seen: Mask | None = None, mask: Mask | None = None
+        self,
+        plates: Sequence[Samples] | Sequence[Mixture],
+        lit: Illumination,
+        *,
+        seen: Mask | None = None,
+        mask: Mask | None = None,
     ) -> Surface:
         """Return the surface that explains one plate per light; see the solvers for the arguments."""
         if self.method(len(plates)) == "robust":
+            images = [plate.image() if isinstance(plate, Mixture) else plate for plate in plates]
             return robust.solve(
-                plates, lit, seen=seen, mask=mask, half=self.half, residual=self.residual, error=self.error
+                images, lit, seen=seen, mask=mask, half=self.half, residual=self.residual, error=self.error
             )
         return woodham1980.solve(plates, lit, seen=seen, mask=mask, half=self.half, residual=self.residual)
 

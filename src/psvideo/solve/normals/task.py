@@ -142,7 +142,7 @@ def task(
     copies = -len(plates) % 3
     return Task(
         plates=np.array([plate.ctypes.data for plate in [*plates, *[plates[-1]] * copies]], np.intp),
-        like=plates[0].reshape(-1)[:0],
+        like=np.empty(0, plates[0].dtype),
         lights=len(plates),
         cols=cols,
         tone=_filled(tone, copies, mode="edge"),

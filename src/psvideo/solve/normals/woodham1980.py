@@ -6,19 +6,21 @@ a n is the least-squares solution of these equations, which minimises the plates
 """
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
 from psvideo.model.surface import Surface
-from psvideo.solve.normals.bands import check_arrays, in_bands, surface_of
+from psvideo.plates.mixture import Mixture
+from psvideo.solve.normals.bands import check_arrays, in_bands, shown_in_bands, surface_of
 from psvideo.solve.normals.illumination import Illumination
-from psvideo.solve.normals.task import EVERYTHING, Mask, Samples, Usable, empty_result, task
+from psvideo.solve.normals.task import EVERYTHING, Mask, Samples, Task, Usable, empty_result, task
 
 __all__ = ["EVERYTHING", "Usable", "solve"]
 
 
 def solve(
-    plates: Sequence[Samples],
+    plates: Sequence[Samples] | Sequence[Mixture],
     lit: Illumination,
     *,
     seen: Mask | None = None,
@@ -33,7 +35,8 @@ def solve(
     """Return the surface that explains one plate per light.
 
     plates: one per light of ``lit``, in its order, each (row, col) or (row, col, 3), all of one type: float32 with
-        1.0 = saturation, or uint16 codes, for which (code - ``black_level``) * ``scale`` is that.
+        1.0 = saturation, or uint16 codes, for which (code - ``black_level``) * ``scale`` is that; or pictures that are
+        not made yet, of which no more than a band of rows ever is.
     seen: True where a plate's rows were exposed, shape (light, row) or (light, row, col); by default all.
     mask: True where to solve, shape (row, col); by default everywhere.
     half: give half floats instead of float32.
@@ -47,17 +50,24 @@ def solve(
 
     The result does not depend on ``threads``. Raises ValueError where the arrays do not belong together.
     """
-    check_arrays(plates, lit, seen, mask)
     from psvideo.solve.normals.kernel import solve_rows, working_memory
 
-    samples = [np.ascontiguousarray(plate) for plate in plates]
-    rows, cols = samples[0].shape[:2]
+    readers = [plate.reader() for plate in plates if isinstance(plate, Mixture)]
+    samples = [
+        np.broadcast_to(np.float32(0), plate.shape) if isinstance(plate, Mixture) else np.ascontiguousarray(plate)
+        for plate in plates
+    ]
+    check_arrays(samples, lit, seen, mask)
+    shape = samples[0].shape
+    rows, cols = shape[:2]
     result = empty_result(rows * cols, lit.intensities.shape[1], half=half, residual=residual)
     given = task(samples, lit, seen, mask, usable, black_level, scale)
-    in_bands(
-        lambda first, last: solve_rows(given, result, working_memory(given), first, last),
-        rows=rows,
-        cols=cols,
-        threads=threads,
-    )
-    return surface_of(result, None, plates[0].shape, half=half)
+
+    def solve_band(one: Task, first: int, last: int) -> None:
+        solve_rows(one, result, working_memory(one), first, last)
+
+    if readers:
+        shown_in_bands(solve_band, given, readers, shape)
+    else:
+        in_bands(partial(solve_band, given), rows=rows, cols=cols, threads=threads)
+    return surface_of(result, None, shape, half=half)
