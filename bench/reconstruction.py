@@ -2,14 +2,13 @@
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
 
 from bench.table import Row
+from bench.timing_plates import HeldFrame
 from psvideo.model.camera import Camera
-from psvideo.model.coded import Coded
 from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.model.shutter import frames_touched
 from psvideo.model.timing import Flash, Timing
@@ -17,19 +16,6 @@ from psvideo.plates.split import split
 
 FRAMES = 24
 REPEATS = 9
-
-
-@dataclass(frozen=True)
-class HeldFrame:
-    """A frame in memory."""
-
-    index: int
-    image: np.ndarray
-
-    @property
-    def coded(self) -> Coded:
-        """The picture in codes: light as it is."""
-        return Coded(codes=np.ascontiguousarray(self.image, np.float32))
 
 
 def rows() -> Iterator[Row]:

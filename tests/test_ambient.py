@@ -7,8 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from memory_frame import MemoryFrame
 
-from psvideo.model.coded import Coded
 from psvideo.model.plan import Plan
 from psvideo.model.shutter import frames_touched
 from psvideo.model.timing import Flash, Timing
@@ -25,17 +25,6 @@ PlanMaker = Callable[..., Plan]
 AmbientOf = Callable[[int, np.ndarray], np.ndarray]
 LEVEL = 0.1
 NOISE = Noise(full_well_e=20_000, read_e=12)
-
-
-@dataclass(frozen=True)
-class MemoryFrame:
-    index: int
-    image: np.ndarray
-
-    @property
-    def coded(self) -> Coded:
-        """The picture in codes: light as it is."""
-        return Coded(codes=np.ascontiguousarray(self.image, np.float32))
 
 
 def texture(plan: Plan) -> np.ndarray:

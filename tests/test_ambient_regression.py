@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from memory_frame import MemoryFrame
 
 from psvideo.model.camera import FloatArray
-from psvideo.model.coded import Coded
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Flash, Timing
 from psvideo.plates.ambient_regression import Separated, design_of, separated
@@ -17,17 +17,6 @@ from psvideo.synth import Exposure, Noise, TrueClock, expose
 PlanMaker = Callable[..., Plan]
 FRAMES, ROWS, COLS = 100, 120, 96
 NOISE = Noise(full_well_e=20_000, read_e=6)
-
-
-@dataclass(frozen=True)
-class HeldFrame:
-    index: int
-    image: np.ndarray
-
-    @property
-    def coded(self) -> Coded:
-        """The picture in codes: light as it is."""
-        return Coded(codes=np.ascontiguousarray(self.image, np.float32))
 
 
 def texture(grain_px: int) -> np.ndarray:
@@ -64,7 +53,7 @@ class Take:
         """The plates' RMS error with so much ambient light taken off."""
         squares = [
             np.mean((plate.image - plate.exposures[:, None] * ambient - self.plates[plate.flash.slot])[plate.seen] ** 2)
-            for plate in split(map(HeldFrame, range(FRAMES), self.frames), self.plan.camera, self.timing)
+            for plate in split(map(MemoryFrame, range(FRAMES), self.frames), self.plan.camera, self.timing)
         ]
         return float(np.sqrt(np.mean(squares)))
 

@@ -3,12 +3,13 @@
 import csv
 import json
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
 import pytest
+from memory_frame import MemoryFrame
 
 from psvideo.calibrate.strobed_readout import StrobedReadout, readout_of
 from psvideo.capture import cameras
@@ -20,12 +21,6 @@ from psvideo.sync.find import find_timing
 from psvideo.synth import Noise, TrueClock, expose
 
 PlanMaker = Callable[..., Plan]
-
-
-@dataclass(frozen=True)
-class MemoryFrame:
-    index: int
-    image: np.ndarray
 
 
 def measured(plan: Plan, *, seed: int = 0, frames: int = 60) -> StrobedReadout:

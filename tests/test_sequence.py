@@ -1,14 +1,14 @@
 """Rounds of plates against references by brute force: any power matrix, saturation, partial rounds, rare dark slots."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from memory_frame import MemoryFrame
 
-from psvideo.model.coded import Coded
 from psvideo.model.plan import Plan, PlannedFlash, mixing_matrix, reference_duration_s
 from psvideo.model.shutter import frames_touched, row_weights
 from psvideo.model.timing import Flash, Timing
@@ -20,17 +20,6 @@ from psvideo.synth.camera.noise import NOISELESS
 
 PlanMaker = Callable[..., Plan]
 AMBIENT = 0.05
-
-
-@dataclass(frozen=True)
-class MemoryFrame:
-    index: int
-    image: np.ndarray
-
-    @property
-    def coded(self) -> Coded:
-        """The picture in codes: light as it is."""
-        return Coded(codes=np.ascontiguousarray(self.image, np.float32))
 
 
 def patterned(plan: Plan, flashes: list[tuple[dict[str, float], float]]) -> Plan:

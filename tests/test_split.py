@@ -2,17 +2,17 @@
 
 import json
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 import OpenEXR
 import pytest
+from memory_frame import MemoryFrame
 from picture_file import read_picture
 
 from psvideo.formats.plan_toml import read_plan
-from psvideo.model.coded import Coded
 from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.model.row_profiles import collect
 from psvideo.model.shutter import frames_touched, row_weights
@@ -24,17 +24,6 @@ from psvideo.sync.find import find_timing
 from psvideo.synth import Exposure, Noise, TrueClock, expose
 
 PlanMaker = Callable[..., Plan]
-
-
-@dataclass(frozen=True)
-class MemoryFrame:
-    index: int
-    image: np.ndarray
-
-    @property
-    def coded(self) -> Coded:
-        """The picture in codes: light as it is."""
-        return Coded(codes=np.ascontiguousarray(self.image, np.float32))
 
 
 def frames_of(shot: Exposure) -> Iterator[MemoryFrame]:

@@ -2,12 +2,13 @@
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+from memory_frame import MemoryFrame
 from picture_file import read_picture
 
 from psvideo.errors import PsvideoError, UsageError
@@ -24,12 +25,6 @@ from psvideo.synth import Exposure, Noise, TrueClock, expose
 
 PlanMaker = Callable[..., Plan]
 CAMERA_NOISE = Noise(full_well_e=20_000, read_e=8)
-
-
-@dataclass(frozen=True)
-class MemoryFrame:
-    index: int
-    image: np.ndarray
 
 
 def textured_plates(plan: Plan, seed: int = 3) -> dict[int, np.ndarray]:

@@ -1,13 +1,14 @@
 """Timing found where something is wrong with the clip: every disturbance that the fit knows, one at a time."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from memory_frame import MemoryFrame
 
 from psvideo.errors import PsvideoError
 from psvideo.formats.exr_files import write_exr
@@ -24,12 +25,6 @@ from psvideo.sync.take_timing import find_take_timing
 from psvideo.synth import Exposure, MainsSwing, Noise, TrueClock, TrueFlash, expose
 
 PlanMaker = Callable[..., Plan]
-
-
-@dataclass(frozen=True)
-class MemoryFrame:
-    index: int
-    image: np.ndarray
 
 
 NOISE = Noise(full_well_e=20_000, read_e=8)

@@ -6,7 +6,7 @@ table.
 """
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import cv2
 import numpy as np
@@ -69,3 +69,27 @@ class Coded:
                 place = np.s_[(row - first) % len(tone.gain) :: len(tone.gain), col :: len(gains)]
                 light[place] = (light[place] - np.float32(tone.zero[row, col])) * np.float32(gain)
         return light
+
+
+class CodedFrame(Protocol):
+    """A frame as timing and plates need it: its place in time and its picture in codes."""
+
+    @property
+    def index(self) -> int:
+        """The frame's place in time, counted from the clip's first frame, holes included."""
+
+    @property
+    def coded(self) -> Coded:
+        """The picture, (row, col) or (row, col, channel)."""
+
+
+class LinearFrame(Protocol):
+    """A frame as a step needs it that works on light."""
+
+    @property
+    def index(self) -> int:
+        """The frame's place in time, counted from the clip's first frame, holes included."""
+
+    @property
+    def image(self) -> Image:
+        """Linear light, (row, col) or (row, col, channel)."""

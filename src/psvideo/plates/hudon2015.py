@@ -10,8 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from psvideo.model.camera import Camera, FloatArray
-from psvideo.model.coded import Image
-from psvideo.model.row_profiles import LinearFrame
+from psvideo.model.coded import Image, LinearFrame
 from psvideo.model.timing import Flash, Timing
 from psvideo.plates.mixture import made
 from psvideo.plates.split import Plate

@@ -8,28 +8,15 @@ added up before somebody wants to see it. It still holds the ambient light of ev
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.camera import Camera, FloatArray
-from psvideo.model.coded import Coded, Image
+from psvideo.model.coded import Coded, CodedFrame, Image
 from psvideo.model.recipe import flash_recipe, frames_of
 from psvideo.model.timing import Flash, Timing
 from psvideo.plates.mixture import Mixture
-
-
-class CodedFrame(Protocol):
-    """What this step needs of a frame: its place in time and its picture in codes."""
-
-    @property
-    def index(self) -> int:
-        """The frame's place in time, counted from the clip's first frame, holes included."""
-
-    @property
-    def coded(self) -> Coded:
-        """The picture, (row, col) or (row, col, channel)."""
 
 
 @dataclass(frozen=True, kw_only=True)
