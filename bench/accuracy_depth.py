@@ -14,7 +14,7 @@ import numpy as np
 
 from bench.accuracy_measure import read_image
 from psvideo.solve.depth import Integration, View, integrate, scaled
-from psvideo.solve.depth.bilateral import BILATERAL, SMOOTH
+from psvideo.solve.depth.cao2022 import BILATERAL, SMOOTH
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data" / "diligent_gt"
 PUBLISHED_MM = {"cat": 0.074, "bear": 0.334, "pot2": 0.220}

@@ -8,13 +8,13 @@ import pytest
 from numpy.typing import NDArray
 from picture_file import read_picture
 
+from psvideo.calibrate.cho2020 import measure_strengths
 from psvideo.calibrate.flat_field import Target, measure_flat_field
 from psvideo.calibrate.guess import guess_rig
 from psvideo.calibrate.light_pictures import LightPictures, light_pictures
 from psvideo.calibrate.matte import measure_matte_sphere, sphere_normals
 from psvideo.calibrate.sphere.outline import given_outline
 from psvideo.calibrate.sphere.sphere_view import SphereView
-from psvideo.calibrate.strengths import measure_strengths
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
 from psvideo.formats.rig_toml import read_rig

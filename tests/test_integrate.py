@@ -19,10 +19,10 @@ from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
 from psvideo.model.surface import Surface
 from psvideo.solve.depth import Depth, Shaping, View, begun, depth_of, integrate, mesh_of, reservations, scaled
-from psvideo.solve.depth.bilateral import SMOOTH, Integration
+from psvideo.solve.depth.cao2022 import SMOOTH, Integration
 from psvideo.solve.depth.multigrid import empty_grids, prepare, solve, weighed
-from psvideo.solve.depth.poisson import poisson_height
 from psvideo.solve.depth.reweighting import write_board
+from psvideo.solve.depth.simchony1990 import poisson_height
 from psvideo.solve.depth.view import slopes_of
 
 ROWS, COLS = 72, 90

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
+from psvideo.calibrate.cho2020 import LIT
 from psvideo.calibrate.light_pictures import LightPictures
-from psvideo.calibrate.strengths import LIT
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import FloatArray
 from psvideo.model.choices import Prior

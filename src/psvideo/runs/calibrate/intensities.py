@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from psvideo.calibrate.strengths import measure_strengths
+from psvideo.calibrate.cho2020 import measure_strengths
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.formats.rig_toml import format_rig, read_rig
 from psvideo.formats.whole_files import write_text

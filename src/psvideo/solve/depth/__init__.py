@@ -5,7 +5,7 @@ grids, ``poisson`` is the fast path for whole rectangles, ``bilateral`` finds th
 it a scale, ``shaping`` keeps that over a clip, and ``mesh`` makes triangles of it.
 """
 
-from psvideo.solve.depth.bilateral import Height, Integration, integrate
+from psvideo.solve.depth.cao2022 import Height, Integration, integrate
 from psvideo.solve.depth.mesh import Mesh, mesh_of
 from psvideo.solve.depth.scale import Depth, scaled
 from psvideo.solve.depth.shaping import Shaping, begun, depth_of, reservations

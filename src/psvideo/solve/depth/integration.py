@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from psvideo.model.camera import FloatArray
 from psvideo.solve.depth.checkerboard import Board, empty_board
 from psvideo.solve.depth.multigrid import CARRIED, Grids, empty_grids, prepare, solve, weighed
-from psvideo.solve.depth.poisson import poisson_height
 from psvideo.solve.depth.reweighting import add_board, equations, pull_to_pins, weigh_sides, write_board
+from psvideo.solve.depth.simchony1990 import poisson_height
 from psvideo.solve.depth.view import Slopes
 
 Floats = NDArray[np.float32]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import FloatArray
-from psvideo.solve.depth.bilateral import Height, Mask
+from psvideo.solve.depth.cao2022 import Height, Mask
 from psvideo.solve.depth.view import View
 
 LEAST_PART_PX = 64
