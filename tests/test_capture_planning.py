@@ -99,6 +99,8 @@ def test_the_marker_is_a_dark_slot_a_longer_first_flash_or_nothing() -> None:
     assert [flash.duration_s for flash in long.plan.flashes] == pytest.approx([LONG_MARKER * 8e-4, 8e-4, 8e-4])
     assert (len(planned(marker="none").plan.flashes), long.plan.dark_every) == (3, 1)
     assert "marker" in kinds(planned(marker="none"))
+    assert "marker" not in kinds(planned(marker="none", flash="key=1ms,left=0.5ms,right=0.5ms")), "lengths mark it"
+    assert "marker" in kinds(planned(marker="long", flash="key=0.5ms,left=0.75ms,right=0.75ms")), "all alike in the end"
     assert "ambient" in kinds(long)
 
 

@@ -7,6 +7,7 @@ from fractions import Fraction
 from typing import Literal
 
 from psvideo.capture.request import Limits, ShootRequest
+from psvideo.model.marker import has_marker
 from psvideo.model.plan import Plan
 from psvideo.model.shoot_figures import SEIZURE_HZ, LightFigures, ShootFigures, SlotFigures
 from psvideo.model.units import NTSC, show_rate, show_seconds
@@ -22,13 +23,14 @@ class Caution:
 
 
 def request_cautions(request: ShootRequest) -> tuple[Caution, ...]:
-    """Return what is to be said about the camera's figures and the marker."""
-    return (*_about_the_readout(request), *_about_the_rate(request), *_about_the_marker(request))
+    """Return what is to be said about the camera's figures."""
+    return (*_about_the_readout(request), *_about_the_rate(request))
 
 
 def shoot_cautions(plan: Plan, figures: ShootFigures, *, limits: Limits | None = None) -> tuple[Caution, ...]:
     """Return what is to be said about the plan itself, whoever wrote it."""
     return (
+        *_about_the_marker(plan),
         *_about_seizures(figures),
         *_about_the_margin(plan, figures),
         *_about_blind_time(plan, figures),
@@ -79,15 +81,19 @@ def _about_the_rate(request: ShootRequest) -> Iterator[Caution]:
         )
 
 
-def _about_the_marker(request: ShootRequest) -> Iterator[Caution]:
-    if request.marker == "none" and request.mode != "synced" and len(request.lights) > 1:
+def _about_the_marker(plan: Plan) -> Iterator[Caution]:
+    if plan.mode != "synced" and not has_marker(plan):
         yield _warning(
             "marker",
             "Without a marker nothing in the footage shows which light is which: note the light of the first flash for "
             "`first_light`, or leave `marker` dark.",
         )
-    if request.marker != "dark":
-        yield _note("ambient", "Without a dark slot ambient light cannot be taken off: the room must be dark.")
+    if not any(flash.is_dark for flash in plan.flashes):
+        yield _note(
+            "ambient",
+            "Without a dark slot ambient light is taken off only where the subject stands still, and none in synced "
+            "clips: keep the room dark.",
+        )
 
 
 def _about_seizures(figures: ShootFigures) -> Iterator[Caution]:

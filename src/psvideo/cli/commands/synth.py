@@ -8,6 +8,7 @@ import typer
 
 from psvideo.cli.console import Voice
 from psvideo.cli.options.clip_and_run import Force, Json, Quiet, Verbose
+from psvideo.cli.options.typed import parse_lines
 from psvideo.errors import UsageError
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ def synth(
         out,
         force=force,
         track=lambda frames: voice.track(frames, total=len(frames), what="filming"),
-        trace=_trace_options(trace, line or []),
+        trace=_trace_options(trace, parse_lines(line)),
     )
     for warning in shot.warnings:
         voice.warn(warning)
@@ -55,18 +56,11 @@ def synth(
     voice.result({**dataclasses.asdict(shot), "path": str(shot.path)})
 
 
-def _trace_options(trace: Path | None, lines: list[str]) -> "TraceOptions | None":
+def _trace_options(trace: Path | None, lines: dict[str, int]) -> "TraceOptions | None":
     from psvideo.synth.lamps.traced import TraceOptions
 
     if trace is None:
         if lines:
             raise UsageError("--line: says which line of a trace a light hangs on; give --trace FILE with it.")
         return None
-    return TraceOptions(path=trace, lines=dict(map(_line, lines)))
-
-
-def _line(text: str) -> tuple[str, int]:
-    name, equals, number = text.rpartition("=")
-    if not (equals and name and number.isdecimal()):
-        raise UsageError(f"--line {text}: expected a light's name and its line, such as --line key=0.")
-    return name, int(number)
+    return TraceOptions(path=trace, lines=lines)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -66,23 +65,6 @@ Fast = Annotated[
     bool, typer.Option("--fast", help="As fast as it goes; then only virtual time counts, keep-alive included.")
 ]
 Yes = Annotated[bool, typer.Option("--yes", help="Everybody has been warned of the flashing; do not ask.")]
-
-
-def parse_lines(words: Sequence[str] | None) -> dict[str, int]:
-    """Return light names and lines out of ``key=0``.
-
-    >>> parse_lines(["key=0", "left=3"])
-    {'key': 0, 'left': 3}
-    """
-    lines: dict[str, int] = {}
-    for word in words or ():
-        name, _, line = word.rpartition("=")
-        if not name or not line.isdecimal():
-            raise UsageError(f"--line {word}: expected a light's name and a line's number, such as key=0.")
-        if name in lines:
-            raise UsageError(f"--line {word}: {name} is wired to line {lines[name]} already.")
-        lines[name] = int(line)
-    return lines
 
 
 def parse_wiring(word: str | None) -> WiringName | None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from psvideo.cli.console import Voice, counted
+from psvideo.cli.options.calibrate import FocalPx, Pictures, RigIn, RigOut, Transfer
 from psvideo.cli.options.clip_and_run import FirstLight, Force, Frames, Json, PlanPath, Quiet, Verbose
 from psvideo.cli.options.typed import parse_box, parse_circle
 from psvideo.model.choices import Prior
@@ -15,11 +16,6 @@ from psvideo.model.choices import Prior
 if TYPE_CHECKING:
     from psvideo.calibrate.flat_field import FlatLight
     from psvideo.calibrate.matte import MatteLight
-
-Pictures = Annotated[Path, typer.Argument(help="A folder of stills (one per light), of plates, or a clip.")]
-RigOut = Annotated[Path, typer.Option("-o", "--out", help="The rig file to write.")]
-RigIn = Annotated[Path, typer.Option("--rig", help="The rig whose directions or positions are known.")]
-Transfer = Annotated[str | None, typer.Option(help="How stills code light: linear, srgb, slog3, ...")]
 
 
 def matte_sphere(
@@ -32,7 +28,7 @@ def matte_sphere(
         float | None,
         typer.Option(help="The sphere's albedo; left out, intensities are relative, mean 1.", min=0.01, max=1),
     ] = None,
-    focal_px: Annotated[float | None, typer.Option(help="Focal length in pixels.", min=1)] = None,
+    focal_px: FocalPx = None,
     transfer: Transfer = None,
     plan: PlanPath = None,
     frames: Frames = None,

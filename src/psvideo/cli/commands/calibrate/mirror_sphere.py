@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from psvideo.cli.console import Voice
+from psvideo.cli.options.calibrate import FocalPx, Transfer
 from psvideo.cli.options.clip_and_run import FirstLight, Force, Frames, Json, PlanPath, Quiet, Verbose
 from psvideo.cli.options.typed import parse_circle, parse_point
 
@@ -26,7 +27,7 @@ def mirror_sphere(
         typer.Option(help="A sphere's outline found by hand: x,y,radius in pixels from the top left. Repeatable."),
     ] = None,
     spheres: Annotated[int, typer.Option(help="How many spheres each picture holds.", min=1, max=8)] = 1,
-    focal_px: Annotated[float | None, typer.Option(help="Focal length in pixels.", min=1)] = None,
+    focal_px: FocalPx = None,
     focal_mm: Annotated[float | None, typer.Option(help="Focal length in mm; needs --sensor-mm.", min=0.1)] = None,
     sensor_mm: Annotated[
         float | None, typer.Option(help="Width in mm of the sensor's part that the picture shows.", min=0.1)
@@ -40,7 +41,7 @@ def mirror_sphere(
     outline_picture: Annotated[
         Path | None, typer.Option(help="A picture from the same camera, room light on, on which the outline shows.")
     ] = None,
-    transfer: Annotated[str | None, typer.Option(help="How stills code light: linear, srgb, slog3, ...")] = None,
+    transfer: Transfer = None,
     plan: PlanPath = None,
     frames: Frames = None,
     first_light: FirstLight = None,

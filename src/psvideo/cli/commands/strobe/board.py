@@ -15,6 +15,7 @@ from psvideo.cli.commands.strobe.emulate import emulate
 from psvideo.cli.commands.strobe.progress import watching
 from psvideo.cli.console import Voice
 from psvideo.cli.options.clip_and_run import Force, Json, Quiet, Verbose
+from psvideo.cli.options.typed import parse_lines
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.strobe.link.ports import AUTO
 
@@ -63,7 +64,7 @@ def check(
     from psvideo.strobe.program_words import describe_program, program_record
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
-    lines, wanted = option.parse_lines(line), option.parse_wiring(wiring)
+    lines, wanted = parse_lines(line), option.parse_wiring(wiring)
     if not port and board is None:
         _print_boards(voice, plan, check_boards(plan, line=lines, wiring=wanted))
         return
@@ -123,7 +124,7 @@ def run(
             board=board,
             seconds=seconds,
             rounds=rounds,
-            line=option.parse_lines(line),
+            line=parse_lines(line),
             wiring=option.parse_wiring(wiring),
             log=log,
             yes=yes,
