@@ -29,9 +29,11 @@ class BuildWithScenes(build_py):
     def _compile_loops(self) -> None:
         """Compile loops beside their modules; where this Python cannot run psvideo, the first run does it."""
         there = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"}
-        library = {"PYTHONPATH": str(Path(self.build_lib).resolve())}
+        before = os.environ.get("PYTHONPATH")  # pip's way to the libraries that it has here for building
+        version_in = str(Path("src").resolve())  # the package's own record of itself, which setuptools wrote there
+        paths = [str(Path(self.build_lib).resolve()), version_in, *([before] if before else [])]
         command = [sys.executable, "-B", "-m", "psvideo.runs.compiling"]
-        if subprocess.run(command, env=there | library, check=False).returncode:
+        if subprocess.run(command, env=there | {"PYTHONPATH": os.pathsep.join(paths)}, check=False).returncode:
             self.warn("loops could not be compiled here, and will be by the first run (psvideo doctor --compile)")
 
     def _scenes(self) -> dict[str, str]:

@@ -117,6 +117,21 @@ def test_the_blur_of_sharp_shapes_is_reported_and_that_of_noise_is_not() -> None
     assert sharpest_blur_px(rng.normal(0.2, 0.004, shapes.shape).astype(np.float32)) is None
 
 
+def test_one_sharp_thing_in_a_large_soft_picture_is_found_wherever_it_stands() -> None:
+    rng = np.random.default_rng(4)
+    soft = np.full((1080, 1920), 0.1, np.float32)
+    for middle in rng.integers(0, 1900, (12, 2)).tolist():
+        cv2.circle(soft, middle, 90, float(rng.uniform(0.2, 0.5)), -1)
+    noise = rng.normal(0, 0.002, soft.shape).astype(np.float32)
+    soft = np.asarray(cv2.GaussianBlur(soft, (0, 0), 8.0), np.float32) + noise
+    assert 3.5 < (sharpest_blur_px(soft) or 0) < 9.6
+    for row, col in ((200, 300), (540, 960), (700, 1500)):
+        sharp = soft.copy()
+        sharp[row : row + 120, col : col + 120] = 0.9
+        sharp = np.asarray(cv2.GaussianBlur(sharp, (0, 0), 0.8), np.float32)
+        assert 0.4 < (sharpest_blur_px(sharp) or 0) < 1.2
+
+
 @pytest.mark.parametrize(
     ("spoil", "words"),
     [

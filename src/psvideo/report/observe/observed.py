@@ -1,6 +1,6 @@
 """What a run sees of a take, gathered round by round: a few numbers a round, and sums that do not grow.
 
-Shares are counted on every fourth row and column. What takes longer (sharpness, the rig's fit, slopes) is looked at in
+Shares are counted on thinned pictures. What takes longer (sharpness, the rig's fit, slopes) is looked at in
 rounds 1, 2, 4, 8 and so on, so that ten thousand rounds cost hardly more than a hundred.
 """
 
@@ -19,14 +19,13 @@ from psvideo.report.observe.motion import Glimpse, Motion, glimpse, motion
 from psvideo.report.observe.rigpoints import RigPoints
 from psvideo.report.observe.slopes import slope_agreement
 from psvideo.report.observe.steadiness import Change, Sample, change, sample_of
+from psvideo.report.observe.thinned import step_of, thinned
 from psvideo.report.observe.worst import Thumbnail, Worst
 
 LIT = 0.01
 """A pixel brighter than this share of saturation under any light is part of the scene; of dark takes, than a sixth of
 their brightest hundredth."""
 DARKEST = 1 / 6
-STRIDE = 4
-"""Shares are counted over every fourth row and column, which is plenty and costs a sixteenth."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,20 +58,24 @@ class InstantFacts:
 
 @dataclass(frozen=True, kw_only=True)
 class Seen:
-    """One round on every fourth row and column: the lights' ``bright`` (light, row, col) by their brightest channel,
-    and the subject, (row, col)."""
+    """One round, thinned: the lights' ``bright`` (light, row, col) by their brightest channel, which of these pixels
+    are in a row that was seen, ``shown`` (light, row, 1), and the subject, (row, col)."""
 
     bright: NDArray[np.float32]
+    shown: NDArray[np.bool_]
     subject: NDArray[np.bool_]
 
 
 def seen_of(one: Round, mask: NDArray[np.bool_] | None) -> Seen:
     """Return a round thinned out, and where its subject is."""
-    bright = np.stack([_brightest(plate.picture.thinned(STRIDE)) for plate in one.plates])
+    step = step_of(*one.plates[0].shape[:2])
+    bright = np.stack([_brightest(plate.picture.thinned(step)) for plate in one.plates])
+    shown = np.stack([plate.rows_seen[::step, None] for plate in one.plates])
     if mask is not None:
-        return Seen(bright=bright, subject=mask[::STRIDE, ::STRIDE])
+        return Seen(bright=bright, shown=shown, subject=thinned(mask))
     most = bright.max(axis=0)
-    return Seen(bright=bright, subject=most > min(LIT, DARKEST * float(np.percentile(most[::2, ::2], 99))))
+    lit = most > min(LIT, DARKEST * float(np.percentile(most[::2, ::2], 99)))
+    return Seen(bright=bright, shown=shown, subject=lit)
 
 
 def instant_facts(
@@ -91,14 +94,14 @@ def instant_facts(
     subject, bright = seen.subject, seen.bright
     count = max(int(subject.sum()), 1)
     shares, levels = [], []
-    for picture, plate in zip(bright, one.plates, strict=True):
+    for picture, shown, plate in zip(bright, seen.shown, one.plates, strict=True):
         shares.append(float(((picture >= plate.saturation) & subject).sum() / count))
-        shown = subject & plate.rows_seen[::STRIDE, None]
-        levels.append(float(picture.mean(where=shown)) if shown.any() else 0.0)
+        light = picture[subject & shown]
+        levels.append(float(light.mean()) if light.size else 0.0)
     return InstantFacts(
         number=one.number,
         time_s=one.time_s,
-        valid_share=None if surface is None else float((surface.valid[::STRIDE, ::STRIDE] & subject).sum() / count),
+        valid_share=None if surface is None else float((thinned(surface.valid) & subject).sum() / count),
         clipped_share=float(np.mean(shares)),
         unseen_share=float(np.mean([1 - plate.rows_seen.mean() for plate in one.plates])),
         borrowed_share=float(np.mean([_borrowed(plate) for plate in one.plates])),
@@ -168,11 +171,11 @@ class Observed:
 
     def look_at_window(self, found: Separated) -> None:
         """Look at the ambient light that a window of frames told without a dark slot."""
-        self._dark = np.array(_brightest(found.image[::STRIDE, ::STRIDE]))
+        self._dark = np.array(_brightest(thinned(found.image)))
         self.ambient_measured.append(float(found.stood.mean()))
 
     def _look_at_dark(self, plate: LightPlate) -> None:
-        self._dark = np.array(_brightest(plate.picture.thinned(STRIDE)))
+        self._dark = np.array(_brightest(plate.picture.thinned(step_of(*plate.shape[:2]))))
 
     def add(self, one: Round, surface: Surface | None = None) -> None:
         """Take in one round, and the surface that was solved from it, if any."""
@@ -184,9 +187,8 @@ class Observed:
         moving, changed = self._moving, self._change(surface)
         facts = instant_facts(one, surface, self.mask, changed, seen=seen, moving=moving, dark=self._dark)
         self.facts.append(facts)
-        for plate, bright in zip(one.plates, seen.bright, strict=True):
-            shown = seen.subject & plate.rows_seen[::STRIDE, None]
-            counted = count_levels(bright[shown], plate.saturation)
+        for plate, bright, shown in zip(one.plates, seen.bright, seen.shown, strict=True):
+            counted = count_levels(bright[seen.subject & shown], plate.saturation)
             self.counts[plate.light] = self.counts.get(plate.light, np.zeros(BINS + 2, np.int64)) + counted
         if len(self.facts).bit_count() == 1:
             self._look_closely(one, surface)

@@ -15,6 +15,8 @@ LEAST_PIXELS = 400
 STEEPEST = 4.0
 """Slopes beyond this lie on outlines, where neighbouring pixels show different things."""
 BLUR_PX = 1.5
+LEAST_AVERAGED = 3
+"""Of so many rows and columns, evenly, the mean of a larger square is taken."""
 
 
 def slope_agreement(surface: Surface) -> float | None:
@@ -40,9 +42,10 @@ def slope_agreement(surface: Surface) -> float | None:
 def _thinned(surface: Surface, step: int) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
     """Return validity and normals averaged over squares of ``step`` pixels; valid where all of a square is."""
     rows, cols = (size // step for size in surface.valid.shape)
-    area = surface.normals[: rows * step, : cols * step].astype(np.float32)
-    planes = [cv2.resize(area[..., n], (cols, rows), interpolation=cv2.INTER_AREA) for n in range(3)]
-    small = np.stack(planes, axis=-1).astype(np.float32)
-    flags = surface.valid[: rows * step, : cols * step].astype(np.float32)
+    fine = max(step // LEAST_AVERAGED, 1)
+    inside = (slice(0, rows * step, fine), slice(0, cols * step, fine))
+    area = surface.normals[inside].astype(np.float32)
+    small = np.asarray(cv2.resize(area, (cols, rows), interpolation=cv2.INTER_AREA), np.float32)
+    flags = surface.valid[inside].astype(np.float32)
     whole = cv2.resize(flags, (cols, rows), interpolation=cv2.INTER_AREA) > 0.999
     return whole, small

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.surface import Surface
+from psvideo.report.observe.thinned import thinned
 
-STRIDE = 4
 LEAST_PIXELS = 100
 MOST_TURNED_DEG = 5.0
 """Where the mean normal of a neighbourhood turns by more than this from one result to the next, something moved."""
@@ -31,7 +31,7 @@ class Change:
 
 @dataclass(frozen=True, kw_only=True)
 class Sample:
-    """Every fourth pixel of a surface in both directions."""
+    """A surface, thinned."""
 
     normals: Values
     albedo: Values
@@ -40,12 +40,11 @@ class Sample:
 
 def sample_of(surface: Surface) -> Sample:
     """Return what to keep of a surface to hold the next one against."""
-    thin = (slice(None, None, STRIDE), slice(None, None, STRIDE))
-    albedo = surface.albedo[thin].astype(np.float32)
+    albedo = thinned(surface.albedo).astype(np.float32)
     return Sample(
-        normals=surface.normals[thin].astype(np.float32),
+        normals=thinned(surface.normals).astype(np.float32),
         albedo=albedo if albedo.ndim == 2 else albedo.mean(axis=2),
-        valid=surface.valid[thin].copy(),
+        valid=thinned(surface.valid),
     )
 
 
