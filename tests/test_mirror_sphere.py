@@ -20,6 +20,7 @@ from psvideo.calibrate.sphere.sphere_view import SphereView
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
 from psvideo.formats.rig_toml import parse_rig, read_rig
+from psvideo.runs.calibrate.mirror_sphere import mirror_sphere
 from psvideo.runs.light_sets import open_light_sets
 
 DIRECTIONS = {"key": (0.3, 0.4, 0.87), "left": (-0.5, 0.2, 0.84), "low": (0.1, -0.4, 0.9), "rim": (0.7, 0.3, 0.4)}
@@ -158,30 +159,37 @@ def test_a_matte_sphere_is_refused_with_what_to_do() -> None:
         calibrate_lights(sightings)
 
 
-def _psbox(shared_data: Path, out: Path, *more: str) -> tuple[np.ndarray, np.ndarray]:
-    folder = shared_data / "psbox_sphere" / "LightProbe-1"
-    assert main(["calibrate", "mirror-sphere", str(folder), "-o", str(out), "-q", *more]) == 0
-    truth = np.loadtxt(folder / "light_directions.txt").T
-    lights = read_rig(out).lights
+@pytest.fixture(scope="module")
+def psbox(shared_data: Path) -> Path:
+    return shared_data / "psbox_sphere" / "LightProbe-1"
+
+
+@pytest.fixture(scope="module")
+def psbox_measured(psbox: Path, tmp_path_factory: pytest.TempPathFactory) -> MirrorCalibration:
+    return mirror_sphere([psbox], out=tmp_path_factory.mktemp("psbox") / "rig.toml")
+
+
+def _psbox_errors(psbox: Path, found: MirrorCalibration) -> tuple[np.ndarray, np.ndarray]:
+    truth = np.loadtxt(psbox / "light_directions.txt").T
+    lights = found.rig.lights
     errors = [angle_deg(light.direction, vector) for light, vector in zip(lights, truth, strict=True)]
     return np.array(errors), np.array([light.error_deg for light in lights])
 
 
-def test_the_psbox_sphere_with_its_hand_made_circle(shared_data: Path, tmp_path: Path) -> None:
-    errors, own = _psbox(shared_data, tmp_path / "rig.toml", "--circle", "535.9,478.0,421.13")
+def test_the_psbox_sphere_with_its_hand_made_circle(psbox: Path, tmp_path: Path) -> None:
+    errors, own = _psbox_errors(psbox, mirror_sphere([psbox], out=tmp_path / "rig.toml", circle=[PSBOX_CIRCLE]))
     assert (errors < 0.5).all()
     assert np.sqrt((errors**2).mean()) < np.sqrt((own**2).mean())
     assert (errors < 2 * own).all()
 
 
 def test_the_psbox_outline_is_the_same_under_room_light_and_leds_and_its_errors_are_owned(
-    shared_data: Path, tmp_path: Path
+    psbox: Path, psbox_measured: MirrorCalibration
 ) -> None:
-    folder = shared_data / "psbox_sphere" / "LightProbe-1"
-    errors, own = _psbox(shared_data, tmp_path / "rig.toml")
+    errors, own = _psbox_errors(psbox, psbox_measured)
     assert errors.mean() < 0.5
     assert (errors < 2.5 * own).all()
-    opened = open_light_sets(folder)
+    opened = open_light_sets(psbox)
     pictures = averaged(opened.sets)
     view = SphereView(focal_px=None, principal_px=(549.5, 499.5))
     assert opened.room is not None
@@ -194,13 +202,13 @@ def test_the_psbox_outline_is_the_same_under_room_light_and_leds_and_its_errors_
     assert (np.abs(away) < 2.5 * own).all()
 
 
-def test_the_psbox_outline_lies_where_the_ball_ends_before_white_paper(shared_data: Path) -> None:
+def test_the_psbox_outline_lies_where_the_ball_ends_before_white_paper(
+    psbox: Path, psbox_measured: MirrorCalibration
+) -> None:
     """A dark ball before bright paper: half-way between their brightness is just inside its rim."""
-    opened = open_light_sets(shared_data / "psbox_sphere" / "LightProbe-1")
-    view = SphereView(focal_px=None, principal_px=(549.5, 499.5))
-    assert opened.room is not None
-    picture = opened.room.mean(axis=2)
-    outline = find_outlines(averaged(opened.sets), view, room=picture)[0]
+    room, view = open_light_sets(psbox).room, SphereView(focal_px=None, principal_px=(549.5, 499.5))
+    assert room is not None
+    picture, outline = room.mean(axis=2), psbox_measured.sightings[0].outline
     supplied = given_outline(view, PSBOX_CIRCLE)
     inside = {}
     for name, one in (("found", outline), ("supplied", supplied)):
