@@ -214,6 +214,18 @@ MISTAKES: dict[str, tuple[Callable[[], object], str]] = {
         "`colour` is 'red'; expected .red",
     ),
     "two strengths": (lambda: NOT_TYPED.relight(SURFACE, (0, 0, 1), strength=[1, 2]), "`strength` is of type list"),
+    "color": (
+        lambda: NOT_TYPED.relight(SURFACE, (0, 0, 1), color=(1, 0, 0)),
+        "no parameter `color`; did you mean 'colou",
+    ),
+    "no rig": (
+        lambda: NOT_TYPED.normals("take3/", out="out/"),
+        "psvideo.normals: missing a required.* 'rig'; its param",
+    ),
+    "too much": (
+        lambda: NOT_TYPED.read_plan("plan.toml", "more"),
+        "too many positional arguments; its parameters are p",
+    ),
     "depth of normals": (lambda: NOT_TYPED.find_depth(SURFACE.normals), "`surface` is of type ndarray"),
     "depth by a name": (lambda: NOT_TYPED.find_depth(SURFACE, "rig.toml"), "`rig` is 'rig.toml' .str.; expected a Rig"),
     "picture of a surface": (lambda: NOT_TYPED.picture_of("normals", SURFACE), "`image` is of type Surface"),

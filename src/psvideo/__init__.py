@@ -4,8 +4,9 @@ This is the front door: what ``import psvideo as ps`` offers, each name loaded w
 """
 
 import sys
+from collections.abc import Callable
 from importlib import import_module
-from types import ModuleType
+from types import FunctionType, ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # what editors and type checkers see; _HOMES is the same for Python
@@ -98,8 +99,32 @@ def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module 'psvideo' has no attribute {name!r}")
     module, _, other = _HOMES[name].partition(":")
-    found = globals()[name] = getattr(import_module(module), other or name)
+    found = getattr(import_module(module), other or name)
+    globals()[name] = found = _answering(name, found) if isinstance(found, FunctionType) else found
     return found
+
+
+def _answering(name: str, function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return the function with unknown and missing parameters answered as all mistakes are: by a PsvideoError."""
+    from functools import wraps
+    from inspect import signature
+
+    from psvideo.errors import UsageError, nearest
+
+    parameters = signature(function).parameters
+
+    @wraps(function)
+    def call(*given: Any, **named: Any) -> Any:
+        try:
+            signature(function).bind(*given, **named)
+        except TypeError as fault:
+            unknown = next((one for one in named if one not in parameters), None)
+            said = f"{fault}; its parameters are {', '.join(parameters)}."
+            said = said if unknown is None else f"there is no parameter `{unknown}`; {nearest(unknown, parameters)}"
+            raise UsageError(f"psvideo.{name}: {said}") from None
+        return function(*given, **named)
+
+    return call
 
 
 def __dir__() -> list[str]:
