@@ -5,7 +5,18 @@ from importlib import import_module
 
 from bench.table import table
 
-TABLES = ("kernel", "reconstruction", "whole_run", "observing", "view", "timing", "compression", "strobe", "accuracy")
+TABLES = (
+    "kernel",
+    "reconstruction",
+    "whole_run",
+    "observing",
+    "encoding",
+    "view",
+    "timing",
+    "compression",
+    "strobe",
+    "accuracy",
+)
 
 for name in sys.argv[1:] or TABLES:
     module = import_module(f"bench.{name}")

@@ -22,7 +22,7 @@ ROUNDS = 16
 
 def rows() -> Iterator[Row]:
     """Observe rounds in turn, and report the steady ones and those that are looked at closely apart."""
-    rounds, surfaces = [_round(n) for n in range(2)], [_surface(n) for n in range(2)]
+    rounds, surfaces = [_round(n) for n in range(2)], [noisy_surface(n) for n in range(2)]
     for one in rounds:
         assert len(one.plates) == LIGHTS
     observed = Observed(lights=tuple(directions(LIGHTS)))
@@ -71,10 +71,12 @@ def _round(number: int) -> Round:
     return Round(number=number, plates=tuple(plates))
 
 
-def _surface(number: int) -> Surface:
+def noisy_surface(number: int) -> Surface:
+    """Return a noisy relief as half floats, every channel a plane of its own, as solvers store it."""
     noise = 0.01 * np.random.default_rng(number).standard_normal((ROWS, COLS, 3), dtype=np.float32)
+    planes = np.ascontiguousarray(np.moveaxis(_normals() + noise, -1, 0), np.float16)
     return Surface(
-        normals=np.asarray(_normals() + noise, np.float16),
+        normals=np.moveaxis(planes, 0, -1),
         albedo=np.full((ROWS, COLS, 3), 0.7, np.float16),
         valid=np.ones((ROWS, COLS), np.bool_),
     )

@@ -17,8 +17,10 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from psvideo import __version__
+from psvideo.compute.halves import halves_of
 from psvideo.compute.threads import writing
 from psvideo.errors import AllDoneError, PsvideoError, UsageError
+from psvideo.export.planes import ones_of
 from psvideo.export.plate_files import write_flash, write_plate
 from psvideo.export.png_maps import decode_normals, encode_normals
 from psvideo.export.result_files import Delivery, is_written, write_surface
@@ -178,6 +180,20 @@ def test_what_is_not_a_number_is_never_written(bad: float, tmp_path: Path) -> No
     with pytest.raises(ValueError, match="NaN or infinity"):
         write_exr(tmp_path / "a.exr", {"Y": np.full((2, 2), bad, np.float32)})
     assert not list(tmp_path.iterdir())
+
+
+@given(values=hnp.arrays(np.float32, (5, 3), elements=st.floats(width=32)))
+def test_halves_are_rounded_as_numpy_rounds_them_and_end_at_the_largest(values: np.ndarray) -> None:
+    halves, finite = halves_of(values)
+    assert finite == bool(np.isfinite(values).all())
+    wanted = np.clip(values, -65504, 65504).astype(np.float16)
+    known = ~np.isnan(values)
+    assert np.array_equal(halves[known].view(np.uint16), wanted[known].view(np.uint16)), "signs of 0 too"
+
+
+def test_a_mask_is_written_as_ones_and_zeros() -> None:
+    mask = np.random.default_rng(0).random((7, 9))[::2, ::-1] > 0.5
+    assert np.array_equal(ones_of(mask), mask.astype(np.float16))
 
 
 def test_strided_planes_are_stored_as_they_look(tmp_path: Path) -> None:

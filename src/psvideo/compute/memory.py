@@ -9,7 +9,8 @@ from numba.np.numpy_support import carray
 
 from psvideo.compute.compiled import FUSED
 
-_HALF_MAX = 65504.0
+HALF_MAX = 65504.0
+"""The largest half float."""
 _ir: Any = llvmlite.ir
 
 
@@ -32,7 +33,7 @@ def _encoded(typing_context: Any, value: Any, like: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         if like.dtype != types.uint16:
             return arguments[0]
-        largest = _ir.Constant(_ir.FloatType(), _HALF_MAX)
+        largest = _ir.Constant(_ir.FloatType(), HALF_MAX)
         fits = builder.fcmp_ordered("<", arguments[0], largest)
         return builder.bitcast(
             builder.fptrunc(builder.select(fits, arguments[0], largest), _ir.HalfType()), _ir.IntType(16)

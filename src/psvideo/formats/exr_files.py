@@ -18,7 +18,6 @@ from psvideo.errors import PsvideoError
 from psvideo.formats.whole_files import whole_file
 from psvideo.model.choices import Compression
 
-HALF_MAX = 65504.0  # the largest finite half float
 _INT32_MAX = 2**31 - 1
 
 _COMPRESSIONS: dict[Compression, object] = {
@@ -79,16 +78,18 @@ def _plane(name: str, values: NDArray[np.floating], half: bool) -> NDArray[np.fl
     if values.ndim != 2:
         raise ValueError(f"channel {name!r} has shape {values.shape}; expected (row, col)")
     if values.dtype == np.float16:
-        stored, finite = values, not np.any((values.view(np.uint16) & 0x7C00) == 0x7C00)
+        stored = np.ascontiguousarray(values)
+        finite = int((stored.view(np.uint16) & np.uint16(0x7C00)).max()) < 0x7C00
+    elif half:
+        from psvideo.compute.halves import halves_of  # loads the compiler, which reading and help do without
+
+        stored, finite = halves_of(values.astype(np.float32, copy=False))
     else:
-        stored, finite = values.astype(np.float32, order="C", copy=False), bool(np.isfinite(values).all())
+        stored = values.astype(np.float32, order="C", copy=False)
+        finite = bool(np.isfinite(stored).all())
     if not finite:
         raise ValueError(f"channel {name!r} holds NaN or infinity; missing pixels are 0 and marked in 'valid'")
-    if not half:
-        return np.ascontiguousarray(stored, np.float32)
-    if stored.dtype != np.float16:
-        stored = np.clip(stored, -HALF_MAX, HALF_MAX).astype(np.float16)
-    return np.ascontiguousarray(stored)
+    return np.asarray(stored if half else np.ascontiguousarray(stored, np.float32))
 
 
 def _header(

@@ -52,7 +52,7 @@ class SmallTake:
 
 
 USUAL = (
-    SmallTake(lights=8, aov=("residual", "error", "depth")),
+    SmallTake(lights=8, aov=("residual", "error", "depth", "beauty")),
     SmallTake(lights=4, motion=", motion = { velocity_m_per_s = [0.4, 0.0, 0.0] }"),
     SmallTake(lights=3, kind="png8", camera='bits = 8, transfer = "srgb"'),
     SmallTake(lights=4, kind="dng", camera='cfa = "RGGB"'),

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from psvideo.clip import Clip, Take
+from psvideo.compute.halves import halves_of
 from psvideo.export.plate_files import plate_name, write_plate
 from psvideo.export.result_files import Delivery, write_surface
 from psvideo.export.space import Space
 from psvideo.export.tags import Tags
-from psvideo.formats.exr_files import HALF_MAX
 from psvideo.model.choices import Compression
 from psvideo.model.rig import Rig
 from psvideo.model.timing import Timing
@@ -107,8 +107,8 @@ def surface_job(
     there = replace(delivery, space=delivery.space.at(one.time_s, one.number, clip.plan.camera.fps))
     beauty = None
     if "beauty" in delivery.aovs:
-        image = np.clip(beauty_of(one, delivery.mix, ambient).image, -HALF_MAX, HALF_MAX)
-        beauty = np.asarray(image, np.float16)
+        image = beauty_of(one, delivery.mix, ambient).image
+        beauty = halves_of(image.reshape(len(image), -1))[0].reshape(image.shape)
     job = partial(write_surface, folder, clip.name, one.number, one.time_s, instant.surface)
     age_s = one.age_s if "age" in delivery.aovs else None
     return partial(job, delivery=there, tags=tags, depth=depth, beauty=beauty, age_s=age_s)
