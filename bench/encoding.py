@@ -21,7 +21,7 @@ REPEATS = 3
 
 
 class Encoded(NamedTuple):
-    """Times in milliseconds; ``beside`` is what is not OpenEXR's: checks, conversions, and the bytes' way to the disk."""
+    """Times in milliseconds; ``beside`` is what is not OpenEXR's: checks, and the bytes' way to the disk."""
 
     compression: str
     half: str
