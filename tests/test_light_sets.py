@@ -42,11 +42,12 @@ def test_a_folder_per_light_holds_several_frames(tmp_path: Path) -> None:
     assert second.images[:, 0, 0] == pytest.approx([0.3, 0.7], abs=1e-4)
 
 
-def test_a_mask_beside_the_pictures_is_no_light(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    for name, value in (("L1", 0.3), ("L2", 0.5), ("mask", 1.0)):
+@pytest.mark.parametrize("mask", ["mask", "cat.mask", "cat_Mask"])
+def test_a_mask_beside_the_pictures_is_no_light(mask: str, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    for name, value in (("L1", 0.3), ("L2", 0.5), (mask, 1.0), ("unmask", 0.4)):
         still(tmp_path / f"{name}.png", value)
-    assert read_images(tmp_path).names == ("L1", "L2")
-    assert "mask.png: is taken for no light's picture" in caplog.text
+    assert read_images(tmp_path).names == ("L1", "L2", "unmask")
+    assert f"{mask}.png: is taken for no light's picture" in caplog.text
 
 
 def test_folders_that_are_scenes_and_not_lights_are_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

@@ -61,7 +61,7 @@ def find_stills(path: Path | Sequence[Path], *, lights: Sequence[str] = ()) -> L
     files = pictures_in(path) if isinstance(path, Path) else list(path)
     dark = [file for file in files if file.stem.lower() in AMBIENT_NAMES]
     room = [file for file in files if file.stem.lower() in ROOM_NAMES]
-    masks = [file for file in files if file.stem.lower() in MASK_NAMES and file.stem not in lights]
+    masks = [file for file in files if any(_bears(file, name) for name in MASK_NAMES) and file.stem not in lights]
     files = [file for file in files if file not in dark and file not in room and file not in masks]
     if not files:
         kinds = ", ".join(sorted(KINDS))

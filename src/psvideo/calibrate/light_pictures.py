@@ -26,8 +26,8 @@ AMBIENT_NAMES = ("ambient", "dark")
 """A picture or a folder of this name shows the scene with every light off; it is taken off the others."""
 ROOM_NAMES = ("room", "outline", "ref")
 """A picture of this name shows the scene with the room light on: on it outlines show best."""
-MASK_NAMES = ("mask",)
-"""A picture of this name says where the subject is; it shows no light."""
+MASK_NAMES = ("mask", "Mask", "MASK")
+"""A picture whose name is or ends with such a word says where the subject is; it shows no light."""
 
 
 @dataclass(frozen=True, kw_only=True)
