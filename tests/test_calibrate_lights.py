@@ -1,5 +1,6 @@
 """Lights measured on matte spheres, white targets and any matte scene; and guessed where nothing was calibrated."""
 
+import json
 from pathlib import Path
 
 import cv2
@@ -17,7 +18,8 @@ from psvideo.calibrate.sphere.outline import given_outline
 from psvideo.calibrate.sphere.sphere_view import SphereView
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
-from psvideo.formats.rig_toml import read_rig
+from psvideo.formats.exr_files import write_exr
+from psvideo.formats.rig_toml import format_rig, read_rig
 from psvideo.model.choices import Prior
 from psvideo.model.ground import ground_of
 from psvideo.model.rig import Light, Rig
@@ -179,6 +181,28 @@ def test_a_matte_scene_shows_the_strengths_of_lights_of_known_directions() -> No
     noisy = [image + np.random.default_rng(9).normal(0, 0.002, image.shape).astype(np.float32) for image in flat.images]
     with pytest.raises(PsvideoError, match="does not show"):
         measure_strengths(light_pictures(flat.names, noisy), directions[:4])
+
+
+def test_the_command_writes_the_strengths_into_the_rig_and_speaks_json(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    directions, strengths = ways(5), np.random.default_rng(6).uniform(0.5, 0.9, (5, 3))
+    for name, image in zip("abcde", sphere_pictures(directions, strengths).images, strict=True):
+        write_exr(tmp_path / "stills" / f"{name}.exr", {c: image[..., k] for k, c in enumerate("RGB")}, half=False)
+    lights = tuple(Light(name=name, direction=(x, y, z)) for name, (x, y, z) in zip("abcde", directions, strict=True))
+    (tmp_path / "known.toml").write_text(format_rig(Rig(lights=lights)))
+    words = ["calibrate", "intensities", str(tmp_path / "stills"), "--rig", str(tmp_path / "known.toml")]
+    words += ["-o", str(tmp_path / "rig.toml")]
+    assert main([*words, "--json"]) == 0
+    spoken = json.loads(capsys.readouterr().out)["lights"]
+    written = read_rig(tmp_path / "rig.toml").lights
+    assert [light["name"] for light in spoken] == [light.name for light in written] == list("abcde")
+    found = np.array([light.intensity for light in written])
+    np.testing.assert_allclose(found, strengths / strengths.mean(axis=0), rtol=0.02)
+    assert off_deg(np.array([light.direction for light in written]), directions).max() < 1e-3
+    assert main(words) == 2, "a rig is not replaced without --force"
+    assert main([*words, "--force"]) == 0
+    assert "5 lights written; intensities are relative" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(("lights", "prior"), [(8, "equal-lights"), (8, "equal-albedo"), (4, None)])

@@ -290,3 +290,16 @@ def test_photographs_with_a_plan_of_their_own_fit(shared_data: Path, tmp_path: P
     assert found.fits
     assert "12 frames, 12 flashes a round: 1 round(s)" in lines(found, "ok")
     assert "cat.mask.png" in lines(found, "ok")
+
+
+def test_a_picture_is_described_and_a_broken_one_is_a_fault(tmp_path: Path) -> None:
+    path = tmp_path / "still.png"
+    path.write_bytes(imagecodecs.png_encode(np.full((6, 8, 3), 30_000, np.uint16)))
+    found = describe(path)
+    assert (found.kind, found.facts["width_px"], found.facts["height_px"]) == ("png image", 8, 6)
+    assert (found.facts["channels"], found.facts["bits"]) == (3, 16)
+    assert [finding.level for finding in found.findings] == ["ok"]
+    path.write_bytes(path.read_bytes()[:40])
+    broken = describe(path)
+    assert [finding.level for finding in broken.findings] == ["FAULT"]
+    assert "still.png" in broken.findings[0].text

@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
+from psvideo.calibrate.light_files import find_plates, find_stills
 from psvideo.calibrate.light_pictures import averaged, light_pictures
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
@@ -48,6 +49,47 @@ def test_a_mask_beside_the_pictures_is_no_light(mask: str, tmp_path: Path, caplo
         still(tmp_path / f"{name}.png", value)
     assert read_images(tmp_path).names == ("L1", "L2", "unmask")
     assert f"{mask}.png: is taken for no light's picture" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("files", "lights", "words"),
+    [
+        (["L1.png", "L1.tif"], [], "two lights have the name 'L1': L1.png and L1.tif. Expected one picture per light"),
+        (["take_key.png", "key.png"], ["key"], "two lights have the name 'key'"),
+        (
+            ["a1.png", "a2.png"],
+            ["key", "left", "top"],
+            "holds 2 pictures .a1.png to a2.png., and the plan has 3 lights",
+        ),
+        (["key.png", "left.png"], ["key", "left", "top"], "holds no picture of 'top'; expected one for each"),
+        (["flashes.png", "b.png"], [], "'flashes' cannot be a light's name"),
+        (["ambient.png", "mask.png"], [], "holds no pictures of lights. Expected still photographs"),
+    ],
+)
+def test_pictures_that_do_not_fit_the_lights_are_named(
+    files: list[str], lights: list[str], words: str, tmp_path: Path
+) -> None:
+    for name in files:
+        still(tmp_path / name, 0.5)
+    with pytest.raises(PsvideoError, match=words):
+        find_stills(tmp_path, lights=lights)
+
+
+def test_numbered_pictures_are_the_plan_s_lights_in_order(tmp_path: Path) -> None:
+    for name in ("x2.png", "x10.png", "x1.png"):
+        still(tmp_path / name, 0.5)
+    found = find_stills(tmp_path, lights=("key", "left", "top"))
+    assert {light: files[0].name for light, files in found.by_light.items()} == {
+        "key": "x1.png",
+        "left": "x2.png",
+        "top": "x10.png",
+    }
+
+
+def test_folders_lack_a_light_of_the_plan_by_name(tmp_path: Path) -> None:
+    still(tmp_path / "key" / "1.png", 0.5)
+    with pytest.raises(PsvideoError, match="holds no pictures of 'left', which the plan flashes; its folders are key"):
+        find_plates(tmp_path, lights=("key", "left"))
 
 
 def test_folders_that_are_scenes_and_not_lights_are_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
