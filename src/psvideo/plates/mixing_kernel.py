@@ -85,7 +85,7 @@ def mix_row(mix: MixtureArrays, row: int, out: Floats) -> None:
         if factor != np.float32(0):
             codes = _row_of(mix, frame, row)
             clipped = _add_row(mix, frame, row, codes, factor, out, begun)
-            holds_clipped = holds_clipped or bool(clipped > 0 and factor > COUNTS)
+            holds_clipped = holds_clipped or bool(clipped > 0 and abs(factor) > COUNTS)
             begun = True
     if not begun:
         out[:] = np.float32(0)
@@ -168,7 +168,7 @@ def _take_off(mix: MixtureArrays, level: int, row: int, share: np.float32, out: 
 def _mark_clipped(mix: MixtureArrays, row: int, out: Floats) -> None:
     rows, cols = mix.zero.shape[1:]
     for frame in range(mix.frames.shape[0]):
-        if mix.coefficients[frame, row] > COUNTS:
+        if abs(mix.coefficients[frame, row]) > COUNTS:
             codes = _row_of(mix, frame, row)
             for sample in range(mix.samples):
                 col = sample % cols

@@ -6,7 +6,7 @@ Frames stay in the codes in which they were read, which several pictures share: 
 beside them. Levels are what is known of the ambient light, in linear light.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -114,7 +114,7 @@ class Mixture:
         """Return where any sample that counts was clipped, of the picture's shape."""
         clipped = np.zeros(self.shape, np.bool_)
         for frame, share in zip(self.frames, self.coefficients, strict=True):
-            counts = share > COUNTS
+            counts = np.abs(share) > COUNTS
             clipped[counts] |= frame.light()[counts] >= np.float32(self.clips_from)
         return clipped
 
@@ -150,6 +150,29 @@ class Mixture:
             mix_rows(mix, places[first:last], flat[first:last])
 
         _in_bands(band, len(rows), mix.samples)
+
+
+def combined(pictures: Sequence[Mixture], shares: Sequence[float], *, ceiling: float) -> Mixture:
+    """Return the sum of pictures, each times its share; ``ceiling`` where any of them is clipped in a sample that
+    counts. A plate that lies in memory is clipped from 1.0 on."""
+    frames = list({id(frame): frame for one in pictures for frame in one.frames}.values())
+    levels = list({id(level): level for one in pictures for level in one.levels}.values())
+    coefficients, taken = (np.zeros((len(parts), pictures[0].shape[0])) for parts in (frames, levels))
+    places = {id(part): place for parts in (frames, levels) for place, part in enumerate(parts)}
+    for one, share in zip(pictures, shares, strict=True):
+        for frame, takes in zip(one.frames, one.coefficients, strict=True):
+            coefficients[places[id(frame)]] += share * takes
+        for level, takes in zip(one.levels, () if one.taken is None else one.taken, strict=True):
+            taken[places[id(level)]] += share * takes * one.coefficients.any(axis=0)
+    clips_from = min(1.0, *(one.clips_from for one in pictures))
+    return Mixture(
+        frames=tuple(frames),
+        coefficients=coefficients,
+        levels=tuple(levels),
+        taken=taken,
+        ceiling=ceiling,
+        clips_from=clips_from,
+    )
 
 
 def _copying(image: Image) -> Reader:

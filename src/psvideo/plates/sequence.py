@@ -17,7 +17,7 @@ from psvideo.model.camera import FloatArray
 from psvideo.model.coded import Image
 from psvideo.model.plan import Plan, mixing_matrix
 from psvideo.model.timing import Flash
-from psvideo.plates.mixture import Mixture, made
+from psvideo.plates.mixture import Mixture, combined, made
 from psvideo.plates.split import Plate
 
 FIRST_NUMBER = 1001
@@ -295,17 +295,12 @@ def _merged(parts: list[Plate], exposures: FloatArray, light: str, number: int) 
 def _mixed(parts: list[Plate], shares: FloatArray, light: str, number: int) -> LightPlate:
     """Take a light out of patterns of several; ``shares`` (part,) are what of each pattern makes up the light."""
     saturation = max(float(shares[shares > 0].sum()), 1.0)
-    image = np.zeros(parts[0].picture.shape, np.float32)
-    clipped = np.zeros(image.shape, np.bool_)
-    for part, share in zip(parts, shares, strict=True):
-        shown = part.image
-        image += np.float32(share) * shown
-        clipped |= shown >= 1.0
-    image[clipped] = np.float32(saturation)
     seen = np.all([part.seen for part in parts], axis=0)
-    image[~seen] = 0
+    picture = combined([part.picture for part in parts], [float(share) for share in shares], ceiling=saturation)
     time_s = _time_s(parts, shares)
-    return LightPlate(light=light, number=number, time_s=time_s, picture=made(image), seen=seen, saturation=saturation)
+    return LightPlate(
+        light=light, number=number, time_s=time_s, picture=picture.within(seen), seen=seen, saturation=saturation
+    )
 
 
 def _time_s(parts: list[Plate], shares: FloatArray) -> float:

@@ -1,13 +1,15 @@
 """What every compiled solver needs around its kernel: arrays checked, bands of rows side by side, a surface made."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from psvideo.compute.threads import over_ranges
 from psvideo.model.surface import Surface
-from psvideo.plates.mixture import Reader
+from psvideo.plates.mixture import Mixture, Reader
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.task import Mask, Result, Samples, Task
 
@@ -40,30 +42,56 @@ def check_arrays(plates: Sequence[Samples], lit: Illumination, seen: Mask | None
         raise ValueError(f"mask has shape {mask.shape} and type {mask.dtype}; expected {shape[:2]} of bool")
 
 
-def in_bands(run: Callable[[int, int], None], *, rows: int, cols: int, threads: int | None) -> None:
-    """Call ``run(first, last)`` for bands of rows side by side. (Numba's own thread pool may abort when two use it.)"""
-    over_ranges(run, rows, each=BAND_PIXELS // cols, threads=threads)
+@dataclass(frozen=True, kw_only=True)
+class Shown:
+    """A solver's plates, one per light: ``samples`` as arrays, or stand-ins of their shape with ``readers``, which make
+    the rows that are solved."""
+
+    samples: list[Samples]
+    readers: tuple[Reader, ...] = ()
+
+    @classmethod
+    def of(cls, plates: Sequence[Samples] | Sequence[Mixture]) -> "Shown":
+        """Hold arrays, contiguous, or pictures that are not made yet."""
+        mixtures = [plate for plate in plates if isinstance(plate, Mixture)]
+        if mixtures:
+            stand_ins: list[Samples] = [np.broadcast_to(np.float32(0), plate.shape) for plate in mixtures]
+            return cls(samples=stand_ins, readers=tuple(plate.reader() for plate in mixtures))
+        return cls(samples=[np.ascontiguousarray(plate) for plate in plates])
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """A plate's shape."""
+        return self.samples[0].shape
+
+    def in_bands(
+        self, run: Callable[[Task, int, int], None], given: Task, *, threads: int | None, step: int = 1
+    ) -> None:
+        """Call ``run(task, first, last)`` for bands of rows side by side; it needs every ``step``-th row.
+
+        Plates that are not made yet are made band by band; the task finds the rows where they would lie if the whole
+        plates did. (Numba's own thread pool may abort when two use it.)
+        """
+        rows, cols = self.shape[:2]
+        if not self.readers:
+            over_ranges(partial(run, given), rows, each=BAND_PIXELS // cols, threads=threads)
+            return
+
+        def band(first: int, last: int) -> None:
+            held = np.empty((len(self.readers), last - first, *self.shape[1:]), np.float32)
+            for read, into in zip(self.readers, held, strict=True):
+                for begin, end in _runs(first, last, step):
+                    read(begin, end, into[begin - first : end - first])
+            begins = np.array([plate.ctypes.data - first * held.strides[1] for plate in held], np.intp)
+            copies = len(given.plates) - len(begins)
+            run(given._replace(plates=np.pad(begins, (0, copies), mode="edge")), first, last)
+
+        over_ranges(band, rows, each=max(MADE_PIXELS // cols, 1), threads=threads)
 
 
-def shown_in_bands(
-    run: Callable[[Task, int, int], None], given: Task, readers: Sequence[Reader], shape: tuple[int, ...]
-) -> None:
-    """Call ``run(task, first, last)`` for bands of rows side by side, of plates of which only these rows are made.
-
-    The task finds the rows where they would lie if the whole plates did.
-    """
-    rows, cols = shape[:2]
-
-    def band(first: int, last: int) -> None:
-        held = np.empty((len(readers), last - first, *shape[1:]), np.float32)
-        for read, into in zip(readers, held, strict=True):
-            read(first, last, into)
-        row_bytes = held.strides[1]
-        begins = np.array([plate.ctypes.data - first * row_bytes for plate in held], np.intp)
-        copies = len(given.plates) - len(readers)
-        run(given._replace(plates=np.pad(begins, (0, copies), mode="edge")), first, last)
-
-    over_ranges(band, rows, each=MADE_PIXELS // cols)
+def _runs(first: int, last: int, step: int) -> list[tuple[int, int]]:
+    """Return the rows that are needed, as runs from the first up to the last."""
+    return [(first, last)] if step == 1 else [(row, row + 1) for row in range(-(-first // step) * step, last, step)]
 
 
 def surface_of(result: Result, error: Samples | None, shape: tuple[int, ...], *, half: bool) -> Surface:

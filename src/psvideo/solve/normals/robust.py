@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from psvideo.model.surface import Misfit, Surface
-from psvideo.solve.normals.bands import check_arrays, in_bands, surface_of
+from psvideo.plates.mixture import Mixture
+from psvideo.solve.normals.bands import Shown, check_arrays, surface_of
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.task import FEW, Floats, Mask, Samples, Task, Usable, Weights, empty_result, task
 
@@ -62,7 +63,7 @@ TUKEY_WIDTH = 4.685  # beside Cauchy's, as far as weights go: so wide, Tukey's k
 
 
 def solve(
-    plates: Sequence[Samples],
+    plates: Sequence[Samples] | Sequence[Mixture],
     lit: Illumination,
     *,
     seen: Mask | None = None,
@@ -93,30 +94,30 @@ def solve(
 
     The result does not depend on ``threads``. Raises ValueError where the arrays do not belong together.
     """
-    check_arrays(plates, lit, seen, mask)
+    shown = Shown.of(plates)
+    check_arrays(shown.samples, lit, seen, mask)
     from psvideo.solve.normals import robust_kernel as kernel
 
-    samples = [np.ascontiguousarray(plate) for plate in plates]
-    rows, cols = samples[0].shape[:2]
+    rows, cols = shown.shape[:2]
     result = empty_result(rows * cols, lit.intensities.shape[1], half=half, residual=residual)
     predicted = np.zeros(rows * cols, np.uint16 if half else np.float32)
-    given = _balanced(task(samples, lit, seen, mask, usable, black_level, scale))
+    given = _balanced(task(shown.samples, lit, seen, mask, usable, black_level, scale))
 
     def run(into: Samples, unexplained: Floats, how: Weights, step: int) -> None:
-        def band(first: int, last: int) -> None:
-            kernel.solve_rows(given, result, into, unexplained, kernel.working_memory(given), how, first, last, step)
+        def band(one: Task, first: int, last: int) -> None:
+            kernel.solve_rows(one, result, into, unexplained, kernel.working_memory(one), how, first, last, step)
 
-        in_bands(band, rows=rows, cols=cols, threads=threads)
+        shown.in_bands(band, given, threads=threads, step=step)
 
     if misfit is None:
         step, unexplained = max(rows * cols // SAMPLE_PIXELS, 1), np.zeros(rows * cols, np.float32)
         run(predicted, unexplained, _weights(reweighting, limit_deg=EVERYTHING_DEG, common=0.0), step)
-        found = surface_of(result, predicted, plates[0].shape, half=half)
+        found = surface_of(result, predicted, shown.shape, half=half)
         misfit = _typical(found, unexplained.reshape(rows, cols), step)
     limit_deg = max(reweighting.most_error_deg, 0.0 if misfit is None else _limit_deg(reweighting, misfit))
     how = _weights(reweighting, limit_deg=limit_deg, common=0.0 if misfit is None else misfit.share)
     run(predicted if error else predicted[:0], np.zeros(0, np.float32), how, 1)
-    surface = surface_of(result, predicted if error else None, plates[0].shape, half=half)
+    surface = surface_of(result, predicted if error else None, shown.shape, half=half)
     return replace(surface, misfit=misfit)
 
 

@@ -42,9 +42,8 @@ class Solving:
     ) -> Surface:
         """Return the surface that explains one plate per light; see the solvers for the arguments."""
         if self.method(len(plates)) == "robust":
-            images = [plate.image() if isinstance(plate, Mixture) else plate for plate in plates]
             return robust.solve(
-                images, lit, seen=seen, mask=mask, half=self.half, residual=self.residual, error=self.error
+                plates, lit, seen=seen, mask=mask, half=self.half, residual=self.residual, error=self.error
             )
         return woodham1980.solve(plates, lit, seen=seen, mask=mask, half=self.half, residual=self.residual)
 

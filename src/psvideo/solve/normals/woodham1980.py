@@ -6,13 +6,10 @@ a n is the least-squares solution of these equations, which minimises the plates
 """
 
 from collections.abc import Sequence
-from functools import partial
-
-import numpy as np
 
 from psvideo.model.surface import Surface
 from psvideo.plates.mixture import Mixture
-from psvideo.solve.normals.bands import check_arrays, in_bands, shown_in_bands, surface_of
+from psvideo.solve.normals.bands import Shown, check_arrays, surface_of
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.task import EVERYTHING, Mask, Samples, Task, Usable, empty_result, task
 
@@ -52,22 +49,14 @@ def solve(
     """
     from psvideo.solve.normals.kernel import solve_rows, working_memory
 
-    readers = [plate.reader() for plate in plates if isinstance(plate, Mixture)]
-    samples = [
-        np.broadcast_to(np.float32(0), plate.shape) if isinstance(plate, Mixture) else np.ascontiguousarray(plate)
-        for plate in plates
-    ]
-    check_arrays(samples, lit, seen, mask)
-    shape = samples[0].shape
-    rows, cols = shape[:2]
+    shown = Shown.of(plates)
+    check_arrays(shown.samples, lit, seen, mask)
+    rows, cols = shown.shape[:2]
     result = empty_result(rows * cols, lit.intensities.shape[1], half=half, residual=residual)
-    given = task(samples, lit, seen, mask, usable, black_level, scale)
+    given = task(shown.samples, lit, seen, mask, usable, black_level, scale)
 
     def solve_band(one: Task, first: int, last: int) -> None:
         solve_rows(one, result, working_memory(one), first, last)
 
-    if readers:
-        shown_in_bands(solve_band, given, readers, shape)
-    else:
-        in_bands(partial(solve_band, given), rows=rows, cols=cols, threads=threads)
-    return surface_of(result, None, shape, half=half)
+    shown.in_bands(solve_band, given, threads=threads)
+    return surface_of(result, None, shown.shape, half=half)
