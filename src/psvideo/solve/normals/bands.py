@@ -43,7 +43,7 @@ def check_arrays(plates: Sequence[Samples], lit: Illumination, seen: Mask | None
 
 
 @dataclass(frozen=True, kw_only=True)
-class Shown:
+class ShownPlates:
     """A solver's plates, one per light: ``samples`` as arrays, or stand-ins of their shape with ``readers``, which make
     the rows that are solved."""
 
@@ -51,7 +51,7 @@ class Shown:
     readers: tuple[Reader, ...] = ()
 
     @classmethod
-    def of(cls, plates: Sequence[Samples] | Sequence[Mixture]) -> "Shown":
+    def of(cls, plates: Sequence[Samples] | Sequence[Mixture]) -> "ShownPlates":
         """Hold arrays, contiguous, or pictures that are not made yet."""
         mixtures = [plate for plate in plates if isinstance(plate, Mixture)]
         if mixtures:

@@ -14,7 +14,7 @@ import numpy as np
 
 from psvideo.model.surface import Misfit, Surface
 from psvideo.plates.mixture import Mixture
-from psvideo.solve.normals.bands import Shown, check_arrays, surface_of
+from psvideo.solve.normals.bands import ShownPlates, check_arrays, surface_of
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.task import FEW, Floats, Mask, Samples, Task, Usable, Weights, empty_result, task
 
@@ -94,7 +94,7 @@ def solve(
 
     The result does not depend on ``threads``. Raises ValueError where the arrays do not belong together.
     """
-    shown = Shown.of(plates)
+    shown = ShownPlates.of(plates)
     check_arrays(shown.samples, lit, seen, mask)
     from psvideo.solve.normals import robust_kernel as kernel
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from psvideo.model.surface import Surface
 from psvideo.plates.mixture import Mixture
-from psvideo.solve.normals.bands import Shown, check_arrays, surface_of
+from psvideo.solve.normals.bands import ShownPlates, check_arrays, surface_of
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.task import EVERYTHING, Mask, Samples, Task, Usable, empty_result, task
 
@@ -49,7 +49,7 @@ def solve(
     """
     from psvideo.solve.normals.kernel import solve_rows, working_memory
 
-    shown = Shown.of(plates)
+    shown = ShownPlates.of(plates)
     check_arrays(shown.samples, lit, seen, mask)
     rows, cols = shown.shape[:2]
     result = empty_result(rows * cols, lit.intensities.shape[1], half=half, residual=residual)
