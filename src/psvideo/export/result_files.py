@@ -111,14 +111,13 @@ def write_surface(
         shape = depth()
         _write_meshes(folder, clip, number, surface, shape, delivery)
     made = Made(surface=surface, space=delivery.space, beauty=beauty, depth=shape, age_s=age_s)
-    planes = {name: planes_of(name, made) for name in delivery.quantities}
-    halves = {name: is_half(name, asked=delivery.half) for name in planes}
+    halves = {name: is_half(name, asked=delivery.half) for name in delivery.quantities}
     world = delivery.space.attributes()
-    attributes = {name: tags.attributes(time_s=time_s, data=not QUANTITIES[name].colour) | world for name in planes}
-    for name, channels in planes.items():
+    attributes = {name: tags.attributes(time_s=time_s, data=not QUANTITIES[name].colour) | world for name in halves}
+    for name in delivery.quantities:  # one after the other: what is made for one file is gone before the next
         write_exr(
             folder / result_name(clip, name, number),
-            channels,
+            planes_of(name, made),
             half=halves[name],
             attributes=attributes[name],
             fps=tags.fps,
@@ -128,7 +127,7 @@ def write_surface(
     if delivery.multipart:
         write_exr_parts(
             folder / bundle_name(clip, number),
-            planes,
+            {name: planes_of(name, made) for name in delivery.quantities},
             half=halves,
             attributes=attributes,
             fps=tags.fps,
@@ -137,7 +136,8 @@ def write_surface(
         )
     if delivery.png16:
         texts = {key: str(value) for key, value in attributes["normals"].items()}
-        normals = encode_normals(np.stack([planes["normals"][channel] for channel in "RGB"], axis=-1))
+        planes = planes_of("normals", made)
+        normals = encode_normals(np.stack([planes[channel] for channel in "RGB"], axis=-1))
         write_png16(folder / result_name(clip, "normals", number, suffix="png"), normals, texts=texts)
         mask = np.where(surface.valid, np.uint16(PNG_MAX), np.uint16(0))
         write_png16(folder / result_name(clip, "valid", number, suffix="png"), mask, texts=texts)

@@ -1,10 +1,9 @@
 """One EXR file: named channels with their attributes, losslessly compressed, whole or not at all.
 
-The picture is encoded in memory and then written as bytes, so that a full disk is an ordinary error: OpenEXR itself
-swallows what goes wrong while it closes a file, and leaves a truncated one.
+OpenEXR encodes into a file that Python has opened, so that a full disk is an ordinary error: by itself it swallows what
+goes wrong while it closes a file, and leaves a truncated one.
 """
 
-import io
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -70,7 +69,7 @@ def write_exr(
         raise ValueError(f"{path}: the channels' planes differ in shape or there are none: {sorted(shapes)}")
     header = dict(attributes or {}) | _header(shapes.pop(), fps, time_code, crop, compression)
     with whole_file(path) as beside:
-        beside.write_bytes(_encoded(path, header, planes))
+        _write(path, beside, lambda: OpenEXR.File(header, planes))
 
 
 def _plane(name: str, values: NDArray[np.floating], half: bool) -> NDArray[np.floating]:
@@ -160,17 +159,13 @@ def write_exr_parts(
         header = dict(attributes[name]) | _header(next(iter(planes.values())).shape, fps, time_code, None, compression)
         built.append(OpenEXR.Part(header, planes, name))
     with whole_file(path) as beside:
-        beside.write_bytes(_bytes_of(path, lambda: OpenEXR.File(built)))
+        _write(path, beside, lambda: OpenEXR.File(built))
 
 
-def _encoded(path: Path, header: dict[str, object], planes: dict[str, NDArray[np.floating]]) -> memoryview:
-    return _bytes_of(path, lambda: OpenEXR.File(header, planes))
-
-
-def _bytes_of(path: Path, build: Callable[[], "OpenEXR.File"]) -> memoryview:
-    stream = io.BytesIO()
+def _write(path: Path, beside: Path, build: Callable[[], "OpenEXR.File"]) -> None:
+    """Write what is built to the file ``beside``, which stands for ``path`` until it is whole."""
     try:
-        build().write(stream)
+        with beside.open("wb") as stream:
+            build().write(stream)
     except RuntimeError as fault:  # what OpenEXR raises for all its faults
         raise PsvideoError(f"{path}: OpenEXR cannot encode this picture: {fault}") from fault
-    return stream.getbuffer()

@@ -1,5 +1,6 @@
 """Relighting a surface, and how linear light, normals and masks become pixels that a screen shows."""
 
+from collections.abc import Callable
 from numbers import Real
 
 import cv2
@@ -12,6 +13,8 @@ from psvideo.model.surface import Surface, check_surface
 
 Image = NDArray[np.float32]
 Pixels = NDArray[np.uint8]
+BAND_ROWS = 256
+"""About so many rows are averaged at a time."""
 
 
 def relight(
@@ -80,22 +83,31 @@ def relight(
 
 def smaller(image: NDArray[np.floating], width_px: int) -> Image:
     """Return a picture at most this wide, averaged down, for showing it."""
-    rows, cols = image.shape[:2]
+    return smaller_by_rows(lambda first, last: image[first:last], image.shape, width_px)
+
+
+def smaller_by_rows(read: Callable[[int, int], NDArray[np.floating]], shape: tuple[int, ...], width_px: int) -> Image:
+    """Return a picture at most this wide, averaged down, of which ``read(first, last)`` gives rows.
+
+    Only a band of rows is held: whole pictures in float32 are large.
+    """
+    rows, cols = shape[:2]
     if cols <= width_px:
-        return image.astype(np.float32)
-    planes = np.moveaxis(image.reshape(rows, cols, -1), -1, 0)  # one by one: whole pictures in float32 are large
-    small = np.stack([_smaller_plane(plane, width_px) for plane in planes], axis=-1)
-    return small.reshape(*small.shape[:2], *image.shape[2:])
-
-
-def _smaller_plane(plane: NDArray[np.floating], width_px: int) -> Image:
-    """Average one channel down, by a whole number first: OpenCV averages whole squares several times faster."""
-    rows, cols = plane.shape
+        return np.asarray(read(0, rows), np.float32)
     factor = cols // width_px
-    squares = np.ascontiguousarray(plane[: rows // factor * factor, : cols // factor * factor], np.float32)
-    coarse = cv2.resize(squares, (cols // factor, rows // factor), interpolation=cv2.INTER_AREA)
+    band, last = factor * max(BAND_ROWS // factor, 1), rows // factor * factor
+    coarse = [_averaged(read(first, min(first + band, last)), factor) for first in range(0, last, band)]
     size = (width_px, max(round(rows * width_px / cols), 1))
-    return cv2.resize(coarse, size, interpolation=cv2.INTER_AREA).astype(np.float32)
+    planes = [cv2.resize(plane, size, interpolation=cv2.INTER_AREA) for plane in np.concatenate(coarse, axis=1)]
+    return np.stack(planes, axis=-1).astype(np.float32).reshape(size[1], size[0], *shape[2:])
+
+
+def _averaged(band: NDArray[np.floating], factor: int) -> Image:
+    """Average squares of a whole number of pixels, which OpenCV does several times faster; (channel, row, col)."""
+    rows, cols = (size // factor for size in band.shape[:2])
+    channels = np.moveaxis(band[: rows * factor, : cols * factor].reshape(rows * factor, cols * factor, -1), -1, 0)
+    squares = (np.ascontiguousarray(channel, np.float32) for channel in channels)
+    return np.stack([cv2.resize(one, (cols, rows), interpolation=cv2.INTER_AREA) for one in squares])
 
 
 def three_channels(image: Image) -> Image:

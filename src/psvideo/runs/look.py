@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from psvideo.pictures.contact import Strip, Tile, sheet
 from psvideo.pictures.quantity import picture_of
-from psvideo.pictures.relighting import exposure_for, smaller, srgb
+from psvideo.pictures.relighting import exposure_for, smaller, smaller_by_rows, srgb
 from psvideo.plates.sequence import Round
 from psvideo.solve.instants import Instant
 
@@ -27,6 +27,8 @@ def look_at_plates(one: Round) -> Pixels:
 
 
 def _plates(one: Round) -> Strip:
-    shown = [(plate.light, smaller(plate.image, SHOWN_WIDTH_PX)) for plate in one.plates]
+    shown = [
+        (plate.light, smaller_by_rows(plate.picture.reader(), plate.shape, SHOWN_WIDTH_PX)) for plate in one.plates
+    ]
     exposure = exposure_for(shown[0][1])
     return Strip("Plates, one per light", [Tile(light, srgb(picture, exposure=exposure)) for light, picture in shown])

@@ -7,6 +7,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.plates.mixture import Mixture
+
 SCALES_PX = ((0.0, 1.5, 1.0), (1.5, 4.0, 2.5), (4.0, 9.0, np.inf))
 """Blur before and after (standard deviations), and up to which result these two measure it: noise makes soft edges look
 sharper, so that they are compared once both pictures are smooth."""
@@ -28,15 +30,20 @@ KERNEL = np.array([[-0.5, 0, 0.5]], np.float32)
 Squares = NDArray[np.float32]
 
 
-def sharpest_blur_px(image: NDArray[np.float32]) -> float | None:
-    """Return the standard deviation of the blur that the sharpest tenth of a picture's edges have, in pixels.
+def middle_of(picture: Mixture) -> NDArray[np.float32]:
+    """Return the middle of a picture, grey (row, col), which is what its sharpness is judged by."""
+    rows, cols = picture.shape[:2]
+    top, left = max(rows - LARGEST_PX, 0) // 2, max(cols - LARGEST_PX, 0) // 2
+    bands = (picture.rows(range(row, min(row + SQUARE_PX, rows - top))) for row in range(top, rows - top, SQUARE_PX))
+    cut = (band[:, left : cols - left] for band in bands)
+    return np.concatenate([np.array(band if band.ndim == 2 else band[..., 1]) for band in cut])
+
+
+def sharpest_blur_px(grey: NDArray[np.float32]) -> float | None:
+    """Return the standard deviation of the blur that the sharpest tenth of a grey picture's edges have, in pixels.
 
     About 0.6 is as sharp as pixels can show, a demosaiced picture has 0.8. None where no edge stands out of the noise.
     """
-    grey = image if image.ndim == 2 else image[..., 1]
-    rows, cols = grey.shape
-    top, left = max(rows - LARGEST_PX, 0) // 2, max(cols - LARGEST_PX, 0) // 2
-    grey = np.ascontiguousarray(grey[top : rows - top, left : cols - left], np.float32)
     squares = _steepest_squares(grey)
     noise, whole = _noise(grey), grey.size / squares.size
     blur_px, least_px = None, 0.0

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from psvideo.model.surface import Misfit, Surface
 from psvideo.plates.ambient_regression import Separated
 from psvideo.plates.sequence import AMBIENT, LightPlate, Round
-from psvideo.report.observe.focus import sharpest_blur_px
+from psvideo.report.observe.focus import middle_of, sharpest_blur_px
 from psvideo.report.observe.levels import BINS, Counts, Levels, count_levels
 from psvideo.report.observe.motion import Glimpse, Motion, glimpse, motion
 from psvideo.report.observe.rigpoints import RigPoints
@@ -205,7 +205,7 @@ class Observed:
         return self.worst.thumbnails
 
     def _look_closely(self, one: Round, surface: Surface | None) -> None:
-        blur_px = sharpest_blur_px(one.plates[0].image)
+        blur_px = sharpest_blur_px(middle_of(one.plates[0].picture))
         if blur_px is not None:
             self.blurs_px.append(blur_px)
         if surface is not None:
