@@ -47,7 +47,7 @@ def cases() -> dict[str, Case]:
         "drift 5 ppm/s": Case(plan=wide, clock=replace(hundred, drift_ppm_per_s=5.0), frames=300),
         "bands": Case(plan=plain, scene=banded, frames=60),
         "void": Case(plan=plain, scene=void, frames=60),
-        "rolling stripes": Case(plan=plain, scene=rolling_stripes),
+        "rolling stripes": Case(plan=plain, scene=rolling_stripes()),
         "jitter 3 us": Case(plan=plain, clock=replace(hundred, jitter_s=3e-6)),
         "tumbling": Case(plan=plain, scene=tumbling),
         "global shutter": Case(plan=plan_of(readout=0.0)),

@@ -75,7 +75,8 @@ def _line(name: str, case: Case) -> Line:
     try:
         found = [outcome(case, seed) for seed in range(case.seeds)]
     except PsvideoError as fault:
-        return Line(name, f"refused: {str(fault)[:90]}", "", "", "", "", "", "", "", "", "", "NO")
+        met = "yes" if case.or_refused else "NO"
+        return Line(name, f"refused: {str(fault)[:90]}", "", "", "", "", "", "", "", "", "", met)
     named = all(one.names_right if one.order == "marker" else not case.marker for one in found)
     worst = max(one.rms_rows for one in found)
     over = max(one.plates.ours / one.plates.oracle for one in found)

@@ -54,7 +54,8 @@ class Case:
 
     ``numbered``: the numbering shows the dropped frames. ``recorder``: what kind of file the clip goes through. The
     clip goes on by ``step`` frames a frame, rounded down; ``recoded`` is what encoding it again adds to each row's
-    mean, in standard deviations of the picture.
+    mean, in standard deviations of the picture. ``or_refused``: the picture may not show the times; then a refusal is
+    right, and wrong times are not.
     """
 
     plan: Plan
@@ -72,6 +73,7 @@ class Case:
     marker: bool = True
     recorder: Recorder | None = None
     bar_rows: float = 0.05
+    or_refused: bool = False
     seeds: int = 2
 
     def film(self, seed: int) -> Filmed:
@@ -201,7 +203,24 @@ def _scenes() -> dict[str, Case]:
         "bands with the dark row's profile": Case(plan=plain, scene=painted),
         "void": Case(plan=plain, scene=void),
         "void, readout unknown": Case(plan=plain, claimed=_unknown(plain), scene=void),
-        "stripes moving with the dark row": Case(plan=plain, scene=rolling_stripes),
+        "stripes moving with the dark row": Case(plan=plain, scene=rolling_stripes()),
+        "half the picture striped, 8 lights": Case(
+            plan=plan_of(lights=tuple("abcdefgh"), durations_s=(0.0016,), readout=0.9),
+            scene=rolling_stripes(speed=1.1, share=0.5, pitch=1.0, light=0.5),
+            ambient=0.02,
+        ),
+        "stripes at twice the dark row's speed, 3000 ppm": Case(
+            plan=plan_of(durations_s=(0.0016,), tolerance_ppm=None),
+            scene=rolling_stripes(speed=2.0, share=0.5, light=0.0),
+            clock=_clock(3000),
+            frames=150,
+        ),
+        "half the picture striped, with the dark row, 180 degrees": Case(
+            plan=plan_of(lights=tuple("abcdefgh"), shutter=0.5),
+            scene=rolling_stripes(share=0.5, pitch=1.0),
+            frames=240,
+            or_refused=True,
+        ),
         "tumbling in a void": Case(plan=plain, scene=tumbling),
         "saturation": Case(plan=plain, scene=saturated),
         "vignetting": Case(plan=plain, scene=vignetted),

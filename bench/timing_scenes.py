@@ -170,16 +170,25 @@ def tumbling(plan: Plan, rng: np.random.Generator) -> Callable[[TrueFlash], Pict
     return plate
 
 
-def rolling_stripes(plan: Plan, rng: np.random.Generator) -> Callable[[TrueFlash], Picture]:
-    """Stripes that travel down the picture as fast as the dark row does."""
-    still = textured(plan, rng)
-    camera = plan.camera
-    pitch_s = plan.flashes[0].duration_s + plan.dark_s
-    rows_per_s = (pitch_s - camera.frame_period_s) / abs(camera.row_time_s) / pitch_s
-    rows = np.arange(camera.height_px)
+def rolling_stripes(*, speed: float = 1.0, share: float = 0.1, pitch: float = 0.5, light: float = 0.15) -> Scene:
+    """Stripes that travel down the picture at a multiple of the dark row's speed.
 
-    def plate(flash: TrueFlash) -> Picture:
-        place = (rows - rows_per_s * flash.middle_s) % (camera.height_px / 2)
-        return np.asarray(still(flash) * np.where(place < 0.1 * camera.height_px, 0.15, 1.0)[:, None], np.float32)
+    ``pitch`` is from stripe to stripe, as a share of the picture's height, and ``share`` of that is a stripe, which
+    gives back so much of its light.
+    """
 
-    return plate
+    def made(plan: Plan, rng: np.random.Generator) -> Callable[[TrueFlash], Picture]:
+        still = textured(plan, rng)
+        camera = plan.camera
+        pitch_s = plan.flashes[0].duration_s + plan.dark_s
+        rows_per_s = speed * (pitch_s - camera.frame_period_s) / abs(camera.row_time_s) / pitch_s
+        rows = np.arange(camera.height_px)
+        each = camera.height_px * pitch
+
+        def plate(flash: TrueFlash) -> Picture:
+            place = (rows - rows_per_s * flash.middle_s) % each
+            return np.asarray(still(flash) * np.where(place < share * each, light, 1.0)[:, None], np.float32)
+
+        return plate
+
+    return made

@@ -15,6 +15,8 @@ GOOD_COURSE = 0.9
 """A course through the clip that takes away this share of the robust loss is not tried again from elsewhere."""
 MOST_STEPS, MOST_STEPS_SHARE = 3, 0.04
 """Frames before which others may be missing (or a share of all frames) until only an excellent fit is believed."""
+MOST_STRAYED_SHARE = 0.2
+"""And frames that may be missing altogether: holes that grow and grow follow a subject, not a strobe."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,18 +24,20 @@ class Course:
     """Where a clip's frames are in time, as followed from a seed.
 
     ``trusted`` are the first and the last place in time at which frames fit; ``share`` of the robust loss goes with it.
+    Frames follow otherwise than their numbering says at so many ``steps``, by so many frames together (``strayed``).
     """
 
     track: FrameTrack
     trusted: tuple[int, int]
     steps: int
+    strayed: int
     share: float
 
 
 def followed(plan: Plan, rows: Profiles, seed: Seed) -> Course:
     """Follow the strobe from the seed, and from another one where frames seem to be missing all over."""
     course = _followed(plan, rows, seed)
-    if course.share > GOOD_COURSE or not too_many(course.steps, len(rows.value)):
+    if course.share > GOOD_COURSE or not too_many(course.steps, 0, len(rows.value)):
         return course
     for other in other_seeds(plan, rows.turned() if seed.beat.upward else rows):
         again = _followed(plan, rows, other) if other.beat.upward == seed.beat.upward else course
@@ -43,9 +47,9 @@ def followed(plan: Plan, rows: Profiles, seed: Seed) -> Course:
     return course
 
 
-def too_many(steps: int, frames: int) -> bool:
-    """Tell whether so many frames seem to be missing that it takes an excellent fit to believe it."""
-    return steps > max(MOST_STEPS, MOST_STEPS_SHARE * frames)
+def too_many(steps: int, strayed: int, frames: int) -> bool:
+    """Tell whether frames seem to be missing at so many places, or so many, that it takes an excellent fit."""
+    return steps > max(MOST_STEPS, MOST_STEPS_SHARE * frames) or strayed > MOST_STRAYED_SHARE * frames
 
 
 def _followed(plan: Plan, rows: Profiles, seed: Seed) -> Course:
@@ -59,10 +63,12 @@ def _followed(plan: Plan, rows: Profiles, seed: Seed) -> Course:
     tracked = from_first_frame(kept, replace(tracked, index=placed.index))
     index = tracked.index
     there = replace(kept, index=index)
+    stray = np.diff(index) - np.diff(numbering.plain)
     return Course(
         track=with_repeats(plan, rows, tracked, numbering.kept),
         trusted=(int(index[placed.lost_first]), int(index[len(index) - 1 - placed.lost_last])),
-        steps=int((np.diff(index) != np.diff(numbering.plain)).sum()),
+        steps=int((stray != 0).sum()),
+        strayed=int(np.abs(stray).sum()),
         share=gain_of(there, unexplained(plan, there, tracked.beat)),
     )
 

@@ -12,6 +12,7 @@ from psvideo.sync.rowfit.jitter import STEADY, Jitter, disagreement_s, jitter, s
 from psvideo.sync.rowfit.plateau import centred
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import Fit, clearest, explained, refine, robust_loss, scaled
+from psvideo.sync.rowfit.restless import across, restless
 from psvideo.sync.rowfit.seed import find_seed, gain_of
 from psvideo.sync.rowfit.softness import BELIEVED, BLURRED, cleared, misfit, within_blur
 from psvideo.sync.rowfit.track import FrameTrack
@@ -46,10 +47,12 @@ OTHER_SWINGS = (-2.5, -1.5, 1.5, 2.5)
 class ClipFit:
     """The fit of a whole clip: its rows with the times that their frames truly have, and which frames are repeats.
 
-    ``steps`` counts the places where frames follow otherwise than numbering and repeated frames explain;
+    ``steps`` counts the places where frames follow otherwise than numbering and repeated frames explain, ``strayed``
+    the frames by which they do;
     ``trusted`` are the first and the last place in time at which frames fit. ``slack_s`` is by how much all flashes
     could come earlier or later and the picture be the same, 0 where it shows their times; ``soft_s`` is how soft the
-    edges are where that was not taken for LEDs' tails, else 0.
+    edges are where that was not taken for LEDs' tails, else 0. ``across`` is how much of what split flashes show is
+    explained (0 to 1) where flashes differ because the subject moves, else 0.
     """
 
     fit: Fit
@@ -57,9 +60,11 @@ class ClipFit:
     track: FrameTrack
     jitter: Jitter
     steps: int
+    strayed: int
     trusted: tuple[int, int]
     slack_s: float = 0.0
     soft_s: float = 0.0
+    across: float = 0.0
 
 
 def find(plan: Plan, rows: Profiles, *, measured: tuple[str, ...] = ()) -> ClipFit:
@@ -82,28 +87,33 @@ def find(plan: Plan, rows: Profiles, *, measured: tuple[str, ...] = ()) -> ClipF
         doubt=None if rows.doubt is None else np.ascontiguousarray(rows.doubt[keep]),
     ).windowed(window)
     free = measured if plan.camera.readout_s is not None else ("row_time_s", *measured)
-    fit = _with_mains(plan, fine, _fit(plan, fine, tracked.beat, free), free)
+    fit = _fit(plan, fine, tracked.beat, free)
+    fine, fit = _restless(plan, fine, fit, free)
+    fit = _with_mains(plan, fine, fit, free)
     fine, fit, apart_s = _in_short_windows(plan, fine, fit, free)
     freed, unsure_s, soft_s = _believed(plan, fine, fit, free)
     if freed.errors_s:
         freed, apart_s = _with_window_errors(plan, fine, freed)
     apart_s = float(np.hypot(unsure_s, apart_s))
     fit, slack_s = centred(plan, fine, freed)
-    stray = jitter(plan, fine, fit)
+    plain, as_seen = _as_seen(plan, fine, fit)
+    stray = jitter(plan, fine, fit) if fine.restless is None else STEADY
     known_s = max(fit.shift_error_s, shift_error_s(plan, fine, fit), slack_s)
     if stray is STEADY:
-        known_s = float(np.hypot(known_s * misfit(plan, fine, fit), disagreement_s(plan, fine, fit)))
+        apart_rows_s = disagreement_s(plan, fine, fit) if fine.restless is None else 0.0
+        known_s = float(np.hypot(known_s * misfit(plan, fine, fit), apart_rows_s))
     error_s = float(np.sqrt(known_s**2 + stray.error_s**2 + apart_s**2))
-    fit = replace(fit, shift_error_s=error_s)
     return ClipFit(
-        fit=fit,
-        rows=fine,
+        fit=replace(as_seen, shift_error_s=error_s),
+        rows=plain,
         track=tracked,
         jitter=stray,
         steps=course.steps,
+        strayed=course.strayed,
         trusted=course.trusted,
         slack_s=slack_s,
         soft_s=soft_s,
+        across=across(plan, fine, fit),
     )
 
 
@@ -114,11 +124,32 @@ def _rows_needed(plan: Plan, rows: Profiles, beat: Beat) -> int:
     return max(COARSE_ROWS, ENOUGH_SAMPLES // len(rows.value), sharp)
 
 
+def _restless(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> tuple[Profiles, Fit]:
+    """Fit again with what flashes that differ say together, where the subject moves."""
+    for _ in range(2):
+        rows = restless(plan, rows, fit.beat)
+        if rows.restless is None:
+            break
+        fit = _fit(plan, rows, fit.beat, free)
+    return rows, fit
+
+
+def _as_seen(plan: Plan, rows: Profiles, fit: Fit) -> tuple[Profiles, Fit]:
+    """Return the fit with what it leaves of the picture itself: flashes that differ are not explained by differing."""
+    if rows.restless is None:
+        return rows, fit
+    plain = replace(rows, restless=None)
+    rest = unexplained(plan, plain, fit.beat, fit.weight)
+    return plain, replace(fit, rest=rest, explained=explained(plain, rest))
+
+
 def _in_short_windows(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> tuple[Profiles, Fit, float]:
     """Fit brightnesses again more often where the subject moves so much that this makes the times better.
 
     Return too how far apart the times are with and without: an error that neither of the two fits can know of.
     """
+    if rows.restless is not None:
+        return rows, fit, _rms_apart_s(rows, fit.beat, _fit(plan, _other_windows(rows), fit.beat, free).beat)
     short = rows.windowed(max(window_frames(plan) // 2, len(rows.value) // MOST_WINDOWS))
     other = _fit(plan, short, fit.beat, free)
     apart_s = _rms_apart_s(rows, fit.beat, other.beat)
@@ -131,13 +162,20 @@ def _with_window_errors(plan: Plan, rows: Profiles, fit: Fit) -> tuple[Fit, floa
 
     Return too how far apart the flashes' times are then.
     """
-    twice = rows.windowed(max(len(rows.value) // (2 * len(rows.window_start)), 1))
-    other = _fit(plan, twice, fit.beat, tuple(fit.errors_s))
+    other = _fit(plan, _other_windows(rows), fit.beat, tuple(fit.errors_s))
     errors_s = {
         name: float(np.hypot(error_s, getattr(other.beat, name) - getattr(fit.beat, name)))
         for name, error_s in fit.errors_s.items()
     }
     return replace(fit, errors_s=errors_s), _rms_apart_s(rows, fit.beat, other.beat)
+
+
+def _other_windows(rows: Profiles) -> Profiles:
+    """Return the same profiles in windows half as long; twice as long where flashes differ, and so need none."""
+    many = len(rows.window_start)
+    return rows.windowed(
+        max(len(rows.value) // (2 * many) if rows.restless is None else 2 * len(rows.value) // many, 1)
+    )
 
 
 def _rms_apart_s(rows: Profiles, one: Beat, other: Beat) -> float:
@@ -194,7 +232,7 @@ def _freed(
         if not clear or not _plausible(plan, tried.beat):
             refused.add(name)
             continue
-        if gain < PLAIN * before and gain_of(rows, tried.rest) < STILL:
+        if rows.restless is None and gain < PLAIN * before and gain_of(rows, tried.rest) < STILL:
             unsure_s = float(np.hypot(unsure_s, _rms_apart_s(rows, fit.beat, tried.beat) / np.sqrt(2)))
             wider_s[name] = off_s / np.sqrt(2)
         fit, free = tried, (*free, name)

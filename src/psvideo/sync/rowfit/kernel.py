@@ -10,6 +10,7 @@ import numpy as np
 from psvideo.compute.compiled import EXACT
 from psvideo.model.camera import FloatArray
 from psvideo.sync.rowfit.row_model import LEFT, RIGHT, SIGNALS, Flashes, Rows, given_off, see, slopes, width
+from psvideo.sync.rowfit.whitening import factors, whiten, whiten_all
 
 RIDGE = 1e-6
 """Share of the normal matrix's diagonal that is added to it, so that a brightness nobody saw stays at zero."""
@@ -70,19 +71,25 @@ def _fit_window(
 @EXACT.kept
 def row_rest(rows: Rows, flashes: Flashes, weight: FloatArray, row: int, design: FloatArray, rest: FloatArray) -> None:
     """Fill ``rest`` (frame,) with what one row's own brightnesses, fitted window by window, leave unexplained."""
-    size = design.shape[1]
+    frames, size = design.shape
     normal, right = np.empty((size, size)), np.empty(size)
     k = 0
-    for n in range(len(rows.value)):
+    for n in range(frames):
         k = see(rows, flashes, n, row, k, design[n])
+    value = rows.value[:, row].copy()
+    if rows.restless[row] > 0.0:
+        diagonal, below = np.empty(frames), np.empty(frames)
+        factors(rows, flashes, row, diagonal, below)
+        whiten(value, diagonal, below)
+        whiten_all(design, diagonal, below, 0, frames)
     for window in range(len(rows.bounds) - 1):
         first, last = rows.bounds[window], rows.bounds[window + 1]
-        _fit_window(rows.value[:, row], weight[:, row], design, first, last, normal, right)
+        _fit_window(value, weight[:, row], design, first, last, normal, right)
         for n in range(first, last):
             explained = 0.0
             for i in range(size):
                 explained += design[n, i] * right[i]
-            rest[n] = rows.value[n, row] - explained
+            rest[n] = value[n] - explained
 
 
 @EXACT.kept
@@ -132,14 +139,20 @@ def equations(
     signals = np.empty((frames, SIGNALS))
     cross = np.empty((SIGNALS, size))
     solved = np.empty(size)
+    diagonal, below = np.empty(frames), np.empty(frames)
     for row in range(first, last):
         k = 0
         for n in range(frames):
             k = see(rows, flashes, n, row, k, design[n])
             first_flash[n] = k
+        value = rows.value[:, row].copy()
+        if rows.restless[row] > 0.0:
+            factors(rows, flashes, row, diagonal, below)
+            whiten(value, diagonal, below)
+            whiten_all(design, diagonal, below, 0, frames)
         for window in range(len(rows.bounds) - 1):
             begin, end = rows.bounds[window], rows.bounds[window + 1]
-            _fit_window(rows.value[:, row], weight[:, row], design, begin, end, normal, right)
+            _fit_window(value, weight[:, row], design, begin, end, normal, right)
             cross[:] = 0.0
             span_s = rows.ends_s[window + 1] - rows.ends_s[window]
             for n in range(begin, end):
@@ -147,6 +160,9 @@ def equations(
                 along = (rows.frame_start_s[n] + rows.row_place[row] * rows.row_time_s - rows.ends_s[window]) / span_s
                 signals[n, LEFT] = shift * (1.0 - along)
                 signals[n, RIGHT] = shift * along
+            if rows.restless[row] > 0.0:
+                whiten_all(signals, diagonal, below, begin, end)
+            for n in range(begin, end):
                 for i in range(size):
                     if design[n, i] != 0.0:
                         for p in range(SIGNALS):
@@ -160,7 +176,7 @@ def equations(
                         explained += design[n, i] * right[i]
                         for p in range(SIGNALS):
                             signals[n, p] -= design[n, i] * cross[p, i]
-                rest[n, row] = rows.value[n, row] - explained
+                rest[n, row] = value[n] - explained
                 error = rest[n, row]
                 if honest:
                     error /= np.sqrt(1.0 - leverage(normal, design[n], weight[n, row], size, solved))

@@ -22,7 +22,8 @@ class Profiles:
 
     ``place`` (row,) counts sensor rows from the one that opens first; ``window_start`` (window,) are the frames at
     which windows begin, in each of which a row has brightnesses of its own. ``doubt`` (frame, row) is by how much a
-    value may be wrong beyond noise, as where pixels saturate.
+    value may be wrong beyond noise, as where pixels saturate. ``restless`` (row,) is by how much the flashes of a light
+    differ in each row, as variance over the noise's; none: all are alike.
     """
 
     value: FloatArray
@@ -31,6 +32,7 @@ class Profiles:
     place: FloatArray
     window_start: IntArray
     doubt: FloatArray | None = None
+    restless: FloatArray | None = None
 
     @property
     def frame_start_s(self) -> FloatArray:
@@ -58,6 +60,7 @@ class Profiles:
             value=np.ascontiguousarray(self.value[:, rows]),
             place=self.place[rows],
             doubt=None if self.doubt is None else self.doubt[:, rows],
+            restless=None if self.restless is None else self.restless[rows],
         )
 
     def one_window(self) -> "Profiles":
@@ -82,6 +85,7 @@ class Profiles:
             value=np.ascontiguousarray(np.add.reduceat(self.value, edges, axis=1) / counts),
             place=np.add.reduceat(self.place, edges) / counts,
             doubt=None if self.doubt is None else np.add.reduceat(self.doubt, edges, axis=1) / counts,
+            restless=None,
         )
 
     def turned(self) -> "Profiles":
@@ -91,6 +95,7 @@ class Profiles:
             value=np.ascontiguousarray(self.value[:, ::-1]),
             place=np.ascontiguousarray(self.place.max() + self.place.min() - self.place[::-1]),
             doubt=None if self.doubt is None else np.ascontiguousarray(self.doubt[:, ::-1]),
+            restless=None if self.restless is None else np.ascontiguousarray(self.restless[::-1]),
         )
 
     @property
@@ -125,6 +130,7 @@ def compiled_rows(rows: Profiles, beat: Beat) -> row_model.Rows:
         np.append(rows.window_start, len(rows.value)),
         rows.ends_s,
         np.array(beat.beat_hz, np.float64),
+        np.zeros(len(rows.place)) if rows.restless is None else rows.restless,
     )
 
 
@@ -213,6 +219,7 @@ def residuals_of(plan: Plan, timing: Timing, index: IntArray, value: FloatArray)
         np.array([0, len(value)]),
         np.zeros(2),
         np.zeros(0),
+        np.zeros(height),
     )
     unknown = slot_unknowns(plan)
     slots = [flash.slot for flash in timing.flashes]

@@ -35,6 +35,8 @@ class Rows(NamedTuple):
     """Where each window begins and the last one ends, on the camera's clock: the shift is linear in between."""
     beat_hz: FloatArray
     """Frequencies at which ambient light may flicker."""
+    restless: FloatArray
+    """By how much a light's flashes differ in each row (row,), as variance over the noise's; 0 where all are alike."""
 
 
 class Flashes(NamedTuple):
@@ -139,6 +141,17 @@ def slopes(
     signals[EXPOSURE] = closing
     signals[ROW_TIME] = (closing - opening) * rows.row_place[row]
     return opening - closing
+
+
+@EXACT.kept
+def seen_of(rows: Rows, flashes: Flashes, frame: int, row: int, j: int) -> float:
+    """Return the share of flash ``j`` that a row saw in a frame, 0 for a dark slot."""
+    if flashes.unknown[j] == 0:
+        return 0.0
+    since_s = rows.frame_start_s[frame] + rows.row_place[row] * rows.row_time_s - flashes.start_s[j]
+    after, _ = given_off(since_s + rows.exposure_s, flashes.duration_s[j], flashes.rise_s, flashes.fall_s)
+    before, _ = given_off(since_s, flashes.duration_s[j], flashes.rise_s, flashes.fall_s)
+    return after - before
 
 
 @EXACT.kept

@@ -13,6 +13,9 @@ from psvideo.sync.verdict.rivals import BETTER, CLEARLY, FAIR, camera_rivals, do
 
 MIN_EXPLAINED, MIN_GAIN = 0.5, 0.3
 """A fit that explains less of the rows' changes, or takes less of the robust loss away, has not found a strobe."""
+ACROSS = 0.5
+"""But where the subject moves so much that flashes of one light differ, what counts is that flashes at other times
+would leave so much more of what split ones show."""
 LUCK = 0.25
 """Share of noise that the best place of a search explains beyond what brightnesses do anywhere."""
 LOST = 0.5
@@ -21,6 +24,9 @@ UNSURE_GAIN, UNSURE = 0.7, 0.1
 """A fit that takes less of the robust loss away, or is unsure by such a share of a flash, is worth a second look."""
 MOVED = 0.05
 """So is one that had to move the exposure or the readout by more than this share."""
+STILL = 0.9
+"""A shutter other than the plan's is believed where it takes away so much of the robust loss, as it does unless the
+subject moves."""
 GAPPED = 0.8
 """A fit that needs frames to be missing and explains less than this share of the changes is worth one, too."""
 OTHER_LENGTHS = (0.5, 0.7, 1.4, 2.0)
@@ -48,7 +54,7 @@ def judged(plan: Plan, rows: Profiles) -> Verdict:
     if not doubtful(plan, found):
         return Verdict(plan=plan, found=found, believed=True)
     meant, found = _as_meant(plan, rows, found)
-    believed = convincing(meant, found)
+    believed = convincing(meant, found) and not _feigned(plan, found)
     if believed and (_unsure(meant, found) or _gaps_feigned(found) or flashes_differ(meant, found)):
         believed = likeliest(meant, rows, list(strobe_rivals(plan))) is None
     return Verdict(plan=meant, found=found, believed=believed)
@@ -77,10 +83,10 @@ def convincing(plan: Plan, found: ClipFit) -> bool:
     rows, fit = found.rows, found.fit
     by_chance = 1 - freedom(plan, rows, fit.beat)
     share, explained = gain_of(rows, fit.rest), fit.explained
-    often = too_many(found.steps, len(rows.value))
+    often = too_many(found.steps, found.strayed, len(rows.value))
+    strobed = explained > max(MIN_EXPLAINED, by_chance + LUCK * (1 - by_chance)) and share > max(MIN_GAIN, by_chance)
     return (
-        explained > max(MIN_EXPLAINED, by_chance + LUCK * (1 - by_chance))
-        and share > max(MIN_GAIN, by_chance)
+        (strobed or found.across > ACROSS)
         and (not often or min(share, explained) > 0.9)
         and abs(fit.beat.clock.mean_offset_ppm()) < MOST_PPM
         and (found.slack_s > 0 or fit.shift_error_s < LOST * _shortest_s(plan))
@@ -89,18 +95,31 @@ def convincing(plan: Plan, found: ClipFit) -> bool:
 
 def doubtful(plan: Plan, found: ClipFit) -> bool:
     """Tell whether a fit leaves so much, or had to stray so far from the plan, that the plan may be wrong by far."""
-    beat, camera = found.fit.beat, plan.camera
-    moved = abs(beat.exposure_s / camera.exposure_s - 1) > MOVED
-    if camera.readout_s:
-        moved = moved or abs(beat.row_time_s * camera.height_px / abs(camera.readout_s) - 1) > MOVED
     return (
-        moved
+        _moved(plan, found)
         or gain_of(found.rows, found.fit.rest) < UNSURE_GAIN
         or _unsure(plan, found)
         or _gaps_feigned(found)
         or not convincing(plan, found)
         or flashes_differ(plan, found)
     )
+
+
+def _moved(plan: Plan, found: ClipFit) -> bool:
+    """Tell whether a fit needs another exposure or readout than the plan's."""
+    beat, camera = found.fit.beat, plan.camera
+    moved = abs(beat.exposure_s / camera.exposure_s - 1) > MOVED
+    if camera.readout_s:
+        moved = moved or abs(beat.row_time_s * camera.height_px / abs(camera.readout_s) - 1) > MOVED
+    return moved
+
+
+def _feigned(plan: Plan, found: ClipFit) -> bool:
+    """Tell whether a subject that moves in step with the shutter may feign another exposure or readout.
+
+    Where nothing moves, the true shutter explains nearly everything.
+    """
+    return _moved(plan, found) and gain_of(found.rows, found.fit.rest) < STILL and found.across < ACROSS
 
 
 def _unsure(plan: Plan, found: ClipFit) -> bool:
