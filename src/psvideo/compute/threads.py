@@ -5,7 +5,9 @@ is cut by the size of the work, never by the number of threads: sums of floating
 """
 
 import contextlib
+import functools
 import os
+import threading
 from collections import deque
 from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -13,6 +15,8 @@ from typing import TypeVar
 
 from psvideo.errors import UsageError
 
+RANGES = "psvideo ranges"
+"""How threads are called that work on ranges."""
 WRITING_THREADS = 2
 MOST_WAITING = 2
 """Files that may wait to be written: what bounds memory."""
@@ -40,16 +44,26 @@ def thread_count() -> int:
 def over_ranges(run: Callable[[int, int], Item], count: int, *, each: int, threads: int | None = None) -> list[Item]:
     """Call ``run(first, last)`` for ranges of ``each`` out of ``count``, side by side, and return its results in order.
 
+    The threads are kept for the next call: beginning and ending them costs as much as solving some rows. A ``run`` that
+    itself calls this does so in its own thread.
+
     >>> over_ranges(lambda first, last: last - first, 5, each=2)
     [2, 2, 1]
     """
     firsts = range(0, count, max(each, 1))
     lasts = [min(first + firsts.step, count) for first in firsts]
     workers = min(threads or thread_count(), len(firsts))
-    if workers < 2:
+    if workers < 2 or threading.current_thread().name.startswith(RANGES):
         return [run(first, last) for first, last in zip(firsts, lasts, strict=True)]
-    with ThreadPoolExecutor(workers) as pool:
-        return list(pool.map(run, firsts, lasts))
+    return list(_pool(workers).map(run, firsts, lasts))
+
+
+@functools.cache
+def _pool(workers: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(workers, thread_name_prefix=RANGES)
+
+
+os.register_at_fork(after_in_child=_pool.cache_clear)  # a child process has none of its parent's threads
 
 
 def in_order(

@@ -30,6 +30,9 @@ LONGEST_MEMORY = 16
 COARSE, LEVEL_SIGMA_PX = 2, 4.0
 """Levels are compared over about 14 blocks of so many pixels a side: the factor adds hardly any noise. The window
 is a Gaussian: a box turns some ripples of the average around, and the average would feed on them."""
+STEADY = 2e-4
+"""Ambient light that changed by less than this, in units of saturation, is taken as it is now: interpolating it would
+change plates by half of that at most, and reading two pictures costs more than reading a plate's frames."""
 SMALL_PX = 100
 """Pictures of fewer rows or columns are compared as they are."""
 LEAST_GAIN, MOST_GAIN = 0.5, 2.0
@@ -50,7 +53,8 @@ class Ambient:
 
     ``image`` is averaged over ``slots`` (row, block) and holds for the moments ``middle_s`` (row,); ``coarse`` is its
     mean over blocks. ``known`` (row,) is False where no dark slot was seen yet: nothing can be taken off there. The
-    image is free of the ripple of ``mains``, where one is known.
+    image is free of the ripple of ``mains``, where one is known. ``steady``: since the slot before nothing changed that
+    is worth interpolating.
     """
 
     image: Image
@@ -60,6 +64,7 @@ class Ambient:
     known: NDArray[np.bool_]
     mains: Mains
     index: int
+    steady: bool = False
 
 
 def update(ambient: Ambient | None, dark: Plate) -> Ambient:
@@ -93,6 +98,7 @@ def update(ambient: Ambient | None, dark: Plate) -> Ambient:
         known=ambient.known | dark.seen,
         mains=mains,
         index=dark.flash.index,
+        steady=bool(whole.all()) and change.is_steady(coarse),
     )
 
 
@@ -208,6 +214,11 @@ class _Change:
         limited = (factor <= np.float32(LEAST_GAIN)) | (factor >= np.float32(MOST_GAIN))
         return cls(gain=gain, restarts=restarts | limited.any(axis=2) if limited.any() else restarts)
 
+    def is_steady(self, level: Image) -> bool:
+        """Tell whether hardly anything of this light, (row, col[, channel]) of blocks, changed by more than noise."""
+        change = np.abs(self.gain - 1) * np.maximum(level, 0)
+        return bool(np.quantile(change[::SPARSE], 0.999) < STEADY and self.restarts.mean() < 1e-3)
+
 
 def _mean(picture: Image) -> Image:
     """Return the mean over channels; numpy is slow along a short last axis."""
@@ -316,7 +327,8 @@ def subtract(plates: Iterable[Plate], *, darks: Iterable[Plate] = ()) -> Iterato
                 break
             before = None
             later = update(after, dark)
-            before = later if after is None or _first_ripple(after.mains, later.mains) else after
+            alone = after is None or later.steady or _first_ripple(after.mains, later.mains)
+            before = later if alone else after
             after = later
             del dark, later  # pictures are held only as long as they are needed
         if after is not None and not plate.flash.is_dark:

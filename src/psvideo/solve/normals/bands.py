@@ -17,6 +17,8 @@ BAND_PIXELS = 1 << 16
 """Pixels of one band; fewer are solved before a thread has started."""
 MADE_PIXELS = 1 << 15
 """Pixels of one band of plates that are made for it: those of a few lights stay in a core's second cache."""
+BANDS = 8
+"""So many of them are worked on by one thread, in the same memory."""
 
 
 def check_arrays(plates: Sequence[Samples], lit: Illumination, seen: Mask | None, mask: Mask | None) -> None:
@@ -77,16 +79,20 @@ class ShownPlates:
             over_ranges(partial(run, given), rows, each=BAND_PIXELS // cols, threads=threads)
             return
 
-        def band(first: int, last: int) -> None:
-            held = np.empty((len(self.readers), last - first, *self.shape[1:]), np.float32)
-            for read, into in zip(self.readers, held, strict=True):
-                for begin, end in _runs(first, last, step):
-                    read(begin, end, into[begin - first : end - first])
-            begins = np.array([plate.ctypes.data - first * held.strides[1] for plate in held], np.intp)
-            copies = len(given.plates) - len(begins)
-            run(given._replace(plates=np.pad(begins, (0, copies), mode="edge")), first, last)
+        made_rows = max(MADE_PIXELS // cols, 1)
 
-        over_ranges(band, rows, each=max(MADE_PIXELS // cols, 1), threads=threads)
+        def bands(begin: int, end: int) -> None:
+            held = np.empty((len(self.readers), made_rows, *self.shape[1:]), np.float32)
+            for first in range(begin, end, made_rows):
+                last = min(first + made_rows, end)
+                for read, into in zip(self.readers, held, strict=True):
+                    for one, other in _runs(first, last, step):
+                        read(one, other, into[one - first : other - first])
+                begins = np.array([plate.ctypes.data - first * held.strides[1] for plate in held], np.intp)
+                copies = len(given.plates) - len(begins)
+                run(given._replace(plates=np.pad(begins, (0, copies), mode="edge")), first, last)
+
+        over_ranges(bands, rows, each=BANDS * made_rows, threads=threads)
 
 
 def _runs(first: int, last: int, step: int) -> list[tuple[int, int]]:
