@@ -24,7 +24,8 @@ def made() -> Made:
     normals[..., 2] = 1
     plane = np.full((ROWS, COLS), 0.5, np.float32)
     none = np.zeros((ROWS, COLS), bool)
-    surface = Surface(normals=normals, albedo=plane, valid=~none, residual=plane, error_deg=plane)
+    source = np.ones((ROWS, COLS), np.uint8)
+    surface = Surface(normals=normals, albedo=plane, valid=~none, residual=plane, error_deg=plane, source=source)
     depth = Depth(depth=plane, cut_east=none, cut_south=none, parts=1, metric=True, view=View())
     return Made(surface=surface, space=Space(), beauty=plane, depth=depth, age_s=np.linspace(0, 0.1, ROWS))
 
@@ -45,7 +46,7 @@ def test_planes_are_the_channels_that_the_table_says(name: str) -> None:
     assert {plane.shape for plane in planes.values()} == {(ROWS, COLS)}
 
 
-@pytest.mark.parametrize("name", ["residual", "error", "beauty", "depth", "position", "age"])
+@pytest.mark.parametrize("name", ["residual", "error", "source", "beauty", "depth", "position", "age"])
 def test_what_was_not_made_is_not_written(name: str) -> None:
     whole = made().surface
     bare = Made(surface=Surface(normals=whole.normals, albedo=whole.albedo, valid=whole.valid), space=Space())
@@ -59,7 +60,18 @@ def test_depth_is_integrated_where_a_quantity_is_computed_from_it() -> None:
 
 def test_files_are_written_as_they_are_made_in_any_order_asked() -> None:
     written = Delivery(space=Space(), aovs=AOVS[::-1]).quantities
-    assert written == ("normals", "albedo", "valid", "residual", "error", "beauty", "age", "depth", "position")
+    assert written == (
+        "normals",
+        "albedo",
+        "valid",
+        "residual",
+        "error",
+        "source",
+        "beauty",
+        "age",
+        "depth",
+        "position",
+    )
     assert [QUANTITIES[name].of for name in written] == sorted(
         (QUANTITIES[name].of for name in written), key=SOURCES.index
     )

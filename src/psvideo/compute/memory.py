@@ -42,8 +42,20 @@ def _encoded(typing_context: Any, value: Any, like: Any) -> Any:
     return like.dtype(types.float32, like), generate
 
 
+def _decoded(typing_context: Any, value: Any) -> Any:
+    """A stored number as a float32: as it is, or from a half float's 16 bits where it is uint16."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        if value != types.uint16:
+            return arguments[0]
+        return builder.fpext(builder.bitcast(arguments[0], _ir.HalfType()), _ir.FloatType())
+
+    return types.float32(value), generate
+
+
 pointer: Any = intrinsic(_pointer)
 encoded: Any = intrinsic(_encoded)
+decoded: Any = intrinsic(_decoded)
 
 
 @FUSED.inlined

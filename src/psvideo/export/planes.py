@@ -55,6 +55,7 @@ PICTURES: Mapping[str, Callable[[Made], Image | None]] = {
     "valid": lambda made: ones_of(made.surface.valid),
     "residual": lambda made: made.surface.residual,
     "error": lambda made: made.surface.error_deg,
+    "source": lambda made: None if made.surface.source is None else made.surface.source.astype(np.float32),
     "beauty": lambda made: made.beauty,
     "depth": lambda made: None if made.depth is None else made.depth.depth,
     "position": lambda made: made.position,

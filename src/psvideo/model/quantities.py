@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass
 from typing import Literal, get_args
 
-Aov = Literal["depth", "residual", "error", "position", "beauty", "age"]
+Aov = Literal["depth", "residual", "error", "source", "position", "beauty", "age"]
 """The quantities that are written where they are asked for; the table has a row for each."""
 Shown = Literal["normals", "light", "mask", "heat", "position"]
 """How a quantity is shown: as directions, as light, as yes and no, as a measure in false colours, as points."""
@@ -54,6 +54,7 @@ _ROWS = (
     Quantity("depth", "Depth", _Y, "asked", "depth", "heat", digits="float", from_zero=False),
     Quantity("residual", "Residual", _Y, "asked", "surface", "heat"),
     Quantity("error", "Predicted error", _Y, "asked", "surface", "heat", unit="°"),
+    Quantity("source", "Source", _Y, "asked", "surface", "heat"),
     Quantity("position", "Position", _RGB, "asked", "depth", "position", digits="float"),
     Quantity("beauty", "Beauty", _RGB, "asked", "plates", "light", colour=True),
     Quantity("age", "Age", _Y, "asked", "plates", "heat", digits="float", unit="s"),

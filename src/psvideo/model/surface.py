@@ -9,6 +9,10 @@ from psvideo.errors import UsageError, check_kind
 
 Pixels = NDArray[np.floating]
 
+MEASURED, TWO_LIGHTS, ONE_LIGHT, NO_LIGHT = np.uint8(1), np.uint8(2), np.uint8(3), np.uint8(4)
+"""Where a pixel's normal is from (``Surface.source``): three lights or more, two and the albedo around it, one and the
+normals around it, or those alone. 0 is what the picture does not show."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Misfit:
@@ -30,20 +34,23 @@ class Surface:
     Attributes
     ----------
     normals
-        Shape (row, col, 3), unit vectors in the camera frame (x right, y up, z to the camera); (0, 0, 0) where not
-        valid.
+        Shape (row, col, 3), unit vectors in the camera frame (x right, y up, z to the camera); (0, 0, 0) where there is
+        none: where not valid, or, of a surface that was filled, where ``source`` is 0.
     albedo
         Shape (row, col) or (row, col, channel), linear light: a plate is albedo * intensity * max(0, n . l). One fixed
-        scale, never stretched to its own maximum; 0 where not valid.
+        scale, never stretched to its own maximum; 0 where there is no normal.
     valid
-        Shape (row, col), True where the normal is to be trusted.
+        Shape (row, col), True where the normal was measured and is to be trusted.
     residual
         Shape (row, col), root mean square over the measurements used of what the fit does not explain, in units of
         sensor saturation; 0 where not valid. None where it was not asked for. Three measurements of one channel are
         always explained exactly, right or wrong.
     error_deg
-        Shape (row, col), the normal's standard error in degrees as the solver judges it; 0 where not valid. None where
-        it was not asked for, or the solver (least squares) does not judge it.
+        Shape (row, col), the normal's standard error in degrees as the solver judges it; 0 where there is no normal.
+        None where it was not asked for.
+    source
+        Shape (row, col), uint8: how a pixel got its normal, MEASURED, TWO_LIGHTS, ONE_LIGHT or NO_LIGHT; 0 where there
+        is none. None where nothing was filled, and all that is not valid is 0.
     misfit
         What is common to the picture; None where the solver does not look for it, or three lights explain all.
 
@@ -59,6 +66,17 @@ class Surface:
     residual: Pixels | None = None
     error_deg: Pixels | None = None
     misfit: Misfit | None = None
+    source: NDArray[np.uint8] | None = None
+
+    @property
+    def shown(self) -> NDArray[np.bool_]:
+        """Shape (row, col), True where there is a normal, measured or not."""
+        return self.valid if self.source is None else self.source > 0
+
+    @property
+    def measured(self) -> NDArray[np.bool_]:
+        """Shape (row, col), True where three lights or more gave the normal, to be trusted or not."""
+        return self.valid if self.source is None else self.valid | (self.source == MEASURED)
 
     def __post_init__(self) -> None:
         """Raise UsageError where these are no arrays, or their shapes do not belong together."""
@@ -66,7 +84,7 @@ class Surface:
             check_kind(name, getattr(self, name), np.ndarray, "a numpy array")
         size = self.valid.shape
         shapes = [self.normals.shape[:2], self.albedo.shape[:2]]
-        shapes += [plane.shape for plane in (self.residual, self.error_deg) if plane is not None]
+        shapes += [plane.shape for plane in (self.residual, self.error_deg, self.source) if plane is not None]
         if len(size) != 2 or any(shape != size for shape in shapes) or self.normals.shape != (*size, 3):
             raise UsageError(
                 f"`normals` {self.normals.shape}, `albedo` {self.albedo.shape} and `valid` {size} do not match; "

@@ -51,6 +51,7 @@ def normals(
     frames: str | None = None,
     first_light: str | None = None,
     solver: Solver = "auto",
+    fill: bool = True,
     near_iterations: int | None = None,
     depth: Path | str | None = None,
     depth_scale: float | None = None,
@@ -97,9 +98,10 @@ def normals(
 
     How it is solved:
 
-    - ``solver``: "auto" is robust against highlights and shadows from five lights on. ``near_iterations``: how often
-      near lights' distances are taken again from the depth of the normals found, 0 to 10 (left out: 1, and 0 with
-      ``depth``).
+    - ``solver``: "auto" is robust against highlights and shadows from five lights on. ``fill`` gives what fewer
+      than three lights reach a best estimate, which is not valid; without it there are zeros. ``near_iterations``: how
+      often near lights' distances are taken again from the depth of the normals found, 0 to 10 (left out: 1, and 0
+      with ``depth``).
     - ``align``: "auto" brings the plates of a round to one instant where something moves, "flow" looks for motion
       everywhere, "none" leaves them. ``rate``: one result per "round", or per "flash". ``denoise``: average up to so
       many results, 1 to 64, where nothing moves.
@@ -110,10 +112,10 @@ def normals(
     - ``space`` (left out: "camera"), with ``camera_to_world`` for "world": a USD file with the camera (which one:
       ``camera``; how its time codes count: ``camera_time``), or a text file with a 3 x 3 or 4 x 4 matrix. ``y``: which
       way green points (left out: "up"). ``float32``: normals in 32 bits.
-    - ``aov``: what else is written: "depth", "residual", "error", "position", "beauty", "age". ``mesh``: "ply", one per
-      instant; "usd", one animated file. ``encode``: 16-bit PNG maps too. ``multipart``: one EXR with all quantities
-      too. ``plates``: the plates too. ``compression``: how EXR files are packed, always without loss: "zip", "zips"
-      (for Nuke), "piz", "rle" (where disks are fast) or "none".
+    - ``aov``: what else is written: "depth", "residual", "error", "source", "position", "beauty", "age". ``mesh``:
+      "ply", one per instant; "usd", one animated file. ``encode``: 16-bit PNG maps too. ``multipart``: one EXR with all
+      quantities too. ``plates``: the plates too. ``compression``: how EXR files are packed, always without loss:
+      "zip", "zips" (for Nuke), "piz", "rle" (where disks are fast) or "none".
     - ``weight``: how strong a light is in the beauty plate, by name (1 where not named); ``with_ambient`` leaves
       ambient light in it. ``preview``: movies for eyes, coded as ``preview_codec``.
     - ``force`` replaces an ``out`` that exists; ``resume`` goes on where a run that was stopped
@@ -183,7 +185,7 @@ def normals(
     )
     lighting.check(delivery)
     timing_path = path_if_given("timing", timing)
-    output = output.given(take, timing_path, first_light, solver, over_time, delivery, *lighting.identity)
+    output = output.given(take, timing_path, first_light, solver, fill, over_time, delivery, *lighting.identity)
     with decoded_once(take, output=output.folder) as kept:
         found = timing_of(kept, timing_path, first_light=first_light, rig=lighting.rig, watch=watch).spelled(
             caller.spell
@@ -197,6 +199,7 @@ def normals(
             output,
             delivery=delivery,
             solver=solver,
+            fill=fill,
             over_time=over_time,
             watch=watch,
         )

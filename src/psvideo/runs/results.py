@@ -68,17 +68,14 @@ class NormalsResult:
     picture: Pixels
 
 
-def _solving(plan: Plan, solver: Solver, delivery: Delivery) -> Solving:
-    solving = Solving(
-        solver=solver, half=delivery.half, residual="residual" in delivery.aovs, error="error" in delivery.aovs
+def _solving(solver: Solver, delivery: Delivery, *, fill: bool) -> Solving:
+    return Solving(
+        solver=solver,
+        half=delivery.half,
+        residual="residual" in delivery.aovs,
+        error="error" in delivery.aovs,
+        fill=fill,
     )
-    method = solving.method(len(plan.lights))
-    if solving.error and method != "robust":
-        raise UsageError(
-            f'`aov=["error"]` is what the robust solver predicts, and this run of {len(plan.lights)} lights uses '
-            f'{method}. Add `solver="robust"`, or leave `aov=["error"]` out.'
-        )
-    return solving
 
 
 def normals_run(
@@ -90,6 +87,7 @@ def normals_run(
     delivery: Delivery,
     solver: Solver = "auto",
     over_time: OverTime | None = None,
+    fill: bool = True,
     watch: Watch = unwatched,
     picture_of: Callable[[Instant], Pixels] | None = None,
 ) -> NormalsResult:
@@ -105,7 +103,7 @@ def normals_run(
     shaping = lighting.shaping if delivery.needs_depth else None
     observed = observing(take, lighting.rig, mask)
     picture: Pixels | None = None
-    solving = _solving(clip.plan, solver, delivery)
+    solving = _solving(solver, delivery, fill=fill)
     method = solving.method(len(clip.plan.lights))
     with (
         folder_of(output) as folder,

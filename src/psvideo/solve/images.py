@@ -28,6 +28,7 @@ def solve_images(
     black_level: float | None = None,
     white_level: float | None = None,
     solver: Solver = "auto",
+    fill: bool = True,
 ) -> Surface:
     """Return the surface that explains photographs of a still scene, one per light.
 
@@ -51,13 +52,16 @@ def solve_images(
     solver
         "robust" weighs highlights and shadows down, "least-squares" takes the surface as matte, "auto" is robust from
         five lights on.
+    fill
+        Give what fewer than three lights reach a best estimate, which is not valid; else it is 0.
 
     Returns
     -------
     Surface
-        ``normals`` (row, col, 3), ``albedo`` (row, col[, 3]), ``valid`` (row, col) and ``residual`` (row, col); where
-        the solver is robust, ``error_deg`` (row, col), the predicted error of every normal in degrees. All are 0 where
-        ``valid`` is False.
+        ``normals`` (row, col, 3), ``albedo`` (row, col[, 3]), ``valid`` (row, col), where normals were measured and are
+        to be trusted, ``residual`` (row, col), and ``error_deg`` (row, col), the predicted error of every normal in
+        degrees. ``source`` (row, col) says where a normal is from: 1 three lights or more, 2 two lights, 3 one light,
+        4 its surroundings; where it is 0, so are the others. Without ``fill`` all are 0 where ``valid`` is False.
 
     Raises
     ------
@@ -91,7 +95,7 @@ def solve_images(
     where = None if mask is None else checked_mask(mask, (rows, cols))
     unit = checked_saturation(saturation, stack, where)
     plates = [image / unit for image in stack]
-    solving = Solving(solver=solver, residual=True, error=True)
+    solving = Solving(solver=solver, residual=True, error=True, fill=fill)
 
     def light(ground: Ground | None = None) -> Illumination:
         return illumination(rig.lights, channels=channels, ground=ground)

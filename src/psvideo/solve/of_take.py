@@ -27,6 +27,7 @@ def solve(
     *,
     mask: NDArray[np.bool_] | None = None,
     solver: Solver = "auto",
+    fill: bool = True,
     align: Align = "auto",
     watch: Watch = unwatched,
 ) -> Iterator[Instant]:
@@ -46,6 +47,8 @@ def solve(
     solver
         "robust" weighs highlights and shadows down, "least-squares" takes the surface as matte, "auto" is robust from
         five lights on.
+    fill
+        Give what fewer than three lights reach a best estimate, which is not valid; else it is 0.
     align
         "auto" brings the plates of a round to one instant where something moves, "flow" looks for motion everywhere,
         "none" leaves them as they are.
@@ -55,7 +58,7 @@ def solve(
     Yields
     ------
     Instant
-        ``surface``, a Surface with ``residual`` and, from the robust solver, ``error_deg``; and ``round``, the plates
+        ``surface``, a Surface with ``residual``, ``error_deg`` and ``source``; and ``round``, the plates
         that it was solved from: ``round.number`` counts from 1001 as the files do, ``round.time_s`` is the instant on
         the camera's clock in seconds, ``round.plates`` hold ``light`` and ``image`` (row, col[, 3]).
 
@@ -80,4 +83,5 @@ def solve(
     near = near_surface_of(rig, lights, height_px=clip.height_px, width_px=clip.width_px, iterations=NEAR_ITERATIONS)
     found = named_by_rig(take, timing or find_take_timing(take, watch=watch), rig)
     rounds = gather(take, found, aligning=Aligning(align=align), with_ambient=False, watch=watch)
-    return surfaces(rounds, plan, rig, mask=mask, solving=Solving(solver=solver, residual=True, error=True), near=near)
+    solving = Solving(solver=solver, residual=True, error=True, fill=fill)
+    return surfaces(rounds, plan, rig, mask=mask, solving=solving, near=near)

@@ -61,6 +61,13 @@ def normals(
         Solver,
         typer.Option(help="auto: robust against highlights and shadows from five lights on."),
     ] = "auto",
+    fill: Annotated[
+        bool,
+        typer.Option(
+            "--fill/--no-fill",
+            help="Give what fewer than three lights reach a best estimate (valid is 0 there), or leave zeros.",
+        ),
+    ] = True,
     near_iterations: Annotated[
         int | None,
         typer.Option(
@@ -134,6 +141,7 @@ def normals(
         frames=frames,
         first_light=first_light,
         solver=solver,
+        fill=fill,
         near_iterations=near_iterations,
         depth=depth,
         depth_scale=depth_scale,

@@ -17,10 +17,11 @@ MISFIT, LOST_MISFIT = 0.135, 0.25
 NOT_MATTE = 0.1
 STRENGTH_MISFIT, BY_STRENGTH, OTHER_STRENGTH = 0.05, 0.5, 1.25
 """Less is enough where other strengths of some lights take half of it away."""
-MOST_TYPICAL_DEG = 6.0
+COMMON_DEG = 3.0
 """A larger predicted error of the typical normal is no single pixel's fault."""
 AGREE, DISAGREE = 0.3, -0.1
-LEAST_VALID, HARDLY_VALID = 0.3, 0.05
+LEAST_VALID, HARDLY_VALID = 0.6, 0.2
+"""Shares of the subject: three lights that stand well reach more of most subjects than the first."""
 MOST_FLICKER_PERCENT = 1.0
 AT_REST = 0.05
 """Noise is judged by results between which less of the picture than this moves."""
@@ -109,7 +110,7 @@ def _misfit(lights: Sequence[str], fit: RigFit) -> Judgement | None:
 def _common(facts: Sequence[InstantFacts]) -> Judgement | None:
     """Judge what is unexplained in all pixels alike, which makes none of them invalid."""
     known = [one.misfit for one in facts if one.misfit is not None]
-    if not known or (error_deg := float(np.median([one.error_deg for one in known]))) <= MOST_TYPICAL_DEG:
+    if not known or (error_deg := float(np.median([one.error_deg for one in known]))) <= COMMON_DEG:
         return None
     share = float(np.median([one.share for one in known]))
     return Judgement(
@@ -152,13 +153,13 @@ def validity(observed: Observed) -> Iterator[Judgement]:
     if not shares:
         return
     usual, least = float(np.median(shares)), min(shares)
-    found = f"{100 * usual:.0f} % of what is lit has a normal to be trusted"
+    found = f"{100 * usual:.0f} % of the subject has a normal to be trusted"
     if usual >= LEAST_VALID:
         yield Judgement(subject="validity", grade="good", found=f"{found} ({100 * least:.0f} % in the worst round).")
         return
     yield Judgement(
         subject="validity",
-        grade="bad" if max(shares) < HARDLY_VALID else "doubtful",
+        grade="bad" if max(shares) < HARDLY_VALID and _common(observed.facts) is None else "doubtful",
         found=f"Only {found}.",
         advice="Give the subject more light, place the lights nearer to the camera's axis, or use more of them, so "
         "that three reach every part.",

@@ -101,7 +101,7 @@ def instant_facts(
     return InstantFacts(
         number=one.number,
         time_s=one.time_s,
-        valid_share=None if surface is None else float((thinned(surface.valid) & subject).sum() / count),
+        valid_share=None if surface is None else _valid_share(surface, subject),
         clipped_share=float(np.mean(shares)),
         unseen_share=float(np.mean([1 - plate.rows_seen.mean() for plate in one.plates])),
         borrowed_share=float(np.mean([_borrowed(plate) for plate in one.plates])),
@@ -113,6 +113,12 @@ def instant_facts(
         moving_share=None if moving is None else moving.share,
         misfit=None if surface is None else surface.misfit,
     )
+
+
+def _valid_share(surface: Surface, subject: NDArray[np.bool_]) -> float:
+    """Return the share of the subject that is valid; what a surface was filled with belongs to it."""
+    whole = subject if surface.source is None else thinned(surface.shown)
+    return float((thinned(surface.valid) & whole).sum() / max(int(whole.sum()), 1))
 
 
 def _borrowed(plate: LightPlate) -> float:

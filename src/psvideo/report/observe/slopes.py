@@ -46,6 +46,6 @@ def _thinned(surface: Surface, step: int) -> tuple[NDArray[np.bool_], NDArray[np
     inside = (slice(0, rows * step, fine), slice(0, cols * step, fine))
     area = surface.normals[inside].astype(np.float32)
     small = np.asarray(cv2.resize(area, (cols, rows), interpolation=cv2.INTER_AREA), np.float32)
-    flags = surface.valid[inside].astype(np.float32)
+    flags = surface.measured[inside].astype(np.float32)
     whole = cv2.resize(flags, (cols, rows), interpolation=cv2.INTER_AREA) > 0.999
     return whole, small

@@ -44,7 +44,7 @@ def sample_of(surface: Surface) -> Sample:
     return Sample(
         normals=thinned(surface.normals).astype(np.float32),
         albedo=albedo if albedo.ndim == 2 else albedo.mean(axis=2),
-        valid=thinned(surface.valid),
+        valid=thinned(surface.measured),
     )
 
 

@@ -36,7 +36,7 @@ class Shaping:
 def depth_of(shaping: Shaping, surface: Surface) -> Depth:
     """Return the depth of one instant; safe to call from several threads."""
     return _scaled(
-        shaping, integrate(surface.normals, surface.valid, shaping.view, how=shaping.how, before=shaping.before)
+        shaping, integrate(surface.normals, surface.shown, shaping.view, how=shaping.how, before=shaping.before)
     )
 
 
@@ -46,7 +46,7 @@ def find_depth(surface: Surface, rig: Rig | None = None) -> Depth:
     Parameters
     ----------
     surface
-        What was solved; depth is found where it is valid.
+        What was solved; depth is found wherever there is a normal, measured or not.
     rig
         Gives the lens (``focal_px``) and the plane on which the subject lies. Without a lens the view is orthographic.
 
@@ -93,7 +93,7 @@ def begun(shaping: Shaping, surface: Surface) -> Shaping:
 
     All later instants begin from the first one, and never from each other: each can be done by itself.
     """
-    height = integrate(surface.normals, surface.valid, shaping.view, how=shaping.how)
+    height = integrate(surface.normals, surface.shown, shaping.view, how=shaping.how)
     first = _scaled(replace(shaping, first=None), height)
     return replace(shaping, first=first, before=Before(height=height, normals=surface.normals))
 

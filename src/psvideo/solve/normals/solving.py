@@ -1,30 +1,42 @@
 """Which solver a run uses, and what it is asked for: chosen once, carried to every round."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
+
+import numpy as np
 
 from psvideo.model.choices import Solver
 from psvideo.model.surface import Surface
 from psvideo.plates.mixture import Mixture
 from psvideo.solve.normals import robust, woodham1980
 from psvideo.solve.normals.illumination import Illumination
-from psvideo.solve.normals.task import Mask, Samples
+from psvideo.solve.normals.judging import MOST_TYPICAL_DEG, Judging, emptied, judged
+from psvideo.solve.normals.plate_noise import LEAST, PlateNoise, noise_of
+from psvideo.solve.normals.task import Mask, Samples, Usable
 
+Plates = Sequence[Samples] | Sequence[Mixture]
 Method = Literal["least-squares", "robust"]
 ROBUST_FROM_LIGHTS = 5
 """With five lights a highlight and a shadow can both be seen; with fewer there is nothing to weigh."""
+CERTAIN = 3.5
+"""A measurement counts as lit from so many standard deviations of a dark one on: of 2,000 dark ones, one does."""
+INDIRECT = 0.2
+"""Below this share of the pixel's mean, light in shadow may come from neighbouring surfaces: where many measurements
+are brighter it is left out. (Of a surface of albedo 0.5 a wide crease sends back as much.)"""
+EVERYTHING = robust.Reweighting(most_error_deg=robust.EVERYTHING_DEG)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Solving:
     """``solver`` "auto" is robust from ROBUST_FROM_LIGHTS lights on. ``half`` gives half floats; ``residual`` and
-    ``error`` ask for what the surface may hold as well (only the robust solver predicts an error)."""
+    ``error`` ask for what the surface may hold as well. ``fill`` gives every pixel of the subject a normal."""
 
     solver: Solver = "auto"
     half: bool = False
     residual: bool = False
     error: bool = False
+    fill: bool = True
 
     def method(self, lights: int) -> Method:
         """Return the solver for so many lights."""
@@ -34,41 +46,83 @@ class Solving:
 
     def solve(
         self,
-        plates: Sequence[Samples] | Sequence[Mixture],
+        plates: Plates,
         lit: Illumination,
         *,
         seen: Mask | None = None,
         mask: Mask | None = None,
     ) -> Surface:
         """Return the surface that explains one plate per light; see the solvers for the arguments."""
-        if self.method(len(plates)) == "robust":
+        from psvideo.solve.filling.filled import Evidence, filled
+
+        noise = noise_of(plates)
+        method = self.method(len(plates))
+        usable = _usable(noise, lit.intensities.shape[1], method)
+        solved = self._solved(plates, lit, usable, method, seen, mask)
+        known = judged(solved, lit, noise)
+        if self.fill:
+            one = Evidence(plates=plates, lit=lit, usable=usable, seen=seen, mask=mask)
+            known = filled(known, one, solved=solved.valid, noise=noise.dark)
+        else:
+            known = emptied(known)
+        return replace(
+            known,
+            residual=known.residual if self.residual else None,
+            error_deg=known.error_deg if self.error else None,
+        )
+
+    def _solved(
+        self,
+        plates: Plates,
+        lit: Illumination,
+        usable: Usable,
+        method: Method,
+        seen: Mask | None,
+        mask: Mask | None,
+    ) -> Surface:
+        """Return every pixel that three measurements solve, well or not."""
+        if method == "robust":
             return robust.solve(
-                plates, lit, seen=seen, mask=mask, half=self.half, residual=self.residual, error=self.error
+                plates,
+                lit,
+                seen=seen,
+                mask=mask,
+                half=self.half,
+                residual=self.residual,
+                usable=usable,
+                reweighting=EVERYTHING,
             )
-        return woodham1980.solve(plates, lit, seen=seen, mask=mask, half=self.half, residual=self.residual)
+        residual = self.residual or len(plates) > 3  # three measurements leave none
+        return woodham1980.solve(plates, lit, seen=seen, mask=mask, half=self.half, residual=residual, usable=usable)
+
+
+def _usable(noise: PlateNoise, channels: int, method: Method) -> Usable:
+    """Return which measurements count: those that stand out of noise, and what else the method leaves out."""
+    dark = CERTAIN * max(noise.dark / np.sqrt(channels), LEAST)
+    return Usable(dark_level=float(dark), shadow_ratio=INDIRECT if method == "robust" else 0.0)
 
 
 def trust_note(method: Method, lights: int) -> str:
     """Return in one sentence what a valid normal of this solver and so many lights can be relied on for."""
+    how = Judging()
+    trusted = (
+        f"A normal is valid where it was measured and its predicted error is at most {how.most_error_deg:g} degrees, "
+        f"or {how.beside_typical:g} times what is typical of the picture where that is more (up to "
+        f"{MOST_TYPICAL_DEG:g}): a rig that is wrong makes no pixel invalid, and the judgement of the rig says so. "
+    )
     if lights == 3:
-        return (
-            "Three lights explain any three brightnesses exactly: a valid normal is one that no light leaves in shadow "
-            "and none saturates, and highlights, soft shadows or light from neighbouring surfaces cannot be seen."
+        return trusted + (
+            "Three lights explain any three brightnesses exactly: highlights, soft shadows or light from neighbouring "
+            "surfaces cannot be seen."
         )
     if method == "least-squares":
-        return (
+        return trusted + (
             "Least squares takes the surface as matte: shadow and saturation are left out, and a highlight turns the "
-            "normal towards it though it stays valid. The residual shows where that may be."
+            "normal towards it. The residual shows where that may be."
         )
     if lights == 4:
-        return (
+        return trusted + (
             "Of four lights that contradict each other the likeliest highlight is left out; where a shadow or a second "
             "highlight spoils another, it is not seen."
         )
-    how = robust.Reweighting()
-    return (
-        "Highlights and shadows weigh little, and a normal is valid where its predicted standard error is at most "
-        f"{how.most_error_deg:g} degrees, or {how.beside_typical:g} times what is typical of the picture where that is "
-        "more. So a rig that is wrong makes no pixel invalid: the judgement of the rig speaks of it. Where only three "
-        "measurements are usable nothing is checked."
-    )
+    return trusted + "Highlights and shadows weigh little. Where only three measurements are usable nothing is checked."

@@ -1,0 +1,128 @@
+"""A surface with its holes filled: every pixel of the subject has a normal and an albedo, and says how it got them."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.model.surface import MEASURED, NO_LIGHT, ONE_LIGHT, TWO_LIGHTS, Surface
+from psvideo.plates.mixture import Mixture
+from psvideo.solve.filling.growing import LEFT_ALONE, SOLVED, THREE_LIGHTS, UNKNOWN, Picture, grow, queue_for
+from psvideo.solve.filling.looking import Said, count_rows, look_rows, room_for
+from psvideo.solve.normals.bands import ShownPlates
+from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.kernel import working_memory
+from psvideo.solve.normals.task import Floats, Mask, Samples, Task, Usable, task
+
+MOST_LIGHTS_AROUND = 5
+"""A pixel that light reaches is of the subject where so many of the nine around it are lit or solved: noise is not."""
+LARGEST_HOLE = 0.005
+"""What no light reaches belongs to the subject where that encloses it and it is no larger share of the picture."""
+CLASSES = np.array([NO_LIGHT, ONE_LIGHT, TWO_LIGHTS, MEASURED], np.uint8)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evidence:
+    """One round as the solvers take it: plates, lights, and which samples to look at."""
+
+    plates: Sequence[Samples] | Sequence[Mixture]
+    lit: Illumination
+    usable: Usable
+    seen: Mask | None = None
+    mask: Mask | None = None
+    black_level: float = 0.0
+    scale: float = 1.0
+
+    def in_bands(self, run: Callable[[Task, int, int], None], threads: int | None) -> None:
+        """Call ``run(task, first, last)`` for bands of rows; pictures that are not made are made band by band."""
+        shown = ShownPlates.of(self.plates)
+        given = task(shown.samples, self.lit, self.seen, self.mask, self.usable, self.black_level, self.scale)
+        shown.in_bands(run, given, threads=threads)
+
+
+def filled(surface: Surface, one: Evidence, *, solved: Mask, noise: float, threads: int | None = None) -> Surface:
+    """Return the surface with a normal and an albedo in every pixel of the subject; its memory is taken over.
+
+    solved: (row, col), where the surface has a normal, trusted or not.
+    noise: the standard deviation of a dark sample, in units of saturation.
+
+    The subject is what the mask allows; without one, what any light reaches, and small holes in it. What was solved
+    stays to the bit. ``source`` says of every pixel how many lights its normal is from.
+    """
+    source = np.where(solved, MEASURED, np.uint8(0)).astype(np.uint8)
+    wanted = _wanted(solved, one, threads)
+    where = np.ascontiguousarray(np.argwhere(wanted), np.int32)
+    if not len(where):
+        return replace(surface, source=source)
+    index = np.where(solved, np.int32(SOLVED), np.int32(LEFT_ALONE))
+    index[wanted] = np.arange(len(where), dtype=np.int32)
+    said = _said(one, index, len(where), noise, threads)
+    lights = np.full(solved.shape, np.uint8(UNKNOWN + 1))
+    lights[solved], lights[wanted] = THREE_LIGHTS, UNKNOWN
+    planes, channels = np.moveaxis(surface.normals, -1, 0), _channels(surface.albedo)
+    picture = Picture(normals=_bits(planes), albedo=_bits(channels), places=index, lights=lights)
+    doubt = np.zeros((len(where), 2), np.float32)
+    grow(picture, said, where, queue_for(len(where)), doubt)
+    source[wanted] = CLASSES[np.minimum(lights[wanted], THREE_LIGHTS)]
+    return replace(surface, source=source, error_deg=_errors(surface, where, doubt))
+
+
+def _errors(surface: Surface, where: NDArray[np.int32], doubt: Floats) -> NDArray[np.floating] | None:
+    if surface.error_deg is None:
+        return None
+    rows, cols = where.T
+    surface.error_deg[rows, cols] = doubt[:, 0]
+    return surface.error_deg
+
+
+def _wanted(solved: Mask, one: Evidence, threads: int | None) -> Mask:
+    """Return the subject's pixels (row, col) that have no normal yet."""
+    if one.mask is not None:
+        return np.asarray(one.mask & ~solved)
+    if solved.all():
+        return np.zeros_like(solved)
+    counts = np.zeros(solved.shape, np.uint8)
+    asked = np.ascontiguousarray(~solved).view(np.uint8)
+
+    def count(given: Task, first: int, last: int) -> None:
+        count_rows(given, working_memory(given), asked, counts, first, last)
+
+    one.in_bands(count, threads)
+    lit = (solved | (counts > 0)).astype(np.uint8)
+    around = cv2.boxFilter(lit, cv2.CV_8U, (3, 3), normalize=False, borderType=cv2.BORDER_REPLICATE)
+    subject = solved | ((lit > 0) & (around >= MOST_LIGHTS_AROUND))
+    return np.asarray((subject | _holes(subject)) & ~solved)
+
+
+def _holes(subject: Mask) -> Mask:
+    """Return the small parts of the rest that the subject encloses."""
+    count, labels, facts, _ = cv2.connectedComponentsWithStats((~subject).astype(np.uint8), connectivity=4)
+    rows, cols = subject.shape
+    left, top, wide, high, size = facts.T
+    inside = (left > 0) & (top > 0) & (left + wide < cols) & (top + high < rows)
+    small = inside & (size <= max(LARGEST_HOLE * rows * cols, 1))
+    small[0] = False
+    return np.asarray(small[labels]) if count > 1 else np.zeros_like(subject)
+
+
+def _said(one: Evidence, index: NDArray[np.int32], pixels: int, noise: float, threads: int | None) -> Said:
+    said = room_for(pixels, noise)
+
+    def look(given: Task, first: int, last: int) -> None:
+        look_rows(given, working_memory(given), index, said, first, last)
+
+    one.in_bands(look, threads)
+    return said
+
+
+def _channels(albedo: NDArray[np.floating]) -> NDArray[np.floating]:
+    return albedo[None] if albedo.ndim == 2 else np.moveaxis(albedo, -1, 0)
+
+
+def _bits(planes: NDArray[np.floating]) -> Samples:
+    """Return planes as the compiled loops take them, in the same memory."""
+    if not planes.flags.c_contiguous:
+        raise ValueError("a surface as the solvers make it expected: channels in planes of their own")
+    return planes.view(np.uint16) if planes.dtype == np.float16 else planes

@@ -1,0 +1,327 @@
+"""The compiled loop that grows normals and albedo from solved pixels into the others, the likeliest neighbours first.
+
+Two lights leave one line g0 + t d for albedo * normal; the albedo of solved neighbours of the same colour gives its
+length, their normals the side (C. Hernandez, G. Vogiatzis, R. Cipolla, "Overcoming shadows in 3-source photometric
+stereo", PAMI 33(2), 2011, section 4). One light leaves a cone, on which the normal nearest to the neighbours' is taken.
+Pixels are taken in the order of their distance from what is solved, where a step to another colour is a long one: so
+they follow their own surface, and what is behind an outline comes last.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.compute.compiled import FUSED
+from psvideo.compute.memory import decoded, encoded, lent
+from psvideo.solve.filling.looking import Said
+from psvideo.solve.normals.blocks import ONE, THREE, ZERO
+from psvideo.solve.normals.task import Bytes, Floats, Samples
+
+REACH_PX = 4  # neighbours are looked at so far in every direction,
+SPREAD_PX = 2.0  # with weights that fall off so,
+SAME_COLOUR = np.float32(0.015)  # and with the colour: shares of red and blue that differ so much weigh a half;
+STEP = 4  # distance of neighbours of one colour, in the whole numbers in which distances are counted
+BUCKETS = 256  # more than the longest step
+ALBEDO_SHARE = np.float32(0.05)  # how well the neighbours' albedo is that of a pixel
+BENT = np.float32(np.radians(15.0))  # how well the neighbours' normal is
+BEYOND = np.float32(0.1)  # what faces away from the camera costs: squared over this
+WEIGHTS = np.array([0.1, 0.25, 0.5, 1.0], np.float32)  # of neighbours that no, one, two or three lights reach
+ANGLES = np.radians(np.arange(-88.0, 89.0, 2.0)).astype(np.float32)
+ANGLE_STEP = np.float32(np.radians(2.0))
+COSINES, SINES = np.cos(ANGLES), np.sin(ANGLES)
+LOG_COSINES = np.log(COSINES)
+HALF, TWO = np.float32(0.5), np.float32(2)
+THIRD, TINY, FAR = np.float32(1 / 3), np.float32(1e-6), np.float32(1e30)
+TURN, MOST_TURN, DEGREES = np.float32(2 * np.pi), np.float32(1.0), np.float32(180 / np.pi)
+LEAST_COSINE, LEAST_SINE_SQUARED = np.float32(0.05), np.float32(1e-3)
+MOST_STEPS = np.float32(50)
+UNCOLOURED = np.float32(0.01)  # the square of what is not known of the colour of a pixel without light
+ONWARD = np.float32(0.7)  # how far neighbours' bend is taken on: all of it would burst from noise
+ONE_LIGHT_DEG, NO_LIGHT_DEG = np.float32(20), np.float32(35)
+FOREVER = 1 << 30
+SOLVED, LEFT_ALONE = -1, -2  # of Picture.places
+THREE_LIGHTS, UNKNOWN = 3, 9  # of Picture.lights
+
+
+class Picture(NamedTuple):
+    """The surface that is filled, planes of float32 or of half floats as the bits of uint16, and what is beside it.
+
+    places: (row, col), the place of a pixel to be filled in the lists, -1 of solved ones, -2 of what is left alone.
+    lights: (row, col), how many lights a pixel's normal is from, 3 where it is solved.
+    """
+
+    normals: Samples  # (3, row, col)
+    albedo: Samples  # (channel, row, col)
+    places: NDArray[np.int32]
+    lights: Bytes
+
+
+class Queue(NamedTuple):
+    """Pixels by distance: a ring of buckets, of lists that are linked."""
+
+    heads: NDArray[np.int32]
+    following: NDArray[np.int32]
+    pixels: NDArray[np.int32]
+    distance: NDArray[np.int32]
+
+
+def queue_for(pixels: int) -> Queue:
+    """Return a queue that holds so many pixels, each pushed by at most four neighbours and once as a start."""
+    return Queue(
+        heads=np.full(BUCKETS, -1, np.int32),
+        following=np.full(5 * pixels + 1, -1, np.int32),
+        pixels=np.zeros(5 * pixels + 1, np.int32),
+        distance=np.full(pixels, FOREVER, np.int32),
+    )
+
+
+WINDOW = np.exp(
+    -(np.arange(-REACH_PX, REACH_PX + 1)[:, None] ** 2 + np.arange(-REACH_PX, REACH_PX + 1)[None] ** 2)
+    / (2 * SPREAD_PX**2)
+).astype(np.float32)
+
+
+@FUSED.kept
+def grow(picture: Picture, said: Said, where: NDArray[np.int32], queue: Queue, doubt: Floats) -> None:
+    """Fill the pixels ``where`` (pixel, 2: row and column) of the picture, nearest first; for one thread.
+
+    ``doubt`` (pixel, 2) takes how far in degrees a normal could turn before it fits much worse, and its distance from
+    what is solved, in pixels of its own colour.
+    """
+    p = Picture(lent(picture.normals), lent(picture.albedo), lent(picture.places), lent(picture.lights))
+    s = Said(lent(said.reached), lent(said.bright), lent(said.towards), lent(said.colour), said.noise)
+    q = Queue(lent(queue.heads), lent(queue.following), lent(queue.pixels), lent(queue.distance))
+    places, out = lent(where), lent(doubt)
+    pushed = 0
+    for pixel in range(len(places)):
+        pushed = _push_start(p, s, places, q, pixel, pushed)
+    begun, now, waiting = 0, 0, pushed
+    while True:
+        while waiting > 0:
+            entry = q.heads[now % BUCKETS]
+            if entry < 0:
+                now += 1
+                continue
+            q.heads[now % BUCKETS] = q.following[entry]
+            waiting -= 1
+            pixel = q.pixels[entry]
+            row, col = places[pixel, 0], places[pixel, 1]
+            if p.lights[row, col] != UNKNOWN:
+                continue
+            _estimate(p, s, row, col, pixel, out)
+            out[pixel, 1] = np.float32(now) / np.float32(STEP)
+            before = pushed
+            pushed = _push_around(p, s, places, q, pixel, now, pushed)
+            waiting += pushed - before
+        while begun < len(places) and p.lights[places[begun, 0], places[begun, 1]] != UNKNOWN:
+            begun += 1
+        if begun == len(places):
+            return
+        q.distance[begun] = now
+        pushed = _push(q, begun, now, pushed)
+        waiting = 1
+
+
+@FUSED.inlined
+def _push(q: Queue, pixel: int, distance: int, pushed: int) -> int:
+    bucket = distance % BUCKETS
+    q.pixels[pushed], q.following[pushed], q.heads[bucket] = pixel, q.heads[bucket], pushed
+    return pushed + 1
+
+
+@FUSED.called
+def _push_start(p: Picture, s: Said, places: NDArray[np.int32], q: Queue, pixel: int, pushed: int) -> int:
+    """Push a pixel that has solved neighbours with the shortest step from one of them."""
+    row, col = places[pixel, 0], places[pixel, 1]
+    for side in range(4):
+        y, x = row + (side == 1) - (side == 0), col + (side == 3) - (side == 2)
+        if 0 <= y < p.places.shape[0] and 0 <= x < p.places.shape[1] and p.places[y, x] == SOLVED:
+            q.distance[pixel] = min(q.distance[pixel], _step(p, s, row, col, y, x))
+    return _push(q, pixel, q.distance[pixel], pushed) if q.distance[pixel] < FOREVER else pushed
+
+
+@FUSED.called
+def _push_around(p: Picture, s: Said, places: NDArray[np.int32], q: Queue, pixel: int, now: int, pushed: int) -> int:
+    """Push a pixel's neighbours that are to be filled and are nearer by this way."""
+    row, col = places[pixel, 0], places[pixel, 1]
+    for side in range(4):
+        y, x = row + (side == 1) - (side == 0), col + (side == 3) - (side == 2)
+        if 0 <= y < p.places.shape[0] and 0 <= x < p.places.shape[1] and p.lights[y, x] == UNKNOWN:
+            other, distance = p.places[y, x], now + _step(p, s, row, col, y, x)
+            if distance < q.distance[other]:
+                q.distance[other] = distance
+                pushed = _push(q, other, distance, pushed)
+    return pushed
+
+
+@FUSED.called
+def _step(p: Picture, s: Said, row: int, col: int, y: int, x: int) -> int:
+    """The distance between neighbours, the longer the more their colours differ."""
+    red, blue, noise = _colour_of(p, s, row, col)
+    red_there, blue_there, noise_there = _colour_of(p, s, y, x)
+    apart = (red - red_there) ** 2 + (blue - blue_there) ** 2
+    allowed = SAME_COLOUR**2 + noise + noise_there
+    return int(np.float32(STEP) * (ONE + min(apart / allowed, MOST_STEPS)))
+
+
+@FUSED.inlined
+def _colour_of(p: Picture, s: Said, row: int, col: int) -> tuple[np.float32, np.float32, np.float32]:
+    """The shares of red and blue, and the square of what noise makes of them."""
+    pixel, last = p.places[row, col], len(p.albedo) - 1
+    if pixel >= 0:
+        red, green, blue = s.colour[pixel, 0], s.colour[pixel, 1], s.colour[pixel, 2]
+    else:
+        red = decoded(p.albedo[0, row, col])
+        green, blue = decoded(p.albedo[min(1, last), row, col]), decoded(p.albedo[last, row, col])
+    total = red + green + blue
+    if not total > ZERO:
+        return THIRD, THIRD, UNCOLOURED
+    one = ONE / total
+    return red * one, blue * one, (s.noise * one) ** 2
+
+
+@FUSED.called
+def _estimate(p: Picture, s: Said, row: int, col: int, pixel: int, doubt: Floats) -> None:
+    """Give a pixel its normal and albedo from its neighbours and from what the lights say."""
+    rows, cols = p.places.shape
+    channels = len(p.albedo)
+    red, blue, noise = _colour_of(p, s, row, col)
+    weight = albedo = nx = ny = nz = reds = blues = ZERO
+    down = right = downs = rights = both = ZERO
+    nx_down = ny_down = nz_down = nx_right = ny_right = nz_right = ZERO
+    for y in range(max(row - REACH_PX, 0), min(row + REACH_PX + 1, rows)):
+        for x in range(max(col - REACH_PX, 0), min(col + REACH_PX + 1, cols)):
+            state = p.lights[y, x]
+            if state > THREE_LIGHTS:
+                continue
+            there_red = decoded(p.albedo[0, y, x])
+            there_blue = decoded(p.albedo[channels - 1, y, x])
+            there = there_red + there_blue + (decoded(p.albedo[1, y, x]) if channels > 1 else there_red)
+            if not there > ZERO:
+                continue
+            one = ONE / there
+            share_red, share_blue = there_red * one, there_blue * one
+            apart = (share_red - red) ** 2 + (share_blue - blue) ** 2
+            alike = ONE / (ONE + apart / (SAME_COLOUR**2 + noise + (s.noise * one) ** 2))
+            alike *= alike
+            w = WEIGHTS[state] * WINDOW[y - row + REACH_PX, x - col + REACH_PX] * (alike * alike + TINY)
+            a, b, c = decoded(p.normals[0, y, x]), decoded(p.normals[1, y, x]), decoded(p.normals[2, y, x])
+            dy, dx = np.float32(y - row), np.float32(x - col)
+            weight += w
+            albedo += w * there * THIRD
+            reds += w * share_red
+            blues += w * share_blue
+            nx, ny, nz = nx + w * a, ny + w * b, nz + w * c
+            wy, wx = w * dy, w * dx
+            down, right = down + wy, right + wx
+            downs, rights, both = downs + wy * dy, rights + wx * dx, both + wy * dx
+            nx_down, ny_down, nz_down = nx_down + wy * a, ny_down + wy * b, nz_down + wy * c
+            nx_right, ny_right, nz_right = nx_right + wx * a, ny_right + wx * b, nz_right + wx * c
+    if weight > ZERO:
+        one = ONE / weight
+        albedo, reds, blues = albedo * one, reds * one, blues * one
+        nx, ny, nz, down, right = nx * one, ny * one, nz * one, down * one, right * one
+        vy, vx, vxy = downs * one - down * down + HALF, rights * one - right * right + HALF, both * one - down * right
+        determinant = ONE / (vy * vx - vxy * vxy)
+        # how far a straight course over the neighbours, taken on to this pixel, leads from their mean
+        per_y = -(down * vx - right * vxy) * determinant * ONWARD
+        per_x = -(right * vy - down * vxy) * determinant * ONWARD
+        nx += per_y * (nx_down * one - down * nx) + per_x * (nx_right * one - right * nx)
+        ny += per_y * (ny_down * one - down * ny) + per_x * (ny_right * one - right * ny)
+        nz += per_y * (nz_down * one - down * nz) + per_x * (nz_right * one - right * nz)
+        length = np.sqrt(nx * nx + ny * ny + nz * nz)
+        one = ONE / max(length, TINY)
+        nx, ny, nz = nx * one, ny * one, nz * one
+    else:
+        nx, ny, nz, albedo, reds, blues = ZERO, ZERO, ONE, ZERO, THIRD, THIRD
+    count = min(s.reached[pixel], 2)
+    if count == 2:
+        nx, ny, nz, albedo, turn = _from_two(s, pixel, nx, ny, nz, albedo)
+    elif count == 1:
+        nx, ny, nz, albedo, turn = _from_one(s, pixel, nx, ny, nz, albedo)
+    else:
+        turn = NO_LIGHT_DEG
+    if count > 0:
+        reds, blues = red, blue
+    doubt[pixel, 0] = turn
+    p.lights[row, col] = count
+    p.normals[0, row, col] = encoded(nx, p.normals)
+    p.normals[1, row, col] = encoded(ny, p.normals)
+    p.normals[2, row, col] = encoded(nz, p.normals)
+    if channels == 1:
+        p.albedo[0, row, col] = encoded(albedo, p.albedo)
+    else:
+        p.albedo[0, row, col] = encoded(THREE * albedo * reds, p.albedo)
+        p.albedo[1, row, col] = encoded(THREE * albedo * max(ONE - reds - blues, ZERO), p.albedo)
+        p.albedo[2, row, col] = encoded(THREE * albedo * blues, p.albedo)
+
+
+@FUSED.inlined
+def _from_two(
+    s: Said, pixel: int, nx: np.float32, ny: np.float32, nz: np.float32, albedo: np.float32
+) -> tuple[np.float32, np.float32, np.float32, np.float32, np.float32]:
+    """The normal of those that two lights leave that fits the neighbours' normal (nx, ny, nz) and albedo best.
+
+    Where there are no neighbours, ``albedo`` is 0 and does not count. Returned with the albedo and how far in degrees
+    the normal could turn.
+    """
+    ax, ay, az = s.towards[pixel, 0, 0], s.towards[pixel, 0, 1], s.towards[pixel, 0, 2]
+    bx, by, bz = s.towards[pixel, 1, 0], s.towards[pixel, 1, 1], s.towards[pixel, 1, 2]
+    first, second = s.bright[pixel, 0], s.bright[pixel, 1]
+    cosine = ax * bx + ay * by + az * bz
+    sine_squared = max(ONE - cosine * cosine, LEAST_SINE_SQUARED)
+    p, q = (first - cosine * second) / sine_squared, (second - cosine * first) / sine_squared
+    gx, gy, gz = p * ax + q * bx, p * ay + q * by, p * az + q * bz
+    length = np.sqrt(gx * gx + gy * gy + gz * gz)
+    one = ONE / max(length, TINY)
+    gx, gy, gz = gx * one, gy * one, gz * one
+    one = ONE / np.sqrt(sine_squared)
+    dx, dy, dz = (ay * bz - az * by) * one, (az * bx - ax * bz) * one, (ax * by - ay * bx) * one
+    guess = np.arctan2(nx * dx + ny * dy + nz * dz, nx * gx + ny * gy + nz * gz)
+    offset = np.log(max(length, TINY)) - np.log(albedo) if albedo > ZERO else ZERO
+    per_albedo = ONE / ALBEDO_SHARE if albedo > ZERO else ZERO
+    best, least, before, last, after, closing = 0, FAR, ZERO, ZERO, ZERO, False
+    for k in range(len(ANGLES)):
+        apart = abs(ANGLES[k] - guess)
+        apart = min(apart, TURN - apart)
+        away = max(-(gz * COSINES[k] + dz * SINES[k]), ZERO) / BEYOND
+        cost = ((offset - LOG_COSINES[k]) * per_albedo) ** 2 + (apart / BENT) ** 2 + away * away
+        if closing:
+            after, closing = cost, False
+        if cost < least:
+            best, least, before, closing = k, cost, last, True
+        last = cost
+    bend, angle = ONE / MOST_TURN, ANGLES[best]
+    if 0 < best < len(ANGLES) - 1:
+        curve = before - TWO * least + after
+        angle += ANGLE_STEP * HALF * (before - after) / max(curve, TINY)
+        bend = max(curve / (TWO * ANGLE_STEP * ANGLE_STEP), bend)
+    c, d = np.cos(angle), np.sin(angle)
+    found = length / max(c, LEAST_COSINE)
+    if albedo > ZERO:
+        found = min(max(found, albedo * (ONE - TWO * ALBEDO_SHARE)), albedo * (ONE + TWO * ALBEDO_SHARE))
+    turn = DEGREES / np.sqrt(bend)
+    return gx * c + dx * d, gy * c + dy * d, gz * c + dz * d, found, turn
+
+
+@FUSED.inlined
+def _from_one(
+    s: Said, pixel: int, nx: np.float32, ny: np.float32, nz: np.float32, albedo: np.float32
+) -> tuple[np.float32, np.float32, np.float32, np.float32, np.float32]:
+    """The normal on the one light's cone that is nearest to the neighbours', with the albedo and how far it could turn.
+
+    Where there are no neighbours the normal stays and gives the albedo.
+    """
+    x, y, z, bright = s.towards[pixel, 0, 0], s.towards[pixel, 0, 1], s.towards[pixel, 0, 2], s.bright[pixel, 0]
+    along = nx * x + ny * y + nz * z
+    if not albedo > ZERO:
+        return nx, ny, nz, bright / max(along, LEAST_COSINE), ONE_LIGHT_DEG
+    cosine = min(bright / albedo, ONE)
+    tx, ty, tz = nx - along * x, ny - along * y, nz - along * z
+    one = np.sqrt(max(ONE - cosine * cosine, ZERO) / max(tx * tx + ty * ty + tz * tz, TINY))
+    cx, cy, cz = x * cosine + tx * one, y * cosine + ty * one, z * cosine + tz * one
+    if cz < ZERO:
+        one = ONE / np.sqrt(max(cx * cx + cy * cy, TINY))
+        cx, cy, cz = cx * one, cy * one, ZERO
+    return cx, cy, cz, albedo, ONE_LIGHT_DEG

@@ -1,0 +1,131 @@
+"""The compiled loop that reads what the lights say in pixels without a solution: the two brightest, and the colour."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.compute.compiled import FUSED
+from psvideo.compute.memory import lent
+from psvideo.solve.normals.blocks import ABSENT, BLOCK, ONE, ZERO
+from psvideo.solve.normals.kernel import lent_task
+from psvideo.solve.normals.measuring import gather_one, gather_three, hide_unseen
+from psvideo.solve.normals.near_kernel import at, of_light, place_lights
+from psvideo.solve.normals.task import Bytes, Floats, Task, Work
+
+
+class Said(NamedTuple):
+    """What the lights say of every pixel that is to be filled (pixel, ...), in units of albedo.
+
+    reached: how many lights reach it. bright: what the brightest and the next one show, 0 where there is none.
+    towards: (pixel, 2, 3), the unit directions to those two. colour: (pixel, 3), the sum over the lights that reach it,
+    alike in all three where the picture is grey. noise: of a colour's sum, as a standard deviation.
+    """
+
+    reached: Bytes
+    bright: Floats
+    towards: Floats
+    colour: Floats
+    noise: np.float32
+
+
+def room_for(pixels: int, noise: float) -> Said:
+    """Return room for what is said of so many pixels."""
+    return Said(
+        reached=np.zeros(pixels, np.uint8),
+        bright=np.zeros((pixels, 2), np.float32),
+        towards=np.zeros((pixels, 2, 3), np.float32),
+        colour=np.zeros((pixels, 3), np.float32),
+        noise=np.float32(noise),
+    )
+
+
+@FUSED.kept
+def count_rows(task: Task, work: Work, wanted: Bytes, counts: Bytes, first: int, last: int) -> None:
+    """Count for every ``wanted`` pixel (row, col) of the rows the lights that reach it, into ``counts``."""
+    t = lent_task(task, work.matrix, work.per_strength)
+    asked, found, values = lent(wanted), lent(counts), lent(work.values)
+    channels = t.tone.shape[1]
+    share = ONE / np.float32(channels)
+    for row in range(first, last):
+        for col in range(0, t.cols, BLOCK):
+            n = min(BLOCK, t.cols - col)
+            if not asked[row, col : col + n].any():
+                continue
+            _read(t, values, row, col, n)
+            for light in range(t.lights):
+                per = t.per_strength[light]
+                for i in range(n):
+                    bright = ZERO
+                    for channel in range(channels):
+                        bright += values[light * channels + channel, i]
+                    reached = asked[row, col + i] and bright * at(per, i) * share > t.dark
+                    found[row, col + i] += reached
+
+
+@FUSED.inlined
+def _read(task: Task, values: Floats, row: int, col: int, n: int) -> None:
+    """Place the lights and read a block's measurements, MISSING where saturated or unseen."""
+    place_lights(task.matrix, task.per_strength, task.near, row, col, n)
+    start = row * task.cols + col
+    if task.tone.shape[1] == 1:
+        gather_one(task, values, start, n)
+    else:
+        gather_three(task, values, start, n)
+    hide_unseen(task, values, row, col, n)
+
+
+@FUSED.kept
+def look_rows(task: Task, work: Work, index: NDArray[np.int32], said: Said, first: int, last: int) -> None:
+    """Read the rows' pixels whose ``index`` (row, col) is not negative; it is their place in ``said``."""
+    t = lent_task(task, work.matrix, work.per_strength)
+    places, values = lent(index), lent(work.values)
+    count, bright, towards, colour = lent(said.reached), lent(said.bright), lent(said.towards), lent(said.colour)
+    channels = t.tone.shape[1]
+    scale, share = t.albedo_scale, ONE / np.float32(channels)
+    for row in range(first, last):
+        for col in range(0, t.cols, BLOCK):
+            n = min(BLOCK, t.cols - col)
+            if not (places[row, col : col + n] >= 0).any():
+                continue
+            _read(t, values, row, col, n)
+            for light in range(t.lights):
+                lamp, per = of_light(t.matrix, light), t.per_strength[light]
+                for i in range(n):
+                    place = places[row, col + i]
+                    if place < 0 or not values[light * channels, i] > ABSENT:
+                        continue
+                    level = ZERO
+                    for channel in range(channels):
+                        level += values[light * channels + channel, i] * share
+                    one = at(per, i)
+                    level *= one
+                    if not level > t.dark:
+                        continue
+                    level *= scale
+                    count[place] += 1
+                    for channel in range(3):
+                        source = min(channel, channels - 1)
+                        colour[place, channel] += max(values[light * channels + source, i], ZERO)
+                    x, y, z = at(lamp, i)
+                    if level > bright[place, 0]:
+                        _move_second(bright, towards, place)
+                        _note(bright, towards, place, 0, level, x * one, y * one, z * one)
+                    elif level > bright[place, 1]:
+                        _note(bright, towards, place, 1, level, x * one, y * one, z * one)
+
+
+@FUSED.inlined
+def _move_second(bright: Floats, towards: Floats, place: int) -> None:
+    bright[place, 1] = bright[place, 0]
+    for axis in range(3):
+        towards[place, 1, axis] = towards[place, 0, axis]
+
+
+@FUSED.inlined
+def _note(
+    bright: Floats, towards: Floats, place: int, rank: int, level: np.float32,
+    x: np.float32, y: np.float32, z: np.float32,
+) -> None:  # fmt: skip
+    bright[place, rank] = level
+    towards[place, rank, 0], towards[place, rank, 1], towards[place, rank, 2] = x, y, z

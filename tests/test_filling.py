@@ -1,0 +1,164 @@
+"""What fewer than three lights reach: estimated from two, one or none of them, marked as such, and never invented."""
+
+import numpy as np
+import pytest
+
+import psvideo as ps
+from psvideo.model.surface import MEASURED, NO_LIGHT, ONE_LIGHT, TWO_LIGHTS, Surface
+from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.solving import Solving
+
+SIZE = 120
+LIGHTS = np.array([[0.6, 0.1, 0.79], [-0.5, 0.5, 0.71], [-0.1, -0.7, 0.71]])
+LIGHTS = LIGHTS / np.linalg.norm(LIGHTS, axis=1, keepdims=True)
+
+
+def ball(radius: float = 50.0) -> tuple[np.ndarray, np.ndarray]:
+    """Return the normals of a ball (row, col, 3), and where it is."""
+    rows, cols = np.mgrid[:SIZE, :SIZE] - (SIZE - 1) / 2
+    x, y = cols / radius, -rows / radius
+    inside = x * x + y * y < 0.98
+    z = np.sqrt(np.where(inside, 1 - x * x - y * y, 0))
+    return np.where(inside[..., None], np.stack([x, y, z], axis=-1), 0), inside
+
+
+def plates_of(
+    normals: np.ndarray, colour: np.ndarray, *, noise: float = 0.001, lights: np.ndarray = LIGHTS
+) -> list[np.ndarray]:
+    """Return a plate per light of a matte surface, with a camera's noise."""
+    rng = np.random.default_rng(3)
+    shade = np.maximum(np.einsum("rcx,lx->lrc", normals, lights), 0)
+    return [(one[..., None] * colour + rng.normal(0, noise, (*one.shape, 3))).astype(np.float32) for one in shade]
+
+
+def lit_by(lights: np.ndarray = LIGHTS) -> Illumination:
+    return Illumination(directions=lights, intensities=np.ones((len(lights), 3)))
+
+
+def angles_deg(found: np.ndarray, truth: np.ndarray) -> np.ndarray:
+    apart = np.linalg.norm(found.astype(np.float64) - truth, axis=-1)
+    return np.asarray(np.degrees(2 * np.arcsin(np.clip(apart / 2, 0, 1))))
+
+
+@pytest.fixture(scope="module")
+def solved() -> tuple[Surface, np.ndarray, np.ndarray]:
+    normals, inside = ball()
+    surface = Solving(error=True).solve(plates_of(normals, np.array([0.5, 0.4, 0.3])), lit_by())
+    return surface, normals, inside
+
+
+def test_every_pixel_of_the_subject_has_a_unit_normal_and_an_albedo(
+    solved: tuple[Surface, np.ndarray, np.ndarray],
+) -> None:
+    surface, normals, inside = solved
+    reached = (np.einsum("rcx,lx->lrc", normals, LIGHTS) > 0.01).any(axis=0)
+    assert surface.shown[reached].all()
+    lengths = np.linalg.norm(surface.normals[surface.shown], axis=-1)
+    np.testing.assert_allclose(lengths, 1, atol=1e-3)
+    assert (surface.albedo[surface.shown] > 0).all()
+    assert not surface.shown[~inside].any(), "nothing is invented where nothing was seen"
+    assert not surface.normals[~surface.shown].any()
+    assert not surface.albedo[~surface.shown].any()
+
+
+def test_the_source_is_how_many_lights_reach_a_pixel_and_only_measured_ones_are_valid(
+    solved: tuple[Surface, np.ndarray, np.ndarray],
+) -> None:
+    surface, normals, _ = solved
+    shade = np.einsum("rcx,lx->lrc", normals, LIGHTS)
+    clear = (np.abs(shade) > 0.02).all(axis=0)  # what grazes may count or not
+    assert surface.source is not None
+    for count, source in ((3, MEASURED), (2, TWO_LIGHTS), (1, ONE_LIGHT)):
+        where = clear & ((shade > 0).sum(axis=0) == count)
+        assert where.sum() > 100
+        assert (surface.source[where] == source).all()
+        assert surface.valid[where].all() == (count == 3)
+    assert not surface.valid[surface.source != MEASURED].any()
+
+
+def test_two_lights_and_the_albedo_around_give_the_normal_and_one_light_nearly(
+    solved: tuple[Surface, np.ndarray, np.ndarray],
+) -> None:
+    surface, normals, _ = solved
+    apart = angles_deg(surface.normals, normals)
+    two, one = surface.source == TWO_LIGHTS, surface.source == ONE_LIGHT
+    assert apart[two].mean() < 10
+    assert np.median(apart[two]) < 5
+    assert apart[one].mean() < 25
+    assert surface.error_deg is not None
+    for where in (two, one):
+        assert (apart[where] <= 2 * surface.error_deg[where]).mean() > 0.75
+
+
+def test_colours_that_meet_keep_their_own_albedo() -> None:
+    normals, _ = ball()
+    left = np.arange(SIZE)[None, :] < SIZE // 2
+    colour = np.where(left[..., None], [0.6, 0.2, 0.1], [0.1, 0.2, 0.35])
+    surface = Solving().solve(plates_of(normals, colour), lit_by())
+    two = surface.source == TWO_LIGHTS
+    off = np.abs(surface.albedo[two] / np.broadcast_to(colour, normals.shape)[two] - 1)
+    assert np.median(off) < 0.05
+    assert (off < 0.2).mean() > 0.9
+
+
+def test_how_strong_the_lights_are_said_to_be_changes_the_albedo_only() -> None:
+    normals, _ = ball()
+    plates = plates_of(normals, np.array([0.5, 0.4, 0.3]))
+    plain = Solving().solve(plates, lit_by())
+    weak = Solving().solve(plates, Illumination(directions=LIGHTS, intensities=np.full((3, 1), 0.05).repeat(3, axis=1)))
+    np.testing.assert_array_equal(weak.source, plain.source)
+    np.testing.assert_allclose(weak.normals, plain.normals, atol=2e-3)
+    np.testing.assert_allclose(weak.albedo, 20 * plain.albedo, rtol=5e-3, atol=1e-3)
+
+
+def test_what_is_not_filled_is_zero() -> None:
+    normals, _ = ball()
+    surface = Solving(fill=False, error=True).solve(plates_of(normals, np.array([0.5, 0.4, 0.3])), lit_by())
+    assert surface.error_deg is not None
+    for plane in (surface.normals, surface.albedo, surface.error_deg):
+        assert not plane[~surface.valid].any()
+    np.testing.assert_array_equal(surface.shown, surface.valid)
+
+
+def test_measured_pixels_are_the_same_to_the_bit_filled_or_not() -> None:
+    normals, _ = ball()
+    plates = plates_of(normals, np.array([0.5, 0.4, 0.3]))
+    whole, plain = (Solving(fill=fill).solve(plates, lit_by()) for fill in (True, False))
+    np.testing.assert_array_equal(whole.valid, plain.valid)
+    np.testing.assert_array_equal(whole.normals[whole.valid], plain.normals[plain.valid])
+
+
+def test_a_small_hole_that_no_light_reaches_is_filled_and_the_void_is_not() -> None:
+    normals, inside = ball()
+    plates = plates_of(normals, np.array([0.5, 0.4, 0.3]))
+    hole = np.zeros_like(inside)
+    hole[58:64, 58:64] = True
+    for plate in plates:
+        plate[hole] = np.random.default_rng(1).normal(0, 0.001, (36, 3))
+    surface = Solving().solve(plates, lit_by())
+    assert surface.source is not None
+    assert (surface.source[hole] == NO_LIGHT).all()
+    assert angles_deg(surface.normals, normals)[hole].max() < 10
+    assert not surface.shown[~inside].any()
+
+
+def test_a_mask_says_what_the_subject_is_even_where_no_light_reaches() -> None:
+    normals, inside = ball()
+    mask = inside | (np.arange(SIZE)[:, None] < 20)
+    surface = Solving().solve(plates_of(normals, np.array([0.5, 0.4, 0.3])), lit_by(), mask=mask)
+    assert surface.shown[mask].all()
+    assert not surface.shown[~mask].any()
+
+
+def test_plates_of_noise_alone_give_nothing() -> None:
+    plates = plates_of(np.zeros((SIZE, SIZE, 3)), np.ones(3), noise=0.002)
+    assert not Solving().solve(plates, lit_by()).shown.any()
+
+
+def test_arrays_from_python_are_filled_or_not() -> None:
+    normals, _ = ball()
+    images = np.stack(plates_of(normals, np.array([0.5, 0.4, 0.3])))
+    for fill in (True, False):
+        source = ps.solve_images(images, LIGHTS, fill=fill).source
+        assert source is not None
+        assert bool((source == TWO_LIGHTS).any()) == fill
