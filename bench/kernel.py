@@ -14,6 +14,8 @@ import numpy as np
 
 from bench.table import Row
 from psvideo.compute.compiled import FUSED
+from psvideo.model.coded import Coded, Tone
+from psvideo.plates.mixture import Mixture
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.kernel import solve_rows, working_memory
 from psvideo.solve.normals.task import Usable, empty_result, task
@@ -23,6 +25,7 @@ ROWS, COLS = 1080, 1920
 PIXELS = ROWS * COLS
 BEYOND_CACHE_BYTES = 160_000_000
 REPEATS = 40
+FRAMES_OF_A_ROUND = 11
 THREADS = os.cpu_count() or 1
 BANDS = 4 * THREADS
 
@@ -33,6 +36,7 @@ def rows() -> Iterator[Row]:
         for lights in (3, 8, 16):
             yield from _rows_for(lights, pool)
     yield from _colour_rows()
+    yield from _round_rows()
 
 
 def _rows_for(lights: int, pool: ThreadPoolExecutor) -> Iterator[Row]:
@@ -52,6 +56,39 @@ def _rows_for(lights: int, pool: ThreadPoolExecutor) -> Iterator[Row]:
     yield Row(
         f"{lights} lights: L2 in numpy / kernel", f"{faster:.0f} ({1e3 * numpy_s:.0f} ms)", ">= 100", faster >= 100
     )
+
+
+def _round_rows() -> Iterator[Row]:
+    """One pass from the codes of a round's frames to normals: eight lights, a dark slot, ambient light taken off."""
+    rng, lights = np.random.default_rng(0), 8
+    base = rng.integers(9_000, 40_000, (ROWS, COLS, 3)).astype(np.uint16)
+    tone = Tone(gain=np.full((1, 1), 1 / 65535))
+    frames = [Coded(codes=np.roll(base, 7 * n, axis=1), tone=tone) for n in range(FRAMES_OF_A_ROUND)]
+    dark = np.full(base.shape, 0.02, np.float32)
+    plates = []
+    for light in range(lights):
+        first = (np.arange(ROWS) < ROWS * (light + 1) // lights).astype(np.float64)  # a dark row that rolls
+        two = (frames[light], frames[light + 1])
+        plates.append(
+            Mixture(frames=two, coefficients=np.stack([first, 1 - first])).without((dark,), np.ones((1, ROWS)))
+        )
+    lit = Illumination(directions=_ring(lights), intensities=np.ones((lights, 3)))
+    targets = [np.empty_like(base) for _ in frames]
+
+    def one_pass() -> None:
+        solve(plates, lit, usable=Usable(shadow_ratio=0.0), half=True, residual=False)
+
+    def copy() -> None:
+        for frame, target in zip(frames, targets, strict=True):
+            target[:] = frame.codes
+
+    one_pass()
+    pass_s, copy_s = _best_of((one_pass, copy))
+    ratio = pass_s / copy_s
+    name = f"round of {FRAMES_OF_A_ROUND} colour frames"
+    yield Row(f"{name}: codes to normals and albedo, {THREADS} threads", f"{1e3 * pass_s:.1f} ms", "", None)
+    yield Row(f"{name}: one thread copies them", f"{1e3 * copy_s:.1f} ms", "", None)
+    yield Row(f"{name}: codes to normals / copy", f"{ratio:.2f}", "<= 1.5", ratio <= 1.5)
 
 
 def _colour_rows() -> Iterator[Row]:
