@@ -259,6 +259,26 @@ def test_colour_and_mosaics_are_followed_alike(plan: Plan) -> None:
         assert np.abs(plate.image - grey[plate.flash.index][..., None] * tint).max() < 2e-4
 
 
+@pytest.mark.parametrize("dark_first", [False, True])
+def test_dark_slots_come_ahead_of_the_plates_around_them_and_none_is_left_out(plan: Plan, dark_first: bool) -> None:
+    plates = shoot(plan, clouded, frames=60).plates
+    begin = next(n for n, plate in enumerate(plates) if plate.flash.is_dark == dark_first)
+    plates = plates[begin:]
+    flashes = tuple(plate.flash for plate in plates)
+    timing = Timing(
+        clip="clip", frame_period_s=1.0, exposure_s=1.0, row_time_s=0.0, clock_offset_ppm=0.0, phase_error_rows=0.0,
+        order="marker", flashes=flashes,
+    )  # fmt: skip
+    coming, darks = ambient.with_darks_ahead(iter(plates), timing)
+    found = list(ambient.subtract(coming, darks=darks))
+    read_before = [plate for plate in plates if plate.flash.is_dark]
+    expected = list(ambient.subtract(plates, darks=read_before))
+    assert [plate.flash.index for plate in found] == [plate.flash.index for plate in expected]
+    for one, other in zip(found, expected, strict=True):
+        assert np.array_equal(one.image, other.image)
+        assert np.array_equal(one.seen, other.seen)
+
+
 def test_ripples_of_an_average_of_hundreds_of_dark_slots_die_out() -> None:
     rng = np.random.default_rng(4)
     size, row = (240, 64), np.ones((1, 240))

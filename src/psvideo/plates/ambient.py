@@ -288,25 +288,30 @@ def with_darks_ahead(plates: Iterator[Plate], timing: Timing) -> tuple[Iterator[
     No plate is made for waiting: it holds the frames that it will be made of.
     """
     waiting: deque[Plate] = deque()
+    unseen: deque[Plate] = deque()
     complete = [flash.index for flash in timing.flashes if flash.is_dark and flash.complete]
     last = max(complete, default=-1)
 
+    def pull() -> bool:
+        plate = next(plates, None)
+        if plate is None:
+            return False
+        waiting.append(plate)
+        unseen.extend([plate] if plate.flash.is_dark else [])
+        return True
+
     def coming() -> Iterator[Plate]:
-        while waiting:
+        while waiting or pull():
             yield waiting.popleft()
-        for plate in plates:
-            yield plate
-            del plate
-            while waiting:
-                yield waiting.popleft()
 
     def darks() -> Iterator[Plate]:
         found = -1
-        while found < last and (plate := next(plates, None)) is not None:
-            waiting.append(plate)
-            if plate.flash.is_dark:
-                found = plate.flash.index
-                yield plate
+        while found < last:
+            while not unseen:
+                if not pull():
+                    return
+            found = unseen[0].flash.index
+            yield unseen.popleft()
 
     return coming(), darks()
 
