@@ -209,7 +209,8 @@ class _Change:
         )
         local = np.asarray(cv2.blur(rest, (width, width)), np.float32)
         variance, per_level = _noise(rest[both].ravel(), level[both].ravel())
-        most = np.float32((CHANGED / width) ** 2) * (variance + per_level * np.maximum(level, 0))
+        shifts = np.float32(width * _bent(rest[both].mean(axis=1, keepdims=True)) ** 2)
+        most = np.float32((CHANGED / width) ** 2) * (variance + shifts + per_level * np.maximum(level, 0))
         restarts = local * local > most
         limited = (factor <= np.float32(LEAST_GAIN)) | (factor >= np.float32(MOST_GAIN))
         return cls(gain=gain, restarts=restarts | limited.any(axis=2) if limited.any() else restarts)
@@ -233,11 +234,22 @@ def _gain(old: Image, new: Image, both: NDArray[np.bool_], *, sparse: bool) -> I
         cv2.GaussianBlur(picture if both.all() else _times_rows(picture, shown), (0, 0), LEVEL_SIGMA_PX)
         for picture in (old, new)
     ]
-    across = np.abs(np.diff(new[::SPARSE] - old[::SPARSE], axis=1))  # its quieter half, which texture spares
-    noise = 2.1 * float(np.percentile(across, 25)) * (COARSE if sparse else 1) if across.size else 0.0
+    change = new - old
+    noise = max(_usual(np.diff(change[::SPARSE], axis=1)), _bent(change[:, ::SPARSE])) * (COARSE if sparse else 1)
     floor = np.float32(2 * noise + 1e-5)
     gain = (np.maximum(small[1], 0) + floor) / (np.maximum(small[0], 0) + floor)
     return np.clip(gain, LEAST_GAIN, MOST_GAIN).reshape(old.shape).astype(np.float32, copy=False)
+
+
+def _usual(step: Image) -> float:
+    """Return the standard deviation of either sample of a step, by the quieter half, which texture spares."""
+    return 2.1 * float(np.percentile(np.abs(step), 25)) if step.size else 0.0
+
+
+def _bent(change: Image) -> float:
+    """Return the standard deviation by how much a change bends from row to row: light that changes down the rows hardly
+    bends it, rows that a codec or a sensor shifts as a whole do."""
+    return _usual(np.diff(change, 2, axis=0)) / float(np.sqrt(3))
 
 
 def _noise(rest: Image, level: Image) -> tuple[np.float32, np.float32]:
