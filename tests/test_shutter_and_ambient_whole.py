@@ -93,11 +93,15 @@ def test_below_360_degrees_a_standing_ball_loses_nothing(
     assert 0.01 < max(ages) < 0.3  # rows come from other rounds, of about 0.03 s each, and say so
 
 
-def test_room_light_without_a_dark_slot_costs_hardly_anything(tmp_path: Path, at_its_best: tuple[float, float]) -> None:
-    clip = film(tmp_path, marker=False, ambient=0.03, frames=90)
-    share, error_deg = solved(clip)
-    assert share > at_its_best[0] - 0.02
-    assert error_deg < 1.3 * at_its_best[1]
+def test_room_light_without_a_dark_slot_costs_hardly_more_than_with_one(tmp_path: Path) -> None:
+    """Its photon noise is there either way."""
+    for name in ("with", "without"):
+        (tmp_path / name).mkdir()
+    best_share, best_deg = solved(film(tmp_path / "with", ambient=0.03, frames=90))
+    tmp_path /= "without"
+    share, error_deg = solved(film(tmp_path, marker=False, ambient=0.03, frames=90))
+    assert share > best_share - 0.02
+    assert error_deg < 1.2 * best_deg
     report = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
     said = next(one for one in report["judgements"] if one["subject"] == "ambient")
     assert said["grade"] == "good", said

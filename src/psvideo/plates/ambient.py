@@ -328,16 +328,18 @@ def with_darks_ahead(plates: Iterator[Plate], timing: Timing) -> tuple[Iterator[
     return coming(), darks()
 
 
-def subtract(plates: Iterable[Plate], *, darks: Iterable[Plate] = ()) -> Iterator[Plate]:
+def subtract(plates: Iterable[Plate], *, darks: Iterable[Plate] = (), waits: bool = True) -> Iterator[Plate]:
     """Yield the plates with ambient light taken off the lit ones; dark slots pass as the average at their moment.
 
     ``darks`` are the clip's dark slots, read ahead of the plates: no further than the one after the current plate.
-    Before the first and after the last, its light is taken as it is. Without any, plates keep theirs.
+    ``waits`` False: not even that while the light is steady, so that few frames are held; then the next dark slot is
+    read when it passes. Before the first and after the last, its light is taken as it is. Without any, plates keep
+    theirs.
     """
     coming = iter(darks)
     before = after = None
     for plate in plates:
-        while after is None or after.index < plate.flash.index:
+        while after is None or _is_stale(after, plate, waits=waits or not after.steady):
             dark = next(coming, None)
             if dark is None:
                 before = after
@@ -354,6 +356,11 @@ def subtract(plates: Iterable[Plate], *, darks: Iterable[Plate] = ()) -> Iterato
             plate = replace(plate, picture=made(after.image), seen=after.known)
         yield plate
         del plate
+
+
+def _is_stale(after: Ambient, plate: Plate, *, waits: bool) -> bool:
+    """Tell whether a plate asks for a later dark slot: for the next one, or, where none waits, for itself."""
+    return after.index < plate.flash.index and (plate.flash.is_dark or waits)
 
 
 def _without(plate: Plate, before: Ambient, after: Ambient) -> Plate:

@@ -115,7 +115,7 @@ def gather(
     if not with_ambient:
         plates = filter(lambda plate: plate.light != AMBIENT, plates)
     if aligning is not None:
-        if has_blind_time(timed_camera(plan, timing)):
+        if plan.mode != "synced" and has_blind_time(timed_camera(plan, timing)):
             plates = with_nearest_rows(plates)
         return aligned(plates, plan.lights, aligning, first=start_number, with_ambient=with_ambient)
     names = coming(plan, flashes, start=start_number)
@@ -135,19 +135,19 @@ def clip_plates(
     places = places_in_time(timing, clip.numbers)
     used = _within(timing, camera, take, places)
     has_dark = not all(flash.lit for flash in take.plan.flashes)
-    waits = has_dark and _come_often(used)
-    if not waits:
+    come_often = has_dark and _come_often(used)
+    if not come_often:
         _decode_ahead(take, watch)
     decoded = read_frames(clip, take.numbers, ahead=AHEAD, threads=thread_count(), kept=take.kept)
     frames = _placed(watch(decoded, total=len(take.numbers), what="rebuilding flashes"), places)
     single = (split if method == "weights" else hudon2015.split)(frames, camera, used)
-    if waits:
+    if come_often:
         single, darks = with_darks_ahead(single, used)
     elif has_dark:
         darks = _dark_plates(take, camera, used, places)
     else:
         darks = _separated_plates(take, camera, used, places, each_window)
-    return map(_colour_of(clip), subtract(single, darks=darks))
+    return map(_colour_of(clip), subtract(single, darks=darks, waits=not come_often))
 
 
 def first_ambient(take: Take, timing: Timing) -> LightPlate | None:

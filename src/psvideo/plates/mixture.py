@@ -143,6 +143,8 @@ class Mixture:
         )
 
     def _into(self, image: Image, rows: range | NDArray[np.intp]) -> None:
+        if not len(rows):
+            return
         mix, places = self.bound(), np.array(rows, np.intp)
         flat = image.reshape(len(rows), -1)
 

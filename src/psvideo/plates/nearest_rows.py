@@ -50,32 +50,35 @@ def with_nearest_rows(plates: Iterable[LightPlate]) -> Iterator[LightPlate]:
 
 @dataclass(frozen=True, kw_only=True)
 class _Waiting:
-    """A plate of which only the rows are held that its own flash showed, ``rows``; ``plate`` has no image."""
+    """A plate; where its own flash did not show all of it, only the ``rows`` are held that this showed, and ``plate``
+    has no picture."""
 
     plate: LightPlate
-    rows: NDArray[np.float32]
+    rows: NDArray[np.float32] | None
     shape: tuple[int, ...]
 
     @classmethod
     def of(cls, plate: LightPlate) -> "_Waiting":
         """Hold a plate."""
-        whole = bool(plate.rows_seen.all())
-        image = plate.image
-        rows = image if whole else image[plate.rows_seen]
-        return cls(plate=replace(plate, picture=made(image[:0])), rows=rows, shape=plate.shape)
+        if plate.rows_seen.all():
+            return cls(plate=plate, rows=None, shape=plate.shape)
+        rows = plate.picture.rows(np.flatnonzero(plate.rows_seen))
+        return cls(plate=replace(plate, picture=made(rows[:0])), rows=rows, shape=plate.shape)
 
     def given(self) -> LightPlate:
         """Return the plate with its own rows, the others 0."""
-        seen = self.plate.rows_seen
-        if seen.all():
-            return replace(self.plate, picture=made(self.rows))
+        if self.rows is None:
+            return self.plate
         image = np.zeros(self.shape, np.float32)
-        image[seen] = self.rows
+        image[self.plate.rows_seen] = self.rows
         return replace(self.plate, picture=made(image))
 
     def put(self, image: NDArray[np.float32], wanted: Flags) -> None:
         """Write those of its rows that are wanted."""
-        image[wanted] = self.rows[wanted[self.plate.rows_seen]]
+        if self.rows is None:
+            image[wanted] = self.plate.picture.rows(np.flatnonzero(wanted))
+        else:
+            image[wanted] = self.rows[wanted[self.plate.rows_seen]]
 
 
 def _later(waiting: deque[_Waiting]) -> list[_Waiting]:
