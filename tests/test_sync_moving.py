@@ -12,6 +12,11 @@ from psvideo.errors import NoStrobeError
 from psvideo.model.row_profiles import collect_with_doubt
 from psvideo.model.timing import Timing
 from psvideo.sync.find import find_timing
+from psvideo.sync.rowfit.beat import FoundClock
+from psvideo.sync.rowfit.profiles import Profiles, compiled_flashes, compiled_rows
+from psvideo.sync.rowfit.row_model import seen_of
+from psvideo.sync.rowfit.seed import first_guess
+from psvideo.sync.rowfit.whitening import factors, whiten
 
 EVERYTHING = groups()["Several at once"]["everything: void, tumbling, drift, tails, flicker, readout"]
 
@@ -43,7 +48,29 @@ def test_stripes_that_keep_pace_with_the_dark_row_are_timed(share: float) -> Non
 
 
 def test_stripes_that_feign_another_shutter_are_refused() -> None:
-    plan = plan_of(lights=tuple("abcdefgh"), shutter=0.5, height_px=96)
-    case = Case(plan=plan, scene=rolling_stripes(share=0.5, pitch=1.0), frames=96)
+    plan = plan_of(lights=tuple("abcdefgh"), shutter=0.5, height_px=48)
+    case = Case(plan=plan, scene=rolling_stripes(share=0.5, pitch=1.0), frames=64)
     with pytest.raises(NoStrobeError, match="no strobe like the plan's"):
         timed(case, seed=0)
+
+
+def test_residuals_are_whitened_by_what_flashes_of_one_light_differ_by() -> None:
+    plan = plan_of(height_px=12)
+    beat = replace(first_guess(plan), clock=FoundClock(phase_s=0.004, offset_ppm=0.0))
+    rows = Profiles(
+        value=np.random.default_rng(2).random((20, 12)),
+        index=np.arange(20),
+        period_s=plan.camera.frame_period_s,
+        place=np.arange(12.0),
+        window_start=np.zeros(1, np.int64),
+        restless=np.full(12, 40.0),
+    )
+    seen, flashes = compiled_rows(rows, beat), compiled_flashes(plan, rows, beat)
+    row = 7
+    shares = np.array([[seen_of(seen, flashes, n, row, j) for j in range(len(flashes.start_s))] for n in range(20)])
+    assert ((shares > 0.01) & (shares < 0.99)).any(), "no frame saw a part of a flash"
+    diagonal, below, column = np.empty(20), np.empty(20), rows.value[:, row].copy()
+    factors(seen, flashes, row, diagonal, below)
+    whiten(column, diagonal, below)
+    factor = np.linalg.cholesky(np.eye(20) + 40.0 * shares @ shares.T)
+    assert np.allclose(column, np.linalg.solve(factor, rows.value[:, row]), atol=1e-12)
