@@ -14,12 +14,16 @@ from psvideo.solve.filling.looking import Said, count_rows, look_rows, room_for
 from psvideo.solve.normals.bands import ShownPlates
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.kernel import working_memory
-from psvideo.solve.normals.task import Floats, Mask, Samples, Task, Usable, task
+from psvideo.solve.normals.task import Bytes, Floats, Mask, Samples, Task, Usable, task
 
 MOST_LIGHTS_AROUND = 5
 """A pixel that light reaches is of the subject where so many of the nine around it are lit or solved: noise is not."""
 LARGEST_HOLE = 0.005
 """What no light reaches belongs to the subject where that encloses it and it is no larger share of the picture."""
+AT_SEAM_DEG = np.array([25, 15, 2.5], np.float32)
+PER_SIDE_DEG, MOST_ERROR_DEG = np.float32(450), np.float32(60)
+"""Two thirds of the pixels that no, one and two lights reach are off by no more than the first beside what is solved,
+and by the second per longer side of the picture in distance from it: on the virtual bust under sets of three lights."""
 CLASSES = np.array([NO_LIGHT, ONE_LIGHT, TWO_LIGHTS, MEASURED], np.uint8)
 
 
@@ -63,17 +67,20 @@ def filled(surface: Surface, one: Evidence, *, solved: Mask, noise: float, threa
     lights[solved], lights[wanted] = THREE_LIGHTS, UNKNOWN
     planes, channels = np.moveaxis(surface.normals, -1, 0), _channels(surface.albedo)
     picture = Picture(normals=_bits(planes), albedo=_bits(channels), places=index, lights=lights)
-    doubt = np.zeros((len(where), 2), np.float32)
-    grow(picture, said, where, queue_for(len(where)), doubt)
+    away = np.zeros(len(where), np.float32)
+    grow(picture, said, where, queue_for(len(where)), away)
     source[wanted] = CLASSES[np.minimum(lights[wanted], THREE_LIGHTS)]
-    return replace(surface, source=source, error_deg=_errors(surface, where, doubt))
+    return replace(surface, source=source, error_deg=_errors(surface, where, lights[wanted], away))
 
 
-def _errors(surface: Surface, where: NDArray[np.int32], doubt: Floats) -> NDArray[np.floating] | None:
+def _errors(surface: Surface, where: NDArray[np.int32], lights: Bytes, away: Floats) -> NDArray[np.floating] | None:
+    """Return the predicted errors with those of the filled pixels, which grow with the distance from what is solved."""
     if surface.error_deg is None:
         return None
     rows, cols = where.T
-    surface.error_deg[rows, cols] = doubt[:, 0]
+    share = away / np.float32(max(surface.valid.shape))
+    each_deg = AT_SEAM_DEG[lights] + PER_SIDE_DEG * share
+    surface.error_deg[rows, cols] = np.minimum(each_deg, MOST_ERROR_DEG)
     return surface.error_deg
 
 

@@ -33,12 +33,11 @@ COSINES, SINES = np.cos(ANGLES), np.sin(ANGLES)
 LOG_COSINES = np.log(COSINES)
 HALF, TWO = np.float32(0.5), np.float32(2)
 THIRD, TINY, FAR = np.float32(1 / 3), np.float32(1e-6), np.float32(1e30)
-TURN, MOST_TURN, DEGREES = np.float32(2 * np.pi), np.float32(1.0), np.float32(180 / np.pi)
+TURN = np.float32(2 * np.pi)
 LEAST_COSINE, LEAST_SINE_SQUARED = np.float32(0.05), np.float32(1e-3)
 MOST_STEPS = np.float32(50)
 UNCOLOURED = np.float32(0.01)  # the square of what is not known of the colour of a pixel without light
 ONWARD = np.float32(0.7)  # how far neighbours' bend is taken on: all of it would burst from noise
-ONE_LIGHT_DEG, NO_LIGHT_DEG = np.float32(20), np.float32(35)
 FOREVER = 1 << 30
 SOLVED, LEFT_ALONE = -1, -2  # of Picture.places
 THREE_LIGHTS, UNKNOWN = 3, 9  # of Picture.lights
@@ -83,16 +82,15 @@ WINDOW = np.exp(
 
 
 @FUSED.kept
-def grow(picture: Picture, said: Said, where: NDArray[np.int32], queue: Queue, doubt: Floats) -> None:
+def grow(picture: Picture, said: Said, where: NDArray[np.int32], queue: Queue, away: Floats) -> None:
     """Fill the pixels ``where`` (pixel, 2: row and column) of the picture, nearest first; for one thread.
 
-    ``doubt`` (pixel, 2) takes how far in degrees a normal could turn before it fits much worse, and its distance from
-    what is solved, in pixels of its own colour.
+    ``away`` (pixel,) takes a pixel's distance from what is solved, in pixels of its own colour.
     """
     p = Picture(lent(picture.normals), lent(picture.albedo), lent(picture.places), lent(picture.lights))
     s = Said(lent(said.reached), lent(said.bright), lent(said.towards), lent(said.colour), said.noise)
     q = Queue(lent(queue.heads), lent(queue.following), lent(queue.pixels), lent(queue.distance))
-    places, out = lent(where), lent(doubt)
+    places, out = lent(where), lent(away)
     pushed = 0
     for pixel in range(len(places)):
         pushed = _push_start(p, s, places, q, pixel, pushed)
@@ -109,8 +107,8 @@ def grow(picture: Picture, said: Said, where: NDArray[np.int32], queue: Queue, d
             row, col = places[pixel, 0], places[pixel, 1]
             if p.lights[row, col] != UNKNOWN:
                 continue
-            _estimate(p, s, row, col, pixel, out)
-            out[pixel, 1] = np.float32(now) / np.float32(STEP)
+            _estimate(p, s, row, col, pixel)
+            out[pixel] = np.float32(now) / np.float32(STEP)
             before = pushed
             pushed = _push_around(p, s, places, q, pixel, now, pushed)
             waiting += pushed - before
@@ -182,7 +180,7 @@ def _colour_of(p: Picture, s: Said, row: int, col: int) -> tuple[np.float32, np.
 
 
 @FUSED.called
-def _estimate(p: Picture, s: Said, row: int, col: int, pixel: int, doubt: Floats) -> None:
+def _estimate(p: Picture, s: Said, row: int, col: int, pixel: int) -> None:
     """Give a pixel its normal and albedo from its neighbours and from what the lights say."""
     rows, cols = p.places.shape
     channels = len(p.albedo)
@@ -237,14 +235,11 @@ def _estimate(p: Picture, s: Said, row: int, col: int, pixel: int, doubt: Floats
         nx, ny, nz, albedo, reds, blues = ZERO, ZERO, ONE, ZERO, THIRD, THIRD
     count = min(s.reached[pixel], 2)
     if count == 2:
-        nx, ny, nz, albedo, turn = _from_two(s, pixel, nx, ny, nz, albedo)
+        nx, ny, nz, albedo = _from_two(s, pixel, nx, ny, nz, albedo)
     elif count == 1:
-        nx, ny, nz, albedo, turn = _from_one(s, pixel, nx, ny, nz, albedo)
-    else:
-        turn = NO_LIGHT_DEG
+        nx, ny, nz, albedo = _from_one(s, pixel, nx, ny, nz, albedo)
     if count > 0:
         reds, blues = red, blue
-    doubt[pixel, 0] = turn
     p.lights[row, col] = count
     p.normals[0, row, col] = encoded(nx, p.normals)
     p.normals[1, row, col] = encoded(ny, p.normals)
@@ -260,11 +255,10 @@ def _estimate(p: Picture, s: Said, row: int, col: int, pixel: int, doubt: Floats
 @FUSED.inlined
 def _from_two(
     s: Said, pixel: int, nx: np.float32, ny: np.float32, nz: np.float32, albedo: np.float32
-) -> tuple[np.float32, np.float32, np.float32, np.float32, np.float32]:
+) -> tuple[np.float32, np.float32, np.float32, np.float32]:
     """The normal of those that two lights leave that fits the neighbours' normal (nx, ny, nz) and albedo best.
 
-    Where there are no neighbours, ``albedo`` is 0 and does not count. Returned with the albedo and how far in degrees
-    the normal could turn.
+    Where there are no neighbours, ``albedo`` is 0 and does not count. Returned with the albedo.
     """
     ax, ay, az = s.towards[pixel, 0, 0], s.towards[pixel, 0, 1], s.towards[pixel, 0, 2]
     bx, by, bz = s.towards[pixel, 1, 0], s.towards[pixel, 1, 1], s.towards[pixel, 1, 2]
@@ -292,31 +286,29 @@ def _from_two(
         if cost < least:
             best, least, before, closing = k, cost, last, True
         last = cost
-    bend, angle = ONE / MOST_TURN, ANGLES[best]
+    angle = ANGLES[best]
     if 0 < best < len(ANGLES) - 1:
         curve = before - TWO * least + after
         angle += ANGLE_STEP * HALF * (before - after) / max(curve, TINY)
-        bend = max(curve / (TWO * ANGLE_STEP * ANGLE_STEP), bend)
     c, d = np.cos(angle), np.sin(angle)
     found = length / max(c, LEAST_COSINE)
     if albedo > ZERO:
         found = min(max(found, albedo * (ONE - TWO * ALBEDO_SHARE)), albedo * (ONE + TWO * ALBEDO_SHARE))
-    turn = DEGREES / np.sqrt(bend)
-    return gx * c + dx * d, gy * c + dy * d, gz * c + dz * d, found, turn
+    return gx * c + dx * d, gy * c + dy * d, gz * c + dz * d, found
 
 
 @FUSED.inlined
 def _from_one(
     s: Said, pixel: int, nx: np.float32, ny: np.float32, nz: np.float32, albedo: np.float32
-) -> tuple[np.float32, np.float32, np.float32, np.float32, np.float32]:
-    """The normal on the one light's cone that is nearest to the neighbours', with the albedo and how far it could turn.
+) -> tuple[np.float32, np.float32, np.float32, np.float32]:
+    """The normal on the one light's cone that is nearest to the neighbours', with the albedo.
 
     Where there are no neighbours the normal stays and gives the albedo.
     """
     x, y, z, bright = s.towards[pixel, 0, 0], s.towards[pixel, 0, 1], s.towards[pixel, 0, 2], s.bright[pixel, 0]
     along = nx * x + ny * y + nz * z
     if not albedo > ZERO:
-        return nx, ny, nz, bright / max(along, LEAST_COSINE), ONE_LIGHT_DEG
+        return nx, ny, nz, bright / max(along, LEAST_COSINE)
     cosine = min(bright / albedo, ONE)
     tx, ty, tz = nx - along * x, ny - along * y, nz - along * z
     one = np.sqrt(max(ONE - cosine * cosine, ZERO) / max(tx * tx + ty * ty + tz * tz, TINY))
@@ -324,4 +316,4 @@ def _from_one(
     if cz < ZERO:
         one = ONE / np.sqrt(max(cx * cx + cy * cy, TINY))
         cx, cy, cz = cx * one, cy * one, ZERO
-    return cx, cy, cz, albedo, ONE_LIGHT_DEG
+    return cx, cy, cz, albedo

@@ -16,6 +16,7 @@ from psvideo.model.surface import Misfit, Surface
 from psvideo.plates.mixture import Mixture
 from psvideo.solve.normals.bands import ShownPlates, check_arrays, surface_of
 from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.task import FEW, Floats, Mask, Samples, Task, Usable, Weights, empty_result, task
 
 if TYPE_CHECKING:
@@ -76,12 +77,14 @@ def solve(
     residual: bool = True,
     error: bool = True,
     misfit: Misfit | None = None,
+    plate_noise: PlateNoise | None = None,
     threads: int | None = None,
 ) -> Surface:
     """Return the surface that explains most of the plates, one per light.
 
     Arguments are those of ``woodham1980.solve``. ``error`` asks for the predicted standard error as well. ``misfit`` is
-    what is typical of the picture; left out, it is found first, from a sample of the picture's rows.
+    what is typical of the picture; left out, it is found first, from a sample of the picture's rows. Where
+    ``plate_noise`` is known, what plain least squares explains to the noise is left to it: nothing is better there.
 
     Of a pixel's usable measurements: five or more are reweighted; of four that contradict each other the likeliest
     highlight is left out; three are taken as they are, and nothing shows whether one of them is a highlight.
@@ -116,6 +119,9 @@ def solve(
         misfit = _typical(found, unexplained.reshape(rows, cols), step)
     limit_deg = max(reweighting.most_error_deg, 0.0 if misfit is None else _limit_deg(reweighting, misfit))
     how = _weights(reweighting, limit_deg=limit_deg, common=0.0 if misfit is None else misfit.share)
+    if plate_noise is not None:
+        each = np.float32(1 / lit.intensities.shape[1])  # channels are combined
+        how = how._replace(read=np.float32(plate_noise.read) * each, photon=np.float32(plate_noise.photon) * each)
     run(predicted if error else predicted[:0], np.zeros(0, np.float32), how, 1)
     surface = surface_of(result, predicted if error else None, shown.shape, half=half)
     return replace(surface, misfit=misfit)
@@ -138,6 +144,8 @@ def _weights(reweighting: Reweighting, *, limit_deg: float, common: float) -> We
         contradiction=np.float32(reweighting.contradiction),
         most_error_deg=np.float32(limit_deg),
         common=np.float32(common),
+        read=np.float32(0),
+        photon=np.float32(0),
     )
 
 

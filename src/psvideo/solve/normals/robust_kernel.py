@@ -35,6 +35,7 @@ from psvideo.solve.normals.blocks import (
     Z,
 )
 from psvideo.solve.normals.equations import DOUBT, LOWER, OUT, SCALE, solve_equations
+from psvideo.solve.normals.explained import explained
 from psvideo.solve.normals.few_lights import EIGHT, FOUR, begin_few, reweigh_few
 from psvideo.solve.normals.measuring import combine, gather_one, gather_three, hide_unseen
 from psvideo.solve.normals.near_kernel import at, place_lights
@@ -139,16 +140,17 @@ def _solve_block(
         combine(task, w, values, m, n)
     _hide_shadows(task, w, m, n)
     few = len(m) == FEW and task.near.depth.size == 0
-    if few:
-        begin_few(task.matrix, task.per_strength, weights.darkest, weights.brightest, w, flat, n)
-    else:
-        choose_start(task, weights, w, v, m, e, n)
-        add_start(task, w, v, m, e, n)
-    solve_equations(w, n, SOUND_SQUARED, False)
-    drop_odd_of_four(task, weights.noise, weights.signal_noise, weights.contradiction, w, v, m, e, n)
-    for _ in range(weights.rounds):
-        _reweigh(task, weights, weights.tukey, weights.width, False, few, w, v, m, e, flat, n)
-        solve_equations(w, n, SOUND_SQUARED, True)
+    if not (weights.read > ZERO and explained(task, weights.read, weights.photon, w, v, m, e, n)):
+        if few:
+            begin_few(task.matrix, task.per_strength, weights.darkest, weights.brightest, w, flat, n)
+        else:
+            choose_start(task, weights, w, v, m, e, n)
+            add_start(task, w, v, m, e, n)
+        solve_equations(w, n, SOUND_SQUARED, False)
+        drop_odd_of_four(task, weights.noise, weights.signal_noise, weights.contradiction, w, v, m, e, n)
+        for _ in range(weights.rounds):
+            _reweigh(task, weights, weights.tukey, weights.width, False, few, w, v, m, e, flat, n)
+            solve_equations(w, n, SOUND_SQUARED, True)
     _reweigh(task, weights, False, TWO, True, few, w, v, m, e, flat, n)
     _predict_error(weights, min(task.lights, LEAST_CHECKED), w, v, n)
     if task.mask.size:

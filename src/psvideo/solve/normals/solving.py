@@ -58,7 +58,7 @@ class Solving:
         noise = noise_of(plates)
         method = self.method(len(plates))
         usable = _usable(noise, lit.intensities.shape[1], method)
-        solved = self._solved(plates, lit, usable, method, seen, mask)
+        solved = self._solved(plates, lit, usable, noise, seen, mask)
         known = judged(solved, lit, noise)
         if self.fill:
             one = Evidence(plates=plates, lit=lit, usable=usable, seen=seen, mask=mask)
@@ -76,12 +76,12 @@ class Solving:
         plates: Plates,
         lit: Illumination,
         usable: Usable,
-        method: Method,
+        noise: PlateNoise,
         seen: Mask | None,
         mask: Mask | None,
     ) -> Surface:
         """Return every pixel that three measurements solve, well or not."""
-        if method == "robust":
+        if self.method(len(plates)) == "robust":
             return robust.solve(
                 plates,
                 lit,
@@ -91,6 +91,7 @@ class Solving:
                 residual=self.residual,
                 usable=usable,
                 reweighting=EVERYTHING,
+                plate_noise=noise,
             )
         residual = self.residual or len(plates) > 3  # three measurements leave none
         return woodham1980.solve(plates, lit, seen=seen, mask=mask, half=self.half, residual=residual, usable=usable)

@@ -107,6 +107,8 @@ class Weights(NamedTuple):
     contradiction: np.float32
     most_error_deg: np.float32
     common: np.float32
+    read: np.float32  # the noise variance of a dark measurement, and per unit of light; 0 where noise is not known
+    photon: np.float32
 
 
 class Work(NamedTuple):
