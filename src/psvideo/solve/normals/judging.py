@@ -48,8 +48,8 @@ class Judging:
 
 LEAST_SHARE = 0.01
 """What robust solving takes for unexplained at least (``Reweighting.signal_noise``)."""
-SURELY = 1.6
-"""Noise is known from its finest detail only: what is left over counts beyond so many times of it."""
+NOISY_SHARES = (0.015, 0.03)
+"""From so much of the light on noise is blamed rather than the rig: it may be twice what its finest detail says."""
 THIN = 4
 """What is typical is looked for in every fourth row and column."""
 AROUND_PX = 9
@@ -98,7 +98,8 @@ def emptied(surface: Surface) -> Surface:
 
 def _not_explained(misfit: Misfit, noise_share: float, how: Judging) -> np.float32:
     """Return from 0 to 1 how much of what is left over in a picture neither noise nor a camera's usual faults make."""
-    share = np.sqrt(max(misfit.share**2 - LEAST_SHARE**2 - (SURELY * noise_share) ** 2, 0.0))
+    noise = noise_share * float(np.interp(noise_share, NOISY_SHARES, (1, 2)))
+    share = np.sqrt(max(misfit.share**2 - LEAST_SHARE**2 - noise**2, 0.0))
     return np.float32(np.clip((share - how.least_misfit) / (how.misfit_share - how.least_misfit), 0, 1))
 
 
