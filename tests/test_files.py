@@ -204,7 +204,9 @@ def test_a_light_that_the_rig_lacks_is_named_with_the_nearest() -> None:
 
 
 def test_intensities_stand_for_all_channels_or_for_each() -> None:
-    lights = (Light(name="a", intensity=(2.0,)), Light(name="b", intensity=(1.0, 2.0, 3.0)))
+    above = (0.0, 0.0, 1.0)
+    one = Light(name="a", intensity=(2.0,), direction=above)
+    lights = (one, Light(name="b", intensity=(1.0, 2.0, 3.0), direction=above))
     assert intensities(lights, 3).tolist() == [[2, 2, 2], [1, 2, 3]]
     with pytest.raises(PsvideoError, match="'b' has 3 intensities and the pictures have 1"):
         intensities(lights, 1)
