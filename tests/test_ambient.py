@@ -259,17 +259,19 @@ def test_colour_and_mosaics_are_followed_alike(plan: Plan) -> None:
         assert np.abs(plate.image - grey[plate.flash.index][..., None] * tint).max() < 2e-4
 
 
+def listed(plates: list[Plate]) -> Timing:
+    return Timing(
+        clip="clip", frame_period_s=1.0, exposure_s=1.0, row_time_s=0.0, clock_offset_ppm=0.0, phase_error_rows=0.0,
+        order="marker", flashes=tuple(plate.flash for plate in plates),
+    )  # fmt: skip
+
+
 @pytest.mark.parametrize("dark_first", [False, True])
 def test_dark_slots_come_ahead_of_the_plates_around_them_and_none_is_left_out(plan: Plan, dark_first: bool) -> None:
     plates = shoot(plan, clouded, frames=60).plates
     begin = next(n for n, plate in enumerate(plates) if plate.flash.is_dark == dark_first)
     plates = plates[begin:]
-    flashes = tuple(plate.flash for plate in plates)
-    timing = Timing(
-        clip="clip", frame_period_s=1.0, exposure_s=1.0, row_time_s=0.0, clock_offset_ppm=0.0, phase_error_rows=0.0,
-        order="marker", flashes=flashes,
-    )  # fmt: skip
-    coming, darks = ambient.with_darks_ahead(iter(plates), timing)
+    coming, darks = ambient.with_darks_ahead(iter(plates), listed(plates))
     found = list(ambient.subtract(coming, darks=darks))
     read_before = [plate for plate in plates if plate.flash.is_dark]
     expected = list(ambient.subtract(plates, darks=read_before))
@@ -277,6 +279,39 @@ def test_dark_slots_come_ahead_of_the_plates_around_them_and_none_is_left_out(pl
     for one, other in zip(found, expected, strict=True):
         assert np.array_equal(one.image, other.image)
         assert np.array_equal(one.seen, other.seen)
+
+
+@pytest.mark.parametrize(("light", "wait"), [(held, 0), (dimmed, 3)])
+def test_while_light_is_steady_no_plate_waits_and_dark_slots_count_as_they_pass(
+    plan: Plan, light: AmbientOf, wait: int
+) -> None:
+    take = shoot(plan, light)
+    read: list[Plate] = []
+
+    def counted() -> Iterator[Plate]:
+        for plate in take.plates:
+            read.append(plate)
+            yield plate
+
+    coming, darks = ambient.with_darks_ahead(counted(), listed(take.plates))
+    expected = list(take.without_ambient())
+    ahead = []
+    for place, plate in enumerate(ambient.subtract(coming, darks=darks, waits=False)):
+        ahead.append(len(read) - 1 - place)
+        assert np.abs(plate.image - expected[place].image).max() < 2e-4
+    assert plate.flash.index == expected[-1].flash.index
+    assert max(ahead[len(ahead) // 2 :]) == wait
+
+
+def test_steady_light_that_begins_to_change_is_followed_from_the_next_dark_slot_on(plan: Plan) -> None:
+    def dimmed_later(n: int, scene: np.ndarray) -> np.ndarray:
+        return LEVEL * scene * (1 + 0.4 * max(n - 60, 0) / 60)
+
+    take = shoot(plan, dimmed_later)
+    coming, darks = ambient.with_darks_ahead(iter(take.plates), listed(take.plates))
+    found = list(ambient.subtract(coming, darks=darks, waits=False))
+    for plate, expected in list(zip(found, take.without_ambient(), strict=True))[-24:]:
+        assert np.array_equal(plate.image, expected.image)
 
 
 def test_ripples_of_an_average_of_hundreds_of_dark_slots_die_out() -> None:
