@@ -16,6 +16,8 @@ GAP_PX = 12
 LABEL_PX = 30
 TITLE_PX = 44
 OVERSAMPLING = 4
+LEAST_TILE_PX = 88
+"""Pictures that would become narrower stand in several rows: 96 lights shall still be told apart."""
 
 
 @dataclass(frozen=True)
@@ -35,21 +37,31 @@ class Strip:
 
 
 def sheet(strips: Sequence[Strip], *, width_px: int = 1600) -> Pixels:
-    """Return the strips below each other as one picture, (row, col, 3); each strip fills the width."""
+    """Return the strips below each other as one picture, (row, col, 3); each strip fills the width, in several rows
+    where one would make its pictures too small."""
     return np.concatenate([_strip(strip, width_px) for strip in strips], axis=0)
 
 
 def _strip(strip: Strip, width_px: int) -> Pixels:
     count = len(strip.tiles)
-    tile_px = (width_px - GAP_PX * (count + 1)) // count
-    pictures = [_fitted(tile.picture, tile_px) for tile in strip.tiles]
+    rows = -(-count // max((width_px - GAP_PX) // (LEAST_TILE_PX + GAP_PX), 1))
+    across = -(-count // rows)
+    title = np.full((TITLE_PX, width_px, 3), BACKGROUND, np.uint8)
+    _write(title, strip.title, GAP_PX, TITLE_PX - 14, 0.62, INK)
+    lines = [strip.tiles[first : first + across] for first in range(0, count, across)]
+    return np.concatenate([title, *(_line(line, across, width_px) for line in lines)], axis=0)
+
+
+def _line(tiles: Sequence[Tile], across: int, width_px: int) -> Pixels:
+    """Return pictures side by side with their labels below, each as wide as ``across`` of them leave it."""
+    tile_px = (width_px - GAP_PX * (across + 1)) // across
+    pictures = [_fitted(tile.picture, tile_px) for tile in tiles]
     height_px = max(picture.shape[0] for picture in pictures)
-    canvas = np.full((TITLE_PX + height_px + LABEL_PX, width_px, 3), BACKGROUND, np.uint8)
-    _write(canvas, strip.title, GAP_PX, TITLE_PX - 14, 0.62, INK)
-    for place, (tile, picture) in enumerate(zip(strip.tiles, pictures, strict=True)):
+    canvas = np.full((height_px + LABEL_PX, width_px, 3), BACKGROUND, np.uint8)
+    for place, (tile, picture) in enumerate(zip(tiles, pictures, strict=True)):
         left = GAP_PX + place * (tile_px + GAP_PX)
-        canvas[TITLE_PX : TITLE_PX + picture.shape[0], left : left + picture.shape[1]] = picture
-        _write(canvas, tile.label, left, TITLE_PX + height_px + 20, 0.46, FAINT_INK)
+        canvas[: picture.shape[0], left : left + picture.shape[1]] = picture
+        _write(canvas, tile.label, left, height_px + 20, 0.46, FAINT_INK)
     return canvas
 
 
