@@ -3,9 +3,12 @@
 A row of the result fits into a core's first cache: every frame's row is added there, and written once.
 """
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba import types
+from numba.extending import overload
 from numba.np.numpy_support import carray
 from numpy.typing import NDArray
 
@@ -60,11 +63,46 @@ def mix_halved(mix: MixtureArrays, first: int, last: int, channels: int, out: Fl
     for row in range(first, last):
         mix_row(given, 2 * row, upper)
         mix_row(given, 2 * row + 1, lower)
-        for col in range(made.shape[1]):
-            total = np.float32(0)
-            for sample in range(2 * col * channels, 2 * (col + 1) * channels):
-                total += upper[sample] + lower[sample]
-            made[row, col] = total * share
+        for sample in range(given.samples):
+            upper[sample] += lower[sample]
+        _add_neighbours(upper, made[row], channels, share)
+
+
+@FUSED.inlined
+def _add_neighbours(pairs: Floats, out: Floats, channels: int, share: np.float32) -> None:
+    """Two neighbouring pixels' channels added up, times their share."""
+    if channels == 3:
+        for col in range(out.shape[0]):
+            a, b, c = pairs[6 * col], pairs[6 * col + 1], pairs[6 * col + 2]
+            out[col] = (a + b + c + pairs[6 * col + 3] + pairs[6 * col + 4] + pairs[6 * col + 5]) * share
+        return
+    for col in range(out.shape[0]):
+        total = np.float32(0)
+        for sample in range(2 * col * channels, 2 * (col + 1) * channels):
+            total += pairs[sample]
+        out[col] = total * share
+
+
+def _some_reach(codes: NDArray[Any], limit: np.float32, most: np.float32) -> bool:
+    """Whether any code, ``most`` at most, is ``limit`` or more. Compiled only."""
+    raise NotImplementedError
+
+
+@overload(_some_reach, jit_options={"forceinline": True}, strict=False)
+def _some_reach_of(codes: Any, limit: Any, most: Any) -> Callable[[Any, np.float32, np.float32], bool]:
+    def of_integers(codes: Any, limit: np.float32, most: np.float32) -> bool:
+        largest = codes[0]
+        for sample in range(codes.shape[0]):  # compared as they are, many in one vector
+            largest = codes[sample] if codes[sample] > largest else largest
+        return bool(min(np.float32(largest), most) >= limit)
+
+    def of_floats(codes: Any, limit: np.float32, most: np.float32) -> bool:
+        count = np.int32(0)
+        for sample in range(codes.shape[0]):
+            count += np.int32(min(codes[sample], most) >= limit)
+        return bool(count > 0)
+
+    return of_integers if isinstance(codes.dtype, types.Integer) else of_floats
 
 
 @FUSED.inlined
@@ -80,20 +118,34 @@ def lent_mix(mix: MixtureArrays) -> MixtureArrays:
 def mix_row(mix: MixtureArrays, row: int, out: Floats) -> None:
     """Make one row: frames added, levels taken off, the ceiling where a sample that counts was clipped."""
     begun, holds_clipped = False, False
+    level, place = _next_level(mix, 0, row), row % mix.zero.shape[1]
     for frame in range(mix.frames.shape[0]):
         factor = mix.coefficients[frame, row]
-        if factor != np.float32(0):
-            codes = _row_of(mix, frame, row)
-            clipped = _add_row(mix, frame, row, codes, factor, out, begun)
-            holds_clipped = holds_clipped or bool(clipped > 0 and abs(factor) > COUNTS)
-            begun = True
+        if factor == np.float32(0):
+            continue
+        codes, zero, gain = _row_of(mix, frame, row), mix.zero[frame, place, 0], mix.gain[frame, place, 0]
+        limit, scale = mix.clips_from / gain + zero, factor * gain
+        if mix.zero.shape[2] > 1:
+            clipped = _add_pattern(mix, frame, place, codes, factor, out, begun)
+        elif mix.table.size:
+            clipped = _add_by_table(codes, mix.table, zero, scale, limit, out, begun)
+        else:
+            clipped = not holds_clipped and abs(factor) > COUNTS and _some_reach(codes, limit, mix.most)
+            if begun:
+                _add_linear(codes, zero, scale, mix.most, out)
+            elif level < mix.levels.shape[0]:
+                _begin_with_level(codes, zero, scale, mix.most, _level_row(mix, level, row), mix.taken[level, row], out)
+                level = _next_level(mix, level + 1, row)
+            else:
+                _begin_linear(codes, zero, scale, mix.most, out)
+        holds_clipped = holds_clipped or (clipped and abs(factor) > COUNTS)
+        begun = True
     if not begun:
         out[:] = np.float32(0)
         return
-    for level in range(mix.levels.shape[0]):
-        share = mix.taken[level, row]
-        if share != np.float32(0):
-            _take_off(mix, level, row, share, out)
+    while level < mix.levels.shape[0]:
+        _take_off(_level_row(mix, level, row), mix.taken[level, row], out)
+        level = _next_level(mix, level + 1, row)
     if holds_clipped:
         _mark_clipped(mix, row, out)
 
@@ -105,63 +157,91 @@ def _row_of(mix: MixtureArrays, frame: int, row: int) -> Any:
 
 
 @FUSED.inlined
-def _add_row(
-    mix: MixtureArrays, frame: int, row: int, codes: NDArray[Any], factor: np.float32, out: Floats, begun: bool
-) -> np.int32:
-    """Add a frame's row times its coefficient; return how many samples are clipped."""
-    rows, cols = mix.zero.shape[1:]
-    clipped = np.int32(0)
-    for col in range(cols):
-        zero, gain = mix.zero[frame, row % rows, col], mix.gain[frame, row % rows, col]
-        limit, scale = mix.clips_from / gain + zero, factor * gain
-        if mix.table.size:
-            for sample in range(col, mix.samples, cols):
-                value = mix.table[np.intp(codes[sample])]
-                clipped += np.int32(value >= limit)
-                light = (value - zero) * scale
-                out[sample] = out[sample] + light if begun else light
-        elif cols > 1:
-            for sample in range(col, mix.samples, cols):
-                value = min(np.float32(codes[sample]), mix.most)
-                clipped += np.int32(value >= limit)
-                light = (value - zero) * scale
-                out[sample] = out[sample] + light if begun else light
-        else:
-            clipped += _add_linear(codes, zero, limit, scale, mix.most, out, begun)
-    return clipped
+def _level_row(mix: MixtureArrays, level: int, row: int) -> Floats:
+    end = (row + 1) * mix.samples
+    picture: Floats = carray(pointer(mix.levels[level], mix.taken), end)
+    return picture[row * mix.samples : end]
 
 
 @FUSED.inlined
-def _add_linear(
-    codes: NDArray[Any],
-    zero: np.float32,
-    limit: np.float32,
-    scale: np.float32,
-    most: np.float32,
-    out: Floats,
-    begun: bool,
-) -> np.int32:
-    """The same for linear codes with one black level: straight loops, which become vectors."""
+def _next_level(mix: MixtureArrays, first: int, row: int) -> int:
+    """The first level from ``first`` on of which the row has a share, or how many levels there are."""
+    for level in range(first, mix.levels.shape[0]):
+        if mix.taken[level, row] != np.float32(0):
+            return level
+    return len(mix.levels)
+
+
+@FUSED.inlined
+def _add_pattern(
+    mix: MixtureArrays, frame: int, place: int, codes: NDArray[Any], factor: np.float32, out: Floats, begun: bool
+) -> bool:
+    """Add a frame's row times its coefficient, where levels differ by column; return whether any sample is clipped."""
+    cols = mix.zero.shape[2]
+    clipped = np.int32(0)
+    for col in range(cols):
+        zero, gain = mix.zero[frame, place, col], mix.gain[frame, place, col]
+        limit, scale = mix.clips_from / gain + zero, factor * gain
+        for sample in range(col, mix.samples, cols):
+            value = _signal(mix, codes[sample])
+            clipped += np.int32(value >= limit)
+            light = (value - zero) * scale
+            out[sample] = out[sample] + light if begun else light
+    return bool(clipped > 0)
+
+
+@FUSED.inlined
+def _signal(mix: MixtureArrays, code: Any) -> np.float32:
+    value: np.float32 = mix.table[np.uintp(code)] if mix.table.size else min(np.float32(code), mix.most)
+    return value
+
+
+@FUSED.inlined
+def _add_by_table(
+    codes: NDArray[Any], table: Floats, zero: np.float32, scale: np.float32, limit: np.float32, out: Floats, begun: bool
+) -> bool:
+    """The same through a table, with one black level."""
     clipped = np.int32(0)
     if begun:
         for sample in range(out.shape[0]):
-            value = min(np.float32(codes[sample]), most)
+            value = table[np.uintp(codes[sample])]
             clipped += np.int32(value >= limit)
             out[sample] += (value - zero) * scale
     else:
         for sample in range(out.shape[0]):
-            value = min(np.float32(codes[sample]), most)
+            value = table[np.uintp(codes[sample])]
             clipped += np.int32(value >= limit)
             out[sample] = (value - zero) * scale
-    return clipped
+    return bool(clipped > 0)
 
 
 @FUSED.inlined
-def _take_off(mix: MixtureArrays, level: int, row: int, share: np.float32, out: Floats) -> None:
-    end = (row + 1) * mix.samples
-    picture = carray(pointer(mix.levels[level], mix.taken), end)[row * mix.samples : end]
+def _begin_linear(codes: NDArray[Any], zero: np.float32, scale: np.float32, most: np.float32, out: Floats) -> None:
+    """Begin a row with linear codes of one black level, ``most`` at most: straight loops, which become vectors."""
     for sample in range(out.shape[0]):
-        out[sample] -= share * picture[sample]
+        out[sample] = (min(np.float32(codes[sample]), most) - zero) * scale
+
+
+@FUSED.inlined
+def _begin_with_level(
+    codes: NDArray[Any], zero: np.float32, scale: np.float32, most: np.float32, level: Floats, share: np.float32,
+    out: Floats,
+) -> None:  # fmt: skip
+    """The same, and take a level off."""
+    for sample in range(out.shape[0]):
+        out[sample] = (min(np.float32(codes[sample]), most) - zero) * scale - share * level[sample]
+
+
+@FUSED.inlined
+def _add_linear(codes: NDArray[Any], zero: np.float32, scale: np.float32, most: np.float32, out: Floats) -> None:
+    for sample in range(out.shape[0]):
+        out[sample] += (min(np.float32(codes[sample]), most) - zero) * scale
+
+
+@FUSED.inlined
+def _take_off(level: Floats, share: np.float32, out: Floats) -> None:
+    for sample in range(out.shape[0]):
+        out[sample] -= share * level[sample]
 
 
 @FUSED.inlined
@@ -173,6 +253,5 @@ def _mark_clipped(mix: MixtureArrays, row: int, out: Floats) -> None:
             for sample in range(mix.samples):
                 col = sample % cols
                 zero, gain = mix.zero[frame, row % rows, col], mix.gain[frame, row % rows, col]
-                value = mix.table[np.intp(codes[sample])] if mix.table.size else np.float32(codes[sample])
-                if value >= mix.clips_from / gain + zero:
+                if _signal(mix, codes[sample]) >= mix.clips_from / gain + zero:
                     out[sample] = mix.ceiling
