@@ -19,11 +19,10 @@ from numpy.typing import NDArray
 
 from psvideo.model.camera import FloatArray
 from psvideo.solve.depth.integration import BILATERAL, SMOOTH, Integration, TakenOver, find_height
-from psvideo.solve.depth.view import Slopes, View, slopes_of
+from psvideo.solve.depth.view import Box, Slopes, View, slopes_of
 
 Mask = NDArray[np.bool_]
 Floats = NDArray[np.float32]
-Box = tuple[slice, slice]
 
 __all__ = ["BILATERAL", "SMOOTH", "Before", "Height", "Integration", "integrate"]
 
@@ -78,18 +77,11 @@ def integrate(
     What looks the same as ``before`` keeps its jumps, where they still hold, and its place.
     """
     box = _box(valid)
-    slopes = slopes_of(normals, valid, view)
-    within = Slopes(
-        facing=np.ascontiguousarray(slopes.facing[box]),
-        across=np.ascontiguousarray(slopes.across[box]),
-        down=np.ascontiguousarray(slopes.down[box]),
-        aspect=slopes.aspect,
-    )
-    del slopes
+    slopes = slopes_of(normals, valid, view, box)
     height, rightward, downward = find_height(
-        within, how, held=None if before is None else _held(before, normals, valid, box)
+        slopes, how, held=None if before is None else _held(before, normals, valid, box)
     )
-    planes = (height, *_cuts(within, rightward, downward), rightward, downward)
+    planes = (height, *_cuts(slopes, rightward, downward), rightward, downward)
     height, cut_east, cut_south, rightward, downward = (_whole(plane, valid.shape, box) for plane in planes)
     return Height(
         height=height, valid=valid, cut_east=cut_east, cut_south=cut_south, rightward=rightward, downward=downward
@@ -98,6 +90,8 @@ def integrate(
 
 def _whole(plane: NDArray[Any], shape: tuple[int, ...], box: Box) -> NDArray[Any]:
     """Put a plane into its place in the picture."""
+    if plane.shape == shape:
+        return plane
     whole = np.zeros(shape, plane.dtype)
     whole[box] = plane
     return whole

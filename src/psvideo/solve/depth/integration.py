@@ -71,12 +71,10 @@ def find_height(
     slopes: Slopes, how: Integration, *, held: TakenOver | None = None
 ) -> tuple[FloatArray, Floats, Floats]:
     """Return the height, and the shares of the steps to the right and down, all (row, col)."""
-    work = _begun(slopes)
     whole = bool((slopes.facing > 0).all())
-    if whole:
-        work.height[:] = poisson_height(slopes)
-        if how.sharpness == 0.0:
-            return work.height, work.rightward, work.downward
+    work = _begun(slopes, poisson_height(slopes) if whole else np.zeros(slopes.facing.shape))
+    if whole and how.sharpness == 0.0:
+        return work.height, work.rightward, work.downward
     before = _weigh(work, 0.0)
     if held is not None and how.sharpness > 0.0:
         work.rightward[held.same], work.downward[held.same] = held.rightward[held.same], held.downward[held.same]
@@ -95,13 +93,14 @@ def find_height(
     return work.height, work.rightward, work.downward
 
 
-def _begun(slopes: Slopes) -> _Work:
-    """Begin at height 0, with equal shares."""
-    rows, cols = slopes.facing.shape
-    facing, across, down = (plane.astype(np.float32) for plane in (slopes.facing, slopes.across, slopes.down))
+def _begun(slopes: Slopes, height: FloatArray) -> _Work:
+    """Begin at a height, with equal shares."""
+    rows, cols = height.shape
+    given = (slopes.facing, slopes.across, slopes.down)
+    facing, across, down = (plane.astype(np.float32, copy=False) for plane in given)
     return _Work(
         given=(facing, across, down, np.float32(slopes.aspect)),
-        height=np.zeros((rows, cols)),
+        height=height,
         rightward=np.full((rows, cols), 0.5, np.float32),
         downward=np.full((rows, cols), 0.5, np.float32),
         lines=np.zeros((2, cols), np.float32),

@@ -18,22 +18,34 @@ def poisson_height(slopes: Slopes) -> FloatArray:
     ``facing`` of 0 anywhere gives no sense.
     """
     rows, cols = slopes.facing.shape
-    across = slopes.across / slopes.facing
-    down = slopes.down / (slopes.facing * slopes.aspect)
-    east = 0.5 * (across[:, 1:] + across[:, :-1])
-    south = 0.5 * (down[1:] + down[:-1])
-    divergence = np.zeros((rows, cols))
-    divergence[:, :-1] += east
-    divergence[:, 1:] -= east
-    divergence[:-1] += south
-    divergence[1:] -= south
-    spectrum = dctn(divergence, type=2, norm="ortho")
-    scale = _eigenvalues(rows)[:, None] + _eigenvalues(cols)
-    scale[0, 0] = 1.0
-    spectrum /= scale
+    spectrum = dctn(_divergence(slopes), type=2, norm="ortho", overwrite_x=True)
+    down, across = _eigenvalues(rows), _eigenvalues(cols)
+    down[0] = 1.0  # the mean, which is nothing at all
+    spectrum[0] /= np.append(1.0, across[1:])
+    for row in range(1, rows):
+        spectrum[row] /= down[row] + across
     spectrum[0, 0] = 0.0
-    height: FloatArray = idctn(spectrum, type=2, norm="ortho")
+    height: FloatArray = idctn(spectrum, type=2, norm="ortho", overwrite_x=True)
     return height
+
+
+def _divergence(slopes: Slopes) -> FloatArray:
+    """Return how much more goes out of every pixel than comes in, (row, col), one row after the other."""
+    rows, cols = slopes.facing.shape
+    divergence = np.zeros((rows, cols))
+    for row in range(rows):
+        facing = slopes.facing[row].astype(np.float64)
+        across = slopes.across[row] / facing
+        east = 0.5 * (across[1:] + across[:-1])
+        divergence[row, :-1] += east
+        divergence[row, 1:] -= east
+        down = slopes.down[row] / (facing * slopes.aspect)
+        if row:
+            south = 0.5 * (down + above)
+            divergence[row - 1] += south
+            divergence[row] -= south
+        above = down
+    return divergence
 
 
 def _eigenvalues(count: int) -> FloatArray:

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from psvideo.model.camera import FloatArray
 from psvideo.model.rig import Rig
 
+Box = tuple[slice, slice]
+"""A rectangle of a picture: its rows, its columns."""
 LEAST_FACING = 0.1
 """Cosine (84 degrees) beyond which a surface is taken to turn away no further: there a pixel mixes near and far."""
 
@@ -73,17 +75,26 @@ class Slopes:
     0 with the others where not valid. ``aspect`` is what the row direction's facing is times the col direction's.
     """
 
-    facing: FloatArray
-    across: FloatArray
-    down: FloatArray
+    facing: NDArray[np.floating]
+    across: NDArray[np.floating]
+    down: NDArray[np.floating]
     aspect: float = 1.0
 
 
-def slopes_of(normals: NDArray[np.floating], valid: NDArray[np.bool_], view: View) -> Slopes:
-    """Return the slopes of a surface from its normals (row, col, 3) in the camera frame."""
-    nx, ny, nz = (np.where(valid, normals[..., axis].astype(np.float64), 0.0) for axis in range(3))
-    x, y = view.rays(*valid.shape)
-    facing = nz - x * nx - y * ny
-    facing = np.where(valid, np.maximum(facing, LEAST_FACING), 0.0)
+def slopes_of(
+    normals: NDArray[np.floating], valid: NDArray[np.bool_], view: View, box: Box = (slice(None), slice(None))
+) -> Slopes:
+    """Return the slopes of a surface, or of a rectangle of it, from its normals (row, col, 3) in the camera frame.
+
+    They are as exact as the normals, but for half floats, of which 32 bits are made.
+    """
+    shown, exact = valid[box], np.result_type(normals.dtype, np.float32)
+    nx, ny, facing = (np.where(shown, normals[..., axis][box], 0).astype(exact) for axis in range(3))
+    if view.perspective:
+        x, y = (rays.astype(exact) for rays in view.rays(*valid.shape))
+        facing -= x[box[1]] * nx
+        facing -= y[box[0]] * ny
+    np.maximum(facing, LEAST_FACING, out=facing)
+    facing *= shown
     aspect = 1.0 if view.focal_px is None else view.focal_px[1] / view.focal_px[0]
-    return Slopes(facing=facing, across=nx, down=-ny, aspect=aspect)
+    return Slopes(facing=facing, across=nx, down=np.negative(ny, out=ny), aspect=aspect)
