@@ -32,7 +32,7 @@ def poisson_height(slopes: Slopes) -> FloatArray:
 def _divergence(slopes: Slopes) -> FloatArray:
     """Return how much more goes out of every pixel than comes in, (row, col), one row after the other."""
     rows, cols = slopes.facing.shape
-    divergence = np.zeros((rows, cols))
+    divergence, above = np.zeros((rows, cols)), np.zeros(cols)
     for row in range(rows):
         facing = slopes.facing[row].astype(np.float64)
         across = slopes.across[row] / facing
