@@ -56,6 +56,7 @@ def write_movie(
     places: Iterable[int] | None = None,
     matrix: int = 2,
     color_range: int = 0,
+    transfer: int = 2,
     options: dict[str, str] | None = None,
     movflags: str = "",
 ) -> None:
@@ -64,10 +65,11 @@ def write_movie(
         stream: Any = container.add_stream(codec, rate=RATE, options={"threads": "1"} | (options or {}))
         stream.width, stream.height, stream.pix_fmt = frames[0].width, frames[0].height, frames[0].format.name
         stream.codec_context.colorspace, stream.codec_context.color_range = matrix, color_range
+        stream.codec_context.color_trc = transfer
         stream.codec_context.time_base = 1 / RATE
         for place, frame in zip(places or range(len(frames)), frames, strict=True):
             frame.pts, frame.time_base = place, 1 / RATE
-            frame.colorspace, frame.color_range = matrix, color_range
+            frame.colorspace, frame.color_range, frame.color_trc = matrix, color_range, transfer
             container.mux(stream.encode(frame))
         container.mux(stream.encode(None))
 
@@ -90,6 +92,10 @@ def grey_ramp(count: int, *, rows: int = 32, cols: int = 48) -> list[av.VideoFra
         make_frame([np.full((rows, cols), 40 + 8 * place, np.uint8), chroma, chroma], "yuv420p")
         for place in range(count)
     ]
+
+
+def in_10_bits(frames: Iterable[av.VideoFrame]) -> list[av.VideoFrame]:
+    return [frame.reformat(format="yuv422p10le") for frame in frames]
 
 
 @pytest.mark.parametrize("weights", [BT709, BT601, BT2020], ids=["709", "601", "2020"])
@@ -154,7 +160,7 @@ def test_yuv_movies_keep_their_depth(
     )
     clip = open_clip(tmp_path / "x.mkv", plan=plan_for(rows=32, cols=48))
     frame = next(iter(read_frames(clip)))
-    assert clip.warnings == ()
+    assert ["8 bits leave few steps" in warning for warning in clip.warnings] == [True] * (bits == 8)
     assert np.abs(frame.image - colour).max() < 1.5 / 2**bits + 3e-5
 
 
@@ -275,10 +281,48 @@ def test_untagged_matrix_is_guessed_from_the_height_and_said(tmp_path: Path, pla
 
 
 def test_a_movie_that_plays_at_another_rate_is_read_with_a_note(tmp_path: Path, plan_for: Callable[..., Path]) -> None:
-    write_movie(tmp_path / "x.mp4", grey_ramp(6), codec="libx264", matrix=1)
-    assert open_clip(tmp_path / "x.mp4", plan=plan_for(rows=32, cols=48)).warnings == ()
-    misnamed = open_clip(tmp_path / "x.mp4", plan=plan_for(rows=32, cols=48, fps=Fraction(120)))
+    write_movie(tmp_path / "x.mov", in_10_bits(grey_ramp(6)), codec="prores", matrix=1)
+    assert open_clip(tmp_path / "x.mov", plan=plan_for(rows=32, cols=48)).warnings == ()
+    misnamed = open_clip(tmp_path / "x.mov", plan=plan_for(rows=32, cols=48, fps=Fraction(120)))
     assert "plays at 119.88 frames per second and the plan says 120" in misnamed.warnings[0]
+
+
+def test_the_rate_at_which_a_phone_shot_slow_motion_counts(shared_data: Path, plan_for: Callable[..., Path]) -> None:
+    movie = shared_data / "movies" / "video_phone" / "androidx_sample_sef_slow_motion.mp4"
+    if not movie.is_file():
+        pytest.skip("the real movies are not there")
+    slow = open_clip(movie, plan=plan_for(rows=240, cols=320, fps=Fraction(240)))
+    assert not any("frames per second" in warning for warning in slow.warnings)
+    wrong = open_clip(movie, plan=plan_for(rows=240, cols=320, fps=Fraction(120)))
+    assert any("was shot at 240 frames per second, and the plan says 120" in warning for warning in wrong.warnings)
+
+
+def test_coding_that_costs_accuracy_is_said(tmp_path: Path, plan_for: Callable[..., Path]) -> None:
+    write_movie(tmp_path / "x.mp4", grey_ramp(6), codec="libx264", matrix=1)
+    (found,) = open_clip(tmp_path / "x.mp4", plan=plan_for(rows=32, cols=48)).warnings
+    assert "H.264 costs accuracy: 8 bits" in found
+    assert "only 1 of 6 frames are whole" in found
+
+
+@pytest.mark.parametrize(
+    ("tag", "transfer", "said"),
+    [
+        (18, "rec709", "tagged with the transfer 'hlg', and the plan says 'rec709'"),
+        (18, "hlg", None),
+        (16, "slog3", "tagged with the transfer 'st2084', and the plan says 'slog3'"),
+        (1, "slog3", None),
+        (1, "rec709", None),
+        (1, "linear", "tagged with the transfer 'rec709', and the plan says 'linear'"),
+        (2, "linear", None),
+    ],
+)
+def test_the_streams_transfer_is_held_against_the_plans(
+    tmp_path: Path, plan_for: Callable[..., Path], tag: int, transfer: str, said: str | None
+) -> None:
+    """Cameras tag logarithmic footage as BT.709 or not at all; HLG and PQ are tagged only where they are meant."""
+    write_movie(tmp_path / "x.mov", in_10_bits(grey_ramp(2)), codec="prores", matrix=1, transfer=tag)
+    found = open_clip(tmp_path / "x.mov", plan=plan_for(rows=32, cols=48, transfer=transfer)).warnings
+    assert [said is not None and said in warning for warning in found] == [True] * (said is not None)
 
 
 @pytest.mark.parametrize(("black", "white"), [(None, None), (16, 235)])

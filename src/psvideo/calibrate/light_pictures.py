@@ -16,6 +16,7 @@ from psvideo.clip.decode.decoders import decode
 from psvideo.clip.folder import KINDS
 from psvideo.clip.linear import linear_light
 from psvideo.clip.reading import looks
+from psvideo.clip.transfer import usual_transfer
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import Encoding
 from psvideo.model.clipping import LOSSY_MARGIN, SATURATED
@@ -159,9 +160,9 @@ class LightFiles:
         return min(len(files) for files in self.by_light.values())
 
     @property
-    def is_jpeg(self) -> bool:
-        """True where the pictures are JPEGs."""
-        return next(iter(self.by_light.values()))[0].suffix.lower() in (".jpg", ".jpeg")
+    def usual_transfer(self) -> str:
+        """The name of the curve by which such pictures code light where nobody says."""
+        return usual_transfer(KINDS[next(iter(self.by_light.values()))[0].suffix.lower()])
 
 
 def read_sets(

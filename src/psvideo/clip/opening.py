@@ -8,7 +8,7 @@ from psvideo.clip.decode.decoders import read_header
 from psvideo.clip.decode.yuv import signal_range
 from psvideo.clip.folder import MOVIES, find_sequence
 from psvideo.clip.record import Clip, Header
-from psvideo.clip.transfer import find_curve
+from psvideo.clip.transfer import DISPLAYED, disagreement, find_curve
 from psvideo.errors import PsvideoError
 from psvideo.formats.plan_toml import find_plan, read_plan
 from psvideo.model.camera import Encoding
@@ -57,8 +57,8 @@ def _open_folder(path: Path, plan_path: Path | None) -> Clip:
         header=header,
         colour=header.colour or find_curve(encoding.transfer).colour,
         encoding=encoding,
-        warnings=header.warnings + _curve_warning(sequence.kind, plan),
-        notes=(passed_over,) if sequence.passed_over else (),
+        warnings=header.warnings + _curve_warnings(sequence.kind, plan, header),
+        notes=((passed_over,) if sequence.passed_over else ()) + _turn_note(header),
     )
 
 
@@ -79,11 +79,11 @@ def _open_movie(path: Path, plan_path: Path | None) -> Clip:
         files=(path,),
         numbers=movie.places,
         header=movie.header,
-        colour=find_curve(encoding.transfer).colour,
+        colour=_movie_colour(encoding, movie.header),
         encoding=encoding,
         timestamps=movie.timestamps,
-        warnings=movie.header.warnings + _rate_warning(movie, plan),
-        notes=notes,
+        warnings=movie.header.warnings + _curve_warnings("movie", plan, movie.header) + _rate_warning(movie, plan),
+        notes=notes + _turn_note(movie.header),
     )
 
 
@@ -107,12 +107,27 @@ def _expanded(encoding: Encoding, header: Header) -> tuple[Encoding, tuple[str, 
     )
 
 
-def _curve_warning(kind: str, plan: Plan) -> tuple[str, ...]:
-    """Say where the plan names a curve for files that hold linear light."""
-    transfer = plan.camera.encoding.transfer
-    if kind != "dng" or find_curve(transfer).name == "linear":
+def _movie_colour(encoding: Encoding, header: Header) -> str:
+    """Return the colour of a movie's light: by its tag where its curve goes with several gamuts, else the curve's."""
+    curve = find_curve(encoding.transfer)
+    return (header.colour or curve.colour) if curve.name in DISPLAYED else curve.colour
+
+
+def _turn_note(header: Header) -> tuple[str, ...]:
+    if header.turn.is_none:
         return ()
-    return (f"DNG files hold linear light, so the plan's transfer = {transfer!r} is not applied",)
+    size = "{} x {} pixels".format(*header.turn.size(header.width_px, header.height_px))
+    return (f"the pictures are {header.turn}, as their file asks: plates and results are {size}",)
+
+
+def _curve_warnings(kind: str, plan: Plan, header: Header) -> tuple[str, ...]:
+    """Say where the plan names another curve than the files have."""
+    transfer = plan.camera.encoding.transfer
+    if kind == "dng":
+        linear = find_curve(transfer).name == "linear"
+        return () if linear else (f"DNG files hold linear light, so the plan's transfer = {transfer!r} is not applied",)
+    wrong = disagreement(transfer, tagged=header.transfer, kind=kind)
+    return () if wrong is None else (wrong,)
 
 
 def _rate_warning(movie: "Movie", plan: Plan) -> tuple[str, ...]:
@@ -120,6 +135,14 @@ def _rate_warning(movie: "Movie", plan: Plan) -> tuple[str, ...]:
     fps = float(plan.camera.fps)
     if movie.rate_hz is None or abs(movie.rate_hz / fps - 1) < RATE_TOLERANCE + movie.rate_error:
         return ()
+    shot_hz = movie.capture_rate_hz
+    if shot_hz is not None and abs(shot_hz / fps - 1) < RATE_TOLERANCE + movie.rate_error:
+        return ()
+    if shot_hz is not None and abs(shot_hz / movie.rate_hz - 1) > RATE_TOLERANCE + movie.rate_error:
+        return (
+            f"the movie says that it was shot at {shot_hz:.6g} frames per second, and the plan says {fps:.6g}, which "
+            "is taken: correct fps in the plan where the movie is right",
+        )
     return (
         f"the movie plays at {movie.rate_hz:.6g} frames per second and the plan says {fps:.6g}; the plan's is taken, "
         "as for high-speed footage that plays slowed down",
@@ -130,6 +153,12 @@ def check_fit(file: Path, header: Header, plan: Plan, plan_path: Path) -> None:
     """Refuse footage that is not what the plan says: another size, or another arrangement of colours."""
     camera = plan.camera
     if (header.width_px, header.height_px) != (camera.width_px, camera.height_px):
+        if header.turn.size(header.width_px, header.height_px) == (camera.width_px, camera.height_px):
+            raise PsvideoError(
+                f"{file}: is to be {header.turn}; {plan_path} says {camera.width_px} x {camera.height_px} pixels, "
+                f"which is how it is shown. A plan counts the sensor's own rows, one after the other in time: write "
+                f"width_px = {header.width_px} and height_px = {header.height_px}. Plates and results stand upright."
+            )
         raise PsvideoError(
             f"{file}: is {header.width_px} x {header.height_px} pixels, and {plan_path} says {camera.width_px} x "
             f"{camera.height_px}. Use the plan of this footage, or correct width_px and height_px in it."

@@ -2,7 +2,7 @@
 
 from bisect import bisect_left
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from psvideo.model.camera import Encoding
 from psvideo.model.coded import Coded
 from psvideo.model.plan import Plan
+from psvideo.model.turn import UPRIGHT, Turn
 
 Levels = tuple[tuple[float, ...], ...]
 """Black levels by position, a pattern that repeats over rows and columns from the picture's top left on."""
@@ -25,7 +26,8 @@ class Header:
     ``width_px`` and ``height_px`` are those of the picture that is delivered, after the crop that the file asks for;
     ``cfa`` is the filter pattern at its top left pixel. Code 0 stands for the signal ``signal_at_0`` and each
     further code adds ``signal_per_code``, where 0 to 1 is what the transfer curve is defined on; None: the largest code
-    is 1. ``video_range``: the file's codes of signal 0 and 1 were 16 and 235 (of 8 bits).
+    is 1. ``video_range``: the file's codes of signal 0 and 1 were 16 and 235 (of 8 bits). ``turn`` is how the file
+    wants the picture turned; the sizes are those before. ``transfer`` is the curve that the file is tagged with.
     """
 
     width_px: int
@@ -40,6 +42,8 @@ class Header:
     signal_at_0: float = 0.0
     signal_per_code: float | None = None
     video_range: bool = False
+    turn: Turn = UPRIGHT
+    transfer: str | None = None
     warnings: tuple[str, ...] = ()
 
 
@@ -99,14 +103,25 @@ class Clip:
     notes: tuple[str, ...] = ()
 
     @property
+    def turn(self) -> Turn:
+        """How frames, which lie as the sensor read them, are turned to stand upright; plates and results do."""
+        return self.header.turn
+
+    @property
     def width_px(self) -> int:
-        """Columns of a frame."""
-        return self.header.width_px
+        """Columns of the upright picture."""
+        return self.turn.size(self.header.width_px, self.header.height_px)[0]
 
     @property
     def height_px(self) -> int:
-        """Rows of a frame."""
-        return self.header.height_px
+        """Rows of the upright picture; the frames' own rows are the plan's ``camera.height_px``."""
+        return self.turn.size(self.header.width_px, self.header.height_px)[1]
+
+    @property
+    def shown_plan(self) -> Plan:
+        """The plan with the size of the upright picture: for what is seen of the scene, not for the time of rows."""
+        camera = replace(self.plan.camera, width_px=self.width_px, height_px=self.height_px)
+        return replace(self.plan, camera=camera)
 
     @property
     def cfa(self) -> str | None:

@@ -113,6 +113,10 @@ CURVES = (
 )
 
 
+DISPLAYED = ("linear", "srgb", "rec709", "gamma24", "gamma22", "gamma18", "st2084", "hlg")
+"""The curves that a file's own tag can name."""
+
+
 def find_curve(name: str) -> TransferCurve:
     """Return the curve with this name; case, blanks and punctuation do not matter.
 
@@ -145,6 +149,39 @@ def _spellings() -> dict[str, TransferCurve]:
 
 def _letters(name: str) -> str:
     return re.sub(r"[^a-z0-9]", "", name.lower()).removesuffix("curve")
+
+
+def usual_transfer(kind: str) -> str:
+    """Return the name of the curve by which files of a kind code light where nobody says: only JPEG has one of its own.
+
+    >>> usual_transfer("jpeg"), usual_transfer("png")
+    ('srgb', 'linear')
+    """
+    return "srgb" if kind == "jpeg" else "linear"
+
+
+def disagreement(named: str, *, tagged: str | None, kind: str) -> str | None:
+    """Say where the curve that a plan names cannot be the one that the files were coded with; None where it may be.
+
+    A curve for recording (logarithms and the like) has no tag of its own, and cameras tag its movies in any way, but
+    not as HLG or PQ. JPEG never holds linear light.
+    """
+    curve = find_curve(named)
+    if tagged is None:
+        wrong = kind == "jpeg" and not curve.source
+        return (
+            f"JPEG pictures do not hold linear light, and the plan says transfer = {named!r}: most are srgb"
+            if wrong
+            else None
+        )
+    told = find_curve(tagged)
+    broadcast = told.name in ("hlg", "st2084")
+    if curve.name == told.name or (not broadcast and curve.name not in DISPLAYED):
+        return None
+    return (
+        f"the files are tagged with the transfer {told.name!r}, and the plan says {curve.name!r}, by which they are "
+        f"read: where the camera did not record so, write transfer = {told.name!r} into the plan"
+    )
 
 
 def to_light(curve: TransferCurve, signal: FloatArray | NDArray[np.float32]) -> FloatArray:

@@ -19,7 +19,7 @@ Planes = dict[str, Image]
 @dataclass(frozen=True, kw_only=True)
 class Made:
     """What an instant's files are written from; ``beauty``, ``depth`` and ``age_s`` are None where nothing asks
-    for them. ``age_s`` (row,) is how far in time from the instant what a row shows was lit."""
+    for them. ``age_s``, of rows or of pixels, is how far in time from the instant what a row shows was lit."""
 
     surface: Surface
     space: Space
@@ -32,7 +32,8 @@ class Made:
         """The age of every pixel in seconds, (row, col)."""
         if self.age_s is None:
             return None
-        return np.broadcast_to(self.age_s.astype(np.float32)[:, None], self.surface.valid.shape)
+        age_s = self.age_s if self.age_s.ndim == 2 else self.age_s[:, None]
+        return np.broadcast_to(age_s.astype(np.float32), self.surface.valid.shape)
 
     @property
     def position(self) -> Image | None:

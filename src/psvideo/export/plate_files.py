@@ -9,6 +9,7 @@ from psvideo.export.tags import Tags
 from psvideo.formats.exr_files import write_exr
 from psvideo.model.choices import Compression
 from psvideo.model.quantities import QUANTITIES
+from psvideo.model.turn import UPRIGHT, Turn
 from psvideo.plates.sequence import LightPlate
 from psvideo.plates.split import Plate
 
@@ -38,14 +39,17 @@ def write_plate(folder: Path, clip: str, plate: LightPlate, tags: Tags, *, compr
     )
 
 
-def write_flash(folder: Path, clip: str, plate: Plate, tags: Tags, *, compression: Compression = "zip") -> None:
-    """Write what one flash showed by itself, with one light or several: ``flashes/<clip>_flash.<index>.exr``."""
+def write_flash(
+    folder: Path, clip: str, plate: Plate, tags: Tags, *, turn: Turn = UPRIGHT, compression: Compression = "zip"
+) -> None:
+    """Write what one flash showed by itself, turned upright: ``flashes/<clip>_flash.<index>.exr``."""
+    seen = np.array(np.broadcast_to(plate.seen[:, None], plate.picture.shape[:2]))
     path = folder / "flashes" / f"{clip}_flash.{plate.flash.index:04d}.exr"
     lights = " ".join(f"{name}={power:g}" for name, power in plate.flash.lights.items()) or "dark"
     attributes = tags.attributes(time_s=plate.time_s, data=not PLATE.colour) | {"psvideo:lights": lights}
     write_exr(
         path,
-        _with_validity(plate.image, np.broadcast_to(plate.seen[:, None], plate.picture.shape[:2])),
+        _with_validity(turn.upright(plate.image), turn.upright(seen)),
         attributes=attributes,
         fps=tags.fps,
         time_code=tags.time_code(plate.time_s),

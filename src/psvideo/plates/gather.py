@@ -6,6 +6,7 @@ A clip of any length streams through in constant memory.
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from typing import TypeVar
 
@@ -37,6 +38,7 @@ from psvideo.plates.sequence import (
     light_plates,
 )
 from psvideo.plates.split import Plate, plate_of, split
+from psvideo.plates.upright import upright
 
 AnyPlate = TypeVar("AnyPlate", Plate, LightPlate)
 
@@ -110,13 +112,16 @@ def gather(
     plan, flashes = take.plan, timing.flashes
     check_separable(plan)
     made = clip_plates(take, timing, method=method, watch=watch, each_window=each_window)
-    single = _shown(made, each_flash)
-    plates = _shown(light_plates(single, plan, flashes, start=start_number), each_plate)
+    single, turn = _shown(made, each_flash), take.clip.turn
+    plates = light_plates(single, plan, flashes, start=start_number)
+    borrows = aligning is not None and plan.mode != "synced" and has_blind_time(timed_camera(plan, timing))
+    if borrows and turn.transposed:  # rows are borrowed while they are rows
+        plates, borrows = with_nearest_rows(plates), False
+    plates = _shown(map(partial(upright, turn=turn), plates), each_plate)
     if not with_ambient:
         plates = filter(lambda plate: plate.light != AMBIENT, plates)
     if aligning is not None:
-        if plan.mode != "synced" and has_blind_time(timed_camera(plan, timing)):
-            plates = with_nearest_rows(plates)
+        plates = with_nearest_rows(plates) if borrows else plates
         return aligned(plates, plan.lights, aligning, first=start_number, with_ambient=with_ambient)
     names = coming(plan, flashes, start=start_number)
     return gathered(plates, plan.lights, expected=names.__getitem__)
@@ -160,7 +165,8 @@ def first_ambient(take: Take, timing: Timing) -> LightPlate | None:
     if dark is None:
         return None
     plate = _colour_of(take.clip)(replace(dark, picture=made(update(None, dark).image)))
-    return LightPlate(light=AMBIENT, number=0, time_s=plate.time_s, picture=plate.picture, seen=plate.seen)
+    shown = LightPlate(light=AMBIENT, number=0, time_s=plate.time_s, picture=plate.picture, seen=plate.seen)
+    return upright(shown, take.clip.turn)
 
 
 def _decode_ahead(take: Take, watch: Watch) -> None:

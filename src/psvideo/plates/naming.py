@@ -89,7 +89,7 @@ def _verdicts(take: Take, timing: Timing, rig: Rig) -> Iterator[RigTurn]:
             last_end = start + cycle
             pictures = _small_plates(take, timing, range(start, last_end))
             if all(slot in pictures for slot in take.plan.lit_slots):
-                yield order_by_rig(take.plan, rig, pictures)
+                yield order_by_rig(take.clip.shown_plan, rig, pictures)
 
 
 def _whole(timing: Timing, start: int, count: int) -> bool:
@@ -106,7 +106,8 @@ def _small_plates(take: Take, timing: Timing, flashes: range) -> dict[int, Image
     if not near:
         return {}
     plates = clip_plates(replace(take, numbers=near), timing)
-    return {plate.flash.slot: _small(plate) for plate in plates if plate.flash.index in flashes}
+    turn = take.clip.turn
+    return {plate.flash.slot: turn.upright(_small(plate)) for plate in plates if plate.flash.index in flashes}
 
 
 def _small(plate: Plate) -> Image:

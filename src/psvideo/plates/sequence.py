@@ -8,6 +8,7 @@ light's full flash is power 1 for its longest planned duration.
 
 from collections.abc import Callable, Iterable, Iterator, Set
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +33,8 @@ class LightPlate:
     ``seen`` (row,) is as in a Plate, or (row, col) where motion hid parts of the plate.
 
     ``saturation`` is the value from which on a pixel is clipped: 1.0, or more where the flash was weaker than full.
-    ``shown_s`` (row,) are the instants that the rows show, None where all show ``time_s``.
+    ``shown_s`` (row,) are the instants that the rows show, or (row, col) where the picture was turned, None where all
+    show ``time_s``.
     """
 
     light: str
@@ -55,7 +57,7 @@ class LightPlate:
 
     @property
     def flashed_s(self) -> FloatArray:
-        """The instant that every row shows, shape (row,)."""
+        """The instant that every row shows, shape (row,), or every pixel, (row, col), where the picture was turned."""
         return np.full(self.shape[0], self.time_s) if self.shown_s is None else self.shown_s
 
     @property
@@ -64,9 +66,13 @@ class LightPlate:
         return self.seen if self.seen.ndim == 1 else np.asarray(self.seen.any(axis=1))
 
     @property
-    def rows_own(self) -> NDArray[np.bool_]:
-        """Which rows the plate's own flash showed, shape (row,); the others come from flashes before or after."""
-        return self.rows_seen if self.shown_s is None else self.rows_seen & (self.shown_s == self.time_s)
+    def own(self) -> NDArray[np.bool_]:
+        """What the plate's own flash showed, (row, 1), or (row, col) where the picture was turned; the rest comes from
+        flashes before or after."""
+        seen = self.rows_seen[:, None]
+        if self.shown_s is None:
+            return seen
+        return np.asarray(seen & (self.shown_s == self.time_s).reshape(len(seen), -1))
 
     @property
     def pixels_seen(self) -> NDArray[np.bool_]:
@@ -101,9 +107,12 @@ class Round:
 
     @property
     def age_s(self) -> FloatArray:
-        """How far from the instant, before or after, the farthest of the flashes is that a row shows, shape (row,)."""
-        away_s: FloatArray = np.max([np.abs(plate.flashed_s - self.time_s) for plate in self.plates], axis=0)
-        return away_s
+        """How far from the instant, before or after, the farthest of the flashes is that a row shows, shape (row,), or
+        that a pixel shows, (row, col), where pictures were turned."""
+        away_s = [np.abs(plate.flashed_s - self.time_s) for plate in self.plates]
+        if any(one.ndim == 2 for one in away_s):
+            away_s = [one if one.ndim == 2 else one[:, None] for one in away_s]
+        return reduce(np.maximum, away_s)
 
     @property
     def lights(self) -> tuple[str, ...]:

@@ -62,7 +62,8 @@ class Reading:
     """How pictures of lights are to be read.
 
     ``plan`` names the plan where none lies beside the pictures; ``frames`` chooses file numbers of a clip, or sets
-    counted from 1; ``transfer`` says how stills code light (left out: as the plan says; sRGB for JPEG, else linear).
+    counted from 1; ``transfer`` says how stills code light (left out: as the plan says; without a plan sRGB for JPEG,
+    else linear).
     """
 
     plan: Path | None = None
@@ -164,7 +165,7 @@ def open_light_sets(path: Path, reading: Reading = Reading(), *, watch: Watch = 
     plan = None if plan_path is None else read_plan(plan_path)
     lights = () if plan is None else plan.lights
     files = find_plates(path, lights=lights) or find_stills(path, lights=lights)
-    encoding = Encoding() if plan is None else plan.camera.encoding
+    encoding = Encoding(transfer=files.usual_transfer) if plan is None else plan.camera.encoding
     return _of_files(files, encoding, reading)
 
 
@@ -178,11 +179,11 @@ def _is_clip(path: Path, plan_path: Path) -> bool:
 
 
 def _of_files(files: LightFiles, encoding: Encoding, reading: Reading) -> LightSets:
-    transfer = reading.transfer or ("srgb" if files.is_jpeg and reading.plan is None else encoding.transfer)
+    transfer = reading.transfer or encoding.transfer
     notes = []
     aside = tuple(f"{file}: is taken for no light's picture and left aside" for file in files.left_aside)
-    if files.is_jpeg and reading.transfer is None:
-        notes.append(f"JPEG pictures are read by the curve {transfer!r}; `transfer` names another")
+    if reading.transfer is None and files.usual_transfer != "linear":
+        notes.append(f"the pictures are read by the curve {transfer!r}; `transfer` names another")
     read = Encoding(transfer=transfer, black_level=encoding.black_level, white_level=encoding.white_level)
     sets = read_sets(files, encoding=read, frames=reading.frames, most=None if reading.frames else reading.most)
     room = None if files.room is None else read_picture(files.room, read)[0]

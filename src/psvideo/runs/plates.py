@@ -87,7 +87,7 @@ def split_run(
         writing() as write,
     ):
         flashes, mix = extras.flashes, extras.mix
-        one_flash = partial(write_flash, folder, clip.name, tags=tags, compression=extras.compression)
+        one_flash = partial(write_flash, folder, clip.name, tags=tags, turn=clip.turn, compression=extras.compression)
         each = (lambda plate: write(partial(one_flash, plate))) if flashes else None
         gathered = gather(
             take,

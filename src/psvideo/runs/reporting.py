@@ -53,7 +53,7 @@ def observing(take: Take, rig: Rig | None = None, mask: NDArray[np.bool_] | None
     near = rig is not None and any(light.position_m is not None for light in rig.lights)
     if rig is not None and not (near and None in (rig.focal_px, rig.principal_px, rig.plane)):
         size = {"height_px": clip.height_px, "width_px": clip.width_px}
-        points = rig_points(clip.plan, rig, channels=clip.channels, **size)
+        points = rig_points(clip.shown_plan, rig, channels=clip.channels, **size)
     return Observed(lights=clip.plan.lights, mask=mask, points=points)
 
 

@@ -3,6 +3,7 @@
 Colours are converted by ``yuv`` with the matrix and range that the file is tagged with.
 """
 
+import contextlib
 from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -15,6 +16,8 @@ from av.container import InputContainer
 from av.video.stream import VideoStream
 
 from psvideo.clip.decode.ffmpeg_planes import planes
+from psvideo.clip.decode.movie_tags import capture_rate_hz, compression_warning, gamut_of, transfer_of, turn_of
+from psvideo.clip.decode.movie_times import Places, places_of, promised_frames, stamps_of
 from psvideo.clip.decode.yuv import CODES, HIGHEST, LOWEST, LUMA_WEIGHTS, signal_range, to_rgb
 from psvideo.clip.record import CodedPicture, Header
 from psvideo.errors import PsvideoError
@@ -22,7 +25,6 @@ from psvideo.errors import PsvideoError
 VIDEO_RANGE, FULL_RANGE = 1, 2  # FFmpeg's AVCOL_RANGE_MPEG and AVCOL_RANGE_JPEG
 UNTAGGED = 2  # matrix coefficients "unspecified" (H.273)
 HD_HEIGHT_PX = 720
-UNEVEN = 0.25
 MOST_REORDERED = 16  # frames by which H.264 and H.265 may put decoding before showing
 AS_RECORDED = {"ignore_editlist": "1"}  # all frames that the camera wrote, also those that an edit list would hide
 
@@ -33,7 +35,7 @@ class Movie:
 
     ``places`` count frames from the first; a gap of whole frames between timestamps leaves places out. ``rate_hz`` is
     the rate at which the file plays, None where a single frame shows none; rounded timestamps leave it unsure by the
-    share ``rate_error``.
+    share ``rate_error``. ``capture_rate_hz`` is the rate at which it was shot, where the file says so.
     """
 
     header: Header
@@ -41,31 +43,42 @@ class Movie:
     places: tuple[int, ...]
     rate_hz: float | None
     rate_error: float = 0.0
+    capture_rate_hz: float | None = None
 
 
 def index_movie(path: Path) -> Movie:
     """Read a movie's header, first frame and timestamps. Raises PsvideoError where it is damaged or truncated."""
     with _opened(path) as (container, stream):
-        timestamps = _timestamps(container, stream)
+        stamps = stamps_of(container, stream)
+        found = places_of(path, stamps.timestamps)
+        promised = promised_frames(container, stream, found.period)
         time_base_s = float(stream.time_base or 1)
-        length_s = (container.duration or 0) / av.time_base
-        promised = stream.frames
         code = container.metadata.get("timecode") or stream.metadata.get("timecode")
-    places, period = _places(path, timestamps)
-    if not promised and period:
-        promised = int(length_s / (period * time_base_s) - 0.5)
-    if not timestamps or (len(timestamps) < promised and places[-1] + 1 < promised):
+        capture_rate = capture_rate_hz(container.metadata | stream.metadata)
+        codec = stream.codec_context.codec.canonical_name
+    held, timestamps = len(stamps.timestamps), found.timestamps
+    if held < promised and found.places[-1] + 1 + found.left_out < promised:
         raise PsvideoError(
-            f"{path}: holds {len(timestamps)} frames, and its header promises {promised}: it is truncated. "
-            "Copy it again."
+            f"{path}: holds {held} frames, and its header promises {promised}: it is truncated. Copy it again."
         )
     header = next(read_movie(path, timestamps[:1])).header
+    coding = compression_warning(codec, header.bits or 0, frames=held, whole_frames=stamps.whole_frames)
+    uneven = _left_out(found) if found.left_out else None
+    warnings = tuple(warning for warning in (coding, uneven) if warning)
     return Movie(
-        header=replace(header, time_code=code),
+        header=replace(header, time_code=code, warnings=header.warnings + warnings),
         timestamps=timestamps,
-        places=places,
-        rate_hz=1 / (period * time_base_s) if period else None,
-        rate_error=1 / (timestamps[-1] - timestamps[0]) if period else 0.0,
+        places=found.places,
+        rate_hz=1 / (found.period * time_base_s) if found.period else None,
+        rate_error=1 / (timestamps[-1] - timestamps[0]) if found.period else 0.0,
+        capture_rate_hz=capture_rate,
+    )
+
+
+def _left_out(found: Places) -> str:
+    return (
+        f"the frames do not come at an even rate throughout: {found.left_out} of them before place {found.places[0]} "
+        f"or after place {found.places[-1]} are left out. Record at a constant frame rate"
     )
 
 
@@ -77,7 +90,8 @@ def read_movie(path: Path, timestamps: Sequence[int]) -> Iterator[CodedPicture]:
     wanted = deque(timestamps)
     with _opened(path) as (container, stream):
         if wanted[0] > (stream.start_time or 0):
-            container.seek(_safe_start(stream, wanted[0]), stream=stream)
+            with contextlib.suppress(av.PermissionError):  # the index names no whole frame before: from the first on
+                container.seek(_safe_start(stream, wanted[0]), stream=stream)
         for frame in container.decode(stream):
             if frame.pts is None or frame.pts < wanted[0]:
                 continue
@@ -118,33 +132,6 @@ def _opened(path: Path) -> Iterator[tuple[InputContainer, VideoStream]]:
         ) from fault
 
 
-def _timestamps(container: InputContainer, stream: VideoStream) -> tuple[int, ...]:
-    """Return every frame's timestamp in the order of time, from the file's index where that holds all of them."""
-    index = stream.index_entries
-    if len(index) == stream.frames > 0 and not stream.codec_context.has_b_frames:
-        return tuple(entry.timestamp for entry in index)
-    packets = (packet for packet in container.demux(stream) if packet.size and not packet.is_discard)
-    return tuple(sorted(packet.pts for packet in packets if packet.pts is not None and not packet.is_corrupt))
-
-
-def _places(path: Path, timestamps: Sequence[int]) -> tuple[tuple[int, ...], float]:
-    """Return each frame's place in time, counted in frames, and the frame period in the timestamps' unit."""
-    steps = np.diff(np.array(timestamps, np.float64))
-    if not steps.size:
-        return (0,), 0.0
-    usual = float(np.median(steps))
-    period = float(steps[np.abs(steps - usual) < 0.5 * usual].mean()) if usual > 0 else 0.0
-    counts = np.rint(steps / period) if period else np.zeros_like(steps)
-    period = float(steps.sum() / max(counts.sum(), 1.0))
-    uneven = np.abs(steps - counts * period) > max(UNEVEN * period, 1.0)
-    if uneven.any() or (counts < 1).any():
-        raise PsvideoError(
-            f"{path}: its frames do not come at an even rate ({int(uneven.sum())} of {steps.size} steps between "
-            "timestamps are no whole number of frames), so their times are not known. Record at a constant frame rate."
-        )
-    return (0, *(int(place) for place in np.cumsum(counts))), period
-
-
 def _picture(path: Path, frame: av.VideoFrame) -> CodedPicture:
     """Take a decoded frame's planes and make R'G'B' codes of them."""
     if frame.interlaced_frame:
@@ -155,6 +142,8 @@ def _picture(path: Path, frame: av.VideoFrame) -> CodedPicture:
     full_by_name = frame.format.name.startswith("yuvj") or not is_yuv
     video_range = frame.color_range == VIDEO_RANGE or (frame.color_range != FULL_RANGE and not full_by_name)
     zero, one = signal_range(bits, video_range=video_range)
+    turn, askew = turn_of(frame)
+    alpha = "the movie's alpha channel is left out" if len(found) in (2, 4) else None
     header = Header(
         width_px=frame.width,
         height_px=frame.height,
@@ -163,7 +152,10 @@ def _picture(path: Path, frame: av.VideoFrame) -> CodedPicture:
         signal_at_0=-zero / (one - zero),
         signal_per_code=1 / (one - zero),
         video_range=video_range,
-        warnings=("the movie's alpha channel is left out",) if len(found) in (2, 4) else (),
+        turn=turn,
+        transfer=transfer_of(frame),
+        colour=gamut_of(frame),
+        warnings=tuple(warning for warning in (alpha, askew) if warning),
     )
     if not is_yuv:
         return CodedPicture(header=header, codes=found[0] if len(found) < 3 else np.stack(found[:3], axis=-1))
@@ -176,9 +168,14 @@ def _picture(path: Path, frame: av.VideoFrame) -> CodedPicture:
 
 def _matrix(path: Path, frame: av.VideoFrame) -> tuple[int, tuple[str, ...]]:
     """Return the matrix coefficients that the frame is tagged with, or what its height makes likely, with a note."""
-    tagged = int(frame.colorspace)
+    tagged = UNTAGGED if frame.colorspace is None else int(frame.colorspace)
     if tagged in LUMA_WEIGHTS:
         return tagged, ()
+    if tagged == UNTAGGED and frame.side_data.get("DOVI_METADATA") is not None:
+        raise PsvideoError(
+            f"{path}: is Dolby Vision whose picture stands for light only together with its metadata (profile 5), "
+            "which is not read; expected HLG, PQ or SDR. Record or export one of these."
+        )
     if tagged != UNTAGGED:
         names = ", ".join(sorted({name for name, *_ in LUMA_WEIGHTS.values()}))
         raise PsvideoError(

@@ -73,5 +73,6 @@ def _full_size(plane: NDArray[np.uint16], height_px: int, width_px: int) -> NDAr
     if plane.shape[1] == width_px:
         return plane
     wide = np.repeat(plane, 2, axis=1)
-    wide[:, 1:-2:2] = cv2.addWeighted(plane[:, :-1], 0.5, plane[:, 1:], 0.5, 0)
+    if plane.shape[1] > 1:
+        wide[:, 1:-2:2] = cv2.addWeighted(plane[:, :-1], 0.5, plane[:, 1:], 0.5, 0)
     return np.ascontiguousarray(wide[:, :width_px])

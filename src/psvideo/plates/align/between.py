@@ -150,7 +150,8 @@ def plate_at(ends: Ends, way: Track, *, time_s: float, number: int) -> LightPlat
 
 @dataclass(frozen=True, kw_only=True)
 class _Side:
-    """A plate, its picture, where it is clipped (None: nowhere) and which rows lie well within what was seen."""
+    """A plate, its picture, where it is clipped (None: nowhere) and what lies well within what was seen, by
+    rows, (row, 1), or by pixels."""
 
     plate: LightPlate
     image: Image
@@ -163,7 +164,8 @@ class _Side:
             return None
         image = plate.image
         clipped = (_brightest(image) >= plate.saturation).astype(np.uint8)
-        within = cv2.erode(plate.rows_own.astype(np.uint8)[:, None], np.ones((5, 1), np.uint8))[:, 0] > 0
+        own = plate.own.astype(np.uint8)
+        within = cv2.erode(own, np.ones((5, min(5, own.shape[1])), np.uint8)) > 0
         wider = np.asarray(cv2.dilate(clipped, np.ones((5, 5), np.uint8)), np.uint8) if clipped.any() else None
         return cls(plate=plate, image=image, clipped=wider, within=within)
 
@@ -173,8 +175,9 @@ class _Side:
         if self.clipped is not None:
             touched = cv2.remap(self.clipped, x, y, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE) > 0
             image[touched] = self.plate.saturation
-        row = np.clip(np.rint(y).astype(np.intp), 0, len(self.within) - 1)
-        return np.asarray(image, np.float32), self.within[row]
+        rows, cols = self.within.shape
+        row, col = (np.clip(np.rint(at).astype(np.intp), 0, most - 1) for at, most in ((y, rows), (x, cols)))
+        return np.asarray(image, np.float32), self.within[row, col]
 
 
 def _brightest(image: Image) -> Image:
@@ -192,7 +195,7 @@ def _fill(band: slice, image: Image, seen: Flags, ends: Ends, sides: list[_Side 
     scale_x, scale_y = np.float32(cols / small_cols), np.float32(rows / small_rows)
     at = (x + 0.5) / scale_x - np.float32(0.5), (y + 0.5) / scale_y - np.float32(0.5)
     source = cv2.remap(way.source, *at, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)
-    seen[band] = (source != NOWHERE) & own.seen[band, None]
+    seen[band] = (source != NOWHERE) & own.pixels_seen[band]
     if not ((source == BEFORE) | (source == AFTER) | (source == BOTH)).any():
         return
     shares = [1 - np.clip(ends.share, 0, 1), np.clip(ends.share, 0, 1)]

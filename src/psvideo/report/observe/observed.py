@@ -126,7 +126,7 @@ def _borrowed(plate: LightPlate) -> float:
     if plate.shown_s is None:
         return 0.0
     times_s, counts = np.unique(plate.shown_s[plate.rows_seen], return_counts=True)
-    return float(1 - counts[np.abs(times_s - plate.time_s).argmin()] / len(plate.shown_s)) if len(times_s) > 1 else 0.0
+    return float(1 - counts[np.abs(times_s - plate.time_s).argmin()] / plate.shown_s.size) if len(times_s) > 1 else 0.0
 
 
 def _ambient_share(dark: NDArray[np.float32] | None, subject: NDArray[np.bool_], levels: list[float]) -> float | None:

@@ -1,0 +1,80 @@
+"""What a movie says of itself beside its pixels: which way is up, how it codes light, at which rate it was shot.
+
+Codes of transfer and primaries are those of ITU-T H.273, tables 2 and 3.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import av
+import numpy as np
+
+from psvideo.model.turn import UPRIGHT, Turn, of_matrix
+
+TRANSFERS = {
+    1: "rec709",
+    4: "gamma22",
+    6: "rec709",
+    8: "linear",
+    13: "srgb",
+    14: "rec709",
+    15: "rec709",
+    16: "st2084",
+    18: "hlg",
+}
+GAMUTS = {1: "lin_rec709_scene", 9: "lin_rec2020_scene", 12: "lin_p3d65_scene"}
+"""The colour interop ids of linear light with these primaries."""
+SPOKEN = {"h264": "H.264", "hevc": "H.265", "mjpeg": "Motion JPEG", "dnxhd": "DNxHD", "prores": "ProRes", "av1": "AV1"}
+ANDROID_RATE = "com.android.capture.fps"
+FEW_WHOLE_FRAMES = 0.5
+FEW_BITS = 8
+FIXED_ONE = 65536
+
+
+def turn_of(frame: av.VideoFrame) -> tuple[Turn, str | None]:
+    """Return how the container wants its frames turned, and a warning where it wants what is no quarter turn."""
+    found: Any = frame.side_data.get("DISPLAYMATRIX")
+    if found is None:
+        return UPRIGHT, None
+    (a, b, _), (c, d, _), _ = (np.frombuffer(bytes(found), np.int32).reshape(3, 3) / FIXED_ONE).round(3).tolist()
+    turn = of_matrix((a, b), (c, d))
+    if turn is None:
+        return UPRIGHT, f"the movie asks to be shown through the matrix {a:g} {b:g} {c:g} {d:g}, which is not applied"
+    return turn, None
+
+
+def transfer_of(frame: av.VideoFrame) -> str | None:
+    """Return the name of the curve that the frame is tagged with, None where it says nothing that is known here."""
+    return TRANSFERS.get(int(frame.color_trc or 0))
+
+
+def gamut_of(frame: av.VideoFrame) -> str | None:
+    """Return the colour interop id of the primaries that the frame is tagged with, None where it names none."""
+    return GAMUTS.get(int(frame.color_primaries or 0))
+
+
+def capture_rate_hz(metadata: Mapping[str, str]) -> float | None:
+    """Return the rate at which a phone shot what plays slowed down, where it says so.
+
+    >>> capture_rate_hz({"com.android.capture.fps": "240.000000"})
+    240.0
+    """
+    try:
+        return float(metadata.get(ANDROID_RATE, "")) or None
+    except ValueError:
+        return None
+
+
+def compression_warning(codec: str, bits: int, *, frames: int, whole_frames: int) -> str | None:
+    """Say what the movie's coding costs: few bits, or frames that are coded as changes of others."""
+    few = bits <= FEW_BITS
+    chained = frames > 1 and whole_frames < FEW_WHOLE_FRAMES * frames
+    if not (few or chained):
+        return None
+    costs = [f"{bits} bits leave few steps for dim light"] if few else []
+    if chained:
+        costs.append(f"only {whole_frames} of {frames} frames are whole ones, the others are coded as changes of these")
+    return (
+        f"{SPOKEN.get(codec, codec)} costs accuracy: {', and '.join(costs)}. Where the camera can, record 10 bits and "
+        "only whole frames (ProRes, DNxHR, All-Intra), or raw"
+    )

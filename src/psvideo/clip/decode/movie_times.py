@@ -1,0 +1,116 @@
+"""When a movie's frames were taken: their timestamps, and the place of each, counted in frames.
+
+A camera that keeps its rate leaves even steps, and whole steps out where it dropped frames. Where the rate changes on
+the way, places can be counted only within an even run.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+import av
+import numpy as np
+from av.container import InputContainer
+from av.video.stream import VideoStream
+
+from psvideo.errors import PsvideoError
+
+UNEVEN = 0.25
+LEAST_EVEN_SHARE = 0.5
+"""The longest even run is used where it is at least this share of the movie."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Places:
+    """The timestamps of an even run of frames, each one's place in time, and the period in the timestamps' unit.
+
+    ``first`` is how many frames come before the run, ``left_out`` how many are not of it; places count from ``first``.
+    The period is 0 where a single frame shows none.
+    """
+
+    timestamps: tuple[int, ...]
+    places: tuple[int, ...]
+    period: float
+    first: int = 0
+    left_out: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stamps:
+    """Every frame's timestamp in the order of time, and how many of them can be decoded by themselves."""
+
+    timestamps: tuple[int, ...]
+    whole_frames: int
+
+
+def stamps_of(container: InputContainer, stream: VideoStream) -> Stamps:
+    """Return what the file says of its frames' times, from its index where that holds all of them."""
+    index = stream.index_entries
+    if len(index) == stream.frames > 0 and not stream.codec_context.has_b_frames:
+        entries = [(entry.timestamp, entry.is_keyframe) for entry in index]
+    else:
+        packets = (packet for packet in container.demux(stream) if packet.size and not packet.is_discard)
+        entries = [(p.pts, p.is_keyframe) for p in packets if p.pts is not None and not p.is_corrupt]
+    return Stamps(
+        timestamps=tuple(sorted(stamp for stamp, _ in entries)), whole_frames=sum(bool(key) for _, key in entries)
+    )
+
+
+def promised_frames(container: InputContainer, stream: VideoStream, period: float) -> int:
+    """Return how many frames the header promises: their number, else as many as fill the length of the video.
+
+    The container's own length counts only where it holds nothing else: sound may go on after the last frame.
+    """
+    if stream.frames or not period:
+        return stream.frames
+    length_s = _length_s(container, stream)
+    return int(length_s / (period * float(stream.time_base or 1)) - 0.5)
+
+
+def _length_s(container: InputContainer, stream: VideoStream) -> float:
+    if stream.duration:
+        return float(stream.duration * (stream.time_base or 1))
+    try:
+        found = datetime.strptime(stream.metadata.get("DURATION", "")[:15], "%H:%M:%S.%f")
+        return found.hour * 3600 + found.minute * 60 + found.second + found.microsecond * 1e-6
+    except ValueError:  # Matroska alone writes it
+        return (container.duration or 0) / av.time_base if len(container.streams) == 1 else 0.0
+
+
+def places_of(path: Path, timestamps: Sequence[int]) -> Places:
+    """Return each frame's place in time, of the longest even run where the rate changes on the way.
+
+    Raises PsvideoError where no run is long enough for that.
+    """
+    steps = np.diff(np.array(timestamps, np.float64))
+    if not steps.size:
+        return Places(timestamps=tuple(timestamps), places=(0,), period=0.0)
+    usual = float(np.median(steps))
+    like = steps[np.abs(steps - usual) < 0.5 * usual]
+    period = float(like.mean()) if like.size else usual
+    counts = np.rint(steps / period) if period > 0 else np.zeros_like(steps)
+    uneven = (np.abs(steps - counts * period) > max(UNEVEN * period, 1.0)) | (counts < 1)
+    first, last = _longest_run(uneven)
+    if last - first < LEAST_EVEN_SHARE * steps.size or last == first:
+        raise PsvideoError(
+            f"{path}: its frames do not come at an even rate ({int(uneven.sum())} of {steps.size} steps between "
+            "timestamps are no whole number of frames), so their times are not known. Record at a constant frame rate."
+        )
+    period = float(steps[first:last].sum() / counts[first:last].sum())
+    places = first + np.concatenate([[0], np.cumsum(counts[first:last])])
+    return Places(
+        timestamps=tuple(timestamps[first : last + 1]),
+        places=tuple(int(place) for place in places),
+        period=period,
+        first=first,
+        left_out=len(timestamps) - (last + 1 - first),
+    )
+
+
+def _longest_run(uneven: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> tuple[int, int]:
+    """Return the first step of the longest run of even ones, and the one after its last."""
+    breaks = np.concatenate([[-1], np.flatnonzero(uneven), [uneven.size]])
+    lengths = np.diff(breaks) - 1
+    at = int(lengths.argmax())
+    return int(breaks[at]) + 1, int(breaks[at + 1])

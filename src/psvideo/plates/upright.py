@@ -1,0 +1,41 @@
+"""Plates turned upright: sensors are read row by row whichever way the camera was held, people look at what is upright.
+
+Frames and their recipes lie as the sensor does. A plate that is turned is made, and held in half its memory.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.model.camera import FloatArray
+from psvideo.model.turn import Turn
+from psvideo.plates.align.packed import packed
+from psvideo.plates.mixture import made
+from psvideo.plates.sequence import LightPlate
+
+
+def upright(plate: LightPlate, turn: Turn) -> LightPlate:
+    """Return a plate as it is to be seen, with what is known of its rows."""
+    if turn.is_none:
+        return plate
+    picture = packed(made(turn.upright(plate.image)), plate.saturation)
+    return replace(plate, picture=picture, seen=_seen(plate, turn), shown_s=_shown_s(plate, turn))
+
+
+def _seen(plate: LightPlate, turn: Turn) -> NDArray[np.bool_]:
+    """Return what is known of the turned plate: of rows where it may be, (row,), else of pixels."""
+    if plate.seen.all():
+        return np.ones(plate.shape[1 if turn.transposed else 0], np.bool_)
+    if turn.transposed or plate.seen.ndim == 2:
+        return turn.upright(np.array(plate.pixels_seen))
+    return plate.seen[:: -1 if turn.rows_flipped else 1]
+
+
+def _shown_s(plate: LightPlate, turn: Turn) -> FloatArray | None:
+    """Return the instants that the turned plate's rows show, or its pixels where the sensor's rows are columns now."""
+    if plate.shown_s is None:
+        return None
+    if not turn.transposed:
+        return plate.shown_s[:: -1 if turn.rows_flipped else 1]
+    return turn.upright(np.broadcast_to(plate.shown_s[:, None], plate.shape[:2]))
