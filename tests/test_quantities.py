@@ -14,6 +14,7 @@ from psvideo.model.surface import Surface
 from psvideo.page.folders import show_of
 from psvideo.page.show import index_of
 from psvideo.solve.depth import Depth, View
+from psvideo.solve.passes.made import Passes
 
 ROWS, COLS = 3, 4
 OF_AN_INSTANT = (*ALWAYS, *AOVS)
@@ -27,7 +28,9 @@ def made() -> Made:
     source = np.ones((ROWS, COLS), np.uint8)
     surface = Surface(normals=normals, albedo=plane, valid=~none, residual=plane, error_deg=plane, source=source)
     depth = Depth(depth=plane, cut_east=none, cut_south=none, parts=1, metric=True, view=View())
-    return Made(surface=surface, space=Space(), beauty=plane, depth=depth, age_s=np.linspace(0, 0.1, ROWS))
+    passes = Passes(reach=source, specular=plane, alpha=plane)
+    age_s = np.linspace(0, 0.1, ROWS)
+    return Made(surface=surface, space=Space(), beauty=plane, depth=depth, age_s=age_s, passes=passes)
 
 
 def test_what_may_be_asked_for_is_what_the_table_says() -> None:
@@ -46,7 +49,9 @@ def test_planes_are_the_channels_that_the_table_says(name: str) -> None:
     assert {plane.shape for plane in planes.values()} == {(ROWS, COLS)}
 
 
-@pytest.mark.parametrize("name", ["residual", "error", "source", "beauty", "depth", "position", "age"])
+@pytest.mark.parametrize(
+    "name", ["residual", "error", "source", "beauty", "depth", "position", "age", "reach", "specular", "alpha"]
+)
 def test_what_was_not_made_is_not_written(name: str) -> None:
     whole = made().surface
     bare = Made(surface=Surface(normals=whole.normals, albedo=whole.albedo, valid=whole.valid), space=Space())
@@ -69,6 +74,9 @@ def test_files_are_written_as_they_are_made_in_any_order_asked() -> None:
         "source",
         "beauty",
         "age",
+        "reach",
+        "specular",
+        "alpha",
         "depth",
         "position",
     )

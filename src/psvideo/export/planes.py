@@ -1,7 +1,7 @@
 """The planes of an instant's files: for each quantity of the table, its picture, and its channels by name."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from psvideo.model.camera import FloatArray
 from psvideo.model.quantities import QUANTITIES
 from psvideo.model.surface import Surface
 from psvideo.solve.depth import Depth
+from psvideo.solve.passes.made import Passes
 
 Image = NDArray[np.floating]
 Planes = dict[str, Image]
@@ -18,14 +19,16 @@ Planes = dict[str, Image]
 
 @dataclass(frozen=True, kw_only=True)
 class Made:
-    """What an instant's files are written from; ``beauty``, ``depth`` and ``age_s`` are None where nothing asks
-    for them. ``age_s``, of rows or of pixels, is how far in time from the instant what a row shows was lit."""
+    """What an instant's files are written from; ``beauty``, ``depth``, ``age_s`` and what ``passes`` hold are None
+    where nothing asks for them. ``age_s``, of rows or of pixels, is how far in time from the instant what a row shows
+    was lit."""
 
     surface: Surface
     space: Space
     beauty: Image | None = None
     depth: Depth | None = None
     age_s: FloatArray | None = None
+    passes: Passes = field(default_factory=Passes)
 
     @property
     def age(self) -> Image | None:
@@ -61,6 +64,9 @@ PICTURES: Mapping[str, Callable[[Made], Image | None]] = {
     "depth": lambda made: None if made.depth is None else made.depth.depth,
     "position": lambda made: made.position,
     "age": lambda made: made.age,
+    "reach": lambda made: None if made.passes.reach is None else made.passes.reach.astype(np.float32),
+    "specular": lambda made: made.passes.specular,
+    "alpha": lambda made: made.passes.alpha,
 }
 """What computes the picture of each quantity that belongs to an instant; None where it was not made."""
 

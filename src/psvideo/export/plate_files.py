@@ -27,8 +27,21 @@ def plate_name(clip: str, light: str, number: int) -> str:
 
 def write_plate(folder: Path, clip: str, plate: LightPlate, tags: Tags, *, compression: Compression = "zip") -> None:
     """Write one plate: channels R, G, B or Y, and ``valid`` where rows are missing."""
+    write_light(folder, clip, plate, plate.image, tags, compression=compression)
+
+
+def write_light(
+    folder: Path,
+    clip: str,
+    plate: LightPlate,
+    image: NDArray[np.floating],
+    tags: Tags,
+    *,
+    compression: Compression = "zip",
+) -> None:
+    """Write what an image says of a plate's light, as the plate itself is written."""
     path = folder / plate_name(clip, plate.light, plate.number)
-    channels = _with_validity(plate.image, plate.pixels_seen)
+    channels = _with_validity(image, plate.pixels_seen)
     write_exr(
         path,
         channels,

@@ -18,6 +18,7 @@ from psvideo.model.quantities import ALWAYS, AOVS, QUANTITIES, SOURCES, Aov, is_
 from psvideo.model.surface import Surface
 from psvideo.plates.beauty import Mix
 from psvideo.solve.depth import Depth, mesh_of
+from psvideo.solve.passes.made import Passes
 
 MOVIE_SUFFIXES: dict[Codec, str] = {"vp9": "mp4", "prores": "mov"}
 
@@ -99,6 +100,7 @@ def write_surface(
     depth: Callable[[], Depth] | None = None,
     beauty: NDArray[np.floating] | None = None,
     age_s: NDArray[np.float64] | None = None,
+    passes: Passes | None = None,
 ) -> None:
     """Write one instant: normals as signed unit vectors, linear albedo, validity, and the AOVs and meshes asked for.
 
@@ -110,7 +112,9 @@ def write_surface(
             raise ValueError("depth is to be written and was not integrated")
         shape = depth()
         _write_meshes(folder, clip, number, surface, shape, delivery)
-    made = Made(surface=surface, space=delivery.space, beauty=beauty, depth=shape, age_s=age_s)
+    made = Made(
+        surface=surface, space=delivery.space, beauty=beauty, depth=shape, age_s=age_s, passes=passes or Passes()
+    )
     halves = {name: is_half(name, asked=delivery.half) for name in delivery.quantities}
     world = delivery.space.attributes()
     attributes = {name: tags.attributes(time_s=time_s, data=not QUANTITIES[name].colour) | world for name in halves}

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass
 from typing import Literal, get_args
 
-Aov = Literal["depth", "residual", "error", "source", "position", "beauty", "age"]
+Aov = Literal["depth", "residual", "error", "source", "position", "beauty", "age", "reach", "specular", "alpha"]
 """The quantities that are written where they are asked for; the table has a row for each."""
 Shown = Literal["normals", "light", "mask", "heat", "position"]
 """How a quantity is shown: as directions, as light, as yes and no, as a measure in false colours, as points."""
@@ -58,6 +58,9 @@ _ROWS = (
     Quantity("position", "Position", _RGB, "asked", "depth", "position", digits="float"),
     Quantity("beauty", "Beauty", _RGB, "asked", "plates", "light", colour=True),
     Quantity("age", "Age", _Y, "asked", "plates", "heat", digits="float", unit="s"),
+    Quantity("reach", "Lights that reach it", _Y, "asked", "plates", "heat"),
+    Quantity("specular", "Beyond diffuse", _RGB, "asked", "plates", "light", colour=True),
+    Quantity("alpha", "Matte", _Y, "asked", "plates", "mask"),
     Quantity("plate", "Plate", _RGB, "plates", "plates", "light", colour=True),
     Quantity("ambient", "Ambient", _RGB, "plates", "plates", "light", colour=True),
 )

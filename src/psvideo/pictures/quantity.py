@@ -20,8 +20,9 @@ def picture_of(quantity: str, image: NDArray[np.generic], *, exposure: float | N
     ----------
     quantity
         A name of the table of quantities: "normals", "albedo", "valid", "residual", "error", "depth", "position",
-        "beauty", "plate" or "ambient". It says how the image is shown: normals and positions as colours (128 + 127 n),
-        light by sRGB's curve, validity in black and white, measures in false colours.
+        "beauty", "reach", "specular", "alpha", "plate" or "ambient". It says how the image is shown: normals and
+        positions as colours (128 + 127 n), light by sRGB's curve, validity in black and white, measures in false
+        colours.
     image
         Shape (row, col) or (row, col, 3), as the solver or a file gives it.
     exposure

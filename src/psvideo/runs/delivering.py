@@ -10,17 +10,20 @@ import numpy as np
 
 from psvideo.clip import Clip, Take
 from psvideo.compute.halves import halves_of
-from psvideo.export.plate_files import plate_name, write_plate
+from psvideo.export.plate_files import plate_name, write_light, write_plate
 from psvideo.export.result_files import Delivery, write_surface
 from psvideo.export.space import Space
 from psvideo.export.tags import Tags
 from psvideo.model.choices import Compression
+from psvideo.model.plan import Plan
 from psvideo.model.rig import Rig
 from psvideo.model.timing import Timing
 from psvideo.plates.beauty import beauty_of
 from psvideo.plates.sequence import AMBIENT, LightPlate, Round, round_numbers
 from psvideo.solve.depth import Depth
 from psvideo.solve.instants import Instant
+from psvideo.solve.normals.solving import ROBUST_FROM_LIGHTS
+from psvideo.solve.passes.made import FEWEST_FOR_SPECULAR, AskedPasses, Passes
 
 LENS_TOLERANCE = 0.01
 """Share by which two focal lengths may differ before a warning: calibrations of one lens differ by less."""
@@ -111,4 +114,55 @@ def surface_job(
         beauty = halves_of(image.reshape(len(image), -1))[0].reshape(image.shape)
     job = partial(write_surface, folder, clip.name, one.number, one.time_s, instant.surface)
     age_s = one.age_s if "age" in delivery.aovs else None
-    return partial(job, delivery=there, tags=tags, depth=depth, beauty=beauty, age_s=age_s)
+    return partial(
+        job, delivery=there, tags=tags, depth=depth, beauty=beauty, age_s=age_s, passes=_whole_picture(instant.passes)
+    )
+
+
+def _whole_picture(passes: Passes | None) -> Passes | None:
+    """Return an instant's passes without what is written light by light."""
+    return None if passes is None else replace(passes, specular_of=())
+
+
+def passes_asked(delivery: Delivery) -> AskedPasses:
+    """Return what a delivery asks of the plates beside the surface; light by light where plates are written too."""
+    aovs = delivery.aovs
+    return AskedPasses(
+        reach="reach" in aovs,
+        specular="specular" in aovs,
+        alpha="alpha" in aovs,
+        each=delivery.plates,
+        weights=dict(delivery.mix.weights),
+    )
+
+
+def pass_doubts(asked: AskedPasses, plan: Plan) -> tuple[str, ...]:
+    """Return in whole sentences why a pass that was asked for does not show what its name says."""
+    said = []
+    if asked.specular and len(plan.lights) < FEWEST_FOR_SPECULAR:
+        said.append(
+            f"`aov` specular is empty: three lights explain any three brightnesses as diffuse. From "
+            f"{FEWEST_FOR_SPECULAR} lights on, better {ROBUST_FROM_LIGHTS}, something is left over."
+        )
+    if asked.alpha and all(not flash.is_dark for flash in plan.flashes):
+        said.append(
+            "`aov` alpha is 1 wherever ambient light falls too: without a dark slot it cannot be told from the lights' "
+            "own. Keep a dark slot in the plan, or darken the room."
+        )
+    return tuple(said)
+
+
+def write_specular(
+    folder: Path,
+    clip: str,
+    instant: Instant,
+    tags: Tags,
+    *,
+    compression: Compression,
+    write: Callable[[Callable[[], None]], None],
+) -> None:
+    """Hand what exceeds the diffuse model under each light to the writing threads."""
+    if instant.passes is None:
+        return
+    for plate, image in zip(instant.round.plates, instant.passes.specular_of, strict=False):
+        write(partial(write_light, folder, clip, plate, image, tags, compression=compression))

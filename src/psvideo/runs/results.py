@@ -26,7 +26,15 @@ from psvideo.plates.gather import first_ambient, gather
 from psvideo.plates.sequence import AMBIENT
 from psvideo.report.observe.observed import InstantFacts
 from psvideo.report.run_report import RunReport
-from psvideo.runs.delivering import check_delivery, surface_job, world_doubts, write_plates
+from psvideo.runs.delivering import (
+    check_delivery,
+    pass_doubts,
+    passes_asked,
+    surface_job,
+    world_doubts,
+    write_plates,
+    write_specular,
+)
 from psvideo.runs.depths import shape_of
 from psvideo.runs.handover import Finished, write_note, write_previews, write_timeline
 from psvideo.runs.lighting import Lighting
@@ -39,6 +47,8 @@ from psvideo.solve.instants import Instant, denoised, surfaces
 from psvideo.solve.normals.solving import Solving, trust_note
 
 Pixels = NDArray[np.uint8]
+SPECULAR_OF_LIGHTS = "specular_of_lights"
+"""The folder of what exceeds the diffuse model under each light, sequences as those of the plates."""
 SAMPLE_ROUND = 3
 """The round that the report shows, counted from 1; the first where there are fewer."""
 
@@ -105,6 +115,7 @@ def normals_run(
     picture: Pixels | None = None
     solving = _solving(solver, delivery, fill=fill)
     method = solving.method(len(clip.plan.lights))
+    asked = passes_asked(delivery)
     with (
         folder_of(output) as folder,
         _at_the_end(folder, take, output, observed.facts, delivery, tags, shaping, watch),
@@ -123,7 +134,14 @@ def normals_run(
         )
         ambient = first_ambient(take, timing) if mixed else None
         found = surfaces(
-            rounds, clip.plan, lighting.rig, mask=mask, solving=solving, near=lighting.near, falloff=lighting.falloff
+            rounds,
+            clip.plan,
+            lighting.rig,
+            mask=mask,
+            solving=solving,
+            near=lighting.near,
+            falloff=lighting.falloff,
+            asked=asked,
         )
         for instant in found if over_time.denoise < 2 else denoised(found, over_time.denoise):
             shaping, shaped = shape_of(shaping, lighting, instant)
@@ -137,6 +155,9 @@ def normals_run(
                     compression=delivery.compression,
                     resume=output.resume,
                     write=write,
+                )
+                write_specular(
+                    folder / SPECULAR_OF_LIGHTS, clip.name, instant, tags, compression=delivery.compression, write=write
                 )
             if not (output.resume and is_written(folder, clip.name, instant.round.number, delivery)):
                 # the surface only: plates are many times larger, and must not wait for the files
@@ -154,6 +175,7 @@ def normals_run(
             trust=" ".join([trust_note(method, len(clip.plan.lights)), *lighting.near_notes]),
             warnings=(
                 *lighting.doubts,
+                *pass_doubts(asked, clip.plan),
                 *(() if shaping is None else reservations(shaping)),
                 *world_doubts(delivery, lighting.rig, clip.width_px, metric=shaping is not None and shaping.metric),
             ),

@@ -25,6 +25,7 @@ from psvideo.solve.near_surface import NearSurface, solve_near
 from psvideo.solve.normals.illumination import Illumination, illumination
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.task import Samples
+from psvideo.solve.passes.made import AskedPasses, Passes, passes_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,10 +38,13 @@ class Instant:
         Its ``number``, ``time_s`` and ``plates``.
     surface
         Normals, albedo and validity of that instant.
+    passes
+        What was asked for of its plates beside these; None where nothing was.
     """
 
     round: Round
     surface: Surface
+    passes: Passes | None = None
 
 
 def surfaces(
@@ -52,11 +56,12 @@ def surfaces(
     solving: Solving = Solving(),
     near: NearSurface | None = None,
     falloff: Falloff | None = None,
+    asked: AskedPasses = AskedPasses(),
 ) -> Iterator[Instant]:
     """Solve every round that has a plate of each of the plan's lights; the clip's start and end cut the others.
 
-    ``near`` says where near lights find the surface, ``falloff`` what share of their light arrives where. Raises
-    PsvideoError where the rig lacks a light, or its lights give no normals.
+    ``near`` says where near lights find the surface, ``falloff`` what share of their light arrives where, ``asked``
+    which passes are made as well. Raises PsvideoError where the rig lacks a light, or its lights give no normals.
     """
     lights = lights_as_planned(rig, plan)
     shares = None if falloff is None else [falloff.field(light.name) for light in lights]
@@ -71,13 +76,17 @@ def surfaces(
         plates = _pictures(one, shares)
         shown = None if seen.all() else seen
 
-        def solve(lit: Illumination) -> Surface:
-            return solving.solve(plates, lit, seen=shown, mask=mask)
+        here = None if near is None else near.at(one.number)
+        lit = light(ground=None if here is None else here.ground)
 
-        if near is None:
-            return Instant(round=one, surface=solve(light()))
-        surface = solve_near(near.at(one.number), lambda ground: light(ground=ground), solve)
-        return Instant(round=one, surface=surface)
+        def solve(found: Illumination) -> Surface:
+            nonlocal lit
+            lit = found
+            return solving.solve(plates, found, seen=shown, mask=mask)
+
+        surface = solve(lit) if here is None else solve_near(here, lambda ground: light(ground=ground), solve)
+        made = passes_of(asked, plates, surface, lit, seen=shown, mask=mask) if asked.any else None
+        return Instant(round=one, surface=surface, passes=made)
 
     # map and filter hold no round while the next one gathers, as a loop's variable would
     return map(solved, filter(lambda one: one.lights == plan.lights, gathered))

@@ -100,10 +100,10 @@ def _wanted(solved: Mask, one: Evidence, threads: int | None) -> Mask:
     lit = (solved | (counts > 0)).astype(np.uint8)
     around = cv2.boxFilter(lit, cv2.CV_8U, (3, 3), normalize=False, borderType=cv2.BORDER_REPLICATE)
     subject = solved | ((lit > 0) & (around >= MOST_LIGHTS_AROUND))
-    return np.asarray((subject | _holes(subject)) & ~solved)
+    return np.asarray((subject | holes_in(subject)) & ~solved)
 
 
-def _holes(subject: Mask) -> Mask:
+def holes_in(subject: Mask) -> Mask:
     """Return the small parts of the rest that the subject encloses."""
     count, labels, facts, _ = cv2.connectedComponentsWithStats((~subject).astype(np.uint8), connectivity=4)
     rows, cols = subject.shape
