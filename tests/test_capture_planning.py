@@ -1,6 +1,7 @@
 """Plans keep the rolling rule for both clocks at their worst, wishes become flashes, and dangers are named."""
 
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from psvideo.model.camera import Camera
 from psvideo.model.plan import Plan
 from psvideo.model.shoot_figures import shoot_figures
 from psvideo.model.shutter import row_weights
+from psvideo.runs.capture_plan import capture_plan
 
 
 def words(**given_words: object) -> ShootWords:
@@ -253,6 +255,31 @@ def test_rows_that_no_frame_sees_are_warned_of() -> None:
     assert shoot.figures.missing_row_share == pytest.approx(0.5 - 0.08)
     assert "42%" in text_of(shoot, "blind")
     assert "blind" not in kinds(planned())
+
+
+def test_rows_that_other_rounds_show_are_not_called_holes() -> None:
+    assert "come from the rounds before and after" in text_of(planned(shutter=180.0), "blind")
+
+
+def test_two_lights_are_warned_of_before_anything_is_filmed() -> None:
+    assert "Normals need three lights" in text_of(planned(lights="key,left"), "lights")
+    assert "lights" not in kinds(planned())
+
+
+def test_a_flash_that_leaves_no_light_is_warned_of_with_what_would_do() -> None:
+    text = text_of(planned(flash="50us"), "dim")
+    assert "7.6 stops less" in text
+    assert "Flash for 0.1562 ms and more" in text
+    assert "dim" not in kinds(planned(flash="0.2ms"))
+
+
+@pytest.mark.parametrize(("third", "warned"), [([0.0, 0.6, 0.8], False), ([-0.6, 0.02, 0.8], True)])
+def test_lights_that_will_stand_in_one_plane_are_warned_of(tmp_path: Path, third: list[float], warned: bool) -> None:
+    places = {"key": [0.6, 0.0, 0.8], "left": [0.1, 0.0, 0.995], "right": third}
+    tables = "".join(f'[[light]]\nname = "{name}"\ndirection = {at}\nintensity = 1.0\n' for name, at in places.items())
+    (tmp_path / "rig.toml").write_text('schema = "psvideo-rig/1"\n' + tables, encoding="utf-8")
+    shoot = capture_plan(parse_request(words()), rig=tmp_path / "rig.toml")
+    assert any(caution.kind == "rig" and "in one plane" in caution.text for caution in shoot.cautions) == warned
 
 
 def test_three_frame_flashes_come_with_the_durations_of_equation_11() -> None:

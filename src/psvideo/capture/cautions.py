@@ -12,6 +12,10 @@ from psvideo.model.plan import Plan
 from psvideo.model.shoot_figures import SEIZURE_HZ, LightFigures, ShootFigures, SlotFigures
 from psvideo.model.units import NTSC, show_rate, show_seconds
 
+LEAST_LIGHTS = 3
+MOST_STOPS = 6.0
+"""A flash of a 64th of the exposure needs 64 times the light of a lamp that would do if it were left on."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Caution:
@@ -30,6 +34,8 @@ def request_cautions(request: ShootRequest) -> tuple[Caution, ...]:
 def shoot_cautions(plan: Plan, figures: ShootFigures, *, limits: Limits | None = None) -> tuple[Caution, ...]:
     """Return what is to be said about the plan itself, whoever wrote it."""
     return (
+        *_about_the_lights(plan),
+        *_about_the_light_of_a_flash(figures),
         *_about_the_marker(plan),
         *_about_seizures(figures),
         *_about_the_margin(plan, figures),
@@ -78,6 +84,29 @@ def _about_the_rate(request: ShootRequest) -> Iterator[Caution]:
             "fps",
             f"Many cameras that say {fps} fps record {float(exact):.5g}, 999 ppm slower, which is more than a crystal "
             f"clock is off. If yours does, write `fps` {exact}.",
+        )
+
+
+def _about_the_lights(plan: Plan) -> Iterator[Caution]:
+    names = plan.lights
+    if len(names) < LEAST_LIGHTS:
+        yield _warning(
+            "lights",
+            f"Normals need three lights that do not lie in one plane with the subject, and the plan has {len(names)} "
+            f"({', '.join(names) or 'none'}): plates and relit views come, normals do not. Add lights.",
+        )
+
+
+def _about_the_light_of_a_flash(figures: ShootFigures) -> Iterator[Caution]:
+    dim = [slot for slot in figures.slots if not slot.is_dark and (slot.stops or 0.0) > MOST_STOPS]
+    if dim:
+        worst = max(dim, key=lambda slot: slot.stops or 0.0)
+        enough_s = worst.duration_s * 2 ** ((worst.stops or 0.0) - MOST_STOPS)
+        yield _warning(
+            "dim",
+            f"A flash of {show_seconds(worst.duration_s)} gives {worst.light_share:.2%} of the light of the same lamp "
+            f"left on, {worst.stops:.1f} stops less: noise will show in the normals unless the lamps are "
+            f"made for it. Flash for {show_seconds(enough_s)} and more, bring the lamps closer, or film slower.",
         )
 
 
@@ -146,8 +175,8 @@ def _about_blind_time(plan: Plan, figures: ShootFigures) -> Iterator[Caution]:
         yield _warning(
             "blind",
             f"At a shutter of {plan.camera.shutter_deg:.4g} degrees {figures.missing_row_share:.0%} of the rows of "
-            "each plate "
-            "never see its flash, and stay holes. Set the shutter to 360 degrees.",
+            "each plate never see its flash. Where the subject stands still they come from the rounds before and "
+            "after; what moves in them is lost. Set the shutter to 360 degrees.",
         )
 
 

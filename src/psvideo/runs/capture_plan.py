@@ -1,12 +1,21 @@
 """The whole of ``psvideo capture-plan``: what is wanted of a shoot in, its plan out."""
 
+from dataclasses import replace
 from pathlib import Path
 
+from psvideo.capture.cautions import LEAST_LIGHTS, Caution
 from psvideo.capture.drawing.diagram import check_diagram_name, write_diagram
 from psvideo.capture.planning import Shoot, plan_shoot
 from psvideo.capture.request import ShootRequest
+from psvideo.errors import PsvideoError
 from psvideo.formats.plan_toml import format_plan
+from psvideo.formats.rig_toml import read_rig
 from psvideo.formats.whole_files import PICTURE_MARK, refuse_existing, write_text
+from psvideo.model.ground import ground_of
+from psvideo.model.intensity import lights_as_planned
+from psvideo.model.near_light import is_near
+from psvideo.model.plan import Plan
+from psvideo.solve.normals.illumination import illumination
 
 MARK = "psvideo-plan/"
 """By which a file is known for a plan, which may be replaced."""
@@ -16,14 +25,16 @@ def capture_plan(
     request: ShootRequest,
     *,
     out: Path | str | None = None,
+    rig: Path | str | None = None,
     diagram: str | None = None,
     force: bool = False,
 ) -> Shoot:
     """Plan a shoot, and write its plan and its timing diagram where they are asked for.
 
-    ``out`` is the plan.toml to write; ``diagram`` a picture of the timing (.svg or .png; "-" means text, and draws
-    none); ``force`` replaces either where it exists. Returns the shoot with its figures and ``cautions``: what may
-    spoil it. Raises UsageError where an output exists, or where wishes exclude each other.
+    ``out`` is the plan.toml to write; ``rig`` says where the lights will stand, which is held against what normals
+    need; ``diagram`` is a picture of the timing (.svg or .png; "-" means text, and draws none); ``force`` replaces
+    either where it exists. Returns the shoot with its figures and ``cautions``: what may spoil it. Raises UsageError
+    where an output exists, or where wishes exclude each other, and PsvideoError where the rig lacks a light.
     """
     plan_path, picture = None if out is None else Path(out), check_diagram_name(diagram)
     if plan_path is not None:
@@ -31,11 +42,29 @@ def capture_plan(
     if picture is not None:
         refuse_existing(picture, force=force, mark=PICTURE_MARK)
     shoot = plan_shoot(request)
+    if rig is not None:
+        shoot = replace(shoot, cautions=(*shoot.cautions, *_about_the_rig(shoot.plan, Path(rig))))
     if picture is not None:
         write_diagram(shoot.plan, picture)
     if plan_path is not None:
         write_text(plan_path, plan_text(shoot))
     return shoot
+
+
+def _about_the_rig(plan: Plan, path: Path) -> tuple[Caution, ...]:
+    """Say where the lights' places give no normals. Raises PsvideoError where the rig lacks a light of the plan."""
+    known = read_rig(path, plan_lights=plan.lights)
+    lights = lights_as_planned(known, plan)
+    if len(lights) < LEAST_LIGHTS:
+        return ()
+    camera = plan.camera
+    near = is_near(lights)
+    ground = ground_of(known, height_px=camera.height_px, width_px=camera.width_px) if near else None
+    try:
+        illumination(lights, channels=3, ground=ground)
+    except PsvideoError as fault:
+        return (Caution(kind="rig", level="warning", text=f"{path}: {fault}"),)
+    return ()
 
 
 def plan_text(shoot: Shoot) -> str:

@@ -40,6 +40,7 @@ def capture_plan(
     lights: option.Lights = "key,left,right",
     power: option.Power = "1",
     flash: option.Flash = None,
+    rig: option.LightsRig = None,
     max_blur: option.MaxBlur = None,
     speed: option.Speed = None,
     field_width: option.FieldWidth = None,
@@ -76,7 +77,7 @@ def capture_plan(
         return
     words = {field.name: context.params[field.name] for field in dataclasses.fields(ShootWords)}
     request = parse_request(ShootWords(**words))
-    shoot = plan_it(request, out=out, diagram=diagram, force=force)
+    shoot = plan_it(request, out=out, rig=rig, diagram=diagram, force=force)
     _deliver(shoot, out, voice)
     if request.preset is not None:
         voice.detail(f"readout of the {request.preset.name}: {request.preset.source}")

@@ -32,6 +32,9 @@ CameraClock = Annotated[float, _option(CAMERA, "--camera-clock-ppm", "Tolerance 
 Lights = Annotated[str, _option(LIGHTS, "--lights", "The lights' names, in the order in which they flash.")]
 Power = Annotated[str, _option(LIGHTS, "--power", "Power, above 0 and up to 1: 0.5, or key=1,left=0.5,right=0.5.")]
 Flash = Annotated[str | None, _option(LIGHTS, "--flash", "Flash duration: 0.8ms, or key=0.8ms,left=0.4ms,right=0.4ms.")]
+LightsRig = Annotated[
+    Path | None, _option(LIGHTS, "--rig", "Where the lights will stand: warns where they give no normals.")
+]
 MaxBlur = Annotated[float | None, _option(LIMITS, "--max-blur", "Largest blur in pixels; needs --speed.")]
 Speed = Annotated[str | None, _option(LIMITS, "--speed", "How fast the subject moves: 800 (px/s) or 0.5m/s.")]
 FieldWidth = Annotated[str | None, _option(LIMITS, "--field-width", "Width of what the camera sees, for m/s: 0.6m.")]
