@@ -9,6 +9,7 @@ from psvideo.clip.decode.malvar2004 import demosaic
 from psvideo.clip.depth_map import DepthMaps, open_depth
 from psvideo.clip.kept import Kept, keeping_near
 from psvideo.clip.mask import read_mask
+from psvideo.clip.mask_sequence import Masks, open_masks
 from psvideo.clip.opening import open_clip
 from psvideo.clip.reading import holds_plain_codes, parse_range, read_frames
 from psvideo.clip.record import Clip, Frame, holes
@@ -19,6 +20,7 @@ __all__ = [
     "DepthMaps",
     "Frame",
     "Kept",
+    "Masks",
     "Take",
     "check_take",
     "decoded_once",
@@ -28,6 +30,7 @@ __all__ = [
     "keeping_near",
     "open_clip",
     "open_depth",
+    "open_masks",
     "parse_range",
     "read_frames",
     "read_mask",

@@ -1,14 +1,10 @@
 """What normals are solved with, read and checked before a long run begins."""
 
-import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
-from psvideo.clip import DepthMaps, Take, open_depth, read_mask
+from psvideo.clip import DepthMaps, Masks, Take, open_depth, open_masks
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.result_files import Delivery
 from psvideo.export.tags import sha256_of
@@ -36,7 +32,7 @@ class Lighting:
     rig: Rig
     condition: float
     near: NearSurface | None = None
-    mask: NDArray[np.bool_] | None = None
+    masks: Masks | None = None
     depths: DepthMaps | None = None
     falloff: Falloff | None = None
 
@@ -90,8 +86,8 @@ class Lighting:
 
     @property
     def mask_sha256(self) -> str | None:
-        """The digest of the mask, None where there is none."""
-        return None if self.mask is None else hashlib.sha256(self.mask.tobytes()).hexdigest()
+        """The digest of the mask, or of all of a sequence; None where there is none."""
+        return None if self.masks is None else self.masks.sha256
 
 
 def read_lighting(
@@ -120,10 +116,11 @@ def read_lighting(
         rig, lights, height_px=clip.height_px, width_px=clip.width_px, iterations=near_iterations, depths=depths
     )
     lit = illumination(lights, channels=clip.channels, ground=None if near is None else near.ground)
-    mask = None if mask_path is None else read_mask(mask_path, width_px=clip.width_px, height_px=clip.height_px)
+    size = {"width_px": clip.width_px, "height_px": clip.height_px}
+    masks = None if mask_path is None else open_masks(mask_path, **size)
     falloff = None if flat_path is None else _read_falloff(flat_path, take, lights)
     return Lighting(
-        rig_path=rig_path, rig=rig, condition=lit.condition, near=near, mask=mask, depths=depths, falloff=falloff
+        rig_path=rig_path, rig=rig, condition=lit.condition, near=near, masks=masks, depths=depths, falloff=falloff
     )
 
 

@@ -91,7 +91,8 @@ def normals(
     - ``timing``: timing.json of this clip; left out, the flashes are found from the picture. ``first_light`` names the
       light of the clip's first complete flash, for plans without a marker.
     - ``frames``: file numbers to use, such as ``"1-100"`` or ``"1-100x2"``; left out, all.
-    - ``mask``: a picture of the frames' size, white where to solve. ``flat``: how light falls off over the picture,
+    - ``mask``: a picture of the frames' size, white where to solve, or a folder or numbered pattern
+      (``masks/mask.####.png``) with one per result. ``flat``: how light falls off over the picture,
       from ``calibrate flat-field``.
     - ``depth``: known depth, an EXR in metres along the optical axis or a 16-bit PNG in millimetres, or a folder with
       one per result; ``depth_scale``: metres per unit of it (left out: 1 for floats, 0.001 for integers).

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo import __version__
-from psvideo.clip import Clip, Take
+from psvideo.clip import Clip, Masks, Take
 from psvideo.export.tags import sha256_of
 from psvideo.formats.whole_files import write_text
 from psvideo.model.plan import Plan
@@ -43,7 +43,7 @@ class Solved:
     aligned: bool = False
 
 
-def observing(take: Take, rig: Rig | None = None, mask: NDArray[np.bool_] | None = None) -> Observed:
+def observing(take: Take, rig: Rig | None = None, masks: Masks | None = None) -> Observed:
     """Return what gathers the facts of a take's rounds; with a rig, it is held against the plates.
 
     Near lights are so only on the rig's plane: where depth is known instead, there may be none.
@@ -54,7 +54,7 @@ def observing(take: Take, rig: Rig | None = None, mask: NDArray[np.bool_] | None
     if rig is not None and not (near and None in (rig.focal_px, rig.principal_px, rig.plane)):
         size = {"height_px": clip.height_px, "width_px": clip.width_px}
         points = rig_points(clip.shown_plan, rig, channels=clip.channels, **size)
-    return Observed(lights=clip.plan.lights, mask=mask, points=points)
+    return Observed(lights=clip.plan.lights, masks=masks, points=points)
 
 
 def judgements(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = False) -> tuple[Judgement, ...]:

@@ -23,7 +23,7 @@ from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.gather import first_ambient, gather
-from psvideo.plates.sequence import AMBIENT
+from psvideo.plates.sequence import AMBIENT, coming
 from psvideo.report.observe.observed import InstantFacts
 from psvideo.report.run_report import RunReport
 from psvideo.runs.delivering import (
@@ -105,13 +105,16 @@ def normals_run(
 
     ``picture_of`` makes the picture of one round; left out, it shows plates and surface.
     """
-    clip, mask = take.clip, lighting.mask
+    clip = take.clip
     over_time = over_time or OverTime()
     over_time.check(clip.plan)
     check_delivery(delivery, take, timing, output.start_number)
+    if lighting.masks is not None and over_time.aligning.rate == "round":
+        coming_rounds = coming(clip.plan, timing.flashes, start=output.start_number).items()
+        lighting.masks.check(number for number, lights in coming_rounds if lights >= set(clip.plan.lights))
     tags = tags_of(clip, lighting.rig_path, delivery.space, over_time.aligning.rate)
     shaping = lighting.shaping if delivery.needs_depth else None
-    observed = observing(take, lighting.rig, mask)
+    observed = observing(take, lighting.rig, lighting.masks)
     picture: Pixels | None = None
     solving = _solving(solver, delivery, fill=fill)
     method = solving.method(len(clip.plan.lights))
@@ -137,7 +140,7 @@ def normals_run(
             rounds,
             clip.plan,
             lighting.rig,
-            mask=mask,
+            masks=lighting.masks,
             solving=solving,
             near=lighting.near,
             falloff=lighting.falloff,

@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.clip import Masks
 from psvideo.model.falloff import Falloff
 from psvideo.model.intensity import (
     image_evened,
@@ -52,7 +53,7 @@ def surfaces(
     plan: Plan,
     rig: Rig,
     *,
-    mask: NDArray[np.bool_] | None = None,
+    masks: Masks | None = None,
     solving: Solving = Solving(),
     near: NearSurface | None = None,
     falloff: Falloff | None = None,
@@ -60,8 +61,9 @@ def surfaces(
 ) -> Iterator[Instant]:
     """Solve every round that has a plate of each of the plan's lights; the clip's start and end cut the others.
 
-    ``near`` says where near lights find the surface, ``falloff`` what share of their light arrives where, ``asked``
-    which passes are made as well. Raises PsvideoError where the rig lacks a light, or its lights give no normals.
+    ``masks`` say where to solve, ``near`` where near lights find the surface, ``falloff`` what share of their light
+    arrives where, ``asked`` which passes are made as well. Raises PsvideoError where the rig lacks a light, its lights
+    give no normals, or a round has no mask.
     """
     lights = lights_as_planned(rig, plan)
     shares = None if falloff is None else [falloff.field(light.name) for light in lights]
@@ -71,6 +73,7 @@ def surfaces(
     def solved(one: Round) -> Instant:
         scaled = [per_saturation(light, plate.saturation) for light, plate in zip(lights, one.plates, strict=True)]
         light = partial(illumination, scaled, channels=1 if len(one.plates[0].shape) == 2 else 3)
+        mask = None if masks is None else masks.at(one.number)
         whole = all(plate.seen.ndim == 1 for plate in one.plates)
         seen = np.stack([plate.seen if whole else plate.pixels_seen for plate in one.plates])
         plates = _pictures(one, shares)

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.clip import Take, check_take
+from psvideo.clip import Masks, Take, check_take
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.model.choices import NEAR_ITERATIONS, Align, Solver
 from psvideo.model.intensity import lights_as_planned
@@ -84,4 +84,5 @@ def solve(
     found = named_by_rig(take, timing or find_take_timing(take, watch=watch), rig)
     rounds = gather(take, found, aligning=Aligning(align=align), with_ambient=False, watch=watch)
     solving = Solving(solver=solver, residual=True, error=True, fill=fill)
-    return surfaces(rounds, plan, rig, mask=mask, solving=solving, near=near)
+    masks = None if mask is None else Masks(still=mask)
+    return surfaces(rounds, plan, rig, masks=masks, solving=solving, near=near)

@@ -51,7 +51,13 @@ def normals(
     out: Annotated[Path, typer.Option("-o", "--out", help="The folder to write.")],
     plan: PlanPath = None,
     timing: TimingPath = None,
-    mask: Annotated[Path | None, typer.Option("--mask", help="A picture, white where to solve.")] = None,
+    mask: Annotated[
+        Path | None,
+        typer.Option(
+            "--mask",
+            help="A picture, white where to solve; or a folder or a numbered pattern (mask.####.png), one per result.",
+        ),
+    ] = None,
     flat: Annotated[
         Path | None, typer.Option(help="How light falls off over the picture, from psvideo calibrate flat-field.")
     ] = None,

@@ -146,17 +146,33 @@ def _missed(
     usual: NDArray[np.float64],
     alive: NDArray[np.bool_],
 ) -> Iterator[Judgement]:
+    """Say which lamps failed in which rounds; where nothing is lit under any of them, no single one is blamed."""
+    missed = level < MISSED * usual
+    empty = missed[:, alive].all(axis=1) & (alive.sum() > 1)
+    if empty.any():
+        named = _numbers([one.number for one, none in zip(facts, empty, strict=True) if none])
+        yield Judgement(
+            subject="lights",
+            grade="doubtful",
+            found=f"Nothing is lit in {int(empty.sum())} of {len(facts)} rounds ({named}): the subject left the "
+            "picture, or no light fired. Their results are empty.",
+            advice="Leave these frames out, or look at the strobe's log.",
+        )
     for k, light in enumerate(lights):
-        numbers = [one.number for one, value in zip(facts, level[:, k], strict=True) if value < MISSED * usual[k]]
+        numbers = [one.number for one, gone in zip(facts, missed[:, k] & ~empty, strict=True) if gone]
         if alive[k] and numbers:
-            more = f" and {len(numbers) - NAMED} more" if len(numbers) > NAMED else ""
-            named = ", ".join(map(str, numbers[:NAMED])) + more
             yield Judgement(
                 subject="lights",
                 grade="bad" if len(numbers) > 0.1 * len(facts) else "doubtful",
-                found=f"The light {light!r} failed or was covered in {len(numbers)} of {len(facts)} rounds ({named}).",
+                found=f"The light {light!r} failed or was covered in {len(numbers)} of {len(facts)} rounds "
+                f"({_numbers(numbers)}).",
                 advice="Check its driver and supply; these rounds' normals are wrong.",
             )
+
+
+def _numbers(numbers: Sequence[int]) -> str:
+    more = f" and {len(numbers) - NAMED} more" if len(numbers) > NAMED else ""
+    return ", ".join(map(str, numbers[:NAMED])) + more
 
 
 def _unsteady(

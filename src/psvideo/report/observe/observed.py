@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.clip import Masks
 from psvideo.model.surface import Misfit, Surface
 from psvideo.plates.ambient_regression import Separated
 from psvideo.plates.sequence import AMBIENT, LightPlate, Round
@@ -146,12 +147,12 @@ def _brightest(image: NDArray[np.float32]) -> NDArray[np.float32]:
 class Observed:
     """What was seen of a take so far; ``add`` takes in one round after the other.
 
-    ``mask`` is where to look, None for all that is lit; ``points`` is where the rig is held against the plates.
+    ``masks`` are where to look, None for all that is lit; ``points`` is where the rig is held against the plates.
     ``ambient_measured`` (window) is in which share of the picture ambient light could be measured without a dark slot.
     """
 
     lights: tuple[str, ...]
-    mask: NDArray[np.bool_] | None = None
+    masks: Masks | None = None
     points: RigPoints | None = None
     facts: list[InstantFacts] = field(default_factory=list)
     counts: dict[str, Counts] = field(default_factory=dict)
@@ -187,11 +188,12 @@ class Observed:
         """Take in one round, and the surface that was solved from it, if any."""
         if one.ambient is not None:
             self._look_at_dark(one.ambient)
-        seen = seen_of(one, self.mask)
+        mask = None if self.masks is None else self.masks.at(one.number)
+        seen = seen_of(one, mask)
         if not self._passed and one.plates[0].light == self.lights[0]:
             self._look_for_motion(one.plates[0])
         moving, changed = self._moving, self._change(surface)
-        facts = instant_facts(one, surface, self.mask, changed, seen=seen, moving=moving, dark=self._dark)
+        facts = instant_facts(one, surface, mask, changed, seen=seen, moving=moving, dark=self._dark)
         self.facts.append(facts)
         for plate, bright, shown in zip(one.plates, seen.bright, seen.shown, strict=True):
             counted = count_levels(bright[seen.subject & shown], plate.saturation)

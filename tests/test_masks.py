@@ -1,0 +1,142 @@
+"""Where to solve, as a sequence of masks; and takes that show nothing, or less than the plan says."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import psvideo as ps
+from psvideo.clip.decode.decoders import decode
+from psvideo.clip.mask_sequence import open_masks
+
+SIZE, NOISE = 64, 0.002
+DIRECTIONS = [[0.0, 0.0, 1.0], [0.6, 0.0, 0.8], [-0.6, 0.0, 0.8], [0.0, 0.6, 0.8], [0.0, -0.6, 0.8]]
+Picture = NDArray[np.float64]
+
+
+def plates(*, right_px: int = 0) -> list[Picture]:
+    """Return one round of a matte ball's plates, moved to the right."""
+    y, x = np.mgrid[:SIZE, :SIZE]
+    x, y = (x - SIZE / 2 + 0.5 - right_px) / 26, (SIZE / 2 - 0.5 - y) / 26
+    normals = np.stack([x, y, np.sqrt(np.maximum(1 - x**2 - y**2, 0))], axis=-1)
+    lit = [np.where(x**2 + y**2 < 1, 0.5 * np.maximum(normals @ np.array(one), 0), 0) for one in DIRECTIONS]
+    return [plate + noise() for plate in lit]
+
+
+def noise(seed: int = 1) -> Picture:
+    return np.random.default_rng(seed).normal(0.004, NOISE, (SIZE, SIZE))
+
+
+def take(folder: Path, frames: Sequence[Picture], *, rig: Sequence[Sequence[float]] = DIRECTIONS) -> Path:
+    """Write frames as a synced clip of five lights with its rig."""
+    folder.mkdir()
+    for number, frame in enumerate(frames):
+        codes = np.clip(frame * 60000 + 5000, 0, 65535).astype(np.uint16)
+        cv2.imwrite(str(folder / f"take.{number:04d}.png"), codes)
+    flashes = "".join(f"[[strobe.flash]]\nlights = {{ L{k} = 1.0 }}\n" for k in range(len(DIRECTIONS)))
+    camera = f"width_px = {SIZE}\nheight_px = {SIZE}\nfps = 24\ntransfer = 'linear'\nblack_level = 5000\n"
+    (folder / "plan.toml").write_text(
+        f"schema = 'psvideo-plan/1'\n[camera]\n{camera}[strobe]\nmode = 'synced'\n{flashes}"
+    )
+    lights = "".join(f"[[light]]\nname = 'L{k}'\ndirection = {list(one)}\n" for k, one in enumerate(rig))
+    (folder / "rig.toml").write_text(f"schema = 'psvideo-rig/1'\n{lights}")
+    return folder
+
+
+def solved(clip: Path, out: Path, **more: object) -> ps.PsvideoError | dict[str, list[dict[str, str]]]:
+    try:
+        ps.normals(clip, rig=clip / "rig.toml", out=out, align="none", **more)  # type: ignore[arg-type]
+    except ps.PsvideoError as fault:
+        return fault
+    report: dict[str, list[dict[str, str]]] = json.loads((out / "report.json").read_text())
+    return report
+
+
+def written(out: Path, name: str) -> list[NDArray[np.float32]]:
+    return [decode("exr", file).codes.astype(np.float32) for file in sorted((out / name).glob("*.exr"))]
+
+
+def masks(folder: Path, numbers: Sequence[int], *, size: int = SIZE, white: slice = slice(8, 40)) -> Path:
+    folder.mkdir()
+    for number in numbers:
+        image = np.zeros((size, size), np.uint8)
+        image[:, white.start + number % 10 : white.stop + number % 10] = 255
+        cv2.imwrite(str(folder / f"mask.{number:04d}.png"), image)
+    return folder
+
+
+@pytest.mark.parametrize("named", ["", "mask.####.png", "mask.%04d.png"])
+def test_every_result_has_its_own_mask(tmp_path: Path, named: str) -> None:
+    clip = take(tmp_path / "take", plates() + plates(right_px=2) + plates())
+    folder = masks(tmp_path / "masks", [1001, 1002, 1003])
+    assert not isinstance(solved(clip, tmp_path / "out", mask=folder / named), ps.PsvideoError)
+    for number, normals in zip((1001, 1002, 1003), written(tmp_path / "out", "normals"), strict=True):
+        mask = ps.read_mask(folder / f"mask.{number}.png")
+        assert normals[mask].any(axis=-1).all()
+        assert not normals[~mask].any()
+
+
+def test_a_mask_sequence_that_does_not_fit_is_refused_before_anything_is_solved(tmp_path: Path) -> None:
+    clip = take(tmp_path / "take", plates() + plates())
+    cases = {
+        "the masks have a hole: after number 1001, 2 of them are missing": masks(tmp_path / "a", [1001, 1004]),
+        "has no mask for result 1002; its files are numbered 1001 to 1001": masks(tmp_path / "b", [1001]),
+        "the mask is 32 x 32 pixels, and the frames are 64 x 64": masks(tmp_path / "c", [1001, 1002], size=32),
+        "black everywhere": masks(tmp_path / "d", [1001, 1002], white=slice(0, 0)),
+        "no file is named like this": tmp_path / "d" / "matte.####.png",
+        "there is no such folder of masks": tmp_path / "none" / "mask.####.png",
+    }
+    for said, path in cases.items():
+        fault = solved(clip, tmp_path / "out", mask=path)
+        assert isinstance(fault, ps.PsvideoError)
+        assert said in str(fault)
+        assert "\n" not in str(fault)
+        assert not (tmp_path / "out").exists()
+
+
+def test_a_mask_sequence_is_known_by_all_its_pictures(tmp_path: Path) -> None:
+    size = {"width_px": SIZE, "height_px": SIZE}
+    one = open_masks(masks(tmp_path / "a", [1001, 1002]), **size)
+    other = open_masks(masks(tmp_path / "b", [1001, 1003 - 1], white=slice(9, 40)), **size)
+    assert one.sha256 != other.sha256
+
+
+def judged(report: object, subject: str) -> str:
+    assert isinstance(report, dict)
+    return " ".join(f"{one['grade']}: {one['found']}" for one in report["judgements"] if one["subject"] == subject)
+
+
+def test_a_take_that_is_all_noise_gives_no_normal_and_says_why(tmp_path: Path) -> None:
+    clip = take(tmp_path / "take", [noise(seed) for seed in range(5)])
+    report = solved(clip, tmp_path / "out", aov=["alpha"])
+    assert judged(report, "exposure").startswith("bad: ")
+    assert judged(report, "validity").startswith("bad: Only 0 %")
+    assert not any(
+        picture.any() for name in ("normals", "albedo", "alpha") for picture in written(tmp_path / "out", name)
+    )
+
+
+def test_a_light_that_never_fires_is_named(tmp_path: Path) -> None:
+    one = plates()
+    one[2] = noise(7) - 0.004
+    assert "bad: The light 'L2' gives no light" in judged(
+        solved(take(tmp_path / "take", one), tmp_path / "out"), "lights"
+    )
+
+
+def test_lights_in_another_order_than_the_rig_s_do_not_fit_the_plates(tmp_path: Path) -> None:
+    clip = take(tmp_path / "take", plates(), rig=DIRECTIONS[1:] + DIRECTIONS[:1])
+    said = judged(solved(clip, tmp_path / "out"), "rig")
+    assert "lights exchanged" in said or "does not fit the plates" in said
+
+
+def test_a_subject_that_leaves_the_picture_leaves_an_empty_result_that_is_said_once(tmp_path: Path) -> None:
+    clip = take(tmp_path / "take", plates() + plates() + [noise(seed) for seed in range(5)])
+    said = judged(solved(clip, tmp_path / "out", aov=["alpha"]), "lights")
+    assert said.startswith("doubtful: Nothing is lit in 1 of 3 rounds (1003): the subject left the picture")
+    assert "failed" not in said
+    assert not any(written(tmp_path / "out", name)[2].any() for name in ("normals", "albedo", "alpha"))
