@@ -1,7 +1,7 @@
 """What each program wants of a delivery, and the note that lies beside it on how to load it.
 
 What a note says of Blender was seen in Blender itself (tests/test_clients_blender.py); of Nuke, Unreal and Houdini it
-follows their manuals.
+follows their manuals; the script for Nuke is checked by its arithmetic (tests/test_nuke.py).
 """
 
 from collections.abc import Sequence
@@ -127,6 +127,8 @@ def _nuke(made: Delivered) -> tuple[Sequence[str], Sequence[str]]:
     )
     return (
         [
+            f"Open {made.clip}.nk, which lies beside this note: the sequences read as they must be, a relighting group "
+            "for every light of the shoot (drag its direction and colour), and their sum. Or by hand:",
             f"Read: {files}, range {made.first}-{made.last}; tick Raw Data. Set the project to "
             f"{float(made.fps):.6g} fps.",
             "The parts of the file are layers of these names: normals, albedo, valid, position. x, y, z are in red, "

@@ -9,16 +9,25 @@ from fractions import Fraction
 from pathlib import Path
 from urllib.parse import quote
 
+import numpy as np
+
 from psvideo.clip import Clip
 from psvideo.clip.folder import number_of
 from psvideo.compute.progress import Watch
+from psvideo.export.nuke_script import ScriptLight, nuke_script, script_name
 from psvideo.export.otio import Footage, Images, timeline_text
 from psvideo.export.programs import Delivered, note, note_name
 from psvideo.export.result_files import MOVIE_SUFFIXES, Delivery
+from psvideo.export.space import Space, placed
 from psvideo.formats.whole_files import write_text
 from psvideo.model.choices import Codec, Preview
+from psvideo.model.ground import ground_of
+from psvideo.model.intensity import lights_as_planned
+from psvideo.model.near_light import is_near
+from psvideo.model.rig import Rig
 from psvideo.runs.caller import Caller
 from psvideo.runs.previews import Shown, preview_name, write_preview
+from psvideo.solve.normals.illumination import illumination
 
 OTHER_RATES = ("flashes",)
 """Folders whose pictures do not come once an instant."""
@@ -60,12 +69,40 @@ def write_previews(
             write_preview(path, preview, instants, fps=run.fps, codec=codec, watch=watch)
 
 
-def write_note(run: Finished, delivery: Delivery, *, first: int, last: int, metric: bool, caller: Caller) -> None:
-    """Write how to load the delivery into the program that it is for, in the caller's words."""
+def write_note(
+    run: Finished, delivery: Delivery, rig: Rig, *, first: int, last: int, metric: bool, caller: Caller
+) -> None:
+    """Write how to load the delivery into the program that it is for, in the caller's words; for Nuke a script too."""
     if delivery.program is None:
         return
-    made = Delivered(clip=run.clip.name, first=first, last=last, fps=run.fps, metric=metric, delivery=delivery)
+    clip = run.clip
+    made = Delivered(clip=clip.name, first=first, last=last, fps=run.fps, metric=metric, delivery=delivery)
     write_text(run.folder / note_name(delivery.program), caller.spell(note(delivery.program, made)))
+    if delivery.program == "nuke":
+        lights = lights_seen(rig, clip, delivery.space)
+        script = nuke_script(made, lights, width_px=clip.width_px, height_px=clip.height_px)
+        write_text(run.folder / script_name(clip.name), script)
+
+
+def lights_seen(rig: Rig, clip: Clip, space: Space) -> tuple[ScriptLight, ...]:
+    """Return the shoot's lights in the frame of delivered normals, near ones as the middle of the surface sees them.
+
+    None where the camera moves through the world: then they have no one direction.
+    """
+    if space.moving is not None:
+        return ()
+    lights = lights_as_planned(rig, clip.plan)
+    near = is_near(lights)
+    ground = ground_of(rig, height_px=clip.height_px, width_px=clip.width_px) if near and rig.plane else None
+    if near and ground is None:
+        return ()
+    lit = illumination(lights, channels=3 if clip.channels == 3 else 1, ground=ground)
+    strengths = np.broadcast_to(lit.intensities, (len(lights), 3))
+    directions = placed(lit.directions, space)
+    return tuple(
+        ScriptLight(name=light.name, direction=tuple(map(float, direction)), colour=tuple(map(float, colour)))
+        for light, direction, colour in zip(lights, directions, strengths, strict=True)
+    )
 
 
 def _sequences(folder: Path) -> dict[str, dict[int, Path]]:

@@ -20,6 +20,7 @@ from psvideo.formats.timing_json import format_timing
 from psvideo.formats.whole_files import write_text
 from psvideo.model.choices import Solver
 from psvideo.model.plan import Plan
+from psvideo.model.rig import Rig
 from psvideo.model.timing import Timing
 from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.gather import first_ambient, gather
@@ -121,7 +122,7 @@ def normals_run(
     asked = passes_asked(delivery)
     with (
         folder_of(output) as folder,
-        _at_the_end(folder, take, output, observed.facts, delivery, tags, shaping, watch),
+        _at_the_end(folder, take, output, observed.facts, delivery, tags, shaping, lighting.rig, watch),
         writing() as write,
     ):
         mixed = delivery.mix.of(AMBIENT) > 0
@@ -199,6 +200,7 @@ def _at_the_end(
     delivery: Delivery,
     tags: Tags,
     shaping: Shaping | None,
+    rig: Rig,
     watch: Watch,
 ) -> Iterator[None]:
     """At the end of a block that wrote the files of all instants, make of them what needs them all."""
@@ -215,4 +217,4 @@ def _at_the_end(
     run = Finished(folder=folder, target=output.folder, clip=clip, fps=tags.fps, first_time_s=facts[0].time_s)
     write_previews(run, delivery.previews, delivery.codec, [f"plates/{light}" for light in clip.plan.lights], watch)
     write_timeline(run)
-    write_note(run, delivery, first=facts[0].number, last=facts[-1].number, metric=metric, caller=output.caller)
+    write_note(run, delivery, rig, first=facts[0].number, last=facts[-1].number, metric=metric, caller=output.caller)
