@@ -66,8 +66,8 @@ class ScriptLight:
     """A lamp of the script: its name, where it stands as seen from the surface, and its colour."""
 
     name: str
-    direction: tuple[float, float, float]
-    colour: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    direction: Sequence[float]
+    colour: Sequence[float] = (1.0, 1.0, 1.0)
 
 
 ANY_LIGHT = ScriptLight(name="key", direction=(0.4, 0.5, 0.768))

@@ -100,7 +100,7 @@ def lights_seen(rig: Rig, clip: Clip, space: Space) -> tuple[ScriptLight, ...]:
     strengths = np.broadcast_to(lit.intensities, (len(lights), 3))
     directions = placed(lit.directions, space)
     return tuple(
-        ScriptLight(name=light.name, direction=tuple(map(float, direction)), colour=tuple(map(float, colour)))
+        ScriptLight(name=light.name, direction=direction.tolist(), colour=colour.tolist())
         for light, direction, colour in zip(lights, directions, strengths, strict=True)
     )
 
