@@ -124,11 +124,12 @@ def _kernel(sets: list[list[np.ndarray]], pool: ThreadPoolExecutor) -> Callable[
     lights = len(sets[0])
     lit = Illumination(directions=_ring(lights), intensities=np.ones((lights, 1)))
     result = empty_result(PIXELS, 1, half=True, residual=False)
-    given = itertools.cycle([task(plates, lit, None, None, Usable(), 0.0, 1 / 65535) for plates in sets])
+    tasks = [task(plates, lit, None, None, Usable(), 0.0, 1 / 65535) for plates in sets]
+    given = itertools.cycle(zip(tasks, sets, strict=True))  # a task holds its plates' addresses only
     edges = np.linspace(0, ROWS, BANDS + 1).astype(int).tolist()
 
     def run() -> None:
-        now = next(given)
+        now, _ = next(given)
         list(
             pool.map(
                 lambda band: solve_rows(now, result, working_memory(now), band[0], band[1]), itertools.pairwise(edges)

@@ -303,6 +303,21 @@ def test_neither_threads_nor_neighbours_change_a_pixel(channels: int) -> None:
     np.testing.assert_allclose(other.normals[:, untouched], one.normals[:, untouched], atol=2e-6)
 
 
+def test_pixels_whose_measurements_are_all_usable_come_out_as_the_general_rule_solves_them() -> None:
+    """One pixel of every row that a light did not show has the row solved by the rule for single pixels."""
+    rng = np.random.default_rng(8)
+    for lights in (3, 4, 7):
+        lit = lit_by(ring(lights, 30), rng.uniform(0.5, 1.5, (lights, 3)))
+        plates = rng.uniform(0.3, 0.7, (lights, 6, 100, 3)).astype(np.float32)
+        seen = np.ones((lights, 6, 100), np.bool_)
+        seen[0, :, 0] = False
+        quick, general = (solve(list(plates), lit, seen=one) for one in (None, seen))
+        assert (quick.valid == general.valid)[:, 1:].all()
+        assert np.abs(quick.normals - general.normals)[:, 1:].max() < 1e-5
+        for name in ("albedo", "residual"):
+            assert np.abs(getattr(quick, name) - getattr(general, name))[:, 1:].max() < 1e-5
+
+
 def test_codes_with_a_black_level_and_half_floats_give_the_same_surface() -> None:
     normals, inside = ball(reach_deg=60)
     lit = lit_by(ring(8, 40))

@@ -52,6 +52,23 @@ def mix_rows(mix: MixtureArrays, rows: Places, out: Floats) -> None:
 
 
 @FUSED.kept
+def mix_pictures(mix: MixtureArrays, shares: Floats, taken: Floats, rows: Places, first: int, out: Floats) -> None:
+    """Make some ``rows`` of several pictures of the same frames and levels: ``out`` (picture, row, sample) begins with
+    the row ``first``. ``shares`` (picture, frame, row) and ``taken`` (picture, level, row) stand for those of ``mix``.
+    """
+    given = lent_mix(mix)
+    made, wanted, each, off = lent(out), lent(rows), lent(shares), lent(taken)
+    for place in range(wanted.shape[0]):
+        row = wanted[place]
+        for picture in range(made.shape[0]):
+            one = MixtureArrays(
+                given.frames, given.like, given.samples, each[picture], given.table, given.zero, given.gain, given.most,
+                given.levels, off[picture], given.ceiling, given.clips_from,
+            )  # fmt: skip
+            mix_row(one, row, made[picture, row - first])
+
+
+@FUSED.kept
 def mix_halved(mix: MixtureArrays, first: int, last: int, channels: int, out: Floats) -> None:
     """Make pairs of rows, and of them the mean over two by two pixels and all channels: ``out`` (row // 2, col // 2).
 

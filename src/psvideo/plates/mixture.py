@@ -17,7 +17,7 @@ from psvideo.compute.threads import over_ranges
 from psvideo.model.camera import FloatArray
 from psvideo.model.clipping import SATURATED
 from psvideo.model.coded import IDENTITY, Coded, Image
-from psvideo.plates.mixing_kernel import COUNTS, MixtureArrays, mix_halved, mix_rows
+from psvideo.plates.mixing_kernel import COUNTS, MixtureArrays, mix_halved, mix_pictures, mix_rows
 
 BAND_SAMPLES = 1 << 20
 """Samples of one band of rows, which a thread makes at a time."""
@@ -157,24 +157,68 @@ class Mixture:
 def combined(pictures: Sequence[Mixture], shares: Sequence[float], *, ceiling: float) -> Mixture:
     """Return the sum of pictures, each times its share; ``ceiling`` where any of them is clipped in a sample that
     counts. A plate that lies in memory is clipped from 1.0 on."""
-    frames = list({id(frame): frame for one in pictures for frame in one.frames}.values())
-    levels = list({id(level): level for one in pictures for level in one.levels}.values())
-    coefficients, taken = (np.zeros((len(parts), pictures[0].shape[0])) for parts in (frames, levels))
-    places = {id(part): place for parts in (frames, levels) for place, part in enumerate(parts)}
-    for one, share in zip(pictures, shares, strict=True):
-        for frame, takes in zip(one.frames, one.coefficients, strict=True):
-            coefficients[places[id(frame)]] += share * takes
-        for level, takes in zip(one.levels, () if one.taken is None else one.taken, strict=True):
-            taken[places[id(level)]] += share * takes * one.coefficients.any(axis=0)
-    clips_from = min(1.0, *(one.clips_from for one in pictures))
+    parts = _Parts.of(pictures)
+    taken = [part.any(axis=0) for part in parts.shares]
+    each = np.array(shares)
     return Mixture(
-        frames=tuple(frames),
-        coefficients=coefficients,
-        levels=tuple(levels),
-        taken=taken,
+        frames=parts.frames,
+        coefficients=np.tensordot(each, parts.shares, 1),
+        levels=parts.levels,
+        taken=np.tensordot(each, parts.taken * np.array(taken)[:, None], 1),
         ceiling=ceiling,
-        clips_from=clips_from,
+        clips_from=min(1.0, *(one.clips_from for one in pictures)),
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Parts:
+    """What several pictures are made of, each once: their frames and levels, and what every one takes of them,
+    ``shares`` (picture, frame, row) and ``taken`` (picture, level, row)."""
+
+    frames: tuple[Coded, ...]
+    levels: tuple[Image, ...]
+    shares: FloatArray
+    taken: FloatArray
+
+    @classmethod
+    def of(cls, pictures: Sequence[Mixture]) -> "_Parts":
+        frames = {id(frame): frame for one in pictures for frame in one.frames}
+        levels = {id(level): level for one in pictures for level in one.levels}
+        places = {key: place for parts in (frames, levels) for place, key in enumerate(parts)}
+        rows = pictures[0].shape[0]
+        shares, taken = (np.zeros((len(pictures), len(parts), rows)) for parts in (frames, levels))
+        for number, one in enumerate(pictures):
+            for frame, takes in zip(one.frames, one.coefficients, strict=True):
+                shares[number, places[id(frame)]] += takes
+            for level, takes in zip(one.levels, () if one.taken is None else one.taken, strict=True):
+                taken[number, places[id(level)]] += takes
+        return cls(frames=tuple(frames.values()), levels=tuple(levels.values()), shares=shares, taken=taken)
+
+
+def rows_maker(pictures: Sequence[Mixture]) -> Callable[[NDArray[np.intp], int, Image], None]:
+    """Return what makes rows of several pictures in the thread that calls it: ``make(rows, first, into)`` takes them in
+    rising order, and an array (picture, row, col[, channel]) that begins with the row ``first``."""
+    alike = {(one.ceiling, one.clips_from, one.shape, one.frames[0].codes.dtype, one.is_made) for one in pictures}
+    if len(alike) > 1 or pictures[0].is_made:
+        readers = [one.reader() for one in pictures]
+
+        def make_each(rows: NDArray[np.intp], first: int, into: Image) -> None:
+            whole = rows[-1] - rows[0] + 1 == len(rows)
+            spans = [(rows[0], rows[-1] + 1)] if whole else [(row, row + 1) for row in rows]
+            for read, made in zip(readers, into, strict=True):
+                for begin, end in spans:
+                    read(begin, end, made[begin - first : end - first])
+
+        return make_each
+    parts = _Parts.of(pictures)
+    together = replace(pictures[0], frames=parts.frames, coefficients=parts.shares[0], levels=parts.levels, taken=None)
+    mix = together.bound()
+    shares, taken = (np.ascontiguousarray(part, np.float32) for part in (parts.shares, parts.taken))
+
+    def make(rows: NDArray[np.intp], first: int, into: Image) -> None:
+        mix_pictures(mix, shares, taken, rows, first, into.reshape(*into.shape[:2], -1))
+
+    return make
 
 
 def _copying(image: Image) -> Reader:

@@ -6,19 +6,21 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
+from psvideo.model.coded import Image
 from psvideo.model.surface import Surface
-from psvideo.plates.mixture import Mixture, Reader
+from psvideo.plates.mixture import Mixture, rows_maker
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.task import Mask, Result, Samples, Task
 
 BAND_PIXELS = 1 << 16
 """Pixels of one band; fewer are solved before a thread has started."""
-MADE_PIXELS = 1 << 15
-"""Pixels of one band of plates that are made for it: those of a few lights stay in a core's second cache."""
-BANDS = 8
-"""So many of them are worked on by one thread, in the same memory."""
+MADE_SAMPLES = 1 << 19
+"""Samples of the plates that are made at a time, of all lights: they stay in a core's second cache."""
+BANDS_ROWS = 128
+"""A thread makes and solves about so many rows one after another, in the same memory."""
 
 
 def check_arrays(plates: Sequence[Samples], lit: Illumination, seen: Mask | None, mask: Mask | None) -> None:
@@ -46,11 +48,10 @@ def check_arrays(plates: Sequence[Samples], lit: Illumination, seen: Mask | None
 
 @dataclass(frozen=True, kw_only=True)
 class ShownPlates:
-    """A solver's plates, one per light: ``samples`` as arrays, or stand-ins of their shape with ``readers``, which make
-    the rows that are solved."""
+    """A solver's plates, one per light: ``samples`` as arrays, or stand-ins of their shape and what ``makes`` rows."""
 
     samples: list[Samples]
-    readers: tuple[Reader, ...] = ()
+    makes: Callable[[NDArray[np.intp], int, Image], None] | None = None
 
     @classmethod
     def of(cls, plates: Sequence[Samples] | Sequence[Mixture]) -> "ShownPlates":
@@ -58,7 +59,7 @@ class ShownPlates:
         mixtures = [plate for plate in plates if isinstance(plate, Mixture)]
         if mixtures:
             stand_ins: list[Samples] = [np.broadcast_to(np.float32(0), plate.shape) for plate in mixtures]
-            return cls(samples=stand_ins, readers=tuple(plate.reader() for plate in mixtures))
+            return cls(samples=stand_ins, makes=rows_maker(mixtures))
         return cls(samples=[np.ascontiguousarray(plate) for plate in plates])
 
     @property
@@ -75,29 +76,26 @@ class ShownPlates:
         plates did. (Numba's own thread pool may abort when two use it.)
         """
         rows, cols = self.shape[:2]
-        if not self.readers:
+        make = self.makes
+        if make is None:
             over_ranges(partial(run, given), rows, each=BAND_PIXELS // cols, threads=threads)
             return
 
-        made_rows = max(MADE_PIXELS // cols, 1)
+        lights, samples = len(self.samples), int(np.prod(self.shape[1:]))
+        made_rows = max(MADE_SAMPLES // (lights * samples), 1)
 
         def bands(begin: int, end: int) -> None:
-            held = np.empty((len(self.readers), made_rows, *self.shape[1:]), np.float32)
+            held = np.empty((lights, made_rows, *self.shape[1:]), np.float32)
+            begins = np.array([plate.ctypes.data for plate in held], np.intp)
+            begins = np.pad(begins, (0, len(given.plates) - lights), mode="edge")
             for first in range(begin, end, made_rows):
                 last = min(first + made_rows, end)
-                for read, into in zip(self.readers, held, strict=True):
-                    for one, other in _runs(first, last, step):
-                        read(one, other, into[one - first : other - first])
-                begins = np.array([plate.ctypes.data - first * held.strides[1] for plate in held], np.intp)
-                copies = len(given.plates) - len(begins)
-                run(given._replace(plates=np.pad(begins, (0, copies), mode="edge")), first, last)
+                wanted = np.arange(-(-first // step) * step, last, step)
+                if len(wanted):
+                    make(wanted, first, held)
+                    run(given._replace(plates=begins - first * held.strides[1]), first, last)
 
-        over_ranges(bands, rows, each=BANDS * made_rows, threads=threads)
-
-
-def _runs(first: int, last: int, step: int) -> list[tuple[int, int]]:
-    """Return the rows that are needed, as runs from the first up to the last."""
-    return [(first, last)] if step == 1 else [(row, row + 1) for row in range(-(-first // step) * step, last, step)]
+        over_ranges(bands, rows, each=-(-BANDS_ROWS // made_rows) * made_rows, threads=threads)
 
 
 def surface_of(result: Result, error: Samples | None, shape: tuple[int, ...], *, half: bool) -> Surface:

@@ -17,4 +17,5 @@ SLIGHTLY_MORE = np.float32(1.000001)
 # The planes of the working array: g, later the normal; what deciding on measurements needs; the normal equations.
 X, Y, Z, ALBEDO, LIMIT, LOW, HIGH, SUM, COUNT = (BLOCK * plane for plane in range(9))
 XX, XY, XZ, YY, YZ, ZZ = (BLOCK * plane for plane in range(9, 15))
-PLANES = 15
+SUMS = 15 * BLOCK  # of three channels, what colour_kernel.py adds up: three planes each
+PLANES = 24

@@ -18,14 +18,11 @@ from psvideo.solve.normals.blocks import (
     ALBEDO,
     BLOCK,
     COUNT,
-    HIGH,
     LEAST_Z,
     LIMIT,
-    LOW,
     MISSING,
     ONE,
     PLANES,
-    SLIGHTLY_MORE,
     SUM,
     THREE,
     TINY,
@@ -40,9 +37,13 @@ from psvideo.solve.normals.blocks import (
     Y,
     Z,
 )
-from psvideo.solve.normals.measuring import all_seen, combine, gather_one, gather_three, hide_unseen, samples_of
+from psvideo.solve.normals.colour_kernel import albedo_from_sums, gather_all, residuals_of_all, solve_all
+from psvideo.solve.normals.grey_kernel import solve_grey
+from psvideo.solve.normals.measuring import all_seen, combine, gather_one, gather_three, hide_unseen
 from psvideo.solve.normals.near_kernel import at, of_light, place_lights
 from psvideo.solve.normals.task import Bytes, Floats, Near, Result, Samples, Task, Work
+
+COLOUR_STEP = 160  # pixels of three channels that are solved together: few enough to stay in the nearest cache
 
 
 def working_memory(task: Task) -> Work:
@@ -66,14 +67,16 @@ def solve_rows(task: Task, result: Result, work: Work, first: int, last: int) ->
     t = lent_task(task, work.matrix, work.per_strength)
     out = Result(lent(result.normals), lent(result.albedo), lent(result.valid), lent(result.residual))
     w, values, m = lent(work.planes), lent(work.values), lent(work.measurements)
+    step = BLOCK if t.tone.shape[1] == 1 else COLOUR_STEP
     for row in range(first, last):
-        for col in range(0, t.cols, BLOCK):
-            n = min(BLOCK, t.cols - col)
+        for col in range(0, t.cols, step):
+            n = min(step, t.cols - col)
+            summed = False
             if t.mask.size and not t.mask[row, col : col + n].any():
                 w[X : X + n], w[Y : Y + n], w[Z : Z + n] = ZERO, ZERO, ZERO
             else:
-                _solve_block(t, w, values, m, row, col, n, out.residual.size > 0)
-            store_block(t, out, w, values, m, row * t.cols + col, n)
+                summed = _solve_block(t, w, values, m, row, col, n, out.residual.size > 0)
+            store_block(t, out, w, values, m, row * t.cols + col, n, summed)
 
 
 @FUSED.inlined
@@ -94,13 +97,17 @@ def lent_task(task: Task, matrix: Floats, per_strength: Floats) -> Task:
 @FUSED.inlined
 def _solve_block(
     task: Task, w: Floats, values: Floats, m: Floats, row: int, col: int, n: int, keep_measurements: bool
-) -> None:
-    """Leave g in the planes X, Y, Z, all 0 where the pixel has no solution to be trusted."""
+) -> bool:
+    """Leave g in the planes X, Y, Z, all 0 where the pixel has no solution to be trusted.
+
+    Returned is whether three channels' sums are left as well (``colour_kernel.py``).
+    """
     start, channels = row * task.cols + col, task.tone.shape[1]
     place_lights(task.matrix, task.per_strength, task.near, row, col, n)
-    distant = task.near.depth.size == 0
-    done = distant and channels == 1 and all_seen(task.seen, row, col, n) and _solve_all_usable(task, w, start, n)
-    if not done or keep_measurements:
+    plain = task.near.depth.size == 0 and all_seen(task.seen, row, col, n)
+    summed = plain and channels == 3 and _solve_colours(task, w, values, m, start, n)
+    done = summed or (plain and channels == 1 and solve_grey(task, w, start, n))
+    if not done or (keep_measurements and not summed):
         if channels == 1:
             gather_one(task, values, start, n)
         else:
@@ -114,48 +121,12 @@ def _solve_block(
         for i in range(n):
             kept = ONE if task.mask[row, col + i] else ZERO
             w[X + i], w[Y + i], w[Z + i] = w[X + i] * kept, w[Y + i] * kept, w[Z + i] * kept
+    return summed
 
 
 @FUSED.inlined
-def _solve_all_usable(task: Task, w: Floats, start: int, n: int) -> bool:
-    """Solve a block of one channel as if all measurements were usable; False where one is not, or hardly is.
-
-    The test is stricter than the rule for single pixels: every measurement is taken as if its light were the strongest
-    or the weakest, and the shadow limit follows the largest instead of the mean. Who fails it is solved by the rule.
-    """
-    for k in range(0, len(task.plates), 3):
-        a, b, c = samples_of(task, k, start, n), samples_of(task, k + 1, start, n), samples_of(task, k + 2, start, n)
-        if k == 0:
-            _add_three(w, n, a, b, c, task.inverse, 0, False)
-        else:
-            _add_three(w, n, a, b, c, task.inverse, k, True)
-    (origin_x, origin_y, origin_z), (gain, offset, ceiling, _) = task.origin, task.tone[0, 0]
-    dark, least, most = task.dark, task.least, task.ratio * task.most
-    unusable = 0
-    for i in range(n):
-        x, y, z = w[X + i] + origin_x, w[Y + i] + origin_y, w[Z + i] + origin_z
-        w[X + i], w[Y + i], w[Z + i] = x, y, z
-        low, high = w[LOW + i] * gain + offset, w[HIGH + i] * gain + offset
-        in_shadow = low * least <= max(dark, high * most) * SLIGHTLY_MORE
-        unusable += in_shadow | (high >= ceiling) | (not x + y + z < -MISSING)
-    return bool(unusable == 0)
-
-
-@FUSED.inlined
-def _add_three(w: Floats, n: int, a: Samples, b: Samples, c: Samples, inverse: Floats, k: int, begun: bool) -> None:
-    """Add three lights' samples, from light k, to g; beside it the lowest and the highest sample."""
-    (xp, yp, zp), (xq, yq, zq), (xr, yr, zr) = inverse[k], inverse[k + 1], inverse[k + 2]
-    for i in range(n):
-        low, high = np.float32(min(a[i], min(b[i], c[i]))), np.float32(max(a[i], max(b[i], c[i])))
-        p, q, r = np.float32(a[i]), np.float32(b[i]), np.float32(c[i])
-        x = xp * p + xq * q + xr * r
-        y = yp * p + yq * q + yr * r
-        z = zp * p + zq * q + zr * r
-        w[X + i] = w[X + i] + x if begun else x
-        w[Y + i] = w[Y + i] + y if begun else y
-        w[Z + i] = w[Z + i] + z if begun else z
-        w[LOW + i] = min(w[LOW + i], low) if begun else low
-        w[HIGH + i] = max(w[HIGH + i], high) if begun else high
+def _solve_colours(task: Task, w: Floats, values: Floats, m: Floats, start: int, n: int) -> bool:
+    return gather_all(task, w, values, start, n) and solve_all(task, w, values, m, n)
 
 
 @FUSED.inlined
@@ -230,18 +201,28 @@ def _solve_normal_equations(w: Floats, n: int, condition_squared: np.float32) ->
 
 
 @FUSED.inlined
-def store_block(task: Task, result: Result, w: Floats, values: Floats, m: Floats, start: int, n: int) -> None:
+def store_block(
+    task: Task, result: Result, w: Floats, values: Floats, m: Floats, start: int, n: int, summed: bool
+) -> None:
+    """From g to what is stored; ``summed``: all measurements count, and three channels' sums are there."""
     end = start + n
     x, y, z = result.normals[0, start:end], result.normals[1, start:end], result.normals[2, start:end]
     _store_normals(w, n, x, y, z, result.albedo[0, start:end], result.valid[start:end], task.albedo_scale)
     if result.residual.size:
         w[XX : XX + n], w[XY : XY + n] = ZERO, ZERO
     for channel in range(task.tone.shape[1]):
+        if summed:
+            break
         if task.tone.shape[1] > 1:
             _albedo_given_normal(task, w, values, m, channel, n, result.albedo[channel, start:end])
         if result.residual.size:
             _add_residual(task, w, values, m, channel, n)
+    if summed:
+        red, green, blue = result.albedo[0, start:end], result.albedo[1, start:end], result.albedo[2, start:end]
+        albedo_from_sums(task, w, n, red, green, blue)
     residual = result.residual[start:end]
+    if summed and result.residual.size:
+        residuals_of_all(task, w, values, n)
     for i in range(len(residual)):
         error = np.sqrt(w[XX + i] / max(w[XY + i], ONE))
         residual[i] = encoded(error if abs(w[X + i]) + abs(w[Y + i]) + abs(w[Z + i]) > ZERO else ZERO, residual)

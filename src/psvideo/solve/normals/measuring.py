@@ -7,8 +7,8 @@ import numpy as np
 from numba.np.numpy_support import carray
 
 from psvideo.compute.compiled import FUSED
-from psvideo.compute.memory import pointer
-from psvideo.solve.normals.blocks import ABSENT, MISSING, ONE, SUM, XX, YY, ZERO, ZZ
+from psvideo.compute.memory import flattened, pointer
+from psvideo.solve.normals.blocks import ABSENT, BLOCK, MISSING, ONE, SUM, XX, YY, ZERO, ZZ
 from psvideo.solve.normals.task import Bytes, Floats, Samples, Task
 
 
@@ -35,9 +35,9 @@ def gather_one(task: Task, values: Floats, start: int, n: int) -> None:
 @FUSED.inlined
 def gather_three(task: Task, values: Floats, start: int, n: int) -> None:
     """Raw samples of three channels to measurements, a plane per light and channel; a light counts whole or not."""
+    line = flattened(values)
     for light in range(task.lights):
-        samples = samples_of(task, light, start, n)
-        red, green, blue = values[3 * light], values[3 * light + 1], values[3 * light + 2]
+        samples, v = samples_of(task, light, start, n), line[3 * BLOCK * light : 3 * BLOCK * (light + 1)]
         gain_r, offset_r, ceiling_r, _ = task.tone[light, 0]
         gain_g, offset_g, ceiling_g, _ = task.tone[light, 1]
         gain_b, offset_b, ceiling_b, _ = task.tone[light, 2]
@@ -46,9 +46,9 @@ def gather_three(task: Task, values: Floats, start: int, n: int) -> None:
             g = np.float32(samples[3 * i + 1]) * gain_g + offset_g
             b = np.float32(samples[3 * i + 2]) * gain_b + offset_b
             here = (r < ceiling_r) & (g < ceiling_g) & (b < ceiling_b) & (min(r, min(g, b)) > ABSENT)
-            red[i] = r if here else MISSING
-            green[i] = g if here else MISSING
-            blue[i] = b if here else MISSING
+            v[i] = r if here else MISSING
+            v[BLOCK + i] = g if here else MISSING
+            v[2 * BLOCK + i] = b if here else MISSING
 
 
 @FUSED.inlined

@@ -107,7 +107,7 @@ def solve_rows(
             else:
                 _solve_block(t, weights, w, v, values, m, e, flat, row, col, n)
             start = row * t.cols + col
-            kernel.store_block(t, out, w, values, m, start, n)
+            kernel.store_block(t, out, w, values, m, start, n, False)
             for i in range(min(n, len(predicted))):
                 predicted[start + i] = encoded(v[DOUBT + i] if out.valid[start + i] else ZERO, predicted)
             for i in range(min(n, len(unexplained))):
