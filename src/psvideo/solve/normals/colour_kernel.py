@@ -52,7 +52,7 @@ def gather_all(task: Task, w: Floats, values: Floats, start: int, n: int) -> boo
 
 
 @FUSED.inlined
-def _add_two(task: Task, w: Floats, values: Floats, start: int, n: int, light: int, begun: bool) -> int:
+def _add_two(task: Task, w: Floats, values: Floats, start: int, n: int, light: int, begun: bool) -> np.int32:
     """Two lights at a time, which halves the ways of the sums to memory and back; returns what cannot be used."""
     first, second = samples_of(task, light, start, n), samples_of(task, light + 1, start, n)
     (gain_r, add_r, top_r, _), (gain_g, add_g, top_g, _) = task.tone[light, 0], task.tone[light, 1]
@@ -91,7 +91,7 @@ def _begin_or_add(w: Floats, at: int, value: np.float32, begun: bool) -> None:
 
 
 @FUSED.inlined
-def _add_one(task: Task, w: Floats, values: Floats, start: int, n: int, light: int) -> int:
+def _add_one(task: Task, w: Floats, values: Floats, start: int, n: int, light: int) -> np.int32:
     """The last of an odd number of lights."""
     samples = samples_of(task, light, start, n)
     (gain_r, add_r, top_r, _), (gain_g, add_g, top_g, _) = task.tone[light, 0], task.tone[light, 1]
