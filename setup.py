@@ -1,5 +1,5 @@
-"""What building the package does beside pyproject.toml: it copies the scenes of data_synth/ into it, and a wheel gets
-loops that are compiled for the processor it is built on (docs/decisions/first-run.md)."""
+"""What building the package does beside pyproject.toml: it copies the scenes of data_synth/ and the add-on for Blender
+into it, and a wheel gets loops that are compiled for the processor it is built on (docs/decisions/first-run.md)."""
 
 import os
 import subprocess
@@ -11,20 +11,20 @@ from setuptools.command.build_py import build_py
 
 
 class BuildWithScenes(build_py):
-    """Build the package, with data_synth/*.toml as psvideo/synth/scenes/*.toml; for a wheel, with compiled loops."""
+    """Build the package with its scenes and the add-on; for a wheel, with compiled loops."""
 
     def run(self) -> None:
         super().run()
         if self.editable_mode:
             return  # a checkout reads data_synth/ itself
-        for scene, copy in self._scenes().items():
+        for file, copy in self._copies().items():
             self.mkpath(str(Path(copy).parent))
-            self.copy_file(scene, copy)
+            self.copy_file(file, copy)
         if self.distribution.get_command_obj("bdist_wheel", create=False):
             self._compile_loops()
 
     def get_outputs(self, include_bytecode: bool = True) -> list[str]:
-        return [*super().get_outputs(include_bytecode), *self._scenes().values()]
+        return [*super().get_outputs(include_bytecode), *self._copies().values()]
 
     def _compile_loops(self) -> None:
         """Compile loops beside their modules; where this Python cannot run psvideo, the first run does it."""
@@ -36,10 +36,14 @@ class BuildWithScenes(build_py):
         if subprocess.run(command, env=there | {"PYTHONPATH": os.pathsep.join(paths)}, check=False).returncode:
             self.warn("loops could not be compiled here, and will be by the first run (psvideo doctor --compile)")
 
-    def _scenes(self) -> dict[str, str]:
-        """Return the copy of every scene by its file."""
-        folder = Path(self.build_lib) / "psvideo" / "synth" / "scenes"
-        return {str(scene): str(folder / scene.name) for scene in sorted(Path("data_synth").glob("*.toml"))}
+    def _copies(self) -> dict[str, str]:
+        """Return the copy of every scene, and of the add-on for Blender, by its file."""
+        package = Path(self.build_lib) / "psvideo"
+        addons = Path("integrations/blender")
+        copies = {scene: package / "synth" / "scenes" / scene.name for scene in Path("data_synth").glob("*.toml")}
+        for file in (*addons.glob("*/*.py"), *addons.glob("*/*.toml")):
+            copies[file] = package / "export" / "blender" / file.relative_to(addons)
+        return {str(file): str(copy) for file, copy in sorted(copies.items())}
 
 
 setup(cmdclass={"build_py": BuildWithScenes})

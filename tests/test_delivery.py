@@ -300,7 +300,16 @@ NOTHING = Asked()
 def test_every_program_has_a_note_with_numbers_rate_colour_and_wrong_ways(name: Program) -> None:
     delivery, at_odds = delivery_of(replace(NOTHING, preset=name))
     assert at_odds == ()
-    made = Delivered(clip="take7", first=1001, last=1100, fps=Fraction(24000, 1001), metric=True, delivery=delivery)
+    made = Delivered(
+        clip="take7",
+        first=1001,
+        last=1100,
+        fps=Fraction(24000, 1001),
+        width_px=64,
+        height_px=48,
+        metric=True,
+        delivery=delivery,
+    )
     said = note(name, made)
     for words in ("1001", "1100", "23.976", "Known wrong ways", "take7", "sRGB" if delivery.png16 else "Raw"):
         assert words in said

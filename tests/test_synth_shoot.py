@@ -19,6 +19,8 @@ import tomlkit
 from psvideo.cli.app import main
 from psvideo.clip import open_clip, read_frames
 from psvideo.errors import PsvideoError, UsageError
+from psvideo.export.blender_addon import NAME as ADDON
+from psvideo.export.blender_addon import addon_folder
 from psvideo.formats.contract import Contract
 from psvideo.formats.plan_toml import read_plan
 from psvideo.formats.rig_toml import read_rig
@@ -378,7 +380,7 @@ def test_a_file_goes_before_a_shipped_scene_of_its_name(tmp_path: Path, monkeypa
     assert scene_file(Path("bust.toml")) == Path("bust.toml")
 
 
-def test_a_built_package_holds_the_scenes_of_the_repository(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_built_package_holds_scenes_and_add_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
     ran: dict[str, Any] = {}
     monkeypatch.setattr(setuptools, "setup", lambda **given: ran.update(given))
@@ -393,6 +395,10 @@ def test_a_built_package_holds_the_scenes_of_the_repository(tmp_path: Path, monk
     copies = {path.name: path.read_bytes() for path in (tmp_path / "psvideo" / "synth" / "scenes").iterdir()}
     assert copies == {path.name: path.read_bytes() for path in SCENES}
     assert {str(tmp_path / "psvideo" / "synth" / "scenes" / name) for name in copies} <= set(command.get_outputs())
+    addon, source = (one / ADDON for one in (tmp_path / "psvideo" / "export" / "blender", addon_folder().parent))
+    assert {path.name: path.read_bytes() for path in addon.iterdir()} == {
+        path.name: path.read_bytes() for path in source.iterdir() if path.is_file()
+    }
 
 
 @pytest.mark.parametrize("name", sorted(CURVES))

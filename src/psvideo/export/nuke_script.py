@@ -6,10 +6,8 @@ as many inputs from it as it says, the first from the top, and puts itself there
 """
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
 
-from psvideo.export.programs import Delivered
+from psvideo.export.programs import Delivered, SeenLight
 from psvideo.export.result_files import result_name
 
 FOLDER = "[file dirname [value root.name]]"
@@ -61,16 +59,7 @@ end_group
 """
 
 
-@dataclass(frozen=True, kw_only=True)
-class ScriptLight:
-    """A lamp of the script: its name, where it stands as seen from the surface, and its colour."""
-
-    name: str
-    direction: Sequence[float]
-    colour: Sequence[float] = (1.0, 1.0, 1.0)
-
-
-ANY_LIGHT = ScriptLight(name="key", direction=(0.4, 0.5, 0.768))
+ANY_LIGHT = SeenLight(name="key", direction=(0.4, 0.5, 0.768))
 """The lamp of a script where the lights of the shoot cannot be said in the normals' frame."""
 
 
@@ -79,18 +68,19 @@ def script_name(clip: str) -> str:
     return f"{clip}.nk"
 
 
-def nuke_script(made: Delivered, lights: Sequence[ScriptLight], *, width_px: int, height_px: int) -> str:
+def nuke_script(made: Delivered) -> str:
     """Return the script: normals, albedo and valid read raw, one relighting group per light, and their sum.
 
     The sum's alpha is where normals are to be trusted. Directions are in the frame of the delivered normals.
     """
-    size = f"{width_px} {height_px} 0 0 {width_px} {height_px} 1 psvideo"
+    width, height = made.width_px, made.height_px
+    size = f"{width} {height} 0 0 {width} {height} 1 psvideo"
     parts = [_root(made, size)]
     for quantity in ("normals", "albedo", "valid"):
         parts.append(_read(made, quantity, size))
         parts.append(f"set {quantity} [stack 0]\n")
     parts.append("push $valid\n")
-    for place, light in enumerate(lights or [ANY_LIGHT]):
+    for place, light in enumerate(made.lights or [ANY_LIGHT]):
         parts.append(f"push $albedo\npush $normals\n{_group(light)}")
         if place:
             parts.append(f"Merge2 {{\n inputs 2\n operation plus\n name sum{place}\n}}\n")
@@ -115,7 +105,7 @@ def _read(made: Delivered, quantity: str, size: str) -> str:
     )
 
 
-def _group(light: ScriptLight) -> str:
+def _group(light: SeenLight) -> str:
     return GROUP.format(
         name=f"light_{re.sub(r'[^A-Za-z0-9_]', '_', light.name)}",
         direction=" ".join(f"{part:.7g}" for part in light.direction),

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
+from psvideo.export.blender_addon import ADDON_FILE
 from psvideo.export.result_files import Delivery, result_name
 from psvideo.model.choices import Program, SpaceName, YDirection
 from psvideo.model.quantities import Aov
@@ -57,15 +58,27 @@ PRESETS: dict[Program, Preset] = {
 
 
 @dataclass(frozen=True, kw_only=True)
+class SeenLight:
+    """A lamp as the middle of the surface sees it: the way to it in the frame of the normals, and its colour."""
+
+    name: str
+    direction: Sequence[float]
+    colour: Sequence[float] = (1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Delivered:
-    """What a note has to say of one delivery."""
+    """What other programs have to know of one delivery. ``lights`` are empty where they have no one direction."""
 
     clip: str
     first: int
     last: int
     fps: Fraction
+    width_px: int
+    height_px: int
     metric: bool
     delivery: Delivery
+    lights: tuple[SeenLight, ...] = ()
 
 
 def note_name(program: Program) -> str:
@@ -155,6 +168,9 @@ def _blender(made: Delivered) -> tuple[Sequence[str], Sequence[str]]:
     ]
     return (
         [
+            f"Edit > Preferences > Add-ons > Install from Disk: {ADDON_FILE}, which lies beside this note. Then File > "
+            "Import > psvideo results, and choose this folder's delivery.json: card, material, lights, camera, frame "
+            "rate and range come in as they must be. Or by hand:",
             f"Image Texture: open {exr}, Source = Image Sequence, Frames = {made.last - made.first + 1}, Start Frame = "
             f"1, Offset = {made.first - 1}, Auto Refresh on; Color Space = Non-Color; interpolation Closest.",
             f"Output properties: frame rate {float(made.fps):.6g}.",

@@ -14,12 +14,14 @@ import numpy as np
 from psvideo.clip import Clip
 from psvideo.clip.folder import number_of
 from psvideo.compute.progress import Watch
-from psvideo.export.nuke_script import ScriptLight, nuke_script, script_name
+from psvideo.export.blender_addon import ADDON_FILE, addon_zip
+from psvideo.export.delivery_json import DELIVERY_FILE, delivery_text
+from psvideo.export.nuke_script import nuke_script, script_name
 from psvideo.export.otio import Footage, Images, timeline_text
-from psvideo.export.programs import Delivered, note, note_name
+from psvideo.export.programs import Delivered, SeenLight, note, note_name
 from psvideo.export.result_files import MOVIE_SUFFIXES, Delivery
 from psvideo.export.space import Space, placed
-from psvideo.formats.whole_files import write_text
+from psvideo.formats.whole_files import whole_file, write_text
 from psvideo.model.choices import Codec, Preview
 from psvideo.model.ground import ground_of
 from psvideo.model.intensity import lights_as_planned
@@ -72,19 +74,31 @@ def write_previews(
 def write_note(
     run: Finished, delivery: Delivery, rig: Rig, *, first: int, last: int, metric: bool, caller: Caller
 ) -> None:
-    """Write how to load the delivery into the program that it is for, in the caller's words; for Nuke a script too."""
-    if delivery.program is None:
-        return
+    """Write delivery.json; for a program how to load the delivery into it, in the caller's words, and what does that:
+    a script for Nuke, an add-on for Blender."""
     clip = run.clip
-    made = Delivered(clip=clip.name, first=first, last=last, fps=run.fps, metric=metric, delivery=delivery)
-    write_text(run.folder / note_name(delivery.program), caller.spell(note(delivery.program, made)))
+    made = Delivered(
+        clip=clip.name,
+        first=first,
+        last=last,
+        fps=run.fps,
+        width_px=clip.width_px,
+        height_px=clip.height_px,
+        metric=metric,
+        delivery=delivery,
+        lights=lights_seen(rig, clip, delivery.space),
+    )
+    write_text(run.folder / DELIVERY_FILE, delivery_text(made, rig))
+    if delivery.program is not None:
+        write_text(run.folder / note_name(delivery.program), caller.spell(note(delivery.program, made)))
     if delivery.program == "nuke":
-        lights = lights_seen(rig, clip, delivery.space)
-        script = nuke_script(made, lights, width_px=clip.width_px, height_px=clip.height_px)
-        write_text(run.folder / script_name(clip.name), script)
+        write_text(run.folder / script_name(clip.name), nuke_script(made))
+    if delivery.program == "blender":
+        with whole_file(run.folder / ADDON_FILE) as beside:
+            beside.write_bytes(addon_zip())
 
 
-def lights_seen(rig: Rig, clip: Clip, space: Space) -> tuple[ScriptLight, ...]:
+def lights_seen(rig: Rig, clip: Clip, space: Space) -> tuple[SeenLight, ...]:
     """Return the shoot's lights in the frame of delivered normals, near ones as the middle of the surface sees them.
 
     None where the camera moves through the world: then they have no one direction.
@@ -100,7 +114,7 @@ def lights_seen(rig: Rig, clip: Clip, space: Space) -> tuple[ScriptLight, ...]:
     strengths = np.broadcast_to(lit.intensities, (len(lights), 3))
     directions = placed(lit.directions, space)
     return tuple(
-        ScriptLight(name=light.name, direction=direction.tolist(), colour=colour.tolist())
+        SeenLight(name=light.name, direction=direction.tolist(), colour=colour.tolist())
         for light, direction, colour in zip(lights, directions, strengths, strict=True)
     )
 
