@@ -27,6 +27,7 @@ if TYPE_CHECKING:  # what editors and type checkers see; _HOMES is the same for 
     from psvideo.runs.light_sets import read_images as read_images
     from psvideo.runs.normals import normals as normals
     from psvideo.runs.split import split as split
+    from psvideo.runs.stills import stills as stills
     from psvideo.runs.sync import sync as sync
     from psvideo.solve.depth.shaping import find_depth as find_depth
     from psvideo.solve.images import solve_images as solve_images
@@ -59,6 +60,7 @@ _HOMES = {
     "solve": "psvideo.solve.of_take",
     "solve_images": "psvideo.solve.images",
     "split": "psvideo.runs.split",
+    "stills": "psvideo.runs.stills",
     "sync": "psvideo.runs.sync",
 }
 """Where each name lives; after a colon, its name there where it has another one."""
@@ -80,6 +82,7 @@ __all__ = [  # noqa: RUF022  (in the order of the work)
     "sync",
     "split",
     "normals",
+    "stills",
     "check",
     "shoot",
     "Plan",

@@ -59,9 +59,9 @@ def find_stills(path: Path | Sequence[Path], *, lights: Sequence[str] = ()) -> L
     """
     folder = path if isinstance(path, Path) else path[0].parent
     files = pictures_in(path) if isinstance(path, Path) else list(path)
-    dark = [file for file in files if file.stem.lower() in AMBIENT_NAMES]
+    dark = [file for file in files if any(bears(file, name) for name in AMBIENT_NAMES) and file.stem not in lights]
     room = [file for file in files if file.stem.lower() in ROOM_NAMES]
-    masks = [file for file in files if any(_bears(file, name) for name in MASK_NAMES) and file.stem not in lights]
+    masks = [file for file in files if any(bears(file, name) for name in MASK_NAMES) and file.stem not in lights]
     files = [file for file in files if file not in dark and file not in room and file not in masks]
     if not files:
         kinds = ", ".join(sorted(KINDS))
@@ -69,7 +69,7 @@ def find_stills(path: Path | Sequence[Path], *, lights: Sequence[str] = ()) -> L
             f"{folder}: holds no pictures of lights. Expected still photographs, one per light ({kinds}), a folder of "
             "plates per light, or a clip with plan.toml."
         )
-    named = {light: [file for file in files if _bears(file, light)] for light in lights}
+    named = {light: [file for file in files if bears(file, light)] for light in lights}
     chosen = {light: found for light, found in named.items() if found} or _in_order(folder, _main_group(files), lights)
     _refuse_twice(folder, chosen)
     lacking = [light for light in lights if light not in chosen]
@@ -102,9 +102,11 @@ def _natural(name: str) -> list[tuple[int, str]]:
     return [(int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", name)]
 
 
-def _bears(file: Path, light: str) -> bool:
-    """True where a file's name is the light's, or ends with it after a mark: ``take3_key.png``, ``key.png``."""
-    return re.search(rf"(^|[^A-Za-z0-9]){re.escape(light)}$", file.stem) is not None
+def bears(file: Path, light: str) -> bool:
+    """True where a file's name is the light's, or ends with it after a mark: ``take3_key.png``, ``key.png``; words in
+    small letters also mean large ones (``DARK``)."""
+    wanted = re.escape(light)
+    return re.search(rf"(^|[^A-Za-z0-9])({wanted}|{wanted.upper()}|{wanted.capitalize()})$", file.stem) is not None
 
 
 def _main_group(files: list[Path]) -> list[Path]:

@@ -173,6 +173,20 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
             "psvideo normals clip/ --rig rig.toml --space world --camera-to-world shot.usd --preview relit -o out/",
         ),
     ),
+    "stills": (
+        (
+            "twelve photographs and a light list, no plan",
+            "psvideo stills photos/ --lights lights.lp -o out/",
+        ),
+        (
+            "a chrome ball at two places under the same lights",
+            "psvideo stills photos/ --sphere ball_left/ --sphere ball_right/ -o out/",
+        ),
+        (
+            "8-bit pictures that hold linear light, with a soft matte, and a page to relight them on",
+            "psvideo stills photos/ --lights rig.toml --transfer linear --aov alpha -o out/",
+        ),
+    ),
     "view": (
         ("scrub normals and albedo, and move a light over them", "psvideo view out/"),
         ("what Algorithm 1 of Hudon et al. (2015) makes of a clip, against this split", "psvideo view clip/"),

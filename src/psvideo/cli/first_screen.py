@@ -42,7 +42,9 @@ COMMANDS = (
         split="Rebuild one plate per flash and write one EXR sequence per light, ambient light taken off.",
     ),
     *_entries(
-        SOLVE, normals="Write normals, albedo and validity for every round of flashes; does sync and split by itself."
+        SOLVE,
+        normals="Write normals, albedo and validity for every round of flashes; does sync and split by itself.",
+        stills="Write normals, albedo and validity of photographs of a still scene, one per light; no plan is needed.",
     ),
     *_entries(
         LOOK,

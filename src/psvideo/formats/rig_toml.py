@@ -133,7 +133,8 @@ def read_rig(path: Path | str, *, plan_lights: Sequence[str] = ()) -> Rig:
         raise PsvideoError(
             f"{path}: vector {int(np.argmin(lengths)) + 1} has no length; expected directions to lights."
         )
-    strengths = _diligent_strengths(path, len(rows))
+    beside = _diligent_strengths(path, len(rows))
+    strengths = [tuple(row[3:6]) if len(row) == 6 else strength for row, strength in zip(rows, beside, strict=True)]
     names = _names(path, len(rows), plan_lights)
     lights = [
         Light(name=name, direction=_vector(vector), intensity=strength)
@@ -180,7 +181,8 @@ def _unit(values: Sequence[float]) -> Vector:
 
 def _numbers(path: Path, text: str) -> list[list[float]]:
     """Return the numbers of each line; words (an .lp file's picture names) are left out."""
-    rows = [[float(word) for word in line.split() if _is_number(word)] for line in text.splitlines()]
+    lines = [line.replace(",", " ").split() for line in text.splitlines()]
+    rows = [[float(word) for word in words if is_number(word)] for words in lines]
     rows = [row for row in rows if row]
     if not rows:
         raise PsvideoError(
@@ -189,7 +191,8 @@ def _numbers(path: Path, text: str) -> list[list[float]]:
     return rows
 
 
-def _is_number(word: str) -> bool:
+def is_number(word: str) -> bool:
+    """Return whether a word of a list is a finite number."""
     try:
         return bool(np.isfinite(float(word)))
     except ValueError:

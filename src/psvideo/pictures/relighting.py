@@ -117,10 +117,15 @@ def three_channels(image: Image) -> Image:
 
 def srgb(linear: Image, *, exposure: float = 1.0) -> Pixels:
     """Return linear light as 8-bit sRGB pixels (IEC 61966-2-1); what is above 1 after ``exposure`` is white."""
-    light = np.clip(three_channels(linear) * np.float32(exposure), 0.0, 1.0)
-    coded: Image = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
-    pixels: Pixels = (255 * coded + 0.5).astype(np.uint8)
+    pixels: Pixels = (255 * srgb_share(three_channels(linear) * np.float32(exposure)) + 0.5).astype(np.uint8)
     return pixels
+
+
+def srgb_share(linear: Image) -> Image:
+    """Return linear light as a share of the largest sRGB code, same shape, 0 to 1."""
+    light = np.clip(linear, 0.0, 1.0)
+    coded: Image = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+    return coded
 
 
 def normal_colours(normals: NDArray[np.floating]) -> Pixels:

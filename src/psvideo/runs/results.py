@@ -101,10 +101,12 @@ def normals_run(
     fill: bool = True,
     watch: Watch = unwatched,
     picture_of: Callable[[Instant], Pixels] | None = None,
+    beside: Callable[[Path, Instant], None] | None = None,
 ) -> NormalsResult:
     """Write normals, albedo and validity of every instant, timing.json and the report; return what is to be reported.
 
-    ``picture_of`` makes the picture of one round; left out, it shows plates and surface.
+    ``picture_of`` makes the picture of one round; left out, it shows plates and surface. ``beside`` writes more of
+    every instant into the folder.
     """
     clip = take.clip
     over_time = over_time or OverTime()
@@ -167,6 +169,8 @@ def normals_run(
                 # the surface only: plates are many times larger, and must not wait for the files
                 write(surface_job(folder, clip, instant, delivery, tags, depth=shaped, ambient=ambient))
             del shaped  # it holds the surface too
+            if beside is not None:
+                beside(folder, instant)
             observed.add(instant.round, instant.surface)
             if len(observed.facts) in (1, SAMPLE_ROUND):
                 picture = (picture_of or look)(instant)

@@ -1,12 +1,15 @@
 """In which panel of the help an option stands, where its command has many."""
 
+STILLS = ("lights", "sphere", "dark", "transfer", "focal_px", "focal_mm", "sensor_mm", "radius_mm", "circle")
+"""What photographs are read with."""
+
 PANELS = {
-    "The clip and its timing": ("plan", "timing", "frames", "first_light", "rig", "mask", "start_number"),
+    "The clip and its timing": ("plan", "timing", "frames", "first_light", "rig", "mask", "start_number", *STILLS),
     "How normals are solved": ("solver", "near_iterations", "max_gap"),
     "Motion and time": ("align", "rate", "denoise"),
     "What is written, and in which convention": (
         *("space", "camera_to_world", "camera", "camera_time", "y", "float32", "aov", "mesh", "encode", "compression"),
-        *("separate", "multipart", "preset", "plates", "with_ambient", "weight", "beauty"),
+        *("separate", "multipart", "preset", "plates", "with_ambient", "weight", "beauty", "rti"),
         *("preview", "preview_codec"),
     ),
     "How the command runs": ("force", "resume", "json", "verbose", "quiet", "help"),

@@ -59,10 +59,10 @@ def mirror_sphere(
         spheres=spheres,
         circles=tuple(circle),
         focal_px=focal_px,
-        focal_widths=_focal_widths(focal_px, focal_mm, sensor_mm),
+        focal_widths=focal_widths(focal_px, focal_mm, sensor_mm),
         principal_px=principal_px,
     )
-    radius_m = _radius_m(radius_mm)
+    radius_m = radius_in_m(radius_mm)
     reading = reading_of(plan, frames, first_light, transfer)
     room = None if outline_picture is None else Path(outline_picture)
     try:
@@ -89,7 +89,7 @@ def _sightings(
     return sightings
 
 
-def _focal_widths(focal_px: float | None, focal_mm: float | None, sensor_mm: float | None) -> float | None:
+def focal_widths(focal_px: float | None, focal_mm: float | None, sensor_mm: float | None) -> float | None:
     """Return the focal length in widths of the picture, where it is given in millimetres."""
     if focal_px is not None and focal_mm is not None:
         raise UsageError("`focal_px` and `focal_mm` both say the focal length; give one of them.")
@@ -98,7 +98,8 @@ def _focal_widths(focal_px: float | None, focal_mm: float | None, sensor_mm: flo
     return None if focal_mm is None or sensor_mm is None else focal_mm / sensor_mm
 
 
-def _radius_m(radius_mm: float | None) -> float | None:
+def radius_in_m(radius_mm: float | None) -> float | None:
+    """Return a sphere's radius in metres; raises UsageError where it cannot be meant."""
     if radius_mm is None:
         return None
     if not LEAST_RADIUS_MM <= radius_mm <= LARGEST_RADIUS_MM:

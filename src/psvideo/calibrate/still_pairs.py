@@ -1,0 +1,124 @@
+"""Which photograph shows which light: by the names that a list or a rig gives, else by order."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from psvideo.calibrate.light_files import bears, find_stills
+from psvideo.calibrate.light_pictures import MASK_NAMES, LightFiles
+from psvideo.errors import PsvideoError
+from psvideo.formats.contract import check_light_name
+
+LISTED = 6
+"""So many names are listed in a message."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pairs:
+    """Photographs in the order of their lights.
+
+    files: one for each light. names: the lights', from the rig, or the files' own where the list has none.
+    places: of the lights in the list. how: by what they were paired, a sentence. dark: shows ambient light alone.
+    mask: white where to solve, found beside them. aside: pictures that belong to no light.
+    """
+
+    files: tuple[Path, ...]
+    names: tuple[str, ...]
+    places: tuple[int, ...]
+    how: str
+    dark: Path | None = None
+    mask: Path | None = None
+    aside: tuple[Path, ...] = ()
+
+
+def pair_stills(folder: Path, known: Sequence[str], *, named: bool, whose: str, keep_names: bool = True) -> Pairs:
+    """Return which picture of a folder shows which light.
+
+    ``known`` are the lights in order; where they are ``named`` (as pictures or as lights), by name if all are there;
+    else by order. ``whose`` is what messages call the list. With ``keep_names`` lights keep the names in ``known``,
+    else they get their pictures' own. Raises PsvideoError where names or counts do not fit.
+    """
+    if not folder.is_dir():
+        raise PsvideoError(f"{folder}: is no folder. Name the folder that holds the photographs, one per light.")
+    found = find_stills(folder)
+    files = [one[0] for one in found.by_light.values()]
+    masks = [file for file in found.left_aside if any(bears(file, name) for name in MASK_NAMES)]
+    dark, mask = (found.ambient[0] if found.ambient else None), (masks[0] if masks else None)
+    matches = [_matching(name, files) for name in known] if named else []
+    if matches and all(len(one) == 1 for one in matches):
+        chosen = [one[0] for one in matches]
+        how = f"Pictures belong to lights by name, as {whose} says: {_shown(known, chosen)}."
+    elif any(matches):
+        raise PsvideoError(_misnamed(folder, known, matches, files, whose))
+    else:
+        chosen = _in_order(folder, files, known, found, whose)
+        how = (
+            f"Pictures belong to lights by order, since {whose} names none of them: {_shown(known, chosen)}. Where "
+            "that is wrong, the rig will not fit."
+        )
+    aside = [file for file in (*files, *found.left_aside) if file not in chosen and file not in masks]
+    names = tuple(known) if keep_names else _own_names(chosen)
+    places = tuple(range(len(known)))
+    return Pairs(files=tuple(chosen), names=names, places=places, how=how, dark=dark, mask=mask, aside=tuple(aside))
+
+
+def _matching(name: str, files: Sequence[Path]) -> list[Path]:
+    """Return the files that a name may mean: as a path with or without its ending, or as a light's name."""
+    word = re.split(r"[\\/]", name.strip())[-1]
+    stem = word.rpartition(".")[0] or word
+    exact = [
+        file for file in files if file.name.lower() == word.lower() or file.stem.lower() in (word.lower(), stem.lower())
+    ]
+    return exact or [file for file in files if bears(file, stem)]
+
+
+def _in_order(folder: Path, files: Sequence[Path], known: Sequence[str], found: LightFiles, whose: str) -> list[Path]:
+    if len(files) == len(known):
+        return list(files)
+    aside = f" ({', '.join(file.name for file in found.left_aside[:3])} left aside)" if found.left_aside else ""
+    raise PsvideoError(
+        f"{folder}: holds {len(files)} pictures of lights, {files[0].name} to {files[-1].name}{aside}, and {whose} "
+        f"lists {len(known)} lights. Expected one picture for each light, in the same order, or names that say which "
+        "belong together: move pictures or lines that have no partner elsewhere."
+    )
+
+
+def _misnamed(
+    folder: Path, known: Sequence[str], matches: Sequence[Sequence[Path]], files: Sequence[Path], whose: str
+) -> str:
+    """Say which names have no picture, or several."""
+    none = [name for name, one in zip(known, matches, strict=True) if not one]
+    several = [(name, one) for name, one in zip(known, matches, strict=True) if len(one) > 1]
+    used = {file for one in matches for file in one}
+    free = [file.name for file in files if file not in used]
+    if several:
+        name, one = several[0]
+        return (
+            f"{folder}: {name!r} of {whose} may be {one[0].name} or {one[1].name}. Expected one picture for each name: "
+            "move the other elsewhere, or write the whole file name into the list."
+        )
+    more = f" Pictures without a light: {_list(free)}." if free else ""
+    return (
+        f"{folder}: {whose} names {_list(none)}, and no picture is called so, though {len(known) - len(none)} others "
+        f"are found by name.{more} Expected one picture for each light: correct the names, or take these lines out."
+    )
+
+
+def _list(names: Sequence[str]) -> str:
+    more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
+    return ", ".join(map(str, names[:LISTED])) + more
+
+
+def _shown(known: Sequence[str], files: Sequence[Path]) -> str:
+    return f"{files[0].name} shows {known[0]!r}, {files[-1].name} shows {known[-1]!r}"
+
+
+def _own_names(files: Sequence[Path]) -> tuple[str, ...]:
+    """Return the files' own names as lights' names, else numbers where one cannot name files of its own."""
+    stems = [file.stem for file in files]
+    try:
+        names = tuple(check_light_name(stem) for stem in stems)
+    except ValueError:
+        names = ()
+    return names if len(set(names)) == len(files) else tuple(f"L{place}" for place in range(len(files)))

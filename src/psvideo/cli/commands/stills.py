@@ -1,0 +1,102 @@
+"""psvideo stills: normal maps and albedo from photographs, one per light, without a plan."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from psvideo.cli.console import Voice, plain, print_report
+from psvideo.cli.options.calibrate import FocalPx, Transfer
+from psvideo.cli.options.clip_and_run import Force, Json, Quiet, Verbose
+from psvideo.cli.options.delivery import AovOption, EncodeOption, MeshOption, Plates, ProgramOption
+from psvideo.cli.options.typed import parse_circle
+from psvideo.model.choices import Solver
+
+
+def stills(
+    context: typer.Context,
+    folder: Annotated[Path, typer.Argument(help="The folder of photographs, one per light, of any names.")],
+    out: Annotated[Path, typer.Option("-o", "--out", help="The folder to write.")],
+    lights: Annotated[
+        Path | None,
+        typer.Option(help="Where the lights are: rig.toml, .lp, a DiLiGenT or UW list, or a table with names."),
+    ] = None,
+    sphere: Annotated[
+        list[Path] | None,
+        typer.Option(help="Instead of --lights: a folder with a chrome ball under the same lights; one per place."),
+    ] = None,
+    dark: Annotated[
+        Path | None, typer.Option(help="A picture with every light off. [default: one named dark or ambient]")
+    ] = None,
+    mask: Annotated[
+        Path | None, typer.Option("--mask", help="A picture, white where to solve. [default: one named mask]")
+    ] = None,
+    transfer: Transfer = None,
+    focal_px: FocalPx = None,
+    focal_mm: Annotated[float | None, typer.Option(help="Focal length in mm; needs --sensor-mm.", min=0.1)] = None,
+    sensor_mm: Annotated[
+        float | None, typer.Option(help="Width in mm of the sensor's part that the picture shows.", min=0.1)
+    ] = None,
+    radius_mm: Annotated[
+        float | None, typer.Option(help="The spheres' radius in mm: with two or more, near lights get positions.")
+    ] = None,
+    circle: Annotated[
+        list[str] | None,
+        typer.Option(help="A sphere's outline found by hand: x,y,radius in pixels from the top left. Repeatable."),
+    ] = None,
+    solver: Annotated[
+        Solver, typer.Option(help="auto: robust against highlights and shadows from five lights on.")
+    ] = "auto",
+    fill: Annotated[
+        bool,
+        typer.Option(
+            "--fill/--no-fill",
+            help="Give what fewer than three lights reach a best estimate (valid is 0 there), or leave zeros.",
+        ),
+    ] = True,
+    preset: ProgramOption = None,
+    aov: AovOption = None,
+    mesh: MeshOption = None,
+    encode: EncodeOption = None,
+    plates: Plates = False,
+    rti: Annotated[
+        bool, typer.Option("--rti/--no-rti", help="Write rti/ too: relighting that OpenLIME shows in a web page.")
+    ] = True,
+    force: Force = False,
+    json: Json = False,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+) -> None:
+    """Write normals, albedo and validity of photographs of a still scene, one per light; no plan is needed."""
+    from psvideo.report.run_report import report_record
+    from psvideo.runs.stills import stills as solve
+
+    voice = Voice(json=json, verbose=verbose, quiet=quiet)
+    report = solve(
+        folder,
+        out=out,
+        lights=lights,
+        sphere=sphere or (),
+        dark=dark,
+        mask=mask,
+        transfer=transfer,
+        focal_px=focal_px,
+        focal_mm=focal_mm,
+        sensor_mm=sensor_mm,
+        radius_mm=radius_mm,
+        circle=[parse_circle(text) for text in circle or ()],
+        solver=solver,
+        fill=fill,
+        preset=preset,
+        aov=plain(aov),
+        mesh=plain(mesh),
+        encode=encode,
+        plates=plates,
+        rti=rti,
+        force=force,
+        watch=voice.track,
+        caller=voice.caller(context),
+    )
+    voice.result(report_record(report))
+    print_report(voice, report)
+    voice.say(f"{out}: written; see {out / 'report.html'}.")

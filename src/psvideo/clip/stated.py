@@ -1,0 +1,136 @@
+"""What a photograph's file says of itself beside its pixels: how it was exposed, how it lies, and its colour's curve.
+
+EXIF (CIPA DC-008) is read from JPEG, TIFF and PNG; the curve from an ICC profile (ICC.1, the red or grey channel's
+``TRC``) or from PNG's own chunks (``sRGB``, ``gAMA``).
+"""
+
+import contextlib
+import io
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import ExifTags, Image, UnidentifiedImageError
+
+from psvideo.clip.transfer import DISPLAYED, find_curve, to_light
+from psvideo.model.camera import FloatArray
+from psvideo.model.turn import EXIF, UPRIGHT, Turn
+
+LIKE = 0.02
+"""A profile's curve is one of those that have a name where it is nowhere further from it than this share of white."""
+WIDTH_35_MM = 36.0
+SIGNALS = np.linspace(0, 1, 65)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stated:
+    """What a file says; None where it does not.
+
+    transfer: the curve's name, or "unknown" where its curve is none that psvideo knows. by: what says so.
+    exposure: light gathered, seconds times ISO over the f-number squared, on a scale of its own.
+    focal_widths: the focal length in widths of the picture's longer side.
+    """
+
+    transfer: str | None = None
+    by: str = ""
+    exposure: float | None = None
+    focal_widths: float | None = None
+    camera: str = ""
+    turn: Turn = UPRIGHT
+
+
+def stated_by(path: Path) -> Stated:
+    """Return what a file says of itself; nothing where it is of a kind that says nothing, or cannot be read."""
+    with contextlib.suppress(OSError, UnidentifiedImageError, Image.DecompressionBombError, ValueError, SyntaxError):
+        with Image.open(path) as picture:
+            exif = picture.getexif()
+            taken = {**exif, **exif.get_ifd(ExifTags.IFD.Exif)}
+            transfer, by = _curve(picture.info)
+        return Stated(
+            transfer=transfer,
+            by=by,
+            exposure=_exposure(taken),
+            focal_widths=_above_0(taken.get(ExifTags.Base.FocalLengthIn35mmFilm), 1 / WIDTH_35_MM),
+            camera=_camera(taken),
+            turn=EXIF.get(int(_above_0(taken.get(ExifTags.Base.Orientation)) or 1), UPRIGHT),
+        )
+    return Stated()
+
+
+def _above_0(value: Any, factor: float = 1.0) -> float | None:
+    with contextlib.suppress(TypeError, ValueError, ZeroDivisionError):
+        number = float(value) * factor
+        return number if 0 < number < np.inf else None
+    return None
+
+
+def _camera(taken: dict[int, Any]) -> str:
+    make, model = (str(taken.get(tag, "")).strip(" \0") for tag in (ExifTags.Base.Make, ExifTags.Base.Model))
+    return model if make and model.startswith(make.split()[0]) else f"{make} {model}".strip()
+
+
+def _exposure(taken: dict[int, Any]) -> float | None:
+    seconds = _above_0(taken.get(ExifTags.Base.ExposureTime))
+    stop = _above_0(taken.get(ExifTags.Base.FNumber)) or 1.0
+    iso = taken.get(ExifTags.Base.ISOSpeedRatings)
+    speed = _above_0(iso[0] if isinstance(iso, tuple) and iso else iso) or 1.0
+    return None if seconds is None else seconds * speed / stop**2
+
+
+def _curve(info: dict[Any, Any]) -> tuple[str | None, str]:
+    """Return the name of the curve that a file names, and what names it."""
+    profile = info.get("icc_profile")
+    if profile:
+        light = _profile_light(bytes(profile))
+        return (None, "") if light is None else (_named(light), "its ICC profile")
+    if "srgb" in info:
+        return "srgb", "its sRGB chunk"
+    if gamma := _above_0(info.get("gamma")):
+        return _named(SIGNALS ** (1 / gamma)), f"its gAMA chunk ({gamma:.4g})"
+    return None, ""
+
+
+def _named(light: FloatArray) -> str:
+    """Return the known curve that makes this light of SIGNALS, or "unknown"."""
+    away = {name: float(np.abs(to_light(find_curve(name), SIGNALS) - light).max()) for name in DISPLAYED[:6]}
+    best = min(away, key=lambda name: away[name])
+    return best if away[best] < LIKE else "unknown"
+
+
+def _profile_light(profile: bytes) -> FloatArray | None:
+    """Return the light that an ICC profile's curve makes of SIGNALS; None where it has no single curve."""
+    with contextlib.suppress(struct.error, ValueError, IndexError):
+        tags = io.BytesIO(profile[128:])
+        (count,) = struct.unpack(">I", tags.read(4))
+        for _ in range(min(count, 100)):
+            name, offset, size = struct.unpack(">4sII", tags.read(12))
+            if name in (b"rTRC", b"kTRC"):
+                return _tone(profile[offset : offset + size])
+    return None
+
+
+def _tone(tag: bytes) -> FloatArray | None:
+    """Return the light of a ``curv`` or ``para`` tag (ICC.1:2010, 10.5 and 10.15)."""
+    kind = tag[:4]
+    if kind == b"curv":
+        (count,) = struct.unpack(">I", tag[8:12])
+        if count == 0:
+            return SIGNALS.copy()
+        entries = np.frombuffer(tag[12 : 12 + 2 * count], ">u2").astype(np.float64)
+        if count == 1:
+            return np.asarray(SIGNALS ** (entries[0] / 256))
+        return np.asarray(np.interp(SIGNALS, np.linspace(0, 1, count), entries / 65535))
+    if kind != b"para":
+        return None
+    (function,) = struct.unpack(">H", tag[8:10])
+    count = (1, 3, 4, 5, 7)[function]
+    g, *rest = (value / 65536 for value in struct.unpack(f">{count}i", tag[12 : 12 + 4 * count]))
+    a, b, c, d, e, f = (rest + [0.0] * 6)[:6] if rest else (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    power = np.maximum(a * SIGNALS + b, 0) ** g
+    if function == 0:
+        return np.asarray(power)
+    if function in (1, 2):
+        return np.asarray(np.where(-b / a <= SIGNALS, power + c, c))
+    return np.asarray(np.where(d <= SIGNALS, power + e, c * SIGNALS + f))

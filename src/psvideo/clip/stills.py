@@ -1,0 +1,116 @@
+"""Still photographs, one per light, as a clip: no plan needed, in the order of the lights, whatever their names."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from psvideo.clip.decode.decoders import read_header
+from psvideo.clip.folder import KINDS
+from psvideo.clip.reading import looks
+from psvideo.clip.record import Clip, Header
+from psvideo.clip.stated import Stated, stated_by
+from psvideo.clip.transfer import find_curve
+from psvideo.errors import PsvideoError
+from psvideo.model.camera import Encoding
+from psvideo.model.plan import Plan
+from psvideo.model.turn import UPRIGHT
+
+
+@dataclass(frozen=True, kw_only=True)
+class Photographs:
+    """Pictures of one scene by one camera: their files, what kind they are, and what they say of themselves.
+
+    transfer: the name of the curve by which they are read; because: why.
+    """
+
+    files: tuple[Path, ...]
+    kind: str
+    header: Header
+    stated: tuple[Stated, ...]
+    transfer: str
+    because: str
+
+    @property
+    def encoding(self) -> Encoding:
+        """How their codes are read."""
+        return Encoding(transfer=self.transfer)
+
+    def clip(self, folder: Path, plan: Plan, plan_path: Path, *, notes: tuple[str, ...] = ()) -> Clip:
+        """Return them as a clip of a synced plan."""
+        head = self.header
+        numbers = tuple(range(1, len(self.files) + 1))
+        return Clip(
+            name=folder.resolve().name,
+            path=folder,
+            plan=plan,
+            plan_path=plan_path,
+            kind=self.kind,
+            files=self.files,
+            numbers=numbers,
+            header=head,
+            colour=head.colour or find_curve(self.transfer).colour,
+            encoding=self.encoding,
+            warnings=head.warnings,
+            notes=notes,
+        )
+
+
+def look_at(files: Sequence[Path], *, transfer: str | None = None) -> Photographs:
+    """Look at photographs without decoding them. ``transfer`` is the curve where somebody says it.
+
+    Raises PsvideoError where one cannot be read, or where they are not of one kind, size, position and curve.
+    """
+    first = files[0]
+    kinds = {file: KINDS[file.suffix.lower()] for file in files}
+    other = next((file for file in files if kinds[file] != kinds[first]), None)
+    if other is not None:
+        raise PsvideoError(
+            f"{first.parent}: {first.name} is {kinds[first].upper()} and {other.name} is {kinds[other].upper()}. "
+            "Expected all pictures as one camera wrote them, of one kind: export them all again, alike."
+        )
+    kind = kinds[first]
+    headers = [read_header(kind, file) for file in files]
+    stated = tuple(stated_by(file) for file in files)
+    _refuse_odd(files, [looks(header) for header in headers], "is")
+    _refuse_odd(files, [str(one.turn) for one in stated], "lies")
+    name, because = (transfer, "as you say") if transfer else _transfer(files, kind, headers[0], stated)
+    find_curve(name)
+    header = headers[0] if headers[0].turn != UPRIGHT else replace(headers[0], turn=stated[0].turn)
+    return Photographs(files=tuple(files), kind=kind, header=header, stated=stated, transfer=name, because=because)
+
+
+def _refuse_odd(files: Sequence[Path], facts: Sequence[str], verb: str) -> None:
+    """Raise PsvideoError where a picture differs from what most are."""
+    usual = Counter(facts).most_common(1)[0][0]
+    odd = next((place for place, fact in enumerate(facts) if fact != usual), None)
+    if odd is not None:
+        like = files[facts.index(usual)]
+        raise PsvideoError(
+            f"{files[odd]}: {verb} {facts[odd]}, and {like.name} {verb} {usual}. Expected pictures of one camera in "
+            "one place and one mode: take this one again, export it like the others, or move it elsewhere."
+        )
+
+
+def _transfer(files: Sequence[Path], kind: str, header: Header, stated: Sequence[Stated]) -> tuple[str, str]:
+    """Return the curve of the pictures, and why: what they say, else what is usual for their kind."""
+    named = [one.transfer or "" for one in stated]
+    odd = next((place for place, name in enumerate(named) if name != named[0]), None)
+    if odd is not None:
+        raise PsvideoError(
+            f"{files[odd]}: says that its curve is {named[odd] or 'nothing in particular'} "
+            f"({stated[odd].by or 'no profile'}), and {files[0].name} {named[0] or 'says nothing'} "
+            f"({stated[0].by or 'no profile'}). Pictures with different curves cannot be compared: export them all "
+            "alike, or say with `transfer` what holds for all."
+        )
+    if named[0] == "unknown":
+        raise PsvideoError(
+            f"{files[0]}: {stated[0].by} has a curve that psvideo does not know. Export the pictures as sRGB or "
+            "linear, or say with `transfer` which curve comes nearest."
+        )
+    if named[0] and kind != "dng":
+        return named[0], f"as {stated[0].by} says"
+    if header.bits == 8:
+        return "srgb", "the usual curve of 8-bit pictures: they say nothing themselves"
+    depth = f"{header.bits} bits" if header.bits else "floating point"
+    return "linear", f"the usual meaning of {kind.upper()} pictures of {depth}: they say nothing themselves"

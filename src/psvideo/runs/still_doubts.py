@@ -1,0 +1,116 @@
+"""What photographs say against what was assumed of them: their curve, and the exposures that their files name.
+
+A matte surface under known lights leaves the less of its light over, the more of what was assumed is true.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from psvideo.clip.decode.decoders import decode
+from psvideo.clip.stills import Photographs
+from psvideo.clip.transfer import find_curve, to_light
+from psvideo.model.camera import FloatArray
+from psvideo.model.rig import Light
+
+POINTS = 6000
+"""So many pixels of every picture are looked at, evenly spread."""
+LEAST, MOST = 0.1, 0.97
+"""Of a pixel's brightest light, and of saturation: between them a sample counts."""
+LEAST_LIGHTS = 4
+SUBJECT = 1 / 6
+"""What is darker than this share of the picture's brightest hundredth says little."""
+CLEARLY = 0.85
+"""Another assumption is named where it leaves less than this share of what is left over."""
+OTHER_EXPOSURE = 1.05
+
+
+@dataclass(frozen=True, kw_only=True)
+class Glance:
+    """Signals of a few pixels, (light, pixel), 0 to 1 as the files code them, and the distant lights' vectors; ``dark``
+    (pixel,) are those of the ambient light alone."""
+
+    signals: FloatArray
+    directions: FloatArray
+    strengths: FloatArray
+    dark: FloatArray | None = None
+
+    def left_over(self, transfer: str, exposures: FloatArray | None = None) -> float:
+        """Return the share of a typical pixel's light that no matte surface explains."""
+        curve = find_curve(transfer)
+        light = to_light(curve, self.signals)
+        light = light if self.dark is None else np.maximum(light - to_light(curve, self.dark), 0)
+        strength = self.strengths if exposures is None else self.strengths * exposures
+        lit = light / strength[:, None]
+        used = (lit > LEAST * lit.max(axis=0)) & (self.signals < MOST)
+        brightest = lit.max(axis=0)
+        enough = (used.sum(axis=0) >= LEAST_LIGHTS) & (brightest > SUBJECT * np.percentile(brightest, 99))
+        lit, used = lit[:, enough], used[:, enough]
+        if lit.shape[1] < POINTS // 100:
+            return float("nan")
+        normal = np.einsum("lp,li,lj->pij", used, self.directions, self.directions) + 1e-6 * np.eye(3)
+        right = np.einsum("lp,li->pi", lit * used, self.directions)
+        found = np.linalg.solve(normal, right[..., None])[..., 0]
+        residual = (lit - self.directions @ found.T) * used
+        return float(np.median(np.sqrt((residual**2).sum(axis=0) / np.maximum(((lit * used) ** 2).sum(axis=0), 1e-12))))
+
+
+def glance_at(pictures: Photographs, lights: Sequence[Light]) -> Glance | None:
+    """Look at a few pixels of every picture; None where lights are near, or too few to check each other."""
+    directions = [light.direction for light in lights if light.direction is not None]
+    if len(directions) < max(len(lights), LEAST_LIGHTS) or pictures.header.bits is None:
+        return None
+    signals = []
+    for file in pictures.files:
+        codes = decode(pictures.kind, file).codes
+        step = max(int(np.sqrt(codes.shape[0] * codes.shape[1] / POINTS)), 1)
+        thin = codes[step // 2 :: step, step // 2 :: step].astype(np.float64) / (2**pictures.header.bits - 1)
+        signals.append((thin if thin.ndim == 2 else thin[..., 1]).ravel())
+    green = [light.intensity[min(1, len(light.intensity) - 1)] for light in lights]
+    dark = signals.pop() if len(signals) > len(lights) else None
+    return Glance(signals=np.array(signals), dark=dark, directions=np.array(directions), strengths=np.array(green))
+
+
+def curve_doubt(glance: Glance | None, pictures: Photographs) -> str | None:
+    """Say where another curve explains the pictures clearly better than the one that was assumed."""
+    if glance is None:
+        return None
+    mine, other = pictures.transfer, "linear" if pictures.transfer != "linear" else "srgb"
+    left, better = glance.left_over(mine), glance.left_over(other)
+    if not better < CLEARLY * left:
+        return None
+    return (
+        f"The pictures were read as {mine!r}, {pictures.because}; but read as {other!r} they fit the lights better: "
+        f"{100 * better:.1f} % of the light is left over instead of {100 * left:.1f} %. If that is how they were made, "
+        f"say `transfer={other!r}`."
+    )
+
+
+def exposures_of(
+    glance: Glance | None, pictures: Photographs, count: int
+) -> tuple[FloatArray | None, str | None, str | None]:
+    """Return by how much more each light's picture was exposed than the usual one, None where all are alike or their
+    files cannot be believed; with what to note, and what to warn of."""
+    named = [one.exposure for one in pictures.stated[:count]]
+    known = np.array([one for one in named if one is not None])
+    if len(known) < count:
+        some = len(known) and f"Only {len(known)} of {count} pictures say how they were exposed; none is scaled."
+        return None, some or None, None
+    relative = known / np.median(known)
+    if relative.max() < OTHER_EXPOSURE * relative.min():
+        return None, None, None
+    odd = pictures.files[int(np.argmax(np.abs(np.log(relative))))].name
+    times = float(np.exp(np.abs(np.log(relative)).max()))
+    said = f"By their EXIF the pictures were exposed differently ({odd} by a factor {times:.2g} from the usual)"
+    if glance is None:
+        return relative, f"{said}; their lights' strengths were scaled by it.", None
+    scaled, plain = glance.left_over(pictures.transfer, relative), glance.left_over(pictures.transfer)
+    if scaled < plain:
+        return relative, f"{said}, and the pictures agree: their lights' strengths were scaled by it.", None
+    return (
+        None,
+        None,
+        f"{said}, but the pictures do not show it: scaled by it, {100 * scaled:.1f} % of the light is left over, and "
+        f"{100 * plain:.1f} % as they are. EXIF was not believed; check whether the files were developed or edited.",
+    )

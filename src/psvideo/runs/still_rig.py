@@ -1,0 +1,99 @@
+"""Where the lights of photographs are: from a list or a rig, or from mirror spheres under the same lights."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from psvideo.calibrate.mirror.lights import calibrate_lights
+from psvideo.calibrate.sphere.sighting import Looking, Sighting, sight_spheres
+from psvideo.compute.progress import Watch
+from psvideo.errors import PsvideoError
+from psvideo.formats.light_lists import pictures_named_by
+from psvideo.formats.rig_toml import read_rig
+from psvideo.model.rig import Rig
+from psvideo.runs.caller import Caller
+from psvideo.runs.light_sets import Reading, sets_of
+
+
+@dataclass(frozen=True, kw_only=True)
+class KnownLights:
+    """Lights before they are paired with pictures. ``called`` are the names by which pictures may be found, ``own``
+    whether the lights have names of their own to keep, ``whose`` what messages call the source."""
+
+    rig: Rig
+    called: tuple[str, ...]
+    own: bool
+    whose: str
+    notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def named(self) -> bool:
+        """Whether there is anything to pair by."""
+        return len(self.called) == len(self.rig.lights)
+
+    def in_order(self, names: Sequence[str]) -> Rig:
+        """Return the rig with other names, in the same order."""
+        lights = tuple(replace(light, name=name) for light, name in zip(self.rig.lights, names, strict=True))
+        return replace(self.rig, lights=lights)
+
+
+def listed_lights(path: Path) -> KnownLights:
+    """Read a rig or a list of lights, with the pictures that it names. Raises PsvideoError where it cannot be used."""
+    rig, pictures = read_rig(path), pictures_named_by(path)
+    own = path.suffix == ".toml"
+    if pictures and len(pictures) != len(rig.lights):
+        raise PsvideoError(
+            f"{path}: names {len(pictures)} pictures and holds {len(rig.lights)} directions. Expected one name in "
+            "every line, or none in any."
+        )
+    return KnownLights(rig=rig, called=rig.names if own else pictures, own=own, whose=path.name)
+
+
+def sphere_lights(
+    spheres: Sequence[Path],
+    looking: Looking,
+    *,
+    radius_m: float | None,
+    transfer: str | None,
+    watch: Watch,
+    caller: Caller,
+) -> KnownLights:
+    """Measure the lights on mirror spheres, one folder of pictures for each place; near where radius and lens say so.
+
+    With near lights the surface is taken to be as far away as the spheres. Raises PsvideoError where no sphere is
+    found, one is cut off, or no light is measured.
+    """
+    sightings: list[Sighting] = []
+    names: tuple[str, ...] = ()
+    for path in spheres:
+        opened = sets_of(path, Reading(transfer=transfer), watch=watch, caller=caller)
+        if names and opened.names != names:
+            raise PsvideoError(
+                f"{path}: shows the lights {', '.join(opened.names[:3])}, …, and {spheres[0]} "
+                f"{', '.join(names[:3])}, …. Expected the same names in every folder of sphere pictures, one for each "
+                "light."
+            )
+        names = opened.names
+        sightings += sight_spheres(opened.sets, looking, where=str(path), room=opened.room)
+    found = calibrate_lights(sightings, radius_m=radius_m)
+    rig = found.rig
+    if any(light.position_m is not None for light in rig.lights):
+        rig = replace(rig, plane=_plane_of(sightings, radius_m or 0.0))
+    near = sum(light.position_m is not None for light in rig.lights)
+    what = f"{near} near, with positions" if near else "as directions"
+    note = f"{len(rig.lights)} of {len(found.lights)} lights were measured on {len(sightings)} sphere(s), {what}."
+    whose = ", ".join(path.name for path in spheres)
+    return KnownLights(rig=rig, called=rig.names, own=False, whose=whose, notes=(note,), warnings=tuple(found.warnings))
+
+
+def _plane_of(sightings: Sequence[Sighting], radius_m: float) -> tuple[float, float, float, float]:
+    """Return the plane across the view in which the spheres' middles lie, on the mean."""
+    away = [
+        sighting.outline.view.focal_px * radius_m / sighting.outline.radius_px
+        for sighting in sightings
+        if sighting.outline.view.focal_px is not None
+    ]
+    return (0.0, 0.0, 1.0, float(np.mean(away)))

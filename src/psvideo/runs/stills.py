@@ -1,0 +1,248 @@
+"""The whole of ``psvideo stills``: photographs of a still scene, one per light, and no plan."""
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from psvideo.calibrate.sphere.sighting import Looking
+from psvideo.calibrate.still_pairs import Pairs, pair_stills
+from psvideo.clip import Clip, Take, decoded_once
+from psvideo.clip.stills import Photographs, look_at
+from psvideo.compute.progress import Watch, unwatched
+from psvideo.errors import UsageError
+from psvideo.export.asked import Asked, delivery_of
+from psvideo.formats.light_lists import write_rig
+from psvideo.formats.paths import path_if_given, path_of
+from psvideo.formats.plan_toml import format_plan
+from psvideo.formats.rig_toml import format_rig
+from psvideo.formats.whole_files import write_text
+from psvideo.model.camera import Camera
+from psvideo.model.choices import MapFiles, MeshKind, Program, Solver
+from psvideo.model.plan import PlannedFlash, assemble_plan
+from psvideo.model.quantities import Aov
+from psvideo.model.rig import Rig
+from psvideo.plates.align.rounds import Aligning
+from psvideo.plates.timed import timing_of
+from psvideo.report.run_report import RunReport
+from psvideo.runs.calibrate.mirror_sphere import focal_widths, radius_in_m
+from psvideo.runs.caller import PYTHON, Caller
+from psvideo.runs.lighting import read_lighting
+from psvideo.runs.output import Output
+from psvideo.runs.results import OverTime, normals_run
+from psvideo.runs.rti import write_rti
+from psvideo.runs.still_doubts import curve_doubt, exposures_of, glance_at
+from psvideo.runs.still_rig import KnownLights, listed_lights, sphere_lights
+from psvideo.solve.instants import Instant
+
+PLAN, RIG, LP = "plan.toml", "rig.toml", "lights.lp"
+"""What a result holds of how the photographs were taken to be."""
+
+
+def stills(
+    folder: Path | str,
+    *,
+    out: Path | str,
+    lights: Path | str | None = None,
+    sphere: Sequence[Path | str] = (),
+    dark: Path | str | None = None,
+    mask: Path | str | None = None,
+    transfer: str | None = None,
+    focal_px: float | None = None,
+    focal_mm: float | None = None,
+    sensor_mm: float | None = None,
+    radius_mm: float | None = None,
+    circle: Sequence[tuple[float, float, float]] = (),
+    solver: Solver = "auto",
+    fill: bool = True,
+    preset: Program | None = None,
+    aov: Sequence[Aov] = (),
+    mesh: Sequence[MeshKind] = (),
+    encode: MapFiles | None = None,
+    plates: bool = False,
+    rti: bool = True,
+    force: bool = False,
+    watch: Watch = unwatched,
+    caller: Caller = PYTHON,
+) -> RunReport:
+    """Write normals, albedo and validity of photographs of one still scene, one per light.
+
+    - ``folder``: the photographs, of any names: JPEG, PNG, TIFF, EXR or DNG of one size. One named ``dark`` or
+      ``ambient`` shows the scene with every light off and is taken off the others; one named ``mask`` is white where to
+      solve. ``dark`` and ``mask`` name them where they lie elsewhere.
+    - ``lights``: where the lights are: rig.toml, an .lp file, a DiLiGenT or UW list, or a table of names, directions
+      and strengths. Or ``sphere``: folders with pictures of a mirror sphere under the same lights, one for each place
+      of the sphere; with ``radius_mm`` and the lens (``focal_px``, or ``focal_mm`` with ``sensor_mm``) two places give
+      near lights their positions. ``circle``: outlines found by hand, x, y and radius in pixels.
+    - ``transfer``: how the files code light. Left out: as their ICC profile or PNG chunk says, else sRGB for 8 bits and
+      linear for 16 bits, EXR and DNG. The report says which, and what speaks against it.
+    - ``rti``: write ``rti/`` too, a polynomial texture map that OpenLIME shows in a web page (of distant lights).
+    - ``solver``, ``fill``, ``preset``, ``aov``, ``mesh``, ``encode``, ``plates``, ``force``: as for ``normals``.
+
+    Pictures are paired with lights by name where the names fit, else by order; the report says which. Written into
+    ``out`` is what ``normals`` writes, and beside it plan.toml, rig.toml and lights.lp: what was taken for granted.
+    ``watch`` is handed every long loop, and ``caller`` the sentences that come on the way.
+
+    Returns
+    -------
+    RunReport
+        As ``normals`` returns it.
+
+    Raises
+    ------
+    UsageError
+        Where parameters do not fit together, or ``out`` exists.
+    PsvideoError
+        Where pictures and lights do not go together, or cannot be used.
+
+    Examples
+    --------
+    >>> import psvideo as ps
+    >>> report = ps.stills("stills/", lights="take3/rig.toml", out="still_results/")
+    >>> [light.name for light in report.lights]
+    ['key', 'left', 'top']
+    """
+    path = path_of("folder", folder)
+    output = Output(folder=path_of("out", out), force=force, caller=caller)
+    output.check()
+    asked = Asked(preset=preset, aov=aov, mesh=mesh, encode=encode, plates=plates)
+    delivery, _ = delivery_of(asked)
+    looking = Looking(
+        circles=tuple(circle), focal_px=focal_px, focal_widths=focal_widths(focal_px, focal_mm, sensor_mm)
+    )
+    known = _known_lights(
+        path_if_given("lights", lights),
+        [path_of("sphere", one) for one in sphere],
+        looking,
+        radius_m=radius_in_m(radius_mm),
+        transfer=transfer,
+        watch=watch,
+        caller=caller,
+    )
+    pairs = pair_stills(
+        path, known.called or known.rig.names, named=known.named, whose=known.whose, keep_names=known.own
+    )
+    pairs = replace(
+        pairs, dark=path_if_given("dark", dark) or pairs.dark, mask=path_if_given("mask", mask) or pairs.mask
+    )
+    with tempfile.TemporaryDirectory(prefix="psvideo-stills-") as place:
+        opened = _opened(path, pairs, known, Path(place), transfer=transfer)
+        take = Take(clip=opened.clip, numbers=opened.clip.numbers)
+        for note in take.clip.notes:
+            caller.say(note)
+        lighting = read_lighting(take, opened.rig_path, pairs.mask)
+        lighting.check(delivery)
+        over_time = OverTime(aligning=Aligning(align="none"))
+        output = output.given(take, None, solver, fill, delivery, *lighting.identity)
+        with decoded_once(take, output=output.folder) as kept:
+            return normals_run(
+                kept,
+                timing_of(kept, None, first_light=None, watch=watch),
+                lighting,
+                output,
+                delivery=delivery,
+                solver=solver,
+                fill=fill,
+                over_time=over_time,
+                watch=watch,
+                beside=partial(_write_beside, opened, rti=rti),
+            ).report
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Opened:
+    """Photographs as a clip, and their lights in the clip's order."""
+
+    clip: Clip
+    rig: Rig
+    rig_path: Path
+
+
+def _known_lights(
+    lights: Path | None,
+    spheres: Sequence[Path],
+    looking: Looking,
+    *,
+    radius_m: float | None,
+    transfer: str | None,
+    watch: Watch,
+    caller: Caller,
+) -> KnownLights:
+    if (lights is None) == (not spheres):
+        raise UsageError(
+            "`lights` and `sphere`: expected one of the two: a file that says where the lights are, or pictures of a "
+            "mirror sphere under them."
+        )
+    if lights is not None:
+        return listed_lights(lights)
+    return sphere_lights(spheres, looking, radius_m=radius_m, transfer=transfer, watch=watch, caller=caller)
+
+
+def _opened(folder: Path, pairs: Pairs, known: KnownLights, place: Path, *, transfer: str | None) -> _Opened:
+    """Return the photographs as a clip; plan and rig are written into ``place``."""
+    files = (*pairs.files, *([pairs.dark] if pairs.dark else []))
+    pictures = look_at(files, transfer=transfer)
+    rig = known.in_order(pairs.names)
+    glance = glance_at(pictures, rig.lights)
+    exposures, note, warning = exposures_of(glance, pictures, len(pairs.files))
+    if exposures is not None:
+        rig = _scaled(rig, exposures)
+    doubt = curve_doubt(glance, pictures)
+    write_text(place / RIG, format_rig(rig))
+    plan = assemble_plan(
+        camera=Camera(
+            name=pictures.stated[0].camera or "camera",
+            width_px=pictures.header.width_px,
+            height_px=pictures.header.height_px,
+            fps=Fraction(1),
+            exposure_s=1.0,
+            readout_s=0.0,
+            encoding=pictures.encoding,
+        ),
+        flashes=_flashes(pairs),
+        dark_s=None,
+        mode="synced",
+    )
+    write_text(place / PLAN, format_plan(plan))
+    notes = (_assumed(pictures), pairs.how, *known.notes, *([note] if note else []), *_aside(pairs))
+    clip = pictures.clip(folder, plan, place / PLAN, notes=notes)
+    warned = (*clip.warnings, *known.warnings, *(said for said in (doubt, warning) if said))
+    return _Opened(clip=replace(clip, warnings=warned), rig=rig, rig_path=place / RIG)
+
+
+def _flashes(pairs: Pairs) -> list[PlannedFlash]:
+    lit = [PlannedFlash(lights={name: 1.0}, duration_s=0.5) for name in pairs.names]
+    return lit + ([PlannedFlash(lights={}, duration_s=0.5)] if pairs.dark else [])
+
+
+def _scaled(rig: Rig, factors: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> Rig:
+    lights = tuple(
+        replace(light, intensity=tuple(float(one * factor) for one in light.intensity))
+        for light, factor in zip(rig.lights, factors, strict=True)
+    )
+    return replace(rig, lights=lights)
+
+
+def _assumed(pictures: Photographs) -> str:
+    return f"The pictures were read as {pictures.transfer!r}, {pictures.because}."
+
+
+def _aside(pairs: Pairs) -> tuple[str, ...]:
+    said = [f"{pairs.dark.name} shows the ambient light, which was taken off." if pairs.dark else ""]
+    said.append(f"{pairs.mask.name} says where to solve." if pairs.mask else "")
+    said.append(f"Left aside: {', '.join(file.name for file in pairs.aside[:6])}." if pairs.aside else "")
+    return tuple(one for one in said if one)
+
+
+def _write_beside(opened: _Opened, folder: Path, instant: Instant, *, rti: bool) -> None:
+    """Write what was taken for granted into the folder of results, and the relightable picture."""
+    write_text(folder / PLAN, format_plan(opened.clip.plan))
+    write_text(folder / RIG, format_rig(opened.rig))
+    if all(light.direction is not None for light in opened.rig.lights):
+        write_rig(folder / LP, opened.rig)
+        if rti:
+            write_rti(folder, instant.round, opened.rig)

@@ -1,0 +1,263 @@
+"""Photographs of a still scene, one per light: read, paired with their lights and solved, without a plan."""
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PIL import Image, ImageCms
+from PIL.PngImagePlugin import PngInfo
+
+import psvideo as ps
+from psvideo.cli.app import main
+from psvideo.clip.decode.decoders import decode
+from psvideo.clip.stated import stated_by
+
+SIZE, RADIUS = 64, 27
+ANGLES = np.radians(np.arange(0, 360, 60))
+LIGHTS = np.stack([0.5 * np.cos(ANGLES), 0.5 * np.sin(ANGLES), np.full(6, np.sqrt(0.75))], axis=1)
+NAMES = [f"shot {n}" for n in (3, 7, 8, 20, 21, 22)]
+Picture = NDArray[np.float64]
+
+
+def ball() -> tuple[Picture, NDArray[np.bool_]]:
+    """Return the normals of a ball (row, col, 3), and where it is."""
+    y, x = np.mgrid[:SIZE, :SIZE]
+    x, y = (x - SIZE / 2 + 0.5) / RADIUS, (SIZE / 2 - 0.5 - y) / RADIUS
+    inside = x**2 + y**2 < 1
+    return np.stack([x, y, np.sqrt(np.maximum(1 - x**2 - y**2, 0))], axis=-1), inside
+
+
+def lit(ambient: float = 0.0) -> list[Picture]:
+    normals, inside = ball()
+    noise = np.random.default_rng(4).normal(0, 0.001, (len(LIGHTS), SIZE, SIZE))
+    shades = [np.where(inside, 0.7 * np.maximum(normals @ light, 0) + ambient, 0) for light in LIGHTS]
+    return [np.clip(shade + grain, 0, 1) for shade, grain in zip(shades, noise, strict=True)]
+
+
+def as_srgb(light: Picture) -> Picture:
+    return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+
+
+def save8(path: Path, signal: Picture, **more: object) -> None:
+    Image.fromarray((255 * signal + 0.5).astype(np.uint8)).save(path, **more)  # type: ignore[arg-type]
+
+
+def save16(path: Path, signal: Picture) -> None:
+    cv2.imwrite(str(path), (65535 * signal + 0.5).astype(np.uint16))
+
+
+def photographs(
+    folder: Path, pictures: Sequence[Picture], names: Sequence[str] = NAMES, save: Callable[..., None] = save16
+) -> Path:
+    folder.mkdir()
+    for name, picture in zip(names, pictures, strict=False):
+        save(folder / f"{name}.png", picture)
+    return folder
+
+
+def listed(path: Path, names: Sequence[str] | None = None, lights: NDArray[np.float64] = LIGHTS) -> Path:
+    """Write lights as .lp, with the pictures' names where there are any."""
+    words = [""] * len(lights) if names is None else [f"{name} " for name in names]
+    rows = [f"{word}{' '.join(map(str, light))}" for word, light in zip(words, lights.tolist(), strict=True)]
+    path.write_text("\n".join([str(len(rows)), *rows, ""]))
+    return path
+
+
+def error_deg(out: Path) -> float:
+    """Return the mean error of the ball's normals, its very rim left out."""
+    normals = decode("exr", next((out / "normals").glob("*.exr"))).codes.astype(np.float64)
+    true, _ = ball()
+    middle = true[..., 2] > 0.3
+    return float(np.degrees(np.arccos(np.clip((normals * true).sum(axis=-1), -1, 1)))[middle].mean())
+
+
+def remarks(report: object) -> str:
+    assert hasattr(report, "shot")
+    return str(report.shot["Remarks"])
+
+
+def test_pictures_find_their_lights_by_name_whatever_the_order_and_the_holes(tmp_path: Path) -> None:
+    folder = photographs(tmp_path / "photos", lit())
+    turned = [3, 0, 5, 1, 4, 2]
+    lights = listed(tmp_path / "lights.lp", [f"C:\\rti\\{NAMES[n]}.JPG" for n in turned], LIGHTS[turned])
+    report = ps.stills(folder, lights=lights, out=tmp_path / "out")
+    assert error_deg(tmp_path / "out") < 1
+    assert "belong to lights by name" in remarks(report)
+    assert not report.timing.dropped_frames
+
+
+def test_pictures_without_names_belong_to_lights_by_order_and_the_report_says_so(tmp_path: Path) -> None:
+    folder = photographs(tmp_path / "photos", lit())
+    report = ps.stills(folder, lights=listed(tmp_path / "lights.lp"), out=tmp_path / "out")
+    assert error_deg(tmp_path / "out") < 1
+    assert "by order, since lights.lp names none of them: shot 3.png shows 'L0', shot 22.png shows 'L5'" in remarks(
+        report
+    )
+    assert {"plan.toml", "rig.toml", "lights.lp"} <= {file.name for file in (tmp_path / "out").iterdir()}
+
+
+def test_a_dark_picture_is_taken_off_and_a_mask_is_used_where_they_are_named_so(tmp_path: Path) -> None:
+    normals, inside = ball()
+    folder = photographs(tmp_path / "photos", lit(ambient=0.1))
+    save16(folder / "ball_DARK.png", np.where(inside, 0.1, 0.0))
+    cv2.imwrite(str(folder / "ball.mask.png"), (255 * (inside & (normals[..., 0] > 0))).astype(np.uint8))
+    report = ps.stills(folder, lights=listed(tmp_path / "lights.lp"), out=tmp_path / "out", transfer="linear")
+    assert "ball_DARK.png shows the ambient light, which was taken off" in remarks(report)
+    solved = decode("exr", next((tmp_path / "out" / "normals").glob("*.exr"))).codes
+    assert not solved[:, : SIZE // 2].any()
+    true = normals[:, SIZE // 2 + 2 :]
+    middle = true[..., 2] > 0.3
+    cosine = np.clip((solved[:, SIZE // 2 + 2 :].astype(np.float64) * true).sum(axis=-1), -1, 1)
+    assert np.degrees(np.arccos(cosine))[middle].mean() < 1
+
+
+@pytest.mark.parametrize("said", ["nothing", "srgb chunk", "profile"])
+def test_eight_bits_are_srgb_unless_they_say_otherwise(tmp_path: Path, said: str) -> None:
+    more: dict[str, object] = {}
+    if said == "profile":
+        more["icc_profile"] = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+    if said == "srgb chunk":
+        more["pnginfo"] = chunk(b"sRGB", b"\0")
+    folder = photographs(tmp_path / "photos", lit(), save=lambda path, light: save8(path, as_srgb(light), **more))
+    report = ps.stills(folder, lights=listed(tmp_path / "lights.lp"), out=tmp_path / "out")
+    assert error_deg(tmp_path / "out") < 1.5
+    assert "read as 'srgb'" in remarks(report)
+    why = {
+        "nothing": "the usual curve of 8-bit",
+        "srgb chunk": "as its sRGB chunk says",
+        "profile": "as its ICC profile",
+    }
+    assert why[said] in remarks(report)
+    assert not any("fit the lights better" in warning for warning in report.warnings)
+
+
+def test_pictures_that_speak_against_what_was_assumed_of_them_are_named(tmp_path: Path) -> None:
+    folder = photographs(tmp_path / "photos", lit(), save=save8)
+    lights = listed(tmp_path / "lights.lp")
+    report = ps.stills(folder, lights=lights, out=tmp_path / "out")
+    doubt = next(warning for warning in report.warnings if "fit the lights better" in warning)
+    assert "read as 'srgb', the usual curve of 8-bit pictures" in doubt
+    assert "say `transfer='linear'`" in doubt
+    assert not ps.stills(folder, lights=lights, out=tmp_path / "other", transfer="linear").warnings
+    assert error_deg(tmp_path / "other") < 1.5 < error_deg(tmp_path / "out")
+
+
+def with_exposures(folder: Path, pictures: Sequence[Picture], seconds: Sequence[float]) -> Path:
+    folder.mkdir()
+    for name, picture, time_s in zip(NAMES, pictures, seconds, strict=True):
+        exif = Image.Exif()
+        exif.get_ifd(0x8769)[0x829A] = time_s
+        save8(folder / f"{name}.jpg", as_srgb(picture), exif=exif, quality=98)
+    return folder
+
+
+def test_exposures_of_exif_are_believed_where_the_pictures_agree_and_not_where_they_do_not(tmp_path: Path) -> None:
+    seconds = [0.02, 0.01, 0.02, 0.02, 0.02, 0.02]
+    pictures, lights = lit(), listed(tmp_path / "lights.lp")
+    half = [pictures[0], pictures[1] / 2, *pictures[2:]]
+    true = ps.stills(with_exposures(tmp_path / "true", half, seconds), lights=lights, out=tmp_path / "out")
+    assert "shot 7.jpg by a factor 2" in remarks(true)
+    assert "strengths were scaled by it" in remarks(true)
+    assert error_deg(tmp_path / "out") < 1.5
+    lies = ps.stills(with_exposures(tmp_path / "lies", pictures, seconds), lights=lights, out=tmp_path / "other")
+    assert any("EXIF was not believed" in warning for warning in lies.warnings)
+    assert error_deg(tmp_path / "other") < 1.5
+
+
+def test_pictures_that_a_camera_held_upright_stand_upright(tmp_path: Path) -> None:
+    folder = tmp_path / "photos"
+    folder.mkdir()
+    for name, picture in zip(NAMES, lit(), strict=True):
+        exif = Image.Exif()
+        exif[0x0112] = 6
+        save8(folder / f"{name}.jpg", as_srgb(np.rot90(picture)), exif=exif, quality=98)
+    ps.stills(folder, lights=listed(tmp_path / "lights.lp"), out=tmp_path / "out")
+    assert error_deg(tmp_path / "out") < 1.5
+
+
+def test_relighting_from_the_rti_planes_gives_back_the_photographs(tmp_path: Path) -> None:
+    """Evaluated as OpenLIME's shader does: (code - bias) * scale, times 1, x, y, xx, xy, yy, times the colour."""
+    pictures = lit()
+    ps.stills(photographs(tmp_path / "photos", pictures), lights=listed(tmp_path / "l.lp"), out=tmp_path / "out")
+    folder = tmp_path / "out" / "rti"
+    info = json.loads((folder / "info.json").read_text())
+    assert (info["type"], info["colorspace"], info["nplanes"]) == ("ptm", "lrgb", 9)
+    scale, bias = (np.reshape(info["materials"][0][key], (3, 1, 1, 3)) for key in ("scale", "bias"))
+    planes = np.array([np.asarray(Image.open(folder / f"plane_{n}.jpg")) / 255 for n in range(3)])
+    colour, *terms = (planes - bias) * scale
+    for light, picture in zip(LIGHTS, pictures, strict=True):
+        x, y, _ = light
+        level = np.concatenate(terms, axis=-1) @ np.array([1, x, y, x * x, x * y, y * y])
+        shown = np.clip(level[..., None] * colour, 0, 1)
+        coded = as_srgb(np.clip(picture * 0.8 / np.percentile(picture, 99), 0, 1))
+        assert np.abs(shown[..., 0] - coded)[ball()[1]].mean() < 0.06
+
+
+BAD: dict[str, tuple[str, ...]] = {
+    "unknown light": ("names 9.png, and no picture is called so", "Pictures without a light: shot 22.png"),
+    "too few lights": ("holds 6 pictures of lights", "lists 5 lights"),
+    "another size": ("shot 8.png: is 32 x 64 pixels", "Expected pictures of one camera"),
+    "another kind": ("shot 3.png is PNG and shot 8.tif is TIFF", "of one kind"),
+    "another curve": ("shot 8.png: says that its curve is linear", "Pictures with different curves cannot be compared"),
+    "no lights": ("`lights` and `sphere`: expected one of the two",),
+    "no folder": ("is no folder",),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_what_cannot_go_together_is_said_in_one_paragraph_and_nothing_is_written(tmp_path: Path, case: str) -> None:
+    save = save8 if case == "another curve" else save16
+    folder = photographs(tmp_path / "photos", lit(), save=save)
+    lights: Path | None = listed(tmp_path / "lights.lp", None)
+    if case == "unknown light":
+        lights = listed(tmp_path / "lights.lp", [*NAMES[:5], "9.png"])
+    if case == "too few lights":
+        lights = listed(tmp_path / "lights.lp", None, LIGHTS[:5])
+    if case == "another size":
+        save16(folder / "shot 8.png", np.full((64, 32), 0.2))
+    if case == "another kind":
+        (folder / "shot 8.png").rename(folder / "shot 8.tif")
+    if case == "another curve":
+        save8(folder / "shot 8.png", lit()[2], pnginfo=chunk(b"gAMA", (100000).to_bytes(4, "big")))
+    if case == "no lights":
+        lights = None
+    if case == "no folder":
+        folder = tmp_path / "elsewhere"
+    with pytest.raises(ps.PsvideoError) as fault:
+        ps.stills(folder, lights=lights, out=tmp_path / "out")
+    for part in BAD[case]:
+        assert part in str(fault.value)
+    assert "\n" not in str(fault.value)
+    assert not (tmp_path / "out").exists()
+
+
+def chunk(name: bytes, data: bytes) -> PngInfo:
+    info = PngInfo()
+    info.add(name, data)
+    return info
+
+
+def test_the_command_says_what_it_assumed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = photographs(tmp_path / "photos", lit(), save=save8)
+    listed(tmp_path / "lights.lp")
+    words = ["stills", str(folder), "--lights", str(tmp_path / "lights.lp"), "-o", str(tmp_path / "out")]
+    assert main(words) == 0
+    said = capsys.readouterr()
+    assert "read as 'srgb'" in said.out + said.err
+    assert "say --transfer linear" in said.err
+    assert main(words) == 2
+
+
+def test_what_a_file_says_of_itself_is_read(tmp_path: Path) -> None:
+    exif = Image.Exif()
+    exif[0x010F], exif[0x0110] = "Canon", "Canon EOS 5D"
+    exif.get_ifd(0x8769)[0xA405] = 50
+    save8(tmp_path / "a.jpg", lit()[0], exif=exif)
+    told = stated_by(tmp_path / "a.jpg")
+    assert told.camera == "Canon EOS 5D"
+    assert told.focal_widths == pytest.approx(50 / 36)
+    assert stated_by(tmp_path / "missing.jpg").transfer is None
