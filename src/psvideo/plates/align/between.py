@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from psvideo.model.coded import Image
 from psvideo.plates.align.flow import Codes, Flags, Flow, Sketch, Vectors, comparable, places
+from psvideo.plates.align.packed import packed
 from psvideo.plates.mixture import made
 from psvideo.plates.sequence import LightPlate
 
@@ -36,6 +37,8 @@ SETTLED_PX = 0.5
 """How far the place that a pixel comes from may still wander when it is looked for step by step."""
 STEPS = 6
 BAND_ROWS = 64
+MARGIN_ROWS = 5
+"""Rows beside those that places lie in which count too: for cubic interpolation, and around what is clipped."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,7 +135,7 @@ def plate_at(ends: Ends, way: Track, *, time_s: float, number: int) -> LightPlat
     own = ends.nearer
     rows, cols = own.shape[:2]
     sides = [_Side.of(ends.before), _Side.of(ends.after)]
-    image = np.array(next(side.image for side in sides if side is not None and side.plate is own))
+    image = np.array(own.image)
     seen = np.empty((rows, cols), np.bool_)
     for top in range(0, rows, BAND_ROWS):
         band = slice(top, min(top + BAND_ROWS, rows))
@@ -141,7 +144,7 @@ def plate_at(ends: Ends, way: Track, *, time_s: float, number: int) -> LightPlat
         light=own.light,
         number=number,
         time_s=time_s,
-        picture=made(image),
+        picture=packed(made(image), own.saturation),
         seen=seen,
         saturation=own.saturation,
         shown_s=own.flashed_s,
@@ -150,33 +153,37 @@ def plate_at(ends: Ends, way: Track, *, time_s: float, number: int) -> LightPlat
 
 @dataclass(frozen=True, kw_only=True)
 class _Side:
-    """A plate, its picture, where it is clipped (None: nowhere) and what lies well within what was seen, by
-    rows, (row, 1), or by pixels."""
+    """A plate, of whose picture only those rows are made that move into a band, and what lies well within what was
+    seen, by rows, (row, 1), or by pixels."""
 
     plate: LightPlate
-    image: Image
-    clipped: NDArray[np.uint8] | None
     within: Flags
 
     @classmethod
     def of(cls, plate: LightPlate | None) -> "_Side | None":
         if plate is None:
             return None
-        image = plate.image
-        clipped = (_brightest(image) >= plate.saturation).astype(np.uint8)
         own = plate.own.astype(np.uint8)
         within = cv2.erode(own, np.ones((5, min(5, own.shape[1])), np.uint8)) > 0
-        wider = np.asarray(cv2.dilate(clipped, np.ones((5, 5), np.uint8)), np.uint8) if clipped.any() else None
-        return cls(plate=plate, image=image, clipped=wider, within=within)
+        return cls(plate=plate, within=within)
 
-    def moved(self, x: Vectors, y: Vectors) -> tuple[Image, Flags]:
-        """Return the plate at places of its own, and where it was seen there; clipped light stays clipped."""
-        image = cv2.remap(self.image, x, y, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
-        if self.clipped is not None:
-            touched = cv2.remap(self.clipped, x, y, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE) > 0
+    def moved(self, x: Vectors, y: Vectors, wanted: Flags) -> tuple[Image, Flags]:
+        """Return the plate at places of its own, and where it was seen there; clipped light stays clipped.
+
+        ``wanted`` says which places count; elsewhere anything may stand.
+        """
+        rows = self.plate.shape[0]
+        first, last = (int(np.clip(edge, 0, rows - 1)) for edge in (y[wanted].min(), y[wanted].max()))
+        first, last = max(first - MARGIN_ROWS, 0), min(last + 1 + MARGIN_ROWS, rows)
+        shown, y_shown = self.plate.picture.rows(range(first, last)), y - np.float32(first)
+        image = cv2.remap(shown, x, y_shown, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+        clipped = (_brightest(shown) >= self.plate.saturation).astype(np.uint8)
+        if clipped.any():
+            wider = cv2.dilate(clipped, np.ones((5, 5), np.uint8))
+            touched = cv2.remap(wider, x, y_shown, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE) > 0
             image[touched] = self.plate.saturation
-        rows, cols = self.within.shape
-        row, col = (np.clip(np.rint(at).astype(np.intp), 0, most - 1) for at, most in ((y, rows), (x, cols)))
+        known = zip((y, x), self.within.shape, strict=True)
+        row, col = (np.clip(np.rint(at).astype(np.intp), 0, most - 1) for at, most in known)
         return np.asarray(image, np.float32), self.within[row, col]
 
 
@@ -196,22 +203,23 @@ def _fill(band: slice, image: Image, seen: Flags, ends: Ends, sides: list[_Side 
     at = (x + 0.5) / scale_x - np.float32(0.5), (y + 0.5) / scale_y - np.float32(0.5)
     source = cv2.remap(way.source, *at, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)
     seen[band] = (source != NOWHERE) & own.pixels_seen[band]
-    if not ((source == BEFORE) | (source == AFTER) | (source == BOTH)).any():
+    flowing = (source != AT_REST) & (source != NOWHERE)
+    if not flowing.any():
         return
     shares = [1 - np.clip(ends.share, 0, 1), np.clip(ends.share, 0, 1)]
     total = np.zeros_like(image[band])
     weight = np.zeros(source.shape, np.float32)
     clipped = np.zeros(source.shape, np.bool_)
     for side, share, flow, alone in zip(sides, shares, (way.from_before, way.from_after), (BEFORE, AFTER), strict=True):
-        if side is None:
+        wanted = (source == BOTH) | (source == alone)
+        if side is None or not wanted.any():
             continue
         go = cv2.remap(flow, *at, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        found, there = side.moved(x - go[..., 0] * scale_x, y - go[..., 1] * scale_y)
+        found, there = side.moved(x - go[..., 0] * scale_x, y - go[..., 1] * scale_y, wanted)
         counts = (np.where(source == BOTH, np.float32(max(share, 1e-6)), (source == alone)) * there).astype(np.float32)
         total += found * (counts if found.ndim == 2 else counts[..., None])
         weight += counts
         clipped |= (counts > 0) & (_brightest(found) >= side.plate.saturation)
-    flowing = (source != AT_REST) & (source != NOWHERE)
     known = flowing & (weight > 0)
     blended = total / np.maximum(weight, 1e-6).reshape(*weight.shape, *[1] * (total.ndim - 2))
     blended[clipped] = own.saturation

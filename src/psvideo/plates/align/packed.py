@@ -2,29 +2,36 @@
 
 import numpy as np
 
+from psvideo.compute.threads import over_ranges
 from psvideo.model.coded import Coded, Tone
 from psvideo.plates.mixture import Mixture
 
 MOST_CODE = 65535
+BAND_ROWS = 64
 
 
 def packed(picture: Mixture, saturation: float) -> Mixture:
-    """Return a picture in half its memory, good to half a step of its codes; what is saturated is so still.
+    """Return a picture in half its memory, good to half a step of its codes; black and what is saturated stay so.
 
     One that is not made yet is held by its frames, and comes back as it is.
     """
     if not picture.is_made:
         return picture
     image = picture.image()
-    least, most = float(image.min()), float(image.max())
-    step = max((most - least) / MOST_CODE, 1e-12)
-    codes = image - np.float32(least)
-    codes *= np.float32(1 / step)
-    codes += np.float32(0.5)
-    tone = Tone(zero=np.full((1, 1), -least / step), gain=np.full((1, 1), step))
-    coded = Coded(codes=np.clip(codes, 0, MOST_CODE, out=codes).astype(np.uint16), tone=tone)
+    least, most = min(float(image.min()), 0.0), max(float(image.max()), 0.0)
+    step = max((most - least) / (MOST_CODE - 1), 1e-12)
+    zero = float(np.ceil(-least / step))
+    codes = np.empty(image.shape, np.uint16)
+
+    def pack(first: int, last: int) -> None:
+        band = image[first:last] * np.float32(1 / step)
+        band += np.float32(zero + 0.5)
+        codes[first:last] = np.clip(band, 0, MOST_CODE, out=band)
+
+    over_ranges(pack, len(image), each=BAND_ROWS)
+    tone = Tone(zero=np.full((1, 1), zero), gain=np.full((1, 1), step))
     return Mixture(
-        frames=(coded,),
+        frames=(Coded(codes=codes, tone=tone),),
         coefficients=np.ones((1, len(image))),
         ceiling=saturation,
         clips_from=saturation - step if most >= saturation else np.inf,
