@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from psvideo.model.surface import Surface
-from psvideo.plates.align import held
+from psvideo.plates.align import between, held
 from psvideo.plates.align.packed import packed
 from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.mixture import Mixture, made
@@ -213,21 +213,23 @@ def test_the_first_and_the_last_round_have_one_side_only(which: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("motion", "how", "per_light"),
+    ("motion", "how", "per_light", "later"),
     [
-        ("at rest", Aligning(align="none"), 1.0),
-        ("at rest", Aligning(), 1.5),  # the early half of a round waits for that of the next
-        ("4 px", Aligning(), 2.0),  # the plates of an instant are made, and those they are made from packed
-        ("4 px", Aligning(align="none", rate="flash"), 2.0),  # two rounds
-        ("4 px", Aligning(rate="flash"), 2.0),  # two rounds packed, and an instant
+        ("at rest", Aligning(align="none"), 1.0, 1.0),
+        ("at rest", Aligning(), 1.5, 1.0),  # the early half of the first round waits for that of the next
+        ("4 px", Aligning(), 1.5, 1.25),  # the plates of an instant are packed, and those they are made from
+        ("4 px", Aligning(align="none", rate="flash"), 2.0, 2.0),  # two rounds
+        ("4 px", Aligning(rate="flash"), 2.0, 1.25),  # two rounds packed, and an instant
     ],
 )
 def test_no_more_plates_are_held_than_instants_need(
-    motion: str, how: Aligning, per_light: float, monkeypatch: pytest.MonkeyPatch
+    motion: str, how: Aligning, per_light: float, later: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """``later`` is once the first instant is out."""
     clip = filmed(8, motion)
     sizes: dict[int, float] = {}
-    most = 0.0
+    most = most_later = 0.0
+    instants = 0
 
     def count(image: np.ndarray) -> None:
         if id(image) not in sizes:
@@ -235,12 +237,13 @@ def test_no_more_plates_are_held_than_instants_need(
             weakref.finalize(image, sizes.pop, id(image))
 
     def plates() -> Iterator[LightPlate]:
-        nonlocal most
+        nonlocal most, most_later
         for one in clip.rounds:
             for plate in one.plates:
                 own = replace(plate, picture=made(plate.image.copy()))
                 count(own.image)
                 most = max(most, sum(sizes.values()))
+                most_later = max(most_later, sum(sizes.values()) if instants else 0.0)
                 yield own
                 del own
 
@@ -250,12 +253,16 @@ def test_no_more_plates_are_held_than_instants_need(
         return small
 
     monkeypatch.setattr(held, "packed", watched)
+    monkeypatch.setattr(between, "packed", watched)
     for shown in aligned(plates(), clip.lights, how, first=1001):
+        instants += 1
         for plate in shown.plates:
-            count(plate.image)
+            if plate.picture.is_made:
+                count(plate.image)
         most = max(most, sum(sizes.values()))
         del shown, plate
     assert most <= per_light * len(clip.lights) + 1  # the plate that comes
+    assert most_later <= later * len(clip.lights) + 1
     assert not sizes
 
 

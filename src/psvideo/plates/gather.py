@@ -45,7 +45,8 @@ AnyPlate = TypeVar("AnyPlate", Plate, LightPlate)
 MOST_WAITING = 24
 """Plates that may wait for the next dark slot; frames are held for them, and farther ones are read before."""
 AHEAD = 2
-"""Frames that are decoded in advance while plates are rebuilt; each costs memory."""
+"""Frames that are decoded in advance while plates are rebuilt; each costs memory. Files that hold plain codes are read
+so quickly that one is enough."""
 
 
 def gather(
@@ -143,7 +144,8 @@ def clip_plates(
     come_often = has_dark and _come_often(used)
     if not come_often:
         _decode_ahead(take, watch)
-    decoded = read_frames(clip, take.numbers, ahead=AHEAD, threads=thread_count(), kept=take.kept)
+    ahead = 1 if holds_plain_codes(clip) else AHEAD
+    decoded = read_frames(clip, take.numbers, ahead=ahead, threads=thread_count(), kept=take.kept)
     frames = _placed(watch(decoded, total=len(take.numbers), what="rebuilding flashes"), places)
     single = (split if method == "weights" else hudon2015.split)(frames, camera, used)
     if come_often:

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from psvideo.model.coded import Image
 from psvideo.plates.align.flow import Codes, Flags, Flow, Sketch, Vectors, comparable, places

@@ -9,7 +9,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from psvideo.plates.align.flow import Sketch, sketch_of, white_of
+from psvideo.plates.align.brightness import evened
+from psvideo.plates.align.flow import Sketch, moved, sketch_of, white_of
 from psvideo.plates.align.packed import packed
 from psvideo.plates.sequence import LightPlate
 
@@ -59,7 +60,8 @@ class Held:
 
     ``sketched`` says whether flow is asked for, ``keep_all`` whether instants lie at every flash, ``trusts_rest``
     whether lights that show nothing move speak for the others, and ``with_ambient`` whether dark slots come. ``newest``
-    is the round that plates come of, ``whole`` the last one that was complete, and ``middle_s`` its middle.
+    is the round that plates come of, ``whole`` the last one that was complete, and ``middle_s`` its middle. ``motion``
+    says by light and round what was compared with the round before, and whether it had moved.
     """
 
     lights: tuple[str, ...]
@@ -71,6 +73,7 @@ class Held:
     shots: dict[str, dict[int, Shot]] = field(default_factory=dict)
     waiting: deque[DueInstant] = field(default_factory=deque)
     ambient: dict[int, LightPlate] = field(default_factory=dict)
+    motion: dict[tuple[str, int], bool] = field(default_factory=dict)
     newest: int = 0
     whole: int = 0
     middle_s: float = 0.0
@@ -108,11 +111,43 @@ class Held:
             return Around(before=own, after=own)
         if before is not None and own.time_s > instant.time_s:
             return Around(before=before, after=own)
+        if self._stood(instant):
+            return Around(before=own, after=own)
         if after is not None:
             return Around(before=own, after=after)
         if not (self.ended or self.newest > instant.round + 1 or self._rests(instant)):
             return None
         return Around(before=before or own, after=own)
+
+    def moved_since(self, light: str, round_number: int) -> bool | None:
+        """Tell whether a light's plate shows motion since that of the round before; None where one of them is not there
+        or no flow is asked for."""
+        key, shots = (light, round_number), self.shots.get(light, {})
+        if key not in self.motion:
+            before, own = shots.get(round_number - 1), shots.get(round_number)
+            if before is None or own is None or before.sketch is None or own.sketch is None:
+                return None
+            self.motion[key] = moved(before.sketch, evened(before.sketch, own.sketch))
+        return self.motion[key]
+
+    def _stood(self, instant: DueInstant) -> bool:
+        """Tell whether nothing moved in an instant's round: no light shows motion since the round before, and all those
+        after the instant, one at least, were compared. So nothing began to move before the last of them.
+
+        The lights before the instant need not wait for the next round then.
+        """
+        if not self.trusts_rest:
+            return False
+        since = {light: self.moved_since(light, instant.round) for light in self.lights}
+        late = [light for light in self.lights if self.shots[light][instant.round].time_s > instant.time_s]
+        return bool(late) and not any(since.values()) and all(since[light] is False for light in late)
+
+    def _stands_on(self) -> bool:
+        """Tell whether the lights in the first half of a round all show that nothing moved since the one before, which
+        was the last whole one: of that, nothing is needed any more."""
+        early = [light for light in self.lights if self.shots[light][self.whole].time_s <= self.middle_s]
+        since = [self.moved_since(light, self.whole + 1) for light in early]
+        return self.trusts_rest and bool(since) and all(one is False for one in since)
 
     def _rests(self, instant: DueInstant) -> bool:
         """Tell whether all lights before an instant, one at least, were compared with the next round, and none moves.
@@ -132,6 +167,7 @@ class Held:
         oldest = min([self.newest, self.whole or self.newest, *(one.round for one in self.waiting)]) - 1
         for number in [number for number in self.ambient if number <= oldest]:
             del self.ambient[number]
+        self.motion = {key: one for key, one in self.motion.items() if key[1] >= oldest}
         for light, shots in self.shots.items():
             near = {number for one in self.waiting if light not in one.made for number in self._rounds_of(light, one)}
             for number, shot in list(shots.items()):
@@ -159,4 +195,6 @@ class Held:
         coming = self.newest if self.newest > self.whole else self.newest + 1
         if shot.round < coming - 1:
             return False
-        return self.keep_all or shot.round != self.whole or shot.time_s > self.middle_s
+        if self.keep_all or shot.round != self.whole:
+            return True
+        return shot.time_s > self.middle_s and not self._stands_on()

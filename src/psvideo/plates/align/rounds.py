@@ -12,7 +12,7 @@ import numpy as np
 from psvideo.model.choices import Align, Rate
 from psvideo.plates.align.between import Ends, plate_at, track
 from psvideo.plates.align.brightness import evened
-from psvideo.plates.align.flow import Flow, flow_between, moved
+from psvideo.plates.align.flow import Flow, flow_between
 from psvideo.plates.align.held import Around, DueInstant, Held
 from psvideo.plates.sequence import AMBIENT, LightPlate, Round, gathered, handed_over
 
@@ -42,9 +42,9 @@ def aligned(
 
     ``plates`` come in the order of their rounds. ``first`` is the number of the clip's first round. One result per
     flash takes numbers of its own from there on, as many a round as there are lights. Plates between which nothing
-    moved pass as they are. Held are, in plates per light, one without alignment, one and a half where nothing moves,
-    and two where all does or at one result per flash. ``with_ambient`` says that dark slots come as well: every round
-    waits for its own, and takes it along as it is.
+    moved pass as they are. Held are, in plates per light, one without alignment, one where nothing moves (one and a
+    half at the clip's start), one and a half and as many in 16 bits where all does, and two at one result per flash.
+    ``with_ambient`` says that dark slots come as well: every round waits for its own, and takes it along as it is.
     """
     if how == UNMOVED:
         return gathered(
@@ -87,8 +87,8 @@ def _complete(held: Held, how: Aligning, flows: Flows) -> Iterator[Round]:
     held.let_go()
     while held.waiting:
         instant = held.waiting[0]
-        for light in _ready(held, instant, how):
-            _make(held, light, instant, how, flows)
+        while ready := _next_ready(held, instant, how):
+            _make(held, ready, instant, how, flows)
             held.let_go()
         if len(instant.made) < len(held.lights) or held.lacks_ambient(instant):
             return
@@ -101,16 +101,16 @@ def _complete(held: Held, how: Aligning, flows: Flows) -> Iterator[Round]:
         yield handed_over(instant.made, instant.number, held.lights)
 
 
-def _ready(held: Held, instant: DueInstant, how: Aligning) -> Iterator[str]:
-    """Yield the lights whose plates at an instant are not made yet and can be; each is judged when it is asked for.
+def _next_ready(held: Held, instant: DueInstant, how: Aligning) -> str | None:
+    """Return the first light whose plate at an instant is not made yet and can be; None where there is none.
 
     At one result per flash plates are held for other instants anyway: none is made before all can be.
     """
     undone = [light for light in held.lights if light not in instant.made]
     undone.sort(key=lambda light: held.shots[light][instant.round].time_s)
     if how.rate == "flash" and any(held.around(light, instant) is None for light in undone):
-        return iter(())
-    return (light for light in undone if held.around(light, instant) is not None)
+        return None
+    return next((light for light in undone if held.around(light, instant) is not None), None)
 
 
 def _make(held: Held, light: str, instant: DueInstant, how: Aligning, flows: Flows) -> None:
@@ -119,7 +119,7 @@ def _make(held: Held, light: str, instant: DueInstant, how: Aligning, flows: Flo
     if around is None:
         raise ValueError(f"light {light} of instant {instant.number} is still to come")
     time_s = instant.time_s
-    flow = None if around.before is around.after else _flow(around, light, how, flows)
+    flow = None if around.before is around.after else _flow(held, around, light, how, flows)
     if flow is None:
         plate = around.nearest(time_s)
     else:
@@ -129,15 +129,16 @@ def _make(held: Held, light: str, instant: DueInstant, how: Aligning, flows: Flo
     instant.made[light] = replace(plate, number=instant.number, time_s=time_s, shown_s=plate.flashed_s)
 
 
-def _flow(around: Around, light: str, how: Aligning, flows: Flows) -> Flow | None:
+def _flow(held: Held, around: Around, light: str, how: Aligning, flows: Flows) -> Flow | None:
     """Return the flow between two shots of a light, None where nothing moved or no flow is asked for."""
     before, after = around.before.sketch, around.after.sketch
     if before is None or after is None:
         return None
     key = light, around.before.round
     if key not in flows:
-        after = evened(before, after)
-        flows[key] = flow_between(before, after) if how.align == "flow" or moved(before, after) else None
+        flows[key] = None
+        if how.align == "flow" or held.moved_since(light, around.after.round):
+            flows[key] = flow_between(before, evened(before, after))
     return flows[key] if how.rate == "flash" else flows.pop(key)
 
 
