@@ -29,7 +29,13 @@ def explained(
             e[light, i] = ONE if m[light, i] > ABSENT else ZERO
     add_equations(task.matrix, w, m, e, n)
     solve_equations(w, n, ROUGHLY, False)
-    odd = 0
+    return explains(task, read, photon, w, v, m, n)
+
+
+@FUSED.inlined
+def explains(task: Task, read: np.float32, photon: np.float32, w: Floats, v: Floats, m: Floats, n: int) -> bool:
+    """Whether g explains every usable measurement of a block to its noise; DOUBT becomes 0."""
+    odd = np.int32(0)
     for light in range(task.lights):
         lamp = of_light(task.matrix, light)
         for i in range(n):
@@ -37,6 +43,6 @@ def explained(
             a, b, c = w[X + i], w[Y + i], w[Z + i]
             error = m[light, i] - (x * a + y * b + z * c)
             variance = read + photon * max(m[light, i], ZERO) + LIGHTS_SQUARED * (a * a + b * b + c * c)
-            odd += (m[light, i] > ABSENT) & (error * error > EXPLAINED_SQUARED * variance)
+            odd = np.int32(odd | (m[light, i] > ABSENT) & (error * error > EXPLAINED_SQUARED * variance))
     v[DOUBT : DOUBT + n] = ZERO
     return bool(odd == 0)

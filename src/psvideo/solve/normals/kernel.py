@@ -105,7 +105,7 @@ def _solve_block(
     start, channels = row * task.cols + col, task.tone.shape[1]
     place_lights(task.matrix, task.per_strength, task.near, row, col, n)
     plain = task.near.depth.size == 0 and all_seen(task.seen, row, col, n)
-    summed = plain and channels == 3 and _solve_colours(task, w, values, m, start, n)
+    summed = plain and channels == 3 and solve_colours(task, w, values, m, start, n)
     done = summed or (plain and channels == 1 and solve_grey(task, w, start, n))
     if not done or (keep_measurements and not summed):
         if channels == 1:
@@ -125,7 +125,8 @@ def _solve_block(
 
 
 @FUSED.inlined
-def _solve_colours(task: Task, w: Floats, values: Floats, m: Floats, start: int, n: int) -> bool:
+def solve_colours(task: Task, w: Floats, values: Floats, m: Floats, start: int, n: int) -> bool:
+    """Solve a block of three channels as if all measurements were usable; False where one is not."""
     return gather_all(task, w, values, start, n) and solve_all(task, w, values, m, n)
 
 

@@ -35,9 +35,9 @@ from psvideo.solve.normals.blocks import (
     Z,
 )
 from psvideo.solve.normals.equations import DOUBT, LOWER, OUT, SCALE, solve_equations
-from psvideo.solve.normals.explained import explained
+from psvideo.solve.normals.explained import explained, explains
 from psvideo.solve.normals.few_lights import EIGHT, FOUR, begin_few, reweigh_few
-from psvideo.solve.normals.measuring import combine, gather_one, gather_three, hide_unseen
+from psvideo.solve.normals.measuring import all_seen, combine, gather_one, gather_three, hide_unseen
 from psvideo.solve.normals.near_kernel import at, place_lights
 from psvideo.solve.normals.odd_of_four import TWO, drop_odd_of_four
 from psvideo.solve.normals.task import FEW, Floats, Result, Samples, Task, Weights
@@ -50,6 +50,7 @@ DEGREES = np.float32(180 / np.pi)
 SOUND_SQUARED = np.float32(1e4)  # while weights change, the last solution is kept where they leave a worse condition
 NO_ERROR = np.float32(180)  # what is predicted where there is no solution
 LEAST_CHECKED = 5  # usable measurements from which on residuals show how well the lights explain a pixel
+DROPPED_FROM = 4  # measurements, of which one may be left out
 UNEXPLAINED = LOWER  # a plane of v that is free by then
 
 
@@ -101,13 +102,14 @@ def solve_rows(
     for row in range(-(-first // step) * step, last, step):
         for col in range(0, t.cols, STEP):
             n = min(STEP, t.cols - col)
+            summed = False
             if t.mask.size and not t.mask[row, col : col + n].any():
                 w[X : X + n], w[Y : Y + n], w[Z : Z + n] = ZERO, ZERO, ZERO
                 v[DOUBT : DOUBT + n], v[UNEXPLAINED : UNEXPLAINED + n] = NO_ERROR, ZERO
             else:
-                _solve_block(t, weights, w, v, values, m, e, flat, row, col, n)
+                summed = _solve_block(t, weights, w, v, values, m, e, flat, row, col, n)
             start = row * t.cols + col
-            kernel.store_block(t, out, w, values, m, start, n, False)
+            kernel.store_block(t, out, w, values, m, start, n, summed)
             for i in range(min(n, len(predicted))):
                 predicted[start + i] = encoded(v[DOUBT + i] if out.valid[start + i] else ZERO, predicted)
             for i in range(min(n, len(unexplained))):
@@ -127,20 +129,24 @@ def _solve_block(
     row: int,
     col: int,
     n: int,
-) -> None:
-    """Leave g in the planes X, Y, Z, all 0 where the normal is not to be trusted, and the error in DOUBT."""
+) -> bool:
+    """Leave g in the planes X, Y, Z, all 0 where the normal is not to be trusted, and the error in DOUBT.
+
+    Returned is whether three channels' sums are left as well (``colour_kernel.py``), of what counts in every pixel.
+    """
     start, channels = row * task.cols + col, task.tone.shape[1]
     place_lights(task.matrix, task.per_strength, task.near, row, col, n)
-    if channels == 1:
-        gather_one(task, values, start, n)
+    distant = task.near.depth.size == 0
+    plain = distant and channels == 3 and all_seen(task.seen, row, col, n)
+    summed = plain and kernel.solve_colours(task, w, values, m, start, n)
+    if summed:
+        w[COUNT : COUNT + n], w[LIMIT : LIMIT + n] = np.float32(task.lights), task.dark
+        done = weights.read > ZERO and explains(task, weights.read, weights.photon, w, v, m, n)
     else:
-        gather_three(task, values, start, n)
-    hide_unseen(task, values, row, col, n)
-    if channels > 1:
-        combine(task, w, values, m, n)
-    _hide_shadows(task, w, m, n)
-    few = len(m) == FEW and task.near.depth.size == 0
-    if not (weights.read > ZERO and explained(task, weights.read, weights.photon, w, v, m, e, n)):
+        _read_usable(task, w, values, m, row, col, n)
+        done = weights.read > ZERO and explained(task, weights.read, weights.photon, w, v, m, e, n)
+    few = len(m) == FEW and distant
+    if not done:
         if few:
             begin_few(task.matrix, task.per_strength, weights.darkest, weights.brightest, w, flat, n)
         else:
@@ -157,6 +163,21 @@ def _solve_block(
         for i in range(n):
             kept = ONE if task.mask[row, col + i] else ZERO
             w[X + i], w[Y + i], w[Z + i] = w[X + i] * kept, w[Y + i] * kept, w[Z + i] * kept
+    return summed and (done or task.lights > DROPPED_FROM)
+
+
+@FUSED.inlined
+def _read_usable(task: Task, w: Floats, values: Floats, m: Floats, row: int, col: int, n: int) -> None:
+    """Read a block's measurements; what is saturated, unseen or in shadow is MISSING, and COUNT is what remains."""
+    start, channels = row * task.cols + col, task.tone.shape[1]
+    if channels == 1:
+        gather_one(task, values, start, n)
+    else:
+        gather_three(task, values, start, n)
+    hide_unseen(task, values, row, col, n)
+    if channels > 1:
+        combine(task, w, values, m, n)
+    _hide_shadows(task, w, m, n)
 
 
 @FUSED.inlined
