@@ -89,10 +89,10 @@ def update(ambient: Ambient | None, dark: Plate) -> Ambient:
     change = _Change.between(ambient.coarse, coarse, whole, sparse=_is_coarse(dark.picture.shape))
     again = ~ambient.known | _first_ripple(ambient.mains, mains)
     restarts = change.restarts[blocks] | again[:, None]
-    image, slots = _blended(ambient, dark, change.gain, restarts, factor)
+    image, reduced, slots = _blended(ambient, dark, change.gain, restarts, factor)
     return Ambient(
         image=image,
-        coarse=_reduced(image),
+        coarse=reduced,
         slots=slots,
         middle_s=np.where(dark.seen, rows.opened.middle_s, ambient.middle_s),
         known=ambient.known | dark.seen,
@@ -105,7 +105,6 @@ def update(ambient: Ambient | None, dark: Plate) -> Ambient:
 def _looked_at(dark: Plate) -> tuple[RowLight, Image]:
     """Return a dark slot's rows and the means over its blocks, of which the image itself is not held."""
     shape = dark.picture.shape
-    size = _coarse_size(shape)
     each = BAND_ROWS if _is_coarse(shape) and shape[0] % COARSE == 0 else shape[0]
 
     read = dark.picture.reader()
@@ -113,9 +112,7 @@ def _looked_at(dark: Plate) -> tuple[RowLight, Image]:
     def look(first: int, last: int) -> tuple[FloatArray, FloatArray, Image]:
         band = read(first, last)
         most = band.reshape(last - first, -1).max(axis=1).astype(np.float64)
-        rows = (last - first) // COARSE if each < shape[0] else size[0]
-        small = cv2.resize(band, (size[1], rows), interpolation=cv2.INTER_AREA)
-        return row_profile(band), most, np.asarray(small, np.float32).reshape(rows, size[1], *shape[2:])
+        return row_profile(band), most, _reduced(band, shape)
 
     means, peaks, smalls = zip(*over_ranges(look, shape[0], each=each), strict=True)
     rows = RowLight.of(dark, np.concatenate(means), np.concatenate(peaks))
@@ -132,10 +129,12 @@ def _coarse_size(shape: tuple[int, ...]) -> tuple[int, int]:
     return shape[0] // shrink, shape[1] // shrink
 
 
-def _reduced(image: Image) -> Image:
-    rows, cols = _coarse_size(image.shape)
-    small = cv2.resize(image, (cols, rows), interpolation=cv2.INTER_AREA)
-    return np.asarray(small, np.float32).reshape(rows, cols, *image.shape[2:])
+def _reduced(band: Image, shape: tuple[int, ...]) -> Image:
+    """Return the means over blocks of some whole rows of blocks of a picture of that shape, or of all its rows."""
+    rows, cols = _coarse_size(shape)
+    rows = rows if len(band) == shape[0] else len(band) // COARSE
+    small = cv2.resize(band, (cols, rows), interpolation=cv2.INTER_AREA)
+    return np.asarray(small, np.float32).reshape(rows, cols, *shape[2:])
 
 
 def _block_rows(rows: int, blocks: int) -> NDArray[np.intp]:
@@ -145,25 +144,27 @@ def _block_rows(rows: int, blocks: int) -> NDArray[np.intp]:
 
 def _blended(
     ambient: Ambient, dark: Plate, gain: Image, restarts: NDArray[np.bool_], factor: FloatArray
-) -> tuple[Image, Image]:
-    """Return the average with one more dark slot, its rows times a factor, and how many slots it spans then."""
+) -> tuple[Image, Image, Image]:
+    """Return the average with one more dark slot, its rows times a factor; its mean over blocks; and how many slots it
+    spans then."""
     image, slots = np.empty_like(ambient.image), np.empty_like(ambient.slots)
     rows, cols = image.shape[:2]
-    blocks = _block_rows(cols, slots.shape[1])
+    blocks = np.repeat(_block_rows(cols, slots.shape[1]), image.size // (rows * cols))
+    whole = rows if rows % COARSE or not _is_coarse(image.shape) else BAND_ROWS
 
     read = dark.picture.reader()
 
-    def blend(first: int, last: int) -> None:
+    def blend(first: int, last: int) -> Image:
         band = slice(first, last)
         new = _times_rows(read(first, last), factor[band])
         old, now, level, out = (
-            picture.reshape(last - first, cols, -1)
+            picture.reshape(last - first, -1)
             for picture in (ambient.image[band], new, _enlarged_rows(gain, image.shape, first, last), image[band])
         )
         _blend(old, now, level, ambient.slots[band], restarts[band], dark.seen[band], blocks, out, slots[band])
+        return _reduced(image[band], image.shape)
 
-    over_ranges(blend, rows, each=BAND_ROWS)
-    return image, slots
+    return image, np.concatenate(over_ranges(blend, rows, each=whole)), slots
 
 
 def _enlarged_rows(gain: Image, shape: tuple[int, ...], first: int, last: int) -> Image:
@@ -217,8 +218,8 @@ class _Change:
 
     def is_steady(self, level: Image) -> bool:
         """Tell whether hardly anything of this light, (row, col[, channel]) of blocks, changed by more than noise."""
-        change = np.abs(self.gain - 1) * np.maximum(level, 0)
-        return bool(np.quantile(change[::SPARSE], 0.999) < STEADY and self.restarts.mean() < 1e-3)
+        change = np.abs(self.gain[::SPARSE] - 1) * np.maximum(level[::SPARSE], 0)
+        return bool(np.quantile(change, 0.999) < STEADY and self.restarts.mean() < 1e-3)
 
 
 def _mean(picture: Image) -> Image:
@@ -277,21 +278,26 @@ def _blend(
     blended: Image,
     slots: Image,
 ) -> None:
-    """Average at the new level, start again where that explains nothing, and keep what was where nothing was seen."""
-    rows, cols, channels = old.shape
-    for row in range(rows):
+    """Average at the new level, start again where that explains nothing, and keep what was where nothing was seen.
+
+    Pictures are (row, sample); ``blocks`` (sample,) are the blocks in which these lie.
+    """
+    share, shares = np.empty(slots.shape[1], np.float32), np.empty(old.shape[1], np.float32)
+    for row in range(old.shape[0]):
+        before, now, level, out = old[row], new[row], gain[row], blended[row]
+        if not seen[row]:
+            slots[row] = old_slots[row]
+            out[:] = before
+            continue
         for block in range(slots.shape[1]):
             spanned = min(old_slots[row, block] + np.float32(1), np.float32(LONGEST_MEMORY))
-            count = np.float32(1) if restarts[row, block] else spanned
-            slots[row, block] = count if seen[row] else old_slots[row, block]
-        for col in range(cols):
-            share = np.float32(1) / max(slots[row, blocks[col]], np.float32(1))
-            for channel in range(channels):
-                before = old[row, col, channel]
-                if seen[row]:
-                    before *= gain[row, col, channel]
-                    before += (new[row, col, channel] - before) * share
-                blended[row, col, channel] = before
+            slots[row, block] = np.float32(1) if restarts[row, block] else spanned
+            share[block] = np.float32(1) / max(slots[row, block], np.float32(1))
+        for sample in range(len(shares)):
+            shares[sample] = share[blocks[sample]]
+        for sample in range(len(shares)):
+            there = before[sample] * level[sample]
+            out[sample] = there + (now[sample] - there) * shares[sample]
 
 
 def with_darks_ahead(plates: Iterator[Plate], timing: Timing) -> tuple[Iterator[Plate], Iterator[Plate]]:

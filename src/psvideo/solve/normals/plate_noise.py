@@ -51,7 +51,7 @@ def noise_of(
     detail, level = np.concatenate(details), np.concatenate(levels)
     if len(detail) < LEAST_PIXELS:
         return PlateNoise(read=LEAST**2, photon=0.0)
-    parts = np.array_split(np.argsort(level, kind="stable"), LEVELS)
+    parts = np.array_split(np.argsort(level), LEVELS)
     at = np.array([float(np.median(level[part])) for part in parts])
     found = np.array([float(np.quantile(detail[part], LOW_SHARE)) / LOW_OF_VARIANCE for part in parts])
     bright, darkest = at > 0.25 * at.max(), int(np.argmin(at))
@@ -68,10 +68,9 @@ def _fine(plate: Samples | Mixture, black_level: float, scale: float, pixels: in
         return np.zeros(0), np.zeros(0)
     step = max((rows - 2) // ROWS, 1)
     firsts = np.arange(0, rows - 2, step)
-    part = [_rows_of(plate, firsts + below) for below in range(3)]
-    if len(plate.shape) == 3:
-        part = [three[..., min(1, plate.shape[2] - 1)] for three in part]
-    top, middle, bottom = ((three.astype(np.float64) - black_level) * scale for three in part)
+    part = _rows_of(plate, (firsts + np.arange(3)[:, None]).ravel())
+    part = part[..., min(1, plate.shape[2] - 1)] if len(plate.shape) == 3 else part
+    top, middle, bottom = np.split((part.astype(np.float64) - black_level) * scale, 3)
     down = top - 2 * middle + bottom
     fine = down[:, :-2] - 2 * down[:, 1:-1] + down[:, 2:]
     every = max(fine.size // pixels, 1)
