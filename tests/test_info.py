@@ -16,6 +16,8 @@ from typer.testing import CliRunner
 
 from psvideo.cli.commands.info import info
 from psvideo.errors import PsvideoError
+from psvideo.export.tags import Tags
+from psvideo.formats.exr_files import write_exr
 from psvideo.formats.plan_toml import format_plan
 from psvideo.formats.rig_toml import format_rig
 from psvideo.formats.timing_json import format_timing
@@ -239,6 +241,21 @@ def test_results_hold_the_same_numbers(tmp_path: Path) -> None:
     assert "normals: 2 file(s), numbered 1001 to 1002, 16 x 12, channels R, G, B" in lines(found, "ok")
     (tmp_path / "albedo" / "shot_albedo.1002.exr").unlink()
     assert "albedo/ and normals/ do not hold the same numbers (1 differ)" in lines(describe(tmp_path), "FAULT")
+
+
+def test_results_say_their_space_direction_colour_and_rate(tmp_path: Path) -> None:
+    tags = Tags(fps=Fraction(24), colour="lin_awg4_scene", plan_sha256="ab" * 32, y="down", space="world")
+    for name, channels in (("normals", "RGB"), ("albedo", "RGB"), ("valid", "Y"), ("error", "Y")):
+        data = {channel: np.zeros((12, 16), np.float32) for channel in channels}
+        attributes = tags.attributes(time_s=0.5, data=name != "albedo")
+        write_exr(tmp_path / name / f"shot_{name}.1001.exr", data, attributes=attributes, fps=tags.fps)
+    found = describe(tmp_path)
+    said = "normals in world space, y down (DirectX); albedo in lin_awg4_scene, linear; 24 results a second"
+    assert said in lines(found, "ok")
+    assert "error: 1 file(s), numbered 1001 to 1001, 16 x 12, channels Y, in °" in lines(found, "ok")
+    (tmp_path / "delivery.json").write_text('{"schema": "psvideo-delivery/1"}', encoding="utf-8")
+    assert describe(tmp_path / "delivery.json").kind == "results folder"
+    assert (found.facts["space"], found.facts["y"], found.facts["colour"]) == ("world", "down", "lin_awg4_scene")
 
 
 def test_what_psvideo_does_not_know_is_refused(tmp_path: Path) -> None:

@@ -15,11 +15,14 @@ from psvideo.formats.contract import read_text
 from psvideo.formats.plan_toml import read_plan
 from psvideo.formats.rig_toml import read_rig
 from psvideo.formats.timing_json import read_timing
+from psvideo.inspect.about_output import describe_output
 from psvideo.inspect.about_plan import plan_findings, rig_findings
 from psvideo.inspect.findings import Description, Fact, Finding, fault, ok, warn
 from psvideo.strobe.runlog import as_played, read_log
 
 MISNAMED_PPM = (900.0, 1100.0)
+OF_A_FOLDER = ("psvideo-delivery", "psvideo-report")
+"""What stands for the folder in which it lies."""
 LIGHT_LISTS = (".lp", ".txt")
 
 
@@ -37,6 +40,8 @@ def describe_file(path: Path) -> Description:
         "psvideo-timing": ("timing", _timing),
         "psvideo-strobe": ("strobe log", _strobe_log),
     }
+    if schema in OF_A_FOLDER:
+        return describe_output(path.parent)
     if schema not in readers:
         kinds = ", ".join(readers)
         raise PsvideoError(

@@ -1,14 +1,15 @@
 """What can be said of a folder that psvideo wrote: plates, or results; whether its sequences go together."""
 
 from collections.abc import Iterator
+from fractions import Fraction
 from pathlib import Path
 
 from psvideo.clip.decode import exr
 from psvideo.clip.folder import number_of
 from psvideo.errors import PsvideoError
 from psvideo.formats.timing_json import read_timing
-from psvideo.inspect.findings import Description, Finding, caught, fault, ok, warn
-from psvideo.model.quantities import ALWAYS
+from psvideo.inspect.findings import Description, Fact, Finding, caught, fault, ok, warn
+from psvideo.model.quantities import ALWAYS, QUANTITIES
 
 
 def is_plates(folder: Path) -> bool:
@@ -26,8 +27,21 @@ def describe_output(folder: Path) -> Description:
     sequences = _sequences(folder)
     kind = "results folder" if is_results(folder) else "plates folder"
     findings = tuple(caught(_findings(folder, sequences, kind)))
-    facts = {name: len(files) for name, files in sequences.items()}
-    return Description(path=folder, kind=kind, facts={"sequences": list(sequences), **facts}, findings=findings)
+    facts: dict[str, Fact] = {"sequences": list(sequences), **{name: len(files) for name, files in sequences.items()}}
+    return Description(path=folder, kind=kind, facts=facts | _said_in_headers(sequences), findings=findings)
+
+
+def _said_in_headers(sequences: dict[str, list[Path]]) -> dict[str, Fact]:
+    """Return what the first files' headers say of space, direction of y, rate and colour; what is not said is None."""
+    heads = {name: exr.contents(files[0])[1] for name, files in sequences.items() if name in ALWAYS}
+    normals = heads.get("normals", {})
+    return {
+        "space": normals.get("psvideo:space"),
+        "y": normals.get("psvideo:y"),
+        "fps": normals.get("framesPerSecond"),
+        "colour": heads.get("albedo", {}).get("colorInteropID"),
+        "time_code": normals.get("timeCode"),
+    }
 
 
 def _sequences(folder: Path) -> dict[str, list[Path]]:
@@ -43,11 +57,28 @@ def _findings(folder: Path, sequences: dict[str, list[Path]], kind: str) -> Iter
         channels, attributes = exr.contents(files[0])
         span = f"numbered {min(numbers)} to {max(numbers)}, " if numbers else ""
         size = f"{attributes['width_px']} x {attributes['height_px']}"
-        yield ok(f"{name}: {len(files)} file(s), {span}{size}, channels {', '.join(channels)}")
+        unit = f", in {QUANTITIES[name].unit}" if name in QUANTITIES and QUANTITIES[name].unit else ""
+        yield ok(f"{name}: {len(files)} file(s), {span}{size}, channels {', '.join(channels)}{unit}")
+    said = _said_in_headers(sequences)
+    if said["space"] is not None:
+        yield ok(_in_words(said))
     if kind == "results folder":
         yield from _results_go_together(sequences)
     if (folder / "timing.json").is_file():
         yield from _plates_are_there(folder)
+
+
+def _in_words(said: dict[str, Fact]) -> str:
+    """Say in which frame and colours results are, and how fast they go."""
+    direction = {"up": "y up (OpenGL)", "down": "y down (DirectX)"}.get(str(said["y"]), "y is not said")
+    parts = [f"normals in {said['space']} space, {direction}"]
+    if said["colour"] is not None:
+        parts.append(f"albedo in {said['colour']}, linear")
+    if said["fps"] is not None:
+        parts.append(f"{float(Fraction(str(said['fps']))):.6g} results a second")
+    if said["time_code"] is not None:
+        parts.append(f"from time code {said['time_code']}")
+    return "; ".join(parts)
 
 
 def _results_go_together(sequences: dict[str, list[Path]]) -> Iterator[Finding]:
