@@ -97,7 +97,11 @@ def test_pictures_without_names_belong_to_lights_by_order_and_the_report_says_so
     assert "by order, since lights.lp names none of them: shot 3.png shows 'L0', shot 22.png shows 'L5'" in remarks(
         report
     )
-    assert {"plan.toml", "rig.toml", "lights.lp"} <= {file.name for file in (tmp_path / "out").iterdir()}
+    setup = tmp_path / "out" / "setup"
+    assert {"plan.toml", "rig.toml", "lights.lp"} == {file.name for file in setup.iterdir()}
+    again = ps.stills(folder, lights=setup / "rig.toml", out=tmp_path / "out", force=True)
+    assert "by name, as rig.toml says" in remarks(again)
+    assert error_deg(tmp_path / "out") < 1
 
 
 def test_a_dark_picture_is_taken_off_and_a_mask_is_used_where_they_are_named_so(tmp_path: Path) -> None:

@@ -40,7 +40,8 @@ from psvideo.runs.still_rig import KnownLights, listed_lights, sphere_lights
 from psvideo.solve.instants import Instant
 
 PLAN, RIG, LP = "plan.toml", "rig.toml", "lights.lp"
-"""What a result holds of how the photographs were taken to be."""
+SETUP = "setup"
+"""The folder in a result that holds how the photographs were taken to be: plan, rig, and the lights as a list."""
 
 
 def stills(
@@ -84,7 +85,7 @@ def stills(
     - ``solver``, ``fill``, ``preset``, ``aov``, ``mesh``, ``encode``, ``plates``, ``force``: as for ``normals``.
 
     Pictures are paired with lights by name where the names fit, else by order; the report says which. Written into
-    ``out`` is what ``normals`` writes, and beside it plan.toml, rig.toml and lights.lp: what was taken for granted.
+    ``out`` is what ``normals`` writes, and ``setup/`` with plan.toml, rig.toml and lights.lp: what was assumed.
     ``watch`` is handed every long loop, and ``caller`` the sentences that come on the way.
 
     Returns
@@ -240,9 +241,10 @@ def _aside(pairs: Pairs) -> tuple[str, ...]:
 
 def _write_beside(opened: _Opened, folder: Path, instant: Instant, *, rti: bool) -> None:
     """Write what was taken for granted into the folder of results, and the relightable picture."""
-    write_text(folder / PLAN, format_plan(opened.clip.plan))
-    write_text(folder / RIG, format_rig(opened.rig))
+    (folder / SETUP).mkdir(exist_ok=True)
+    write_text(folder / SETUP / PLAN, format_plan(opened.clip.plan))
+    write_text(folder / SETUP / RIG, format_rig(opened.rig))
     if all(light.direction is not None for light in opened.rig.lights):
-        write_rig(folder / LP, opened.rig)
+        write_rig(folder / SETUP / LP, opened.rig)
         if rti:
             write_rti(folder, instant.round, opened.rig)

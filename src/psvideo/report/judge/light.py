@@ -1,6 +1,6 @@
 """Judgements on light: exposure, clipping, lamps that fail or flicker, and what else lit the set."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,6 +76,17 @@ def _clipping(levels: dict[str, Levels]) -> Iterator[Judgement]:
         )
         return
     whole = [one for one in levels.values() if one.clipped_share <= 1 - TARGET_QUANTILE]
+    if len(over) > NAMED:
+        shares = [one.clipped_share for one in over.values()]
+        yield Judgement(
+            subject="clipping",
+            grade="bad" if max(shares) > lost else "doubtful",
+            found=f"{len(over)} of {len(levels)} lights clip: "
+            f"{first_of({light: one.clipped_share for light, one in over.items()})} of the subject.",
+            advice="Lower their powers (or durations) to about "
+            f"{_percent(min(one.right_power(whole) for one in over.values()))}, or close the aperture.",
+        )
+        return
     for light, one in over.items():
         yield Judgement(
             subject="clipping",
@@ -83,6 +94,17 @@ def _clipping(levels: dict[str, Levels]) -> Iterator[Judgement]:
             found=f"The flash of {light!r} is clipped in {100 * one.clipped_share:.0f} % of the subject.",
             advice=f"Lower its power (or its duration) to about {_percent(one.right_power(whole))}.",
         )
+
+
+def first_of(shares: Mapping[str, float]) -> str:
+    """Return the lights with the largest shares in per cent, and how many more there are.
+
+    >>> first_of({"a": 0.2, "b": 0.5, "c": 0.1, "d": 0.3, "e": 0.05})
+    "'b' 50 %, 'd' 30 %, 'a' 20 %, 'c' 10 % and 1 more"
+    """
+    largest = sorted(shares.items(), key=lambda named: -named[1])
+    more = f" and {len(largest) - NAMED} more" if len(largest) > NAMED else ""
+    return ", ".join(f"{light!r} {100 * share:.0f} %" for light, share in largest[:NAMED]) + more
 
 
 def _half(stops: float) -> str:
@@ -122,6 +144,15 @@ def lamps(observed: Observed, *, timed: bool = True) -> Iterator[Judgement]:
 
 
 def _weak(lights: Sequence[str], relative: NDArray[np.float64]) -> Iterator[Judgement]:
+    weak = [light for light, share in zip(lights, relative, strict=True) if NO_LIGHT <= share < WEAK_LIGHT]
+    if len(weak) > NAMED:
+        yield Judgement(
+            subject="lights",
+            grade="doubtful",
+            found=f"{len(weak)} of {len(lights)} lights are weak: less than {100 * WEAK_LIGHT:.0f} % of the strongest "
+            f"({', '.join(map(repr, weak[:NAMED]))} and {len(weak) - NAMED} more).",
+            advice="Raise their power or their flash duration, or move them nearer.",
+        )
     for light, share in zip(lights, relative, strict=True):
         if share < NO_LIGHT:
             yield Judgement(
@@ -130,7 +161,7 @@ def _weak(lights: Sequence[str], relative: NDArray[np.float64]) -> Iterator[Judg
                 found=f"The light {light!r} gives no light ({100 * max(share, 0):.1f} % of the strongest).",
                 advice="Check its cable, driver and line, and that the plan names it as the board does.",
             )
-        elif share < WEAK_LIGHT:
+        elif share < WEAK_LIGHT and len(weak) <= NAMED:
             yield Judgement(
                 subject="lights",
                 grade="doubtful",

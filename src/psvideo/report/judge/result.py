@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from psvideo.report.judge.light import NAMED
 from psvideo.report.judgement import Grade, Judgement
 from psvideo.report.observe.observed import InstantFacts, Observed
 from psvideo.report.observe.rigfit import RigFit
@@ -91,7 +92,9 @@ def _misfit(lights: Sequence[str], fit: RigFit) -> Judgement | None:
     grade: Grade = "bad" if fit.excess > LOST_MISFIT else "doubtful"
     found = f"The rig does not fit the plates: {100 * fit.misfit:.0f} % of the light cannot come from its lights"
     if by_strength:
-        named = ", ".join(f"{light!r} {100 * strength:.0f} %" for light, strength in off)
+        off.sort(key=lambda one: -abs(float(np.log(max(one[1], 1e-6)))))
+        named = ", ".join(f"{light!r} {100 * strength:.0f} %" for light, strength in off[:NAMED])
+        named += f" and {len(off) - NAMED} more," if len(off) > NAMED else ""
         return Judgement(
             subject="rig",
             grade=grade,
