@@ -69,6 +69,17 @@ def mix_pictures(mix: MixtureArrays, shares: Floats, taken: Floats, rows: Places
 
 
 @FUSED.kept
+def mix_thinned(mix: MixtureArrays, step: int, channels: int, out: Floats) -> None:
+    """Make every ``step``-th row, and of it every ``step``-th pixel: ``out`` (row, sample)."""
+    given, made = lent_mix(mix), lent(out)
+    whole = np.empty(given.samples, np.float32)
+    for row in range(made.shape[0]):
+        mix_row(given, step * row, whole)
+        for sample in range(made.shape[1]):
+            made[row, sample] = whole[sample // channels * step * channels + sample % channels]
+
+
+@FUSED.kept
 def mix_halved(mix: MixtureArrays, first: int, last: int, channels: int, out: Floats) -> None:
     """Make pairs of rows, and of them the mean over two by two pixels and all channels: ``out`` (row // 2, col // 2).
 

@@ -17,7 +17,7 @@ from psvideo.compute.threads import over_ranges
 from psvideo.model.camera import FloatArray
 from psvideo.model.clipping import SATURATED
 from psvideo.model.coded import IDENTITY, Coded, Image
-from psvideo.plates.mixing_kernel import COUNTS, MixtureArrays, mix_halved, mix_pictures, mix_rows
+from psvideo.plates.mixing_kernel import COUNTS, MixtureArrays, mix_halved, mix_pictures, mix_rows, mix_thinned
 
 BAND_SAMPLES = 1 << 20
 """Samples of one band of rows, which a thread makes at a time."""
@@ -91,7 +91,13 @@ class Mixture:
 
     def thinned(self, stride: int) -> Image:
         """Return every so many rows and columns of the picture."""
-        return self.rows(range(0, self.shape[0], stride))[:, ::stride]
+        if self.is_made:
+            return np.asarray(self.frames[0].codes[::stride, ::stride], np.float32)
+        rows, cols = (-(-size // stride) for size in self.shape[:2])
+        image = np.empty((rows, cols, *self.shape[2:]), np.float32)
+        channels = int(np.prod(self.shape[2:]))
+        mix_thinned(self.bound(), stride, channels, image.reshape(rows, -1))
+        return image
 
     def halved(self) -> Image:
         """Return the picture's mean over two by two pixels and over channels, shape (row // 2, col // 2)."""
