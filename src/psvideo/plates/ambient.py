@@ -293,8 +293,11 @@ def _blend(
             spanned = min(old_slots[row, block] + np.float32(1), np.float32(LONGEST_MEMORY))
             slots[row, block] = np.float32(1) if restarts[row, block] else spanned
             share[block] = np.float32(1) / max(slots[row, block], np.float32(1))
-        for sample in range(len(shares)):
-            shares[sample] = share[blocks[sample]]
+        if share.min() == share.max():  # as usual
+            shares[:] = share[0]
+        else:
+            for sample in range(len(shares)):
+                shares[sample] = share[blocks[sample]]
         for sample in range(len(shares)):
             there = before[sample] * level[sample]
             out[sample] = there + (now[sample] - there) * shares[sample]
