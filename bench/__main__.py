@@ -10,6 +10,7 @@ TABLES = (
     "reconstruction",
     "whole_run",
     "observing",
+    "memory",
     "encoding",
     "view",
     "timing",

@@ -1,0 +1,124 @@
+"""Memory as a contract: it grows with the picture and with the flashes of a round, and never with the clip."""
+
+import json
+import math
+import os
+import subprocess
+import sys
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tifffile
+
+from psvideo.formats.plan_toml import format_plan
+from psvideo.formats.rig_toml import format_rig
+from psvideo.formats.timing_json import format_timing
+from psvideo.model.camera import Camera
+from psvideo.model.plan import Plan, PlannedFlash
+from psvideo.model.rig import Light, Rig
+from psvideo.model.timing import Flash, Timing
+from psvideo.synth import TrueClock, expose
+
+LIGHTS = {f"l{n}": (0.5 * math.cos(0.9 * n), 0.5 * math.sin(0.9 * n), math.sqrt(0.75)) for n in range(7)}
+FRAMES_A_ROUND = 10
+"""A flash or the dark slot every 1.25 frames: after each round of eight the same ten frames come again."""
+PHASE_S = 0.003
+SMALL, LARGE = (90, 160), (450, 800)
+FEW, MANY = 60, 600
+MOST_GROWTH_MB = 1.5
+"""So much a process's peak may rise from 60 frames to 570: C libraries keep what was freed in pieces. A byte a pixel
+that stays with every instant makes 0.7, the codes of a frame that stay with every frame 42."""
+MOST_BYTES_PER_SAMPLE = 80
+"""A sample of the picture in the 16-bit codes of 19 frames (a round and a half, a flash over three, those that are read
+ahead): 38 bytes; ambient light, twice, and results with what they are judged by: 42."""
+RUN = """
+import json, sys
+from fractions import Fraction
+from pathlib import Path
+import psvideo as ps
+
+def peak_kb():
+    return next(int(line.split()[1]) for line in open("/proc/self/status") if line.startswith("VmHWM"))
+
+def watched(frames, **_):
+    for number, frame in enumerate(frames):
+        if number % 30 == 0:
+            peaks.append(peak_kb() / 1024)
+        yield frame
+        del frame
+
+runs = []
+for folder in map(Path, sys.argv[1:]):
+    peaks = []
+    given = {"rig": folder / "rig.toml", "timing": folder / "timing.json", "out": folder / "out"}
+    ps.normals(folder, **given, solver="least-squares", watch=watched)
+    runs.append([*peaks, peak_kb() / 1024])
+print(json.dumps(runs))
+"""
+
+
+def filmed(folder: Path, size: tuple[int, int], frames: int) -> Path:
+    """Write a clip of a relief at rest: five frames that come again and again, in files that are links."""
+    rows, cols = size
+    period_s = 1 / 120
+    camera = Camera(width_px=cols, height_px=rows, fps=Fraction(120), exposure_s=period_s, readout_s=0.97 * period_s)
+    lit = [PlannedFlash(lights={name: 1.0}, duration_s=0.0008) for name in LIGHTS]
+    flashes = (*lit, PlannedFlash(lights={}, duration_s=0.0008))
+    plan = Plan(camera=camera, flashes=flashes, dark_s=1.25 * period_s - 0.0008)
+    y, x = np.mgrid[0:rows, 0:cols] / rows
+    normals = np.stack([0.4 * np.sin(9 * x), 0.4 * np.cos(7 * y), np.ones_like(x)], axis=-1)
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    plates = [(0.7 * normals @ one)[..., None].astype(np.float32) * np.ones(3, np.float32) for one in LIGHTS.values()]
+    clock = TrueClock(phase_s=PHASE_S, offset_ppm=0.0)
+    shot = expose(plates, plan, frames=2 * FRAMES_A_ROUND, clock=clock, ambient=np.full((*size, 3), 0.02, np.float32))
+    (folder / "frames").mkdir(parents=True)
+    for number in range(frames):
+        file = folder / "frames" / f"relief.{number:04d}.tif"
+        if number < FRAMES_A_ROUND:
+            codes = np.clip(shot.frames[FRAMES_A_ROUND + number] * 65535, 0, 65535).astype(np.uint16)
+            tifffile.imwrite(file, codes, photometric="rgb")
+        else:
+            os.link(folder / "frames" / f"relief.{number % FRAMES_A_ROUND:04d}.tif", file)
+    count = int(frames / 1.25)
+    fired = tuple(
+        Flash(
+            index=n,
+            slot=n % len(flashes),
+            lights=flashes[n % len(flashes)].lights,
+            start_s=PHASE_S + 1.25 * period_s * n,
+            duration_s=0.0008,
+            complete=n < count - 2,
+        )
+        for n in range(count)
+    )
+    timing = Timing(
+        clip=folder.name,
+        frame_period_s=period_s,
+        exposure_s=period_s,
+        row_time_s=0.97 * period_s / rows,
+        clock_offset_ppm=0.0,
+        phase_error_rows=0.001,
+        order="marker",
+        flashes=fired,
+    )
+    (folder / "plan.toml").write_text(format_plan(plan))
+    (folder / "timing.json").write_text(format_timing(timing))
+    rig = Rig(lights=tuple(Light(name=name, direction=one) for name, one in LIGHTS.items()))
+    (folder / "rig.toml").write_text(format_rig(rig))
+    return folder
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="a process's peak is read from /proc")
+def test_memory_grows_with_the_picture_and_not_with_the_clip(tmp_path: Path) -> None:
+    """One process runs a long clip of small pictures and then a short one of large pictures: its peaks on the way."""
+    clips = [filmed(tmp_path / "long", SMALL, MANY), filmed(tmp_path / "large", LARGE, FEW)]
+    alone = os.environ | {"MALLOC_ARENA_MAX": "1"}  # as the command line sets it
+    done = subprocess.run([sys.executable, "-c", RUN, *clips], env=alone, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    long, large = json.loads(done.stdout.splitlines()[-1])
+    samples = LARGE[0] * LARGE[1] * 3
+    assert long[-2] - long[FEW // 30] <= MOST_GROWTH_MB  # the last is with the report
+    assert (large[-1] - long[-1]) * 2**20 <= MOST_BYTES_PER_SAMPLE * samples
+    assert len(list((tmp_path / "long" / "out" / "normals").iterdir())) == MANY // FRAMES_A_ROUND - 2
