@@ -220,6 +220,48 @@ def test_it_scrubs_plays_and_takes_lights_by_mouse_finger_and_keys(server: PageS
     assert all(url.startswith((server.url, "data:")) for url in watched.asked)
 
 
+def test_space_plays_also_after_a_click_on_a_button(server: PageServer, watched: Watched) -> None:
+    page = watched.open(server.url)
+    page.locator(".choice button[data-layout=one]").click()
+    page.keyboard.press("Space")
+    page.wait_for_selector("#play[aria-label=Stop]")
+    page.keyboard.press("Space")
+    page.wait_for_selector("#play[aria-label=Play]")
+    page.keyboard.press("Tab")
+    page.keyboard.press("Space")
+    assert page.evaluate("() => psvideo.state.layout") == "two", "what Tab reached is pressed"
+
+
+def test_what_is_not_measured_is_hatched_and_the_disc_of_lights_is_drawn(server: PageServer, watched: Watched) -> None:
+    page = watched.open(server.url)
+    assert page.locator("#mark-invalid").is_checked()
+    disc, knob = page.locator(".disc"), page.locator(".knob").first
+    box, handle = disc.bounding_box(), knob.bounding_box()
+    assert box is not None
+    assert handle is not None
+    assert box["x"] < handle["x"] + 13 < box["x"] + box["width"]
+    assert disc.get_attribute("data-tip") == "drag the light"
+    knob.drag_to(page.locator(".pane").first)
+    page.wait_for_selector(".disc[data-tip='']", state="attached")
+
+
+@pytest.mark.parametrize(("width", "height", "stacked"), [(1440, 420, "no"), (390, 844, "yes")])
+def test_two_pictures_stand_as_they_are_larger_and_nothing_is_cut_off(
+    browser: Browser, server: PageServer, width: int, height: int, stacked: str
+) -> None:
+    context = browser.new_context(viewport={"width": width, "height": height})
+    page = Watched(context.new_page()).open(server.url)
+    settled(page)
+    assert page.locator("#viewer").get_attribute("data-stacked") == stacked
+    outside = page.evaluate(
+        """() => [...document.querySelectorAll("button, select, input, a")].filter((one) => one.checkVisibility())
+             .filter((one) => { const b = one.getBoundingClientRect(); return b.left < 0 || b.right > innerWidth; })
+             .map((one) => one.outerHTML.slice(0, 80))"""
+    )
+    assert not outside
+    context.close()
+
+
 def test_a_corrupt_picture_says_so_in_its_pane_and_the_others_are_shown(server: PageServer, watched: Watched) -> None:
     page = watched.open(server.url)
     page.locator("#scrub").fill("4")
@@ -269,7 +311,9 @@ def test_views_are_chosen_by_keys_and_show_what_they_name(server: PageServer, wa
     page.keyboard.press("1")
     page.keyboard.press("v")
     settled(page)
-    assert page.locator("#mark-invalid").is_checked()
+    assert not page.locator("#mark-invalid").is_checked()
+    page.keyboard.press("v")
+    settled(page)
     page.keyboard.press("]")
     settled(page)
     assert "+0.25 EV" in page.locator("#part-display").inner_text()

@@ -15,6 +15,7 @@ import pytest
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.page import page_server, show_of
 from psvideo.page.serving import PageServer
+from psvideo.page.show import index_of
 
 
 @pytest.fixture(scope="module")
@@ -80,6 +81,23 @@ def test_nothing_but_the_page_and_its_pictures_is_served(server: PageServer, pat
     assert status == 404
     assert b"nobody" not in body
     assert b"root:" not in body
+
+
+def test_the_report_beside_the_results_is_shown_and_may_run_nothing(tmp_path: Path) -> None:
+    folder = small.results(tmp_path / "out")
+    (folder / "report.html").write_text("<!doctype html><p>found</p>", encoding="utf-8")
+    show = show_of(folder)
+    assert index_of(show)["report"] is True
+    with page_server(show, port=0) as one:
+        thread = threading.Thread(target=one.serve_forever)
+        thread.start()
+        status, body, headers = ask(one, "/report.html")
+        one.shutdown()
+        thread.join()
+    assert (status, body) == (200, b"<!doctype html><p>found</p>")
+    policy = headers["content-security-policy"]
+    assert "default-src 'none'" in policy
+    assert "script-src" not in policy
 
 
 @pytest.mark.parametrize(

@@ -76,6 +76,7 @@ def _results(path: Path) -> Show:
         verdict=str(report.get("verdict", "")),
         findings=tuple(str(sentence) for sentence in _list(report.get("findings"))),
         facts=dict(_facts(report)),
+        report=path / "report.html" if (path / "report.html").is_file() else None,
         timing=_timing_of(path / "timing.json"),
     )
 

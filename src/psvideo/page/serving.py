@@ -8,6 +8,7 @@ import json
 import re
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
 
 from psvideo.errors import PsvideoError, UsageError
@@ -24,6 +25,11 @@ POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data: blob:; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
+REPORT_POLICY = (
+    "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'; "
+    "frame-ancestors 'none'"
+)
+"""A report is one file: its style and pictures are in it, and it runs nothing."""
 PICTURE = re.compile(r"/picture/([A-Za-z0-9_.:+-]+)/(\d{1,9})")
 STALE_S = 20.0
 """A connection on which nothing is asked for so long is closed."""
@@ -98,6 +104,8 @@ class Handler(BaseHTTPRequestHandler):
             self._answer(self.server.assets[name], TYPES[name.rpartition(".")[2]])
         elif asked.path == "/index.json":
             self._answer_json(index_of(self.server.show))
+        elif asked.path == "/report.html" and self.server.show.report is not None:
+            self._report(self.server.show.report)
         elif asked.path == "/timing.json" and self.server.show.timing is not None:
             self._answer_json(_or_fault(self.server.show))
         elif picture := PICTURE.fullmatch(asked.path):
@@ -106,6 +114,12 @@ class Handler(BaseHTTPRequestHandler):
             self._refuse(HTTPStatus.NOT_FOUND, "There is nothing of that name here.")
 
     do_HEAD = do_GET  # noqa: N815  # the base class looks for this name
+
+    def _report(self, file: Path) -> None:
+        try:
+            self._answer(file.read_bytes(), TYPES["html"], policy=REPORT_POLICY)
+        except OSError:
+            self._refuse(HTTPStatus.NOT_FOUND, "The report is not there any more.")
 
     def _picture(self, name: str, number: int, query: str) -> None:
         show = self.server.show
@@ -127,13 +141,13 @@ class Handler(BaseHTTPRequestHandler):
     def _refuse(self, status: HTTPStatus, sentence: str) -> None:
         self._answer(f"{sentence}\n".encode(), "text/plain; charset=utf-8", status)
 
-    def _answer(self, body: bytes, kind: str, status: HTTPStatus = HTTPStatus.OK) -> None:
+    def _answer(self, body: bytes, kind: str, status: HTTPStatus = HTTPStatus.OK, *, policy: str = POLICY) -> None:
         self.send_response(status)
         for header, value in (
             ("Content-Type", kind),
             ("Content-Length", str(len(body))),
             ("Cache-Control", "no-store"),
-            ("Content-Security-Policy", POLICY),
+            ("Content-Security-Policy", policy),
             ("Cross-Origin-Resource-Policy", "same-origin"),
             ("Cross-Origin-Opener-Policy", "same-origin"),
             ("Referrer-Policy", "no-referrer"),

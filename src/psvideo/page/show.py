@@ -5,6 +5,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Literal
 
 from psvideo.model.quantities import Shown
@@ -56,6 +57,8 @@ class Show:
     facts: Mapping[str, str] = field(default_factory=dict)
     thinned: bool = False
     """Whether pictures were left out on purpose, so that holes in the numbers mean nothing."""
+    report: Path | None = None
+    """The page that says what was found; None where there is none."""
     timing: Callable[[], Mapping[str, object]] | None = None
     """Gives what the diagram of flashes is drawn from; None where nothing is known of them."""
 
@@ -78,6 +81,7 @@ def index_of(show: Show) -> dict[str, object]:
         "notes": list(show.notes),
         "facts": dict(show.facts),
         "timing": show.timing is not None,
+        "report": show.report is not None,
         "thinned": show.thinned,
         "sequences": [_entry(sequence) for sequence in show.sequences],
     }

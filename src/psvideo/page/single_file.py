@@ -95,6 +95,7 @@ def _part(show: Show, width_px: int, count: int) -> Show:
         width_px=width,
         height_px=height,
         notes=(),
+        report=None,
         thinned=len(chosen) < len(master.numbers),
     )
 

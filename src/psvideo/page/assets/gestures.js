@@ -79,6 +79,7 @@ function moveLight(app, held, event) {
   const { middle, radius } = discOf(app, held.element);
   const x = (event.clientX - box.left - middle[0]) / radius;
   const y = -(event.clientY - box.top - middle[1]) / radius;
+  app.state.dragged = true;
   app.changeLight(app.state.selected, { direction: directionAt(x, y) });
 }
 

@@ -3,7 +3,7 @@ import { directionAt } from "./lights.js";
 
 const HELP = [
   ["Sequence", [["Space", "play and stop"], ["← →", "one picture back or on; with Shift ten"], ["Home  End", "first and last"], ["Enter", "in the number field: go to that picture"]]],
-  ["Pictures", [["1 … 9", "what the active pane shows, in the list's order"], ["N", "make the next pane active"], ["S  D  F  W", "one, two or four panes, or a wipe"], ["X", "swap A and B"], ["B", "before and after: Algorithm 1 of Hudon et al. 2015 against this split"], ["Wheel", "or two fingers: zoom; Shift and drag moves; 0 or a double click fits"]]],
+  ["Pictures", [["1 … 9", "what the active pane shows, in the list's order"], ["N", "make the next pane active"], ["S  D  F  W", "one, two or four panes, or a wipe; two stand as they are larger"], ["X", "swap A and B"], ["B", "before and after: Algorithm 1 of Hudon et al. 2015 against this split"], ["Wheel", "or two fingers: zoom; Shift and drag moves; 0 or a double click fits"]]],
   ["Light", [["Drag", "in the relit picture: moves the chosen light"], ["Tab ← → ↑ ↓", "the same by keys, on the light's handle"], ["L  Delete", "add a light; remove the chosen one"]]],
   ["Looking", [["[  ]", "a quarter stop darker, brighter"], ["A", "expose for this picture"], ["C", "next channel"], ["V", "hatch what is not valid"], ["T  P", "timing; panel"], ["?", "this page"]]],
 ];
@@ -36,13 +36,17 @@ function keyNames(keys) {
 }
 
 export function listenToKeys(app) {
+  // what was clicked lets go of the focus, so that Space plays; what Tab reached keeps it and is pressed
+  document.addEventListener("click", (event) => {
+    if (event.detail > 0) event.target.closest("button:not(.knob), summary, input[type=checkbox], label.tick")?.blur();
+  });
   document.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || document.getElementById("help").open) return;
     const on = event.target;
     if (on.matches("input[type=text], select, input[type=color]")) return;
     if (on.matches(".knob") && nudge(app, event)) return;
     if (on.matches("input[type=range]") && event.key.startsWith("Arrow")) return;
-    if (on.matches("button, summary, input[type=checkbox]") && (event.key === " " || event.key === "Enter")) return;
+    if (on.matches("button, summary, input[type=checkbox], a") && (event.key === " " || event.key === "Enter")) return;
     const act = actions(app, event)[event.key.length === 1 ? event.key.toLowerCase() : event.key];
     if (!act) return;
     event.preventDefault();

@@ -13,6 +13,8 @@ import { placeUnder, tellPixel } from "./probe.js";
 import { TimingView } from "./timing.js";
 import { FLAT_WIDTH, FlatStage } from "./flat.js";
 
+const PIXELS_SHOW = 3;
+
 class App {
   constructor(index, fetchBlock, fetchTiming) {
     this.index = index;
@@ -69,8 +71,14 @@ class App {
   }
 
   paneWidth() {
-    const across = this.state.layout === "two" || this.state.layout === "four" ? 2 : 1;
+    const across = this.state.layout === "four" || (this.state.layout === "two" && !this.stacked()) ? 2 : 1;
     return this.viewer.clientWidth * devicePixelRatio / across;
+  }
+
+  // Two pictures stand side by side or on each other, whichever shows them larger.
+  stacked() {
+    const [wide, high] = [this.viewer.clientWidth / this.index.width_px, this.viewer.clientHeight / this.index.height_px];
+    return Math.min(wide, high / 2) > Math.min(wide / 2, high);
   }
 
   change(patch) {
@@ -220,6 +228,7 @@ class App {
   drawNow() {
     const blocks = this.loader.blocks();
     const ratio = devicePixelRatio;
+    this.viewer.dataset.stacked = this.stacked() ? "yes" : "no";
     const whole = this.viewer.getBoundingClientRect();
     this.stage.resize(Math.round(whole.width * ratio), Math.round(whole.height * ratio));
     this.stage.clear();
@@ -230,6 +239,7 @@ class App {
       const rect = scaled({ x: box.left - whole.left, y: box.top - whole.top, width: box.width, height: box.height }, ratio);
       look.quick = this.loader.quick(); // software rendering takes half as long without mixing neighbours
       look.window = windowOf(this, box.width, box.height);
+      look.sharp = this.state.zoom > 1 && rect.width / (look.window.width * this.index.width_px) >= PIXELS_SHOW; // pixels as they are, not mixed
       this.stage.draw(look, rect, this.cutOf(rect, place));
     });
     tellPanes(this, blocks);
@@ -281,7 +291,7 @@ function firstState(app) {
   const contents = [0, 1, 2, 3].map((place) => ids[Math.min(place, ids.length - 1)]);
   return { at: 0, playing: false, layout: ids.length > 1 && app.index.kind !== "clip" ? "two" : "one", contents, active: 0, wipe: 0.5, exposure: 0,
     channels: 0, lights: [newLight([])], selected: 0, specular: 0, exponent: 30, relief: 1, zoom: 1, centre: [0.5, 0.5],
-    markInvalid: false };
+    dragged: false, markInvalid: app.sequences.has("valid") };
 }
 
 function listenToBar(app) {
@@ -292,6 +302,7 @@ function listenToBar(app) {
   document.getElementById("timing-button").addEventListener("click", () => app.toggleTiming());
   document.getElementById("panel-button").addEventListener("click", () => app.togglePanel());
   document.getElementById("help-button").addEventListener("click", () => document.getElementById("help").showModal());
+  document.getElementById("report-link").hidden = !app.index.report;
   document.getElementById("name").textContent = app.index.name;
   document.title = `${app.index.name} – psvideo`;
   const verdict = document.getElementById("verdict");

@@ -147,11 +147,14 @@ export function discOf(app, element) {
 function tellHandles(app, element, content) {
   const layer = element.querySelector(".handles");
   const lights = content === RELIT ? app.state.lights : [];
-  while (layer.children.length > lights.length) layer.lastChild.remove();
-  while (layer.children.length < lights.length) layer.append(handle(app));
+  const knobs = layer.getElementsByClassName("knob");
+  while (knobs.length > lights.length) knobs[knobs.length - 1].remove();
+  while (knobs.length < lights.length) layer.append(handle(app));
   const { middle, radius } = discOf(app, element);
+  tellDisc(layer, lights.length > 0, middle, radius);
+  layer.querySelector(".disc")?.setAttribute("data-tip", app.state.dragged ? "" : "drag the light");
   lights.forEach((light, place) => {
-    const knob = layer.children[place];
+    const knob = knobs[place];
     knob.dataset.light = place;
     knob.style.left = `${middle[0] + light.direction[0] * radius}px`;
     knob.style.top = `${middle[1] - light.direction[1] * radius}px`;
@@ -161,6 +164,21 @@ function tellHandles(app, element, content) {
     const [x, y] = light.direction;
     knob.setAttribute("aria-label", `${light.name}, ${Math.round(x * 100)} % right, ${Math.round(y * 100)} % up; arrow keys move it`);
   });
+}
+
+// The rim of the disc on which lights are dragged: there they graze the surface.
+function tellDisc(layer, wanted, [across, down], radius) {
+  let disc = layer.querySelector(".disc");
+  if (!wanted) {
+    disc?.remove();
+    return;
+  }
+  if (!disc) {
+    disc = document.createElement("div");
+    disc.className = "disc";
+    layer.prepend(disc);
+  }
+  Object.assign(disc.style, { left: `${across - radius}px`, top: `${down - radius}px`, width: `${2 * radius}px`, height: `${2 * radius}px` });
 }
 
 function handle(app) {

@@ -121,7 +121,7 @@ class Stage {
     gl.uniform4f(this.uniform("uWindow"), window.x, window.y, window.width, window.height);
     const uses = (name, id) => {
       gl.activeTexture(gl.TEXTURE0 + UNITS[name]);
-      gl.bindTexture(gl.TEXTURE_2D, id && blocks[id] ? this.texture(id, blocks[id], look.quick) : this.empty);
+      gl.bindTexture(gl.TEXTURE_2D, id && blocks[id] ? this.texture(id, blocks[id], look.quick || look.sharp) : this.empty);
     };
     const relit = look.kind === "relit";
     uses("uMain", relit ? "normals" : sequence.id);
