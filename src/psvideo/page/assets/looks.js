@@ -8,6 +8,8 @@ const QUICK_WIDTH = 960;
 const WHITE = 0.8;
 const MOST_POINTS = 20000;
 
+const MEASURED = ["normals", "albedo", "depth", "residual", "error", "position"]; // what valid is said of
+
 // The things that a pane can show, in the order of the keys 1 to 9.
 export function contentsOf(index) {
   const own = index.sequences.map((sequence) => ({ id: sequence.id, label: sequence.label, group: sequence.group }));
@@ -22,7 +24,7 @@ export function sequenceOf(app, content) {
 // The ids of all sequences that a pane's content is made from.
 export function needsOf(app, content) {
   const ids = content === RELIT ? ["normals", "albedo", placeIdOf(app)] : [content];
-  if (app.state.markInvalid) ids.push("valid");
+  if (app.state.markInvalid && (content === RELIT || MEASURED.includes(content))) ids.push("valid");
   return ids.filter((id) => id && app.sequences.has(id));
 }
 
@@ -148,7 +150,7 @@ export function lookOf(app, content, blocks) {
   return {
     kind, sequence, blocks: present, channels, lights, exponent, aspect: app.index.height_px / app.index.width_px,
     place: kind === "position" ? stored(app, present[sequence.id]) : place, ...view,
-    markInvalid: markInvalid && Boolean(present.valid) && app.sequences.get("valid").timeline === sequence.timeline,
+    markInvalid: markInvalid && Boolean(present.valid) && MEASURED.includes(sequence.id),
     specular,
     exposure: 2 ** exposure * baseExposure(app, content, present),
     range: rangeOf(app, sequence, present),

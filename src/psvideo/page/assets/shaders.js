@@ -55,7 +55,8 @@ const SHOWN = {
   relit: (way) => (way.linear ? "relit(vAt)" : "srgb(chosen(relit(vAt) * uExposure))"),
 };
 
-const HATCH = `if (texture(uValid, vAt).x < 0.5) {
+// Nothing is hatched where nothing is shown.
+const HATCH = `if (texture(uValid, vAt).x < 0.5 && texture(uMain, vAt).rgb != vec3(0.0)) {
     float stripe = step(0.5, fract((gl_FragCoord.x + gl_FragCoord.y) / 12.0));
     shown = mix(shown, mix(uInvalidInk, uValidInk, stripe), 0.55);
   }`;
