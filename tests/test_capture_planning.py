@@ -216,6 +216,16 @@ def test_a_plan_for_a_trigger_needs_no_readout_and_no_marker() -> None:
     assert "synced" not in kinds(shoot)
 
 
+def test_lights_synced_to_the_frames_shine_while_all_rows_are_open_unless_something_limits_them() -> None:
+    shoot = planned(mode="synced", readout=None, flash=None)
+    assert [flash.duration_s for flash in shoot.plan.flashes] == pytest.approx([0.01] * 3)
+    assert shoot.chosen == "10 ms, decided by the time in which all rows are open"
+    rolling = planned(mode="synced", readout="4ms", flash=None).plan
+    assert rolling.flashes[0].duration_s == pytest.approx(0.006)
+    with pytest.raises(UsageError, match="Nothing says how long"):
+        planned(flash=None)
+
+
 def test_half_rate_keeps_two_frames_between_flashes() -> None:
     shoot = planned(mode="half-rate")
     assert shoot.plan.dark_s + 8e-4 == pytest.approx(0.02)

@@ -1,5 +1,6 @@
 """Lights calibrated on spheres in strobed clips, and normals solved with the rigs that came out of it."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -111,3 +112,16 @@ def test_two_chrome_balls_in_a_strobed_clip_show_where_near_lights_are(tmp_path:
     for name, place in NEAR.items():
         assert np.linalg.norm(np.subtract(np.array(found[name]), place)) < 0.025, name  # 0.021 m at worst, as measured
     assert read_rig(rig).focal_px == (500.0, 500.0)
+    subject = '[[object]]\nmesh = "sphere"\nheight_m = 0.16\nposition_m = [0.0, 0.0, -0.77]\nalbedo = 0.6\n'
+    (tmp_path / "subject").mkdir()
+    matte, photos = shot(tmp_path / "subject", PERSPECTIVE + lights + subject), tmp_path / "photos"
+    assert main(["split", str(matte), "-o", str(tmp_path / "plates"), "-q"]) == 0
+    photos.mkdir()
+    for name in NEAR:
+        shutil.copy(next((tmp_path / "plates" / name).iterdir()), photos / f"{name}.exr")
+    words = ["stills", str(photos), "--sphere", str(clip), "--spheres", "2", "--focal-px", "500", "--radius-mm", "80"]
+    assert main([*words, "-o", str(tmp_path / "out"), "-q"]) == 0
+    normals, true = pixels(next((tmp_path / "out" / "normals").iterdir())), pixels(matte / "truth" / "normals.exr")
+    inside = (pixels(matte / "truth" / "mask.exr") > 0.5) & (true[..., 2] > 0.5)
+    errors = np.degrees(np.arccos(np.clip((normals * true).sum(axis=-1), -1, 1)))[inside]
+    assert np.median(errors) < 4

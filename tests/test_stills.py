@@ -265,3 +265,35 @@ def test_what_a_file_says_of_itself_is_read(tmp_path: Path) -> None:
     assert told.camera == "Canon EOS 5D"
     assert told.focal_widths == pytest.approx(50 / 36)
     assert stated_by(tmp_path / "missing.jpg").transfer is None
+
+
+def chrome(folder: Path, *, middle: tuple[float, float] = (128, 118), radius: float = 80) -> Path:
+    """Write pictures of a chrome ball under the lights, and one under room light, on which its outline shows."""
+    folder.mkdir()
+    y, x = np.mgrid[:256, :256]
+    x, y = (x - middle[0]) / radius, (middle[1] - y) / radius
+    inside = x**2 + y**2 < 1
+    for name, light in zip(NAMES, LIGHTS, strict=True):
+        half = light + np.array([0, 0, 1])
+        half /= np.linalg.norm(half)
+        spot = np.exp(-((x - half[0]) ** 2 + (y - half[1]) ** 2) / (2 * 0.03**2))
+        save16(folder / f"{name}.png", np.clip(np.where(inside, 0.03 + spot, 0.0), 0, 1))
+    save16(folder / "room.png", np.where(inside, 0.5, 0.02))
+    return folder
+
+
+def test_a_chrome_ball_under_the_same_lights_is_enough(tmp_path: Path) -> None:
+    folder, ball_folder = photographs(tmp_path / "photos", lit()), chrome(tmp_path / "ball")
+    report = ps.stills(folder, sphere=[ball_folder], out=tmp_path / "out")
+    assert error_deg(tmp_path / "out") < 1.5
+    assert "6 of 6 lights were measured on 1 sphere(s), as directions" in remarks(report)
+    assert "belong to lights by name" in remarks(report)
+
+
+def test_a_sphere_that_the_picture_cuts_off_is_refused(tmp_path: Path) -> None:
+    folder, ball_folder = photographs(tmp_path / "photos", lit()), chrome(tmp_path / "ball", middle=(215, 118))
+    with pytest.raises(ps.PsvideoError) as fault:
+        ps.stills(folder, sphere=[ball_folder], out=tmp_path / "out")
+    assert "ball" in str(fault.value)
+    assert "\n" not in str(fault.value)
+    assert not (tmp_path / "out").exists()

@@ -11,6 +11,8 @@ from psvideo.model.units import show_seconds
 LONG_MARKER = 1.5
 """The marker flash of ``marker="long"`` is this much longer than the others: plainly so, and still cheap."""
 
+OPEN = "the time in which all rows are open"
+
 LONGEST_SHARE_OF_EXPOSURE = 0.25
 """Unless the user says so, no flash is longer: a quarter of the exposure already costs a fifth of the rate (eq. 6)."""
 
@@ -26,13 +28,17 @@ class Bound:
 def longest_flash(request: ShootRequest) -> Bound:
     """Return the longest flash that every limit allows, and the limit that decided.
 
-    With a longer marker flash the limits hold for that one, and the others are shorter. Raises UsageError where
-    nothing limits the flash, or where sharpness and LEDs leave too little light.
+    With a longer marker flash the limits hold for that one, and the others are shorter. Lights that are synced to the
+    frames need no limit: they shine while all rows are open. Raises UsageError where nothing limits the flash, or where
+    sharpness and LEDs leave too little light.
     """
     limits = request.limits
     if (limits.max_blur_px is None) != (limits.speed_px_s is None):
         raise UsageError("`max_blur_px` needs `speed_px_s`, and the reverse: blur = speed x flash duration. Give both.")
-    if limits.max_blur_px is None and limits.max_duty is None and limits.max_pulse_s is None:
+    unlimited = limits.max_blur_px is None and limits.max_duty is None and limits.max_pulse_s is None
+    if unlimited and request.mode == "synced" and _open_s(request) > 0:
+        return Bound(flash_s=_open_s(request) / (LONG_MARKER if request.marker == "long" else 1.0), why=OPEN)
+    if unlimited:
         raise UsageError(
             "Nothing says how long a flash should be. Give `flash_s` 0.8ms, or what limits it: `max_blur_px` 1 "
             "`speed_px_s` 800 (px/s), `max_duty` 0.1, `max_pulse_s` 1ms."
@@ -58,10 +64,14 @@ def _bounds(request: ShootRequest) -> list[Bound]:
             Bound(flash_s=flash_for_duty_s(request, limits.max_duty), why=f"the LEDs' duty of {limits.max_duty:.3g}")
         )
     if request.mode == "synced":
-        open_s = exposure_s - abs(request.camera.readout_s or 0.0)
-        if open_s > 0:
-            bounds.append(Bound(flash_s=open_s, why="the time in which all rows are open"))
+        if _open_s(request) > 0:
+            bounds.append(Bound(flash_s=_open_s(request), why=OPEN))
     return bounds
+
+
+def _open_s(request: ShootRequest) -> float:
+    """Return for how long all rows are open together: as long as a light of a synced shoot may be on."""
+    return request.camera.exposure_s - abs(request.camera.readout_s or 0.0)
 
 
 def flash_for_duty_s(request: ShootRequest, max_duty: float) -> float:

@@ -58,6 +58,7 @@ def stills(
     sensor_mm: float | None = None,
     radius_mm: float | None = None,
     circle: Sequence[tuple[float, float, float]] = (),
+    spheres: int = 1,
     solver: Solver = "auto",
     fill: bool = True,
     preset: Program | None = None,
@@ -78,7 +79,8 @@ def stills(
     - ``lights``: where the lights are: rig.toml, an .lp file, a DiLiGenT or UW list, or a table of names, directions
       and strengths. Or ``sphere``: folders with pictures of a mirror sphere under the same lights, one for each place
       of the sphere; with ``radius_mm`` and the lens (``focal_px``, or ``focal_mm`` with ``sensor_mm``) two places give
-      near lights their positions. ``circle``: outlines found by hand, x, y and radius in pixels.
+      near lights their positions. ``spheres``: how many each picture holds; ``circle``: outlines found
+      by hand, x, y and radius in pixels.
     - ``transfer``: how the files code light. Left out: as their ICC profile or PNG chunk says, else sRGB for 8 bits and
       linear for 16 bits, EXR and DNG. The report says which, and what speaks against it.
     - ``rti``: write ``rti/`` too, a polynomial texture map that OpenLIME shows in a web page (of distant lights).
@@ -113,7 +115,10 @@ def stills(
     asked = Asked(preset=preset, aov=aov, mesh=mesh, encode=encode, plates=plates)
     delivery, _ = delivery_of(asked)
     looking = Looking(
-        circles=tuple(circle), focal_px=focal_px, focal_widths=focal_widths(focal_px, focal_mm, sensor_mm)
+        spheres=spheres,
+        circles=tuple(circle),
+        focal_px=focal_px,
+        focal_widths=focal_widths(focal_px, focal_mm, sensor_mm),
     )
     known = _known_lights(
         path_if_given("lights", lights),

@@ -25,6 +25,7 @@ def stills(
         list[Path] | None,
         typer.Option(help="Instead of --lights: a folder with a chrome ball under the same lights; one per place."),
     ] = None,
+    spheres: Annotated[int, typer.Option(help="How many balls each picture of --sphere holds.", min=1, max=8)] = 1,
     dark: Annotated[
         Path | None, typer.Option(help="A picture with every light off. [default: one named dark or ambient]")
     ] = None,
@@ -77,6 +78,7 @@ def stills(
         out=out,
         lights=lights,
         sphere=sphere or (),
+        spheres=spheres,
         dark=dark,
         mask=mask,
         transfer=transfer,

@@ -1,6 +1,6 @@
 """In which panel of the help an option stands, where its command has many."""
 
-STILLS = ("lights", "sphere", "dark", "transfer", "focal_px", "focal_mm", "sensor_mm", "radius_mm", "circle")
+STILLS = ("lights", "sphere", "spheres", "dark", "transfer", "focal_px", "focal_mm", "sensor_mm", "radius_mm", "circle")
 """What photographs are read with."""
 
 PANELS = {
