@@ -29,10 +29,18 @@ from psvideo.solve.normals.blocks import (
     Z,
 )
 from psvideo.solve.normals.measuring import samples_of
+from psvideo.solve.normals.near_kernel import at, of_light
 from psvideo.solve.normals.task import Floats, Samples, Task
 
 TWO = np.float32(2)
 RX, RY, RZ, GX, GY, GZ, BX, BY, BZ = (SUMS + BLOCK * plane for plane in range(9))
+
+
+@FUSED.inlined
+def _sent(task: Task, light: int) -> tuple[np.float32, np.float32, np.float32]:
+    """What a distant light sends everywhere. (Compiled for near lights too, and never called then.)"""
+    sent: tuple[np.float32, np.float32, np.float32] = at(of_light(task.matrix, light), 0)
+    return sent
 
 
 @FUSED.inlined
@@ -58,7 +66,7 @@ def _add_two(task: Task, w: Floats, values: Floats, start: int, n: int, light: i
     (gain_r, add_r, top_r, _), (gain_g, add_g, top_g, _) = task.tone[light, 0], task.tone[light, 1]
     (gain_b, add_b, top_b, _), (gain_s, add_s, top_s, _) = task.tone[light, 2], task.tone[light + 1, 0]
     (gain_t, add_t, top_t, _), (gain_u, add_u, top_u, _) = task.tone[light + 1, 1], task.tone[light + 1, 2]
-    (xa, ya, za), (xb, yb, zb) = task.matrix[light], task.matrix[light + 1]
+    (xa, ya, za), (xb, yb, zb) = _sent(task, light), _sent(task, light + 1)
     v = values[3 * BLOCK * light : 3 * BLOCK * (light + 2)]
     unusable = np.int32(0)
     for i in range(n):
@@ -96,7 +104,7 @@ def _add_one(task: Task, w: Floats, values: Floats, start: int, n: int, light: i
     samples = samples_of(task, light, start, n)
     (gain_r, add_r, top_r, _), (gain_g, add_g, top_g, _) = task.tone[light, 0], task.tone[light, 1]
     gain_b, add_b, top_b, _ = task.tone[light, 2]
-    x, y, z = task.matrix[light]
+    x, y, z = _sent(task, light)
     v = values[3 * BLOCK * light : 3 * BLOCK * (light + 1)]
     unusable = np.int32(0)
     for i in range(n):
@@ -127,7 +135,7 @@ def solve_all(task: Task, w: Floats, values: Floats, measurements: Floats, n: in
         w[XX + i], w[YY + i], w[ZZ + i] = w[XX + i] * share, w[YY + i] * share, w[ZZ + i] * share
         w[SUM + i], w[LOW + i] = ZERO, -MISSING
     for light in range(task.lights):
-        per, v, m = task.per_strength[light], line[3 * BLOCK * light :], measurements[light]
+        per, v, m = at(task.per_strength[light], 0), line[3 * BLOCK * light :], measurements[light]
         for i in range(n):
             value = w[XX + i] * v[i] + w[YY + i] * v[BLOCK + i] + w[ZZ + i] * v[2 * BLOCK + i]
             m[i] = value
@@ -154,7 +162,7 @@ def _squares(task: Task) -> tuple[np.float32, np.float32, np.float32, np.float32
     """The symmetric matrix L^T L: its first row, and what is below."""
     xx = xy = xz = yy = yz = zz = ZERO
     for light in range(task.lights):
-        x, y, z = task.matrix[light]
+        x, y, z = _sent(task, light)
         xx, xy, xz, yy, yz, zz = xx + x * x, xy + x * y, xz + x * z, yy + y * y, yz + y * z, zz + z * z
     return xx, xy, xz, yy, yz, zz
 
@@ -187,7 +195,7 @@ def residuals_of_all(task: Task, w: Floats, values: Floats, n: int) -> None:
     w[XX : XX + n] = ZERO
     w[XY : XY + n] = np.float32(3 * task.lights)
     for light in range(task.lights):
-        x, y, z = task.matrix[light]
+        x, y, z = _sent(task, light)
         to_r, to_g, to_b = task.tone[light, 0, 3], task.tone[light, 1, 3], task.tone[light, 2, 3]
         v = line[3 * BLOCK * light :]
         for i in range(n):
