@@ -63,9 +63,8 @@ def _bounds(request: ShootRequest) -> list[Bound]:
         bounds.append(
             Bound(flash_s=flash_for_duty_s(request, limits.max_duty), why=f"the LEDs' duty of {limits.max_duty:.3g}")
         )
-    if request.mode == "synced":
-        if _open_s(request) > 0:
-            bounds.append(Bound(flash_s=_open_s(request), why=OPEN))
+    if request.mode == "synced" and _open_s(request) > 0:
+        bounds.append(Bound(flash_s=_open_s(request), why=OPEN))
     return bounds
 
 
