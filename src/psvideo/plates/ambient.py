@@ -27,20 +27,22 @@ from psvideo.plates.split import Plate
 
 LONGEST_MEMORY = 16
 """Dark slots that the average spans at most."""
-COARSE, LEVEL_SIGMA_PX = 2, 4.0
-"""Levels are compared over about 14 blocks of so many pixels a side: the factor adds hardly any noise. The window
-is a Gaussian: a box turns some ripples of the average around, and the average would feed on them."""
+BLOCKS_PX = ((100, 2), (600, 4))
+"""Levels are compared over blocks of so many pixels a side from pictures of so many rows and columns on; those of
+smaller pictures as they are."""
+LEVEL_SIGMA_PX = {1: 4.0, 2: 8.0, 4: 8.0}
+"""Over how many pixels, by a block's size: about 14 blocks of one or two pixels, 7 of four, so that the factor adds
+hardly any noise. The window is a Gaussian: a box turns some ripples of the average around, and the average would feed
+on them."""
 STEADY = 2e-4
 """Ambient light that changed by less than this, in units of saturation, is taken as it is now: interpolating it would
 change plates by half of that at most, and reading two pictures costs more than reading a plate's frames."""
-SMALL_PX = 100
-"""Pictures of fewer rows or columns are compared as they are."""
 LEAST_GAIN, MOST_GAIN = 0.5, 2.0
 """Where light changed by more than these factors between dark slots, the average starts again."""
 SPARSE, MOST_JUDGED = 5, 20_000
 """Noise is judged from every fifth pixel of every fifth row, or so many pixels, which is plenty."""
 BAND_ROWS = 64
-"""Rows that are worked on at a time: a whole number of blocks, that fit into a core's second cache."""
+"""Rows that are worked on at a time: a whole number of blocks that fit into a core's second cache."""
 NEIGHBOURHOOD_PX = 9
 """What the level does not explain is judged over a square of this width, which averages noise away."""
 CHANGED = 4.0
@@ -86,7 +88,7 @@ def update(ambient: Ambient | None, dark: Plate) -> Ambient:
     blocks = _block_rows(len(dark.seen), len(coarse))
     coarse = _times_rows(coarse, np.bincount(blocks, factor) / np.bincount(blocks))
     whole = np.bincount(blocks, ~(ambient.known & dark.seen)) == 0
-    change = _Change.between(ambient.coarse, coarse, whole, sparse=_is_coarse(dark.picture.shape))
+    change = _Change.between(ambient.coarse, coarse, whole, block=_block_px(dark.picture.shape))
     again = ~ambient.known | _first_ripple(ambient.mains, mains)
     restarts = change.restarts[blocks] | again[:, None]
     image, reduced, slots = _blended(ambient, dark, change.gain, restarts, factor)
@@ -105,7 +107,7 @@ def update(ambient: Ambient | None, dark: Plate) -> Ambient:
 def _looked_at(dark: Plate) -> tuple[RowLight, Image]:
     """Return a dark slot's rows and the means over its blocks, of which the image itself is not held."""
     shape = dark.picture.shape
-    each = BAND_ROWS if _is_coarse(shape) and shape[0] % COARSE == 0 else shape[0]
+    each = _rows_at_a_time(shape)
 
     read = dark.picture.reader()
 
@@ -119,20 +121,25 @@ def _looked_at(dark: Plate) -> tuple[RowLight, Image]:
     return rows, np.concatenate(smalls)
 
 
-def _is_coarse(shape: tuple[int, ...]) -> bool:
-    """Whether levels are compared over blocks; small pictures are compared as they are."""
-    return min(shape[:2]) >= SMALL_PX
+def _block_px(shape: tuple[int, ...]) -> int:
+    """Return how many pixels a side of the blocks has over which levels are compared."""
+    return max([px for least, px in BLOCKS_PX if min(shape[:2]) >= least], default=1)
+
+
+def _rows_at_a_time(shape: tuple[int, ...]) -> int:
+    """Return how many rows are worked on at a time: all of them where they are no whole number of blocks."""
+    block = _block_px(shape)
+    return BAND_ROWS if block > 1 and shape[0] % block == 0 else shape[0]
 
 
 def _coarse_size(shape: tuple[int, ...]) -> tuple[int, int]:
-    shrink = COARSE if _is_coarse(shape) else 1
-    return shape[0] // shrink, shape[1] // shrink
+    return shape[0] // _block_px(shape), shape[1] // _block_px(shape)
 
 
 def _reduced(band: Image, shape: tuple[int, ...]) -> Image:
     """Return the means over blocks of some whole rows of blocks of a picture of that shape, or of all its rows."""
     rows, cols = _coarse_size(shape)
-    rows = rows if len(band) == shape[0] else len(band) // COARSE
+    rows = rows if len(band) == shape[0] else len(band) // _block_px(shape)
     small = cv2.resize(band, (cols, rows), interpolation=cv2.INTER_AREA)
     return np.asarray(small, np.float32).reshape(rows, cols, *shape[2:])
 
@@ -150,7 +157,6 @@ def _blended(
     image, slots = np.empty_like(ambient.image), np.empty_like(ambient.slots)
     rows, cols = image.shape[:2]
     blocks = np.repeat(_block_rows(cols, slots.shape[1]), image.size // (rows * cols))
-    whole = rows if rows % COARSE or not _is_coarse(image.shape) else BAND_ROWS
 
     read = dark.picture.reader()
 
@@ -164,7 +170,7 @@ def _blended(
         _blend(old, now, level, ambient.slots[band], restarts[band], dark.seen[band], blocks, out, slots[band])
         return _reduced(image[band], image.shape)
 
-    return image, np.concatenate(over_ranges(blend, rows, each=whole)), slots
+    return image, np.concatenate(over_ranges(blend, rows, each=_rows_at_a_time(image.shape))), slots
 
 
 def _enlarged_rows(gain: Image, shape: tuple[int, ...], first: int, last: int) -> Image:
@@ -200,10 +206,10 @@ class _Change:
     restarts: NDArray[np.bool_]
 
     @classmethod
-    def between(cls, old: Image, new: Image, both: NDArray[np.bool_], *, sparse: bool) -> "_Change":
-        """Compare two pictures in the rows that both show; ``sparse``: they are means over blocks."""
-        gain = _gain(old, new, both, sparse=sparse)
-        width = max(NEIGHBOURHOOD_PX // COARSE | 1, 3) if sparse else NEIGHBOURHOOD_PX
+    def between(cls, old: Image, new: Image, both: NDArray[np.bool_], *, block: int) -> "_Change":
+        """Compare two pictures in the rows that both show; they are means over blocks of so many pixels a side."""
+        gain = _gain(old, new, both, block=block)
+        width = max(NEIGHBOURHOOD_PX // block | 1, 3) if block > 1 else NEIGHBOURHOOD_PX
         before, now, factor = (picture.reshape(*old.shape[:2], -1) for picture in (old, new, gain))
         rest, level = (
             np.where(both[:, None], _mean(picture), np.float32(0)) for picture in (now - factor * before, now)
@@ -228,15 +234,15 @@ def _mean(picture: Image) -> Image:
     return np.asarray(cv2.transform(picture, np.full((1, channels), 1 / channels, np.float32)), np.float32)
 
 
-def _gain(old: Image, new: Image, both: NDArray[np.bool_], *, sparse: bool) -> Image:
+def _gain(old: Image, new: Image, both: NDArray[np.bool_], *, block: int) -> Image:
     """Return by which factor each neighbourhood's light changed, of the pictures' shape; 1 where it is dark."""
-    shown = both.astype(np.float32)
+    shown, sigma = both.astype(np.float32), LEVEL_SIGMA_PX[block] / block
     small = [
-        cv2.GaussianBlur(picture if both.all() else _times_rows(picture, shown), (0, 0), LEVEL_SIGMA_PX)
+        cv2.GaussianBlur(picture if both.all() else _times_rows(picture, shown), (0, 0), sigma)
         for picture in (old, new)
     ]
     change = new - old
-    noise = max(_usual(np.diff(change[::SPARSE], axis=1)), _bent(change[:, ::SPARSE])) * (COARSE if sparse else 1)
+    noise = max(_usual(np.diff(change[::SPARSE], axis=1)), _bent(change[:, ::SPARSE])) * block
     floor = np.float32(2 * noise + 1e-5)
     gain = (np.maximum(small[1], 0) + floor) / (np.maximum(small[0], 0) + floor)
     return np.clip(gain, LEAST_GAIN, MOST_GAIN).reshape(old.shape).astype(np.float32, copy=False)
