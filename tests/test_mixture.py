@@ -21,18 +21,20 @@ from psvideo.plates.split import split
 
 ROWS, COLS = 46, 38
 CURVE = (np.linspace(0, 1, 65536) ** 2.2).astype(np.float32)
+HALVES = np.arange(65536, dtype=np.uint16).view(np.float16).astype(np.float32)
 TONES: dict[str, tuple[Any, Tone]] = {
     "8 bits": (np.uint8, Tone(gain=np.full((1, 1), 1 / 255))),
     "12 bits of 16": (np.uint16, Tone(zero=np.full((1, 1), 64.0), gain=np.full((1, 1), 1 / 4031), most=4095.0)),
     "curve": (np.uint16, Tone(table=CURVE)),
-    "half floats": (np.uint16, Tone(table=np.arange(65536, dtype=np.uint16).view(np.float16).astype(np.float32))),
+    "half floats": (np.uint16, Tone(table=HALVES)),
+    "half floats as they are": (np.uint16, Tone(table=HALVES, halves=True)),
     "mosaic": (np.uint16, Tone(zero=np.array([[500.0, 510.0], [490.0, 505.0]]), gain=np.full((2, 2), 1 / 60000))),
     "mosaic under a curve": (np.uint16, Tone(table=CURVE, zero=np.array([[0.01, 0.02]]), gain=np.array([[1.1, 1.2]]))),
     "light": (np.float32, Tone()),
 }
 
 
-MOST = {"half floats": 0x3C40, "12 bits of 16": 4200, "8 bits": 255}
+MOST = {"half floats": 0x3C40, "half floats as they are": 0x3C40, "12 bits of 16": 4200, "8 bits": 255}
 
 
 def codes_of(name: str, rng: np.random.Generator, shape: tuple[int, ...]) -> np.ndarray:

@@ -61,7 +61,8 @@ def _tone(scale: "Scale", transfer: str, black: Levels | None, white: float | No
 @functools.lru_cache(maxsize=4)
 def _half_tone(transfer: str, black: Levels | None, white: float | None) -> Tone:
     values = np.arange(65536, dtype=np.uint16).view(np.float16).astype(np.float32)
-    return Tone(table=_float_light(values, transfer, black, white))
+    as_they_are = black is None and white is None and not find_curve(transfer).source
+    return Tone(table=_float_light(values, transfer, black, white), halves=as_they_are)
 
 
 @dataclass(frozen=True, kw_only=True)

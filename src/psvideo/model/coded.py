@@ -21,13 +21,15 @@ class Tone:
 
     table: what every code that its type can hold becomes first; empty where light is linear in the code. zero, gain:
     (row, col), by position, a pattern that repeats from the picture's top left on: each filter colour of a mosaic may
-    have its own black level. most: codes above this count as it.
+    have its own black level. most: codes above this count as it. halves: codes are the bits of half floats, and the
+    table gives these as they are.
     """
 
     table: Image = field(default_factory=lambda: np.empty(0, np.float32))
     zero: NDArray[np.float64] = field(default_factory=lambda: np.zeros((1, 1)))
     gain: NDArray[np.float64] = field(default_factory=lambda: np.ones((1, 1)))
     most: float = np.inf
+    halves: bool = False
 
     @property
     def is_identity(self) -> bool:

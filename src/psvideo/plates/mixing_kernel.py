@@ -13,7 +13,7 @@ from numba.np.numpy_support import carray
 from numpy.typing import NDArray
 
 from psvideo.compute.compiled import FUSED
-from psvideo.compute.memory import lent, pointer
+from psvideo.compute.memory import decoded, lent, pointer
 
 Floats = NDArray[np.float32]
 Places = NDArray[np.intp]
@@ -33,6 +33,7 @@ class MixtureArrays(NamedTuple):
     samples: int
     coefficients: Floats  # (frame, row)
     table: Floats  # (code,), or empty
+    halves: bool  # codes are the bits of half floats, and the table gives these as they are
     zero: Floats
     gain: Floats
     most: np.float32
@@ -62,8 +63,8 @@ def mix_pictures(mix: MixtureArrays, shares: Floats, taken: Floats, rows: Places
         row = wanted[place]
         for picture in range(made.shape[0]):
             one = MixtureArrays(
-                given.frames, given.like, given.samples, each[picture], given.table, given.zero, given.gain, given.most,
-                given.levels, off[picture], given.ceiling, given.clips_from,
+                given.frames, given.like, given.samples, each[picture], given.table, given.halves, given.zero,
+                given.gain, given.most, given.levels, off[picture], given.ceiling, given.clips_from,
             )  # fmt: skip
             mix_row(one, row, made[picture, row - first])
 
@@ -137,8 +138,8 @@ def _some_reach_of(codes: Any, limit: Any, most: Any) -> Callable[[Any, np.float
 def lent_mix(mix: MixtureArrays) -> MixtureArrays:
     """The same without reference counts."""
     return MixtureArrays(
-        lent(mix.frames), lent(mix.like), mix.samples, lent(mix.coefficients), lent(mix.table), lent(mix.zero),
-        lent(mix.gain), mix.most, lent(mix.levels), lent(mix.taken), mix.ceiling, mix.clips_from,
+        lent(mix.frames), lent(mix.like), mix.samples, lent(mix.coefficients), lent(mix.table), mix.halves,
+        lent(mix.zero), lent(mix.gain), mix.most, lent(mix.levels), lent(mix.taken), mix.ceiling, mix.clips_from,
     )  # fmt: skip
 
 
@@ -155,6 +156,8 @@ def mix_row(mix: MixtureArrays, row: int, out: Floats) -> None:
         limit, scale = mix.clips_from / gain + zero, factor * gain
         if mix.zero.shape[2] > 1:
             clipped = _add_pattern(mix, frame, place, codes, factor, out, begun)
+        elif mix.halves:
+            clipped = _add_halves(codes, zero, scale, limit, out, begun)
         elif mix.table.size:
             clipped = _add_by_table(codes, mix.table, zero, scale, limit, out, begun)
         else:
@@ -239,6 +242,25 @@ def _add_by_table(
         for sample in range(out.shape[0]):
             value = table[np.uintp(codes[sample])]
             clipped += np.int32(value >= limit)
+            out[sample] = (value - zero) * scale
+    return bool(clipped > 0)
+
+
+@FUSED.inlined
+def _add_halves(
+    codes: NDArray[Any], zero: np.float32, scale: np.float32, limit: np.float32, out: Floats, begun: bool
+) -> bool:
+    """The same of half floats, which the processor knows: their table would fill a core's nearest caches."""
+    clipped = np.int32(0)
+    if begun:
+        for sample in range(out.shape[0]):
+            value = decoded(np.uint16(codes[sample]))
+            clipped = np.int32(clipped | (value >= limit))
+            out[sample] += (value - zero) * scale
+    else:
+        for sample in range(out.shape[0]):
+            value = decoded(np.uint16(codes[sample]))
+            clipped = np.int32(clipped | (value >= limit))
             out[sample] = (value - zero) * scale
     return bool(clipped > 0)
 

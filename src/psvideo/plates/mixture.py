@@ -139,6 +139,7 @@ class Mixture:
             samples=int(np.prod(self.shape[1:])),
             coefficients=np.ascontiguousarray(self.coefficients, np.float32),
             table=first.tone.table,
+            halves=all(frame.tone.halves for frame in frames),
             zero=np.stack([frame.tone.zero for frame in frames]).astype(np.float32),
             gain=np.stack([frame.tone.gain for frame in frames]).astype(np.float32),
             most=np.float32(min(frame.tone.most for frame in frames)),
