@@ -48,7 +48,7 @@ def pair_stills(folder: Path, known: Sequence[str], *, named: bool, whose: str, 
     matches = [_matching(name, files) for name in known] if named else []
     if matches and all(len(one) == 1 for one in matches):
         chosen = [one[0] for one in matches]
-        how = f"Pictures belong to lights by name, as {whose} says: {_shown(known, chosen)}."
+        how = f"Pictures belong to lights by name ({whose}): {_shown(known, chosen)}."
     elif any(matches):
         raise PsvideoError(_misnamed(folder, known, matches, files, whose))
     else:

@@ -147,7 +147,7 @@ def pass_doubts(asked: AskedPasses, plan: Plan) -> tuple[str, ...]:
     if asked.alpha and all(not flash.is_dark for flash in plan.flashes):
         said.append(
             "`aov` alpha is 1 wherever ambient light falls too: without a dark slot it cannot be told from the lights' "
-            "own. Keep a dark slot in the plan, or darken the room."
+            "own. Keep a dark slot in the plan (of stills: a picture named dark), or darken the room."
         )
     return tuple(said)
 
