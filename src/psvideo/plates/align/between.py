@@ -1,114 +1,120 @@
-"""A light's plate at an instant between two of its flashes: both plates moved along the flow, and blended.
+"""A light's plate at an instant between two of its flashes: both plates moved along the motion, and blended.
 
-What was hidden in one of the plates is taken from the other; what is unknown counts as not seen. Blending by time also
-carries shading over, which changes where a surface turns.
+What was hidden in one of the plates is taken from the other. Blending by time also carries shading over, which changes
+where a surface turns. Where nothing moves, or motion explains nothing better, the nearer plate is taken as it is.
 """
 
 import functools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
+from psvideo.compute.threads import over_ranges
 from psvideo.model.coded import Image
-from psvideo.plates.align.flow import Codes, Flags, Flow, Sketch, Vectors, comparable, places
+from psvideo.plates.align.flow import Codes, Flags, Vectors, comparable, places
+from psvideo.plates.align.moving import SHADING_PX, Followed, Pair
 from psvideo.plates.align.packed import packed
 from psvideo.plates.mixture import made
 from psvideo.plates.sequence import LightPlate
 
 AT_REST, BEFORE, AFTER, BOTH, NOWHERE = range(5)
-"""What a pixel is taken from: the nearer plate as it is, one plate moved along the flow, both, none."""
+"""What a pixel is taken from: the nearer plate as it is, one plate moved along the motion, both, or none."""
 
-EXPLAINED = 0.5
-"""Flow is used where it leaves less than this share of the squared change unexplained, ..."""
-LEAST_SQUARE = 1.0
-"""... and where that change is more than this, in squared codes; elsewhere moving shows nothing."""
-UNLIKE = 12.0
-"""Plates that differ by more codes than this, after blurring, do not show the same thing."""
+UNLIKE = 10.0
+"""Plates whose detail differs by more codes along the motion do not show the same thing."""
+ALIKE_PX = 5
+SHADED = 24.0
+"""... nor do those that differ by more as a whole: a shadow passed."""
 REST = 3.0
-"""Where the flow finds nothing, plates that differ by fewer codes are taken as they are."""
-BLUR_PX, WINDOW_PX, DETAIL_PX = 1.5, 9, 6.0
-REACH_PX = 17
-"""Around what moved, flow is used as well: bare parts of a subject move with it."""
-SLIVER_PX = 5
-"""What is known in narrower strips between what is not lies on outlines, where flow mixes what is before and behind."""
-SETTLED_PX = 0.5
-"""How far the place that a pixel comes from may still wander when it is looked for step by step."""
-STEPS = 6
+"""What stands still while its shading changes by more codes is blended by time."""
+ENOUGH = 4
+"""Where so many lights are sure, what others show is left out unless it is sure as well."""
+MANY = 4
+"""Of so many lights one must be sure, of more half."""
+APART_PX = 1.0
+"""What moves by so much more or less from plate to plate moves by itself, and may hide other things."""
 BAND_ROWS = 64
 MARGIN_ROWS = 5
 """Rows beside those that places lie in which count too: for cubic interpolation, and around what is clipped."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Track:
-    """Where every pixel of an instant comes from, on the sketches' grid: the way to it from either plate (row, col, 2),
-    and ``source`` (row, col), one of AT_REST to NOWHERE."""
+class Taken:
+    """Of one light (row, col): where its plates ``alike`` show the same along the motion, ``source``, what a pixel is
+    to be taken from, and where that is ``sure``."""
 
-    from_before: Vectors
-    from_after: Vectors
+    alike: Flags
+    sure: Flags
     source: Codes
 
 
-def track(before: Sketch, after: Sketch, flow: Flow, time_s: float) -> Track:
-    """Follow the flow to an instant, which may lie before or after both plates too."""
-    share = (time_s - before.time_s) / (after.time_s - before.time_s)
-    from_before, settled_before = _way_to(flow.forward, share)
-    from_after, settled_after = _way_to(flow.backward, 1 - share)
-    compared = np.broadcast_to((before.seen & after.seen)[:, None], before.codes.shape)
-    shows_before = settled_before & _all_around(flow.steady_before & compared, from_before)
-    shows_after = settled_after & _all_around(flow.steady_after & compared, from_after)
-    one, other = (_blurred(codes.astype(np.float32), BLUR_PX) for codes in comparable(before, after))
-    at_rest = other - one
-    along = _fetched(other, from_after) - _fetched(one, from_before)
-    square_at_rest = _mean_square(at_rest)
-    moves = (_mean_square(along) < EXPLAINED * square_at_rest) & (square_at_rest > LEAST_SQUARE)
-    moves = cv2.dilate(moves.astype(np.uint8), np.ones((REACH_PX, REACH_PX), np.uint8)) > 0
-    detail = along - _blurred(along, DETAIL_PX)  # shading may change as a surface turns, detail not
-    alike = _mean_square(detail) < UNLIKE**2
-    source = np.where(square_at_rest < UNLIKE**2, AT_REST, NOWHERE)
-    flowing = np.select(
-        [shows_before & shows_after & alike, shows_before & ~shows_after, shows_after & ~shows_before],
-        [BOTH, BEFORE, AFTER],
-        np.where((square_at_rest < REST**2) & compared, AT_REST, NOWHERE),
-    )
-    source = np.where(moves, flowing, source).astype(np.uint8)
-    known = cv2.morphologyEx((source != NOWHERE).astype(np.uint8), cv2.MORPH_OPEN, np.ones((SLIVER_PX, SLIVER_PX)))
-    source[(known == 0) & moves] = NOWHERE
-    return Track(from_before=from_before, from_after=from_after, source=source)
+def taken_of(pair: Pair, motion: Followed) -> Taken:
+    """Return what every pixel of a light's plate is taken from, on the sketches' grid."""
+    one, other = comparable(pair.before, pair.after)
+    spans_s = motion.time_s - pair.before.time_s, pair.after.time_s - motion.time_s
+    ways = motion.way(spans_s[0]), motion.way(-spans_s[1])
+    before, after = (_along(codes, way) for codes, way in zip((one, other), ways, strict=True))
+    apart = cv2.subtract(after, before, dtype=cv2.CV_32F)
+    shading = cv2.blur(apart, (SHADING_PX, SHADING_PX))
+    alike = cv2.blur((apart - shading) ** 2, (ALIKE_PX, ALIKE_PX)) < UNLIKE**2
+    alike &= np.abs(shading) < SHADED
+    nearer = BEFORE if spans_s[0] <= spans_s[1] else AFTER
+    source = np.where(motion.moves, np.where(alike, BOTH, nearer), AT_REST).astype(np.uint8)
+    source[~motion.moves & alike & (np.abs(shading) > REST)] = BOTH
+    gone = [_outside(way) for way in ways]
+    for hidden, span_s in zip(gone, (spans_s[0], -spans_s[1]), strict=True):
+        _add_hidden(hidden, motion, alike, span_s, sum(spans_s))
+    source[gone[0] & ~gone[1]] = AFTER
+    source[gone[1] & ~gone[0]] = BEFORE
+    return Taken(alike=alike, sure=alike | (gone[0] != gone[1]), source=source)
 
 
-def _way_to(flow: Vectors, share: float) -> tuple[Vectors, Flags]:
-    """Return the way that leads to every pixel when each has gone a share of its flow, and where one was found.
+def without_doubtful(shown: Sequence[Taken], motion: Followed, others: int) -> list[Codes]:
+    """Return the sources of all lights under which something moves, without what is doubtful where enough is sure.
 
-    Flow is known where things start, and asked for where they arrive: the start is looked for step by step.
+    Nor is anything known where more than half of many lights show that something moved, and no motion explains it.
+    ``others`` is the number of lights under which nothing moves.
     """
-    way = np.float32(share) * flow
-    missed_px = np.zeros(flow.shape[:2], np.float32)
-    for _ in range(STEPS):
-        further = np.float32(share) * _fetched(flow, way)
-        missed_px = np.hypot(further[..., 0] - way[..., 0], further[..., 1] - way[..., 1])
-        way = further
-    return way, missed_px < SETTLED_PX
+    sure = np.sum([one.sure for one in shown], axis=0, dtype=np.int16)
+    left_out = sure + others >= ENOUGH
+    if len(shown) >= MANY:
+        left_out |= ~motion.moves & (sure < min(len(shown) // 2, len(shown) - MANY + 1))
+    return [np.where(left_out & ~one.sure, np.uint8(NOWHERE), one.source) for one in shown]
 
 
-def _fetched(values: Vectors, way: Vectors) -> Vectors:
-    """Return what every pixel of a picture (row, col) or of vectors finds at the start of its way."""
-    x, y = places(*way.shape[:2])
-    found = cv2.remap(values, x - way[..., 0], y - way[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return np.asarray(found, np.float32)
+def _along(codes: Codes, way: Vectors) -> Codes:
+    x, y = places(*codes.shape)
+    return np.asarray(cv2.remap(codes, x - way[0], y - way[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))
 
 
-def _all_around(flags: Flags, way: Vectors) -> Flags:
-    return np.asarray(_fetched(flags.astype(np.float32), way) > 0.9)
+def _outside(way: Vectors) -> Flags:
+    rows, cols = way.shape[1:]
+    x, y = places(rows, cols)
+    x, y = x - way[0], y - way[1]
+    return np.asarray((x < -0.5) | (x > cols - 0.5) | (y < -0.5) | (y > rows - 0.5))
 
 
-def _blurred(values: Vectors, sigma_px: float) -> Vectors:
-    return np.asarray(cv2.GaussianBlur(values, (0, 0), sigma_px), np.float32)
+def _add_hidden(hidden: Flags, motion: Followed, alike: Flags, span_s: float, round_s: float) -> None:
+    """Add to ``hidden`` what something else covers in a plate, a time before the instant: what its place there is
+    better explained by, which moves otherwise."""
+    rows, cols = np.nonzero(~alike)
+    own = motion.velocity[:, rows, cols]
+    there = _places_from(rows, cols, -np.float32(span_s) * own, hidden.shape)
+    others = np.where(motion.moves[rows, cols], motion.velocity[:, there[0], there[1]], motion.nearby[:, rows, cols])
+    back = _places_from(*there, np.float32(span_s) * others, hidden.shape)
+    again = motion.velocity[:, back[0], back[1]]
+    apart_px, missed_px = (np.hypot(*(pair[0] - pair[1])) * round_s for pair in ((others, own), (again, others)))
+    hidden[rows, cols] |= (apart_px > APART_PX) & (missed_px <= APART_PX) & alike[back]
 
 
-def _mean_square(values: Vectors) -> Vectors:
-    return np.asarray(cv2.blur(values * values, (WINDOW_PX, WINDOW_PX)), np.float32)
+def _places_from(
+    rows: NDArray[np.intp], cols: NDArray[np.intp], way: Vectors, shape: tuple[int, ...]
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    row, col = np.rint(rows + way[1]).astype(np.intp), np.rint(cols + way[0]).astype(np.intp)
+    return np.clip(row, 0, shape[0] - 1), np.clip(col, 0, shape[1] - 1)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,20 +135,22 @@ class Ends:
         return nearer
 
 
-def plate_at(ends: Ends, way: Track, *, time_s: float, number: int) -> LightPlate:
+def plate_at(ends: Ends, source: Codes, motion: Followed, *, number: int) -> LightPlate:
     """Return a light's plate at an instant; ``seen`` (row, col) is False where what it showed is not known."""
     own = ends.nearer
     rows, cols = own.shape[:2]
     sides = [_Side.of(ends.before), _Side.of(ends.after)]
     image = np.array(own.image)
     seen = np.empty((rows, cols), np.bool_)
-    for top in range(0, rows, BAND_ROWS):
-        band = slice(top, min(top + BAND_ROWS, rows))
-        _fill(band, image, seen, ends, sides, way)
+
+    def fill(top: int, bottom: int) -> None:
+        _fill(slice(top, bottom), image, seen, ends, sides, source, motion)
+
+    over_ranges(fill, rows, each=BAND_ROWS)
     return LightPlate(
         light=own.light,
         number=number,
-        time_s=time_s,
+        time_s=motion.time_s,
         picture=packed(made(image), own.saturation),
         seen=seen,
         saturation=own.saturation,
@@ -191,35 +199,36 @@ def _brightest(image: Image) -> Image:
     return image if image.ndim == 2 else functools.reduce(np.maximum, np.moveaxis(image, -1, 0))
 
 
-def _fill(band: slice, image: Image, seen: Flags, ends: Ends, sides: list[_Side | None], way: Track) -> None:
+def _fill(
+    band: slice, image: Image, seen: Flags, ends: Ends, sides: list[_Side | None], source: Codes, motion: Followed
+) -> None:
     """Make one band of rows of the plate at an instant."""
     own = ends.nearer
     rows, cols = seen.shape
-    small_rows, small_cols = way.source.shape
+    scale_x, scale_y = (np.float32(own / small) for own, small in zip((cols, rows), source.shape[::-1], strict=True))
     x, y = places(band.stop - band.start, cols)
     y += np.float32(band.start)
-    scale_x, scale_y = np.float32(cols / small_cols), np.float32(rows / small_rows)
     at = (x + 0.5) / scale_x - np.float32(0.5), (y + 0.5) / scale_y - np.float32(0.5)
-    source = cv2.remap(way.source, *at, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)
-    seen[band] = (source != NOWHERE) & own.pixels_seen[band]
-    flowing = (source != AT_REST) & (source != NOWHERE)
-    if not flowing.any():
+    taken = cv2.remap(source, *at, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)
+    seen[band] = (taken != NOWHERE) & own.pixels_seen[band]
+    if not (flowing := (taken != AT_REST) & (taken != NOWHERE)).any():
         return
-    shares = [1 - np.clip(ends.share, 0, 1), np.clip(ends.share, 0, 1)]
+    go_x, go_y = (cv2.remap(v, *at, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE) for v in motion.velocity)
+    share = np.clip(ends.share, 0, 1)
     total = np.zeros_like(image[band])
-    weight = np.zeros(source.shape, np.float32)
-    clipped = np.zeros(source.shape, np.bool_)
-    for side, share, flow, alone in zip(sides, shares, (way.from_before, way.from_after), (BEFORE, AFTER), strict=True):
-        wanted = (source == BOTH) | (source == alone)
+    weight = np.zeros(taken.shape, np.float32)
+    clipped = np.zeros(taken.shape, np.bool_)
+    for side, part, alone in zip(sides, (1 - share, share), (BEFORE, AFTER), strict=True):
+        wanted = (taken == BOTH) | (taken == alone)
         if side is None or not wanted.any():
             continue
-        go = cv2.remap(flow, *at, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        found, there = side.moved(x - go[..., 0] * scale_x, y - go[..., 1] * scale_y, wanted)
-        counts = (np.where(source == BOTH, np.float32(max(share, 1e-6)), (source == alone)) * there).astype(np.float32)
+        span_s = np.float32(motion.time_s - side.plate.time_s)
+        found, there = side.moved(x - span_s * scale_x * go_x, y - span_s * scale_y * go_y, wanted)
+        counts = (np.where(taken == BOTH, np.float32(max(part, 1e-6)), (taken == alone)) * there).astype(np.float32)
         total += found * (counts if found.ndim == 2 else counts[..., None])
         weight += counts
         clipped |= (counts > 0) & (_brightest(found) >= side.plate.saturation)
-    known = flowing & (weight > 0)
+    known = flowing & (weight > 0) & own.rows_seen[band, None]
     blended = total / np.maximum(weight, 1e-6).reshape(*weight.shape, *[1] * (total.ndim - 2))
     blended[clipped] = own.saturation
     image[band][known] = blended[known]

@@ -15,13 +15,14 @@ LIT, NEAR_WHITE = 32, 250
 FEWEST = 64
 """Blocks that are compared, at least."""
 EXPLAINED = 0.5
-"""Brightness is evened out where it leaves less than this share of the squared change unexplained."""
+"""Brightness is evened out where it leaves less than this share of the usual block's change unexplained: what moves
+changes few blocks, but these a lot."""
 ROOT_TOE = float(np.sqrt(TOE))
 SCALE = 255 / (float(np.sqrt(1 + TOE)) - ROOT_TOE)
 
 
 def evened(before: Sketch, after: Sketch) -> Sketch:
-    """Return ``after`` in the brightness of ``before`` where one factor explains most of what changed; else as it is.
+    """Return ``after`` in the brightness of ``before`` where a factor explains most of the usual change; else as it is.
 
     Both sketches are of one light and one scale. What moves changes few blocks by one factor, so that the median over
     all lit blocks gives the exposure, and motion is left to be found.
@@ -33,8 +34,8 @@ def evened(before: Sketch, after: Sketch) -> Sketch:
     if np.count_nonzero(lit) < FEWEST:
         return after
     gain = float(np.median(_light(one[lit]) / _light(other[lit])))
-    change = float(np.mean(np.square(other[lit] - one[lit])))
-    left = float(np.mean(np.square(_brightened(other[lit], gain) - one[lit])))
+    change = float(np.median(np.abs(other[lit] - one[lit])))
+    left = float(np.median(np.abs(_brightened(other[lit], gain) - one[lit])))
     if left >= EXPLAINED * change:
         return after
     table = np.rint(_brightened(np.arange(256, dtype=np.float32), gain)).astype(np.uint8)

@@ -25,8 +25,8 @@ TOE = 0.02
 """Light that is added before the square root, as a share of white: it keeps the noise of dark pixels small."""
 LEAST_WHITE = 1 / 16
 """A clip that begins in the dark is not brightened by more than this."""
-BOTH_WAYS_PX, BOTH_WAYS_SHARE = 0.7, 0.05
-"""How far there and back may miss the start: pixels, and a share of the way."""
+FINEST_SCALE, FINE_PIXELS = 1, 250_000
+"""Flow is found on half the sketch and enlarged where sketches have so many pixels: good to a twentieth of one."""
 BLOCK_PX, AROUND = 4, 4
 """Change is looked for in the means of blocks, over so many of them together."""
 LEAST_CHANGE = 1.5
@@ -49,20 +49,6 @@ class Sketch:
     codes: Codes
     seen: Flags
     blocks: Vectors
-
-
-@dataclass(frozen=True, kw_only=True)
-class Flow:
-    """The way from every pixel of one sketch to the next and back, shape (row, col, 2) as (x right, y down), px.
-
-    ``steady_before`` and ``steady_after`` (row, col) are True where there and back leads to the start: what the pixel
-    shows is visible in both.
-    """
-
-    forward: Vectors
-    backward: Vectors
-    steady_before: Flags
-    steady_after: Flags
 
 
 def white_of(plate: LightPlate) -> float:
@@ -128,30 +114,18 @@ def _noise(before: Sketch, after: Sketch) -> float:
     return float(quarter) / QUARTER_OF_NORMAL / float(np.sqrt(6))
 
 
-def flow_between(before: Sketch, after: Sketch) -> Flow:
-    """Return the flow between two sketches, both ways."""
-    one, other = comparable(before, after)
-    search: Any = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
-    search.setFinestScale(0)
-    forward, backward = (np.asarray(search.calc(*pair, None), np.float32) for pair in ((one, other), (other, one)))
-    return Flow(
-        forward=forward,
-        backward=backward,
-        steady_before=_returns(forward, backward),
-        steady_after=_returns(backward, forward),
-    )
+def flow_from(one: Codes, other: Codes, start_px: tuple[float, float] | None = None) -> Vectors:
+    """Return the way from every pixel of one picture to the other, (row, col, 2) as (x right, y down), px.
 
-
-def _returns(there: Vectors, back: Vectors) -> Flags:
-    """Return where going there and back leads to the start again, within the picture."""
-    rows, cols = there.shape[:2]
-    x, y = places(rows, cols)
-    x, y = x + there[..., 0], y + there[..., 1]
-    returned = cv2.remap(back, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    missed_px = np.hypot(there[..., 0] + returned[..., 0], there[..., 1] + returned[..., 1])
-    inside = (x >= -0.5) & (x <= cols - 0.5) & (y >= -0.5) & (y <= rows - 0.5)
-    allowed_px = BOTH_WAYS_PX + BOTH_WAYS_SHARE * np.hypot(there[..., 0], there[..., 1])
-    return np.asarray(inside & (missed_px <= allowed_px))
+    ``start_px`` is where it is looked for; left out, nearby.
+    """
+    search: Any = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
+    search.setFinestScale(FINEST_SCALE if one.size >= FINE_PIXELS else 0)
+    start = None
+    if start_px is not None:
+        start = np.empty((*one.shape, 2), np.float32)
+        start[:] = start_px
+    return np.asarray(search.calc(one, other, start), np.float32)
 
 
 def places(rows: int, cols: int) -> tuple[Vectors, Vectors]:

@@ -44,14 +44,14 @@ class Around:
 
 @dataclass(kw_only=True)
 class DueInstant:
-    """An instant that is to be shown, of a round, and the lights' plates at it that are made already; ``moves`` once
-    any of them was found to move."""
+    """An instant that is to be shown, of a round, and the lights' plates at it that are made already; ``moving``
+    are the lights that were found to move and wait for each other."""
 
     number: int
     time_s: float
     round: int
     made: dict[str, LightPlate] = field(default_factory=dict)
-    moves: bool = False
+    moving: set[str] = field(default_factory=set)
 
 
 @dataclass(kw_only=True)
@@ -119,6 +119,13 @@ class Held:
             return None
         return Around(before=before or own, after=own)
 
+    def sure_around(self, light: str, instant: DueInstant) -> Around:
+        """Return what a light's plate at an instant is made from, which is there. Raises ValueError where it is not."""
+        around = self.around(light, instant)
+        if around is None:
+            raise ValueError(f"light {light} of instant {instant.number} is still to come")
+        return around
+
     def moved_since(self, light: str, round_number: int) -> bool | None:
         """Tell whether a light's plate shows motion since that of the round before; None where one of them is not there
         or no flow is asked for."""
@@ -156,7 +163,7 @@ class Held:
         """
         early = [light for light in self.lights if self.shots[light][instant.round].time_s < instant.time_s]
         seen = self.newest > instant.round and all(light in instant.made for light in early)
-        return self.trusts_rest and bool(early) and seen and not instant.moves
+        return self.trusts_rest and bool(early) and seen and not instant.moving
 
     def lacks_ambient(self, instant: DueInstant) -> bool:
         """Tell whether a round's dark slot is wanted and may still come."""

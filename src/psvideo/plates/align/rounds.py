@@ -10,14 +10,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from psvideo.model.choices import Align, Rate
-from psvideo.plates.align.between import Ends, plate_at, track
+from psvideo.plates.align.between import Ends, plate_at, taken_of, without_doubtful
 from psvideo.plates.align.brightness import evened
-from psvideo.plates.align.flow import Flow, flow_between
+from psvideo.plates.align.flow import Codes
 from psvideo.plates.align.held import Around, DueInstant, Held
+from psvideo.plates.align.moving import Followed, Pair, followed_at
 from psvideo.plates.sequence import AMBIENT, LightPlate, Round, gathered, handed_over
-
-Flows = dict[tuple[str, int], Flow | None]
-"""Flow from the plate of a light in a round (its number) to the next one; None where nothing moved."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,15 +61,14 @@ def _slid(
         trusts_rest=how.align == "auto" and how.rate == "round",
         with_ambient=with_ambient,
     )
-    flows: Flows = {}
     for plate in plates:
         number, times_s = plate.number, held.take(plate)
         del plate
         if times_s is not None:
             held.waiting.extend(_instants(number, list(times_s.values()), how, first))
-        yield from _complete(held, how, flows)
+        yield from _complete(held, how)
     held.ended = True
-    yield from _complete(held, how, flows)
+    yield from _complete(held, how)
 
 
 def _instants(number: int, times_s: list[float], how: Aligning, first: int) -> list[DueInstant]:
@@ -82,70 +79,78 @@ def _instants(number: int, times_s: list[float], how: Aligning, first: int) -> l
     return [DueInstant(number=start + n, time_s=time_s, round=number) for n, time_s in enumerate(sorted(times_s))]
 
 
-def _complete(held: Held, how: Aligning, flows: Flows) -> Iterator[Round]:
+def _complete(held: Held, how: Aligning) -> Iterator[Round]:
     """Make what can be made by now, release what that needed, and yield the instants that are complete, in order."""
     held.let_go()
     while held.waiting:
         instant = held.waiting[0]
-        while ready := _next_ready(held, instant, how):
-            _make(held, ready, instant, how, flows)
-            held.let_go()
+        _pass_rest(held, instant, how)
+        if instant.moving and len(instant.made) + len(instant.moving) == len(held.lights):
+            _make_moving(held, instant)
         if len(instant.made) < len(held.lights) or held.lacks_ambient(instant):
             return
         if instant.round in held.ambient:
             instant.made[AMBIENT] = held.ambient[instant.round]
         held.waiting.popleft()
         held.let_go()
-        for key in [key for key in flows if key[1] < instant.round - 1]:
-            del flows[key]
         yield handed_over(instant.made, instant.number, held.lights)
 
 
-def _next_ready(held: Held, instant: DueInstant, how: Aligning) -> str | None:
-    """Return the first light whose plate at an instant is not made yet and can be; None where there is none.
+def _pass_rest(held: Held, instant: DueInstant, how: Aligning) -> None:
+    """Hand on the plates of lights under which nothing moves, and note those under which something does.
 
-    At one result per flash plates are held for other instants anyway: none is made before all can be.
+    At one result per flash plates are held for other instants anyway: none is judged before all can be.
     """
-    undone = [light for light in held.lights if light not in instant.made]
+    undone = [light for light in held.lights if light not in instant.made and light not in instant.moving]
     undone.sort(key=lambda light: held.shots[light][instant.round].time_s)
     if how.rate == "flash" and any(held.around(light, instant) is None for light in undone):
-        return None
-    return next((light for light in undone if held.around(light, instant) is not None), None)
+        return
+    for light in undone:
+        around = held.around(light, instant)
+        if around is None:
+            continue
+        if _moves(held, light, around, how):
+            instant.moving.add(light)
+            held.pack(light, around)
+        else:
+            _hand_on(instant, around.nearest(instant.time_s))
+        held.let_go()
 
 
-def _make(held: Held, light: str, instant: DueInstant, how: Aligning, flows: Flows) -> None:
-    """Make a light's plate at an instant."""
-    around = held.around(light, instant)
-    if around is None:
-        raise ValueError(f"light {light} of instant {instant.number} is still to come")
-    time_s = instant.time_s
-    flow = None if around.before is around.after else _flow(held, around, light, how, flows)
-    if flow is None:
-        plate = around.nearest(time_s)
-    else:
-        instant.moves = True
-        held.pack(light, around)
-        plate = _moved_to(around, flow, time_s)
-    instant.made[light] = replace(plate, number=instant.number, time_s=time_s, shown_s=plate.flashed_s)
+def _moves(held: Held, light: str, around: Around, how: Aligning) -> bool:
+    """Tell whether anything moves between two shots of a light, where that is asked for."""
+    if around.before is around.after or around.before.sketch is None:
+        return False
+    return how.align == "flow" or bool(held.moved_since(light, around.after.round))
 
 
-def _flow(held: Held, around: Around, light: str, how: Aligning, flows: Flows) -> Flow | None:
-    """Return the flow between two shots of a light, None where nothing moved or no flow is asked for."""
+def _pair(around: Around) -> Pair:
     before, after = around.before.sketch, around.after.sketch
     if before is None or after is None:
-        return None
-    key = light, around.before.round
-    if key not in flows:
-        flows[key] = None
-        if how.align == "flow" or held.moved_since(light, around.after.round):
-            flows[key] = flow_between(before, evened(before, after))
-    return flows[key] if how.rate == "flash" else flows.pop(key)
+        raise ValueError("there is no motion without sketches")
+    return Pair(before=before, after=evened(before, after))
 
 
-def _moved_to(around: Around, flow: Flow, time_s: float) -> LightPlate:
+def _make_moving(held: Held, instant: DueInstant) -> None:
+    """Make the plates of all lights under which something moves; each is let go as soon as it was used."""
+    lights = [light for light in held.lights if light in instant.moving]
+    pairs = [_pair(held.sure_around(light, instant)) for light in lights]
+    motion = followed_at(pairs, instant.time_s)
+    shown = [taken_of(pair, motion) for pair in pairs]
+    sources = without_doubtful(shown, motion, len(held.lights) - len(lights))
+    for light, source in zip(lights, sources, strict=True):
+        _hand_on(instant, _moved_to(held.sure_around(light, instant), source, motion))
+        instant.moving.remove(light)
+        held.let_go()
+
+
+def _moved_to(around: Around, source: Codes, motion: Followed) -> LightPlate:
     before, after = around.before, around.after
-    if before.sketch is None or after.sketch is None:
-        raise ValueError("there is no flow without sketches")
-    way = track(before.sketch, evened(before.sketch, after.sketch), flow, time_s)
-    ends = Ends(before=before.plate, after=after.plate, share=(time_s - before.time_s) / (after.time_s - before.time_s))
-    return plate_at(ends, way, time_s=time_s, number=after.round)
+    share = (motion.time_s - before.time_s) / (after.time_s - before.time_s)
+    ends = Ends(before=before.plate, after=after.plate, share=share)
+    return plate_at(ends, source, motion, number=after.round)
+
+
+def _hand_on(instant: DueInstant, plate: LightPlate) -> None:
+    shown_s = plate.flashed_s
+    instant.made[plate.light] = replace(plate, number=instant.number, time_s=instant.time_s, shown_s=shown_s)

@@ -1,0 +1,197 @@
+"""How everything moves at an instant, found from all lights together: one velocity for every pixel.
+
+What moves is the same under every light. Flow between the plates of single lights (before and after the instant)
+proposes velocities, and so does what the picture's change as a whole correlates with, where flow does not reach;
+standing still is always proposed. Taken is what makes the plates of all lights alike, in small windows, and rest where
+nothing explains much more than rest does: flow that fits shadows and shading of one light says nothing of the others.
+"""
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.compute.threads import over_ranges
+from psvideo.plates.align.correlation import displacements
+from psvideo.plates.align.flow import Codes, Flags, Sketch, Vectors, comparable, flow_from
+from psvideo.plates.align.moving_kernel import arriving_rows, unlike_rows
+
+MOST_FLOWS = 4
+"""Flow is looked for between the plates of so many lights, evenly spread: more propose the same again."""
+WINDOW_PX, FINE_PX = 9, 3
+"""Plates are alike over the first window, and rest is no better over the second."""
+EXPLAINED, MARGIN, GAIN = 0.65, 0.05, 0.25
+"""What moves leaves less than this share of what rest leaves unexplained, less this much of every light; or less than
+that by so much of every light."""
+STILL_CODES, STILL_LIGHTS, STILL_SHARE = 3.0, 2, 0.7
+"""Pixels that change by less, under two lights at least and so many of all, are at rest: what changes under the others
+is a shadow, or something else that passes."""
+FINEST_PX, SHADING_PX, SHADING = 1.0, 13, 0.7
+"""Sketches are compared smoothed by the first, and without most of what is wider than the second: as surfaces turn,
+their shading changes, their detail does not."""
+PUZZLING, PUZZLED = 0.5, 0.004
+"""More of the picture than this share is unlike by so much of every light: what moves is faster than flow follows."""
+FAR = 2
+"""So many displacements of the picture's changing parts are tried then."""
+BAND_PIXELS = 1 << 16
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pair:
+    """The sketches of a light before and after an instant, in the same brightness."""
+
+    before: Sketch
+    after: Sketch
+
+
+@dataclass(frozen=True, kw_only=True)
+class Followed:
+    """``velocity`` (2, row, col) is x right, y down, in pixels of the sketches per second, 0 where not ``moves``."""
+
+    time_s: float
+    velocity: Vectors
+    moves: Flags
+
+    @functools.cached_property
+    def nearby(self) -> Vectors:
+        """The velocity of what moves nearest to every pixel, (2, row, col)."""
+        if not self.moves.any():
+            return self.velocity
+        still = (~self.moves).astype(np.uint8)
+        labels = cv2.distanceTransformWithLabels(still, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)[1]
+        of_label = np.zeros((2, int(labels.max()) + 1), np.float32)
+        of_label[:, labels[self.moves]] = self.velocity[:, self.moves]
+        return of_label[:, labels]
+
+    def way(self, span_s: float) -> Vectors:
+        """Return how far every pixel goes in a time, shape (2, row, col)."""
+        return np.float32(span_s) * self.velocity
+
+
+def followed_at(pairs: Sequence[Pair], time_s: float) -> Followed:
+    """Return how everything moves at an instant, which may lie before or after some lights' plates too."""
+    lights = _Lights.of(pairs, time_s)
+    rest = lights.unlike(np.zeros((2, *lights.shape), np.float32))
+    wide_rest = _mean(rest, WINDOW_PX)
+    best = np.full(lights.shape, np.inf, np.float32)
+    velocity = np.zeros((2, *lights.shape), np.float32)
+    for proposed in lights.proposed():
+        _take_better(lights, proposed, velocity, best)
+    if np.mean(np.minimum(best, wide_rest) > PUZZLING * lights.count) > PUZZLED:
+        for proposed in lights.proposed_far():
+            _take_better(lights, proposed, velocity, best)
+    fine = _mean(lights.unlike(velocity), FINE_PX)
+    moves = best < np.maximum(EXPLAINED * wide_rest - MARGIN * lights.count, wide_rest - GAIN * lights.count)
+    moves &= fine < _mean(rest, FINE_PX)
+    moves &= lights.still() < max(STILL_LIGHTS, STILL_SHARE * lights.count)
+    velocity *= moves
+    return Followed(time_s=time_s, velocity=velocity, moves=moves)
+
+
+def _take_better(lights: "_Lights", proposed: Vectors, velocity: Vectors, best: Vectors) -> None:
+    unlike = _mean(lights.unlike(proposed), WINDOW_PX)
+    better = unlike < best
+    np.copyto(best, unlike, where=better)
+    np.copyto(velocity, proposed, where=better)
+
+
+def _mean(values: Vectors, window_px: int) -> Vectors:
+    return np.asarray(cv2.blur(values, (window_px, window_px)), np.float32)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Lights:
+    """The lights' codes as flow sees them (before, after), their detail (light, row, col), and the times to them."""
+
+    codes: tuple[tuple[Codes, Codes], ...]
+    befores: Codes
+    afters: Codes
+    spans_s: Vectors
+
+    @classmethod
+    def of(cls, pairs: Sequence[Pair], time_s: float) -> "_Lights":
+        codes = tuple(comparable(pair.before, pair.after) for pair in pairs)
+        befores, afters = np.empty((2, len(pairs), *codes[0][0].shape), np.uint8)
+
+        def sharpen(light: int, _: int) -> None:
+            befores[light], afters[light] = (_detail(picture) for picture in codes[light])
+
+        over_ranges(sharpen, len(pairs), each=1)
+        spans_s = [(time_s - pair.before.time_s, pair.after.time_s - time_s) for pair in pairs]
+        return cls(codes=codes, befores=befores, afters=afters, spans_s=np.array(spans_s, np.float32))
+
+    @property
+    def count(self) -> int:
+        return len(self.codes)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return self.befores.shape[1:]
+
+    def unlike(self, velocity: Vectors) -> Vectors:
+        """Return how unlike all lights' plates are along velocities, shape (row, col), 0 to the number of lights."""
+        out = np.empty(self.shape, np.float32)
+
+        def run(first: int, last: int) -> None:
+            unlike_rows(self.befores, self.afters, self.spans_s, velocity, first, last, out)
+
+        over_ranges(run, self.shape[0], each=max(BAND_PIXELS // self.shape[1], 1))
+        return out
+
+    def still(self) -> NDArray[np.intp]:
+        """Return under how many lights a pixel shows the same at rest, shape (row, col)."""
+        count = np.zeros(self.shape, np.intp)
+        for one, other in self.codes:
+            change = cv2.GaussianBlur(cv2.subtract(other, one, dtype=cv2.CV_32F), (0, 0), FINEST_PX)
+            count += _mean(np.asarray(change * change, np.float32), FINE_PX) < STILL_CODES**2
+        return count
+
+    def proposed(self) -> list[Vectors]:
+        """Return the velocities that flow proposes: both ways of few lights, one way of each of more."""
+        chosen = _spread(self.count, MOST_FLOWS)
+        ways = [(light, bool(n % 2)) for n, light in enumerate(chosen)]
+        if len(chosen) <= MOST_FLOWS // 2:
+            ways = [(light, back) for light in chosen for back in (False, True)]
+        return self._flows([(light, back, None) for light, back in ways])
+
+    def proposed_far(self) -> list[Vectors]:
+        """Return velocities of what moved farther than flow reaches by itself."""
+        found = displacements([tuple(map(_smoothed, pair)) for pair in self.codes], FAR)
+        some = _spread(self.count, MOST_FLOWS // FAR)
+        constant = [np.empty((2, *self.shape), np.float32) for _ in found]
+        for plane, (x, y) in zip(constant, found, strict=True):
+            plane[0], plane[1] = np.array([x, y]) / self.spans_s.sum(axis=1).mean()
+        return constant + self._flows([(light, bool(n % 2), place) for place in found for n, light in enumerate(some)])
+
+    def _flows(self, ways: list[tuple[int, bool, tuple[float, float] | None]]) -> list[Vectors]:
+        def run(first: int, _: int) -> Vectors:
+            light, back, start_px = ways[first]
+            since_s, until_s = (float(span) for span in self.spans_s[light])
+            one, other = self.codes[light]
+            sign = -1.0 if back else 1.0
+            start = None if start_px is None else (sign * start_px[0], sign * start_px[1])
+            flow = flow_from(other, one, start) if back else flow_from(one, other, start)
+            round_s = since_s + until_s
+            out = np.empty((2, *self.shape), np.float32)
+            share = np.float32((until_s if back else since_s) / round_s)
+            arriving_rows(flow, share, np.float32(sign / round_s), 0, self.shape[0], out)
+            return out
+
+        return over_ranges(run, len(ways), each=1)
+
+
+def _spread(count: int, most: int) -> list[int]:
+    return sorted({round(float(place)) for place in np.linspace(0, count - 1, min(count, most))})
+
+
+def _smoothed(codes: Codes) -> Vectors:
+    return np.asarray(cv2.GaussianBlur(codes.astype(np.float32), (0, 0), FINEST_PX), np.float32)
+
+
+def _detail(codes: Codes) -> Codes:
+    smooth = _smoothed(codes)
+    detail = smooth - np.float32(SHADING) * _mean(smooth, SHADING_PX)
+    return np.asarray(np.clip(detail + np.float32(64.5), 0, 255), np.uint8)

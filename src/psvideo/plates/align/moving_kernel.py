@@ -1,0 +1,71 @@
+"""Compiled parts of following motion: how unlike plates are along velocities, and where flow leads."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.compute.compiled import FUSED
+from psvideo.compute.memory import lent
+
+Codes = NDArray[np.uint8]
+Floats = NDArray[np.float32]
+ZERO, ONE, HALF = np.float32(0), np.float32(1), np.float32(0.5)
+UNLIKE_SQUARE = np.float32(4.0**2)
+"""Two codes that differ by 4 are half unlike: noise makes 1 to 2."""
+STEPS = 4
+"""How often the start of a way is looked for."""
+
+
+@FUSED.inlined
+def _between(picture: Codes, row: np.float32, col: np.float32) -> np.float32:
+    """A code between pixels; beyond the border it is the border's."""
+    row = min(max(row, ZERO), np.float32(picture.shape[0] - 1))
+    col = min(max(col, ZERO), np.float32(picture.shape[1] - 1))
+    top, left = int(row), int(col)
+    below, right = min(top + 1, picture.shape[0] - 1), min(left + 1, picture.shape[1] - 1)
+    down, across = row - np.float32(top), col - np.float32(left)
+    upper = np.float32(picture[top, left]) * (ONE - across) + np.float32(picture[top, right]) * across
+    lower = np.float32(picture[below, left]) * (ONE - across) + np.float32(picture[below, right]) * across
+    return upper * (ONE - down) + lower * down
+
+
+@FUSED.kept
+def unlike_rows(
+    befores: Codes, afters: Codes, spans_s: Floats, velocity: Floats, first: int, last: int, out: Floats
+) -> None:
+    """Fill rows of ``out`` (row, col): how unlike the lights' plates before and after are at the ends of the way.
+
+    ``befores`` and ``afters`` are (light, row, col), ``spans_s`` (light, 2) the times since and until them, and
+    ``velocity`` (2, row, col) in pixels per second. Every light counts from 0 to 1, by Geman and McClure's function of
+    the difference: a shadow that passes under one light does not outvote the others.
+    """
+    before, after, span, way, made = lent(befores), lent(afters), lent(spans_s), lent(velocity), lent(out)
+    for row in range(first, last):
+        for col in range(made.shape[1]):
+            x, y = way[0, row, col], way[1, row, col]
+            total = ZERO
+            for light in range(before.shape[0]):
+                since, until = span[light, 0], span[light, 1]
+                one = _between(before[light], np.float32(row) - y * since, np.float32(col) - x * since)
+                other = _between(after[light], np.float32(row) + y * until, np.float32(col) + x * until)
+                square = (other - one) * (other - one)
+                total += square / (square + UNLIKE_SQUARE)
+            made[row, col] = total
+
+
+@FUSED.kept
+def arriving_rows(flow: Floats, share: np.float32, per_s: np.float32, first: int, last: int, out: Floats) -> None:
+    """Fill rows of velocities, ``out`` (2, row, col), of what arrives at every pixel after a share of its flow.
+
+    ``flow`` (row, col, 2) is known where things start, and asked for where they arrive: the start is looked for step by
+    step. It times ``per_s`` is the velocity.
+    """
+    given, made = lent(flow), lent(out)
+    rows, cols = made.shape[1], made.shape[2]
+    for row in range(first, last):
+        for col in range(cols):
+            x, y = given[row, col, 0], given[row, col, 1]
+            for _ in range(STEPS):
+                at_row = int(min(max(np.float32(row) - share * y + HALF, ZERO), np.float32(rows - 1)))
+                at_col = int(min(max(np.float32(col) - share * x + HALF, ZERO), np.float32(cols - 1)))
+                x, y = given[at_row, at_col, 0], given[at_row, at_col, 1]
+            made[0, row, col], made[1, row, col] = x * per_s, y * per_s
