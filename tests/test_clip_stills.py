@@ -1,7 +1,9 @@
 """Still pictures: every kind comes out with the very values that went in, and damaged files are refused by name."""
 
+import mmap
 import struct
 from collections.abc import Callable
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +15,10 @@ import pytest
 import tifffile
 from numpy.typing import NDArray
 
+from psvideo.clip.decode import tiff
 from psvideo.clip.decode.decoders import decode, read_header
 from psvideo.clip.decode.exr_chunks import is_cut_short
+from psvideo.compute.memory import unload
 from psvideo.errors import PsvideoError
 
 Write = Callable[[Path, NDArray[Any]], None]
@@ -184,6 +188,29 @@ def test_an_exr_of_any_compression_is_whole_until_a_byte_is_missing(
     for size in (len(data) - 1, len(data) // 2, 300, 50):
         (tmp_path / "x.exr").write_bytes(data[:size])
         assert is_cut_short(tmp_path / "x.exr")
+
+
+def test_a_large_plain_tiff_stays_in_its_file_with_every_bit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever else a TIFF may be (packed, in planes, of the other byte order) is decoded as any other."""
+    plain: list[dict[str, Any]] = [{}, {"rowsperstrip": 3}]
+    others: list[dict[str, Any]] = [{"compression": "zlib"}, {"planarconfig": "separate"}, {"byteorder": ">"}]
+    monkeypatch.setattr(tiff, "STAYS_FROM_BYTES", 1)
+    for options, channels in product([*plain, *others], (1, 3)):
+        picture, path = random(16, channels), tmp_path / "picture.tif"
+        write_tiff(**options if channels == 3 else {k: v for k, v in options.items() if k != "planarconfig"})(
+            path, picture
+        )
+        codes = decode("tiff", path).codes
+        assert np.array_equal(codes, picture)
+        unload(codes)
+        assert np.array_equal(codes, picture), "read again"
+        in_file = options in plain or (channels == 1 and "planarconfig" in options)
+        assert isinstance(root_of(codes), mmap.mmap) == in_file, options
+
+
+def root_of(array: Any) -> Any:
+    """Return what an array's memory belongs to."""
+    return root_of(array.base) if isinstance(array, np.ndarray) and array.base is not None else array
 
 
 def test_png_alpha_is_left_out_with_a_note(tmp_path: Path) -> None:

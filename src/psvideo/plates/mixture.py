@@ -13,6 +13,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.memory import unload
 from psvideo.compute.threads import over_ranges
 from psvideo.model.camera import FloatArray
 from psvideo.model.clipping import SATURATED
@@ -76,6 +77,7 @@ class Mixture:
         def read(first: int, last: int, into: Image | None = None) -> Image:
             band = np.empty((last - first, *self.shape[1:]), np.float32) if into is None else into
             mix_rows(mix, np.arange(first, last), band.reshape(last - first, -1))
+            _unload(self.frames)
             return band
 
         return read
@@ -97,6 +99,7 @@ class Mixture:
         image = np.empty((rows, cols, *self.shape[2:]), np.float32)
         channels = int(np.prod(self.shape[2:]))
         mix_thinned(self.bound(), stride, channels, image.reshape(rows, -1))
+        _unload(self.frames)
         return image
 
     def halved(self) -> Image:
@@ -105,7 +108,12 @@ class Mixture:
         grey = np.empty((rows, cols), np.float32)
         mix = self.bound()
         channels = 1 if len(self.shape) == 2 else self.shape[2]
-        _in_bands(lambda first, last: mix_halved(mix, first, last, channels, grey), rows, 2 * mix.samples)
+
+        def band(first: int, last: int) -> None:
+            mix_halved(mix, first, last, channels, grey)
+            _unload(self.frames)
+
+        _in_bands(band, rows, 2 * mix.samples)
         return grey
 
     def without(self, levels: tuple[Image, ...], taken: FloatArray) -> "Mixture":
@@ -157,6 +165,7 @@ class Mixture:
 
         def band(first: int, last: int) -> None:
             mix_rows(mix, places[first:last], flat[first:last])
+            _unload(self.frames)
 
         _in_bands(band, len(rows), mix.samples)
 
@@ -224,8 +233,15 @@ def rows_maker(pictures: Sequence[Mixture]) -> Callable[[NDArray[np.intp], int, 
 
     def make(rows: NDArray[np.intp], first: int, into: Image) -> None:
         mix_pictures(mix, shares, taken, rows, first, into.reshape(*into.shape[:2], -1))
+        _unload(parts.frames)
 
     return make
+
+
+def _unload(frames: Sequence[Coded]) -> None:
+    """Hold nothing of frames that are large and stay in their files; what is looked at again is read again."""
+    for frame in frames:
+        unload(frame.codes)
 
 
 def _copying(image: Image) -> Reader:

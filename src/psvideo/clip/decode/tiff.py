@@ -1,6 +1,7 @@
 """TIFF: grey or RGB, 8 to 16 bits or half and single floats; compressed, tiled or plain."""
 
 import logging
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,9 @@ from psvideo.errors import PsvideoError
 # tifffile writes to its own log what it thinks of odd tags; what matters of it is raised here.
 logging.getLogger("tifffile").addHandler(logging.NullHandler())
 
+STAYS_FROM_BYTES = 1 << 27
+"""Samples of so many bytes and more (22 megapixels in colour) stay in their file where they lie there as they are."""
+NATIVE = "<" if sys.byteorder == "little" else ">"
 GREY, RGB, MOSAIC, LINEAR_RAW = 1, 2, 32803, 34892  # values of the tag PhotometricInterpretation
 
 
@@ -27,8 +31,21 @@ def decode(path: Path) -> CodedPicture:
     with tifffile.TiffFile(path) as file:
         page = _only_page(path, file)
         head = _header(path, page)
-        codes = pixels(page)[..., : head.channels]
+        codes = _in_file(path, page) if _stays_in_file(file, page, head) else pixels(page)[..., : head.channels]
     return CodedPicture(header=head, codes=codes[..., 0] if head.channels == 1 else np.ascontiguousarray(codes))
+
+
+def _stays_in_file(file: tifffile.TiffFile, page: tifffile.TiffPage, head: Header) -> bool:
+    """Return whether a picture is large, and lies in its file as it would in memory."""
+    plain = bool(page.is_memmappable) and page.planarconfig == 1 and page.samplesperpixel == head.channels
+    whole = page.dataoffsets[0] % np.dtype(page.dtype).itemsize == 0
+    return plain and whole and file.byteorder == NATIVE and page.nbytes >= STAYS_FROM_BYTES
+
+
+def _in_file(path: Path, page: tifffile.TiffPage) -> NDArray[np.generic]:
+    """Return a picture's samples, (row, col, sample), of which the system reads what is looked at."""
+    shape = (page.imagelength, page.imagewidth, page.samplesperpixel)
+    return np.memmap(path, dtype=page.dtype, mode="r", offset=page.dataoffsets[0], shape=shape)
 
 
 def pixels(page: tifffile.TiffPage) -> NDArray[np.generic]:
