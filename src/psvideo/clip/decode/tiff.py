@@ -45,7 +45,7 @@ def _stays_in_file(file: tifffile.TiffFile, page: tifffile.TiffPage, head: Heade
 def _in_file(path: Path, page: tifffile.TiffPage) -> NDArray[np.generic]:
     """Return a picture's samples, (row, col, sample), of which the system reads what is looked at."""
     shape = (page.imagelength, page.imagewidth, page.samplesperpixel)
-    return np.memmap(path, dtype=page.dtype, mode="r", offset=page.dataoffsets[0], shape=shape)
+    return np.memmap(path, dtype=np.dtype(page.dtype), mode="r", offset=page.dataoffsets[0], shape=shape)
 
 
 def pixels(page: tifffile.TiffPage) -> NDArray[np.generic]:
