@@ -110,6 +110,12 @@ def judged(report: object, subject: str) -> str:
     return " ".join(f"{one['grade']}: {one['found']}" for one in report["judgements"] if one["subject"] == subject)
 
 
+@pytest.mark.parametrize("rounds", [2, 5])
+def test_every_round_of_photographs_has_its_result_the_last_one_too(tmp_path: Path, rounds: int) -> None:
+    solved(take(tmp_path / "take", plates() * rounds), tmp_path / "out")
+    assert len(written(tmp_path / "out", "normals")) == rounds
+
+
 def test_a_take_that_is_all_noise_gives_no_normal_and_says_why(tmp_path: Path) -> None:
     clip = take(tmp_path / "take", [noise(seed) for seed in range(5)])
     report = solved(clip, tmp_path / "out", aov=["alpha"])

@@ -210,17 +210,22 @@ def _assemble(
     )
 
 
+WITHIN = 1e-9
+"""A synced flash begins so much of the exposure after it and ends as much before: rounding puts none into two frames,
+of which the clip may lack the second."""
+
+
 def _synced_timing(plan: Plan, indices: NDArray[np.int64], *, clip: str, dropped: Sequence[DroppedFrames]) -> Timing:
     """One flash a frame, in the plan's order: nothing is left to find, and when its rows open does not matter."""
-    period_s = plan.camera.frame_period_s
+    period_s, exposure_s = plan.camera.frame_period_s, plan.camera.exposure_s
     train = plan.train(0, int(indices[-1]) + 1)
     flashes = tuple(
         Flash(
             index=n,
             slot=int(slot),
             lights=plan.flashes[slot].lights,
-            start_s=n * period_s,
-            duration_s=min(float(duration_s), plan.camera.exposure_s),
+            start_s=n * period_s + WITHIN * exposure_s,
+            duration_s=min(float(duration_s), (1 - 2 * WITHIN) * exposure_s),
             complete=True,
         )
         for n, (slot, duration_s) in enumerate(zip(train.slot, train.duration_s, strict=True))
