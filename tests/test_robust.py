@@ -376,7 +376,7 @@ def test_auto_is_robust_from_five_lights_on() -> None:
 def test_the_note_says_what_three_lights_cannot_show() -> None:
     assert "highlights" in trust_note("least-squares", 3)
     assert "cannot be seen" in trust_note("robust", 3)
-    assert "6 degrees" in trust_note("robust", 8)
+    assert "5.5 degrees" in trust_note("robust", 8)
 
 
 def test_the_command_says_which_solver_it_used_and_predicts_errors_with_either(tmp_path: Path) -> None:

@@ -1,20 +1,17 @@
 """A surface with its holes filled: every pixel of the subject has a normal and an albedo, and says how it got them."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.surface import MEASURED, NO_LIGHT, ONE_LIGHT, TWO_LIGHTS, Surface
-from psvideo.plates.mixture import Mixture
 from psvideo.solve.filling.growing import LEFT_ALONE, SOLVED, THREE_LIGHTS, UNKNOWN, Picture, grow, queue_for
 from psvideo.solve.filling.looking import Said, count_rows, look_rows, room_for
-from psvideo.solve.normals.bands import ShownPlates
-from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.kernel import working_memory
-from psvideo.solve.normals.task import Bytes, Floats, Mask, Samples, Task, Usable, task
+from psvideo.solve.normals.task import Bytes, Floats, Mask, Samples, Task
 
 MOST_LIGHTS_AROUND = 5
 """A pixel that light reaches is of the subject where so many of the nine around it are lit or solved: noise is not."""
@@ -25,25 +22,6 @@ PER_SIDE_DEG, MOST_ERROR_DEG = np.float32(450), np.float32(60)
 """Two thirds of the pixels that no, one and two lights reach are off by no more than the first beside what is solved,
 and by the second per longer side of the picture in distance from it: on the virtual bust under sets of three lights."""
 CLASSES = np.array([NO_LIGHT, ONE_LIGHT, TWO_LIGHTS, MEASURED], np.uint8)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Evidence:
-    """One round as the solvers take it: plates, lights, and which samples to look at."""
-
-    plates: Sequence[Samples] | Sequence[Mixture]
-    lit: Illumination
-    usable: Usable
-    seen: Mask | None = None
-    mask: Mask | None = None
-    black_level: float = 0.0
-    scale: float = 1.0
-
-    def in_bands(self, run: Callable[[Task, int, int], None], threads: int | None) -> None:
-        """Call ``run(task, first, last)`` for bands of rows; pictures that are not made are made band by band."""
-        shown = ShownPlates.of(self.plates)
-        given = task(shown.samples, self.lit, self.seen, self.mask, self.usable, self.black_level, self.scale)
-        shown.in_bands(run, given, threads=threads)
 
 
 def filled(surface: Surface, one: Evidence, *, solved: Mask, noise: float, threads: int | None = None) -> Surface:

@@ -9,8 +9,8 @@ from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import lent
 from psvideo.solve.normals.blocks import ABSENT, BLOCK, ONE, ZERO
 from psvideo.solve.normals.kernel import lent_task
-from psvideo.solve.normals.measuring import gather_one, gather_three, hide_unseen
-from psvideo.solve.normals.near_kernel import at, of_light, place_lights
+from psvideo.solve.normals.measuring import read_block
+from psvideo.solve.normals.near_kernel import at, of_light
 from psvideo.solve.normals.task import Bytes, Floats, Task, Work
 
 
@@ -52,7 +52,7 @@ def count_rows(task: Task, work: Work, wanted: Bytes, counts: Bytes, first: int,
             n = min(BLOCK, t.cols - col)
             if not asked[row, col : col + n].any():
                 continue
-            _read(t, values, row, col, n)
+            read_block(t, values, row, col, n)
             for light in range(t.lights):
                 per = t.per_strength[light]
                 for i in range(n):
@@ -61,18 +61,6 @@ def count_rows(task: Task, work: Work, wanted: Bytes, counts: Bytes, first: int,
                         bright += values[light * channels + channel, i]
                     reached = asked[row, col + i] and bright * at(per, i) * share > t.dark
                     found[row, col + i] += reached
-
-
-@FUSED.inlined
-def _read(task: Task, values: Floats, row: int, col: int, n: int) -> None:
-    """Place the lights and read a block's measurements, MISSING where saturated or unseen."""
-    place_lights(task.matrix, task.per_strength, task.near, row, col, n)
-    start = row * task.cols + col
-    if task.tone.shape[1] == 1:
-        gather_one(task, values, start, n)
-    else:
-        gather_three(task, values, start, n)
-    hide_unseen(task, values, row, col, n)
 
 
 @FUSED.kept
@@ -88,7 +76,7 @@ def look_rows(task: Task, work: Work, index: NDArray[np.int32], said: Said, firs
             n = min(BLOCK, t.cols - col)
             if not (places[row, col : col + n] >= 0).any():
                 continue
-            _read(t, values, row, col, n)
+            read_block(t, values, row, col, n)
             for light in range(t.lights):
                 lamp, per = of_light(t.matrix, light), t.per_strength[light]
                 for i in range(n):

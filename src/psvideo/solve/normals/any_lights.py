@@ -54,7 +54,9 @@ def add_start(task: Task, w: Floats, v: Floats, m: Floats, e: Floats, n: int) ->
 
 
 @FUSED.inlined
-def find_scale(task: Task, weights: Weights, w: Floats, v: Floats, m: Floats, e: Floats, n: int) -> None:
+def find_scale(
+    task: Task, noise: np.float32, share: np.float32, w: Floats, v: Floats, m: Floats, e: Floats, n: int
+) -> None:
     """Residuals without their sign, and in SCALE their median as a standard deviation, at least a camera's noise.
 
     Three of the residuals may be 0 because three unknowns were fitted: the median is that of the others.
@@ -74,7 +76,7 @@ def find_scale(task: Task, weights: Weights, w: Floats, v: Floats, m: Floats, e:
     halve(v, e, n)
     for i in range(n):
         length = np.sqrt(w[X + i] ** 2 + w[Y + i] ** 2 + w[Z + i] ** 2)
-        least = weights.noise + weights.signal_noise * length
+        least = noise + share * length
         v[SCALE + i] = max(SIGMA_OF_MEDIAN * HALF * (v[FROM + i] + v[TO + i]), least)
 
 

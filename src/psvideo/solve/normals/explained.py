@@ -12,7 +12,7 @@ from psvideo.solve.normals.near_kernel import at, of_light
 from psvideo.solve.normals.task import Floats, Task
 
 EXPLAINED_SQUARED = np.float32(4.5**2)  # of 128 pixels under eight lights, noise spoils none in 99 of 100 blocks
-LIGHTS_SQUARED = np.float32(0.003**2)  # lights and lenses are never known better than this share of the signal
+LIGHTS = np.float32(0.003)  # lights and lenses are never known better than this share of the signal
 ROUGHLY = np.float32(1e4)  # the condition squared up to which a pixel counts as solved
 
 
@@ -42,7 +42,7 @@ def explains(task: Task, read: np.float32, photon: np.float32, w: Floats, v: Flo
             x, y, z = at(lamp, i)
             a, b, c = w[X + i], w[Y + i], w[Z + i]
             error = m[light, i] - (x * a + y * b + z * c)
-            variance = read + photon * max(m[light, i], ZERO) + LIGHTS_SQUARED * (a * a + b * b + c * c)
+            variance = read + photon * max(m[light, i], ZERO) + LIGHTS * LIGHTS * (a * a + b * b + c * c)
             odd = np.int32(odd | (m[light, i] > ABSENT) & (error * error > EXPLAINED_SQUARED * variance))
     v[DOUBT : DOUBT + n] = ZERO
     return bool(odd == 0)

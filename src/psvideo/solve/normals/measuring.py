@@ -9,6 +9,7 @@ from numba.np.numpy_support import carray
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import flattened, pointer
 from psvideo.solve.normals.blocks import ABSENT, BLOCK, MISSING, ONE, SUM, XX, YY, ZERO, ZZ
+from psvideo.solve.normals.near_kernel import place_lights
 from psvideo.solve.normals.task import Bytes, Floats, Samples, Task
 
 
@@ -93,3 +94,15 @@ def hide_unseen(task: Task, values: Floats, row: int, col: int, n: int) -> None:
                 values[plane, i] = values[plane, i] if seen[light, row, col + i] else MISSING
         elif not seen[light, row, 0]:
             values[plane, :n] = MISSING
+
+
+@FUSED.inlined
+def read_block(task: Task, values: Floats, row: int, col: int, n: int) -> None:
+    """Place the lights and read a block's measurements, MISSING where saturated or unseen."""
+    place_lights(task.matrix, task.per_strength, task.near, row, col, n)
+    start = row * task.cols + col
+    if task.tone.shape[1] == 1:
+        gather_one(task, values, start, n)
+    else:
+        gather_three(task, values, start, n)
+    hide_unseen(task, values, row, col, n)

@@ -101,8 +101,8 @@ def solve(
     check_arrays(shown.samples, lit, seen, mask)
     from psvideo.solve.normals import robust_kernel as kernel
 
-    rows, cols = shown.shape[:2]
-    result = empty_result(rows * cols, lit.intensities.shape[1], half=half, residual=residual)
+    (rows, cols), channels = shown.shape[:2], lit.intensities.shape[1]  # which are combined
+    result = empty_result(rows * cols, channels, half=half, residual=residual)
     predicted = np.zeros(rows * cols, np.uint16 if half else np.float32)
     given = _balanced(task(shown.samples, lit, seen, mask, usable, black_level, scale))
 
@@ -112,16 +112,15 @@ def solve(
 
         shown.in_bands(band, given, threads=threads, step=step)
 
+    noise = (0.0, 0.0) if plate_noise is None else (plate_noise.read / channels, plate_noise.photon / channels)
     if misfit is None:
         step, unexplained = max(rows * cols // SAMPLE_PIXELS, 1), np.zeros(rows * cols, np.float32)
-        run(predicted, unexplained, _weights(reweighting, limit_deg=EVERYTHING_DEG, common=0.0), step)
+        how = _weights(reweighting, noise, limit_deg=EVERYTHING_DEG, common=0.0)
+        run(predicted, unexplained, how, step)
         found = surface_of(result, predicted, shown.shape, half=half)
         misfit = _typical(found, unexplained.reshape(rows, cols), step)
     limit_deg = max(reweighting.most_error_deg, 0.0 if misfit is None else _limit_deg(reweighting, misfit))
-    how = _weights(reweighting, limit_deg=limit_deg, common=0.0 if misfit is None else misfit.share)
-    if plate_noise is not None:
-        each = np.float32(1 / lit.intensities.shape[1])  # channels are combined
-        how = how._replace(read=np.float32(plate_noise.read) * each, photon=np.float32(plate_noise.photon) * each)
+    how = _weights(reweighting, noise, limit_deg=limit_deg, common=0.0 if misfit is None else misfit.share)
     run(predicted if error else predicted[:0], np.zeros(0, np.float32), how, 1)
     surface = surface_of(result, predicted if error else None, shown.shape, half=half)
     return replace(surface, misfit=misfit)
@@ -131,7 +130,7 @@ def _limit_deg(reweighting: Reweighting, misfit: Misfit) -> float:
     return min(reweighting.beside_typical * misfit.error_deg, MOST_TYPICAL_DEG)
 
 
-def _weights(reweighting: Reweighting, *, limit_deg: float, common: float) -> Weights:
+def _weights(reweighting: Reweighting, noise: tuple[float, float], *, limit_deg: float, common: float) -> Weights:
     tukey = reweighting.loss == "tukey"
     return Weights(
         rounds=reweighting.rounds,
@@ -144,8 +143,8 @@ def _weights(reweighting: Reweighting, *, limit_deg: float, common: float) -> We
         contradiction=np.float32(reweighting.contradiction),
         most_error_deg=np.float32(limit_deg),
         common=np.float32(common),
-        read=np.float32(0),
-        photon=np.float32(0),
+        read=np.float32(noise[0]),
+        photon=np.float32(noise[1]),
     )
 
 

@@ -35,7 +35,7 @@ from psvideo.solve.normals.blocks import (
     Z,
 )
 from psvideo.solve.normals.equations import DOUBT, LOWER, OUT, SCALE, solve_equations
-from psvideo.solve.normals.explained import explained, explains
+from psvideo.solve.normals.explained import LIGHTS, explained, explains
 from psvideo.solve.normals.few_lights import EIGHT, FOUR, begin_few, reweigh_few
 from psvideo.solve.normals.measuring import all_seen, combine, gather_one, gather_three, hide_unseen
 from psvideo.solve.normals.near_kernel import at, place_lights
@@ -155,9 +155,10 @@ def _solve_block(
         solve_equations(w, n, SOUND_SQUARED, False)
         drop_odd_of_four(task, weights.noise, weights.signal_noise, weights.contradiction, w, v, m, e, n)
         for _ in range(weights.rounds):
-            _reweigh(task, weights, weights.tukey, weights.width, False, few, w, v, m, e, flat, n)
+            _reweigh(task, weights, weights.signal_noise, weights.tukey, weights.width, False, few, w, v, m, e, flat, n)
             solve_equations(w, n, SOUND_SQUARED, True)
-    _reweigh(task, weights, False, TWO, True, few, w, v, m, e, flat, n)
+    share = LIGHTS if weights.read > ZERO else weights.signal_noise
+    _reweigh(task, weights, share, False, TWO, True, few, w, v, m, e, flat, n)
     _predict_error(weights, min(task.lights, LEAST_CHECKED), w, v, n)
     if task.mask.size:
         for i in range(n):
@@ -182,14 +183,17 @@ def _read_usable(task: Task, w: Floats, values: Floats, m: Floats, row: int, col
 
 @FUSED.inlined
 def _reweigh(
-    task: Task, weights: Weights, tukey: bool, width: np.float32, last: bool, few: bool,
+    task: Task, weights: Weights, share: np.float32, tukey: bool, width: np.float32, last: bool, few: bool,
     w: Floats, v: Floats, m: Floats, e: Floats, flat: Floats, n: int,
 ) -> None:  # fmt: skip
-    """SCALE and the normal equations, every measurement weighed by how well the last solution explains it."""
+    """SCALE and the normal equations, every measurement weighed by how well the last solution explains it.
+
+    share: of a pixel's light, what is left over at least.
+    """
     if few:
-        reweigh_few(task.matrix, tukey, width, weights.noise, weights.signal_noise, w, v, flat, n)
+        reweigh_few(task.matrix, tukey, width, weights.noise, share, w, v, flat, n)
     else:
-        find_scale(task, weights, w, v, m, e, n)
+        find_scale(task, weights.noise, share, w, v, m, e, n)
         add_weighted(task, tukey, width, last, w, v, m, e, n)
 
 

@@ -10,8 +10,9 @@ from psvideo.model.choices import Solver
 from psvideo.model.surface import Surface
 from psvideo.plates.mixture import Mixture
 from psvideo.solve.normals import robust, woodham1980
+from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.illumination import Illumination
-from psvideo.solve.normals.judging import MOST_TYPICAL_DEG, Judging, emptied, judged
+from psvideo.solve.normals.judging import Judging, emptied, judged
 from psvideo.solve.normals.plate_noise import LEAST, PlateNoise, noise_of
 from psvideo.solve.normals.task import Mask, Samples, Usable
 
@@ -53,18 +54,15 @@ class Solving:
         mask: Mask | None = None,
     ) -> Surface:
         """Return the surface that explains one plate per light; see the solvers for the arguments."""
-        from psvideo.solve.filling.filled import Evidence, filled
+        from psvideo.solve.filling.filled import filled
 
         noise = noise_of(plates)
         method = self.method(len(plates))
         usable = _usable(noise, lit.intensities.shape[1], method)
         solved = self._solved(plates, lit, usable, noise, seen, mask)
-        known = judged(solved, lit, noise)
-        if self.fill:
-            one = Evidence(plates=plates, lit=lit, usable=usable, seen=seen, mask=mask)
-            known = filled(known, one, solved=solved.valid, noise=noise.dark)
-        else:
-            known = emptied(known)
+        one = Evidence(plates=plates, lit=lit, usable=usable, seen=seen, mask=mask)
+        known = judged(solved, one, noise)
+        known = filled(known, one, solved=solved.valid, noise=noise.dark) if self.fill else emptied(known)
         return replace(
             known,
             residual=known.residual if self.residual else None,
@@ -109,7 +107,7 @@ def trust_note(method: Method, lights: int) -> str:
     trusted = (
         f"A normal is valid where it was measured and its predicted error is at most {how.most_error_deg:g} degrees, "
         f"or {how.beside_typical:g} times what is typical of the picture where that is more (up to "
-        f"{MOST_TYPICAL_DEG:g}): a rig that is wrong makes no pixel invalid, and the judgement of the rig says so. "
+        f"{how.most_typical_deg:g}): a rig that is wrong makes no pixel invalid, and the judgement of the rig says so. "
     )
     if lights == 3:
         return trusted + (

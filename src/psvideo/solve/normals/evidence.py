@@ -1,0 +1,29 @@
+"""One round as the solvers take it, for those who look at it again: what is judged and what is filled."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from psvideo.plates.mixture import Mixture
+from psvideo.solve.normals.bands import ShownPlates
+from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.task import Mask, Samples, Task, Usable, task
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evidence:
+    """Plates, lights, and which samples to look at."""
+
+    plates: Sequence[Samples] | Sequence[Mixture]
+    lit: Illumination
+    usable: Usable
+    seen: Mask | None = None
+    mask: Mask | None = None
+    black_level: float = 0.0
+    scale: float = 1.0
+
+    def in_bands(self, run: Callable[[Task, int, int], None], threads: int | None = None, *, step: int = 1) -> None:
+        """Call ``run(task, first, last)`` for bands of rows, of which it needs every ``step``-th; pictures that are
+        not made are made band by band."""
+        shown = ShownPlates.of(self.plates)
+        given = task(shown.samples, self.lit, self.seen, self.mask, self.usable, self.black_level, self.scale)
+        shown.in_bands(run, given, threads=threads, step=step)
