@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from psvideo.model.surface import Surface
 from psvideo.solve.normals.evidence import Evidence
-from psvideo.solve.normals.kernel import working_memory
 from psvideo.solve.normals.task import Floats, Samples, Task
 
 GRID_PX = 480
@@ -41,12 +40,12 @@ class Doubting:
     one held against constants from the others.
     """
 
-    misfit_deg: float = 2.7
+    misfit_deg: float = 2.5
     misfit_power: float = 0.65
     little_deg: float = 0.5
-    indirect_deg: float = 28.0
-    own_indirect_deg: float = 40.0
-    bent_share: float = 0.06
+    indirect_deg: float = 26.0
+    own_indirect_deg: float = 38.0
+    bent_share: float = 0.055
     bent_indirect_deg: float = 100.0
     most_bent_deg: float = 20.0
     sharp_deg: float = 80.0
@@ -54,15 +53,19 @@ class Doubting:
 
 @dataclass(frozen=True, kw_only=True)
 class Points:
-    """Every ``step``-th row and column of a surface: its normals (row, col, 3), where it has one, and errors in
-    degrees: what noise makes, what residuals predict, and what they would predict of nothing but noise."""
+    """Every ``step``-th row and column of a surface, and errors there in degrees: what noise makes, what residuals
+    predict, and what they would predict of nothing but noise."""
 
     step: int
-    normals: Floats
-    known: NDArray[np.bool_]
+    surface: Surface
     noise_deg: Floats
     fit_deg: Floats
     fit_of_noise_deg: Floats
+
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """Where there is a normal."""
+        return self.surface.valid
 
 
 def step_of(shape: tuple[int, ...]) -> int:
@@ -93,7 +96,7 @@ def doubt_deg(points: Points, one: Evidence, surface: Surface, *, how: Doubting 
 
 def _bent_deg(points: Points, near: Floats) -> Floats:
     """Return the angle between every normal and the mean of those around it."""
-    planes = [np.ascontiguousarray(points.normals[..., axis]) for axis in range(3)]
+    planes = [points.surface.normals[..., axis].astype(np.float32) for axis in range(3)]
     means = [_mean(plane, NEAR) / near for plane in planes]
     along = sum(plane * mean for plane, mean in zip(planes, means, strict=True))
     length = np.sqrt(sum(mean * mean for mean in means))
@@ -109,6 +112,7 @@ def _mean(plane: Floats, width: int) -> Floats:
 def _indirect(points: Points, one: Evidence, surface: Surface) -> tuple[Floats, Floats]:
     """Return at every point the light from lamps that do not reach it, in units of albedo, summed, and their number."""
     from psvideo.solve.normals.judging_kernel import indirect_rows
+    from psvideo.solve.normals.kernel import working_memory
 
     sums, counts = np.zeros_like(points.noise_deg), np.zeros_like(points.noise_deg)
     planes, albedo = stored(surface)

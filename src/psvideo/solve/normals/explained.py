@@ -9,10 +9,9 @@ from psvideo.compute.compiled import FUSED
 from psvideo.solve.normals.blocks import ABSENT, ONE, ZERO, X, Y, Z
 from psvideo.solve.normals.equations import DOUBT, add_equations, solve_equations
 from psvideo.solve.normals.near_kernel import at, of_light
-from psvideo.solve.normals.task import Floats, Task
+from psvideo.solve.normals.task import LIGHTS, Floats, Task
 
 EXPLAINED_SQUARED = np.float32(4.5**2)  # of 128 pixels under eight lights, noise spoils none in 99 of 100 blocks
-LIGHTS = np.float32(0.003)  # lights and lenses are never known better than this share of the signal
 ROUGHLY = np.float32(1e4)  # the condition squared up to which a pixel counts as solved
 
 

@@ -14,10 +14,9 @@ from psvideo.model.surface import MEASURED, Surface
 from psvideo.solve.normals.bands import BAND_PIXELS
 from psvideo.solve.normals.doubting import Doubting, Points, bits, doubt_deg, step_of, stored
 from psvideo.solve.normals.evidence import Evidence
-from psvideo.solve.normals.explained import LIGHTS
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.plate_noise import PlateNoise
-from psvideo.solve.normals.task import Floats, Samples
+from psvideo.solve.normals.task import LIGHTS, Floats, Mask, Samples, Spread
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,7 +36,7 @@ class Judging:
 
     most_error_deg: float = 5.5
     beside_typical: float = 1.1
-    most_typical_deg: float = 6.5
+    most_typical_deg: float = 7.0
     fit_share: float = 0.4
     fit_noise: float = 2.3
     held: float = 1.15
@@ -45,6 +44,7 @@ class Judging:
     doubting: Doubting = field(default_factory=Doubting)
 
 
+NOTHING = np.zeros((0, 0), np.float32)
 MANY_LIGHTS = 8
 """Beyond so many lights residuals are not taken to average out."""
 SURE = 1.3
@@ -56,24 +56,18 @@ def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging =
 
     What robust solving predicted is in ``error_deg`` already; of least squares noise and residuals say what is known.
     """
-    solved = surface.valid
     spread = _Spread.of(surface, one.lit, noise, how)
     points = spread.points(surface)
     doubt = doubt_deg(points, one, surface, how=how.doubting)
-    error = np.zeros(solved.shape, np.float32)
-    spread.judge(surface, spread.fit(surface), doubt, points.step, (SURE * spread.of_noise, how.fit_share), error)
-    error *= solved
+    at_points = spread.judged(points.surface, doubt, 1, how, limit_deg=0.0)[0][points.known].astype(np.float32)
     limit_deg, misfit = how.most_error_deg, surface.misfit
-    some = points.known
-    if some.any():
-        typical = float(np.median(error[:: points.step, :: points.step][some]))
-        by_noise = float(np.median(points.noise_deg[some]))
-        limit_deg = max(
-            limit_deg, min(how.beside_typical * np.sqrt(max(typical**2 - by_noise**2, 0.0)), how.most_typical_deg)
-        )
+    if at_points.size:
+        typical, by_noise = float(np.median(at_points)), float(np.median(points.noise_deg[points.known]))
+        beyond = how.beside_typical * float(np.sqrt(max(typical**2 - by_noise**2, 0.0)))
+        limit_deg = max(limit_deg, min(beyond, how.most_typical_deg))
         misfit = None if misfit is None else replace(misfit, error_deg=typical)
-    trusted = solved & (error <= np.float32(limit_deg))
-    return replace(surface, valid=trusted, error_deg=error.astype(surface.normals.dtype), misfit=misfit)
+    error, trusted = spread.judged(surface, doubt, points.step, how, limit_deg=limit_deg)
+    return replace(surface, valid=trusted, error_deg=error, misfit=misfit)
 
 
 def emptied(surface: Surface) -> Surface:
@@ -89,9 +83,7 @@ class _Spread:
     """How noise spreads into normals under all lights. ``of_noise``: how much of it residuals hold; ``of_residual``: by
     what they become degrees where they are not that already, 0 where they are."""
 
-    inverse: Floats
-    variances: Floats
-    scale: np.float32
+    noise: Spread
     of_noise: float
     of_residual: float
 
@@ -108,9 +100,11 @@ class _Spread:
         of_noise = many * ((channels * lights - channels - 2) / free if plain else 1)
         of_residual = many * lights / free if plain else 0
         return cls(
-            inverse=np.linalg.inv(matrix.T @ matrix).astype(np.float32),
-            variances=np.array(variances, np.float32),
-            scale=np.float32(np.degrees(how.held)),
+            noise=Spread(
+                inverse=np.linalg.inv(matrix.T @ matrix).astype(np.float32),
+                variances=np.array(variances, np.float32),
+                scale=np.float32(np.degrees(how.held)),
+            ),
             of_noise=how.fit_noise * float(np.sqrt(of_noise)),
             of_residual=how.fit_noise / how.held * float(np.sqrt(of_residual)),
         )
@@ -120,7 +114,7 @@ class _Spread:
         if surface.error_deg is not None:
             return bits(surface.error_deg)
         known = self.of_residual > 0 and surface.residual is not None
-        return bits(surface.residual) if known and surface.residual is not None else np.zeros((0, 0), np.float32)
+        return bits(surface.residual) if known and surface.residual is not None else NOTHING
 
     def points(self, surface: Surface) -> Points:
         """Return every so many rows and columns of a surface, and what noise and residuals make of them."""
@@ -134,42 +128,48 @@ class _Spread:
             error_deg=None if surface.error_deg is None else _every(surface.error_deg, step),
             source=None,
         )
-        noise_deg, fit_deg, of_noise_deg = (np.zeros(thin.valid.shape, np.float32) for _ in range(3))
-        nothing = np.zeros((0, 0), np.float32)
-        self.judge(thin, nothing, nothing, 1, (0.0, 0.0), noise_deg)
-        fit = self.fit(thin)
+        fit, v = self.fit(thin), self.noise.variances
+        noise_deg, fit_deg, of_noise_deg = np.zeros((3, *thin.valid.shape), np.float32)
+        self.fill(thin, NOTHING, self.noise, (0.0, 0.0), noise_deg)
         if fit.size:
-            replace(self, variances=np.zeros(4, np.float32)).judge(thin, fit, nothing, 1, (0.0, 1.0), fit_deg)
-            self.residual_noise().judge(thin, nothing, nothing, 1, (0.0, 0.0), of_noise_deg)
+            self.fill(thin, fit, self.noise._replace(variances=np.zeros_like(v)), (0.0, 1.0), fit_deg)
+            self.fill(thin, NOTHING, self.noise._replace(variances=v[[0, 1, 3, 3]]), (0.0, 0.0), of_noise_deg)
         return Points(
             step=step,
-            normals=thin.normals.astype(np.float32),
-            known=thin.valid,
+            surface=thin,
             noise_deg=noise_deg,
             fit_deg=fit_deg,
             fit_of_noise_deg=np.float32(self.of_noise) * of_noise_deg,
         )
 
-    def residual_noise(self) -> "_Spread":
-        """Return how noise spreads into what residuals predict, which solvers never take for less than ``LIGHTS``."""
-        return replace(self, variances=self.variances[[0, 1, 3, 3]])
+    def judged(
+        self, surface: Surface, doubt: Floats, step: int, how: Judging, *, limit_deg: float
+    ) -> tuple[NDArray[np.floating], Mask]:
+        """Return all errors in degrees, and whether they are within the limit."""
+        error, trusted = np.empty(surface.valid.shape, surface.normals.dtype), np.empty(surface.valid.shape, np.bool_)
+        factors = (SURE * self.of_noise, how.fit_share, limit_deg)
+        self.fill(surface, self.fit(surface), self.noise, factors, error, doubt=doubt, step=step, trusted=trusted)
+        return error, trusted
 
-    def judge(
-        self, surface: Surface, fit: Samples, doubt: Floats, step: int, factors: tuple[float, float], error: Floats
-    ) -> None:
-        """Fill ``error`` as ``judge_rows`` does."""
+    def fill(
+        self, surface: Surface, fit: Samples, noise: Spread, factors: tuple[float, ...], error: NDArray[np.floating], *,
+        doubt: Floats = NOTHING, step: int = 1, trusted: Mask | None = None,
+    ) -> None:  # fmt: skip
+        """Fill ``error``, and ``trusted`` where it is asked for, as ``judge_rows`` does."""
         from psvideo.solve.normals.judging_kernel import judge_rows
 
         planes, albedo = stored(surface)
-        counts = np.array([*factors, self.of_residual], np.float32)
-
-        def judge(first: int, last: int) -> None:
-            judge_rows(
-                planes, albedo, fit, self.inverse, self.variances, self.scale, doubt, counts, step, error, first, last
-            )
-
+        limit_deg = factors[2] if len(factors) > 2 else 0.0
+        counts = np.array([*factors[:2], self.of_residual, limit_deg], np.float32)
+        kept = (np.empty(error.shape, np.bool_) if trusted is None else trusted).view(np.uint8)
         rows, cols = error.shape
-        over_ranges(judge, rows, each=BAND_PIXELS // cols)
+        over_ranges(
+            lambda first, last: judge_rows(
+                planes, albedo, fit, noise, counts, doubt, step, bits(error), kept, first, last
+            ),
+            rows,
+            each=BAND_PIXELS // cols,
+        )
 
 
 def _every(planes: NDArray[np.floating], step: int) -> NDArray[np.floating]:

@@ -35,12 +35,12 @@ from psvideo.solve.normals.blocks import (
     Z,
 )
 from psvideo.solve.normals.equations import DOUBT, LOWER, OUT, SCALE, solve_equations
-from psvideo.solve.normals.explained import LIGHTS, explained, explains
+from psvideo.solve.normals.explained import explained, explains
 from psvideo.solve.normals.few_lights import EIGHT, FOUR, begin_few, reweigh_few
 from psvideo.solve.normals.measuring import all_seen, combine, gather_one, gather_three, hide_unseen
 from psvideo.solve.normals.near_kernel import at, place_lights
 from psvideo.solve.normals.odd_of_four import TWO, drop_odd_of_four
-from psvideo.solve.normals.task import FEW, Floats, Result, Samples, Task, Weights
+from psvideo.solve.normals.task import FEW, LIGHTS, Floats, Result, Samples, Task, Weights
 
 STEP = 128  # pixels that are solved together: few enough that all of their planes stay in the nearest cache
 SMALL_SAMPLE = np.float32(1.9)  # the median of few residuals of a fit that follows them falls short by so much

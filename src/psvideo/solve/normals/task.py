@@ -21,6 +21,9 @@ PIXEL_CONDITION = 12.0  # beyond it, with the lights that shadow leaves, albedo 
 FEW = 9
 """Up to so many distant lights a pixel's measurements stay in registers (``few_lights.py``)."""
 
+LIGHTS = np.float32(0.003)
+"""Lights and lenses are never known better than this share of the signal."""
+
 _NO_LIMIT = -1e9
 
 
@@ -109,6 +112,18 @@ class Weights(NamedTuple):
     common: np.float32
     read: np.float32  # the noise variance of a dark measurement, and per unit of light; 0 where noise is not known
     photon: np.float32
+
+
+class Spread(NamedTuple):
+    """How noise spreads into normals under all lights.
+
+    inverse: (3, 3), of the lights' normal equations. scale: degrees that hold a share of errors, per radian.
+    variances: of a dark sample, per unit of albedo, of its square; the last instead of that for what residuals say.
+    """
+
+    inverse: Floats
+    variances: Floats
+    scale: np.float32
 
 
 class Work(NamedTuple):
