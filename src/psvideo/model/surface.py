@@ -19,8 +19,8 @@ class Misfit:
     """What the lights leave unexplained in a typical pixel of one picture, whichever pixel that is.
 
     share: of the pixel's own light, as a standard deviation; noise and a rig that is wrong make it. The solver never
-        takes it for less than 1 %.
-    error_deg: the normal's predicted standard error there.
+        takes it for less than 0.3 %.
+    error_deg: the normal's predicted standard error there, without what noise makes of it.
     """
 
     share: float

@@ -63,9 +63,9 @@ def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging =
     limit_deg, misfit = how.most_error_deg, surface.misfit
     if at_points.size:
         typical, by_noise = float(np.median(at_points)), float(np.median(points.noise_deg[points.known]))
-        beyond = how.beside_typical * float(np.sqrt(max(typical**2 - by_noise**2, 0.0)))
-        limit_deg = max(limit_deg, min(beyond, how.most_typical_deg))
-        misfit = None if misfit is None else replace(misfit, error_deg=typical)
+        beyond_deg = float(np.sqrt(max(typical**2 - by_noise**2, 0.0)))
+        limit_deg = max(limit_deg, min(how.beside_typical * beyond_deg, how.most_typical_deg))
+        misfit = None if misfit is None else replace(misfit, error_deg=beyond_deg)
     error, trusted = spread.judged(surface, doubt, points.step, how, limit_deg=limit_deg)
     return replace(surface, valid=trusted, error_deg=error, misfit=misfit)
 
