@@ -1,0 +1,73 @@
+"""Predicted errors are true: of noise alone, under a wrong rig, and where light comes by way of other surfaces."""
+
+import numpy as np
+import pytest
+
+from psvideo.model.surface import Surface
+from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.solving import Solving
+
+SIZE = 96
+COLOUR = np.array([0.5, 0.4, 0.3])
+
+
+def ring(lights: int, slant_deg: float) -> np.ndarray:
+    around, slant = 0.3 + np.arange(lights) * 2 * np.pi / lights, np.radians(slant_deg)
+    up = np.full(lights, np.cos(slant))
+    return np.stack([np.sin(slant) * np.cos(around), np.sin(slant) * np.sin(around), up], axis=-1)
+
+
+def ball() -> tuple[np.ndarray, np.ndarray]:
+    """Return the normals of a ball (row, col, 3), and where it is."""
+    rows, cols = np.mgrid[:SIZE, :SIZE] - (SIZE - 1) / 2
+    x, y = cols / (0.45 * SIZE), -rows / (0.45 * SIZE)
+    inside = x * x + y * y < 0.95
+    z = np.sqrt(np.where(inside, 1 - x * x - y * y, 0))
+    return np.where(inside[..., None], np.stack([x, y, z], axis=-1), 0), inside
+
+
+def judged(
+    lights: np.ndarray, *, claimed: np.ndarray | None = None, noise: float = 0.002, indirect: float = 0.0
+) -> tuple[Surface, np.ndarray, np.ndarray]:
+    """Return a ball as solved, true errors in degrees where it was measured, and predicted ones.
+
+    indirect: what of its albedo every light gives all of the ball by way of other surfaces.
+    """
+    normals, inside = ball()
+    rng = np.random.default_rng(3)
+    shade = np.maximum(np.einsum("rcx,lx->lrc", normals, lights), 0) + indirect * inside
+    plates = [(one[..., None] * COLOUR + rng.normal(0, noise, (*one.shape, 3))).astype(np.float32) for one in shade]
+    directions = lights if claimed is None else claimed
+    lit = Illumination(directions=directions, intensities=np.ones((len(lights), 3)))
+    surface = Solving(error=True).solve(plates, lit, mask=inside)
+    assert surface.error_deg is not None
+    measured = surface.measured & inside
+    apart = np.linalg.norm(surface.normals.astype(np.float64) - normals, axis=-1)[measured]
+    return surface, np.degrees(2 * np.arcsin(np.clip(apart / 2, 0, 1))), surface.error_deg[measured].astype(float)
+
+
+@pytest.mark.parametrize("lights", [3, 4, 8])
+def test_of_noise_alone_two_thirds_are_within_the_predicted_error(lights: int) -> None:
+    _, errors, predicted = judged(ring(lights, 30))
+    assert 0.6 <= (errors <= predicted).mean() <= 0.92, "some doubt is left"
+    assert np.median(predicted) < 2.2 * np.median(errors)
+
+
+def test_light_by_way_of_other_surfaces_is_seen_where_lights_do_not_reach() -> None:
+    _, errors, predicted = judged(ring(8, 55), indirect=0.06)
+    _, _, without = judged(ring(8, 55))
+    assert (errors <= 2 * predicted).mean() >= 0.9
+    assert np.median(predicted) > 1.5 * np.median(without)
+
+
+def test_a_rig_that_is_wrong_is_predicted_and_makes_few_pixels_invalid() -> None:
+    lights = ring(8, 35)
+    across = np.random.default_rng(2).normal(size=lights.shape)
+    across -= np.sum(across * lights, axis=1, keepdims=True) * lights
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    claimed = np.cos(np.radians(3)) * lights + np.sin(np.radians(3)) * across
+    surface, errors, predicted = judged(lights, claimed=claimed)
+    assert (errors <= 2 * predicted).mean() >= 0.8
+    assert surface.misfit is not None
+    assert 0.7 < surface.misfit.error_deg / np.median(errors) < 2.5, "a rig averages out more than gloss does"
+    assert surface.valid.sum() > 0.6 * surface.measured.sum()
