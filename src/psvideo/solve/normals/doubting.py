@@ -20,6 +20,8 @@ GRID_PX = 480
 """The grid has at most so many points along the longer side."""
 NEAR, AROUND = 9, 27
 """Bends are angles to the mean of a square of so many points; the rest is averaged over the larger one."""
+MOST_FIT_DEG = np.float32(12)
+"""What residuals predict counts as no more around a point: a line of rows that went wrong is not its surroundings."""
 LEAST_LIGHTS = 0.02
 """So many lights that do not reach a point, in the mean, must there be for light from around to be known."""
 
@@ -77,7 +79,8 @@ def doubt_deg(points: Points, one: Evidence, surface: Surface, *, how: Doubting 
     """Return by how many degrees normals may be off beyond noise, (row, col) of the points."""
     weight = points.known.astype(np.float32)
     near, around = (_mean(weight, width) for width in (NEAR, AROUND))
-    squares = np.where(points.known, points.fit_deg**2 - points.fit_of_noise_deg**2, np.float32(0))
+    fit = np.minimum(points.fit_deg, MOST_FIT_DEG)
+    squares = np.where(points.known, fit**2 - points.fit_of_noise_deg**2, np.float32(0))
     misfit = np.sqrt(np.maximum(_mean(squares, AROUND) / around, 0))
     sums, counts = _indirect(points, one, surface)
     noise = np.radians(points.noise_deg)
