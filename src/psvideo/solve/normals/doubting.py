@@ -54,7 +54,7 @@ class Doubting:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Points:
+class ThinSurface:
     """Every ``step``-th row and column of a surface, and errors there in degrees: what noise makes, what residuals
     predict, and what they would predict of nothing but noise."""
 
@@ -75,7 +75,7 @@ def step_of(shape: tuple[int, ...]) -> int:
     return max(-(-max(shape[:2]) // GRID_PX), 1)
 
 
-def doubt_deg(points: Points, one: Evidence, surface: Surface, *, how: Doubting = Doubting()) -> Floats:
+def doubt_deg(points: ThinSurface, one: Evidence, surface: Surface, *, how: Doubting = Doubting()) -> Floats:
     """Return by how many degrees normals may be off beyond noise, (row, col) of the points."""
     weight = points.known.astype(np.float32)
     near, around = (_mean(weight, width) for width in (NEAR, AROUND))
@@ -97,7 +97,7 @@ def doubt_deg(points: Points, one: Evidence, surface: Surface, *, how: Doubting 
     return np.asarray(doubt, np.float32)
 
 
-def _bent_deg(points: Points, near: Floats) -> Floats:
+def _bent_deg(points: ThinSurface, near: Floats) -> Floats:
     """Return the angle between every normal and the mean of those around it."""
     planes = [points.surface.normals[..., axis].astype(np.float32) for axis in range(3)]
     means = [_mean(plane, NEAR) / near for plane in planes]
@@ -112,7 +112,7 @@ def _mean(plane: Floats, width: int) -> Floats:
     return np.asarray(cv2.blur(plane, (width, width), borderType=cv2.BORDER_CONSTANT) + np.float32(1e-9), np.float32)
 
 
-def _indirect(points: Points, one: Evidence, surface: Surface) -> tuple[Floats, Floats]:
+def _indirect(points: ThinSurface, one: Evidence, surface: Surface) -> tuple[Floats, Floats]:
     """Return at every point the light from lamps that do not reach it, in units of albedo, summed, and their number."""
     from psvideo.solve.normals.judging_kernel import indirect_rows
     from psvideo.solve.normals.kernel import working_memory

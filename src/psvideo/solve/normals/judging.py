@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from psvideo.compute.threads import over_ranges
 from psvideo.model.surface import MEASURED, Surface
 from psvideo.solve.normals.bands import BAND_PIXELS
-from psvideo.solve.normals.doubting import Doubting, Points, bits, doubt_deg, step_of, stored
+from psvideo.solve.normals.doubting import Doubting, ThinSurface, bits, doubt_deg, step_of, stored
 from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.plate_noise import PlateNoise
@@ -116,7 +116,7 @@ class _Spread:
         known = self.of_residual > 0 and surface.residual is not None
         return bits(surface.residual) if known and surface.residual is not None else NOTHING
 
-    def points(self, surface: Surface) -> Points:
+    def points(self, surface: Surface) -> ThinSurface:
         """Return every so many rows and columns of a surface, and what noise and residuals make of them."""
         step = step_of(surface.valid.shape)
         thin = replace(
@@ -134,7 +134,7 @@ class _Spread:
         if fit.size:
             self.fill(thin, fit, self.noise._replace(variances=np.zeros_like(v)), (0.0, 1.0), fit_deg)
             self.fill(thin, NOTHING, self.noise._replace(variances=v[[0, 1, 3, 3]]), (0.0, 0.0), of_noise_deg)
-        return Points(
+        return ThinSurface(
             step=step,
             surface=thin,
             noise_deg=noise_deg,
