@@ -45,6 +45,12 @@ class Seen(NamedTuple):
         return f"{self.error_deg:.2f}°" + ("" if self.valid > 0.9995 else f", {self.valid:.1%} valid")
 
 
+BUST = {"mesh": "bust", "height_m": 0.5, "rotate_deg": [0, 14, 0], "position_m": [0, -0.05, 0]}
+BOX = {"mesh": "box", "height_m": 0.5, "rotate_deg": [20, 30, 10], "albedo": 0.6}
+VASE = {"mesh": "vase", "height_m": 0.5, "rotate_deg": [20, 30, 10]}
+ASLANT = (1, 2, 1)
+
+
 def slide(px: float) -> dict[str, Any]:
     """A motion by so many pixels from flash to flash, aslant: not whole pixels, at which moving a plate is exact."""
     across, up = 0.98 * px, 0.2 * px
@@ -98,16 +104,23 @@ class Filmed:
 
 
 def filmed(
-    lights: int, motion: dict[str, Any] | None, *, noise: float = 0.0, skin: Any = MOTTLED, rounds: int = ROUNDS
+    lights: int,
+    motion: dict[str, Any] | None,
+    *,
+    noise: float = 0.0,
+    skin: Any = MOTTLED,
+    rounds: int = ROUNDS,
+    subject: dict[str, Any] | None = None,
 ) -> Filmed:
-    """Film a ball as flashes see it, the middle of all rounds at 0 s."""
+    """Film a ball, or another ``subject``, as flashes see it, the middle of all rounds at 0 s."""
     directions = ring(lights, 27)
     table = [{"name": f"l{n}", "direction": [float(x) for x in d], "intensity": 0.9} for n, d in enumerate(directions)]
     wall = {"pattern": "noise", "colour": 0.4, "second": 0.2, "size_m": 0.1}
     camera = {"width_px": COLS, "height_px": ROWS, "fps": 120, "shutter_deg": 360.0, "readout_s": 0.008,
               "width_m": WIDTH_M, "colour": "grey"}  # fmt: skip
+    thing = subject or {"mesh": "sphere", "height_m": 0.4, "albedo": skin}
     objects = [
-        {"mesh": "sphere", "height_m": 0.4, "albedo": skin, "motion": motion},
+        thing | {"motion": motion},
         {"mesh": "plane", "scale": 4.0, "position_m": [0, 0, WALL_M], "albedo": wall},
     ]
     scene = {"schema": "psvideo-scene/1", "camera": camera, "light": table, "object": objects}
@@ -149,6 +162,11 @@ def rows() -> Iterator[Accuracy]:
     yield _moving("3 lights, 4 px per flash, bare skin (no texture)", filmed(3, slide(4), skin=0.6))
     yield _moving("3 lights, spinning in the picture, 3 px per flash at its edge", filmed(3, turn(3, (0, 0, 1))))
     yield _moving("3 lights, turning about the vertical, 3 px per flash", filmed(3, turn(3, (0, 1, 0))))
+    for px in (2, 8, 16):
+        yield _moving(f"bust, 5 lights, {px} px per flash", filmed(5, slide(px), subject=BUST))
+    for name, subject, lights in (("bust", BUST, 5), ("bare box", BOX, 5), ("vase", VASE, 3)):
+        clip = filmed(lights, turn(2, ASLANT), subject=subject)
+        yield _moving(f"{name}, {lights} lights, tumbling, 2 px per flash", clip)
     before, after = three.rounds[1], three.shown(Aligning())[1]
     yield Accuracy(
         f"3 lights, 4 px per flash: within {EDGE_PX} px of the outline, ball and wall",

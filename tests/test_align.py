@@ -41,6 +41,7 @@ MOTIONS: dict[str, dict[str, Any] | None] = {
     "at rest": None,
     "1 px": {"velocity_m_per_s": [metres_per_s(1.1), metres_per_s(0.3), 0]},
     "4 px": {"velocity_m_per_s": [metres_per_s(4.2), metres_per_s(-0.7), 0]},
+    "16 px": {"velocity_m_per_s": [metres_per_s(15.8), metres_per_s(2.7), 0]},
     "spin": {"axis": [0, 0, 1], "spin_deg_per_s": float(np.rad2deg(3.0 / 80) / PITCH_S)},
     "turn": {"axis": [0, 1, 0], "spin_deg_per_s": float(np.rad2deg(1.0 / 80) / PITCH_S)},
 }
@@ -170,6 +171,16 @@ def test_flow_takes_the_error_of_motion_away(lights: int, motion: str, before_de
     assert error_deg > before_deg
     error_deg, told_after = clip.error_deg(clip.solved(brought_as_filmed(lights, motion)[1]), middle.time_s)
     assert error_deg < 1.0
+    assert told_after > 0.9 * said
+
+
+def test_what_moves_by_half_its_width_in_a_round_is_followed() -> None:
+    clip = noiseless(3, "16 px")
+    middle = clip.rounds[1]
+    error_deg, said = clip.error_deg(clip.solved(middle), middle.time_s)
+    assert error_deg > 25
+    error_deg, told_after = clip.error_deg(clip.solved(brought_as_filmed(3, "16 px")[1]), middle.time_s)
+    assert error_deg < 3
     assert told_after > 0.9 * said
 
 

@@ -16,12 +16,10 @@ from psvideo.compute.threads import over_ranges
 from psvideo.model.coded import Image
 from psvideo.plates.align.flow import Codes, Flags, Vectors, comparable, places
 from psvideo.plates.align.moving import SHADING_PX, Followed, Pair
+from psvideo.plates.align.moving_kernel import AFTER, AT_REST, BEFORE, BOTH, NOWHERE, blend_rows
 from psvideo.plates.align.packed import packed
 from psvideo.plates.mixture import made
 from psvideo.plates.sequence import LightPlate
-
-AT_REST, BEFORE, AFTER, BOTH, NOWHERE = range(5)
-"""What a pixel is taken from: the nearer plate as it is, one plate moved along the motion, both, or none."""
 
 UNLIKE = 10.0
 """Plates whose detail differs by more codes along the motion do not show the same thing."""
@@ -209,28 +207,26 @@ def _fill(
     x, y = places(band.stop - band.start, cols)
     y += np.float32(band.start)
     at = (x + 0.5) / scale_x - np.float32(0.5), (y + 0.5) / scale_y - np.float32(0.5)
-    taken = cv2.remap(source, *at, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE)
+    taken = np.asarray(cv2.remap(source, *at, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE), np.uint8)
     seen[band] = (taken != NOWHERE) & own.pixels_seen[band]
     if not (flowing := (taken != AT_REST) & (taken != NOWHERE)).any():
         return
     go_x, go_y = (cv2.remap(v, *at, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE) for v in motion.velocity)
-    share = np.clip(ends.share, 0, 1)
-    total = np.zeros_like(image[band])
-    weight = np.zeros(taken.shape, np.float32)
-    clipped = np.zeros(taken.shape, np.bool_)
-    for side, part, alone in zip(sides, (1 - share, share), (BEFORE, AFTER), strict=True):
+    share = float(np.clip(ends.share, 0, 1))
+    weights = np.zeros((2, *taken.shape), np.float32)
+    moved: list[Image] = []
+    for place, (side, part, alone) in enumerate(zip(sides, (1 - share, share), (BEFORE, AFTER), strict=True)):
         wanted = (taken == BOTH) | (taken == alone)
         if side is None or not wanted.any():
+            moved.append(np.zeros_like(image[band]))
             continue
         span_s = np.float32(motion.time_s - side.plate.time_s)
         found, there = side.moved(x - span_s * scale_x * go_x, y - span_s * scale_y * go_y, wanted)
-        counts = (np.where(taken == BOTH, np.float32(max(part, 1e-6)), (taken == alone)) * there).astype(np.float32)
-        total += found * (counts if found.ndim == 2 else counts[..., None])
-        weight += counts
-        clipped |= (counts > 0) & (_brightest(found) >= side.plate.saturation)
-    known = flowing & (weight > 0) & own.rows_seen[band, None]
-    blended = total / np.maximum(weight, 1e-6).reshape(*weight.shape, *[1] * (total.ndim - 2))
-    blended[clipped] = own.saturation
-    image[band][known] = blended[known]
-    seen[band] = np.where(flowing, known, seen[band])
-    image[band][~seen[band]] = 0
+        weights[place] = there * np.float32(max(part, 1e-6))
+        moved.append(found)
+    full = np.array(
+        [*(np.inf if side is None else side.plate.saturation for side in sides), own.saturation], np.float32
+    )
+    seen[band] = np.where(flowing, own.rows_seen[band, None], seen[band])
+    one, other, blended = (part.reshape(*taken.shape, -1) for part in (*moved, image[band]))
+    blend_rows(taken, weights, one, other, full, seen[band], blended)

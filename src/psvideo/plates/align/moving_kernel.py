@@ -1,4 +1,4 @@
-"""Compiled parts of following motion: how unlike plates are along velocities, and where flow leads."""
+"""Compiled parts of following motion: how unlike plates are along velocities, where flow leads, what is blended."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +8,9 @@ from psvideo.compute.memory import lent
 
 Codes = NDArray[np.uint8]
 Floats = NDArray[np.float32]
+Flags = NDArray[np.bool_]
+AT_REST, BEFORE, AFTER, BOTH, NOWHERE = range(5)
+"""What a pixel is taken from: the nearer plate as it is, one plate moved along the motion, both, or none."""
 ZERO, ONE, HALF = np.float32(0), np.float32(1), np.float32(0.5)
 UNLIKE_SQUARE = np.float32(4.0**2)
 """Two codes that differ by 4 are half unlike: noise makes 1 to 2."""
@@ -69,3 +72,39 @@ def arriving_rows(flow: Floats, share: np.float32, per_s: np.float32, first: int
                 at_col = int(min(max(np.float32(col) - share * x + HALF, ZERO), np.float32(cols - 1)))
                 x, y = given[at_row, at_col, 0], given[at_row, at_col, 1]
             made[0, row, col], made[1, row, col] = x * per_s, y * per_s
+
+
+@FUSED.kept
+def blend_rows(
+    taken: Codes, weights: Floats, before: Floats, after: Floats, full: Floats, seen: Flags, image: Floats
+) -> None:
+    """Fill ``image`` (row, col, channel) with what is taken of plates before and after, as they were moved there.
+
+    ``taken`` (row, col) is AT_REST (image stays), BEFORE, AFTER, BOTH or NOWHERE; ``weights`` (2, row, col) what either
+    counts where both are taken, 0 where it is not known; ``full`` the values from which on either is clipped, and what
+    clipped light becomes. ``seen`` (row, col) says where anything may be known, and afterwards is; elsewhere is 0.
+    """
+    for row in range(taken.shape[0]):
+        for col in range(taken.shape[1]):
+            code = taken[row, col]
+            if code == NOWHERE:
+                seen[row, col] = False
+            elif code != AT_REST:
+                one = weights[0, row, col] if code != AFTER else ZERO
+                other = weights[1, row, col] if code != BEFORE else ZERO
+                seen[row, col] &= one + other > ZERO
+                if seen[row, col]:
+                    _blend(one, other, before[row, col], after[row, col], full, image[row, col])
+            if not seen[row, col]:
+                image[row, col] = ZERO
+
+
+@FUSED.inlined
+def _blend(one: np.float32, other: np.float32, before: Floats, after: Floats, full: Floats, made: Floats) -> None:
+    clipped = False
+    for channel in range(made.shape[0]):
+        if (one > ZERO and before[channel] >= full[0]) or (other > ZERO and after[channel] >= full[1]):
+            clipped = True
+        made[channel] = (one * before[channel] + other * after[channel]) / (one + other)
+    if clipped:
+        made[:] = full[2]
