@@ -16,8 +16,9 @@ from bench.accuracy_measure import Accuracy, angles_deg, ring
 from psvideo.model.surface import Surface
 from psvideo.plates.align.denoise import Average, averaged
 from psvideo.plates.align.rounds import Aligning, aligned
+from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import made
-from psvideo.plates.sequence import LightPlate, Round
+from psvideo.plates.sequence import Round
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.woodham1980 import solve
 from psvideo.synth.lamps.true_flashes import TrueFlash

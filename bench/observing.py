@@ -10,8 +10,9 @@ from bench.table import Row
 from bench.whole_run_clips import COLS, ROWS, directions
 from psvideo.model.coded import Coded, Tone
 from psvideo.model.surface import Surface
+from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import Mixture
-from psvideo.plates.sequence import LightPlate, Round
+from psvideo.plates.sequence import Round
 from psvideo.report.observe.observed import Observed
 
 LIGHTS = 8

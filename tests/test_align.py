@@ -14,8 +14,9 @@ from psvideo.model.surface import Surface
 from psvideo.plates.align import between, held
 from psvideo.plates.align.packed import packed
 from psvideo.plates.align.rounds import Aligning, aligned
+from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import Mixture, made
-from psvideo.plates.sequence import LightPlate, Round
+from psvideo.plates.sequence import Round
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.woodham1980 import solve
 from psvideo.synth.lamps.true_flashes import TrueFlash

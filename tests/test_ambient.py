@@ -12,7 +12,7 @@ from memory_frame import MemoryFrame
 from psvideo.model.plan import Plan
 from psvideo.model.shutter import frames_touched
 from psvideo.model.timing import Flash, Timing
-from psvideo.plates import ambient
+from psvideo.plates import ambient, ambient_off
 from psvideo.plates.mains import Exposures, Mains, Ripple, RowLight, find_ripple
 from psvideo.plates.mixture import made
 from psvideo.plates.split import Plate, split
@@ -40,7 +40,7 @@ class Take:
     truth: dict[int, np.ndarray]
 
     def without_ambient(self) -> Iterator[Plate]:
-        return ambient.subtract(self.plates, darks=[plate for plate in self.plates if not plate.flash.lights])
+        return ambient_off.subtract(self.plates, darks=[plate for plate in self.plates if not plate.flash.lights])
 
     def errors(self) -> np.ndarray:
         """Return the errors of whole plates between two dark slots once ambient light is off, (plate, row, col)."""
@@ -230,7 +230,7 @@ def test_dark_slots_are_read_no_further_ahead_than_the_next(plan: Plan) -> None:
                 yield plate
 
     served = 0
-    for plate in ambient.subtract(take.plates, darks=darks()):
+    for plate in ambient_off.subtract(take.plates, darks=darks()):
         served += 1
         assert sum(index >= plate.flash.index for index in read) <= 1
     assert served == len(take.plates)
@@ -271,10 +271,10 @@ def test_dark_slots_come_ahead_of_the_plates_around_them_and_none_is_left_out(pl
     plates = shoot(plan, clouded, frames=60).plates
     begin = next(n for n, plate in enumerate(plates) if plate.flash.is_dark == dark_first)
     plates = plates[begin:]
-    coming, darks = ambient.with_darks_ahead(iter(plates), listed(plates))
-    found = list(ambient.subtract(coming, darks=darks))
+    coming, darks = ambient_off.with_darks_ahead(iter(plates), listed(plates))
+    found = list(ambient_off.subtract(coming, darks=darks))
     read_before = [plate for plate in plates if plate.flash.is_dark]
-    expected = list(ambient.subtract(plates, darks=read_before))
+    expected = list(ambient_off.subtract(plates, darks=read_before))
     assert [plate.flash.index for plate in found] == [plate.flash.index for plate in expected]
     for one, other in zip(found, expected, strict=True):
         assert np.array_equal(one.image, other.image)
@@ -293,10 +293,10 @@ def test_while_light_is_steady_no_plate_waits_and_dark_slots_count_as_they_pass(
             read.append(plate)
             yield plate
 
-    coming, darks = ambient.with_darks_ahead(counted(), listed(take.plates))
+    coming, darks = ambient_off.with_darks_ahead(counted(), listed(take.plates))
     expected = list(take.without_ambient())
     ahead = []
-    for place, plate in enumerate(ambient.subtract(coming, darks=darks, waits=False)):
+    for place, plate in enumerate(ambient_off.subtract(coming, darks=darks, waits=False)):
         ahead.append(len(read) - 1 - place)
         assert np.abs(plate.image - expected[place].image).max() < 2e-4
     assert plate.flash.index == expected[-1].flash.index
@@ -308,8 +308,8 @@ def test_steady_light_that_begins_to_change_is_followed_from_the_next_dark_slot_
         return LEVEL * scene * (1 + 0.4 * max(n - 60, 0) / 60)
 
     take = shoot(plan, dimmed_later)
-    coming, darks = ambient.with_darks_ahead(iter(take.plates), listed(take.plates))
-    found = list(ambient.subtract(coming, darks=darks, waits=False))
+    coming, darks = ambient_off.with_darks_ahead(iter(take.plates), listed(take.plates))
+    found = list(ambient_off.subtract(coming, darks=darks, waits=False))
     for plate, expected in list(zip(found, take.without_ambient(), strict=True))[-24:]:
         assert np.array_equal(plate.image, expected.image)
 

@@ -20,8 +20,9 @@ from psvideo.export.preview_movie import even, write_movie
 from psvideo.export.programs import Delivered, note
 from psvideo.model.choices import Program
 from psvideo.plates.beauty import Mix, beauty_of, mix_of
+from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import made
-from psvideo.plates.sequence import LightPlate, Round
+from psvideo.plates.sequence import Round
 
 otio = pytest.importorskip("opentimelineio")
 SCENES = Path(__file__).resolve().parents[1] / "data_synth"

@@ -9,8 +9,9 @@ import pytest
 from psvideo.model.surface import Surface
 from psvideo.model.timing import Timing
 from psvideo.plates.align.denoise import Average, averaged
+from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import made
-from psvideo.plates.sequence import LightPlate, Round
+from psvideo.plates.sequence import Round
 from psvideo.report.judge.result import steadiness
 from psvideo.report.observe.observed import InstantFacts, instant_facts
 from psvideo.report.observe.steadiness import Change, Sample, change, sample_of

@@ -12,7 +12,7 @@ from memory_frame import MemoryFrame
 from psvideo.model.plan import Plan, PlannedFlash, mixing_matrix, reference_duration_s
 from psvideo.model.shutter import frames_touched, row_weights
 from psvideo.model.timing import Flash, Timing
-from psvideo.plates import ambient, sequence
+from psvideo.plates import ambient_off, sequence
 from psvideo.plates.sequence import Round, coming, light_plates
 from psvideo.plates.split import split
 from psvideo.synth import Exposure, Noise, TrueClock, expose
@@ -86,7 +86,7 @@ def gathered(plan: Plan, shot: Exposure, timing: Timing) -> list[Round]:
             yield MemoryFrame(n, image)
 
     held = list(split(frames(), plan.camera, timing))
-    plates = ambient.subtract(held, darks=[plate for plate in held if not plate.flash.lights])
+    plates = ambient_off.subtract(held, darks=[plate for plate in held if not plate.flash.lights])
     expected = coming(plan, timing.flashes)
     single = light_plates(plates, plan, timing.flashes)
     return list(sequence.gathered(single, plan.lights, expected=expected.__getitem__))

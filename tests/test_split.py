@@ -17,7 +17,7 @@ from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.model.row_profiles import collect
 from psvideo.model.shutter import frames_touched, row_weights
 from psvideo.model.timing import Flash, Timing
-from psvideo.plates import ambient, hudon2015
+from psvideo.plates import ambient_off, hudon2015
 from psvideo.plates.sequence import Round, coming, gathered, light_plates
 from psvideo.plates.split import Plate, split
 from psvideo.sync.find import find_timing
@@ -32,7 +32,7 @@ def frames_of(shot: Exposure) -> Iterator[MemoryFrame]:
 
 def without_ambient(plates: Iterable[Plate]) -> Iterator[Plate]:
     held = list(plates)
-    return ambient.subtract(held, darks=[plate for plate in held if not plate.flash.lights])
+    return ambient_off.subtract(held, darks=[plate for plate in held if not plate.flash.lights])
 
 
 def rounds_of(plates: Iterable[Plate], plan: Plan, timing: Timing) -> list[Round]:

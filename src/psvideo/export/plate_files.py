@@ -10,7 +10,7 @@ from psvideo.formats.exr_files import write_exr
 from psvideo.model.choices import Compression
 from psvideo.model.quantities import QUANTITIES
 from psvideo.model.turn import UPRIGHT, Turn
-from psvideo.plates.sequence import LightPlate
+from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.split import Plate
 
 PLATE = QUANTITIES["plate"]

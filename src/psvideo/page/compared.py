@@ -21,7 +21,7 @@ from psvideo.model.timing import Timing, places_in_time
 
 if TYPE_CHECKING:
     from psvideo.clip import Take
-    from psvideo.plates.sequence import LightPlate
+    from psvideo.plates.light_plate import LightPlate
 
 RUN_UP: Mapping[SplitMethod, int] = {"weights": 0, "hudon2015": 240}
 """Frames before a round that a method looks at, where there are so many."""

@@ -23,20 +23,13 @@ from psvideo.model.shutter import frames_touched
 from psvideo.model.timing import Flash, Timing, places_in_time, timed_camera
 from psvideo.plates import hudon2015
 from psvideo.plates.align.rounds import Aligning, aligned
-from psvideo.plates.ambient import subtract, update, with_darks_ahead
+from psvideo.plates.ambient import update
+from psvideo.plates.ambient_off import subtract, with_darks_ahead
 from psvideo.plates.ambient_regression import Design, Separated, design_of, separated, windows_of
+from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import made
 from psvideo.plates.nearest_rows import has_blind_time, with_nearest_rows
-from psvideo.plates.sequence import (
-    AMBIENT,
-    FIRST_NUMBER,
-    LightPlate,
-    Round,
-    check_separable,
-    coming,
-    gathered,
-    light_plates,
-)
+from psvideo.plates.sequence import AMBIENT, FIRST_NUMBER, Round, check_separable, coming, gathered, light_plates
 from psvideo.plates.split import Plate, plate_of, split
 from psvideo.plates.upright import upright
 

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.camera import Camera, FloatArray
+from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import made
-from psvideo.plates.sequence import LightPlate
 
 LATER, MOST_LATER = 2, 8
 """A plate waits for so many later ones of its light: for the first number where earlier ones showed what it lacks, and

@@ -1,84 +1,22 @@
-"""Plates in the order of flashes, gathered into one set per round: each light once, at its full flash.
-
-Every flash is a sum of lights, ``plate[k] = sum_l power[k, l] * light[l]``. One light per flash is the identity; other
-patterns are demultiplexed by the pseudo-inverse. A light that flashes alone several times a round, at different powers
-or durations (HDR), is merged: what is saturated is left out and the rest is summed, which weights it by photon noise. A
-light's full flash is power 1 for its longest planned duration.
-"""
+"""Plates in the order of flashes, gathered into one set per round: each light once, at its full flash."""
 
 from collections.abc import Callable, Iterable, Iterator, Set
 from dataclasses import dataclass
 from functools import reduce
 
 import numpy as np
-from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import FloatArray
-from psvideo.model.coded import Image
 from psvideo.model.plan import Plan, mixing_matrix
 from psvideo.model.timing import Flash
-from psvideo.plates.mixture import Mixture, combined, made
+from psvideo.plates.demultiplexed import Making, makings_of, of_light
+from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.split import Plate
 
 FIRST_NUMBER = 1001
 AMBIENT = "ambient"
 """What stands for a light where a dark slot showed the ambient light."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class LightPlate:
-    """The scene under one light at its full flash, at one instant.
-
-    ``seen`` (row,) is as in a Plate, or (row, col) where motion hid parts of the plate.
-
-    ``saturation`` is the value from which on a pixel is clipped: 1.0, or more where the flash was weaker than full.
-    ``shown_s`` (row,) are the instants that the rows show, or (row, col) where the picture was turned, None where all
-    show ``time_s``.
-    """
-
-    light: str
-    number: int
-    time_s: float
-    picture: Mixture
-    seen: NDArray[np.bool_]
-    saturation: float = 1.0
-    shown_s: FloatArray | None = None
-
-    @property
-    def image(self) -> Image:
-        """The picture, (row, col) or (row, col, channel), in linear light; made when it is asked for."""
-        return self.picture.image()
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """The picture's shape."""
-        return self.picture.shape
-
-    @property
-    def flashed_s(self) -> FloatArray:
-        """The instant that every row shows, shape (row,), or every pixel, (row, col), where the picture was turned."""
-        return np.full(self.shape[0], self.time_s) if self.shown_s is None else self.shown_s
-
-    @property
-    def rows_seen(self) -> NDArray[np.bool_]:
-        """Which rows any frame saw, also where motion hid something in them, shape (row,)."""
-        return self.seen if self.seen.ndim == 1 else np.asarray(self.seen.any(axis=1))
-
-    @property
-    def own(self) -> NDArray[np.bool_]:
-        """What the plate's own flash showed, (row, 1), or (row, col) where the picture was turned; the rest comes from
-        flashes before or after."""
-        seen = self.rows_seen[:, None]
-        if self.shown_s is None:
-            return seen
-        return np.asarray(seen & (self.shown_s == self.time_s).reshape(len(seen), -1))
-
-    @property
-    def pixels_seen(self) -> NDArray[np.bool_]:
-        """What is known of the plate, shape (row, col)."""
-        known = self.seen if self.seen.ndim == 2 else self.seen[:, None]
-        return np.broadcast_to(known, self.shape[:2])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,40 +83,6 @@ def round_numbers(flashes: tuple[Flash, ...], *, start: int = FIRST_NUMBER) -> t
     return tuple(number + shift for number in numbers)
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Making:
-    """How a light is had from the flashes of a round: ``shares`` by slot of what holds ``exposure`` of it (by slot);
-    ``alone`` where no other light is in these flashes."""
-
-    light: str
-    shares: dict[int, float]
-    exposures: dict[int, float]
-    alone: bool
-
-    @property
-    def slots(self) -> set[int]:
-        """The flashes that the light depends on."""
-        return set(self.shares)
-
-
-def _makings(plan: Plan) -> list[_Making]:
-    matrix = mixing_matrix(plan)
-    inverse = np.linalg.pinv(matrix)
-    inverse[np.abs(inverse) < 1e-12] = 0.0
-    makings = []
-    for light, column, shares in zip(plan.lights, matrix.T, inverse, strict=True):
-        needed = [row for row, share in enumerate(shares) if share]
-        makings.append(
-            _Making(
-                light=light,
-                shares={plan.lit_slots[row]: float(shares[row]) for row in needed},
-                exposures={plan.lit_slots[row]: float(column[row]) for row in needed},
-                alone=all(np.count_nonzero(matrix[row]) == 1 for row in needed),
-            )
-        )
-    return makings
-
-
 def light_plates(
     plates: Iterable[Plate], plan: Plan, flashes: tuple[Flash, ...], *, start: int = FIRST_NUMBER
 ) -> Iterator[LightPlate]:
@@ -187,8 +91,8 @@ def light_plates(
     Plates are numbered by ``round_numbers``. Only flashes are held that a light still waits for.
     """
     numbers = round_numbers(flashes, start=start)
-    makings = _makings(plan)
-    waiting: list[_Making] = []
+    makings = makings_of(plan)
+    waiting: list[Making] = []
     lit: dict[int, Plate] = {}
     number: int | None = None
     shown_dark: int | None = None
@@ -204,7 +108,7 @@ def light_plates(
         del plate
         for making in waiting:
             if making.slots <= lit.keys():
-                yield _of_light(making, lit, now)
+                yield of_light(making, lit, now)
         waiting = [making for making in waiting if not making.slots <= lit.keys()]
         needed = {slot for making in waiting for slot in making.slots}
         lit = {slot: held for slot, held in lit.items() if slot in needed}
@@ -215,11 +119,11 @@ def coming(plan: Plan, flashes: tuple[Flash, ...], *, start: int = FIRST_NUMBER)
     complete: dict[int, list[Flash]] = {}
     for flash, number in zip(flashes, round_numbers(flashes, start=start), strict=True):
         complete.setdefault(number, []).extend([flash] if flash.complete else [])
-    makings = _makings(plan)
+    makings = makings_of(plan)
     return {number: frozenset(_names(makings, held)) for number, held in complete.items()}
 
 
-def _names(makings: list[_Making], flashes: list[Flash]) -> Iterator[str]:
+def _names(makings: list[Making], flashes: list[Flash]) -> Iterator[str]:
     slots = {flash.slot for flash in flashes}
     yield from (making.light for making in makings if making.slots <= slots)
     if not all(flash.lit for flash in flashes):
@@ -264,54 +168,3 @@ def handed_over(held: dict[str, LightPlate], number: int, lights: tuple[str, ...
 
 def _of_dark(plate: Plate, number: int) -> LightPlate:
     return LightPlate(light=AMBIENT, number=number, time_s=plate.time_s, picture=plate.picture, seen=plate.seen)
-
-
-def _of_light(making: _Making, lit: dict[int, Plate], number: int) -> LightPlate:
-    parts = [lit[slot] for slot in making.shares]
-    if making.alone:
-        return _merged(parts, np.array(list(making.exposures.values())), making.light, number)
-    return _mixed(parts, np.array(list(making.shares.values())), making.light, number)
-
-
-def _merged(parts: list[Plate], exposures: FloatArray, light: str, number: int) -> LightPlate:
-    """Merge flashes of one light alone; ``exposures`` (part,) are their shares of its full flash.
-
-    The sum of what is not clipped over the sum of its exposures is the best estimate under photon noise. Where all is
-    clipped, the weakest flash says how bright it is at least. A row that some of the flashes did not show is taken from
-    the others.
-    """
-    seen = np.any([part.seen for part in parts], axis=0)
-    if len(parts) == 1 and exposures[0] == 1.0:
-        picture = parts[0].picture
-    else:
-        shape = parts[0].picture.shape
-        light_sum, exposure_sum = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
-        for part, exposure in zip(parts, exposures, strict=True):
-            image = part.image
-            good = (image < 1.0) & part.seen.reshape(-1, *[1] * (image.ndim - 1))
-            light_sum += np.where(good, image, 0)
-            exposure_sum += np.where(good, np.float32(exposure), 0)
-        least = np.float32(1 / exposures.min())
-        merged = np.where(exposure_sum > 0, light_sum / np.maximum(exposure_sum, 1e-6), least).astype(np.float32)
-        merged[~seen] = 0
-        picture = made(merged)
-    time_s = _time_s(parts, exposures)
-    return LightPlate(
-        light=light, number=number, time_s=time_s, picture=picture, seen=seen, saturation=float(1 / exposures.min())
-    )
-
-
-def _mixed(parts: list[Plate], shares: FloatArray, light: str, number: int) -> LightPlate:
-    """Take a light out of patterns of several; ``shares`` (part,) are what of each pattern makes up the light."""
-    saturation = max(float(shares[shares > 0].sum()), 1.0)
-    seen = np.all([part.seen for part in parts], axis=0)
-    picture = combined([part.picture for part in parts], [float(share) for share in shares], ceiling=saturation)
-    time_s = _time_s(parts, shares)
-    return LightPlate(
-        light=light, number=number, time_s=time_s, picture=picture.within(seen), seen=seen, saturation=saturation
-    )
-
-
-def _time_s(parts: list[Plate], shares: FloatArray) -> float:
-    """Return the instant that a light's plate shows: the mean of its flashes', by how much each counts."""
-    return float(np.average([plate.time_s for plate in parts], weights=np.abs(shares)))

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from psvideo.model.camera import FloatArray
 from psvideo.model.turn import Turn
 from psvideo.plates.align.packed import packed
+from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import made
-from psvideo.plates.sequence import LightPlate
 
 
 def upright(plate: LightPlate, turn: Turn) -> LightPlate:

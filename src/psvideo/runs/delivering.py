@@ -19,7 +19,8 @@ from psvideo.model.plan import Plan
 from psvideo.model.rig import Rig
 from psvideo.model.timing import Timing
 from psvideo.plates.beauty import beauty_of
-from psvideo.plates.sequence import AMBIENT, LightPlate, Round, round_numbers
+from psvideo.plates.light_plate import LightPlate
+from psvideo.plates.sequence import AMBIENT, Round, round_numbers
 from psvideo.solve.depth import Depth
 from psvideo.solve.instants import Instant
 from psvideo.solve.normals.solving import ROBUST_FROM_LIGHTS

@@ -18,8 +18,8 @@ from psvideo.plates.align.flow import Codes, Flags, Vectors, comparable, places
 from psvideo.plates.align.moving import SHADING_PX, Followed, Pair
 from psvideo.plates.align.moving_kernel import AFTER, AT_REST, BEFORE, BOTH, NOWHERE, blend_rows
 from psvideo.plates.align.packed import packed
+from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import made
-from psvideo.plates.sequence import LightPlate
 
 UNLIKE = 10.0
 """Plates whose detail differs by more codes along the motion do not show the same thing."""

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.coded import Image
-from psvideo.plates.sequence import LightPlate
+from psvideo.plates.light_plate import LightPlate
 
 Codes = NDArray[np.uint8]
 Vectors = NDArray[np.float32]

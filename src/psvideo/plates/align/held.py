@@ -12,7 +12,7 @@ import numpy as np
 from psvideo.plates.align.brightness import evened
 from psvideo.plates.align.flow import Sketch, moved, sketch_of, white_of
 from psvideo.plates.align.packed import packed
-from psvideo.plates.sequence import LightPlate
+from psvideo.plates.light_plate import LightPlate
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,7 +15,8 @@ from psvideo.plates.align.brightness import evened
 from psvideo.plates.align.flow import Codes
 from psvideo.plates.align.held import Around, DueInstant, Held
 from psvideo.plates.align.moving import Followed, Pair, followed_at
-from psvideo.plates.sequence import AMBIENT, LightPlate, Round, gathered, handed_over
+from psvideo.plates.light_plate import LightPlate
+from psvideo.plates.sequence import AMBIENT, Round, gathered, handed_over
 
 
 @dataclass(frozen=True, kw_only=True)

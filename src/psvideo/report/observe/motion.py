@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.plates.sequence import LightPlate
+from psvideo.plates.light_plate import LightPlate
 
 WIDTH_PX = 480
 TOE = 0.02

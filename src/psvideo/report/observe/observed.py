@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from psvideo.clip import Masks
 from psvideo.model.surface import Misfit, Surface
 from psvideo.plates.ambient_regression import Separated
-from psvideo.plates.sequence import AMBIENT, LightPlate, Round
+from psvideo.plates.light_plate import LightPlate
+from psvideo.plates.sequence import AMBIENT, Round
 from psvideo.report.observe.focus import middle_of, sharpest_blur_px
 from psvideo.report.observe.levels import BINS, Counts, Levels, count_levels
 from psvideo.report.observe.motion import Glimpse, Motion, glimpse, motion

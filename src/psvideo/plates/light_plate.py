@@ -1,0 +1,65 @@
+"""A light's plate: the scene under it alone, at its full flash, at one instant."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.model.camera import FloatArray
+from psvideo.model.coded import Image
+from psvideo.plates.mixture import Mixture
+
+
+@dataclass(frozen=True, kw_only=True)
+class LightPlate:
+    """The scene under one light at its full flash, at one instant.
+
+    ``seen`` (row,) is as in a Plate, or (row, col) where motion hid parts of the plate.
+
+    ``saturation`` is the value from which on a pixel is clipped: 1.0, or more where the flash was weaker than full.
+    ``shown_s`` (row,) are the instants that the rows show, or (row, col) where the picture was turned, None where all
+    show ``time_s``.
+    """
+
+    light: str
+    number: int
+    time_s: float
+    picture: Mixture
+    seen: NDArray[np.bool_]
+    saturation: float = 1.0
+    shown_s: FloatArray | None = None
+
+    @property
+    def image(self) -> Image:
+        """The picture, (row, col) or (row, col, channel), in linear light; made when it is asked for."""
+        return self.picture.image()
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The picture's shape."""
+        return self.picture.shape
+
+    @property
+    def flashed_s(self) -> FloatArray:
+        """The instant that every row shows, shape (row,), or every pixel, (row, col), where the picture was turned."""
+        return np.full(self.shape[0], self.time_s) if self.shown_s is None else self.shown_s
+
+    @property
+    def rows_seen(self) -> NDArray[np.bool_]:
+        """Which rows any frame saw, also where motion hid something in them, shape (row,)."""
+        return self.seen if self.seen.ndim == 1 else np.asarray(self.seen.any(axis=1))
+
+    @property
+    def own(self) -> NDArray[np.bool_]:
+        """What the plate's own flash showed, (row, 1), or (row, col) where the picture was turned; the rest comes from
+        flashes before or after."""
+        seen = self.rows_seen[:, None]
+        if self.shown_s is None:
+            return seen
+        return np.asarray(seen & (self.shown_s == self.time_s).reshape(len(seen), -1))
+
+    @property
+    def pixels_seen(self) -> NDArray[np.bool_]:
+        """What is known of the plate, shape (row, col)."""
+        known = self.seen if self.seen.ndim == 2 else self.seen[:, None]
+        return np.broadcast_to(known, self.shape[:2])
