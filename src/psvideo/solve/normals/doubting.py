@@ -37,9 +37,9 @@ class Doubting:
         and the light from around, which counts as so many; both together as no more than so many, and angles as no
         more than the last.
 
-    From a ball, a bear and a cat (DiLiGenT), a sphere (Washington), and 16 virtual subjects of seven materials with
-    light between their surfaces, under 5 to 96 lights and rigs that were off by up to 3 degrees; each photographed
-    one held against constants from the others.
+    Fitted together, and rounded, on a ball, a bear and a cat (DiLiGenT), a sphere (Washington), and 16 virtual subjects
+    of seven materials with light between their surfaces, under 5 to 96 lights and rigs that were off by up to 3
+    degrees; none of them was left out to test the others.
     """
 
     misfit_deg: float = 2.5
