@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from psvideo.model.surface import Surface
-from psvideo.plates.align import between, held
+from psvideo.plates.align import between, flow, held
 from psvideo.plates.align.packed import packed
 from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.light_plate import LightPlate
@@ -398,6 +398,23 @@ def test_clipped_light_stays_clipped_where_it_moves() -> None:
         well_clipped = true.image >= 1.0
         assert well_clipped.sum() > 200
         assert (plate.image >= 1.0)[well_clipped & plate.pixels_seen].mean() > 0.95
+
+
+@pytest.mark.parametrize(("motion", "moves"), [("at rest", False), ("1 px", True)])
+def test_noise_that_blocks_share_as_compression_makes_it_is_no_motion(motion: str, moves: bool) -> None:
+    """Blocks of 8 x 8 pixels are off by about a code of 255 each, and their pixels by hardly more."""
+    rng = np.random.default_rng(4)
+    before, after = (one.plates[0] for one in noiseless(3, motion).rounds[:2])
+
+    def compressed(plate: LightPlate) -> LightPlate:
+        root = np.sqrt(np.maximum(plate.image, 0)) + 0.02
+        steps = np.kron(rng.normal(0, 0.6 / 255, (ROWS // 8 + 1, COLS // 8 + 1)), np.ones((8, 8)))[:ROWS, :COLS]
+        shown = root + (steps + rng.normal(0, 0.05 / 255, steps.shape)).reshape(*steps.shape, *[1] * (root.ndim - 2))
+        return replace(plate, picture=made(np.square(np.maximum(shown - 0.02, 0)).astype(np.float32)))
+
+    white = flow.white_of(before)
+    sketches = [flow.sketch_of(compressed(plate), white=white) for plate in (before, after)]
+    assert flow.moved(sketches[0], sketches[1]) == moves
 
 
 def test_a_round_that_lacks_a_light_is_not_shown_but_helps_its_neighbours() -> None:

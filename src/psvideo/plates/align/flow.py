@@ -32,7 +32,12 @@ BLOCK_PX, AROUND = 4, 4
 LEAST_CHANGE = 1.5
 """Blocks that change by fewer codes did not move ..."""
 NOISE_FACTOR = 5.0
-"""... nor those that change by less than so many times what noise makes of them."""
+"""... nor those that change by less than so many times what noise makes of them, if it is every pixel's own ..."""
+CODED_BLOCKS = 2
+"""Compression works on squares of 8 pixels and more: so many blocks."""
+BLOCK_NOISE_FACTOR, MOST_BLOCK_NOISE = 3.0, 2.0
+"""... or by less than so many times what blocks themselves show of it, no more than so many codes: compression makes
+noise that whole blocks share. More is motion that fills the picture."""
 SOME, LEAST_LIT = 8, 8
 """Noise is estimated from every so many rows, where codes are not less than this: below, it is cut off at zero."""
 QUARTER_OF_NORMAL = 0.3186
@@ -96,7 +101,8 @@ def moved(before: Sketch, after: Sketch) -> bool:
         shown = cv2.resize(rows_seen[:, None].astype(np.float32), (1, len(change)), interpolation=cv2.INTER_AREA)
         change[shown[:, 0] < 1] = 0
     local = cv2.blur(change * change, (AROUND, AROUND))
-    return bool(local.max() > max(LEAST_CHANGE, NOISE_FACTOR * _noise(before, after) / BLOCK_PX) ** 2)
+    blocks = BLOCK_NOISE_FACTOR * min(_spread(change, before.blocks, CODED_BLOCKS), MOST_BLOCK_NOISE)
+    return bool(local.max() > max(LEAST_CHANGE, NOISE_FACTOR * _noise(before, after) / BLOCK_PX, blocks) ** 2)
 
 
 def _noise(before: Sketch, after: Sketch) -> float:
@@ -107,7 +113,13 @@ def _noise(before: Sketch, after: Sketch) -> float:
     some = np.flatnonzero(before.seen & after.seen)[::SOME]
     one, other = (sketch.codes[some].astype(np.int16) for sketch in (before, after))
     change = other - one
-    fine = np.abs(change[:, 2:] - 2 * change[:, 1:-1] + change[:, :-2])[one[:, 1:-1] >= LEAST_LIT]
+    return _spread(change, one)
+
+
+def _spread(change: NDArray[Any], shown: NDArray[Any], step: int = 1) -> float:
+    """Return the standard deviation of a change by its detail over ``step`` columns, where anything is shown."""
+    fine = np.abs(change[:, 2 * step :] - 2 * change[:, step:-step] + change[:, : -2 * step])
+    fine = fine[shown[:, step:-step] >= LEAST_LIT]
     if fine.size < 64:
         return 0.0
     quarter = np.partition(fine, fine.size // 4)[fine.size // 4]
