@@ -21,6 +21,9 @@ STRENGTH_MISFIT, BY_STRENGTH, OTHER_STRENGTH = 0.05, 0.5, 1.25
 COMMON_DEG = 3.0
 """A larger predicted error of the typical normal is no single pixel's fault."""
 AGREE, DISAGREE = 0.3, -0.1
+MOVING_FACTOR = 2.0
+"""Where the picture moves, so many times more may be left unexplained before the rig is doubted: no rig explains what
+moved between flashes."""
 LEAST_VALID, HARDLY_VALID = 0.6, 0.2
 """Shares of the subject: three lights that stand well reach more of most subjects than the first."""
 MOST_FLICKER_PERCENT = 1.0
@@ -113,7 +116,8 @@ def _misfit(lights: Sequence[str], fit: RigFit) -> Judgement | None:
 def _common(facts: Sequence[InstantFacts]) -> Judgement | None:
     """Judge what is unexplained in all pixels alike, which makes none of them invalid."""
     known = [one.misfit for one in facts if one.misfit is not None]
-    if not known or (error_deg := float(np.median([one.error_deg for one in known]))) <= COMMON_DEG:
+    most_deg = COMMON_DEG * (MOVING_FACTOR if _moves(facts) else 1)
+    if not known or (error_deg := float(np.median([one.error_deg for one in known]))) <= most_deg:
         return None
     share = float(np.median([one.share for one in known]))
     return Judgement(

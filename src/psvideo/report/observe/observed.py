@@ -61,7 +61,7 @@ class InstantFacts:
 @dataclass(frozen=True, kw_only=True)
 class Seen:
     """One round, thinned: the lights' ``bright`` (light, row, col) by their brightest channel, which of these pixels
-    are in a row that was seen, ``shown`` (light, row, 1), and the subject, (row, col)."""
+    are known, ``shown`` (light, row, col), and the subject, (row, col)."""
 
     bright: NDArray[np.float32]
     shown: NDArray[np.bool_]
@@ -72,7 +72,7 @@ def seen_of(one: Round, mask: NDArray[np.bool_] | None) -> Seen:
     """Return a round thinned out, and where its subject is."""
     step = step_of(*one.plates[0].shape[:2])
     bright = np.stack([_brightest(plate.picture.thinned(step)) for plate in one.plates])
-    shown = np.stack([plate.rows_seen[::step, None] for plate in one.plates])
+    shown = np.stack([plate.pixels_seen[::step, ::step] for plate in one.plates])
     if mask is not None:
         return Seen(bright=bright, shown=shown, subject=thinned(mask))
     most = bright.max(axis=0)
