@@ -20,8 +20,9 @@ Plates = Sequence[Samples] | Sequence[Mixture]
 Method = Literal["least-squares", "robust"]
 ROBUST_FROM_LIGHTS = 5
 """With five lights a highlight and a shadow can both be seen; with fewer there is nothing to weigh."""
-CERTAIN = 3.5
-"""A measurement counts as lit from so many standard deviations of a dark one on: of 2,000 dark ones, one does."""
+CERTAIN = 5.0
+"""A measurement counts as lit from so many standard deviations of a dark one on: of three million dark ones, one does,
+and a picture has as many."""
 INDIRECT = 0.2
 """Below this share of the pixel's mean, light in shadow may come from neighbouring surfaces: where many measurements
 are brighter it is left out. (Of a surface of albedo 0.5 a wide crease sends back as much.)"""
