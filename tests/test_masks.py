@@ -28,7 +28,7 @@ def plates(*, right_px: int = 0) -> list[Picture]:
 
 
 def noise(seed: int = 1) -> Picture:
-    return np.random.default_rng(seed).normal(0.0, NOISE, (SIZE, SIZE))
+    return np.random.default_rng(seed).normal(0.004, NOISE, (SIZE, SIZE))
 
 
 def take(folder: Path, frames: Sequence[Picture], *, rig: Sequence[Sequence[float]] = DIRECTIONS) -> Path:
