@@ -139,7 +139,10 @@ def test_code_kept_beside_its_module_is_found_whatever_folder_is_set_for_keeping
     assert hits(NUMBA_CACHE_DIR=str(tmp_path / "other")) == 0, "stale, wherever it lies"
 
 
-def test_compiling_is_said_once_and_not_where_quiet_is_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
+def test_compiling_is_said_once_and_not_where_quiet_is_asked_for(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(numba.core.caching.CacheImpl, "_locator_classes", [])  # else a run before this one kept them
     for quiet, lines in ((False, 1), (True, 0)):
         with compiling_said(quiet=quiet):
             FUSED.kept(lambda value: 5 * value)(10)

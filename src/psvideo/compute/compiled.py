@@ -20,12 +20,13 @@ from types import ModuleType
 from typing import Any, TypeVar
 
 import numba
-from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
 from numba.core.dispatcher import Dispatcher
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 _Cache: Any = FunctionCache
 _Files: Any = IndexDataCacheFile
+_NoCache: Any = NullCache
 _PART: dict[str, Any] = {"nogil": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 LOG = logging.getLogger("psvideo.compiling")
 """Says, as information, when a loop was kept nowhere and is being compiled."""
@@ -71,6 +72,14 @@ class _Kept(_Cache):  # type: ignore[misc]
                 Path(self._cache_file._index_path).unlink()
 
 
+class _NotKept(_NoCache):  # type: ignore[misc]
+    """Where there is no folder to keep compiled code in: every run compiles, and says so."""
+
+    def load_overload(self, signature: Any, target: Any) -> Any:
+        LOG.info("compiling %s, which cannot be kept", signature)
+        return super().load_overload(signature, target)
+
+
 @dataclass(frozen=True)
 class Arithmetic:
     """What the compiler may do with floating-point numbers, and functions compiled so.
@@ -83,8 +92,10 @@ class Arithmetic:
     def kept(self, function: Function) -> Function:
         """Compile a function that Python calls, and keep it on disk where there is a folder to keep it in."""
         compiled: Any = numba.njit(nogil=True, **self._options)(function)
-        with contextlib.suppress(RuntimeError):  # neither beside the module nor in the user's folder can be written
+        try:
             compiled._cache = _Kept(function, self._options)
+        except RuntimeError:  # numba's "no locator": neither beside the module nor in the user's folder can be written
+            compiled._cache = _NotKept()
         result: Function = compiled
         return result
 

@@ -40,8 +40,19 @@ from psvideo.cli.options.delivery import (
     WithAmbient,
     YOption,
 )
+from psvideo.cli.options.solving import (
+    AlignOption,
+    Denoise,
+    DepthPath,
+    DepthScale,
+    Fill,
+    FlatPath,
+    MaskPath,
+    NearIterations,
+    RateOption,
+    SolverOption,
+)
 from psvideo.cli.options.typed import parse_weights
-from psvideo.model.choices import MOST_ITERATIONS, NEAR_ITERATIONS, Align, Rate, Solver
 
 
 def normals(
@@ -51,67 +62,24 @@ def normals(
     out: Annotated[Path, typer.Option("-o", "--out", help="The folder to write.")],
     plan: PlanPath = None,
     timing: TimingPath = None,
-    mask: Annotated[
-        Path | None,
-        typer.Option(
-            "--mask",
-            help="A picture, white where to solve; or a folder or a numbered pattern (mask.####.png), one per result.",
-        ),
-    ] = None,
-    flat: Annotated[
-        Path | None, typer.Option(help="How light falls off over the picture, from psvideo calibrate flat-field.")
-    ] = None,
+    mask: MaskPath = None,
+    flat: FlatPath = None,
     frames: Frames = None,
     first_light: FirstLight = None,
-    solver: Annotated[
-        Solver,
-        typer.Option(help="auto: robust against highlights and shadows from five lights on."),
-    ] = "auto",
-    fill: Annotated[
-        bool,
-        typer.Option(
-            "--fill/--no-fill",
-            help="Give what fewer than three lights reach a best estimate (valid is 0 there), or leave zeros.",
-        ),
-    ] = True,
-    near_iterations: Annotated[
-        int | None,
-        typer.Option(
-            help="Near lights only: how often their distances are taken again from the depth of the normals found. "
-            f"[default: {NEAR_ITERATIONS}; 0 with --depth]",
-            min=0,
-            max=MOST_ITERATIONS,
-        ),
-    ] = None,
-    depth: Annotated[
-        Path | None,
-        typer.Option(
-            "--depth",
-            help="Known depth: an EXR in metres along the optical axis or a 16-bit PNG in millimetres, or a folder "
-            "with one per result. Near lights find the surface there, and depth its scale.",
-        ),
-    ] = None,
-    depth_scale: Annotated[
-        float | None,
-        typer.Option("--depth-scale", help="Metres per unit of --depth. [default: 1 for floats, 0.001 for integers]"),
-    ] = None,
+    solver: SolverOption = "auto",
+    fill: Fill = True,
+    near_iterations: NearIterations = None,
+    depth: DepthPath = None,
+    depth_scale: DepthScale = None,
     preset: ProgramOption = None,
     space: SpaceOption = None,
     camera_to_world: CameraToWorld = None,
     camera: CameraName = None,
     camera_time: CameraTimeOption = None,
     y: YOption = None,
-    align: Annotated[
-        Align,
-        typer.Option(
-            help="Bring the plates of a round, which show different instants, to one. auto: where something moves; "
-            "flow: look for motion everywhere; none: leave them as they are."
-        ),
-    ] = "auto",
-    rate: Annotated[
-        Rate, typer.Option(help="One result per round, or one per flash: as many times more as there are lights.")
-    ] = "round",
-    denoise: Annotated[int, typer.Option(min=1, max=64, help="Average up to N results where nothing moves.")] = 1,
+    align: AlignOption = "auto",
+    rate: RateOption = "round",
+    denoise: Denoise = 1,
     float32: FloatOption = False,
     aov: AovOption = None,
     mesh: MeshOption = None,

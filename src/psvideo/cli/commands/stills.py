@@ -6,11 +6,11 @@ from typing import Annotated
 import typer
 
 from psvideo.cli.console import Voice, plain, print_report
-from psvideo.cli.options.calibrate import FocalPx, Transfer
+from psvideo.cli.options.calibrate import Circles, FocalMm, FocalPx, RadiusMm, SensorMm, Spheres, Transfer
 from psvideo.cli.options.clip_and_run import Force, Json, Quiet, Verbose
 from psvideo.cli.options.delivery import AovOption, EncodeOption, MeshOption, Plates, ProgramOption
+from psvideo.cli.options.solving import Fill, SolverOption
 from psvideo.cli.options.typed import parse_circle
-from psvideo.model.choices import Solver
 
 
 def stills(
@@ -25,7 +25,7 @@ def stills(
         list[Path] | None,
         typer.Option(help="Instead of --lights: a folder with a chrome ball under the same lights; one per place."),
     ] = None,
-    spheres: Annotated[int, typer.Option(help="How many balls each picture of --sphere holds.", min=1, max=8)] = 1,
+    spheres: Spheres = 1,
     dark: Annotated[
         Path | None, typer.Option(help="A picture with every light off. [default: one named dark or ambient]")
     ] = None,
@@ -34,27 +34,12 @@ def stills(
     ] = None,
     transfer: Transfer = None,
     focal_px: FocalPx = None,
-    focal_mm: Annotated[float | None, typer.Option(help="Focal length in mm; needs --sensor-mm.", min=0.1)] = None,
-    sensor_mm: Annotated[
-        float | None, typer.Option(help="Width in mm of the sensor's part that the picture shows.", min=0.1)
-    ] = None,
-    radius_mm: Annotated[
-        float | None, typer.Option(help="The spheres' radius in mm: with two or more, near lights get positions.")
-    ] = None,
-    circle: Annotated[
-        list[str] | None,
-        typer.Option(help="A sphere's outline found by hand: x,y,radius in pixels from the top left. Repeatable."),
-    ] = None,
-    solver: Annotated[
-        Solver, typer.Option(help="auto: robust against highlights and shadows from five lights on.")
-    ] = "auto",
-    fill: Annotated[
-        bool,
-        typer.Option(
-            "--fill/--no-fill",
-            help="Give what fewer than three lights reach a best estimate (valid is 0 there), or leave zeros.",
-        ),
-    ] = True,
+    focal_mm: FocalMm = None,
+    sensor_mm: SensorMm = None,
+    radius_mm: RadiusMm = None,
+    circle: Circles = None,
+    solver: SolverOption = "auto",
+    fill: Fill = True,
     preset: ProgramOption = None,
     aov: AovOption = None,
     mesh: MeshOption = None,

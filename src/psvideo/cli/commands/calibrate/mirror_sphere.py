@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from psvideo.cli.console import Voice
-from psvideo.cli.options.calibrate import FocalPx, Transfer
+from psvideo.cli.options.calibrate import Circles, FocalMm, FocalPx, RadiusMm, SensorMm, Spheres, Transfer
 from psvideo.cli.options.clip_and_run import FirstLight, Force, Frames, Json, PlanPath, Quiet, Verbose
 from psvideo.cli.options.typed import parse_circle, parse_point
 
@@ -22,22 +22,15 @@ def mirror_sphere(
         typer.Argument(help="A folder of stills (one per light), of plates, or a clip; one per place of the sphere."),
     ],
     out: Annotated[Path, typer.Option("-o", "--out", help="The rig file to write; a picture goes beside it (.png).")],
-    circle: Annotated[
-        list[str] | None,
-        typer.Option(help="A sphere's outline found by hand: x,y,radius in pixels from the top left. Repeatable."),
-    ] = None,
-    spheres: Annotated[int, typer.Option(help="How many spheres each picture holds.", min=1, max=8)] = 1,
+    circle: Circles = None,
+    spheres: Spheres = 1,
     focal_px: FocalPx = None,
-    focal_mm: Annotated[float | None, typer.Option(help="Focal length in mm; needs --sensor-mm.", min=0.1)] = None,
-    sensor_mm: Annotated[
-        float | None, typer.Option(help="Width in mm of the sensor's part that the picture shows.", min=0.1)
-    ] = None,
+    focal_mm: FocalMm = None,
+    sensor_mm: SensorMm = None,
     principal_px: Annotated[
         str | None, typer.Option(help="Where the lens's axis meets the picture, in pixels: x,y; left out: its middle.")
     ] = None,
-    radius_mm: Annotated[
-        float | None, typer.Option(help="The spheres' radius in mm: with two or more, near lights get positions.")
-    ] = None,
+    radius_mm: RadiusMm = None,
     outline_picture: Annotated[
         Path | None, typer.Option(help="A picture from the same camera, room light on, on which the outline shows.")
     ] = None,
