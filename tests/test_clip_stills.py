@@ -1,6 +1,6 @@
 """Still pictures: every kind comes out with the very values that went in, and damaged files are refused by name."""
 
-import mmap
+import os
 import struct
 from collections.abc import Callable
 from itertools import product
@@ -16,9 +16,9 @@ import tifffile
 from numpy.typing import NDArray
 
 from psvideo.clip.decode import tiff
-from psvideo.clip.decode.decoders import decode, read_header
+from psvideo.clip.decode.decoders import decode, opened, read_header
 from psvideo.clip.decode.exr_chunks import is_cut_short
-from psvideo.compute.memory import unload
+from psvideo.clip.record import PictureInFile
 from psvideo.errors import PsvideoError
 
 Write = Callable[[Path, NDArray[Any]], None]
@@ -200,17 +200,33 @@ def test_a_large_plain_tiff_stays_in_its_file_with_every_bit(tmp_path: Path, mon
         write_tiff(**options if channels == 3 else {k: v for k, v in options.items() if k != "planarconfig"})(
             path, picture
         )
-        codes = decode("tiff", path).codes
-        assert np.array_equal(codes, picture)
-        unload(codes)
-        assert np.array_equal(codes, picture), "read again"
+        found = opened("tiff", path)
+        assert found.codes.shape == picture.shape
+        assert found.codes.dtype == picture.dtype
+        assert np.array_equal(found.codes, picture)
+        assert np.array_equal(found.codes[3:9], picture[3:9])
         in_file = options in plain or (channels == 1 and "planarconfig" in options)
-        assert isinstance(root_of(codes), mmap.mmap) == in_file, options
+        assert isinstance(found, PictureInFile) == in_file, options
+        assert np.array_equal(decode("tiff", path).codes, picture)
 
 
-def root_of(array: Any) -> Any:
-    """Return what an array's memory belongs to."""
-    return root_of(array.base) if isinstance(array, np.ndarray) and array.base is not None else array
+@pytest.mark.parametrize("change", ["cut short", "written again", "gone"])
+def test_a_picture_that_stays_in_its_file_is_refused_once_the_file_is_another(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, change: str
+) -> None:
+    monkeypatch.setattr(tiff, "STAYS_FROM_BYTES", 1)
+    path = tmp_path / "picture.tif"
+    write_tiff()(path, random(16, 3))
+    codes = opened("tiff", path).codes
+    if change == "cut short":
+        os.truncate(path, 300)
+    elif change == "written again":
+        path.write_bytes(path.read_bytes())
+        os.utime(path, ns=(0, 0))
+    else:
+        path.unlink()
+    with pytest.raises(PsvideoError, match=r"picture\.tif: (was changed|cannot be read any more)"):
+        codes[3:9]
 
 
 def test_png_alpha_is_left_out_with_a_note(tmp_path: Path) -> None:

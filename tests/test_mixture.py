@@ -100,7 +100,7 @@ def test_parts_of_a_picture_are_those_of_the_whole(name: str) -> None:
 @pytest.mark.parametrize("name", TONES)
 def test_light_of_codes_is_what_their_tone_says(name: str) -> None:
     kind, tone = TONES[name]
-    codes = shot(name, seed=2).frames[0].codes
+    codes = np.asarray(shot(name, seed=2).frames[0].codes)
     signal = tone.table[codes] if tone.table.size else np.minimum(codes.astype(np.float64), tone.most)
     row, col = np.mgrid[0:ROWS, 0:COLS] if codes.ndim == 2 else (np.zeros((1, 1, 1), int), np.zeros((1, 1, 1), int))
     rows, cols = tone.zero.shape

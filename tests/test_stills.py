@@ -1,28 +1,34 @@
 """Photographs of a still scene, one per light: read, paired with their lights and solved, without a plan."""
 
 import json
+import os
 import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
 import cv2
 import numpy as np
 import pytest
+import tifffile
 from numpy.typing import NDArray
 from PIL import Image, ImageCms
 from PIL.PngImagePlugin import PngInfo
 
 import psvideo as ps
 from psvideo.cli.app import main
+from psvideo.clip.decode import tiff
 from psvideo.clip.decode.decoders import decode
 from psvideo.clip.stated import stated_by
+from psvideo.errors import PsvideoError
 
 SIZE, RADIUS = 64, 27
 ANGLES = np.radians(np.arange(0, 360, 60))
 LIGHTS = np.stack([0.5 * np.cos(ANGLES), 0.5 * np.sin(ANGLES), np.full(6, np.sqrt(0.75))], axis=1)
 NAMES = [f"shot {n}" for n in (3, 7, 8, 20, 21, 22)]
 Picture = NDArray[np.float64]
+Item = TypeVar("Item")
 
 
 def ball() -> tuple[Picture, NDArray[np.bool_]]:
@@ -90,6 +96,33 @@ def test_pictures_find_their_lights_by_name_whatever_the_order_and_the_holes(tmp
     assert error_deg(tmp_path / "out") < 1
     assert "belong to lights by name" in remarks(report)
     assert not report.timing.dropped_frames
+
+
+def test_large_plain_tiffs_give_the_same_bytes_and_one_that_is_cut_short_while_it_is_solved_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = photographs(
+        tmp_path / "photos", lit(), save=lambda path, light: save_tiff(path.with_suffix(".tif"), light)
+    )
+    lights = listed(tmp_path / "lights.lp")
+    ps.stills(folder, lights=lights, out=tmp_path / "read")
+    monkeypatch.setattr(tiff, "STAYS_FROM_BYTES", 1)
+    ps.stills(folder, lights=lights, out=tmp_path / "left")
+    for file in (tmp_path / "read").rglob("*.exr"):
+        assert file.read_bytes() == (tmp_path / "left" / file.relative_to(tmp_path / "read")).read_bytes()
+
+    def cutting(frames: Iterable[Item], *, total: int, what: str, unit: str = "frame") -> Iterator[Item]:
+        for frame in frames:
+            yield frame
+            if (folder / "shot 20.tif").stat().st_size > 4000 and getattr(frame, "number", 0) == 4:
+                os.truncate(folder / "shot 20.tif", 4000)
+
+    with pytest.raises(PsvideoError, match=r"shot 20\.tif: was changed while it was worked on"):
+        ps.stills(folder, lights=lights, out=tmp_path / "cut", watch=cutting)
+
+
+def save_tiff(path: Path, signal: Picture) -> None:
+    tifffile.imwrite(path, (65535 * signal + 0.5).astype(np.uint16), photometric="minisblack")
 
 
 def test_pictures_without_names_belong_to_lights_by_order_and_the_report_says_so(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.clip.decode.yuv import signal_range
-from psvideo.clip.record import CodedPicture, Header, Levels
+from psvideo.clip.record import CodedPicture, Header, Levels, PictureInFile
 from psvideo.clip.transfer import find_curve, to_light
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import Encoding
@@ -22,21 +22,24 @@ def linear_light(picture: CodedPicture, encoding: Encoding) -> NDArray[np.float3
     return in_codes(picture, encoding).light()
 
 
-def in_codes(picture: CodedPicture, encoding: Encoding) -> Coded:
+def in_codes(picture: CodedPicture | PictureInFile, encoding: Encoding) -> Coded:
     """Return a picture as it was read, and what light its codes stand for; only curves on single floats are undone.
 
     The plan's levels, where it gives them, override the file's.
     """
-    head, codes = picture.header, np.ascontiguousarray(picture.codes)
+    head = picture.header
+    codes = np.ascontiguousarray(picture.codes) if isinstance(picture, CodedPicture) else picture.codes
     white = head.white if encoding.white_level is None else encoding.white_level
     black = head.black if encoding.black_level is None else ((encoding.black_level,),)
     if head.bits is not None:
-        return Coded(codes=codes, tone=_tone(_scale(head, encoding), encoding.transfer, black, white, codes.itemsize))
+        return Coded(
+            codes=codes, tone=_tone(_scale(head, encoding), encoding.transfer, black, white, codes.dtype.itemsize)
+        )
     if codes.dtype == np.float16:
         return Coded(codes=codes.view(np.uint16), tone=_half_tone(encoding.transfer, black, white))
     if black is None and white is None and not find_curve(encoding.transfer).source:
-        return Coded(codes=np.asarray(codes, np.float32), tone=IDENTITY)
-    return Coded(codes=_float_light(codes, encoding.transfer, black, white))
+        return Coded(codes=codes if codes.dtype == np.float32 else np.asarray(codes, np.float32), tone=IDENTITY)
+    return Coded(codes=_float_light(np.asarray(codes), encoding.transfer, black, white))
 
 
 @functools.lru_cache(maxsize=32)

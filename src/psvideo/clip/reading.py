@@ -11,12 +11,16 @@ from fileseq.exceptions import ParseException
 from fileseq.frameset import FrameSet
 from numpy.typing import NDArray
 
-from psvideo.clip.decode.decoders import decode
+from psvideo.clip.decode.decoders import opened
 from psvideo.clip.kept import Kept
 from psvideo.clip.linear import in_codes
-from psvideo.clip.record import Clip, CodedPicture, Frame, Header
+from psvideo.clip.record import Clip, CodedPicture, Frame, Header, PictureInFile
 from psvideo.compute.threads import in_order, thread_count
 from psvideo.errors import PsvideoError, UsageError
+
+Picture = CodedPicture | PictureInFile
+CHECKED_ROWS = 256
+"""Rows of a picture that are looked at in one go for what is no number."""
 
 
 def read_frames(
@@ -77,10 +81,10 @@ def _span(numbers: tuple[int, ...]) -> str:
     return f"its {len(numbers)} frames are numbered {numbers[0]} to {numbers[-1]}"
 
 
-def _decoder(clip: Clip, numbers: list[int]) -> Callable[[int], CodedPicture]:
+def _decoder(clip: Clip, numbers: list[int]) -> Callable[[int], Picture]:
     """Return what decodes a frame; a movie's are asked for in the order of ``numbers``."""
     if not clip.is_movie:
-        return lambda number: decode(clip.kind, clip.file_of(number))
+        return lambda number: opened(clip.kind, clip.file_of(number))
     from psvideo.clip.decode.movie import read_movie
 
     pictures = read_movie(clip.path, [clip.timestamps[bisect_left(clip.numbers, number)] for number in numbers])
@@ -88,35 +92,38 @@ def _decoder(clip: Clip, numbers: list[int]) -> Callable[[int], CodedPicture]:
 
 
 def _picture(
-    clip: Clip, number: int, decoded: Callable[[int], CodedPicture], kept: Kept | None, keep: bool
-) -> tuple[int, CodedPicture]:
+    clip: Clip, number: int, decoded: Callable[[int], Picture], kept: Kept | None, keep: bool
+) -> tuple[int, Picture]:
     """Read a frame's picture back where it is kept, else decode it, and keep it if that is wanted."""
     if kept is not None and number in kept:
         return number, kept.get(number)
     picture = decoded(number)
     _check_like_first(clip, picture.header, _name(clip, number))
     _check_finite(picture, _name(clip, number))
-    if kept is not None and keep:
+    if kept is not None and keep and isinstance(picture, CodedPicture):
         kept.put(number, picture)
     return number, picture
 
 
-def _as_frames(clip: Clip, pictures: Generator[tuple[int, CodedPicture]]) -> Iterator[Frame]:
+def _as_frames(clip: Clip, pictures: Generator[tuple[int, Picture]]) -> Iterator[Frame]:
     with contextlib.closing(pictures):
         yield from map(partial(_frame, clip), pictures)  # holds no picture while its frame is worked on
 
 
-def _frame(clip: Clip, numbered: tuple[int, CodedPicture]) -> Frame:
+def _frame(clip: Clip, numbered: tuple[int, Picture]) -> Frame:
     number, picture = numbered
     return Frame(index=clip.index_of(number), number=number, coded=in_codes(picture, clip.encoding))
 
 
-def _check_finite(picture: CodedPicture, name: str) -> None:
+def _check_finite(picture: Picture, name: str) -> None:
     """Refuse a picture that holds values that are no numbers."""
-    codes = picture.codes
-    if picture.header.bits is None and not _is_finite(codes):
+    if picture.header.bits is not None:
+        return
+    bands = (picture.codes[first : first + CHECKED_ROWS] for first in range(0, len(picture.codes), CHECKED_ROWS))
+    missing = sum(0 if _is_finite(band) else int((~np.isfinite(band)).sum()) for band in bands)
+    if missing:
         raise PsvideoError(
-            f"{name}: holds {int((~np.isfinite(codes)).sum())} values that are no numbers (NaN or "
+            f"{name}: holds {missing} values that are no numbers (NaN or "
             "infinity). Write the frame again with finite pixels."
         )
 

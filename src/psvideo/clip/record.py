@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.clip.in_file import RowsInFile
 from psvideo.model.camera import Encoding
 from psvideo.model.coded import Coded
 from psvideo.model.plan import Plan
@@ -53,6 +54,14 @@ class CodedPicture:
 
     header: Header
     codes: NDArray[Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PictureInFile:
+    """One picture that is left in its file, of which rows are read when somebody wants them."""
+
+    header: Header
+    codes: RowsInFile
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,31 +1,17 @@
-"""Memory as compiled loops see it: arrays elsewhere, half floats as they are stored, arrays lent to threads; and
-pictures that stay in their files."""
+"""Memory as compiled loops see it: arrays elsewhere, half floats as they are stored, arrays lent to threads."""
 
-import mmap
 from typing import Any
 
 import llvmlite.ir
-import numpy as np
 from numba import types
 from numba.extending import intrinsic
 from numba.np.numpy_support import carray
-from numpy.typing import NDArray
 
 from psvideo.compute.compiled import FUSED
 
 HALF_MAX = 65504.0
 """The largest half float."""
 _ir: Any = llvmlite.ir
-
-
-def unload(array: NDArray[Any]) -> None:
-    """Give memory back through which an array's file was read (``numpy.memmap``); it is read again where it is asked
-    for again. Nothing happens to arrays that lie in memory, nor where the system has no such thing."""
-    base: Any = array
-    while isinstance(base, np.ndarray):
-        base = base.base
-    if isinstance(base, mmap.mmap) and hasattr(mmap, "MADV_DONTNEED"):
-        base.madvise(mmap.MADV_DONTNEED)
 
 
 def _pointer(typing_context: Any, address: Any, like: Any) -> Any:

@@ -45,10 +45,11 @@ IDENTITY = Tone()
 class Coded:
     """A picture in codes: (row, col) or (row, col, channel); uint8, uint16 or float32, C-contiguous.
 
-    Half floats are held as their 16 bits, and the tone's table says what each stands for.
+    Half floats are held as their 16 bits, and the tone's table says what each stands for. Large pictures may stay in
+    their files, and rows of them are read when they are wanted.
     """
 
-    codes: NDArray[Any]
+    codes: "NDArray[Any] | StoredCodes"
     tone: Tone = IDENTITY
 
     @property
@@ -71,6 +72,27 @@ class Coded:
                 place = np.s_[(row - first) % len(tone.gain) :: len(tone.gain), col :: len(gains)]
                 light[place] = (light[place] - np.float32(tone.zero[row, col])) * np.float32(gain)
         return light
+
+
+class StoredCodes(Protocol):
+    """Codes that do not lie in memory."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The picture's shape."""
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """The codes' type."""
+
+    def __len__(self) -> int:
+        """How many rows there are."""
+
+    def __getitem__(self, rows: slice) -> NDArray[Any]:
+        """Read some rows that follow each other."""
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        """Read the whole picture."""
 
 
 class CodedFrame(Protocol):

@@ -70,11 +70,14 @@ def mix_pictures(mix: MixtureArrays, shares: Floats, taken: Floats, rows: Places
 
 
 @FUSED.kept
-def mix_thinned(mix: MixtureArrays, step: int, channels: int, out: Floats) -> None:
-    """Make every ``step``-th row, and of it every ``step``-th pixel: ``out`` (row, sample)."""
+def mix_thinned(mix: MixtureArrays, first: int, last: int, step: int, channels: int, out: Floats) -> None:
+    """Make every ``step``-th row, and of it every ``step``-th pixel: ``out`` (row, sample).
+
+    ``first`` and ``last`` count rows of ``out``.
+    """
     given, made = lent_mix(mix), lent(out)
     whole = np.empty(given.samples, np.float32)
-    for row in range(made.shape[0]):
+    for row in range(first, last):
         mix_row(given, step * row, whole)
         for sample in range(made.shape[1]):
             made[row, sample] = whole[sample // channels * step * channels + sample % channels]

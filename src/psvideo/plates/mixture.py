@@ -13,7 +13,6 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.compute.memory import unload
 from psvideo.compute.threads import over_ranges
 from psvideo.model.camera import FloatArray
 from psvideo.model.clipping import SATURATED
@@ -72,12 +71,11 @@ class Mixture:
         array, if one is given, else into a new one."""
         if self.is_made:
             return _copying(self.image())
-        mix = self.bound()
+        bound = self.bound()
 
         def read(first: int, last: int, into: Image | None = None) -> Image:
             band = np.empty((last - first, *self.shape[1:]), np.float32) if into is None else into
-            mix_rows(mix, np.arange(first, last), band.reshape(last - first, -1))
-            _unload(self.frames)
+            bound.run(mix_rows, first, last, np.arange(first, last), band.reshape(last - first, -1))
             return band
 
         return read
@@ -85,8 +83,7 @@ class Mixture:
     def rows(self, rows: range | NDArray[np.intp]) -> Image:
         """Return some rows of the picture, shape (row, col[, channel])."""
         if self.is_made:
-            codes: Image = self.frames[0].codes[np.array(rows, np.intp)]
-            return codes
+            return np.asarray(self.image()[np.array(rows, np.intp)])
         image = np.empty((len(rows), *self.shape[1:]), np.float32)
         self._into(image, rows)
         return image
@@ -94,26 +91,28 @@ class Mixture:
     def thinned(self, stride: int) -> Image:
         """Return every so many rows and columns of the picture."""
         if self.is_made:
-            return np.asarray(self.frames[0].codes[::stride, ::stride], np.float32)
+            return self.image()[::stride, ::stride]
         rows, cols = (-(-size // stride) for size in self.shape[:2])
         image = np.empty((rows, cols, *self.shape[2:]), np.float32)
-        channels = int(np.prod(self.shape[2:]))
-        mix_thinned(self.bound(), stride, channels, image.reshape(rows, -1))
-        _unload(self.frames)
+        channels, bound = int(np.prod(self.shape[2:])), self.bound()
+        each = max(BAND_SAMPLES // bound.mix.samples // stride, 1)
+        for first in range(0, rows, each):
+            last = min(first + each, rows)
+            ends = stride * first, stride * (last - 1) + 1
+            bound.run(mix_thinned, *ends, first, last, stride, channels, image.reshape(rows, -1))
         return image
 
     def halved(self) -> Image:
         """Return the picture's mean over two by two pixels and over channels, shape (row // 2, col // 2)."""
         rows, cols = self.shape[0] // 2, self.shape[1] // 2
         grey = np.empty((rows, cols), np.float32)
-        mix = self.bound()
+        bound = self.bound()
         channels = 1 if len(self.shape) == 2 else self.shape[2]
 
         def band(first: int, last: int) -> None:
-            mix_halved(mix, first, last, channels, grey)
-            _unload(self.frames)
+            bound.run(mix_halved, 2 * first, 2 * last, first, last, channels, grey)
 
-        _in_bands(band, rows, 2 * mix.samples)
+        _in_bands(band, rows, 2 * bound.mix.samples)
         return grey
 
     def without(self, levels: tuple[Image, ...], taken: FloatArray) -> "Mixture":
@@ -132,8 +131,8 @@ class Mixture:
             clipped[counts] |= frame.light()[counts] >= np.float32(self.clips_from)
         return clipped
 
-    def bound(self) -> MixtureArrays:
-        """Return what a compiled loop needs; valid as long as this picture is held."""
+    def bound(self) -> "Bound":
+        """Return what a compiled loop needs."""
         frames = self.frames
         tables = {id(frame.tone.table): frame.tone.table for frame in frames if frame.tone.table.size}
         if len(tables) > 1 or (tables and any(not frame.tone.table.size for frame in frames)):
@@ -141,9 +140,9 @@ class Mixture:
             return replace(self, frames=frames).bound()
         first = frames[0]
         taken = np.zeros((0, self.shape[0])) if self.taken is None else self.taken
-        return MixtureArrays(
-            frames=np.array([frame.codes.ctypes.data for frame in frames], np.intp),
-            like=first.codes.reshape(-1)[:0],
+        mix = MixtureArrays(
+            frames=np.zeros(len(frames), np.intp),
+            like=np.empty(0, first.codes.dtype),
             samples=int(np.prod(self.shape[1:])),
             coefficients=np.ascontiguousarray(self.coefficients, np.float32),
             table=first.tone.table,
@@ -156,18 +155,37 @@ class Mixture:
             ceiling=np.float32(self.ceiling),
             clips_from=np.float32(self.clips_from),
         )
+        return Bound(mix=mix, frames=frames, levels=self.levels)
 
     def _into(self, image: Image, rows: range | NDArray[np.intp]) -> None:
         if not len(rows):
             return
-        mix, places = self.bound(), np.array(rows, np.intp)
+        bound, places = self.bound(), np.array(rows, np.intp)
         flat = image.reshape(len(rows), -1)
 
         def band(first: int, last: int) -> None:
-            mix_rows(mix, places[first:last], flat[first:last])
-            _unload(self.frames)
+            some = places[first:last]
+            bound.run(mix_rows, some.min(), some.max() + 1, some, flat[first:last])
 
-        _in_bands(band, len(rows), mix.samples)
+        _in_bands(band, len(rows), bound.mix.samples)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Bound:
+    """A picture as a compiled loop takes it, beside what it is made of."""
+
+    mix: MixtureArrays
+    frames: tuple[Coded, ...]
+    levels: tuple[Image, ...]
+
+    def run(self, loop: Callable[..., None], first: int, last: int, *arguments: object) -> None:
+        """Call ``loop(mix, *arguments)``, which takes the frames' rows from the first up to the last.
+
+        Where frames stay in their files, these rows are read, and held no longer than the loop runs.
+        """
+        held = [frame.codes[first:last] for frame in self.frames]
+        begins = np.array([rows.ctypes.data - first * rows.strides[0] for rows in held], np.intp)
+        loop(self.mix._replace(frames=begins), *arguments)
 
 
 def combined(pictures: Sequence[Mixture], shares: Sequence[float], *, ceiling: float) -> Mixture:
@@ -228,20 +246,14 @@ def rows_maker(pictures: Sequence[Mixture]) -> Callable[[NDArray[np.intp], int, 
         return make_each
     parts = _Parts.of(pictures)
     together = replace(pictures[0], frames=parts.frames, coefficients=parts.shares[0], levels=parts.levels, taken=None)
-    mix = together.bound()
+    bound = together.bound()
     shares, taken = (np.ascontiguousarray(part, np.float32) for part in (parts.shares, parts.taken))
 
     def make(rows: NDArray[np.intp], first: int, into: Image) -> None:
-        mix_pictures(mix, shares, taken, rows, first, into.reshape(*into.shape[:2], -1))
-        _unload(parts.frames)
+        flat = into.reshape(*into.shape[:2], -1)
+        bound.run(mix_pictures, rows[0], rows[-1] + 1, shares, taken, rows, first, flat)
 
     return make
-
-
-def _unload(frames: Sequence[Coded]) -> None:
-    """Hold nothing of frames that are large and stay in their files; what is looked at again is read again."""
-    for frame in frames:
-        unload(frame.codes)
 
 
 def _copying(image: Image) -> Reader:

@@ -11,7 +11,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import TypeVar
 
-from psvideo.clip.record import CodedPicture, Header
+from psvideo.clip.record import CodedPicture, Header, PictureInFile
 from psvideo.errors import PsvideoError
 
 Read = TypeVar("Read")
@@ -30,6 +30,15 @@ def decode(kind: str, file: Path) -> CodedPicture:
     """Decode one picture."""
     read: Callable[[Path], CodedPicture] = _module(kind).decode
     return guarded(read, file)
+
+
+def opened(kind: str, file: Path) -> CodedPicture | PictureInFile:
+    """Decode one picture, or leave it in its file where it is large and lies there as it would in memory."""
+    if kind == "tiff":
+        from psvideo.clip.decode import tiff
+
+        return guarded(tiff.opened, file)
+    return decode(kind, file)
 
 
 def _module(kind: str) -> ModuleType:

@@ -8,7 +8,8 @@ import numpy as np
 import tifffile
 from numpy.typing import NDArray
 
-from psvideo.clip.record import CodedPicture, Header
+from psvideo.clip.in_file import RowsInFile
+from psvideo.clip.record import CodedPicture, Header, PictureInFile
 from psvideo.errors import PsvideoError
 
 # tifffile writes to its own log what it thinks of odd tags; what matters of it is raised here.
@@ -30,22 +31,24 @@ def decode(path: Path) -> CodedPicture:
     """Decode a whole picture; alpha and other extra channels are left out."""
     with tifffile.TiffFile(path) as file:
         page = _only_page(path, file)
+        return _decoded(page, _header(path, page))
+
+
+def opened(path: Path) -> CodedPicture | PictureInFile:
+    """Return a picture; where it is large and lies in its file as it would in memory, it is left there."""
+    with tifffile.TiffFile(path) as file:
+        page = _only_page(path, file)
         head = _header(path, page)
-        codes = _in_file(path, page) if _stays_in_file(file, page, head) else pixels(page)[..., : head.channels]
+        plain = bool(page.is_memmappable) and page.planarconfig == 1 and page.samplesperpixel == head.channels
+        if not plain or file.byteorder != NATIVE or page.nbytes < STAYS_FROM_BYTES:
+            return _decoded(page, head)
+        shape = (page.imagelength, page.imagewidth, *((head.channels,) if head.channels > 1 else ()))
+        return PictureInFile(header=head, codes=RowsInFile.at(path, page.dataoffsets[0], np.dtype(page.dtype), shape))
+
+
+def _decoded(page: tifffile.TiffPage, head: Header) -> CodedPicture:
+    codes = pixels(page)[..., : head.channels]
     return CodedPicture(header=head, codes=codes[..., 0] if head.channels == 1 else np.ascontiguousarray(codes))
-
-
-def _stays_in_file(file: tifffile.TiffFile, page: tifffile.TiffPage, head: Header) -> bool:
-    """Return whether a picture is large, and lies in its file as it would in memory."""
-    plain = bool(page.is_memmappable) and page.planarconfig == 1 and page.samplesperpixel == head.channels
-    whole = page.dataoffsets[0] % np.dtype(page.dtype).itemsize == 0
-    return plain and whole and file.byteorder == NATIVE and page.nbytes >= STAYS_FROM_BYTES
-
-
-def _in_file(path: Path, page: tifffile.TiffPage) -> NDArray[np.generic]:
-    """Return a picture's samples, (row, col, sample), of which the system reads what is looked at."""
-    shape = (page.imagelength, page.imagewidth, page.samplesperpixel)
-    return np.memmap(path, dtype=np.dtype(page.dtype), mode="r", offset=page.dataoffsets[0], shape=shape)
 
 
 def pixels(page: tifffile.TiffPage) -> NDArray[np.generic]:
