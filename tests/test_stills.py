@@ -111,8 +111,8 @@ def test_large_plain_tiffs_give_the_same_bytes_and_one_that_is_cut_short_while_i
     for file in (tmp_path / "read").rglob("*.exr"):
         assert file.read_bytes() == (tmp_path / "left" / file.relative_to(tmp_path / "read")).read_bytes()
 
-    def cutting(frames: Iterable[Item], *, total: int, what: str, unit: str = "frame") -> Iterator[Item]:
-        for frame in frames:
+    def cutting(items: Iterable[Item], *, total: int, what: str, unit: str = "frame") -> Iterator[Item]:
+        for frame in items:
             yield frame
             if (folder / "shot 20.tif").stat().st_size > 4000 and getattr(frame, "number", 0) == 4:
                 os.truncate(folder / "shot 20.tif", 4000)
