@@ -131,7 +131,7 @@ class Mixture:
             clipped[counts] |= frame.light()[counts] >= np.float32(self.clips_from)
         return clipped
 
-    def bound(self) -> "Bound":
+    def bound(self) -> "ReadyMixture":
         """Return what a compiled loop needs."""
         frames = self.frames
         tables = {id(frame.tone.table): frame.tone.table for frame in frames if frame.tone.table.size}
@@ -155,7 +155,7 @@ class Mixture:
             ceiling=np.float32(self.ceiling),
             clips_from=np.float32(self.clips_from),
         )
-        return Bound(mix=mix, frames=frames, levels=self.levels)
+        return ReadyMixture(mix=mix, frames=frames, levels=self.levels)
 
     def _into(self, image: Image, rows: range | NDArray[np.intp]) -> None:
         if not len(rows):
@@ -171,7 +171,7 @@ class Mixture:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Bound:
+class ReadyMixture:
     """A picture as a compiled loop takes it, beside what it is made of."""
 
     mix: MixtureArrays
