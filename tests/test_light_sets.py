@@ -54,7 +54,7 @@ def test_a_mask_beside_the_pictures_is_no_light(mask: str, tmp_path: Path, caplo
 @pytest.mark.parametrize(
     ("files", "lights", "words"),
     [
-        (["L1.png", "L1.tif"], [], "two lights have the name 'L1': L1.png and L1.tif. Expected one picture per light"),
+        (["L1.png", "L1.tif"], [], "L1.png and L1.tif are one photograph in two kinds. Expected one picture per light"),
         (["take_key.png", "key.png"], ["key"], "two lights have the name 'key'"),
         (
             ["a1.png", "a2.png"],
@@ -132,7 +132,7 @@ def test_what_does_not_fit_is_said(tmp_path: Path) -> None:
         open_light_sets(tmp_path)
     still(tmp_path / "two" / "key.png", 0.1)
     still(tmp_path / "two" / "key.tif", 0.1)
-    with pytest.raises(PsvideoError, match="two lights have the name 'key'"):
+    with pytest.raises(PsvideoError, match="are one photograph in two kinds"):
         open_light_sets(tmp_path / "two")
     still(tmp_path / "sizes" / "a.png", 0.1)
     still(tmp_path / "sizes" / "b.png", 0.1, (6, 9))

@@ -321,7 +321,7 @@ def test_a_chrome_ball_under_the_same_lights_is_enough(tmp_path: Path) -> None:
     folder, ball_folder = photographs(tmp_path / "photos", lit()), chrome(tmp_path / "ball")
     report = ps.stills(folder, sphere=[ball_folder], out=tmp_path / "out")
     assert error_deg(tmp_path / "out") < 1.5
-    assert "6 of 6 lights were measured on 1 sphere(s), as directions" in remarks(report)
+    assert "6 of 6 lights were measured on 1 sphere, as directions" in remarks(report)
     assert "belong to lights by name" in remarks(report)
 
 

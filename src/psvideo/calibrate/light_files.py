@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from psvideo.calibrate.light_pictures import AMBIENT_NAMES, MASK_NAMES, ROOM_NAMES, LightFiles
-from psvideo.clip.folder import KINDS, number_of
+from psvideo.clip.folder import KINDS, number_of, unread_in
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.contract import check_light_name
+from psvideo.formats.plan_toml import FRAMES
 from psvideo.formats.timing_json import read_timing
 
 TIMING = "timing.json"
@@ -64,11 +65,7 @@ def find_stills(path: Path | Sequence[Path], *, lights: Sequence[str] = ()) -> L
     masks = [file for file in files if any(bears(file, name) for name in MASK_NAMES) and file.stem not in lights]
     files = [file for file in files if file not in dark and file not in room and file not in masks]
     if not files:
-        kinds = ", ".join(sorted(KINDS))
-        raise PsvideoError(
-            f"{folder}: holds no pictures of lights. Expected still photographs, one per light ({kinds}), a folder of "
-            "plates per light, or a clip with plan.toml."
-        )
+        raise PsvideoError(f"{folder}: holds no pictures of lights. {_instead(folder)}")
     named = {light: [file for file in files if bears(file, light)] for light in lights}
     chosen = {light: found for light, found in named.items() if found} or _in_order(folder, _main_group(files), lights)
     _refuse_twice(folder, chosen)
@@ -86,6 +83,15 @@ def find_stills(path: Path | Sequence[Path], *, lights: Sequence[str] = ()) -> L
         room=room[0] if room else None,
         left_aside=(*(file for file in files if file not in used), *masks),
     )
+
+
+def _instead(folder: Path) -> str:
+    """Say what was expected of a folder without pictures, and what may have been meant."""
+    if (folder / FRAMES).is_dir() and (folder / "plan.toml").is_file():
+        return "It is a clip with its plan: psvideo normals takes it."
+    kinds = ", ".join(sorted(KINDS))
+    expected = f"Expected still photographs, one per light ({kinds}), or a folder of plates per light."
+    return f"{expected} {unread_in(folder)}".rstrip()
 
 
 def pictures_in(folder: Path) -> list[Path]:
@@ -139,6 +145,11 @@ def _in_order(folder: Path, files: list[Path], lights: Sequence[str]) -> dict[st
 
 def _refuse_twice(folder: Path, chosen: dict[str, list[Path]]) -> None:
     for light, found in chosen.items():
+        if len(found) > 1 and found[0].stem == found[1].stem:
+            raise PsvideoError(
+                f"{folder}: {found[0].name} and {found[1].name} are one photograph in two kinds. Expected one picture "
+                "per light: move one kind elsewhere, rather the JPEG."
+            )
         if len(found) > 1:
             raise PsvideoError(
                 f"{folder}: two lights have the name {light!r}: {found[0].name} and {found[1].name}. Expected one "

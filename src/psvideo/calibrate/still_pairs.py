@@ -1,5 +1,6 @@
 """Which photograph shows which light: by the names that a list or a rig gives, else by order."""
 
+import hashlib
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,6 +11,7 @@ from psvideo.calibrate.light_pictures import MASK_NAMES, LightFiles
 from psvideo.errors import PsvideoError
 from psvideo.formats.contract import check_light_name
 
+FEWEST = 3
 LISTED = 6
 """So many names are listed in a message."""
 
@@ -32,19 +34,31 @@ class Pairs:
     aside: tuple[Path, ...] = ()
 
 
-def pair_stills(folder: Path, known: Sequence[str], *, named: bool, whose: str, keep_names: bool = True) -> Pairs:
+def pair_stills(
+    folder: Path,
+    known: Sequence[str],
+    *,
+    named: bool,
+    whose: str,
+    keep_names: bool = True,
+    dark: Path | None = None,
+    mask: Path | None = None,
+) -> Pairs:
     """Return which picture of a folder shows which light.
 
     ``known`` are the lights in order; where they are ``named`` (as pictures or as lights), by name if all are there;
     else by order. ``whose`` is what messages call the list. With ``keep_names`` lights keep the names in ``known``,
-    else they get their pictures' own. Raises PsvideoError where names or counts do not fit.
+    else they get their pictures' own. ``dark`` and ``mask`` show no light,
+    wherever they lie. Raises PsvideoError where names or counts do not fit.
     """
     if not folder.is_dir():
         raise PsvideoError(f"{folder}: is no folder. Name the folder that holds the photographs, one per light.")
     found = find_stills(folder)
-    files = [one[0] for one in found.by_light.values()]
+    apart = {file.resolve() for file in (dark, mask) if file}
+    files = [one[0] for one in found.by_light.values() if one[0].resolve() not in apart]
+    _refuse_few(folder, files)
     masks = [file for file in found.left_aside if any(bears(file, name) for name in MASK_NAMES)]
-    dark, mask = (found.ambient[0] if found.ambient else None), (masks[0] if masks else None)
+    dark, mask = dark or (found.ambient[0] if found.ambient else None), mask or (masks[0] if masks else None)
     matches = [_matching(name, files) for name in known] if named else []
     if matches and all(len(one) == 1 for one in matches):
         chosen = [one[0] for one in matches]
@@ -57,10 +71,30 @@ def pair_stills(folder: Path, known: Sequence[str], *, named: bool, whose: str, 
             f"Pictures belong to lights by order, since {whose} names none of them: {_shown(known, chosen)}. Where "
             "that is wrong, the rig will not fit."
         )
-    aside = [file for file in (*files, *found.left_aside) if file not in chosen and file not in masks]
+    aside = [
+        file for file in (*files, *found.left_aside) if file not in (*chosen, *masks) and file.resolve() not in apart
+    ]
     names = tuple(known) if keep_names else _own_names(chosen)
     places = tuple(range(len(known)))
     return Pairs(files=tuple(chosen), names=names, places=places, how=how, dark=dark, mask=mask, aside=tuple(aside))
+
+
+def _refuse_few(folder: Path, files: Sequence[Path]) -> None:
+    """Raise PsvideoError where there are too few pictures, or one twice."""
+    if len(files) < FEWEST:
+        raise PsvideoError(
+            f"{folder}: holds {len(files)} picture{'' if len(files) == 1 else 's'} of lights "
+            f"({', '.join(file.name for file in files)}). Normals need three at least, each under another light."
+        )
+    seen: dict[str, Path] = {}
+    for file in files:
+        with file.open("rb") as opened:
+            first = seen.setdefault(hashlib.file_digest(opened, "sha256").hexdigest(), file)
+        if first is not file:
+            raise PsvideoError(
+                f"{folder}: {first.name} and {file.name} are one and the same picture. Expected a photograph of its "
+                "own for each light: copy the missing one from the camera, or take it again."
+            )
 
 
 def _matching(name: str, files: Sequence[Path]) -> list[Path]:

@@ -3,9 +3,11 @@
 import contextlib
 import ctypes
 import os
+import shlex
 import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -14,7 +16,7 @@ from psvideo.cli.console import compiling_said
 from psvideo.cli.first_screen import COMMANDS, Entry
 from psvideo.cli.spelling import spelled
 from psvideo.cli.teaching import PROGRAM, command_called, teach, words_typed
-from psvideo.errors import PsvideoError
+from psvideo.errors import PsvideoError, UsageError, nearest
 
 STOPPED = 130
 """What the command line library ends with when the user interrupts."""
@@ -81,6 +83,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _ended(words: Sequence[str]) -> int:
+    called = command_called(words)
+    names = [entry.name for entry in COMMANDS]
+    if called and called not in names and "_PSVIDEO_COMPLETE" not in os.environ:
+        print(f"psvideo: {_no_command(called, names)}", file=sys.stderr)
+        return UsageError.exit_status
     try:
         application(words)(args=words, prog_name=PROGRAM, obj=words)
     except PsvideoError as fault:
@@ -94,6 +101,13 @@ def _ended(words: Sequence[str]) -> int:
             return 1
         return end.code if isinstance(end.code, int) else 0
     return 0
+
+
+def _no_command(word: str, names: Sequence[str]) -> str:
+    """Say what to type instead of a word that is no command."""
+    if Path(word).exists():
+        return f"{word}: the command comes first. psvideo info {shlex.quote(word)} says what it is."
+    return f"there is no command {word!r}; {nearest(word, names)} psvideo -h shows what each does."
 
 
 def _share_one_heap() -> None:

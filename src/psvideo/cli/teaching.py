@@ -11,6 +11,12 @@ from psvideo.cli.examples import EXAMPLES
 from psvideo.cli.options.panels import MANY, panel_of
 
 PROGRAM = "psvideo"
+MISSING = {
+    "rig": "It names the file that says where the lights are, rig.toml: psvideo calibrate mirror-sphere measures them "
+    "on a chrome ball.",
+    "out": "It names what to write; nothing that exists is replaced without --force.",
+}
+"""What options that may not be left out are for."""
 
 
 def examples_of(path: str) -> tuple[tuple[str, str], ...]:
@@ -44,6 +50,15 @@ class Teaching(TyperCommand):
                 if param.param_type_name == "option" and not param.required:
                     param.rich_help_panel = panel_of(param.name or "")
         return params
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the words typed; what a beginner leaves out is explained."""
+        try:
+            return list(super().parse_args(ctx, args))
+        except typer.BadParameter as fault:
+            if not fault.message:  # it is missing
+                fault.message = MISSING.get(getattr(fault.param, "name", None) or "", "")
+            raise
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Print the help, then the examples."""

@@ -6,6 +6,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from psvideo.errors import PsvideoError
+from psvideo.formats.plan_toml import FRAMES
 
 KINDS = {
     ".png": "png",
@@ -18,6 +19,14 @@ KINDS = {
     ".jpeg": "jpeg",
 }
 MOVIES = (".mov", ".mp4", ".mkv", ".mxf")
+TO_PICTURES = "export the pictures as 16-bit TIFF, PNG or DNG; a phone's camera can be set to JPEG or raw"
+TO_FOOTAGE = "export it with its maker's program, as DNG, EXR or ProRes"
+UNREAD = {
+    **dict.fromkeys((".heic", ".heif", ".avif", ".webp", ".jxl", ".bmp", ".gif", ".psd"), TO_PICTURES),
+    **dict.fromkeys((".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2", ".pef"), "convert the pictures to DNG"),
+    **dict.fromkeys((".braw", ".r3d", ".crm", ".ari", ".arx", ".nev", ".mlv"), TO_FOOTAGE),
+}
+"""What cameras write and psvideo does not read, and what to do with it."""
 NUMBERED = re.compile(r"(.*?)(\d+)", re.DOTALL)
 
 
@@ -36,7 +45,7 @@ def find_sequence(folder: Path) -> NumberedImages:
 
     Raises PsvideoError where there is none, or where it is not clear which images are meant.
     """
-    beside, within = _images(folder), _images(folder / "frames")
+    beside, within = _images(folder), _images(folder / FRAMES)
     if _numbered(beside) and _numbered(within):
         raise PsvideoError(
             f"{folder}: numbered images lie in the folder ({_numbered(beside)[0].name}, …) and in its frames/ too "
@@ -52,6 +61,18 @@ def find_sequence(folder: Path) -> NumberedImages:
     return NumberedImages(
         kind=KINDS[frames[0].suffix.lower()], files=tuple(frames), numbers=numbers, passed_over=passed_over
     )
+
+
+def unread_in(folder: Path) -> str:
+    """Return a sentence on a folder's files that cameras write and psvideo does not read; empty without such files."""
+    found = sorted(entry.name for entry in folder.iterdir() if entry.suffix.lower() in UNREAD)
+    return unread(Path(found[0]), more=len(found) - 1) if found else ""
+
+
+def unread(file: Path, *, more: int = 0) -> str:
+    """Return what to do with a file that cameras write and psvideo does not read; empty for others."""
+    advice, others = UNREAD.get(file.suffix.lower(), ""), f" (and {more} more)" if more else ""
+    return advice and f"{file.name}{others} is {file.suffix[1:].upper()}, which is not read: {advice}."
 
 
 def _images(folder: Path) -> list[Path]:
@@ -91,7 +112,18 @@ def _nothing(folder: Path, images: list[Path]) -> str:
         return f"holds a movie and no numbered images. Name the movie itself: {folder / movies[0]}"
     found = f"holds images without a number at the end of the name ({images[0].name})" if images else "holds no images"
     kinds = ", ".join(sorted(KINDS))
-    return f"{found}; expected numbered frames such as name.0001.png ({kinds}) here or in frames/."
+    said = f"{found}; expected numbered frames such as name.0001.png ({kinds}) here or in frames/."
+    return f"{said} {_instead(folder)}".rstrip()
+
+
+def _instead(folder: Path) -> str:
+    """Say what the user may have meant: a clip inside, what psvideo made of one, or files that are to be converted."""
+    if other := unread_in(folder) or (unread_in(folder / FRAMES) if (folder / FRAMES).is_dir() else ""):
+        return other
+    if (folder / "timing.json").is_file():
+        return "This is what psvideo made of a clip (timing.json): name the clip itself."
+    clips = sorted(plan.parent for plan in folder.glob("*/plan.toml"))
+    return f"A clip lies in it: name {clips[0]}." if clips else ""
 
 
 def _refuse_mixture(frames: list[Path]) -> None:

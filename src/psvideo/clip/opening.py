@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 from psvideo.clip.decode.decoders import read_header
 from psvideo.clip.decode.yuv import signal_range
-from psvideo.clip.folder import MOVIES, find_sequence
+from psvideo.clip.folder import MOVIES, find_sequence, unread
 from psvideo.clip.record import Clip, Header
 from psvideo.clip.transfer import DISPLAYED, disagreement, find_curve
 from psvideo.errors import PsvideoError
-from psvideo.formats.plan_toml import find_plan, read_plan
+from psvideo.formats.plan_toml import FRAMES, find_plan, read_plan
 from psvideo.model.camera import Encoding
 from psvideo.model.plan import Plan
 
@@ -33,9 +33,13 @@ def open_clip(path: Path, *, plan: Path | None = None) -> Clip:
         return _open_folder(path, plan)
     if path.suffix.lower() in MOVIES:
         return _open_movie(path, plan)
-    raise PsvideoError(
-        f"{path}: is neither a folder nor a movie ({', '.join(MOVIES)}). Name the folder that holds the frames."
-    )
+    advice = unread(path) or f"Name the folder that holds the frames, such as {_folder_of(path)}."
+    raise PsvideoError(f"{path}: is neither a folder nor a movie ({', '.join(MOVIES)}). {advice}")
+
+
+def _folder_of(file: Path) -> Path:
+    """Return the clip's folder that a file may belong to."""
+    return file.parent.parent if file.parent.name == FRAMES else file.parent
 
 
 def _open_folder(path: Path, plan_path: Path | None) -> Clip:

@@ -55,7 +55,9 @@ def read_text(path: Path) -> str:
         return path.read_text(encoding="utf-8")
     except FileNotFoundError:
         raise PsvideoError(f"{path}: there is no such file. Check the name, or write the file first.") from None
-    except (OSError, UnicodeDecodeError) as fault:
+    except UnicodeDecodeError as fault:
+        raise PsvideoError(f"{path}: is no text (byte {fault.start} is none of UTF-8). Name another file.") from None
+    except OSError as fault:
         raise PsvideoError(f"{path}: cannot be read as text ({fault}). Check the file and its permissions.") from fault
 
 

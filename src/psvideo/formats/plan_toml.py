@@ -229,15 +229,22 @@ def _camera_table(camera: Camera) -> tomlkit.items.Table:
     return table
 
 
+FRAMES = "frames"
+"""The folder in a clip's in which its frames may lie."""
+
+
 def find_plan(path: Path, *, given: Path | None = None) -> Path:
     """Return the plan that belongs to a clip: the one given, else plan.toml in the folder or beside the movie."""
     if given is not None:
         return given
     folder = path if path.is_dir() else path.parent
     plan = folder / "plan.toml"
+    if not plan.is_file() and folder.name == FRAMES and (folder.parent / "plan.toml").is_file():
+        raise PsvideoError(f"{folder}: there is no plan.toml here, but one folder up. Name the clip: {folder.parent}")
     if not plan.is_file():
         raise PsvideoError(
             f"{folder}: there is no plan.toml here. Put the plan that the strobe played beside the footage, "
-            "name it with `plan`, or write one with psvideo capture-plan."
+            "name it with `plan`, or write one with psvideo capture-plan. Photographs, one per light, need none: "
+            "psvideo stills."
         )
     return plan

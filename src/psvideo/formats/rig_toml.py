@@ -5,6 +5,7 @@ list of unit vectors with its count on the first line (University of Washington)
 plan's lights in the order in which the plan first lights them.
 """
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Self
@@ -22,6 +23,8 @@ SCHEMA = "psvideo-rig/1"
 UNIT_LENGTH_TOLERANCE = 0.01
 FARTHEST_LIGHT_M = 50.0
 """No near light is further from the camera; positions in millimetres are, from 5 cm on."""
+
+DECIMAL_COMMA = re.compile(r"-?\d+,\d+")
 
 Triple = Annotated[list[float], Field(min_length=3, max_length=3)]
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
@@ -123,10 +126,16 @@ def read_rig(path: Path | str, *, plan_lights: Sequence[str] = ()) -> Rig:
     path = path_of("path", path)
     text = read_text(path)
     if path.suffix == ".toml":
-        return parse_rig(text, source=str(path))
+        return _in_front(parse_rig(text, source=str(path)), path)
     rows = _numbers(path, text)
     if path.suffix == ".lp" or len(rows[0]) == 1:
         rows = _counted(path, rows)
+    short = next((place for place, row in enumerate(rows, start=1) if len(row) < 3), None)
+    if short:
+        raise PsvideoError(
+            f"{path}: light {short} has only {len(rows[short - 1])} of the three numbers x y z of the direction to the "
+            "light (x right, y up, z towards the camera). Angles are to be made directions first."
+        )
     vectors = np.array([row[:3] for row in rows], np.float64)
     lengths = np.linalg.norm(vectors, axis=1)
     if np.any(lengths < 1e-6):
@@ -140,7 +149,19 @@ def read_rig(path: Path | str, *, plan_lights: Sequence[str] = ()) -> Rig:
         Light(name=name, direction=_vector(vector), intensity=strength)
         for name, vector, strength in zip(names, vectors / lengths[:, None], strengths, strict=True)
     ]
-    return Rig(lights=tuple(lights))
+    return _in_front(Rig(lights=tuple(lights)), path)
+
+
+def _in_front(rig: Rig, path: Path) -> Rig:
+    """Return the rig; raise PsvideoError where no light can reach what the camera sees."""
+    heights = [light.direction[2] for light in rig.lights if light.direction is not None]
+    if heights and len(heights) == len(rig.lights) and max(heights) <= 0:
+        raise PsvideoError(
+            f"{path}: every light stands behind the subject (z is {max(heights):.2g} at most). Expected directions "
+            "from the surface to the light in the camera's axes: x right, y up, z towards the camera. Turn the sign "
+            "of z, and of y where it counts downwards."
+        )
+    return rig
 
 
 def parse_rig(text: str, *, source: str = "rig") -> Rig:
@@ -181,12 +202,17 @@ def _unit(values: Sequence[float]) -> Vector:
 
 def _numbers(path: Path, text: str) -> list[list[float]]:
     """Return the numbers of each line; words (an .lp file's picture names) are left out."""
-    lines = [line.replace(",", " ").split() for line in text.splitlines()]
+    comma = next((word for word in re.split(r"[\s;]+", text) if DECIMAL_COMMA.fullmatch(word)), None)
+    if comma:
+        raise PsvideoError(
+            f"{path}: writes {comma!r}. Expected numbers with points, such as {comma.replace(',', '.')}."
+        )
+    lines = [re.split(r"[,;]" if re.search("[,;]", line) else r"\s+", line.strip()) for line in text.splitlines()]
     rows = [[float(word) for word in words if is_number(word)] for words in lines]
     rows = [row for row in rows if row]
     if not rows:
         raise PsvideoError(
-            f"{path}: holds no numbers. Expected rig.toml, an .lp file, or one light direction per line."
+            f"{path}: holds no numbers. Expected rig.toml, an .lp file, or one light direction x y z per line."
         )
     return rows
 
@@ -208,7 +234,7 @@ def _counted(path: Path, rows: list[list[float]]) -> list[list[float]]:
         )
     vectors = [row[-3:] for row in vectors]
     if any(len(row) != 3 for row in vectors):
-        raise PsvideoError(f"{path}: expected three numbers x y z in every line after the first.")
+        raise PsvideoError(f"{path}: expected three numbers x y z of a direction in every line after the first.")
     return vectors
 
 

@@ -84,9 +84,13 @@ def sphere_lights(
         rig = replace(rig, plane=_plane_of(sightings, radius_m or 0.0))
     near = sum(light.position_m is not None for light in rig.lights)
     what = f"{near} near, with positions" if near else "as directions"
-    note = f"{len(rig.lights)} of {len(found.lights)} lights were measured on {len(sightings)} sphere(s), {what}."
+    note = f"{len(rig.lights)} of {len(found.lights)} lights were measured on {_spheres(len(sightings))}, {what}."
     whose = ", ".join(path.name for path in spheres)
     return KnownLights(rig=rig, called=rig.names, own=False, whose=whose, notes=(note,), warnings=tuple(found.warnings))
+
+
+def _spheres(count: int) -> str:
+    return "1 sphere" if count == 1 else f"{count} spheres"
 
 
 def _plane_of(sightings: Sequence[Sighting], radius_m: float) -> tuple[float, float, float, float]:

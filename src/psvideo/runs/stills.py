@@ -42,6 +42,10 @@ from psvideo.solve.instants import Instant
 PLAN, RIG, LP = "plan.toml", "rig.toml", "lights.lp"
 SETUP = "setup"
 """The folder in a result that holds how the photographs were taken to be: plan, rig, and the lights as a list."""
+NO_DARK = (
+    "No picture is named dark or ambient, so the room is taken for dark. If it was not, photograph the subject with "
+    "every light off as well."
+)
 
 
 def stills(
@@ -130,10 +134,13 @@ def stills(
         caller=caller,
     )
     pairs = pair_stills(
-        path, known.called or known.rig.names, named=known.named, whose=known.whose, keep_names=known.own
-    )
-    pairs = replace(
-        pairs, dark=path_if_given("dark", dark) or pairs.dark, mask=path_if_given("mask", mask) or pairs.mask
+        path,
+        known.called or known.rig.names,
+        named=known.named,
+        whose=known.whose,
+        keep_names=known.own,
+        dark=path_if_given("dark", dark),
+        mask=path_if_given("mask", mask),
     )
     with tempfile.TemporaryDirectory(prefix="psvideo-stills-") as place:
         opened = _opened(path, pairs, known, Path(place), transfer=transfer)
@@ -238,7 +245,7 @@ def _assumed(pictures: Photographs) -> str:
 
 
 def _aside(pairs: Pairs) -> tuple[str, ...]:
-    said = [f"{pairs.dark.name} shows the ambient light, which was taken off." if pairs.dark else ""]
+    said = [f"{pairs.dark.name} shows the ambient light, which was taken off." if pairs.dark else NO_DARK]
     said.append(f"{pairs.mask.name} says where to solve." if pairs.mask else "")
     said.append(f"Left aside: {', '.join(file.name for file in pairs.aside[:6])}." if pairs.aside else "")
     return tuple(one for one in said if one)

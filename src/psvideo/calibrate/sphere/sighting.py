@@ -141,7 +141,7 @@ def _not_found(where: str, found: int, wanted: int) -> str:
     return (
         f"{where}: {what} found: no round outline stands out from its background on a third of its length. Put "
         "something lighter or darker behind the sphere, keep all of it in the picture, add a picture with the room "
-        "light on (`outline_picture`), or mark the outline by hand with `circle` x,y,radius."
+        "light on (named room, or `outline_picture`), or mark the outline by hand with `circle` x,y,radius."
     )
 
 

@@ -54,7 +54,7 @@ def guarded(read: Callable[[Path], Read], file: Path) -> Read:
     except PsvideoError:
         raise
     except FileNotFoundError:
-        raise PsvideoError(f"{file}: is not there any more. Put the file back, or open the clip again.") from None
+        raise PsvideoError(f"{file}: is not there any more. Check its name, or put it back.") from None
     except OSError as fault:
         raise PsvideoError(
             f"{file}: cannot be read ({fault.strerror or fault}). Check the file and its disk."

@@ -123,13 +123,35 @@ def _opened(path: Path) -> Iterator[tuple[InputContainer, VideoStream]]:
             if not container.streams.video:
                 raise PsvideoError(f"{path}: holds no video. Name the movie that the camera recorded.")
             stream = container.streams.video[0]
+            if stream.codec_context is None:
+                raise PsvideoError(f"{path}: {_sealed(path) or 'is coded in a way that is not read'}. {IN_THE_CLEAR}")
             stream.thread_type = "AUTO"
             yield container, stream
     except (av.FFmpegError, UnicodeDecodeError) as fault:
+        if path.is_file() and not path.stat().st_size:
+            raise PsvideoError(f"{path}: is empty (0 bytes). Copy it again from the camera's card.") from None
+        if sealed := _sealed(path):
+            raise PsvideoError(f"{path}: {sealed}. {IN_THE_CLEAR}") from fault
         raise PsvideoError(
             f"{path}: cannot be decoded; it is truncated, damaged or of a kind that is not read ({fault}). "
             "Copy it again from the camera's card."
         ) from fault
+
+
+IN_THE_CLEAR = "Expected a movie as the camera recorded it: ProRes, DNxHR, H.264 or H.265, without protection."
+ENCRYPTED = b"encv"
+"""The sample entry of encrypted video (ISO/IEC 14496-12, 8.12)."""
+LOOKED_AT = 1 << 22
+"""So many bytes at both ends of a file: there lies its description."""
+
+
+def _sealed(path: Path) -> str:
+    """Say that a movie is encrypted; empty where it is not, or cannot be read."""
+    with contextlib.suppress(OSError), path.open("rb") as file:
+        found = file.read(LOOKED_AT)
+        file.seek(max(path.stat().st_size - LOOKED_AT, 0))
+        return "is encrypted" if ENCRYPTED in found + file.read(LOOKED_AT) else ""
+    return ""
 
 
 def _picture(path: Path, frame: av.VideoFrame) -> CodedPicture:

@@ -12,6 +12,9 @@ from psvideo.report.observe.observed import InstantFacts, Observed
 DIM_STOPS, DARK_STOPS = -3.5, -6.0
 """A take whose brightest lamp's brightest parts stay so far below saturation is noisy, or lost in noise."""
 BEST_STOPS = -0.5
+MISPLACED = 16.0
+"""A mask beyond which the picture is so many times brighter than within lies beside the subject: a dark subject before
+a white wall differs by a photograph's contrast, some 8 times."""
 MOST_CLIPPED, LOST_CLIPPED = 0.02, 0.1
 """Shares of the subject that one lamp may clip: more costs normals there, and with three lamps all of them."""
 SPARE_CLIPPED = 0.25
@@ -35,6 +38,14 @@ def exposure(observed: Observed) -> Iterator[Judgement]:
     if not any(one.total for one in levels.values()):
         yield Judgement(subject="exposure", grade="bad", found="Nothing in the picture is lit.", advice=MORE_LIGHT)
         return
+    if observed.beyond_mask and min(observed.beyond_mask) > MISPLACED:
+        yield Judgement(
+            subject="mask",
+            grade="bad",
+            found=f"The mask leaves out what is lit: beyond it the picture is {min(observed.beyond_mask):.0f} times as "
+            "bright as within.",
+            advice="Paint white where normals are wanted, and black elsewhere; the mask may be inverted.",
+        )
     clipped = list(_clipping(levels))
     top = max(one.stops(TARGET_QUANTILE) for one in levels.values())
     worst = max(one.clipped_share for one in levels.values())
@@ -153,6 +164,8 @@ def _weak(lights: Sequence[str], relative: NDArray[np.float64]) -> Iterator[Judg
             f"({', '.join(map(repr, weak[:NAMED]))} and {len(weak) - NAMED} more).",
             advice="Raise their power or their flash duration, or move them nearer.",
         )
+    if relative.max() <= 0:  # nothing is lit, which is said once
+        return
     for light, share in zip(lights, relative, strict=True):
         if share < NO_LIGHT:
             yield Judgement(

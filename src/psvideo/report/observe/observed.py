@@ -28,6 +28,7 @@ LIT = 0.01
 """A pixel brighter than this share of saturation under any light is part of the scene; of dark takes, than a sixth of
 their brightest hundredth."""
 DARKEST = 1 / 6
+FAINT = 2.0**-12
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,11 +62,13 @@ class InstantFacts:
 @dataclass(frozen=True, kw_only=True)
 class Seen:
     """One round, thinned: the lights' ``bright`` (light, row, col) by their brightest channel, which of these pixels
-    are known, ``shown`` (light, row, col), and the subject, (row, col)."""
+    are known, ``shown`` (light, row, col), and the subject, (row, col); ``beyond`` is by how much brighter than the
+    subject's brightest hundredth that of what a mask leaves out is, 0 without a mask."""
 
     bright: NDArray[np.float32]
     shown: NDArray[np.bool_]
     subject: NDArray[np.bool_]
+    beyond: float = 0.0
 
 
 def seen_of(one: Round, mask: NDArray[np.bool_] | None) -> Seen:
@@ -73,11 +76,19 @@ def seen_of(one: Round, mask: NDArray[np.bool_] | None) -> Seen:
     step = step_of(*one.plates[0].shape[:2])
     bright = np.stack([_brightest(plate.picture.thinned(step)) for plate in one.plates])
     shown = np.stack([plate.pixels_seen[::step, ::step] for plate in one.plates])
-    if mask is not None:
-        return Seen(bright=bright, shown=shown, subject=thinned(mask))
     most = bright.max(axis=0)
+    if mask is not None:
+        subject = thinned(mask)
+        return Seen(bright=bright, shown=shown, subject=subject, beyond=_beyond(most, subject))
     lit = most > min(LIT, DARKEST * float(np.percentile(most[::2, ::2], 99)))
     return Seen(bright=bright, shown=shown, subject=lit)
+
+
+def _beyond(most: NDArray[np.float32], subject: NDArray[np.bool_]) -> float:
+    if not subject.any() or subject.all():
+        return 0.0
+    inside, outside = (float(np.percentile(most[where], 99)) for where in (subject, ~subject))
+    return outside / max(inside, FAINT)
 
 
 def instant_facts(
@@ -161,6 +172,7 @@ class Observed:
     slopes: list[float] = field(default_factory=list)
     light_at_points: list[NDArray[np.float64]] = field(default_factory=list)
     ambient_measured: list[float] = field(default_factory=list)
+    beyond_mask: list[float] = field(default_factory=list)
     worst: Worst = field(default_factory=Worst)
     _glimpse: Glimpse | None = None
     _sample: Sample | None = None
@@ -191,6 +203,7 @@ class Observed:
             self._look_at_dark(one.ambient)
         mask = None if self.masks is None else self.masks.at(one.number)
         seen = seen_of(one, mask)
+        self.beyond_mask.append(seen.beyond)
         if not self._passed and one.plates[0].light == self.lights[0]:
             self._look_for_motion(one.plates[0])
         moving, changed = self._moving, self._change(surface)

@@ -55,6 +55,8 @@ def noise_of(
     at = np.array([float(np.median(level[part])) for part in parts])
     found = np.array([float(np.quantile(detail[part], LOW_SHARE)) / LOW_OF_VARIANCE for part in parts])
     bright, darkest = at > 0.25 * at.max(), int(np.argmin(at))
+    if at.max() <= 0:  # no light anywhere
+        return PlateNoise(read=max(float(found[darkest]), LEAST**2), photon=0.0)
     rise = (found - found[darkest]) / np.maximum(at - at[darkest], 1e-6)
     photon = max(float(np.median(rise[bright])), 0.0)
     read = max(float(found[darkest]) - photon * max(float(at[darkest]), 0.0), LEAST**2)
