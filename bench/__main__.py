@@ -12,6 +12,7 @@ TABLES = (
     "observing",
     "memory",
     "encoding",
+    "hostile",
     "view",
     "timing",
     "compression",

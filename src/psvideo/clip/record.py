@@ -16,6 +16,9 @@ from psvideo.model.coded import Coded
 from psvideo.model.plan import Plan
 from psvideo.model.turn import UPRIGHT, Turn
 
+MOST_PIXELS = 1 << 29
+"""Pictures of more pixels are taken for damaged headers, which would ask for all memory before anything is decoded:
+the largest cameras' composites have 400 megapixels."""
 Levels = tuple[tuple[float, ...], ...]
 """Black levels by position, a pattern that repeats over rows and columns from the picture's top left on."""
 
@@ -29,6 +32,8 @@ class Header:
     further code adds ``signal_per_code``, where 0 to 1 is what the transfer curve is defined on; None: the largest code
     is 1. ``video_range``: the file's codes of signal 0 and 1 were 16 and 235 (of 8 bits). ``turn`` is how the file
     wants the picture turned; the sizes are those before. ``transfer`` is the curve that the file is tagged with.
+
+    Raises ValueError where the size is none that a picture has.
     """
 
     width_px: int
@@ -46,6 +51,12 @@ class Header:
     turn: Turn = UPRIGHT
     transfer: str | None = None
     warnings: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """See that the size can be one of a picture."""
+        width_px, height_px = self.width_px, self.height_px
+        if min(width_px, height_px) < 1 or width_px * height_px > MOST_PIXELS:
+            raise ValueError(f"it says that it is {width_px} x {height_px} pixels")
 
 
 @dataclass(frozen=True, kw_only=True)

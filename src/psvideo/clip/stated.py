@@ -7,6 +7,7 @@ EXIF (CIPA DC-008) is read from JPEG, TIFF and PNG; the curve from an ICC profil
 import contextlib
 import io
 import struct
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -43,7 +44,9 @@ class Stated:
 
 def stated_by(path: Path) -> Stated:
     """Return what a file says of itself; nothing where it is of a kind that says nothing, or cannot be read."""
-    with contextlib.suppress(OSError, UnidentifiedImageError, Image.DecompressionBombError, ValueError, SyntaxError):
+    unreadable = (OSError, UnidentifiedImageError, Image.DecompressionBombError, ValueError, SyntaxError)
+    with contextlib.suppress(*unreadable), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of tags that are damaged: what they say is left out
         with Image.open(path) as picture:
             exif = picture.getexif()
             taken = {**exif, **exif.get_ifd(ExifTags.IFD.Exif)}

@@ -1,9 +1,10 @@
-"""TOML files under contract: strict, versioned, and with every mistake named at once.
+"""TOML and JSON files under contract: strict, versioned, and with every mistake named at once.
 
 A file that breaks its contract gets one paragraph that names file, key, what was found and what was expected; an
 unknown key is answered with the nearest known one.
 """
 
+import json
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
@@ -36,6 +37,8 @@ def check_light_name(name: str) -> str:
 
 
 Model = TypeVar("Model", bound=Contract)
+MOST_BYTES = 1 << 28
+"""The longest text that is read: the timing of a take of hours has a quarter of it."""
 
 
 def read_toml(path: Path, model: type[Model], schema: str) -> Model:
@@ -52,6 +55,8 @@ def read_text(path: Path) -> str:
         )
         raise PsvideoError(f"{path}: is a folder, and a file is expected. {advice}")
     try:
+        if path.stat().st_size > MOST_BYTES:
+            raise PsvideoError(f"{path}: is too large for a text that psvideo reads. Name the file that is meant.")
         return path.read_text(encoding="utf-8")
     except FileNotFoundError:
         raise PsvideoError(f"{path}: there is no such file. Check the name, or write the file first.") from None
@@ -61,11 +66,23 @@ def read_text(path: Path) -> str:
         raise PsvideoError(f"{path}: cannot be read as text ({fault}). Check the file and its permissions.") from fault
 
 
+def read_json(path: Path, *, advice: str) -> dict[str, Any]:
+    """Read a JSON file that holds an object. Raises PsvideoError that ends with ``advice`` where it does not."""
+    text = read_text(path)
+    try:
+        data = json.loads(text)
+    except (ValueError, RecursionError) as fault:  # nested without end, numbers of thousands of digits
+        raise PsvideoError(f"{path}: not a JSON object ({fault}). {advice}") from fault
+    if not isinstance(data, dict):
+        raise PsvideoError(f"{path}: not a JSON object but {type(data).__name__}. {advice}")
+    return data
+
+
 def parse_toml(text: str, model: type[Model], schema: str, *, source: str) -> Model:
     """Check TOML text against its model. ``source`` is the name that messages give it."""
     try:
         data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as fault:
+    except (ValueError, RecursionError) as fault:  # TOMLDecodeError; numbers or tables without end
         raise PsvideoError(f"{source}: not a TOML file: {fault}. Mend that line (TOML 1.0).") from fault
     check_schema(data.get("schema"), schema, source=source)
     try:

@@ -130,6 +130,8 @@ def read_rig(path: Path | str, *, plan_lights: Sequence[str] = ()) -> Rig:
     rows = _numbers(path, text)
     if path.suffix == ".lp" or len(rows[0]) == 1:
         rows = _counted(path, rows)
+    if not rows:
+        raise PsvideoError(f"{path}: says that it lists 0 lights; expected a line for every light.")
     short = next((place for place, row in enumerate(rows, start=1) if len(row) < 3), None)
     if short:
         raise PsvideoError(

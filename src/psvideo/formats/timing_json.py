@@ -6,7 +6,7 @@ from pathlib import Path
 from pydantic import Field, ValidationError
 
 from psvideo.errors import PsvideoError
-from psvideo.formats.contract import Contract, check_schema, read_text
+from psvideo.formats.contract import Contract, check_schema, read_json
 from psvideo.formats.paths import path_of
 from psvideo.model.timing import DroppedFrames, Flash, Order, Timing
 
@@ -71,12 +71,10 @@ def read_timing(path: Path | str) -> Timing:
     True
     """
     path = path_of("path", path)
+    data = read_json(path, advice="Make it again with psvideo sync.")
+    check_schema(data.get("schema"), SCHEMA, source=str(path))
     try:
-        data = json.loads(read_text(path))
-        check_schema(data.get("schema"), SCHEMA, source=str(path))
         file = _TimingFile.model_validate(data)
-    except (json.JSONDecodeError, AttributeError) as fault:
-        raise PsvideoError(f"{path}: not a JSON object ({fault}). Make it again with psvideo sync.") from fault
     except ValidationError as fault:
         first = fault.errors()[0]
         key = ".".join(map(str, first["loc"]))

@@ -67,7 +67,7 @@ def _schema(path: Path) -> str | None:
         text = read_text(path)
         data: Any = tomllib.loads(text) if path.suffix == ".toml" else json.loads(text)
         return str(data["schema"]).partition("/")[0]
-    except (tomllib.TOMLDecodeError, json.JSONDecodeError, KeyError, TypeError):
+    except (ValueError, RecursionError, KeyError, TypeError):
         return f"psvideo-{path.stem}"
 
 

@@ -1,6 +1,5 @@
 """What a folder of results or plates has to show, and the clip that it was made from beside it."""
 
-import json
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from fractions import Fraction
@@ -10,6 +9,7 @@ from pathlib import Path
 from psvideo.clip.decode.exr import contents, stored
 from psvideo.clip.folder import number_of
 from psvideo.errors import PsvideoError, UsageError
+from psvideo.formats.contract import read_json
 from psvideo.formats.timing_json import read_timing, timing_record
 from psvideo.inspect.about_output import is_plates, is_results
 from psvideo.model.quantities import QUANTITIES, Quantity
@@ -167,13 +167,7 @@ def _report(path: Path) -> Mapping[str, object]:
     """Return report.json, nothing where there is none. Raises PsvideoError where it is damaged."""
     if not path.is_file():
         return {}
-    try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as fault:
-        raise PsvideoError(
-            f"{path}: cannot be read as JSON ({fault}). Run psvideo normals again, or remove it."
-        ) from fault
-    return found if isinstance(found, dict) else {}
+    return read_json(path, advice="Run psvideo normals again, or remove it.")
 
 
 def _list(value: object) -> list[object]:

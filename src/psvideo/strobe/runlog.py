@@ -11,7 +11,7 @@ from pathlib import Path
 from pydantic import Field, ValidationError
 
 from psvideo.errors import PsvideoError
-from psvideo.formats.contract import Contract, check_schema, read_text
+from psvideo.formats.contract import Contract, check_schema, read_json
 from psvideo.model.plan import UNKNOWN_CLOCK_PPM, Plan, PlannedFlash
 from psvideo.strobe.clock import ClockFit
 from psvideo.strobe.limits import lit_ticks
@@ -124,12 +124,10 @@ def format_log(log: RunLog) -> str:
 
 def read_log(path: Path) -> RunLog:
     """Read strobe.json. Raises PsvideoError that names the file, the key and what was expected."""
+    data = read_json(path, advice="Take it away, or write it again.")
+    check_schema(data.get("schema"), SCHEMA, source=str(path))
     try:
-        data = json.loads(read_text(path))
-        check_schema(data.get("schema"), SCHEMA, source=str(path))
         return RunLog.model_validate(data)
-    except (json.JSONDecodeError, AttributeError) as fault:
-        raise PsvideoError(f"{path}: not a JSON object ({fault}). Take it away, or write it again.") from fault
     except ValidationError as fault:
         first = fault.errors()[0]
         key = ".".join(map(str, first["loc"]))

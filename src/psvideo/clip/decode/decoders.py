@@ -29,7 +29,14 @@ def read_header(kind: str, file: Path) -> Header:
 def decode(kind: str, file: Path) -> CodedPicture:
     """Decode one picture."""
     read: Callable[[Path], CodedPicture] = _module(kind).decode
-    return guarded(read, file)
+    picture = guarded(read, file)
+    head = picture.header
+    if picture.codes.shape != (head.height_px, head.width_px, 3)[: 2 if head.channels == 1 else 3]:
+        raise PsvideoError(
+            f"{file}: says that it is {head.width_px} x {head.height_px} pixels of {head.channels} channel(s), and "
+            f"holds an array of {picture.codes.shape}: it is damaged. Copy it again from the camera's card."
+        )
+    return picture
 
 
 def opened(kind: str, file: Path) -> CodedPicture | PictureInFile:

@@ -25,8 +25,13 @@ OF_THE_CONTAINER = ("type", "name", "chunkCount", "pixelAspectRatio", "screenWin
 
 def header(path: Path) -> Header:
     """Read what the file says without decoding its pixels."""
+    return header_of(path, partial(_picture_channels, path))
+
+
+def header_of(path: Path, choose: Callable[[list[str]], tuple[str, ...]]) -> Header:
+    """Read what the file says of the channels that ``choose`` takes, without decoding its pixels."""
     with _open(path, header_only=True) as file:
-        return _header(file, _picture_channels(path, _names(file)))
+        return _header(file, choose(_names(file)))
 
 
 def decode(path: Path) -> CodedPicture:
@@ -36,6 +41,7 @@ def decode(path: Path) -> CodedPicture:
 
 def decode_channels(path: Path, choose: Callable[[list[str]], tuple[str, ...]]) -> CodedPicture:
     """Decode the channels that ``choose`` takes from the names of all, one or three."""
+    header_of(path, choose)
     with _open(path, header_only=False) as file:
         names = choose(_names(file))
         channels = file.channels()

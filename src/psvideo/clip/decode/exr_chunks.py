@@ -23,11 +23,17 @@ def is_cut_short(path: Path) -> bool:
             magic, version = struct.unpack("<II", file.read(8))
             if magic != MAGIC or version & (TILED | DEEP | SEVERAL_PARTS):
                 return False
-            attributes = dict(_attributes(file))
+            attributes = dict(_attributes(file, size))
             top, bottom = struct.unpack("<4i", attributes["dataWindow"])[1::2]
             rows = ROWS_PER_CHUNK[attributes["compression"][0]]
             count = (bottom - top) // rows + 1
+            if count < 1:
+                return False
+            if 8 * count > size:
+                return True
             offsets = struct.unpack(f"<{count}Q", file.read(8 * count))
+            if max(offsets) + 8 > size:
+                return True
             file.seek(max(offsets))
             _, length = struct.unpack("<iI", file.read(8))
         except struct.error:
@@ -37,11 +43,13 @@ def is_cut_short(path: Path) -> bool:
     return bool(min(offsets) == 0 or max(offsets) + 8 + length > size)
 
 
-def _attributes(file: BinaryIO) -> Iterator[tuple[str, bytes]]:
+def _attributes(file: BinaryIO, size: int) -> Iterator[tuple[str, bytes]]:
     """Yield the attributes' names and values; leaves the file at the table of chunks."""
     while name := _text(file):
         _text(file)
         (length,) = struct.unpack("<I", file.read(4))
+        if length > size:
+            raise struct.error("the file ends inside a value")
         yield name, file.read(length)
 
 

@@ -57,6 +57,8 @@ def index_movie(path: Path) -> Movie:
         capture_rate = capture_rate_hz(container.metadata | stream.metadata)
         codec = stream.codec_context.codec.canonical_name
     held, timestamps = len(stamps.timestamps), found.timestamps
+    if not held:
+        raise PsvideoError(f"{path}: holds no frame that can be found; it is truncated or damaged. Copy it again.")
     if held < promised and found.places[-1] + 1 + found.left_out < promised:
         raise PsvideoError(
             f"{path}: holds {held} frames, and its header promises {promised}: it is truncated. Copy it again."

@@ -1,4 +1,4 @@
-"""PNG: 8 and 16 bits, grey or RGB.
+"""PNG: 8 and 16 bits, grey or RGB. Palettes and fewer bits, as masks have them, become 8 bits.
 
 Decoded by imagecodecs, which raises on a truncated or damaged file, where others deliver the rest as black.
 """
@@ -14,7 +14,7 @@ from psvideo.errors import PsvideoError
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 END = b"IEND\xaeB`\x82"
 TAIL = 1024
-COLOUR_TYPES = {0: 1, 2: 3, 4: 1, 6: 3}
+COLOUR_TYPES = {0: 1, 2: 3, 3: 3, 4: 1, 6: 3}
 ALPHA_TYPES = (4, 6)
 
 
@@ -42,10 +42,12 @@ def _parse_header(path: Path, data: bytes, tail: bytes) -> Header:
     if END not in tail:
         raise PsvideoError(f"{path}: ends before its last chunk (IEND): it is truncated. Copy it again.")
     width_px, height_px, bits, colour_type = struct.unpack(">IIBB", data[16:26])
-    if colour_type not in COLOUR_TYPES or bits not in (8, 16):
-        kind = "a palette" if colour_type == 3 else f"{bits} bits per sample"
-        raise PsvideoError(f"{path}: has {kind}; expected grey or RGB of 8 or 16 bits. Export the frames as such.")
+    if colour_type not in COLOUR_TYPES or bits not in (1, 2, 4, 8, 16):
+        raise PsvideoError(
+            f"{path}: says that it has {bits} bits and colours of type {colour_type}, which PNG does not have: it is "
+            "damaged. Copy it again."
+        )
     warnings = ("the PNG files' alpha channel is left out",) if colour_type in ALPHA_TYPES else ()
     return Header(
-        width_px=width_px, height_px=height_px, channels=COLOUR_TYPES[colour_type], bits=bits, warnings=warnings
+        width_px=width_px, height_px=height_px, channels=COLOUR_TYPES[colour_type], bits=max(bits, 8), warnings=warnings
     )

@@ -2,6 +2,8 @@
 
 import logging
 import sys
+from itertools import islice
+from math import prod
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +19,8 @@ logging.getLogger("tifffile").addHandler(logging.NullHandler())
 
 STAYS_FROM_BYTES = 1 << 27
 """Samples of so many bytes and more (22 megapixels in colour) stay in their file where they lie there as they are."""
+MOST_PAGES = 32
+"""A picture and its thumbnails are fewer."""
 NATIVE = "<" if sys.byteorder == "little" else ">"
 GREY, RGB, MOSAIC, LINEAR_RAW = 1, 2, 32803, 34892  # values of the tag PhotometricInterpretation
 
@@ -64,7 +68,7 @@ def check_places(path: Path, page: tifffile.TiffPage) -> None:
     size = path.stat().st_size
     offsets, counts = page.dataoffsets, page.databytecounts
     held = sum(count > 0 and offset + count <= size for offset, count in zip(offsets, counts, strict=False))
-    expected = max(len(offsets), len(counts), 1)
+    expected = max(len(offsets), len(counts), prod(page.chunked), 1)
     if held < expected:
         raise PsvideoError(
             f"{path}: {expected - held} of its {expected} strips or tiles are empty or lie beyond the end of the file: "
@@ -87,8 +91,9 @@ def sample_bits(path: Path, page: tifffile.TiffPage) -> int | None:
 
 def _only_page(path: Path, file: tifffile.TiffFile) -> tifffile.TiffPage:
     """Return the page that holds the picture; reduced copies of it (thumbnails) do not count."""
-    pages = [page.aspage() for page in file.pages if not page.aspage().is_reduced]
-    if len(pages) != 1:
+    found = list(islice(file.pages, MOST_PAGES))  # a damaged page may name itself as the one that follows
+    pages = [page.aspage() for page in found if not page.aspage().is_reduced]
+    if len(pages) != 1 or len(found) == MOST_PAGES:
         raise PsvideoError(f"{path}: holds {len(pages)} pictures; expected one per file. Export one file per frame.")
     return pages[0]
 
