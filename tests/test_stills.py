@@ -2,9 +2,7 @@
 
 import json
 import os
-import shlex
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -332,26 +330,3 @@ def test_a_sphere_that_the_picture_cuts_off_is_refused(tmp_path: Path) -> None:
     assert "ball" in str(fault.value)
     assert "\n" not in str(fault.value)
     assert not (tmp_path / "out").exists()
-
-
-def test_the_journey_from_twelve_stills_to_a_relit_page_runs_as_the_page_says(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    page = (Path(__file__).parents[1] / "docs" / "stills.md").read_text(encoding="utf-8")
-    block = page.split("```sh\n")[1].split("```")[0]
-    names = [f"IMG_{number}" for number in (4, 5, 7, 8, 12, 19, 20, 21, 30, 31, 100, 101)]
-    angles = np.radians(np.arange(12) * 30)
-    lean = np.where(np.arange(12) % 2, 0.35, 0.6)
-    lights = np.stack([lean * np.cos(angles), lean * np.sin(angles), np.sqrt(1 - lean**2)], axis=1)
-    normals, inside = ball()
-    shades = [np.where(inside, 0.7 * np.maximum(normals @ light, 0), 0) for light in lights]
-    save = partial(save8, quality=98)
-    (tmp_path / "photos").mkdir()
-    for name, shade in zip(names, shades, strict=True):
-        save(tmp_path / "photos" / f"{name}.JPG", as_srgb(shade))
-    listed(tmp_path / "lights.lp", [f"{name}.JPG" for name in names], lights)
-    monkeypatch.chdir(tmp_path)
-    for line in block.strip().splitlines():
-        assert main([*shlex.split(line)[1:], *(["-q"] if " stills " in line else [])]) == 0
-    assert error_deg(tmp_path / "out") < 1.5
-    assert "<canvas" in (tmp_path / "relit.html").read_text(encoding="utf-8")
