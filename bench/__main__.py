@@ -17,6 +17,7 @@ TABLES = (
     "timing",
     "compression",
     "strobe",
+    "cameras",
     "accuracy",
 )
 

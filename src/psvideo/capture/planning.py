@@ -8,12 +8,17 @@ from psvideo.capture.cautions import Caution, request_cautions, shoot_cautions
 from psvideo.capture.request import ShootRequest
 from psvideo.capture.wish import LONG_MARKER, longest_flash
 from psvideo.errors import UsageError
+from psvideo.model.maximal_length import TAPS
 from psvideo.model.plan import UNKNOWN_CLOCK_PPM, Plan, PlannedFlash, assemble_plan
 from psvideo.model.shoot_figures import ShootFigures, shoot_figures
 from psvideo.model.units import show_seconds
 
 DARK_SLOT_EVERY_S = 0.5
 """Dark slots come about twice a second: often enough to follow ambient light, below any flicker that is felt."""
+
+
+BOARD_STEPS = 240
+"""Flashes of a cycle that every known board holds (lights/protocol.toml)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,11 +48,12 @@ def plan_shoot(request: ShootRequest) -> Shoot:
 def make_plan(request: ShootRequest, flash_s: Mapping[str, float]) -> Plan:
     """Return the plan: one flash per light in the order of the lights, and the marker.
 
-    A long marker is the first light's flash; a dark slot ends the round and takes the shortest flash's duration.
+    A long marker is the first light's flash; a dark slot ends the round and takes the shortest flash's duration. A
+    coded marker keeps the dark slot in the rounds of the longest code that every board plays.
     """
     lit = [_lit(request, name, flash_s[name], is_first=index == 0) for index, name in enumerate(request.lights)]
     dark = []
-    if request.marker == "dark":
+    if request.marker in ("dark", "coded"):
         dark_slot_s = request.dark_slot_s or min(flash.duration_s for flash in lit)
         dark = [PlannedFlash(lights={}, duration_s=dark_slot_s)]
     flashes = (*lit, *dark)
@@ -62,8 +68,22 @@ def make_plan(request: ShootRequest, flash_s: Mapping[str, float]) -> Plan:
     _refuse_short_dark(request, plan.dark_s)
     if not dark:
         return plan
+    if request.marker == "coded":
+        return replace(plan, dark_code=_longest_code(len(lit)))
     round_s = sum(flash.duration_s + plan.dark_s for flash in lit)
     return replace(plan, dark_every=request.dark_every or max(1, math.ceil(DARK_SLOT_EVERY_S / round_s)))
+
+
+def _longest_code(lights: int) -> int:
+    """Return the order of the longest code whose cycle of this many lights every board plays."""
+    steps = {order: lights * (2**order - 1) + 2 ** (order - 1) for order in TAPS}
+    playable = [order for order, count in steps.items() if count <= BOARD_STEPS]
+    if not playable:
+        raise UsageError(
+            f"`marker` coded: the shortest code of {lights} lights is a cycle of {min(steps.values())} flashes, and a "
+            f"board holds {BOARD_STEPS}. Take fewer lights, or leave `marker` dark."
+        )
+    return max(playable)
 
 
 def _lit(request: ShootRequest, name: str, duration_s: float, *, is_first: bool) -> PlannedFlash:

@@ -11,7 +11,7 @@ from psvideo.model.camera import Camera, Encoding, exposure_of
 from psvideo.model.plan import Mode
 from psvideo.model.units import show_rate, show_seconds
 
-Marker = Literal["dark", "long", "none"]
+Marker = Literal["dark", "coded", "long", "none"]
 
 READOUT_SLACK = 1e-3
 """A readout may exceed the frame period by rounding, as plan.toml allows."""

@@ -62,6 +62,8 @@ def _deciding_rows(plan: Plan, figures: ShootFigures) -> Iterator[tuple[str, str
     yield "flashes", f"{figures.flash_rate_hz:.2f} a second, {figures.flash_rate_hz / fps:.1%} of the frame rate"
     if figures.dark_slot_rate_hz:
         rounds = "each round" if plan.dark_every == 1 else f"one round of {plan.dark_every}"
+        if plan.dark_code:
+            rounds = f"rounds by a code that repeats every {show_seconds(plan.cycle_s)}"
         yield "dark slots", f"{figures.dark_slot_rate_hz:.2f} a second, in {rounds}"
     yield "dark time", show_seconds(plan.dark_s) + _margin(plan, figures)
     if plan.mode != "synced":

@@ -141,6 +141,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("when did every flash fire, and how certain is that?", "psvideo sync clip/"),
         ("kept for later, with a picture to look at", "psvideo sync clip/ -o timing.json --picture timing.png"),
         ("a plan without a marker: say which light flashed first", "psvideo sync clip/ --first-light key"),
+        ("several cameras under one strobe: their clocks", "psvideo sync camA/ camB/ camC/ -o clocks.json"),
     ),
     "split": (
         ("one EXR sequence per light", "psvideo split clip/ -o plates/"),

@@ -18,6 +18,7 @@ OTHERWISE = {
     "max_pulse_s": "max-pulse",
     "dark_s": "dark",
     "near_s": "near",
+    "starts_s": "starts",
 }
 """Options that are not called as their parameters are: most of these take their unit along."""
 

@@ -12,6 +12,7 @@ from psvideo.errors import PsvideoError
 from psvideo.formats.contract import Contract, check_light_name, parse_toml, read_text
 from psvideo.formats.paths import path_of
 from psvideo.model.camera import Camera, Encoding, exposure_of
+from psvideo.model.maximal_length import TAPS
 from psvideo.model.plan import Mode, Plan, PlannedFlash, assemble_plan
 
 SCHEMA = "psvideo-plan/1"
@@ -75,6 +76,15 @@ class RoundTable(Contract):
     fall_s: float = Field(default=0.0, ge=0)
     clock_tolerance_ppm: Annotated[float, Field(ge=0, le=10_000)] | Literal["unknown"] = 100.0
     dark_every: int = Field(default=1, ge=1)
+    dark_code: int = 0
+
+    @model_validator(mode="after")
+    def _has_one_pattern(self) -> Self:
+        if self.dark_code and self.dark_code not in TAPS:
+            raise ValueError(f"dark_code is {self.dark_code}; expected an order from {min(TAPS)} to {max(TAPS)}, or 0")
+        if self.dark_code and self.dark_every > 1:
+            raise ValueError("dark_code and dark_every both say which rounds are dark; expected one of the two")
+        return self
 
     def plan(self, camera: Camera, flashes: Sequence[PlannedFlash]) -> Plan:
         """Return the plan that plays these flashes for a camera."""
@@ -87,6 +97,7 @@ class RoundTable(Contract):
             fall_s=self.fall_s,
             clock_tolerance_ppm=self.clock_tolerance_ppm,
             dark_every=self.dark_every,
+            dark_code=self.dark_code,
         )
 
 
@@ -199,7 +210,10 @@ def format_plan(plan: Plan) -> str:
     strobe["rise_s"] = plan.rise_s
     strobe["fall_s"] = plan.fall_s
     strobe["clock_tolerance_ppm"] = "unknown" if plan.clock_tolerance_ppm is None else plan.clock_tolerance_ppm
-    strobe["dark_every"] = plan.dark_every
+    if plan.dark_code:
+        strobe["dark_code"] = plan.dark_code
+    else:
+        strobe["dark_every"] = plan.dark_every
     flashes = tomlkit.aot()
     for flash in plan.flashes:
         table = tomlkit.table()

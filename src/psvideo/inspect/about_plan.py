@@ -42,10 +42,10 @@ def length_finding(plan: Plan, numbers: tuple[int, ...]) -> Finding:
     seconds = span * plan.camera.frame_period_s
     per_cycle = len(plan.cycle_slots)
     flashes = int(seconds / plan.cycle_s * per_cycle)
-    rounds = int(seconds / plan.cycle_s * plan.dark_every)
+    rounds = int(seconds / plan.cycle_s * len(plan.dark_rounds))
     text = f"{seconds:.4g} s at {float(plan.camera.fps):.6g} fps: about {flashes} flashes, {rounds} whole round(s)"
     if rounds < 1:
-        return fault(f"{text}, which is too short: a round lasts {plan.cycle_s / plan.dark_every:.4g} s")
+        return fault(f"{text}, which is too short: a round lasts {plan.cycle_s / len(plan.dark_rounds):.4g} s")
     return ok(text)
 
 

@@ -5,6 +5,7 @@ skip their dark slots mark the cycle. Where turning the cycle by some flashes gi
 lights' names are not in the timing: their powers, a rig's directions or a person must say it.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from psvideo.model.plan import Plan
@@ -39,3 +40,11 @@ def turned_slot(plan: Plan, slot: int, turn: int) -> int:
     """Return the slot that stands ``turn`` places further on in the cycle; negative turns go back."""
     cycle = plan.cycle_slots
     return cycle[(cycle.index(slot) + turn) % len(cycle)]
+
+
+def cycle_places(plan: Plan, slots: Sequence[int]) -> tuple[int, ...]:
+    """Return the places in the cycle, from 0, at which consecutive flashes of these slots may begin."""
+    cycle = plan.cycle_slots
+    around = cycle * (1 + -(-len(slots) // len(cycle)))
+    seen = tuple(slots)
+    return tuple(place for place in range(len(cycle)) if around[place : place + len(seen)] == seen)

@@ -1,8 +1,8 @@
 """The capture plan: which lights flash, how long, how far apart, and for which camera.
 
 A plan is frozen data that expands to arrays of flash times; it neither acts nor draws. A *round* is one pass through
-the list of flashes. Dark slots are kept in every ``dark_every``-th round only, so the *cycle*, which repeats exactly,
-is ``dark_every`` rounds: the first has its dark slots, the others skip them. Flash ``k + 1`` starts
+the list of flashes. Dark slots are kept in every ``dark_every``-th round, or in those that a code names; the others
+skip them. The *cycle*, which repeats exactly, is as many rounds as that pattern has. Flash ``k + 1`` starts
 ``duration_s[k] + dark_s`` after flash ``k`` starts, in seconds of the strobe's clock (Hudon et al. 2015, eq. 1 and 14).
 """
 
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.camera import Camera, FloatArray
+from psvideo.model.maximal_length import maximal_length
 
 Mode = Literal["rolling", "half-rate", "synced"]
 
@@ -74,6 +75,8 @@ class Plan:
         How far the strobe's and the camera's clocks may be apart; None where that is unknown.
     dark_every
         Dark slots are kept only in every Nth round.
+    dark_code
+        The order of a maximal-length sequence: dark slots are kept in the rounds in which it is 1. 0: no code.
     """
 
     camera: Camera
@@ -84,6 +87,7 @@ class Plan:
     fall_s: float = 0.0
     clock_tolerance_ppm: float | None = 100.0
     dark_every: int = 1
+    dark_code: int = 0
 
     @property
     def lights(self) -> tuple[str, ...]:
@@ -96,9 +100,15 @@ class Plan:
         return tuple(slot for slot, flash in enumerate(self.flashes) if not flash.is_dark)
 
     @property
+    def dark_rounds(self) -> tuple[bool, ...]:
+        """Which rounds of a cycle keep their dark slots, the first always."""
+        return maximal_length(self.dark_code) if self.dark_code else (True, *[False] * (self.dark_every - 1))
+
+    @property
     def cycle_slots(self) -> tuple[int, ...]:
-        """The slots of one cycle: a round with its dark slots, then ``dark_every - 1`` rounds without them."""
-        return tuple(range(len(self.flashes))) + self.lit_slots * (self.dark_every - 1)
+        """The slots of one cycle, round by round, with dark slots in those that keep them."""
+        every, lit = tuple(range(len(self.flashes))), self.lit_slots
+        return tuple(slot for dark in self.dark_rounds for slot in (every if dark else lit))
 
     @property
     def clock_range_ppm(self) -> float:
@@ -109,6 +119,11 @@ class Plan:
     def cycle_s(self) -> float:
         """The cycle's length in strobe seconds."""
         return sum(self.flashes[slot].duration_s + self.dark_s for slot in self.cycle_slots)
+
+    @property
+    def marker_s(self) -> float:
+        """How long a stretch shows the place in the cycle: a cycle, or a whole run of a code and a round to spare."""
+        return self.cycle_s * min(1.0, (self.dark_code + 1) / len(self.dark_rounds) if self.dark_code else 1.0)
 
     @property
     def power(self) -> FloatArray:
@@ -169,6 +184,7 @@ def assemble_plan(
     fall_s: float = 0.0,
     clock_tolerance_ppm: float | Literal["unknown"] | None = 100.0,
     dark_every: int = 1,
+    dark_code: int = 0,
 ) -> Plan:
     """Return the plan of these flashes; where ``dark_s`` is None, with the dark time that its mode needs.
 
@@ -187,4 +203,5 @@ def assemble_plan(
         fall_s=fall_s,
         clock_tolerance_ppm=tolerance_ppm,
         dark_every=dark_every,
+        dark_code=dark_code,
     )

@@ -88,15 +88,15 @@ def shoot_figures(plan: Plan, *, speed_px_s: float | None = None) -> ShootFigure
     margin_ppm = None if plan.mode == "synced" else (1 - plan.camera.exposure_s / plan.dark_s) * 1e6
     return ShootFigures(
         flash_rate_hz=lit / cycle_s,
-        result_rate_hz=plan.dark_every / cycle_s,
+        result_rate_hz=len(plan.dark_rounds) / cycle_s,
         dark_slot_rate_hz=(len(plan.cycle_slots) - lit) / cycle_s,
-        round_s=cycle_s / plan.dark_every,
+        round_s=cycle_s / len(plan.dark_rounds),
         cycle_s=cycle_s,
         partial_row_share=mean("partial_row_share"),
         missing_row_share=mean("missing_row_share"),
         margin_ppm=margin_ppm,
         motion_per_flash_px=None if speed_px_s is None else speed_px_s * cycle_s / lit,
-        motion_per_round_px=None if speed_px_s is None else speed_px_s * cycle_s / plan.dark_every,
+        motion_per_round_px=None if speed_px_s is None else speed_px_s * cycle_s / len(plan.dark_rounds),
         slots=slots,
         lights=tuple(_light_figures(plan, name, times) for name in plan.lights),
     )

@@ -164,14 +164,14 @@ def window_of(plan: Plan, numbers: Sequence[int]) -> tuple[int, ...]:
     if plan.mode == "synced":
         return tuple(numbers[: ROUNDS * len(plan.flashes)])
     per_frame = plan.camera.frame_period_s
-    round_s = plan.cycle_s / plan.dark_every
-    wanted = max(ROUNDS * round_s / per_frame, 1.3 * plan.cycle_s / per_frame + 6)
+    round_s = plan.cycle_s / len(plan.dark_rounds)
+    wanted = max(ROUNDS * round_s / per_frame, 1.3 * plan.marker_s / per_frame + 6)
     return tuple(numbers[: min(max(math.ceil(wanted), LEAST_FRAMES), MOST_FRAMES)])
 
 
 def too_short(plan: Plan, numbers: Sequence[int]) -> bool:
     """Tell whether so few frames cannot be expected to show the strobe."""
-    return len(numbers) < 2 * len(plan.cycle_slots) / max(plan.dark_every, 1) + 3
+    return len(numbers) < 2 * len(plan.cycle_slots) / len(plan.dark_rounds) + 3
 
 
 def _later(clip: Clip, window: tuple[int, ...]) -> tuple[int, ...]:

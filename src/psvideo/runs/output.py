@@ -69,7 +69,7 @@ def sequence_fps(plan: Plan, rate: Rate = "round") -> Fraction:
     results = len(plan.lights) if rate == "flash" else 1
     if plan.mode == "synced":
         return results * plan.camera.fps / len(plan.flashes)
-    return Fraction(results * plan.dark_every / plan.cycle_s).limit_denominator(100_000)
+    return Fraction(results * len(plan.dark_rounds) / plan.cycle_s).limit_denominator(100_000)
 
 
 def tags_of(clip: Clip, rig_path: Path | None = None, space: Space = CAMERA_SPACE, rate: Rate = "round") -> Tags:

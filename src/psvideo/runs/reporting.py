@@ -147,7 +147,7 @@ def _shot(clip: Clip, numbers: Sequence[int]) -> dict[str, str]:
         "Strobe": f"synced, one flash a frame: {flashes}"
         if synced
         else f"{plan.mode}; {flashes}; {plan.dark_s * 1e3:.4g} ms dark between them",
-        "Rounds a second": f"{plan.dark_every / plan.cycle_s:.4g}"
+        "Rounds a second": f"{len(plan.dark_rounds) / plan.cycle_s:.4g}"
         if plan.mode != "synced"
         else f"{float(camera.fps) / len(plan.flashes):.4g}",
         "Remarks": "; ".join((*clip.warnings, *clip.notes)) or "none",

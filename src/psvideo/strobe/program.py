@@ -146,7 +146,11 @@ def wire(plan: Plan, caps: Capabilities, given: Mapping[str, int]) -> dict[str, 
 def _lack_of_room(plan: Plan, caps: Capabilities) -> Iterator[str]:
     steps = len(plan.cycle_slots)
     if steps > caps.steps:
-        yield f"a cycle is {steps} flashes, and the board holds {caps.steps} (dark_every is {plan.dark_every})"
+        yield f"a cycle is {steps} flashes, and the board holds {caps.steps} ({_pattern(plan)})"
+
+
+def _pattern(plan: Plan) -> str:
+    return f"dark_code is {plan.dark_code}" if plan.dark_code else f"dark_every is {plan.dark_every}"
 
 
 def _make_slot(plan: Plan, number: int, dark: int, caps: Capabilities, lines: Mapping[str, int]) -> Slot | str:

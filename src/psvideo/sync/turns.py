@@ -50,7 +50,7 @@ def turns(plan: Plan, rows: Profiles, beat: Beat) -> Turns:
 
 def _part(plan: Plan, rows: Profiles) -> Profiles:
     """Return enough of the clip to separate turns, dark slots that are rare included."""
-    needed = max(TURN_FRAMES, int(2.5 * plan.cycle_s / rows.period_s))
+    needed = max(TURN_FRAMES, int(2.5 * plan.marker_s / rows.period_s))
     return rows.take(slice(0, min(needed, len(rows.value)))).binned(TURN_ROWS)
 
 

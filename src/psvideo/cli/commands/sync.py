@@ -1,4 +1,4 @@
-"""psvideo sync: find when every flash fired."""
+"""psvideo sync: find when every flash fired, and how the clocks of cameras that saw the same ones stand."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -7,7 +7,6 @@ import typer
 
 from psvideo.cli.console import Voice
 from psvideo.cli.options.clip_and_run import (
-    ClipPath,
     FirstLight,
     Force,
     Frames,
@@ -17,12 +16,35 @@ from psvideo.cli.options.clip_and_run import (
     Quiet,
     Verbose,
 )
+from psvideo.cli.options.typed import parse_starts_s
+from psvideo.errors import UsageError
 
 if TYPE_CHECKING:
+    from psvideo.model.camera_clocks import CameraClocks
     from psvideo.model.timing import Timing
 
+ClipPaths = Annotated[
+    list[Path],
+    typer.Argument(
+        help="A clip: a folder of numbered frames with plan.toml, or a movie file. Several: of cameras that saw one "
+        "strobe; their clocks are compared.",
+        show_default=False,
+    ),
+]
+Starts = Annotated[
+    str | None,
+    typer.Option(
+        "--starts",
+        help="Several cameras: roughly when each clip began, in seconds of any one clock, such as 0,1.3,2.1; needed "
+        "where the marker is not coded.",
+    ),
+]
+
 TimingOut = Annotated[
-    Path | None, typer.Option("-o", "--out", help="Where to write timing.json; left out: only a summary is printed.")
+    Path | None,
+    typer.Option(
+        "-o", "--out", help="Where to write timing.json (several cameras: clocks.json); left out: only a summary."
+    ),
 ]
 PictureOut = Annotated[
     Path | None, typer.Option("--picture", help="PNG to write that shows how well the flashes were found.")
@@ -30,13 +52,14 @@ PictureOut = Annotated[
 
 
 def sync(
-    clip: ClipPath,
+    clip: ClipPaths,
     out: TimingOut = None,
     plan: PlanPath = None,
     frames: Frames = None,
     first_light: FirstLight = None,
     rig: OrderRig = None,
     picture: PictureOut = None,
+    starts: Starts = None,
     force: Force = False,
     json: Json = False,
     verbose: Verbose = False,
@@ -47,8 +70,14 @@ def sync(
     from psvideo.runs.sync import sync as find
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
+    if len(clip) > 1:
+        _refuse_of_one(plan=plan, frames=frames, first_light=first_light, rig=rig, picture=picture)
+        _several(clip, out, starts, force, voice)
+        return
+    if starts is not None:
+        raise UsageError("`starts` compares several cameras' clips, and one was given.")
     timing = find(
-        clip,
+        clip[0],
         out=out,
         plan=plan,
         frames=frames,
@@ -64,6 +93,43 @@ def sync(
     for written in (out, picture):
         if written is not None:
             voice.say(f"{written}: written.")
+
+
+def _refuse_of_one(**options: object) -> None:
+    for name, value in options.items():
+        if value is not None:
+            raise UsageError(f"`{name}` belongs to one clip, and several were given. Call sync for that clip alone.")
+
+
+def _several(clips: list[Path], out: Path | None, starts: str | None, force: bool, voice: Voice) -> None:
+    from psvideo.formats.clocks_json import clocks_record
+    from psvideo.runs.sync_cameras import sync_cameras
+
+    starts_s = None if starts is None else parse_starts_s(starts)
+    clocks = sync_cameras(clips, out=out, starts_s=starts_s, force=force, watch=voice.track, caller=voice.caller())
+    voice.result(clocks_record(clocks))
+    voice.say(describe_clocks(clocks))
+    if out is not None:
+        voice.say(f"{out}: written.")
+
+
+def describe_clocks(clocks: "CameraClocks") -> str:
+    """Return how the cameras' clocks stand, a line for each."""
+    first, *others = clocks.cameras
+    lines = [f"{first.clip}: the reference. {NUMBERING_SENTENCE[clocks.numbering]}"]
+    for camera in others:
+        drift = f", drifting by {camera.drift_ppm_per_s:+.3g} ppm a second" if camera.drift_ppm_per_s else ""
+        lines.append(
+            f"{camera.clip}: began {camera.offset_s:+.6f} s after it, {camera.rate_ppm:+.2f} ppm{drift}; "
+            f"{camera.shared} flashes shared, times known to {camera.error_s * 1e6:.2g} us."
+        )
+    return "\n".join(lines)
+
+
+NUMBERING_SENTENCE = {
+    "marker": "Which flashes are the same is known from the marker, as the clips ran at the same time.",
+    "given": "Which flashes are the same is known from when the clips were said to begin.",
+}
 
 
 def describe_timing(timing: "Timing") -> str:

@@ -44,7 +44,11 @@ MaxStops = Annotated[float | None, _option(LIMITS, "--max-stops", "Most stops be
 Mode = Annotated[str, _option(STROBE, "--mode", "rolling, half-rate or synced.")]
 Marker = Annotated[
     str | None,
-    _option(STROBE, "--marker", "What distinguishes the lights: a dark slot, a long flash, none."),
+    _option(
+        STROBE,
+        "--marker",
+        "What distinguishes the lights: dark, coded (dark slots by a code, for several cameras), long, none.",
+    ),
 ]
 DarkSlot = Annotated[
     str | None, _option(STROBE, "--dark-slot", "The dark slot's duration; default: the shortest flash's.")

@@ -74,8 +74,10 @@ def parse_request(words: ShootWords) -> ShootRequest:
         raise UsageError(
             "--dark has no meaning with --mode synced: the trigger says when each flash comes. Leave it out."
         )
-    if marker != "dark" and (words.dark_slot or words.dark_every):
+    if marker not in ("dark", "coded") and (words.dark_slot or words.dark_every):
         raise UsageError(f"--dark-slot and --dark-every belong to a dark slot, and --marker {marker} has none.")
+    if marker == "coded" and (words.dark_every or mode == "synced"):
+        raise UsageError("--marker coded says itself which rounds are dark: leave --dark-every and --mode synced out.")
     return ShootRequest(
         camera=camera,
         preset=preset,

@@ -34,6 +34,18 @@ def parse_seconds(text: str, *, option: str) -> float:
     return float(found[1]) / below / per_second
 
 
+def parse_starts_s(text: str) -> list[float]:
+    """Return the seconds of a list such as ``0,1.3,-2.1``. Raises UsageError that names the option.
+
+    >>> parse_starts_s("0, 1.3")
+    [0.0, 1.3]
+    """
+    parts = [part.strip() for part in text.split(",")]
+    if not all(re.fullmatch(NUMBER, part, re.IGNORECASE) for part in parts):
+        raise UsageError(f"--starts {text!r} is no list of seconds. Write one for each clip, such as 0,1.3,2.1.")
+    return [float(part) for part in parts]
+
+
 def parse_positive_seconds(text: str, *, option: str) -> float:
     """Return a time above zero, as `parse_seconds` does."""
     seconds = parse_seconds(text, option=option)

@@ -55,7 +55,7 @@ def too_many(steps: int, strayed: int, frames: int) -> bool:
 def _followed(plan: Plan, rows: Profiles, seed: Seed) -> Course:
     numbering = seed.numbering
     kept = renumbered(rows, numbering)
-    memory = max(window_frames(plan), int(1.2 * plan.cycle_s / rows.period_s))
+    memory = max(window_frames(plan), int(1.2 * plan.marker_s / rows.period_s))
     tracked = track(plan, kept, seed.beat, seed.frames, memory=memory)
     tracked = replace(tracked, beat=replace(tracked.beat, clock=_clock_of(plan, tracked)))
     index = settled(plan, kept, tracked.index, tracked.beat)

@@ -155,7 +155,7 @@ def _alike(change: FloatArray, repeated: Mask) -> bool:
 
 def fold_frames(plan: Plan, rows: Profiles) -> int:
     """Return how many frames fill the cycle densely."""
-    return max(64, int(10 * plan.cycle_s / rows.period_s))
+    return max(64, int(10 * plan.marker_s / rows.period_s))
 
 
 def _differences(rows: Profiles) -> FloatArray:

@@ -42,7 +42,7 @@ def search(
         for offset in ppm
         for phase_s in phases_s
     ]
-    loss = _losses(plan, rows, clocks, start, place=rows.place if readout_known else np.zeros_like(rows.place))
+    loss = losses(plan, rows, clocks, start, place=rows.place if readout_known else np.zeros_like(rows.place))
     loss = loss.reshape(len(ppm), len(phases_s), -1) / len(rows.value)
     if readout_known:
         best = _best(loss.mean(axis=2)[None], keep)
@@ -51,16 +51,25 @@ def search(
 
 
 def _grid(plan: Plan, rows: Profiles, range_ppm: float) -> tuple[FloatArray, FloatArray]:
-    shortest_s = min(plan.flashes[slot].duration_s for slot in plan.lit_slots)
-    span_s = float(rows.frame_start_s[-1] - rows.frame_start_s[0]) + rows.period_s
-    slips = int(np.ceil(range_ppm * 1e-6 * span_s / (0.5 * shortest_s)))
-    ppm: FloatArray = np.linspace(-1.0, 1.0, 2 * slips + 1) * range_ppm if slips else np.zeros(1)
+    shortest_s = _shortest_s(plan)
     steps = int(np.ceil(plan.cycle_s / (shortest_s / 3)))
     phases_s: FloatArray = np.arange(steps, dtype=np.float64) * (plan.cycle_s / steps)
-    return phases_s, ppm
+    return phases_s, clock_ratios_ppm(plan, rows, range_ppm)
 
 
-def _losses(plan: Plan, rows: Profiles, clocks: list[FoundClock], start: Beat, *, place: FloatArray) -> FloatArray:
+def clock_ratios_ppm(plan: Plan, rows: Profiles, range_ppm: float) -> FloatArray:
+    """Return the clock ratios of the grid: half a flash's slip over the frames apart, up to ``range_ppm``."""
+    span_s = float(rows.frame_start_s[-1] - rows.frame_start_s[0]) + rows.period_s
+    slips = int(np.ceil(range_ppm * 1e-6 * span_s / (0.5 * _shortest_s(plan))))
+    ppm: FloatArray = np.linspace(-1.0, 1.0, 2 * slips + 1) * range_ppm if slips else np.zeros(1)
+    return ppm
+
+
+def _shortest_s(plan: Plan) -> float:
+    return min(plan.flashes[slot].duration_s for slot in plan.lit_slots)
+
+
+def losses(plan: Plan, rows: Profiles, clocks: list[FoundClock], start: Beat, *, place: FloatArray) -> FloatArray:
     """Return the loss of every clock in every row, shape (clock, row)."""
     first_s, last_s = float(rows.frame_start_s[0]), float(rows.frame_start_s[-1])
     latest_s = max(clock.phase_s for clock in clocks)

@@ -8,6 +8,7 @@ import numpy as np
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import UNKNOWN_CLOCK_PPM, Plan
 from psvideo.sync.rowfit.beat import Beat, FoundClock
+from psvideo.sync.rowfit.coded import search_coded
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import refine
 from psvideo.sync.rowfit.retime import Mask, Numbering, as_numbered, fold_frames, inserted, likeliest, stood_in, twins
@@ -143,8 +144,8 @@ def _best(plan: Plan, rows: Profiles, numbering: Numbering, stretches: list[slic
 
 
 def _length(plan: Plan, rows: Profiles) -> int:
-    """Return how many frames a stretch has: a cycle and a half, so that the marker is among them."""
-    return min(len(rows.value), max(SEED_FRAMES, int(1.5 * plan.cycle_s / rows.period_s) + 2))
+    """Return how many frames a stretch has: half as long again as it takes to see the marker."""
+    return min(len(rows.value), max(SEED_FRAMES, int(1.5 * plan.marker_s / rows.period_s) + 2))
 
 
 def _stretches(plan: Plan, rows: Profiles) -> list[slice]:
@@ -170,7 +171,8 @@ def seeded(plan: Plan, rows: Profiles, guess: Beat, range_ppm: float) -> tuple[B
     """Search one stretch and sharpen the best places found; return the best and what it explains."""
     known = plan.camera.readout_s is not None
     turned = rows.turned() if guess.upward else rows
-    places = search(plan, turned.binned(SEARCH_ROWS), range_ppm=range_ppm, start=guess, readout_known=known, keep=3)
+    look = search_coded if plan.dark_code else search
+    places = look(plan, turned.binned(SEARCH_ROWS), range_ppm=range_ppm, start=guess, readout_known=known, keep=3)
     free = () if known else ("row_time_s",)
     tried = []
     for place in places:

@@ -118,7 +118,7 @@ def likeliest(
 def _liveliest(plan: Plan, rows: Profiles) -> Profiles:
     """Return the stretch, long enough to separate plans, that changes most from frame to frame."""
     count = len(rows.value)
-    length = min(count, max(LEAST_FRAMES, int(1.2 * plan.cycle_s / rows.period_s) + 2))
+    length = min(count, max(LEAST_FRAMES, int(1.2 * plan.marker_s / rows.period_s) + 2))
     change = np.append(0.0, np.cumsum(np.abs(np.diff(rows.value, axis=0)).mean(axis=1)))
     starts = np.unique(np.linspace(0, count - length, 5).astype(int))
     first = max(starts.tolist(), key=lambda start: float(change[start + length - 1] - change[start]))

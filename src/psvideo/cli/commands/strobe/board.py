@@ -153,7 +153,7 @@ def _is_everybody_warned(plan: Path, warning: str) -> bool:
 def _print_run(voice: Voice, played: StrobeRun, log: Path | None) -> None:
     outcome = played.outcome
     how = {"done": "Played", "stopped": "Stopped after"}.get(outcome.ended, "Broken off after")
-    voice.say(f"{how} {outcome.cycles} whole cycles of {played.program.played.dark_every} round(s) each.")
+    voice.say(f"{how} {outcome.cycles} whole cycles of {len(played.program.played.dark_rounds)} round(s) each.")
     if outcome.clock is not None and outcome.clock.gain_error_ppm <= WORTH_SAYING_PPM:
         clock = outcome.clock
         voice.say(

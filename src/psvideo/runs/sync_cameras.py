@@ -1,0 +1,78 @@
+"""The whole of ``psvideo sync`` for several cameras: clips of one strobe in, their clocks against each other out."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from psvideo.compute.progress import Watch, unwatched
+from psvideo.errors import UsageError
+from psvideo.formats.clocks_json import SCHEMA, format_clocks
+from psvideo.formats.paths import path_if_given, path_of
+from psvideo.formats.whole_files import refuse_existing, write_text
+from psvideo.model.camera_clocks import CameraClocks
+from psvideo.runs.caller import PYTHON, Caller, say_of_clip
+from psvideo.sync.cameras import CameraTake, camera_clocks
+from psvideo.sync.open_take import open_take
+from psvideo.sync.take_timing import find_take_timing
+
+
+def sync_cameras(
+    clips: Sequence[Path | str],
+    *,
+    out: Path | str | None = None,
+    starts_s: Sequence[float] | None = None,
+    force: bool = False,
+    watch: Watch = unwatched,
+    caller: Caller = PYTHON,
+) -> CameraClocks:
+    """Find how the clocks of several cameras stand to each other, from the flashes of the one strobe that they saw.
+
+    Parameters
+    ----------
+    clips
+        Two clips or more, each with the plan of its own camera beside it; the first one's clock is the reference.
+    out
+        A clocks.json to write; ``force`` replaces it where it exists.
+    starts_s
+        Roughly when each clip began, in seconds on any one clock: needed where the marker leaves it open which flashes
+        are the same. A coded marker does not.
+    watch, caller
+        Are handed every long loop, and the sentences that come on the way.
+
+    Returns
+    -------
+    CameraClocks
+        Of every camera ``offset_s``, ``rate_ppm``, ``drift_ppm_per_s`` and ``error_s`` against the first one.
+
+    Raises
+    ------
+    UsageError
+        Where ``out`` exists, or ``starts_s`` are not as many as ``clips``.
+    PsvideoError
+        Where cameras saw different strobes, share no flashes, or it is not certain which they share.
+
+    Examples
+    --------
+    >>> import psvideo as ps
+    >>> clocks = ps.sync_cameras(["camA/", "camB/"])  # doctest: +SKIP
+    """
+    out = path_if_given("out", out)
+    if out is not None:
+        refuse_existing(out, force=force, mark=SCHEMA)
+    if len(clips) < 2:
+        raise UsageError("`clips`: expected two or more, of cameras that saw one strobe.")
+    if starts_s is not None and len(starts_s) != len(clips):
+        raise UsageError(f"`starts_s`: found {len(starts_s)} for {len(clips)} clips; expected one for each.")
+    takes = []
+    for clip in clips:
+        take = open_take(path_of("clips", clip))
+        say_of_clip(take.clip, caller)
+        timing = find_take_timing(take, watch=watch)
+        for note in timing.notes:
+            caller.warn(f"{take.clip.name}: {note}")
+        takes.append(CameraTake(plan=take.plan, timing=timing))
+    clocks = camera_clocks(takes, starts_s=starts_s)
+    for note in clocks.notes:
+        caller.warn(note)
+    if out is not None:
+        write_text(out, format_clocks(clocks))
+    return clocks

@@ -1,0 +1,187 @@
+"""Which flashes several cameras share, and how their clocks stand to each other for it.
+
+Every camera finds the flashes on its own clock. The marker says where in the strobe's cycle a clip begins; clips that
+run at the same time share flashes, so of all whole cycles that may lie between two clips only those are possible at
+which they overlap. Where more than one is, nothing is chosen: the user must say roughly when the clips began.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from psvideo.errors import PsvideoError, UsageError
+from psvideo.model.camera_clocks import CameraClock, CameraClocks
+from psvideo.model.marker import cycle_places
+from psvideo.model.plan import Plan
+from psvideo.model.timing import Timing
+from psvideo.strobe.runlog import CAMERA_CLOCK_PPM
+
+LEAST_SHARED = 8
+"""Flashes that two clips must share: a rate from fewer says nothing."""
+MISNAMED_PPM = 1000.0
+"""By how much a frame rate that is misnamed by 1.001 moves a clock."""
+CLEAR = 4.0
+"""Standard errors by which a drift, or another strobe, must show."""
+LEAST_ERROR_S = 0.2e-6
+"""No time is taken to be known better than so: shutters and LEDs are not."""
+NEAR = 0.25
+"""A start that is given decides between cycles where it is off by less than this share of one."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraTake:
+    """What one camera saw: its plan, and the timing that was found in its clip."""
+
+    plan: Plan
+    timing: Timing
+
+
+def camera_clocks(takes: Sequence[CameraTake], *, starts_s: Sequence[float] | None = None) -> CameraClocks:
+    """Return the cameras' clocks against the first one's.
+
+    ``starts_s`` says roughly when every clip began, on any one clock: it decides where the marker leaves several whole
+    cycles possible. Raises PsvideoError where the cameras saw different strobes, where clips share too few flashes, and
+    where which flashes they share is not known.
+    """
+    first = takes[0]
+    for take in takes:
+        _refuse_other_plan(first, take)
+        _refuse_guess(take.timing)
+    cycle_s = first.plan.cycle_s
+    cameras, decided, notes = [], True, []
+    for k, take in enumerate(takes):
+        wanted_s = None if starts_s is None else starts_s[k] - starts_s[0]
+        possible = _possible(first, take)
+        decided &= len(possible) == 1
+        number = _chosen(first, take, possible, wanted_s)
+        cameras.append(_clock(first, take, number))
+        notes += _notes(first.timing, take.timing, cameras[-1])
+    numbering = "marker" if decided else "given"
+    return CameraClocks(cameras=tuple(cameras), numbering=numbering, cycle_s=cycle_s, notes=tuple(notes))  # type: ignore[arg-type]
+
+
+def _refuse_other_plan(first: CameraTake, take: CameraTake) -> None:
+    one, other = (replace(each.plan, camera=first.plan.camera, clock_tolerance_ppm=None) for each in (first, take))
+    if abs(one.dark_s - other.dark_s) > 1e-9 or replace(one, dark_s=other.dark_s) != other:
+        raise PsvideoError(
+            f"{take.timing.clip}: its plan's strobe is not {first.timing.clip}'s: expected the same flashes, dark time "
+            f"({one.dark_s * 1e3:.6g} ms, found {other.dark_s * 1e3:.6g} ms) and dark slots in both, as one strobe "
+            "played them. Put the plan that was played beside every clip, with each camera's own [camera] table and "
+            "dark_s written out."
+        )
+
+
+def _refuse_guess(timing: Timing) -> None:
+    if timing.order == "guess":
+        raise PsvideoError(
+            f"{timing.clip}: which flash is which is a guess, as the plan has no marker, so nothing says which flashes "
+            "two cameras share. Plan with a coded marker (`marker` coded)."
+        )
+
+
+def _slots(timing: Timing) -> list[int]:
+    return [flash.slot for flash in timing.flashes]
+
+
+def _possible(first: CameraTake, take: CameraTake) -> list[int]:
+    """Return the numbers that a clip's flash 0 may have among the first clip's, where they share any flash."""
+    cycle = len(first.plan.cycle_slots)
+    counts = len(first.timing.flashes), len(take.timing.flashes)
+    ours, theirs = (cycle_places(each.plan, _slots(each.timing)) for each in (first, take))
+    apart = {(place - base) % cycle for place in theirs for base in ours}
+    if first is take:
+        return [0]
+    return [number for number in range(1 - counts[1], counts[0]) if number % cycle in apart]
+
+
+def _chosen(first: CameraTake, take: CameraTake, possible: Sequence[int], wanted_s: float | None) -> int:
+    names = f"{take.timing.clip} and {first.timing.clip}"
+    if len(possible) > 1 and wanted_s is None:
+        choices = ", ".join(f"{_began_s(first, take, number):+.3f}" for number in possible[:6])
+        more = ", ..." if len(possible) > 6 else ""
+        raise PsvideoError(
+            f"{names}: the strobe repeats itself every {first.plan.cycle_s:.4g} s, so which flashes they share is not "
+            f"certain: {take.timing.clip} may have begun {choices}{more} s after {first.timing.clip}. Say roughly when "
+            "each clip began, in seconds of any clock (`starts_s`), or plan with a longer code (`marker` coded)."
+        )
+    if wanted_s is not None and possible:
+        number = min(possible, key=lambda one: abs(_began_s(first, take, one) - wanted_s))
+        off_s = abs(_began_s(first, take, number) - wanted_s)
+        if len(possible) > 1 and off_s > NEAR * first.plan.cycle_s:
+            raise UsageError(
+                f"`starts_s`: {names} are said to begin {wanted_s:.3f} s apart, and the nearest that the flashes allow "
+                f"is {_began_s(first, take, number):.3f} s; with a cycle of {first.plan.cycle_s:.4g} s that decides "
+                "nothing. Give starts that are right to a fifth of a cycle, or plan with a longer code."
+            )
+        possible = [number]
+    shared = max(
+        (_overlap(first, take, number)[1] - _overlap(first, take, number)[0] for number in possible), default=0
+    )
+    if shared < LEAST_SHARED:
+        raise PsvideoError(
+            f"{names} share {shared} flash(es); expected {LEAST_SHARED} at least. Clips must run at the same time, and "
+            "with the first one named."
+        )
+    return possible[0]
+
+
+def _began_s(first: CameraTake, take: CameraTake, number: int) -> float:
+    """Return how long after the first clip another began, were its flash 0 that flash of the first clip's."""
+    cycle = first.plan.train(cycle_places(first.plan, _slots(first.timing))[0], 1)
+    place = cycle_places(first.plan, _slots(first.timing))[0]
+    strobe_s = float(first.plan.train(place + number, 1).start_s[0] - cycle.start_s[0])
+    return first.timing.flashes[0].start_s + strobe_s - take.timing.flashes[0].start_s
+
+
+def _overlap(first: CameraTake, take: CameraTake, number: int) -> tuple[int, int]:
+    """Return the first clip's flashes that both saw, as a range."""
+    return max(0, number), min(len(first.timing.flashes), number + len(take.timing.flashes))
+
+
+def _clock(first: CameraTake, take: CameraTake, number: int) -> CameraClock:
+    begin, end = _overlap(first, take, number)
+    reference_s = first.timing.start_s[begin:end]
+    camera_s = take.timing.start_s[begin - number : end - number]
+    known_s = float(np.hypot(first.timing.phase_error_s or 0.0, take.timing.phase_error_s or 0.0))
+    error_s = 0.0 if first is take else max(known_s, LEAST_ERROR_S)
+    ahead_s = reference_s - camera_s
+    fit = np.polynomial.Polynomial.fit(camera_s, ahead_s, 1)
+    if _rms_s(fit(camera_s) - ahead_s) > error_s:
+        bent = np.polynomial.Polynomial.fit(camera_s, ahead_s, 2)
+        fit = bent if _rms_s(bent(camera_s) - ahead_s) < 0.5 * _rms_s(fit(camera_s) - ahead_s) else fit
+    left_s = _rms_s(fit(camera_s) - ahead_s)
+    if left_s > CLEAR * error_s:
+        raise PsvideoError(
+            f"{take.timing.clip} and {first.timing.clip} do not follow one clock: their flashes are "
+            f"{left_s * 1e6:.3g} us off a steady drift, and known to {error_s * 1e6:.2g} us. Did the "
+            "cameras see different strobes, or does a clip lack frames that its timing does not list?"
+        )
+    powers = (*fit.convert().coef, 0.0, 0.0)
+    return CameraClock(
+        clip=take.timing.clip,
+        first_flash=number,
+        offset_s=float(powers[0]),
+        rate_ppm=float(powers[1]) * 1e6,
+        drift_ppm_per_s=2e6 * float(powers[2]),
+        shared=end - begin,
+        error_s=float(np.hypot(error_s, left_s)),
+    )
+
+
+def _rms_s(times_s: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(times_s**2)))
+
+
+def _notes(first: Timing, timing: Timing, clock: CameraClock) -> list[str]:
+    """Say where clocks are further apart than cameras' are. Raises PsvideoError where no frame rate explains it."""
+    apart = abs(clock.rate_ppm)
+    if apart <= 2 * CAMERA_CLOCK_PPM:
+        return []
+    told = f"{timing.clip} and {first.clip}: their clocks are {clock.rate_ppm:+.0f} ppm apart"
+    if abs(apart - MISNAMED_PPM) <= 2 * CAMERA_CLOCK_PPM:
+        return [f"{told}: one plan's frame rate is probably misnamed by 1.001 (24 for 23.976)."]
+    raise PsvideoError(
+        f"{told}, and cameras' clocks are within {2 * CAMERA_CLOCK_PPM:g} ppm of each other. The cameras saw different "
+        "strobes, or a plan's frame rate is wrong."
+    )

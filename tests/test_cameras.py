@@ -1,0 +1,206 @@
+"""Several cameras that saw one strobe: codes, places in them, and clocks, against clocks that are known."""
+
+import itertools
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from psvideo.cli.app import main
+from psvideo.errors import PsvideoError, UsageError
+from psvideo.formats.plan_toml import format_plan, parse_plan
+from psvideo.model.camera_clocks import CameraClock
+from psvideo.model.marker import alike_turns, cycle_places
+from psvideo.model.maximal_length import TAPS, maximal_length
+from psvideo.model.plan import Plan
+from psvideo.model.timing import Flash, Timing
+from psvideo.sync.cameras import CameraTake, camera_clocks
+
+PlanMaker = Callable[..., Plan]
+TRUE = CameraClock(clip="B", first_flash=0, offset_s=1.7, rate_ppm=41.0, drift_ppm_per_s=0.0, shared=0, error_s=0.0)
+
+
+@pytest.mark.parametrize("order", TAPS)
+def test_every_run_of_a_maximal_length_sequence_but_zeros_stands_once(order: int) -> None:
+    bits = maximal_length(order)
+    runs = {tuple((bits * 2)[n : n + order]) for n in range(len(bits))}
+    assert len(bits) == len(runs) == 2**order - 1
+    assert not any(not any(run) for run in runs)
+
+
+def test_a_coded_plan_shows_its_place_in_any_run_of_rounds(make_plan: PlanMaker) -> None:
+    plan = replace(make_plan(), dark_code=5)
+    assert alike_turns(plan) == (0,)
+    cycle = plan.cycle_slots
+    assert len(cycle) == 3 * 31 + 16
+    for place, length in itertools.product(range(len(cycle)), (24, 30)):
+        assert cycle_places(plan, [cycle[(place + k) % len(cycle)] for k in range(length)]) == (place,)
+    assert parse_plan(format_plan(plan)) == plan
+
+
+def seen(plan: Plan, clock: CameraClock, *, begin: int, count: int, error_s: float = 0.0, seed: int = 0) -> CameraTake:
+    """What a camera sees of the flashes ``begin`` and on, whose true times are the strobe's, on the reference clock."""
+    train = plan.train(begin, count)
+    camera_s = np.array([_on_camera(clock, float(time_s)) for time_s in train.start_s])
+    camera_s += error_s * np.random.default_rng(seed).standard_normal()
+    flashes = tuple(
+        Flash(
+            index=k,
+            slot=int(slot),
+            lights=plan.flashes[slot].lights,
+            start_s=float(start_s),
+            duration_s=0.0008,
+            complete=True,
+        )
+        for k, (slot, start_s) in enumerate(zip(train.slot, camera_s, strict=True))
+    )
+    timing = Timing(
+        clip=clock.clip,
+        frame_period_s=plan.camera.frame_period_s,
+        exposure_s=plan.camera.exposure_s,
+        row_time_s=1e-5,
+        clock_offset_ppm=0.0,
+        phase_error_rows=0.1,
+        phase_error_s=max(error_s, 1e-7),
+        order="marker",
+        flashes=flashes,
+    )
+    return CameraTake(plan=plan, timing=timing)
+
+
+def _on_camera(clock: CameraClock, reference_s: float) -> float:
+    """Invert the polynomial by Newton's steps."""
+    camera_s = reference_s - clock.offset_s
+    for _ in range(6):
+        camera_s += reference_s - float(clock.reference_s(np.array([camera_s]))[0])
+    return camera_s
+
+
+AT_FIRST = replace(TRUE, clip="A", offset_s=0.0, rate_ppm=0.0)
+
+
+@pytest.mark.parametrize("drift", [0.0, 8.0])
+@pytest.mark.parametrize("begin", [-60, 0, 90])
+def test_a_clock_is_found_from_the_flashes_that_two_cameras_share(
+    make_plan: PlanMaker, drift: float, begin: int
+) -> None:
+    plan = replace(make_plan(), dark_code=7)
+    other = replace(plan, camera=replace(plan.camera, fps=Fraction(50), exposure_s=0.008))
+    true = replace(TRUE, drift_ppm_per_s=drift)
+    clocks = camera_clocks([seen(plan, AT_FIRST, begin=0, count=200), seen(other, true, begin=begin, count=200)])
+    found = clocks.cameras[1]
+    assert (clocks.numbering, found.first_flash) == ("marker", begin)
+    at_s = np.array([_on_camera(true, float(time_s)) for time_s in plan.train(max(begin, 0), 50).start_s])
+    assert found.reference_s(at_s) == pytest.approx(true.reference_s(at_s), abs=0.5e-6)
+    assert found.drift_ppm_per_s == pytest.approx(drift, abs=0.01)
+
+
+def test_whole_cycles_that_nothing_decides_are_listed_and_never_chosen(make_plan: PlanMaker) -> None:
+    plan = make_plan()
+    takes = [seen(plan, AT_FIRST, begin=0, count=60), seen(plan, TRUE, begin=17, count=60)]
+    with pytest.raises(PsvideoError, match=r"repeats itself every .* may have begun"):
+        camera_clocks(takes)
+    began_s = takes[0].timing.flashes[17].start_s - takes[1].timing.flashes[0].start_s
+    clocks = camera_clocks(takes, starts_s=[100.0, 100.0 + began_s + 0.1 * plan.cycle_s])
+    assert (clocks.numbering, clocks.cameras[1].first_flash) == ("given", 17)
+    with pytest.raises(UsageError, match="decides nothing"):
+        camera_clocks(takes, starts_s=[100.0, 100.0 + began_s + 0.45 * plan.cycle_s])
+
+
+def test_exact_numbers_after_any_cut_of_two_seconds(make_plan: PlanMaker) -> None:
+    plan = replace(make_plan(lights=("key", "left", "right", "top")), dark_code=7)
+    count = round(2.0 * len(plan.cycle_slots) / plan.cycle_s)
+    first = seen(plan, AT_FIRST, begin=0, count=count)
+    for begin in (*range(-count + 12, count - 12, 31), count - 12):
+        assert camera_clocks([first, seen(plan, TRUE, begin=begin, count=count)]).cameras[1].first_flash == begin
+
+
+def test_cameras_of_different_strobes_are_refused(make_plan: PlanMaker) -> None:
+    plan = replace(make_plan(), dark_code=6)
+    first = seen(plan, AT_FIRST, begin=0, count=200)
+    other = make_plan(duration_s=0.0009)
+    with pytest.raises(PsvideoError, match="strobe is not A's"):
+        camera_clocks([first, seen(replace(other, dark_code=6), TRUE, begin=0, count=200)])
+    with pytest.raises(PsvideoError, match="saw different strobes"):
+        camera_clocks([first, seen(plan, replace(TRUE, rate_ppm=2400.0), begin=0, count=200)])
+    with pytest.raises(PsvideoError, match="share 0 flash"):
+        camera_clocks([seen(plan, AT_FIRST, begin=0, count=100), seen(plan, TRUE, begin=150, count=20)])
+    late = seen(plan, TRUE, begin=0, count=200).timing
+    jumped = tuple(replace(f, start_s=f.start_s + 3e-4 * (f.index > 120)) for f in late.flashes)
+    with pytest.raises(PsvideoError, match="do not follow one clock"):
+        camera_clocks([first, CameraTake(plan=plan, timing=replace(late, flashes=jumped))])
+    misnamed = camera_clocks([first, seen(plan, replace(TRUE, rate_ppm=1020.0), begin=0, count=200)])
+    assert "misnamed" in misnamed.notes[0]
+    guessed = CameraTake(plan=plan, timing=replace(first.timing, order="guess"))
+    with pytest.raises(PsvideoError, match="is a guess"):
+        camera_clocks([first, guessed])
+
+
+SCENE = """
+schema = "psvideo-scene/1"
+name = "{name}"
+frames = {frames}
+seed = {seed}
+[camera]
+width_px = 24
+height_px = 64
+fps = {fps}
+shutter_deg = {shutter}
+readout_s = {readout}
+width_m = 0.4
+colour = "grey"
+[strobe]
+flash_s = 0.0008
+dark_s = 0.0103
+dark_code = 5
+clock_offset_ppm = {ppm}
+phase_s = {phase}
+[[light]]
+name = "a"
+direction = [0.3, 0.3, 0.9]
+[[light]]
+name = "b"
+direction = [-0.3, 0.3, 0.9]
+[output]
+dropped = {dropped}
+[[object]]
+mesh = "sphere"
+scale = 0.15
+albedo = { pattern = "noise", size_m = 0.02 }
+"""
+
+
+def film(folder: Path, name: str, **scene: object) -> Path:
+    (folder / f"{name}.toml").write_text(SCENE.format(name=name, **scene))
+    assert main(["synth", str(folder / f"{name}.toml"), "-o", str(folder / name), "-q"]) == 0
+    return folder / name
+
+
+def test_sync_of_several_clips_of_unlike_cameras_writes_their_clocks(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The strobe's second is 60 ppm longer than A's and 25 ppm longer than B's; B began 0.21 s later."""
+    a, b = 60e-6, 25e-6
+    first = film(
+        tmp_path, "A", frames=48, seed=1, fps=100, shutter=360, readout=0.008, ppm=60, phase=-0.2, dropped=[20]
+    )
+    later_s, start_s = 0.21, 0.2 / (1 + a)
+    phase_b_s = -(later_s / (1 + a) + start_s) * (1 + b)
+    other = film(
+        tmp_path, "B", frames=40, seed=2, fps=120, shutter=360, readout=-0.006, ppm=25, phase=phase_b_s, dropped=[]
+    )
+    capsys.readouterr()
+    assert main(["sync", str(first), str(other), "-o", str(tmp_path / "clocks.json")]) == 0
+    assert "known from the marker" in capsys.readouterr().out
+    clocks = json.loads((tmp_path / "clocks.json").read_text())
+    found = clocks["cameras"][1]
+    assert (clocks["schema"], clocks["reference"], clocks["numbering"]) == ("psvideo-clocks/1", "A", "marker")
+    assert found["offset_s"] == pytest.approx(later_s, abs=2e-6)
+    assert found["rate_ppm"] == pytest.approx(35.0, abs=5.0)
+    assert main(["sync", str(first), str(other), "--first-light", "a"]) == 2
+    assert "belongs to one clip" in capsys.readouterr().err
+    assert main(["sync", str(first), str(other), "--starts", "0"]) == 2
