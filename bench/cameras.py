@@ -13,7 +13,7 @@ from psvideo.errors import PsvideoError
 from psvideo.model.camera_clocks import CameraClock
 from psvideo.model.plan import Plan
 from psvideo.model.row_profiles import collect
-from psvideo.sync.cameras import CameraTake, camera_clocks
+from psvideo.sync.shared_flashes import CameraTake, camera_clocks
 from psvideo.sync.find import find_timing
 from psvideo.synth import Noise, TrueClock, expose
 

@@ -18,7 +18,7 @@ from psvideo.model.marker import alike_turns, cycle_places
 from psvideo.model.maximal_length import TAPS, maximal_length
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Flash, Timing
-from psvideo.sync.cameras import CameraTake, camera_clocks
+from psvideo.sync.shared_flashes import CameraTake, camera_clocks
 
 PlanMaker = Callable[..., Plan]
 TRUE = CameraClock(clip="B", first_flash=0, offset_s=1.7, rate_ppm=41.0, drift_ppm_per_s=0.0, shared=0, error_s=0.0)
@@ -168,9 +168,9 @@ direction = [-0.3, 0.3, 0.9]
 [output]
 dropped = {dropped}
 [[object]]
-mesh = "sphere"
-scale = 0.15
-albedo = { pattern = "noise", size_m = 0.02 }
+mesh = "plane"
+scale = 4.0
+albedo = {{ pattern = "noise", size_m = 0.03 }}
 """
 
 

@@ -152,6 +152,7 @@ PRINTED_WITH = {
     "psvideo.capture.drawing.diagram.diagram_text",
     "psvideo.capture.tables.camera_table",
     "psvideo.capture.tables.shoot_report",
+    "psvideo.formats.clocks_json.clocks_record",
     "psvideo.formats.timing_json.timing_record",
     "psvideo.report.run_report.report_record",
     "psvideo.strobe.program_words.describe_program",
