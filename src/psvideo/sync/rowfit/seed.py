@@ -8,10 +8,10 @@ import numpy as np
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import UNKNOWN_CLOCK_PPM, Plan
 from psvideo.sync.rowfit.beat import Beat, FoundClock
-from psvideo.sync.rowfit.rounds_first import search_coded
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import refine
 from psvideo.sync.rowfit.retime import Mask, Numbering, as_numbered, fold_frames, inserted, likeliest, stood_in, twins
+from psvideo.sync.rowfit.rounds_first import search_coded
 from psvideo.sync.rowfit.search import search
 from psvideo.sync.rowfit.track import frame_losses
 
