@@ -79,7 +79,7 @@ def _seen(camera: _Camera, begins_s: float, seed: int) -> CameraTake:
         clock=TrueClock(phase_s=-begins_s * rate, offset_ppm=camera.ppm),
         noise=Noise(full_well_e=20_000, read_e=8),
         bits=12,
-        dropped=frozenset(camera.dropped),
+        dropped=camera.dropped,
     )
     pairs = [HeldFrame(index=n, image=image) for n, image in zip(shot.indices, shot.frames, strict=True)]
     indices, profiles = collect(iter(pairs))
