@@ -20,8 +20,11 @@ from psvideo.errors import PsvideoError, UsageError, nearest
 
 STOPPED = 130
 """What the command line library ends with when the user interrupts."""
-M_ARENA_MAX = -8
-"""glibc's number of the setting (malloc.h)."""
+M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8
+"""glibc's numbers of the settings (malloc.h)."""
+MOST_IN_HEAP_BYTES, MOST_SPARE_BYTES = 32 << 20, 1 << 30
+"""Pictures up to so many bytes, the most that glibc allows, lie in the heap, and so much of it may be free: a run's
+pictures come and go in the same memory, which the system would clear each time that it is given back."""
 
 
 def application(arguments: Sequence[str]) -> typer.Typer:
@@ -117,7 +120,10 @@ def _share_one_heap() -> None:
     another drops would cost memory several times.
     """
     with contextlib.suppress(OSError, AttributeError, TypeError):  # another C library, or none to be called by name
-        ctypes.CDLL(None).mallopt(M_ARENA_MAX, 1)
+        mallopt = ctypes.CDLL(None).mallopt
+        mallopt(M_ARENA_MAX, 1)
+        mallopt(M_MMAP_THRESHOLD, MOST_IN_HEAP_BYTES)
+        mallopt(M_TRIM_THRESHOLD, MOST_SPARE_BYTES)
 
 
 if __name__ == "__main__":

@@ -22,6 +22,7 @@ from typing import Any, TypeVar
 import numba
 from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
 from numba.core.dispatcher import Dispatcher
+from numba.core.runtime import rtsys
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 _Cache: Any = FunctionCache
@@ -57,7 +58,7 @@ class _Kept(_Cache):  # type: ignore[misc]
     def load_overload(self, signature: Any, target: Any) -> Any:
         for place in (self._cache_file, self._installed):
             with contextlib.suppress(*_UNREADABLE):
-                target.refresh()
+                rtsys.initialize(target)  # all that kept code needs of numba; to compile, numba loads the rest itself
                 data = place.load(self._index_key(signature, target.codegen()))
                 if data is not None:
                     return self._impl.rebuild(target, data)

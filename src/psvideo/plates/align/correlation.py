@@ -8,7 +8,6 @@ from collections.abc import Sequence
 
 import cv2
 import numpy as np
-from scipy import fft
 
 from psvideo.plates.align.flow import Vectors
 
@@ -23,6 +22,8 @@ AROUND_PX = 3
 
 def displacements(pairs: Sequence[tuple[Vectors, ...]], count: int) -> list[tuple[float, float]]:
     """Return the likeliest displacements (x right, y down, in pixels) from the first pictures to the second ones."""
+    from scipy import fft  # scipy takes 15 MB, which runs do without where nothing moves
+
     shape = pairs[0][0].shape
     scale = max(-(-max(shape) // LARGEST_PX), 1)
     rows, cols = (max(side // scale, 1) for side in shape)

@@ -9,7 +9,6 @@ eigenvector of the sum of ``(light lightT) * (1 - L L+)``.
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 from numpy.typing import NDArray
 
 from psvideo.model.camera import FloatArray
@@ -54,7 +53,9 @@ def rig_fit(light: FloatArray, vectors: FloatArray) -> RigFit | None:
     values = np.linalg.eigvalsh(moments)
     own = float(np.sqrt(max(values[: count - 3].sum(), 0) / values.sum()))
     gains = np.einsum("pi,pj,pij->ij", unit, unit, np.broadcast_to(beyond, (len(unit), count, count)))
-    share, h = (found[..., 0] for found in scipy.linalg.eigh(gains, np.diag(np.diag(moments))))
+    unit_free = 1 / np.sqrt(np.diag(moments))  # of gains h = share * diag(moments) h
+    share, h = (found[..., 0] for found in np.linalg.eigh(unit_free[:, None] * gains * unit_free))
+    h = unit_free * h
     true = 1 / np.maximum(np.abs(h), 1e-3 * np.abs(h).max())
     strengths = tuple(float(value) for value in true / np.median(true))
     return RigFit(misfit=misfit, own_misfit=own, scaled_misfit=float(np.sqrt(max(share, 0))), strengths=strengths)

@@ -5,7 +5,6 @@ for periodic; the cosine transform (T. Simchony et al. 1990) leaves its border f
 """
 
 import numpy as np
-from scipy.fft import dctn, idctn
 
 from psvideo.model.camera import FloatArray
 from psvideo.solve.depth.view import Slopes
@@ -17,6 +16,8 @@ def poisson_height(slopes: Slopes) -> FloatArray:
     A step between two pixels is to be the mean of their slopes, all steps count alike. Every pixel must be valid: a
     ``facing`` of 0 anywhere gives no sense.
     """
+    from scipy.fft import dctn, idctn  # scipy takes 15 MB, which runs without depth do without
+
     rows, cols = slopes.facing.shape
     spectrum = dctn(_divergence(slopes), type=2, norm="ortho", overwrite_x=True)
     down, across = _eigenvalues(rows), _eigenvalues(cols)

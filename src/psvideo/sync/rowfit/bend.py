@@ -7,7 +7,6 @@ marginal likelihood of the fit, and a clock that runs straight stays straight.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
@@ -108,6 +107,8 @@ def _inflation(hessian: FloatArray, scores: FloatArray, rows: Profiles) -> float
 
 def _wandering(hessian: FloatArray, pull: FloatArray, beat: Beat, knots: _Knots) -> tuple[float, float]:
     """Return the most likely strength of the rate's random walk, and its log-likelihood above a straight clock's."""
+    from scipy.linalg import cho_solve_banded, cholesky_banded  # runs with a timing do without scipy
+
     size = len(knots.at_s)
     h = hessian[:size, :size]
     if not h.any():
