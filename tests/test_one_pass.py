@@ -48,7 +48,7 @@ def decoded(monkeypatch: pytest.MonkeyPatch) -> collections.Counter[str]:
         count.update([file.name])
         return decode(kind, file)
 
-    monkeypatch.setattr(reading, "decode", counted)
+    monkeypatch.setattr(reading, "opened", counted)
     return count
 
 

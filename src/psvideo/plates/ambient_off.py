@@ -13,8 +13,11 @@ from psvideo.plates.mixture import made
 from psvideo.plates.split import Plate
 
 
-def with_darks_ahead(plates: Iterator[Plate], timing: Timing) -> tuple[Iterator[Plate], Iterator[Plate]]:
-    """Return a clip's plates, and the dark slots among them ahead of the others, which wait meanwhile.
+def with_darks_ahead(
+    plates: Iterator[Plate], timing: Timing, *, beyond: int = -1
+) -> tuple[Iterator[Plate], Iterator[Plate]]:
+    """Return a clip's plates, and the dark slots among them ahead of the others, which wait meanwhile: those after the
+    flash with the index ``beyond``.
 
     No plate is made for waiting: it holds the frames that it will be made of.
     """
@@ -28,7 +31,7 @@ def with_darks_ahead(plates: Iterator[Plate], timing: Timing) -> tuple[Iterator[
         if plate is None:
             return False
         waiting.append(plate)
-        unseen.extend([plate] if plate.flash.is_dark else [])
+        unseen.extend([plate] if plate.flash.is_dark and plate.flash.index > beyond else [])
         return True
 
     def coming() -> Iterator[Plate]:
@@ -36,7 +39,7 @@ def with_darks_ahead(plates: Iterator[Plate], timing: Timing) -> tuple[Iterator[
             yield waiting.popleft()
 
     def darks() -> Iterator[Plate]:
-        found = -1
+        found = beyond
         while found < last:
             while not unseen:
                 if not pull():

@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
-from itertools import pairwise
+from itertools import chain, islice, pairwise
 from typing import TypeVar
 
 import numpy as np
@@ -37,6 +37,9 @@ AnyPlate = TypeVar("AnyPlate", Plate, LightPlate)
 
 MOST_WAITING = 24
 """Plates that may wait for the next dark slot; frames are held for them, and farther ones are read before."""
+EARLY_DARKS = 2
+"""Dark slots at the clip's start whose few frames are read on their own where that is quick, so that no plate waits
+for them: two show whether the ambient light is steady, and where it is none waits later."""
 AHEAD = 2
 """Frames that are decoded in advance while plates are rebuilt; each costs memory. Files that hold plain codes are read
 so quickly that one is enough."""
@@ -142,7 +145,10 @@ def clip_plates(
     frames = _placed(watch(decoded, total=len(take.numbers), what="rebuilding flashes"), places)
     single = (split if method == "weights" else hudon2015.split)(frames, camera, used)
     if come_often:
-        single, darks = with_darks_ahead(single, used)
+        known_early = EARLY_DARKS if holds_plain_codes(clip) else 0
+        early = [flash.index for flash in used.flashes if flash.is_dark and flash.complete][:known_early]
+        single, ahead_of_plates = with_darks_ahead(single, used, beyond=max(early, default=-1))
+        darks = chain(islice(_dark_plates(take, camera, used, places), len(early)), ahead_of_plates)
     elif has_dark:
         darks = _dark_plates(take, camera, used, places)
     else:
