@@ -220,7 +220,7 @@ def test_no_more_than_the_frames_asked_for_are_decoded_ahead(shot: Path, monkeyp
         decoded.append(file.name)
         return decode(kind, file)
 
-    monkeypatch.setattr(reading, "decode", counted)
+    monkeypatch.setattr(reading, "opened", counted)
     for number in range(13, 33):
         write_png(shot / "frames" / f"shot.{number}.png")
     frames = read_frames(open_clip(shot), ahead=2)

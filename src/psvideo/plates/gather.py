@@ -147,8 +147,8 @@ def clip_plates(
     if come_often:
         known_early = EARLY_DARKS if holds_plain_codes(clip) else 0
         early = [flash.index for flash in used.flashes if flash.is_dark and flash.complete][:known_early]
-        single, ahead_of_plates = with_darks_ahead(single, used, beyond=max(early, default=-1))
-        darks = chain(islice(_dark_plates(take, camera, used, places), len(early)), ahead_of_plates)
+        single, later = with_darks_ahead(single, used, beyond=max(early, default=-1))
+        darks: Iterator[Plate] = chain(islice(_dark_plates(take, camera, used, places), len(early)), later)
     elif has_dark:
         darks = _dark_plates(take, camera, used, places)
     else:
