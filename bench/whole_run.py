@@ -1,9 +1,10 @@
 """A whole `normals` run at 1080p: what each further frame costs, beside its files alone.
 
-``python -m bench.whole_run [WORDS ...] [--against FOLDER] [--cache FOLDER]``: words choose rows ("tiff", "3", "moving";
-one of several words of a kind), FOLDER is a checkout of an earlier state, which is run in the same turns. Figures are
-differences between a long and a short run of whole processes, over the frames between them: starting up, compiling and
-the report do not count. Processor seconds are the user's and the system's together, the least of so many turns.
+``python -m bench.whole_run [WORDS ...] [--against FOLDER] [--cache FOLDER] [--turns N]``: words choose rows ("tiff",
+"3", "moving"; one of several words of a kind), FOLDER is a checkout of an earlier state, which is run in the same
+turns. A row takes minutes. Figures are differences between a long and a short run of whole processes, over the frames
+between them: starting up, compiling and the report do not count. Processor seconds are the user's and the system's
+together, the least of so many turns.
 """
 
 import argparse
@@ -94,14 +95,16 @@ class Further:
         return f"{1e3 * self.processor_s:.0f} / {1e3 * self.wall_s:.0f}"
 
 
-def rows(words: Sequence[str] = (), *, against: Path | None = None, cache: Path = CACHE) -> Iterator[Whole]:
+def rows(
+    words: Sequence[str] = (), *, against: Path | None = None, cache: Path = CACHE, turns: int = TURNS
+) -> Iterator[Whole]:
     """Measure the clips that words choose, all where there are none; ``against`` as in the module's sentence."""
     for lights in LIGHTS:
         for kind in get_args(Kind):
             for moving in (False, True):
                 clip = ClipOf(kind=kind, lights=lights, moving=moving)
                 if chosen(clip, words):
-                    yield from _rows_of(clip, against, cache)
+                    yield from _rows_of(clip, against, cache, turns)
 
 
 def chosen(clip: ClipOf, words: Sequence[str]) -> bool:
@@ -111,7 +114,7 @@ def chosen(clip: ClipOf, words: Sequence[str]) -> bool:
     return all(own in words or not set(every) & set(words) for own, every in zip(named, of_a_kind, strict=True))
 
 
-def _rows_of(clip: ClipOf, against: Path | None, cache: Path) -> Iterator[Whole]:
+def _rows_of(clip: ClipOf, against: Path | None, cache: Path, turns: int) -> Iterator[Whole]:
     rounds = round(FURTHER_FRAMES * clip.plan.camera.frame_period_s / clip.plan.cycle_s)
     short, long = (clip.frames_of(count) for count in (SHORT_ROUNDS, SHORT_ROUNDS + rounds))
     path, rig = filmed(clip, cache, frames=long)
@@ -123,13 +126,13 @@ def _rows_of(clip: ClipOf, against: Path | None, cache: Path) -> Iterator[Whole]
             out, timing = spare / state, spare / f"{state}.json"
             _run(root or HERE, ["-m", "psvideo.cli.app", "sync", path, "-o", timing, "-q"])
             call = ["-m", "psvideo.cli.app", "normals", path, "--rig", rig, "--timing", timing, "-o", out, "-q"]
-            _run(root or HERE, call)  # compiles
             ends = [["--force", "--frames", f"0-{count - 1}"] for count in (short, long)]
+            _run(root or HERE, [*call, *ends[0]])  # compiles
             jobs[state] = root or HERE, [*call, *ends[0]], [*call, *ends[1]]
         jobs["decoding"] = HERE, ["-c", DECODE, path, short], ["-c", DECODE, path, long]
         encode = ["-c", ENCODE, spare / "now", spare / "encoded"]
         jobs["encoding"] = HERE, [*encode, SHORT_ROUNDS], [*encode, SHORT_ROUNDS + rounds]
-        found = all_further(jobs, long - short)
+        found = all_further(jobs, long - short, turns=turns)
     copy_s = _copy_s(clip)
     for state in states:
         yield _row(clip.name, state, found, copy_s)
@@ -151,10 +154,10 @@ def _row(clip: str, state: str, found: dict[str, Further], copy_s: float) -> Who
     )
 
 
-def all_further(jobs: dict[str, Job], frames: int) -> dict[str, Further]:
+def all_further(jobs: dict[str, Job], frames: int, *, turns: int = TURNS) -> dict[str, Further]:
     """Run every job's short and long process, all in turn, and return what each of the frames between them took."""
     costs: dict[str, list[tuple[Cost, Cost]]] = {name: [] for name in jobs}
-    for _ in range(TURNS):
+    for _ in range(turns):
         for name, (root, short, long) in jobs.items():
             costs[name].append((_run(root, short), _run(root, long)))
     return {name: _further(*zip(*taken, strict=True), frames=frames) for name, taken in costs.items()}
@@ -201,5 +204,6 @@ if __name__ == "__main__":
     parser.add_argument("words", nargs="*")
     parser.add_argument("--against", type=Path)
     parser.add_argument("--cache", type=Path, default=CACHE)
+    parser.add_argument("--turns", type=int, default=TURNS)
     given = parser.parse_args()
-    print(table(rows(given.words, against=given.against, cache=given.cache)))
+    print(table(rows(given.words, against=given.against, cache=given.cache, turns=given.turns)))

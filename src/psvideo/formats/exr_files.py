@@ -78,7 +78,8 @@ def _plane(name: str, values: NDArray[np.floating], half: bool) -> NDArray[np.fl
         raise ValueError(f"channel {name!r} has shape {values.shape}; expected (row, col)")
     if values.dtype == np.float16:
         stored = np.ascontiguousarray(values)
-        finite = int((stored.view(np.uint16) & np.uint16(0x7C00)).max()) < 0x7C00
+        # the bits of positive infinity and, as unsigned ones, of negative infinity; NaN's are above
+        finite = int(stored.view(np.int16).max()) < 0x7C00 and int(stored.view(np.uint16).max()) < 0xFC00
     elif half:
         from psvideo.compute.halves import halves_of  # loads the compiler, which reading and help do without
 
