@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import reduce
 
 import numpy as np
+from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import FloatArray
@@ -17,6 +18,8 @@ from psvideo.plates.split import Plate
 FIRST_NUMBER = 1001
 AMBIENT = "ambient"
 """What stands for a light where a dark slot showed the ambient light."""
+POOLED_ROUNDS = 16
+"""Rounds whose results are pooled where nothing moves: a step is then a 16th of what noise makes of one."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,11 +35,15 @@ class Round:
         (row, col[, 3]), float32, linear light.
     ambient
         Such a plate of the dark slot, None where there is none.
+    stood
+        On a coarse grid over the picture, (row, col), True where nothing changed since the round before; None where
+        nobody looked.
     """
 
     number: int
     plates: tuple[LightPlate, ...]
     ambient: LightPlate | None = None
+    stood: NDArray[np.bool_] | None = None
 
     @property
     def time_s(self) -> float:
@@ -159,11 +166,13 @@ def gathered(
         yield handed_over(held, number, lights)
 
 
-def handed_over(held: dict[str, LightPlate], number: int, lights: tuple[str, ...]) -> Round:
+def handed_over(
+    held: dict[str, LightPlate], number: int, lights: tuple[str, ...], stood: NDArray[np.bool_] | None = None
+) -> Round:
     """Return a round of what is held by light, in the order of ``lights``, and hold nothing of it any more."""
     plates, ambient = tuple(held.pop(light) for light in lights if light in held), held.pop(AMBIENT, None)
     held.clear()
-    return Round(number=number, plates=plates, ambient=ambient)
+    return Round(number=number, plates=plates, ambient=ambient, stood=stood)
 
 
 def _of_dark(plate: Plate, number: int) -> LightPlate:

@@ -27,6 +27,7 @@ from psvideo.solve.normals.illumination import Illumination, illumination
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.task import Samples
 from psvideo.solve.passes.made import AskedPasses, Passes, passes_of
+from psvideo.solve.steady import Steady, steadied
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,6 +71,8 @@ def surfaces(
     if shares is not None:
         lights = tuple(where_least_arrives(light, share) for light, share in zip(lights, shares, strict=True))
 
+    steady: Steady | None = None
+
     def solved(one: Round) -> Instant:
         scaled = [per_saturation(light, plate.saturation) for light, plate in zip(lights, one.plates, strict=True)]
         light = partial(illumination, scaled, channels=1 if len(one.plates[0].shape) == 2 else 3)
@@ -88,6 +91,8 @@ def surfaces(
             return solving.solve(plates, found, seen=shown, mask=mask)
 
         surface = solve(lit) if here is None else solve_near(here, lambda ground: light(ground=ground), solve)
+        nonlocal steady
+        steady = steadied(steady, surface, one.number, one.stood)
         made = passes_of(asked, plates, surface, lit, seen=shown, mask=mask) if asked.any else None
         return Instant(round=one, surface=surface, passes=made)
 

@@ -93,8 +93,9 @@ def comparable(before: Sketch, after: Sketch) -> tuple[Codes, Codes]:
     return one, other
 
 
-def moved(before: Sketch, after: Sketch) -> bool:
-    """Return whether anything changed between two sketches by more than noise does; quick, and rather yes than no."""
+def changed(before: Sketch, after: Sketch) -> Flags:
+    """Return where anything changed between two sketches by more than noise does, by block, (row, col); quick, and
+    rather yes than no."""
     change = after.blocks - before.blocks
     rows_seen = before.seen & after.seen
     if not rows_seen.all():
@@ -102,7 +103,7 @@ def moved(before: Sketch, after: Sketch) -> bool:
         change[shown[:, 0] < 1] = 0
     local = cv2.blur(change * change, (AROUND, AROUND))
     blocks = BLOCK_NOISE_FACTOR * min(_spread(change, before.blocks, CODED_BLOCKS), MOST_BLOCK_NOISE)
-    return bool(local.max() > max(LEAST_CHANGE, NOISE_FACTOR * _noise(before, after) / BLOCK_PX, blocks) ** 2)
+    return np.asarray(local > max(LEAST_CHANGE, NOISE_FACTOR * _noise(before, after) / BLOCK_PX, blocks) ** 2)
 
 
 def _noise(before: Sketch, after: Sketch) -> float:

@@ -10,9 +10,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from psvideo.plates.align.brightness import evened
-from psvideo.plates.align.flow import Sketch, moved, sketch_of, white_of
+from psvideo.plates.align.flow import Flags, Sketch, changed, sketch_of, white_of
 from psvideo.plates.align.packed import packed
 from psvideo.plates.light_plate import LightPlate
+from psvideo.plates.sequence import POOLED_ROUNDS
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,7 +62,8 @@ class Held:
     ``sketched`` says whether flow is asked for, ``keep_all`` whether instants lie at every flash, ``trusts_rest``
     whether lights that show nothing move speak for the others, and ``with_ambient`` whether dark slots come. ``newest``
     is the round that plates come of, ``whole`` the last one that was complete, and ``middle_s`` its middle. ``motion``
-    says by light and round what was compared with the round before, and whether it had moved.
+    says by light and round what was compared with the round before, and where it had moved; ``drift`` where it had
+    since the ``first`` sketch of a light in a block of rounds that are pooled.
     """
 
     lights: tuple[str, ...]
@@ -73,7 +75,9 @@ class Held:
     shots: dict[str, dict[int, Shot]] = field(default_factory=dict)
     waiting: deque[DueInstant] = field(default_factory=deque)
     ambient: dict[int, LightPlate] = field(default_factory=dict)
-    motion: dict[tuple[str, int], bool] = field(default_factory=dict)
+    motion: dict[tuple[str, int], Flags] = field(default_factory=dict)
+    drift: dict[tuple[str, int], Flags] = field(default_factory=dict)
+    first: dict[str, Sketch] = field(default_factory=dict)
     newest: int = 0
     whole: int = 0
     middle_s: float = 0.0
@@ -90,6 +94,7 @@ class Held:
             if plate.light not in self.whites:
                 self.whites[plate.light] = white_of(plate)
             sketch = sketch_of(plate, white=self.whites[plate.light])
+            self._look_for_drift(plate.light, sketch)
         shot = Shot(round=plate.number, time_s=plate.time_s, sketch=sketch, plate=plate)
         self.shots.setdefault(plate.light, {})[plate.number] = shot
         times_s = {
@@ -101,6 +106,13 @@ class Held:
             return None
         self.whole, self.middle_s = plate.number, float(np.mean(list(times_s.values())))
         return times_s
+
+    def _look_for_drift(self, light: str, sketch: Sketch) -> None:
+        """Hold a sketch against the first one of its block of rounds, from the second after that on."""
+        if sketch.number % POOLED_ROUNDS == 0:
+            self.first[light] = sketch
+        elif (first := self.first.get(light)) is not None and sketch.number - first.number > 1:
+            self.drift[light, sketch.number] = changed(first, evened(first, sketch))
 
     def around(self, light: str, instant: DueInstant) -> Around | None:
         """Return what a light's plate at an instant is made from; None where that is still to come."""
@@ -134,8 +146,19 @@ class Held:
             before, own = shots.get(round_number - 1), shots.get(round_number)
             if before is None or own is None or before.sketch is None or own.sketch is None:
                 return None
-            self.motion[key] = moved(before.sketch, evened(before.sketch, own.sketch))
-        return self.motion[key]
+            self.motion[key] = changed(before.sketch, evened(before.sketch, own.sketch))
+        return bool(self.motion[key].any())
+
+    def stood(self, number: int) -> Flags | None:
+        """Return where nothing changed since the round before, nor since the first of its block, under any light, nor
+        until the next round as far as that was looked at; None where any light was not compared."""
+        if any(self.moved_since(light, number) is None for light in self.lights):
+            return None
+        changes = [self.motion[light, number] for light in self.lights]
+        changes += [self.motion[light, number + 1] for light in self.lights if (light, number + 1) in self.motion]
+        changes += [self.drift[light, number] for light in self.lights if (light, number) in self.drift]
+        moved = np.any(changes, axis=0)
+        return ~moved if moved.any() else np.ones((1, 1), np.bool_)
 
     def _stood(self, instant: DueInstant) -> bool:
         """Tell whether nothing moved in an instant's round: no light shows motion since the round before, and all those
@@ -174,7 +197,9 @@ class Held:
         oldest = min([self.newest, self.whole or self.newest, *(one.round for one in self.waiting)]) - 1
         for number in [number for number in self.ambient if number <= oldest]:
             del self.ambient[number]
-        self.motion = {key: one for key, one in self.motion.items() if key[1] >= oldest}
+        for seen in (self.motion, self.drift):
+            for key in [key for key in seen if key[1] < oldest]:
+                del seen[key]
         for light, shots in self.shots.items():
             near = {number for one in self.waiting if light not in one.made for number in self._rounds_of(light, one)}
             for number, shot in list(shots.items()):

@@ -93,8 +93,9 @@ def _complete(held: Held, how: Aligning) -> Iterator[Round]:
         if instant.round in held.ambient:
             instant.made[AMBIENT] = held.ambient[instant.round]
         held.waiting.popleft()
+        stood = held.stood(instant.round) if held.sketched else None
         held.let_go()
-        yield handed_over(instant.made, instant.number, held.lights)
+        yield handed_over(instant.made, instant.number, held.lights, stood)
 
 
 def _pass_rest(held: Held, instant: DueInstant, how: Aligning) -> None:

@@ -1,0 +1,140 @@
+"""Results held steady over rounds in which nothing moved: noise must not make classes and filled values flicker.
+
+Rounds are pooled in blocks of fixed numbers. A pixel's class is what most of the last rounds say, and what is not
+trusted shows their mean; what is trusted stays as it was measured. As a block goes on, its rounds take the place of the
+block before, one after the other, so that nothing jumps. Where the picture changed, a pixel begins again: nothing is
+smeared. So a result depends on its block and the one before, and on no other round.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.compute.threads import over_ranges
+from psvideo.model.surface import Surface
+from psvideo.plates.sequence import POOLED_ROUNDS
+from psvideo.solve.normals.bands import BAND_PIXELS
+from psvideo.solve.normals.doubting import bits, stored
+from psvideo.solve.normals.task import Bytes
+from psvideo.solve.steady_kernel import SEGMENT, VOTES, Pool, SurfacePlanes, Still, steady_rows, touch_rows, turn_block
+
+MOST_SINCE = 255
+EACH_SLOT = 256
+
+
+@dataclass(kw_only=True)
+class Steady:
+    """What is held between rounds of segments of rows where any pixel is not trusted, and in the block after.
+
+    ``slots`` (row, segment) says where in ``pool`` a segment is, -1 where it is not; ``used`` of its slots are.
+    ``since`` counts rounds at rest on a coarse grid, ``trusted`` (row, col) is the last round's.
+    """
+
+    number: int
+    slots: NDArray[np.int32]
+    pool: Pool
+    used: int
+    since: Bytes
+    trusted: Bytes
+
+    @classmethod
+    def beginning(cls, surface: Surface, number: int) -> "Steady":
+        """Return what is held before the first round: nothing."""
+        rows, cols = surface.valid.shape
+        planes = 3 + len(stored(surface)[1]) + (surface.error_deg is not None)
+        return cls(
+            number=number - 1,
+            slots=np.full((rows, -(-cols // SEGMENT)), -1, np.int32),
+            pool=_room(0, planes),
+            used=0,
+            since=np.zeros((1, 1), np.uint8),
+            trusted=np.zeros((rows, cols), np.uint8),
+        )
+
+
+def steadied(held: Steady | None, surface: Surface, number: int, stood: NDArray[np.bool_] | None) -> Steady:
+    """Hold a round's surface steady, in its own memory, and return what is held for the next one.
+
+    held: what was returned of the round before, None at first; it is taken over.
+    number: the round's.
+    stood: on a grid over the picture (any rows and columns), True where nothing changed since the round before; None
+        where that is not known, and all begins again.
+    """
+    if held is None or stood is None or number != held.number + 1:
+        held, stood = Steady.beginning(surface, number), np.zeros((1, 1), np.bool_)
+    held.number = number
+    held.since = _counted(held.since, stood)
+    place = number % POOLED_ROUNDS + 1
+    if place == 1:
+        _turn(held)
+    still = Still(held.since, place, POOLED_ROUNDS, held.trusted)
+    planes, albedo = stored(surface)
+    error = np.zeros((0, 0), planes.dtype) if surface.error_deg is None else bits(surface.error_deg)
+    if surface.source is None:
+        raise ValueError("a surface with `source` expected, as Solving gives it")
+    result = SurfacePlanes(planes, albedo, error, surface.valid.view(np.uint8), surface.source)
+    fresh = _touch(held, result, still)
+    rows, cols = surface.valid.shape
+    over_ranges(
+        lambda first, last: steady_rows(result, held.pool, held.slots, fresh, still, first, last),
+        rows,
+        each=max(BAND_PIXELS // cols, 1),
+    )
+    return held
+
+
+def _counted(since: Bytes, stood: NDArray[np.bool_]) -> Bytes:
+    """Return since how many rounds nothing changed, one more where nothing did."""
+    shape = np.maximum(since.shape, stood.shape)
+    row, col = (np.arange(size) for size in shape)
+    wide = (part[np.ix_(row * part.shape[0] // shape[0], col * part.shape[1] // shape[1])] for part in (since, stood))
+    before, rests = wide
+    return np.where(rests, np.minimum(before, MOST_SINCE - 1) + 1, 0).astype(np.uint8)
+
+
+def _turn(held: Steady) -> None:
+    """Begin a block, and let go of segments that were trusted throughout the one before."""
+    kept = np.flatnonzero(held.pool.touched[: held.used])
+    place = np.full(held.used + 1, -1, np.int32)
+    place[kept] = np.arange(len(kept), dtype=np.int32)
+    held.slots, held.used = place[held.slots], len(kept)
+    old = held.pool
+    pool = Pool(old.votes[kept], old.values[kept], old.before[kept], np.zeros(len(kept), np.uint8))
+    over_ranges(lambda first, last: turn_block(pool, first, last, POOLED_ROUNDS), len(kept), each=EACH_SLOT)
+    held.pool = pool
+
+
+def _touch(held: Steady, result: SurfacePlanes, still: Still) -> Bytes:
+    """Note which segments hold what is not trusted, and make room for those that are new; return which slots are."""
+    rows, cols = result.valid.shape
+    touched = np.zeros(held.slots.shape, np.uint8)
+    over_ranges(
+        lambda first, last: touch_rows(result, still, touched, first, last), rows, each=max(BAND_PIXELS // cols, 1)
+    )
+    new = (touched > 0) & (held.slots < 0)
+    before, held.used = held.used, held.used + int(new.sum())
+    held.slots[new] = np.arange(before, held.used, dtype=np.int32)
+    if held.used > len(held.pool.touched):
+        held.pool = _wider(held.pool, max(held.used, 2 * before))
+    held.pool.touched[held.slots[touched > 0]] = 1
+    fresh = np.zeros(len(held.pool.touched), np.uint8)
+    fresh[before : held.used] = 1
+    return fresh
+
+
+def _wider(pool: Pool, slots: int) -> Pool:
+    """Return the pool with room for so many slots."""
+    wider, used = _room(slots, pool.values.shape[1]), len(pool.touched)
+    wider.votes[:used], wider.values[:used], wider.before[:used] = pool.votes, pool.values, pool.before
+    wider.touched[:used] = pool.touched
+    return wider
+
+
+def _room(slots: int, planes: int) -> Pool:
+    return Pool(
+        votes=np.zeros((slots, VOTES, SEGMENT), np.uint8),
+        values=np.zeros((slots, planes, SEGMENT), np.uint16),
+        before=np.zeros((slots, planes, SEGMENT), np.uint16),
+        touched=np.zeros(slots, np.uint8),
+    )

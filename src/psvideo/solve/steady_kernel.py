@@ -1,0 +1,237 @@
+"""Compiled loops that pool results over rounds at rest: votes on a pixel's class, and means of what is not trusted."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.compute.compiled import FUSED
+from psvideo.compute.memory import decoded, encoded, lent
+from psvideo.model.surface import MEASURED
+from psvideo.solve.normals.blocks import ONE, ZERO
+from psvideo.solve.normals.task import Bytes, Floats, Samples
+
+SEGMENT = 64
+"""Pixels of a row that are pooled together, or not."""
+REACHED, TRUSTED, REACHED_BEFORE, TRUSTED_BEFORE, ROUNDS, VALUES, HAS_BEFORE = range(7)
+"""The planes of votes: the sums, over this block's rounds since the pixel changed, of the lights that reach it and of
+whether it was trusted; the same of the block before, as if of a whole one; how many rounds this block's are of; how
+many values were added up; and whether there is a mean from before."""
+VOTES = 7
+OF_SOURCE = np.array([0, 4, 3, 2, 1], np.uint8)  # by Surface.source: three lights or more count 4, none 1
+SOURCES = np.array([0, 4, 3, 2, 1], np.uint8)  # the way back
+ALL = np.uint8(OF_SOURCE[MEASURED])
+TINY, HALF, SURELY = np.float32(1e-6), np.float32(0.5), np.float32(3.5)
+ADDS, FORGETS, TAKES, ZEROES, WEIGHT, PER, SOURCE, VALID = range(8)
+"""The planes of the working array: whether a pixel's values are added, what was held of it is forgotten, it takes the
+mean, or zeros; what the mean from before weighs, and by what sums become means; and its class."""
+WORK = 8
+
+
+class SurfacePlanes(NamedTuple):
+    """A surface's planes, which are changed: normals (3, row, col), albedo (channel, row, col), error (row, col) or
+    empty, as floats or the bits of half floats; valid and source (row, col)."""
+
+    normals: Samples
+    albedo: Samples
+    error: Samples
+    valid: Bytes
+    source: Bytes
+
+
+class Pool(NamedTuple):
+    """What is held of segments (slot, plane, pixel): votes, sums of values, the means of the block before, both in
+    half floats; ``touched`` (slot,) says in which some pixel was not trusted in this block."""
+
+    votes: Bytes
+    values: NDArray[np.uint16]
+    before: NDArray[np.uint16]
+    touched: Bytes
+
+
+class Still(NamedTuple):
+    """Since how many rounds nothing changed, on a coarse grid over the picture; which round of its block this is, from
+    1 on; how many make a block; and which pixels were trusted in the round before."""
+
+    since: Bytes
+    place: int
+    block: int
+    trusted: Bytes
+
+
+@FUSED.kept
+def touch_rows(result: SurfacePlanes, still: Still, touched: Bytes, first: int, last: int) -> None:
+    """Note in ``touched`` (row, segment) where any pixel of the rows is not trusted, or is so no more or again."""
+    valid, source, out = lent(result.valid), lent(result.source), lent(touched)
+    since, trusted = lent(still.since), lent(still.trusted)
+    rows, cols = valid.shape
+    for row in range(first, last):
+        at_row = row * since.shape[0] // rows
+        for segment in range(out.shape[1]):
+            begin, end = segment * SEGMENT, min((segment + 1) * SEGMENT, cols)
+            doubtful, turned = np.uint8(0), np.uint8(0)
+            for col in range(begin, end):
+                doubtful |= np.uint8((source[row, col] > 0) & (valid[row, col] == 0))
+                turned |= valid[row, col] ^ trusted[row, col]
+            if turned and not doubtful:
+                for col in range(begin, end):
+                    stood = since[at_row, col * since.shape[1] // cols] > 0
+                    doubtful |= np.uint8((valid[row, col] != trusted[row, col]) & stood)
+            out[row, segment] = doubtful
+
+
+@FUSED.kept
+def turn_block(pool: Pool, first: int, last: int, block: int) -> None:
+    """Make of slots' sums what the next block takes as the one before."""
+    votes, values, before = lent(pool.votes), lent(pool.values), lent(pool.before)
+    for slot in range(first, last):
+        for i in range(SEGMENT):
+            left = block - int(votes[slot, ROUNDS, i])  # more than 0 where the pixel changed in this block
+            for now, then in ((REACHED, REACHED_BEFORE), (TRUSTED, TRUSTED_BEFORE)):
+                votes[slot, then, i] = int(votes[slot, now, i]) + left * int(votes[slot, then, i]) // block
+            count = int(votes[slot, VALUES, i])
+            left = left if votes[slot, HAS_BEFORE, i] else 0
+            one, weight = ONE / np.float32(max(count + left, 1)), np.float32(left)
+            for plane in range(values.shape[1]):
+                total = decoded(values[slot, plane, i]) + weight * decoded(before[slot, plane, i])
+                before[slot, plane, i] = encoded(total * one, before)
+                values[slot, plane, i] = 0
+            votes[slot, HAS_BEFORE, i] = count + left > 0
+            for plane in (REACHED, TRUSTED, ROUNDS, VALUES):
+                votes[slot, plane, i] = 0
+
+
+@FUSED.kept
+def steady_rows(
+    result: SurfacePlanes, pool: Pool, slots: NDArray[np.int32], fresh: Bytes, still: Still, first: int, last: int
+) -> None:
+    """Add the rows' results to the pool and take from it what is steadier than they are.
+
+    slots: (row, segment), where a segment is held, -1 where it is not. fresh: (slot,), 1 of those that were not before.
+    """
+    r = SurfacePlanes(
+        lent(result.normals), lent(result.albedo), lent(result.error), lent(result.valid), lent(result.source)
+    )
+    p = Pool(lent(pool.votes), lent(pool.values), lent(pool.before), lent(pool.touched))
+    where, new, since, trusted = lent(slots), lent(fresh), lent(still.since), lent(still.trusted)
+    rows, cols = r.valid.shape
+    work, made = np.zeros((WORK, SEGMENT), np.float32), np.zeros((p.values.shape[1], SEGMENT), np.float32)
+    for row in range(first, last):
+        at_row = row * since.shape[0] // rows
+        for segment in range(where.shape[1]):
+            slot, begin = where[row, segment], segment * SEGMENT
+            width = min(SEGMENT, cols - begin)
+            if slot >= 0:
+                busy = False
+                for i in range(width):
+                    col = begin + i
+                    stood = int(since[at_row, col * since.shape[1] // cols])
+                    rounds, source, valid = min(still.place, stood + 1), r.source[row, col], r.valid[row, col]
+                    votes = p.votes[slot]
+                    if stood == 0:
+                        _forget(votes, i, source, valid, still.block)
+                    elif new[slot]:
+                        _begin(votes, i, rounds, trusted[row, col], still.block)
+                    trusted[row, col] = valid
+                    _add(votes, i, rounds, source, valid, stood == 0, work)
+                    _decide(votes, i, source, still.block, work)
+                    busy |= work[ADDS, i] + work[TAKES, i] + work[ZEROES, i] + work[FORGETS, i] > ZERO
+                if busy:
+                    _add_values(r, p, row, begin, width, slot, work, made)
+                    _take_means(r, row, begin, width, work, made)
+                for i in range(width):
+                    r.source[row, begin + i] = np.uint8(work[SOURCE, i])
+                    r.valid[row, begin + i] = np.uint8(work[VALID, i])
+            else:
+                for col in range(begin, begin + width):
+                    trusted[row, col] = r.valid[row, col]
+
+
+@FUSED.inlined
+def _forget(votes: Bytes, i: int, source: int, valid: int, block: int) -> None:
+    """Begin again with a pixel that changed, as if it had always been as it is."""
+    votes[REACHED, i], votes[TRUSTED, i], votes[VALUES, i] = 0, 0, 0
+    votes[REACHED_BEFORE, i], votes[TRUSTED_BEFORE, i] = OF_SOURCE[source] * block, valid * block
+    votes[HAS_BEFORE, i] = (source > 0) & (valid == 0)
+
+
+@FUSED.inlined
+def _begin(votes: Bytes, i: int, rounds: int, trusted: int, block: int) -> None:
+    """Begin with a pixel that was the same all the time, trusted or without a normal."""
+    votes[REACHED, i], votes[TRUSTED, i] = (rounds - 1) * trusted * ALL, (rounds - 1) * trusted
+    votes[REACHED_BEFORE, i], votes[TRUSTED_BEFORE, i] = block * trusted * ALL, block * trusted
+    votes[VALUES, i], votes[HAS_BEFORE, i] = 0, 0
+
+
+@FUSED.inlined
+def _add(votes: Bytes, i: int, rounds: int, source: int, valid: int, changed: bool, work: Floats) -> None:
+    """Add a round's votes, and say whether its values are added."""
+    reached = OF_SOURCE[source]
+    votes[ROUNDS, i] = rounds
+    votes[REACHED, i] += reached
+    votes[TRUSTED, i] += valid
+    adds = (reached > 0) & ((valid == 0) | (votes[VALUES, i] > 0))
+    votes[VALUES, i] += adds
+    work[ADDS, i], work[FORGETS, i] = adds, changed
+
+
+@FUSED.inlined
+def _decide(votes: Bytes, i: int, own: int, block: int, work: Floats) -> None:
+    """Give a pixel the class that most rounds give it, and say whether it takes their mean."""
+    rounds, count = int(votes[ROUNDS, i]), int(votes[VALUES, i])
+    left = block - rounds  # rounds of the block before that count
+    whole = np.float32(block * block)
+    reached = np.float32(int(votes[REACHED, i]) * block + left * int(votes[REACHED_BEFORE, i])) / whole
+    sure = np.float32(int(votes[TRUSTED, i]) * block + left * int(votes[TRUSTED_BEFORE, i])) / whole
+    source = SOURCES[min(int(reached + HALF), 4)]
+    before = max(block - count, 0) if votes[HAS_BEFORE, i] else 0
+    known = count + before > 0
+    measured = np.float32(votes[REACHED, i]) >= SURELY * np.float32(rounds)
+    if source != own and not (known and (source != MEASURED or measured)) and source != 0:
+        source = own
+    trusted = (source == MEASURED) & (sure >= HALF)
+    work[SOURCE, i], work[VALID, i] = source, trusted
+    work[ZEROES, i] = source == 0
+    work[TAKES, i] = known and source != 0 and not (trusted and own == MEASURED)
+    work[WEIGHT, i], work[PER, i] = before, ONE / np.float32(max(count + before, 1))
+
+
+@FUSED.called
+def _add_values(
+    r: SurfacePlanes, p: Pool, row: int, begin: int, width: int, slot: int, work: Floats, means: Floats
+) -> None:
+    """Add a segment's values to its sums, and take the means."""
+    for plane in range(p.values.shape[1]):
+        shown = _plane(r, plane, row)
+        sums, before = p.values[slot, plane], p.before[slot, plane]
+        for i in range(width):
+            value, changed = decoded(shown[begin + i]), work[FORGETS, i] > ZERO
+            total = (ZERO if changed else decoded(sums[i])) + (value if work[ADDS, i] > ZERO else ZERO)
+            mean = value if changed else decoded(before[i])
+            sums[i], before[i] = encoded(total, sums), encoded(mean, before)
+            means[plane, i] = (total + work[WEIGHT, i] * mean) * work[PER, i]
+
+
+@FUSED.called
+def _take_means(r: SurfacePlanes, row: int, begin: int, width: int, work: Floats, means: Floats) -> None:
+    """Give the pixels of a segment that take them their means, normals of length 1."""
+    for i in range(width):
+        square = means[0, i] * means[0, i] + means[1, i] * means[1, i] + means[2, i] * means[2, i]
+        one = ONE / max(np.sqrt(square), TINY)
+        for plane in range(3):
+            means[plane, i] *= one
+    for plane in range(len(means)):
+        shown = _plane(r, plane, row)
+        for i in range(width):
+            value = means[plane, i] if work[TAKES, i] > ZERO else decoded(shown[begin + i])
+            shown[begin + i] = encoded(ZERO if work[ZEROES, i] > ZERO else value, shown)
+
+
+@FUSED.inlined
+def _plane(r: SurfacePlanes, plane: int, row: int) -> Any:
+    """A row of one of a surface's planes."""
+    if plane < 3:
+        return r.normals[plane, row]
+    if plane < 3 + len(r.albedo):
+        return r.albedo[plane - 3, row]
+    return r.error[row]

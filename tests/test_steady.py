@@ -1,0 +1,195 @@
+"""Where nothing moves, neither classes nor filled values flicker; where something does, nothing is smeared."""
+
+import functools
+import itertools
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from psvideo.model.surface import MEASURED, NO_LIGHT, ONE_LIGHT, TWO_LIGHTS, Surface
+from psvideo.plates.align.rounds import Aligning, aligned
+from psvideo.plates.light_plate import LightPlate
+from psvideo.plates.mixture import made
+from psvideo.plates.sequence import POOLED_ROUNDS
+from psvideo.solve.instants import surfaces
+from psvideo.solve.steady import Steady, steadied
+from psvideo.synth import read_scene
+from psvideo.synth.scene import Scene
+from psvideo.synth.shotplan import true_plan
+from psvideo.synth.stage import Stage, set_stage
+from psvideo.synth.subject.shading import light_collected
+
+SCENES = Path(__file__).resolve().parents[1] / "data_synth"
+RESTS = np.ones((1, 1), np.bool_)
+SHAPE = (20, 150)
+Flags = NDArray[np.bool_]
+
+
+def noisy(rng: np.random.Generator, *, half: bool = False) -> Surface:
+    """A surface that is trusted on the left, hardly reached on the right, and either from round to round between."""
+    _rows, cols = SHAPE
+    chance = np.linspace(-0.8, 1.2, cols)
+    lights = np.clip(np.floor(4 * (chance + rng.normal(0, 0.15, SHAPE))), 0, 4).astype(np.uint8)
+    source = np.array([MEASURED, MEASURED, TWO_LIGHTS, ONE_LIGHT, NO_LIGHT], np.uint8)[lights]
+    source[0, -1] = 0
+    planes = rng.normal(0, 0.05, (3, *SHAPE)) + np.array([0.3, -0.2, 0.8])[:, None, None]
+    planes /= np.linalg.norm(planes, axis=0)
+    planes[:, source == 0] = 0
+    kind = np.float16 if half else np.float32
+    return Surface(
+        normals=np.moveaxis(planes.astype(kind), 0, -1),
+        albedo=np.moveaxis(rng.uniform(0.4, 0.6, (3, *SHAPE)).astype(kind), 0, -1),
+        valid=lights == 0,
+        error_deg=rng.uniform(1, 20, SHAPE).astype(kind),
+        source=source,
+    )
+
+
+def run(surfaces: list[Surface], first: int, stood: Flags = RESTS) -> Iterator[Surface]:
+    held: Steady | None = None
+    for number, surface in enumerate(surfaces, first):
+        held = steadied(held, surface, number, stood)
+        yield surface
+
+
+def some(count: int, *, half: bool = False, seed: int = 3) -> list[Surface]:
+    rng = np.random.default_rng(seed)
+    return [noisy(rng, half=half) for _ in range(count)]
+
+
+def source_of(one: Surface) -> NDArray[np.uint8]:
+    assert one.source is not None
+    return one.source
+
+
+def turned_deg(one: Surface, other: Surface) -> NDArray[np.floating]:
+    apart = np.linalg.norm(one.normals.astype(np.float64) - other.normals.astype(np.float64), axis=-1)
+    return np.asarray(np.degrees(2 * np.arcsin(apart / 2)))
+
+
+@pytest.mark.parametrize("half", [False, True])
+def test_classes_and_filled_normals_keep_where_nothing_moves(half: bool) -> None:
+    plain, steady = some(20, half=half), list(run(some(20, half=half), 1001))
+    flips = [[np.mean(source_of(a) != source_of(b)) for a, b in itertools.pairwise(part)] for part in (plain, steady)]
+    turns = [
+        np.mean([turned_deg(a, b)[(source_of(a) > 1) & (source_of(b) > 1)].mean() for a, b in itertools.pairwise(part)])
+        for part in (plain, steady)
+    ]
+    assert np.mean(flips[1]) < np.mean(flips[0]) / 6
+    assert turns[1] < turns[0] / 10
+    for one in steady:
+        assert not (one.valid & (source_of(one) != MEASURED)).any()
+        shown = source_of(one) > 0
+        lengths = np.linalg.norm(one.normals.astype(np.float64), axis=-1)
+        np.testing.assert_allclose(lengths[shown], 1, atol=2e-3)
+        assert not lengths[~shown].any()
+
+
+def test_what_is_trusted_stays_as_it_was_measured() -> None:
+    plain, steady = some(20), list(run(some(20), 1001))
+    for one, other in zip(plain, steady, strict=True):
+        both = one.valid & other.valid
+        assert both[:, :5].all()
+        np.testing.assert_array_equal(one.normals[both], other.normals[both])
+        np.testing.assert_array_equal(one.albedo[both], other.albedo[both])
+
+
+def test_a_result_depends_on_its_block_of_rounds_and_the_one_before() -> None:
+    late = 3 * POOLED_ROUNDS
+    whole = list(run(some(late + 5), 0))
+    part = list(run(some(late + 5)[late - POOLED_ROUNDS :], late - POOLED_ROUNDS))
+    for one, other in zip(whole[late:], part[POOLED_ROUNDS:], strict=True):
+        for name in ("normals", "albedo", "error_deg", "valid", "source"):
+            assert np.asarray(getattr(one, name)).tobytes() == np.asarray(getattr(other, name)).tobytes(), name
+
+
+def test_what_changed_begins_again_and_the_rest_goes_on() -> None:
+    half_stood = np.array([[True], [False]])
+    plain = some(20)
+    steady = list(run(some(20), 1001, half_stood))
+    below = slice(SHAPE[0] // 2, None)
+    for one, other in zip(plain, steady, strict=True):
+        np.testing.assert_array_equal(source_of(one)[below], source_of(other)[below])
+        np.testing.assert_allclose(one.normals[below], other.normals[below], atol=1e-3)
+    flips = np.mean([source_of(a)[:10] != source_of(b)[:10] for a, b in itertools.pairwise(steady)])
+    assert flips < np.mean([source_of(a)[:10] != source_of(b)[:10] for a, b in itertools.pairwise(plain)]) / 6
+
+
+def test_a_round_that_nobody_compared_stays_as_it_is() -> None:
+    plain, other = some(3), some(3)
+    held: Steady | None = None
+    for number, surface in enumerate(other):
+        held = steadied(held, surface, number, None)
+    for one, same in zip(plain, other, strict=True):
+        np.testing.assert_array_equal(source_of(one), source_of(same))
+        np.testing.assert_allclose(one.normals, same.normals, atol=1e-3)
+
+
+def test_bytes_do_not_depend_on_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    given = []
+    for threads in ("1", "3"):
+        monkeypatch.setenv("PSVIDEO_THREADS", threads)
+        wide = [
+            replace(
+                one,
+                normals=np.moveaxis(np.tile(np.moveaxis(one.normals, -1, 0), (1, 40, 6)), 0, -1),
+                albedo=np.moveaxis(np.tile(np.moveaxis(one.albedo, -1, 0), (1, 40, 6)), 0, -1),
+                valid=np.tile(one.valid, (40, 6)),
+                source=np.tile(source_of(one), (40, 6)),
+                error_deg=None,
+            )
+            for one in some(3)
+        ]
+        given.append(b"".join(one.normals.tobytes() + one.valid.tobytes() for one in run(wide, 15)))
+    assert given[0] == given[1]
+
+
+@functools.cache
+def bust() -> tuple[Scene, Stage, list[NDArray[np.floating]]]:
+    """A bust, and what each of five lights shows of it."""
+    scene = read_scene(SCENES / "bust.toml")
+    camera = scene.camera.model_copy(update={"width_px": 144, "height_px": 80})
+    scene = scene.model_copy(update={"camera": camera, "object": scene.object[:1]})
+    stage = set_stage(scene, SCENES)
+    assert stage.still is not None
+    shown = [stage.still.hits.image(light_collected(stage.still, light)) for light in stage.rig.lights]
+    return scene, stage, shown
+
+
+def standing_bust(lights: int, align: Aligning) -> list[Surface]:
+    """A bust that stands still, filmed with a camera's noise and solved as the commands do."""
+    scene, stage, shown = bust()
+    plan, clean = true_plan(scene.model_copy(update={"light": scene.light[:lights]})), shown[:lights]
+    rng = np.random.default_rng(7)
+
+    def film() -> Iterator[LightPlate]:
+        for number in range(1001, 1009):
+            for n, (light, plate) in enumerate(zip(plan.lights, clean, strict=True)):
+                electrons = rng.normal(size=plate.shape) * np.sqrt(20000 * (plate + 0.02) + 2 * 5**2)
+                image = np.minimum(plate + electrons / 20000, 1).astype(np.float32)
+                time_s = (number + n / (lights + 1)) * 0.006
+                seen = np.ones(len(image), np.bool_)
+                yield LightPlate(light=light, number=number, time_s=time_s, picture=made(image), seen=seen)
+
+    rounds = aligned(film(), plan.lights, align, first=1001)
+    return [instant.surface for instant in surfaces(rounds, plan, stage.rig)]
+
+
+@pytest.mark.parametrize("lights", [3, 5])
+def test_a_standing_bust_does_not_flicker(lights: int) -> None:
+    flips: dict[str, float] = {}
+    turns: dict[str, float] = {}
+    for align in ("none", "auto"):
+        shown = standing_bust(lights, Aligning(align=align))
+        assert len(shown) == 8
+        pairs = list(itertools.pairwise(shown))
+        subject = np.mean([one.shown for one in shown], axis=0) > 0.5
+        changed = [(source_of(a) != source_of(b)) | (a.valid != b.valid) for a, b in pairs]
+        flips[align] = max(float(100 * one[subject].mean()) for one in changed)
+        turns[align] = max(float(turned_deg(a, b)[(source_of(a) > 1) & (source_of(b) > 1)].mean()) for a, b in pairs)
+    assert flips["auto"] <= 0.1 < flips["none"]
+    assert turns["auto"] <= 0.5 < turns["none"]
