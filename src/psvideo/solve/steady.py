@@ -17,7 +17,7 @@ from psvideo.plates.sequence import POOLED_ROUNDS
 from psvideo.solve.normals.bands import BAND_PIXELS
 from psvideo.solve.normals.doubting import bits, stored
 from psvideo.solve.normals.task import Bytes
-from psvideo.solve.steady_kernel import SEGMENT, VOTES, Pool, SurfacePlanes, Still, steady_rows, touch_rows, turn_block
+from psvideo.solve.steady_kernel import SEGMENT, VOTES, Pool, Still, SurfacePlanes, steady_rows, touch_rows, turn_block
 
 MOST_SINCE = 255
 EACH_SLOT = 256
