@@ -191,7 +191,7 @@ def _at_every_flash(clip: Filmed) -> Iterator[Accuracy]:
         [clip.seen(one) for one in clip.shown(Aligning(align=align, rate="flash"))[3:6]] for align in ("none", "auto")
     )
     means = [Seen(*np.mean(seen, axis=0).tolist()) for seen in (before, after)]
-    yield Accuracy("3 lights, 4 px per flash, --rate flash", str(means[0]), "--align", str(means[1]))
+    yield Accuracy("3 lights, 4 px per flash, --fps flash", str(means[0]), "--align", str(means[1]))
 
 
 def _at_rest() -> Iterator[Accuracy]:

@@ -162,8 +162,8 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
             "psvideo normals clip/ --rig rig.toml --solver robust --aov error -o out/",
         ),
         (
-            "a moving subject: plates brought to one instant, one result per flash",
-            "psvideo normals clip/ --rig rig.toml --align auto --rate flash -o out/",
+            "a moving subject: one result per flash; a rate such as 24 too",
+            "psvideo normals clip/ --rig rig.toml --fps flash -o out/",
         ),
         (
             "for Unreal: tangent space, green down, 16-bit PNG too, and a note on how to load them",

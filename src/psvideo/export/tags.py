@@ -31,7 +31,8 @@ class Tags:
         """Return the time code of an instant, where the clip has one that goes on to it."""
         if self.first_time_code is None or self.camera_fps is None:
             return None
-        return advanced(self.first_time_code, time_s, self.camera_fps)
+        slow = next((rate for rate in (self.camera_fps, self.fps) if _has_time_code(rate)), self.camera_fps)
+        return advanced(self.first_time_code, time_s, slow)
 
     def attributes(self, *, time_s: float, data: bool) -> dict[str, str | float]:
         """Return the header attributes of one picture; ``data`` marks what is no colour (normals, masks)."""
@@ -52,6 +53,11 @@ def sha256_of(path: Path) -> str:
         return hashlib.sha256(path.read_bytes()).hexdigest()
     except OSError as fault:
         raise PsvideoError(f"{path}: cannot be read ({fault.strerror}). Check the file and its permissions.") from fault
+
+
+def _has_time_code(fps: Fraction) -> bool:
+    """Tell whether a time code counts this rate's frames; a camera that is faster counts those of the project."""
+    return round(fps) <= MOST_FRAMES and fps.denominator in (1, 1001)
 
 
 def advanced(code: str, time_s: float, fps: Fraction) -> str | None:

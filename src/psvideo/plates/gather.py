@@ -22,6 +22,7 @@ from psvideo.model.recipe import frames_of
 from psvideo.model.shutter import frames_touched
 from psvideo.model.timing import Flash, Timing, places_in_time, timed_camera
 from psvideo.plates import hudon2015
+from psvideo.plates.align.comb import Comb, Schedule, schedule_of
 from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.ambient import update
 from psvideo.plates.ambient_off import subtract, with_darks_ahead
@@ -119,9 +120,20 @@ def gather(
         plates = filter(lambda plate: plate.light != AMBIENT, plates)
     if aligning is not None:
         plates = with_nearest_rows(plates) if borrows else plates
-        return aligned(plates, plan.lights, aligning, first=start_number, with_ambient=with_ambient)
+        due = scheduled(take, timing, aligning, start_number=start_number)
+        return aligned(plates, plan.lights, aligning, first=start_number, with_ambient=with_ambient, schedule=due)
     names = coming(plan, flashes, start=start_number)
     return gathered(plates, plan.lights, expected=names.__getitem__)
+
+
+def scheduled(take: Take, timing: Timing, aligning: Aligning, *, start_number: int) -> Schedule | None:
+    """Return which instants ``gather`` will show, where they come at a steady rate; None where rounds decide."""
+    if not isinstance(aligning.rate, Comb):
+        return None
+    camera, places = timed_camera(take.plan, timing), places_in_time(timing, take.clip.numbers)
+    used = _within(timing, camera, take, places)
+    end_s = (max(places.values()) + 0.5) * camera.frame_period_s
+    return schedule_of(take.plan, used.flashes, aligning.rate, start=start_number, end_s=end_s)
 
 
 def clip_plates(

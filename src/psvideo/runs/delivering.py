@@ -18,6 +18,8 @@ from psvideo.model.choices import Compression
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Rig
 from psvideo.model.timing import Timing
+from psvideo.model.units import show_rate
+from psvideo.plates.align.comb import Comb, Schedule
 from psvideo.plates.beauty import beauty_of
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import AMBIENT, Round, round_numbers
@@ -34,6 +36,23 @@ def check_delivery(delivery: Delivery, take: Take, timing: Timing, start_number:
     """Raise UsageError or PsvideoError where a delivery asks for what this take does not have."""
     delivery.mix.check(take.plan)
     check_camera(delivery.space, take, timing, start_number)
+
+
+def instants_said(comb: Comb, due: Schedule, start_number: int) -> str:
+    """Return in whole sentences which instants are delivered at a steady rate, and which are not."""
+    numbers = due.numbers
+    shown = f"{len(numbers)}, {numbers[0]} to {numbers[-1]}" if numbers else "none"
+    before, within, after = due.left_out
+    lacking = [
+        f"{count} {where}"
+        for count, where in ((before, "at the start"), (within, "in holes"), (after, "at the end"))
+        if count
+    ]
+    rest = f" Left out, as no whole round is near: {', '.join(lacking)}." if lacking else " None is left out."
+    return (
+        f"Instants at {show_rate(comb.fps)}: number {start_number} + k shows {comb.first_s:.7g} s + k / {comb.fps} on "
+        f"the camera's clock. Delivered are {shown}.{rest}"
+    )
 
 
 def check_camera(space: Space, take: Take, timing: Timing, start_number: int) -> None:

@@ -1,6 +1,7 @@
 """The whole of ``psvideo normals``: a clip and a rig in, a folder of normals, albedo and validity out."""
 
 from collections.abc import Mapping, Sequence
+from fractions import Fraction
 from math import inf
 from pathlib import Path
 
@@ -20,7 +21,6 @@ from psvideo.model.choices import (
     MeshKind,
     Preview,
     Program,
-    Rate,
     Solver,
     SpaceName,
     YDirection,
@@ -32,7 +32,7 @@ from psvideo.plates.timed import timing_of
 from psvideo.report.run_report import RunReport
 from psvideo.runs.caller import PYTHON, Caller, say_kept, say_of_clip
 from psvideo.runs.lighting import read_lighting
-from psvideo.runs.output import Output
+from psvideo.runs.output import Output, rate_of
 from psvideo.runs.results import OverTime, normals_run
 from psvideo.sync.open_take import open_take
 
@@ -56,7 +56,7 @@ def normals(
     depth: Path | str | None = None,
     depth_scale: float | None = None,
     align: Align = "auto",
-    rate: Rate = "round",
+    fps: str | float | Fraction = "round",
     denoise: int = 1,
     preset: Program | None = None,
     space: SpaceName | None = None,
@@ -104,8 +104,9 @@ def normals(
       often near lights' distances are taken again from the depth of the normals found, 0 to 10 (left out: 1, and 0
       with ``depth``).
     - ``align``: "auto" brings the plates of a round to one instant where something moves, "flow" looks for motion
-      everywhere, "none" leaves them. ``rate``: one result per "round", or per "flash". ``denoise``: average up to so
-      many results, 1 to 64, where nothing moves.
+      everywhere, "none" leaves them. ``fps``: one result per "round", per "flash", per camera "frame", or so many a
+      second, exactly (a Fraction; whole or decimal numbers are taken as they are written), at most as many as the
+      camera took. ``denoise``: average up to so many results, 1 to 64, where nothing moves.
 
     What is written, into the folder ``out`` (float16 EXR sequences, numbered from ``start_number``):
 
@@ -171,8 +172,8 @@ def normals(
     if "usd" in delivery.meshes:
         require_usd()
     _check_numbers(near_iterations=near_iterations, depth=depth, depth_scale=depth_scale, denoise=denoise)
-    over_time = OverTime(aligning=Aligning(align=align, rate=rate), denoise=denoise)
     take = open_take(clip_path, plan=path_if_given("plan", plan), frames=frames)
+    over_time = OverTime(aligning=Aligning(align=align, rate=rate_of(fps, take.plan)), denoise=denoise)
     say_of_clip(take.clip, caller)
     over_time.check(take.plan)
     lighting = read_lighting(

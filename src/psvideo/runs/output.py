@@ -8,11 +8,14 @@ from pathlib import Path
 
 from psvideo import __version__
 from psvideo.clip import Clip, Take
+from psvideo.errors import UsageError
 from psvideo.export.space import CAMERA_SPACE, Space
 from psvideo.export.tags import Tags, sha256_of
+from psvideo.formats.plan_toml import parse_fps
 from psvideo.formats.whole_folders import refuse_folder, whole_folder
 from psvideo.model.choices import Rate
 from psvideo.model.plan import Plan
+from psvideo.plates.align.comb import Comb, comb_of
 from psvideo.plates.sequence import FIRST_NUMBER
 from psvideo.runs.caller import PYTHON, Caller
 
@@ -63,16 +66,33 @@ def folder_of(output: Output) -> AbstractContextManager[Path]:
     return whole_folder(output.folder, mark=MARK, force=output.force, resume=output.resume, settings=output.settings)
 
 
-def sequence_fps(plan: Plan, rate: Rate = "round") -> Fraction:
-    """Return the rate of rounds, or of the lights' flashes, at which a sequence is delivered; the mean where dark slots
-    come between."""
+def sequence_fps(plan: Plan, rate: Rate | Comb = "round") -> Fraction:
+    """Return the rate of rounds, of the lights' flashes, or that was asked for, at which a sequence is delivered; the
+    mean where dark slots come between."""
+    if isinstance(rate, Comb):
+        return rate.fps
     results = len(plan.lights) if rate == "flash" else 1
     if plan.mode == "synced":
         return results * plan.camera.fps / len(plan.flashes)
     return Fraction(results * len(plan.dark_rounds) / plan.cycle_s).limit_denominator(100_000)
 
 
-def tags_of(clip: Clip, rig_path: Path | None = None, space: Space = CAMERA_SPACE, rate: Rate = "round") -> Tags:
+def rate_of(fps: str | float | Fraction, plan: Plan) -> Rate | Comb:
+    """Return which instants are asked for: by a word, or by a rate. Raises UsageError where there are none such."""
+    if fps == "round":
+        return "round"
+    if fps == "flash":
+        return "flash"
+    if fps == "frame":
+        return comb_of(plan.camera.fps, plan.camera)
+    try:
+        exact = parse_fps(str(fps))
+    except ValueError as fault:
+        raise UsageError(f"`fps` {fps}: {fault}; or one of round, flash, frame.") from None
+    return comb_of(exact, plan.camera)
+
+
+def tags_of(clip: Clip, rig_path: Path | None = None, space: Space = CAMERA_SPACE, rate: Rate | Comb = "round") -> Tags:
     """Return what every file of a run says of itself."""
     return Tags(
         fps=sequence_fps(clip.plan, rate),

@@ -22,13 +22,15 @@ from psvideo.model.choices import Solver
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Rig
 from psvideo.model.timing import Timing
+from psvideo.plates.align.comb import Comb
 from psvideo.plates.align.rounds import Aligning
-from psvideo.plates.gather import first_ambient, gather
+from psvideo.plates.gather import first_ambient, gather, scheduled
 from psvideo.plates.sequence import AMBIENT, coming
 from psvideo.report.observe.observed import InstantFacts
 from psvideo.report.run_report import RunReport
 from psvideo.runs.delivering import (
     check_delivery,
+    instants_said,
     pass_doubts,
     passes_asked,
     surface_job,
@@ -63,10 +65,15 @@ class OverTime:
 
     def check(self, plan: Plan) -> None:
         """Raise UsageError where a plan has no instant of its own for every light, and one is asked for."""
+        if isinstance(self.aligning.rate, Comb) and self.aligning.align == "none":
+            raise UsageError(
+                "`fps` asks for instants between the flashes, and `align='none'` makes none: plates would be repeated. "
+                "Leave one of the two out."
+            )
         alone = all(len(plan.flashes[slot].lit) == 1 for slot in plan.lit_slots)
         if self.aligning.rate == "flash" and not (alone and len(plan.lit_slots) == len(plan.lights)):
             raise UsageError(
-                '`rate="flash"` needs a plan in which every light flashes once a round, by itself; in this one lights '
+                '`fps="flash"` needs a plan in which every light flashes once a round, by itself; in this one lights '
                 "flash together, or several times. Leave it out: one result per round is given."
             )
 
@@ -115,6 +122,11 @@ def normals_run(
     if lighting.masks is not None and over_time.aligning.rate == "round":
         coming_rounds = coming(clip.plan, timing.flashes, start=output.start_number).items()
         lighting.masks.check(number for number, lights in coming_rounds if lights >= set(clip.plan.lights))
+    due = scheduled(take, timing, over_time.aligning, start_number=output.start_number)
+    if due is not None and isinstance(over_time.aligning.rate, Comb):
+        output.caller.say(instants_said(over_time.aligning.rate, due, output.start_number))
+        if lighting.masks is not None:
+            lighting.masks.check(iter(due.numbers))
     tags = tags_of(clip, lighting.rig_path, delivery.space, over_time.aligning.rate)
     shaping = lighting.shaping if delivery.needs_depth else None
     observed = observing(take, lighting.rig, lighting.masks)

@@ -47,12 +47,12 @@ from psvideo.cli.options.solving import (
     DepthScale,
     Fill,
     FlatPath,
+    FpsOption,
     MaskPath,
     NearIterations,
-    RateOption,
     SolverOption,
 )
-from psvideo.cli.options.typed import parse_weights
+from psvideo.cli.options.typed import parse_instants, parse_weights
 
 
 def normals(
@@ -78,7 +78,7 @@ def normals(
     camera_time: CameraTimeOption = None,
     y: YOption = None,
     align: AlignOption = "auto",
-    rate: RateOption = "round",
+    fps: FpsOption = "round",
     denoise: Denoise = 1,
     float32: FloatOption = False,
     aov: AovOption = None,
@@ -120,7 +120,7 @@ def normals(
         depth=depth,
         depth_scale=depth_scale,
         align=align,
-        rate=rate,
+        fps=parse_instants(fps),
         denoise=denoise,
         preset=preset,
         space=space,

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from psvideo.model.choices import MOST_ITERATIONS, NEAR_ITERATIONS, Align, Rate, Solver
+from psvideo.model.choices import MOST_ITERATIONS, NEAR_ITERATIONS, Align, Solver
 
 SolverOption = Annotated[
     Solver, typer.Option("--solver", help="auto: robust against highlights and shadows from five lights on.")
@@ -57,8 +57,13 @@ AlignOption = Annotated[
         "flow: look for motion everywhere; none: leave them as they are.",
     ),
 ]
-RateOption = Annotated[
-    Rate,
-    typer.Option("--rate", help="One result per round, or one per flash: as many times more as there are lights."),
+FpsOption = Annotated[
+    str,
+    typer.Option(
+        "--fps",
+        help="Results per round, per flash (as many times more as there are lights), per camera frame, or a rate: 24, "
+        "23.976, 24000/1001.",
+        metavar="round|flash|frame|RATE",
+    ),
 ]
 Denoise = Annotated[int, typer.Option(min=1, max=64, help="Average up to N results where nothing moves.")]

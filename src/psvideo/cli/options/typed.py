@@ -105,6 +105,16 @@ def parse_rate(text: str, *, option: str = "--fps") -> Fraction:
     return exact if is_rounded and whole % 6 == 0 else rate
 
 
+def parse_instants(text: str) -> str | Fraction:
+    """Return which instants are wanted: ``round``, ``flash``, ``frame``, or an exact rate.
+
+    >>> parse_instants("flash"), parse_instants("23.976")
+    ('flash', Fraction(24000, 1001))
+    """
+    word = text.strip().lower()
+    return word if word in ("round", "flash", "frame") else parse_rate(text)
+
+
 def parse_lights(text: str) -> tuple[str, ...]:
     """Return the lights' names from ``key,left,right``, in the order in which they will flash."""
     names = tuple(name.strip() for name in text.split(","))

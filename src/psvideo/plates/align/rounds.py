@@ -12,6 +12,7 @@ import numpy as np
 from psvideo.model.choices import Align, Rate
 from psvideo.plates.align.between import Ends, plate_at, taken_of, without_doubtful
 from psvideo.plates.align.brightness import evened
+from psvideo.plates.align.comb import Comb, Schedule
 from psvideo.plates.align.flow import Codes
 from psvideo.plates.align.held import Around, DueInstant, Held
 from psvideo.plates.align.moving import Followed, Pair, followed_at
@@ -23,11 +24,11 @@ from psvideo.plates.sequence import AMBIENT, Round, gathered, handed_over
 class Aligning:
     """How plates are brought to one instant. ``auto`` looks for flow between plates that differ by more than noise.
 
-    ``rate`` says which instants are shown: the middle of every round's flashes, or every flash.
+    ``rate`` says which instants are shown: the middle of every round's flashes, every flash, or those of a steady rate.
     """
 
     align: Align = "auto"
-    rate: Rate = "round"
+    rate: Rate | Comb = "round"
 
 
 UNMOVED = Aligning(align="none")
@@ -35,30 +36,42 @@ UNMOVED = Aligning(align="none")
 
 
 def aligned(
-    plates: Iterable[LightPlate], lights: tuple[str, ...], how: Aligning, *, first: int, with_ambient: bool = False
+    plates: Iterable[LightPlate],
+    lights: tuple[str, ...],
+    how: Aligning,
+    *,
+    first: int,
+    with_ambient: bool = False,
+    schedule: Schedule | None = None,
 ) -> Iterator[Round]:
     """Yield rounds whose plates all show one instant: one for every complete round, or for every flash of it.
 
-    ``plates`` come in the order of their rounds. ``first`` is the number of the clip's first round. One result per
-    flash takes numbers of its own from there on, as many a round as there are lights. Plates between which nothing
-    moved pass as they are. Held are, in plates per light, one without alignment, one where nothing moves (one and a
-    half at the clip's start), one and a half and as many in 16 bits where all does, and two at one result per flash.
-    ``with_ambient`` says that dark slots come as well: every round waits for its own, and takes it along as it is.
+    ``plates`` come in the order of their rounds. ``first`` is the number of the clip's first round; ``schedule`` are
+    the instants of a steady rate, by round. One result per flash takes numbers of its own from there on, as many a
+    round as there are lights. Plates between which nothing moved pass as they are. Held are, in plates per light, one
+    without alignment, one where nothing moves (one and a half at the clip's start), one and a half and as many in 16
+    bits where all does, and two at other rates than the rounds'. ``with_ambient`` says that dark slots come as well:
+    every round waits for its own, and takes it along as it is.
     """
     if how == UNMOVED:
         return gathered(
             plates, lights, expected=lambda _: {*lights, AMBIENT} if with_ambient else {*lights}, whole=True
         )
-    return _slid(plates, lights, how, first, with_ambient)
+    return _slid(plates, lights, how, first, with_ambient, schedule)
 
 
 def _slid(
-    plates: Iterable[LightPlate], lights: tuple[str, ...], how: Aligning, first: int, with_ambient: bool
+    plates: Iterable[LightPlate],
+    lights: tuple[str, ...],
+    how: Aligning,
+    first: int,
+    with_ambient: bool,
+    schedule: Schedule | None,
 ) -> Iterator[Round]:
     held = Held(
         lights=lights,
         sketched=how.align != "none",
-        keep_all=how.rate == "flash",
+        keep_all=how.rate != "round",
         trusts_rest=how.align == "auto" and how.rate == "round",
         with_ambient=with_ambient,
     )
@@ -66,14 +79,19 @@ def _slid(
         number, times_s = plate.number, held.take(plate)
         del plate
         if times_s is not None:
-            held.waiting.extend(_instants(number, list(times_s.values()), how, first))
+            held.waiting.extend(_instants(number, list(times_s.values()), how, first, schedule))
         yield from _complete(held, how)
     held.ended = True
     yield from _complete(held, how)
 
 
-def _instants(number: int, times_s: list[float], how: Aligning, first: int) -> list[DueInstant]:
+def _instants(
+    number: int, times_s: list[float], how: Aligning, first: int, schedule: Schedule | None
+) -> list[DueInstant]:
     """Return the instants that are shown of a complete round."""
+    if schedule is not None:
+        due = schedule.by_round.get(number, ())
+        return [DueInstant(number=own, time_s=time_s, round=number) for own, time_s in due]
     if how.rate == "round":
         return [DueInstant(number=number, time_s=float(np.mean(times_s)), round=number)]
     start = first + (number - first) * len(times_s)
@@ -101,11 +119,11 @@ def _complete(held: Held, how: Aligning) -> Iterator[Round]:
 def _pass_rest(held: Held, instant: DueInstant, how: Aligning) -> None:
     """Hand on the plates of lights under which nothing moves, and note those under which something does.
 
-    At one result per flash plates are held for other instants anyway: none is judged before all can be.
+    At other rates than the rounds' plates are held for other instants anyway: none is judged before all can be.
     """
     undone = [light for light in held.lights if light not in instant.made and light not in instant.moving]
     undone.sort(key=lambda light: held.shots[light][instant.round].time_s)
-    if how.rate == "flash" and any(held.around(light, instant) is None for light in undone):
+    if how.rate != "round" and any(held.around(light, instant) is None for light in undone):
         return
     for light in undone:
         around = held.around(light, instant)

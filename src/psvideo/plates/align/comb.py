@@ -1,0 +1,90 @@
+"""Which instants of a clip are shown at a rate of its own, and from which round each is made.
+
+Instant ``k`` is ``first_s + k / fps`` on the camera's clock, exactly; its file has the number ``start + k``. An instant
+belongs to the whole round whose middle is nearest: then every light flashed before and after it, in that round and
+one beside it.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from psvideo.errors import UsageError
+from psvideo.model.camera import Camera
+from psvideo.model.plan import Plan
+from psvideo.model.timing import Flash
+from psvideo.plates.sequence import coming, round_numbers
+
+REACH = 0.75
+"""Of a round's length: what is farther from the middle of any whole round is shown by none, beside a hole."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Comb:
+    """Instants at a steady rate: number ``k``, from 0, is at ``first_s + k / fps`` on the camera's clock."""
+
+    fps: Fraction
+    first_s: float
+
+    def time_s(self, k: int) -> float:
+        """Return instant ``k`` in seconds."""
+        return self.first_s + float(k / self.fps)
+
+
+def comb_of(fps: Fraction, camera: Camera) -> Comb:
+    """Return the instants of a rate, the first in the middle of the clip's first frame: of its middle row's exposure.
+
+    Raises UsageError where a rate is above the camera's.
+    """
+    if fps > camera.fps:
+        raise UsageError(
+            f"`fps` {fps}: the camera took {camera.fps} frames a second, and nothing more often can be known of the "
+            "scene. Give at most that, or `fps` frame."
+        )
+    return Comb(fps=fps, first_s=0.5 * (camera.exposure_s + abs(camera.readout_s or 0.0)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Schedule:
+    """The instants that are shown, (number, time in seconds), by round; and ``left_out``, how many of the comb before
+    the first, within holes, and after the last instant lack a round."""
+
+    by_round: Mapping[int, tuple[tuple[int, float], ...]]
+    left_out: tuple[int, int, int]
+
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """The numbers of all instants that are shown, ascending."""
+        return tuple(number for instants in self.by_round.values() for number, _ in instants)
+
+
+def schedule_of(plan: Plan, flashes: tuple[Flash, ...], comb: Comb, *, start: int, end_s: float) -> Schedule:
+    """Return which instants up to ``end_s``, where the clip ends, are shown from which round."""
+    lights = coming(plan, flashes, start=start)
+    times_s: dict[int, list[float]] = {}
+    for flash, number in zip(flashes, round_numbers(flashes, start=start), strict=True):
+        if flash.complete and flash.lit and lights[number] >= {*plan.lights}:
+            times_s.setdefault(number, []).append(flash.start_s + 0.5 * flash.duration_s)
+    count = int((end_s - comb.first_s) * comb.fps) + 1
+    if not times_s:
+        return Schedule(by_round={}, left_out=(count, 0, 0))
+    numbers = list(times_s)
+    middles_s = np.array([np.mean(times) for times in times_s.values()])
+    reach_s = REACH * plan.cycle_s / len(plan.dark_rounds)
+    first_s, last_s = min(times_s[numbers[0]]), max(times_s[numbers[-1]])
+    by_round: dict[int, list[tuple[int, float]]] = {}
+    left_out = [0, 0, 0]
+    for k in range(count):
+        time_s = comb.time_s(k)
+        nearest = int(np.argmin(np.abs(middles_s - time_s)))
+        where = 0 if time_s < first_s else 2 if time_s > last_s else 1
+        if where == 1 and abs(middles_s[nearest] - time_s) <= reach_s:
+            by_round.setdefault(numbers[nearest], []).append((start + k, time_s))
+        else:
+            left_out[where] += 1
+    return Schedule(
+        by_round={number: tuple(instants) for number, instants in by_round.items()},
+        left_out=(left_out[0], left_out[1], left_out[2]),
+    )

@@ -1,0 +1,157 @@
+"""Results at any instant: which instants a rate asks for, on paper, and what is delivered at them."""
+
+from collections.abc import Callable
+from fractions import Fraction
+from itertools import pairwise
+from pathlib import Path
+
+import cv2
+import numpy as np
+import OpenEXR
+import pytest
+
+import psvideo as ps
+from psvideo.cli.options.typed import parse_instants
+from psvideo.errors import UsageError
+from psvideo.export.tags import Tags
+from psvideo.model.plan import Plan
+from psvideo.model.timing import Flash
+from psvideo.plates.align.comb import comb_of, schedule_of
+from psvideo.runs.output import rate_of, sequence_fps
+
+PlanMaker = Callable[..., Plan]
+
+
+def flashes_of(plan: Plan, count: int, without: tuple[int, ...] = ()) -> tuple[Flash, ...]:
+    train = plan.train(0, count)
+    return tuple(
+        Flash(
+            index=k,
+            slot=int(slot),
+            lights=plan.flashes[slot].lights,
+            start_s=float(start_s),
+            duration_s=float(duration_s),
+            complete=k not in without,
+        )
+        for k, (slot, start_s, duration_s) in enumerate(zip(train.slot, train.start_s, train.duration_s, strict=True))
+    )
+
+
+@pytest.mark.parametrize("fps", ["24", "24000/1001", "25", "30", "48", "60", "frame"])
+def test_instants_of_a_rate_are_exact_each_once_and_lie_between_a_rounds_neighbours(
+    make_plan: PlanMaker, fps: str
+) -> None:
+    plan = make_plan()
+    comb = rate_of(parse_instants(fps), plan)
+    assert not isinstance(comb, str)
+    assert sequence_fps(plan, comb) == comb.fps == (plan.camera.fps if fps == "frame" else Fraction(fps))
+    flashes = flashes_of(plan, 40)
+    due = schedule_of(plan, flashes, comb, start=1001, end_s=flashes[-1].start_s)
+    shown = [one for instants in due.by_round.values() for one in instants]
+    first = 0.5 * (plan.camera.exposure_s + (plan.camera.readout_s or 0.0))
+    assert [number for number, _ in shown] == list(range(shown[0][0], shown[-1][0] + 1))
+    for number, time_s in shown:
+        assert time_s == first + float(Fraction(number - 1001) / comb.fps)
+    middles = {1001 + r: np.mean([f.start_s + f.duration_s / 2 for f in flashes[4 * r : 4 * r + 3]]) for r in range(10)}
+    for number, instants in due.by_round.items():
+        for _, time_s in instants:
+            assert abs(time_s - middles[number]) == min(abs(time_s - middle) for middle in middles.values())
+    assert sum(due.left_out) + len(shown) == int((flashes[-1].start_s - first) * comb.fps) + 1
+
+
+def test_instants_without_a_round_near_are_left_out_and_counted(make_plan: PlanMaker) -> None:
+    plan = make_plan()
+    comb = comb_of(Fraction(60), plan.camera)
+    whole = schedule_of(plan, flashes_of(plan, 48), comb, start=1001, end_s=0.4)
+    holed = schedule_of(plan, flashes_of(plan, 48, without=(18, 22)), comb, start=1001, end_s=0.4)
+    assert set(holed.numbers) < set(whole.numbers)
+    assert holed.left_out[1] == len(whole.numbers) - len(holed.numbers) > 1
+    assert schedule_of(plan, flashes_of(plan, 3, without=(1,)), comb, start=1001, end_s=0.4).numbers == ()
+
+
+def test_rates_that_cannot_be_had_are_refused(make_plan: PlanMaker) -> None:
+    plan = make_plan()
+    with pytest.raises(UsageError, match="nothing more often can be known"):
+        rate_of(240, plan)
+    for wrong in ("fast", "0", "-24", "1/0"):
+        with pytest.raises(UsageError, match="fps"):
+            rate_of(parse_instants(wrong), plan)
+
+
+def test_the_sources_time_code_counts_the_frames_of_the_delivery_where_the_camera_is_faster() -> None:
+    tags = Tags(
+        fps=Fraction(24),
+        colour="",
+        plan_sha256="",
+        camera_fps=Fraction(120_000, 1001),
+        first_time_code="10:00:00:12",
+    )
+    assert [tags.time_code(0.008 + k / 24) for k in (0, 11, 12)] == ["10:00:00:12", "10:00:00:23", "10:00:01:00"]
+
+
+SCENE = """
+schema = "psvideo-scene/1"
+name = "pass"
+frames = 20
+[camera]
+width_px = 96
+height_px = 64
+fps = 100
+shutter_deg = 360.0
+readout_s = 0.009
+width_m = 0.30
+colour = "grey"
+[strobe]
+flash_s = 0.0008
+phase_s = 0.001
+[[light]]
+name = "a"
+direction = [0.5, 0.2, 0.85]
+[[light]]
+name = "b"
+direction = [-0.5, 0.2, 0.85]
+[[light]]
+name = "c"
+direction = [0.0, -0.5, 0.85]
+[[object]]
+mesh = "plane"
+scale = 2.0
+position_m = [0.0, 0.0, -0.1]
+albedo = { pattern = "noise", size_m = 0.03 }
+motion = { velocity_m_per_s = [0.6, 0.0, 0.0] }
+"""
+
+
+PX_PER_FRAME = 1.92
+
+
+@pytest.fixture(scope="module")
+def passing(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A textured wall that passes by at 192 px a second."""
+    folder = tmp_path_factory.mktemp("passing")
+    (folder / "scene.toml").write_text(SCENE)
+    return Path(ps.shoot(folder / "scene.toml", folder / "clip").path)
+
+
+def exr(path: Path, channel: str) -> np.ndarray:
+    pixels: np.ndarray = OpenEXR.File(str(path)).channels()[channel].pixels
+    return pixels
+
+
+def test_results_at_every_camera_frame_show_it_where_it_was_then(passing: Path, tmp_path: Path) -> None:
+    report = ps.normals(passing, rig=passing / "rig.toml", out=tmp_path / "out", fps="frame")
+    assert len(report.instants) > 10
+    pictures = [exr(path, "RGB")[..., 1] for path in sorted((tmp_path / "out" / "albedo").iterdir())]
+    assert len(pictures) == len(report.instants)
+    inner = np.s_[8:-8, 16:-24]
+    window = cv2.createHanningWindow((96 - 40, 64 - 16), cv2.CV_64F)
+    cut = [np.asarray(one[inner], np.float64) for one in pictures]
+    went = [cv2.phaseCorrelate(one, other, window)[0][0] for one, other in pairwise(cut)]
+    assert went == pytest.approx([PX_PER_FRAME] * len(went), abs=0.4)
+    assert np.mean(went) == pytest.approx(PX_PER_FRAME, abs=0.1)
+    times_s = [one.time_s for one in report.instants]
+    assert times_s == pytest.approx([0.0095 + (one.number - 1001) / 100 for one in report.instants], abs=1e-9)
+    said = OpenEXR.File(str(next((tmp_path / "out" / "normals").iterdir()))).header()
+    assert said["framesPerSecond"] == 100
+    with pytest.raises(UsageError, match="would be repeated"):
+        ps.normals(passing, rig=passing / "rig.toml", out=tmp_path / "none", fps="frame", align="none")
