@@ -33,7 +33,7 @@ checks: $(VENV)/.installed-test
 
 # Blender fits one version of Python (bpy 5.0: 3.11; 5.1 and newer: 3.13) and takes about 1 GB: an environment of its own
 blender: $(VENV)/.installed-test .venv-blender/.installed
-	$(BIN)/python -m pytest -q -s tests/test_clients_blender.py tests/test_clients_blender_addon.py
+	$(BIN)/python -m pytest -q -s tests/test_clients_blender.py tests/test_clients_blender_addon.py tests/test_clients_blender_stage.py
 
 .venv-blender/.installed:
 	$(PYTHON) -m venv .venv-blender

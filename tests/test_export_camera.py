@@ -137,6 +137,7 @@ def test_a_mesh_lies_where_the_camera_stands_and_is_not_mirrored(tmp_path: Path)
         triangles=np.array([[0, 1, 2]], np.int32),
         normals=np.array([[0, 0, 1.0]] * 3, np.float32),
         colours=np.ones((3, 3), np.float32),
+        places=np.zeros((3, 2), np.float32),
     )
     write_part(tmp_path / "a.npz", mesh, space)
     moved = read_part(tmp_path / "a.npz")

@@ -31,6 +31,7 @@ def triangle(shift: float = 0.0) -> Mesh:
         triangles=np.array([[0, 1, 2]], np.int32),
         normals=np.array([[0, 0, 1]] * 3, np.float32),
         colours=np.array([[0.0, 0.18, 1.5]] * 3, np.float32),
+        places=np.array([[0.5, 1.0], [0.0, 0.0], [1.0, 0.0]], np.float32),
     )
 
 
@@ -78,6 +79,7 @@ def test_an_animated_usd_holds_every_instant(tmp_path: Path) -> None:
     assert list(mesh.GetFaceVertexIndicesAttr().Get(1002)) == [0, 1, 2]
     assert list(mesh.GetFaceVertexCountsAttr().Get(1002)) == [3]
     assert np.allclose(np.array(mesh.GetDisplayColorAttr().Get(1001))[0], [0, 0.18, 1.5])
+    assert np.array_equal(np.array(geometry.PrimvarsAPI(mesh).GetPrimvar("st").Get(1002)), triangle().places)
     assert mesh.GetSubdivisionSchemeAttr().Get() == "none"
 
 

@@ -4,7 +4,7 @@ Colours in a PLY are 8-bit sRGB, which is what viewers take them for: the linear
 """
 
 import io
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 from psvideo.export.space import Space, placed, placed_points
 from psvideo.formats.whole_files import whole_file
 from psvideo.solve.depth.mesh import Mesh
+
+KEPT = tuple(field.name for field in fields(Mesh))
+"""What of a mesh is kept until the animation is put together: all of it."""
 
 
 def mesh_name(clip: str, number: int, *, suffix: str = "ply") -> str:
@@ -72,7 +75,7 @@ def write_part(path: Path, mesh: Mesh, space: Space) -> None:
     """Keep one instant's mesh for the animation that is put together when all are there."""
     stream = io.BytesIO()
     part = in_space(mesh, space)
-    np.savez(stream, points=part.points, triangles=part.triangles, normals=part.normals, colours=part.colours)
+    np.savez(stream, **{name: getattr(part, name) for name in KEPT})
     with whole_file(path) as beside:
         beside.write_bytes(stream.getbuffer())
 
@@ -80,4 +83,4 @@ def write_part(path: Path, mesh: Mesh, space: Space) -> None:
 def read_part(path: Path) -> Mesh:
     """Read what ``write_part`` kept."""
     with np.load(path) as held:
-        return Mesh(**{name: held[name] for name in ("points", "triangles", "normals", "colours")})
+        return Mesh(**{name: held[name] for name in KEPT})

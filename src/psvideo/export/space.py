@@ -60,16 +60,21 @@ class Space:
         pose = self.moving.pose(time_s, number, camera_fps)
         return replace(self, camera_to_world=pose.rotation, origin=pose.origin)
 
+    @property
+    def matrix(self) -> FloatArray:
+        """The camera-to-world matrix (4, 4), place in the last column; of camera space, the unit matrix."""
+        turn = np.eye(3) if self.camera_to_world is None else self.camera_to_world
+        origin = np.zeros(3) if self.origin is None else self.origin
+        return np.vstack([np.column_stack([turn, origin]), [0, 0, 0, 1]])
+
     def attributes(self) -> dict[str, str | float]:
         """Return what a file's header says of the world: its unit, its up axis, and the camera-to-world matrix."""
         if self.camera_to_world is None:
             return {}
-        origin = np.zeros(3) if self.origin is None else self.origin
-        rows = np.vstack([np.column_stack([self.camera_to_world, origin]), [0, 0, 0, 1]])
         return {
             "psvideo:meters_per_unit": float(self.unit_m),
             "psvideo:up": self.up,
-            "psvideo:camera_to_world": " ".join(f"{number:.9g}" for number in rows.ravel()),
+            "psvideo:camera_to_world": " ".join(f"{number:.9g}" for number in self.matrix.ravel()),
         }
 
 

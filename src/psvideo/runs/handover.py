@@ -3,7 +3,7 @@
 import os
 import re
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -20,7 +20,8 @@ from psvideo.export.nuke_script import nuke_script, script_name
 from psvideo.export.otio import Footage, Images, timeline_text
 from psvideo.export.programs import Delivered, SeenLight, note, note_name
 from psvideo.export.result_files import MOVIE_SUFFIXES, Delivery
-from psvideo.export.space import Space, placed
+from psvideo.export.space import CAMERA_SPACE, Space, placed
+from psvideo.export.usd.usd_stage import StageView, stage_name, stage_text
 from psvideo.formats.whole_files import whole_file, write_text
 from psvideo.model.choices import Codec, Preview
 from psvideo.model.ground import ground_of
@@ -96,6 +97,48 @@ def write_note(
     if delivery.program == "blender":
         with whole_file(run.folder / ADDON_FILE) as beside:
             beside.write_bytes(addon_zip())
+
+
+def write_stage(run: Finished, delivery: Delivery, rig: Rig, instants: Mapping[int, float], *, metric: bool) -> None:
+    """Write ``<clip>.usda``: camera, lights, card or mesh and material; ``instants`` are times (s) by number."""
+    clip, numbers = run.clip, sorted(instants)
+    made = Delivered(
+        clip=clip.name,
+        first=numbers[0],
+        last=numbers[-1],
+        fps=run.fps,
+        width_px=clip.width_px,
+        height_px=clip.height_px,
+        metric=metric,
+        delivery=delivery,
+    )
+    text = stage_text(made, numbers, _stage_view(rig, clip, delivery.space, instants))
+    write_text(run.folder / stage_name(clip.name), text)
+
+
+def _stage_view(rig: Rig, clip: Clip, space: Space, instants: Mapping[int, float]) -> StageView:
+    """Return the camera and the lights of a stage, in the camera's frame."""
+    lights = lights_as_planned(rig, clip.plan)
+    near = tuple(light for light in lights if light.position_m is not None)
+    focal, middle = None, (0.0, 0.0)
+    if rig.focal_px is not None:
+        col, row = rig.principal_px or ((clip.width_px - 1) / 2, (clip.height_px - 1) / 2)
+        focal = rig.focal_px[0] / clip.width_px
+        middle = (
+            (col + 0.5) / clip.width_px - 0.5,
+            (0.5 * clip.height_px - row - 0.5) / clip.width_px,
+        )
+    moving = space.moving is not None
+    posed = [number for number in instants if space.name == "world" and (moving or number == min(instants))]
+    fps = clip.plan.camera.fps
+    return StageView(
+        focal=focal,
+        middle=middle,
+        away_m=rig.plane[3] / rig.plane[2] if rig.plane and rig.plane[2] else None,
+        poses={number: space.at(instants[number], number, fps).matrix for number in posed},
+        lights=() if near else lights_seen(rig, clip, CAMERA_SPACE),
+        near=near,
+    )
 
 
 def lights_seen(rig: Rig, clip: Clip, space: Space) -> tuple[SeenLight, ...]:

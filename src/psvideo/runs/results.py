@@ -39,7 +39,7 @@ from psvideo.runs.delivering import (
     write_specular,
 )
 from psvideo.runs.depths import shape_of
-from psvideo.runs.handover import Finished, write_note, write_previews, write_timeline
+from psvideo.runs.handover import Finished, write_note, write_previews, write_stage, write_timeline
 from psvideo.runs.lighting import Lighting
 from psvideo.runs.look import look
 from psvideo.runs.output import Output, folder_of, tags_of
@@ -233,4 +233,6 @@ def _at_the_end(
     run = Finished(folder=folder, target=output.folder, clip=clip, fps=tags.fps, first_time_s=facts[0].time_s)
     write_previews(run, delivery.previews, delivery.codec, [f"plates/{light}" for light in clip.plan.lights], watch)
     write_timeline(run)
+    if delivery.program is not None or "usd" in delivery.meshes:
+        write_stage(run, delivery, rig, {one.number: one.time_s for one in facts}, metric=metric)
     write_note(run, delivery, rig, first=facts[0].number, last=facts[-1].number, metric=metric, caller=output.caller)

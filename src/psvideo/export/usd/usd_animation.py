@@ -64,12 +64,13 @@ def _prim(stage: Any, space: Space) -> Any:
     prim.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
     colours = UsdGeom.PrimvarsAPI(prim)
     colours.CreatePrimvar("displayColor", Sdf.ValueTypeNames.Color3fArray, UsdGeom.Tokens.vertex)
+    colours.CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.vertex)
     return prim
 
 
 def _sample(prim: Any, mesh: Mesh, number: int) -> None:
     """Set the mesh of one instant."""
-    from pxr import Vt
+    from pxr import UsdGeom, Vt
 
     ends = np.stack([mesh.points.min(axis=0), mesh.points.max(axis=0)]) if len(mesh.points) else np.zeros((2, 3))
     counts = np.full(len(mesh.triangles), 3, np.int32)
@@ -81,5 +82,7 @@ def _sample(prim: Any, mesh: Mesh, number: int) -> None:
     ]
     for attribute, values in vectors:
         attribute.Set(Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(values)), float(number))
+    places = UsdGeom.PrimvarsAPI(prim).GetPrimvar("st")
+    places.Set(Vt.Vec2fArray.FromNumpy(np.ascontiguousarray(mesh.places)), float(number))
     prim.GetFaceVertexIndicesAttr().Set(Vt.IntArray.FromNumpy(mesh.triangles.reshape(-1)), float(number))
     prim.GetFaceVertexCountsAttr().Set(Vt.IntArray.FromNumpy(counts), float(number))

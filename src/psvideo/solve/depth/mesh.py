@@ -20,12 +20,14 @@ class Mesh:
     triangles: (triangle, 3) int32, indices of vertices.
     normals: (vertex, 3) float32, unit.
     colours: (vertex, 3) float32, linear albedo.
+    places: (vertex, 2) float32, right and up in the picture, 0 to 1 from its lower left corner.
     """
 
     points: NDArray[np.float32]
     triangles: NDArray[np.int32]
     normals: NDArray[np.float32]
     colours: NDArray[np.float32]
+    places: NDArray[np.float32]
 
 
 def mesh_of(surface: Surface, depth: Depth) -> Mesh:
@@ -40,7 +42,13 @@ def mesh_of(surface: Surface, depth: Depth) -> Mesh:
         triangles=number[triangles],
         normals=surface.normals.reshape(-1, 3)[used].astype(np.float32),
         colours=albedo.reshape(-1, 3)[used].astype(np.float32),
+        places=_places(used, depth.depth.shape),
     )
+
+
+def _places(used: NDArray[np.bool_], shape: tuple[int, ...]) -> NDArray[np.float32]:
+    row, col = np.divmod(np.flatnonzero(used), shape[1])
+    return np.stack([(col + 0.5) / shape[1], 1 - (row + 0.5) / shape[0]], axis=-1).astype(np.float32)
 
 
 def _triangles(depth: Depth) -> NDArray[np.int32]:

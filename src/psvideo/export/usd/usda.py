@@ -1,0 +1,43 @@
+"""Parts of a USD text file (usda): prims as blocks, numbers, matrices and names."""
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from psvideo.model.camera import FloatArray
+
+
+def indented(lines: Sequence[str]) -> list[str]:
+    """Return lines one level further in."""
+    return [f"    {line}" if line else line for line in lines]
+
+
+def block(head: str, *parts: Sequence[str] | str) -> list[str]:
+    """Return a prim: its head, and what stands in it, lines or lists of them."""
+    inner = [line for part in parts for line in ([part] if isinstance(part, str) else part)]
+    return [head, "{", *indented(inner), "}"]
+
+
+def numbers_of(values: Sequence[float] | FloatArray) -> str:
+    """Return a tuple.
+
+    >>> numbers_of([1, 0.5])
+    '(1, 0.5)'
+    """
+    return "(" + ", ".join(f"{value:.9g}" for value in values) + ")"
+
+
+def matrix_of(matrix: FloatArray) -> str:
+    """Return a matrix as USD has it: rows are what the axes become, the last one the place."""
+    return "(" + ", ".join(numbers_of(row) for row in np.asarray(matrix).T) + ")"
+
+
+def identifier(word: str) -> str:
+    """Return a word as a prim may be called.
+
+    >>> identifier("key 1"), identifier("3")
+    ('key_1', '_3')
+    """
+    name = re.sub(r"\W", "_", word, flags=re.ASCII)
+    return f"_{name}" if not name or name[0].isdigit() else name
