@@ -4,9 +4,15 @@ import numpy as np
 import pytest
 
 import psvideo as ps
+from psvideo.model.coded import Coded, Tone
 from psvideo.model.surface import MEASURED, NO_LIGHT, ONE_LIGHT, TWO_LIGHTS, Surface
+from psvideo.plates.mixture import Mixture
+from psvideo.solve.filling.filled import filled
+from psvideo.solve.normals import woodham1980
+from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.solving import Solving
+from psvideo.solve.normals.task import Usable
 
 SIZE = 120
 LIGHTS = np.array([[0.6, 0.1, 0.79], [-0.5, 0.5, 0.71], [-0.1, -0.7, 0.71]])
@@ -162,3 +168,42 @@ def test_arrays_from_python_are_filled_or_not() -> None:
         source = ps.solve_images(images, LIGHTS, fill=fill).source
         assert source is not None
         assert bool((source == TWO_LIGHTS).any()) == fill
+
+
+class ReadRows:
+    """Codes that note which of their rows were read."""
+
+    def __init__(self, codes: np.ndarray) -> None:
+        self.codes, self.shape, self.dtype = codes, codes.shape, codes.dtype
+        self.read: set[int] = set()
+
+    def __len__(self) -> int:
+        return len(self.codes)
+
+    def __array__(self, dtype: object = None, copy: bool | None = None) -> np.ndarray:
+        return self[:]
+
+    def __getitem__(self, rows: slice) -> np.ndarray:
+        self.read.update(range(len(self))[rows])
+        return np.asarray(self.codes[rows])
+
+
+def test_where_little_is_missing_little_is_read_again() -> None:
+    """A hole in ten rows: only these are made of the frames once more, and what comes out is the same."""
+    normals, _ = ball(200.0)  # fills the picture
+    codes = [(plate.clip(0, 1) * 65535).astype(np.uint16) for plate in plates_of(normals, np.array([0.5, 0.4, 0.3]))]
+    watched = [ReadRows(one) for one in codes]
+    tone = Tone(gain=np.full((1, 1), 1 / 65535))
+    unmade = [Mixture(frames=(Coded(codes=one, tone=tone),), coefficients=np.ones((1, SIZE))) for one in watched]
+    missing = np.zeros((SIZE, SIZE), np.bool_)
+    missing[50:60, 30:90] = True
+    found = []
+    for plates in (unmade, [one.image() for one in unmade]):
+        surface = woodham1980.solve(plates, lit_by(), usable=Usable())
+        for one in watched:
+            one.read.clear()
+        evidence = Evidence(plates=plates, lit=lit_by(), usable=Usable())
+        found.append(filled(surface, evidence, solved=surface.valid & ~missing, noise=0.001))
+        assert all(one.read <= set(range(50, 60)) for one in watched)
+    np.testing.assert_array_equal(found[0].normals, found[1].normals)
+    np.testing.assert_array_equal(np.asarray(found[0].source), np.asarray(found[1].source))

@@ -81,7 +81,7 @@ def _wanted(solved: Mask, one: Evidence, threads: int | None) -> Mask:
     def count(given: Task, first: int, last: int) -> None:
         count_rows(given, working_memory(given), asked, counts, first, last)
 
-    one.in_bands(count, threads)
+    one.in_bands(count, threads, needed=np.asarray(~solved.all(axis=1)))
     lit = (solved | (counts > 0)).astype(np.uint8)
     around = cv2.boxFilter(lit, cv2.CV_8U, (3, 3), normalize=False, borderType=cv2.BORDER_REPLICATE)
     subject = solved | ((lit > 0) & (around >= MOST_LIGHTS_AROUND))
@@ -105,7 +105,7 @@ def _said(one: Evidence, index: NDArray[np.int32], pixels: int, noise: float, th
     def look(given: Task, first: int, last: int) -> None:
         look_rows(given, working_memory(given), index, said, first, last)
 
-    one.in_bands(look, threads)
+    one.in_bands(look, threads, needed=np.asarray((index >= 0).any(axis=1)))
     return said
 
 

@@ -68,9 +68,16 @@ class ShownPlates:
         return self.samples[0].shape
 
     def in_bands(
-        self, run: Callable[[Task, int, int], None], given: Task, *, threads: int | None, step: int = 1
+        self,
+        run: Callable[[Task, int, int], None],
+        given: Task,
+        *,
+        threads: int | None,
+        step: int = 1,
+        needed: NDArray[np.bool_] | None = None,
     ) -> None:
-        """Call ``run(task, first, last)`` for bands of rows side by side; it needs every ``step``-th row.
+        """Call ``run(task, first, last)`` for bands of rows side by side; it needs every ``step``-th row, of those
+        that are ``needed`` (row,), and reads no others.
 
         Plates that are not made yet are made band by band; the task finds the rows where they would lie if the whole
         plates did. (Numba's own thread pool may abort when two use it.)
@@ -91,6 +98,7 @@ class ShownPlates:
             for first in range(begin, end, made_rows):
                 last = min(first + made_rows, end)
                 wanted = np.arange(-(-first // step) * step, last, step)
+                wanted = wanted if needed is None else wanted[needed[wanted]]
                 if len(wanted):
                     make(wanted, first, held)
                     run(given._replace(plates=begins - first * held.strides[1]), first, last)

@@ -21,9 +21,16 @@ class Evidence:
     black_level: float = 0.0
     scale: float = 1.0
 
-    def in_bands(self, run: Callable[[Task, int, int], None], threads: int | None = None, *, step: int = 1) -> None:
-        """Call ``run(task, first, last)`` for bands of rows, of which it needs every ``step``-th; pictures that are
-        not made are made band by band."""
+    def in_bands(
+        self,
+        run: Callable[[Task, int, int], None],
+        threads: int | None = None,
+        *,
+        step: int = 1,
+        needed: Mask | None = None,
+    ) -> None:
+        """Call ``run(task, first, last)`` for bands of rows, of which it needs every ``step``-th, and of these those
+        ``needed`` (row,); pictures that are not made are made band by band."""
         shown = ShownPlates.of(self.plates)
         given = task(shown.samples, self.lit, self.seen, self.mask, self.usable, self.black_level, self.scale)
-        shown.in_bands(run, given, threads=threads, step=step)
+        shown.in_bands(run, given, threads=threads, step=step, needed=needed)
