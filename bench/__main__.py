@@ -19,6 +19,8 @@ TABLES = (
     "strobe",
     "cameras",
     "accuracy",
+    "predicted",
+    "verdicts",
 )
 
 for name in sys.argv[1:] or TABLES:

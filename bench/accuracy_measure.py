@@ -146,18 +146,32 @@ def turned(case: Case, wrong_deg: float) -> Case:
     return case._replace(lit=Illumination(directions=claimed, intensities=case.lit.intensities))
 
 
-def diligent_ball() -> Case:
-    """The ball of DiLiGenT, 48 lights."""
-    folder = SHARED_DATA / "diligent_ball"
+def diligent_lights(folder: Path) -> tuple[list[Path], np.ndarray, np.ndarray]:
+    """Return a DiLiGenT folder's pictures, and their lights' directions and strengths by channel, 1 in the mean."""
     with (folder / "lights.csv").open() as file:
         listed = [row for row in csv.reader(file) if row[0].endswith(".png")]
     numbers = np.array([[float(word) for word in row[1:7]] for row in listed])
-    plates = [read_image(folder / row[0], cv2.IMREAD_UNCHANGED)[..., ::-1] / np.float32(65535) for row in listed]
-    strengths = numbers[:, 3:] / numbers[:, 3:].mean()
+    return [folder / row[0] for row in listed], numbers[:, :3], numbers[:, 3:] / numbers[:, 3:].mean()
+
+
+def diligent(folder: Path, name: str) -> Case:
+    """Photographs of DiLiGenT with their true normals."""
+    files, directions, strengths = diligent_lights(folder)
+    plates = [read_image(file, cv2.IMREAD_UNCHANGED)[..., ::-1] / np.float32(65535) for file in files]
+    lit = Illumination(directions=directions, intensities=strengths)
     mask = read_image(folder / "mask.png", cv2.IMREAD_GRAYSCALE) > 127
-    lit = Illumination(directions=numbers[:, :3], intensities=strengths)
     plates = [np.ascontiguousarray(plate, np.float32) for plate in plates]
-    return Case("DiLiGenT ball", plates, lit, np.load(folder / "normal_gt.npy").astype(np.float64), mask)
+    return Case(name, plates, lit, np.load(folder / "normal_gt.npy").astype(np.float64), mask)
+
+
+def diligent_ball() -> Case:
+    """The ball of DiLiGenT, 48 lights."""
+    return diligent(SHARED_DATA / "diligent_ball", "DiLiGenT ball")
+
+
+def photographed(thing: str) -> Case:
+    """Photographs of DiLiGenT's bear or cat, 96 lights."""
+    return diligent(SHARED_DATA / "diligent_photos" / thing, thing)
 
 
 def rendered_bunny() -> Case:

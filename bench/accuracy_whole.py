@@ -3,10 +3,8 @@
 Every pixel of the subject counts, measured or not. "Reached" is what three lights light without noise.
 """
 
-import csv
 from collections.abc import Generator, Iterator
 
-import cv2
 import numpy as np
 
 from bench.accuracy_measure import (
@@ -19,7 +17,7 @@ from bench.accuracy_measure import (
     diligent_ball,
     errors_deg,
     gloss,
-    read_image,
+    photographed,
     spread_subsets,
     turned,
     washington_sphere,
@@ -61,7 +59,7 @@ def rows() -> Iterator[Accuracy]:
 
 def photographs() -> Iterator[Accuracy]:
     """DiLiGenT's bear, cat and ball with all lights and with 12 that are well spread, and Washington's sphere."""
-    for case in (diligent("bear"), diligent("cat"), diligent_ball()):
+    for case in (photographed("bear"), photographed("cat"), diligent_ball()):
         whole = yield from every_pixel(case, None)
         for chosen in (farthest(case.lit.directions, 12), *spread_subsets(case.lit.directions, 12, 2)):
             yield from every_pixel(case.choose(chosen), 1.1 * whole)
@@ -85,19 +83,6 @@ def bust(lights: tuple[int, ...]) -> tuple[Case, np.ndarray]:
     reached = np.sum([plate.mean(axis=-1) > 1e-6 for plate in clean], axis=0) >= 3
     subject = hits.image(hits.point_m)[..., 2] > -1.5  # without the wall
     return Case(f"bust, {len(lights)} lights {lights}", plates, lit, truth, subject), reached & subject
-
-
-def diligent(thing: str) -> Case:
-    """Photographs of DiLiGenT, 96 lights."""
-    folder = SHARED_DATA / "diligent_photos" / thing
-    with (folder / "lights.csv").open() as file:
-        listed = [row for row in csv.reader(file) if row[0].endswith(".png")]
-    numbers = np.array([[float(word) for word in row[1:7]] for row in listed])
-    plates = [read_image(folder / row[0], cv2.IMREAD_UNCHANGED)[..., ::-1] / np.float32(65535) for row in listed]
-    lit = Illumination(directions=numbers[:, :3], intensities=numbers[:, 3:] / numbers[:, 3:].mean())
-    mask = read_image(folder / "mask.png", cv2.IMREAD_GRAYSCALE) > 127
-    plates = [np.ascontiguousarray(plate, np.float32) for plate in plates]
-    return Case(thing, plates, lit, np.load(folder / "normal_gt.npy").astype(np.float64), mask)
 
 
 def farthest(directions: np.ndarray, count: int) -> np.ndarray:

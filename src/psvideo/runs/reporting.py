@@ -19,7 +19,8 @@ from psvideo.model.rig import Light, Rig
 from psvideo.model.timing import Timing
 from psvideo.report.html import report_page
 from psvideo.report.judge.light import ambient, exposure, lamps
-from psvideo.report.judge.result import focus, rig, steadiness, validity
+from psvideo.report.judge.of_rig import rig
+from psvideo.report.judge.result import accuracy, focus, steadiness, validity
 from psvideo.report.judge.time import coverage, motion, timing_and_order
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.observed import Observed
@@ -69,6 +70,7 @@ def judgements(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool 
         motion(plan, timing, observed, aligned=aligned),
         focus(observed),
         *rig(observed),
+        *accuracy(observed),
         *validity(observed),
         *steadiness(observed.facts),
     )

@@ -136,7 +136,7 @@ def lamps(observed: Observed, *, timed: bool = True) -> Iterator[Judgement]:
     level = np.array([one.levels for one in facts])
     usual = np.median(level, axis=0)
     relative = usual / max(float(usual.max()), 1e-12)
-    said = list(_weak(observed.lights, relative))
+    said = list(_weak(observed.lights, relative, _brightest(observed)))
     alive = usual > NO_LIGHT * usual.max()
     whole = np.array([one.unseen_share == 0 for one in facts])
     if timed and whole.any():
@@ -154,8 +154,16 @@ def lamps(observed: Observed, *, timed: bool = True) -> Iterator[Judgement]:
         )
 
 
-def _weak(lights: Sequence[str], relative: NDArray[np.float64]) -> Iterator[Judgement]:
-    weak = [light for light, share in zip(lights, relative, strict=True) if NO_LIGHT <= share < WEAK_LIGHT]
+def _brightest(observed: Observed) -> NDArray[np.float64]:
+    """Return the light in every lamp's brightest parts, as a share of the strongest lamp's."""
+    tops = np.array([2.0 ** observed.levels(light).stops(TARGET_QUANTILE) for light in observed.lights])
+    return np.asarray(tops / tops.max())
+
+
+def _weak(lights: Sequence[str], relative: NDArray[np.float64], brightest: NDArray[np.float64]) -> Iterator[Judgement]:
+    """Say which lamps give little. One that comes from the side gives the subject little, and its parts enough."""
+    dim = (relative < WEAK_LIGHT) & (brightest < WEAK_LIGHT)
+    weak = [light for light, share, is_dim in zip(lights, relative, dim, strict=True) if is_dim and share >= NO_LIGHT]
     if len(weak) > NAMED:
         yield Judgement(
             subject="lights",
@@ -166,7 +174,7 @@ def _weak(lights: Sequence[str], relative: NDArray[np.float64]) -> Iterator[Judg
         )
     if relative.max() <= 0:  # nothing is lit, which is said once
         return
-    for light, share in zip(lights, relative, strict=True):
+    for light, share, is_dim in zip(lights, relative, dim, strict=True):
         if share < NO_LIGHT:
             yield Judgement(
                 subject="lights",
@@ -174,7 +182,7 @@ def _weak(lights: Sequence[str], relative: NDArray[np.float64]) -> Iterator[Judg
                 found=f"The light {light!r} gives no light ({100 * max(share, 0):.1f} % of the strongest).",
                 advice="Check its cable, driver and line, and that the plan names it as the board does.",
             )
-        elif share < WEAK_LIGHT and len(weak) <= NAMED:
+        elif is_dim and len(weak) <= NAMED:
             yield Judgement(
                 subject="lights",
                 grade="doubtful",

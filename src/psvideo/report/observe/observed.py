@@ -18,15 +18,18 @@ from psvideo.plates.sequence import AMBIENT, Round
 from psvideo.report.observe.focus import middle_of, sharpest_blur_px
 from psvideo.report.observe.levels import BINS, Counts, Levels, count_levels
 from psvideo.report.observe.motion import Glimpse, Motion, glimpse, motion
+from psvideo.report.observe.rigfit import RigFit
 from psvideo.report.observe.rigpoints import RigPoints
 from psvideo.report.observe.slopes import slope_agreement
 from psvideo.report.observe.steadiness import Change, Sample, change, sample_of
 from psvideo.report.observe.thinned import step_of, thinned
 from psvideo.report.observe.worst import Thumbnail, Worst
+from psvideo.solve.filling.filled import holes_in
+from psvideo.solve.passes.alpha_matte import lit_from
 
 LIT = 0.01
-"""A pixel brighter than this share of saturation under any light is part of the scene; of dark takes, than a sixth of
-their brightest hundredth."""
+"""A pixel brighter than this share of saturation under any light is part of the scene, unless it is a dim backdrop's;
+of dark takes, than a sixth of their brightest hundredth."""
 DARKEST = 1 / 6
 FAINT = 2.0**-12
 
@@ -37,10 +40,11 @@ class InstantFacts:
     frame saw; ``borrowed_share`` is that of rows that other rounds showed. A void background counts as neither.
     ``change`` is what differs from the result before, at rest.
 
-    ``valid_share`` is None where no normals were solved. ``levels`` (light) is each light's mean on the subject, 1.0 =
-    saturation; ``clipped`` (light) the share of it that is saturated. ``ambient`` is the ambient light's share of what
-    an exposure holds. ``speed_px_s`` is how fast the fastest parts move, and ``moving_share`` how much
-    of the picture does; None where it is not known. What changes too fast to be followed has a share and no speed.
+    ``valid_share`` and ``measured_share``, what three lights reach, are None where no normals were solved, the latter
+    where nothing was filled as well. ``levels`` (light) is each light's mean on the subject, 1.0 = saturation;
+    ``clipped`` (light) the share of it that is saturated. ``ambient`` is the ambient light's share of what an exposure
+    holds. ``speed_px_s`` is how fast the fastest parts move, and ``moving_share`` how much of the picture does; None
+    where it is not known. What changes too fast to be followed has a share and no speed.
     ``misfit`` is what the robust solver found common to the whole picture.
     """
 
@@ -57,6 +61,7 @@ class InstantFacts:
     speed_px_s: float | None = None
     moving_share: float | None = None
     misfit: Misfit | None = None
+    measured_share: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,8 +85,8 @@ def seen_of(one: Round, mask: NDArray[np.bool_] | None) -> Seen:
     if mask is not None:
         subject = thinned(mask)
         return Seen(bright=bright, shown=shown, subject=subject, beyond=_beyond(most, subject))
-    lit = most > min(LIT, DARKEST * float(np.percentile(most[::2, ::2], 99)))
-    return Seen(bright=bright, shown=shown, subject=lit)
+    lit = most > lit_from(most, min(LIT, DARKEST * float(np.percentile(most[::2, ::2], 99))))
+    return Seen(bright=bright, shown=shown, subject=lit | holes_in(lit))
 
 
 def _beyond(most: NDArray[np.float32], subject: NDArray[np.bool_]) -> float:
@@ -106,6 +111,7 @@ def instant_facts(
     seen = seen or seen_of(one, mask)
     subject, bright = seen.subject, seen.bright
     count = max(int(subject.sum()), 1)
+    valid, measured = _shares(surface, subject)
     shares, levels = [], []
     for picture, shown, plate in zip(bright, seen.shown, one.plates, strict=True):
         shares.append(float(((picture >= plate.saturation) & subject).sum() / count))
@@ -114,7 +120,8 @@ def instant_facts(
     return InstantFacts(
         number=one.number,
         time_s=one.time_s,
-        valid_share=None if surface is None else _valid_share(surface, subject),
+        valid_share=valid,
+        measured_share=measured,
         clipped_share=float(np.mean(shares)),
         unseen_share=float(np.mean([1 - plate.rows_seen.mean() for plate in one.plates])),
         borrowed_share=float(np.mean([_borrowed(plate) for plate in one.plates])),
@@ -128,10 +135,16 @@ def instant_facts(
     )
 
 
-def _valid_share(surface: Surface, subject: NDArray[np.bool_]) -> float:
-    """Return the share of the subject that is valid; what a surface was filled with belongs to it."""
-    whole = subject if surface.source is None else thinned(surface.shown)
-    return float((thinned(surface.valid) & whole).sum() / max(int(whole.sum()), 1))
+def _shares(surface: Surface | None, subject: NDArray[np.bool_]) -> tuple[float | None, float | None]:
+    """Return which shares of the subject are valid and measured. Of a surface that was filled, noise is none of it; of
+    one that was emptied, what was measured is not known."""
+    if surface is None:
+        return None, None
+    filled = bool((surface.shown & ~surface.valid).any())
+    whole = subject & thinned(surface.shown) if filled else subject
+    count = max(int(whole.sum()), 1)
+    valid, measured = (float((thinned(part) & whole).sum() / count) for part in (surface.valid, surface.measured))
+    return valid, measured if filled or valid == 1 else None
 
 
 def _borrowed(plate: LightPlate) -> float:
@@ -220,6 +233,11 @@ class Observed:
     def levels(self, light: str) -> Levels:
         """Return a light's counts over the take."""
         return Levels(self.counts.get(light, np.zeros(BINS + 2, np.int64)))
+
+    @property
+    def rig_fit(self) -> RigFit | None:
+        """What the points say of the rig so far; None where it cannot be said."""
+        return None if self.points is None else self.points.fit(self.light_at_points)
 
     @property
     def thumbnails(self) -> tuple[Thumbnail, ...]:

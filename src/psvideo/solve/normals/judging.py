@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from psvideo.compute.threads import over_ranges
 from psvideo.model.surface import MEASURED, Surface
 from psvideo.solve.normals.bands import BAND_PIXELS
-from psvideo.solve.normals.doubting import Doubting, ThinSurface, bits, doubt_deg, step_of, stored
+from psvideo.solve.normals.doubting import Doubting, Signs, ThinSurface, bits, doubt_deg, signs_of, step_of, stored
 from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.plate_noise import PlateNoise
@@ -34,11 +34,11 @@ class Judging:
     doubting: what may turn normals beyond that.
     """
 
-    most_error_deg: float = 5.5
+    most_error_deg: float = 5.0
     beside_typical: float = 1.1
-    most_typical_deg: float = 7.0
-    fit_share: float = 0.4
-    fit_noise: float = 2.3
+    most_typical_deg: float = 6.5
+    fit_share: float = 0.25
+    fit_noise: float = 1.95
     held: float = 1.15
     least_share: float = 0.001
     doubting: Doubting = field(default_factory=Doubting)
@@ -47,7 +47,7 @@ class Judging:
 NOTHING = np.zeros((0, 0), np.float32)
 MANY_LIGHTS = 8
 """Beyond so many lights residuals are not taken to average out."""
-SURE = 1.3
+SURE = 1.5
 """In a single pixel residuals count from so many times what noise makes of them."""
 
 
@@ -58,16 +58,26 @@ def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging =
     """
     spread = _Spread.of(surface, one.lit, noise, how)
     points = spread.points(surface)
-    doubt = doubt_deg(points, one, surface, how=how.doubting)
+    doubt = doubt_deg(signs_of(points, one, surface), how=how.doubting)
     at_points = spread.judged(points.surface, doubt, 1, how, limit_deg=0.0)[0][points.known].astype(np.float32)
     limit_deg, misfit = how.most_error_deg, surface.misfit
     if at_points.size:
-        typical, by_noise = float(np.median(at_points)), float(np.median(points.noise_deg[points.known]))
+        albedo = _brightness(points.surface.albedo)[points.known]
+        typical, by_noise = (_typical(each, albedo) for each in (at_points, points.noise_deg[points.known]))
         beyond_deg = float(np.sqrt(max(typical**2 - by_noise**2, 0.0)))
         limit_deg = max(limit_deg, min(how.beside_typical * beyond_deg, how.most_typical_deg))
         misfit = None if misfit is None else replace(misfit, error_deg=beyond_deg)
     error, trusted = spread.judged(surface, doubt, points.step, how, limit_deg=limit_deg)
     return replace(surface, valid=trusted, error_deg=error, misfit=misfit)
+
+
+def looked_at(
+    surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging = Judging()
+) -> tuple[ThinSurface, Signs]:
+    """Return the points at which a surface is judged, and what speaks against their normals: what constants are fitted
+    to."""
+    points = _Spread.of(surface, one.lit, noise, how).points(surface)
+    return points, signs_of(points, one, surface)
 
 
 def emptied(surface: Surface) -> Surface:
@@ -170,6 +180,17 @@ class _Spread:
             rows,
             each=BAND_PIXELS // cols,
         )
+
+
+def _brightness(albedo: NDArray[np.floating]) -> Floats:
+    return np.asarray(albedo if albedo.ndim == 2 else albedo.mean(axis=-1, dtype=np.float32), np.float32)
+
+
+def _typical(each: Floats, weight: Floats) -> float:
+    """Return the weighted median: what is bright shows more of the subject than a dim backdrop does."""
+    order = np.argsort(each, kind="stable")
+    upto = np.cumsum(weight[order], dtype=np.float64)
+    return float(each[order[np.searchsorted(upto, upto[-1] / 2)]])
 
 
 def _every(planes: NDArray[np.floating], step: int) -> NDArray[np.floating]:

@@ -87,7 +87,7 @@ def indirect_rows(
     t = lent_task(task, work.matrix, work.per_strength)
     n, a, values, total, count = lent(normals), lent(albedo), lent(work.values), lent(sums), lent(counts)
     channels, facing = t.tone.shape[1], FACING if t.ratio > ZERO else ZERO
-    share = ONE / np.float32(channels)
+    each = ONE / np.float32(channels)
     for row in range(-(-first // step) * step, last, step):
         for col in range(0, t.cols, BLOCK):
             width = min(BLOCK, t.cols - col)
@@ -97,12 +97,12 @@ def indirect_rows(
                 for i in range(-col % step, width, step):
                     size = ZERO
                     for channel in range(channels):
-                        size += decoded(a[channel, row, col + i]) * share
+                        size += decoded(a[channel, row, col + i]) * each
                     if not size > ZERO or not values[light * channels, i] > ABSENT:
                         continue
                     level = ZERO
                     for channel in range(channels):
-                        level += values[light * channels + channel, i] * share
+                        level += values[light * channels + channel, i] * each
                     one = at(per, i)
                     lx, ly, lz = at(lamp, i)
                     nx = decoded(n[0, row, col + i])
@@ -112,5 +112,7 @@ def indirect_rows(
                     level *= one * t.albedo_scale
                     hindered = (cosine <= facing) | (level < max(t.dark * t.albedo_scale, SHADOWED * size * cosine))
                     if hindered:
-                        total[row // step, (col + i) // step] += min(max(level / size, -MOST_INDIRECT), MOST_INDIRECT)
+                        grazing = max(cosine, ZERO) if cosine <= facing else ZERO
+                        share = level / size - grazing
+                        total[row // step, (col + i) // step] += min(max(share, -MOST_INDIRECT), MOST_INDIRECT)
                         count[row // step, (col + i) // step] += ONE

@@ -57,11 +57,7 @@ class Solving:
         """Return the surface that explains one plate per light; see the solvers for the arguments."""
         from psvideo.solve.filling.filled import filled
 
-        noise = noise_of(plates)
-        method = self.method(len(plates))
-        usable = _usable(noise, lit.intensities.shape[1], method)
-        solved = self._solved(plates, lit, usable, noise, seen, mask)
-        one = Evidence(plates=plates, lit=lit, usable=usable, seen=seen, mask=mask)
+        solved, one, noise = self.measured(plates, lit, seen=seen, mask=mask)
         known = judged(solved, one, noise)
         known = filled(known, one, solved=solved.valid, noise=noise.dark) if self.fill else emptied(known)
         return replace(
@@ -69,6 +65,20 @@ class Solving:
             residual=known.residual if self.residual else None,
             error_deg=known.error_deg if self.error else None,
         )
+
+    def measured(
+        self,
+        plates: Plates,
+        lit: Illumination,
+        *,
+        seen: Mask | None = None,
+        mask: Mask | None = None,
+    ) -> tuple[Surface, Evidence, PlateNoise]:
+        """Return every pixel that three measurements solve, well or not, and what it is judged by."""
+        noise = noise_of(plates)
+        usable = _usable(noise, lit.intensities.shape[1], self.method(len(plates)))
+        solved = self._solved(plates, lit, usable, noise, seen, mask)
+        return solved, Evidence(plates=plates, lit=lit, usable=usable, seen=seen, mask=mask), noise
 
     def _solved(
         self,
@@ -79,7 +89,7 @@ class Solving:
         seen: Mask | None,
         mask: Mask | None,
     ) -> Surface:
-        """Return every pixel that three measurements solve, well or not."""
+        """Return what the solver makes of the plates."""
         if self.method(len(plates)) == "robust":
             return robust.solve(
                 plates,
@@ -107,8 +117,8 @@ def trust_note(method: Method, lights: int) -> str:
     how = Judging()
     trusted = (
         f"A normal is valid where it was measured and its predicted error is at most {how.most_error_deg:g} degrees, "
-        f"or {how.beside_typical:g} times what is typical of the picture where that is more (up to "
-        f"{how.most_typical_deg:g}): a rig that is wrong makes no pixel invalid, and the judgement of the rig says so. "
+        f"or {how.beside_typical:g} times what is typical of the picture beyond noise where that is more (up to "
+        f"{how.most_typical_deg:g}): where rig or surface spoil all pixels alike, the judgement of accuracy says so. "
     )
     if lights == 3:
         return trusted + (

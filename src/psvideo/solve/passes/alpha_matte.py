@@ -41,7 +41,7 @@ def soft_matte(rows: PlateRows, noise: PlateNoise, *, mask: Mask | None = None) 
             np.maximum(most[first:last], rows.light(light, first, last).mean(axis=-1), out=most[first:last])
 
     rows.over_bands(brightest)
-    lit = cv2.medianBlur((most > _threshold(most, level)).view(np.uint8), 3) > 0
+    lit = cv2.medianBlur((most > lit_from(most, level)).view(np.uint8), 3) > 0
     lit |= holes_in(lit)
     inside = cv2.erode(lit.view(np.uint8), BESIDE, borderType=cv2.BORDER_REPLICATE) > 0
     outside = cv2.dilate(lit.view(np.uint8), BESIDE, borderType=cv2.BORDER_REPLICATE) == 0
@@ -49,9 +49,12 @@ def soft_matte(rows: PlateRows, noise: PlateNoise, *, mask: Mask | None = None) 
     return alpha if mask is None else np.where(mask, alpha, np.float32(0))
 
 
-def _threshold(most: Floats, level: float) -> float:
-    """Return the brightness from which on a pixel is lit, no less than ``level``, the noise's."""
-    logs = np.log(np.maximum(most, np.float32(level)))
+def lit_from(most: Floats, level: float) -> float:
+    """Return the brightness from which on a pixel is the subject's, no less than ``level``, the noise's.
+
+    most: (row, col), the brightest that any light shows.
+    """
+    logs = np.log(np.maximum(most, np.float32(max(level, LEAST))))
     count, edges = np.histogram(logs, BINS)
     middles, share = (edges[1:] + edges[:-1]) / 2, count / count.sum()
     below, mean = np.cumsum(share), np.cumsum(share * middles)

@@ -1,0 +1,99 @@
+"""Judgements on the rig: whether its directions and strengths can have made the plates."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from psvideo.report.judge.light import NAMED
+from psvideo.report.judge.result import AT_REST, NOISY_DEG, moves
+from psvideo.report.judgement import Grade, Judgement
+from psvideo.report.observe.observed import InstantFacts, Observed
+from psvideo.report.observe.rigfit import RigFit
+
+MISFIT, LOST_MISFIT = 0.135, 0.25
+"""Shares of the light that another rig would explain and this one cannot. A rig that was off by 1 to 5 degrees left
+0.11 to 0.13 on photographs, two lights exchanged among five 0.18, a list in another order 0.19."""
+LEFT_OVER = 0.1
+STRENGTH_MISFIT, BY_STRENGTH, OTHER_STRENGTH = 0.05, 0.5, 1.25
+"""Less is enough where other strengths of some lights, half of them at most, take half of it away."""
+AGREE, DISAGREE = 0.3, -0.1
+TOO_FAR_DEG = 8.0
+"""Slopes of normals that are so far off agree badly under the right rig too: then only clear disagreement counts."""
+
+
+def rig(observed: Observed) -> Iterator[Judgement]:
+    """Judge whether the rig's directions and strengths can have made these plates."""
+    fit = observed.rig_fit
+    wrong = None if fit is None else _misfit(observed.lights, fit)
+    crossed = _crossed(observed)
+    if wrong or crossed:
+        yield from (one for one in (wrong, crossed) if one)
+    elif fit is not None:
+        yield _explained(fit)
+    elif observed.slopes:
+        yield Judgement(
+            subject="rig",
+            grade="good",
+            found="The normals fit together as one surface's; with three lights no more of the rig can be checked.",
+        )
+
+
+def _explained(fit: RigFit) -> Judgement:
+    found = f"The rig explains the plates: {100 * fit.misfit:.1f} % of the light is left over"
+    if fit.misfit > LEFT_OVER:
+        found += (
+            f" ({100 * fit.own_misfit:.0f} % under any rig), by gloss, soft shadows, or directions a few degrees off"
+        )
+    return Judgement(subject="rig", grade="good", found=f"{found}.")
+
+
+def _misfit(lights: Sequence[str], fit: RigFit) -> Judgement | None:
+    off = [
+        (light, strength)
+        for light, strength in zip(lights, fit.strengths, strict=True)
+        if not 1 / OTHER_STRENGTH < strength < OTHER_STRENGTH
+    ]
+    some = 0 < len(off) <= len(lights) / 2
+    by_strength = some and fit.excess > STRENGTH_MISFIT and fit.scaled_misfit < BY_STRENGTH * fit.misfit
+    if fit.excess <= MISFIT and not by_strength:
+        return None
+    grade: Grade = "bad" if fit.excess > LOST_MISFIT else "doubtful"
+    found = f"The rig does not fit the plates: {100 * fit.misfit:.0f} % of the light cannot come from its lights"
+    if by_strength:
+        off.sort(key=lambda one: -abs(float(np.log(max(one[1], 1e-6)))))
+        named = ", ".join(f"{light!r} {100 * strength:.0f} %" for light, strength in off[:NAMED])
+        named += f" and {len(off) - NAMED} more," if len(off) > NAMED else ""
+        return Judgement(
+            subject="rig",
+            grade=grade,
+            found=f"{found}; with other strengths it would: {named} of what the rig says.",
+            advice="Check the power and the driver of these lights, or calibrate the rig again.",
+        )
+    return Judgement(
+        subject="rig",
+        grade=grade,
+        found=f"{found}.",
+        advice="Use the rig file of this set-up; calibrate again if a light or the camera was moved; check that lights "
+        "have the same names in plan and rig.",
+    )
+
+
+def _crossed(observed: Observed) -> Judgement | None:
+    agreement = float(np.median(observed.slopes)) if observed.slopes else 1.0
+    far = max((one.misfit.error_deg for one in observed.facts if one.misfit is not None), default=0.0) > TOO_FAR_DEG
+    if agreement > AGREE or not quiet(observed.facts) or (agreement > DISAGREE and (far or moves(observed.facts))):
+        return None
+    return Judgement(
+        subject="rig",
+        grade="bad" if agreement < DISAGREE else "doubtful",
+        found=f"The normals cannot be those of one surface (agreement of slopes {agreement:.2f}, 1 at best): "
+        "directions are mirrored or turned, or lights exchanged.",
+        advice="Check that the rig file is in camera axes (x right, y up), belongs to this set-up, and names the "
+        "lights as the plan does; calibrate again if anything was moved.",
+    )
+
+
+def quiet(facts: Sequence[InstantFacts]) -> bool:
+    """Tell whether normals are steady enough to be held against each other."""
+    known = [one.change.normals_deg for one in facts if one.change is not None and (one.moving_share or 0.0) < AT_REST]
+    return not known or float(np.median(known)) < NOISY_DEG

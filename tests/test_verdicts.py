@@ -1,0 +1,368 @@
+"""Every threshold of a verdict separates footage that is just good from footage that is just not."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from psvideo.model.camera import Camera
+from psvideo.model.plan import Plan, PlannedFlash, assemble_plan
+from psvideo.model.rig import Light, Rig
+from psvideo.model.timing import DroppedFrames, Timing
+from psvideo.plates.ambient_regression import Separated
+from psvideo.plates.light_plate import LightPlate
+from psvideo.plates.mixture import made
+from psvideo.plates.sequence import AMBIENT, Round
+from psvideo.report.judge import light, result, time
+from psvideo.report.judge.of_rig import rig as judge_rig
+from psvideo.report.judgement import Judgement
+from psvideo.report.observe.observed import Observed
+from psvideo.report.observe.rigpoints import rig_points
+from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.solving import Solving
+
+SIZE = 96
+SEEDS = (0, 1, 2)
+Line = tuple[str, str]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Footage:
+    """A painted ball in the void, or a wall of waves, under a few lights, filmed for a few rounds.
+
+    stops: where its brightest hundredth (0.5 %) lies below saturation under the first light; ``clip`` instead: the
+        share of it that the first light clips, or all of them do. gains: of each light, (light,) or (round, light).
+    noise: of saturation. dark: a part of the subject where only two lights reach. ambient: by round, as a share of what
+        an exposure holds. blur_px, shift_px: of the picture, and how far it moves from round to round.
+    claimed_deg, turned_deg, claimed_gain: by how much the rig's directions are off, each its own way; by how much all
+        are turned around the axis; what it says of the first light's strength. solved: whether normals are needed.
+    """
+
+    shape: str = "ball"
+    lights: int = 5
+    rounds: int = 1
+    stops: float = -0.5
+    clip: float | None = None
+    clip_all: bool = False
+    gains: Sequence[float] | Sequence[Sequence[float]] = (1.0,)
+    noise: float = 0.001
+    dark: float = 0.0
+    ambient: Sequence[float] = ()
+    measured: float | None = None
+    blur_px: float = 0.0
+    shift_px: float = 0.0
+    claimed_deg: float = 0.0
+    turned_deg: float = 0.0
+    claimed_gain: float = 1.0
+    unseen: float = 0.0
+    borrowed: float = 0.0
+    solved: bool = False
+    fill: bool = True
+    backdrop: float = 0.0
+
+    def observed(self, seed: int) -> Observed:
+        """Film it, solve it where that is asked for, and return what a run observes."""
+        rng = np.random.default_rng(seed)
+        ways = ring(self.lights)
+        claimed, rig = self._claimed(ways, seed)
+        names = tuple(one.name for one in rig.lights)
+        points = rig_points(plan_of(names), rig, height_px=SIZE, width_px=SIZE, channels=1) if self.solved else None
+        observed = Observed(lights=names, points=points)
+        lit = Illumination(directions=claimed, intensities=np.array([one.intensity for one in rig.lights], np.float64))
+        for n in range(self.rounds):
+            clean = self._plates(ways, n)
+            noisy = [(one + rng.normal(0, self.noise, one.shape)).astype(np.float32) for one in clean]
+            plates = [np.minimum(one, 1.0) for one in noisy]
+            one = self._round(names, plates, clean, n)
+            if self.measured is not None:
+                stood = np.arange(100).reshape(10, 10) < 100 * self.measured
+                image = np.full((SIZE, SIZE), self._dark_level(clean, n), np.float32)
+                observed.look_at_window(Separated(image=image, stood=stood, known=np.ones(SIZE, np.bool_)))
+            observed.add(one, Solving(error=True, fill=self.fill).solve(plates, lit) if self.solved else None)
+        return observed
+
+    def _claimed(self, ways: np.ndarray, seed: int) -> tuple[np.ndarray, Rig]:
+        across = np.random.default_rng(100 + seed).normal(size=ways.shape)
+        across -= np.sum(across * ways, axis=1, keepdims=True) * ways
+        across /= np.linalg.norm(across, axis=1, keepdims=True)
+        off, turn = np.radians(self.claimed_deg), np.radians(self.turned_deg)
+        claimed = np.cos(off) * ways + np.sin(off) * across
+        claimed = claimed @ np.array([[np.cos(turn), np.sin(turn), 0], [-np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
+        gains = np.where(np.arange(len(ways)) == 0, self.claimed_gain, 1.0)
+        lights = tuple(
+            Light(name=f"light{n}", direction=(float(way[0]), float(way[1]), float(way[2])), intensity=(float(gain),))
+            for n, (way, gain) in enumerate(zip(claimed, gains, strict=True))
+        )
+        return claimed, Rig(lights=lights)
+
+    def _plates(self, ways: np.ndarray, number: int) -> list[np.ndarray]:
+        normals, albedo = SHAPES[self.shape](self.shift_px * number)
+        shades = [albedo * np.maximum(normals @ way, 0) for way in ways]
+        if self.backdrop:
+            shades = [np.where(albedo > 0, one, self.backdrop * way[2]) for one, way in zip(shades, ways, strict=True)]
+        if self.dark:
+            inside = np.linalg.norm(normals, axis=-1) > 0
+            cols = np.argsort(np.argsort(np.where(inside, np.arange(SIZE)[None, :], SIZE).ravel())).reshape(
+                inside.shape
+            )
+            hidden = inside & (cols < self.dark * inside.sum())
+            shades = [shade * (1 - hidden * (n > 1)) for n, shade in enumerate(shades)]
+        if self.blur_px:
+            shades = [np.asarray(cv2.GaussianBlur(shade, (0, 0), self.blur_px)) for shade in shades]
+        lit = shades[0][shades[0].max() * 0.01 < np.max(shades, axis=0)]
+        target = 2.0**self.stops if self.clip is None else 1.0
+        scale = target / float(np.quantile(lit, 0.995 if self.clip is None else 1 - self.clip))
+        gains = np.asarray(self.gains, np.float64)
+        gains = np.resize(gains[number] if gains.ndim == 2 else gains, self.lights)
+        if self.clip is not None and not self.clip_all:
+            gains = np.where(np.arange(self.lights) == 0, gains, 0.3 / scale)
+        return [shade * scale * gain for shade, gain in zip(shades, gains, strict=True)]
+
+    def _dark_level(self, clean: Sequence[np.ndarray], number: int) -> float:
+        subject = np.max(clean, axis=0) > 0.01
+        mean = float(np.mean([one[subject].mean() for one in clean]))
+        share = self.ambient[number % len(self.ambient)]
+        return mean * share / (1 - share)
+
+    def _round(self, names: Sequence[str], plates: Sequence[np.ndarray], clean: Sequence[np.ndarray], n: int) -> Round:
+        seen = np.arange(SIZE) >= self.unseen * SIZE
+        shown_s = np.where(np.arange(SIZE) < self.borrowed * SIZE, n - 1.0, float(n)) if self.borrowed else None
+        taken = tuple(
+            LightPlate(light=name, number=1001 + n, time_s=float(n), picture=made(plate), seen=seen, shown_s=shown_s)
+            for name, plate in zip(names, plates, strict=True)
+        )
+        dark = None
+        if self.ambient and self.measured is None:
+            level = np.full((SIZE, SIZE), self._dark_level(clean, n), np.float32)
+            whole = np.ones(SIZE, np.bool_)
+            dark = LightPlate(light=AMBIENT, number=1001 + n, time_s=float(n), picture=made(level), seen=whole)
+        return Round(number=1001 + n, plates=taken, ambient=dark)
+
+
+def ring(lights: int) -> np.ndarray:
+    around = 0.3 + np.arange(lights) * 2 * np.pi / lights
+    return np.stack([0.5 * np.cos(around), 0.5 * np.sin(around), np.full(lights, np.sqrt(0.75))], axis=-1)
+
+
+def ball(shift_px: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return normals and albedo of a ball whose paint moves."""
+    rows, cols = np.mgrid[:SIZE, :SIZE] - (SIZE - 1) / 2
+    x, y = cols / (0.45 * SIZE), -rows / (0.45 * SIZE)
+    inside = x * x + y * y < 0.8
+    normals = np.stack([x, y, np.sqrt(np.where(inside, 1 - x * x - y * y, 0))], axis=-1) * inside[..., None]
+    return normals, (0.7 + 0.1 * paint(shift_px)) * inside
+
+
+def waves(shift_px: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return normals and albedo of a wall that fills the picture."""
+    rows, cols = np.mgrid[:SIZE, :SIZE] * (6 * np.pi / SIZE)
+    one, other = 0.4 * np.cos(cols + 0.7 * rows), 0.4 * np.cos(rows - 0.4 * cols)
+    normals = np.stack([0.4 * other - one, 0.7 * one + other, np.ones_like(one)], axis=-1)  # of sin + sin, y up
+    return normals / np.linalg.norm(normals, axis=-1, keepdims=True), 0.7 + 0.2 * paint(shift_px)
+
+
+def tiles(shift_px: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return normals and albedo of a flat wall of dark and bright tiles, for sharpness."""
+    rows, cols = np.mgrid[:SIZE, :SIZE] // 16
+    flat = np.zeros((SIZE, SIZE, 3))
+    flat[..., 2] = 1
+    return flat, np.where((rows + cols) % 2, 0.8, 0.2)
+
+
+def paint(shift_px: float) -> np.ndarray:
+    wide = np.random.default_rng(9).normal(size=(SIZE, 4 * SIZE))
+    soft = np.asarray(cv2.GaussianBlur(wide, (0, 0), 3))
+    start = SIZE + round(shift_px)
+    return np.asarray(np.clip(soft[:, start : start + SIZE] / soft.std(), -2, 2))
+
+
+SHAPES: dict[str, Callable[[float], tuple[np.ndarray, np.ndarray]]] = {"ball": ball, "waves": waves, "tiles": tiles}
+GOOD = Footage()
+
+
+def plan_of(names: Sequence[str], *, fps: int = 100, **changed: Any) -> Plan:
+    camera = Camera(width_px=SIZE, height_px=SIZE, fps=Fraction(fps), exposure_s=1 / fps, readout_s=0.0)
+    flashes = [PlannedFlash(lights={name: 1.0}, duration_s=0.5 / fps) for name in names]
+    return replace(assemble_plan(camera=camera, flashes=flashes, dark_s=None, mode="synced"), **changed)
+
+
+def timing_of(**changed: Any) -> Timing:
+    known = Timing(
+        clip="c", frame_period_s=0.01, exposure_s=0.01, row_time_s=1e-4, clock_offset_ppm=0.0, phase_error_rows=0.1,
+        order="marker", flashes=(),
+    )  # fmt: skip
+    return replace(known, **changed)
+
+
+def graded(lines: Judgement | Sequence[Judgement] | None, subject: str) -> str:
+    """Return the gravest grade that a judgement gives to a subject."""
+    said = [lines] if isinstance(lines, Judgement) else list(lines or ())
+    grades = [line.grade for line in said if line.subject == subject]
+    return next((grade for grade in ("bad", "doubtful", "good") if grade in grades), "nothing")
+
+
+def exposure(one: Observed) -> list[Judgement]:
+    return list(light.exposure(one))
+
+
+def lamps(one: Observed) -> list[Judgement]:
+    return list(light.lamps(one))
+
+
+def flickering(share: float) -> list[list[float]]:
+    """Return gains by which the second light's level jumps by a share of it from round to round."""
+    return [[1.0, 1.0 + share * (n % 2), 1.0, 1.0, 1.0] for n in range(6)]
+
+
+def missing(count: int, left: float) -> list[list[float]]:
+    """Return gains by which the second light gives only a part in some of twelve rounds."""
+    return [[1.0, left if n < count else 1.0, 1.0, 1.0, 1.0] for n in range(12)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Threshold:
+    """What is judged, of which subject, and footage on both sides of the border with its grades."""
+
+    name: str
+    judge: Callable[[Observed], Any]
+    subject: str
+    good: Footage
+    grade: str = "good"
+    worse: Footage
+    worse_grade: str = "doubtful"
+
+
+def _by(name: str, judge: Callable[[Observed], Any], subject: str, good: dict[str, Any], worse: dict[str, Any],
+        grades: str = "good doubtful", **both: Any) -> Threshold:  # fmt: skip
+    grade, worse_grade = grades.split()
+    return Threshold(
+        name=name,
+        judge=judge,
+        subject=subject,
+        good=Footage(**both, **good),
+        grade=grade,
+        worse=Footage(**both, **worse),
+        worse_grade=worse_grade,
+    )
+
+
+LIT = [
+    _by("dim", exposure, "exposure", {"stops": -3.4}, {"stops": -3.7}),
+    _by("dark", exposure, "exposure", {"stops": -5.8}, {"stops": -6.3}, "doubtful bad"),
+    _by("clips", exposure, "clipping", {"clip": 0.016}, {"clip": 0.025}, "nothing doubtful", noise=0),
+    _by("clips much", exposure, "clipping", {"clip": 0.23}, {"clip": 0.27}, "doubtful bad", noise=0),
+    _by("clips much of three", exposure, "clipping", {"clip": 0.09}, {"clip": 0.11}, "doubtful bad", noise=0, lights=3),
+    _by("all clip", exposure, "clipping", {"clip": 0.16}, {"clip": 0.3}, "doubtful bad", noise=0, clip_all=True),
+    _by("weak", lamps, "lights", {"gains": [1, 0.15, 1, 1, 1]}, {"gains": [1, 0.1, 1, 1, 1]}),
+    _by("dead", lamps, "lights", {"gains": [1, 0.012, 1, 1, 1]}, {"gains": [1, 0.008, 1, 1, 1]}, "doubtful bad"),
+    _by("missed", lamps, "lights", {"gains": missing(1, 0.55)}, {"gains": missing(1, 0.45)}, rounds=12),
+    _by("missed often", lamps, "lights", {"gains": missing(1, 0.3)}, {"gains": missing(2, 0.3)}, "doubtful bad",
+        rounds=12),
+    _by("unsteady", lamps, "lights", {"gains": flickering(0.016)}, {"gains": flickering(0.025)}, rounds=6),
+    _by("ambient", light.ambient, "ambient", {"ambient": [0.09]}, {"ambient": [0.11]}),
+    _by("ambient lost", light.ambient, "ambient", {"ambient": [0.48]}, {"ambient": [0.52]}, "doubtful bad"),
+    _by("ambient swings", light.ambient, "ambient", {"ambient": [0.074, 0.087]}, {"ambient": [0.07, 0.09]}, rounds=6),
+    _by("ambient noticed", light.ambient, "ambient", {"ambient": [0.03, 0.06]}, {"ambient": [0.04, 0.08]}, rounds=6),
+    _by("ambient measured", light.ambient, "ambient", {"measured": 0.82}, {"measured": 0.78}, ambient=[0.03]),
+    _by("ambient faint", light.ambient, "ambient", {"ambient": [0.018]}, {"ambient": [0.023]}, measured=0.7),
+    _by("focus", result.focus, "focus", {"blur_px": 2.5}, {"blur_px": 3.2}, shape="tiles"),
+]  # fmt: skip
+
+
+def rig_of(one: Observed) -> list[Judgement]:
+    return list(judge_rig(one))
+
+
+def accuracy(one: Observed) -> list[Judgement]:
+    return list(result.accuracy(one))
+
+
+def validity(one: Observed) -> list[Judgement]:
+    return list(result.validity(one))
+
+
+def steadiness(one: Observed) -> list[Judgement]:
+    return list(result.steadiness(one.facts))
+
+
+def levels(share: float) -> list[float]:
+    return [1.0, 1.0 + share]
+
+
+SOLVED = [
+    _by("rig", rig_of, "rig", {"claimed_deg": 15}, {"claimed_deg": 26}, shape="waves", lights=8),
+    _by("rig lost", rig_of, "rig", {"claimed_deg": 26}, {"claimed_deg": 40}, "doubtful bad", shape="waves", lights=8),
+    _by("strength", rig_of, "rig", {"claimed_gain": 1.15}, {"claimed_gain": 1.4}, shape="waves"),
+    _by("turned", rig_of, "rig", {"turned_deg": 24}, {"turned_deg": 27}, shape="waves", lights=3),
+    _by("turned around", rig_of, "rig", {"turned_deg": 31}, {"turned_deg": 35}, "doubtful bad", shape="waves",
+        lights=3),
+    _by("accuracy", accuracy, "accuracy", {"claimed_deg": 1}, {"claimed_deg": 5}, shape="waves", lights=8),
+    _by("validity", validity, "validity", {"dark": 0.35}, {"dark": 0.45}),
+    _by("validity lost", validity, "validity", {"dark": 0.75}, {"dark": 0.85}, "doubtful bad"),
+    _by("noise", steadiness, "noise", {"noise": 0.015}, {"noise": 0.022}, "nothing doubtful",
+        shape="waves", stops=-0.1, rounds=2, lights=3),
+    _by("noise lost", steadiness, "noise", {"noise": 0.042}, {"noise": 0.06}, "doubtful bad",
+        shape="waves", stops=-0.1, rounds=2, lights=3),
+    _by("flicker", steadiness, "flicker", {"gains": [[1.0] * 3, [1.008] * 3]}, {"gains": [[1.0] * 3, [1.013] * 3]},
+        rounds=2, lights=3),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("case", LIT, ids=lambda case: case.name)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_light_on_both_sides_of_a_threshold_is_told_apart(case: Threshold, seed: int) -> None:
+    assert graded(case.judge(case.good.observed(seed)), case.subject) == case.grade
+    assert graded(case.judge(case.worse.observed(seed)), case.subject) == case.worse_grade
+
+
+@pytest.mark.parametrize("case", SOLVED, ids=lambda case: case.name)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_results_on_both_sides_of_a_threshold_are_told_apart(case: Threshold, seed: int) -> None:
+    assert graded(case.judge(replace(case.good, solved=True).observed(seed)), case.subject) == case.grade
+    assert graded(case.judge(replace(case.worse, solved=True).observed(seed)), case.subject) == case.worse_grade
+
+
+def timed(**changed: Any) -> str:
+    return graded(list(time.timing_and_order(timing_of(**changed), "rolling")), "timing")
+
+
+def covered(subject: str, footage: Footage = GOOD, *, dark_s: float = 0.01, **changed: Any) -> str:
+    """Return what is said of the rows of a rolling plan with this dark time."""
+    plan = plan_of(["a"], mode="rolling", dark_s=dark_s)
+    return graded(list(time.coverage(plan, timing_of(**changed), footage.observed(0))), subject)
+
+
+def moved(px_per_flash: float, *, aligned: bool = False) -> str:
+    """Return what is said of paint that moves by so much from flash to flash of one light, a flash a second."""
+    one = Footage(shape="waves", lights=1, rounds=4, shift_px=px_per_flash).observed(0)
+    return graded(
+        time.motion(plan_of(one.lights, fps=1), timing_of(frame_period_s=1.0), one, aligned=aligned), "motion"
+    )
+
+
+def test_times_rows_and_motion_on_both_sides_of_a_threshold_are_told_apart() -> None:
+    assert [timed(phase_error_rows=rows) for rows in (0.28, 0.32, 1.9, 2.1)] == ["good", "doubtful", "doubtful", "bad"]
+    assert [covered("rows", dark_s=dark_s) for dark_s in (0.00985, 0.0097, 0.0082, 0.0078)] == [
+        "good", "doubtful", "doubtful", "bad"
+    ]  # fmt: skip
+    unseen = [covered("rows", Footage(unseen=share)) for share in (0.01, 0.04, 0.28, 0.33)]
+    assert unseen == ["good", "doubtful", "doubtful", "bad"]
+    borrowed = [covered("rows", Footage(borrowed=share), exposure_s=open_s) for share, open_s in
+                ((0.01, 0.005), (0.2, 0.00975), (0.2, 0.0096))]  # fmt: skip
+    assert borrowed == ["good", "good", "doubtful"]
+    assert covered("frames", dropped_frames=(DroppedFrames(after=3, count=1),)) == "doubtful"
+    assert [moved(px) for px in (0, 1, 2, 4, 5)] == ["good", "good", "doubtful", "doubtful", "bad"]
+    assert moved(5, aligned=True) == "doubtful"
+
+
+@pytest.mark.parametrize("fill", [True, False])
+def test_validity_is_counted_over_the_subject_filled_or_not_before_a_dim_backdrop(fill: bool) -> None:
+    one = Footage(dark=0.45, solved=True, fill=fill)
+    for backdrop in (0.0, 0.02):
+        (facts,) = replace(one, backdrop=backdrop).observed(0).facts
+        assert facts.valid_share is not None
+        assert 0.48 < facts.valid_share < 0.58, "of the ball; what is behind it counts neither way"
