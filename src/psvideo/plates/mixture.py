@@ -21,6 +21,8 @@ from psvideo.plates.mixing_kernel import COUNTS, MixtureArrays, mix_halved, mix_
 
 BAND_SAMPLES = 1 << 20
 """Samples of one band of rows, which a thread makes at a time."""
+THINNED_SAMPLES = 1 << 24
+"""The same where few of the rows are made: frames that stay in their files are read so far at a time."""
 
 
 class Reader(Protocol):
@@ -95,7 +97,7 @@ class Mixture:
         rows, cols = (-(-size // stride) for size in self.shape[:2])
         image = np.empty((rows, cols, *self.shape[2:]), np.float32)
         channels, bound = int(np.prod(self.shape[2:])), self.bound()
-        each = max(BAND_SAMPLES // bound.mix.samples // stride, 1)
+        each = max(THINNED_SAMPLES // bound.mix.samples // stride, 1)
         for first in range(0, rows, each):
             last = min(first + each, rows)
             ends = stride * first, stride * (last - 1) + 1
