@@ -91,6 +91,8 @@ def test_the_beauty_plate_is_the_sum_of_the_plates_with_each_light_as_strong_as_
         total = sum(image * (0.5 if name == "key" else 1.0) for name, image in plates.items())
         assert np.abs(picture(path) - total).max() < 2e-3
         parts = {part.name(): part for part in OpenEXR.File(str(whole / f"clip.{number}.exr")).parts}
+        assert next(iter(parts)) == "beauty", "what viewers show first"
+        assert set(parts["beauty"].channels) >= {"RGBA"}, "with a matte"
         assert parts["beauty"].header["colorInteropID"] == OpenEXR.File(str(path)).header()["colorInteropID"] != "data"
 
 
@@ -334,3 +336,19 @@ def test_options_that_go_against_a_preset_win_and_are_reported() -> None:
     delivery, at_odds = delivery_of(asked)
     assert (delivery.space.y, delivery.space.name, delivery.multipart) == ("down", "tangent", False)
     assert [sentence.split()[0] for sentence in at_odds] == ["`y='down'`", "`space='tangent'`", "`multipart=False`"]
+
+
+def test_positions_without_metres_are_left_out_of_a_programs_delivery_and_refused_where_they_are_asked_for(
+    clip: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["normals", str(clip), "--rig", str(clip / "rig.toml"), "-o", str(tmp_path / "out"), "--for", "houdini"]
+    assert main([*words, "--aov", "position"]) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert "--for houdini has no positions: without [camera] focal_px in the rig depth is relative" in said
+    assert not (tmp_path / "out").exists()
+    assert main([*words, "--frames", "0-9"]) == 0
+    assert "has no positions" in " ".join(capsys.readouterr().out.split())
+    assert not {"position", "depth"} & {path.name for path in (tmp_path / "out").iterdir()}
+    assert "position" not in (tmp_path / "out" / "README-houdini.txt").read_text(encoding="utf-8").lower().replace(
+        "relative positions", ""
+    )

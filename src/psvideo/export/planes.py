@@ -81,3 +81,11 @@ def planes_of(name: str, made: Made) -> Planes:
         raise ValueError(f"{name} is to be written and was not made")
     channels = QUANTITIES[name].channels
     return {channel: image[..., place] if image.ndim == 3 else image for place, channel in enumerate(channels)}
+
+
+def bundled(name: str, made: Made) -> Planes:
+    """Return a quantity's channels in a multipart file: beauty has A too, the matte where it was made, else valid."""
+    planes = planes_of(name, made)
+    if name == "beauty":
+        planes["A"] = ones_of(made.surface.valid) if made.passes.alpha is None else made.passes.alpha
+    return planes

@@ -32,7 +32,7 @@ PRESETS: dict[Program, Preset] = {
         space="camera",
         y="up",
         multipart=True,
-        aovs=("position",),
+        aovs=("beauty", "position"),
         reasons={"y": "Nuke's axes have y up", "space": "ReLight needs normals in the frame of its positions"},
     ),
     "blender": Preset(
@@ -144,11 +144,14 @@ def _nuke(made: Delivered) -> tuple[Sequence[str], Sequence[str]]:
             "for every light of the shoot (drag its direction and colour), and their sum. Or by hand:",
             f"Read: {files}, range {made.first}-{made.last}; tick Raw Data. Set the project to "
             f"{float(made.fps):.6g} fps.",
-            "The parts of the file are layers of these names: normals, albedo, valid, position. x, y, z are in red, "
-            "green, blue.",
+            f"The parts of the file are layers of these names: {', '.join(made.delivery.bundle)}. x, y, z are in red, "
+            "green, blue; beauty is the sum of all lights, with alpha.",
             "Shuffle albedo into rgba, valid into alpha.",
             "ReLight: this into color, normal vectors = normals, point positions = position, use alpha on; "
-            f"cam = {camera}; lights = a Scene with your lights, in the same frame and unit.",
+            f"cam = {camera}; lights = a Scene with your lights, in the same frame and unit."
+            if made.delivery.needs_depth
+            else "ReLight needs point positions in metres, which this rig does not give (lens and plane): use the "
+            "script's groups.",
             "ReLight needs a material: a Diffuse node (white) on its material input gives albedo * n.l.",
         ],
         [
@@ -211,6 +214,11 @@ def _unreal(made: Delivered) -> tuple[Sequence[str], Sequence[str]]:
     )
 
 
+POINTS = (
+    "Points: read position and normals into P and N of a grid of points by pixel, and delete points where valid is 0.",
+)
+
+
 def _houdini(made: Delivered) -> tuple[Sequence[str], Sequence[str]]:
     files = f"{made.clip}.$F4.exr" if made.delivery.multipart else f"normals/{made.clip}_normals.$F4.exr"
     meshes = [f"Meshes: File SOP, mesh/{made.clip}_mesh.$F4.ply."] if "ply" in made.delivery.meshes else []
@@ -218,10 +226,9 @@ def _houdini(made: Delivered) -> tuple[Sequence[str], Sequence[str]]:
     return (
         [
             f"Copernicus or COP2 File node: {files}, frames {made.first} to {made.last}; colour space Raw (no "
-            "conversion). The parts of the file are planes: normals, albedo, valid, depth, position.",
+            f"conversion). The parts of the file are planes: {', '.join(made.delivery.bundle)}.",
             f"Set the scene to {float(made.fps):.6g} frames a second and the frame range to {made.first}-{made.last}.",
-            "Points: read position and normals into P and N of a grid of points by pixel, and delete points where "
-            "valid is 0.",
+            *(POINTS if "position" in made.delivery.aovs else ()),
             *meshes,
             "Karma or Mantra: a normal from camera space is turned with ntransform from the camera's space.",
         ],

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.export.mesh_files import mesh_name, write_part, write_ply
-from psvideo.export.planes import Made, planes_of
+from psvideo.export.planes import Made, bundled, planes_of
 from psvideo.export.png_maps import PNG_MAX, encode_normals, write_png16
 from psvideo.export.space import Space
 from psvideo.export.tags import Tags
@@ -49,6 +49,12 @@ class Delivery:
     def needs_depth(self) -> bool:
         """Whether normals are to be integrated."""
         return bool(self.meshes) or any(QUANTITIES[name].of == "depth" for name in self.aovs)
+
+    @property
+    def bundle(self) -> tuple[str, ...]:
+        """The parts of a multipart file in order: the sum of the plates first, which viewers show."""
+        first = [name for name in self.quantities if name == "beauty"]
+        return (*first, *(name for name in self.quantities if name != "beauty"))
 
     @property
     def quantities(self) -> tuple[str, ...]:
@@ -131,7 +137,7 @@ def write_surface(
     if delivery.multipart:
         write_exr_parts(
             folder / bundle_name(clip, number),
-            {name: planes_of(name, made) for name in delivery.quantities},
+            {name: bundled(name, made) for name in delivery.bundle},
             half=halves,
             attributes=attributes,
             fps=tags.fps,

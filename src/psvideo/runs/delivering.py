@@ -1,7 +1,7 @@
 """What a delivery asks of a run: a camera that is known at every instant, the plates and their sum written as well."""
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -10,12 +10,14 @@ import numpy as np
 
 from psvideo.clip import Clip, Take
 from psvideo.compute.halves import halves_of
+from psvideo.errors import UsageError
 from psvideo.export.plate_files import plate_name, write_light, write_plate
 from psvideo.export.result_files import Delivery, write_surface
 from psvideo.export.space import Space
 from psvideo.export.tags import Tags
 from psvideo.model.choices import Compression
 from psvideo.model.plan import Plan
+from psvideo.model.quantities import QUANTITIES, Aov
 from psvideo.model.rig import Rig
 from psvideo.model.timing import Timing
 from psvideo.model.units import show_rate
@@ -23,6 +25,8 @@ from psvideo.plates.align.comb import Comb, Schedule
 from psvideo.plates.beauty import beauty_of
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import AMBIENT, Round, round_numbers
+from psvideo.runs.caller import Caller
+from psvideo.runs.lighting import Lighting
 from psvideo.solve.depth import Depth
 from psvideo.solve.instants import Instant
 from psvideo.solve.normals.solving import ROBUST_FROM_LIGHTS
@@ -36,6 +40,25 @@ def check_delivery(delivery: Delivery, take: Take, timing: Timing, start_number:
     """Raise UsageError or PsvideoError where a delivery asks for what this take does not have."""
     delivery.mix.check(take.plan)
     check_camera(delivery.space, take, timing, start_number)
+
+
+def metric_delivery(delivery: Delivery, aov: Sequence[Aov], lighting: Lighting, caller: Caller) -> Delivery:
+    """Return a program's delivery without positions that its preset adds, where depth has no metres; say why.
+
+    Raises UsageError where ``aov`` asks for such positions for a program, whose camera and lights count in metres.
+    """
+    if delivery.program is None or lighting.metric or "position" not in delivery.aovs:
+        return delivery
+    lacking = "[camera] focal_px" if lighting.rig.focal_px is None else "a [surface] plane, or `depth`"
+    why = (
+        f"`preset={delivery.program!r}` has no positions: without {lacking} in the rig depth is relative, and points "
+        "would not lie where the program's camera and lights are."
+    )
+    if "position" in aov:
+        raise UsageError(f"{why} Give the rig lens and plane, or leave `preset` or `aov=['position']` out.")
+    caller.say(why)
+    kept = tuple(name for name in delivery.aovs if name in aov or QUANTITIES[name].of != "depth")
+    return replace(delivery, aovs=kept)
 
 
 def instants_said(comb: Comb, due: Schedule, start_number: int) -> str:

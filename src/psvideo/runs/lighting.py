@@ -58,6 +58,11 @@ class Lighting:
             )
 
     @property
+    def metric(self) -> bool:
+        """Whether depth comes in metres: the rig knows the lens, and the rig or a file how far away the surface is."""
+        return self.rig.focal_px is not None and (self.rig.plane is not None or self.depths is not None)
+
+    @property
     def identity(self) -> tuple[object, ...]:
         """What distinguishes this lighting from others: the rig's bytes and lights, mask, depth and falloff."""
         depths = () if self.depths is None else self.depths.identity

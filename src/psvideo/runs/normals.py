@@ -31,6 +31,7 @@ from psvideo.plates.sequence import FIRST_NUMBER
 from psvideo.plates.timed import timing_of
 from psvideo.report.run_report import RunReport
 from psvideo.runs.caller import PYTHON, Caller, say_kept, say_of_clip
+from psvideo.runs.delivering import metric_delivery
 from psvideo.runs.lighting import read_lighting
 from psvideo.runs.output import Output, rate_of
 from psvideo.runs.results import OverTime, normals_run
@@ -186,6 +187,7 @@ def normals(
         flat_path=path_if_given("flat", flat),
     )
     lighting.check(delivery)
+    delivery = metric_delivery(delivery, asked.aov, lighting, caller)
     timing_path = path_if_given("timing", timing)
     output = output.given(take, timing_path, first_light, solver, fill, over_time, delivery, *lighting.identity)
     with decoded_once(take, output=output.folder) as kept:

@@ -31,6 +31,7 @@ from psvideo.plates.timed import timing_of
 from psvideo.report.run_report import RunReport
 from psvideo.runs.calibrate.mirror_sphere import focal_widths, radius_in_m
 from psvideo.runs.caller import PYTHON, Caller
+from psvideo.runs.delivering import metric_delivery
 from psvideo.runs.lighting import read_lighting
 from psvideo.runs.output import Output
 from psvideo.runs.results import OverTime, normals_run
@@ -149,6 +150,7 @@ def stills(
             caller.say(note)
         lighting = read_lighting(take, opened.rig_path, pairs.mask)
         lighting.check(delivery)
+        delivery = metric_delivery(delivery, aov, lighting, caller)
         over_time = OverTime(aligning=Aligning(align="none"))
         output = output.given(take, None, solver, fill, delivery, *lighting.identity)
         with decoded_once(take, output=output.folder) as kept:
