@@ -1,6 +1,7 @@
 """Results at any instant: which instants a rate asks for, on paper, and what is delivered at them."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
 from pathlib import Path
@@ -13,8 +14,12 @@ import pytest
 import psvideo as ps
 from psvideo.cli.options.typed import parse_instants
 from psvideo.errors import UsageError
+from psvideo.export.planes import Made, planes_of
+from psvideo.export.space import Space
 from psvideo.export.tags import Tags
 from psvideo.model.plan import Plan
+from psvideo.model.quantities import QUANTITIES
+from psvideo.model.surface import Surface
 from psvideo.model.timing import Flash
 from psvideo.plates.align.comb import comb_of, schedule_of
 from psvideo.runs.output import rate_of, sequence_fps
@@ -139,7 +144,7 @@ def exr(path: Path, channel: str) -> np.ndarray:
 
 
 def test_results_at_every_camera_frame_show_it_where_it_was_then(passing: Path, tmp_path: Path) -> None:
-    report = ps.normals(passing, rig=passing / "rig.toml", out=tmp_path / "out", fps="frame")
+    report = ps.normals(passing, rig=passing / "rig.toml", out=tmp_path / "out", fps="frame", aov=["motion"])
     assert len(report.instants) > 10
     pictures = [exr(path, "RGB")[..., 1] for path in sorted((tmp_path / "out" / "albedo").iterdir())]
     assert len(pictures) == len(report.instants)
@@ -153,5 +158,26 @@ def test_results_at_every_camera_frame_show_it_where_it_was_then(passing: Path, 
     assert times_s == pytest.approx([0.0095 + (one.number - 1001) / 100 for one in report.instants], abs=1e-9)
     said = OpenEXR.File(str(next((tmp_path / "out" / "normals").iterdir()))).header()
     assert said["framesPerSecond"] == 100
+    motions = sorted((tmp_path / "out" / "motion").iterdir())
+    rows, cols = np.mgrid[:64, :96].astype(np.float32)
+    for k in range(1, len(pictures) - 1):
+        u, v, back_u, back_v = (exr(motions[k], name) for name in QUANTITIES["motion"].channels)
+        for other, way_u, way_v in ((pictures[k + 1], u, v), (pictures[k - 1], back_u, back_v)):
+            there = cv2.remap(np.asarray(other, np.float32), cols + way_u, rows - way_v, cv2.INTER_CUBIC)
+            warped, stayed = (np.abs(one - pictures[k])[inner].mean() for one in (there, other))
+            assert warped < 0.5 * stayed
+        assert np.median(u[inner]) == pytest.approx(PX_PER_FRAME, abs=0.3)
     with pytest.raises(UsageError, match="would be repeated"):
         ps.normals(passing, rig=passing / "rig.toml", out=tmp_path / "none", fps="frame", align="none")
+
+
+def test_motion_vectors_are_named_and_signed_as_the_program_wants_them() -> None:
+    """One pixel to the right and two up in a frame, three to the left and four down in the one before."""
+    flat = np.zeros((2, 2, 3), np.float32)
+    surface = Surface(normals=flat, albedo=flat, valid=np.ones((2, 2), bool))
+    motion = np.broadcast_to(np.array([1.0, 2.0, -3.0, -4.0], np.float32), (2, 2, 4))
+    made = Made(surface=surface, space=Space(), motion=motion, program="nuke")
+    plain = {name: float(plane[0, 0]) for name, plane in planes_of("motion", made).items()}
+    assert plain == {"forward.u": 1, "forward.v": 2, "backward.u": -3, "backward.v": -4}
+    blender = [float(plane[0, 0]) for plane in planes_of("motion", replace(made, program="blender")).values()]
+    assert blender == [-3, -4, -1, -2]

@@ -30,7 +30,15 @@ def made() -> Made:
     depth = Depth(depth=plane, cut_east=none, cut_south=none, parts=1, metric=True, view=View())
     passes = Passes(reach=source, specular=plane, alpha=plane)
     age_s = np.linspace(0, 0.1, ROWS)
-    return Made(surface=surface, space=Space(), beauty=plane, depth=depth, age_s=age_s, passes=passes)
+    return Made(
+        surface=surface,
+        space=Space(),
+        beauty=plane,
+        depth=depth,
+        age_s=age_s,
+        passes=passes,
+        motion=np.ones((ROWS, COLS, 4)),
+    )
 
 
 def test_what_may_be_asked_for_is_what_the_table_says() -> None:
@@ -50,7 +58,8 @@ def test_planes_are_the_channels_that_the_table_says(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["residual", "error", "source", "beauty", "depth", "position", "age", "reach", "specular", "alpha"]
+    "name",
+    ["residual", "error", "source", "beauty", "depth", "position", "age", "reach", "specular", "alpha", "motion"],
 )
 def test_what_was_not_made_is_not_written(name: str) -> None:
     whole = made().surface
@@ -77,6 +86,7 @@ def test_files_are_written_as_they_are_made_in_any_order_asked() -> None:
         "reach",
         "specular",
         "alpha",
+        "motion",
         "depth",
         "position",
     )

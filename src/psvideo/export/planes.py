@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from psvideo.export.space import Space, placed, placed_points
 from psvideo.model.camera import FloatArray
+from psvideo.model.choices import Program
 from psvideo.model.quantities import QUANTITIES
 from psvideo.model.surface import Surface
 from psvideo.solve.depth import Depth
@@ -21,7 +22,8 @@ Planes = dict[str, Image]
 class Made:
     """What an instant's files are written from; ``beauty``, ``depth``, ``age_s`` and what ``passes`` hold are None
     where nothing asks for them. ``age_s``, of rows or of pixels, is how far in time from the instant what a row shows
-    was lit."""
+    was lit. ``motion`` (row, col, 4), in pixels, x right and y up: where every pixel is one delivered frame later, and
+    one earlier, seen from where it is; it is named and signed as ``program`` wants it."""
 
     surface: Surface
     space: Space
@@ -29,6 +31,8 @@ class Made:
     depth: Depth | None = None
     age_s: FloatArray | None = None
     passes: Passes = field(default_factory=Passes)
+    motion: Image | None = None
+    program: Program | None = None
 
     @property
     def age(self) -> Image | None:
@@ -67,8 +71,14 @@ PICTURES: Mapping[str, Callable[[Made], Image | None]] = {
     "reach": lambda made: None if made.passes.reach is None else made.passes.reach.astype(np.float32),
     "specular": lambda made: made.passes.specular,
     "alpha": lambda made: made.passes.alpha,
+    "motion": lambda made: made.motion,
 }
 """What computes the picture of each quantity that belongs to an instant; None where it was not made."""
+
+
+BLENDER_VECTOR = (("X", 2, 1.0), ("Y", 3, 1.0), ("Z", 0, -1.0), ("W", 1, -1.0))
+"""Of Blender's vector pass: channel, place in ``Made.motion``, sign. X and Y lead from here to where it was, Z and W
+from where it will be to here (Cycles, primitive_motion_vector)."""
 
 
 def planes_of(name: str, made: Made) -> Planes:
@@ -79,6 +89,8 @@ def planes_of(name: str, made: Made) -> Planes:
     image = PICTURES[name](made)
     if image is None:
         raise ValueError(f"{name} is to be written and was not made")
+    if name == "motion" and made.program == "blender":
+        return {f"psvideo.Vector.{channel}": sign * image[..., place] for channel, place, sign in BLENDER_VECTOR}
     channels = QUANTITIES[name].channels
     return {channel: image[..., place] if image.ndim == 3 else image for place, channel in enumerate(channels)}
 

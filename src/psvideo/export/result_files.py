@@ -107,6 +107,7 @@ def write_surface(
     beauty: NDArray[np.floating] | None = None,
     age_s: NDArray[np.float64] | None = None,
     passes: Passes | None = None,
+    motion: NDArray[np.floating] | None = None,
 ) -> None:
     """Write one instant: normals as signed unit vectors, linear albedo, validity, and the AOVs and meshes asked for.
 
@@ -119,7 +120,14 @@ def write_surface(
         shape = depth()
         _write_meshes(folder, clip, number, surface, shape, delivery)
     made = Made(
-        surface=surface, space=delivery.space, beauty=beauty, depth=shape, age_s=age_s, passes=passes or Passes()
+        surface=surface,
+        space=delivery.space,
+        beauty=beauty,
+        depth=shape,
+        age_s=age_s,
+        passes=passes or Passes(),
+        motion=motion,
+        program=delivery.program,
     )
     halves = {name: is_half(name, asked=delivery.half) for name in delivery.quantities}
     world = delivery.space.attributes()

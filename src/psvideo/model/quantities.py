@@ -7,10 +7,13 @@ from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass
 from typing import Literal, get_args
 
-Aov = Literal["depth", "residual", "error", "source", "position", "beauty", "age", "reach", "specular", "alpha"]
+Aov = Literal[
+    "depth", "residual", "error", "source", "position", "beauty", "age", "reach", "specular", "alpha", "motion"
+]
 """The quantities that are written where they are asked for; the table has a row for each."""
-Shown = Literal["normals", "light", "mask", "heat", "position"]
-"""How a quantity is shown: as directions, as light, as yes and no, as a measure in false colours, as points."""
+Shown = Literal["normals", "light", "mask", "heat", "position", "never"]
+"""How a quantity is shown: as directions, as light, as yes and no, as a measure in false colours, as points; or not at
+all, being for programs only."""
 Source = Literal["surface", "plates", "depth"]
 SOURCES: tuple[Source, ...] = ("surface", "plates", "depth")
 """What a quantity is computed from: the solved surface, the round's plates, or the integrated depth, in this order."""
@@ -45,6 +48,7 @@ class Quantity:
 
 
 _RGB, _Y = ("R", "G", "B"), ("Y",)
+_UV = ("forward.u", "forward.v", "backward.u", "backward.v")
 
 _ROWS = (
     # name, label, channels, written, of, shown
@@ -61,6 +65,7 @@ _ROWS = (
     Quantity("reach", "Lights that reach it", _Y, "asked", "plates", "heat"),
     Quantity("specular", "Beyond diffuse", _RGB, "asked", "plates", "light", colour=True),
     Quantity("alpha", "Matte", _Y, "asked", "plates", "mask"),
+    Quantity("motion", "Motion vectors", _UV, "asked", "plates", "never", digits="float", unit="px"),
     Quantity("plate", "Plate", _RGB, "plates", "plates", "light", colour=True),
     Quantity("ambient", "Ambient", _RGB, "plates", "plates", "light", colour=True),
 )

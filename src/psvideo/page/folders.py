@@ -62,7 +62,11 @@ def _with_clip_beside(show: Show, path: Path) -> Show:
 
 
 def _results(path: Path) -> Show:
-    known = [row for row in QUANTITIES.values() if row.written != "plates" and _files(path / row.name)]
+    known = [
+        row
+        for row in QUANTITIES.values()
+        if row.written != "plates" and row.shown != "never" and _files(path / row.name)
+    ]
     sequences = [_sequence(path / row.name, row) for row in known]
     width_px, height_px, fps = _look(path / known[0].name)
     report = _report(path / "report.json")

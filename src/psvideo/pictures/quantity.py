@@ -51,6 +51,8 @@ def picture_of(quantity: str, image: NDArray[np.generic], *, exposure: float | N
     if quantity not in QUANTITIES:
         raise UsageError(f"`quantity` is {quantity!r}; {nearest(quantity, QUANTITIES)}")
     row, array = QUANTITIES[quantity], np.asarray(image)
+    if row.shown == "never":
+        raise UsageError(f"`quantity` {quantity}: is for programs, and no picture to look at.")
     if array.dtype.kind not in "fiub":
         kind = type(image).__name__
         raise UsageError(f"`image` is of type {kind}, which holds no numbers; expected an array of {row.name}.")

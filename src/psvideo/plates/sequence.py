@@ -11,6 +11,7 @@ from psvideo.errors import PsvideoError
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan, mixing_matrix
 from psvideo.model.timing import Flash
+from psvideo.plates.align.moving import Followed
 from psvideo.plates.demultiplexed import Making, makings_of, of_light
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.split import Plate
@@ -38,12 +39,15 @@ class Round:
     stood
         On a coarse grid over the picture, (row, col), True where nothing changed since the round before; None where
         nobody looked.
+    motion
+        How everything moved when the plates were brought to one instant; None where nothing did.
     """
 
     number: int
     plates: tuple[LightPlate, ...]
     ambient: LightPlate | None = None
     stood: NDArray[np.bool_] | None = None
+    motion: Followed | None = None
 
     @property
     def time_s(self) -> float:

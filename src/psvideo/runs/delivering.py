@@ -3,10 +3,12 @@
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from fractions import Fraction
 from functools import partial
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from psvideo.clip import Clip, Take
 from psvideo.compute.halves import halves_of
@@ -22,6 +24,7 @@ from psvideo.model.rig import Rig
 from psvideo.model.timing import Timing
 from psvideo.model.units import show_rate
 from psvideo.plates.align.comb import Comb, Schedule
+from psvideo.plates.align.moving import pixels_per_s
 from psvideo.plates.beauty import beauty_of
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import AMBIENT, Round, round_numbers
@@ -158,8 +161,21 @@ def surface_job(
     job = partial(write_surface, folder, clip.name, one.number, one.time_s, instant.surface)
     age_s = one.age_s if "age" in delivery.aovs else None
     return partial(
-        job, delivery=there, tags=tags, depth=depth, beauty=beauty, age_s=age_s, passes=_whole_picture(instant.passes)
+        job,
+        delivery=there,
+        tags=tags,
+        depth=depth,
+        beauty=beauty,
+        age_s=age_s,
+        passes=_whole_picture(instant.passes),
+        motion=_motion_of(one, tags.fps) if "motion" in delivery.aovs else None,
     )
+
+
+def _motion_of(one: Round, fps: Fraction) -> NDArray[np.float32]:
+    """Return where every pixel is a delivered frame later and earlier, x right and y up, (row, col, 4), in pixels."""
+    ahead = pixels_per_s(one.motion, one.plates[0].shape) * np.array([1 / fps, -1 / fps], np.float32)
+    return np.concatenate([ahead, -ahead], axis=-1)
 
 
 def _whole_picture(passes: Passes | None) -> Passes | None:

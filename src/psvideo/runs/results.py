@@ -119,6 +119,11 @@ def normals_run(
     over_time = over_time or OverTime()
     over_time.check(clip.plan)
     check_delivery(delivery, take, timing, output.start_number)
+    if "motion" in delivery.aovs and over_time.aligning.align == "none":
+        raise UsageError(
+            "`aov='motion'` is what plates are brought to one instant by, and `align='none'` does not look for it. "
+            "Leave one of the two out."
+        )
     if lighting.masks is not None and over_time.aligning.rate == "round":
         coming_rounds = coming(clip.plan, timing.flashes, start=output.start_number).items()
         lighting.masks.check(number for number, lights in coming_rounds if lights >= set(clip.plan.lights))

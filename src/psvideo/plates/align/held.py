@@ -11,6 +11,7 @@ import numpy as np
 
 from psvideo.plates.align.brightness import evened
 from psvideo.plates.align.flow import Flags, Sketch, changed, sketch_of, white_of
+from psvideo.plates.align.moving import Followed
 from psvideo.plates.align.packed import packed
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import POOLED_ROUNDS
@@ -46,13 +47,14 @@ class Around:
 @dataclass(kw_only=True)
 class DueInstant:
     """An instant that is to be shown, of a round, and the lights' plates at it that are made already; ``moving``
-    are the lights that were found to move and wait for each other."""
+    are the lights that were found to move and wait for each other, ``motion`` how, once it was found."""
 
     number: int
     time_s: float
     round: int
     made: dict[str, LightPlate] = field(default_factory=dict)
     moving: set[str] = field(default_factory=set)
+    motion: Followed | None = None
 
 
 @dataclass(kw_only=True)

@@ -71,6 +71,17 @@ class Followed:
         return np.float32(span_s) * self.velocity
 
 
+def pixels_per_s(motion: Followed | None, shape: tuple[int, ...]) -> Vectors:
+    """Return the velocity of every pixel of a picture (row, col[, channel]), x right and y down, (row, col, 2)."""
+    rows, cols = shape[:2]
+    if motion is None:
+        return np.zeros((rows, cols, 2), np.float32)
+    small_rows, small_cols = motion.moves.shape
+    scale = cols / small_cols, rows / small_rows
+    grown = [cv2.resize(way, (cols, rows), interpolation=cv2.INTER_LINEAR) for way in motion.velocity]
+    return np.stack([np.float32(factor) * way for factor, way in zip(scale, grown, strict=True)], axis=-1)
+
+
 def followed_at(pairs: Sequence[Pair], time_s: float) -> Followed:
     """Return how everything moves at an instant, which may lie before or after some lights' plates too."""
     lights = _Lights.of(pairs, time_s)

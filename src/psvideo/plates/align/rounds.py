@@ -113,7 +113,7 @@ def _complete(held: Held, how: Aligning) -> Iterator[Round]:
         held.waiting.popleft()
         stood = held.stood(instant.round) if held.sketched else None
         held.let_go()
-        yield handed_over(instant.made, instant.number, held.lights, stood)
+        yield replace(handed_over(instant.made, instant.number, held.lights, stood), motion=instant.motion)
 
 
 def _pass_rest(held: Held, instant: DueInstant, how: Aligning) -> None:
@@ -155,7 +155,7 @@ def _make_moving(held: Held, instant: DueInstant) -> None:
     """Make the plates of all lights under which something moves; each is let go as soon as it was used."""
     lights = [light for light in held.lights if light in instant.moving]
     pairs = [_pair(held.sure_around(light, instant)) for light in lights]
-    motion = followed_at(pairs, instant.time_s)
+    instant.motion = motion = followed_at(pairs, instant.time_s)
     shown = [taken_of(pair, motion) for pair in pairs]
     sources = without_doubtful(shown, motion, len(held.lights) - len(lights))
     for light, source in zip(lights, sources, strict=True):
