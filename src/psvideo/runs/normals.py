@@ -116,9 +116,10 @@ def normals(
       ``camera``; how its time codes count: ``camera_time``), or a text file with a 3 x 3 or 4 x 4 matrix. ``y``: which
       way green points (left out: "up"). ``float32``: normals in 32 bits.
     - ``aov``: what else is written: "depth", "residual", "error", "source", "position", "beauty", "age", "reach",
-      "specular", "alpha", "motion". ``mesh``: "ply", one per instant; "usd", one animated file. ``encode``: 16-bit PNG
-      maps too. ``multipart``: one EXR with all quantities too. ``plates``: the plates too. ``compression``: how EXR files
-      are packed, always without loss: "zip", "zips" (for Nuke), "piz", "rle" (where disks are fast) or "none".
+      "specular", "alpha", "motion". ``mesh``: "ply", one per instant; "usd", one animated file. ``encode``: 16-bit
+      PNG maps too. ``multipart``: one EXR with all quantities too. ``plates``: the plates too. ``compression``: how
+      EXR files are packed, always without loss: "zip", "zips" (for Nuke), "piz", "rle" (where disks are fast) or
+      "none".
     - ``weight``: how strong a light is in the beauty plate, by name (1 where not named); ``with_ambient`` leaves
       ambient light in it. ``preview``: movies for eyes, coded as ``preview_codec``.
     - ``force`` replaces an ``out`` that exists; ``resume`` goes on where a run that was stopped
