@@ -142,8 +142,9 @@ class Mixture:
             return replace(self, frames=frames).bound()
         first = frames[0]
         taken = np.zeros((0, self.shape[0])) if self.taken is None else self.taken
+        lies = [frame.codes for frame in frames if isinstance(frame.codes, np.ndarray)]
         mix = MixtureArrays(
-            frames=np.zeros(len(frames), np.intp),
+            frames=np.array([codes.ctypes.data for codes in lies], np.intp),
             like=np.empty(0, first.codes.dtype),
             samples=int(np.prod(self.shape[1:])),
             coefficients=np.ascontiguousarray(self.coefficients, np.float32),
@@ -185,6 +186,9 @@ class ReadyMixture:
 
         Where frames stay in their files, these rows are read, and held no longer than the loop runs.
         """
+        if len(self.mix.frames) == len(self.frames):  # all of them lie in memory
+            loop(self.mix, *arguments)
+            return
         held = [frame.codes[first:last] for frame in self.frames]
         begins = np.array([rows.ctypes.data - first * rows.strides[0] for rows in held], np.intp)
         loop(self.mix._replace(frames=begins), *arguments)

@@ -68,9 +68,12 @@ def sketch_of(plate: LightPlate, *, white: float) -> Sketch:
     seen, grey = plate.seen, plate.picture.halved() if halved else _grey(plate.image)
     if halved:
         seen = np.asarray(seen[: rows // 2 * 2].reshape(-1, 2).all(axis=1))
-    light = np.clip(grey * np.float32(1 / white), 0, 1) + np.float32(TOE)
-    scale = np.float32(255 / (np.sqrt(1 + TOE) - np.sqrt(TOE)))
-    shown = np.asarray((cv2.sqrt(light) - np.float32(np.sqrt(TOE))) * scale, np.float32)
+    shown = grey * np.float32(1 / white)  # and from here on in the same memory
+    np.clip(shown, 0, 1, out=shown)
+    shown += np.float32(TOE)
+    cv2.sqrt(shown, shown)
+    shown -= np.float32(np.sqrt(TOE))
+    shown *= np.float32(255 / (np.sqrt(1 + TOE) - np.sqrt(TOE)))
     size = max(shown.shape[1] // BLOCK_PX, 1), max(shown.shape[0] // BLOCK_PX, 1)
     blocks = np.asarray(cv2.resize(shown, size, interpolation=cv2.INTER_AREA), np.float32)
     codes = (shown + np.float32(0.5)).astype(np.uint8)
