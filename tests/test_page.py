@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,6 +19,7 @@ from psvideo.page.serving import PageServer
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page, Playwright, ViewportSize
 
+ASSETS = Path(__file__).resolve().parents[1] / "src" / "psvideo" / "page" / "assets"
 ALONE = [
     "--no-sandbox",
     "--disable-quic",
@@ -172,6 +174,38 @@ def test_a_highlight_is_blinns(server: PageServer, watched: Watched) -> None:
     true = albedo() * lambert(KEY) + shine[..., None]
     near = np.abs(normals @ unit) > 0.01  # at the edge of its own shadow the highlight ends at once
     assert np.abs(found - true)[near].max() <= 4e-3  # the 20th power of a half float
+
+
+def around_in(page: Page, name: str, directions: np.ndarray) -> np.ndarray:
+    """Return the light (n, 3) that comes from directions (n, 3), as the page's own file defines it."""
+    source = base64.b64encode((ASSETS / "around.js").read_bytes()).decode()
+    script = "async ([source, name, all]) => { const made = await import(`data:text/javascript;base64,${source}`);"
+    found = page.evaluate(
+        f"{script} return all.map((one) => made.radianceOf(name, one)); }}", [source, name, directions.tolist()]
+    )
+    return np.array(found)
+
+
+@pytest.mark.parametrize(("name", "turn_deg"), [("studio", 0), ("window", 50)])
+def test_light_from_all_around_is_what_a_matte_surface_gathers(
+    name: str, turn_deg: float, server: PageServer, watched: Watched
+) -> None:
+    """Gathered direction by direction, from surroundings that are turned about the upright axis."""
+    polar, across = np.meshgrid((np.arange(40) + 0.5) * np.pi / 40, (np.arange(80) + 0.5) * np.pi / 40, indexing="ij")
+    level = np.sin(polar)
+    there = np.stack([level * np.sin(across), np.cos(polar), level * np.cos(across)], axis=-1).reshape(-1, 3)
+    watched.page.goto("about:blank")
+    radiance = around_in(watched.page, name, there) * (level.ravel() * (np.pi / 40) ** 2)[:, None]
+    cos, sin = np.cos(np.radians(turn_deg)), np.sin(np.radians(turn_deg))
+    turned = there @ np.array([[cos, 0, -sin], [0, 1, 0], [sin, 0, cos]])
+    normals, inside = small.ball()
+    gathered = np.maximum(normals.astype(np.float64) @ turned.T, 0) @ radiance / np.pi
+    page = watched.open(server.url)
+    found = relit_in(page, lights=[], around=name, aroundTurn=turn_deg, aroundStrength=1)
+    true = albedo() * gathered
+    error = np.abs(found - true)[inside]
+    assert error.mean() < 0.03 * true[inside].max(), "two degrees of the harmonics leave 1 % on average"
+    assert error.max() < 0.1 * true[inside].max(), "and 9 % at most (Ramamoorthi and Hanrahan 2001)"
 
 
 def test_it_scrubs_plays_and_takes_lights_by_mouse_finger_and_keys(server: PageServer, watched: Watched) -> None:

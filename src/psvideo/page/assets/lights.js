@@ -4,6 +4,8 @@
 // direction, at a distance from the subject's middle that is counted in widths of the picture, and has its stated
 // strength there.
 
+import { aroundOn } from "./around.js";
+
 export const MOST_LIGHTS = 8;
 const FIRST_PLACES = [[0.45, 0.5], [-0.7, 0.15], [0, -0.75], [0.75, -0.3], [-0.35, 0.8], [0.1, 0.1], [-0.6, -0.55], [0.6, 0.75]];
 const FIRST_COLOURS = ["#ffffff", "#9cc8ff", "#ffb877", "#ffffff", "#ffd9b0", "#ffffff", "#c4dcff", "#ffffff"];
@@ -45,11 +47,11 @@ export function lightUniforms(lights) {
 }
 
 // Linear light of one pixel: albedo and normal as [x, y, z], the point in widths of the picture from its middle.
-export function relitPixel(normal, albedo, point, uniforms, specular, exponent) {
+export function relitPixel(normal, albedo, point, uniforms, specular, exponent, around) {
   const length = Math.hypot(...normal);
   if (length < 0.5) return [0, 0, 0];
   const n = normal.map((value) => value / length);
-  const light = [0, 0, 0];
+  const light = around ? aroundOn(around, n).map((value, channel) => value * albedo[channel]) : [0, 0, 0];
   for (let index = 0; index < uniforms.count; index += 1) {
     const [x, y, z, distance] = uniforms.places.subarray(4 * index, 4 * index + 4);
     let l = [x, y, z];

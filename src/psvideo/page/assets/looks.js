@@ -1,5 +1,6 @@
 // From what is chosen to what is drawn: which pictures a pane needs, and how they are to be looked at.
 import { percentiles, pixelAt } from "./block.js";
+import { aroundNumbers } from "./around.js";
 import { product, toCameraOf } from "./matrix.js";
 
 export const RELIT = "relit";
@@ -137,6 +138,15 @@ function median(values) {
   return (values[(values.length - 1) >> 1] + values[values.length >> 1]) / 2;
 }
 
+let heldAround = { key: "", numbers: null };
+
+// The light from all around as it is chosen, computed when it changes.
+function aroundOf({ around, aroundTurn, aroundStrength }) {
+  const key = `${around} ${aroundTurn} ${aroundStrength}`;
+  if (heldAround.key !== key) heldAround = { key, numbers: aroundNumbers(around, aroundTurn, aroundStrength) };
+  return heldAround.numbers;
+}
+
 // Everything that a stage needs to draw one pane; null where its picture is not there.
 export function lookOf(app, content, blocks) {
   const sequence = sequenceOf(app, content);
@@ -151,7 +161,7 @@ export function lookOf(app, content, blocks) {
     kind, sequence, blocks: present, channels, lights, exponent, aspect: app.index.height_px / app.index.width_px,
     place: kind === "position" ? stored(app, present[sequence.id]) : place, ...view,
     markInvalid: markInvalid && Boolean(present.valid) && MEASURED.includes(sequence.id),
-    specular,
+    specular, around: kind === RELIT ? aroundOf(app.state) : null,
     exposure: 2 ** exposure * baseExposure(app, content, present),
     range: rangeOf(app, sequence, present),
   };

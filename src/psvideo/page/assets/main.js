@@ -291,7 +291,7 @@ function firstState(app) {
   const contents = [0, 1, 2, 3].map((place) => ids[Math.min(place, ids.length - 1)]);
   return { at: 0, playing: false, layout: ids.length > 1 && app.index.kind !== "clip" ? "two" : "one", contents, active: 0, wipe: 0.5, exposure: 0,
     channels: 0, lights: [newLight([])], selected: 0, specular: 0, exponent: 30, relief: 1, zoom: 1, centre: [0.5, 0.5],
-    dragged: false, markInvalid: app.sequences.has("valid") };
+    around: "none", aroundTurn: 0, aroundStrength: 0.6, dragged: false, markInvalid: app.sequences.has("valid") };
 }
 
 function listenToBar(app) {

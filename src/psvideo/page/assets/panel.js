@@ -1,10 +1,11 @@
 // The panel at the side: lights, surface, display, the pixel under the pointer, and what is known of the take.
 import { MOST_LIGHTS } from "./lights.js";
+import { AROUND } from "./around.js";
 import { RELIT } from "./looks.js";
 
 export function buildPanel(app) {
   const parts = [];
-  if (app.contents.some(({ id }) => id === RELIT)) parts.push(lightsPart(app), surfacePart(app));
+  if (app.contents.some(({ id }) => id === RELIT)) parts.push(lightsPart(app), aroundPart(app), surfacePart(app));
   parts.push(displayPart(app), part("Pixel", "pixel", element("dl", { id: "pixel", className: "facts", textContent: "Move over a picture." })), takePart(app));
   document.getElementById("panel").replaceChildren(...parts);
 }
@@ -83,6 +84,18 @@ function lightControls(light, place, set) {
     controls.push(slider("Distance", { id: `distance-${place}`, min: 0.1, max: 4, step: 0.01, value: light.distance, show, change: (distance) => set({ distance }) }));
   }
   return controls;
+}
+
+function aroundPart(app) {
+  const { around, aroundTurn, aroundStrength } = app.state;
+  const choice = element("select", { id: "around" }, new Option("None", "none"), ...Object.entries(AROUND).map(([name, { label }]) => new Option(label, name)));
+  choice.value = around;
+  choice.addEventListener("change", () => app.change({ around: choice.value }));
+  return part("Light from all around", "around",
+    element("label", { className: "slider" }, element("span", { textContent: "Place" }), choice),
+    slider("Turn", { id: "around-turn", min: -180, max: 180, step: 1, value: aroundTurn, show: (value) => `${value}°`, change: (value) => app.change({ aroundTurn: value }) }),
+    slider("Strength", { id: "around-strength", min: 0, max: 3, step: 0.01, value: aroundStrength, show: plain(2), change: (value) => app.change({ aroundStrength: value }) }),
+  );
 }
 
 function surfacePart(app) {

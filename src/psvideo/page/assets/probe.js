@@ -49,7 +49,7 @@ export function relitOf(look, u, v, lights) {
   const [x, y, z] = pixelAt(normals, u, v);
   const normal = product(look.toCamera, [x, y * ySign, z]);
   const ground = albedo ? pixelAt(albedo, u, v) : [0.7, 0.7, 0.7];
-  return relitPixel(normal, ground, pointOf(look, u, v, ySign), lights, look.specular, look.exponent);
+  return relitPixel(normal, ground, pointOf(look, u, v, ySign), lights, look.specular, look.exponent, look.around);
 }
 
 function pointOf(look, u, v, ySign) {

@@ -12,7 +12,7 @@ void main() {
 }`;
 
 // `way`: kind (one of KINDS), grey, channels, linear, albedo, valid, place (0 a plane, 1 points, 2 depth), lights (their
-// number), near (whether any is), shine (whether there are highlights).
+// number), near (whether any is), shine (whether there are highlights), around (whether light comes from all around).
 export function fragment(way) {
   return `#version 300 es
 precision highp float;
@@ -32,6 +32,7 @@ uniform float uScale; // points per width of the picture; for depth how deep the
 uniform vec4 uLightPlace[8];
 uniform vec3 uLightColour[8];
 uniform float uSpecular, uExponent;
+uniform vec3 uAround[9];
 ${SRGB}
 vec3 chosen(vec3 light) {
   return ${["light", "light.rrr", "light.ggg", "light.bbb", "vec3(dot(light, vec3(0.2126, 0.7152, 0.0722)))"][way.channels]};
@@ -69,6 +70,11 @@ const SRGB = `vec3 srgb(vec3 light) {
   return mix(power, 12.92 * light, vec3(lessThanEqual(light, vec3(0.0031308))));
 }`;
 
+// See around.js.
+const AROUND_TEXT = `light += albedo * max(uAround[0] + uAround[1] * n.y + uAround[2] * n.z + uAround[3] * n.x
+    + uAround[4] * (n.x * n.y) + uAround[5] * (n.y * n.z) + uAround[6] * (3.0 * n.z * n.z - 1.0)
+    + uAround[7] * (n.x * n.z) + uAround[8] * (n.x * n.x - n.y * n.y), 0.0);`;
+
 function relitText(way) {
   return `
 vec3 pointAt(vec2 at) {
@@ -87,6 +93,7 @@ vec3 relit(vec2 at) {
   ${way.near ? "vec3 place = pointAt(at);" : ""}
   vec3 light = vec3(0.0);
   ${Array.from({ length: way.lights }, (_, index) => lightText(way, index)).join("\n  ")}
+  ${way.around ? AROUND_TEXT : ""}
   return size < 0.5 ? vec3(0.0) : light;
 }`;
 }

@@ -142,6 +142,7 @@ class Stage {
     gl.uniform4fv(this.uniform("uLightPlace"), lights.places);
     gl.uniform3fv(this.uniform("uLightColour"), lights.colours);
     gl.uniform1f(this.uniform("uSpecular"), look.specular);
+    if (look.around) gl.uniform3fv(this.uniform("uAround"), look.around);
     gl.uniform1f(this.uniform("uExponent"), look.exponent);
   }
 
@@ -194,6 +195,7 @@ function wayOf(look, linear) {
     kind, linear, grey: !relit && blocks[look.sequence.id]?.channels === 1, channels: look.channels,
     albedo: Boolean(blocks.albedo), valid: look.markInvalid && kind !== "mask" && !linear, place: near ? look.place.kind : 0,
     lights: relit ? lights.length : 0, near, shine: relit && look.specular > 0,
+    around: relit && Boolean(look.around),
   };
 }
 
