@@ -4,6 +4,7 @@ import functools
 import weakref
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,11 @@ import pytest
 
 from psvideo.model.surface import Surface
 from psvideo.plates.align import between, flow, held
+from psvideo.plates.align.comb import Comb, Schedule
+from psvideo.plates.align.opened import opened
 from psvideo.plates.align.packed import packed
 from psvideo.plates.align.rounds import Aligning, aligned
+from psvideo.plates.beauty import beauty_of, mix_of
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import Mixture, made
 from psvideo.plates.sequence import Round
@@ -459,3 +463,29 @@ def test_what_moves_while_the_exposure_changes_is_still_followed(gain: float) ->
     (_, share), (error_deg, share_breathing) = said
     assert share_breathing > 0.9 * share
     assert error_deg < 4.6
+
+
+def psnr_db(image: np.ndarray, truth: np.ndarray, inner: tuple[slice, slice]) -> float:
+    return float(10 * np.log10(truth[inner].max() ** 2 / np.mean((image - truth)[inner] ** 2)))
+
+
+@pytest.mark.parametrize("motion", ["4 px", pytest.param("spin", marks=pytest.mark.campaign)])
+def test_an_open_shutter_shows_what_a_true_one_does_and_better_than_the_mean_of_frames(motion: str) -> None:
+    clip = noiseless(3, motion)
+    comb = Comb(fps=Fraction(24), first_s=0.0, open_s=0.5 / 24)
+    due = Schedule(by_round={1002: tuple((1001, time_s) for time_s in comb.samples_s(0))}, left_out=(0, 0, 0))
+    plates = (plate for one in clip.rounds for plate in one.plates)
+    how = Aligning(rate=comb)
+    (one,) = opened(aligned(plates, clip.lights, how, first=1001, schedule=due))
+    truth = np.zeros(one.plates[0].shape, np.float32)
+    many = 45
+    for j in range(many):
+        time_s = comb.open_s * ((j + 0.5) / many - 0.5)
+        truth += np.sum([plate.image for plate in at_once(clip, time_s).plates], axis=0) / many
+    inner = np.s_[8:-8, 8:-8]
+    blurred = psnr_db(beauty_of(one, mix_of({}, with_ambient=False)).image, truth, inner)
+    sharp = psnr_db(beauty_of(replace(one, open_plates=()), mix_of({}, with_ambient=False)).image, truth, inner)
+    each = [np.sum([plate.image for plate in r.plates], axis=0) for r in clip.rounds]
+    frames = psnr_db(np.mean(each, axis=0), truth, inner)
+    assert blurred > 35
+    assert blurred > max(sharp, frames) + 3

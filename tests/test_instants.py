@@ -78,6 +78,11 @@ def test_rates_that_cannot_be_had_are_refused(make_plan: PlanMaker) -> None:
     plan = make_plan()
     with pytest.raises(UsageError, match="nothing more often can be known"):
         rate_of(240, plan)
+    with pytest.raises(UsageError, match="add `fps`"):
+        rate_of("round", plan, shutter=180)
+    for angle in (0.0, 361.0):
+        with pytest.raises(UsageError, match="expected an angle"):
+            rate_of(24, plan, shutter=angle)
     for wrong in ("fast", "0", "-24", "1/0"):
         with pytest.raises(UsageError, match="fps"):
             rate_of(parse_instants(wrong), plan)

@@ -56,7 +56,7 @@ def beauty_of(one: Round, mix: Mix, ambient: LightPlate | None = None) -> LightP
     ``ambient`` is the latest that was seen, where the round has no dark slot of its own. What a plate does not know is
     0 and not seen in the sum. A pixel that is clipped in a light is at least as bright as the sum says.
     """
-    parts: Mapping[str, LightPlate | None] = {plate.light: plate for plate in one.plates} | {
+    parts: Mapping[str, LightPlate | None] = {plate.light: plate for plate in one.open_plates or one.plates} | {
         AMBIENT: one.ambient or ambient
     }
     used = [(plate, mix.of(name)) for name, plate in parts.items() if plate is not None and mix.of(name)]

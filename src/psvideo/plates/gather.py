@@ -23,6 +23,7 @@ from psvideo.model.shutter import frames_touched
 from psvideo.model.timing import Flash, Timing, places_in_time, timed_camera
 from psvideo.plates import hudon2015
 from psvideo.plates.align.comb import Comb, Schedule, schedule_of
+from psvideo.plates.align.opened import opened
 from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.ambient import update
 from psvideo.plates.ambient_off import subtract, with_darks_ahead
@@ -121,7 +122,8 @@ def gather(
     if aligning is not None:
         plates = with_nearest_rows(plates) if borrows else plates
         due = scheduled(take, timing, aligning, start_number=start_number)
-        return aligned(plates, plan.lights, aligning, first=start_number, with_ambient=with_ambient, schedule=due)
+        rounds = aligned(plates, plan.lights, aligning, first=start_number, with_ambient=with_ambient, schedule=due)
+        return opened(rounds) if isinstance(aligning.rate, Comb) and aligning.rate.open_s else rounds
     names = coming(plan, flashes, start=start_number)
     return gathered(plates, plan.lights, expected=names.__getitem__)
 

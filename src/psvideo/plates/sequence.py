@@ -41,6 +41,8 @@ class Round:
         nobody looked.
     motion
         How everything moved when the plates were brought to one instant; None where nothing did.
+    open_plates
+        Of each light what an open shutter shows about the instant; empty where none is wanted.
     """
 
     number: int
@@ -48,6 +50,7 @@ class Round:
     ambient: LightPlate | None = None
     stood: NDArray[np.bool_] | None = None
     motion: Followed | None = None
+    open_plates: tuple[LightPlate, ...] = ()
 
     @property
     def time_s(self) -> float:

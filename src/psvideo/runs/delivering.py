@@ -117,7 +117,7 @@ def world_doubts(delivery: Delivery, rig: Rig, width_px: int, *, metric: bool) -
 
 def plates_of(one: Round) -> Iterator[LightPlate]:
     """Yield what a round's sequences of plates show: every light, and ambient light where the round has it."""
-    yield from one.plates
+    yield from one.open_plates or one.plates
     if one.ambient is not None and AMBIENT not in one.lights:
         yield replace(one.ambient, number=one.number)
 

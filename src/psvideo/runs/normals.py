@@ -58,6 +58,7 @@ def normals(
     depth_scale: float | None = None,
     align: Align = "auto",
     fps: str | float | Fraction = "round",
+    shutter: float | None = None,
     denoise: int = 1,
     preset: Program | None = None,
     space: SpaceName | None = None,
@@ -107,7 +108,9 @@ def normals(
     - ``align``: "auto" brings the plates of a round to one instant where something moves, "flow" looks for motion
       everywhere, "none" leaves them. ``fps``: one result per "round", per "flash", per camera "frame", or so many a
       second, exactly (a Fraction; whole or decimal numbers are taken as they are written), at most as many as the
-      camera took. ``denoise``: average up to so many results, 1 to 64, where nothing moves.
+      camera took. ``shutter``: the angle, up to 360 degrees of such a rate, for which a shutter is open in beauty and
+      plates; surfaces are those of its middle. ``denoise``: average up to so many results, 1 to 64, where nothing
+      moves.
 
     What is written, into the folder ``out`` (float16 EXR sequences, numbered from ``start_number``):
 
@@ -175,7 +178,7 @@ def normals(
         require_usd()
     _check_numbers(near_iterations=near_iterations, depth=depth, depth_scale=depth_scale, denoise=denoise)
     take = open_take(clip_path, plan=path_if_given("plan", plan), frames=frames)
-    over_time = OverTime(aligning=Aligning(align=align, rate=rate_of(fps, take.plan)), denoise=denoise)
+    over_time = OverTime(aligning=Aligning(align=align, rate=rate_of(fps, take.plan, shutter=shutter)), denoise=denoise)
     say_of_clip(take.clip, caller)
     over_time.check(take.plan)
     lighting = read_lighting(

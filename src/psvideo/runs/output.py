@@ -77,19 +77,21 @@ def sequence_fps(plan: Plan, rate: Rate | Comb = "round") -> Fraction:
     return Fraction(results * len(plan.dark_rounds) / plan.cycle_s).limit_denominator(100_000)
 
 
-def rate_of(fps: str | float | Fraction, plan: Plan) -> Rate | Comb:
+def rate_of(fps: str | float | Fraction, plan: Plan, *, shutter: float | None = None) -> Rate | Comb:
     """Return which instants are asked for: by a word, or by a rate. Raises UsageError where there are none such."""
+    if fps in ("round", "flash") and shutter is not None:
+        raise UsageError("`shutter` is open for a share of a steady rate's time: add `fps`, such as 24 or frame.")
     if fps == "round":
         return "round"
     if fps == "flash":
         return "flash"
     if fps == "frame":
-        return comb_of(plan.camera.fps, plan.camera)
+        return comb_of(plan.camera.fps, plan.camera, shutter_deg=shutter)
     try:
         exact = parse_fps(str(fps))
     except ValueError as fault:
         raise UsageError(f"`fps` {fps}: {fault}; or one of round, flash, frame.") from None
-    return comb_of(exact, plan.camera)
+    return comb_of(exact, plan.camera, shutter_deg=shutter)
 
 
 def tags_of(clip: Clip, rig_path: Path | None = None, space: Space = CAMERA_SPACE, rate: Rate | Comb = "round") -> Tags:

@@ -50,6 +50,7 @@ from psvideo.cli.options.solving import (
     FpsOption,
     MaskPath,
     NearIterations,
+    ShutterOption,
     SolverOption,
 )
 from psvideo.cli.options.typed import parse_instants, parse_weights
@@ -79,6 +80,7 @@ def normals(
     y: YOption = None,
     align: AlignOption = "auto",
     fps: FpsOption = "round",
+    shutter: ShutterOption = None,
     denoise: Denoise = 1,
     float32: FloatOption = False,
     aov: AovOption = None,
@@ -121,6 +123,7 @@ def normals(
         depth_scale=depth_scale,
         align=align,
         fps=parse_instants(fps),
+        shutter=shutter,
         denoise=denoise,
         preset=preset,
         space=space,

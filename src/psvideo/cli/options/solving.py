@@ -66,4 +66,8 @@ FpsOption = Annotated[
         metavar="round|flash|frame|RATE",
     ),
 ]
+ShutterOption = Annotated[
+    float | None,
+    typer.Option("--shutter", help="Motion blur of this shutter angle in beauty and plates, at a rate: 180."),
+]
 Denoise = Annotated[int, typer.Option(min=1, max=64, help="Average up to N results where nothing moves.")]

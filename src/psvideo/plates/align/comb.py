@@ -17,33 +17,51 @@ from psvideo.model.plan import Plan
 from psvideo.model.timing import Flash
 from psvideo.plates.sequence import coming, round_numbers
 
+SAMPLES = 15
+"""Instants of one opening, the middle one among them: what moves by so many pixels in it is blurred without steps."""
+MOST_DEG = 360.0
 REACH = 0.75
 """Of a round's length: what is farther from the middle of any whole round is shown by none, beside a hole."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Comb:
-    """Instants at a steady rate: number ``k``, from 0, is at ``first_s + k / fps`` on the camera's clock."""
+    """Instants at a steady rate: number ``k``, from 0, is at ``first_s + k / fps`` on the camera's clock.
+
+    ``open_s`` is how long a shutter is to be open about each, 0 where results are to be sharp.
+    """
 
     fps: Fraction
     first_s: float
+    open_s: float = 0.0
 
     def time_s(self, k: int) -> float:
         """Return instant ``k`` in seconds."""
         return self.first_s + float(k / self.fps)
 
+    def samples_s(self, k: int) -> list[float]:
+        """Return the instants that instant ``k`` is made of: itself, or those of an opening about it, ascending."""
+        time_s = self.time_s(k)
+        if not self.open_s:
+            return [time_s]
+        return [time_s + self.open_s * ((j - SAMPLES // 2) / SAMPLES) for j in range(SAMPLES)]
 
-def comb_of(fps: Fraction, camera: Camera) -> Comb:
+
+def comb_of(fps: Fraction, camera: Camera, *, shutter_deg: float | None = None) -> Comb:
     """Return the instants of a rate, the first in the middle of the clip's first frame: of its middle row's exposure.
 
-    Raises UsageError where a rate is above the camera's.
+    ``shutter_deg`` opens a shutter about each. Raises UsageError where a rate is above the camera's, and where an angle
+    is none.
     """
+    if shutter_deg is not None and not 0 < shutter_deg <= MOST_DEG:
+        raise UsageError(f"`shutter` {shutter_deg:g}: expected an angle above 0 and up to {MOST_DEG:g} degrees.")
     if fps > camera.fps:
         raise UsageError(
             f"`fps` {fps}: the camera took {camera.fps} frames a second, and nothing more often can be known of the "
             "scene. Give at most that, or `fps` frame."
         )
-    return Comb(fps=fps, first_s=0.5 * (camera.exposure_s + abs(camera.readout_s or 0.0)))
+    first_s = 0.5 * (camera.exposure_s + abs(camera.readout_s or 0.0))
+    return Comb(fps=fps, first_s=first_s, open_s=(shutter_deg or 0.0) / MOST_DEG / float(fps))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +75,7 @@ class Schedule:
     @property
     def numbers(self) -> tuple[int, ...]:
         """The numbers of all instants that are shown, ascending."""
-        return tuple(number for instants in self.by_round.values() for number, _ in instants)
+        return tuple(dict.fromkeys(number for instants in self.by_round.values() for number, _ in instants))
 
 
 def schedule_of(plan: Plan, flashes: tuple[Flash, ...], comb: Comb, *, start: int, end_s: float) -> Schedule:
@@ -77,11 +95,12 @@ def schedule_of(plan: Plan, flashes: tuple[Flash, ...], comb: Comb, *, start: in
     by_round: dict[int, list[tuple[int, float]]] = {}
     left_out = [0, 0, 0]
     for k in range(count):
-        time_s = comb.time_s(k)
-        nearest = int(np.argmin(np.abs(middles_s - time_s)))
-        where = 0 if time_s < first_s else 2 if time_s > last_s else 1
-        if where == 1 and abs(middles_s[nearest] - time_s) <= reach_s:
-            by_round.setdefault(numbers[nearest], []).append((start + k, time_s))
+        times = np.array(comb.samples_s(k))
+        nearest = np.abs(middles_s - times[:, None]).argmin(axis=1)
+        where = 0 if times[0] < first_s else 2 if times[-1] > last_s else 1
+        if where == 1 and (np.abs(middles_s[nearest] - times) <= reach_s).all():
+            for place, time_s in zip(nearest, times, strict=True):
+                by_round.setdefault(numbers[int(place)], []).append((start + k, float(time_s)))
         else:
             left_out[where] += 1
     return Schedule(
