@@ -13,6 +13,7 @@ TABLES = (
     "memory",
     "encoding",
     "hostile",
+    "killed",
     "view",
     "timing",
     "compression",

@@ -267,6 +267,22 @@ def test_a_folder_is_resumed_only_with_the_settings_it_was_begun_with(tmp_path: 
         pass
 
 
+def test_a_run_that_was_killed_before_it_noted_its_settings_begins_again(tmp_path: Path) -> None:
+    beside = tmp_path / ".out.partial"
+    beside.mkdir()
+    (beside / ".settings.7.partial").write_text("o")
+    with whole_folder(tmp_path / "out", mark="a", resume=True, settings="one") as folder:
+        assert [path.name for path in folder.iterdir()] == [".settings"]
+
+
+def test_what_a_run_that_was_killed_had_moved_out_of_the_way_is_removed_by_the_next(tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / ".out.old-7" / "a").mkdir(parents=True)
+    with whole_folder(tmp_path / "out", mark="a", force=True) as folder:
+        (folder / "a").write_text("new")
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
 def test_a_failed_run_leaves_the_output_that_it_was_to_replace(tmp_path: Path) -> None:
     out = tmp_path / "out"
     out.mkdir()

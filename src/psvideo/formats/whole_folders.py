@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from psvideo.errors import AllDoneError, PsvideoError, UsageError
-from psvideo.formats.whole_files import refuse_existing
+from psvideo.formats.whole_files import refuse_existing, write_text
 
 SETTINGS = ".settings"
 """In a folder that is or was written: a digest of what the run was given, so that only the same run resumes it."""
@@ -40,8 +40,10 @@ def whole_folder(
         beside.mkdir(parents=True, exist_ok=True)
         for unfinished in [*beside.rglob(UNFINISHED)]:
             unfinished.unlink()
+        for old in path.parent.glob(_old_name(path, "*")) if path.exists() else ():
+            shutil.rmtree(old, ignore_errors=True)
         if settings:
-            (beside / SETTINGS).write_text(settings, encoding="utf-8")
+            write_text(beside / SETTINGS, settings)
         yield beside
         _replace(beside, path)
     except OSError as fault:
@@ -90,11 +92,18 @@ def _noted(folder: Path) -> str:
 
 
 def _refuse_other_settings(path: Path, settings: str) -> None:
-    if _noted(_beside(path.resolve())) != settings:
+    beside = _beside(path.resolve())
+    nothing_begun = all(one.match(UNFINISHED) for one in beside.iterdir())
+    if _noted(beside) != settings and not nothing_begun:
         raise UsageError(
             f"{path}: the run that was stopped here had other settings, footage, plan, rig or timing, and mixing both "
             "would spoil the sequence. Give the same ones again, or leave `resume` out to start again."
         )
+
+
+def _old_name(path: Path, process: str) -> str:
+    """Return the name under which a folder that is replaced stands for a moment; one that is killed then leaves it."""
+    return f".{path.name}.old-{process}"
 
 
 def _replace(beside: Path, path: Path) -> None:
@@ -102,7 +111,7 @@ def _replace(beside: Path, path: Path) -> None:
     if not path.exists():
         beside.rename(path)
         return
-    old = path.with_name(f".{path.name}.old-{os.getpid()}")
+    old = path.with_name(_old_name(path, str(os.getpid())))
     path.rename(old)
     beside.rename(path)
     shutil.rmtree(old, ignore_errors=True)
