@@ -4,11 +4,13 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 from picture_file import read_picture
 
 from psvideo.model.plan import Plan
-from psvideo.pictures.timing_sheet import timing_picture, write_sheet
+from psvideo.pictures.contact import GAP_PX
+from psvideo.pictures.timing_sheet import COLOURS, DARK, SIDE_PX, timing_picture, write_sheet
 from psvideo.sync.find import find_timing
 from psvideo.sync.rowfit.profiles import residuals_of
 from psvideo.synth import TrueClock, expose
@@ -29,5 +31,11 @@ def test_right_times_leave_nothing_and_wrong_ones_leave_red_and_blue(
     right, wrong = (timing_picture(plan, one, places, profiles).astype(int) for one in (timing, late))
     coloured = [(np.ptp(picture, axis=2) > 60).mean() for picture in (right, wrong)]
     assert coloured[1] > coloured[0] + 0.01
+    left = right[:, GAP_PX : GAP_PX + SIDE_PX]
+    assert (left.min(axis=2) > 200).any(axis=1).sum() > 60, "numbers stand at the left of every plot"
+    names = {flash.lit for flash in timing.flashes if flash.lit}
+    for colour in (*COLOURS[: len(names)], DARK):
+        squares = cv2.erode((right == colour).all(axis=2).astype(np.uint8), np.ones((12, 12), np.uint8))
+        assert squares.any(), "every light's colour stands in the legend"
     write_sheet(tmp_path / "timing.png", right.astype(np.uint8))
     np.testing.assert_array_equal(read_picture(tmp_path / "timing.png")[..., ::-1], right)

@@ -47,7 +47,7 @@ def _strip(strip: Strip, width_px: int) -> Pixels:
     rows = -(-count // max((width_px - GAP_PX) // (LEAST_TILE_PX + GAP_PX), 1))
     across = -(-count // rows)
     title = np.full((TITLE_PX, width_px, 3), BACKGROUND, np.uint8)
-    _write(title, strip.title, GAP_PX, TITLE_PX - 14, 0.62, INK)
+    write_line(title, strip.title, GAP_PX, TITLE_PX - 14, 0.62, INK)
     lines = [strip.tiles[first : first + across] for first in range(0, count, across)]
     return np.concatenate([title, *(_line(line, across, width_px) for line in lines)], axis=0)
 
@@ -61,7 +61,7 @@ def _line(tiles: Sequence[Tile], across: int, width_px: int) -> Pixels:
     for place, (tile, picture) in enumerate(zip(tiles, pictures, strict=True)):
         left = GAP_PX + place * (tile_px + GAP_PX)
         canvas[: picture.shape[0], left : left + picture.shape[1]] = picture
-        _write(canvas, tile.label, left, height_px + 20, 0.46, FAINT_INK)
+        write_line(canvas, tile.label, left, height_px + 20, 0.46, FAINT_INK)
     return canvas
 
 
@@ -74,7 +74,7 @@ def _fitted(picture: Pixels, width_px: int) -> Pixels:
     ).astype(np.uint8)
 
 
-def _write(canvas: Pixels, text: str, left: int, baseline: int, size: float, ink: tuple[int, int, int]) -> None:
+def write_line(canvas: Pixels, text: str, left: int, baseline: int, size: float, ink: tuple[int, int, int]) -> None:
     """Write a line of text, drawn larger and scaled down, which is smoother than the font's own lines."""
     font = cv2.FONT_HERSHEY_SIMPLEX
     (wide, tall), below = cv2.getTextSize(text, font, size * OVERSAMPLING, OVERSAMPLING + 1)

@@ -1,5 +1,6 @@
 """How well the flashes were found, as a picture: row profiles over time, fitted edges, what is left, and drift."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import cv2
@@ -11,18 +12,22 @@ from psvideo.formats.whole_files import marked_png, whole_file
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
-from psvideo.pictures.contact import Pixels, Strip, Tile, sheet
+from psvideo.pictures.contact import BACKGROUND, FAINT_INK, GAP_PX, INK, Pixels, Strip, Tile, sheet, write_line
 from psvideo.sync.rowfit.profiles import residuals_of
 
 MOST_FRAMES = 120
-TALL_PX, WIDE_PX = 320, 1440
+SHEET_PX, SIDE_PX, BELOW_PX = 1440, 62, 24
+"""The sheet's width, and what an axis takes at the left of a plot and below it."""
+TALL_PX, WIDE_PX = 320, SHEET_PX - 2 * GAP_PX - SIDE_PX
+TEXT = 0.44
 COLOURS = ((255, 120, 90), (110, 220, 120), (110, 160, 255), (255, 210, 90), (220, 120, 255), (90, 220, 230))
 DARK = (140, 140, 140)
 RESIDUAL_GAIN = 10.0
+LEFT_OVER = {"brighter than the fit": (255, 60, 60), "darker than the fit": (60, 60, 255)}
 
 
 def timing_picture(plan: Plan, timing: Timing, indices: NDArray[np.int64], profiles: FloatArray) -> Pixels:
-    """Return 8-bit pixels (row, col, 3): four strips for eyes.
+    """Return 8-bit pixels (row, col, 3): four strips for eyes, with axes and a legend.
 
     ``indices`` (frame,) are the frames' true places in time, ``profiles`` (frame, row) their row means.
     """
@@ -30,16 +35,75 @@ def timing_picture(plan: Plan, timing: Timing, indices: NDArray[np.int64], profi
     values, places = profiles[first], indices[first]
     white = float(np.percentile(values, 99.5)) + 1e-9
     rest = residuals_of(plan, timing, places, values)
-    shown = _edges(timing, places, _grey(values, white), values.shape[1])
-    strips = [
-        Strip(
-            f"Row profiles, frame by frame ({len(places)} frames). {timing.how_sure}", [Tile("", _grey(values, white))]
+    rows = values.shape[1]
+    shown = _edges(timing, places, _grey(values, white), rows)
+    plots = {
+        f"How bright every row of every frame is ({len(places)} frames). {timing.how_sure}": _in_axes(
+            _grey(values, white), places, rows
         ),
-        Strip("The same with every flash's end and start as fitted, one colour a light", [Tile("", shown)]),
-        Strip(f"What the fit leaves, {RESIDUAL_GAIN:.0f} times as bright", [Tile("", _signed(rest, white))]),
-        Strip(_drift_title(timing), [Tile("", _drift(timing))]),
-    ]
-    return sheet(strips, width_px=WIDE_PX)
+        "The same with the rows at which a flash starts and ends, as fitted": np.concatenate(
+            [_in_axes(shown, places, rows), _legend(_colours(timing))]
+        ),
+        f"What the fit leaves, {RESIDUAL_GAIN:.0f} times as bright; grey: nothing": np.concatenate(
+            [_in_axes(_signed(rest, white), places, rows), _legend(LEFT_OVER)]
+        ),
+        _drift_title(timing): _drift_in_axes(timing),
+    }
+    return sheet([Strip(title, [Tile("", plot)]) for title, plot in plots.items()], width_px=SHEET_PX)
+
+
+def _ticks(first: float, last: float, count: int) -> list[float]:
+    """Return round numbers between two, about as many as asked for."""
+    step = max((last - first) / count, 1e-12)
+    size = 10.0 ** np.floor(np.log10(step))
+    step = next(float(size * times) for times in (1, 2, 5, 10) if size * times >= step)
+    return [float(value) for value in np.arange(np.ceil(first / step) * step, last + step / 1000, step)]
+
+
+def _framed(plot: Pixels, across: Mapping[float, str], down: Mapping[float, str]) -> Pixels:
+    """Return a plot with numbers below and at its left, each at its share of the width or height."""
+    tall, wide = plot.shape[:2]
+    canvas = np.full((tall + BELOW_PX, wide + SIDE_PX, 3), BACKGROUND, np.uint8)
+    canvas[:tall, SIDE_PX:] = plot
+    for share, text in across.items():
+        x = SIDE_PX + round(share * (wide - 1))
+        canvas[tall : tall + 5, x] = FAINT_INK
+        write_line(canvas, text, min(max(x - 4 * len(text), 0), SIDE_PX + wide - 9 * len(text)), tall + 20, TEXT, INK)
+    for share, text in down.items():
+        y = round(share * (tall - 1))
+        canvas[y, SIDE_PX - 5 : SIDE_PX] = FAINT_INK
+        write_line(canvas, text, max(SIDE_PX - 10 - 8 * len(text), 0), min(max(y + 5, 12), tall), TEXT, INK)
+    return canvas
+
+
+def _in_axes(plot: Pixels, places: NDArray[np.int64], rows: int) -> Pixels:
+    """Return a picture of rows over frames with both numbered: frames from the clip's first on, rows from the top."""
+    counts = [int(value) for value in _ticks(0, len(places) - 1, 12) if value == int(value)]
+    across = {(count + 0.5) / len(places): str(int(places[count])) for count in counts}
+    across[min(across)] = f"frame {across[min(across)]}"
+    down = {value / rows: str(int(value)) for value in _ticks(0, rows - 1, 4)}
+    down[0.0] = "row 0"
+    return _framed(plot, across, down)
+
+
+def _colours(timing: Timing) -> dict[str, tuple[int, int, int]]:
+    """Return the colour of every set of lights that flashes together, by its name, and the dark slot's."""
+    names = list(dict.fromkeys("+".join(flash.lit) for flash in timing.flashes))
+    return {name or "dark slot": COLOURS[place % len(COLOURS)] if name else DARK for place, name in enumerate(names)}
+
+
+def _legend(colours: Mapping[str, tuple[int, int, int]]) -> Pixels:
+    """Return a line of colours with what they mean; where they do not all fit, the first."""
+    canvas = np.full((BELOW_PX, WIDE_PX + SIDE_PX, 3), BACKGROUND, np.uint8)
+    x = SIDE_PX
+    for name, colour in colours.items():
+        if x + 30 + 9 * len(name) > canvas.shape[1]:
+            write_line(canvas, "...", x, 16, TEXT, INK)
+            break
+        canvas[6:18, x : x + 12] = colour
+        write_line(canvas, name, x + 16, 17, TEXT, INK)
+        x += 36 + 8 * len(name)
+    return canvas
 
 
 def _scaled(picture: NDArray[np.uint8]) -> Pixels:
@@ -62,11 +126,11 @@ def _signed(rest: FloatArray, white: float) -> Pixels:
 
 def _edges(timing: Timing, places: NDArray[np.int64], picture: Pixels, height: int) -> Pixels:
     """Draw where each flash starts and ends while a row opens or closes."""
-    names = list(dict.fromkeys("+".join(flash.lit) for flash in timing.flashes))
+    colours = _colours(timing)
     drawn, per_frame = picture.copy(), WIDE_PX / len(places)
     for column, place in enumerate(places.tolist()):
         for flash in timing.flashes:
-            colour = COLOURS[names.index("+".join(flash.lit)) % len(COLOURS)] if flash.lit else DARK
+            colour = colours["+".join(flash.lit) or "dark slot"]
             for moment_s in (flash.start_s, flash.start_s + flash.duration_s):
                 row = _row_at(timing, moment_s - place * timing.frame_period_s, height)
                 if row is not None:
@@ -86,10 +150,7 @@ def _row_at(timing: Timing, since_s: float, height: int) -> float | None:
 
 
 def _drift_title(timing: Timing) -> str:
-    return (
-        f"By how much flashes stray from a clock that runs straight ({timing.clock_offset_ppm:+.1f} ppm); "
-        f"one line is {_unit_s(timing) * 1e6:.3g} us"
-    )
+    return f"By how many us flashes stray from a clock that runs straight ({timing.clock_offset_ppm:+.1f} ppm)"
 
 
 def _unit_s(timing: Timing) -> float:
@@ -120,6 +181,15 @@ def _drift(timing: Timing) -> Pixels:
         y = round(float(middle - np.clip(late_s / unit_s, -2.2, 2.2) * 0.4 * middle))
         cv2.circle(canvas, (round(float(place)), y), 2, (120, 200, 255), -1)
     return canvas
+
+
+def _drift_in_axes(timing: Timing) -> Pixels:
+    unit, count = _unit_s(timing) * 1e6, len(timing.flashes)
+    down = {0.5 - line * 0.2: f"{line * unit:+.3g}" if line else "0" for line in (-1, 0, 1)}
+    numbers = [int(value) for value in _ticks(0, max(count - 1, 1), 12) if value == int(value) and value < count]
+    across = {number / max(count - 1, 1): str(number) for number in numbers}
+    across[0.0] = "flash 0"
+    return _framed(_drift(timing), across, down)
 
 
 def write_sheet(path: Path, picture: Pixels) -> None:
