@@ -300,6 +300,21 @@ def test_what_a_file_says_of_itself_is_read(tmp_path: Path) -> None:
     assert stated_by(tmp_path / "missing.jpg").transfer is None
 
 
+def test_the_lens_that_exif_names_gives_depth_its_view(tmp_path: Path) -> None:
+    folder = tmp_path / "photos"
+    folder.mkdir()
+    for name, picture in zip(NAMES, lit(), strict=True):
+        exif = Image.Exif()
+        exif.get_ifd(0x8769)[0xA405] = 72
+        save8(folder / f"{name}.jpg", as_srgb(picture), exif=exif, quality=98)
+    report = ps.stills(folder, lights=listed(tmp_path / "lights.lp"), out=tmp_path / "out")
+    assert "The lens is taken for 128 pixels long, as EXIF says" in remarks(report)
+    assert ps.read_rig(tmp_path / "out" / "setup" / "rig.toml").focal_px == (128.0, 128.0)
+    given = ps.stills(folder, lights=tmp_path / "lights.lp", out=tmp_path / "out", focal_px=200.0, force=True)
+    assert "as EXIF says" not in remarks(given)
+    assert ps.read_rig(tmp_path / "out" / "setup" / "rig.toml").focal_px == (200.0, 200.0)
+
+
 def chrome(folder: Path, *, middle: tuple[float, float] = (128, 118), radius: float = 80) -> Path:
     """Write pictures of a chrome ball under the lights, and one under room light, on which its outline shows."""
     folder.mkdir()

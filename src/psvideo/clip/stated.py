@@ -31,15 +31,21 @@ class Stated:
 
     transfer: the curve's name, or "unknown" where its curve is none that psvideo knows. by: what says so.
     exposure: light gathered, seconds times ISO over the f-number squared, on a scale of its own.
-    focal_widths: the focal length in widths of the picture's longer side.
+    focal_widths: the focal length in widths of the picture's longer side, which is longer_px; focal_px: in pixels.
     """
 
     transfer: str | None = None
     by: str = ""
     exposure: float | None = None
     focal_widths: float | None = None
+    longer_px: int = 0
     camera: str = ""
     turn: Turn = UPRIGHT
+
+    @property
+    def focal_px(self) -> float | None:
+        """The focal length in pixels, where the file says it of a picture that was not cropped."""
+        return self.focal_widths * self.longer_px if self.focal_widths and self.longer_px else None
 
 
 def stated_by(path: Path) -> Stated:
@@ -51,11 +57,13 @@ def stated_by(path: Path) -> Stated:
             exif = picture.getexif()
             taken = {**exif, **exif.get_ifd(ExifTags.IFD.Exif)}
             transfer, by = _curve(picture.info)
+            longer_px = max(picture.size)
         return Stated(
             transfer=transfer,
             by=by,
             exposure=_exposure(taken),
             focal_widths=_above_0(taken.get(ExifTags.Base.FocalLengthIn35mmFilm), 1 / WIDTH_35_MM),
+            longer_px=longer_px,
             camera=_camera(taken),
             turn=EXIF.get(int(_above_0(taken.get(ExifTags.Base.Orientation)) or 1), UPRIGHT),
         )

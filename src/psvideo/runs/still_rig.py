@@ -6,8 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
+from psvideo.calibrate.light_files import pictures_in
 from psvideo.calibrate.mirror.lights import calibrate_lights
 from psvideo.calibrate.sphere.sighting import Looking, Sighting, sight_spheres
+from psvideo.clip.stated import Stated, stated_by
 from psvideo.compute.progress import Watch
 from psvideo.errors import PsvideoError
 from psvideo.formats.light_lists import pictures_named_by
@@ -15,6 +17,9 @@ from psvideo.formats.rig_toml import read_rig
 from psvideo.model.rig import Rig
 from psvideo.runs.caller import Caller
 from psvideo.runs.light_sets import Reading, sets_of
+
+SAME_LENS = 1.01
+"""A zoom that was not touched states the same; prime lenses always do."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,6 +71,12 @@ def sphere_lights(
     With near lights the surface is taken to be as far away as the spheres. Raises PsvideoError where no sphere is
     found, one is cut off, or no light is measured.
     """
+    notes: tuple[str, ...] = ()
+    if looking.focal_px is None and looking.focal_widths is None:
+        lens_px = lens_stated([stated_by(file) for path in spheres if path.is_dir() for file in pictures_in(path)])
+        if lens_px is not None:
+            looking = replace(looking, focal_px=lens_px)
+            notes = (f"The spheres were seen through a lens of {lens_px:.6g} pixels, as their EXIF says.",)
     sightings: list[Sighting] = []
     names: tuple[str, ...] = ()
     for path in spheres:
@@ -86,7 +97,16 @@ def sphere_lights(
     what = f"{near} near, with positions" if near else "as directions"
     note = f"{len(rig.lights)} of {len(found.lights)} lights were measured on {_spheres(len(sightings))}, {what}."
     whose = ", ".join(path.name for path in spheres)
-    return KnownLights(rig=rig, called=rig.names, own=False, whose=whose, notes=(note,), warnings=tuple(found.warnings))
+    return KnownLights(
+        rig=rig, called=rig.names, own=False, whose=whose, notes=(*notes, note), warnings=tuple(found.warnings)
+    )
+
+
+def lens_stated(stated: Sequence[Stated]) -> float | None:
+    """Return the focal length in pixels that pictures say by their EXIF, None where one says none or another."""
+    found = [one.focal_px for one in stated]
+    known = [one for one in found if one is not None]
+    return known[0] if len(known) == len(found) > 0 and max(known) < SAME_LENS * min(known) else None
 
 
 def _spheres(count: int) -> str:

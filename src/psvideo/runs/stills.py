@@ -37,7 +37,7 @@ from psvideo.runs.output import Output
 from psvideo.runs.results import OverTime, normals_run
 from psvideo.runs.rti import write_rti
 from psvideo.runs.still_doubts import curve_doubt, exposures_of, glance_at
-from psvideo.runs.still_rig import KnownLights, listed_lights, sphere_lights
+from psvideo.runs.still_rig import KnownLights, lens_stated, listed_lights, sphere_lights
 from psvideo.solve.instants import Instant
 
 PLAN, RIG, LP = "plan.toml", "rig.toml", "lights.lp"
@@ -144,7 +144,7 @@ def stills(
         mask=path_if_given("mask", mask),
     )
     with tempfile.TemporaryDirectory(prefix="psvideo-stills-") as place:
-        opened = _opened(path, pairs, known, Path(place), transfer=transfer)
+        opened = _opened(path, pairs, known, looking, Path(place), transfer=transfer)
         take = Take(clip=opened.clip, numbers=opened.clip.numbers)
         for note in take.clip.notes:
             caller.say(note)
@@ -197,7 +197,9 @@ def _known_lights(
     return sphere_lights(spheres, looking, radius_m=radius_m, transfer=transfer, watch=watch, caller=caller)
 
 
-def _opened(folder: Path, pairs: Pairs, known: KnownLights, place: Path, *, transfer: str | None) -> _Opened:
+def _opened(
+    folder: Path, pairs: Pairs, known: KnownLights, looking: Looking, place: Path, *, transfer: str | None
+) -> _Opened:
     """Return the photographs as a clip; plan and rig are written into ``place``."""
     files = (*pairs.files, *([pairs.dark] if pairs.dark else []))
     pictures = look_at(files, transfer=transfer)
@@ -206,6 +208,7 @@ def _opened(folder: Path, pairs: Pairs, known: KnownLights, place: Path, *, tran
     exposures, note, warning = exposures_of(glance, pictures, len(pairs.files))
     if exposures is not None:
         rig = _scaled(rig, exposures)
+    rig, lens = _through_lens(rig, pictures, looking)
     doubt = curve_doubt(glance, pictures)
     write_text(place / RIG, format_rig(rig))
     plan = assemble_plan(
@@ -223,10 +226,24 @@ def _opened(folder: Path, pairs: Pairs, known: KnownLights, place: Path, *, tran
         mode="synced",
     )
     write_text(place / PLAN, format_plan(plan))
-    notes = (_assumed(pictures), pairs.how, *known.notes, *([note] if note else []), *_aside(pairs))
+    notes = (_assumed(pictures), pairs.how, *known.notes, *([note] if note else []), *lens, *_aside(pairs))
     clip = pictures.clip(folder, plan, place / PLAN, notes=notes)
     warned = (*clip.warnings, *known.warnings, *(said for said in (doubt, warning) if said))
     return _Opened(clip=replace(clip, warnings=warned), rig=rig, rig_path=place / RIG)
+
+
+def _through_lens(rig: Rig, pictures: Photographs, looking: Looking) -> tuple[Rig, tuple[str, ...]]:
+    """Return the rig with the lens that was given, or that EXIF names; with what is to be said of it."""
+    if rig.focal_px is not None:
+        return rig, ()
+    header = pictures.header
+    wide_px = header.turn.size(header.width_px, header.height_px)[0]
+    given_px = looking.focal_px or (looking.focal_widths * wide_px if looking.focal_widths else None)
+    lens_px = given_px or lens_stated(pictures.stated)
+    if lens_px is None:
+        return rig, ()
+    said = () if given_px else (f"The lens is taken for {lens_px:.6g} pixels long, as EXIF says; shapes depend on it.",)
+    return replace(rig, focal_px=(lens_px, lens_px)), said
 
 
 def _flashes(pairs: Pairs) -> list[PlannedFlash]:
