@@ -139,6 +139,7 @@ def test_floating_point_pictures_come_out_as_they_are(tmp_path: Path, kind: str,
     (write_exr if kind == "exr" else write_tiff())(tmp_path / "x.1", codes)
     picture = decode(kind, tmp_path / "x.1")
     assert np.array_equal(picture.codes, codes)
+    assert picture.codes.dtype == dtype, "a frame in half floats takes half the memory"
     assert picture.header.bits is None
     assert read_header(kind, tmp_path / "x.1") == picture.header
 

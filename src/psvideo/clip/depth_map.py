@@ -118,7 +118,7 @@ def _read(path: Path, maps: DepthMaps) -> Floats:
 
 def _decode_exr(path: Path) -> NDArray[np.floating]:
     """Decode the channel that holds depth."""
-    grey: NDArray[np.floating] = decode_channels(path, lambda found: _depth_channel(path, found)).codes
+    grey = decode_channels(path, lambda found: _depth_channel(path, found)).codes.astype(np.float32, copy=False)
     if grey.ndim == 3:
         alike = bool((grey[..., 0] == grey[..., 1]).all() and (grey[..., 0] == grey[..., 2]).all())
         return grey[..., 0] if alike else grey

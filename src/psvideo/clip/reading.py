@@ -130,7 +130,8 @@ def _check_finite(picture: Picture, name: str) -> None:
 
 def _is_finite(codes: NDArray[Any]) -> bool:
     if codes.dtype == np.float16:  # numpy has no fast sum of halves; beyond these bits they are no numbers
-        return bool((np.ascontiguousarray(codes).view(np.int16) & 0x7FFF).max() < 0x7C00)
+        bits = np.ascontiguousarray(codes).view(np.uint16)  # from infinity on, of either sign
+        return int(bits.view(np.int16).max()) < 0x7C00 and int(bits.max()) < 0xFC00
     return bool(np.isfinite(codes.sum(dtype=np.float64)))
 
 

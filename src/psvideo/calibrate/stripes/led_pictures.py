@@ -135,6 +135,7 @@ def _profiles(pictures: Iterator[tuple[str, CodedPicture]], columns: tuple[int, 
 def in_colours(picture: CodedPicture) -> NDArray[Any]:
     """Return codes (row, col, channel): of a mosaic the green ones, which every row has in every second column."""
     codes, cfa = picture.codes, picture.header.cfa
+    codes = codes.astype(np.float32) if codes.dtype == np.float16 else codes  # means are taken of them
     if cfa is None:
         return codes.reshape(*codes.shape[:2], -1)
     even, odd = (np.repeat(codes[row::2, cfa.index("G", 2 * row) % 2 :: 2], 2, axis=1) for row in (0, 1))

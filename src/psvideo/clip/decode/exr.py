@@ -11,6 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
@@ -40,15 +41,25 @@ def decode(path: Path) -> CodedPicture:
 
 
 def decode_channels(path: Path, choose: Callable[[list[str]], tuple[str, ...]]) -> CodedPicture:
-    """Decode the channels that ``choose`` takes from the names of all, one or three."""
+    """Decode the channels that ``choose`` takes from the names of all, one or three: half floats, where all are."""
     header_of(path, choose)
     with _open(path, header_only=False) as file:
         names = choose(_names(file))
         channels = file.channels()
         planes = [channels[name].pixels for name in names]
         head = _header(file, names)
-        codes = np.asarray(planes[0], np.float32) if len(planes) == 1 else np.stack(planes, axis=-1, dtype=np.float32)
-        return CodedPicture(header=head, codes=_in_display_window(codes, file.header(), head))
+        return CodedPicture(header=head, codes=_in_display_window(_side_by_side(planes), file.header(), head))
+
+
+def _side_by_side(planes: list[NDArray[Any]]) -> NDArray[Any]:
+    """Return planes as one picture, (row, col) or (row, col, channel), in half floats if all of them are."""
+    if any(plane.dtype != np.float16 for plane in planes):
+        planes = [plane.astype(np.float32, copy=False) for plane in planes]
+    if len(planes) == 1:
+        return planes[0]
+    if planes[0].dtype == np.float16:  # merged as bits, which takes a fifth of numpy's time
+        return np.asarray(cv2.merge([plane.view(np.uint16) for plane in planes])).view(np.float16)
+    return np.stack(planes, axis=-1)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -188,7 +188,7 @@ def _brightness(albedo: NDArray[np.floating]) -> Floats:
 
 def _typical(each: Floats, weight: Floats) -> float:
     """Return the weighted median: what is bright shows more of the subject than a dim backdrop does."""
-    order = np.argsort(each, kind="stable")
+    order = np.argsort(each)
     upto = np.cumsum(weight[order], dtype=np.float64)
     return float(each[order[np.searchsorted(upto, upto[-1] / 2)]])
 
