@@ -12,6 +12,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.io import loadmat  # type: ignore[attr-defined]
 
+import psvideo as ps
 from psvideo.cli.app import main
 from psvideo.compute.compiled import EXACT
 from psvideo.errors import PsvideoError
@@ -26,6 +27,7 @@ from psvideo.solve.normals import robust, woodham1980
 from psvideo.solve.normals.illumination import Illumination, illumination
 from psvideo.solve.normals.near_kernel import place_lights
 from psvideo.solve.normals.task import Floats, Near
+from psvideo.solve.sweeping import swept
 
 Array = NDArray[np.float64]
 SIZE, WIDTH_M, FAR_M = 96, 0.4, 1.6
@@ -168,6 +170,29 @@ def test_alternating_with_integrated_depth_takes_off_what_a_plane_cannot_know(
     assert error_deg(1) < 0.12 * with_plane
     monkeypatch.setattr(near_surface, "ROUGH_PX", 32)  # large pictures are integrated on rough pixels
     assert error_deg(1) < 0.2 * with_plane
+
+
+def test_a_wall_behind_the_subject_is_found_by_how_light_falls_off() -> None:
+    def room(u: Array, v: Array) -> Array:
+        return np.where(np.abs(u - MIDDLE) < 0.25 * SIZE, relief(u, v), 1.5 * FAR_M + 0.3 * (v - MIDDLE) / SIZE)
+
+    points, normals = surface(room)
+    rig = ring_rig(8, 2)
+    rng = np.random.default_rng(4)
+    plates = [plate + rng.normal(0, 0.0003, plate.shape).astype(np.float32) for plate in filmed(rig, points, normals)]
+    cols = np.arange(SIZE)
+    wall = np.broadcast_to(np.abs(cols - MIDDLE) > 0.32 * SIZE, (SIZE, SIZE))
+    subject = np.broadcast_to(np.abs(cols - MIDDLE) < 0.2 * SIZE, (SIZE, SIZE))
+    found = ps.solve_images(np.stack(plates), rig)
+    apart = np.degrees(np.linalg.norm(found.normals - normals, axis=-1))
+    assert np.median(apart[wall]) < 1, "on the plane they would be off by more than ten degrees"
+    assert np.median(apart[subject]) < 0.3
+    near = near_surface.near_surface_of(rig, rig.lights, height_px=SIZE, width_px=SIZE)
+    assert near is not None
+    depth_m = swept(near, rig.lights, plates).ground.depth_m
+    assert np.median(np.abs(depth_m / -points[..., 2] - 1)[wall]) < 0.04
+    few = replace(rig, lights=rig.lights[:4])
+    assert swept(near, few.lights, plates[:4]) is near, "four lights do not tell distance from normal"
 
 
 def test_distant_lights_may_stand_among_near_ones_and_a_far_light_is_a_distant_one() -> None:

@@ -70,7 +70,7 @@ def ground_of(rig: Rig, *, height_px: int, width_px: int, known_m: NDArray[np.fl
     depth_m: NDArray[np.floating] | None
     depth_m = None if rig.plane is None else _plane_depth_m(rig, height_px, width_px)
     if known_m is not None:
-        depth_m = _spread(known_m) if depth_m is None else np.where(known_m > 0, known_m, depth_m)
+        depth_m = spread(known_m) if depth_m is None else np.where(known_m > 0, known_m, depth_m)
     if depth_m is None or depth_m.shape != (height_px, width_px):
         raise ValueError(f"known depth for a picture of {height_px} x {width_px} expected")
     x, y = every_ray(rig.focal_px, rig.principal_px, height_px, width_px)
@@ -83,14 +83,14 @@ def ground_of(rig: Rig, *, height_px: int, width_px: int, known_m: NDArray[np.fl
     )
 
 
-def _spread(known_m: NDArray[np.floating]) -> NDArray[np.floating]:
+def spread(known_m: NDArray[np.floating]) -> NDArray[np.floating]:
     """Give pixels of unknown depth that of the nearest known pixel."""
     unknown = (known_m <= 0).astype(np.uint8)
     _, labels = cv2.distanceTransformWithLabels(unknown, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
     depth_of_label = np.zeros(int(labels.max()) + 1, known_m.dtype)
     depth_of_label[labels[known_m > 0]] = known_m[known_m > 0]
-    spread: NDArray[np.floating] = depth_of_label[labels]
-    return spread
+    everywhere: NDArray[np.floating] = depth_of_label[labels]
+    return everywhere
 
 
 def _plane_depth_m(rig: Rig, height_px: int, width_px: int) -> FloatArray:

@@ -16,6 +16,7 @@ from psvideo.solve.given import check_count, checked_images, checked_lights, che
 from psvideo.solve.near_surface import near_surface_of, solve_near
 from psvideo.solve.normals.illumination import Illumination, illumination
 from psvideo.solve.normals.solving import Solving
+from psvideo.solve.sweeping import swept
 
 
 def solve_images(
@@ -104,7 +105,7 @@ def solve_images(
         return solving.solve(plates, lit, mask=where)
 
     near = near_surface_of(rig, rig.lights, height_px=rows, width_px=cols, iterations=NEAR_ITERATIONS)
-    surface = solve(light()) if near is None else solve_near(near, light, solve)
+    surface = solve(light()) if near is None else solve_near(swept(near, rig.lights, plates), light, solve)
     return _in_units(surface, unit)
 
 

@@ -28,6 +28,7 @@ from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.task import Samples
 from psvideo.solve.passes.made import AskedPasses, Passes, passes_of
 from psvideo.solve.steady import Steady, steadied
+from psvideo.solve.sweeping import swept
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,7 +83,7 @@ def surfaces(
         plates = _pictures(one, shares)
         shown = None if seen.all() else seen
 
-        here = None if near is None else near.at(one.number)
+        here = None if near is None else swept(near.at(one.number), scaled, plates, seen=shown)
         lit = light(ground=None if here is None else here.ground)
 
         def solve(found: Illumination) -> Surface:

@@ -24,6 +24,8 @@ from psvideo.solve.normals.illumination import Illumination
 
 ROUGH_PX = 480
 """Depth for the lights' sake is integrated on a picture of at most so many pixels along its longer side."""
+MOST_OFF = 0.12
+"""Integrated depth that is off by more than this share of what the lights' falloff says is not believed."""
 LEAST_COVERED = 0.5
 """Share of a rough pixel's normals that must be there."""
 
@@ -33,12 +35,14 @@ class NearSurface:
     """Where near lights find the surface: the first ``ground``, and how often it is made again from the normals.
 
     known_m: the depth (row, col) known of the instant with a number, 0 where unknown; it comes before the ground's.
+    apart: (row, col), pixels through which no surface runs, so that what lies beside them is integrated by itself.
     """
 
     ground: Ground
     shaping: Shaping
     iterations: int = 0
     known_m: Callable[[int], NDArray[np.float32]] | None = None
+    apart: NDArray[np.bool_] | None = None
 
     def at(self, number: int) -> "NearSurface":
         """Return where the surface is at the instant with this number."""
@@ -82,9 +86,21 @@ def solve_near(
     ground = near.ground
     surface = solve(light(ground))
     for _ in range(near.iterations):
-        ground = ground.with_depth(_rough_depth_m(near.shaping, surface))
+        depth_m = _rough_depth_m(near.shaping, surface if near.apart is None else _cut(surface, near.apart))
+        if near.apart is not None:  # what was integrated across an edge that nobody saw is far from what was swept
+            swept_m = near.ground.depth_m
+            depth_m[np.abs(depth_m - swept_m) > MOST_OFF * swept_m] = 0
+            ground = near.ground
+        ground = ground.with_depth(depth_m)
         surface = solve(light(ground))
     return surface
+
+
+def _cut(surface: Surface, apart: NDArray[np.bool_]) -> Surface:
+    """Return a surface without some of its pixels."""
+    shown = surface.shown & ~apart
+    normals = np.where(shown[..., None], surface.normals, np.float32(0))
+    return Surface(normals=normals, albedo=shown.astype(np.float32), valid=shown)
 
 
 def _rough_depth_m(shaping: Shaping, surface: Surface) -> NDArray[np.float32]:

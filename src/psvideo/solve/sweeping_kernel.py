@@ -1,0 +1,78 @@
+"""The compiled loop of sweeping: how well every distance explains what near lights show in a point."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.compute.compiled import FUSED
+
+ROUNDS = 4
+"""Of weighing down what does not fit."""
+LEAST_LIT, TINY = 4, 1e-12
+
+Doubles = NDArray[np.float64]
+
+
+@FUSED.kept
+def sweep_points(
+    light: Doubles, rays: Doubles, plane_m: Doubles, ratios: Doubles, positions: Doubles, axes: Doubles,
+    lamps: Doubles, noise: float, own: float, costs: Doubles,
+) -> None:  # fmt: skip
+    """Fill ``costs`` (ratio, point): the mean of log(1 + r^2) over the lights that reach a point, r what the best
+    normal leaves of their light in units of its error; 0 where too few do.
+
+    light: (point, light), below 0 where it is not known. rays: (point, 3), to depth 1. plane_m: (point,), the depth of
+    ratio 1. positions: (light, 3), in metres, or a distant light's direction. lamps: (light, 3): intensity, anisotropy,
+    and 1 for a near light. noise: of dark light; own: what else a point's brightest light is off by, as a share.
+    """
+    points, lights = light.shape
+    vectors, weight, left = np.zeros((lights, 3)), np.zeros(lights), np.zeros(lights)
+    for point in range(points):
+        lit, most = 0, 0.0
+        for k in range(lights):
+            lit += light[point, k] > 6 * noise
+            most = max(most, light[point, k])
+        if lit < LEAST_LIT:
+            costs[:, point] = 0.0
+            continue
+        off = np.sqrt(noise * noise + own * own * most * most)
+        for n in range(len(ratios)):
+            depth = plane_m[point] * ratios[n]
+            for k in range(lights):
+                x, y, z, sent = positions[k, 0], positions[k, 1], positions[k, 2], lamps[k, 0]
+                if lamps[k, 2] > 0:
+                    x, y, z = x - depth * rays[point, 0], y - depth * rays[point, 1], z - depth * rays[point, 2]
+                    away = np.sqrt(x * x + y * y + z * z)
+                    x, y, z = x / away, y / away, z / away
+                    sent /= away * away
+                    if lamps[k, 1] > 0:
+                        sent *= max(-(x * axes[k, 0] + y * axes[k, 1] + z * axes[k, 2]), 0.01) ** lamps[k, 1]
+                vectors[k, 0], vectors[k, 1], vectors[k, 2] = x * sent, y * sent, z * sent
+                weight[k] = 1.0 if light[point, k] > 6 * noise else 0.0
+            total = 0.0
+            for _ in range(ROUNDS):
+                _left_over(light[point], vectors, weight, left)
+                total = 0.0
+                for k in range(lights):
+                    if light[point, k] > 6 * noise:
+                        square = (left[k] / off) ** 2
+                        total += np.log1p(square)
+                        weight[k] = 1.0 / (1.0 + 0.25 * square)
+            costs[n, point] = total / lit
+
+
+@FUSED.inlined
+def _left_over(light: Doubles, vectors: Doubles, weight: Doubles, left: Doubles) -> None:
+    """Fill ``left`` with what weighted least squares leaves of the light, by Cramer's rule."""
+    xx = xy = xz = yy = yz = zz = a = b = c = 0.0
+    for k in range(len(light)):
+        w, x, y, z = weight[k], vectors[k, 0], vectors[k, 1], vectors[k, 2]
+        xx, xy, xz = xx + w * x * x, xy + w * x * y, xz + w * x * z
+        yy, yz, zz = yy + w * y * y, yz + w * y * z, zz + w * z * z
+        a, b, c = a + w * x * light[k], b + w * y * light[k], c + w * z * light[k]
+    one, two, three = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
+    det = max(xx * one + xy * two + xz * three, TINY)
+    gx = (one * a + two * b + three * c) / det
+    gy = (two * a + (xx * zz - xz * xz) * b + (xy * xz - xx * yz) * c) / det
+    gz = (three * a + (xy * xz - xx * yz) * b + (xx * yy - xy * xy) * c) / det
+    for k in range(len(light)):
+        left[k] = light[k] - (vectors[k, 0] * gx + vectors[k, 1] * gy + vectors[k, 2] * gz)
