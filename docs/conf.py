@@ -19,7 +19,7 @@ source_suffix = {".md": "markdown"}
 root_doc = "docs/index"
 include_patterns = [
     *("docs/*.md", "docs/decisions/*.md", "lights/**.md", "calibration/**.md"),
-    *("bench/README.md", "CONTRIBUTING.md", "CHANGELOG.md"),
+    *("bench/README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md"),
 ]
 exclude_patterns = [".*", "src", "tests", "docs/_site", "**/build"]
 myst_heading_anchors = 4
