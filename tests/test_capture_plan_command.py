@@ -44,7 +44,7 @@ def test_machines_get_json_with_plan_figures_and_cautions(tmp_path: Path) -> Non
     data = json.loads(run(*README, "--json", "--speed", "800").stdout)
     assert parse_plan(data["plan"]).mode == "rolling"
     assert data["figures"]["slots"][0]["blur_px"] == pytest.approx(0.64)
-    assert {"flicker", "readout", "fps", "three-frames"} == {caution["kind"] for caution in data["cautions"]}
+    assert {"flicker", "readout", "fps", "three-frames", "motion"} == {caution["kind"] for caution in data["cautions"]}
     data = json.loads(run(*README, "--json", "-o", tmp_path / "plan.toml").stdout)
     assert Path(data["path"]).is_file()
 

@@ -1,5 +1,7 @@
 """Plans keep the rolling rule for both clocks at their worst, wishes become flashes, and dangers are named."""
 
+import itertools
+import re
 from fractions import Fraction
 from pathlib import Path
 
@@ -17,6 +19,7 @@ from psvideo.cli.spelling import spelled
 from psvideo.errors import UsageError
 from psvideo.formats.plan_toml import format_plan, parse_plan
 from psvideo.model.camera import Camera
+from psvideo.model.motion_cost import motion_cost
 from psvideo.model.plan import Plan
 from psvideo.model.shoot_figures import shoot_figures
 from psvideo.model.shutter import row_weights
@@ -165,7 +168,7 @@ def test_wishes_that_exclude_each_other_are_explained_with_the_numbers() -> None
         ({"readout": "11ms"}, "impossible"),
         ({"readout": "-11ms"}, "impossible"),
         ({"mode": "rolling-rate"}, "half-rate"),
-        ({"marker": "bright"}, "dark, long, none"),
+        ({"marker": "bright"}, "dark, coded, long, none"),
         ({"dark_every": 0}, "--dark-every"),
         ({"marker": "none", "dark_slot": "1ms"}, "--dark-slot"),
         ({"black": 512.0, "white": 512.0}, "--black"),
@@ -315,6 +318,22 @@ def test_figures_that_rest_on_little_are_called_so() -> None:
     assert "rests on little" in text_of(assumed, "readout")
     measured = plan_shoot(parse_request(ShootWords(camera="z9", fps="120", size="3840x2160", flash="0.8ms")))
     assert "readout" not in kinds(measured)
+
+
+def test_what_motion_will_cost_is_said_where_the_speed_is_known() -> None:
+    assert "motion" not in kinds(planned())
+    assert "motion" not in kinds(planned(speed="20"))
+    slow, fast = (planned(speed=speed).cautions for speed in ("100", "800"))
+    levels = [next(one.level for one in cautions if one.kind == "motion") for cautions in (slow, fast)]
+    assert levels == ["note", "warning"]
+    assert re.search(
+        r"[89]\.\d px from flash to flash: .* are lost .* degrees", text_of(planned(speed="800"), "motion")
+    )
+    costs = [motion_cost(step_px) for step_px in (0.0, 0.5, 1.0, 3.0, 8.0, 16.0, 40.0)]
+    for before, after in itertools.pairwise(costs):
+        assert before.lost <= after.lost <= after.worst_lost <= 1
+        assert before.off_deg <= after.off_deg <= after.worst_off_deg
+    assert costs[0].lost == costs[0].worst_off_deg == 0
 
 
 def test_a_plan_of_somebody_else_can_be_judged_without_its_request() -> None:

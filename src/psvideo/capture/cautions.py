@@ -8,6 +8,7 @@ from typing import Literal
 
 from psvideo.capture.request import Limits, ShootRequest
 from psvideo.model.marker import has_marker
+from psvideo.model.motion_cost import LEAST_PX, cost_words, motion_cost
 from psvideo.model.plan import Plan
 from psvideo.model.shoot_figures import SEIZURE_HZ, LightFigures, ShootFigures, SlotFigures
 from psvideo.model.units import NTSC, show_rate, show_seconds
@@ -15,6 +16,9 @@ from psvideo.model.units import NTSC, show_rate, show_seconds
 LEAST_LIGHTS = 3
 MOST_STOPS = 6.0
 """A flash of a 64th of the exposure needs 64 times the light of a lamp that would do if it were left on."""
+
+MOST_LOST = 0.1
+"""Where motion costs more of the normals than this share, people should know before they shoot."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,6 +45,7 @@ def shoot_cautions(plan: Plan, figures: ShootFigures, *, limits: Limits | None =
         *_about_the_margin(plan, figures),
         *_about_blind_time(plan, figures),
         *_about_three_frames(plan, figures),
+        *_about_motion(figures),
         *_about_the_leds(figures, limits or Limits()),
         *_about_synced_rows(plan, figures),
     )
@@ -189,6 +194,18 @@ def _about_three_frames(plan: Plan, figures: ShootFigures) -> Iterator[Caution]:
         "three-frames",
         f"Up to {most:.0%} of the flashes reach into three frames; they are put together all the same. "
         f"{_free_of_three(plan)}{_equation_11(plan, wide)}",
+    )
+
+
+def _about_motion(figures: ShootFigures) -> Iterator[Caution]:
+    step_px = figures.motion_per_flash_px
+    if step_px is None or step_px < LEAST_PX:
+        return
+    grave = motion_cost(step_px).lost > MOST_LOST
+    yield (_warning if grave else _note)(
+        "motion",
+        f"What moves goes {step_px:.2g} px from flash to flash: {cost_words(step_px)}. Move slower, raise the frame rate, "
+        "flash fewer lights, or show the subject smaller.",
     )
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from psvideo.compute.threads import over_ranges
 from psvideo.model.coded import Image
 from psvideo.plates.align.flow import Codes, Flags, Vectors, comparable, places
-from psvideo.plates.align.moving import SHADING_PX, Followed, Pair
+from psvideo.plates.align.moving import SHADING_PX, Followed, Pair, window_of
 from psvideo.plates.align.moving_kernel import AFTER, AT_REST, BEFORE, BOTH, NOWHERE, blend_rows
 from psvideo.plates.align.packed import packed
 from psvideo.plates.light_plate import LightPlate
@@ -34,6 +34,7 @@ MANY = 4
 """Of so many lights one must be sure, of more half."""
 APART_PX = 1.0
 """What moves by so much more or less from plate to plate moves by itself, and may hide other things."""
+HALF = np.float32(0.5)
 BAND_ROWS = 64
 MARGIN_ROWS = 5
 """Rows beside those that places lie in which count too: for cubic interpolation, and around what is clipped."""
@@ -50,14 +51,15 @@ class Taken:
 
 
 def taken_of(pair: Pair, motion: Followed) -> Taken:
-    """Return what every pixel of a light's plate is taken from, on the sketches' grid."""
+    """Return what every pixel of a light's plate is taken from, on the velocities' grid."""
     one, other = comparable(pair.before, pair.after)
     spans_s = motion.time_s - pair.before.time_s, pair.after.time_s - motion.time_s
     ways = motion.way(spans_s[0]), motion.way(-spans_s[1])
     before, after = (_along(codes, way) for codes, way in zip((one, other), ways, strict=True))
     apart = cv2.subtract(after, before, dtype=cv2.CV_32F)
-    shading = cv2.blur(apart, (SHADING_PX, SHADING_PX))
-    alike = cv2.blur((apart - shading) ** 2, (ALIKE_PX, ALIKE_PX)) < UNLIKE**2
+    wide, narrow = ((window_of(size_px, motion.step),) * 2 for size_px in (SHADING_PX, ALIKE_PX))
+    shading = cv2.blur(apart, wide)
+    alike = cv2.blur((apart - shading) ** 2, narrow) < UNLIKE**2
     alike &= np.abs(shading) < SHADED
     nearer = BEFORE if spans_s[0] <= spans_s[1] else AFTER
     source = np.where(motion.moves, np.where(alike, BOTH, nearer), AT_REST).astype(np.uint8)
@@ -84,8 +86,10 @@ def without_doubtful(shown: Sequence[Taken], motion: Followed, others: int) -> l
 
 
 def _along(codes: Codes, way: Vectors) -> Codes:
-    x, y = places(*codes.shape)
-    return np.asarray(cv2.remap(codes, x - way[0], y - way[1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))
+    x, y = places(*way.shape[1:])
+    high, wide = (np.float32(many / few) for many, few in zip(codes.shape, way.shape[1:], strict=True))
+    x, y = (x - way[0] + HALF) * wide - HALF, (y - way[1] + HALF) * high - HALF
+    return np.asarray(cv2.remap(codes, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))
 
 
 def _outside(way: Vectors) -> Flags:
@@ -104,7 +108,8 @@ def _add_hidden(hidden: Flags, motion: Followed, alike: Flags, span_s: float, ro
     others = np.where(motion.moves[rows, cols], motion.velocity[:, there[0], there[1]], motion.nearby[:, rows, cols])
     back = _places_from(*there, np.float32(span_s) * others, hidden.shape)
     again = motion.velocity[:, back[0], back[1]]
-    apart_px, missed_px = (np.hypot(*(pair[0] - pair[1])) * round_s for pair in ((others, own), (again, others)))
+    per = round_s * motion.step
+    apart_px, missed_px = (np.hypot(*(pair[0] - pair[1])) * per for pair in ((others, own), (again, others)))
     hidden[rows, cols] |= (apart_px > APART_PX) & (missed_px <= APART_PX) & alike[back]
 
 
@@ -138,7 +143,7 @@ def plate_at(ends: Ends, source: Codes, motion: Followed, *, number: int) -> Lig
     own = ends.nearer
     rows, cols = own.shape[:2]
     sides = [_Side.of(ends.before), _Side.of(ends.after)]
-    image = np.array(own.image)
+    image = np.empty(own.shape, np.float32)
     seen = np.empty((rows, cols), np.bool_)
 
     def fill(top: int, bottom: int) -> None:
@@ -163,6 +168,7 @@ class _Side:
 
     plate: LightPlate
     within: Flags
+    everywhere: bool
 
     @classmethod
     def of(cls, plate: LightPlate | None) -> "_Side | None":
@@ -170,23 +176,26 @@ class _Side:
             return None
         own = plate.own.astype(np.uint8)
         within = cv2.erode(own, np.ones((5, min(5, own.shape[1])), np.uint8)) > 0
-        return cls(plate=plate, within=within)
+        return cls(plate=plate, within=within, everywhere=bool(within.all()))
 
-    def moved(self, x: Vectors, y: Vectors, wanted: Flags) -> tuple[Image, Flags]:
+    def moved(self, x: Vectors, y: Vectors, wanted: Flags) -> tuple[Image, Flags | np.bool_]:
         """Return the plate at places of its own, and where it was seen there; clipped light stays clipped.
 
         ``wanted`` says which places count; elsewhere anything may stand.
         """
         rows = self.plate.shape[0]
-        first, last = (int(np.clip(edge, 0, rows - 1)) for edge in (y[wanted].min(), y[wanted].max()))
+        used = y if wanted.all() else y[wanted]
+        first, last = (int(np.clip(edge, 0, rows - 1)) for edge in (used.min(), used.max()))
         first, last = max(first - MARGIN_ROWS, 0), min(last + 1 + MARGIN_ROWS, rows)
         shown, y_shown = self.plate.picture.rows(range(first, last)), y - np.float32(first)
         image = cv2.remap(shown, x, y_shown, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
-        clipped = (_brightest(shown) >= self.plate.saturation).astype(np.uint8)
-        if clipped.any():
+        if shown.max() >= self.plate.saturation:
+            clipped = (_brightest(shown) >= self.plate.saturation).astype(np.uint8)
             wider = cv2.dilate(clipped, np.ones((5, 5), np.uint8))
             touched = cv2.remap(wider, x, y_shown, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE) > 0
             image[touched] = self.plate.saturation
+        if self.everywhere:
+            return np.asarray(image, np.float32), np.True_
         known = zip((y, x), self.within.shape, strict=True)
         row, col = (np.clip(np.rint(at).astype(np.intp), 0, most - 1) for at, most in known)
         return np.asarray(image, np.float32), self.within[row, col]
@@ -209,7 +218,10 @@ def _fill(
     at = (x + 0.5) / scale_x - np.float32(0.5), (y + 0.5) / scale_y - np.float32(0.5)
     taken = np.asarray(cv2.remap(source, *at, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE), np.uint8)
     seen[band] = (taken != NOWHERE) & own.pixels_seen[band]
-    if not (flowing := (taken != AT_REST) & (taken != NOWHERE)).any():
+    flowing = (taken != AT_REST) & (taken != NOWHERE)
+    if not flowing.all():
+        image[band] = own.picture.rows(range(band.start, band.stop))
+    if not flowing.any():
         return
     go_x, go_y = (cv2.remap(v, *at, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE) for v in motion.velocity)
     share = float(np.clip(ends.share, 0, 1))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
 from psvideo.plates.align.correlation import displacements
-from psvideo.plates.align.flow import Codes, Flags, Sketch, Vectors, comparable, flow_from
+from psvideo.plates.align.flow import FINE_PIXELS, Codes, Flags, Sketch, Vectors, comparable, flow_from
 from psvideo.plates.align.moving_kernel import arriving_rows, unlike_rows
 
 MOST_FLOWS = 4
@@ -36,6 +36,8 @@ PUZZLING, PUZZLED = 0.5, 0.004
 """More of the picture than this share is unlike by so much of every light: what moves is faster than flow follows."""
 FAR = 2
 """So many displacements of the picture's changing parts are tried then."""
+COARSE = 2
+"""Of sketches of FINE_PIXELS every so many rows and columns get a velocity: flow is found as coarsely there."""
 BAND_PIXELS = 1 << 16
 
 
@@ -49,11 +51,13 @@ class Pair:
 
 @dataclass(frozen=True, kw_only=True)
 class Followed:
-    """``velocity`` (2, row, col) is x right, y down, in pixels of the sketches per second, 0 where not ``moves``."""
+    """``velocity`` (2, row, col) is x right, y down, in its own pixels per second, 0 where not ``moves``. Each of these
+    pixels is ``step`` by ``step`` of the sketches'."""
 
     time_s: float
     velocity: Vectors
     moves: Flags
+    step: int = 1
 
     @functools.cached_property
     def nearby(self) -> Vectors:
@@ -86,7 +90,7 @@ def followed_at(pairs: Sequence[Pair], time_s: float) -> Followed:
     """Return how everything moves at an instant, which may lie before or after some lights' plates too."""
     lights = _Lights.of(pairs, time_s)
     rest = lights.unlike(np.zeros((2, *lights.shape), np.float32))
-    wide_rest = _mean(rest, WINDOW_PX)
+    wide_rest = lights.mean(rest, WINDOW_PX)
     best = np.full(lights.shape, np.inf, np.float32)
     velocity = np.zeros((2, *lights.shape), np.float32)
     for proposed in lights.proposed():
@@ -94,19 +98,25 @@ def followed_at(pairs: Sequence[Pair], time_s: float) -> Followed:
     if np.mean(np.minimum(best, wide_rest) > PUZZLING * lights.count) > PUZZLED:
         for proposed in lights.proposed_far():
             _take_better(lights, proposed, velocity, best)
-    fine = _mean(lights.unlike(velocity), FINE_PX)
+    fine = lights.mean(lights.unlike(velocity), FINE_PX)
     moves = best < np.maximum(EXPLAINED * wide_rest - MARGIN * lights.count, wide_rest - GAIN * lights.count)
-    moves &= fine < _mean(rest, FINE_PX)
+    moves &= fine < lights.mean(rest, FINE_PX)
     moves &= lights.still() < max(STILL_LIGHTS, STILL_SHARE * lights.count)
     velocity *= moves
-    return Followed(time_s=time_s, velocity=velocity, moves=moves)
+    return Followed(time_s=time_s, velocity=velocity, moves=moves, step=lights.step)
 
 
 def _take_better(lights: "_Lights", proposed: Vectors, velocity: Vectors, best: Vectors) -> None:
-    unlike = _mean(lights.unlike(proposed), WINDOW_PX)
+    unlike = lights.mean(lights.unlike(proposed), WINDOW_PX)
     better = unlike < best
     np.copyto(best, unlike, where=better)
     np.copyto(velocity, proposed, where=better)
+
+
+def window_of(window_px: int, step: int) -> int:
+    """Return how many pixels of ``step`` of the sketches' a window is wide, an odd number; 1 stays, others are 3 at
+    least."""
+    return max(window_px // step | 1, min(window_px, 3))
 
 
 def _mean(values: Vectors, window_px: int) -> Vectors:
@@ -139,8 +149,19 @@ class _Lights:
         return len(self.codes)
 
     @property
+    def step(self) -> int:
+        """How many pixels of the sketches lie between two velocities."""
+        return COARSE if self.befores[0].size >= FINE_PIXELS else 1
+
+    @property
     def shape(self) -> tuple[int, ...]:
-        return self.befores.shape[1:]
+        """How many velocities there are, (row, col)."""
+        rows, cols = self.befores.shape[1:]
+        return rows // self.step, cols // self.step
+
+    def mean(self, values: Vectors, window_px: int) -> Vectors:
+        """Return means over windows of so many pixels of the sketches."""
+        return _mean(values, window_of(window_px, self.step))
 
     def unlike(self, velocity: Vectors) -> Vectors:
         """Return how unlike all lights' plates are along velocities, shape (row, col), 0 to the number of lights."""
@@ -157,7 +178,8 @@ class _Lights:
         count = np.zeros(self.shape, np.intp)
         for one, other in self.codes:
             change = cv2.GaussianBlur(cv2.subtract(other, one, dtype=cv2.CV_32F), (0, 0), FINEST_PX)
-            count += _mean(np.asarray(change * change, np.float32), FINE_PX) < STILL_CODES**2
+            still = _mean(np.asarray(change * change, np.float32), FINE_PX) < STILL_CODES**2
+            count += still[: self.step * len(count) : self.step, : self.step * count.shape[1] : self.step]
         return count
 
     def proposed(self) -> list[Vectors]:
@@ -174,7 +196,7 @@ class _Lights:
         some = _spread(self.count, MOST_FLOWS // FAR)
         constant = [np.empty((2, *self.shape), np.float32) for _ in found]
         for plane, (x, y) in zip(constant, found, strict=True):
-            plane[0], plane[1] = np.array([x, y]) / self.spans_s.sum(axis=1).mean()
+            plane[0], plane[1] = np.array([x, y]) / self.step / self.spans_s.sum(axis=1).mean()
         return constant + self._flows([(light, bool(n % 2), place) for place in found for n, light in enumerate(some)])
 
     def _flows(self, ways: list[tuple[int, bool, tuple[float, float] | None]]) -> list[Vectors]:
@@ -188,7 +210,7 @@ class _Lights:
             round_s = since_s + until_s
             out = np.empty((2, *self.shape), np.float32)
             share = np.float32((until_s if back else since_s) / round_s)
-            arriving_rows(flow, share, np.float32(sign / round_s), 0, self.shape[0], out)
+            arriving_rows(flow, share, np.float32(sign / round_s), 0, out.shape[1], out)
             return out
 
         return over_ranges(run, len(ways), each=1)

@@ -31,25 +31,35 @@ def _between(picture: Codes, row: np.float32, col: np.float32) -> np.float32:
     return upper * (ONE - down) + lower * down
 
 
+@FUSED.inlined
+def _steps(shape: tuple[int, int], coarse: tuple[int, int]) -> tuple[np.float32, np.float32]:
+    """How many rows and columns of a picture lie between those of a coarser one."""
+    return np.float32(shape[0]) / np.float32(coarse[0]), np.float32(shape[1]) / np.float32(coarse[1])
+
+
 @FUSED.kept
 def unlike_rows(
     befores: Codes, afters: Codes, spans_s: Floats, velocity: Floats, first: int, last: int, out: Floats
 ) -> None:
     """Fill rows of ``out`` (row, col): how unlike the lights' plates before and after are at the ends of the way.
 
-    ``befores`` and ``afters`` are (light, row, col), ``spans_s`` (light, 2) the times since and until them, and
-    ``velocity`` (2, row, col) in pixels per second. Every light counts from 0 to 1, by Geman and McClure's function of
-    the difference: a shadow that passes under one light does not outvote the others.
+    ``befores`` and ``afters`` are (light, row, col), of as many pixels as ``out`` or more, ``spans_s`` (light, 2) the
+    times since and until them, and ``velocity`` (2, row, col) in pixels of ``out`` per second. Every light counts from
+    0 to 1, by Geman and McClure's function of the difference: a shadow that passes under one light does not outvote the
+    others.
     """
     before, after, span, way, made = lent(befores), lent(afters), lent(spans_s), lent(velocity), lent(out)
+    high, wide = _steps(before.shape[1:], made.shape)
     for row in range(first, last):
+        down = (np.float32(row) + HALF) * high - HALF
         for col in range(made.shape[1]):
-            x, y = way[0, row, col], way[1, row, col]
+            x, y = way[0, row, col] * wide, way[1, row, col] * high
+            across = (np.float32(col) + HALF) * wide - HALF
             total = ZERO
             for light in range(before.shape[0]):
                 since, until = span[light, 0], span[light, 1]
-                one = _between(before[light], np.float32(row) - y * since, np.float32(col) - x * since)
-                other = _between(after[light], np.float32(row) + y * until, np.float32(col) + x * until)
+                one = _between(before[light], down - y * since, across - x * since)
+                other = _between(after[light], down + y * until, across + x * until)
                 square = (other - one) * (other - one)
                 total += square / (square + UNLIKE_SQUARE)
             made[row, col] = total
@@ -59,19 +69,22 @@ def unlike_rows(
 def arriving_rows(flow: Floats, share: np.float32, per_s: np.float32, first: int, last: int, out: Floats) -> None:
     """Fill rows of velocities, ``out`` (2, row, col), of what arrives at every pixel after a share of its flow.
 
-    ``flow`` (row, col, 2) is known where things start, and asked for where they arrive: the start is looked for step by
-    step. It times ``per_s`` is the velocity.
+    ``flow`` (row, col, 2), of as many pixels as ``out`` or more, is known where things start, and asked for where they
+    arrive: the start is looked for step by step. It times ``per_s`` is the velocity, in pixels of ``out``.
     """
     given, made = lent(flow), lent(out)
-    rows, cols = made.shape[1], made.shape[2]
+    rows, cols = given.shape[0], given.shape[1]
+    high, wide = _steps(given.shape[:2], made.shape[1:])
     for row in range(first, last):
-        for col in range(cols):
-            x, y = given[row, col, 0], given[row, col, 1]
+        down = (np.float32(row) + HALF) * high - HALF
+        for col in range(made.shape[2]):
+            across = (np.float32(col) + HALF) * wide - HALF
+            x, y = given[int(down), int(across), 0], given[int(down), int(across), 1]
             for _ in range(STEPS):
-                at_row = int(min(max(np.float32(row) - share * y + HALF, ZERO), np.float32(rows - 1)))
-                at_col = int(min(max(np.float32(col) - share * x + HALF, ZERO), np.float32(cols - 1)))
+                at_row = int(min(max(down - share * y + HALF, ZERO), np.float32(rows - 1)))
+                at_col = int(min(max(across - share * x + HALF, ZERO), np.float32(cols - 1)))
                 x, y = given[at_row, at_col, 0], given[at_row, at_col, 1]
-            made[0, row, col], made[1, row, col] = x * per_s, y * per_s
+            made[0, row, col], made[1, row, col] = x * per_s / wide, y * per_s / high
 
 
 @FUSED.kept
@@ -84,27 +97,27 @@ def blend_rows(
     counts where both are taken, 0 where it is not known; ``full`` the values from which on either is clipped, and what
     clipped light becomes. ``seen`` (row, col) says where anything may be known, and afterwards is; elsewhere is 0.
     """
+    code, weight, one, other = lent(taken), lent(weights), lent(before), lent(after)
     for row in range(taken.shape[0]):
         for col in range(taken.shape[1]):
-            code = taken[row, col]
-            if code == NOWHERE:
+            what = code[row, col]
+            if what != AT_REST and what != NOWHERE:
+                early = weight[0, row, col] if what != AFTER else ZERO
+                late = weight[1, row, col] if what != BEFORE else ZERO
+                total = early + late
+                known = seen[row, col] and total > ZERO
+                seen[row, col] = known
+                per, clipped = ONE / (total if known else ONE), False
+                early, late = early * per, late * per
+                for channel in range(image.shape[2]):
+                    first, second = one[row, col, channel], other[row, col, channel]
+                    clipped |= (early > ZERO and first >= full[0]) or (late > ZERO and second >= full[1])
+                    image[row, col, channel] = early * first + late * second
+                if clipped and known:
+                    for channel in range(image.shape[2]):
+                        image[row, col, channel] = full[2]
+            elif what == NOWHERE:
                 seen[row, col] = False
-            elif code != AT_REST:
-                one = weights[0, row, col] if code != AFTER else ZERO
-                other = weights[1, row, col] if code != BEFORE else ZERO
-                seen[row, col] &= one + other > ZERO
-                if seen[row, col]:
-                    _blend(one, other, before[row, col], after[row, col], full, image[row, col])
             if not seen[row, col]:
-                image[row, col] = ZERO
-
-
-@FUSED.inlined
-def _blend(one: np.float32, other: np.float32, before: Floats, after: Floats, full: Floats, made: Floats) -> None:
-    clipped = False
-    for channel in range(made.shape[0]):
-        if (one > ZERO and before[channel] >= full[0]) or (other > ZERO and after[channel] >= full[1]):
-            clipped = True
-        made[channel] = (one * before[channel] + other * after[channel]) / (one + other)
-    if clipped:
-        made[:] = full[2]
+                for channel in range(image.shape[2]):
+                    image[row, col, channel] = ZERO

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from psvideo.model.motion_cost import cost_words
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.report.judgement import Judgement
@@ -170,13 +171,7 @@ def motion(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = Fa
         subject="motion",
         grade="bad" if grave else "doubtful",
         found=f"{100 * share:.0f} % of the picture moves, by up to {step_px:.1f} px from flash to flash "
-        f"({blur_px:.1f} px of blur within one): normals there are off by about {_cost_deg(step_px):.0f} degrees"
-        + (" less what `align` made good." if aligned else "."),
+        f"({blur_px:.1f} px of blur within one): {cost_words(step_px)}.",
         advice="Move slower, raise the frame rate or flash fewer lights"
-        + (', or let `align="flow"` bring the plates together.' if not aligned else "."),
+        + (", or leave `align` at auto, which brings the plates together." if not aligned else "."),
     )
-
-
-def _cost_deg(step_px: float) -> float:
-    """Return about what motion costs, from the table of docs on errors: 1.2 to 2.5 degrees a pixel, less from then."""
-    return float(np.interp(step_px, [0, 1, 4, 16], [0, 1.8, 6.7, 15]))
