@@ -1,7 +1,7 @@
 """What motion costs with alignment as runs have it, by px from flash to flash: the table of `model/motion_cost.py`.
 
 python -m bench.motion_costs. Virtual subjects before a mottled wall slide or tumble; a camera's noise is on them. Lost
-is what is trusted at rest and no more; degrees are the mean error of what is trusted, and of every pixel of the subject.
+is what is trusted at rest and no more; degrees are the mean error of what is trusted, and of every pixel.
 """
 
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ from psvideo.plates.align.rounds import Aligning
 from psvideo.solve.normals.solving import Solving
 
 BALL = {"mesh": "sphere", "height_m": 0.4, "albedo": MOTTLED}
-SUBJECTS = {"ball, 3 lights": (BALL, 3), "bust, 5 lights": (BUST, 5), "bare box, 5 lights": (BOX, 5)}
+SUBJECTS = {"ball, 3 lights": (BALL, 3), "bare box, 5 lights": (BOX, 5), "bust, 5 lights": (BUST, 5)}
 STEPS_PX = (1.0, 4.0, 16.0)
 NOISE = 0.002
 

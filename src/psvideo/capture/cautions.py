@@ -17,7 +17,7 @@ LEAST_LIGHTS = 3
 MOST_STOPS = 6.0
 """A flash of a 64th of the exposure needs 64 times the light of a lamp that would do if it were left on."""
 
-MOST_LOST = 0.1
+MOST_LOST = 0.2
 """Where motion costs more of the normals than this share, people should know before they shoot."""
 
 
@@ -204,8 +204,8 @@ def _about_motion(figures: ShootFigures) -> Iterator[Caution]:
     grave = motion_cost(step_px).lost > MOST_LOST
     yield (_warning if grave else _note)(
         "motion",
-        f"What moves goes {step_px:.2g} px from flash to flash: {cost_words(step_px)}. Move slower, raise the frame rate, "
-        "flash fewer lights, or show the subject smaller.",
+        f"What moves goes {step_px:.2g} px from flash to flash: {cost_words(step_px)}. Move slower, raise the frame "
+        "rate, flash fewer lights, or show the subject smaller.",
     )
 
 

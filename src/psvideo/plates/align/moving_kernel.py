@@ -111,7 +111,8 @@ def blend_rows(
                 early, late = early * per, late * per
                 for channel in range(image.shape[2]):
                     first, second = one[row, col, channel], other[row, col, channel]
-                    clipped |= (early > ZERO and first >= full[0]) or (late > ZERO and second >= full[1])
+                    if (early > ZERO and first >= full[0]) or (late > ZERO and second >= full[1]):
+                        clipped = True
                     image[row, col, channel] = early * first + late * second
                 if clipped and known:
                     for channel in range(image.shape[2]):
