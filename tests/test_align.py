@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from psvideo.model.surface import Surface
-from psvideo.plates.align import between, flow, held
+from psvideo.plates.align import between, flow, held, moving
 from psvideo.plates.align.comb import Comb, Schedule
 from psvideo.plates.align.opened import opened
 from psvideo.plates.align.packed import packed
@@ -367,6 +367,19 @@ def changed(clip: Filmed, change: Callable[[LightPlate], LightPlate], index: int
     rounds = list(clip.rounds)
     rounds[index] = replace(rounds[index], plates=tuple(map(change, rounds[index].plates)))
     return tuple(rounds)
+
+
+def test_velocities_of_large_pictures_on_a_coarser_grid_follow_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
+    clip = noiseless(3, "4 px")
+    before, fine = clip.rounds[1], brought_as_filmed(3, "4 px")[1]
+    monkeypatch.setattr(moving, "FINE_PIXELS", 1000)
+    coarse = brought(clip)[1]
+    assert any(
+        one.image.tobytes() != other.image.tobytes() for one, other in zip(coarse.plates, fine.plates, strict=True)
+    )
+    none, usual, coarser = (clip.error_deg(clip.solved(one), fine.time_s) for one in (before, fine, coarse))
+    assert coarser[0] < 1.25 * usual[0] < none[0] / 3
+    assert coarser[1] > usual[1] - 0.02
 
 
 def test_rows_that_no_frame_saw_stay_unseen_and_do_not_look_like_motion() -> None:
