@@ -1,7 +1,7 @@
 """The records of this room: a clip, one of its frames, and what a decoder hands over before light is made of it."""
 
 from bisect import bisect_left
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -23,6 +23,16 @@ Levels = tuple[tuple[float, ...], ...]
 """Black levels by position, a pattern that repeats over rows and columns from the picture's top left on."""
 
 
+SHOT = ("cameraMake", "cameraModel", "cameraSerialNumber", "lensMake", "lensModel", "reelName")
+"""OpenEXR's standard attributes on what took a picture."""
+
+
+def shot_of(found: Mapping[str, object]) -> tuple[tuple[str, str], ...]:
+    """Return what is known of camera, lens and reel: the texts among ``found`` that say something, by SHOT's names."""
+    known = ((name, str(found[name]).strip(" \0") if isinstance(found.get(name), str) else "") for name in SHOT)
+    return tuple((name, text) for name, text in known if text)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Header:
     """What a picture's file says about itself. ``bits`` None: floating point; None elsewhere: the file does not say.
@@ -32,6 +42,7 @@ class Header:
     further code adds ``signal_per_code``, where 0 to 1 is what the transfer curve is defined on; None: the largest code
     is 1. ``video_range``: the file's codes of signal 0 and 1 were 16 and 235 (of 8 bits). ``turn`` is how the file
     wants the picture turned; the sizes are those before. ``transfer`` is the curve that the file is tagged with.
+    ``shot`` is what the file says of camera, lens and reel, by the names of SHOT.
 
     Raises ValueError where the size is none that a picture has.
     """
@@ -50,6 +61,7 @@ class Header:
     video_range: bool = False
     turn: Turn = UPRIGHT
     transfer: str | None = None
+    shot: tuple[tuple[str, str], ...] = ()
     warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:

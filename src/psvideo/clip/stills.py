@@ -8,7 +8,7 @@ from pathlib import Path
 from psvideo.clip.decode.decoders import read_header
 from psvideo.clip.folder import KINDS
 from psvideo.clip.reading import looks
-from psvideo.clip.record import Clip, Header
+from psvideo.clip.record import Clip, Header, shot_of
 from psvideo.clip.stated import Stated, stated_by
 from psvideo.clip.transfer import find_curve
 from psvideo.errors import PsvideoError
@@ -38,7 +38,8 @@ class Photographs:
 
     def clip(self, folder: Path, plan: Plan, plan_path: Path, *, notes: tuple[str, ...] = ()) -> Clip:
         """Return them as a clip of a synced plan."""
-        head = self.header
+        by_exif = shot_of({"cameraModel": self.stated[0].camera})
+        head = replace(self.header, shot=self.header.shot or by_exif)
         numbers = tuple(range(1, len(self.files) + 1))
         return Clip(
             name=folder.resolve().name,

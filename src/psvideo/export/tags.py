@@ -2,21 +2,35 @@
 
 import hashlib
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
 from psvideo import __version__
 from psvideo.errors import PsvideoError
+from psvideo.formats.exr_files import Attribute
 
 CODE = re.compile(r"(\d\d):(\d\d):(\d\d):(\d\d)")
 MOST_FRAMES = 30
 """EXR's time code counts at most 30 frames a second."""
 
 
+D65 = (0.3127, 0.3290)
+PRIMARIES: Mapping[str, tuple[float, ...]] = {
+    "lin_rec709_scene": (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, *D65),
+    "lin_rec2020_scene": (0.708, 0.292, 0.170, 0.797, 0.131, 0.046, *D65),
+    "lin_p3d65_scene": (0.680, 0.320, 0.265, 0.690, 0.150, 0.060, *D65),
+    "lin_ap1_scene": (0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767),
+    "lin_ap0_scene": (0.7347, 0.2653, 0.0, 1.0, 0.0001, -0.0770, 0.32168, 0.33767),
+}
+"""x and y of red, green, blue and white: ITU-R BT.709, BT.2020, SMPTE RP 431-2 with D65, and ACES (S-2014-004)."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Tags:
-    """What is the same for a whole sequence. ``colour`` is the colour interop id of plates and albedo."""
+    """What is the same for a whole sequence. ``colour`` is the colour interop id of plates and albedo, ``shot`` what
+    the footage says of camera, lens and reel."""
 
     fps: Fraction
     colour: str
@@ -26,6 +40,7 @@ class Tags:
     y: str = "up"
     camera_fps: Fraction | None = None
     first_time_code: str | None = None
+    shot: tuple[tuple[str, str], ...] = ()
 
     def time_code(self, time_s: float) -> str | None:
         """Return the time code of an instant, where the clip has one that goes on to it."""
@@ -34,9 +49,9 @@ class Tags:
         slow = next((rate for rate in (self.camera_fps, self.fps) if _has_time_code(rate)), self.camera_fps)
         return advanced(self.first_time_code, time_s, slow)
 
-    def attributes(self, *, time_s: float, data: bool) -> dict[str, str | float]:
+    def attributes(self, *, time_s: float, data: bool) -> dict[str, Attribute]:
         """Return the header attributes of one picture; ``data`` marks what is no colour (normals, masks)."""
-        known: dict[str, str | float] = {
+        known: dict[str, Attribute] = {
             "colorInteropID": "data" if data else self.colour,
             "psvideo:time_s": float(time_s),
             "psvideo:space": self.space,
@@ -44,7 +59,19 @@ class Tags:
             "psvideo:version": __version__,
             "psvideo:plan_sha256": self.plan_sha256,
         }
-        return known if self.rig_sha256 is None else known | {"psvideo:rig_sha256": self.rig_sha256}
+        if self.rig_sha256 is not None:
+            known["psvideo:rig_sha256"] = self.rig_sha256
+        return known | dict(self.shot) | ({} if data else self._space())
+
+    def _space(self) -> dict[str, Attribute]:
+        """Return what is known of the colour's primaries: those of a space with a name, or that it is a sensor's."""
+        if self.colour in PRIMARIES:
+            return {"chromaticities": PRIMARIES[self.colour]}
+        if self.colour == "unknown":
+            said = dict(self.shot)
+            camera = " ".join(said[name] for name in ("cameraMake", "cameraModel") if name in said) or "the camera"
+            return {"psvideo:colour": f"linear light as the sensor of {camera} saw it, not converted, no white balance"}
+        return {}
 
 
 def sha256_of(path: Path) -> str:

@@ -28,7 +28,11 @@ _COMPRESSIONS: dict[Compression, object] = {
 }
 
 Channels = Mapping[str, NDArray[np.floating]]
-Attribute = str | int | float | Fraction
+Attribute = str | int | float | Fraction | tuple[float, ...]
+
+
+SHARED = ("chromaticities",)
+"""Attributes that must be alike in all parts of a file (OpenEXR, multi-part files)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -151,13 +155,18 @@ def write_exr_parts(
 ) -> None:
     """Write one file with a part per name; each has its own channels and ``attributes``, else as ``write_exr``.
 
-    ``half`` may be given part by part.
+    ``half`` may be given part by part. What the standard has all parts share is that of the first one which has it.
     """
     built = []
+    shared = {key: one[key] for one in reversed([*attributes.values()]) for key in SHARED if key in one}
     for name, channels in parts.items():
         short = half if isinstance(half, bool) else half[name]
         planes = {channel: _plane(channel, values, short) for channel, values in channels.items()}
-        header = dict(attributes[name]) | _header(next(iter(planes.values())).shape, fps, time_code, None, compression)
+        header = (
+            dict(attributes[name])
+            | shared
+            | _header(next(iter(planes.values())).shape, fps, time_code, None, compression)
+        )
         built.append(OpenEXR.Part(header, planes, name))
     with whole_file(path) as beside:
         _write(path, beside, lambda: OpenEXR.File(built))

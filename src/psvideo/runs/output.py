@@ -105,4 +105,5 @@ def tags_of(clip: Clip, rig_path: Path | None = None, space: Space = CAMERA_SPAC
         y=space.y,
         camera_fps=clip.plan.camera.fps,
         first_time_code=clip.time_code,
+        shot=clip.header.shot,
     )

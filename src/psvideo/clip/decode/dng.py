@@ -17,7 +17,7 @@ import tifffile
 from numpy.typing import NDArray
 
 from psvideo.clip.decode.tiff import LINEAR_RAW, MOSAIC, check_places, pixels, sample_bits
-from psvideo.clip.record import CodedPicture, Header, Levels
+from psvideo.clip.record import CodedPicture, Header, Levels, shot_of
 from psvideo.errors import PsvideoError
 
 FILTERS = "RGB"  # CFAPattern counts red, green, blue as 0, 1, 2
@@ -26,6 +26,16 @@ CROP_ORIGIN, CROP_SIZE, ACTIVE_AREA = 50719, 50720, 50829
 CFA_SIZE, CFA_PATTERN = 33421, 33422
 TIME_CODES = 51043
 DECODED_BY_TIFFFILE = {1, 7, 8, 34892, 52546}  # not compressed; JPEG, lossless too; Deflate; lossy JPEG; JPEG XL
+
+
+SHOT_TAGS = {
+    "cameraMake": 271,
+    "cameraModel": 272,
+    "cameraSerialNumber": 50735,
+    "lensModel": 42036,
+    "reelName": 51081,
+}
+"""Tags of DNG and CinemaDNG."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,6 +97,7 @@ def _header(path: Path, file: tifffile.TiffFile, page: tifffile.TiffPage) -> Hea
         cfa=_filters(path, page, cut) if page.photometric == MOSAIC else None,
         colour="unknown",
         time_code=_time_code(file.pages[0].aspage()),
+        shot=shot_of({name: _tag(file.pages[0].aspage(), code) for name, code in SHOT_TAGS.items()}),
     )
 
 

@@ -17,7 +17,7 @@ import OpenEXR
 from numpy.typing import NDArray
 
 from psvideo.clip.decode.exr_chunks import is_cut_short
-from psvideo.clip.record import CodedPicture, Header
+from psvideo.clip.record import CodedPicture, Header, shot_of
 from psvideo.errors import PsvideoError
 
 GREY_NAMES = ("Y", "L", "V")
@@ -171,6 +171,7 @@ def _header(file: Any, names: tuple[str, ...]) -> Header:
         bits=None,
         colour=attributes.get("colorInteropID"),
         time_code=_time_code(attributes.get("timeCode")),
+        shot=shot_of(attributes),
         warnings=warnings,
     )
 

@@ -16,7 +16,7 @@ from av.container import InputContainer
 from av.video.stream import VideoStream
 
 from psvideo.clip.decode.ffmpeg_planes import planes
-from psvideo.clip.decode.movie_tags import capture_rate_hz, compression_warning, gamut_of, transfer_of, turn_of
+from psvideo.clip.decode.movie_tags import capture_rate_hz, compression_warning, gamut_of, shot_by, transfer_of, turn_of
 from psvideo.clip.decode.movie_times import Places, places_of, promised_frames, stamps_of
 from psvideo.clip.decode.yuv import CODES, HIGHEST, LOWEST, LUMA_WEIGHTS, signal_range, to_rgb
 from psvideo.clip.record import CodedPicture, Header
@@ -55,6 +55,7 @@ def index_movie(path: Path) -> Movie:
         time_base_s = float(stream.time_base or 1)
         code = container.metadata.get("timecode") or stream.metadata.get("timecode")
         capture_rate = capture_rate_hz(container.metadata | stream.metadata)
+        shot = shot_by(container.metadata | stream.metadata)
         codec = stream.codec_context.codec.canonical_name
     held, timestamps = len(stamps.timestamps), found.timestamps
     if not held:
@@ -68,7 +69,7 @@ def index_movie(path: Path) -> Movie:
     uneven = _left_out(found) if found.left_out else None
     warnings = tuple(warning for warning in (coding, uneven) if warning)
     return Movie(
-        header=replace(header, time_code=code, warnings=header.warnings + warnings),
+        header=replace(header, time_code=code, shot=shot, warnings=header.warnings + warnings),
         timestamps=timestamps,
         places=found.places,
         rate_hz=1 / (found.period * time_base_s) if found.period else None,

@@ -9,6 +9,7 @@ from typing import Any
 import av
 import numpy as np
 
+from psvideo.clip.record import shot_of
 from psvideo.model.turn import UPRIGHT, Turn, of_matrix
 
 TRANSFERS = {
@@ -29,6 +30,21 @@ ANDROID_RATE = "com.android.capture.fps"
 FEW_WHOLE_FRAMES = 0.5
 FEW_BITS = 8
 FIXED_ONE = 65536
+
+
+SAID_BY_MOVIES = {
+    "cameraMake": ("com.apple.quicktime.make", "make", "com.android.manufacturer"),
+    "cameraModel": ("com.apple.quicktime.model", "model", "com.android.model"),
+    "lensModel": ("com.apple.quicktime.camera.lens_model", "lens_model"),
+    "reelName": ("reel_name", "com.apple.proapps.reel"),
+}
+"""By what names containers say what took a movie."""
+
+
+def shot_by(metadata: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
+    """Return what a container says of camera, lens and reel."""
+    first = {name: [key for key in keys if key in metadata] for name, keys in SAID_BY_MOVIES.items()}
+    return shot_of({name: metadata[keys[0]] for name, keys in first.items() if keys})
 
 
 def turn_of(frame: av.VideoFrame) -> tuple[Turn, str | None]:
