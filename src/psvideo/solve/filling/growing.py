@@ -1,10 +1,8 @@
 """The compiled loop that grows normals and albedo from solved pixels into the others, the likeliest neighbours first.
 
-Two lights leave one line g0 + t d for albedo * normal; the albedo of solved neighbours of the same colour gives its
-length, their normals the side (C. Hernandez, G. Vogiatzis, R. Cipolla, "Overcoming shadows in 3-source photometric
-stereo", PAMI 33(2), 2011, section 4). One light leaves a cone, on which the normal nearest to the neighbours' is taken.
-Pixels are taken in the order of their distance from what is solved, where a step to another colour is a long one: so
-they follow their own surface, and what is behind an outline comes last.
+Neighbours of the same colour give a normal and an albedo, and what one or two lights say of the pixel mends them
+(``hernandez2011``). Pixels are taken in the order of their distance from what is solved, where a step to another colour
+is a long one: so they follow their own surface, and what is behind an outline comes last.
 """
 
 from typing import NamedTuple
@@ -14,6 +12,7 @@ from numpy.typing import NDArray
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import decoded, encoded, lent
+from psvideo.solve.filling.hernandez2011 import from_one, from_two
 from psvideo.solve.filling.looking import Said
 from psvideo.solve.normals.blocks import ONE, THREE, ZERO
 from psvideo.solve.normals.task import Bytes, Floats, Samples
@@ -23,18 +22,8 @@ SPREAD_PX = 2.0  # with weights that fall off so,
 SAME_COLOUR = np.float32(0.015)  # and with the colour: shares of red and blue that differ so much weigh a half;
 STEP = 4  # distance of neighbours of one colour, in the whole numbers in which distances are counted
 BUCKETS = 256  # more than the longest step
-ALBEDO_SHARE = np.float32(0.05)  # how well the neighbours' albedo is that of a pixel
-BENT = np.float32(np.radians(15.0))  # how well the neighbours' normal is
-BEYOND = np.float32(0.1)  # what faces away from the camera costs: squared over this
 WEIGHTS = np.array([0.1, 0.25, 0.5, 1.0], np.float32)  # of neighbours that no, one, two or three lights reach
-ANGLES = np.radians(np.arange(-88.0, 89.0, 2.0)).astype(np.float32)
-ANGLE_STEP = np.float32(np.radians(2.0))
-COSINES, SINES = np.cos(ANGLES), np.sin(ANGLES)
-LOG_COSINES = np.log(COSINES)
-HALF, TWO = np.float32(0.5), np.float32(2)
-THIRD, TINY, FAR = np.float32(1 / 3), np.float32(1e-6), np.float32(1e30)
-TURN = np.float32(2 * np.pi)
-LEAST_COSINE, LEAST_SINE_SQUARED = np.float32(0.05), np.float32(1e-3)
+HALF, THIRD, TINY = np.float32(0.5), np.float32(1 / 3), np.float32(1e-6)
 MOST_STEPS = np.float32(50)
 UNCOLOURED = np.float32(0.01)  # the square of what is not known of the colour of a pixel without light
 ONWARD = np.float32(0.7)  # how far neighbours' bend is taken on: all of it would burst from noise
@@ -182,6 +171,32 @@ def _colour_of(p: Picture, s: Said, row: int, col: int) -> tuple[np.float32, np.
 @FUSED.called
 def _estimate(p: Picture, s: Said, row: int, col: int, pixel: int) -> None:
     """Give a pixel its normal and albedo from its neighbours and from what the lights say."""
+    nx, ny, nz, albedo, reds, blues = _said_around(p, s, row, col)
+    count = min(s.reached[pixel], 2)
+    if count == 2:
+        nx, ny, nz, albedo = from_two(s, pixel, nx, ny, nz, albedo)
+    elif count == 1:
+        nx, ny, nz, albedo = from_one(s, pixel, nx, ny, nz, albedo)
+    if count > 0:
+        reds, blues, _ = _colour_of(p, s, row, col)
+    p.lights[row, col] = count
+    p.normals[0, row, col] = encoded(nx, p.normals)
+    p.normals[1, row, col] = encoded(ny, p.normals)
+    p.normals[2, row, col] = encoded(nz, p.normals)
+    if len(p.albedo) == 1:
+        p.albedo[0, row, col] = encoded(albedo, p.albedo)
+    else:
+        p.albedo[0, row, col] = encoded(THREE * albedo * reds, p.albedo)
+        p.albedo[1, row, col] = encoded(THREE * albedo * max(ONE - reds - blues, ZERO), p.albedo)
+        p.albedo[2, row, col] = encoded(THREE * albedo * blues, p.albedo)
+
+
+@FUSED.inlined
+def _said_around(
+    p: Picture, s: Said, row: int, col: int
+) -> tuple[np.float32, np.float32, np.float32, np.float32, np.float32, np.float32]:
+    """The normal (x, y, z), albedo, and shares of red and blue that a pixel's neighbours give it, those of its own
+    colour most; their bend is taken on, so that a round surface stays round."""
     rows, cols = p.places.shape
     channels = len(p.albedo)
     red, blue, noise = _colour_of(p, s, row, col)
@@ -216,104 +231,19 @@ def _estimate(p: Picture, s: Said, row: int, col: int, pixel: int) -> None:
             downs, rights, both = downs + wy * dy, rights + wx * dx, both + wy * dx
             nx_down, ny_down, nz_down = nx_down + wy * a, ny_down + wy * b, nz_down + wy * c
             nx_right, ny_right, nz_right = nx_right + wx * a, ny_right + wx * b, nz_right + wx * c
-    if weight > ZERO:
-        one = ONE / weight
-        albedo, reds, blues = albedo * one, reds * one, blues * one
-        nx, ny, nz, down, right = nx * one, ny * one, nz * one, down * one, right * one
-        vy, vx, vxy = downs * one - down * down + HALF, rights * one - right * right + HALF, both * one - down * right
-        determinant = ONE / (vy * vx - vxy * vxy)
-        # how far a straight course over the neighbours, taken on to this pixel, leads from their mean
-        per_y = -(down * vx - right * vxy) * determinant * ONWARD
-        per_x = -(right * vy - down * vxy) * determinant * ONWARD
-        nx += per_y * (nx_down * one - down * nx) + per_x * (nx_right * one - right * nx)
-        ny += per_y * (ny_down * one - down * ny) + per_x * (ny_right * one - right * ny)
-        nz += per_y * (nz_down * one - down * nz) + per_x * (nz_right * one - right * nz)
-        length = np.sqrt(nx * nx + ny * ny + nz * nz)
-        one = ONE / max(length, TINY)
-        nx, ny, nz = nx * one, ny * one, nz * one
-    else:
-        nx, ny, nz, albedo, reds, blues = ZERO, ZERO, ONE, ZERO, THIRD, THIRD
-    count = min(s.reached[pixel], 2)
-    if count == 2:
-        nx, ny, nz, albedo = _from_two(s, pixel, nx, ny, nz, albedo)
-    elif count == 1:
-        nx, ny, nz, albedo = _from_one(s, pixel, nx, ny, nz, albedo)
-    if count > 0:
-        reds, blues = red, blue
-    p.lights[row, col] = count
-    p.normals[0, row, col] = encoded(nx, p.normals)
-    p.normals[1, row, col] = encoded(ny, p.normals)
-    p.normals[2, row, col] = encoded(nz, p.normals)
-    if channels == 1:
-        p.albedo[0, row, col] = encoded(albedo, p.albedo)
-    else:
-        p.albedo[0, row, col] = encoded(THREE * albedo * reds, p.albedo)
-        p.albedo[1, row, col] = encoded(THREE * albedo * max(ONE - reds - blues, ZERO), p.albedo)
-        p.albedo[2, row, col] = encoded(THREE * albedo * blues, p.albedo)
-
-
-@FUSED.inlined
-def _from_two(
-    s: Said, pixel: int, nx: np.float32, ny: np.float32, nz: np.float32, albedo: np.float32
-) -> tuple[np.float32, np.float32, np.float32, np.float32]:
-    """The normal of those that two lights leave that fits the neighbours' normal (nx, ny, nz) and albedo best.
-
-    Where there are no neighbours, ``albedo`` is 0 and does not count. Returned with the albedo.
-    """
-    ax, ay, az = s.towards[pixel, 0, 0], s.towards[pixel, 0, 1], s.towards[pixel, 0, 2]
-    bx, by, bz = s.towards[pixel, 1, 0], s.towards[pixel, 1, 1], s.towards[pixel, 1, 2]
-    first, second = s.bright[pixel, 0], s.bright[pixel, 1]
-    cosine = ax * bx + ay * by + az * bz
-    sine_squared = max(ONE - cosine * cosine, LEAST_SINE_SQUARED)
-    p, q = (first - cosine * second) / sine_squared, (second - cosine * first) / sine_squared
-    gx, gy, gz = p * ax + q * bx, p * ay + q * by, p * az + q * bz
-    length = np.sqrt(gx * gx + gy * gy + gz * gz)
+    if not weight > ZERO:
+        return ZERO, ZERO, ONE, ZERO, THIRD, THIRD
+    one = ONE / weight
+    albedo, reds, blues = albedo * one, reds * one, blues * one
+    nx, ny, nz, down, right = nx * one, ny * one, nz * one, down * one, right * one
+    vy, vx, vxy = downs * one - down * down + HALF, rights * one - right * right + HALF, both * one - down * right
+    determinant = ONE / (vy * vx - vxy * vxy)
+    # how far a straight course over the neighbours, taken on to this pixel, leads from their mean
+    per_y = -(down * vx - right * vxy) * determinant * ONWARD
+    per_x = -(right * vy - down * vxy) * determinant * ONWARD
+    nx += per_y * (nx_down * one - down * nx) + per_x * (nx_right * one - right * nx)
+    ny += per_y * (ny_down * one - down * ny) + per_x * (ny_right * one - right * ny)
+    nz += per_y * (nz_down * one - down * nz) + per_x * (nz_right * one - right * nz)
+    length = np.sqrt(nx * nx + ny * ny + nz * nz)
     one = ONE / max(length, TINY)
-    gx, gy, gz = gx * one, gy * one, gz * one
-    one = ONE / np.sqrt(sine_squared)
-    dx, dy, dz = (ay * bz - az * by) * one, (az * bx - ax * bz) * one, (ax * by - ay * bx) * one
-    guess = np.arctan2(nx * dx + ny * dy + nz * dz, nx * gx + ny * gy + nz * gz)
-    offset = np.log(max(length, TINY)) - np.log(albedo) if albedo > ZERO else ZERO
-    per_albedo = ONE / ALBEDO_SHARE if albedo > ZERO else ZERO
-    best, least, before, last, after, closing = 0, FAR, ZERO, ZERO, ZERO, False
-    for k in range(len(ANGLES)):
-        apart = abs(ANGLES[k] - guess)
-        apart = min(apart, TURN - apart)
-        away = max(-(gz * COSINES[k] + dz * SINES[k]), ZERO) / BEYOND
-        cost = ((offset - LOG_COSINES[k]) * per_albedo) ** 2 + (apart / BENT) ** 2 + away * away
-        if closing:
-            after, closing = cost, False
-        if cost < least:
-            best, least, before, closing = k, cost, last, True
-        last = cost
-    angle = ANGLES[best]
-    if 0 < best < len(ANGLES) - 1:
-        curve = before - TWO * least + after
-        angle += ANGLE_STEP * HALF * (before - after) / max(curve, TINY)
-    c, d = np.cos(angle), np.sin(angle)
-    found = length / max(c, LEAST_COSINE)
-    if albedo > ZERO:
-        found = min(max(found, albedo * (ONE - TWO * ALBEDO_SHARE)), albedo * (ONE + TWO * ALBEDO_SHARE))
-    return gx * c + dx * d, gy * c + dy * d, gz * c + dz * d, found
-
-
-@FUSED.inlined
-def _from_one(
-    s: Said, pixel: int, nx: np.float32, ny: np.float32, nz: np.float32, albedo: np.float32
-) -> tuple[np.float32, np.float32, np.float32, np.float32]:
-    """The normal on the one light's cone that is nearest to the neighbours', with the albedo.
-
-    Where there are no neighbours the normal stays and gives the albedo.
-    """
-    x, y, z, bright = s.towards[pixel, 0, 0], s.towards[pixel, 0, 1], s.towards[pixel, 0, 2], s.bright[pixel, 0]
-    along = nx * x + ny * y + nz * z
-    if not albedo > ZERO:
-        return nx, ny, nz, bright / max(along, LEAST_COSINE)
-    cosine = min(bright / albedo, ONE)
-    tx, ty, tz = nx - along * x, ny - along * y, nz - along * z
-    one = np.sqrt(max(ONE - cosine * cosine, ZERO) / max(tx * tx + ty * ty + tz * tz, TINY))
-    cx, cy, cz = x * cosine + tx * one, y * cosine + ty * one, z * cosine + tz * one
-    if cz < ZERO:
-        one = ONE / np.sqrt(max(cx * cx + cy * cy, TINY))
-        cx, cy, cz = cx * one, cy * one, ZERO
-    return cx, cy, cz, albedo
+    return nx * one, ny * one, nz * one, albedo, reds, blues
