@@ -15,8 +15,11 @@ from numpy.typing import NDArray
 from psvideo.model.coded import Image
 from psvideo.plates.align.comb import SAMPLES
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixture import Mixture, made
+from psvideo.plates.mixture import made
 from psvideo.plates.sequence import Round
+
+GUESSED = 1 / 1024
+"""What a plate shows where motion hid what it should counts so little beside what others know of that pixel."""
 
 
 def opened(rounds: Iterable[Round]) -> Iterator[Round]:
@@ -25,7 +28,7 @@ def opened(rounds: Iterable[Round]) -> Iterator[Round]:
         middle: Round | None = None
         sums: list[_Sum] = []
         for place, one in enumerate(several):
-            sums = sums or [_Sum.of(plate) for plate in one.plates]
+            sums = sums or [_Sum(first=plate) for plate in one.plates]
             for total, plate in zip(sums, one.plates, strict=True):
                 total.add(plate)
             middle = one if place == SAMPLES // 2 else middle
@@ -36,36 +39,38 @@ def opened(rounds: Iterable[Round]) -> Iterator[Round]:
 
 @dataclass(kw_only=True)
 class _Sum:
-    """A light's plates while the shutter is open, as long as they are the same only counted; then summed where known.
+    """A light's plates while the shutter is open: as long as they are the same only counted, then summed.
 
-    ``count`` (row, col): how many of them are known there.
+    ``weight`` (row, col): of how many something is known there, guesses aside; 0 in rows that no frame saw.
     """
 
-    same: Mixture | None
+    first: LightPlate
     times: int = 0
     total: Image | None = None
-    count: NDArray[np.float32] | None = None
-
-    @classmethod
-    def of(cls, plate: LightPlate) -> "_Sum":
-        return cls(same=plate.picture)
+    weight: NDArray[np.float32] | None = None
 
     def add(self, plate: LightPlate) -> None:
-        if self.same is plate.picture:
+        if self.total is None and plate.picture is self.first.picture:
             self.times += 1
             return
-        if self.same is not None:
-            whole = np.ones(plate.shape[:2], np.float32) * np.float32(self.times)
-            self.total, self.count, self.same = self.times * self.same.image(), whole, None
-        if self.total is None or self.count is None:
-            raise ValueError("a sum needs its first plate")
-        known = plate.pixels_seen.astype(np.float32)
-        self.total += plate.image * (known if self.total.ndim == 2 else known[..., None])
-        self.count += known
+        if self.total is None or self.weight is None:
+            self.weight = self.times * _weight(self.first)
+            self.total = self.first.image * _like(self.weight, self.first)
+        own = _weight(plate)
+        self.total += plate.image * _like(own, plate)
+        self.weight += own
 
     def mean(self, middle: LightPlate) -> LightPlate:
-        if self.total is None or self.count is None:
+        if self.total is None or self.weight is None:
             return middle
-        count = np.maximum(self.count, 1.0)
-        mean = np.asarray(self.total / (count if self.total.ndim == 2 else count[..., None]), np.float32)
-        return replace(middle, picture=made(mean), seen=self.count > 0)
+        mean = self.total / _like(np.maximum(self.weight, GUESSED), middle)
+        return replace(middle, picture=made(np.asarray(mean, np.float32)), seen=self.weight > 0)
+
+
+def _weight(plate: LightPlate) -> NDArray[np.float32]:
+    known = np.where(plate.pixels_seen, np.float32(1), np.float32(GUESSED))
+    return np.asarray(known * plate.rows_seen[:, None], np.float32)
+
+
+def _like(weight: NDArray[np.float32], plate: LightPlate) -> NDArray[np.float32]:
+    return weight if len(plate.shape) == 2 else weight[..., None]
