@@ -482,9 +482,14 @@ def psnr_db(image: np.ndarray, truth: np.ndarray, inner: tuple[slice, slice]) ->
     return float(10 * np.log10(truth[inner].max() ** 2 / np.mean((image - truth)[inner] ** 2)))
 
 
-@pytest.mark.parametrize("motion", ["4 px", pytest.param("spin", marks=pytest.mark.campaign)])
-def test_an_open_shutter_shows_what_a_true_one_does_and_better_than_the_mean_of_frames(motion: str) -> None:
-    clip = noiseless(3, motion)
+@pytest.mark.parametrize(
+    ("lights", "motion"),
+    [(5, "4 px"), *(pytest.param(3, motion, marks=pytest.mark.campaign) for motion in ("4 px", "spin"))],
+)
+def test_an_open_shutter_shows_what_a_true_one_does_and_better_than_the_mean_of_frames(
+    lights: int, motion: str
+) -> None:
+    clip = noiseless(lights, motion)
     comb = Comb(fps=Fraction(24), first_s=0.0, open_s=0.5 / 24)
     due = Schedule(by_round={1002: tuple((1001, time_s) for time_s in comb.samples_s(0))}, left_out=(0, 0, 0))
     plates = (plate for one in clip.rounds for plate in one.plates)

@@ -47,7 +47,8 @@ class Around:
 @dataclass(kw_only=True)
 class DueInstant:
     """An instant that is to be shown, of a round, and the lights' plates at it that are made already; ``moving``
-    are the lights that were found to move and wait for each other, ``motion`` how, once it was found."""
+    are the lights that were found to move and wait for each other, ``motion`` how, once it was found.
+    ``guessed``: what is doubtful is shown as it most likely is, for nothing is measured in it."""
 
     number: int
     time_s: float
@@ -55,6 +56,7 @@ class DueInstant:
     made: dict[str, LightPlate] = field(default_factory=dict)
     moving: set[str] = field(default_factory=set)
     motion: Followed | None = None
+    guessed: bool = False
 
 
 @dataclass(kw_only=True)

@@ -91,11 +91,19 @@ def _instants(
     """Return the instants that are shown of a complete round."""
     if schedule is not None:
         due = schedule.by_round.get(number, ())
-        return [DueInstant(number=own, time_s=time_s, round=number) for own, time_s in due]
+        return [
+            DueInstant(number=own, time_s=time_s, round=number, guessed=_is_beside(how, own - first, time_s))
+            for own, time_s in due
+        ]
     if how.rate == "round":
         return [DueInstant(number=number, time_s=float(np.mean(times_s)), round=number)]
     start = first + (number - first) * len(times_s)
     return [DueInstant(number=start + n, time_s=time_s, round=number) for n, time_s in enumerate(sorted(times_s))]
+
+
+def _is_beside(how: Aligning, k: int, time_s: float) -> bool:
+    """Tell whether an instant is looked at for an open shutter only, beside the one whose surface is solved."""
+    return isinstance(how.rate, Comb) and time_s != how.rate.time_s(k)
 
 
 def _complete(held: Held, how: Aligning) -> Iterator[Round]:
@@ -157,7 +165,9 @@ def _make_moving(held: Held, instant: DueInstant) -> None:
     pairs = [_pair(held.sure_around(light, instant)) for light in lights]
     instant.motion = motion = followed_at(pairs, instant.time_s)
     shown = [taken_of(pair, motion) for pair in pairs]
-    sources = without_doubtful(shown, motion, len(held.lights) - len(lights))
+    sources = [one.source for one in shown]
+    if not instant.guessed:
+        sources = without_doubtful(shown, motion, len(held.lights) - len(lights))
     for light, source in zip(lights, sources, strict=True):
         _hand_on(instant, _moved_to(held.sure_around(light, instant), source, motion))
         instant.moving.remove(light)
