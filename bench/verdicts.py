@@ -1,6 +1,7 @@
 """Verdicts on photographs: what `psvideo stills` says of subjects that were photographed, beside what is true of them.
 
-``python -m bench.verdicts [PART OF A NAME]`` prints what was found as well.
+``python -m bench.verdicts [PART OF A NAME [FOLDER]]`` prints what was found as well, and writes a picture of every
+subject into the folder: normals, albedo, validity, predicted error, and the subject relit from the left and the right.
 """
 
 import sys
@@ -9,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import cv2
 import numpy as np
 
 import psvideo as ps
@@ -16,6 +18,7 @@ from bench.accuracy_measure import SHARED_DATA, angles_deg, diligent_lights, was
 from bench.table import Row, table
 from psvideo.formats.light_lists import write_rig
 from psvideo.model.rig import Light, Rig
+from psvideo.report.judge.result import MEAN_OF_HELD
 from psvideo.report.run_report import RunReport
 
 EIGHT, TWELVE = (4, 19, 27, 44, 52, 67, 75, 91), (1, 8, 18, 24, 37, 41, 50, 59, 66, 79, 85, 94)
@@ -174,6 +177,9 @@ def rows(only: str = "", *, said: bool = False, kept: Path | None = None) -> Ite
         with tempfile.TemporaryDirectory() as place:
             report = subject.solved(Path(place))
             figures, met = _figures(subject, report, Path(place) / "out")
+            if kept is not None:
+                kept.mkdir(parents=True, exist_ok=True)
+                _write_picture(kept / f"{subject.name.replace(' ', '_').replace(',', '')}.png", Path(place) / "out")
         if said:
             print(f"\n{subject.name}: {report.verdict}\n  {figures}\n  " + "\n  ".join(report.findings), flush=True)
         yield Row(
@@ -185,7 +191,7 @@ def _figures(subject: Subject, report: RunReport, out: Path) -> tuple[str, bool]
     """Return what is true of the result, in words, and whether what the report says of the rig agrees."""
     facts = report.instants[0]
     said = f"{100 * (facts.valid_share or 0):.0f} % trusted"
-    deg = None if facts.misfit is None else facts.misfit.error_deg
+    deg = None if facts.misfit is None else MEAN_OF_HELD * facts.misfit.error_deg
     said += "" if deg is None else f", said to be off by {deg:.1f}°"
     if subject.truth is None:
         return said, True
@@ -199,7 +205,19 @@ def _figures(subject: Subject, report: RunReport, out: Path) -> tuple[str, bool]
         f"{100 * np.mean(off[trusted] > 10):.1f} % of them over 10°; {held[0]:.0f} % within the predicted error, "
         f"{held[1]:.0f} % within twice"
     )
-    return said, deg is None or 1 / CLOSE <= deg / float(np.median(off)) <= CLOSE
+    return said, deg is None or 1 / CLOSE <= deg / float(off.mean()) <= CLOSE
+
+
+def _write_picture(path: Path, out: Path) -> None:
+    names = ("normals", "albedo", "valid", "error")
+    normals, albedo, valid, error = (_image(next((out / kind).glob("*.exr"))) for kind in names)
+    surface = ps.Surface(
+        normals=normals, albedo=albedo, valid=valid > 0.5, source=(albedo.max(axis=-1) > 0).astype("u1")
+    )
+    shown = [ps.picture_of(name, one) for name, one in zip(names, (normals, albedo, valid, error), strict=True)]
+    sides = [ps.relight(surface, (x, 0.3, 0.7)) for x in (-0.65, 0.65)]
+    shown += [ps.picture_of("beauty", np.asarray(side)) for side in sides]
+    cv2.imwrite(str(path), np.hstack(shown)[..., ::-1])
 
 
 def _image(path: Path) -> np.ndarray:
@@ -211,4 +229,5 @@ def _image(path: Path) -> np.ndarray:
 
 
 if __name__ == "__main__":
-    print(table(list(rows(sys.argv[1] if len(sys.argv) > 1 else "", said=True))))
+    part, folder = [*sys.argv[1:], "", ""][:2]
+    print(table(list(rows(part, said=True, kept=Path(folder) if folder else None))))
