@@ -17,8 +17,9 @@ LEFT_OVER = 0.1
 STRENGTH_MISFIT, BY_STRENGTH, OTHER_STRENGTH = 0.05, 0.5, 1.25
 """Less is enough where other strengths of some lights, half of them at most, take half of it away."""
 AGREE, DISAGREE = 0.3, -0.1
-TOO_FAR_DEG = 8.0
-"""Slopes of normals that are so far off agree badly under the right rig too: then only clear disagreement counts."""
+TOO_FAR_DEG, AGREE_FAR = 8.0, 0.15
+"""Slopes of normals that are so far off agree badly under the right rig too: then they must agree by the second. (A
+bear's under eight lights in one plane: 0.21; five lights of which each is taken for the next: 0.11.)"""
 
 
 def rig(observed: Observed) -> Iterator[Judgement]:
@@ -81,7 +82,9 @@ def _misfit(lights: Sequence[str], fit: RigFit) -> Judgement | None:
 def _crossed(observed: Observed) -> Judgement | None:
     agreement = float(np.median(observed.slopes)) if observed.slopes else 1.0
     far = max((one.misfit.error_deg for one in observed.facts if one.misfit is not None), default=0.0) > TOO_FAR_DEG
-    if agreement > AGREE or not quiet(observed.facts) or (agreement > DISAGREE and (far or moves(observed.facts))):
+    if agreement > (AGREE_FAR if far else AGREE) or not quiet(observed.facts):
+        return None
+    if agreement > DISAGREE and moves(observed.facts):
         return None
     return Judgement(
         subject="rig",
