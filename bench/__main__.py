@@ -19,6 +19,7 @@ TABLES = (
     "compression",
     "strobe",
     "cameras",
+    "instants",
     "accuracy",
     "predicted",
     "verdicts",

@@ -52,8 +52,9 @@ def sync_cameras(
 
     Examples
     --------
-    >>> import psvideo as ps
-    >>> clocks = ps.sync_cameras(["camA/", "camB/"])  # doctest: +SKIP
+    >>> clocks = sync_cameras(["camA/", "camB/"], out="clocks.json")  # doctest: +SKIP
+    >>> clocks.cameras[1].rate_ppm  # doctest: +SKIP
+    35.0
     """
     out = path_if_given("out", out)
     if out is not None:
