@@ -145,7 +145,8 @@ def _smaller(view: View, step: int) -> View:
 def near_trust(near: NearSurface) -> str:
     """Return in a whole sentence what a valid normal under near lights depends on."""
     distance_m = -near.ground.middle_m[2]
-    source = "the rig's [surface] plane is" if near.shaping.known_m is None else "the depth that was given says"
+    source = "the rig's [surface] plane is, or with five near lights and more where their falloff puts it"
+    source = source if near.shaping.known_m is None else "the depth that was given says"
     return (
         f"The lights are near, and the subject is taken to be where {source}: {distance_m:.3g} m "
         "away in the picture's middle. Were the lights' distances wrong by a tenth, normals would be off by about 3 "
