@@ -12,12 +12,13 @@ import pytest
 
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.formats.plan_toml import format_plan, parse_plan
+from psvideo.formats.plan_toml import format_plan, parse_plan, read_plan
 from psvideo.model.camera_clocks import CameraClock
 from psvideo.model.marker import alike_turns, cycle_places
 from psvideo.model.maximal_length import TAPS, maximal_length
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Flash, Timing
+from psvideo.strobe.link.boards import BOARDS
 from psvideo.sync.shared_flashes import CameraTake, camera_clocks
 
 PlanMaker = Callable[..., Plan]
@@ -78,6 +79,17 @@ def _on_camera(clock: CameraClock, reference_s: float) -> float:
     for _ in range(6):
         camera_s += reference_s - float(clock.reference_s(np.array([camera_s]))[0])
     return camera_s
+
+
+@pytest.mark.parametrize(("lights", "order"), [("a,b,c", 6), ("a,b,c,d", 5), ("a,b,c,d,e,f,g,h", 4)])
+def test_a_coded_marker_is_the_longest_that_every_board_plays(tmp_path: Path, lights: str, order: int) -> None:
+    camera = ["--size", "640x360", "--fps", "120", "--readout", "8ms", "--flash", "0.8ms", "--marker", "coded"]
+    assert main(["capture-plan", *camera, "--lights", lights, "-o", str(tmp_path / "plan.toml"), "-q"]) == 0
+    plan = read_plan(tmp_path / "plan.toml")
+    assert plan.dark_code == order
+    most = min(board.steps for board in BOARDS.values())
+    assert len(plan.cycle_slots) <= most < len(replace(plan, dark_code=order + 1).cycle_slots)
+    assert main(["capture-plan", *camera, "--lights", lights, "--dark-every", "4"]) == 2
 
 
 AT_FIRST = replace(TRUE, clip="A", offset_s=0.0, rate_ppm=0.0)
