@@ -23,6 +23,7 @@ from bench.accuracy_measure import (
     turned,
     washington_sphere,
 )
+from bench.accuracy_whole import bust
 from bench.table import table
 from psvideo.solve.normals.doubting import Doubting, Signs, doubt_deg
 from psvideo.solve.normals.illumination import Illumination
@@ -100,6 +101,8 @@ def subjects() -> Iterator[tuple[str, Case]]:
         yield "ball", diligent_ball()
         yield "grey sphere", washington_sphere()
         yield "bunny", rendered_bunny()
+    case, reached = bust((0, 1, 2, 3, 4))
+    yield "virtual bust", case._replace(mask=reached)
     for name, normals, inside in (_ball(), _waves(), _bumps()):
         for slant_deg in (30, 50):
             ways = np.concatenate([ring(8, slant_deg), ring(4, slant_deg / 2)])

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from bench.accuracy_whole import bust
 
 from psvideo.model.surface import Surface
 from psvideo.solve.normals.illumination import Illumination
@@ -71,3 +72,11 @@ def test_a_rig_that_is_wrong_is_predicted_and_makes_few_pixels_invalid() -> None
     assert surface.misfit is not None
     assert 0.7 < surface.misfit.error_deg / np.median(errors) < 2.5, "a rig averages out more than gloss does"
     assert surface.valid.sum() > 0.6 * surface.measured.sum()
+
+
+def test_a_matte_bust_is_trusted_hair_and_creases_included() -> None:
+    case, reached = bust((0, 1, 2, 3, 4))
+    surface = Solving(error=True).solve(case.plates, case.lit, mask=case.mask)
+    errors = np.degrees(2 * np.arcsin(np.clip(np.linalg.norm(surface.normals - case.truth, axis=-1) / 2, 0, 1)))
+    assert surface.valid[reached].mean() >= 0.99
+    assert (errors[surface.valid & reached] > 10).mean() <= 0.001
