@@ -129,6 +129,19 @@ def test_a_round_that_nobody_compared_stays_as_it_is() -> None:
         np.testing.assert_allclose(one.normals, same.normals, atol=1e-3)
 
 
+def test_a_round_in_which_rows_were_missing_has_no_vote_there() -> None:
+    first, second = some(2)
+    assert first.source is not None
+    assert second.source is not None
+    own = second.source.copy()
+    first.source[:10], first.valid[:10] = 0, False
+    held = steadied(None, first, 1, None, np.arange(20)[:, None] >= 10)
+    held = steadied(held, second, 2, RESTS)
+    assert np.array_equal(second.source[:10], own[:10]), "as it was solved"
+    assert held.since[0, 0] == 0
+    assert held.since[-1, 0] == 1
+
+
 def test_bytes_do_not_depend_on_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     given = []
     for threads in ("1", "3"):

@@ -27,7 +27,7 @@ from psvideo.solve.normals.illumination import Illumination, illumination
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.task import Samples
 from psvideo.solve.passes.made import AskedPasses, Passes, passes_of
-from psvideo.solve.steady import Steady, steadied
+from psvideo.solve.steady import SHOWN, Steady, steadied
 from psvideo.solve.sweeping import swept
 
 
@@ -93,12 +93,23 @@ def surfaces(
 
         surface = solve(lit) if here is None else solve_near(here, lambda ground: light(ground=ground), solve)
         nonlocal steady
-        steady = steadied(steady, surface, one.number, one.stood)
+        steady = steadied(steady, surface, one.number, one.stood, _shown(seen))
         made = passes_of(asked, plates, surface, lit, seen=shown, mask=mask) if asked.any else None
         return Instant(round=one, surface=surface, passes=made)
 
     # map and filter hold no round while the next one gathers, as a loop's variable would
     return map(solved, filter(lambda one: one.lights == plan.lights, gathered))
+
+
+def _shown(seen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return, (row, col) or (row, 1) or (1, 1), the rows and columns that every light showed at least a part of: frames
+    that are missing lack whole ones, motion hides parts."""
+    if seen.all():
+        return SHOWN
+    if seen.ndim == 2:
+        return np.asarray(np.logical_and.reduce(seen), np.bool_)[:, None]
+    rows, cols = (np.any(seen, axis=axis, keepdims=True).all(axis=0) for axis in (2, 1))
+    return np.asarray(rows & cols)
 
 
 def _pictures(one: Round, shares: Sequence[NDArray[np.float32]] | None) -> Sequence[Samples] | Sequence[Mixture]:

@@ -19,6 +19,8 @@ from psvideo.solve.normals.doubting import bits, stored
 from psvideo.solve.normals.task import Bytes
 from psvideo.solve.steady_kernel import SEGMENT, VOTES, Pool, Still, SurfacePlanes, steady_rows, touch_rows, turn_block
 
+Flags = NDArray[np.bool_]
+SHOWN = np.ones((1, 1), np.bool_)
 MOST_SINCE = 255
 EACH_SLOT = 256
 
@@ -28,7 +30,8 @@ class Steady:
     """What is held between rounds of segments of rows where any pixel is not trusted, and in the block after.
 
     ``slots`` (row, segment) says where in ``pool`` a segment is, -1 where it is not; ``used`` of its slots are.
-    ``since`` counts rounds at rest on a coarse grid, ``trusted`` (row, col) is the last round's.
+    ``since`` counts rounds at rest on a coarse grid, ``trusted`` (row, col) is the last round's, and ``shown`` where
+    all lights showed the picture in it, on a grid.
     """
 
     number: int
@@ -37,6 +40,7 @@ class Steady:
     used: int
     since: Bytes
     trusted: Bytes
+    shown: Flags
 
     @classmethod
     def beginning(cls, surface: Surface, number: int) -> "Steady":
@@ -50,21 +54,25 @@ class Steady:
             used=0,
             since=np.zeros((1, 1), np.uint8),
             trusted=np.zeros((rows, cols), np.uint8),
+            shown=SHOWN,
         )
 
 
-def steadied(held: Steady | None, surface: Surface, number: int, stood: NDArray[np.bool_] | None) -> Steady:
+def steadied(held: Steady | None, surface: Surface, number: int, stood: Flags | None, shown: Flags = SHOWN) -> Steady:
     """Hold a round's surface steady, in its own memory, and return what is held for the next one.
 
     held: what was returned of the round before, None at first; it is taken over.
     number: the round's.
     stood: on a grid over the picture (any rows and columns), True where nothing changed since the round before; None
         where that is not known, and all begins again.
+    shown: on a grid, False where frames were missing that some light showed the picture in: what is not there has no
+        vote, and where it was not the round before, a pixel begins again.
     """
     if held is None or stood is None or number != held.number + 1:
         held, stood = Steady.beginning(surface, number), np.zeros((1, 1), np.bool_)
     held.number = number
-    held.since = _counted(held.since, stood)
+    held.since = _counted(_counted(held.since, stood), held.shown & shown, more=0)
+    held.shown = shown
     place = number % POOLED_ROUNDS + 1
     if place == 1:
         _turn(held)
@@ -84,13 +92,13 @@ def steadied(held: Steady | None, surface: Surface, number: int, stood: NDArray[
     return held
 
 
-def _counted(since: Bytes, stood: NDArray[np.bool_]) -> Bytes:
-    """Return since how many rounds nothing changed, one more where nothing did."""
+def _counted(since: Bytes, stood: Flags, more: int = 1) -> Bytes:
+    """Return since how many rounds nothing changed, one more where nothing did; of two grids, the finer one."""
     shape = np.maximum(since.shape, stood.shape)
     row, col = (np.arange(size) for size in shape)
     wide = (part[np.ix_(row * part.shape[0] // shape[0], col * part.shape[1] // shape[1])] for part in (since, stood))
     before, rests = wide
-    return np.where(rests, np.minimum(before, MOST_SINCE - 1) + 1, 0).astype(np.uint8)
+    return np.where(rests, np.minimum(before, MOST_SINCE - more) + more, 0).astype(np.uint8)
 
 
 def _turn(held: Steady) -> None:
