@@ -47,7 +47,7 @@ def costs(clip: Filmed, how: Aligning) -> Cost:
     )
 
 
-def rows(steps_px: tuple[float, ...] = STEPS_PX) -> Iterator[tuple[str, float, dict[str, Cost]]]:
+def measured(steps_px: tuple[float, ...] = STEPS_PX) -> Iterator[tuple[str, float, dict[str, Cost]]]:
     """Yield subject, motion and px per flash, and the costs with and without alignment."""
     motions: dict[str, Any] = {"slides": slide, "tumbles": lambda px: turn(px, ASLANT)}
     ways: tuple[Align, ...] = ("none", "auto")
@@ -61,7 +61,7 @@ def rows(steps_px: tuple[float, ...] = STEPS_PX) -> Iterator[tuple[str, float, d
 
 def main() -> None:
     """Print the table."""
-    for name, px, ways in rows():
+    for name, px, ways in measured():
         words = [
             f"{align}: {100 * one.trusted:.1f} % trusted, {one.trusted_deg:.2f} deg, {100 * one.far:.1f} % over 10, "
             f"every pixel {one.every_deg:.2f}"
