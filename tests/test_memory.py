@@ -27,9 +27,12 @@ FRAMES_A_ROUND = 10
 PHASE_S = 0.003
 SMALL, LARGE = (90, 160), (450, 800)
 FEW, MANY = 60, 600
-MOST_GROWTH_MB = 1.5
-"""So much a process's peak may rise from 60 frames to 570: C libraries keep what was freed in pieces. A byte a pixel
-that stays with every instant makes 0.7, the codes of a frame that stay with every frame 42."""
+MOST_AT_ONCE_MB = 1.5
+"""So much a process's peak may rise once between 60 frames and 570: when the cores are busy otherwise, one result more
+is held on the way (1.2)."""
+MOST_GROWTH_MB = 0.7
+"""So much it may rise beside that, in all: C libraries keep what was freed in pieces (0.35). A byte a pixel that stays
+with every instant makes 0.7 more, the codes of a frame that stay with every frame 42."""
 MOST_BYTES_PER_SAMPLE = 80
 """A sample of the picture in the 16-bit codes of 19 frames (a round and a half, a flash over three, those that are read
 ahead): 38 bytes; ambient light, twice, and results with what they are judged by: 42."""
@@ -119,6 +122,8 @@ def test_memory_grows_with_the_picture_and_not_with_the_clip(tmp_path: Path) -> 
     assert done.returncode == 0, done.stderr
     long, large = json.loads(done.stdout.splitlines()[-1])
     samples = LARGE[0] * LARGE[1] * 3
-    assert long[-2] - long[FEW // 30] <= MOST_GROWTH_MB  # the last is with the report
+    *steps, most = np.sort(np.diff(long[FEW // 30 : -1]))  # the last is with the report
+    assert most <= MOST_AT_ONCE_MB
+    assert sum(steps) <= MOST_GROWTH_MB
     assert (large[-1] - long[-1]) * 2**20 <= MOST_BYTES_PER_SAMPLE * samples
     assert len(list((tmp_path / "long" / "out" / "normals").iterdir())) == MANY // FRAMES_A_ROUND - 2
