@@ -161,9 +161,8 @@ def rows() -> Iterator[Summary]:
 
 
 def _summary(kind: str, found: Sequence[Outcome]) -> Summary:
-    faults, refused = (
-        sum(bool(one.fault) for one in found), sum(one.said.startswith("refused") for one in found if not one.fault)
-    )  # fmt: skip
+    faults = sum(bool(one.fault) for one in found)
+    refused = sum(one.said.startswith("refused") for one in found if not one.fault)
     return Summary(
         kind=kind,
         tried=len(found),

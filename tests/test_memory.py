@@ -28,8 +28,8 @@ PHASE_S = 0.003
 SMALL, LARGE = (90, 160), (450, 800)
 FEW, MANY = 60, 600
 MOST_AT_ONCE_MB = 1.5
-"""So much a process's peak may rise once between 60 frames and 570: when the cores are busy otherwise, one result more
-is held on the way (1.2)."""
+"""So much a process's peak may rise once between 60 frames and 570: when the cores are busy otherwise it does in some
+runs, by 1.2, at a frame that differs from run to run, and with no more threads than before; on free cores by 0.06."""
 MOST_GROWTH_MB = 0.7
 """So much it may rise beside that, in all: C libraries keep what was freed in pieces (0.35). A byte a pixel that stays
 with every instant makes 0.7 more, the codes of a frame that stay with every frame 42."""
