@@ -8,18 +8,25 @@ from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
+import OpenEXR
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError, UsageError
+from psvideo.formats.clocks_json import format_clocks, read_clocks
 from psvideo.formats.plan_toml import format_plan, parse_plan, read_plan
-from psvideo.model.camera_clocks import CameraClock
+from psvideo.model.camera_clocks import CameraClock, CameraClocks
 from psvideo.model.marker import alike_turns, cycle_places
 from psvideo.model.maximal_length import TAPS, maximal_length
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Flash, Timing
+from psvideo.runs.output import rate_of
 from psvideo.strobe.link.boards import BOARDS
 from psvideo.sync.shared_flashes import CameraTake, camera_clocks
+from psvideo.synth import shoot
 
 PlanMaker = Callable[..., Plan]
 TRUE = CameraClock(clip="B", first_flash=0, offset_s=1.7, rate_ppm=41.0, drift_ppm_per_s=0.0, shared=0, error_s=0.0)
@@ -216,3 +223,103 @@ def test_sync_of_several_clips_of_unlike_cameras_writes_their_clocks(
     assert main(["sync", str(first), str(other), "--first-light", "a"]) == 2
     assert "belongs to one clip" in capsys.readouterr().err
     assert main(["sync", str(first), str(other), "--starts", "0"]) == 2
+
+
+SLIDING = """
+schema = "psvideo-scene/1"
+name = "{name}"
+frames = 36
+seed = 3
+[camera]
+width_px = 96
+height_px = 60
+fps = {fps}
+shutter_deg = 360
+readout_s = {readout_s}
+width_m = 0.96
+[strobe]
+flash_s = 0.0008
+dark_s = 0.0102
+phase_s = {phase_s}
+clock_offset_ppm = {ppm}
+[[light]]
+name = "key"
+direction = [0.3, 0.4, 0.9]
+[[light]]
+name = "left"
+direction = [-0.5, 0.1, 0.9]
+[[light]]
+name = "right"
+direction = [0.4, -0.5, 0.9]
+[[object]]
+mesh = "sphere"
+height_m = 0.36
+position_m = [{x_m}, 0.0, 0.0]
+albedo = {{ pattern = "noise", colour = [0.9, 0.8, 0.7], second = [0.2, 0.3, 0.4], size_m = 0.06 }}
+motion = {{ velocity_m_per_s = [0.6, 0.0, 0.0] }}
+"""
+LATER_S, FASTER_PPM = 0.0713, 40.0
+
+
+def filmed(folder: Path, *, name: str, fps: int, readout_s: float, later_s: float, ppm: float) -> Path:
+    """Film a sphere that slides by 60 px a second, ``later_s`` seconds after the first camera began."""
+    phase_s, x_m = (0.0031 - later_s) / (1 + 1e-6 * ppm), -0.18 + 0.6 * later_s
+    scene = folder / f"{name}.toml"
+    scene.write_text(SLIDING.format(name=name, fps=fps, readout_s=readout_s, phase_s=phase_s, ppm=-ppm, x_m=x_m))
+    return shoot(scene, folder / name).path
+
+
+def plate_numbers(folder: Path) -> set[int]:
+    return {int(file.suffixes[-2].removeprefix(".")) for file in folder.iterdir()}
+
+
+def picture_of(file: Path) -> tuple[NDArray[np.float32], float]:
+    with OpenEXR.File(str(file)) as read:
+        return np.asarray(read.channels()["RGB"].pixels, np.float32), float(read.header()["psvideo:time_s"])
+
+
+def test_cameras_of_one_strobe_show_the_same_instants_under_the_same_numbers(tmp_path: Path) -> None:
+    a = filmed(tmp_path, name="a", fps=119, readout_s=0.007, later_s=0.0, ppm=0.0)
+    b = filmed(tmp_path, name="b", fps=100, readout_s=-0.009, later_s=LATER_S, ppm=FASTER_PPM)
+    clocks = tmp_path / "clocks.json"
+    assert main(["sync", str(a), str(b), "-o", str(clocks), "--starts", f"0,{LATER_S}", "-q"]) == 0
+    found = read_clocks(clocks)
+    assert found.of("b").offset_s == pytest.approx(LATER_S, abs=5e-6)
+    for clip in (a, b):
+        out = str(tmp_path / f"plates_{clip.name}")
+        assert main(["split", str(clip), "--fps", "24", "--resync", str(clocks), "-o", out, "-q"]) == 0
+    numbers = [plate_numbers(tmp_path / f"plates_{name}" / "key") for name in "ab"]
+    shared = sorted(numbers[0] & numbers[1])
+    assert len(shared) >= 4
+    for light, number in itertools.product(("key", "left", "right"), shared):
+        (one, one_s), (other, other_s) = (
+            picture_of(tmp_path / f"plates_{name}" / light / f"{name}_{light}.{number}.exr") for name in "ab"
+        )
+        assert np.abs(one - other).mean() < 0.003 * one.mean()
+        assert found.of("b").reference_s(np.float64(other_s)) == pytest.approx(one_s, abs=1e-7)
+
+
+def test_instants_that_no_two_cameras_share_are_refused(tmp_path: Path, make_plan: PlanMaker) -> None:
+    plan = make_plan()
+    clocks = CameraClocks(cameras=(AT_FIRST, TRUE), numbering="marker", cycle_s=0.05, first_instant_s=0.01)
+    path = tmp_path / "clocks.json"
+    path.write_text(format_clocks(clocks), encoding="utf-8")
+    assert read_clocks(path) == clocks
+    with pytest.raises(UsageError, match="the clocks are those of A, B"):
+        rate_of("24", plan, resync=path, clip="C")
+    with pytest.raises(UsageError, match="Add `fps`"):
+        rate_of("frame", plan, resync=path, clip="B")
+    path.write_text(path.read_text(encoding="utf-8").replace('"rate_ppm": 41.0', '"rate_ppm": "41"'), encoding="utf-8")
+    with pytest.raises(PsvideoError, match=r"clocks\.json: .*rate_ppm"):
+        read_clocks(path)
+
+
+@given(
+    st.floats(-100, 100), st.floats(-200, 200), st.floats(-5, 5), st.lists(st.floats(-1e4, 1e4), min_size=1, max_size=5)
+)
+def test_times_carried_to_another_camera_and_back_are_the_same(
+    offset_s: float, rate_ppm: float, drift: float, times_s: list[float]
+) -> None:
+    clock = replace(TRUE, offset_s=offset_s, rate_ppm=rate_ppm, drift_ppm_per_s=drift)
+    at_s = np.array(times_s)
+    assert clock.camera_s(clock.reference_s(at_s)) == pytest.approx(at_s, abs=1e-8)

@@ -155,7 +155,17 @@ def shoot(tmp_path_factory: pytest.TempPathFactory) -> Path:
 CHEAP = ("capture-plan", "strobe list", "strobe check", "info", "sync", "split", "normals", "strobe run", "calibrate")
 NOT_HERE = (
     *("--port auto", "--port /dev", "--log clip", "--seconds", "take7.mov", "clip.mov", "sphere/", "paper/", "left/"),
-    *("stripes/", "plates/ -", "--solver robust", "1-100", "intensities clip/", "--first-light", "shot.usd", "camA"),
+    *(
+        "stripes/",
+        "plates/ -",
+        "--solver robust",
+        "1-100",
+        "intensities clip/",
+        "--first-light",
+        "shot.usd",
+        "camA",
+        "camB",
+    ),
 )
 """What the examples' folder has not: a board, other footage, more lights, a plan without a marker."""
 

@@ -29,6 +29,7 @@ if TYPE_CHECKING:  # what editors and type checkers see; _HOMES is the same for 
     from psvideo.runs.split import split as split
     from psvideo.runs.stills import stills as stills
     from psvideo.runs.sync import sync as sync
+    from psvideo.runs.sync_cameras import sync_cameras as sync_cameras
     from psvideo.solve.depth.shaping import find_depth as find_depth
     from psvideo.solve.images import solve_images as solve_images
     from psvideo.solve.of_take import solve as solve
@@ -62,6 +63,7 @@ _HOMES = {
     "split": "psvideo.runs.split",
     "stills": "psvideo.runs.stills",
     "sync": "psvideo.runs.sync",
+    "sync_cameras": "psvideo.runs.sync_cameras",
 }
 """Where each name lives; after a colon, its name there where it has another one."""
 
@@ -80,6 +82,7 @@ __all__ = [  # noqa: RUF022  (in the order of the work)
     "relight",
     "picture_of",
     "sync",
+    "sync_cameras",
     "split",
     "normals",
     "stills",

@@ -150,6 +150,10 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
             "psvideo split clip/ --frames 1-100 --timing timing.json -o part/",
         ),
         ("and the scene under all lights at once", "psvideo split clip/ --beauty --preview beauty -o plates/"),
+        (
+            "24 a second, the same instants as the other cameras of this strobe",
+            "psvideo split camB/ --fps 24 --resync clocks.json -o platesB/",
+        ),
         ("the paper's Algorithm 1, to compare with", "psvideo split clip/ --method hudon2015 -o plates_2015/"),
     ),
     "normals": (

@@ -84,6 +84,11 @@ def parse_toml(text: str, model: type[Model], schema: str, *, source: str) -> Mo
         data = tomllib.loads(text)
     except (ValueError, RecursionError) as fault:  # TOMLDecodeError; numbers or tables without end
         raise PsvideoError(f"{source}: not a TOML file: {fault}. Mend that line (TOML 1.0).") from fault
+    return parse_record(data, model, schema, source=source)
+
+
+def parse_record(data: dict[str, Any], model: type[Model], schema: str, *, source: str) -> Model:
+    """Check what a TOML or JSON file holds against its model. ``source`` is the name that messages give it."""
     check_schema(data.get("schema"), schema, source=source)
     try:
         return model.model_validate(data)

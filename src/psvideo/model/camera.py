@@ -58,6 +58,11 @@ class Camera:
         return 360.0 * self.exposure_s / self.frame_period_s
 
     @property
+    def middle_s(self) -> float:
+        """The middle of the first frame: of its middle row's exposure; of its first row's where no readout is known."""
+        return 0.5 * (self.exposure_s + abs(self.readout_s or 0.0))
+
+    @property
     def row_time_s(self) -> float:
         """Seconds from one row's opening to the next one's; negative where the bottom row comes first.
 

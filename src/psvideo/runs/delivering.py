@@ -25,11 +25,14 @@ from psvideo.model.timing import Timing
 from psvideo.model.units import show_rate
 from psvideo.plates.align.comb import Comb, Schedule
 from psvideo.plates.align.moving import pixels_per_s
+from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.beauty import beauty_of
+from psvideo.plates.gather import scheduled
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import AMBIENT, Round, round_numbers
 from psvideo.runs.caller import Caller
 from psvideo.runs.lighting import Lighting
+from psvideo.runs.output import Output
 from psvideo.solve.depth import Depth
 from psvideo.solve.instants import Instant
 from psvideo.solve.normals.solving import ROBUST_FROM_LIGHTS
@@ -64,8 +67,15 @@ def metric_delivery(delivery: Delivery, aov: Sequence[Aov], lighting: Lighting, 
     return replace(delivery, aovs=kept)
 
 
-def instants_said(comb: Comb, due: Schedule, start_number: int) -> str:
-    """Return in whole sentences which instants are delivered at a steady rate, and which are not."""
+def say_instants(take: Take, timing: Timing, aligning: Aligning | None, output: Output) -> Schedule | None:
+    """Say which instants are delivered at a steady rate, and which are not; return them, None where rounds decide."""
+    due = None if aligning is None else scheduled(take, timing, aligning, start_number=output.start_number)
+    if due is not None and aligning is not None and isinstance(aligning.rate, Comb):
+        output.caller.say(_instants_said(aligning.rate, due, output.start_number))
+    return due
+
+
+def _instants_said(comb: Comb, due: Schedule, start_number: int) -> str:
     numbers = due.numbers
     shown = f"{len(numbers)}, {numbers[0]} to {numbers[-1]}" if numbers else "none"
     before, within, after = due.left_out
@@ -74,10 +84,11 @@ def instants_said(comb: Comb, due: Schedule, start_number: int) -> str:
         for count, where in ((before, "at the start"), (within, "in holes"), (after, "at the end"))
         if count
     ]
+    clock = "the camera's clock" if comb.clock is None else "the clock of the cameras' reference"
     rest = f" Left out, as no whole round is near: {', '.join(lacking)}." if lacking else " None is left out."
     return (
         f"Instants at {show_rate(comb.fps)}: number {start_number} + k shows {comb.first_s:.7g} s + k / {comb.fps} on "
-        f"the camera's clock. Delivered are {shown}.{rest}"
+        f"{clock}. Delivered are {shown}.{rest}"
     )
 
 

@@ -59,6 +59,7 @@ def normals(
     align: Align = "auto",
     fps: str | float | Fraction = "round",
     shutter: float | None = None,
+    resync: Path | str | None = None,
     denoise: int = 1,
     preset: Program | None = None,
     space: SpaceName | None = None,
@@ -109,8 +110,9 @@ def normals(
       everywhere, "none" leaves them. ``fps``: one result per "round", per "flash", per camera "frame", or so many a
       second, exactly (a Fraction; whole or decimal numbers are taken as they are written), at most as many as the
       camera took. ``shutter``: the angle, up to 360 degrees of such a rate, for which a shutter is open in beauty and
-      plates; surfaces are those of its middle. ``denoise``: average up to so many results, 1 to 64, where nothing
-      moves.
+      plates; surfaces are those of its middle. ``resync``: a clocks.json of several cameras (``sync_cameras``), which
+      then show the same instants of such a rate under the same numbers. ``denoise``: average up to so many results, 1
+      to 64, where nothing moves.
 
     What is written, into the folder ``out`` (float16 EXR sequences, numbered from ``start_number``):
 
@@ -178,7 +180,8 @@ def normals(
         require_usd()
     _check_numbers(near_iterations=near_iterations, depth=depth, depth_scale=depth_scale, denoise=denoise)
     take = open_take(clip_path, plan=path_if_given("plan", plan), frames=frames)
-    over_time = OverTime(aligning=Aligning(align=align, rate=rate_of(fps, take.plan, shutter=shutter)), denoise=denoise)
+    rate = rate_of(fps, take.plan, shutter=shutter, resync=path_if_given("resync", resync), clip=take.clip.name)
+    over_time = OverTime(aligning=Aligning(align=align, rate=rate), denoise=denoise)
     say_of_clip(take.clip, caller)
     over_time.check(take.plan)
     lighting = read_lighting(

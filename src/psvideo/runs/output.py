@@ -11,6 +11,7 @@ from psvideo.clip import Clip, Take
 from psvideo.errors import UsageError
 from psvideo.export.space import CAMERA_SPACE, Space
 from psvideo.export.tags import Tags, sha256_of
+from psvideo.formats.clocks_json import read_clocks
 from psvideo.formats.plan_toml import parse_fps
 from psvideo.formats.whole_folders import refuse_folder, whole_folder
 from psvideo.model.choices import Rate
@@ -77,21 +78,28 @@ def sequence_fps(plan: Plan, rate: Rate | Comb = "round") -> Fraction:
     return Fraction(results * len(plan.dark_rounds) / plan.cycle_s).limit_denominator(100_000)
 
 
-def rate_of(fps: str | float | Fraction, plan: Plan, *, shutter: float | None = None) -> Rate | Comb:
-    """Return which instants are asked for: by a word, or by a rate. Raises UsageError where there are none such."""
+def rate_of(
+    fps: str | float | Fraction, plan: Plan, *, shutter: float | None = None, resync: Path | None = None, clip: str = ""
+) -> Rate | Comb:
+    """Return which instants are asked for: by a word, or by a rate; with ``resync``, a clocks.json, those that other
+    cameras show too of this ``clip``. Raises UsageError where there are none such."""
     if fps in ("round", "flash") and shutter is not None:
         raise UsageError("`shutter` is open for a share of a steady rate's time: add `fps`, such as 24 or frame.")
+    if fps in ("round", "flash", "frame") and resync is not None:
+        raise UsageError("`resync`: cameras share the instants of a steady rate. Add `fps`, such as 24.")
     if fps == "round":
         return "round"
     if fps == "flash":
         return "flash"
+    camera = plan.camera
     if fps == "frame":
-        return comb_of(plan.camera.fps, plan.camera, shutter_deg=shutter)
+        return comb_of(camera.fps, camera, shutter_deg=shutter)
     try:
         exact = parse_fps(str(fps))
     except ValueError as fault:
         raise UsageError(f"`fps` {fps}: {fault}; or one of round, flash, frame.") from None
-    return comb_of(exact, plan.camera, shutter_deg=shutter)
+    clocks = None if resync is None else read_clocks(resync)
+    return comb_of(exact, camera, shutter_deg=shutter, clocks=clocks, clip=clip)
 
 
 def tags_of(clip: Clip, rig_path: Path | None = None, space: Space = CAMERA_SPACE, rate: Rate | Comb = "round") -> Tags:

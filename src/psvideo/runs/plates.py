@@ -18,11 +18,12 @@ from psvideo.model.choices import Codec, Compression, Preview, SplitMethod
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Rig
 from psvideo.model.timing import Timing
+from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.beauty import BEAUTY, Mix, beauty_of
 from psvideo.plates.gather import first_ambient, gather
 from psvideo.plates.sequence import AMBIENT, round_numbers
 from psvideo.report.run_report import RunReport
-from psvideo.runs.delivering import plates_of
+from psvideo.runs.delivering import plates_of, say_instants
 from psvideo.runs.handover import Finished, write_previews, write_timeline
 from psvideo.runs.look import look_at_plates
 from psvideo.runs.output import Output, folder_of, tags_of
@@ -68,16 +69,19 @@ def split_run(
     *,
     method: SplitMethod = "weights",
     extras: Extras = Extras(),
+    aligning: Aligning | None = None,
     known: Rig | None = None,
     watch: Watch = unwatched,
 ) -> SplitResult:
     """Write one sequence per light, ambient where there are dark slots, timing.json and the report.
 
-    ``known`` is the rig, if there is one, to be held against the plates.
+    ``aligning`` brings plates to instants of a rate; left out, every plate shows its own flash. ``known`` is the rig,
+    if there is one, to be held against the plates.
     """
     clip = take.clip
     observed, picture = observing(take, known), None
-    tags = tags_of(clip)
+    tags = tags_of(clip, rate="round" if aligning is None else aligning.rate)
+    say_instants(take, timing, aligning, output)
     extras.check(clip.plan)
     written: set[str] = set()
     times_s: list[float] = []
@@ -92,6 +96,7 @@ def split_run(
         gathered = gather(
             take,
             timing,
+            aligning=aligning,
             method=method,
             start_number=output.start_number,
             watch=watch,
@@ -115,7 +120,8 @@ def split_run(
             del one, plate, sums  # they would be held while the next round gathers
         if picture is None:
             raise PsvideoError(nothing_complete(clip, timing))
-        timing = _with_plates(timing, clip.name, written, start_number=output.start_number)
+        if aligning is None:
+            timing = _with_plates(timing, clip.name, written, start_number=output.start_number)
         write_text(folder / "timing.json", format_timing(timing))
         report = run_report(take, timing, observed, output)
         write_report(folder, report, [("One round", picture)])

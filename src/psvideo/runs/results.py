@@ -24,15 +24,15 @@ from psvideo.model.rig import Rig
 from psvideo.model.timing import Timing
 from psvideo.plates.align.comb import Comb
 from psvideo.plates.align.rounds import Aligning
-from psvideo.plates.gather import first_ambient, gather, scheduled
+from psvideo.plates.gather import first_ambient, gather
 from psvideo.plates.sequence import AMBIENT, coming
 from psvideo.report.observe.observed import InstantFacts
 from psvideo.report.run_report import RunReport
 from psvideo.runs.delivering import (
     check_delivery,
-    instants_said,
     pass_doubts,
     passes_asked,
+    say_instants,
     surface_job,
     world_doubts,
     write_plates,
@@ -127,11 +127,9 @@ def normals_run(
     if lighting.masks is not None and over_time.aligning.rate == "round":
         coming_rounds = coming(clip.plan, timing.flashes, start=output.start_number).items()
         lighting.masks.check(number for number, lights in coming_rounds if lights >= set(clip.plan.lights))
-    due = scheduled(take, timing, over_time.aligning, start_number=output.start_number)
-    if due is not None and isinstance(over_time.aligning.rate, Comb):
-        output.caller.say(instants_said(over_time.aligning.rate, due, output.start_number))
-        if lighting.masks is not None:
-            lighting.masks.check(iter(due.numbers))
+    due = say_instants(take, timing, over_time.aligning, output)
+    if due is not None and lighting.masks is not None:
+        lighting.masks.check(iter(due.numbers))
     tags = tags_of(clip, lighting.rig_path, delivery.space, over_time.aligning.rate)
     shaping = lighting.shaping if delivery.needs_depth else None
     observed = observing(take, lighting.rig, lighting.masks)

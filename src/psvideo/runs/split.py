@@ -1,6 +1,7 @@
 """The whole of ``psvideo split``: a clip in, a folder of plates out."""
 
 from collections.abc import Mapping, Sequence
+from fractions import Fraction
 from pathlib import Path
 
 from psvideo.clip import decoded_once
@@ -9,13 +10,15 @@ from psvideo.errors import UsageError
 from psvideo.formats.paths import path_if_given, path_of
 from psvideo.formats.rig_toml import read_rig
 from psvideo.model.choices import Codec, Compression, PlatesPreview, SplitMethod
+from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.beauty import mix_of
 from psvideo.plates.sequence import FIRST_NUMBER
 from psvideo.plates.timed import timing_of
 from psvideo.report.run_report import RunReport
 from psvideo.runs.caller import PYTHON, Caller, say_kept, say_of_clip
-from psvideo.runs.output import Output
+from psvideo.runs.output import Output, rate_of
 from psvideo.runs.plates import Extras, split_run
+from psvideo.runs.results import OverTime
 from psvideo.sync.open_take import open_take
 
 
@@ -33,6 +36,9 @@ def split(
     beauty: bool = False,
     with_ambient: bool = False,
     weight: Mapping[str, float] | None = None,
+    fps: str | float | Fraction = "round",
+    shutter: float | None = None,
+    resync: Path | str | None = None,
     preview: Sequence[PlatesPreview] = (),
     preview_codec: Codec = "vp9",
     compression: Compression = "zip",
@@ -54,6 +60,10 @@ def split(
       ``weight`` says (by name; 1 where not named), with ambient light where ``with_ambient``. ``preview``: movies for
       eyes, coded as ``preview_codec``. ``compression``: how EXR files are packed,
       always without loss: "zip", "zips", "piz", "rle" or "none".
+    - ``fps``: plates of one instant per "flash", per camera "frame", or so many a second, exactly, brought there by
+      the alignment; left out, every plate shows its own flash. ``shutter``: the angle, up to 360 degrees of such a
+      rate, for which a shutter is open in them. ``resync``: a clocks.json of several cameras (``sync_cameras``), which
+      then show the same instants of such a rate under the same numbers.
     - ``start_number``: the number of the first round's files. ``force`` replaces an ``out`` that exists; ``resume``
       goes on where a run that was stopped left off, and raises AllDoneError where none was and ``out`` is finished.
 
@@ -91,13 +101,25 @@ def split(
     take = open_take(path_of("clip", clip), plan=path_if_given("plan", plan), frames=frames)
     say_of_clip(take.clip, caller)
     extras.check(take.plan)
+    rate = rate_of(fps, take.plan, shutter=shutter, resync=path_if_given("resync", resync), clip=take.clip.name)
+    over_time = OverTime(aligning=Aligning(rate=rate))
+    over_time.check(take.plan)
     known = None if rig is None else read_rig(path_of("rig", rig), plan_lights=take.plan.lights)
     given = path_if_given("timing", timing)
-    output = output.given(take, given, first_light, known, method, extras)
+    output = output.given(take, given, first_light, known, method, extras, over_time)
     with decoded_once(take, output=output.folder) as kept:
         found = timing_of(kept, given, first_light=first_light, rig=known, watch=watch).spelled(caller.spell)
         for note in found.notes:
             caller.warn(note)
-        done = split_run(kept, found, output, method=method, extras=extras, known=known, watch=watch)
+        done = split_run(
+            kept,
+            found,
+            output,
+            method=method,
+            extras=extras,
+            aligning=None if rate == "round" else over_time.aligning,
+            known=known,
+            watch=watch,
+        )
         say_kept(kept.kept, caller)
     return done.report

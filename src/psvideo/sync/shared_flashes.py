@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.model.camera_clocks import CameraClock, CameraClocks
+from psvideo.model.camera_clocks import CameraClock, CameraClocks, Numbering
 from psvideo.model.marker import cycle_places
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
@@ -57,8 +57,14 @@ def camera_clocks(takes: Sequence[CameraTake], *, starts_s: Sequence[float] | No
         number = _chosen(first, take, possible, wanted_s)
         cameras.append(_clock(first, take, number))
         notes += _notes(first.timing, take.timing, cameras[-1])
-    numbering = "marker" if decided else "given"
-    return CameraClocks(cameras=tuple(cameras), numbering=numbering, cycle_s=cycle_s, notes=tuple(notes))  # type: ignore[arg-type]
+    numbering: Numbering = "marker" if decided else "given"
+    return CameraClocks(
+        cameras=tuple(cameras),
+        numbering=numbering,
+        cycle_s=cycle_s,
+        first_instant_s=first.plan.camera.middle_s,
+        notes=tuple(notes),
+    )
 
 
 def _refuse_other_plan(first: CameraTake, take: CameraTake) -> None:

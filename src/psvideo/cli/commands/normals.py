@@ -50,6 +50,7 @@ from psvideo.cli.options.solving import (
     FpsOption,
     MaskPath,
     NearIterations,
+    ResyncOption,
     ShutterOption,
     SolverOption,
 )
@@ -81,6 +82,7 @@ def normals(
     align: AlignOption = "auto",
     fps: FpsOption = "round",
     shutter: ShutterOption = None,
+    resync: ResyncOption = None,
     denoise: Denoise = 1,
     float32: FloatOption = False,
     aov: AovOption = None,
@@ -124,6 +126,7 @@ def normals(
         align=align,
         fps=parse_instants(fps),
         shutter=shutter,
+        resync=resync,
         denoise=denoise,
         preset=preset,
         space=space,

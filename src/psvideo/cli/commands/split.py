@@ -22,7 +22,8 @@ from psvideo.cli.options.clip_and_run import (
     Verbose,
 )
 from psvideo.cli.options.delivery import CodecOption, CompressionOption, PlatesPreviewOption, Weights, WithAmbient
-from psvideo.cli.options.typed import parse_weights
+from psvideo.cli.options.solving import FpsOption, ResyncOption, ShutterOption
+from psvideo.cli.options.typed import parse_instants, parse_weights
 from psvideo.model.choices import SplitMethod
 
 
@@ -42,6 +43,9 @@ def split(
     beauty: Annotated[bool, typer.Option("--beauty", help="Also write the sum of all lights.")] = False,
     with_ambient: WithAmbient = False,
     weight: Weights = None,
+    fps: FpsOption = "round",
+    shutter: ShutterOption = None,
+    resync: ResyncOption = None,
     preview: PlatesPreviewOption = None,
     preview_codec: CodecOption = "vp9",
     compression: CompressionOption = "zip",
@@ -70,6 +74,9 @@ def split(
         beauty=beauty,
         with_ambient=with_ambient,
         weight=parse_weights(weight),
+        fps=parse_instants(fps),
+        shutter=shutter,
+        resync=resync,
         preview=plain(preview),
         preview_codec=preview_codec,
         compression=compression,
@@ -83,4 +90,5 @@ def split(
     voice.say(describe_timing(report.timing))
     print_report(voice, report)
     plates = sum(flash.plate is not None for flash in report.timing.flashes)
-    voice.say(f"{out}: {counted(plates, 'plate')} written; see {out / 'report.html'}.")
+    made = counted(plates, "plate") if fps == "round" else counted(len(report.instants), "instant")
+    voice.say(f"{out}: {made} written; see {out / 'report.html'}.")

@@ -70,4 +70,11 @@ ShutterOption = Annotated[
     float | None,
     typer.Option("--shutter", help="Motion blur of this shutter angle in beauty and plates, at a rate: 180."),
 ]
+ResyncOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--resync",
+        help="The clocks.json of several cameras: all of them show the same instants of a rate under the same numbers.",
+    ),
+]
 Denoise = Annotated[int, typer.Option(min=1, max=64, help="Average up to N results where nothing moves.")]

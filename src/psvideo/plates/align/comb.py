@@ -1,8 +1,8 @@
 """Which instants of a clip are shown at a rate of its own, and from which round each is made.
 
-Instant ``k`` is ``first_s + k / fps`` on the camera's clock, exactly; its file has the number ``start + k``. An instant
-belongs to the whole round whose middle is nearest: then every light flashed before and after it, in that round and
-one beside it.
+Instant ``k`` is ``first_s + k / fps`` on the camera's clock, exactly, or on the clock of the first of several cameras,
+where all are to show the same instants; its file has the number ``start + k``. An instant belongs to the whole round
+whose middle is nearest: then every light flashed before and after it, in that round and one beside it.
 """
 
 from collections.abc import Mapping
@@ -13,6 +13,7 @@ import numpy as np
 
 from psvideo.errors import UsageError
 from psvideo.model.camera import Camera
+from psvideo.model.camera_clocks import CameraClock, CameraClocks
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Flash
 from psvideo.plates.sequence import coming, round_numbers
@@ -28,30 +29,48 @@ REACH = 0.75
 class Comb:
     """Instants at a steady rate: number ``k``, from 0, is at ``first_s + k / fps`` on the camera's clock.
 
-    ``open_s`` is how long a shutter is to be open about each, 0 where results are to be sharp.
+    ``open_s`` is how long a shutter is to be open about each, 0 where results are to be sharp. ``clock`` is the
+    camera's against another one's, on whose clock the instants are then steady.
     """
 
     fps: Fraction
     first_s: float
     open_s: float = 0.0
+    clock: CameraClock | None = None
 
     def time_s(self, k: int) -> float:
-        """Return instant ``k`` in seconds."""
-        return self.first_s + float(k / self.fps)
+        """Return instant ``k`` in seconds on the camera's clock."""
+        return self._on_camera(self.first_s + float(k / self.fps))
 
     def samples_s(self, k: int) -> list[float]:
         """Return the instants that instant ``k`` is made of: itself, or those of an opening about it, ascending."""
-        time_s = self.time_s(k)
         if not self.open_s:
-            return [time_s]
-        return [time_s + self.open_s * ((j - SAMPLES // 2) / SAMPLES) for j in range(SAMPLES)]
+            return [self.time_s(k)]
+        steady_s = self.first_s + float(k / self.fps)
+        return [self._on_camera(steady_s + self.open_s * ((j - SAMPLES // 2) / SAMPLES)) for j in range(SAMPLES)]
+
+    def count_until(self, end_s: float) -> int:
+        """Return how many instants come up to a time on the camera's clock."""
+        steady_s = end_s if self.clock is None else float(self.clock.reference_s(np.float64(end_s)))
+        return max(int((steady_s - self.first_s) * self.fps) + 1, 0)
+
+    def _on_camera(self, steady_s: float) -> float:
+        return steady_s if self.clock is None else float(self.clock.camera_s(np.float64(steady_s)))
 
 
-def comb_of(fps: Fraction, camera: Camera, *, shutter_deg: float | None = None) -> Comb:
+def comb_of(
+    fps: Fraction,
+    camera: Camera,
+    *,
+    shutter_deg: float | None = None,
+    clocks: CameraClocks | None = None,
+    clip: str = "",
+) -> Comb:
     """Return the instants of a rate, the first in the middle of the clip's first frame: of its middle row's exposure.
 
-    ``shutter_deg`` opens a shutter about each. Raises UsageError where a rate is above the camera's, and where an angle
-    is none.
+    ``shutter_deg`` opens a shutter about each. With ``clocks`` they are those of the reference's clip, seen by the
+    ``clip`` of that name: all cameras show the same instants under the same numbers. Raises UsageError where a rate is
+    above the camera's, where an angle is none, and where the clocks are others'.
     """
     if shutter_deg is not None and not 0 < shutter_deg <= MOST_DEG:
         raise UsageError(f"`shutter` {shutter_deg:g}: expected an angle above 0 and up to {MOST_DEG:g} degrees.")
@@ -60,8 +79,10 @@ def comb_of(fps: Fraction, camera: Camera, *, shutter_deg: float | None = None) 
             f"`fps` {fps}: the camera took {camera.fps} frames a second, and nothing more often can be known of the "
             "scene. Give at most that, or `fps` frame."
         )
-    first_s = 0.5 * (camera.exposure_s + abs(camera.readout_s or 0.0))
-    return Comb(fps=fps, first_s=first_s, open_s=(shutter_deg or 0.0) / MOST_DEG / float(fps))
+    open_s = (shutter_deg or 0.0) / MOST_DEG / float(fps)
+    if clocks is None:
+        return Comb(fps=fps, first_s=camera.middle_s, open_s=open_s)
+    return Comb(fps=fps, first_s=clocks.first_instant_s, open_s=open_s, clock=clocks.of(clip))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,7 +106,7 @@ def schedule_of(plan: Plan, flashes: tuple[Flash, ...], comb: Comb, *, start: in
     for flash, number in zip(flashes, round_numbers(flashes, start=start), strict=True):
         if flash.complete and flash.lit and lights[number] >= {*plan.lights}:
             times_s.setdefault(number, []).append(flash.start_s + 0.5 * flash.duration_s)
-    count = int((end_s - comb.first_s) * comb.fps) + 1
+    count = comb.count_until(end_s)
     if not times_s:
         return Schedule(by_round={}, left_out=(count, 0, 0))
     numbers = list(times_s)
