@@ -368,7 +368,7 @@ def test_the_shipped_scenes_are_found_by_name(tmp_path: Path, monkeypatch: pytes
         assert scene_file(Path(path.stem)) == builtin_scene(path.stem)
         assert builtin_scene(path.stem).read_bytes() == path.read_bytes()
     assert set(builtin_scenes()) == {path.stem for path in SCENES} >= {"bust", "fan", "still_life", "sphere", "gloss"}
-    with pytest.raises(PsvideoError, match=r"bist: is neither a file nor .*those are bust, fan, gloss"):
+    with pytest.raises(PsvideoError, match=r"bist: is neither a file nor .*those are bust, colour, fan"):
         scene_file(Path("bist"))
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from psvideo.clip.kept import Kept, keeping_near
 from psvideo.clip.record import Clip
 from psvideo.errors import check_kind
+from psvideo.model.colours import Unmixing
 from psvideo.model.plan import Plan
 
 
@@ -23,16 +24,25 @@ class Take:
         Of the frames to use.
     kept
         Holds pictures that are decoded already, and takes those that will be looked at again.
+    unmixing
+        How flashes of several colours are taken apart; the clip's plan is then as results show it. None: they are not.
     """
 
     clip: Clip
     numbers: tuple[int, ...]
     kept: Kept | None = None
+    unmixing: Unmixing | None = None
 
     @property
     def plan(self) -> Plan:
-        """The plan that the strobe played."""
+        """The plan that the strobe played, with the lights that results show."""
         return self.clip.plan
+
+    def unmixed(self, unmixing: Unmixing | None) -> "Take":
+        """Return the take with its flashes taken apart by colour, once its timing was found."""
+        if unmixing is None:
+            return self
+        return replace(self, clip=replace(self.clip, plan=unmixing.shown), unmixing=unmixing)
 
 
 def check_take(take: object) -> None:

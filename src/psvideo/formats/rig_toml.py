@@ -29,6 +29,8 @@ DECIMAL_COMMA = re.compile(r"-?\d+,\d+")
 Triple = Annotated[list[float], Field(min_length=3, max_length=3)]
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
 Strength = Annotated[float, Field(gt=0)]
+Share = Annotated[float, Field(ge=0)]
+Colour = Annotated[list[Share], Field(min_length=3, max_length=3)]
 
 
 class _RigLight(Contract):
@@ -40,6 +42,7 @@ class _RigLight(Contract):
     reference_duration_s: float | None = Field(default=None, gt=0)
     anisotropy: float | None = Field(default=None, ge=0)
     axis: Triple | None = None
+    colour: Colour | None = None
 
     @field_validator("name")
     @classmethod
@@ -59,6 +62,10 @@ class _RigLight(Contract):
                 raise ValueError(
                     f"light {self.name!r}: {key} has length {length:.4g}, expected a unit vector (length 1)"
                 )
+        if self.colour is not None and not any(self.colour):
+            raise ValueError(
+                f"light {self.name!r}: colour is black; expected what red, green and blue see of it on a white card"
+            )
         away_m = 0.0 if self.position_m is None else float(np.linalg.norm(self.position_m))
         if away_m > FARTHEST_LIGHT_M:
             raise ValueError(
@@ -74,7 +81,8 @@ class _View(Contract):
 
 
 class _Surface(Contract):
-    plane: Annotated[list[float], Field(min_length=4, max_length=4)]
+    plane: Annotated[list[float], Field(min_length=4, max_length=4)] | None = None
+    colour: Annotated[list[Strength], Field(min_length=3, max_length=3)] | None = None
 
 
 class _RigFile(Contract):
@@ -169,12 +177,13 @@ def _in_front(rig: Rig, path: Path) -> Rig:
 def parse_rig(text: str, *, source: str = "rig") -> Rig:
     """Read a rig from TOML text; ``source`` is what messages call it."""
     file = parse_toml(text, _RigFile, SCHEMA, source=source)
-    view, surface = file.camera, file.surface
+    view, surface = file.camera, file.surface or _Surface()
     return Rig(
         lights=tuple(_light(light) for light in file.light),
         focal_px=None if view.focal_px is None else (view.focal_px[0], view.focal_px[1]),
         principal_px=None if view.principal_px is None else (view.principal_px[0], view.principal_px[1]),
-        plane=None if surface is None else (surface.plane[0], surface.plane[1], surface.plane[2], surface.plane[3]),
+        plane=None if (at := surface.plane) is None else (at[0], at[1], at[2], at[3]),
+        surface_colour=None if surface.colour is None else _vector(surface.colour),
     )
 
 
@@ -189,6 +198,7 @@ def _light(file: _RigLight) -> Light:
         reference_duration_s=file.reference_duration_s,
         anisotropy=file.anisotropy,
         axis=None if file.axis is None else _unit(file.axis),
+        colour=None if file.colour is None else _vector(file.colour),
     )
 
 
@@ -273,15 +283,17 @@ def format_rig(rig: Rig) -> str:
     view = {"focal_px": rig.focal_px, "principal_px": rig.principal_px}
     if any(view.values()):
         document["camera"] = {key: list(pair) for key, pair in view.items() if pair}
-    if rig.plane:
-        document["surface"] = {"plane": list(rig.plane)}
+    surface = {"plane": rig.plane, "colour": rig.surface_colour}
+    if any(surface.values()):
+        document["surface"] = {key: list(values) for key, values in surface.items() if values}
     return tomlkit.dumps(document)
 
 
 def _light_table(light: Light) -> tomlkit.items.Table:
     table = tomlkit.table()
     table["name"] = light.name
-    for key in ("direction", "position_m", "intensity", "error_deg", "reference_duration_s", "anisotropy", "axis"):
+    keys = ("direction", "position_m", "intensity", "colour", "error_deg", "reference_duration_s", "anisotropy", "axis")
+    for key in keys:
         value = getattr(light, key)
         if key == "intensity" and len(value) == 1:
             value = value[0]

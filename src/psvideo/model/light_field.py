@@ -63,7 +63,7 @@ def points_on_plane(plan: Plan, rig: Rig, *, down: FloatArray, across: FloatArra
 
 def _strength(light: Light, points: Points) -> FloatArray:
     """Return a light's intensity in each point's channel; its mean where it was measured in other channels."""
-    strengths = np.array(light.intensity, np.float64)
+    strengths = np.array(light.by_channel, np.float64)
     if len(strengths) == points.channels:
         chosen: FloatArray = strengths[points.channel]
         return chosen

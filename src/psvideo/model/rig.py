@@ -46,6 +46,8 @@ class Light:
         For how long the light shone when its intensity was measured; None means as long as the plan flashes it.
     anisotropy, axis
         Of a near light: it falls off with this power of the cosine from its axis, the unit vector the way it shines.
+    colour
+        Of a coloured light: how much of its intensity the camera's red, green and blue see on white. None: white.
     """
 
     name: str
@@ -56,6 +58,7 @@ class Light:
     reference_duration_s: float | None = None
     anisotropy: float | None = None
     axis: Vector | None = None
+    colour: Vector | None = None
 
     def __post_init__(self) -> None:
         if np.ndim(self.intensity) != 1:
@@ -67,12 +70,22 @@ class Light:
             given = getattr(self, name)
             if given is not None:
                 three_numbers(name, given, "three numbers (x, y, z): x right, y up, z towards the camera")
+        if self.colour is not None:
+            three_numbers("colour", self.colour, "what red, green and blue see of the light: three numbers from 0 on")
         if (self.direction is None) == (self.position_m is None):
             both = "neither" if self.direction is None else "both"
             raise UsageError(
                 f"Light {self.name!r} has {both} of `direction` and `position_m`; expected a direction of a distant "
                 "light, or the position of a near one."
             )
+
+    @property
+    def by_channel(self) -> tuple[float, ...]:
+        """The intensity in the camera's channels: times the colour, where the light has one."""
+        if self.colour is None:
+            return self.intensity
+        strengths = self.intensity if len(self.intensity) == 3 else self.intensity[:1] * 3
+        return tuple(strength * part for strength, part in zip(strengths, self.colour, strict=True))
 
 
 @dataclass(frozen=True)
@@ -87,6 +100,9 @@ class Rig:
         The lens: focal lengths (x, y) and principal point (col, row) in pixels; None where it is not known.
     plane
         (a, b, c, d) of the plane a x + b y + c z + d = 0 in which the subject stands, camera's frame, in metres.
+    surface_colour
+        What is known of the subject's colour, red, green and blue in any unit: needed where one flash of several
+        colours is all there is. None: not known.
     """
 
     lights: tuple[Light, ...]
@@ -94,6 +110,7 @@ class Rig:
     focal_px: tuple[float, float] | None = None
     principal_px: tuple[float, float] | None = None
     plane: tuple[float, float, float, float] | None = None
+    surface_colour: Vector | None = None
 
     def __post_init__(self) -> None:
         given: object = self.lights
@@ -152,9 +169,10 @@ def intensities(lights: Sequence[Light], channels: int) -> FloatArray:
     Raises PsvideoError where a light has another count of channels than the pictures.
     """
     for light in lights:
-        if len(light.intensity) not in (1, channels):
+        if len(light.by_channel) not in (1, channels):
+            what = "intensities" if light.colour is None else "channels in its colour"
             raise PsvideoError(
-                f"Light {light.name!r} has {len(light.intensity)} intensities and the pictures have {channels} "
+                f"Light {light.name!r} has {len(light.by_channel)} {what} and the pictures have {channels} "
                 "channel(s); expected one number, or one per channel."
             )
-    return np.array([np.broadcast_to(light.intensity, channels) for light in lights], np.float64)
+    return np.array([np.broadcast_to(light.by_channel, channels) for light in lights], np.float64)

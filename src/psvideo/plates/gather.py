@@ -33,6 +33,7 @@ from psvideo.plates.mixture import made
 from psvideo.plates.nearest_rows import has_blind_time, with_nearest_rows
 from psvideo.plates.sequence import AMBIENT, FIRST_NUMBER, Round, check_separable, coming, gathered, light_plates
 from psvideo.plates.split import Plate, plate_of, split
+from psvideo.plates.unmixed import slot_names, slot_plates, unmixed
 from psvideo.plates.upright import upright
 
 AnyPlate = TypeVar("AnyPlate", Plate, LightPlate)
@@ -109,10 +110,16 @@ def gather(
     check_take(take)
     check_kind("timing", timing, Timing, "a Timing: ps.find_timing(take) or ps.read_timing(path) gives one")
     plan, flashes = take.plan, timing.flashes
-    check_separable(plan)
+    if take.unmixing is None:
+        check_separable(plan)
     made = clip_plates(take, timing, method=method, watch=watch, each_window=each_window)
     single, turn = _shown(made, each_flash), take.clip.turn
-    plates = light_plates(single, plan, flashes, start=start_number)
+    names = plan.lights if take.unmixing is None else slot_names(plan)
+    plates = (
+        light_plates(single, plan, flashes, start=start_number)
+        if take.unmixing is None
+        else slot_plates(single, flashes, start=start_number)
+    )
     borrows = aligning is not None and plan.mode != "synced" and has_blind_time(timed_camera(plan, timing))
     if borrows and turn.transposed:  # rows are borrowed while they are rows
         plates, borrows = with_nearest_rows(plates), False
@@ -122,10 +129,18 @@ def gather(
     if aligning is not None:
         plates = with_nearest_rows(plates) if borrows else plates
         due = scheduled(take, timing, aligning, start_number=start_number)
-        rounds = aligned(plates, plan.lights, aligning, first=start_number, with_ambient=with_ambient, schedule=due)
+        rounds = aligned(plates, names, aligning, first=start_number, with_ambient=with_ambient, schedule=due)
+        rounds = _apart(rounds, take)
         return opened(rounds) if isinstance(aligning.rate, Comb) and aligning.rate.open_s else rounds
-    names = coming(plan, flashes, start=start_number)
-    return gathered(plates, plan.lights, expected=names.__getitem__)
+    if take.unmixing is not None:
+        return _apart(gathered(plates, names, expected=lambda _: {*names, AMBIENT}, whole=True), take)
+    expected = coming(plan, flashes, start=start_number)
+    return gathered(plates, names, expected=expected.__getitem__)
+
+
+def _apart(rounds: Iterator[Round], take: Take) -> Iterator[Round]:
+    """Take a round's flashes apart by colour, where they hold several."""
+    return rounds if take.unmixing is None else map(partial(unmixed, how=take.unmixing), rounds)
 
 
 def scheduled(take: Take, timing: Timing, aligning: Aligning, *, start_number: int) -> Schedule | None:

@@ -82,7 +82,8 @@ def check_separable(plan: Plan) -> None:
     raise PsvideoError(
         f"The plan's flashes cannot separate the lights {', '.join(mixed)}: they flash together in the same "
         "mixture, or there are fewer different flashes than lights. Flash each by itself, use as many patterns as "
-        "lights, or give lights that always flash together one name."
+        "lights, or give lights that always flash together one name. Where the lights have different colours, name the "
+        "rig and give each its `colour` there: psvideo calibrate colours measures them."
     )
 
 

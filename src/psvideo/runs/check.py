@@ -16,6 +16,7 @@ from psvideo.errors import NoStrobeError, PsvideoError, UsageError
 from psvideo.formats.paths import path_if_given, path_of
 from psvideo.formats.rig_toml import read_rig
 from psvideo.model.clipping import SATURATED
+from psvideo.model.colours import unmixing_of
 from psvideo.model.plan import Plan
 from psvideo.model.timing import DroppedFrames, Timing
 from psvideo.plates.gather import gather
@@ -128,8 +129,10 @@ def judged(
         else:
             timing = timing if known is None else named_by_rig(take, timing, known)
             timing = _with_later_holes(timing, clip, window)
-            observed = observing(take, known)
-            for one in gather(take, timing, watch=watch, each_window=observed.look_at_window):
+            unmixing = None if known is None else unmixing_of(clip.plan, known, channels=clip.channels)
+            apart = take.unmixed(unmixing)
+            observed = observing(apart, known if unmixing is None else unmixing.rig)
+            for one in gather(apart, timing, watch=watch, each_window=observed.look_at_window):
                 observed.add(one)
                 del one
             if not observed.facts:
@@ -138,7 +141,7 @@ def judged(
                     "a round needs as many frames as it has flashes, and one or two more."
                 )
             seen = Judgement(subject="strobe", grade="good", found=_strobe_words(clip.plan, timing))
-            lines = (seen, *judgements(clip.plan, timing, observed), *_steady_later(take, later))
+            lines = (seen, *judgements(apart.plan, timing, observed), *_steady_later(take, later))
             notes = timing.notes
     return Check(
         clip=clip.name,

@@ -11,6 +11,7 @@ from psvideo.export.tags import sha256_of
 from psvideo.formats.flat_toml import read_falloff
 from psvideo.formats.rig_toml import read_rig
 from psvideo.model.choices import NEAR_ITERATIONS
+from psvideo.model.colours import Unmixing, unmixing_of
 from psvideo.model.falloff import Falloff
 from psvideo.model.intensity import lights_as_planned
 from psvideo.model.rig import Light, Rig
@@ -26,11 +27,14 @@ UNSURE_DEG = 5.0
 @dataclass(frozen=True, kw_only=True)
 class Lighting:
     """What is solved with, read and checked before a long run begins: the rig, for near lights where the surface is
-    taken to be, what is known of its depth, and where to solve."""
+    taken to be, what is known of its depth, and where to solve. Where flashes hold several colours, ``unmixing`` takes
+    them apart, ``rig`` holds the lamps that results show, and ``flashed`` the lights as they flash."""
 
     rig_path: Path
     rig: Rig
     condition: float
+    unmixing: Unmixing | None = None
+    flashed: Rig | None = None
     near: NearSurface | None = None
     masks: Masks | None = None
     depths: DepthMaps | None = None
@@ -111,9 +115,12 @@ def read_lighting(
     Raises PsvideoError where they do not fit the plan, or give no normals.
     """
     clip = take.clip
-    check_separable(clip.plan)
-    rig = read_rig(rig_path, plan_lights=clip.plan.lights)
-    lights = lights_as_planned(rig, clip.plan)
+    flashed = read_rig(rig_path, plan_lights=clip.plan.lights)
+    unmixing = unmixing_of(clip.plan, flashed, channels=clip.channels)
+    if unmixing is None:
+        check_separable(clip.plan)
+    rig, plan = (flashed, clip.plan) if unmixing is None else (unmixing.rig, unmixing.shown)
+    lights = lights_as_planned(rig, plan)
     depths = None if depth_path is None else _read_depth(take, rig, depth_path, metres_per_unit)
     if near_iterations is None:
         near_iterations = NEAR_ITERATIONS if depths is None else 0
@@ -125,7 +132,15 @@ def read_lighting(
     masks = None if mask_path is None else open_masks(mask_path, **size)
     falloff = None if flat_path is None else _read_falloff(flat_path, take, lights)
     return Lighting(
-        rig_path=rig_path, rig=rig, condition=lit.condition, near=near, masks=masks, depths=depths, falloff=falloff
+        rig_path=rig_path,
+        rig=rig,
+        condition=lit.condition,
+        unmixing=unmixing,
+        flashed=flashed,
+        near=near,
+        masks=masks,
+        depths=depths,
+        falloff=falloff,
     )
 
 

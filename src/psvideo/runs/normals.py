@@ -183,7 +183,6 @@ def normals(
     rate = rate_of(fps, take.plan, shutter=shutter, resync=path_if_given("resync", resync), clip=take.clip.name)
     over_time = OverTime(aligning=Aligning(align=align, rate=rate), denoise=denoise)
     say_of_clip(take.clip, caller)
-    over_time.check(take.plan)
     lighting = read_lighting(
         take,
         rig_path,
@@ -193,12 +192,13 @@ def normals(
         metres_per_unit=depth_scale,
         flat_path=path_if_given("flat", flat),
     )
+    over_time.check(take.plan, unmixed=lighting.unmixing is not None)
     lighting.check(delivery)
     delivery = metric_delivery(delivery, asked.aov, lighting, caller)
     timing_path = path_if_given("timing", timing)
     output = output.given(take, timing_path, first_light, solver, fill, over_time, delivery, *lighting.identity)
     with decoded_once(take, output=output.folder) as kept:
-        found = timing_of(kept, timing_path, first_light=first_light, rig=lighting.rig, watch=watch).spelled(
+        found = timing_of(kept, timing_path, first_light=first_light, rig=lighting.flashed, watch=watch).spelled(
             caller.spell
         )
         for note in found.notes:

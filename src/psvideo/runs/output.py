@@ -72,7 +72,7 @@ def sequence_fps(plan: Plan, rate: Rate | Comb = "round") -> Fraction:
     mean where dark slots come between."""
     if isinstance(rate, Comb):
         return rate.fps
-    results = len(plan.lights) if rate == "flash" else 1
+    results = len(plan.lit_slots) if rate == "flash" else 1
     if plan.mode == "synced":
         return results * plan.camera.fps / len(plan.flashes)
     return Fraction(results * len(plan.dark_rounds) / plan.cycle_s).limit_denominator(100_000)

@@ -17,6 +17,7 @@ from psvideo.formats.whole_files import write_text
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Light, Rig
 from psvideo.model.timing import Timing
+from psvideo.plates.unmixed import slot_names
 from psvideo.report.html import report_page
 from psvideo.report.judge.light import ambient, exposure, lamps
 from psvideo.report.judge.of_rig import rig
@@ -55,7 +56,8 @@ def observing(take: Take, rig: Rig | None = None, masks: Masks | None = None) ->
     if rig is not None and not (near and None in (rig.focal_px, rig.principal_px, rig.plane)):
         size = {"height_px": clip.height_px, "width_px": clip.width_px}
         points = rig_points(clip.shown_plan, rig, channels=clip.channels, **size)
-    return Observed(lights=clip.plan.lights, masks=masks, points=points)
+    watched = "" if take.unmixing is None else slot_names(clip.plan)[0]
+    return Observed(lights=clip.plan.lights, watched=watched, masks=masks, points=points)
 
 
 def judgements(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = False) -> tuple[Judgement, ...]:

@@ -63,15 +63,17 @@ class OverTime:
     aligning: Aligning = field(default_factory=Aligning)
     denoise: int = 1
 
-    def check(self, plan: Plan) -> None:
-        """Raise UsageError where a plan has no instant of its own for every light, and one is asked for."""
+    def check(self, plan: Plan, *, unmixed: bool = False) -> None:
+        """Raise UsageError where a plan has no instant of its own for every light, and one is asked for; flashes that
+        are taken apart by colour (``unmixed``) show all their lights at once."""
         if isinstance(self.aligning.rate, Comb) and self.aligning.align == "none":
             raise UsageError(
                 "`fps` asks for instants between the flashes, and `align='none'` makes none: plates would be repeated. "
                 "Leave one of the two out."
             )
-        alone = all(len(plan.flashes[slot].lit) == 1 for slot in plan.lit_slots)
-        if self.aligning.rate == "flash" and not (alone and len(plan.lit_slots) == len(plan.lights)):
+        alone = unmixed or all(len(plan.flashes[slot].lit) == 1 for slot in plan.lit_slots)
+        once = unmixed or len(plan.lit_slots) == len(plan.lights)
+        if self.aligning.rate == "flash" and not (alone and once):
             raise UsageError(
                 '`fps="flash"` needs a plan in which every light flashes once a round, by itself; in this one lights '
                 "flash together, or several times. Leave it out: one result per round is given."
@@ -115,9 +117,10 @@ def normals_run(
     ``picture_of`` makes the picture of one round; left out, it shows plates and surface. ``beside`` writes more of
     every instant into the folder.
     """
+    take = take.unmixed(lighting.unmixing)
     clip = take.clip
     over_time = over_time or OverTime()
-    over_time.check(clip.plan)
+    over_time.check(clip.plan, unmixed=take.unmixing is not None)
     check_delivery(delivery, take, timing, output.start_number)
     if "motion" in delivery.aovs and over_time.aligning.align == "none":
         raise UsageError(

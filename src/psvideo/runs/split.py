@@ -10,6 +10,7 @@ from psvideo.errors import UsageError
 from psvideo.formats.paths import path_if_given, path_of
 from psvideo.formats.rig_toml import read_rig
 from psvideo.model.choices import Codec, Compression, PlatesPreview, SplitMethod
+from psvideo.model.colours import unmixing_of
 from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.beauty import mix_of
 from psvideo.plates.sequence import FIRST_NUMBER
@@ -100,25 +101,28 @@ def split(
     )
     take = open_take(path_of("clip", clip), plan=path_if_given("plan", plan), frames=frames)
     say_of_clip(take.clip, caller)
-    extras.check(take.plan)
     rate = rate_of(fps, take.plan, shutter=shutter, resync=path_if_given("resync", resync), clip=take.clip.name)
     over_time = OverTime(aligning=Aligning(rate=rate))
-    over_time.check(take.plan)
     known = None if rig is None else read_rig(path_of("rig", rig), plan_lights=take.plan.lights)
+    unmixing = None if known is None else unmixing_of(take.plan, known, channels=take.clip.channels)
+    extras.check(take.unmixed(unmixing).plan)
+    over_time.check(take.plan, unmixed=unmixing is not None)
     given = path_if_given("timing", timing)
     output = output.given(take, given, first_light, known, method, extras, over_time)
     with decoded_once(take, output=output.folder) as kept:
         found = timing_of(kept, given, first_light=first_light, rig=known, watch=watch).spelled(caller.spell)
         for note in found.notes:
             caller.warn(note)
+        shown = known if unmixing is None else unmixing.rig
+        apart = kept.unmixed(unmixing)
         done = split_run(
-            kept,
+            apart,
             found,
             output,
             method=method,
             extras=extras,
             aligning=None if rate == "round" else over_time.aligning,
-            known=known,
+            known=shown,
             watch=watch,
         )
         say_kept(kept.kept, caller)

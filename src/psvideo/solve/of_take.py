@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from psvideo.clip import Masks, Take, check_take
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.model.choices import NEAR_ITERATIONS, Align, Solver
+from psvideo.model.colours import unmixing_of
 from psvideo.model.intensity import lights_as_planned
 from psvideo.model.rig import Rig, check_rig
 from psvideo.model.timing import Timing
@@ -78,10 +79,12 @@ def solve(
     """
     check_take(take)
     check_rig(rig)
+    found = named_by_rig(take, timing or find_take_timing(take, watch=watch), rig)
+    if (unmixing := unmixing_of(take.plan, rig, channels=take.clip.channels)) is not None:
+        take, rig = take.unmixed(unmixing), unmixing.rig
     plan, clip = take.plan, take.clip
     lights = lights_as_planned(rig, plan)
     near = near_surface_of(rig, lights, height_px=clip.height_px, width_px=clip.width_px, iterations=NEAR_ITERATIONS)
-    found = named_by_rig(take, timing or find_take_timing(take, watch=watch), rig)
     rounds = gather(take, found, aligning=Aligning(align=align), with_ambient=False, watch=watch)
     solving = Solving(solver=solver, residual=True, error=True, fill=fill)
     masks = None if mask is None else Masks(still=mask)

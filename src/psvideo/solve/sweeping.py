@@ -123,7 +123,7 @@ def _costs(
     x, y = every_ray(ground.focal_px, ground.principal_px, *ground.depth_m.shape)
     rays = np.empty((*plane_m.shape, 3))
     rays[..., 0], rays[..., 1], rays[..., 2] = x[:, ::step], y[::step], -1
-    strengths = [float(np.mean(light.intensity)) for light in lights]
+    strengths = [float(np.mean(light.by_channel)) for light in lights]
     lamps = np.stack([np.array(strengths), field.anisotropy, field.is_near.astype(np.float64)], axis=-1)
     costs = np.empty((len(RATIOS), plane_m.size))
     dark = max(noise, LEAST)

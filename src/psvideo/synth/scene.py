@@ -108,6 +108,7 @@ class LightTable(Contract):
     direction: Triple | None = None
     position_m: Triple | None = None
     intensity: Colour = 0.8
+    colour: Annotated[list[Strength], Field(min_length=3, max_length=3)] | None = None
     anisotropy: Strength = 0.0
     axis: Triple | None = None
 

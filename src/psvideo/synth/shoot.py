@@ -55,7 +55,7 @@ def shoot(
     Parameters
     ----------
     scene
-        A scene file, or the name of one that comes with psvideo: bust, fan, gloss, sphere, still_life.
+        A scene file, or the name of one that comes with psvideo: bust, colour, fan, gloss, sphere, still_life.
     out
         The clip folder to write, whole or not at all: frames/, plan.toml and rig.toml as a camera and its crew would
         leave them, and truth/ with what only the virtual shoot knows.

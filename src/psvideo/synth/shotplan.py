@@ -88,6 +88,7 @@ def _light(table: LightTable, reference_duration_s: float | None) -> Light:
         reference_duration_s=reference_duration_s,
         anisotropy=table.anisotropy or None,
         axis=None if table.axis is None else _unit(table.axis),
+        colour=None if table.colour is None else _vector(table.colour),
     )
 
 

@@ -18,7 +18,9 @@ if TYPE_CHECKING:
 def synth(
     scene: Annotated[
         Path,
-        typer.Argument(help="A scene file, or one that comes along by its name: bust, fan, gloss, sphere, still_life."),
+        typer.Argument(
+            help="A scene file, or one that comes along by its name: bust, colour, fan, gloss, sphere, still_life."
+        ),
     ],
     out: Annotated[Path, typer.Option("-o", "--out", help="The clip folder to write.")],
     trace: Annotated[

@@ -174,9 +174,11 @@ class Observed:
 
     ``masks`` are where to look, None for all that is lit; ``points`` is where the rig is held against the plates.
     ``ambient_measured`` (window) is in which share of the picture ambient light could be measured without a dark slot.
+    ``watched`` is whose plates motion is looked for in, as they pass; left out, the first light's.
     """
 
     lights: tuple[str, ...]
+    watched: str = ""
     masks: Masks | None = None
     points: RigPoints | None = None
     facts: list[InstantFacts] = field(default_factory=list)
@@ -194,10 +196,10 @@ class Observed:
     _passed: bool = False
 
     def look(self, plate: LightPlate) -> None:
-        """Look at a plate before it is moved to one instant: motion is seen in the first light's, and ambient light in
-        the dark slots."""
+        """Look at a plate before it is moved to one instant: motion is seen in those of one light, and ambient
+        light in the dark slots."""
         self._passed = True
-        if plate.light == self.lights[0]:
+        if plate.light == (self.watched or self.lights[0]):
             self._look_for_motion(plate)
         if plate.light == AMBIENT:
             self._look_at_dark(plate)

@@ -46,7 +46,7 @@ def light_collected(view: SeenScene, light: Light) -> Colours:
 
 def irradiance(light: Light, points_m: FloatArray) -> tuple[FloatArray, FloatArray, Colours]:
     """Return per point the unit direction to the light, the distance in metres (inf where distant), the irradiance."""
-    strength = np.broadcast_to(np.asarray(light.intensity, np.float32), (3,))
+    strength = np.broadcast_to(np.asarray(light.by_channel, np.float32), (3,))
     if light.direction is not None:
         direction = np.broadcast_to(np.asarray(light.direction, np.float64), points_m.shape)
         return direction, np.full(len(points_m), np.inf), np.broadcast_to(strength, points_m.shape)

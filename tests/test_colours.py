@@ -1,0 +1,214 @@
+"""Flashes of several colours: taken apart on paper by the model's own sum, and in whole takes against the truth."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import pytest
+
+import psvideo as ps
+from psvideo.errors import PsvideoError
+from psvideo.formats.rig_toml import format_rig, parse_rig
+from psvideo.model.colours import Unmixing, lamps_of, unmixing_of
+from psvideo.model.plan import Plan, PlannedFlash
+from psvideo.model.rig import Light, Rig, Vector
+from psvideo.plates.light_plate import LightPlate
+from psvideo.plates.mixture import made
+from psvideo.plates.sequence import Round
+from psvideo.plates.unmixed import slot_names, unmixed
+
+PLACES: dict[str, Vector] = {"key": (0.6, 0.0, 0.8), "left": (-0.48, 0.36, 0.8), "top": (0.0, -0.6, 0.8)}
+COLOURS: dict[str, Vector] = {"red": (1.0, 0.1, 0.02), "green": (0.15, 1.0, 0.2), "blue": (0.02, 0.18, 1.0)}
+EXCHANGED = (("red", "green", "blue"), ("green", "blue", "red"), ("blue", "red", "green"))
+MakePlan = Callable[..., Plan]
+
+
+def rig_of(**changed: Vector) -> Rig:
+    return Rig(
+        lights=tuple(
+            Light(name=f"{place}_{name}", direction=at, intensity=(1.1,), colour=changed.get(name, colour))
+            for place, at in PLACES.items()
+            for name, colour in COLOURS.items()
+        )
+    )
+
+
+def plan_of(make_plan: MakePlan, turns: tuple[tuple[str, ...], ...]) -> Plan:
+    lit = [
+        PlannedFlash(
+            lights={f"{place}_{colour}": 1.0 for place, colour in zip(PLACES, turn, strict=True)}, duration_s=0.0008
+        )
+        for turn in turns
+    ]
+    return replace(make_plan(dark=False), flashes=(*lit, PlannedFlash(lights={}, duration_s=0.0008)))
+
+
+def scene(rng: np.random.Generator, count: int = 40) -> tuple[np.ndarray, np.ndarray]:
+    """Return normals that face all lights, and albedos of any colour, as pictures of one row."""
+    normals = rng.normal(size=(1, count, 3)) * 0.2 + (0, 0, 1)
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    return normals, rng.uniform(0.02, 0.9, (1, count, 3))
+
+
+def flashed(plan: Plan, rig: Rig, normals: np.ndarray, albedo: np.ndarray) -> Round:
+    """Add up what every flash shows, light by light and channel by channel."""
+    plates = []
+    for slot, name in zip(plan.lit_slots, slot_names(plan), strict=True):
+        image = np.zeros_like(albedo)
+        for light, power in plan.flashes[slot].lights.items():
+            one = rig.select([light])[0]
+            shade = np.maximum(normals @ np.array(one.direction), 0)
+            image += power * np.array(one.by_channel) * albedo * shade[..., None]
+        plates.append(
+            LightPlate(
+                light=name,
+                number=1001,
+                time_s=0.01 * slot,
+                picture=made(image.astype(np.float32)),
+                seen=np.ones(1, np.bool_),
+                saturation=10.0,
+            )
+        )
+    return Round(number=1001, plates=tuple(plates))
+
+
+def taken_apart(plan: Plan, rig: Rig) -> Unmixing:
+    how = unmixing_of(plan, rig, channels=3)
+    assert how is not None
+    return how
+
+
+def test_a_rig_file_keeps_colours_of_lights_and_of_the_surface() -> None:
+    rig = replace(rig_of(), surface_colour=(0.5, 0.4, 0.3))
+    assert parse_rig(format_rig(rig)) == rig
+
+
+def test_lights_in_one_place_are_a_lamp_named_by_what_their_names_begin_with(make_plan: MakePlan) -> None:
+    assert [len(lamp) for lamp in lamps_of(rig_of().lights)] == [3, 3, 3]
+    assert taken_apart(plan_of(make_plan, EXCHANGED), rig_of()).shown.lights == ("key", "left", "top")
+
+
+def test_exchanged_colours_give_each_lamp_alone_on_any_surface(make_plan: MakePlan) -> None:
+    plan, rig = plan_of(make_plan, EXCHANGED), rig_of()
+    normals, albedo = scene(np.random.default_rng(1))
+    shown = unmixed(flashed(plan, rig, normals, albedo), taken_apart(plan, rig))
+    assert shown.lights == ("key", "left", "top")
+    for plate in shown.plates:
+        truth = albedo * (normals @ np.array(PLACES[plate.light]))[..., None]
+        np.testing.assert_allclose(plate.image, truth, atol=1e-5)
+
+
+def test_one_flash_gives_its_lights_where_the_surface_s_colour_is_known(make_plan: MakePlan) -> None:
+    plan, rig = plan_of(make_plan, EXCHANGED[:1]), replace(rig_of(), surface_colour=(0.6, 0.3, 0.15))
+    normals, _ = scene(np.random.default_rng(2))
+    albedo = np.broadcast_to(np.array([0.6, 0.3, 0.15]), normals.shape)
+    shown = unmixed(flashed(plan, rig, normals, albedo), taken_apart(plan, rig))
+    assert shown.lights == ("key_red", "left_green", "top_blue")
+    for plate in shown.plates:
+        truth = albedo * (normals @ np.array(PLACES[plate.light.split("_")[0]]))[..., None]
+        np.testing.assert_allclose(plate.image, truth, atol=1e-5)
+
+
+def test_a_clipped_sample_clips_what_it_counts_in(make_plan: MakePlan) -> None:
+    plan, rig = plan_of(make_plan, EXCHANGED), rig_of()
+    normals, albedo = scene(np.random.default_rng(3))
+    shot = flashed(plan, rig, normals, albedo)
+    first = shot.plates[0]
+    image = first.image.copy()
+    image[0, 7, 1] = first.saturation
+    shot = replace(shot, plates=(replace(first, picture=made(image)), *shot.plates[1:]))
+    for plate in unmixed(shot, taken_apart(plan, rig)).plates:
+        assert plate.image[0, 7, 1] >= plate.saturation
+        assert plate.image[0, 7, 0] < plate.saturation
+        assert (np.delete(plate.image, 7, axis=1) < plate.saturation).all()
+
+
+def test_colours_that_cannot_be_separated_are_refused(make_plan: MakePlan) -> None:
+    orange = rig_of(green=(0.97, 0.14, 0.02))
+    with pytest.raises(PsvideoError, match=r"condition number of their colours is .* key_red and left_green are most"):
+        unmixing_of(plan_of(make_plan, EXCHANGED[:1]), orange, channels=3)
+    with pytest.raises(PsvideoError, match=r"monochrome camera cannot tell colours apart"):
+        unmixing_of(plan_of(make_plan, EXCHANGED), rig_of(), channels=1)
+    plain = rig_of()
+    some = replace(plain, lights=(replace(plain.lights[0], colour=None), *plain.lights[1:]))
+    with pytest.raises(PsvideoError, match=r"colours to some lights, and none to key_red"):
+        unmixing_of(plan_of(make_plan, EXCHANGED), some, channels=3)
+
+
+def test_a_rig_without_colours_is_left_alone(make_plan: MakePlan) -> None:
+    rig = rig_of()
+    plain = replace(rig, lights=tuple(replace(light, colour=None) for light in rig.lights))
+    assert unmixing_of(plan_of(make_plan, EXCHANGED), plain, channels=3) is None
+
+
+SCENE = """
+schema = "psvideo-scene/1"
+name = "ball"
+frames = 14
+seed = 3
+[camera]
+width_px = 80
+height_px = 64
+fps = 120
+shutter_deg = 360.0
+readout_s = 0.0081
+width_m = 0.5
+full_well_e = 30000.0
+read_e = 3.0
+[strobe]
+flash = [
+  { lights = { key_red = 1.0, left_green = 1.0, top_blue = 1.0 }, duration_s = 0.0008 },
+  { lights = { key_green = 1.0, left_blue = 1.0, top_red = 1.0 }, duration_s = 0.0008 },
+  { lights = { key_blue = 1.0, left_red = 1.0, top_green = 1.0 }, duration_s = 0.0008 },
+  { lights = {}, duration_s = 0.0008 },
+]
+[ambient]
+level = 0.02
+[[object]]
+mesh = "sphere"
+height_m = 0.4
+albedo = { pattern = "noise", colour = [0.7, 0.12, 0.1], second = [0.1, 0.3, 0.7], size_m = 0.08 }
+"""
+
+
+def scene_file(folder: Path) -> Path:
+    """Write the scene with its nine LEDs."""
+    lights = "".join(
+        f'[[light]]\nname = "{place}_{name}"\ndirection = {list(at)}\nintensity = 1.0\ncolour = {list(colour)}\n'
+        for place, at in PLACES.items()
+        for name, colour in COLOURS.items()
+    )
+    path = folder / "ball.toml"
+    path.write_text(SCENE + lights)
+    return path
+
+
+def picture(path: Path) -> np.ndarray:
+    return np.asarray(next(iter(OpenEXR.File(str(path)).channels().values())).pixels, np.float32)
+
+
+@pytest.fixture(scope="module")
+def filmed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("colours")
+    return ps.shoot(scene_file(folder), folder / "clip").path
+
+
+def test_a_coloured_surface_under_exchanged_colours_gives_its_normals_and_albedo(filmed: Path, tmp_path: Path) -> None:
+    report = ps.normals(filmed, rig=filmed / "rig.toml", out=tmp_path / "out", plates=True)
+    normals = picture(sorted((tmp_path / "out" / "normals").iterdir())[0])
+    valid = picture(sorted((tmp_path / "out" / "valid").iterdir())[0]) > 0
+    albedo = picture(sorted((tmp_path / "out" / "albedo").iterdir())[0])
+    cosine = (normals * picture(filmed / "truth" / "normals.exr")).sum(-1)
+    assert np.degrees(np.arccos(np.clip(cosine[valid], -1, 1))).mean() < 1.5
+    assert np.median(np.abs(albedo - picture(filmed / "truth" / "albedo.exr"))[valid]) < 0.01
+    assert sorted(path.name for path in (tmp_path / "out" / "plates").iterdir())[-3:] == ["key", "left", "top"]
+    assert len(report.lights) == 3
+
+
+def test_split_takes_colours_apart_by_the_rig_and_asks_for_it(filmed: Path, tmp_path: Path) -> None:
+    with pytest.raises(PsvideoError, match=r"give each its `colour` there: psvideo calibrate colours"):
+        ps.split(filmed, out=tmp_path / "none")
+    ps.split(filmed, rig=filmed / "rig.toml", out=tmp_path / "plates")
+    assert {"key", "left", "top", "ambient"} <= {path.name for path in (tmp_path / "plates").iterdir()}
