@@ -353,6 +353,17 @@ def test_what_the_subject_hides_of_the_wall_is_right_or_not_valid() -> None:
     assert wrong(one) < 0.4 * wrong(clip.rounds[1])
 
 
+def test_a_beauty_plate_has_no_hole_where_motion_leaves_plates_in_doubt() -> None:
+    clip = noiseless(5, "4 px")
+    one = brought(clip)[1]
+    beauty, inner = beauty_of(one, mix_of({}, with_ambient=False)), np.s_[8:-8, 8:-8]
+    there = beauty_of(at_once(clip, one.time_s), mix_of({}, with_ambient=False)).image
+    unsure = ~beauty.pixels_seen[inner]
+    assert unsure.mean() > 0.1
+    assert (beauty.image > 0.5 * there)[inner][unsure].all()
+    assert np.abs(beauty.image - there)[inner][unsure].mean() < 0.05 * there.mean()
+
+
 def at_once(clip: Filmed, time_s: float) -> Round:
     """The plates as they would be if all lights had flashed at one instant."""
     view = clip.stage.view(time_s)

@@ -53,8 +53,9 @@ def mix_of(weights: Mapping[str, float], *, with_ambient: bool) -> Mix:
 def beauty_of(one: Round, mix: Mix, ambient: LightPlate | None = None) -> LightPlate:
     """Return the sum of a round's plates and, where the mix asks for it, of what one exposure saw of ambient light.
 
-    ``ambient`` is the latest that was seen, where the round has no dark slot of its own. What a plate does not know is
-    0 and not seen in the sum. A pixel that is clipped in a light is at least as bright as the sum says.
+    ``ambient`` is the latest that was seen, where the round has no dark slot of its own. What motion hides in a plate
+    is not seen in the sum, which shows the best guess there; rows that no frame saw are 0. A pixel that is clipped in a
+    light is at least as bright as the sum says.
     """
     parts: Mapping[str, LightPlate | None] = {plate.light: plate for plate in one.open_plates or one.plates} | {
         AMBIENT: one.ambient or ambient
@@ -66,5 +67,6 @@ def beauty_of(one: Round, mix: Mix, ambient: LightPlate | None = None) -> LightP
     by_row = all(plate.seen.ndim == 1 for plate, _ in used)
     known = [plate.seen if by_row else plate.pixels_seen for plate, _ in used]
     seen = np.all(known, axis=0) if used else np.ones(image.shape[0], np.bool_)
-    image[~seen] = 0
+    for plate, _ in used:
+        image[~plate.rows_seen] = 0
     return LightPlate(light=BEAUTY, number=one.number, time_s=one.time_s, picture=made(image), seen=seen)

@@ -138,8 +138,11 @@ class Ends:
         return nearer
 
 
-def plate_at(ends: Ends, source: Codes, motion: Followed, *, number: int) -> LightPlate:
-    """Return a light's plate at an instant; ``seen`` (row, col) is False where what it showed is not known."""
+def plate_at(ends: Ends, source: Codes, motion: Followed, *, number: int, guess: Codes | None = None) -> LightPlate:
+    """Return a light's plate at an instant; ``seen`` (row, col) is False where what it showed is not known.
+
+    ``guess`` says what to show where the ``source`` is NOWHERE, for eyes; left out, the plate that is nearer in time.
+    """
     own = ends.nearer
     rows, cols = own.shape[:2]
     sides = [_Side.of(ends.before), _Side.of(ends.after)]
@@ -147,7 +150,7 @@ def plate_at(ends: Ends, source: Codes, motion: Followed, *, number: int) -> Lig
     seen = np.empty((rows, cols), np.bool_)
 
     def fill(top: int, bottom: int) -> None:
-        _fill(slice(top, bottom), image, seen, ends, sides, source, motion)
+        _fill(slice(top, bottom), image, seen, ends, sides, (source, source if guess is None else guess), motion)
 
     over_ranges(fill, rows, each=BAND_ROWS)
     return LightPlate(
@@ -207,20 +210,30 @@ def _brightest(image: Image) -> Image:
 
 
 def _fill(
-    band: slice, image: Image, seen: Flags, ends: Ends, sides: list[_Side | None], source: Codes, motion: Followed
+    band: slice,
+    image: Image,
+    seen: Flags,
+    ends: Ends,
+    sides: list[_Side | None],
+    sources: tuple[Codes, Codes],
+    motion: Followed,
 ) -> None:
-    """Make one band of rows of the plate at an instant."""
+    """Make one band of rows of the plate at an instant: of its source, and of a guess where that is nowhere."""
     own = ends.nearer
     rows, cols = seen.shape
-    scale_x, scale_y = (np.float32(own / small) for own, small in zip((cols, rows), source.shape[::-1], strict=True))
+    small = sources[0].shape[::-1]
+    scale_x, scale_y = (np.float32(own / few) for own, few in zip((cols, rows), small, strict=True))
     x, y = places(band.stop - band.start, cols)
     y += np.float32(band.start)
     at = (x + 0.5) / scale_x - np.float32(0.5), (y + 0.5) / scale_y - np.float32(0.5)
-    taken = np.asarray(cv2.remap(source, *at, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE), np.uint8)
-    seen[band] = (taken != NOWHERE) & own.pixels_seen[band]
+    given, taken = (
+        np.asarray(cv2.remap(source, *at, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE), np.uint8)
+        for source in sources
+    )
+    known = given != NOWHERE
+    seen[band] = known & own.pixels_seen[band]
     flowing = (taken != AT_REST) & (taken != NOWHERE)
-    if not flowing.all():
-        image[band] = own.picture.rows(range(band.start, band.stop))
+    image[band] = own.picture.rows(range(band.start, band.stop))
     if not flowing.any():
         return
     go_x, go_y = (cv2.remap(v, *at, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE) for v in motion.velocity)
@@ -242,3 +255,4 @@ def _fill(
     seen[band] = np.where(flowing, own.rows_seen[band, None], seen[band])
     one, other, blended = (part.reshape(*taken.shape, -1) for part in (*moved, image[band]))
     blend_rows(taken, weights, one, other, full, seen[band], blended)
+    seen[band] &= known

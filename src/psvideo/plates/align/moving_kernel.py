@@ -95,7 +95,8 @@ def blend_rows(
 
     ``taken`` (row, col) is AT_REST (image stays), BEFORE, AFTER, BOTH or NOWHERE; ``weights`` (2, row, col) what either
     counts where both are taken, 0 where it is not known; ``full`` the values from which on either is clipped, and what
-    clipped light becomes. ``seen`` (row, col) says where anything may be known, and afterwards is; elsewhere is 0.
+    clipped light becomes. ``seen`` (row, col) says where anything may be known, and afterwards is; elsewhere the image
+    stays.
     """
     code, weight, one, other = lent(taken), lent(weights), lent(before), lent(after)
     for row in range(taken.shape[0]):
@@ -107,18 +108,17 @@ def blend_rows(
                 total = early + late
                 known = seen[row, col] and total > ZERO
                 seen[row, col] = known
-                per, clipped = ONE / (total if known else ONE), False
+                if not known:
+                    continue
+                per, clipped = ONE / total, False
                 early, late = early * per, late * per
                 for channel in range(image.shape[2]):
                     first, second = one[row, col, channel], other[row, col, channel]
                     if (early > ZERO and first >= full[0]) or (late > ZERO and second >= full[1]):
                         clipped = True
                     image[row, col, channel] = early * first + late * second
-                if clipped and known:
+                if clipped:
                     for channel in range(image.shape[2]):
                         image[row, col, channel] = full[2]
             elif what == NOWHERE:
                 seen[row, col] = False
-            if not seen[row, col]:
-                for channel in range(image.shape[2]):
-                    image[row, col, channel] = ZERO

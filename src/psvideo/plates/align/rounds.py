@@ -165,20 +165,20 @@ def _make_moving(held: Held, instant: DueInstant) -> None:
     pairs = [_pair(held.sure_around(light, instant)) for light in lights]
     instant.motion = motion = followed_at(pairs, instant.time_s)
     shown = [taken_of(pair, motion) for pair in pairs]
-    sources = [one.source for one in shown]
+    guesses = sources = [one.source for one in shown]
     if not instant.guessed:
         sources = without_doubtful(shown, motion, len(held.lights) - len(lights))
-    for light, source in zip(lights, sources, strict=True):
-        _hand_on(instant, _moved_to(held.sure_around(light, instant), source, motion))
+    for light, source, guess in zip(lights, sources, guesses, strict=True):
+        _hand_on(instant, _moved_to(held.sure_around(light, instant), source, guess, motion))
         instant.moving.remove(light)
         held.let_go()
 
 
-def _moved_to(around: Around, source: Codes, motion: Followed) -> LightPlate:
+def _moved_to(around: Around, source: Codes, guess: Codes, motion: Followed) -> LightPlate:
     before, after = around.before, around.after
     share = (motion.time_s - before.time_s) / (after.time_s - before.time_s)
     ends = Ends(before=before.plate, after=after.plate, share=share)
-    return plate_at(ends, source, motion, number=after.round)
+    return plate_at(ends, source, motion, number=after.round, guess=guess)
 
 
 def _hand_on(instant: DueInstant, plate: LightPlate) -> None:
