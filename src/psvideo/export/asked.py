@@ -43,7 +43,7 @@ class Asked:
     with_ambient: bool = False
     weight: Mapping[str, float] = field(default_factory=dict)
     preview: Sequence[Preview] = ()
-    preview_codec: Codec = "vp9"
+    preview_codec: Codec = "h264"
 
 
 def delivery_of(asked: Asked) -> tuple[Delivery, tuple[str, ...]]:

@@ -20,7 +20,7 @@ from psvideo.plates.beauty import Mix
 from psvideo.solve.depth import Depth, mesh_of
 from psvideo.solve.passes.made import Passes
 
-MOVIE_SUFFIXES: dict[Codec, str] = {"vp9": "mp4", "prores": "mov"}
+MOVIE_SUFFIXES: dict[Codec, str] = {"h264": "mp4", "vp9": "mp4", "prores": "mov"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +41,7 @@ class Delivery:
     plates: bool = False
     mix: Mix = field(default_factory=Mix)
     previews: tuple[Preview, ...] = ()
-    codec: Codec = "vp9"
+    codec: Codec = "h264"
     program: Program | None = None
     compression: Compression = "zip"
 

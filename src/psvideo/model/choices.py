@@ -24,8 +24,10 @@ Preview = Literal["relit", "normals", "plates", "beauty"]
 """What a movie for eyes shows."""
 PlatesPreview = Literal["plates", "beauty"]
 """What a movie of plates shows, where nothing is solved."""
-Codec = Literal["vp9", "prores"]
+Codec = Literal["h264", "vp9", "prores"]
 """How movies are coded."""
+PREVIEWS: tuple[Preview, ...] = ("relit",)
+"""The movies of a clip's results where nobody says otherwise."""
 Compression = Literal["zip", "zips", "piz", "rle", "none"]
 """How pixels are packed, always without loss. ZIP is read everywhere; ZIPS (single lines) suits Nuke, RLE fast disks.
 DWAA, DWAB and B44 lose data, and which they lose depends on the channels' names: they are not offered."""

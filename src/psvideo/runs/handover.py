@@ -56,10 +56,17 @@ def write_timeline(run: Finished) -> None:
 
 
 def write_previews(
-    run: Finished, previews: Sequence[Preview], codec: Codec, plates: Sequence[str], watch: Watch
+    run: Finished, previews: Sequence[Preview], codec: Codec, *, plates: Sequence[str], watch: Watch, caller: Caller
 ) -> None:
     """Make the movies asked for; ``plates`` are the sequences (folders) that the one of plates shows."""
-    found = _sequences(run.folder)
+    if not previews:
+        return
+    from psvideo.export.preview_movie import codec_at_hand  # FFmpeg's libraries take memory: only where a movie is made
+
+    found, wanted = _sequences(run.folder), codec
+    codec = codec_at_hand(wanted)
+    if codec != wanted:
+        caller.warn(f"FFmpeg was built without an encoder for {wanted!r}: movies for eyes are {codec!r}.")
     for preview in previews:
         names = {"relit": ("normals", "albedo"), "plates": tuple(plates)}.get(preview, (preview,))
         numbers = sorted(set.intersection(*(set(found.get(name, {})) for name in names)))

@@ -13,6 +13,7 @@ from psvideo.export.usd import require_usd
 from psvideo.formats.paths import path_if_given, path_of
 from psvideo.model.choices import (
     MOST_ITERATIONS,
+    PREVIEWS,
     Align,
     CameraTime,
     Codec,
@@ -76,8 +77,8 @@ def normals(
     plates: bool = False,
     with_ambient: bool = False,
     weight: Mapping[str, float] | None = None,
-    preview: Sequence[Preview] = (),
-    preview_codec: Codec = "vp9",
+    preview: Sequence[Preview] = PREVIEWS,
+    preview_codec: Codec = "h264",
     start_number: int = FIRST_NUMBER,
     force: bool = False,
     resume: bool = False,
@@ -126,7 +127,7 @@ def normals(
       EXR files are packed, always without loss: "zip", "zips" (for Nuke), "piz", "rle" (where disks are fast) or
       "none".
     - ``weight``: how strong a light is in the beauty plate, by name (1 where not named); ``with_ambient`` leaves
-      ambient light in it. ``preview``: movies for eyes, coded as ``preview_codec``.
+      ambient light in it. ``preview``: movies for eyes, coded as ``preview_codec``; empty for none.
     - ``force`` replaces an ``out`` that exists; ``resume`` goes on where a run that was stopped
       left off, and raises AllDoneError where none was and ``out`` is finished.
 

@@ -48,7 +48,7 @@ class Extras:
     flashes: bool = False
     mix: Mix | None = None
     previews: tuple[Preview, ...] = ()
-    codec: Codec = "vp9"
+    codec: Codec = "h264"
     compression: Compression = "zip"
 
     def check(self, plan: Plan) -> None:
@@ -136,7 +136,8 @@ def _at_the_end(
     yield
     if times_s:
         run = Finished(folder=folder, target=output.folder, clip=take.clip, fps=tags.fps, first_time_s=times_s[0])
-        write_previews(run, extras.previews, extras.codec, take.plan.lights, watch)
+        lights = take.plan.lights
+        write_previews(run, extras.previews, extras.codec, plates=lights, watch=watch, caller=output.caller)
         write_timeline(run)
 
 

@@ -6,7 +6,7 @@ stopped makes them at its end as one that was not.
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -23,10 +23,10 @@ from psvideo.pictures.relighting import exposure_for, smaller, srgb
 
 Pixels = NDArray[np.uint8]
 Image = NDArray[np.float32]
-WIDTH_PX = 1280
+WIDTH_PX = 960
 TURN_S = 4.0
 """The light of the relit movie goes round once in so many seconds of playing,"""
-TILT = 0.8
+TILT = 0.6
 """so far from the camera's axis (sine of the angle)."""
 INK = (226, 226, 226)
 
@@ -53,7 +53,8 @@ def write_preview(
 ) -> None:
     """Write one movie of the instants, in the order of their numbers; a number that is not there holds the one before.
 
-    How bright pictures are shown is set by the first instant, for the whole movie.
+    How bright pictures are shown is set by the first instant, for the whole movie. A lone instant is relit for one
+    turn of the light.
     """
     from psvideo.export.preview_movie import (  # FFmpeg's libraries take memory: only where a movie is made
         even,
@@ -61,6 +62,9 @@ def write_preview(
     )
 
     exposure = _exposure(preview, instants[0])
+    if len(instants) == 1 and preview == "relit":
+        turn = range(instants[0].number, instants[0].number + max(round(TURN_S * fps), 1))
+        instants = [replace(instants[0], number=number) for number in turn]
 
     def pictures() -> Iterator[Pixels]:
         watched = watch(instants, total=len(instants), what=f"movie of {preview}", unit="pictures")

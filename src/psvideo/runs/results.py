@@ -237,7 +237,8 @@ def _at_the_end(
         for part in parts.values():
             part.unlink()
     run = Finished(folder=folder, target=output.folder, clip=clip, fps=tags.fps, first_time_s=facts[0].time_s)
-    write_previews(run, delivery.previews, delivery.codec, [f"plates/{light}" for light in clip.plan.lights], watch)
+    plates = [f"plates/{light}" for light in clip.plan.lights]
+    write_previews(run, delivery.previews, delivery.codec, plates=plates, watch=watch, caller=output.caller)
     write_timeline(run)
     if delivery.program is not None or "usd" in delivery.meshes:
         write_stage(run, delivery, rig, {one.number: one.time_s for one in facts}, metric=metric)

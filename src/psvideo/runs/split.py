@@ -41,7 +41,7 @@ def split(
     shutter: float | None = None,
     resync: Path | str | None = None,
     preview: Sequence[PlatesPreview] = (),
-    preview_codec: Codec = "vp9",
+    preview_codec: Codec = "h264",
     compression: Compression = "zip",
     start_number: int = FIRST_NUMBER,
     force: bool = False,

@@ -31,6 +31,7 @@ from psvideo.cli.options.delivery import (
     FloatOption,
     MeshOption,
     Multipart,
+    NoPreview,
     Plates,
     PreviewOption,
     ProgramOption,
@@ -54,7 +55,7 @@ from psvideo.cli.options.solving import (
     ShutterOption,
     SolverOption,
 )
-from psvideo.cli.options.typed import parse_instants, parse_weights
+from psvideo.cli.options.typed import chosen_previews, parse_instants, parse_weights
 
 
 def normals(
@@ -95,7 +96,8 @@ def normals(
     with_ambient: WithAmbient = False,
     weight: Weights = None,
     preview: PreviewOption = None,
-    preview_codec: CodecOption = "vp9",
+    no_preview: NoPreview = False,
+    preview_codec: CodecOption = "h264",
     start_number: StartNumber = 1001,
     force: Force = False,
     resume: Resume = False,
@@ -143,7 +145,7 @@ def normals(
         plates=plates,
         with_ambient=with_ambient,
         weight=parse_weights(weight),
-        preview=plain(preview),
+        preview=chosen_previews(preview, no_preview=no_preview),
         preview_codec=preview_codec,
         start_number=start_number,
         force=force,

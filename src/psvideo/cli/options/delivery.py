@@ -80,14 +80,16 @@ Weights = Annotated[
 ]
 PreviewOption = Annotated[
     list[PreviewWord] | None,
-    typer.Option("--preview", help="Make a movie for eyes; may be given several times."),
+    typer.Option("--preview", help="Make this movie for eyes, not the relit one; may be given several times."),
 ]
+NoPreview = Annotated[bool, typer.Option("--no-preview", help="Make no movie for eyes.")]
 PlatesPreviewOption = Annotated[
     list[PlatesPreviewWord] | None,
     typer.Option("--preview", help="Make a movie for eyes; may be given several times."),
 ]
 CodecOption = Annotated[
-    Codec, typer.Option("--preview-codec", help="vp9 (.mp4) for browsers and players, prores (.mov) for editors.")
+    Codec,
+    typer.Option("--preview-codec", help="h264 (.mp4) plays everywhere; vp9 (.mp4) in browsers, prores (.mov) in editors."),
 ]
 ProgramOption = Annotated[
     Program | None,

@@ -10,7 +10,7 @@ PANELS = {
     "What is written, and in which convention": (
         *("space", "camera_to_world", "camera", "camera_time", "y", "float32", "aov", "mesh", "encode", "compression"),
         *("separate", "multipart", "preset", "plates", "with_ambient", "weight", "beauty", "rti"),
-        *("preview", "preview_codec"),
+        *("preview", "no_preview", "preview_codec"),
     ),
     "How the command runs": ("force", "resume", "json", "verbose", "quiet", "help"),
 }

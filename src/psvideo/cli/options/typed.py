@@ -5,8 +5,10 @@ import re
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
+from psvideo.cli.console import plain
 from psvideo.errors import UsageError, nearest
 from psvideo.formats.plan_toml import parse_fps
+from psvideo.model.choices import PREVIEWS, Preview
 from psvideo.model.units import NTSC
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6}
@@ -245,3 +247,10 @@ def parse_lines(words: Sequence[str] | None) -> dict[str, int]:
             raise UsageError(f"--line {word}: {name} is wired to line {lines[name]} already.")
         lines[name] = int(line)
     return lines
+
+
+def chosen_previews(named: Sequence[Preview] | None, *, no_preview: bool) -> Sequence[Preview]:
+    """Return the movies for eyes that are to be made: those named, none, or else the usual ones."""
+    if named and no_preview:
+        raise UsageError("--preview asks for a movie, and --no-preview for none. Leave one of the two out.")
+    return () if no_preview else plain(named) or PREVIEWS
