@@ -166,7 +166,11 @@ def test_a_clips_results_come_with_a_movie_that_plays_everywhere_unless_none_is_
     assert normals(clip, tmp_path / "usual") == 0
     (movie,) = (tmp_path / "usual" / "preview").iterdir()
     stream, frames = decoded(movie)
-    assert (movie.name, stream.codec_context.name, stream.codec_context.pix_fmt) == ("clip_relit.mp4", "h264", "yuv420p")
+    assert (movie.name, stream.codec_context.name, stream.codec_context.pix_fmt) == (
+        "clip_relit.mp4",
+        "h264",
+        "yuv420p",
+    )
     assert len(frames) == len(list((tmp_path / "usual" / "normals").iterdir()))
     held = movie.read_bytes()
     assert held.index(b"moov") < held.index(b"mdat"), "the description comes first"
@@ -250,6 +254,7 @@ def test_a_stopped_run_goes_on_to_the_same_delivery(clip: Path, whole: Path, mon
     partial = clip.parent / ".again.partial"
     min((partial / "plates" / "key").iterdir()).unlink()
     min((partial / "beauty").iterdir()).unlink()
+    min((partial / "preview" / ".relit").iterdir()).unlink()
     assert normals(clip, out, *EVERYTHING, "--resume") == 0
     assert digest(out) == digest(whole)
 

@@ -33,6 +33,7 @@ from psvideo.plates.sequence import AMBIENT, Round, round_numbers
 from psvideo.runs.caller import Caller
 from psvideo.runs.lighting import Lighting
 from psvideo.runs.output import Output
+from psvideo.runs.relit import keep_relit
 from psvideo.solve.depth import Depth
 from psvideo.solve.instants import Instant
 from psvideo.solve.normals.solving import ROBUST_FROM_LIGHTS
@@ -171,7 +172,7 @@ def surface_job(
         beauty = halves_of(image.reshape(len(image), -1))[0].reshape(image.shape)
     job = partial(write_surface, folder, clip.name, one.number, one.time_s, instant.surface)
     age_s = one.age_s if "age" in delivery.aovs else None
-    return partial(
+    written = partial(
         job,
         delivery=there,
         tags=tags,
@@ -181,6 +182,16 @@ def surface_job(
         passes=_whole_picture(instant.passes),
         motion=_motion_of(one, tags.fps) if "motion" in delivery.aovs else None,
     )
+    if "relit" not in delivery.previews:
+        return written
+
+    shown = partial(keep_relit, folder, one.number, instant.surface, there.space, tags.fps)
+    return partial(_in_turn, shown, written)
+
+
+def _in_turn(*jobs: Callable[[], None]) -> None:
+    for job in jobs:
+        job()
 
 
 def _motion_of(one: Round, fps: Fraction) -> NDArray[np.float32]:

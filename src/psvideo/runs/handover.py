@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -30,6 +31,7 @@ from psvideo.model.near_light import is_near
 from psvideo.model.rig import Rig
 from psvideo.runs.caller import Caller
 from psvideo.runs.previews import Shown, preview_name, write_preview
+from psvideo.runs.relit import KEPT, relit_file
 from psvideo.solve.normals.illumination import illumination
 
 OTHER_RATES = ("flashes",)
@@ -71,12 +73,17 @@ def write_previews(
         names = {"relit": ("normals", "albedo"), "plates": tuple(plates)}.get(preview, (preview,))
         numbers = sorted(set.intersection(*(set(found.get(name, {})) for name in names)))
         instants = [
-            Shown(number=number, files={name.rpartition("/")[2]: found[name][number] for name in names})
+            Shown(
+                number=number,
+                files={name.rpartition("/")[2]: found[name][number] for name in names},
+                relit=kept if (kept := relit_file(run.folder, number)).is_file() else None,
+            )
             for number in numbers
         ]
         path = run.folder / preview_name(run.clip.name, preview, MOVIE_SUFFIXES[codec])
         if instants and not path.is_file():
             write_preview(path, preview, instants, fps=run.fps, codec=codec, watch=watch)
+    shutil.rmtree(run.folder / KEPT, ignore_errors=True)
 
 
 def write_note(

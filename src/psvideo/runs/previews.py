@@ -8,6 +8,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import lru_cache
 from pathlib import Path
 
 import cv2
@@ -15,28 +16,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.clip.decode import exr
+from psvideo.compute.memory import HALF_MAX
 from psvideo.compute.progress import Watch
 from psvideo.model.choices import Codec, Preview
 from psvideo.model.quantities import QUANTITIES
 from psvideo.pictures.quantity import picture_of
 from psvideo.pictures.relighting import exposure_for, smaller, srgb
+from psvideo.runs.relit import TURN_S, WIDTH_PX, read_relit
 
 Pixels = NDArray[np.uint8]
 Image = NDArray[np.float32]
-WIDTH_PX = 960
-TURN_S = 4.0
-"""The light of the relit movie goes round once in so many seconds of playing,"""
-TILT = 0.6
-"""so far from the camera's axis (sine of the angle)."""
 INK = (226, 226, 226)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Shown:
-    """The files of one instant, by what they show."""
+    """The files of one instant, by what they show; ``relit`` is its picture in the relit movie, where it was kept."""
 
     number: int
     files: Mapping[str, Path]
+    relit: Path | None = None
 
 
 def preview_name(clip: str, preview: Preview, suffix: str) -> str:
@@ -64,7 +63,7 @@ def write_preview(
     exposure = _exposure(preview, instants[0])
     if len(instants) == 1 and preview == "relit":
         turn = range(instants[0].number, instants[0].number + max(round(TURN_S * fps), 1))
-        instants = [replace(instants[0], number=number) for number in turn]
+        instants = [replace(instants[0], number=number, relit=None) for number in turn]
 
     def pictures() -> Iterator[Pixels]:
         watched = watch(instants, total=len(instants), what=f"movie of {preview}", unit="pictures")
@@ -93,20 +92,17 @@ def _picture(preview: Preview, one: Shown, exposure: float, fps: Fraction) -> Pi
 
 
 def _relit(one: Shown, exposure: float, fps: Fraction) -> Pixels:
-    """Return the surface under a light that goes round the camera's axis."""
-    said = exr.contents(one.files["normals"])[1]
-    angle = 2 * math.pi * one.number / float(fps) / TURN_S
-    light = np.array([TILT * math.cos(angle), TILT * math.sin(angle), math.sqrt(1 - TILT**2)])
-    facing = np.maximum(_read(one.files["normals"], WIDTH_PX) @ _delivered(light, said).astype(np.float32), 0)
-    return srgb(_read(one.files["albedo"], WIDTH_PX) * facing[..., None], exposure=exposure)
+    kept = None if one.relit is None else np.load(one.relit)
+    picture = read_relit(one.files["normals"], one.files["albedo"], one.number, fps) if kept is None else kept
+    return np.asarray(_shown_as(exposure)[picture.view(np.uint16)])
 
 
-def _delivered(light: NDArray[np.float64], said: Mapping[str, object]) -> NDArray[np.float64]:
-    """Return a direction of the camera frame in the frame that a file of normals says it is in."""
-    matrix = said.get("psvideo:camera_to_world")
-    if isinstance(matrix, str):
-        light = np.array(matrix.split(), np.float64).reshape(4, 4)[:3, :3] @ light
-    return light * (1, -1, 1) if said.get("psvideo:y") == "down" else light
+@lru_cache(maxsize=1)
+def _shown_as(exposure: float) -> Pixels:
+    """Return the sRGB code of every half float, by its bits."""
+    halves = np.arange(1 << 16, dtype=np.uint16).view(np.float16).astype(np.float32)
+    light = np.nan_to_num(halves, nan=0.0, posinf=HALF_MAX, neginf=0.0)
+    return srgb(light[:, None], exposure=exposure)[:, 0, 0]
 
 
 def _sheet(one: Shown, exposure: float) -> Pixels:

@@ -89,7 +89,9 @@ PlatesPreviewOption = Annotated[
 ]
 CodecOption = Annotated[
     Codec,
-    typer.Option("--preview-codec", help="h264 (.mp4) plays everywhere; vp9 (.mp4) in browsers, prores (.mov) in editors."),
+    typer.Option(
+        "--preview-codec", help="h264 (.mp4) plays everywhere, vp9 (.mp4) in browsers, prores (.mov) in editors."
+    ),
 ]
 ProgramOption = Annotated[
     Program | None,

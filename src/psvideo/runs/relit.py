@@ -1,0 +1,75 @@
+"""Pictures of the relit movie: the surface under a light that goes round the lens, small and in linear light.
+
+They are made while an instant's surface is in memory, and lie beside the results until the movie is made of them: to
+read results back takes four times as long. Where one is missing it is made from the files, to the same bytes.
+"""
+
+import math
+from collections.abc import Mapping
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.clip.decode import exr
+from psvideo.compute.halves import halves_of
+from psvideo.export.space import Space, placed
+from psvideo.formats.whole_files import whole_file
+from psvideo.model.surface import Surface
+from psvideo.pictures.relit_kernel import Halves, relit
+
+TURN_S = 4.0
+"""The light goes round once in so many seconds of playing,"""
+TILT = 0.6
+"""so far from the camera's axis (sine of the angle)."""
+WIDTH_PX = 1280
+"""Pictures of movies are at most so wide."""
+KEPT = "preview/.relit"
+"""The folder of pictures that wait for their movie."""
+
+
+def keep_relit(folder: Path, number: int, surface: Surface, space: Space, fps: Fraction) -> None:
+    """Keep the picture of one instant of a run that writes into ``folder``."""
+    said = space.attributes() | {"psvideo:y": space.y}
+    picture = _relit(_planes(placed(surface.normals, space)), _planes(surface.albedo), _light(number, fps, said))
+    with whole_file(relit_file(folder, number)) as beside, beside.open("wb") as file:
+        np.save(file, picture)
+
+
+def read_relit(normals: Path, albedo: Path, number: int, fps: Fraction) -> Halves:
+    """Return an instant's picture from its files."""
+    of_normals, of_albedo = exr.stored(normals), exr.stored(albedo)
+    return _relit(of_normals.planes, of_albedo.planes, _light(number, fps, of_normals.attributes))
+
+
+def relit_file(folder: Path, number: int) -> Path:
+    """Return where an instant's picture is kept below the output folder."""
+    return folder / KEPT / f"{number}.npy"
+
+
+def _planes(image: NDArray[np.floating]) -> tuple[NDArray[np.floating], ...]:
+    """Return the channels of a picture (row, col[, channel])."""
+    return (image,) if image.ndim == 2 else tuple(image[..., channel] for channel in range(image.shape[2]))
+
+
+def _relit(
+    normals: tuple[NDArray[np.floating], ...], albedo: tuple[NDArray[np.floating], ...], light: NDArray[np.float32]
+) -> Halves:
+    factor = -(-normals[0].shape[1] // WIDTH_PX)
+    return relit(tuple(map(_half, normals)), tuple(map(_half, albedo)), light, factor)
+
+
+def _half(plane: NDArray[np.floating]) -> Halves:
+    """Return a channel as files store it."""
+    return plane if plane.dtype == np.float16 else halves_of(plane.astype(np.float32))[0]
+
+
+def _light(number: int, fps: Fraction, said: Mapping[str, object]) -> NDArray[np.float32]:
+    """Return the light's direction at an instant, in the frame that a file of normals says it is in."""
+    angle = 2 * math.pi * number / float(fps) / TURN_S
+    light = np.array([TILT * math.cos(angle), TILT * math.sin(angle), math.sqrt(1 - TILT**2)])
+    matrix = said.get("psvideo:camera_to_world")
+    if isinstance(matrix, str):
+        light = np.array(matrix.split(), np.float64).reshape(4, 4)[:3, :3] @ light
+    return (light * (1, -1, 1) if said.get("psvideo:y") == "down" else light).astype(np.float32)
