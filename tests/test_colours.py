@@ -17,7 +17,7 @@ from psvideo.model.rig import Light, Rig, Vector
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import made
 from psvideo.plates.sequence import Round
-from psvideo.plates.unmixed import slot_names, unmixed
+from psvideo.plates.unmixed import slot_names, unmixed, unmixing_note
 
 PLACES: dict[str, Vector] = {"key": (0.6, 0.0, 0.8), "left": (-0.48, 0.36, 0.8), "top": (0.0, -0.6, 0.8)}
 COLOURS: dict[str, Vector] = {"red": (1.0, 0.1, 0.02), "green": (0.15, 1.0, 0.2), "blue": (0.02, 0.18, 1.0)}
@@ -45,11 +45,13 @@ def plan_of(make_plan: MakePlan, turns: tuple[tuple[str, ...], ...]) -> Plan:
     return replace(make_plan(dark=False), flashes=(*lit, PlannedFlash(lights={}, duration_s=0.0008)))
 
 
-def scene(rng: np.random.Generator, count: int = 40) -> tuple[np.ndarray, np.ndarray]:
-    """Return normals that face all lights, and albedos of any colour, as pictures of one row."""
-    normals = rng.normal(size=(1, count, 3)) * 0.2 + (0, 0, 1)
+def scene(
+    rng: np.random.Generator, rows: int = 1, cols: int = 40, spread: float = 0.2
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return normals that face all lights, and albedos of any colour."""
+    normals = np.clip(rng.normal(size=(rows, cols, 3)), -1.5, 1.5) * spread + (0, 0, 1)
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-    return normals, rng.uniform(0.02, 0.9, (1, count, 3))
+    return normals, rng.uniform(0.02, 0.9, (rows, cols, 3))
 
 
 def flashed(plan: Plan, rig: Rig, normals: np.ndarray, albedo: np.ndarray) -> Round:
@@ -67,11 +69,11 @@ def flashed(plan: Plan, rig: Rig, normals: np.ndarray, albedo: np.ndarray) -> Ro
                 number=1001,
                 time_s=0.01 * slot,
                 picture=made(image.astype(np.float32)),
-                seen=np.ones(1, np.bool_),
+                seen=np.ones(len(image), np.bool_),
                 saturation=10.0,
             )
         )
-    return Round(number=1001, plates=tuple(plates))
+    return Round(number=1001, plates=tuple(plates), stood=np.ones((1, 1), np.bool_))
 
 
 def taken_apart(plan: Plan, rig: Rig) -> Unmixing:
@@ -106,9 +108,33 @@ def test_one_flash_gives_its_lights_where_the_surface_s_colour_is_known(make_pla
     albedo = np.broadcast_to(np.array([0.6, 0.3, 0.15]), normals.shape)
     shown = unmixed(flashed(plan, rig, normals, albedo), taken_apart(plan, rig))
     assert shown.lights == ("key_red", "left_green", "top_blue")
+    assert "of the colour that the rig's [surface] gives everywhere: a channel that is off by 10% turns" in (
+        unmixing_note(taken_apart(plan, rig))
+    )
     for plate in shown.plates:
         truth = albedo * (normals @ np.array(PLACES[plate.light.split("_")[0]]))[..., None]
         np.testing.assert_allclose(plate.image, truth, atol=1e-5)
+
+
+def test_what_moved_between_flashes_is_had_from_one_by_the_colour_that_its_neighbourhood_shows(
+    make_plan: MakePlan,
+) -> None:
+    """Normals that differ from flash to flash, on a surface of one colour: no flow brings them together."""
+    plan, rig = plan_of(make_plan, EXCHANGED), rig_of()
+    rng, how = np.random.default_rng(5), taken_apart(plan, rig)
+    albedo = np.broadcast_to(np.array([0.7, 0.35, 0.2]), (40, 40, 3))
+    views = [scene(rng, 40, 40, spread=0.4)[0] for _ in plan.lit_slots]
+    plates = [flashed(plan, rig, view, albedo).plates[n] for n, view in enumerate(views)]
+    shown_s = [np.full(40, 0.01 * n) for n in range(3)]
+    moved = [replace(plate, time_s=0.02, shown_s=at) for plate, at in zip(plates, shown_s, strict=True)]
+    shot = Round(number=1001, plates=tuple(moved))
+    off = {}
+    for stood in (False, True):
+        round_of_lamps = unmixed(replace(shot, stood=np.full((1, 1), stood)), how)
+        truth = [albedo * (views[-1] @ np.array(PLACES[one.light]))[..., None] for one in round_of_lamps.plates]
+        images = [one.image for one in round_of_lamps.plates]
+        off[stood] = np.abs(np.array(images) - truth).mean() / np.mean(truth)
+    assert off[False] < 0.02 < 0.08 < off[True]
 
 
 def test_a_clipped_sample_clips_what_it_counts_in(make_plan: MakePlan) -> None:
@@ -205,6 +231,7 @@ def test_a_coloured_surface_under_exchanged_colours_gives_its_normals_and_albedo
     assert np.median(np.abs(albedo - picture(filmed / "truth" / "albedo.exr"))[valid]) < 0.01
     assert sorted(path.name for path in (tmp_path / "out" / "plates").iterdir())[-3:] == ["key", "left", "top"]
     assert len(report.lights) == 3
+    assert "exchanged between flashes: plates are those of the lamps under white light" in report.trust
 
 
 def test_split_takes_colours_apart_by_the_rig_and_asks_for_it(filmed: Path, tmp_path: Path) -> None:

@@ -63,9 +63,7 @@ class _RigLight(Contract):
                     f"light {self.name!r}: {key} has length {length:.4g}, expected a unit vector (length 1)"
                 )
         if self.colour is not None and not any(self.colour):
-            raise ValueError(
-                f"light {self.name!r}: colour is black; expected what red, green and blue see of it on a white card"
-            )
+            raise ValueError(f"light {self.name!r}: colour is black; expected what the camera's channels see of it")
         away_m = 0.0 if self.position_m is None else float(np.linalg.norm(self.position_m))
         if away_m > FARTHEST_LIGHT_M:
             raise ValueError(

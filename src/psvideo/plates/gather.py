@@ -114,12 +114,9 @@ def gather(
         check_separable(plan)
     made = clip_plates(take, timing, method=method, watch=watch, each_window=each_window)
     single, turn = _shown(made, each_flash), take.clip.turn
-    names = plan.lights if take.unmixing is None else slot_names(plan)
-    plates = (
-        light_plates(single, plan, flashes, start=start_number)
-        if take.unmixing is None
-        else slot_plates(single, flashes, start=start_number)
-    )
+    names, plates = plan.lights, light_plates(single, plan, flashes, start=start_number)
+    if take.unmixing is not None:
+        names, plates = slot_names(plan), slot_plates(single, flashes, start=start_number)
     borrows = aligning is not None and plan.mode != "synced" and has_blind_time(timed_camera(plan, timing))
     if borrows and turn.transposed:  # rows are borrowed while they are rows
         plates, borrows = with_nearest_rows(plates), False
@@ -139,7 +136,6 @@ def gather(
 
 
 def _apart(rounds: Iterator[Round], take: Take) -> Iterator[Round]:
-    """Take a round's flashes apart by colour, where they hold several."""
     return rounds if take.unmixing is None else map(partial(unmixed, how=take.unmixing), rounds)
 
 

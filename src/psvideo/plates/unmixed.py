@@ -8,12 +8,13 @@ taken from one flash alone, by the colour that the smallest neighbourhood shows 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.camera import FloatArray
 from psvideo.model.coded import Image
-from psvideo.model.colours import WHITE, OneFlash, Unmixing
+from psvideo.model.colours import WHITE, Unmixing
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Flash
 from psvideo.plates.light_plate import LightPlate
@@ -21,8 +22,49 @@ from psvideo.plates.mixing_kernel import COUNTS
 from psvideo.plates.mixture import made
 from psvideo.plates.sequence import AMBIENT, Round, round_numbers
 from psvideo.plates.split import Plate
+from psvideo.plates.surface_colour import colours_of, contradicted
 
 Flags = NDArray[np.bool_]
+
+
+DOUBT = 0.1
+"""What a surface's colour is taken to be off by, where the report says what that costs."""
+
+
+def unmixing_note(how: Unmixing) -> str:
+    """Return in whole sentences how flashes were taken apart by colour, and what that leaves in doubt."""
+    if how.shares is not None:
+        return (
+            "Several colours flashed at once and were exchanged between flashes: plates are those of the lamps under "
+            f"white light, whatever the surface's colour (condition number {how.condition:.2f}, by which noise is "
+            "raised at most). What moved between the flashes of a round, so that flow could not follow it, comes from "
+            "one flash, and its normals are as good as the colour found for its surroundings."
+        )
+    known = "white" if how.surface_colour is None else "of the colour that the rig's [surface] gives"
+    turned = _turned_deg(how)
+    cost = "" if turned is None else f": a channel that is off by {DOUBT:.0%} turns normals by {turned:.1f} degrees"
+    return (
+        f"Every flash lights several colours at once, the same each time, and the surface was taken to be {known} "
+        f"everywhere{cost}. Give its `colour` under [surface] in the rig, or exchange the lamps' colours between "
+        f"flashes. Condition number of the colours: {how.condition:.2f}."
+    )
+
+
+def _turned_deg(how: Unmixing) -> float | None:
+    """Return by how much the normal of a surface that faces the camera turns at worst where one channel is off."""
+    first = how.alone[0]
+    lights = [how.rig.select([how.shown.lights[place]])[0] for place in first.lights]
+    if len(lights) != 3 or any(light.direction is None for light in lights):
+        return None
+    towards = np.array([light.direction for light in lights])
+    facing = np.array([0.0, 0.0, 1.0])
+    seen = np.linalg.inv(first.inverse) @ (towards @ facing)
+    turned = []
+    for channel in range(len(seen)):
+        off = seen * (1 + DOUBT * (np.arange(len(seen)) == channel))
+        normal = np.linalg.solve(towards, first.inverse @ off)
+        turned.append(np.degrees(np.arccos(min(normal @ facing / np.linalg.norm(normal), 1.0))))
+    return float(max(turned))
 
 
 def slot_names(plan: Plan) -> tuple[str, ...]:
@@ -49,9 +91,15 @@ def unmixed(one: Round, how: Unmixing) -> Round:
     """Return a round of all its flashes as a round of the shown lights."""
     flashes = _Flashes(one)
     if how.shares is None:
-        parts = [_alone(flashes, place, how.alone[place], how) for place in range(len(one.plates))]
-        return replace(one, plates=tuple(_in_order([plate for part in parts for plate in part], how)))
-    return replace(one, plates=tuple(_exchanged(flashes, how.shares, how)))
+        colour = np.array(how.surface_colour or WHITE, np.float32)
+        apart = [flashes.alone(place, how, colour / colour.max()) for place in range(len(one.plates))]
+        by_name = {plate.light: plate for plates in apart for plate in plates}
+        return replace(one, plates=tuple(by_name[name] for name in how.shown.lights))
+    together = flashes.together(how, how.shares)
+    plates = tuple(together)
+    if how.alone:
+        plates = flashes.mended(plates, how)
+    return replace(one, plates=plates)
 
 
 class _Flashes:
@@ -68,37 +116,65 @@ class _Flashes:
         away_s = [np.abs(plate.flashed_s - self.one.time_s).min() for plate in self.one.plates]
         return int(np.argmin(away_s))
 
-    def like(self, place: int, light: str, image: Image, seen: NDArray[np.bool_], most: float) -> LightPlate:
-        """Return a plate with the times of one of the flashes."""
-        return replace(self.one.plates[place], light=light, picture=made(image), seen=seen, saturation=most)
+    def together(self, how: Unmixing, shares: FloatArray) -> Iterator[LightPlate]:
+        """Yield every lamp's plate out of all flashes."""
+        seen = np.logical_and.reduce([plate.pixels_seen for plate in self.one.plates])
+        for share, name in zip(shares, how.shown.lights, strict=True):
+            image, clipped = np.zeros_like(self.images[0]), np.zeros(self.images[0].shape, np.bool_)
+            for part, picture, at_end in zip(share, self.images, self.clipped, strict=True):
+                image += part.astype(np.float32) * picture
+                clipped |= at_end & (np.abs(part) > COUNTS * np.abs(share).max())
+            most = max(float(np.maximum(share, 0).sum(axis=0).max()), 1.0)
+            image[clipped] = most
+            image[~seen] = 0
+            yield self._like(self.nearest, name, image, seen, most)
+
+    def alone(self, place: int, how: Unmixing, colour: Image) -> list[LightPlate]:
+        """Return the plates of the lights of one flash, given the surface's colour, (channel,) or (row, col, channel),
+        at most 1."""
+        flash, own = how.alone[place], self.one.plates[place]
+        clipped = self.clipped[place].any(axis=-1)
+        light = (self.images[place] / colour) @ flash.inverse.T.astype(np.float32)  # (row, col, light)
+        plates = []
+        for n, shown in enumerate(flash.lights):
+            most = max(float(np.maximum(flash.inverse[n], 0).sum() / colour.min()), 1.0)
+            image = np.asarray(light[..., n, None] * colour, np.float32)
+            image[clipped] = most
+            plates.append(self._like(place, how.shown.lights[shown], image, own.seen, most))
+        return plates
+
+    def mended(self, plates: tuple[LightPlate, ...], how: Unmixing) -> tuple[LightPlate, ...]:
+        """Return the lamps' plates, where the flashes contradict each other, out of the nearest flash alone."""
+        products = np.stack([plate.image for plate in plates])
+        wrong = self._moved() & (contradicted(products) | ~plates[0].seen)
+        if not wrong.any():
+            return plates
+        given = how.surface_colour
+        colour = colours_of(products, wrong) if given is None else np.array(given, np.float32) / np.float32(max(given))
+        alone = {plate.light: plate for plate in self.alone(self.nearest, how, colour)}
+        return tuple(_within(plate, alone[plate.light], wrong) for plate in plates)
+
+    def _moved(self) -> Flags:
+        stood, (rows, cols) = self.one.stood, self.images[0].shape[:2]
+        if stood is None:
+            return np.ones((rows, cols), np.bool_)
+        wide = cv2.resize(stood.astype(np.uint8), (cols, rows), interpolation=cv2.INTER_NEAREST)
+        return np.asarray(wide == 0)
+
+    def _like(self, place: int, light: str, image: Image, seen: Flags, most: float) -> LightPlate:
+        own = self.one.plates[place]
+        return replace(own, light=light, time_s=self.one.time_s, picture=made(image), seen=seen, saturation=most)
 
 
-def _in_order(plates: list[LightPlate], how: Unmixing) -> list[LightPlate]:
-    by_name = {plate.light: plate for plate in plates}
-    return [by_name[name] for name in how.shown.lights]
-
-
-def _exchanged(flashes: _Flashes, shares: FloatArray, how: Unmixing) -> Iterator[LightPlate]:
-    seen = np.logical_and.reduce([plate.pixels_seen for plate in flashes.one.plates])
-    for lamp, name in enumerate(how.shown.lights):
-        image, clipped = np.zeros_like(flashes.images[0]), np.zeros(flashes.images[0].shape, np.bool_)
-        for share, picture, at_end in zip(shares[lamp], flashes.images, flashes.clipped, strict=True):
-            image += share.astype(np.float32) * picture
-            clipped |= at_end & (np.abs(share) > COUNTS * np.abs(shares[lamp]).max())
-        most = max(float(np.where(shares[lamp] > 0, shares[lamp], 0).sum(axis=0).max()), 1.0)
-        image[clipped] = most
-        image[~seen] = 0
-        yield flashes.like(flashes.nearest, name, image, seen, most)
-
-
-def _alone(flashes: _Flashes, place: int, flash: OneFlash, how: Unmixing) -> Iterator[LightPlate]:
-    colour = np.array(how.surface_colour or WHITE, np.float32)
-    colour = colour / colour.max()
-    image, clipped = flashes.images[place], flashes.clipped[place].any(axis=-1)
-    light = (image / colour) @ flash.inverse.T.astype(np.float32)  # (row, col, light)
-    for n, shown in enumerate(flash.lights):
-        most = max(float(np.maximum(flash.inverse[n] / colour, 0).sum()), 1.0)
-        plate = light[..., n, None] * colour
-        plate[clipped] = most
-        own = flashes.one.plates[place]
-        yield flashes.like(place, how.shown.lights[shown], np.asarray(plate, np.float32), own.seen, most)
+def _within(plate: LightPlate, other: LightPlate, where: Flags) -> LightPlate:
+    """Return a plate that is another one where that is asked for."""
+    image, most = plate.image, max(plate.saturation, other.saturation)
+    image = np.where(image >= plate.saturation, most, image)
+    shown = np.where(other.image >= other.saturation, most, other.image)
+    image[where] = shown[where]
+    return replace(
+        plate,
+        picture=made(np.asarray(image, np.float32)),
+        seen=np.where(where, other.pixels_seen, plate.pixels_seen),
+        saturation=most,
+    )

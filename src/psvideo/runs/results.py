@@ -26,6 +26,7 @@ from psvideo.plates.align.comb import Comb
 from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.gather import first_ambient, gather
 from psvideo.plates.sequence import AMBIENT, coming
+from psvideo.plates.unmixed import unmixing_note
 from psvideo.report.observe.observed import InstantFacts
 from psvideo.report.run_report import RunReport
 from psvideo.runs.delivering import (
@@ -195,10 +196,11 @@ def normals_run(
             del instant  # its plates would be held while the next round gathers
         if picture is None:
             raise PsvideoError(nothing_complete(clip, timing))
+        colours_said = () if take.unmixing is None else (unmixing_note(take.unmixing),)
         solved = Solved(
             lighting=lighting,
             solver=method,
-            trust=" ".join([trust_note(method, len(clip.plan.lights)), *lighting.near_notes]),
+            trust=" ".join([trust_note(method, len(clip.plan.lights)), *lighting.near_notes, *colours_said]),
             warnings=(
                 *lighting.doubts,
                 *pass_doubts(asked, clip.plan),

@@ -214,6 +214,8 @@ def remarks_on_lights(plan: Plan, found: ClipFit, beat: Beat, *, named: bool) ->
         )
     if len({frozenset(plan.flashes[slot].lit) for slot in lit}) < LEAST_LIGHTS:
         return ()
+    if any(len(plan.flashes[slot].lit) > 1 for slot in lit):
+        return ()  # flashes of several colours that are exchanged are alike on what is grey
     size = float(np.sqrt((light**2).mean()))
     apart = [float(np.sqrt(((light[:, a] - light[:, b]) ** 2).mean())) for a, b in combinations(range(len(lit)), 2)]
     if max(apart) > ALIKE * size:
