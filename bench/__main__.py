@@ -20,6 +20,7 @@ TABLES = (
     "strobe",
     "cameras",
     "instants",
+    "rolling",
     "accuracy",
     "predicted",
     "verdicts",

@@ -9,8 +9,9 @@ from docs.figures.explained import EXPLAINED
 from docs.figures.faults import FAULTS
 from docs.figures.python_page import PYTHON
 from docs.figures.staging import PICTURES
+from docs.figures.turning import TURNING
 
-FIGURES = EXPLAINED | FAULTS | PYTHON
+FIGURES = EXPLAINED | FAULTS | PYTHON | TURNING
 
 
 def main(names: list[str]) -> None:
