@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from psvideo.clip import keeping_near, open_clip, read_frames
+from psvideo.clip import Take, keeping_near, open_clip, read_frames
 from psvideo.clip.decode import movie
 from psvideo.clip.decode.yuv import CODES, HIGHEST, LOWEST, to_rgb
 from psvideo.clip.record import CodedPicture
@@ -19,7 +19,10 @@ from psvideo.errors import PsvideoError
 from psvideo.formats.plan_toml import format_plan
 from psvideo.model.camera import Encoding
 from psvideo.model.plan import Plan
+from psvideo.sync.take_timing import find_take_timing
+from psvideo.synth import TrueClock, expose
 
+PlanMaker = Callable[..., Plan]
 RATE = Fraction(120000, 1001)
 BT709, BT601, BT2020 = (0.2126, 0.0722), (0.299, 0.114), (0.2627, 0.0593)
 MATRIX_TAGS = {BT709: 1, BT601: 6, BT2020: 9}
@@ -268,6 +271,56 @@ def test_uneven_timestamps_are_refused(tmp_path: Path, plan_for: Callable[..., P
         container.mux(stream.encode(None))
     with pytest.raises(PsvideoError, match=r"x\.mp4: its frames do not come at an even rate"):
         open_clip(tmp_path / "x.mp4", plan=plan_for(rows=32, cols=48))
+
+
+SLOWER = [4] * 10 + [5] * 10 + [4] * 9
+"""A phone in dim light: 30 frames a second, then 24, then 30 again, as places of 1/120 s."""
+
+
+def movie_of_varying_rate(path: Path, plan: Plan, steps: list[int], phase_s: float) -> None:
+    """Film a wall under the plan's strobe at the places of 1/120 s that the steps lead to, and write these as times."""
+    places = np.concatenate([[0], np.cumsum(steps)])
+    camera = dataclasses.replace(plan.camera, fps=RATE)
+    plates = [None if flash.is_dark else np.full((160, 8), 0.3 + 0.1 * n) for n, flash in enumerate(plan.flashes)]
+    dropped = sorted(set(range(places[-1] + 1)) - set(places.tolist()))
+    shot = expose(
+        plates,
+        dataclasses.replace(plan, camera=camera),
+        frames=int(places[-1]) + 1,
+        clock=TrueClock(phase_s=phase_s, offset_ppm=40.0),
+        dropped=dropped,
+    )
+    frames = [make_frame([(65535 * frame).astype(np.uint16)], "gray16le") for frame in np.clip(shot.frames, 0, 1)]
+    write_movie(path, frames, places=places.tolist())
+
+
+def test_frames_of_a_rate_that_changes_are_taken_at_their_own_times(tmp_path: Path, make_plan: PlanMaker) -> None:
+    plan = make_plan(width_px=8, height_px=160, fps=RATE / 4, duration_s=0.003)
+    movie_of_varying_rate(tmp_path / "x.mkv", plan, SLOWER, phase_s=0.0123)
+    (tmp_path / "plan.toml").write_text(format_plan(plan))
+    clip = open_clip(tmp_path / "x.mkv", plan=tmp_path / "plan.toml")
+    assert np.diff(clip.numbers).tolist() == SLOWER, "to the millisecond, as Matroska counts"
+    assert clip.plan.camera.fps == RATE
+    assert clip.filmed_plan.camera.fps == plan.camera.fps
+    assert any("varies from 23.9" in warning and "29.9" in warning for warning in clip.warnings)
+    timing = find_take_timing(Take(clip=clip, numbers=clip.numbers))
+    assert timing.dropped_frames == ()
+    assert timing.clock_offset_ppm == pytest.approx(40.0, abs=20.0)
+    truth_s = 0.0123 + np.arange(200) * (plan.flashes[0].duration_s + plan.dark_s) * (1 + 40e-6)
+    off_s = [np.abs(truth_s - flash.start_s).min() for flash in timing.flashes if flash.complete]
+    assert len(off_s) > 10
+    assert max(off_s) < 1e-4
+
+
+def test_a_rate_that_changes_is_refused_where_every_frame_is_to_have_its_flash(
+    tmp_path: Path, make_plan: PlanMaker
+) -> None:
+    plan = make_plan(width_px=8, height_px=160, fps=RATE / 4, duration_s=0.003)
+    movie_of_varying_rate(tmp_path / "x.mkv", plan, SLOWER, phase_s=0.0)
+    synced = dataclasses.replace(plan, mode="synced")
+    (tmp_path / "plan.toml").write_text(format_plan(synced))
+    with pytest.raises(PsvideoError, match=r"varies from .* constant frame rate"):
+        open_clip(tmp_path / "x.mkv", plan=tmp_path / "plan.toml")
 
 
 def test_untagged_matrix_is_guessed_from_the_height_and_said(tmp_path: Path, plan_for: Callable[..., Path]) -> None:

@@ -74,10 +74,13 @@ def _open_movie(path: Path, plan_path: Path | None) -> Clip:
     movie = index_movie(path)
     check_fit(path, movie.header, plan, plan_path)
     encoding, notes = _expanded(_encoding("movie", plan, plan_path), movie.header)
+    rate_warnings = _rate_warning(movie, plan) if movie.rates_hz is None else _varying(path, movie, plan)
+    per_frame = _places_a_frame(movie, plan)
+    camera = replace(plan.camera, fps=plan.camera.fps * per_frame)
     return Clip(
         name=path.stem,
         path=path,
-        plan=plan,
+        plan=replace(plan, camera=camera),
         plan_path=plan_path,
         kind="movie",
         files=(path,),
@@ -86,7 +89,8 @@ def _open_movie(path: Path, plan_path: Path | None) -> Clip:
         colour=_movie_colour(encoding, movie.header),
         encoding=encoding,
         timestamps=movie.timestamps,
-        warnings=movie.header.warnings + _curve_warnings("movie", plan, movie.header) + _rate_warning(movie, plan),
+        warnings=movie.header.warnings + _curve_warnings("movie", plan, movie.header) + rate_warnings,
+        places_per_frame=per_frame,
         notes=notes + _turn_note(movie.header),
     )
 
@@ -150,6 +154,30 @@ def _rate_warning(movie: "Movie", plan: Plan) -> tuple[str, ...]:
     return (
         f"the movie plays at {movie.rate_hz:.6g} frames per second and the plan says {fps:.6g}; the plan's is taken, "
         "as for high-speed footage that plays slowed down",
+    )
+
+
+def _places_a_frame(movie: "Movie", plan: Plan) -> int:
+    """Return how many of a movie's places there are from one frame of the plan's rate to the next."""
+    if movie.place_rate_hz is None or movie.per_frame == 1:
+        return 1
+    ratio = movie.place_rate_hz / float(plan.camera.fps)
+    whole = max(round(ratio), 1)
+    return whole if abs(ratio / whole - 1) < RATE_TOLERANCE + movie.rate_error else movie.per_frame
+
+
+def _varying(path: Path, movie: "Movie", plan: Plan) -> tuple[str, ...]:
+    """Say that a movie's rate varies. Raises PsvideoError where one flash was fired for each frame."""
+    low, high = movie.rates_hz or (0.0, 0.0)
+    rates = f"varies from {low:.4g} to {high:.4g} frames per second"
+    if plan.mode == "synced":
+        raise PsvideoError(
+            f"{path}: its rate {rates}; the plan is synced, with one flash for each frame, and expects an even rate. "
+            "Record at a constant frame rate."
+        )
+    return (
+        f"the rate {rates}; every frame is taken at the time that the file says, the exposure time for constant. Lock "
+        "exposure and frame rate",
     )
 
 

@@ -116,8 +116,9 @@ class Clip:
     ``files`` are the frames' files in order, or the one movie. ``numbers`` are the frames' numbers, with holes where
     frames were dropped. ``cfa`` is the filter pattern at the picture's top left, None where it is not mosaiced.
     ``colour`` is the colour interop id of plates and albedo made from this clip; ``encoding`` is how its codes are
-    read; a movie has the frames' ``timestamps``. ``warnings`` say what may cost accuracy or was guessed, ``notes`` what
-    else was found on opening.
+    read; a movie has the frames' ``timestamps``. Where a movie's rate varies, numbers count ``places_per_frame`` places
+    for every frame of the plan's rate, and ``plan`` has the rate of places. ``warnings`` say what may cost accuracy or
+    was guessed, ``notes`` what else was found on opening.
     """
 
     name: str
@@ -131,6 +132,7 @@ class Clip:
     colour: str
     encoding: Encoding
     timestamps: tuple[int, ...] = ()
+    places_per_frame: int = 1
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
@@ -148,6 +150,18 @@ class Clip:
     def height_px(self) -> int:
         """Rows of the upright picture; the frames' own rows are the plan's ``camera.height_px``."""
         return self.turn.size(self.header.width_px, self.header.height_px)[1]
+
+    @property
+    def dropped(self) -> tuple[tuple[int, int], ...]:
+        """The holes that the numbering shows, as (number before the hole, count of missing frames); none where the
+        rate varies: then places are left out between all frames."""
+        return holes(self.numbers) if self.places_per_frame == 1 else ()
+
+    @property
+    def filmed_plan(self) -> Plan:
+        """The plan with the rate at which it was to be filmed, also where the movie's rate varies."""
+        fps = self.plan.camera.fps / self.places_per_frame
+        return replace(self.plan, camera=replace(self.plan.camera, fps=fps))
 
     @property
     def shown_plan(self) -> Plan:

@@ -8,7 +8,7 @@ import numpy as np
 from psvideo.clip.decode.decoders import read_header
 from psvideo.clip.opening import open_clip
 from psvideo.clip.reading import looks, read_frames
-from psvideo.clip.record import Clip, holes
+from psvideo.clip.record import Clip
 from psvideo.errors import PsvideoError
 from psvideo.inspect.about_plan import length_finding, plan_findings, rig_findings
 from psvideo.inspect.findings import Description, Fact, Finding, caught, fault, ok, warn
@@ -43,9 +43,9 @@ def _facts(clip: Clip) -> dict[str, Fact]:
         "frames": len(clip.numbers),
         "first_number": clip.numbers[0],
         "last_number": clip.numbers[-1],
-        "dropped_frames": sum(count for _, count in holes(clip.numbers)),
+        "dropped_frames": sum(count for _, count in clip.dropped),
         "time_code": clip.time_code,
-        "fps": float(clip.plan.camera.fps),
+        "fps": float(clip.filmed_plan.camera.fps),
         "mode": clip.plan.mode,
         "lights": list(clip.plan.lights),
     }
@@ -58,7 +58,7 @@ def _findings(clip: Clip) -> Iterator[Finding]:
     yield from (ok(text) for text in clip.notes)
     yield from _hole_findings(clip)
     yield from _likeness_findings(clip)
-    yield from plan_findings(clip.plan)
+    yield from plan_findings(clip.filmed_plan)
     yield length_finding(clip.plan, clip.numbers)
     rig = clip.plan_path.with_name("rig.toml")
     if rig.is_file():
@@ -67,7 +67,7 @@ def _findings(clip: Clip) -> Iterator[Finding]:
 
 
 def _hole_findings(clip: Clip) -> Iterator[Finding]:
-    found = holes(clip.numbers)
+    found = clip.dropped
     if not found:
         return
     shown = ", ".join(f"{count} after {after}" for after, count in found[:MANY])

@@ -27,8 +27,11 @@ Flags = NDArray[np.bool_]
 
 
 def has_blind_time(camera: Camera) -> bool:
-    """Return whether rows are closed for a part of every frame, so that flashes may miss them."""
-    return camera.exposure_s < (1 - BLIND) * camera.frame_period_s
+    """Return whether rows are closed for a part of frames, so that flashes may miss them.
+
+    An exposure that is longer than the period is one of a movie whose rate varies: places are closer than its frames.
+    """
+    return abs(camera.exposure_s / camera.frame_period_s - 1) > BLIND
 
 
 def with_nearest_rows(plates: Iterable[LightPlate]) -> Iterator[LightPlate]:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from psvideo.clip import Clip, Kept, Take, holes, keeping_near, read_frames
+from psvideo.clip import Clip, Kept, Take, keeping_near, read_frames
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import NoStrobeError, PsvideoError, UsageError
 from psvideo.formats.paths import path_if_given, path_of
@@ -199,7 +199,7 @@ def _unseen(reason: str) -> Judgement:
 def _with_later_holes(timing: Timing, clip: Clip, window: tuple[int, ...]) -> Timing:
     """Add the holes that the numbering shows after the frames that were looked at."""
     known = {hole.after for hole in timing.dropped_frames}
-    more = [DroppedFrames(after=after, count=count) for after, count in holes(clip.numbers) if after not in known]
+    more = [DroppedFrames(after=after, count=count) for after, count in clip.dropped if after not in known]
     return replace(timing, dropped_frames=(*timing.dropped_frames, *more))
 
 

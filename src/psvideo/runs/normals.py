@@ -181,7 +181,9 @@ def normals(
         require_usd()
     _check_numbers(near_iterations=near_iterations, depth=depth, depth_scale=depth_scale, denoise=denoise)
     take = open_take(clip_path, plan=path_if_given("plan", plan), frames=frames)
-    rate = rate_of(fps, take.plan, shutter=shutter, resync=path_if_given("resync", resync), clip=take.clip.name)
+    rate = rate_of(
+        fps, take.clip.filmed_plan, shutter=shutter, resync=path_if_given("resync", resync), clip=take.clip.name
+    )
     over_time = OverTime(aligning=Aligning(align=align, rate=rate), denoise=denoise)
     say_of_clip(take.clip, caller)
     lighting = read_lighting(

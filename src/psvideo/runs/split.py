@@ -101,7 +101,9 @@ def split(
     )
     take = open_take(path_of("clip", clip), plan=path_if_given("plan", plan), frames=frames)
     say_of_clip(take.clip, caller)
-    rate = rate_of(fps, take.plan, shutter=shutter, resync=path_if_given("resync", resync), clip=take.clip.name)
+    rate = rate_of(
+        fps, take.clip.filmed_plan, shutter=shutter, resync=path_if_given("resync", resync), clip=take.clip.name
+    )
     over_time = OverTime(aligning=Aligning(rate=rate))
     known = None if rig is None else read_rig(path_of("rig", rig), plan_lights=take.plan.lights)
     unmixing = None if known is None else unmixing_of(take.plan, known, channels=take.clip.channels)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.clip import Take, check_take, holes, read_frames
+from psvideo.clip import Take, check_take, read_frames
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.compute.threads import thread_count
 from psvideo.model.camera import FloatArray
@@ -47,7 +47,7 @@ def timing_of_profiles(take: Take, profiles: TakeProfiles, *, first_light: str |
         profiles.value,
         clip=take.clip.name,
         first_light=first_light,
-        dropped=tuple(DroppedFrames(after=after, count=count) for after, count in holes(take.clip.numbers)),
+        dropped=tuple(DroppedFrames(after=after, count=count) for after, count in take.clip.dropped),
         numbers=take.numbers,
         doubt=profiles.doubt,
     )

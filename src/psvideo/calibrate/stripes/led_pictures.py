@@ -64,7 +64,7 @@ def read_led_pictures(
         pictures = _decoded([by_number[number] for number in places or ()])
     elif len(paths) == 1 and path.suffix.lower() in MOVIES and path.is_file():
         movie = index_movie(path)
-        places, rate_hz = _chosen(movie.places, frames), movie.rate_hz
+        places, rate_hz = _chosen(movie.places, frames), movie.place_rate_hz
         stamps = dict(zip(movie.places, movie.timestamps, strict=True))
         pictures = ((f"{path}, frame {place}", found) for place, found in _filmed(path, stamps, places))
     else:

@@ -17,7 +17,7 @@ from av.video.stream import VideoStream
 
 from psvideo.clip.decode.ffmpeg_planes import planes
 from psvideo.clip.decode.movie_tags import capture_rate_hz, compression_warning, gamut_of, shot_by, transfer_of, turn_of
-from psvideo.clip.decode.movie_times import Places, places_of, promised_frames, stamps_of
+from psvideo.clip.decode.movie_times import UNEVEN, Places, places_of, promised_frames, stamps_of
 from psvideo.clip.decode.yuv import CODES, HIGHEST, LOWEST, LUMA_WEIGHTS, signal_range, to_rgb
 from psvideo.clip.record import CodedPicture, Header
 from psvideo.errors import PsvideoError
@@ -33,9 +33,11 @@ AS_RECORDED = {"ignore_editlist": "1"}  # all frames that the camera wrote, also
 class Movie:
     """A movie's first frame's header and, in the order of time, every frame's timestamp and place.
 
-    ``places`` count frames from the first; a gap of whole frames between timestamps leaves places out. ``rate_hz`` is
-    the rate at which the file plays, None where a single frame shows none; rounded timestamps leave it unsure by the
-    share ``rate_error``. ``capture_rate_hz`` is the rate at which it was shot, where the file says so.
+    ``places`` count frames from the first; a gap of whole frames between timestamps leaves places out. Where the rate
+    varies there are ``per_frame`` places from one frame to the usual next one, and ``rates_hz`` are the lowest and the
+    highest rate. ``rate_hz`` is the rate at which the file usually plays, None where a single frame shows none; rounded
+    timestamps leave it unsure by the share ``rate_error``. ``capture_rate_hz`` is the rate at which it was shot, where
+    the file says so.
     """
 
     header: Header
@@ -44,6 +46,13 @@ class Movie:
     rate_hz: float | None
     rate_error: float = 0.0
     capture_rate_hz: float | None = None
+    per_frame: int = 1
+    rates_hz: tuple[float, float] | None = None
+
+    @property
+    def place_rate_hz(self) -> float | None:
+        """How many places there are a second."""
+        return None if self.rate_hz is None else self.rate_hz * self.per_frame
 
 
 def index_movie(path: Path) -> Movie:
@@ -51,7 +60,7 @@ def index_movie(path: Path) -> Movie:
     with _opened(path) as (container, stream):
         stamps = stamps_of(container, stream)
         found = places_of(path, stamps.timestamps)
-        promised = promised_frames(container, stream, found.period)
+        promised = promised_frames(container, stream, found.period * found.per_frame)
         time_base_s = float(stream.time_base or 1)
         code = container.metadata.get("timecode") or stream.metadata.get("timecode")
         capture_rate = capture_rate_hz(container.metadata | stream.metadata)
@@ -67,21 +76,38 @@ def index_movie(path: Path) -> Movie:
     header = next(read_movie(path, timestamps[:1])).header
     coding = compression_warning(codec, header.bits or 0, frames=held, whole_frames=stamps.whole_frames)
     uneven = _left_out(found) if found.left_out else None
-    warnings = tuple(warning for warning in (coding, uneven) if warning)
+    warnings = tuple(warning for warning in (coding, uneven, _strays(found)) if warning)
     return Movie(
         header=replace(header, time_code=code, shot=shot, warnings=header.warnings + warnings),
         timestamps=timestamps,
         places=found.places,
-        rate_hz=1 / (found.period * time_base_s) if found.period else None,
+        rate_hz=1 / (found.period * found.per_frame * time_base_s) if found.period else None,
         rate_error=1 / (timestamps[-1] - timestamps[0]) if found.period else 0.0,
         capture_rate_hz=capture_rate,
+        per_frame=found.per_frame,
+        rates_hz=_rates_hz(found, time_base_s) if found.per_frame > 1 else None,
     )
+
+
+def _rates_hz(found: Places, time_base_s: float) -> tuple[float, float]:
+    steps_s = np.diff(found.places) * found.period * time_base_s
+    return float(1 / steps_s.max()), float(1 / steps_s.min())
 
 
 def _left_out(found: Places) -> str:
     return (
         f"the frames do not come at an even rate throughout: {found.left_out} of them before place {found.places[0]} "
         f"or after place {found.places[-1]} are left out. Record at a constant frame rate"
+    )
+
+
+def _strays(found: Places) -> str | None:
+    """Say where timestamps wander: each step is about a frame, and together they do not keep time."""
+    if found.strays <= UNEVEN:
+        return None
+    return (
+        f"the frames' times stray by up to {found.strays:.2g} frames from an even rate, which is taken all the same: "
+        "the flashes show whether it was. Record at a constant frame rate"
     )
 
 

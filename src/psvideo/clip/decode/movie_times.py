@@ -1,7 +1,8 @@
 """When a movie's frames were taken: their timestamps, and the place of each, counted in frames.
 
-A camera that keeps its rate leaves even steps, and whole steps out where it dropped frames. Where the rate changes on
-the way, places can be counted only within an even run.
+A camera that keeps its rate leaves even steps, and whole steps out where it dropped frames. One that changes between
+rates (30 and 24 a second, as phones do in dim light) leaves steps that are whole multiples of a shorter one (1/120 s):
+places count those. Where there is no such step, places can be counted only within an even run.
 """
 
 from collections.abc import Sequence
@@ -19,6 +20,14 @@ from psvideo.errors import PsvideoError
 UNEVEN = 0.25
 LEAST_EVEN_SHARE = 0.5
 """The longest even run is used where it is at least this share of the movie."""
+MOST_STEPS = 8
+"""The usual step between frames is divided into at most so many: 24, 25, 30 and 60 a second are whole multiples of 1/8
+of one another or less."""
+EXACT = 0.02
+"""A step is a whole multiple within this share of the usual one, or the timestamps' own unit."""
+LEAST_HELD_SHARE = 0.8
+"""A rate is held for a while: so many of the steps that are no whole frames are as long as the one before or after.
+Timestamps that jitter, or stumble once, are not."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,7 +35,8 @@ class Places:
     """The timestamps of an even run of frames, each one's place in time, and the period in the timestamps' unit.
 
     ``first`` is how many frames come before the run, ``left_out`` how many are not of it; places count from ``first``.
-    The period is 0 where a single frame shows none.
+    The period is 0 where a single frame shows none. Where the rate varies it is the ``per_frame``-th part of the usual
+    step between frames, and places count such parts. ``strays`` is by how many frames timestamps are off, at most.
     """
 
     timestamps: tuple[int, ...]
@@ -34,6 +44,8 @@ class Places:
     period: float
     first: int = 0
     left_out: int = 0
+    per_frame: int = 1
+    strays: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,7 +103,10 @@ def places_of(path: Path, timestamps: Sequence[int]) -> Places:
     period = float(like.mean()) if like.size else usual
     counts = np.rint(steps / period) if period > 0 else np.zeros_like(steps)
     uneven = (np.abs(steps - counts * period) > max(UNEVEN * period, 1.0)) | (counts < 1)
+    if varying := _of_several_rates(timestamps, steps, usual):
+        return varying
     first, last = _longest_run(uneven)
+    strays = _stray(timestamps[first : last + 1], counts[first:last])
     if last - first < LEAST_EVEN_SHARE * steps.size or last == first:
         raise PsvideoError(
             f"{path}: its frames do not come at an even rate ({int(uneven.sum())} of {steps.size} steps between "
@@ -105,7 +120,45 @@ def places_of(path: Path, timestamps: Sequence[int]) -> Places:
         period=period,
         first=first,
         left_out=len(timestamps) - (last + 1 - first),
+        strays=strays,
     )
+
+
+def _stray(timestamps: Sequence[int], counts: np.ndarray[tuple[int], np.dtype[np.float64]]) -> float:
+    """Return by how many frames timestamps are off, at most, from those of an even rate."""
+    if len(counts) < 2:
+        return 0.0
+    places = np.concatenate([[0], np.cumsum(counts)])
+    rate, first = np.polyfit(places, np.array(timestamps, np.float64), 1)
+    return float(np.abs(first + rate * places - timestamps).max() / rate)
+
+
+def _of_several_rates(
+    timestamps: Sequence[int], steps: np.ndarray[tuple[int], np.dtype[np.float64]], usual: float
+) -> Places | None:
+    """Return the places of frames that keep one rate, then another; None where they keep one, jittering or with whole
+    frames left out, or where their steps have no common part."""
+    whole = np.rint(steps / usual) if usual > 0 else np.zeros_like(steps)
+    mean = float(steps.sum() / max(whole.sum(), 1.0))
+    if usual <= 0 or np.abs(np.cumsum(steps - whole * mean)).max() <= UNEVEN * usual:
+        return None
+    alike = np.abs(np.diff(steps)) <= np.maximum(EXACT * usual, 1.0)
+    held = np.append(alike, False) | np.append(False, alike)
+    for parts in range(2, MOST_STEPS + 1):
+        period, allowed = usual / parts, max(EXACT * usual, 1.0)
+        counts = np.rint(steps / period)
+        period = float(steps.sum() / max(counts.sum(), 1.0))
+        fits = allowed < UNEVEN * period and counts.min() >= 1 and np.abs(steps - counts * period).max() <= allowed
+        odd = counts % parts > 0
+        if fits and held[odd].sum() >= LEAST_HELD_SHARE * odd.sum() > 0:
+            places = np.concatenate([[0], np.cumsum(counts)])
+            return Places(
+                timestamps=tuple(timestamps),
+                places=tuple(int(place) for place in places),
+                period=period,
+                per_frame=parts,
+            )
+    return None
 
 
 def _longest_run(uneven: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> tuple[int, int]:
