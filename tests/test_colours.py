@@ -4,14 +4,19 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import OpenEXR
 import pytest
 
 import psvideo as ps
+from psvideo.calibrate.flat_field import Target
+from psvideo.calibrate.led_colours import measure_led_colours, with_colours
+from psvideo.calibrate.light_pictures import LightPictures, light_pictures
+from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
-from psvideo.formats.rig_toml import format_rig, parse_rig
-from psvideo.model.colours import Unmixing, lamps_of, unmixing_of
+from psvideo.formats.rig_toml import format_rig, parse_rig, read_rig
+from psvideo.model.colours import WHITE, Unmixing, lamps_of, unmixing_of
 from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.model.rig import Light, Rig, Vector
 from psvideo.plates.light_plate import LightPlate
@@ -167,6 +172,55 @@ def test_a_rig_without_colours_is_left_alone(make_plan: MakePlan) -> None:
     rig = rig_of()
     plain = replace(rig, lights=tuple(replace(light, colour=None) for light in rig.lights))
     assert unmixing_of(plan_of(make_plan, EXCHANGED), plain, channels=3) is None
+
+
+def card(rng: np.random.Generator, rig: Rig, *, exposure: float = 0.5) -> LightPictures:
+    """Return pictures of a card of albedo 0.9 that faces the camera, under one light at a time."""
+    images = []
+    for light in rig.lights:
+        seen = 0.9 * exposure * np.array(light.direction or WHITE)[2] * np.array(light.by_channel)
+        images.append(np.clip(seen + rng.normal(0, 2e-3, (24, 32, 3)), 0, 1).astype(np.float32))
+    return light_pictures(rig.names, images)
+
+
+TARGET = Target(albedo=0.45, normal=np.array([0.0, 0.0, 1.0]), rows=slice(0, 24), cols=slice(0, 32))
+"""Half the card's albedo: the pictures were exposed for half."""
+
+
+def test_a_white_card_gives_colours_and_intensities_with_their_errors() -> None:
+    rig = rig_of()
+    bare = replace(rig, lights=tuple(replace(light, colour=None, intensity=(1.0,)) for light in rig.lights))
+    found = measure_led_colours(card(np.random.default_rng(1), rig), bare, TARGET)
+    for measured, light in zip(with_colours(bare, found).lights, rig.lights, strict=True):
+        np.testing.assert_allclose(measured.by_channel, light.by_channel, atol=2e-3)
+    assert found.error.max() < 1e-3
+    assert 1.2 < found.condition < 1.6
+
+
+def test_a_card_that_clips_and_colours_that_are_alike_are_refused() -> None:
+    rng = np.random.default_rng(1)
+    with pytest.raises(PsvideoError, match=r"'key_red': 100% of the white target is saturated .* at most 2% may be"):
+        measure_led_colours(card(rng, rig_of(), exposure=2.0), rig_of(), TARGET)
+    alike = rig_of(green=(0.99, 0.12, 0.02))
+    with pytest.raises(PsvideoError, match=r"condition number is .*, and (key|left|top)_red and \1_green are most"):
+        measure_led_colours(card(rng, alike), alike, TARGET)
+    grey = light_pictures(("key_red",), [np.full((24, 32), 0.3, np.float32)])
+    with pytest.raises(PsvideoError, match=r"monochrome camera cannot tell colours apart"):
+        measure_led_colours(grey, rig_of(), TARGET)
+
+
+def test_calibrate_colours_writes_a_rig_that_takes_flashes_apart(tmp_path: Path) -> None:
+    rig, folder = rig_of(), tmp_path / "card"
+    folder.mkdir()
+    pictures = card(np.random.default_rng(1), rig)
+    for name, image in zip(pictures.names, pictures.images, strict=True):
+        cv2.imwrite(str(folder / f"{name}.png"), np.round(image[..., ::-1] * 65535).astype(np.uint16))
+    bare = replace(rig, lights=tuple(replace(light, colour=None) for light in rig.lights))
+    (tmp_path / "rig.toml").write_text(format_rig(bare))
+    words = ["calibrate", "colours", str(folder), "--rig", str(tmp_path / "rig.toml"), "--albedo", "0.45"]
+    assert main([*words, "-o", str(tmp_path / "measured.toml"), "-q"]) == 0
+    for measured, light in zip(read_rig(tmp_path / "measured.toml").lights, rig.lights, strict=True):
+        np.testing.assert_allclose(measured.by_channel, light.by_channel, atol=2e-3)
 
 
 SCENE = """

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from psvideo.calibrate.light_pictures import LightPictures
 from psvideo.errors import PsvideoError
@@ -70,16 +71,29 @@ def with_intensities(rig: Rig, found: list[FlatLight]) -> Rig:
     return replace(rig, lights=lights)
 
 
-def _flat(light: Light, n: int, pictures: LightPictures, target: Target, ground: Ground | None) -> FlatLight:
+def on_target(
+    light: Light,
+    n: int,
+    pictures: LightPictures,
+    target: Target,
+    ground: Ground | None,
+    *,
+    least_share: float = LEAST_SHARE,
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Return what light ``n`` of the pictures sends to a target, (row, col, channel), the same everywhere but for
+    falloff that the rig does not explain; and which pixels count, ``least_share`` of them at least.
+
+    Raises PsvideoError where too much is saturated or unseen, or the light does not reach the target.
+    """
     part = (target.rows, target.cols)
     values = pictures.images[n][part].astype(np.float64)
     clipped = pictures.saturated[n][part]
     values, clipped = (one if one.ndim == 3 else one[..., None] for one in (values, clipped))
     usable = ~clipped.any(axis=2) & pictures.seen[n][target.rows, None]
-    if usable.mean() < LEAST_SHARE:
+    if usable.mean() < least_share:
         raise PsvideoError(
             f"Light {light.name!r}: {1 - usable.mean():.0%} of the white target is saturated or was not seen; at most "
-            f"{1 - LEAST_SHARE:.0%} may be. Expose less, dim the light, or name a part of the picture with `box`."
+            f"{1 - least_share:.0%} may be. Expose less, dim the light, or name a part of the picture with `box`."
         )
     shade = field_of(light, ground, part) @ target.normal
     if np.min(shade) <= LEAST_COSINE * np.max(np.abs(shade)):
@@ -87,7 +101,11 @@ def _flat(light: Light, n: int, pictures: LightPictures, target: Target, ground:
             f"Light {light.name!r} does not reach the white target by the rig's direction: expected it before the "
             "target's face. Check the rig, or give the target's normal with the rig's [surface] plane."
         )
-    flat = values / np.broadcast_to(shade, usable.shape)[..., None] / target.albedo
+    return values / np.broadcast_to(shade, usable.shape)[..., None] / target.albedo, usable
+
+
+def _flat(light: Light, n: int, pictures: LightPictures, target: Target, ground: Ground | None) -> FlatLight:
+    flat, usable = on_target(light, n, pictures, target, ground)
     level = np.median(flat[usable], axis=0)
     if np.min(level) <= 0:
         raise PsvideoError(f"Light {light.name!r}: the white target is black in a channel. Check that it was flashed.")

@@ -105,6 +105,16 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
             "psvideo calibrate flat-field paper/ --rig rig.toml --box 400,200,1500,900 -o rig2.toml",
         ),
     ),
+    "calibrate colours": (
+        (
+            "what red, green and blue see of each LED, from white paper that one LED at a time lights",
+            "psvideo calibrate colours paper/ --rig rig.toml --albedo 0.85 -o rig2.toml",
+        ),
+        (
+            "only a part of the picture is paper",
+            "psvideo calibrate colours paper/ --rig rig.toml --box 400,200,1500,900 -o rig2.toml",
+        ),
+    ),
     "calibrate intensities": (
         (
             "relative strengths from the scene itself, from four lights on",

@@ -13,7 +13,7 @@ from psvideo.formats.flat_toml import SCHEMA as FLAT_SCHEMA
 from psvideo.formats.flat_toml import format_falloff
 from psvideo.formats.rig_toml import format_rig, read_rig
 from psvideo.formats.whole_files import refuse_existing, write_text
-from psvideo.model.ground import ground_of
+from psvideo.model.ground import Ground, ground_of
 from psvideo.model.near_light import is_near
 from psvideo.model.rig import Rig
 from psvideo.runs.calibrate.reading import pictures_of, reading_of, rig_out
@@ -65,11 +65,7 @@ def flat_field(
         raise UsageError(f"`albedo` {albedo:g}: expected a share above 0 and up to 1.")
     found = pictures_of(Path(pictures), reading_of(plan, frames, first_light, transfer), watch=watch, caller=caller)
     known = read_rig(Path(rig), plan_lights=found.names)
-    near = is_near(known.select(found.names))
-    ground = ground_of(known, height_px=found.height_px, width_px=found.width_px) if near else None
-    normal = np.array([0.0, 0.0, 1.0] if known.plane is None else known.plane[:3])
-    rows, cols = _part(box, found)
-    target = Target(albedo=albedo, normal=normal / np.linalg.norm(normal), rows=rows, cols=cols)
+    target, ground = target_of(found, known, albedo=albedo, box=box)
     lights = measure_flat_field(found, known, target, ground=ground)
     measured = with_intensities(known, lights)
     write_text(rig_path, format_rig(measured))
@@ -81,6 +77,18 @@ def flat_field(
             "intensity per light, not a map. Write the map with `flat` flat.toml, and give it to psvideo normals"
         )
     return FlatFieldCalibration(lights=tuple(lights), rig=measured)
+
+
+def target_of(
+    found: LightPictures, known: Rig, *, albedo: float, box: tuple[int, int, int, int] | None
+) -> tuple[Target, Ground | None]:
+    """Return the white target of some pictures: it faces the camera, or lies in the rig's plane; and where it stands,
+    where lights are near. Raises UsageError where the box is outside the picture."""
+    near = is_near(known.select(found.names))
+    ground = ground_of(known, height_px=found.height_px, width_px=found.width_px) if near else None
+    normal = np.array([0.0, 0.0, 1.0] if known.plane is None else known.plane[:3])
+    rows, cols = _part(box, found)
+    return Target(albedo=albedo, normal=normal / np.linalg.norm(normal), rows=rows, cols=cols), ground
 
 
 def _part(box: tuple[int, int, int, int] | None, pictures: LightPictures) -> tuple[slice, slice]:

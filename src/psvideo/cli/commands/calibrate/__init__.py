@@ -3,7 +3,7 @@
 import typer
 
 from psvideo.cli.commands.calibrate.convert import convert
-from psvideo.cli.commands.calibrate.lights import flat_field, guess, intensities, matte_sphere
+from psvideo.cli.commands.calibrate.lights import colours, flat_field, guess, intensities, matte_sphere
 from psvideo.cli.commands.calibrate.mirror_sphere import mirror_sphere
 from psvideo.cli.commands.calibrate.readout import readout
 
@@ -11,6 +11,7 @@ calibrate = typer.Typer(help="Measure cameras and lights before a shoot.", no_ar
 calibrate.command("mirror-sphere")(mirror_sphere)
 calibrate.command("matte-sphere")(matte_sphere)
 calibrate.command("flat-field")(flat_field)
+calibrate.command("colours")(colours)
 calibrate.command("intensities")(intensities)
 calibrate.command("guess")(guess)
 calibrate.command("convert")(convert)

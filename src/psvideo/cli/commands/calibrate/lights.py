@@ -1,4 +1,4 @@
-"""psvideo calibrate matte-sphere, flat-field, intensities, guess: where lights are and how strong."""
+"""psvideo calibrate matte-sphere, flat-field, colours, intensities, guess: where lights are and how strong."""
 
 from __future__ import annotations
 
@@ -117,6 +117,60 @@ def flat_field(
         voice.say(f"{flat}: falloff written, which leaves {left:.1%}; give it to psvideo normals with --flat.")
     voice.say(f"{out}: {counted(len(found.lights), 'light')} written.")
     voice.result({"lights": [_flat_record(light) for light in found.lights]})
+
+
+def colours(
+    pictures: Pictures,
+    rig: RigIn,
+    out: RigOut,
+    albedo: Annotated[float, typer.Option(help="The card's albedo: white paper 0.85, a white card 0.9.")] = 0.9,
+    box: Annotated[
+        str | None, typer.Option(help="The card's part of the picture: left,top,right,bottom in pixels.")
+    ] = None,
+    transfer: Transfer = None,
+    plan: PlanPath = None,
+    frames: Frames = None,
+    first_light: FirstLight = None,
+    force: Force = False,
+    json: Json = False,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+) -> None:
+    """Measure what red, green and blue see of every coloured light, from a white card that one light at a time lights;
+    writes the rig with colours."""
+    from psvideo.runs.calibrate.colours import colours as measure
+
+    voice = Voice(json=json, verbose=verbose, quiet=quiet)
+    done = measure(
+        pictures,
+        rig=rig,
+        out=out,
+        albedo=albedo,
+        box=None if box is None else parse_box(box),
+        transfer=transfer,
+        plan=plan,
+        frames=frames,
+        first_light=first_light,
+        force=force,
+        watch=voice.track,
+        caller=voice.caller(),
+    )
+    found = done.found
+    for name, seen, error in zip(found.names, found.seen, found.error, strict=True):
+        shares = ", ".join(f"{value / seen.max():.4f}" for value in seen)
+        voice.say(f"  {name:12} intensity {seen.max():.4g}  colour {shares}  +- {error.max():.2%}")
+    voice.say(f"Hardest to tell apart: {', '.join(found.together)}, condition number {found.condition:.2f}.")
+    voice.say(f"{out}: {counted(len(found.names), 'light')} with colours.")
+    voice.result(
+        {
+            "lights": [
+                {"name": name, "seen": seen.tolist(), "error": error.tolist()}
+                for name, seen, error in zip(found.names, found.seen, found.error, strict=True)
+            ],
+            "together": found.together,
+            "condition": found.condition,
+        }
+    )
 
 
 def intensities(

@@ -1,0 +1,104 @@
+"""The colours of LEDs: what the camera's channels see of each on a white card, one LED flashed at a time."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from psvideo.calibrate.flat_field import Target, on_target
+from psvideo.calibrate.light_pictures import LightPictures
+from psvideo.errors import PsvideoError
+from psvideo.model.camera import FloatArray
+from psvideo.model.colours import CHANNELS, MAX_CONDITION, colour_condition, lamps_of, most_alike
+from psvideo.model.ground import Ground
+from psvideo.model.rig import Light, Rig
+
+LEAST_SHARE = 0.98
+"""Of the card that may not be clipped: where the brightest channel is cut off, the others seem to see more."""
+PATCHES = 4
+"""Bands of the card whose differences say how well its colour is known."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LedColours:
+    """What was measured: ``seen`` (light, channel) is intensity times colour, ``error`` its standard error in shares of
+    the light's brightest channel; ``condition`` belongs to ``together``, those of the lights that flash at once whose
+    colours are the hardest to tell apart."""
+
+    names: tuple[str, ...]
+    seen: FloatArray
+    error: FloatArray
+    together: tuple[str, ...]
+    condition: float
+
+
+def measure_led_colours(
+    pictures: LightPictures, rig: Rig, target: Target, *, ground: Ground | None = None
+) -> LedColours:
+    """Measure the matrix of lights and channels on a white card.
+
+    Raises PsvideoError where the pictures are grey, the card clips or is black under a light, or the colours of lights
+    that are to flash together cannot be separated.
+    """
+    if pictures.images.ndim == 3:
+        raise PsvideoError(
+            "The pictures are grey: a monochrome camera cannot tell colours apart. Film in colour, or flash one light "
+            "at a time, with lights of any colour."
+        )
+    lights = rig.select(pictures.names)
+    found = [_measured(light, n, pictures, target, ground) for n, light in enumerate(lights)]
+    seen, error = (np.stack([one[part] for one in found]) for part in (0, 1))
+    groups = _together(lights)
+    conditions = [colour_condition(seen[[pictures.names.index(name) for name in group]]) for group in groups]
+    worst = int(np.argmax(conditions))
+    colours = LedColours(
+        names=pictures.names, seen=seen, error=error, together=groups[worst], condition=conditions[worst]
+    )
+    if colours.condition > MAX_CONDITION:
+        raise _inseparable(colours)
+    return colours
+
+
+def with_colours(rig: Rig, found: LedColours) -> Rig:
+    """Return the rig with the measured colours, the brightest channel 1, and the intensity there."""
+    measured = dict(zip(found.names, found.seen.tolist(), strict=True))
+    return replace(rig, lights=tuple(_coloured(light, measured.get(light.name)) for light in rig.lights))
+
+
+def _coloured(light: Light, seen: Sequence[float] | None) -> Light:
+    if seen is None:
+        return light
+    most = max(seen)
+    red, green, blue = (float(f"{value / most:.5g}") for value in seen)
+    return replace(light, intensity=(float(f"{most:.6g}"),), colour=(red, green, blue))
+
+
+def _measured(
+    light: Light, n: int, pictures: LightPictures, target: Target, ground: Ground | None
+) -> tuple[FloatArray, FloatArray]:
+    flat, usable = on_target(light, n, pictures, target, ground, least_share=LEAST_SHARE)
+    level = np.median(flat[usable], axis=0)
+    if level.max() <= 0:
+        raise PsvideoError(f"Light {light.name!r}: the white card is black under it. Check that it was flashed.")
+    bands = [rows for rows in np.array_split(np.arange(len(flat)), PATCHES) if usable[rows].any()]
+    medians = [np.median(flat[rows][usable[rows]], axis=0) for rows in bands]
+    shares = np.array([one / max(one.max(), 1e-12) for one in medians])
+    return np.maximum(level, 0.0), shares.std(axis=0) / np.sqrt(max(len(bands) - 1, 1))
+
+
+def _together(lights: Sequence[Light]) -> tuple[tuple[str, ...], ...]:
+    """Return the lights whose colours must differ: those of each lamp; of lamps with one LED each, any three."""
+    lamps = tuple(lamp for lamp in lamps_of(lights) if len(lamp) > 1)
+    names = tuple(light.name for light in lights)
+    return lamps or tuple(names[n : n + CHANNELS] for n in range(0, len(names), CHANNELS))
+
+
+def _inseparable(found: LedColours) -> PsvideoError:
+    seen = found.seen[[found.names.index(name) for name in found.together]]
+    one, other = most_alike(seen)
+    return PsvideoError(
+        f"The colours of {', '.join(found.together)} cannot be separated: their condition number is "
+        f"{found.condition:.3g} (at most {MAX_CONDITION:g} is accepted), and {found.together[one]} and "
+        f"{found.together[other]} are most alike. Take LEDs of other colours (red, green and blue are told apart with "
+        "about 1.5), check that each picture shows one LED alone, and that the pictures' curve is named by `transfer`."
+    )

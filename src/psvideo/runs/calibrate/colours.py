@@ -1,0 +1,62 @@
+"""The whole of ``psvideo calibrate colours``."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from psvideo.calibrate.led_colours import LedColours, measure_led_colours, with_colours
+from psvideo.compute.progress import Watch, unwatched
+from psvideo.errors import UsageError
+from psvideo.formats.rig_toml import format_rig, read_rig
+from psvideo.formats.whole_files import write_text
+from psvideo.model.rig import Rig
+from psvideo.runs.calibrate.flat_field import target_of
+from psvideo.runs.calibrate.reading import pictures_of, reading_of, rig_out
+from psvideo.runs.caller import PYTHON, Caller
+
+
+@dataclass(frozen=True, kw_only=True)
+class ColourCalibration:
+    """What a white card showed of every light's colour, and the rig with it."""
+
+    found: LedColours
+    rig: Rig
+
+
+def colours(
+    pictures: Path | str,
+    *,
+    rig: Path | str,
+    out: Path | str,
+    albedo: float = 0.9,
+    box: tuple[int, int, int, int] | None = None,
+    transfer: str | None = None,
+    plan: Path | str | None = None,
+    frames: str | None = None,
+    first_light: str | None = None,
+    force: bool = False,
+    watch: Watch = unwatched,
+    caller: Caller = PYTHON,
+) -> ColourCalibration:
+    """Measure what the camera's channels see of every coloured light, on a white card; write the rig with colours.
+
+    - ``pictures``: a folder of stills, one per light alone, of plates, or a clip whose plan flashes one light at a
+      time: the card faces the camera, or lies in the plane that the rig gives. ``transfer``, ``plan``, ``frames``,
+      ``first_light``: as for ``matte_sphere``.
+    - ``rig``: whose directions or positions are known. ``out``: the rig file to write: each light's ``colour``, and its
+      intensity in its brightest channel. ``force`` replaces it where it exists.
+    - ``albedo``: the card's, above 0 and up to 1. ``box``: the card's part of the picture: left, top, right, bottom in
+      pixels.
+
+    Raises UsageError where the output exists or values cannot be, and PsvideoError where the card clips, the pictures
+    are grey, or colours cannot be separated.
+    """
+    rig_path = rig_out(out, force=force)
+    if not 0 < albedo <= 1:
+        raise UsageError(f"`albedo` {albedo:g}: expected a share above 0 and up to 1.")
+    found = pictures_of(Path(pictures), reading_of(plan, frames, first_light, transfer), watch=watch, caller=caller)
+    known = read_rig(Path(rig), plan_lights=found.names)
+    target, ground = target_of(found, known, albedo=albedo, box=box)
+    measured = measure_led_colours(found, known, target, ground=ground)
+    made = with_colours(known, measured)
+    write_text(rig_path, format_rig(made))
+    return ColourCalibration(found=measured, rig=made)
