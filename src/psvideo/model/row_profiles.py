@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,12 +12,6 @@ from psvideo.model.coded import Coded, CodedFrame, Image
 
 LOST = 1.0
 """Light, as a share of saturation, that a clipped sample may well have lost: one that two lights clip loses as much."""
-
-
-def row_profile(image: Image) -> FloatArray:
-    """Return the mean over columns and channels of a picture, shape (row,)."""
-    flat = image.reshape(image.shape[0], -1)
-    return cv2.reduce(flat, 1, cv2.REDUCE_AVG, dtype=cv2.CV_64F)[:, 0].astype(np.float64)
 
 
 def collect(frames: Iterable[CodedFrame]) -> tuple[NDArray[np.int64], FloatArray]:

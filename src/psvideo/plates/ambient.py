@@ -12,13 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.compute.compiled import EXACT
-from psvideo.compute.threads import over_ranges
 from psvideo.model.camera import FloatArray
 from psvideo.model.coded import Image
-from psvideo.model.row_profiles import row_profile
-from psvideo.plates.ambient_blocks import block_px, block_rows, enlarged_rows, reduced, rows_at_a_time, times_rows
+from psvideo.plates.ambient_blocks import block_px, block_rows, no_blocks, over_bands, times_rows
 from psvideo.plates.ambient_change import AmbientChange
+from psvideo.plates.ambient_kernel import blend_rows, look_rows
 from psvideo.plates.mains import Mains, RowLight
 from psvideo.plates.split import Plate
 
@@ -83,19 +81,15 @@ def update(ambient: Ambient | None, dark: Plate) -> Ambient:
 
 def _looked_at(dark: Plate) -> tuple[RowLight, Image]:
     """Return a dark slot's rows and the means over its blocks, of which the image itself is not held."""
-    shape = dark.picture.shape
-    each = rows_at_a_time(shape)
+    bound, shape = dark.picture.bound(), dark.picture.shape
+    means, clipped, coarse = np.empty(shape[0]), np.empty(shape[0], np.bool_), no_blocks(shape)
+    block = block_px(shape)
 
-    read = dark.picture.reader()
+    def look(first: int, last: int) -> None:
+        bound.run(look_rows, first, last, block, first, last, means, clipped, coarse)
 
-    def look(first: int, last: int) -> tuple[FloatArray, FloatArray, Image]:
-        band = read(first, last)
-        most = band.reshape(last - first, -1).max(axis=1).astype(np.float64)
-        return row_profile(band), most, reduced(band, shape)
-
-    means, peaks, smalls = zip(*over_ranges(look, shape[0], each=each), strict=True)
-    rows = RowLight.of(dark, np.concatenate(means), np.concatenate(peaks))
-    return rows, np.concatenate(smalls)
+    over_bands(look, shape)
+    return RowLight.of(dark, means, clipped), coarse
 
 
 def _blended(
@@ -103,62 +97,21 @@ def _blended(
 ) -> tuple[Image, Image, Image]:
     """Return the average with one more dark slot, its rows times a factor; its mean over blocks; and how many slots it
     spans then."""
-    image, slots = np.empty_like(ambient.image), np.empty_like(ambient.slots)
-    rows, cols = image.shape[:2]
-    blocks = np.repeat(block_rows(cols, slots.shape[1]), image.size // (rows * cols))
+    image, coarse, slots = (np.empty_like(one) for one in (ambient.image, ambient.coarse, ambient.slots))
+    bound, block = dark.picture.bound(), block_px(image.shape)
+    old, out = (picture.reshape(len(image), -1) for picture in (ambient.image, image))
+    factors, seen = factor.astype(np.float32), np.ascontiguousarray(dark.seen)
 
-    read = dark.picture.reader()
+    def blend(first: int, last: int) -> None:
+        bound.run(
+            blend_rows, first, last, block, LONGEST_MEMORY, factors, seen, restarts, gain, old, ambient.slots, first,
+            last, out, slots, coarse,
+        )  # fmt: skip
 
-    def blend(first: int, last: int) -> Image:
-        band = slice(first, last)
-        new = times_rows(read(first, last), factor[band])
-        old, now, level, out = (
-            picture.reshape(last - first, -1)
-            for picture in (ambient.image[band], new, enlarged_rows(gain, image.shape, first, last), image[band])
-        )
-        _blend(old, now, level, ambient.slots[band], restarts[band], dark.seen[band], blocks, out, slots[band])
-        return reduced(image[band], image.shape)
-
-    return image, np.concatenate(over_ranges(blend, rows, each=rows_at_a_time(image.shape))), slots
+    over_bands(blend, image.shape)
+    return image, coarse, slots
 
 
 def first_ripple(before: Mains, after: Mains) -> bool:
     """Tell whether a ripple is known that is still in the earlier picture."""
     return before.ripple is None and after.ripple is not None
-
-
-@EXACT.kept
-def _blend(
-    old: Image,
-    new: Image,
-    gain: Image,
-    old_slots: Image,
-    restarts: NDArray[np.bool_],
-    seen: NDArray[np.bool_],
-    blocks: NDArray[np.intp],
-    blended: Image,
-    slots: Image,
-) -> None:
-    """Average at the new level, start again where that explains nothing, and keep what was where nothing was seen.
-
-    Pictures are (row, sample); ``blocks`` (sample,) are the blocks in which these lie.
-    """
-    share, shares = np.empty(slots.shape[1], np.float32), np.empty(old.shape[1], np.float32)
-    for row in range(old.shape[0]):
-        before, now, level, out = old[row], new[row], gain[row], blended[row]
-        if not seen[row]:
-            slots[row] = old_slots[row]
-            out[:] = before
-            continue
-        for block in range(slots.shape[1]):
-            spanned = min(old_slots[row, block] + np.float32(1), np.float32(LONGEST_MEMORY))
-            slots[row, block] = np.float32(1) if restarts[row, block] else spanned
-            share[block] = np.float32(1) / max(slots[row, block], np.float32(1))
-        if share.min() == share.max():  # as usual
-            shares[:] = share[0]
-        else:
-            for sample in range(len(shares)):
-                shares[sample] = share[blocks[sample]]
-        for sample in range(len(shares)):
-            there = before[sample] * level[sample]
-            out[sample] = there + (now[sample] - there) * shares[sample]

@@ -58,9 +58,9 @@ class RowLight:
     good: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, plate: Plate, mean: FloatArray, most: FloatArray) -> "RowLight":
-        """Return the rows of a plate that still holds its ambient light, of their means and their largest samples."""
-        good = plate.seen & (mean > 0) & (most < 1.0)
+    def of(cls, plate: Plate, mean: FloatArray, clipped: NDArray[np.bool_]) -> "RowLight":
+        """Return the rows of a plate that still holds its ambient light, of their means and which are clipped."""
+        good = plate.seen & (mean > 0) & ~clipped
         return cls(mean=mean, opened=Exposures(shares=plate.shares, middles_s=plate.middles_s), good=good)
 
 

@@ -1,0 +1,151 @@
+"""The compiled loops of ambient light: a dark slot looked at, and averaged with those before it, row by row.
+
+A row lies in a core's first cache while all is done to it; of whole pictures there is only what is kept.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.compute.compiled import FUSED, REORDERED
+from psvideo.compute.memory import lent
+from psvideo.model.camera import FloatArray
+from psvideo.plates.mixing_kernel import Floats, MixtureArrays, lent_mix, mix_row
+
+Flags = NDArray[np.bool_]
+ONE, HALF = np.float32(1), np.float32(0.5)
+
+
+@FUSED.kept
+def look_rows(
+    mix: MixtureArrays, block: int, first: int, last: int, means: FloatArray, clipped: Flags, coarse: Floats
+) -> None:
+    """Fill of some rows of a picture, whole rows of blocks, the ``means`` (row,) and whether any sample is ``clipped``
+    (row,), and the means over blocks of so many pixels a side, ``coarse`` (row, col, channel) of blocks."""
+    given, found = lent_mix(mix), lent(coarse)
+    line, total = np.empty(given.samples, np.float32), np.zeros(given.samples, np.float32)
+    for row in range(first, last):
+        mix_row(given, row, line)
+        means[row] = _sum(line) / given.samples
+        clipped[row] = _any_clipped(line)
+        _into_blocks(line, total, row, block, len(means), found)
+
+
+@FUSED.kept
+def blend_rows(
+    mix: MixtureArrays, block: int, longest: float, factor: Floats, seen: Flags, restarts: Flags, gain: Floats,
+    old: Floats, old_slots: Floats, first: int, last: int, image: Floats, slots: Floats, coarse: Floats,
+) -> None:  # fmt: skip
+    """Average some rows of the pictures before, ``old`` (row, sample), brought to a new level, with one more, ``mix``
+    times ``factor`` (row,); keep what was where nothing is ``seen`` (row,).
+
+    gain: (row, col, channel) of blocks, the new level, which changes steadily between their middles. old_slots,
+    restarts: (row, block), how many pictures the average spans, ``longest`` at most, and where it begins again. Filled
+    are ``image`` and ``slots`` like the old ones, and ``coarse`` like the gain with the image's means over blocks.
+    """
+    given, before, out, levels, found = lent_mix(mix), lent(old), lent(image), lent(gain), lent(coarse)
+    samples, cols, channels = given.samples, given.samples // levels.shape[2], levels.shape[2]
+    line, total = np.empty(samples, np.float32), np.zeros(samples, np.float32)
+    share, shares = np.empty(slots.shape[1], np.float32), np.empty(samples, np.float32)
+    above, below, level = np.empty(samples, np.float32), np.empty(samples, np.float32), np.empty(samples, np.float32)
+    held = -2
+    for row in range(first, last):
+        if seen[row]:
+            for place in range(len(share)):
+                spanned = min(old_slots[row, place] + ONE, np.float32(longest))
+                slots[row, place] = ONE if restarts[row, place] else spanned
+                share[place] = ONE / max(slots[row, place], ONE)
+            _over_pixels(share, block, cols, channels, shares)
+            upper, part = _between(row, block, levels.shape[0])
+            if upper != held:
+                if upper == held + 1:
+                    above[:] = below
+                else:
+                    _across(levels[upper], block, above)
+                _across(levels[min(upper + 1, levels.shape[0] - 1)], block, below)
+                held = upper
+            mix_row(given, row, line)
+            own, then = factor[row], before[row]
+            for sample in range(samples):  # loops over few arrays each become vectors
+                level[sample] = above[sample] + part * (below[sample] - above[sample])
+            for sample in range(samples):
+                there = then[sample] * level[sample]
+                out[row, sample] = there + (line[sample] * own - there) * shares[sample]
+        else:
+            slots[row] = old_slots[row]
+            out[row] = before[row]
+        _into_blocks(out[row], total, row, block, len(seen), found)
+
+
+@REORDERED.inlined
+def _sum(line: Floats) -> float:
+    total = 0.0
+    for sample in range(line.shape[0]):
+        total += np.float64(line[sample])
+    return total
+
+
+@FUSED.inlined
+def _any_clipped(line: Floats) -> bool:
+    clipped = np.int32(0)
+    for sample in range(line.shape[0]):
+        clipped = np.int32(clipped | (line[sample] >= ONE))
+    return bool(clipped > 0)
+
+
+@FUSED.inlined
+def _into_blocks(line: Floats, total: Floats, row: int, block: int, rows: int, coarse: Floats) -> None:
+    """Add a row to its blocks' sums, and store their means after the last row of theirs."""
+    for sample in range(line.shape[0]):
+        total[sample] += line[sample]
+    down, across, channels = coarse.shape
+    own = min(row // block, down - 1)
+    if row + 1 < (rows if own == down - 1 else (own + 1) * block):
+        return
+    cols = line.shape[0] // channels
+    high = row + 1 - own * block
+    for place in range(across):
+        begin, end = place * block, (place + 1) * block if place < across - 1 else cols
+        scale = ONE / np.float32(high * (end - begin))
+        for channel in range(channels):
+            mean = np.float32(0)
+            for col in range(begin, end):
+                mean += total[col * channels + channel]
+            coarse[own, place, channel] = mean * scale
+    total[:] = np.float32(0)
+
+
+@FUSED.inlined
+def _over_pixels(each: Floats, block: int, cols: int, channels: int, line: Floats) -> None:
+    """Repeat what is known of blocks for every sample of their row."""
+    if each.min() == each.max():  # as usual
+        line[:] = each[0]
+        return
+    for place in range(each.shape[0]):
+        end = (place + 1) * block if place < each.shape[0] - 1 else cols
+        line[place * block * channels : end * channels] = each[place]
+
+
+@FUSED.inlined
+def _between(row: int, block: int, down: int) -> tuple[int, np.float32]:
+    """Return the block whose middle lies above a row, and how far the row is on the way to the middle of the next."""
+    place = min(max((np.float32(row) + HALF) / np.float32(block) - HALF, np.float32(0)), np.float32(down - 1))
+    upper = min(int(place), max(down - 2, 0))
+    return upper, place - np.float32(upper)
+
+
+@FUSED.inlined
+def _across(gain: Floats, block: int, line: Floats) -> None:
+    """Fill a row with what is known of a row of blocks, which changes steadily between their middles."""
+    across, channels = gain.shape
+    begin, cols = block // 2, line.shape[0] // channels
+    for col in range(begin):
+        line[col * channels : (col + 1) * channels] = gain[0]
+    scale = ONE / np.float32(block)
+    for step in range(block):
+        part = (np.float32(step) + HALF) * scale if block > 1 else np.float32(0)
+        for left in range(across - 1):
+            at = (begin + left * block + step) * channels
+            for channel in range(channels):
+                line[at + channel] = gain[left, channel] + part * (gain[left + 1, channel] - gain[left, channel])
+    for col in range(begin + (across - 1) * block, cols):
+        line[col * channels : (col + 1) * channels] = gain[across - 1]
