@@ -22,7 +22,7 @@ from psvideo.report.observe.rigfit import RigFit
 from psvideo.report.observe.rigpoints import RigPoints
 from psvideo.report.observe.slopes import slope_agreement
 from psvideo.report.observe.steadiness import Change, Sample, change, sample_of
-from psvideo.report.observe.thinned import step_of, thinned
+from psvideo.report.observe.thinned import step_of, thin_surface, thinned
 from psvideo.report.observe.worst import Thumbnail, Worst
 from psvideo.solve.filling.filled import holes_in
 from psvideo.solve.passes.alpha_matte import lit_from
@@ -140,10 +140,11 @@ def _shares(surface: Surface | None, subject: NDArray[np.bool_]) -> tuple[float 
     one that was emptied, what was measured is not known."""
     if surface is None:
         return None, None
-    filled = bool((surface.shown & ~surface.valid).any())
-    whole = subject & thinned(surface.shown) if filled else subject
+    some = thin_surface(surface)
+    filled = surface.source is not None and bool((surface.source > surface.valid.view(np.uint8)).any())
+    whole = subject & some.shown if filled else subject
     count = max(int(whole.sum()), 1)
-    valid, measured = (float((thinned(part) & whole).sum() / count) for part in (surface.valid, surface.measured))
+    valid, measured = (float((part & whole).sum() / count) for part in (some.valid, some.measured))
     return valid, measured if filled or valid == 1 else None
 
 

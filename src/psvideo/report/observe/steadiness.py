@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.surface import Surface
-from psvideo.report.observe.thinned import thinned
+from psvideo.report.observe.thinned import thin_surface
 
 LEAST_PIXELS = 100
 MOST_TURNED_DEG = 5.0
@@ -40,11 +40,12 @@ class Sample:
 
 def sample_of(surface: Surface) -> Sample:
     """Return what to keep of a surface to hold the next one against."""
-    albedo = thinned(surface.albedo).astype(np.float32)
+    some = thin_surface(surface)
+    albedo = some.albedo.astype(np.float32)
     return Sample(
-        normals=thinned(surface.normals).astype(np.float32),
+        normals=some.normals.astype(np.float32),
         albedo=albedo if albedo.ndim == 2 else albedo.mean(axis=2),
-        valid=thinned(surface.measured),
+        valid=some.measured,
     )
 
 

@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.model.surface import Surface
+
 LEAST_STEP = 4
 ENOUGH = 16_384
 """So many pixels of a picture: a share is then known to 0.4 % and better, and a take costs the same at any size."""
@@ -24,3 +26,13 @@ def thinned(picture: NDArray[Any]) -> NDArray[Any]:
     """Return the rows and columns of a picture (row, col[, channel]) that are looked at, as a picture of its own."""
     step = step_of(*picture.shape[:2])
     return np.ascontiguousarray(picture[::step, ::step])
+
+
+def thin_surface(surface: Surface) -> Surface:
+    """Return what is looked at of a surface: normals, albedo, and what is valid and measured."""
+    return Surface(
+        normals=thinned(surface.normals),
+        albedo=thinned(surface.albedo),
+        valid=thinned(surface.valid),
+        source=None if surface.source is None else thinned(surface.source),
+    )

@@ -37,11 +37,11 @@ def filled(surface: Surface, one: Evidence, *, solved: Mask, noise: float, threa
     The subject is what the mask allows; without one, what any light reaches, and small holes in it. What was solved
     stays to the bit. ``source`` says of every pixel how many lights its normal is from.
     """
-    source = np.where(solved, MEASURED, np.uint8(0)).astype(np.uint8)
+    source = np.multiply(solved, MEASURED, dtype=np.uint8)
     wanted = _wanted(solved, one, threads)
-    where = np.ascontiguousarray(np.argwhere(wanted), np.int32)
-    if not len(where):
+    if not wanted.any():
         return replace(surface, source=source)
+    where = np.ascontiguousarray(np.argwhere(wanted), np.int32)
     index = np.where(solved, np.int32(SOLVED), np.int32(LEFT_ALONE))
     index[wanted] = np.arange(len(where), dtype=np.int32)
     said = _said(one, index, len(where), noise, threads)

@@ -30,10 +30,13 @@ def judge_rows(
     doubt: of every ``step``-th row and column, degrees to be added; or empty.
     """
     n, a, f, d, out, kept = lent(normals), lent(albedo), lent(fit), lent(doubt), lent(error), lent(trusted)
-    v, inverse = spread.variances, spread.inverse
     channels, cols = len(a), out.shape[1]
     share, scale = ONE / np.float32(channels), spread.scale * spread.scale
-    trace = inverse[0, 0] + inverse[1, 1] + inverse[2, 2]
+    v, inverse = spread.variances, spread.inverse  # numbers outside the loops, which then become vectors
+    read, photon, own, of_fit = v[0], v[1], v[2], v[3]
+    xx, yy, zz, xy, xz, yz = inverse[0, 0], inverse[1, 1], inverse[2, 2], inverse[0, 1], inverse[0, 2], inverse[1, 2]
+    of_noise, counts, degrees_of, limit = factors[0] * factors[0], factors[1], factors[2], factors[3]
+    trace, holds_fit = xx + yy + zz, f.size > 0
     beyond, sizes = np.zeros(cols, np.float32), np.zeros(cols, np.float32)
     for row in range(first, last):
         if d.size:
@@ -45,21 +48,18 @@ def judge_rows(
         for col in range(cols):
             x, y, z = decoded(n[0, row, col]), decoded(n[1, row, col]), decoded(n[2, row, col])
             size = max(sizes[col], TINY)
-            along = x * x * inverse[0, 0] + y * y * inverse[1, 1] + z * z * inverse[2, 2]
-            along += TWO * (x * y * inverse[0, 1] + x * z * inverse[0, 2] + y * z * inverse[1, 2])
+            along = x * x * xx + y * y * yy + z * z * zz + TWO * (x * y * xy + x * z * xz + y * z * yz)
             wide = max(trace - along, ZERO) * scale
-            noise = (v[0] + v[1] * size) / (size * size)
+            noise = (read + photon * size) / (size * size)
             more = beyond[col]
-            if f.size:
+            if holds_fit:
                 one = decoded(f[row, col])
-                one = one * factors[2] * np.sqrt(wide) / size if factors[2] > ZERO else one
-                one = min(one, MOST_FIT_DEG)
-                expected = factors[0] * factors[0] * wide * (noise + v[3])
-                more += factors[1] * np.sqrt(max(one * one - expected, ZERO))
-            degrees = min(np.sqrt(wide * (noise + v[2]) + more * more), LARGEST_DEG)
+                one = min(one * degrees_of * np.sqrt(wide) / size if degrees_of > ZERO else one, MOST_FIT_DEG)
+                more += counts * np.sqrt(max(one * one - of_noise * wide * (noise + of_fit), ZERO))
+            degrees = min(np.sqrt(wide * (noise + own) + more * more), LARGEST_DEG)
             solved = sizes[col] > ZERO
             out[row, col] = encoded(degrees if solved else ZERO, out)
-            kept[row, col] = solved & (degrees <= factors[3])
+            kept[row, col] = solved & (degrees <= limit)
 
 
 @FUSED.inlined
@@ -92,27 +92,30 @@ def indirect_rows(
         for col in range(0, t.cols, BLOCK):
             width = min(BLOCK, t.cols - col)
             read_block(t, values, row, col, width)
-            for light in range(t.lights):
-                lamp, per = of_light(t.matrix, light), t.per_strength[light]
-                for i in range(-col % step, width, step):
-                    size = ZERO
-                    for channel in range(channels):
-                        size += decoded(a[channel, row, col + i]) * each
-                    if not size > ZERO or not values[light * channels, i] > ABSENT:
+            for i in range(-col % step, width, step):
+                size = ZERO
+                for channel in range(channels):
+                    size += decoded(a[channel, row, col + i]) * each
+                if not size > ZERO:
+                    continue
+                nx, ny, nz = decoded(n[0, row, col + i]), decoded(n[1, row, col + i]), decoded(n[2, row, col + i])
+                sum_of, number = ZERO, ZERO
+                for light in range(t.lights):
+                    if not values[light * channels, i] > ABSENT:
                         continue
+                    lamp, per = of_light(t.matrix, light), t.per_strength[light]
                     level = ZERO
                     for channel in range(channels):
                         level += values[light * channels + channel, i] * each
                     one = at(per, i)
                     lx, ly, lz = at(lamp, i)
-                    nx = decoded(n[0, row, col + i])
-                    ny = decoded(n[1, row, col + i])
-                    nz = decoded(n[2, row, col + i])
                     cosine = (lx * nx + ly * ny + lz * nz) * one
                     level *= one * t.albedo_scale
                     hindered = (cosine <= facing) | (level < max(t.dark * t.albedo_scale, SHADOWED * size * cosine))
                     if hindered:
                         grazing = max(cosine, ZERO) if cosine <= facing else ZERO
                         share = level / size - grazing
-                        total[row // step, (col + i) // step] += min(max(share, -MOST_INDIRECT), MOST_INDIRECT)
-                        count[row // step, (col + i) // step] += ONE
+                        sum_of += min(max(share, -MOST_INDIRECT), MOST_INDIRECT)
+                        number += ONE
+                total[row // step, (col + i) // step] = sum_of
+                count[row // step, (col + i) // step] = number
