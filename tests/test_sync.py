@@ -122,9 +122,7 @@ def test_the_clips_of_another_simulator_are_timed_and_named(clip: str, shared_da
     assert black is not None
     assert white is not None
     pictures = [read_picture(file, cv2.IMREAD_UNCHANGED) for file in sorted((folder / "frames").glob("*.png"))]
-    profiles = np.array(
-        [(p.reshape(len(p), -1).mean(axis=1) - black) / (white - black) for p in pictures]
-    )
+    profiles = np.array([(p.reshape(len(p), -1).mean(axis=1) - black) / (white - black) for p in pictures])
     timing = find_timing(plan, np.arange(len(pictures)), profiles, clip=clip)
     truth = json.loads((folder / "truth" / "timing.json").read_text())["flashes"]
     assert [next(iter(flash.lights), None) for flash in timing.flashes] == [flash["light"] for flash in truth]

@@ -13,6 +13,7 @@ import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
 
+from psvideo.compute.spilled import let_go
 from psvideo.errors import PsvideoError
 from psvideo.formats.whole_files import whole_file
 from psvideo.model.choices import Compression
@@ -74,6 +75,7 @@ def write_exr(
     header = dict(attributes or {}) | _header(shapes.pop(), fps, time_code, crop, compression)
     with whole_file(path) as beside:
         _write(path, beside, lambda: OpenEXR.File(header, planes))
+    let_go(*planes.values())
 
 
 def _plane(name: str, values: NDArray[np.floating], half: bool) -> NDArray[np.floating]:

@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.spilled import let_go
 from psvideo.errors import UsageError, check_kind
 from psvideo.model.rig import Vector, three_numbers
 from psvideo.model.surface import Surface, check_surface
@@ -83,7 +84,12 @@ def relight(
 
 def smaller(image: NDArray[np.floating], width_px: int) -> Image:
     """Return a picture at most this wide, averaged down, for showing it."""
-    return smaller_by_rows(lambda first, last: image[first:last], image.shape, width_px)
+
+    def read(first: int, last: int) -> NDArray[np.floating]:
+        let_go(image[:first])
+        return image[first:last]
+
+    return smaller_by_rows(read, image.shape, width_px)
 
 
 def smaller_by_rows(read: Callable[[int, int], NDArray[np.floating]], shape: tuple[int, ...], width_px: int) -> Image:

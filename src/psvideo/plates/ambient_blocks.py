@@ -37,7 +37,7 @@ def over_bands(run: Callable[[int, int], None], shape: tuple[int, ...]) -> None:
     block = block_px(shape)
     edges = [*range(0, shape[0] // block * block, BAND_ROWS), shape[0]]
     bands = list(pairwise(edges))
-    over_ranges(lambda first, last: [run(*band) for band in bands[first:last]], len(bands), each=1)
+    over_ranges(lambda place, _: run(*bands[place]), len(bands), each=1)
 
 
 def times_rows(image: Image, factor: NDArray[np.floating]) -> Image:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -163,7 +163,7 @@ def normals_run(
             clip.plan,
             lighting.rig,
             masks=lighting.masks,
-            solving=solving,
+            solving=replace(solving, spare=folder),
             near=lighting.near,
             falloff=lighting.falloff,
             asked=asked,

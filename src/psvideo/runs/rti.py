@@ -34,6 +34,7 @@ PLANES = 9
 THIN = 4
 """Every fourth row and column say how bright the pictures are."""
 RED_GREEN_BLUE, TERMS = 3, 6
+ZERO, ONE = np.zeros(3), np.ones(3)
 
 
 def write_rti(folder: Path, one: Round, rig: Rig) -> None:
@@ -56,7 +57,7 @@ def write_rti(folder: Path, one: Round, rig: Rig) -> None:
         span = np.maximum(high - low, 1e-3)
         scale += [float(f"{value:.6g}") for value in span]
         bias += [float(f"{value:.6g}") for value in -low / span]
-        _write_plane(target / f"plane_{number}.jpg", (terms[..., first : first + 3] - low) / span)
+        _write_plane(target / f"plane_{number}.jpg", terms[..., first : first + 3], low, span)
     info = {
         "width": base.shape[1],
         "height": base.shape[0],
@@ -107,8 +108,11 @@ def _shown(light: Floats, step: int, strength: Sequence[float] | FloatArray) -> 
     return np.broadcast_to(srgb_share(even), (high, wide, 3))
 
 
-def _write_plane(path: Path, plane: NDArray[np.floating]) -> None:
-    codes = (255 * np.clip(plane, 0, 1) + 0.5).astype(np.uint8)[..., ::-1]
+def _write_plane(path: Path, plane: NDArray[np.floating], low: FloatArray = ZERO, span: FloatArray = ONE) -> None:
+    """Write a plane as a picture whose codes go from ``low`` to so much more."""
+    codes = np.empty(plane.shape, np.uint8)
+    for row, shown in zip(plane, codes, strict=True):
+        shown[:] = (255 * np.clip((row - low) / span, 0, 1) + 0.5)[:, ::-1]
     whole_colour = [cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444]
     done, data = cv2.imencode(".jpg", codes, [cv2.IMWRITE_JPEG_QUALITY, QUALITY, *whole_colour])
     if not done:

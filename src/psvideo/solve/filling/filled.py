@@ -1,11 +1,13 @@
 """A surface with its holes filled: every pixel of the subject has a normal and an albedo, and says how it got them."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.spilled import let_go, planes_for
 from psvideo.model.surface import MEASURED, NO_LIGHT, ONE_LIGHT, TWO_LIGHTS, Surface
 from psvideo.solve.filling.growing import LEFT_ALONE, SOLVED, THREE_LIGHTS, UNKNOWN, Picture, grow, queue_for
 from psvideo.solve.filling.looking import Said, count_rows, look_rows, room_for
@@ -42,8 +44,7 @@ def filled(surface: Surface, one: Evidence, *, solved: Mask, noise: float, threa
     if not wanted.any():
         return replace(surface, source=source)
     where = np.ascontiguousarray(np.argwhere(wanted), np.int32)
-    index = np.where(solved, np.int32(SOLVED), np.int32(LEFT_ALONE))
-    index[wanted] = np.arange(len(where), dtype=np.int32)
+    index = _places(solved, wanted, one.spare)
     said = _said(one, index, len(where), noise, threads)
     lights = np.full(solved.shape, np.uint8(UNKNOWN + 1))
     lights[solved], lights[wanted] = THREE_LIGHTS, UNKNOWN
@@ -51,8 +52,22 @@ def filled(surface: Surface, one: Evidence, *, solved: Mask, noise: float, threa
     picture = Picture(normals=_bits(planes), albedo=_bits(channels), places=index, lights=lights)
     away = np.zeros(len(where), np.float32)
     grow(picture, said, where, queue_for(len(where)), away)
+    let_go(*planes, *channels, index)
     source[wanted] = CLASSES[np.minimum(lights[wanted], THREE_LIGHTS)]
     return replace(surface, source=source, error_deg=_errors(surface, where, lights[wanted], away))
+
+
+def _places(solved: Mask, wanted: Mask, spare: Path | None) -> NDArray[np.int32]:
+    """Return a pixel's place among those that are wanted, and what else ``growing.Picture`` says (row, col)."""
+    index = planes_for(solved.shape, np.int32, pixels=solved.size, folder=spare)
+    before = 0
+    for row, (known, asked) in enumerate(zip(solved, wanted, strict=True)):
+        index[row] = np.where(known, np.int32(SOLVED), np.int32(LEFT_ALONE))
+        count = int(np.count_nonzero(asked))
+        index[row, asked] = np.arange(before, before + count, dtype=np.int32)
+        before += count
+        let_go(index[row])
+    return index
 
 
 def _errors(surface: Surface, where: NDArray[np.int32], lights: Bytes, away: Floats) -> NDArray[np.floating] | None:
@@ -75,6 +90,15 @@ def _wanted(solved: Mask, one: Evidence, threads: int | None) -> Mask:
         return np.asarray(one.mask & ~solved)
     if solved.all():
         return np.zeros_like(solved)
+    lit = _lit(solved, one, threads)
+    around = cv2.boxFilter(lit, cv2.CV_8U, (3, 3), normalize=False, borderType=cv2.BORDER_REPLICATE)
+    subject = solved | ((lit > 0) & (around >= MOST_LIGHTS_AROUND))
+    del lit, around
+    return np.asarray((subject | holes_in(subject)) & ~solved)
+
+
+def _lit(solved: Mask, one: Evidence, threads: int | None) -> Bytes:
+    """Return 1 where any light reaches a pixel or it is solved, else 0."""
     counts = np.zeros(solved.shape, np.uint8)
     asked = np.ascontiguousarray(~solved).view(np.uint8)
 
@@ -82,10 +106,7 @@ def _wanted(solved: Mask, one: Evidence, threads: int | None) -> Mask:
         count_rows(given, working_memory(given), asked, counts, first, last)
 
     one.in_bands(count, threads, needed=np.asarray(~solved.all(axis=1)))
-    lit = (solved | (counts > 0)).astype(np.uint8)
-    around = cv2.boxFilter(lit, cv2.CV_8U, (3, 3), normalize=False, borderType=cv2.BORDER_REPLICATE)
-    subject = solved | ((lit > 0) & (around >= MOST_LIGHTS_AROUND))
-    return np.asarray((subject | holes_in(subject)) & ~solved)
+    return ((counts > 0) | solved).view(np.uint8)
 
 
 def holes_in(subject: Mask) -> Mask:

@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.spilled import let_go
 from psvideo.model.surface import Surface
 from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.task import Floats, Samples, Task
@@ -145,6 +146,7 @@ def _indirect(points: ThinSurface, one: Evidence, surface: Surface) -> tuple[Flo
 
     def look(given: Task, first: int, last: int) -> None:
         indirect_rows(given, working_memory(given), planes, albedo, sums, counts, first, last, points.step)
+        let_go(*(plane[first:last] for plane in (*planes, *albedo)))
 
     one.in_bands(look, step=points.step)
     return sums, counts

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from psvideo.plates.mixture import Mixture
 from psvideo.solve.normals.bands import ShownPlates
@@ -11,7 +12,7 @@ from psvideo.solve.normals.task import Mask, Samples, Task, Usable, task
 
 @dataclass(frozen=True, kw_only=True)
 class Evidence:
-    """Plates, lights, and which samples to look at."""
+    """Plates, lights, and which samples to look at; ``spare``, a folder in whose files large pictures are worked on."""
 
     plates: Sequence[Samples] | Sequence[Mixture]
     lit: Illumination
@@ -20,6 +21,7 @@ class Evidence:
     mask: Mask | None = None
     black_level: float = 0.0
     scale: float = 1.0
+    spare: Path | None = None
 
     def in_bands(
         self,

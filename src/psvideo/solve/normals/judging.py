@@ -5,10 +5,12 @@ cannot.
 """
 
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.spilled import let_go, planes_for
 from psvideo.compute.threads import over_ranges
 from psvideo.model.surface import MEASURED, Surface
 from psvideo.solve.normals.bands import BAND_PIXELS
@@ -67,7 +69,7 @@ def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging =
         beyond_deg = float(np.sqrt(max(typical**2 - by_noise**2, 0.0)))
         limit_deg = max(limit_deg, min(how.beside_typical * beyond_deg, how.most_typical_deg))
         misfit = None if misfit is None else replace(misfit, error_deg=beyond_deg)
-    error, trusted = spread.judged(surface, doubt, points.step, how, limit_deg=limit_deg)
+    error, trusted = spread.judged(surface, doubt, points.step, how, limit_deg=limit_deg, spare=one.spare)
     return replace(surface, valid=trusted, error_deg=error, misfit=misfit)
 
 
@@ -153,10 +155,18 @@ class _Spread:
         )
 
     def judged(
-        self, surface: Surface, doubt: Floats, step: int, how: Judging, *, limit_deg: float
+        self,
+        surface: Surface,
+        doubt: Floats,
+        step: int,
+        how: Judging,
+        *,
+        limit_deg: float,
+        spare: Path | None = None,
     ) -> tuple[NDArray[np.floating], Mask]:
         """Return all errors in degrees, and whether they are within the limit."""
-        error, trusted = np.empty(surface.valid.shape, surface.normals.dtype), np.empty(surface.valid.shape, np.bool_)
+        trusted = np.empty(surface.valid.shape, np.bool_)
+        error = planes_for(trusted.shape, surface.normals.dtype, pixels=trusted.size, folder=spare)
         factors = (SURE * self.of_noise, how.fit_share, limit_deg)
         self.fill(surface, self.fit(surface), self.noise, factors, error, doubt=doubt, step=step, trusted=trusted)
         return error, trusted
@@ -173,13 +183,12 @@ class _Spread:
         counts = np.array([*factors[:2], self.of_residual, limit_deg], np.float32)
         kept = (np.empty(error.shape, np.bool_) if trusted is None else trusted).view(np.uint8)
         rows, cols = error.shape
-        over_ranges(
-            lambda first, last: judge_rows(
-                planes, albedo, fit, noise, counts, doubt, step, bits(error), kept, first, last
-            ),
-            rows,
-            each=BAND_PIXELS // cols,
-        )
+
+        def judge(first: int, last: int) -> None:
+            judge_rows(planes, albedo, fit, noise, counts, doubt, step, bits(error), kept, first, last)
+            let_go(*(plane[first:last] for plane in (*planes, *albedo, error, *([fit] if fit.size else []))))
+
+        over_ranges(judge, rows, each=BAND_PIXELS // cols)
 
 
 def _brightness(albedo: NDArray[np.floating]) -> Floats:

@@ -8,16 +8,29 @@ without the brightest few.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from psvideo.compute.spilled import let_go, planes_for
 from psvideo.model.surface import Misfit, Surface
 from psvideo.plates.mixture import Mixture
 from psvideo.solve.normals.bands import ShownPlates, check_arrays, surface_of
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.plate_noise import PlateNoise
-from psvideo.solve.normals.task import FEW, Floats, Mask, Samples, Task, Usable, Weights, empty_result, task
+from psvideo.solve.normals.task import (
+    FEW,
+    Floats,
+    Mask,
+    Samples,
+    Task,
+    Usable,
+    Weights,
+    empty_result,
+    let_rows_go,
+    task,
+)
 
 if TYPE_CHECKING:
     pass
@@ -78,6 +91,7 @@ def solve(
     error: bool = True,
     misfit: Misfit | None = None,
     plate_noise: PlateNoise | None = None,
+    spare: Path | None = None,
     threads: int | None = None,
 ) -> Surface:
     """Return the surface that explains most of the plates, one per light.
@@ -102,13 +116,15 @@ def solve(
     from psvideo.solve.normals import robust_kernel as kernel
 
     (rows, cols), channels = shown.shape[:2], lit.intensities.shape[1]  # which are combined
-    result = empty_result(rows * cols, channels, half=half, residual=residual)
-    predicted = np.zeros(rows * cols, np.uint16 if half else np.float32)
+    result = empty_result(rows * cols, channels, half=half, residual=residual, spare=spare)
+    predicted = planes_for((rows * cols,), np.uint16 if half else np.float32, pixels=rows * cols, folder=spare)
     given = _balanced(task(shown.samples, lit, seen, mask, usable, black_level, scale))
 
     def run(into: Samples, unexplained: Floats, how: Weights, step: int) -> None:
         def band(one: Task, first: int, last: int) -> None:
             kernel.solve_rows(one, result, into, unexplained, kernel.working_memory(one), how, first, last, step)
+            let_rows_go(result, cols, first, last)
+            let_go(predicted[first * cols : last * cols])
 
         shown.in_bands(band, given, threads=threads, step=step)
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -32,13 +33,15 @@ EVERYTHING = robust.Reweighting(most_error_deg=robust.EVERYTHING_DEG)
 @dataclass(frozen=True, kw_only=True)
 class Solving:
     """``solver`` "auto" is robust from ROBUST_FROM_LIGHTS lights on. ``half`` gives half floats; ``residual`` and
-    ``error`` ask for what the surface may hold as well. ``fill`` gives every pixel of the subject a normal."""
+    ``error`` ask for what the surface may hold as well. ``fill`` gives every pixel of the subject a normal. ``spare``
+    is a folder in whose files large pictures are worked on; without one they lie in memory."""
 
     solver: Solver = "auto"
     half: bool = False
     residual: bool = False
     error: bool = False
     fill: bool = True
+    spare: Path | None = None
 
     def method(self, lights: int) -> Method:
         """Return the solver for so many lights."""
@@ -59,12 +62,14 @@ class Solving:
 
         solved, one, noise = self.measured(plates, lit, seen=seen, mask=mask)
         known = judged(solved, one, noise)
-        known = filled(known, one, solved=solved.valid, noise=noise.dark) if self.fill else emptied(known)
-        return replace(
+        known = replace(
             known,
             residual=known.residual if self.residual else None,
             error_deg=known.error_deg if self.error else None,
         )
+        valid = solved.valid
+        del solved  # residuals that nobody asked for are gone with it
+        return filled(known, one, solved=valid, noise=noise.dark) if self.fill else emptied(known)
 
     def measured(
         self,
@@ -78,7 +83,7 @@ class Solving:
         noise = noise_of(plates)
         usable = _usable(noise, lit.intensities.shape[1], self.method(len(plates)))
         solved = self._solved(plates, lit, usable, noise, seen, mask)
-        return solved, Evidence(plates=plates, lit=lit, usable=usable, seen=seen, mask=mask), noise
+        return solved, Evidence(plates=plates, lit=lit, usable=usable, seen=seen, mask=mask, spare=self.spare), noise
 
     def _solved(
         self,
@@ -101,9 +106,12 @@ class Solving:
                 usable=usable,
                 reweighting=EVERYTHING,
                 plate_noise=noise,
+                spare=self.spare,
             )
         residual = self.residual or len(plates) > 3  # three measurements leave none
-        return woodham1980.solve(plates, lit, seen=seen, mask=mask, half=self.half, residual=residual, usable=usable)
+        return woodham1980.solve(
+            plates, lit, seen=seen, mask=mask, half=self.half, residual=residual, usable=usable, spare=self.spare
+        )
 
 
 def _usable(noise: PlateNoise, channels: int, method: Method) -> Usable:

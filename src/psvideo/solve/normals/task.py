@@ -2,11 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.spilled import let_go, planes_for
 from psvideo.model.camera import FloatArray
 from psvideo.model.clipping import ROUNDING
 from psvideo.solve.normals.illumination import Illumination
@@ -197,15 +200,22 @@ def _near(lit: Illumination, unit: float, copies: int) -> Near:
     )
 
 
-def empty_result(pixels: int, channels: int, *, half: bool, residual: bool) -> Result:
-    """Return memory for the solution of so many pixels."""
+def empty_result(pixels: int, channels: int, *, half: bool, residual: bool, spare: Path | None = None) -> Result:
+    """Return memory for the solution of so many pixels; of large pictures files in the folder ``spare``."""
     stored = np.uint16 if half else np.float32
+    room = partial(planes_for, kind=stored, pixels=pixels, folder=spare)
     return Result(
-        normals=np.empty((3, pixels), stored),
-        albedo=np.empty((channels, pixels), stored),
+        normals=room((3, pixels)),
+        albedo=room((channels, pixels)),
         valid=np.empty(pixels, np.uint8),
-        residual=np.empty(pixels if residual else 0, stored),
+        residual=room((pixels if residual else 0,)),
     )
+
+
+def let_rows_go(result: Result, cols: int, first: int, last: int) -> None:
+    """Hand rows of a solution that lies in files back to the system."""
+    part = slice(first * cols, last * cols)
+    let_go(*(plane[part] for plane in (*result.normals, *result.albedo, result.residual)))
 
 
 def _filled(values: FloatArray, copies: int, *, mode: Literal["constant", "edge"] = "constant") -> Floats:

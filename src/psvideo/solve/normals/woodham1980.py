@@ -6,12 +6,13 @@ a n is the least-squares solution of these equations, which minimises the plates
 """
 
 from collections.abc import Sequence
+from pathlib import Path
 
 from psvideo.model.surface import Surface
 from psvideo.plates.mixture import Mixture
 from psvideo.solve.normals.bands import ShownPlates, check_arrays, surface_of
 from psvideo.solve.normals.illumination import Illumination
-from psvideo.solve.normals.task import EVERYTHING, Mask, Samples, Task, Usable, empty_result, task
+from psvideo.solve.normals.task import EVERYTHING, Mask, Samples, Task, Usable, empty_result, let_rows_go, task
 
 __all__ = ["EVERYTHING", "Usable", "solve"]
 
@@ -27,6 +28,7 @@ def solve(
     scale: float = 1.0,
     half: bool = False,
     residual: bool = True,
+    spare: Path | None = None,
     threads: int | None = None,
 ) -> Surface:
     """Return the surface that explains one plate per light.
@@ -37,6 +39,7 @@ def solve(
     seen: True where a plate's rows were exposed, shape (light, row) or (light, row, col); by default all.
     mask: True where to solve, shape (row, col); by default everywhere.
     half: give half floats instead of float32.
+    spare: a folder in whose files large pictures are worked on.
 
     Of three channels, one normal: each channel counts by its own brightness in the pixel; then each gets its
     least-squares albedo for that normal. A pixel is valid where three or more usable measurements remain, their lights
@@ -52,11 +55,12 @@ def solve(
     shown = ShownPlates.of(plates)
     check_arrays(shown.samples, lit, seen, mask)
     rows, cols = shown.shape[:2]
-    result = empty_result(rows * cols, lit.intensities.shape[1], half=half, residual=residual)
+    result = empty_result(rows * cols, lit.intensities.shape[1], half=half, residual=residual, spare=spare)
     given = task(shown.samples, lit, seen, mask, usable, black_level, scale)
 
     def solve_band(one: Task, first: int, last: int) -> None:
         solve_rows(one, result, working_memory(one), first, last)
+        let_rows_go(result, cols, first, last)
 
     shown.in_bands(solve_band, given, threads=threads)
     return surface_of(result, None, shown.shape, half=half)

@@ -1,0 +1,72 @@
+"""Planes of large pictures that lie in a file: the system's cache holds them, as far as it likes, the process does not.
+
+Whoever has worked on a part of them lets it go; it is read back where it is wanted again.
+"""
+
+import mmap
+import os
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from psvideo.errors import PsvideoError
+
+LARGE_PIXELS = 1 << 25
+"""Pictures of more pixels have planes in files: just more than 8K video has, whose results come and go in memory."""
+
+
+def planes_for(shape: tuple[int, ...], kind: DTypeLike, *, pixels: int, folder: Path | None) -> NDArray[Any]:
+    """Return room for planes of a picture of so many pixels: in memory, or, where that is large and there is a folder,
+    in a nameless file there, which is gone with the array.
+
+    Raises PsvideoError where the folder's disk has no room.
+    """
+    size = int(np.prod(shape)) * np.dtype(kind).itemsize
+    if folder is None or pixels <= LARGE_PIXELS or not size:
+        return np.empty(shape, kind)
+    try:
+        with tempfile.TemporaryFile(dir=folder) as file:
+            if hasattr(os, "posix_fallocate"):  # a full disk is an error now, and no signal later
+                os.posix_fallocate(file.fileno(), 0, size)
+            else:
+                file.truncate(size)
+            held = mmap.mmap(file.fileno(), size)
+    except OSError as fault:
+        raise PsvideoError(
+            f"{folder}: a picture of {pixels / 1e6:.0f} megapixels is worked on in files there, and one of "
+            f"{size / 1e6:.0f} MB has no room ({fault.strerror or fault}). Free some, or write to another disk."
+        ) from fault
+    return np.frombuffer(held, kind).reshape(shape)
+
+
+def let_go(*parts: NDArray[Any]) -> None:
+    """Hand parts of such planes, whole rows, back to the system's cache; other arrays stay as they are.
+
+    A colour picture's channels may lie in planes of their own.
+    """
+    if any(_mapping_of(part) is not None for part in parts):
+        _let_planes_go(
+            [plane for part in parts for plane in ([part] if part.flags.c_contiguous else np.moveaxis(part, -1, 0))]
+        )
+
+
+def _let_planes_go(planes: list[NDArray[Any]]) -> None:
+    for part in planes:
+        held = _mapping_of(part)
+        if held is None or not part.size or not hasattr(mmap, "MADV_DONTNEED"):
+            continue
+        begin = part.ctypes.data - np.frombuffer(held, np.uint8).ctypes.data
+        first = begin // mmap.PAGESIZE * mmap.PAGESIZE
+        held.madvise(mmap.MADV_DONTNEED, first, begin + part.nbytes - first)
+
+
+def _mapping_of(array: NDArray[Any]) -> mmap.mmap | None:
+    """Return what an array lies in, None where that is no file."""
+    base: Any = array
+    while isinstance(base, np.ndarray):
+        base = base.base
+    base = base.obj if isinstance(base, memoryview) else base
+    return base if isinstance(base, mmap.mmap) else None

@@ -1,0 +1,64 @@
+"""Planes of large pictures lie in files while they are worked on, and the results are the same to the byte."""
+
+import errno
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from psvideo.compute import spilled
+from psvideo.errors import PsvideoError
+from psvideo.model.rig import Light
+from psvideo.solve.normals.illumination import illumination
+from psvideo.solve.normals.solving import Solving
+
+DIRECTIONS = [(0.5, 0.0, 0.8), (-0.5, 0.1, 0.8), (0.1, 0.5, 0.8), (-0.1, -0.5, 0.8), (0.3, 0.3, 0.8)]
+
+
+def plates_of(lights: int) -> list[np.ndarray]:
+    """A bump in three colours before a black wall, with shadows and noise."""
+    y, x = (np.mgrid[0:64, 0:80] - 36).astype(np.float32) / 30
+    inside = x * x + y * y < 1
+    normals = np.stack([x, -y, np.sqrt(np.maximum(1 - x * x - y * y, 0))], -1) * inside[..., None]
+    rng = np.random.default_rng(3)
+    shades = [np.maximum(normals @ np.array(one, np.float32), 0) for one in DIRECTIONS[:lights]]
+    images = [shade[..., None] * np.array([0.7, 0.5, 0.4], np.float32) for shade in shades]
+    return [np.asarray(one + 0.002 * rng.standard_normal(one.shape), np.float32) for one in images]
+
+
+@pytest.mark.parametrize("lights", [4, 5])
+def test_a_picture_that_is_worked_on_in_files_gives_the_same_surface(
+    lights: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lit = illumination([Light(name=str(n), direction=one) for n, one in enumerate(DIRECTIONS[:lights])], channels=3)
+    solving = Solving(half=True, error=True, residual=True, spare=tmp_path)
+    held = solving.solve(plates_of(lights), lit)
+    monkeypatch.setattr(spilled, "LARGE_PIXELS", 100)
+    found = solving.solve(plates_of(lights), lit)
+    assert (held.source is not None) and (held.source > 1).any(), "something is filled"
+    for name in ("normals", "albedo", "valid", "residual", "error_deg", "source"):
+        assert getattr(found, name).tobytes() == getattr(held, name).tobytes(), name
+    assert not list(tmp_path.iterdir()), "the files have no names"
+
+
+def test_what_was_let_go_is_read_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(spilled, "LARGE_PIXELS", 100)
+    planes = spilled.planes_for((3, 200, 60), np.float16, pixels=200 * 60, folder=tmp_path)
+    wanted = np.random.default_rng(0).random(planes.shape).astype(np.float16)
+    planes[:] = wanted
+    picture = np.moveaxis(planes, 0, -1)
+    spilled.let_go(planes[1, 7:31], picture[:90], np.zeros(4))
+    assert (picture == np.moveaxis(wanted, 0, -1)).all()
+
+
+def test_a_disk_without_room_is_said_before_anything_is_solved(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "posix_fallocate", full)
+    monkeypatch.setattr(spilled, "LARGE_PIXELS", 100)
+    with pytest.raises(PsvideoError, match=r"one of 0 MB has no room \(No space left on device\)"):
+        spilled.planes_for((3, 200), np.float16, pixels=200, folder=tmp_path)
