@@ -36,7 +36,8 @@ def test_a_picture_that_is_worked_on_in_files_gives_the_same_surface(
     held = solving.solve(plates_of(lights), lit)
     monkeypatch.setattr(spilled, "LARGE_PIXELS", 100)
     found = solving.solve(plates_of(lights), lit)
-    assert (held.source is not None) and (held.source > 1).any(), "something is filled"
+    assert held.source is not None
+    assert (held.source > 1).any(), "something is filled"
     for name in ("normals", "albedo", "valid", "residual", "error_deg", "source"):
         assert getattr(found, name).tobytes() == getattr(held, name).tobytes(), name
     assert not list(tmp_path.iterdir()), "the files have no names"
@@ -52,9 +53,7 @@ def test_what_was_let_go_is_read_back(tmp_path: Path, monkeypatch: pytest.Monkey
     assert (picture == np.moveaxis(wanted, 0, -1)).all()
 
 
-def test_a_disk_without_room_is_said_before_anything_is_solved(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_disk_without_room_is_said_before_anything_is_solved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*_: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
