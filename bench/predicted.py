@@ -73,7 +73,7 @@ class Seen:
         signs = Signs(
             misfit_deg=self.signs.misfit_deg[some],
             indirect_deg=self.signs.indirect_deg[some],
-            bent_deg=self.signs.bent_deg[some],
+            torn_deg=self.signs.torn_deg[some],
         )
         return Seen(self.subject, self.lights, self.true_deg[some], self.noise_deg[some], self.fit_deg[some], signs)
 
@@ -189,7 +189,7 @@ def _looked(subject: str, case: Case) -> Seen:
         noise_deg=points.noise_deg[known],
         fit_deg=np.sqrt(sure)[known],
         signs=Signs(
-            misfit_deg=signs.misfit_deg[known], indirect_deg=signs.indirect_deg[known], bent_deg=signs.bent_deg[known]
+            misfit_deg=signs.misfit_deg[known], indirect_deg=signs.indirect_deg[known], torn_deg=signs.torn_deg[known]
         ),
     )
 
@@ -212,14 +212,14 @@ def fitted(seen: list[Seen]) -> tuple[Doubting, float]:
         return total
 
     start = Doubting()
-    first = np.log([start.misfit_deg, start.misfit_power, start.little_deg, start.indirect, start.per_bent_deg, 0.25])
+    first = np.log([start.misfit_deg, start.misfit_power, start.little_deg, start.indirect, start.per_torn, 0.1])
     search: Any = scipy.optimize.minimize
     return _constants(search(loss, first, method="Nelder-Mead", options={"maxiter": 400}).x)
 
 
 def _constants(logs: np.ndarray) -> tuple[Doubting, float]:
-    misfit, power, little, indirect, bent, share = (float(value) for value in np.exp(np.clip(logs, -6, 4)))
-    how = Doubting(misfit_deg=misfit, misfit_power=power, little_deg=little, indirect=indirect, per_bent_deg=bent)
+    misfit, power, little, indirect, torn, share = (float(value) for value in np.exp(np.clip(logs, -6, 4)))
+    how = Doubting(misfit_deg=misfit, misfit_power=power, little_deg=little, indirect=indirect, per_torn=torn)
     return how, share
 
 
@@ -228,7 +228,7 @@ def _held(sets: list[Seen], how: Doubting, share: float) -> np.ndarray:
     found, limits = [], Judging()
     for each in sets:
         predicted, true = each.predicted_deg(how, share), each.true_deg
-        typical = limits.beside_typical * float(np.median(predicted))
+        typical = float(np.median(predicted))
         trusted = predicted <= max(limits.most_error_deg, min(typical, limits.most_typical_deg))
         over = float(np.mean(true[trusted] > 10)) if trusted.any() else 0.0
         alike = float(np.corrcoef(predicted, true)[0, 1])

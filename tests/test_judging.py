@@ -5,8 +5,11 @@ import pytest
 from bench.accuracy_whole import bust
 
 from psvideo.model.surface import Surface
+from psvideo.solve.normals.doubting import Signs, ThinSurface, doubt_deg, signs_of
+from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.solving import Solving
+from psvideo.solve.normals.task import Usable
 
 SIZE = 96
 COLOUR = np.array([0.5, 0.4, 0.3])
@@ -80,3 +83,30 @@ def test_a_matte_bust_is_trusted_hair_and_creases_included() -> None:
     errors = np.degrees(2 * np.arcsin(np.clip(np.linalg.norm(surface.normals - case.truth, axis=-1) / 2, 0, 1)))
     assert surface.valid[reached].mean() >= 0.99
     assert (errors[surface.valid & reached] > 10).mean() <= 0.001
+
+
+def doubted(turned: np.ndarray) -> tuple[Signs, np.ndarray]:
+    """Return what speaks against the normals of a plain, turned by slopes (row, col, 2: along columns, along rows)."""
+    normals = np.stack([-turned[..., 0], turned[..., 1], np.ones(turned.shape[:2])], axis=-1)
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    inside, grey, lights = np.ones(turned.shape[:2], bool), np.full(turned.shape[:2], 0.5, np.float32), ring(4, 30)
+    planes = np.moveaxis(np.ascontiguousarray(np.moveaxis(normals.astype(np.float32), -1, 0)), 0, -1)
+    surface = Surface(normals=planes, albedo=grey, valid=inside, residual=None)
+    plates = [np.maximum(normals @ light, 0).astype(np.float32) * grey for light in lights]
+    lit = Illumination(directions=lights, intensities=np.ones((4, 1)))
+    one = Evidence(plates=plates, lit=lit, usable=Usable(dark_level=0.003, shadow_ratio=0.0))
+    level = np.full(inside.shape, 2, np.float32)
+    points = ThinSurface(step=1, surface=surface, noise_deg=0 * level, fit_deg=level, fit_of_noise_deg=0 * level)
+    signs = signs_of(points, one, surface)
+    return signs, doubt_deg(signs)
+
+
+def test_normals_that_belong_to_no_surface_are_doubted_and_steep_ones_are_not() -> None:
+    down, right = np.mgrid[:SIZE, :SIZE] / SIZE - 0.5
+    dome, doubt_of_dome = doubted(np.stack([right, down], axis=-1))
+    swirl, doubt_of_swirl = doubted(np.stack([down, -right], axis=-1))
+    middle = (slice(20, -20), slice(20, -20))
+    assert dome.torn_deg[middle].max() < 0.1
+    # 2 / 96 of a slope around every four points, over a radius of two and a half, as an angle
+    assert np.median(swirl.torn_deg[middle]) == pytest.approx(np.degrees(2 / SIZE * 2.5), rel=0.25)
+    assert (doubt_of_swirl[middle] > 1.5 * doubt_of_dome[middle]).all()

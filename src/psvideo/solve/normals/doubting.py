@@ -2,8 +2,8 @@
 
 Three signs are looked for on a coarse grid, and around every pixel, since they are smooth where noise is not. What the
 lights leave unexplained says how far the model is from the surface. Light that shows where a lamp does not reach came
-by way of other surfaces, which light everything alike and leave no residual. And where either is, edges and creases are
-worse than what is around them.
+by way of other surfaces, which light everything alike and leave no residual. And normals that belong to no surface are
+wrong whatever the lights say of them: along a closed way the slopes of a surface add up to nothing.
 """
 
 from dataclasses import dataclass
@@ -19,9 +19,15 @@ from psvideo.solve.normals.task import Floats, Samples, Task
 
 GRID_PX = 480
 """The grid has at most so many points along the longer side."""
-NEAR, AROUND = 9, 27
-"""Bends are angles to the mean of a square of so many points; the rest is averaged over the larger one."""
-MOST_FIT_DEG = np.float32(12)
+TORN, NEAR, AROUND = 5, 9, 27
+"""Slopes are added up along the edges of squares of so many points, averaged over those of the second; the rest is
+averaged over the largest."""
+LEAST_FACING, MOST_TORN = np.float32(0.25), np.float32(0.5)
+"""Slopes are those of normals that face the camera at least so much; and around four points they count up to so much,
+since where one thing is before another they say nothing of either."""
+TORN_OF_NOISE = np.float32(0.35)
+"""How much of what noise does to a normal shows in slopes that are added up: 0.27 on nothing but noise, and a margin."""
+MOST_FIT_DEG = np.float32(24)
 """What residuals predict counts as no more around a point: a line of rows that went wrong is not its surroundings."""
 LEAST_REACH = np.float32(0.2)
 """Where fewer lights reach, residuals of noise predict more: as if no less than this share of them did."""
@@ -37,30 +43,28 @@ class Doubting:
         m^(1 + power) / (m + little) of these degrees: true errors depend less on how well the lights lie, and on how
         many there are, than what residuals predict; where it is little it is noise.
     indirect: how much of the angle counts by which light from around would turn the normal.
-    per_bent_deg, most_bent_deg: by which share more it is for each degree to the mean normal around, up to so many:
-        photographs say nothing of sharper bends, and hair and pleats of matte subjects are as good as what is around.
+    per_torn: by which share more it is where normals belong to no surface by a degree, with its root.
 
     Fitted, with ``Judging.fit_share``, on a ball, a bear and a cat (DiLiGenT), a sphere with a wrong rig (Washington),
     another renderer's bunny, and eight virtual shapes of six materials, under 5 to 96 lights. Each subject left out and
     predicted from the others: ``python -m bench predicted``.
     """
 
-    misfit_deg: float = 4.5
-    misfit_power: float = 0.15
+    misfit_deg: float = 3.5
+    misfit_power: float = 0.18
     little_deg: float = 1.2
     indirect: float = 1.0
-    per_bent_deg: float = 0.045
-    most_bent_deg: float = 12.0
+    per_torn: float = 0.6
 
 
 @dataclass(frozen=True, kw_only=True)
 class Signs:
     """What is looked for, (row, col) of the points, in degrees: what residuals predict beyond noise, by which angle
-    light from around would turn the normal, and bends."""
+    light from around would turn the normal, and by which normals around belong to no surface."""
 
     misfit_deg: Floats
     indirect_deg: Floats
-    bent_deg: Floats
+    torn_deg: Floats
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,7 +92,7 @@ def step_of(shape: tuple[int, ...]) -> int:
 def signs_of(points: ThinSurface, one: Evidence, surface: Surface) -> Signs:
     """Return what speaks against the points' normals."""
     weight = points.known.astype(np.float32)
-    near, around = (_mean(weight, width) for width in (NEAR, AROUND))
+    around = _mean(weight, AROUND)
     fit = np.minimum(points.fit_deg, MOST_FIT_DEG)
     sums, counts = _indirect(points, one, surface)
     reach = np.clip(1 - counts / np.float32(len(one.plates)), LEAST_REACH, 1)
@@ -98,7 +102,7 @@ def signs_of(points: ThinSurface, one: Evidence, surface: Surface) -> Signs:
     return Signs(
         misfit_deg=np.sqrt(np.maximum(_mean(squares, AROUND) / around, 0)),
         indirect_deg=np.degrees(indirect + own) * _turned(points.surface, one),
-        bent_deg=np.sqrt(np.maximum(_bent_deg(points, near) ** 2 - points.noise_deg**2, 0)),
+        torn_deg=np.sqrt(np.maximum(_torn_squared(points) - (TORN_OF_NOISE * points.noise_deg) ** 2, 0)),
     )
 
 
@@ -107,8 +111,7 @@ def doubt_deg(signs: Signs, *, how: Doubting = Doubting()) -> Floats:
     misfit = np.float32(how.misfit_deg) * signs.misfit_deg ** np.float32(1 + how.misfit_power)
     misfit /= signs.misfit_deg + np.float32(how.little_deg)
     both = np.hypot(misfit, np.float32(how.indirect) * signs.indirect_deg)
-    bent = np.minimum(signs.bent_deg, np.float32(how.most_bent_deg))
-    return np.asarray(both * (1 + np.float32(how.per_bent_deg) * bent), np.float32)
+    return np.asarray(both * (1 + np.float32(how.per_torn) * np.sqrt(signs.torn_deg)), np.float32)
 
 
 def _turned(surface: Surface, one: Evidence) -> Floats:
@@ -121,14 +124,23 @@ def _turned(surface: Surface, one: Evidence) -> Floats:
     return np.sqrt(np.maximum(np.float32(added @ added) - along * along, 0))
 
 
-def _bent_deg(points: ThinSurface, near: Floats) -> Floats:
-    """Return the angle between every normal and the mean of those around it."""
-    planes = [points.surface.normals[..., axis].astype(np.float32) for axis in range(3)]
-    means = [_mean(plane, NEAR) / near for plane in planes]
-    along = sum(plane * mean for plane, mean in zip(planes, means, strict=True))
-    length = np.sqrt(sum(mean * mean for mean in means))
-    cosine = along / np.maximum(length, np.float32(1e-6))
-    return np.asarray(np.degrees(np.sqrt(np.maximum(2 - 2 * cosine, 0))), np.float32)
+def _torn_squared(points: ThinSurface) -> Floats:
+    """Return the squared angle by which normals around every point belong to no surface: what their slopes add up to
+    around four points each, over a square."""
+    across, up, towards = (points.surface.normals[..., axis].astype(np.float32) for axis in range(3))
+    facing = np.maximum(towards, LEAST_FACING)
+    right, down = -across / facing, up / facing
+    known = points.known
+    within = np.zeros(known.shape, np.float32)
+    within[:-1, :-1] = known[:-1, :-1] & known[1:, :-1] & known[:-1, 1:] & known[1:, 1:]
+    along = right[:, :-1] + right[:, 1:]
+    over = down[:-1] + down[1:]
+    seen = (facing[:-1, :-1] + facing[1:, :-1] + facing[:-1, 1:] + facing[1:, 1:]) / 4
+    whole = np.zeros(known.shape, np.float32)
+    whole[:-1, :-1] = (along[:-1] - along[1:] + over[:, 1:] - over[:, :-1]) / 2 * seen ** np.float32(1.5)
+    whole = np.clip(whole, -MOST_TORN, MOST_TORN) * within
+    each = np.degrees(_mean(whole, TORN) / _mean(within, TORN)) * np.float32(TORN / 2)
+    return _mean(each * each * within, NEAR) / _mean(within, NEAR)
 
 
 def _mean(plane: Floats, width: int) -> Floats:

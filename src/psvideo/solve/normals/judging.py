@@ -1,7 +1,7 @@
 """What to think of measured normals: how far each may be off, and which are to be trusted.
 
-Noise and the lights' directions say what a fit can know; residuals, light from around and bends (``doubting``) what it
-cannot.
+Noise and the lights' directions say what a fit can know; residuals, light from around and normals that belong to no
+surface (``doubting``) what it cannot.
 """
 
 from dataclasses import dataclass, field, replace
@@ -25,9 +25,9 @@ from psvideo.solve.normals.task import LIGHTS, Floats, Mask, Samples, Spread
 class Judging:
     """How errors are predicted and when a normal is trusted.
 
-    most_error_deg, beside_typical, most_typical_deg: a normal is trusted where its predicted error is at most the
-        first, or so many times what the lights' misfit makes typical of the picture where that is more, up to the
-        last: a rig that is wrong is no pixel's fault.
+    most_error_deg, most_typical_deg: a normal is trusted where its predicted error is at most the first, or what the
+        lights' misfit makes typical of the picture where that is more, up to the last: a rig that is wrong is no
+        pixel's fault.
     fit_share: how much of what residuals predict counts in the pixel itself, beyond ``fit_noise`` times what noise
         makes: so much do residuals predict of nothing but noise. (Robust solving corrects them for few lights, where
         what is not matte does not average out.)
@@ -37,9 +37,8 @@ class Judging:
     """
 
     most_error_deg: float = 5.0
-    beside_typical: float = 1.1
     most_typical_deg: float = 6.5
-    fit_share: float = 0.25
+    fit_share: float = 0.1
     fit_noise: float = 1.95
     held: float = 1.15
     least_share: float = 0.001
@@ -67,7 +66,7 @@ def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging =
         albedo = _brightness(points.surface.albedo)[points.known]
         typical, by_noise = (_typical(each, albedo) for each in (at_points, points.noise_deg[points.known]))
         beyond_deg = float(np.sqrt(max(typical**2 - by_noise**2, 0.0)))
-        limit_deg = max(limit_deg, min(how.beside_typical * beyond_deg, how.most_typical_deg))
+        limit_deg = max(limit_deg, min(beyond_deg, how.most_typical_deg))
         misfit = None if misfit is None else replace(misfit, error_deg=beyond_deg)
     error, trusted = spread.judged(surface, doubt, points.step, how, limit_deg=limit_deg, spare=one.spare)
     return replace(surface, valid=trusted, error_deg=error, misfit=misfit)

@@ -125,7 +125,7 @@ def trust_note(method: Method, lights: int) -> str:
     how = Judging()
     trusted = (
         f"A normal is valid where it was measured and its predicted error is at most {how.most_error_deg:g} degrees, "
-        f"or {how.beside_typical:g} times what is typical of the picture beyond noise where that is more (up to "
+        "or what is typical of the picture beyond noise where that is more (up to "
         f"{how.most_typical_deg:g}): where rig or surface spoil all pixels alike, the judgement of accuracy says so. "
     )
     if lights == 3:
