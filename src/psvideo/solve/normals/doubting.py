@@ -26,7 +26,7 @@ LEAST_FACING, MOST_TORN = np.float32(0.25), np.float32(0.5)
 """Slopes are those of normals that face the camera at least so much; and around four points they count up to so much,
 since where one thing is before another they say nothing of either."""
 TORN_OF_NOISE = np.float32(0.35)
-"""How much of what noise does to a normal shows in slopes that are added up: 0.27 on nothing but noise, and a margin."""
+"""How much of what noise does to a normal shows in slopes added up: 0.27 on nothing but noise, and a margin."""
 MOST_FIT_DEG = np.float32(24)
 """What residuals predict counts as no more around a point: a line of rows that went wrong is not its surroundings."""
 LEAST_REACH = np.float32(0.2)
