@@ -20,7 +20,6 @@ from picture_file import read_picture
 from psvideo.export.png_maps import PNG_MAX, encode_normals
 from psvideo.export.preview_movie import write_movie
 from psvideo.export.space import Space
-from psvideo.model.choices import Codec
 
 CLIENTS = Path(__file__).parent / "clients"
 BIN = Path(sys.executable).parent
@@ -205,11 +204,10 @@ def test_a_browser_hands_a_png_of_normals_to_webgl_as_it_is_where_conversion_is_
     assert np.abs(converted - ball(NUMBER)[0]).max() > 0.4
 
 
-@pytest.mark.parametrize("codec", ["h264", "vp9"])
-def test_a_browser_plays_a_preview_in_its_colours(page: Any, tmp_path: Path, codec: Codec) -> None:
+def test_a_browser_plays_a_preview_in_its_colours(page: Any, tmp_path: Path) -> None:
     colours = np.array([[255, 0, 0], [0, 255, 0], [0, 0, 255], [128, 128, 255], [0, 0, 0], [200, 90, 30]], np.uint8)
     picture = np.repeat(np.repeat(colours[None], 32, axis=0), 32, axis=1)
-    write_movie(tmp_path / "a.mp4", [picture] * 12, fps=Fraction(24), codec=codec)
+    write_movie(tmp_path / "a.mp4", [picture] * 12, fps=Fraction(24), codec="vp9")
     length_s, width, pixels = page.evaluate(VIDEO, [text_of(tmp_path / "a.mp4"), 0.25])
     assert length_s == pytest.approx(0.5)
     shown = np.array(pixels).reshape(32, width, 4)[16, 16::32, :3]

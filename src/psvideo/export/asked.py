@@ -10,10 +10,10 @@ from psvideo.export.result_files import Delivery
 from psvideo.export.space import choose_space
 from psvideo.model.choices import (
     CameraTime,
-    Codec,
     Compression,
     MapFiles,
     MeshKind,
+    MovieCodec,
     Preview,
     Program,
     SpaceName,
@@ -43,7 +43,7 @@ class Asked:
     with_ambient: bool = False
     weight: Mapping[str, float] = field(default_factory=dict)
     preview: Sequence[Preview] = ()
-    preview_codec: Codec = "h264"
+    preview_codec: MovieCodec = "both"
 
 
 def delivery_of(asked: Asked) -> tuple[Delivery, tuple[str, ...]]:

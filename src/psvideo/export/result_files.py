@@ -13,14 +13,14 @@ from psvideo.export.png_maps import PNG_MAX, encode_normals, write_png16
 from psvideo.export.space import Space
 from psvideo.export.tags import Tags
 from psvideo.formats.exr_files import write_exr, write_exr_parts
-from psvideo.model.choices import Codec, Compression, Preview, Program
+from psvideo.model.choices import Codec, Compression, MovieCodec, Preview, Program
 from psvideo.model.quantities import ALWAYS, AOVS, QUANTITIES, SOURCES, Aov, is_half
 from psvideo.model.surface import Surface
 from psvideo.plates.beauty import Mix
 from psvideo.solve.depth import Depth, mesh_of
 from psvideo.solve.passes.made import Passes
 
-MOVIE_SUFFIXES: dict[Codec, str] = {"h264": "mp4", "vp9": "mp4", "prores": "mov"}
+MOVIE_SUFFIXES: dict[Codec, str] = {"vp9": "mp4", "prores": "mov"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +41,7 @@ class Delivery:
     plates: bool = False
     mix: Mix = field(default_factory=Mix)
     previews: tuple[Preview, ...] = ()
-    codec: Codec = "h264"
+    codec: MovieCodec = "both"
     program: Program | None = None
     compression: Compression = "zip"
 

@@ -1,5 +1,6 @@
 """What may be chosen by name, each list once; on its own, so that a command's help loads nothing else."""
 
+from collections.abc import Mapping
 from typing import Literal
 
 Solver = Literal["auto", "least-squares", "robust"]
@@ -24,8 +25,11 @@ Preview = Literal["relit", "normals", "plates", "beauty"]
 """What a movie for eyes shows."""
 PlatesPreview = Literal["plates", "beauty"]
 """What a movie of plates shows, where nothing is solved."""
-Codec = Literal["h264", "vp9", "prores"]
-"""How movies are coded."""
+Codec = Literal["vp9", "prores"]
+"""How a movie is coded."""
+MovieCodec = Literal["both", "vp9", "prores"]
+"""How movies for eyes are coded; both: once for browsers and once for editing programs."""
+CODECS: Mapping[MovieCodec, tuple[Codec, ...]] = {"both": ("vp9", "prores"), "vp9": ("vp9",), "prores": ("prores",)}
 PREVIEWS: tuple[Preview, ...] = ("relit",)
 """The movies of a clip's results where nobody says otherwise."""
 Compression = Literal["zip", "zips", "piz", "rle", "none"]

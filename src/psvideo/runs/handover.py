@@ -24,7 +24,7 @@ from psvideo.export.result_files import MOVIE_SUFFIXES, Delivery
 from psvideo.export.space import CAMERA_SPACE, Space, placed
 from psvideo.export.usd.usd_stage import StageView, stage_name, stage_text
 from psvideo.formats.whole_files import whole_file, write_text
-from psvideo.model.choices import Codec, Preview
+from psvideo.model.choices import CODECS, MovieCodec, Preview
 from psvideo.model.ground import ground_of
 from psvideo.model.intensity import lights_as_planned
 from psvideo.model.near_light import is_near
@@ -58,17 +58,12 @@ def write_timeline(run: Finished) -> None:
 
 
 def write_previews(
-    run: Finished, previews: Sequence[Preview], codec: Codec, *, plates: Sequence[str], watch: Watch, caller: Caller
+    run: Finished, previews: Sequence[Preview], codec: MovieCodec, *, plates: Sequence[str], watch: Watch
 ) -> None:
     """Make the movies asked for; ``plates`` are the sequences (folders) that the one of plates shows."""
     if not previews:
         return
-    from psvideo.export.preview_movie import codec_at_hand  # FFmpeg's libraries take memory: only where a movie is made
-
-    found, wanted = _sequences(run.folder), codec
-    codec = codec_at_hand(wanted)
-    if codec != wanted:
-        caller.warn(f"FFmpeg was built without an encoder for {wanted!r}: movies for eyes are {codec!r}.")
+    found = _sequences(run.folder)
     for preview in previews:
         names = {"relit": ("normals", "albedo"), "plates": tuple(plates)}.get(preview, (preview,))
         numbers = sorted(set.intersection(*(set(found.get(name, {})) for name in names)))
@@ -80,9 +75,10 @@ def write_previews(
             )
             for number in numbers
         ]
-        path = run.folder / preview_name(run.clip.name, preview, MOVIE_SUFFIXES[codec])
-        if instants and not path.is_file():
-            write_preview(path, preview, instants, fps=run.fps, codec=codec, watch=watch)
+        for each in CODECS[codec]:
+            path = run.folder / preview_name(run.clip.name, preview, MOVIE_SUFFIXES[each])
+            if instants and not path.is_file():
+                write_preview(path, preview, instants, fps=run.fps, codec=each, watch=watch)
     shutil.rmtree(run.folder / KEPT, ignore_errors=True)
 
 

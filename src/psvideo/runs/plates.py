@@ -14,7 +14,7 @@ from psvideo.export.plate_files import plate_name, write_flash, write_plate
 from psvideo.export.tags import Tags
 from psvideo.formats.timing_json import format_timing
 from psvideo.formats.whole_files import write_text
-from psvideo.model.choices import Codec, Compression, Preview, SplitMethod
+from psvideo.model.choices import Compression, MovieCodec, Preview, SplitMethod
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Rig
 from psvideo.model.timing import Timing
@@ -48,7 +48,7 @@ class Extras:
     flashes: bool = False
     mix: Mix | None = None
     previews: tuple[Preview, ...] = ()
-    codec: Codec = "h264"
+    codec: MovieCodec = "both"
     compression: Compression = "zip"
 
     def check(self, plan: Plan) -> None:
@@ -137,7 +137,7 @@ def _at_the_end(
     if times_s:
         run = Finished(folder=folder, target=output.folder, clip=take.clip, fps=tags.fps, first_time_s=times_s[0])
         lights = take.plan.lights
-        write_previews(run, extras.previews, extras.codec, plates=lights, watch=watch, caller=output.caller)
+        write_previews(run, extras.previews, extras.codec, plates=lights, watch=watch)
         write_timeline(run)
 
 

@@ -240,7 +240,7 @@ def _at_the_end(
             part.unlink()
     run = Finished(folder=folder, target=output.folder, clip=clip, fps=tags.fps, first_time_s=facts[0].time_s)
     plates = [f"plates/{light}" for light in clip.plan.lights]
-    write_previews(run, delivery.previews, delivery.codec, plates=plates, watch=watch, caller=output.caller)
+    write_previews(run, delivery.previews, delivery.codec, plates=plates, watch=watch)
     write_timeline(run)
     if delivery.program is not None or "usd" in delivery.meshes:
         write_stage(run, delivery, rig, {one.number: one.time_s for one in facts}, metric=metric)

@@ -9,7 +9,7 @@ from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import UsageError
 from psvideo.formats.paths import path_if_given, path_of
 from psvideo.formats.rig_toml import read_rig
-from psvideo.model.choices import Codec, Compression, PlatesPreview, SplitMethod
+from psvideo.model.choices import Compression, MovieCodec, PlatesPreview, SplitMethod
 from psvideo.model.colours import unmixing_of
 from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.beauty import mix_of
@@ -41,7 +41,7 @@ def split(
     shutter: float | None = None,
     resync: Path | str | None = None,
     preview: Sequence[PlatesPreview] = (),
-    preview_codec: Codec = "h264",
+    preview_codec: MovieCodec = "both",
     compression: Compression = "zip",
     start_number: int = FIRST_NUMBER,
     force: bool = False,

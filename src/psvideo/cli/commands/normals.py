@@ -97,7 +97,7 @@ def normals(
     weight: Weights = None,
     preview: PreviewOption = None,
     no_preview: NoPreview = False,
-    preview_codec: CodecOption = "h264",
+    preview_codec: CodecOption = "both",
     start_number: StartNumber = 1001,
     force: Force = False,
     resume: Resume = False,

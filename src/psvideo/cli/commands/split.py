@@ -47,7 +47,7 @@ def split(
     shutter: ShutterOption = None,
     resync: ResyncOption = None,
     preview: PlatesPreviewOption = None,
-    preview_codec: CodecOption = "h264",
+    preview_codec: CodecOption = "both",
     compression: CompressionOption = "zip",
     start_number: StartNumber = 1001,
     force: Force = False,

@@ -8,10 +8,10 @@ import typer
 
 from psvideo.model.choices import (
     CameraTime,
-    Codec,
     Compression,
     MapFiles,
     MeshKind,
+    MovieCodec,
     PlatesPreview,
     Preview,
     Program,
@@ -88,10 +88,8 @@ PlatesPreviewOption = Annotated[
     typer.Option("--preview", help="Make a movie for eyes; may be given several times."),
 ]
 CodecOption = Annotated[
-    Codec,
-    typer.Option(
-        "--preview-codec", help="h264 (.mp4) plays everywhere, vp9 (.mp4) in browsers, prores (.mov) in editors."
-    ),
+    MovieCodec,
+    typer.Option("--preview-codec", help="vp9 (.mp4) for browsers and players, prores (.mov) for editors, or both."),
 ]
 ProgramOption = Annotated[
     Program | None,
