@@ -22,6 +22,7 @@ from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import Mixture, made
 from psvideo.plates.sequence import Round
 from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.woodham1980 import solve
 from psvideo.synth.lamps.true_flashes import TrueFlash
 from psvideo.synth.scene import Scene
@@ -66,10 +67,15 @@ class Filmed:
 
     def error_deg(self, surface: Surface, time_s: float) -> tuple[float, float]:
         """Return the mean error over the subject, and which share of it is valid."""
-        hits = self.stage.view(time_s).hits
-        subject = hits.image((hits.point_m[:, 2] > WALL_M + 0.01).astype(np.float32)) > 0.5
+        subject = self.subject(time_s)
         said = surface.valid & subject
-        return float(angle_deg(surface.normals, true_normals(hits))[said].mean()), float(said.sum() / subject.sum())
+        off_deg = angle_deg(surface.normals, true_normals(self.stage.view(time_s).hits))
+        return float(off_deg[said].mean()), float(said.sum() / subject.sum())
+
+    def subject(self, time_s: float) -> np.ndarray:
+        """Return where the subject is."""
+        hits = self.stage.view(time_s).hits
+        return hits.image((hits.point_m[:, 2] > WALL_M + 0.01).astype(np.float32)) > 0.5
 
     def solved(self, one: Round) -> Surface:
         seen = np.stack([plate.pixels_seen for plate in one.plates])
@@ -362,6 +368,30 @@ def test_a_beauty_plate_has_no_hole_where_motion_leaves_plates_in_doubt() -> Non
     assert unsure.mean() > 0.1
     assert (beauty.image > 0.5 * there)[inner][unsure].all()
     assert np.abs(beauty.image - there)[inner][unsure].mean() < 0.05 * there.mean()
+
+
+def test_what_no_motion_explains_is_solved_but_not_trusted() -> None:
+    """The third round shows another subject: what the second one looked like at one instant cannot be known."""
+    clip = filmed(3, "4 px", 0.002)
+
+    def turned(plate: LightPlate) -> LightPlate:
+        return replace(plate, picture=made(np.ascontiguousarray(np.rot90(plate.image[:, 30:-30], 2).copy())))
+
+    def cut(plate: LightPlate) -> LightPlate:
+        return replace(plate, picture=made(np.ascontiguousarray(plate.image[:, 30:-30])))
+
+    shares = []
+    for change in (cut, turned):
+        rounds = [replace(one, plates=tuple(map(cut, one.plates))) for one in clip.rounds[:2]]
+        last = replace(clip.rounds[2], plates=tuple(map(change, clip.rounds[2].plates)))
+        one = brought(clip, rounds=(*rounds, last))[1]
+        surface = Solving().solve([plate.image for plate in one.plates], clip.lit, unsure=one.unsure)
+        subject = clip.subject(one.time_s)[:, 30:-30]
+        shares.append([float((part & subject).sum() / subject.sum()) for part in (surface.measured, surface.valid)])
+    (measured, trusted), (still_measured, hardly_trusted) = shares
+    assert trusted > 0.97 * measured
+    assert still_measured > 0.9 * measured
+    assert hardly_trusted < 0.25 * measured
 
 
 def at_once(clip: Filmed, time_s: float) -> Round:

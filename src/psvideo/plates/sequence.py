@@ -41,6 +41,9 @@ class Round:
         nobody looked.
     motion
         How everything moved when the plates were brought to one instant; None where nothing did.
+    unsure
+        By how much every light's plate may be off where motion does not explain what it is made from, (light, row, col)
+        on a coarse grid over the picture, a standard error in units of the plates' light; None where nothing moved.
     open_plates
         Of each light what an open shutter shows about the instant; empty where none is wanted.
     """
@@ -50,6 +53,7 @@ class Round:
     ambient: LightPlate | None = None
     stood: NDArray[np.bool_] | None = None
     motion: Followed | None = None
+    unsure: NDArray[np.float32] | None = None
     open_plates: tuple[LightPlate, ...] = ()
 
     @property

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -83,13 +84,15 @@ def surfaces(
         plates = _pictures(one, shares)
         shown = None if seen.all() else seen
 
+        unsure = _unsure(one, shares)
+
         here = None if near is None else swept(near.at(one.number), scaled, plates, seen=shown)
         lit = light(ground=None if here is None else here.ground)
 
         def solve(found: Illumination) -> Surface:
             nonlocal lit
             lit = found
-            return solving.solve(plates, found, seen=shown, mask=mask)
+            return solving.solve(plates, found, seen=shown, mask=mask, unsure=unsure)
 
         surface = solve(lit) if here is None else solve_near(here, lambda ground: light(ground=ground), solve)
         nonlocal steady
@@ -120,6 +123,18 @@ def _pictures(one: Round, shares: Sequence[NDArray[np.float32]] | None) -> Seque
     if shares is None:
         return plates
     return [image_evened(plate, share) for plate, share in zip(plates, shares, strict=True)]
+
+
+def _unsure(one: Round, shares: Sequence[NDArray[np.float32]] | None) -> NDArray[np.float32] | None:
+    """Return by how much a round's plates may be off for motion, on the scale of ``_pictures``."""
+    if one.unsure is None:
+        return None
+    each = [plane / np.float32(plate.saturation) for plane, plate in zip(one.unsure, one.plates, strict=True)]
+    if shares is not None:
+        size = one.unsure.shape[:0:-1]
+        small = [np.asarray(cv2.resize(share, size, interpolation=cv2.INTER_AREA), np.float32) for share in shares]
+        each = [image_evened(plane, share) for plane, share in zip(each, small, strict=True)]
+    return np.stack(each)
 
 
 def denoised(instants: Iterable[Instant], results: int) -> Iterator[Instant]:

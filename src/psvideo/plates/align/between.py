@@ -14,18 +14,27 @@ from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
 from psvideo.model.coded import Image
+from psvideo.plates.align.brightness import light_of
 from psvideo.plates.align.flow import Codes, Flags, Vectors, comparable, places
 from psvideo.plates.align.moving import SHADING_PX, Followed, Pair, window_of
 from psvideo.plates.align.moving_kernel import AFTER, AT_REST, BEFORE, BOTH, NOWHERE, blend_rows
 from psvideo.plates.align.packed import packed
+from psvideo.plates.align.unsure import unsure_of
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import made
 
 UNLIKE = 10.0
 """Plates whose detail differs by more codes along the motion do not show the same thing."""
 ALIKE_PX = 5
-SHADED = 24.0
-"""... nor do those that differ by more as a whole: a shadow passed."""
+EVENLY, BARE = 24.0, 3.0
+"""Where they differ by more than the first as a whole, only what is bare does: its detail differs by no more than the
+second. It turns, and its shading with it; detail and shading that both change are two things."""
+DARK = 0.003
+"""Light that is no shadow's edge, as a share of a sketch's white: noise makes as much."""
+SHADED = 0.25
+"""... nor do those of which one is darker, as a whole, than this share of the other: a shadow passed."""
+BLENDED = 0.25
+"""Plates that are alike in detail differ by shading, which turns evenly: their blend is off by so much less."""
 REST = 3.0
 """What stands still while its shading changes by more codes is blended by time."""
 ENOUGH = 4
@@ -43,11 +52,13 @@ MARGIN_ROWS = 5
 @dataclass(frozen=True, kw_only=True)
 class Taken:
     """Of one light (row, col): where its plates ``alike`` show the same along the motion, ``source``, what a pixel is
-    to be taken from, and where that is ``sure``."""
+    to be taken from, and where that is ``sure``; and by how much it may be off, in units of the plates' light,
+    ``unsure``."""
 
     alike: Flags
     sure: Flags
     source: Codes
+    unsure: Vectors
 
 
 def taken_of(pair: Pair, motion: Followed) -> Taken:
@@ -59,8 +70,9 @@ def taken_of(pair: Pair, motion: Followed) -> Taken:
     apart = cv2.subtract(after, before, dtype=cv2.CV_32F)
     wide, narrow = ((window_of(size_px, motion.step),) * 2 for size_px in (SHADING_PX, ALIKE_PX))
     shading = cv2.blur(apart, wide)
-    alike = cv2.blur((apart - shading) ** 2, narrow) < UNLIKE**2
-    alike &= np.abs(shading) < SHADED
+    unlike = cv2.blur((apart - shading) ** 2, narrow)
+    alike = unlike < np.where(np.abs(shading) < EVENLY, np.float32(UNLIKE**2), np.float32(BARE**2))
+    alike &= ~_shaded(before, after, wide)
     nearer = BEFORE if spans_s[0] <= spans_s[1] else AFTER
     source = np.where(motion.moves, np.where(alike, BOTH, nearer), AT_REST).astype(np.uint8)
     source[~motion.moves & alike & (np.abs(shading) > REST)] = BOTH
@@ -69,7 +81,10 @@ def taken_of(pair: Pair, motion: Followed) -> Taken:
         _add_hidden(hidden, motion, alike, span_s, sum(spans_s))
     source[gone[0] & ~gone[1]] = AFTER
     source[gone[1] & ~gone[0]] = BEFORE
-    return Taken(alike=alike, sure=alike | (gone[0] != gone[1]), source=source)
+    hidden = gone[0] != gone[1]
+    unsure = unsure_of(pair, before, after, motion) * ~hidden
+    unsure[source == BOTH] *= np.float32(BLENDED)
+    return Taken(alike=alike, sure=alike | hidden, source=source, unsure=unsure)
 
 
 def without_doubtful(shown: Sequence[Taken], motion: Followed, others: int) -> list[Codes]:
@@ -83,6 +98,12 @@ def without_doubtful(shown: Sequence[Taken], motion: Followed, others: int) -> l
     if len(shown) >= MANY:
         left_out |= ~motion.moves & (sure < min(len(shown) // 2, len(shown) - MANY + 1))
     return [np.where(left_out & ~one.sure, np.uint8(NOWHERE), one.source) for one in shown]
+
+
+def _shaded(before: Codes, after: Codes, window: tuple[int, int]) -> Flags:
+    """Return where one of two plates is in shadow as a whole."""
+    one, other = (light_of(cv2.blur(codes, window).astype(np.float32)) for codes in (before, after))
+    return np.asarray(np.minimum(one, other) < np.float32(SHADED) * np.maximum(one, other) - np.float32(DARK))
 
 
 def _along(codes: Codes, way: Vectors) -> Codes:

@@ -33,7 +33,7 @@ def evened(before: Sketch, after: Sketch) -> Sketch:
     lit = (np.minimum(one, other) > LIT) & (np.maximum(one, other) < NEAR_WHITE)
     if np.count_nonzero(lit) < FEWEST:
         return after
-    gain = float(np.median(_light(one[lit]) / _light(other[lit])))
+    gain = float(np.median(light_of(one[lit]) / light_of(other[lit])))
     change = float(np.median(np.abs(other[lit] - one[lit])))
     left = float(np.median(np.abs(_brightened(other[lit], gain) - one[lit])))
     if left >= EXPLAINED * change:
@@ -47,12 +47,12 @@ def evened(before: Sketch, after: Sketch) -> Sketch:
     return replace(after, codes=codes, blocks=np.asarray(blocks, np.float32))
 
 
-def _light(codes: NDArray[np.float32]) -> Vectors:
+def light_of(codes: NDArray[np.float32]) -> Vectors:
     """Return the light that a sketch's codes stand for, 1 = white."""
     return np.asarray(np.square(codes / np.float32(SCALE) + np.float32(ROOT_TOE)) - np.float32(TOE), np.float32)
 
 
 def _brightened(codes: NDArray[np.float32], gain: float) -> Vectors:
     """Return the codes of so many times the light."""
-    light = np.clip(np.float32(gain) * _light(codes), 0, 1)
+    light = np.clip(np.float32(gain) * light_of(codes), 0, 1)
     return np.asarray((np.sqrt(light + np.float32(TOE)) - np.float32(ROOT_TOE)) * np.float32(SCALE), np.float32)

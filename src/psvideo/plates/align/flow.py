@@ -47,13 +47,14 @@ QUARTER_OF_NORMAL = 0.3186
 @dataclass(frozen=True, kw_only=True)
 class Sketch:
     """A plate as flow sees it: ``codes`` (row, col), which of these rows any frame saw, ``seen`` (row,), and the means
-    of blocks of codes, ``blocks`` (row, col)."""
+    of blocks of codes, ``blocks`` (row, col). ``white`` is the light of code 255."""
 
     number: int
     time_s: float
     codes: Codes
     seen: Flags
     blocks: Vectors
+    white: float
 
 
 def white_of(plate: LightPlate) -> float:
@@ -77,7 +78,7 @@ def sketch_of(plate: LightPlate, *, white: float) -> Sketch:
     size = max(shown.shape[1] // BLOCK_PX, 1), max(shown.shape[0] // BLOCK_PX, 1)
     blocks = np.asarray(cv2.resize(shown, size, interpolation=cv2.INTER_AREA), np.float32)
     codes = (shown + np.float32(0.5)).astype(np.uint8)
-    return Sketch(number=plate.number, time_s=plate.time_s, codes=codes, seen=seen, blocks=blocks)
+    return Sketch(number=plate.number, time_s=plate.time_s, codes=codes, seen=seen, blocks=blocks, white=white)
 
 
 def _grey(image: Image) -> Image:
@@ -106,10 +107,10 @@ def changed(before: Sketch, after: Sketch) -> Flags:
         change[shown[:, 0] < 1] = 0
     local = cv2.blur(change * change, (AROUND, AROUND))
     blocks = BLOCK_NOISE_FACTOR * min(_spread(change, before.blocks, CODED_BLOCKS), MOST_BLOCK_NOISE)
-    return np.asarray(local > max(LEAST_CHANGE, NOISE_FACTOR * _noise(before, after) / BLOCK_PX, blocks) ** 2)
+    return np.asarray(local > max(LEAST_CHANGE, NOISE_FACTOR * noise_between(before, after) / BLOCK_PX, blocks) ** 2)
 
 
-def _noise(before: Sketch, after: Sketch) -> float:
+def noise_between(before: Sketch, after: Sketch) -> float:
     """Return the noise of the change between two sketches, in codes, by its finest detail in some of the rows.
 
     The quieter half decides: up to half of what is lit may move and be as rich in detail as it likes.

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from psvideo.plates.align.brightness import evened
-from psvideo.plates.align.flow import Flags, Sketch, changed, sketch_of, white_of
+from psvideo.plates.align.flow import Flags, Sketch, Vectors, changed, sketch_of, white_of
 from psvideo.plates.align.moving import Followed
 from psvideo.plates.align.packed import packed
 from psvideo.plates.light_plate import LightPlate
@@ -47,7 +47,8 @@ class Around:
 @dataclass(kw_only=True)
 class DueInstant:
     """An instant that is to be shown, of a round, and the lights' plates at it that are made already; ``moving``
-    are the lights that were found to move and wait for each other, ``motion`` how, once it was found.
+    are the lights that were found to move and wait for each other, ``motion`` how, once it was found, and ``unsure`` by
+    how much their plates may be off for it.
     ``guessed``: what is doubtful is shown as it most likely is, for nothing is measured in it."""
 
     number: int
@@ -56,6 +57,7 @@ class DueInstant:
     made: dict[str, LightPlate] = field(default_factory=dict)
     moving: set[str] = field(default_factory=set)
     motion: Followed | None = None
+    unsure: Vectors | None = None
     guessed: bool = False
 
 

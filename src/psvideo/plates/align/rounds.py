@@ -4,18 +4,19 @@ A round's flashes show different instants. Each light's plate at the wanted inst
 light around it, as soon as the second one is there; at the clip's ends, and beside a gap, from the two nearest ones.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from psvideo.model.choices import Align, Rate
-from psvideo.plates.align.between import Ends, plate_at, taken_of, without_doubtful
+from psvideo.plates.align.between import Ends, Taken, plate_at, taken_of, without_doubtful
 from psvideo.plates.align.brightness import evened
 from psvideo.plates.align.comb import Comb, Schedule
-from psvideo.plates.align.flow import Codes
+from psvideo.plates.align.flow import Codes, Vectors
 from psvideo.plates.align.held import Around, DueInstant, Held
 from psvideo.plates.align.moving import Followed, Pair, followed_at
+from psvideo.plates.align.moving_kernel import NOWHERE
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import AMBIENT, Round, gathered, handed_over
 
@@ -121,7 +122,9 @@ def _complete(held: Held, how: Aligning) -> Iterator[Round]:
         held.waiting.popleft()
         stood = held.stood(instant.round) if held.sketched else None
         held.let_go()
-        yield replace(handed_over(instant.made, instant.number, held.lights, stood), motion=instant.motion)
+        yield replace(
+            handed_over(instant.made, instant.number, held.lights, stood), motion=instant.motion, unsure=instant.unsure
+        )
 
 
 def _pass_rest(held: Held, instant: DueInstant, how: Aligning) -> None:
@@ -168,10 +171,19 @@ def _make_moving(held: Held, instant: DueInstant) -> None:
     guesses = sources = [one.source for one in shown]
     if not instant.guessed:
         sources = without_doubtful(shown, motion, len(held.lights) - len(lights))
+    instant.unsure = _unsure(shown, sources, lights, held.lights)
     for light, source, guess in zip(lights, sources, guesses, strict=True):
         _hand_on(instant, _moved_to(held.sure_around(light, instant), source, guess, motion))
         instant.moving.remove(light)
         held.let_go()
+
+
+def _unsure(shown: Sequence[Taken], sources: Sequence[Codes], moving: Sequence[str], lights: Sequence[str]) -> Vectors:
+    """Return by how much every light's plate may be off, (light, row, col); what is left out or stands is not."""
+    unsure = np.zeros((len(lights), *sources[0].shape), np.float32)
+    for light, one, source in zip(moving, shown, sources, strict=True):
+        unsure[lights.index(light)] = one.unsure * (source != NOWHERE)
+    return unsure
 
 
 def _moved_to(around: Around, source: Codes, guess: Codes, motion: Followed) -> LightPlate:

@@ -21,8 +21,12 @@ LEAST_BLOCKS = 0.002
 FASTEST = 0.95
 """The speed reported is that of the fastest twentieth of what moves."""
 RETURN_PX = 0.7
+EXPLAINED, DETAIL_PX, SHADING_CODES = 0.7, 9, 12.0
+"""... and what changed is explained where plates differ along the flow by less than this share of what they do at rest,
+over so many pixels: flow that fits by chance leads there and back as well. Less than the last may be shading that
+turns."""
 FOLLOWED = 0.3
-"""Where there and back meet for less than this share of what changed, flow gives no speed."""
+"""Where there and back meet for less than this share of what changed, or explain less of it, flow gives no speed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,12 +79,13 @@ def motion(before: Glimpse, after: Glimpse) -> Motion | None:
     forward, backward = (
         search.calc(*pair, None) for pair in ((before.codes, after.codes), (after.codes, before.codes))
     )
-    followed = changed & _returns(forward, backward)
+    returns = changed & _returns(forward, backward)
+    followed = returns & _explained(one, other, forward)
     if followed.sum() < FOLLOWED * changed.sum():
         return Motion(speed_px_s=None, share=float(changed.mean()))
     way = np.hypot(forward[..., 0], forward[..., 1])[followed] * before.scale
     speed = float(np.quantile(way, FASTEST)) / abs(after.time_s - before.time_s)
-    return Motion(speed_px_s=speed, share=float(followed.mean()))
+    return Motion(speed_px_s=speed, share=float(returns.mean()))
 
 
 def _changed(one: NDArray[np.float32], other: NDArray[np.float32]) -> NDArray[np.bool_]:
@@ -96,9 +101,22 @@ def _changed(one: NDArray[np.float32], other: NDArray[np.float32]) -> NDArray[np
     return np.asarray(local > max(LEAST_CHANGE, NOISE_FACTOR * noise / 3))
 
 
-def _returns(forward: NDArray[np.float32], backward: NDArray[np.float32]) -> NDArray[np.bool_]:
-    rows, cols = forward.shape[:2]
+def _explained(one: NDArray[np.float32], other: NDArray[np.float32], way: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """Tell where flow explains most of what two pictures differ by, or leaves no more than shading, (row, col)."""
+    x, y = _places(way)
+    moved = cv2.remap(other, x + way[..., 0], y + way[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+    left, change = (cv2.blur((picture - one) ** 2, (DETAIL_PX, DETAIL_PX)) for picture in (moved, other))
+    return np.asarray(left < np.maximum(EXPLAINED**2 * change, SHADING_CODES**2))
+
+
+def _places(way: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    rows, cols = way.shape[:2]
     x, y = np.meshgrid(np.arange(cols, dtype=np.float32), np.arange(rows, dtype=np.float32))
+    return x, y
+
+
+def _returns(forward: NDArray[np.float32], backward: NDArray[np.float32]) -> NDArray[np.bool_]:
+    x, y = _places(forward)
     back = cv2.remap(backward, x + forward[..., 0], y + forward[..., 1], cv2.INTER_LINEAR)
     missed = np.hypot(*np.moveaxis(forward + back, -1, 0))
     return np.asarray(missed < RETURN_PX + 0.1 * np.hypot(forward[..., 0], forward[..., 1]))

@@ -7,18 +7,22 @@ from pathlib import Path
 from psvideo.plates.mixture import Mixture
 from psvideo.solve.normals.bands import ShownPlates
 from psvideo.solve.normals.illumination import Illumination
-from psvideo.solve.normals.task import Mask, Samples, Task, Usable, task
+from psvideo.solve.normals.task import Floats, Mask, Samples, Task, Usable, task
 
 
 @dataclass(frozen=True, kw_only=True)
 class Evidence:
-    """Plates, lights, and which samples to look at; ``spare``, a folder in whose files large pictures are worked on."""
+    """Plates, lights, and which samples to look at; ``spare``, a folder in whose files large pictures are worked on.
+
+    ``unsure`` (light, row, col), on a grid of its own over the picture, is by how much plates may be off for motion.
+    """
 
     plates: Sequence[Samples] | Sequence[Mixture]
     lit: Illumination
     usable: Usable
     seen: Mask | None = None
     mask: Mask | None = None
+    unsure: Floats | None = None
     black_level: float = 0.0
     scale: float = 1.0
     spare: Path | None = None

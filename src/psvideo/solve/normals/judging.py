@@ -17,6 +17,7 @@ from psvideo.solve.normals.bands import BAND_PIXELS
 from psvideo.solve.normals.doubting import Doubting, Signs, ThinSurface, bits, doubt_deg, signs_of, step_of, stored
 from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.moving_doubt import MovingDoubt, moved_deg, moving_doubt_deg
 from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.task import LIGHTS, Floats, Mask, Samples, Spread
 
@@ -33,7 +34,7 @@ class Judging:
         what is not matte does not average out.)
     held: so many standard deviations hold 68 % of two-dimensional Gaussian errors (1.07, and some doubt).
     least_share: of the light, the least that any camera, lens and lamp is off by.
-    doubting: what may turn normals beyond that.
+    doubting, moving: what may turn normals beyond that, and where things move.
     """
 
     most_error_deg: float = 5.0
@@ -43,6 +44,7 @@ class Judging:
     held: float = 1.15
     least_share: float = 0.001
     doubting: Doubting = field(default_factory=Doubting)
+    moving: MovingDoubt = field(default_factory=MovingDoubt)
 
 
 NOTHING = np.zeros((0, 0), np.float32)
@@ -59,7 +61,11 @@ def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging =
     """
     spread = _Spread.of(surface, one.lit, noise, how)
     points = spread.points(surface)
-    doubt = doubt_deg(signs_of(points, one, surface), how=how.doubting)
+    turned_deg = moved_deg(points, one)
+    doubt = doubt_deg(signs_of(points, one, surface, turned_deg), how=how.doubting)
+    moving = (
+        None if turned_deg is None else moving_doubt_deg(turned_deg, points.known.astype(np.float32), how=how.moving)
+    )
     at_points = spread.judged(points.surface, doubt, 1, how, limit_deg=0.0)[0][points.known].astype(np.float32)
     limit_deg, misfit = how.most_error_deg, surface.misfit
     if at_points.size:
@@ -68,6 +74,8 @@ def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging =
         beyond_deg = float(np.sqrt(max(typical**2 - by_noise**2, 0.0)))
         limit_deg = max(limit_deg, min(beyond_deg, how.most_typical_deg))
         misfit = None if misfit is None else replace(misfit, error_deg=beyond_deg)
+    if moving is not None:
+        doubt = np.hypot(doubt, moving)
     error, trusted = spread.judged(surface, doubt, points.step, how, limit_deg=limit_deg, spare=one.spare)
     return replace(surface, valid=trusted, error_deg=error, misfit=misfit)
 

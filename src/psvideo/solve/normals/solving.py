@@ -15,7 +15,7 @@ from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.judging import Judging, emptied, judged
 from psvideo.solve.normals.plate_noise import LEAST, PlateNoise, noise_of
-from psvideo.solve.normals.task import Mask, Samples, Usable
+from psvideo.solve.normals.task import Floats, Mask, Samples, Usable
 
 Plates = Sequence[Samples] | Sequence[Mixture]
 Method = Literal["least-squares", "robust"]
@@ -56,11 +56,13 @@ class Solving:
         *,
         seen: Mask | None = None,
         mask: Mask | None = None,
+        unsure: Floats | None = None,
     ) -> Surface:
-        """Return the surface that explains one plate per light; see the solvers for the arguments."""
+        """Return the surface that explains one plate per light; see the solvers for the arguments, and ``Evidence`` for
+        what is unsure of the plates."""
         from psvideo.solve.filling.filled import filled
 
-        solved, one, noise = self.measured(plates, lit, seen=seen, mask=mask)
+        solved, one, noise = self.measured(plates, lit, seen=seen, mask=mask, unsure=unsure)
         known = judged(solved, one, noise)
         known = replace(
             known,
@@ -78,12 +80,14 @@ class Solving:
         *,
         seen: Mask | None = None,
         mask: Mask | None = None,
+        unsure: Floats | None = None,
     ) -> tuple[Surface, Evidence, PlateNoise]:
         """Return every pixel that three measurements solve, well or not, and what it is judged by."""
         noise = noise_of(plates)
         usable = _usable(noise, lit.intensities.shape[1], self.method(len(plates)))
         solved = self._solved(plates, lit, usable, noise, seen, mask)
-        return solved, Evidence(plates=plates, lit=lit, usable=usable, seen=seen, mask=mask, spare=self.spare), noise
+        one = Evidence(plates=plates, lit=lit, usable=usable, seen=seen, mask=mask, unsure=unsure, spare=self.spare)
+        return solved, one, noise
 
     def _solved(
         self,

@@ -1,0 +1,33 @@
+"""By how much a light's plate at an instant may be off where the plates that it is made from do not agree.
+
+What both plates show alike along the motion is sure. Where they differ, shading turned, something passed, or the motion
+is not the true one; the plate at the instant then lies somewhere between them, the nearer in time to one the likelier.
+"""
+
+import cv2
+import numpy as np
+
+from psvideo.plates.align.brightness import ROOT_TOE, SCALE
+from psvideo.plates.align.flow import Codes, Vectors, noise_between
+from psvideo.plates.align.moving import Followed, Pair, window_of
+
+WINDOW_PX = 5
+"""Plates are compared over so many pixels of their sketches."""
+NOISE_FACTOR = 1.6
+"""Squares of a change below so many times those that noise makes of it are noise."""
+
+
+def unsure_of(pair: Pair, before: Codes, after: Codes, motion: Followed) -> Vectors:
+    """Return the standard error of a light's plate at an instant, (row, col) of the velocities, in units of its light.
+
+    ``before`` and ``after`` are the codes of its sketches, moved to the instant.
+    """
+    one, other = before.astype(np.float32), after.astype(np.float32)
+    windows = (window_of(WINDOW_PX, motion.step),) * 2
+    noise = np.float32(NOISE_FACTOR * noise_between(pair.before, pair.after) ** 2)
+    square = cv2.blur((other - one) ** 2, windows) - noise
+    since_s, until_s = motion.time_s - pair.before.time_s, pair.after.time_s - motion.time_s
+    share = min(abs(since_s), abs(until_s)) / (since_s + until_s)
+    per_code = cv2.blur(one + other, windows) / np.float32(SCALE) + np.float32(2 * ROOT_TOE)
+    per_code *= np.float32(share * pair.before.white / SCALE)
+    return np.asarray(np.sqrt(np.maximum(square, 0)) * per_code, np.float32)
