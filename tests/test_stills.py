@@ -338,6 +338,46 @@ def test_a_chrome_ball_under_the_same_lights_is_enough(tmp_path: Path) -> None:
     assert "belong to lights by name" in remarks(report)
 
 
+def test_chrome_balls_may_be_named_picture_by_picture_or_by_patterns(tmp_path: Path) -> None:
+    folder, one = photographs(tmp_path / "photos", lit()), chrome(tmp_path / "ball")
+    ps.stills(folder, sphere=sorted(one.glob("*.png")), out=tmp_path / "single")
+    assert error_deg(tmp_path / "single") < 1.5
+    both, two = tmp_path / "both", chrome(tmp_path / "other", middle=(140, 130))
+    both.mkdir()
+    for name, source in (("left", one), ("right", two)):
+        for file in source.iterdir():
+            (both / f"{name}_{file.name}").write_bytes(file.read_bytes())
+    report = ps.stills(folder, sphere=[both / "left_*.png", both / "right_*.png"], out=tmp_path / "patterns")
+    assert error_deg(tmp_path / "patterns") < 1.5
+    assert "6 of 6 lights were measured on 2 spheres" in remarks(report)
+    assert "belong to lights by name" in remarks(report), "called by what the star stands for"
+    with pytest.raises(ps.PsvideoError, match=r"middle_\*\.png: fits no picture"):
+        ps.stills(folder, sphere=[both / "middle_*.png"], out=tmp_path / "none")
+
+
+def test_a_cameras_own_raw_files_are_solved_as_linear_light(tmp_path: Path) -> None:
+    """DNGs under another maker's ending: LibRaw goes by what a file holds, and gives what tifffile gives."""
+    folder = tmp_path / "photos"
+    folder.mkdir()
+    for name, picture in zip(NAMES, lit(), strict=True):
+        levels = [(50714, "I", 1, 200, True), (50717, "I", 1, 15000, True)]
+        filters = [(33421, "H", 2, (2, 2), True), (33422, "B", 4, (0, 1, 1, 2), True)]
+        dng_tags = [(50706, "B", 4, (1, 4, 0, 0), True), (50708, "s", 0, "Test Camera", True), *filters, *levels]
+        codes = (200 + 12000 * picture).astype(np.uint16)
+        tifffile.imwrite(folder / f"{name}.nef", codes, photometric=32803, extratags=dng_tags)
+    raw, dng = folder / f"{NAMES[0]}.nef", tmp_path / "same.dng"
+    dng.write_bytes(raw.read_bytes())
+    assert np.array_equal(decode("raw", raw).codes, decode("dng", dng).codes)
+    head = decode("raw", raw).header
+    assert (head.cfa, head.white, head.black) == ("RGGB", 15000.0, ((200.0, 200.0), (200.0, 200.0)))
+    report = ps.stills(folder, lights=listed(tmp_path / "lights.lp"), out=tmp_path / "out")
+    assert error_deg(tmp_path / "out") < 1.5
+    assert "read as 'linear'" in remarks(report)
+    raw.write_bytes(raw.read_bytes()[:600])
+    with pytest.raises(ps.PsvideoError, match=r"shot 3\.nef: .*LibRaw .* cannot read it"):
+        ps.stills(folder, lights=tmp_path / "lights.lp", out=tmp_path / "cut")
+
+
 def test_a_sphere_that_the_picture_cuts_off_is_refused(tmp_path: Path) -> None:
     folder, ball_folder = photographs(tmp_path / "photos", lit()), chrome(tmp_path / "ball", middle=(215, 118))
     with pytest.raises(ps.PsvideoError) as fault:

@@ -17,13 +17,16 @@ KINDS = {
     ".dpx": "dpx",
     ".jpg": "jpeg",
     ".jpeg": "jpeg",
+    **dict.fromkeys((".cr2", ".cr3", ".nef", ".nrw", ".arw", ".raf", ".orf", ".rw2", ".pef", ".srw"), "raw"),
 }
+RAWS = ("dng", "raw")
+"""Kinds that hold the sensor's own values: linear, with the levels and colour filters that the file states."""
 MOVIES = (".mov", ".mp4", ".mkv", ".mxf")
 TO_PICTURES = "export the pictures as 16-bit TIFF, PNG or DNG; a phone's camera can be set to JPEG or raw"
 TO_FOOTAGE = "export it with its maker's program, as DNG, EXR or ProRes"
 UNREAD = {
     **dict.fromkeys((".heic", ".heif", ".avif", ".webp", ".jxl", ".bmp", ".gif", ".psd"), TO_PICTURES),
-    **dict.fromkeys((".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2", ".pef"), "convert the pictures to DNG"),
+    **dict.fromkeys((".x3f", ".3fr", ".iiq", ".fff"), "convert the pictures to DNG"),
     **dict.fromkeys((".braw", ".r3d", ".crm", ".ari", ".arx", ".nev", ".mlv"), TO_FOOTAGE),
 }
 """What cameras write and psvideo does not read, and what to do with it."""

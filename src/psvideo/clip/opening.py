@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from psvideo.clip.decode.decoders import read_header
 from psvideo.clip.decode.yuv import signal_range
-from psvideo.clip.folder import MOVIES, find_sequence, unread
+from psvideo.clip.folder import MOVIES, RAWS, find_sequence, unread
 from psvideo.clip.record import Clip, Header
 from psvideo.clip.transfer import DISPLAYED, disagreement, find_curve
 from psvideo.errors import PsvideoError
@@ -102,7 +102,7 @@ def _encoding(kind: str, plan: Plan, plan_path: Path) -> Encoding:
         find_curve(encoding.transfer)
     except PsvideoError as fault:
         raise PsvideoError(f"{plan_path}: {fault}") from None
-    return replace(encoding, transfer="linear") if kind == "dng" else encoding
+    return replace(encoding, transfer="linear") if kind in RAWS else encoding
 
 
 def _expanded(encoding: Encoding, header: Header) -> tuple[Encoding, tuple[str, ...]]:
@@ -131,9 +131,10 @@ def _turn_note(header: Header) -> tuple[str, ...]:
 def _curve_warnings(kind: str, plan: Plan, header: Header) -> tuple[str, ...]:
     """Say where the plan names another curve than the files have."""
     transfer = plan.camera.encoding.transfer
-    if kind == "dng":
+    if kind in RAWS:
         linear = find_curve(transfer).name == "linear"
-        return () if linear else (f"DNG files hold linear light, so the plan's transfer = {transfer!r} is not applied",)
+        said = f"{kind.upper()} files hold linear light, so the plan's transfer = {transfer!r} is not applied"
+        return () if linear else (said,)
     wrong = disagreement(transfer, tagged=header.transfer, kind=kind)
     return () if wrong is None else (wrong,)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from psvideo.clip.decode.decoders import read_header
-from psvideo.clip.folder import KINDS
+from psvideo.clip.folder import KINDS, RAWS
 from psvideo.clip.reading import looks
 from psvideo.clip.record import Clip, Header, shot_of
 from psvideo.clip.stated import Stated, stated_by
@@ -72,13 +72,24 @@ def look_at(files: Sequence[Path], *, transfer: str | None = None) -> Photograph
         )
     kind = kinds[first]
     headers = [read_header(kind, file) for file in files]
-    stated = tuple(stated_by(file) for file in files)
+    longer_px = max(headers[0].width_px, headers[0].height_px)  # of raw files EXIF is read beside a small picture
+    stated = tuple(replace(_stated(kind, file), longer_px=longer_px) for file in files)
     _refuse_odd(files, [looks(header) for header in headers], "is")
     _refuse_odd(files, [str(one.turn) for one in stated], "lies")
     name, because = (transfer, "as you say") if transfer else _transfer(files, kind, headers[0], stated)
     find_curve(name)
     header = headers[0] if headers[0].turn != UPRIGHT else replace(headers[0], turn=stated[0].turn)
     return Photographs(files=tuple(files), kind=kind, header=header, stated=stated, transfer=name, because=because)
+
+
+def _stated(kind: str, file: Path) -> Stated:
+    """Return what a photograph says; of raw files whose EXIF only LibRaw finds, the exposure as it reads it."""
+    said = stated_by(file)
+    if kind != "raw" or said.exposure is not None:
+        return said
+    from psvideo.clip.decode import raw  # loads LibRaw
+
+    return replace(said, exposure=raw.exposure_of(file))
 
 
 def _refuse_odd(files: Sequence[Path], facts: Sequence[str], verb: str) -> None:
@@ -109,7 +120,7 @@ def _transfer(files: Sequence[Path], kind: str, header: Header, stated: Sequence
             f"{files[0]}: {stated[0].by} has a curve that psvideo does not know. Export the pictures as sRGB or "
             "linear, or say with `transfer` which curve comes nearest."
         )
-    if named[0] and kind != "dng":
+    if named[0] and kind not in RAWS:
         return named[0], f"as {stated[0].by} says"
     if header.bits == 8:
         return "srgb", "the usual curve of 8-bit pictures: they say nothing themselves"

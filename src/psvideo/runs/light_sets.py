@@ -20,6 +20,7 @@ from psvideo.calibrate.light_pictures import (
     read_picture,
     read_sets,
 )
+from psvideo.calibrate.still_places import Place
 from psvideo.clip import Take
 from psvideo.clip.folder import MOVIES
 from psvideo.compute.progress import Watch, unwatched
@@ -121,6 +122,14 @@ def sets_of(path: Path, reading: Reading, *, watch: Watch, caller: Caller) -> Li
     for note in opened.notes:
         caller.detail(note)
     return replace(opened, sets=_compared(opened.sets, path, caller))
+
+
+def pictures_of(place: Place, reading: Reading) -> LightSets:
+    """Open single photographs, one per light. Raises PsvideoError where two are of one light."""
+    files = find_stills(place.files)
+    renamed = {place.names.get(found[0], light): found for light, found in files.by_light.items()}
+    files = replace(files, by_light=renamed)
+    return _of_files(files, Encoding(transfer=files.usual_transfer), reading)
 
 
 def _compared(sets: Iterator[LightPictures], where: Path, caller: Caller) -> Iterator[LightPictures]:

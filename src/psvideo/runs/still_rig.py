@@ -9,6 +9,7 @@ import numpy as np
 from psvideo.calibrate.light_files import pictures_in
 from psvideo.calibrate.mirror.lights import calibrate_lights
 from psvideo.calibrate.sphere.sighting import Looking, Sighting, sight_spheres
+from psvideo.calibrate.still_places import Place, places_of
 from psvideo.clip.stated import Stated, stated_by
 from psvideo.compute.progress import Watch
 from psvideo.errors import PsvideoError
@@ -16,7 +17,7 @@ from psvideo.formats.light_lists import pictures_named_by
 from psvideo.formats.rig_toml import read_rig
 from psvideo.model.rig import Rig
 from psvideo.runs.caller import Caller
-from psvideo.runs.light_sets import Reading, sets_of
+from psvideo.runs.light_sets import Reading, pictures_of, sets_of
 
 SAME_LENS = 1.01
 """A zoom that was not touched states the same; prime lenses always do."""
@@ -72,23 +73,30 @@ def sphere_lights(
     found, one is cut off, or no light is measured.
     """
     notes: tuple[str, ...] = ()
+    places = places_of(spheres)
     if looking.focal_px is None and looking.focal_widths is None:
-        lens_px = lens_stated([stated_by(file) for path in spheres if path.is_dir() for file in pictures_in(path)])
+        lens_px = lens_stated([stated_by(file) for place in places for file in _files_of(place)])
         if lens_px is not None:
             looking = replace(looking, focal_px=lens_px)
             notes = (f"The spheres were seen through a lens of {lens_px:.6g} pixels, as their EXIF says.",)
     sightings: list[Sighting] = []
     names: tuple[str, ...] = ()
-    for path in spheres:
-        opened = sets_of(path, Reading(transfer=transfer), watch=watch, caller=caller)
+    first = ""
+    for place in places:
+        path = place.called if isinstance(place, Place) else str(place)
+        reading = Reading(transfer=transfer)
+        if isinstance(place, Place):
+            opened = pictures_of(place, reading)
+        else:
+            opened = sets_of(place, reading, watch=watch, caller=caller)
         if names and opened.names != names:
             raise PsvideoError(
-                f"{path}: shows the lights {', '.join(opened.names[:3])}, …, and {spheres[0]} "
+                f"{path}: shows the lights {', '.join(opened.names[:3])}, …, and {first} "
                 f"{', '.join(names[:3])}, …. Expected the same names in every folder of sphere pictures, one for each "
                 "light."
             )
-        names = opened.names
-        sightings += sight_spheres(opened.sets, looking, where=str(path), room=opened.room)
+        names, first = opened.names, first or path
+        sightings += sight_spheres(opened.sets, looking, where=path, room=opened.room)
     found = calibrate_lights(sightings, radius_m=radius_m)
     rig = found.rig
     if any(light.position_m is not None for light in rig.lights):
@@ -96,7 +104,7 @@ def sphere_lights(
     near = sum(light.position_m is not None for light in rig.lights)
     what = f"{near} near, with positions" if near else "as directions"
     note = f"{len(rig.lights)} of {len(found.lights)} lights were measured on {_spheres(len(sightings))}, {what}."
-    whose = ", ".join(path.name for path in spheres)
+    whose = ", ".join(Path(one.called).name if isinstance(one, Place) else one.name for one in places)
     return KnownLights(
         rig=rig, called=rig.names, own=False, whose=whose, notes=(*notes, note), warnings=tuple(found.warnings)
     )
@@ -107,6 +115,12 @@ def lens_stated(stated: Sequence[Stated]) -> float | None:
     found = [one.focal_px for one in stated]
     known = [one for one in found if one is not None]
     return known[0] if len(known) == len(found) > 0 and max(known) < SAME_LENS * min(known) else None
+
+
+def _files_of(place: Path | Place) -> Sequence[Path]:
+    if isinstance(place, Place):
+        return place.files
+    return pictures_in(place) if place.is_dir() else ()
 
 
 def _spheres(count: int) -> str:

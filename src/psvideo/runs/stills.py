@@ -78,14 +78,15 @@ def stills(
 ) -> RunReport:
     """Write normals, albedo and validity of photographs of one still scene, one per light.
 
-    - ``folder``: the photographs, of any names: JPEG, PNG, TIFF, EXR or DNG of one size. One named ``dark`` or
-      ``ambient`` shows the scene with every light off and is taken off the others; one named ``mask`` is white where to
-      solve. ``dark`` and ``mask`` name them where they lie elsewhere.
+    - ``folder``: the photographs, of any names: JPEG, PNG, TIFF, EXR, DNG or a camera's raw files, of one size. One
+      named ``dark`` or ``ambient`` shows the scene with every light off and is taken off the others; one named ``mask``
+      is white where to solve. ``dark`` and ``mask`` name them where they lie elsewhere.
     - ``lights``: where the lights are: rig.toml, an .lp file, a DiLiGenT or UW list, or a table of names, directions
-      and strengths. Or ``sphere``: folders with pictures of a mirror sphere under the same lights, one for each place
-      of the sphere; with ``radius_mm`` and the lens (``focal_px``, or ``focal_mm`` with ``sensor_mm``) two places give
-      near lights their positions. ``spheres``: how many each picture holds; ``circle``: outlines found
-      by hand, x, y and radius in pixels.
+      and strengths. Or ``sphere``: pictures of a mirror sphere under the same lights, as a folder or a pattern
+      (``ball/left_*.jpg``) for each place of the sphere, or picture by picture, those of one folder as one place; with
+      ``radius_mm`` and the lens (``focal_px``, or ``focal_mm`` with ``sensor_mm``) two places give near lights their
+      positions. ``spheres``: how many each picture holds; ``circle``: outlines found by hand, x, y and radius in
+      pixels.
     - ``transfer``: how the files code light. Left out: as their ICC profile or PNG chunk says, else sRGB for 8 bits and
       linear for 16 bits, EXR and DNG. The report says which, and what speaks against it.
     - ``rti``: write ``rti/`` too, a polynomial texture map that OpenLIME shows in a web page (of distant lights).

@@ -23,7 +23,10 @@ def stills(
     ] = None,
     sphere: Annotated[
         list[Path] | None,
-        typer.Option(help="Instead of --lights: a folder with a chrome ball under the same lights; one per place."),
+        typer.Option(
+            help="Instead of --lights: a chrome ball under the same lights, as a folder, a pattern ('ball/*.jpg') or "
+            "picture by picture; again for a ball at another place."
+        ),
     ] = None,
     spheres: Spheres = 1,
     dark: Annotated[
