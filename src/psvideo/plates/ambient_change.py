@@ -15,7 +15,8 @@ hardly any noise. The window is a Gaussian: a box turns some ripples of the aver
 on them."""
 STEADY = 2e-4
 """Ambient light that changed by less than this, in units of saturation, is taken as it is now: interpolating it would
-change plates by half of that at most, and reading two pictures costs more than reading a plate's frames."""
+change plates by half of that at most, and reading two pictures costs more than reading a plate's frames. Nor does an
+average start again for it: where a file cuts noise off at black, what is left of it looks like less than it is."""
 LEAST_GAIN, MOST_GAIN = 0.5, 2.0
 """Where light changed by more than these factors between dark slots, the average starts again."""
 SPARSE, MOST_JUDGED = 5, 20_000
@@ -47,6 +48,7 @@ class AmbientChange:
         variance, per_level = _noise(rest[both].ravel(), level[both].ravel())
         shifts = np.float32(width * _bent(rest[both].mean(axis=1, keepdims=True)) ** 2)
         most = np.float32((CHANGED / width) ** 2) * (variance + shifts + per_level * np.maximum(level, 0))
+        most = np.maximum(most, np.float32((STEADY / 2) ** 2))
         restarts = local * local > most
         limited = (factor <= np.float32(LEAST_GAIN)) | (factor >= np.float32(MOST_GAIN))
         return cls(gain=gain, restarts=restarts | limited.any(axis=2) if limited.any() else restarts)

@@ -17,8 +17,9 @@ from psvideo.solve.normals.task import Mask, Result, Samples, Task
 
 BAND_PIXELS = 1 << 16
 """Pixels of one band; fewer are solved before a thread has started."""
-MADE_SAMPLES = 1 << 19
-"""Samples of the plates that are made at a time, of all lights: they stay in a core's second cache."""
+MADE_SAMPLES, LEAST_MADE_ROWS = 1 << 18, 8
+"""Samples of the plates that are made at a time, of all lights: they stay in a core's second cache beside what is read
+and written; but so many rows, since every call costs something."""
 BANDS_ROWS = 128
 """A thread makes and solves about so many rows one after another, in the same memory."""
 
@@ -89,7 +90,7 @@ class ShownPlates:
             return
 
         lights, samples = len(self.samples), int(np.prod(self.shape[1:]))
-        made_rows = max(MADE_SAMPLES // (lights * samples), 1)
+        made_rows = max(MADE_SAMPLES // (lights * samples), LEAST_MADE_ROWS)
 
         def bands(begin: int, end: int) -> None:
             held = np.empty((lights, made_rows, *self.shape[1:]), np.float32)
