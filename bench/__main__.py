@@ -20,6 +20,7 @@ TABLES = (
     "strobe",
     "cameras",
     "instants",
+    "colour",
     "rolling",
     "accuracy",
     "predicted",
