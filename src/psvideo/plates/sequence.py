@@ -46,6 +46,8 @@ class Round:
         on a coarse grid over the picture, a standard error in units of the plates' light; None where nothing moved.
     open_plates
         Of each light what an open shutter shows about the instant; empty where none is wanted.
+    doubtful
+        (row, col), True where plates depend on a colour of the surface that was guessed; None where none do.
     """
 
     number: int
@@ -55,6 +57,7 @@ class Round:
     motion: Followed | None = None
     unsure: NDArray[np.float32] | None = None
     open_plates: tuple[LightPlate, ...] = ()
+    doubtful: NDArray[np.bool_] | None = None
 
     @property
     def time_s(self) -> float:

@@ -26,6 +26,10 @@ NEIGHBOURHOODS = (1 / 24, 1 / 8, 1 / 3, 2.0)
 """Widths, in shares of the picture's longer side, in which the flashes are asked to agree, the smallest first."""
 LEAST_PX = 11
 """... and no narrower than that, where pictures are small."""
+AROUND = 1 / 4
+"""How wide, in the same shares, the neighbourhood is in which all surfaces are to have the same colour."""
+ONE_COLOUR = 0.15
+"""Colours are one where no channel, the brightest 1, differs by more: normals that are a few degrees off."""
 STEPS = 6
 """Of the power iteration: a rank-1 matrix is there after one."""
 LEAST = 0.02
@@ -39,24 +43,43 @@ def contradicted(products: Image) -> Flags:
     return np.asarray(cv2.blur(rest, window) > MOVED**2 * cv2.blur(whole, window))
 
 
-def colours_of(products: Image, where: Flags) -> Image:
+def colours_of(products: Image, where: Flags) -> tuple[Image, Flags]:
     """Return the colour (row, col, channel), the brightest channel 1, that the smallest neighbourhood shows in which
-    the flashes agree; only pixels ``where`` something is wanted to be known count."""
+    the flashes agree; only pixels ``where`` something is wanted to be known count. And where it is sure, (row, col).
+
+    Sums of two surfaces that face the same way agree as well, in a colour between theirs: one is sure only where all
+    that rests nearby, and what is found around, have the same.
+    """
     rows, cols = where.shape
-    weight = where.astype(np.float32)
-    kept = products * weight[..., None]
+    kept = products * where[..., None]
     colour = np.ones((rows, cols, products.shape[-1]), np.float32)
-    open_yet = where.copy()
+    open_yet, agreed = where.copy(), np.zeros((rows, cols), np.bool_)
     for share in NEIGHBOURHOODS:
-        size = max(2 * int(share * max(rows, cols) / 2) + 1, LEAST_PX)
-        sums = np.stack(
-            [cv2.boxFilter(lamp, -1, (size, size), normalize=False, borderType=cv2.BORDER_CONSTANT) for lamp in kept]
-        )
+        sums = _sums(kept, share)
         rest, whole = _unexplained(sums)
-        agree = open_yet & ((rest <= CONTRADICTION**2 * whole) | (share == NEIGHBOURHOODS[-1]))
-        colour[agree] = _colour(sums)[agree]
-        open_yet &= ~agree
-    return colour
+        agree = rest <= CONTRADICTION**2 * whole
+        anywhere = share == NEIGHBOURHOODS[-1]
+        chosen = open_yet & (agree | anywhere)
+        colour[chosen] = _colour(sums)[chosen]
+        agreed |= chosen & (not anywhere)
+        open_yet &= ~chosen
+    resting = _colour(_sums(products * ~where[..., None], AROUND))
+    same = _most(np.abs(colour - resting)) < ONE_COLOUR
+    return colour, np.asarray(agreed & same & (_spread(colour, where) < ONE_COLOUR / 2))
+
+
+def _spread(colour: Image, where: Flags) -> Image:
+    """Return by how much colours differ from each other around a pixel, as a standard deviation, (row, col)."""
+    counts = where[..., None].astype(np.float32)
+    sums, squares, count = _sums(np.stack([colour * counts, colour**2 * counts, np.ones_like(colour) * counts]), AROUND)
+    mean = sums / np.maximum(count, 1)
+    return np.sqrt(np.maximum(_most(squares / np.maximum(count, 1) - mean**2), 0))
+
+
+def _sums(products: Image, share: float) -> Image:
+    size = max(2 * int(share * max(products.shape[1:3]) / 2) + 1, LEAST_PX)
+    border = cv2.BORDER_CONSTANT
+    return np.stack([cv2.boxFilter(lamp, -1, (size, size), normalize=False, borderType=border) for lamp in products])
 
 
 def _gram(products: Image) -> Image:

@@ -38,7 +38,8 @@ def unmixing_note(how: Unmixing) -> str:
             "Several colours flashed at once and were exchanged between flashes: plates are those of the lamps under "
             f"white light, whatever the surface's colour (condition number {how.condition:.2f}, by which noise is "
             "raised at most). What moved between the flashes of a round, so that flow could not follow it, comes from "
-            "one flash, and its normals are as good as the colour found for its surroundings."
+            "one flash, by the colour that its surroundings show; it is valid only where what rests nearby has the "
+            "same colour, or the rig's [surface] gives it."
         )
     known = "white" if how.surface_colour is None else "of the colour that the rig's [surface] gives"
     turned = _turned_deg(how)
@@ -95,11 +96,8 @@ def unmixed(one: Round, how: Unmixing) -> Round:
         apart = [flashes.alone(place, how, colour / colour.max()) for place in range(len(one.plates))]
         by_name = {plate.light: plate for plates in apart for plate in plates}
         return replace(one, plates=tuple(by_name[name] for name in how.shown.lights))
-    together = flashes.together(how, how.shares)
-    plates = tuple(together)
-    if how.alone:
-        plates = flashes.mended(plates, how)
-    return replace(one, plates=plates)
+    plates = tuple(flashes.together(how, how.shares))
+    return flashes.mended(plates, how) if how.alone else replace(one, plates=plates)
 
 
 class _Flashes:
@@ -143,16 +141,20 @@ class _Flashes:
             plates.append(self._like(place, how.shown.lights[shown], image, own.seen, most))
         return plates
 
-    def mended(self, plates: tuple[LightPlate, ...], how: Unmixing) -> tuple[LightPlate, ...]:
-        """Return the lamps' plates, where the flashes contradict each other, out of the nearest flash alone."""
+    def mended(self, plates: tuple[LightPlate, ...], how: Unmixing) -> Round:
+        """Return the round of the lamps, where the flashes contradict each other, out of the nearest flash alone."""
         products = np.stack([plate.image for plate in plates])
         wrong = self._moved() & (contradicted(products) | ~plates[0].seen)
         if not wrong.any():
-            return plates
-        given = how.surface_colour
-        colour = colours_of(products, wrong) if given is None else np.array(given, np.float32) / np.float32(max(given))
+            return replace(self.one, plates=plates)
+        if how.surface_colour is None:
+            colour, sure = colours_of(products, wrong)
+        else:
+            given = np.array(how.surface_colour, np.float32)
+            colour, sure = given / given.max(), wrong
         alone = {plate.light: plate for plate in self.alone(self.nearest, how, colour)}
-        return tuple(_within(plate, alone[plate.light], wrong) for plate in plates)
+        mended = tuple(_within(plate, alone[plate.light], wrong) for plate in plates)
+        return replace(self.one, plates=mended, doubtful=wrong & ~sure)
 
     def _moved(self) -> Flags:
         stood, (rows, cols) = self.one.stood, self.images[0].shape[:2]

@@ -95,6 +95,8 @@ def surfaces(
             return solving.solve(plates, found, seen=shown, mask=mask, unsure=unsure)
 
         surface = solve(lit) if here is None else solve_near(here, lambda ground: light(ground=ground), solve)
+        if one.doubtful is not None:
+            surface = _without(surface, one.doubtful)
         nonlocal steady
         steady = steadied(steady, surface, one.number, one.stood, _shown(seen))
         made = passes_of(asked, plates, surface, lit, seen=shown, mask=mask) if asked.any else None
@@ -102,6 +104,20 @@ def surfaces(
 
     # map and filter hold no round while the next one gathers, as a loop's variable would
     return map(solved, filter(lambda one: one.lights == plan.lights, gathered))
+
+
+def _without(surface: Surface, doubtful: NDArray[np.bool_]) -> Surface:
+    """Return a surface that is not valid where it is doubtful; 0 there, where nothing was to be filled."""
+    valid = surface.valid & ~doubtful
+    if surface.source is not None:
+        return replace(surface, valid=valid)
+    empty = surface.valid & doubtful
+    surface.normals[empty] = 0
+    surface.albedo[empty] = 0
+    for plane in (surface.residual, surface.error_deg):
+        if plane is not None:
+            plane[empty] = 0
+    return replace(surface, valid=valid)
 
 
 def _shown(seen: NDArray[np.bool_]) -> NDArray[np.bool_]:
