@@ -15,7 +15,7 @@ from psvideo.clip import kept, reading
 from psvideo.clip.decode.decoders import decode
 from psvideo.clip.record import CodedPicture
 from psvideo.report.observe.observed import Observed
-from psvideo.runs import results as runs
+from psvideo.runs import solving as runs
 from psvideo.solve.instants import surfaces
 
 SCENES = Path(__file__).resolve().parents[1] / "data_synth"

@@ -81,7 +81,7 @@ class Footage:
             if self.measured is not None:
                 stood = np.arange(100).reshape(10, 10) < 100 * self.measured
                 image = np.full((SIZE, SIZE), self._dark_level(clean, n), np.float32)
-                observed.look_at_window(Separated(image=image, stood=stood, known=np.ones(SIZE, np.bool_)))
+                observed.look_at_window(Separated(begins=0, image=image, stood=stood, known=np.ones(SIZE, np.bool_)))
             observed.add(one, Solving(error=True, fill=self.fill).solve(plates, lit) if self.solved else None)
         return observed
 

@@ -71,14 +71,18 @@ def read_timing(path: Path | str) -> Timing:
     True
     """
     path = path_of("path", path)
-    data = read_json(path, advice="Make it again with psvideo sync.")
-    check_schema(data.get("schema"), SCHEMA, source=str(path))
+    return parse_timing(read_json(path, advice="Make it again with psvideo sync."), source=str(path))
+
+
+def parse_timing(data: dict[str, object], *, source: str) -> Timing:
+    """Return the timing that a record as ``timing_record`` gives it holds; ``source`` names its file in errors."""
+    check_schema(data.get("schema"), SCHEMA, source=source)
     try:
         file = _TimingFile.model_validate(data)
     except ValidationError as fault:
         first = fault.errors()[0]
         key = ".".join(map(str, first["loc"]))
-        raise PsvideoError(f"{path}: key '{key}': {first['msg']}. Make it again with psvideo sync.") from None
+        raise PsvideoError(f"{source}: key '{key}': {first['msg']}. Make it again with psvideo sync.") from None
     flashes = tuple(Flash(**flash.model_dump()) for flash in file.flashes)
     dropped = tuple(DroppedFrames(after=hole.after, count=hole.count) for hole in file.dropped_frames)
     scalars = file.model_dump(exclude={"schema_", "flashes", "dropped_frames", "repeated_frames"})

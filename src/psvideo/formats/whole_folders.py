@@ -7,11 +7,15 @@ the run was given is noted in both, so that a run with other inputs neither goes
 import contextlib
 import os
 import shutil
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 from psvideo.errors import AllDoneError, PsvideoError, UsageError
 from psvideo.formats.whole_files import refuse_existing, write_text
+
+if sys.platform != "win32":
+    import fcntl
 
 SETTINGS = ".settings"
 """In a folder that is or was written: a digest of what the run was given, so that only the same run resumes it."""
@@ -34,23 +38,79 @@ def whole_folder(
     refuse_folder(path, mark=mark, force=force, resume=resume, settings=settings)
     path = path.resolve()
     beside = _beside(path)
-    try:
-        if not resume:
-            shutil.rmtree(beside, ignore_errors=True)
+    with _said_where(path):
         beside.mkdir(parents=True, exist_ok=True)
-        for unfinished in [*beside.rglob(UNFINISHED)]:
-            unfinished.unlink()
-        for old in path.parent.glob(_old_name(path, "*")) if path.exists() else ():
-            shutil.rmtree(old, ignore_errors=True)
-        if settings:
-            write_text(beside / SETTINGS, settings)
-        yield beside
-        _replace(beside, path)
+        with _held(beside, path):
+            for left in [*(beside.rglob(UNFINISHED) if resume else beside.iterdir())]:
+                _remove(left)
+            for old in path.parent.glob(_old_name(path, "*")) if path.exists() else ():
+                shutil.rmtree(old, ignore_errors=True)
+            if settings:
+                write_text(beside / SETTINGS, settings)
+            yield beside
+            _replace(beside, path)
+
+
+@contextlib.contextmanager
+def begun_folder(path: Path, *, mark: str, force: bool = False, settings: str = "") -> Iterator[Path]:
+    """Give the hidden folder of ``whole_folder`` to write a part of its files into, beside others who do so; it stays.
+
+    Raises as ``whole_folder`` with ``resume``.
+    """
+    refuse_folder(path, mark=mark, force=force, resume=True, settings=settings)
+    path = path.resolve()
+    beside = _beside(path)
+    with _said_where(path):
+        beside.mkdir(parents=True, exist_ok=True)
+        with _held(beside, path, shared=True):
+            if _noted(beside) != settings:
+                write_text(beside / SETTINGS, settings)
+            yield beside
+
+
+def begun(path: Path) -> Path:
+    """Return the hidden folder in which an output is written until it is whole; it need not be there."""
+    return _beside(path.resolve())
+
+
+@contextlib.contextmanager
+def _said_where(path: Path) -> Iterator[None]:
+    """Make of a folder that cannot be written a PsvideoError that names it."""
+    try:
+        yield
     except OSError as fault:
         raise PsvideoError(
             f"{path}: cannot be written ({fault.strerror or fault}). Nothing was left under that name: make room or "
             "check the folder's permissions, then run the command again."
         ) from fault
+
+
+@contextlib.contextmanager
+def _held(beside: Path, path: Path, *, shared: bool = False) -> Iterator[None]:
+    """Keep other runs from writing the same output meanwhile, or let in those that share it; a process that ends in any
+    way holds it no more. Some network drives know no locks, and there nobody is kept out."""
+    if sys.platform == "win32":
+        yield
+        return
+    folder = os.open(beside, os.O_RDONLY)
+    try:
+        with contextlib.suppress(OSError):
+            try:
+                fcntl.flock(folder, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise PsvideoError(
+                    f"{path}: another run is writing this output now. Wait for it, or name another output."
+                ) from None
+        yield
+    finally:
+        os.close(folder)
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)
 
 
 def refuse_folder(path: Path, *, mark: str, force: bool, resume: bool = False, settings: str = "") -> None:

@@ -50,16 +50,18 @@ def with_darks_ahead(
     return coming(), darks()
 
 
-def subtract(plates: Iterable[Plate], *, darks: Iterable[Plate] = (), waits: bool = True) -> Iterator[Plate]:
+def subtract(
+    plates: Iterable[Plate], *, darks: Iterable[Plate] = (), waits: bool = True, known: Ambient | None = None
+) -> Iterator[Plate]:
     """Yield the plates with ambient light taken off the lit ones; dark slots pass as the average at their moment.
 
     ``darks`` are the clip's dark slots, read ahead of the plates: no further than the one after the current plate.
     ``waits`` False: not even that while the light is steady, so that few frames are held; then the next dark slot is
     read when it passes. Before the first and after the last, its light is taken as it is. Without any, plates keep
-    theirs.
+    theirs. ``known`` is what dark slots told before the first plate, where ``darks`` begin after these.
     """
     coming = iter(darks)
-    before = after = None
+    before = after = known
     for plate in plates:
         while after is None or _is_stale(after, plate, waits=waits or not after.steady):
             dark = next(coming, None)

@@ -65,10 +65,11 @@ class Design:
 class Separated:
     """What a window of frames tells of the ambient light of one exposure.
 
-    image: as a frame. stood: (block row, block col), True where it was measured, False where it was guessed from
-    around. known: (row,).
+    begins: its first frame. image: as a frame. stood: (block row, block col), True where it was measured, False where
+    it was guessed from around. known: (row,).
     """
 
+    begins: int
     image: Image
     stood: Flags
     known: Flags
@@ -144,7 +145,7 @@ def separated(
         plane = _without_noise(np.ascontiguousarray(total[own]), np.ascontiguousarray(noise[own]))
         earlier = None if before is None else (before.image[own], before.stood)
         total[own] = _guessed(plane, stood, earlier)
-    return Separated(image=total, stood=stood, known=design.known)
+    return Separated(begins=design.frames[0], image=total, stood=stood, known=design.known)
 
 
 def _small(image: Image) -> Image:

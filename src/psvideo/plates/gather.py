@@ -4,35 +4,32 @@ A clip of any length streams through in constant memory.
 """
 
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import partial
 from itertools import chain, islice, pairwise
 from typing import TypeVar
 
-import numpy as np
-
-from psvideo.clip import Clip, Frame, Take, check_take, demosaic, holds_plain_codes, read_frames
+from psvideo.clip import Clip, Take, check_take, demosaic, holds_plain_codes, read_frames
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.compute.threads import thread_count
 from psvideo.errors import check_kind
-from psvideo.model.camera import Camera
 from psvideo.model.choices import SplitMethod
-from psvideo.model.recipe import frames_of
-from psvideo.model.shutter import frames_touched
-from psvideo.model.timing import Flash, Timing, places_in_time, timed_camera
+from psvideo.model.timing import Timing, places_in_time, timed_camera
 from psvideo.plates import hudon2015
 from psvideo.plates.align.comb import Comb, Schedule, schedule_of
 from psvideo.plates.align.opened import opened
 from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.ambient import update
 from psvideo.plates.ambient_off import subtract, with_darks_ahead
-from psvideo.plates.ambient_regression import Design, Separated, design_of, separated, windows_of
+from psvideo.plates.ambient_regression import Separated
+from psvideo.plates.ambient_shown import AHEAD, ambient_shown, dark_plates, placed, used_of
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import made
 from psvideo.plates.nearest_rows import has_blind_time, with_nearest_rows
+from psvideo.plates.part import Part
 from psvideo.plates.sequence import AMBIENT, FIRST_NUMBER, Round, check_separable, coming, gathered, light_plates
-from psvideo.plates.split import Plate, plate_of, split
+from psvideo.plates.split import Plate, split
 from psvideo.plates.unmixed import slot_names, slot_plates, unmixed
 from psvideo.plates.upright import upright
 
@@ -43,9 +40,6 @@ MOST_WAITING = 24
 EARLY_DARKS = 2
 """Dark slots at the clip's start whose few frames are read on their own where that is quick, so that no plate waits
 for them: two show whether the ambient light is steady, and where it is none waits later."""
-AHEAD = 2
-"""Frames that are decoded in advance while plates are rebuilt; each costs memory. Files that hold plain codes are read
-so quickly that one is enough."""
 
 
 def gather(
@@ -56,6 +50,7 @@ def gather(
     with_ambient: bool = True,
     method: SplitMethod = "weights",
     start_number: int = FIRST_NUMBER,
+    part: Part | None = None,
     watch: Watch = unwatched,
     each_flash: Callable[[Plate], None] | None = None,
     each_plate: Callable[[LightPlate], None] | None = None,
@@ -76,6 +71,8 @@ def gather(
         "weights", or "hudon2015": Algorithm 1 of that paper, to compare with.
     start_number
         The number of the first round.
+    part
+        Which of the take's frames are gathered, to the same plates as all would give; left out, all.
     watch
         Is handed the loop over the frames, to show progress.
     each_flash
@@ -112,7 +109,7 @@ def gather(
     plan, flashes = take.plan, timing.flashes
     if take.unmixing is None:
         check_separable(plan)
-    made = clip_plates(take, timing, method=method, watch=watch, each_window=each_window)
+    made = clip_plates(take, timing, method=method, part=part, watch=watch, each_window=each_window)
     single, turn = _shown(made, each_flash), take.clip.turn
     names, plates = plan.lights, light_plates(single, plan, flashes, start=start_number)
     if take.unmixing is not None:
@@ -126,7 +123,15 @@ def gather(
     if aligning is not None:
         plates = with_nearest_rows(plates) if borrows else plates
         due = scheduled(take, timing, aligning, start_number=start_number)
-        rounds = aligned(plates, names, aligning, first=start_number, with_ambient=with_ambient, schedule=due)
+        rounds = aligned(
+            plates,
+            names,
+            aligning,
+            first=start_number,
+            with_ambient=with_ambient,
+            schedule=due,
+            whites=None if part is None else part.whites,
+        )
         rounds = _apart(rounds, take)
         return opened(rounds) if isinstance(aligning.rate, Comb) and aligning.rate.open_s else rounds
     if take.unmixing is not None:
@@ -144,9 +149,9 @@ def scheduled(take: Take, timing: Timing, aligning: Aligning, *, start_number: i
     if not isinstance(aligning.rate, Comb):
         return None
     camera, places = timed_camera(take.plan, timing), places_in_time(timing, take.clip.numbers)
-    used = _within(timing, camera, take, places)
     end_s = (max(places.values()) + 0.5) * camera.frame_period_s
-    return schedule_of(take.plan, used.flashes, aligning.rate, start=start_number, end_s=end_s)
+    flashes = used_of(take, timing).flashes
+    return schedule_of(take.plan, flashes, aligning.rate, start=start_number, end_s=end_s)
 
 
 def clip_plates(
@@ -154,31 +159,34 @@ def clip_plates(
     timing: Timing,
     *,
     method: SplitMethod = "weights",
+    part: Part | None = None,
     watch: Watch = unwatched,
     each_window: Callable[[Separated], None] | None = None,
 ) -> Iterator[Plate]:
-    """Decode a take once and yield the plate of every flash that it holds, ambient light taken off, demosaiced."""
+    """Decode a take once and yield the plate of every flash that it holds, ambient light taken off, demosaiced.
+
+    ``part`` decodes and yields no more than that; how ambient light is taken off depends on the whole take.
+    """
     clip, camera = take.clip, timed_camera(take.plan, timing)
     places = places_in_time(timing, clip.numbers)
-    used = _within(timing, camera, take, places)
-    has_dark = not all(flash.lit for flash in take.plan.flashes)
-    come_often = has_dark and _come_often(used)
+    numbers = take.numbers if part is None else part.numbers
+    here = used_of(take, timing, numbers)
+    come_often = _dark_slots_come_often(take, timing)
     if not come_often:
-        _decode_ahead(take, watch)
+        _decode_ahead(take, numbers, watch)
     ahead = 1 if holds_plain_codes(clip) else AHEAD
-    decoded = read_frames(clip, take.numbers, ahead=ahead, threads=thread_count(), kept=take.kept)
-    frames = _placed(watch(decoded, total=len(take.numbers), what="rebuilding flashes"), places)
-    single = (split if method == "weights" else hudon2015.split)(frames, camera, used)
+    decoded = read_frames(clip, numbers, ahead=ahead, threads=thread_count(), kept=take.kept)
+    frames = placed(watch(decoded, total=len(numbers), what="rebuilding flashes"), places)
+    single = (split if method == "weights" else hudon2015.split)(frames, camera, here)
+    known = None if part is None else part.ambient
     if come_often:
-        known_early = EARLY_DARKS if holds_plain_codes(clip) else 0
-        early = [flash.index for flash in used.flashes if flash.is_dark and flash.complete][:known_early]
-        single, later = with_darks_ahead(single, used, beyond=max(early, default=-1))
-        darks: Iterator[Plate] = chain(islice(_dark_plates(take, camera, used, places), len(early)), later)
-    elif has_dark:
-        darks = _dark_plates(take, camera, used, places)
+        known_early = EARLY_DARKS if holds_plain_codes(clip) and part is None else 0
+        early = [flash.index for flash in here.flashes if flash.is_dark and flash.complete][:known_early]
+        single, later = with_darks_ahead(single, here, beyond=max(early, default=-1))
+        darks: Iterator[Plate] = chain(islice(dark_plates(take, timing), len(early)), later)
     else:
-        darks = _separated_plates(take, camera, used, places, each_window)
-    return map(_colour_of(clip), subtract(single, darks=darks, waits=not come_often))
+        darks = ambient_shown(take, timing, each_window, after=-1 if known is None else known.index)
+    return map(_colour_of(clip), subtract(single, darks=darks, waits=not come_often, known=known))
 
 
 def first_ambient(take: Take, timing: Timing) -> LightPlate | None:
@@ -186,8 +194,7 @@ def first_ambient(take: Take, timing: Timing) -> LightPlate | None:
 
     A round that comes before any dark slot has no ambient plate of its own.
     """
-    camera, places = timed_camera(take.plan, timing), places_in_time(timing, take.clip.numbers)
-    dark = next(_dark_plates(take, camera, _within(timing, camera, take, places), places), None)
+    dark = next(dark_plates(take, timing), None)
     if dark is None:
         return None
     plate = _colour_of(take.clip)(replace(dark, picture=made(update(None, dark).image)))
@@ -195,92 +202,22 @@ def first_ambient(take: Take, timing: Timing) -> LightPlate | None:
     return upright(shown, take.clip.turn)
 
 
-def _decode_ahead(take: Take, watch: Watch) -> None:
-    """Decode all frames into the take's store, unless the fit did, where what shows ambient light is read before."""
+def _decode_ahead(take: Take, numbers: tuple[int, ...], watch: Watch) -> None:
+    """Decode frames into the take's store, unless the fit did, where what shows ambient light is read before."""
     clip, kept = take.clip, take.kept
     if kept is None or take.plan.mode == "synced" or holds_plain_codes(clip):
         return
     if not (len(kept) or kept.missed):
-        frames = read_frames(clip, take.numbers, ahead=thread_count(), threads=thread_count(), kept=kept, keep=True)
-        deque(watch(frames, total=len(take.numbers), what="decoding"), maxlen=0)
+        frames = read_frames(clip, numbers, ahead=thread_count(), threads=thread_count(), kept=kept, keep=True)
+        deque(watch(frames, total=len(numbers), what="decoding"), maxlen=0)
 
 
-def _placed(frames: Iterable[Frame], places: Mapping[int, int]) -> Iterator[Frame]:
-    """Put frames where they truly are in time; repeated ones, which are nowhere, are left out."""
-    for frame in frames:
-        if frame.number in places:
-            yield frame if frame.index == places[frame.number] else replace(frame, index=places[frame.number])
-
-
-def _within(timing: Timing, camera: Camera, take: Take, places: Mapping[int, int]) -> Timing:
-    """Take as complete only the flashes whose frames all lie between the take's first frame and its last."""
-    first, last = frames_touched(camera, timing.start_s, timing.duration_s)
-    used = [places[number] for number in take.numbers if number in places]
-    begin, end = used[0], used[-1]
-    flashes = tuple(
-        replace(flash, complete=flash.complete and bool(first[n] >= begin and last[n] <= end))
-        for n, flash in enumerate(timing.flashes)
-    )
-    return replace(timing, flashes=flashes)
-
-
-def _come_often(timing: Timing) -> bool:
-    """Tell whether no more than so many flashes lie between complete dark slots that plates can wait for the next."""
-    dark = [flash.index for flash in timing.flashes if flash.is_dark and flash.complete]
-    return all(after - before <= MOST_WAITING for before, after in pairwise(dark))
-
-
-def _dark_plates(take: Take, camera: Camera, timing: Timing, places: Mapping[int, int]) -> Iterator[Plate]:
-    """Read ahead, from the few frames that they touch, the dark slots, between which ambient light is interpolated."""
-    number_at = {places[number]: number for number in take.numbers if number in places}
-    for dark in timing.flashes:
-        if dark.complete and dark.is_dark:
-            near = tuple(number_at[place] for place in frames_of(camera, timing, dark) if place in number_at)
-            frames = _placed(read_frames(take.clip, near, kept=take.kept), places)
-            plate = plate_of(dark, frames, camera, timing) if near else None
-            if plate is not None:
-                yield plate
-            del plate
-
-
-def _separated_plates(
-    take: Take,
-    camera: Camera,
-    timing: Timing,
-    places: Mapping[int, int],
-    show: Callable[[Separated], None] | None,
-) -> Iterator[Plate]:
-    """Read windows of frames ahead, and give the ambient light of each as if a dark slot in its middle had shown it.
-
-    A triggered clip has no rows that saw a part of a flash, and nothing is told.
-    """
-    if take.plan.mode == "synced":
-        return
-    numbers = [number for number in take.numbers if number in places]
-    before: Separated | None = None
-    for window in windows_of(numbers):
-        design = design_of(take.plan, camera, timing, [places[number] for number in window])
-        if not design.known.any():
-            continue
-        frames = _placed(read_frames(take.clip, window, ahead=AHEAD, threads=thread_count(), kept=take.kept), places)
-        images = (frame.image for frame in frames)
-        before = separated(design, images, before=before, mosaic=take.clip.cfa is not None)
-        if show is not None:
-            show(before)
-        yield _as_dark_slot(before, design, camera, timing)
-
-
-def _as_dark_slot(found: Separated, design: Design, camera: Camera, timing: Timing) -> Plate:
-    begin_s, end_s = (index * camera.frame_period_s for index in (design.frames[0], design.frames[-1] + 1))
-    middle_s = (begin_s + end_s) / 2
-    last = max((flash.index for flash in timing.flashes if flash.start_s < end_s), default=0)
-    return Plate(
-        flash=Flash(index=last, slot=0, lights={}, start_s=middle_s, duration_s=0.0, complete=True),
-        picture=made(found.image),
-        shares=np.ones((1, camera.height_px)),
-        middles_s=np.full((1, camera.height_px), middle_s),
-        seen=found.known,
-    )
+def _dark_slots_come_often(take: Take, timing: Timing) -> bool:
+    """Tell whether there are dark slots, and no more than so many flashes between the complete ones that plates can
+    wait for the next."""
+    dark = [flash.index for flash in used_of(take, timing).flashes if flash.is_dark and flash.complete]
+    planned = not all(flash.lit for flash in take.plan.flashes)
+    return planned and all(after - before <= MOST_WAITING for before, after in pairwise(dark))
 
 
 def _colour_of(clip: Clip) -> Callable[[Plate], Plate]:

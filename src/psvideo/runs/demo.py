@@ -21,6 +21,7 @@ from psvideo.plates.timed import timing_of
 from psvideo.runs.lighting import read_lighting
 from psvideo.runs.output import Output
 from psvideo.runs.results import normals_run
+from psvideo.runs.solving import Job
 from psvideo.solve.instants import Instant
 from psvideo.sync.open_take import open_take
 from psvideo.synth.scenes import builtin_scene
@@ -48,7 +49,8 @@ def run_demo(folder: Path, *, force: bool = False, watch: Watch = unwatched) -> 
         timing = timing_of(take, None, first_light=None, watch=watch)
         lighting = read_lighting(take, clip_path / "rig.toml")
         sheet_of = partial(demo_sheet, take.clip)
-        result = normals_run(take, timing, lighting, output, delivery=delivery, watch=watch, picture_of=sheet_of)
+        job = Job(take=take, timing=timing, lighting=lighting, delivery=delivery)
+        result = normals_run(job, output, watch=watch, picture_of=sheet_of)
     _write_png(folder / "demo.png", result.picture)
     return folder / "demo.png"
 

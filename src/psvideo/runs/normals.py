@@ -11,6 +11,7 @@ from psvideo.errors import UsageError
 from psvideo.export.asked import Asked, delivery_of
 from psvideo.export.usd import require_usd
 from psvideo.formats.paths import path_if_given, path_of
+from psvideo.formats.whole_folders import begun
 from psvideo.model.choices import (
     MOST_ITERATIONS,
     PREVIEWS,
@@ -35,7 +36,9 @@ from psvideo.runs.caller import PYTHON, Caller, say_kept, say_of_clip
 from psvideo.runs.delivering import metric_delivery
 from psvideo.runs.lighting import read_lighting
 from psvideo.runs.output import Output, rate_of
-from psvideo.runs.results import OverTime, normals_run
+from psvideo.runs.piece_notes import noted_timing
+from psvideo.runs.results import normals_run, piece_run
+from psvideo.runs.solving import Job, OverTime
 from psvideo.sync.open_take import open_take
 
 MOST_AVERAGED = 64
@@ -82,6 +85,7 @@ def normals(
     start_number: int = FIRST_NUMBER,
     force: bool = False,
     resume: bool = False,
+    piece: str | None = None,
     watch: Watch = unwatched,
     caller: Caller = PYTHON,
 ) -> RunReport:
@@ -129,7 +133,8 @@ def normals(
     - ``weight``: how strong a light is in the beauty plate, by name (1 where not named); ``with_ambient`` leaves
       ambient light in it. ``preview``: movies for eyes, coded as ``preview_codec``; empty for none.
     - ``force`` replaces an ``out`` that exists; ``resume`` goes on where a run that was stopped
-      left off, and raises AllDoneError where none was and ``out`` is finished.
+      left off, and raises AllDoneError where none was and ``out`` is finished. ``piece``: solve only a piece of the
+      run, such as the third of ten, "3/10", beside other processes that solve the others; ``resume`` then ends it.
 
     ``watch`` is handed every long loop, and ``caller`` the sentences that come on the way.
 
@@ -153,7 +158,8 @@ def normals(
     2
     """
     clip_path, rig_path = path_of("clip", clip), path_of("rig", rig)
-    output = Output(folder=path_of("out", out), force=force, resume=resume, start_number=start_number, caller=caller)
+    going_on = resume or piece is not None
+    output = Output(folder=path_of("out", out), force=force, resume=going_on, start_number=start_number, caller=caller)
     output.check()
     asked = Asked(
         preset=preset,
@@ -200,23 +206,25 @@ def normals(
     delivery = metric_delivery(delivery, asked.aov, lighting, caller)
     timing_path = path_if_given("timing", timing)
     output = output.given(take, timing_path, first_light, solver, fill, over_time, delivery, *lighting.identity)
+    noted = noted_timing(begun(output.folder)) if going_on and timing_path is None else None
     with decoded_once(take, output=output.folder) as kept:
-        found = timing_of(kept, timing_path, first_light=first_light, rig=lighting.flashed, watch=watch).spelled(
-            caller.spell
-        )
+        found = noted or timing_of(kept, timing_path, first_light=first_light, rig=lighting.flashed, watch=watch)
+        found = found.spelled(caller.spell)
         for note in found.notes:
             caller.warn(note)
-        done = normals_run(
-            kept,
-            found,
-            lighting,
-            output,
+        job = Job(
+            take=kept,
+            timing=found,
+            lighting=lighting,
             delivery=delivery,
             solver=solver,
-            fill=fill,
             over_time=over_time,
-            watch=watch,
+            fill=fill,
+            start_number=start_number,
         )
+        if piece is not None:
+            return piece_run(job, output, piece, watch=watch)
+        done = normals_run(job, output, watch=watch)
         say_kept(kept.kept, caller)
     return done.report
 

@@ -13,7 +13,7 @@ from psvideo.export.space import CAMERA_SPACE, Space
 from psvideo.export.tags import Tags, sha256_of
 from psvideo.formats.clocks_json import read_clocks
 from psvideo.formats.plan_toml import parse_fps
-from psvideo.formats.whole_folders import refuse_folder, whole_folder
+from psvideo.formats.whole_folders import begun_folder, refuse_folder, whole_folder
 from psvideo.model.choices import Rate
 from psvideo.model.plan import Plan
 from psvideo.plates.align.comb import Comb, comb_of
@@ -65,6 +65,11 @@ def _identity(take: Take) -> list[object]:
 def folder_of(output: Output) -> AbstractContextManager[Path]:
     """Return the block that writes the folder whole or not at all."""
     return whole_folder(output.folder, mark=MARK, force=output.force, resume=output.resume, settings=output.settings)
+
+
+def begun_by(output: Output) -> AbstractContextManager[Path]:
+    """Return the block that writes a part of the folder, which stays unfinished."""
+    return begun_folder(output.folder, mark=MARK, force=output.force, settings=output.settings)
 
 
 def sequence_fps(plan: Plan, rate: Rate | Comb = "round") -> Fraction:

@@ -63,6 +63,8 @@ def observing(take: Take, rig: Rig | None = None, masks: Masks | None = None) ->
 def judgements(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = False) -> tuple[Judgement, ...]:
     """Return one line per thing that decides whether a take can be used."""
     on_time = tuple(timing_and_order(timing, plan.mode))
+    if not observed.facts:
+        return on_time
     return (
         *on_time,
         *coverage(plan, timing, observed),

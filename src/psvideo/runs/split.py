@@ -19,7 +19,7 @@ from psvideo.report.run_report import RunReport
 from psvideo.runs.caller import PYTHON, Caller, say_kept, say_of_clip
 from psvideo.runs.output import Output, rate_of
 from psvideo.runs.plates import Extras, split_run
-from psvideo.runs.results import OverTime
+from psvideo.runs.solving import OverTime
 from psvideo.sync.open_take import open_take
 
 

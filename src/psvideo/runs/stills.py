@@ -34,8 +34,9 @@ from psvideo.runs.caller import PYTHON, Caller
 from psvideo.runs.delivering import metric_delivery
 from psvideo.runs.lighting import read_lighting
 from psvideo.runs.output import Output
-from psvideo.runs.results import OverTime, normals_run
+from psvideo.runs.results import normals_run
 from psvideo.runs.rti import write_rti
+from psvideo.runs.solving import Job, OverTime
 from psvideo.runs.still_doubts import curve_doubt, exposures_of, glance_at
 from psvideo.runs.still_rig import KnownLights, lens_stated, listed_lights, sphere_lights
 from psvideo.solve.instants import Instant
@@ -155,18 +156,16 @@ def stills(
         over_time = OverTime(aligning=Aligning(align="none"))
         output = output.given(take, None, solver, fill, delivery, *lighting.identity)
         with decoded_once(take, output=output.folder) as kept:
-            return normals_run(
-                kept,
-                timing_of(kept, None, first_light=None, watch=watch),
-                lighting,
-                output,
+            job = Job(
+                take=kept,
+                timing=timing_of(kept, None, first_light=None, watch=watch),
+                lighting=lighting,
                 delivery=delivery,
                 solver=solver,
                 fill=fill,
                 over_time=over_time,
-                watch=watch,
-                beside=partial(_write_beside, opened, rti=rti),
-            ).report
+            )
+            return normals_run(job, output, watch=watch, beside=partial(_write_beside, opened, rti=rti)).report
 
 
 @dataclass(frozen=True, kw_only=True)

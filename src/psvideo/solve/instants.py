@@ -20,7 +20,7 @@ from psvideo.model.intensity import (
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Rig
 from psvideo.model.surface import Surface
-from psvideo.plates.align.denoise import Average, averaged
+from psvideo.plates.align.denoise import Average, added, averaged
 from psvideo.plates.mixture import Mixture
 from psvideo.plates.sequence import Round
 from psvideo.solve.near_surface import NearSurface, solve_near
@@ -154,9 +154,18 @@ def _unsure(one: Round, shares: Sequence[NDArray[np.float32]] | None) -> NDArray
 
 
 def denoised(instants: Iterable[Instant], results: int) -> Iterator[Instant]:
-    """Average every surface with those before it, up to so many ``results``, where nothing moves."""
+    """Average every surface with those before it, up to so many ``results``, where nothing moves.
+
+    An average begins with the block of ``results`` numbers before an instant's own, so that it depends on no others.
+    """
     average: Average | None = None
+    later: Average | None = None
+    block: int | None = None
     for instant in instants:
+        if block != (block := instant.round.number // results):
+            average, later = later or average, None
+        together = later is average
         average, surface = averaged(average, instant.surface, results)
+        later = average if together else added(later, instant.surface, results)
         yield replace(instant, surface=surface)
         del instant, surface

@@ -13,6 +13,7 @@ from psvideo.cli.options.clip_and_run import (
     Force,
     Frames,
     Json,
+    PieceOption,
     PlanPath,
     Quiet,
     Resume,
@@ -101,6 +102,7 @@ def normals(
     start_number: StartNumber = 1001,
     force: Force = False,
     resume: Resume = False,
+    piece: PieceOption = None,
     json: Json = False,
     verbose: Verbose = False,
     quiet: Quiet = False,
@@ -150,10 +152,14 @@ def normals(
         start_number=start_number,
         force=force,
         resume=resume,
+        piece=piece,
         watch=voice.track,
         caller=voice.caller(context),
     )
     voice.result(report_record(report))
+    if piece is not None:
+        voice.say(f"{out}: piece {piece} is solved, {counted(len(report.instants), 'instant')}; --resume ends the run.")
+        return
     voice.say(describe_timing(report.timing))
     print_report(voice, report)
     voice.say(f"{out}: {counted(len(report.instants), 'instant')} written; see {out / 'report.html'}.")

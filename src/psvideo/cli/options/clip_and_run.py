@@ -28,6 +28,10 @@ TimingPath = Annotated[
 StartNumber = Annotated[int, typer.Option("--start-number", min=0, help="The number of the first round's files.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace outputs that exist.")]
 Resume = Annotated[bool, typer.Option("--resume", help="Go on where a run that was stopped left off.")]
+PieceOption = Annotated[
+    str | None,
+    typer.Option("--piece", help="Solve a piece alone: 3/10, or 0/10 for what all share; --resume ends the run."),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for machines.")]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Say more.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but errors.")]

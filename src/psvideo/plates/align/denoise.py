@@ -42,9 +42,14 @@ def averaged(before: Average | None, surface: Surface, results: int) -> tuple[Av
     ``before`` is the average up to the result before. It is of ``results`` at most; beyond that the oldest fade out, so
     that memory does not depend on it.
     """
-    now = _average_of(surface)
-    average = now if before is None else _updated(before, now, results)
+    average = added(before, surface, results)
     return average, _with(surface, average)
+
+
+def added(before: Average | None, surface: Surface, results: int) -> Average:
+    """Return the average that a surface adds to."""
+    now = _average_of(surface)
+    return now if before is None else _updated(before, now, results)
 
 
 def _average_of(surface: Surface) -> Average:

@@ -117,7 +117,7 @@ class Held:
         """Hold a sketch against the first one of its block of rounds, from the second after that on."""
         if sketch.number % POOLED_ROUNDS == 0:
             self.first[light] = sketch
-        elif (first := self.first.get(light)) is not None and sketch.number - first.number > 1:
+        elif (first := self.first.get(light)) is not None and 1 < sketch.number - first.number < POOLED_ROUNDS:
             self.drift[light, sketch.number] = changed(first, evened(first, sketch))
 
     def around(self, light: str, instant: DueInstant) -> Around | None:

@@ -44,6 +44,7 @@ def aligned(
     first: int,
     with_ambient: bool = False,
     schedule: Schedule | None = None,
+    whites: dict[str, float] | None = None,
 ) -> Iterator[Round]:
     """Yield rounds whose plates all show one instant: one for every complete round, or for every flash of it.
 
@@ -52,30 +53,27 @@ def aligned(
     round as there are lights. Plates between which nothing moved pass as they are. Held are, in plates per light, one
     without alignment, one where nothing moves (one and a half at the clip's start), one and a half and as many in 16
     bits where all does, and two at other rates than the rounds'. ``with_ambient`` says that dark slots come as well:
-    every round waits for its own, and takes it along as it is.
+    every round waits for its own, and takes it along as it is. ``whites`` (by light) are those of the clip's first
+    plates, where ``plates`` begin later; what it lacks is put in.
     """
     if how == UNMOVED:
         return gathered(
             plates, lights, expected=lambda _: {*lights, AMBIENT} if with_ambient else {*lights}, whole=True
         )
-    return _slid(plates, lights, how, first, with_ambient, schedule)
-
-
-def _slid(
-    plates: Iterable[LightPlate],
-    lights: tuple[str, ...],
-    how: Aligning,
-    first: int,
-    with_ambient: bool,
-    schedule: Schedule | None,
-) -> Iterator[Round]:
     held = Held(
         lights=lights,
         sketched=how.align != "none",
         keep_all=how.rate != "round",
         trusts_rest=how.align == "auto" and how.rate == "round",
         with_ambient=with_ambient,
+        whites={} if whites is None else whites,
     )
+    return _slid(plates, held, how, first, schedule)
+
+
+def _slid(
+    plates: Iterable[LightPlate], held: Held, how: Aligning, first: int, schedule: Schedule | None
+) -> Iterator[Round]:
     for plate in plates:
         number, times_s = plate.number, held.take(plate)
         del plate

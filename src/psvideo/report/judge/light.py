@@ -263,7 +263,7 @@ def ambient(observed: Observed) -> Judgement:
     share = float(np.median(shares))
     found = f"Ambient light is {100 * share:.0f} % of the signal."
     if observed.ambient_measured:
-        measured = min(observed.ambient_measured)
+        measured = min(observed.ambient_measured.values())
         found = (
             f"{found[:-1]}, found without a dark slot in the {100 * measured:.0f} % of the picture that stood still."
         )

@@ -174,7 +174,10 @@ class Observed:
     """What was seen of a take so far; ``add`` takes in one round after the other.
 
     ``masks`` are where to look, None for all that is lit; ``points`` is where the rig is held against the plates.
-    ``ambient_measured`` (window) is in which share of the picture ambient light could be measured without a dark slot.
+    ``only`` are the numbers of rounds that are noted, None for all; the others serve to hold these against.
+    ``ambient_measured`` (by window's first frame) is in which share of the picture ambient light could be measured
+    without a dark slot. ``first`` is the number of the clip's first round, and ``white`` what motion takes for white,
+    found with its first plate.
     ``watched`` is whose plates motion is looked for in, as they pass; left out, the first light's.
     """
 
@@ -182,12 +185,15 @@ class Observed:
     watched: str = ""
     masks: Masks | None = None
     points: RigPoints | None = None
+    only: range | None = None
+    first: int | None = None
+    white: float | None = None
     facts: list[InstantFacts] = field(default_factory=list)
     counts: dict[str, Counts] = field(default_factory=dict)
     blurs_px: list[float] = field(default_factory=list)
     slopes: list[float] = field(default_factory=list)
     light_at_points: list[NDArray[np.float64]] = field(default_factory=list)
-    ambient_measured: list[float] = field(default_factory=list)
+    ambient_measured: dict[int, float] = field(default_factory=dict)
     beyond_mask: list[float] = field(default_factory=list)
     worst: Worst = field(default_factory=Worst)
     _glimpse: Glimpse | None = None
@@ -208,7 +214,7 @@ class Observed:
     def look_at_window(self, found: Separated) -> None:
         """Look at the ambient light that a window of frames told without a dark slot."""
         self._dark = np.array(_brightest(thinned(found.image)))
-        self.ambient_measured.append(float(found.stood.mean()))
+        self.ambient_measured[found.begins] = float(found.stood.mean())
 
     def _look_at_dark(self, plate: LightPlate) -> None:
         self._dark = np.array(_brightest(plate.picture.thinned(step_of(*plate.shape[:2]))))
@@ -217,6 +223,10 @@ class Observed:
         """Take in one round, and the surface that was solved from it, if any."""
         if one.ambient is not None:
             self._look_at_dark(one.ambient)
+        if self.only is not None and one.number not in self.only:
+            self._sample = None if surface is None else sample_of(surface)
+            return
+        self.first = one.number if self.first is None else self.first
         mask = None if self.masks is None else self.masks.at(one.number)
         seen = seen_of(one, mask)
         self.beyond_mask.append(seen.beyond)
@@ -228,10 +238,22 @@ class Observed:
         for plate, bright, shown in zip(one.plates, seen.bright, seen.shown, strict=True):
             counted = count_levels(bright[seen.subject & shown], plate.saturation)
             self.counts[plate.light] = self.counts.get(plate.light, np.zeros(BINS + 2, np.int64)) + counted
-        if len(self.facts).bit_count() == 1:
+        if (one.number - self.first + 1).bit_count() == 1:
             self._look_closely(one, surface)
         if surface is not None:
             self.worst.offer(facts, surface)
+
+    def followed_by(self, other: "Observed") -> None:
+        """Take in what was seen of the rounds after these."""
+        self.facts += other.facts
+        for light, counted in other.counts.items():
+            self.counts[light] = self.counts.get(light, np.zeros(BINS + 2, np.int64)) + counted
+        self.blurs_px += other.blurs_px
+        self.slopes += other.slopes
+        self.light_at_points += other.light_at_points
+        self.ambient_measured |= other.ambient_measured
+        self.beyond_mask += other.beyond_mask
+        self.worst.join(other.worst)
 
     def levels(self, light: str) -> Levels:
         """Return a light's counts over the take."""
@@ -260,7 +282,8 @@ class Observed:
 
     def _look_for_motion(self, plate: LightPlate) -> None:
         before = self._glimpse
-        self._glimpse = glimpse(plate, None if before is None else before.white)
+        self._glimpse = glimpse(plate, self.white)
+        self.white = self._glimpse.white
         self._moving = None if before is None else motion(before, self._glimpse)
 
     def _change(self, surface: Surface | None) -> Change | None:

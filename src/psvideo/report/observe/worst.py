@@ -1,5 +1,6 @@
 """The worst instants of a run, each with a small picture of its normals and of where they are valid."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -57,8 +58,8 @@ def badness(facts: Facts) -> tuple[float, str]:
 class Worst:
     """Keeps the few worst instants of those that it is offered."""
 
-    def __init__(self) -> None:
-        self._kept: list[Thumbnail] = []
+    def __init__(self, kept: Iterable[Thumbnail] = ()) -> None:
+        self._kept = [*kept]
 
     @property
     def thumbnails(self) -> tuple[Thumbnail, ...]:
@@ -79,3 +80,7 @@ class Worst:
             valid=surface.valid[::step, ::step].copy(),
         )
         self._kept = sorted([*self._kept, small], key=lambda one: -one.badness)[:KEPT]
+
+    def join(self, later: "Worst") -> None:
+        """Keep the worst of these and of later ones."""
+        self._kept = sorted([*self._kept, *later.thumbnails], key=lambda one: -one.badness)[:KEPT]

@@ -1,0 +1,252 @@
+"""The instants of a run, or of a piece of it, written as they are solved; what was seen of them is returned."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.clip import Take
+from psvideo.compute.progress import Watch, unwatched
+from psvideo.compute.threads import writing
+from psvideo.errors import UsageError
+from psvideo.export.result_files import Delivery, is_written
+from psvideo.export.tags import Tags
+from psvideo.model.choices import Solver
+from psvideo.model.plan import Plan
+from psvideo.model.timing import Timing
+from psvideo.plates.align.comb import Comb
+from psvideo.plates.align.rounds import Aligning
+from psvideo.plates.gather import first_ambient, gather
+from psvideo.plates.part import Part
+from psvideo.plates.sequence import AMBIENT, FIRST_NUMBER
+from psvideo.report.observe.observed import Observed
+from psvideo.runs.delivering import passes_asked, surface_job, write_plates, write_specular
+from psvideo.runs.depths import shape_of
+from psvideo.runs.lighting import Lighting
+from psvideo.runs.look import look
+from psvideo.runs.output import tags_of
+from psvideo.runs.reporting import observing
+from psvideo.solve.depth import Shaping, reservations
+from psvideo.solve.instants import Instant, denoised, surfaces
+from psvideo.solve.normals.solving import Solving
+from psvideo.solve.passes.made import AskedPasses
+
+Pixels = NDArray[np.uint8]
+SPECULAR_OF_LIGHTS = "specular_of_lights"
+"""The folder of what exceeds the diffuse model under each light, sequences as those of the plates."""
+SAMPLE_ROUND = 3
+"""The round that the report shows, counted from 1; the first where it is not there."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class OverTime:
+    """What is done between instants: how plates are brought to one, and how many results are averaged at rest."""
+
+    aligning: Aligning = field(default_factory=Aligning)
+    denoise: int = 1
+
+    def check(self, plan: Plan, *, unmixed: bool = False) -> None:
+        """Raise UsageError where a plan has no instant of its own for every light, and one is asked for; flashes that
+        are taken apart by colour (``unmixed``) show all their lights at once."""
+        if isinstance(self.aligning.rate, Comb) and self.aligning.align == "none":
+            raise UsageError(
+                "`fps` asks for instants between the flashes, and `align='none'` makes none: plates would be repeated. "
+                "Leave one of the two out."
+            )
+        alone = unmixed or all(len(plan.flashes[slot].lit) == 1 for slot in plan.lit_slots)
+        once = unmixed or len(plan.lit_slots) == len(plan.lights)
+        if self.aligning.rate == "flash" and not (alone and once):
+            raise UsageError(
+                '`fps="flash"` needs a plan in which every light flashes once a round, by itself; in this one lights '
+                "flash together, or several times. Leave it out: one result per round is given."
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Job:
+    """What all pieces of a run have in common: the take and its timing, what it is solved with, what is delivered."""
+
+    take: Take
+    timing: Timing
+    lighting: Lighting
+    delivery: Delivery
+    solver: Solver = "auto"
+    over_time: OverTime = field(default_factory=OverTime)
+    fill: bool = True
+    start_number: int = FIRST_NUMBER
+
+    @property
+    def solving(self) -> Solving:
+        """How normals are solved."""
+        return Solving(
+            solver=self.solver,
+            half=self.delivery.half,
+            residual="residual" in self.delivery.aovs,
+            error="error" in self.delivery.aovs,
+            fill=self.fill,
+        )
+
+    @property
+    def asked(self) -> AskedPasses:
+        """Which passes are made beside the surface."""
+        return passes_asked(self.delivery)
+
+    @cached_property
+    def tags(self) -> Tags:
+        """What every file says of itself."""
+        return tags_of(self.take.clip, self.lighting.rig_path, self.delivery.space, self.over_time.aligning.rate)
+
+    @property
+    def shaping(self) -> Shaping | None:
+        """How normals become depth before the first instant, None where no depth is asked for."""
+        return self.lighting.shaping if self.delivery.needs_depth else None
+
+    @property
+    def mixes_ambient(self) -> bool:
+        """Whether ambient light is a part of the beauty plate."""
+        return self.delivery.mix.of(AMBIENT) > 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Beginning:
+    """What a clip's first instant leaves to all others.
+
+    number: its own. whites: by light, what sketches of plates take for white. white: what motion in the report takes
+    for it. shaping: begun with its depth, None where none is asked for.
+    """
+
+    number: int
+    whites: dict[str, float]
+    white: float | None
+    shaping: Shaping | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Piece:
+    """A range of a run's instants that is solved by itself: their ``numbers``, what is read for them, and what the
+    clip's first instant left, None where they begin with it."""
+
+    numbers: range
+    part: Part
+    beginning: Beginning | None
+
+
+@dataclass(kw_only=True)
+class Found:
+    """What instants gave: what was seen of them, a picture of one round, and in whole sentences what is not known of
+    their depth."""
+
+    observed: Observed
+    picture: Pixels | None = None
+    reserved: tuple[str, ...] = ()
+
+    def followed_by(self, other: "Found") -> None:
+        """Take in what was found of the instants after these."""
+        self.observed.followed_by(other.observed)
+        self.picture = self.picture if other.picture is None else other.picture
+        self.reserved = self.reserved or other.reserved
+
+
+def write_instants(
+    job: Job,
+    folder: Path,
+    *,
+    piece: Piece | None = None,
+    resume: bool = False,
+    watch: Watch = unwatched,
+    picture_of: Callable[[Instant], Pixels] | None = None,
+    beside: Callable[[Path, Instant], None] | None = None,
+) -> Found:
+    """Write the files of every instant of a run, or of a piece of it, into a folder; return what was found.
+
+    ``resume`` leaves out files that are there. ``picture_of`` makes the picture of one round; left out, it shows plates
+    and surface. ``beside`` writes more of every instant.
+    """
+    beginning = None if piece is None else piece.beginning
+    observed = observing(job.take, job.lighting.rig, job.lighting.masks)
+    if piece is not None:
+        observed.only = piece.numbers
+    if beginning is not None:
+        observed.first, observed.white = beginning.number, beginning.white
+    shaping = job.shaping if beginning is None else beginning.shaping
+    found = Found(observed=observed)
+    ambient = first_ambient(job.take, job.timing) if job.mixes_ambient else None
+    with writing() as write:
+        part = None if piece is None else piece.part
+        for instant in instants_of(job, observed, part=part, spare=folder, watch=watch):
+            ambient = (instant.round.ambient or ambient) if job.mixes_ambient else None
+            number = instant.round.number
+            if piece is not None and number >= piece.numbers.stop:
+                break
+            if piece is None or number in piece.numbers:
+                shaping, shaped = shape_of(shaping, job.lighting, instant)
+                _write_light_by_light(job, folder, instant, write, resume=resume)
+                if not (resume and is_written(folder, job.take.clip.name, number, job.delivery)):
+                    # the surface only: plates are many times larger, and must not wait for the files
+                    clip = job.take.clip
+                    write(surface_job(folder, clip, instant, job.delivery, job.tags, depth=shaped, ambient=ambient))
+                del shaped  # it holds the surface too
+                if beside is not None:
+                    beside(folder, instant)
+            observed.add(instant.round, instant.surface)
+            if observed.first is not None and number - observed.first in (0, SAMPLE_ROUND - 1) and observed.facts:
+                found.picture = (picture_of or look)(instant)
+            del instant  # its plates would be held while the next round gathers
+    found.reserved = () if shaping is None else reservations(shaping)
+    return found
+
+
+def _write_light_by_light(
+    job: Job, folder: Path, instant: Instant, write: Callable[[Callable[[], None]], None], *, resume: bool
+) -> None:
+    """Hand an instant's plates, and what exceeds the diffuse model in them, to the writing threads, if asked for."""
+    if not job.delivery.plates:
+        return
+    name, compression = job.take.clip.name, job.delivery.compression
+    write_plates(folder / "plates", name, instant.round, job.tags, compression=compression, resume=resume, write=write)
+    write_specular(folder / SPECULAR_OF_LIGHTS, name, instant, job.tags, compression=compression, write=write)
+
+
+def instants_of(
+    job: Job, observed: Observed, *, part: Part | None = None, spare: Path | None = None, watch: Watch = unwatched
+) -> Iterator[Instant]:
+    """Give a job's instants one after the other, or those of a part of the frames; plates are shown to ``observed``.
+
+    ``spare`` is a folder for what memory need not hold.
+    """
+    rounds = gather(
+        job.take,
+        job.timing,
+        aligning=job.over_time.aligning,
+        with_ambient=job.mixes_ambient or job.delivery.plates,
+        start_number=job.start_number,
+        part=part,
+        watch=watch,
+        each_plate=observed.look,
+        each_window=observed.look_at_window,
+    )
+    found = surfaces(
+        rounds,
+        job.take.plan,
+        job.lighting.rig,
+        masks=job.lighting.masks,
+        solving=replace(job.solving, spare=spare),
+        near=job.lighting.near,
+        falloff=job.lighting.falloff,
+        asked=job.asked,
+    )
+    return found if job.over_time.denoise < 2 else denoised(found, job.over_time.denoise)
+
+
+def beginning_of(job: Job) -> Beginning | None:
+    """Return what a clip's first instant leaves to the others, None where there is no instant; decodes its frames."""
+    take = replace(job.take, kept=None)
+    part = Part(numbers=take.numbers)
+    observed = observing(take, job.lighting.rig, job.lighting.masks)
+    for instant in instants_of(replace(job, take=take), observed, part=part):
+        shaping, _ = shape_of(job.shaping, job.lighting, instant)
+        return Beginning(number=instant.round.number, whites=dict(part.whites), white=observed.white, shaping=shaping)
+    return None
