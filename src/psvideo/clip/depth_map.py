@@ -60,7 +60,10 @@ class DepthMaps:
         """What distinguishes these files from others, without reading them again."""
         files = tuple(self.files.values()) or (self.path,)
         states = [file.stat() for file in files]
-        return (self.metres_per_unit, *((str(f), s.st_size, s.st_mtime_ns) for f, s in zip(files, states, strict=True)))
+        return (
+            self.metres_per_unit,
+            *((str(f.resolve()), s.st_size, s.st_mtime_ns) for f, s in zip(files, states, strict=True)),
+        )
 
 
 def open_depth(path: Path, *, width_px: int, height_px: int, metres_per_unit: float | None = None) -> DepthMaps:

@@ -68,6 +68,14 @@ def begun_folder(path: Path, *, mark: str, force: bool = False, settings: str = 
             yield beside
 
 
+def forget_begun(path: Path) -> None:
+    """Remove what a run that was stopped left of an output, unless one is writing it now, which raises PsvideoError."""
+    path = path.resolve()
+    if (beside := _beside(path)).is_dir():
+        with _said_where(path), _held(beside, path):
+            shutil.rmtree(beside)
+
+
 def begun(path: Path) -> Path:
     """Return the hidden folder in which an output is written until it is whole; it need not be there."""
     return _beside(path.resolve())

@@ -1,14 +1,14 @@
 """psvideo normals: normal maps and albedo for every round of flashes."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from psvideo.cli.commands.sync import describe_timing
 from psvideo.cli.console import Voice, counted, plain, print_report
 from psvideo.cli.options.clip_and_run import (
-    ClipPath,
+    ClipPaths,
     FirstLight,
     Force,
     Frames,
@@ -17,9 +17,11 @@ from psvideo.cli.options.clip_and_run import (
     PlanPath,
     Quiet,
     Resume,
+    Scheduler,
     StartNumber,
     TimingPath,
     Verbose,
+    Workers,
 )
 from psvideo.cli.options.delivery import (
     AovOption,
@@ -61,7 +63,7 @@ from psvideo.cli.options.typed import chosen_previews, parse_instants, parse_wei
 
 def normals(
     context: typer.Context,
-    clip: ClipPath,
+    clips: ClipPaths,
     rig: Annotated[Path, typer.Option("--rig", help="Where the lights are: rig.toml, .lp, DiLiGenT or UW list.")],
     out: Annotated[Path, typer.Option("-o", "--out", help="The folder to write.")],
     plan: PlanPath = None,
@@ -103,19 +105,24 @@ def normals(
     force: Force = False,
     resume: Resume = False,
     piece: PieceOption = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     json: Json = False,
     verbose: Verbose = False,
     quiet: Quiet = False,
 ) -> None:
-    """Write normals, albedo and validity for every round of flashes; does sync and split by itself."""
+    """Write normals, albedo and validity for every round of flashes; does sync and split by itself.
+
+    Several clips are solved one after the other, each into a folder of its own.
+    """
+    from psvideo.report.of_takes import take_row
     from psvideo.report.run_report import report_record
     from psvideo.runs.normals import normals as solve
+    from psvideo.runs.normals_of_takes import normals_of_takes
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
-    report = solve(
-        clip,
+    options: dict[str, Any] = dict(  # noqa: C408, as they are called below
         rig=rig,
-        out=out,
         plan=plan,
         timing=timing,
         mask=mask,
@@ -150,12 +157,18 @@ def normals(
         preview=chosen_previews(preview, no_preview=no_preview),
         preview_codec=preview_codec,
         start_number=start_number,
-        force=force,
-        resume=resume,
-        piece=piece,
-        watch=voice.track,
-        caller=voice.caller(context),
     )
+    many = len(clips) > 1 or workers is not None or scheduler is not None
+    told: dict[str, Any] = {"force": force, "resume": resume, "watch": voice.track, "caller": voice.caller(context)}
+    if many:
+        results = normals_of_takes(clips, out=out, workers=workers, scheduler=scheduler, piece=piece, **told, **options)
+        voice.result({"takes": [take_row(one) for one in results]})
+        for one in results:
+            voice.say(f"{one.out}: {one.fault or one.verdict}")
+        if any(one.fault for one in results):
+            raise typer.Exit(1)
+        return
+    report = solve(clips[0], out=out, piece=piece, **told, **options)
     voice.result(report_record(report))
     if piece is not None:
         voice.say(f"{out}: piece {piece} is solved, {counted(len(report.instants), 'instant')}; --resume ends the run.")

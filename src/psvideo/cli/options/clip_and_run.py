@@ -8,6 +8,10 @@ import typer
 from psvideo.cli.options.completing import offer_lights
 
 ClipPath = Annotated[Path, typer.Argument(help="A clip: a folder of numbered frames with plan.toml, or a movie file.")]
+ClipPaths = Annotated[
+    list[Path],
+    typer.Argument(help="A clip: a folder of numbered frames with plan.toml, or a movie file. Or several."),
+]
 PlanPath = Annotated[Path | None, typer.Option("--plan", help="The plan, where it does not lie beside the footage.")]
 Frames = Annotated[str | None, typer.Option("--frames", help="File numbers to use, such as 1-100 or 1-100x2.")]
 FirstLight = Annotated[
@@ -31,6 +35,12 @@ Resume = Annotated[bool, typer.Option("--resume", help="Go on where a run that w
 PieceOption = Annotated[
     str | None,
     typer.Option("--piece", help="Solve a piece alone: 3/10, or 0/10 for what all share; --resume ends the run."),
+]
+Workers = Annotated[
+    int | None, typer.Option("--workers", min=1, help="Solve with so many processes (a dask cluster on this computer).")
+]
+Scheduler = Annotated[
+    str | None, typer.Option("--scheduler", help="Solve with the workers of a dask scheduler: tcp://HOST:8786.")
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for machines.")]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Say more.")]

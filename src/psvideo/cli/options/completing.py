@@ -28,7 +28,11 @@ def _plan_typed(context: typer.Context) -> Path | None:
     option = context.params.get("plan")
     if isinstance(option, str | Path):
         return Path(option)
-    words = [*context.args, *(context.params.get(name) for name in ("clip", "pictures"))]
+    words = [
+        *context.args,
+        *(context.params.get("clips") or ()),
+        *(context.params.get(n) for n in ("clip", "pictures")),
+    ]
     # before the option's value is typed, the parser leaves the arguments among the words
     return next((Path(word) for word in words if isinstance(word, str | Path)), None)
 

@@ -1,0 +1,149 @@
+"""Takes solved by the workers of a dask cluster, on this computer or on others: they get paths and ranges, no pixels.
+
+A take is found in time by one worker, then solved in pieces by all, and put together here. What a worker that died or
+hung had begun is done again by another. Where the scheduler dies, everything that was solved stays for ``resume``.
+"""
+
+import contextlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from psvideo.compute.progress import Watch, unwatched
+from psvideo.compute.threads import THREADS, thread_count
+from psvideo.errors import PsvideoError, UsageError
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+EXTRA = (
+    "`workers` and `scheduler` need dask, an extra: python -m pip install 'psvideo[dask]'. Without it one process "
+    "solves everything, with all cores."
+)
+SILENT_S = 60
+"""A worker that is not heard of for so long is started again, and its work is given to another."""
+SETTINGS = {"distributed.nanny.pre-spawn-environ": {}, "distributed.scheduler.worker-ttl": f"{SILENT_S}s"}
+"""dask's own environment for workers sets MALLOC_TRIM_THRESHOLD_, which halves the speed of numpy."""
+RETRIES = 2
+"""A piece is tried so many times more where a worker fails at it for other reasons than its footage."""
+ANSWERS_S = 10
+"""Within this a scheduler answers."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cluster:
+    """Where work goes: to so many processes here, or to the workers of the scheduler at an address."""
+
+    workers: int | None = None
+    scheduler: str | None = None
+
+    def check(self) -> None:
+        """Raise UsageError where the extra is not installed, or both or neither are named."""
+        if (self.workers is None) == (self.scheduler is None):
+            raise UsageError("`workers` starts processes here and `scheduler` uses others': expected one of the two.")
+        if self.workers is not None and self.workers < 1:
+            raise UsageError(f"`workers` {self.workers}: expected how many processes to start, 1 or more.")
+        require_dask()
+
+
+def require_dask() -> None:
+    """Raise UsageError where dask is not installed."""
+    try:
+        import distributed  # noqa: F401
+    except ImportError:
+        raise UsageError(EXTRA) from None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shared:
+    """A take to be solved in so many pieces, into ``out``, with the other ``options`` of ``runs.normals.normals``."""
+
+    clip: Path
+    out: Path
+    pieces: int
+    options: Mapping[str, Any]
+
+
+@contextlib.contextmanager
+def connected(cluster: Cluster) -> "Iterator[Client]":
+    """Give a client of the cluster, which is ended with the block where it was started here.
+
+    Raises PsvideoError where no scheduler answers.
+    """
+    import dask
+    from distributed import Client, LocalCluster
+
+    if cluster.scheduler is not None:
+        try:
+            client = Client(cluster.scheduler, timeout=ANSWERS_S, set_as_default=False)
+        except (OSError, ValueError) as fault:
+            raise PsvideoError(
+                f"{cluster.scheduler}: no scheduler answers there ({fault}). Start one with: dask scheduler, and on "
+                "each computer: dask worker tcp://HOST:8786; all need psvideo, and the same paths."
+            ) from fault
+        with client:
+            yield client
+        return
+    count = cluster.workers or 1
+    with (
+        dask.config.set(SETTINGS),
+        LocalCluster(
+            n_workers=count,
+            threads_per_worker=1,
+            memory_limit=0,
+            dashboard_address=None,
+            env={THREADS: str(max(thread_count() // count, 1))},
+            silence_logs=50,
+        ) as local,
+        Client(local, set_as_default=False) as client,
+    ):
+        yield client
+
+
+def solved_apart(client: "Client", takes: Sequence[Shared], *, watch: Watch = unwatched) -> Iterator[tuple[int, str]]:
+    """Have takes solved in pieces, and give the place of each, and what is wrong with it or nothing, as it is done.
+
+    Raises PsvideoError where the scheduler is gone.
+    """
+    from distributed import as_completed
+
+    left: dict[int, int] = {}
+    place_of: dict[str, int] = {}
+    faults: dict[int, str] = {}
+    futures: list[Future] = []
+    for place, take in enumerate(takes):
+        timed = client.submit(solve_piece, take, 0, after=None, pure=False, retries=RETRIES)
+        pieces = [
+            client.submit(solve_piece, take, number, after=timed, pure=False, retries=RETRIES)
+            for number in range(1, take.pieces + 1)
+        ]
+        left[place] = 1 + len(pieces)
+        place_of |= {future.key: place for future in (timed, *pieces)}
+        futures += [timed, *pieces]
+    done = as_completed(futures, loop=client.loop, raise_errors=False)
+    for future in watch(done, total=len(futures), what="solving", unit="pieces"):
+        place = place_of[future.key]
+        left[place] -= 1
+        if future.status != "finished" and place not in faults:
+            faults[place] = _fault(future)
+        if left[place] == 0:
+            yield place, faults.get(place, "")
+
+
+def solve_piece(take: Shared, number: int, *, after: object) -> int:
+    """Solve one piece of a take, in a worker; return how many instants it has. ``after`` is what it waits for."""
+    from psvideo.runs.normals import normals
+
+    report = normals(take.clip, out=take.out, piece=f"{number}/{take.pieces}", **take.options)
+    return len(report.instants)
+
+
+def _fault(future: "Future") -> str:
+    if future.status in ("cancelled", "lost"):
+        raise PsvideoError(
+            "The cluster's scheduler is gone. What was solved is kept beside the outputs: run the command again with "
+            "`resume`, here or on a cluster."
+        )
+    fault = future.exception()
+    return str(fault) if isinstance(fault, PsvideoError) else f"{type(fault).__name__}: {fault}"
