@@ -3,6 +3,8 @@
 import hashlib
 import itertools
 import json
+import shutil
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -251,3 +253,34 @@ def test_two_runs_into_one_folder_are_refused_and_pieces_are_not(tmp_path: Path)
             pass
         with pytest.raises(UsageError, match="other settings"), begun_folder(other, mark="timing.json", settings="b"):
             pass
+
+
+def test_two_workers_give_the_bytes_of_one_process_and_takes_one_report(tmp_path: Path) -> None:
+    clip = filmed(tmp_path, frames=60)
+    given: dict[str, Any] = {"rig": clip / "rig.toml", "preview": ()}
+    ps.normals(clip, out=tmp_path / "one" / "clip", **given)
+    (tmp_path / "dark").mkdir()
+    shutil.copy(clip / "plan.toml", tmp_path / "dark")
+    cv2.imwrite(str(tmp_path / "dark" / "dark.0001.png"), np.zeros((HEIGHT, WIDTH), np.uint16))
+    results = ps.normals_of_takes([clip, tmp_path / "dark"], out=tmp_path / "all", workers=2, pieces=2, **given)
+    assert [one.clip.name for one in results] == ["dark", "clip"], "the worst first"
+    assert "dark" in results[0].fault
+    assert results[1].instants == len(judged(tmp_path / "one" / "clip")["instants"])
+    assert digest(tmp_path / "all" / "clip") == digest(tmp_path / "one" / "clip")
+    assert judged(tmp_path / "all" / "clip") == judged(tmp_path / "one" / "clip")
+    assert "dark: could not be solved." in (tmp_path / "all" / "report.html").read_text(encoding="utf-8")
+
+
+def test_what_cannot_be_shared_is_refused_in_a_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    given: dict[str, Any] = {"out": tmp_path / "out", "rig": tmp_path / "rig.toml"}
+    with pytest.raises(UsageError, match="`workers` 0: expected"):
+        ps.normals_of_takes(["clip"], workers=0, **given)
+    with pytest.raises(UsageError, match="expected one of the two"):
+        ps.normals_of_takes(["clip"], workers=2, scheduler="tcp://127.0.0.1:9", **given)
+    with pytest.raises(UsageError, match="several are named 'clip'"):
+        ps.normals_of_takes(["a/clip", "b/clip"], **given)
+    with pytest.raises(UsageError, match="names no clip"):
+        ps.normals_of_takes([], **given)
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(UsageError, match=r"python -m pip install 'psvideo\[dask\]'"):
+        ps.normals_of_takes(["clip"], workers=2, **given)

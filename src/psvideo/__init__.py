@@ -26,6 +26,7 @@ if TYPE_CHECKING:  # what editors and type checkers see; _HOMES is the same for 
     from psvideo.runs.check import check as check
     from psvideo.runs.light_sets import read_images as read_images
     from psvideo.runs.normals import normals as normals
+    from psvideo.runs.normals_of_takes import normals_of_takes as normals_of_takes
     from psvideo.runs.split import split as split
     from psvideo.runs.stills import stills as stills
     from psvideo.runs.sync import sync as sync
@@ -49,6 +50,7 @@ _HOMES = {
     "find_timing": "psvideo.sync.take_timing:find_take_timing",
     "gather": "psvideo.plates.gather",
     "normals": "psvideo.runs.normals",
+    "normals_of_takes": "psvideo.runs.normals_of_takes",
     "open_take": "psvideo.sync.open_take",
     "picture_of": "psvideo.pictures.quantity",
     "read_images": "psvideo.runs.light_sets",
@@ -85,6 +87,7 @@ __all__ = [  # noqa: RUF022  (in the order of the work)
     "sync_cameras",
     "split",
     "normals",
+    "normals_of_takes",
     "stills",
     "check",
     "shoot",

@@ -92,7 +92,7 @@ def connected(cluster: Cluster) -> "Iterator[Client]":
             n_workers=count,
             threads_per_worker=1,
             memory_limit=0,
-            dashboard_address=None,
+            dashboard_address="127.0.0.1:0",  # else a port that others may have
             env={THREADS: str(max(thread_count() // count, 1))},
             silence_logs=50,
         ) as local,

@@ -1,4 +1,4 @@
-"""Several takes in one go, or one by several processes: ``psvideo normals takes/* -o results/ --workers 2``."""
+"""Several takes in one go, or one by several processes: ``psvideo normals takes/* -o results/``."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence

@@ -111,11 +111,8 @@ def normals(
     verbose: Verbose = False,
     quiet: Quiet = False,
 ) -> None:
-    """Write normals, albedo and validity for every round of flashes; does sync and split by itself.
-
-    Several clips are solved one after the other, each into a folder of its own.
-    """
-    from psvideo.report.of_takes import take_row
+    """Write normals, albedo and validity for every round of flashes; does sync and split by itself."""
+    from psvideo.report.of_takes import takes_record
     from psvideo.report.run_report import report_record
     from psvideo.runs.normals import normals as solve
     from psvideo.runs.normals_of_takes import normals_of_takes
@@ -162,7 +159,7 @@ def normals(
     told: dict[str, Any] = {"force": force, "resume": resume, "watch": voice.track, "caller": voice.caller(context)}
     if many:
         results = normals_of_takes(clips, out=out, workers=workers, scheduler=scheduler, piece=piece, **told, **options)
-        voice.result({"takes": [take_row(one) for one in results]})
+        voice.result(takes_record(results))
         for one in results:
             voice.say(f"{one.out}: {one.fault or one.verdict}")
         if any(one.fault for one in results):
