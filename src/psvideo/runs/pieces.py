@@ -64,7 +64,7 @@ def piece_named(text: str, numbers: range) -> range:
 
 def write_piece(job: Job, folder: Path, piece: str, *, watch: Watch = unwatched) -> Found:
     """Solve one piece into a folder that is not finished, and note what it found; return that."""
-    numbers = piece_named(piece, Numbering(job).numbers)
+    numbers = piece_named(piece, Succession(job).numbers)
     note_timing(folder, job.timing)
     return _written(job, folder, numbers, watch=watch)
 
@@ -76,7 +76,7 @@ def pieces_begun(folder: Path) -> bool:
 
 def pieced_together(job: Job, folder: Path, *, watch: Watch = unwatched) -> Found:
     """Solve what no piece has solved yet, and return what all of them found."""
-    missing = [*_missing(Numbering(job).numbers, [numbers for numbers, _ in noted(folder)])]
+    missing = [*_missing(Succession(job).numbers, [numbers for numbers, _ in noted(folder)])]
     for numbers in missing:
         _written(job, folder, numbers, watch=watch)
     whole = Found(observed=observing(job.take, job.lighting.rig, job.lighting.masks))
@@ -136,7 +136,7 @@ class Pieces:
     def _frames(self, numbers: range) -> tuple[int, ...]:
         """Return the frames that a range of instants is made from."""
         job = self.job
-        course = Numbering(job)
+        course = Succession(job)
         borrows = job.take.plan.mode != "synced" and has_blind_time(timed_camera(job.take.plan, job.timing))
         rounds = course.rounds_of(numbers)
         before = course.rounds_of(range(self._solved_from(numbers.start), numbers.start + 1)).start
@@ -153,7 +153,7 @@ class Pieces:
 
 
 @dataclass(frozen=True)
-class Numbering:
+class Succession:
     """How a job's instants, rounds and frames follow each other."""
 
     job: Job
