@@ -359,6 +359,18 @@ def test_times_rows_and_motion_on_both_sides_of_a_threshold_are_told_apart() -> 
     assert moved(5, aligned=True) == "doubtful"
 
 
+@pytest.mark.parametrize(("ambient", "said"), [(0.03, False), (0.08, True)])
+def test_ambient_light_that_no_flash_freezes_is_said_with_its_blur_and_its_lean(ambient: float, said: bool) -> None:
+    plan = replace(plan_of(["a"], fps=1), mode="rolling")
+    timing = timing_of(frame_period_s=1.0, exposure_s=0.5, row_time_s=1.0 / SIZE)
+    one = Footage(shape="waves", lights=1, rounds=4, shift_px=4).observed(0)
+    one.facts[:] = [replace(facts, ambient=ambient) for facts in one.facts]
+    found = time.motion(plan, timing, one).found
+    assert ("do not freeze the ambient light, 8 % of the signal" in found) == said
+    speed_px_s = float(np.median([facts.speed_px_s or 0.0 for facts in one.facts[1:]]))
+    assert not said or f"blurs by up to {0.5 * speed_px_s:.0f} px and leans by {speed_px_s:.0f} px" in found
+
+
 @pytest.mark.parametrize("fill", [True, False])
 def test_validity_is_counted_over_the_subject_filled_or_not_before_a_dim_backdrop(fill: bool) -> None:
     one = Footage(dark=0.45, solved=True, fill=fill)

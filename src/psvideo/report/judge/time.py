@@ -7,6 +7,7 @@ import numpy as np
 from psvideo.model.motion_cost import cost_words
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
+from psvideo.report.judge.light import NOTICED
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.observed import Observed
 
@@ -171,7 +172,19 @@ def motion(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = Fa
         subject="motion",
         grade="bad" if grave else "doubtful",
         found=f"{100 * share:.0f} % of the picture moves, by up to {step_px:.1f} px from flash to flash "
-        f"({blur_px:.1f} px of blur within one): {cost_words(step_px)}.",
+        f"({blur_px:.1f} px of blur within one): {cost_words(step_px)}." + _unfrozen(plan, timing, observed, speed),
         advice="Move slower, raise the frame rate or flash fewer lights"
         + (", or leave `align` at auto, which brings the plates together." if not aligned else "."),
+    )
+
+
+def _unfrozen(plan: Plan, timing: Timing, observed: Observed, speed_px_s: float) -> str:
+    """Say by how much ambient light, which flashes do not freeze, shows motion blurred and leaning, where it counts."""
+    shares = [one.ambient for one in observed.facts if one.ambient is not None]
+    if plan.mode == "synced" or not shares or float(np.median(shares)) < NOTICED:
+        return ""
+    blur_px, lean_px = speed_px_s * timing.exposure_s, speed_px_s * abs(timing.row_time_s) * plan.camera.height_px
+    return (
+        f" Flashes do not freeze the ambient light, {100 * float(np.median(shares)):.0f} % of the signal: in it what "
+        f"moves blurs by up to {blur_px:.0f} px and leans by {lean_px:.0f} px from the first row to the last."
     )
