@@ -16,6 +16,8 @@ from psvideo.errors import PsvideoError
 
 LARGE_PIXELS = 1 << 25
 """Pictures of more pixels have planes in files: just more than 8K video has, whose results come and go in memory."""
+AROUND_BYTES = 1 << 20
+"""So much before a part goes with it: where a page is read, the system hands over those around it too."""
 
 
 def planes_for(shape: tuple[int, ...], kind: DTypeLike, *, pixels: int, folder: Path | None) -> NDArray[Any]:
@@ -59,7 +61,7 @@ def _let_planes_go(planes: list[NDArray[Any]]) -> None:
         if held is None or not part.size or not hasattr(mmap, "MADV_DONTNEED"):
             continue
         begin = part.ctypes.data - np.frombuffer(held, np.uint8).ctypes.data
-        first = begin // mmap.PAGESIZE * mmap.PAGESIZE
+        first = max(begin - AROUND_BYTES, 0) // mmap.PAGESIZE * mmap.PAGESIZE
         held.madvise(mmap.MADV_DONTNEED, first, begin + part.nbytes - first)
 
 

@@ -22,6 +22,7 @@ from psvideo.plates.sequence import Round
 from psvideo.solve.passes.plate_rows import BAND_PIXELS, PlateRows
 
 Floats = NDArray[np.float32]
+Pixels = NDArray[np.uint8]
 FOLDER = "rti"
 LARGEST_PX = 4096
 """The longer side of the planes: graphics cards hold textures of so many pixels everywhere."""
@@ -43,24 +44,26 @@ def write_rti(folder: Path, one: Round, rig: Rig) -> None:
     step = max(-(-max(rows.shape[:2]) // LARGEST_PX), 1)
     lamps = directions(rig.lights)
     strengths = intensities(rig.lights, 1 if len(rows.shape) == 2 else 3)
-    shown = [
-        plate.picture.thinned(max(step, THIN)) / np.float32(of.mean())
+    exposure = min(
+        exposure_for(plate.picture.thinned(max(step, THIN)) / np.float32(of.mean()))
         for plate, of in zip(one.plates, strengths, strict=True)
-    ]
-    base, terms = _fitted(rows, lamps, strengths / min(map(exposure_for, shown)), step)
+    )
+    base, terms = _fitted(rows, lamps, strengths / exposure, step)
     target = folder / FOLDER
     target.mkdir(parents=True, exist_ok=True)
     scale, bias = [1.0] * RED_GREEN_BLUE, [0.0] * RED_GREEN_BLUE
     _write_plane(target / "plane_0.jpg", base)
+    shape = base.shape
+    del base
     for number, first in enumerate(range(0, TERMS, 3), start=1):
         low, high = np.percentile(terms[..., first : first + 3].reshape(-1, 3), CUT_PERCENT, axis=0)
         span = np.maximum(high - low, 1e-3)
         scale += [float(f"{value:.6g}") for value in span]
         bias += [float(f"{value:.6g}") for value in -low / span]
-        _write_plane(target / f"plane_{number}.jpg", terms[..., first : first + 3], low, span)
+        _write_plane(target / f"plane_{number}.jpg", _codes(terms[..., first : first + 3], low, span))
     info = {
-        "width": base.shape[1],
-        "height": base.shape[0],
+        "width": shape[1],
+        "height": shape[0],
         "format": "jpg",
         "type": "ptm",
         "colorspace": "lrgb",
@@ -78,10 +81,11 @@ def terms_of(lights: FloatArray) -> FloatArray:
     return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
 
 
-def _fitted(rows: PlateRows, lamps: FloatArray, strengths: FloatArray, step: int) -> tuple[Floats, NDArray[np.float16]]:
-    """Return the colour of every pixel (row, col, 3), its largest channel 1, and the polynomials (row, col, 6)."""
+def _fitted(rows: PlateRows, lamps: FloatArray, strengths: FloatArray, step: int) -> tuple[Pixels, NDArray[np.float16]]:
+    """Return the colour of every pixel in codes (row, col, 3), its largest channel 255, and the polynomials
+    (row, col, 6)."""
     high, wide = rows.shape[0] // step, rows.shape[1] // step
-    base, terms = np.empty((high, wide, 3), np.float32), np.empty((high, wide, TERMS), np.float16)
+    base, terms = np.empty((high, wide, 3), np.uint8), np.empty((high, wide, TERMS), np.float16)
     basis = terms_of(lamps)
     used = np.arange(TERMS) < (TERMS if len(lamps) >= TERMS else RED_GREEN_BLUE)
     equations = (basis * used).T @ (basis * used)
@@ -91,7 +95,7 @@ def _fitted(rows: PlateRows, lamps: FloatArray, strengths: FloatArray, step: int
         seen = [_shown(rows.light(n, first * step, last * step), step, strengths[n]) for n in range(len(lamps))]
         colour = np.mean(seen, axis=0)
         colour = colour / np.maximum(colour.max(axis=-1, keepdims=True), 1e-4)
-        base[first:last] = colour
+        base[first:last] = _codes(colour, ZERO, ONE)
         square = np.maximum((colour**2).sum(axis=-1), 1e-4)
         levels = [(one * colour).sum(axis=-1) / square for one in seen]
         terms[first:last] = np.tensordot(np.stack(levels, axis=-1), solving, axes=(-1, -1))
@@ -108,14 +112,18 @@ def _shown(light: Floats, step: int, strength: Sequence[float] | FloatArray) -> 
     return np.broadcast_to(srgb_share(even), (high, wide, 3))
 
 
-def _write_plane(path: Path, plane: NDArray[np.floating], low: FloatArray = ZERO, span: FloatArray = ONE) -> None:
-    """Write a plane as a picture whose codes go from ``low`` to so much more."""
+def _codes(plane: NDArray[np.floating], low: FloatArray, span: FloatArray) -> Pixels:
+    """Return 8-bit codes that go from ``low`` to so much more, (row, col, 3)."""
     codes = np.empty(plane.shape, np.uint8)
     for row, shown in zip(plane, codes, strict=True):
-        shown[:] = (255 * np.clip((row - low) / span, 0, 1) + 0.5)[:, ::-1]
+        shown[:] = 255 * np.clip((row - low) / span, 0, 1) + 0.5
+    return codes
+
+
+def _write_plane(path: Path, codes: Pixels) -> None:
     whole_colour = [cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444]
-    done, data = cv2.imencode(".jpg", codes, [cv2.IMWRITE_JPEG_QUALITY, QUALITY, *whole_colour])
+    done, data = cv2.imencode(".jpg", codes[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, QUALITY, *whole_colour])
     if not done:
-        raise ValueError(f"a plane of shape {plane.shape} cannot be encoded")
+        raise ValueError(f"a plane of shape {codes.shape} cannot be encoded")
     with whole_file(path) as beside:
         beside.write_bytes(data.tobytes())

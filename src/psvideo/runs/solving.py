@@ -237,6 +237,7 @@ def instants_of(
         near=job.lighting.near,
         falloff=job.lighting.falloff,
         asked=job.asked,
+        one_by_one=job.over_time.aligning.align == "none",
     )
     return found if job.over_time.denoise < 2 else denoised(found, job.over_time.denoise)
 

@@ -61,11 +61,13 @@ def surfaces(
     near: NearSurface | None = None,
     falloff: Falloff | None = None,
     asked: AskedPasses = AskedPasses(),
+    one_by_one: bool = False,
 ) -> Iterator[Instant]:
     """Solve every round that has a plate of each of the plan's lights; the clip's start and end cut the others.
 
     ``masks`` say where to solve, ``near`` where near lights find the surface, ``falloff`` what share of their light
-    arrives where, ``asked`` which passes are made as well. Raises PsvideoError where the rig lacks a light, its lights
+    arrives where, ``asked`` which passes are made as well. ``one_by_one``: rounds do not say what stood still between
+    them, and nothing is held from one to the next. Raises PsvideoError where the rig lacks a light, its lights
     give no normals, or a round has no mask.
     """
     lights = lights_as_planned(rig, plan)
@@ -99,6 +101,7 @@ def surfaces(
             surface = _without(surface, one.doubtful)
         nonlocal steady
         steady = steadied(steady, surface, one.number, one.stood, _shown(seen))
+        steady = None if one_by_one else steady
         made = passes_of(asked, plates, surface, lit, seen=shown, mask=mask) if asked.any else None
         return Instant(round=one, surface=surface, passes=made)
 

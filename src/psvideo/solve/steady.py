@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.spilled import let_go
 from psvideo.compute.threads import over_ranges
 from psvideo.model.surface import Surface
 from psvideo.plates.sequence import POOLED_ROUNDS
@@ -84,11 +85,12 @@ def steadied(held: Steady | None, surface: Surface, number: int, stood: Flags | 
     result = SurfacePlanes(planes, albedo, error, surface.valid.view(np.uint8), surface.source)
     fresh = _touch(held, result, still)
     rows, cols = surface.valid.shape
-    over_ranges(
-        lambda first, last: steady_rows(result, held.pool, held.slots, fresh, still, first, last),
-        rows,
-        each=max(BAND_PIXELS // cols, 1),
-    )
+
+    def hold(first: int, last: int) -> None:
+        steady_rows(result, held.pool, held.slots, fresh, still, first, last)
+        let_go(*(plane[first:last] for plane in (*planes, *albedo)))
+
+    over_ranges(hold, rows, each=max(BAND_PIXELS // cols, 1))
     return held
 
 

@@ -147,6 +147,7 @@ class _Spread:
             error_deg=None if surface.error_deg is None else _every(surface.error_deg, step),
             source=None,
         )
+        let_go(surface.normals, surface.albedo)
         fit, v = self.fit(thin), self.noise.variances
         noise_deg, fit_deg, of_noise_deg = np.zeros((3, *thin.valid.shape), np.float32)
         self.fill(thin, NOTHING, self.noise, (0.0, 0.0), noise_deg)
