@@ -6,6 +6,7 @@ import base64
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,7 +14,8 @@ import numpy as np
 import page_folder as small
 import pytest
 
-from psvideo.page import page_server, show_of, write_page
+from psvideo.errors import UsageError
+from psvideo.page import page_server, show_of, side_by_side, write_page
 from psvideo.page.serving import PageServer
 
 if TYPE_CHECKING:
@@ -445,6 +447,43 @@ def test_one_file_opens_by_itself_and_relights_alike(folder: Path, tmp_path: Pat
     page.keyboard.press("t")
     page.wait_for_selector("#timing-facts dt")
     assert [url for url in watched.asked if not url.startswith("data:")] == [page_file.as_uri()]
+
+
+@pytest.mark.parametrize("in_one_file", [False, True])
+def test_results_side_by_side_are_each_relit_as_they_are_under_the_same_light(
+    in_one_file: bool, folder: Path, tmp_path: Path, watched: Watched
+) -> None:
+    other = small.results(tmp_path / "other", y="down", world=True)
+    for file in other.glob("albedo/*.exr"):
+        small.write(file, small.rgb(np.full((small.ROWS, small.COLS, 3), 0.25)), int(file.stem[-4:]))
+    show = side_by_side([show_of(folder), show_of(other)], [folder, other])
+    assert [one.group for one in show.sequences] == ["out"] * 4 + ["other"] * 4
+    with page_server(show, port=0) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        write_page(show, tmp_path / "page.html", width_px=640, count=3)
+        page = watched.open((tmp_path / "page.html").as_uri() if in_one_file else server.url)
+        assert page.evaluate("() => psvideo.panes()") == ["relit", "r2.relit"]
+        assert np.abs(relit_in(page, lights=[light(KEY)]) - albedo() * lambert(KEY)).max() <= 1e-3
+        found = page.evaluate("() => Array.from(psvideo.relitValues('r2.relit').values)")
+        second = np.array(found).reshape(small.ROWS, small.COLS, 4)[..., :3]
+        assert np.abs(second - 0.25 * lambert(KEY)).max() <= 1e-3
+        settled(page)
+        assert page.locator(".caption").all_inner_texts() == ["out · 1001", "other · 1001 · world space · y down"]
+        server.shutdown()
+        thread.join()
+
+
+def test_what_cannot_stand_side_by_side_is_named(folder: Path, tmp_path: Path) -> None:
+    one = show_of(folder)
+    with pytest.raises(UsageError, match=r"wide: its pictures are 128 x 48 pixels"):
+        side_by_side([one, replace(one, width_px=128)], [folder, tmp_path / "wide"])
+    with pytest.raises(UsageError, match=r"plates: holds no results"):
+        side_by_side([one, replace(one, kind="plates")], [folder, tmp_path / "plates"])
+    later = replace(one, sequences=tuple(replace(s, numbers=tuple(n + 7 for n in s.numbers)) for s in one.sequences))
+    both = side_by_side([one, later], [tmp_path / "a" / "out", tmp_path / "b" / "out"])
+    assert {s.timeline for s in both.sequences} == {"rounds", "r2.rounds"}, "then by time"
+    assert both.name == "a/out | b/out"
 
 
 WITHOUT_WEBGL2 = """

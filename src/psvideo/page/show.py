@@ -19,17 +19,17 @@ Reader = Callable[[int, Look], PagePicture]
 class ShownSequence:
     """Pictures of one quantity. ``times_s`` are the instants that the pictures show, on the camera's clock.
 
-    Sequences of one ``timeline`` share their numbers; those of another are put beside them by time. ``slow``: pictures
-    are computed when they are asked for, so none is made ahead. ``kind``, ``unit`` and ``from_zero`` are those of the
-    table of quantities. ``family``: what is shown at one exposure, to be
-    compared; left out, the sequence by itself.
+    Sequences of one ``timeline`` ("rounds", "frames"; of another result "r2.rounds") share their numbers; those of
+    another are put beside them by time. ``slow``: pictures are computed when they are asked for, so none is made ahead.
+    ``kind``, ``unit`` and ``from_zero`` are those of the table of quantities. ``family``: what is shown at one exposure
+    or in one range, to be compared; left out, the sequence by itself.
     """
 
     id: str
     label: str
     kind: Shown
     group: str
-    timeline: Literal["rounds", "frames"]
+    timeline: str
     numbers: tuple[int, ...]
     times_s: tuple[float, ...]
     read: Reader

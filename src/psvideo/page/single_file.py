@@ -83,8 +83,12 @@ def _part(show: Show, width_px: int, count: int) -> Show:
     """Return the part of a show that goes into the file, at the rate at which its pictures follow each other."""
     master = show.sequences[0]
     chosen = _spread(master.numbers, count)
-    alike = [sequence for sequence in show.sequences if sequence.timeline == master.timeline and not sequence.slow]
-    sequences = [_only(sequence, chosen) for sequence in alike]
+    times_s = [time_s for number, time_s in zip(master.numbers, master.times_s, strict=True) if number in chosen]
+    sequences = [
+        _only(sequence, chosen if sequence.timeline == master.timeline else _nearest(sequence, times_s))
+        for sequence in show.sequences
+        if (sequence.timeline == master.timeline or sequence.timeline.endswith(".rounds")) and not sequence.slow
+    ]
     width = min(width_px, show.width_px)
     fps = show.fps * max(len(chosen) - 1, 1) / max(len(master.numbers) - 1, 1)
     height = max(round(show.height_px * width / show.width_px), 1)
@@ -103,6 +107,12 @@ def _part(show: Show, width_px: int, count: int) -> Show:
 def _spread(numbers: Sequence[int], count: int) -> frozenset[int]:
     places = np.linspace(0, len(numbers) - 1, min(count, len(numbers))).round().astype(int)
     return frozenset(numbers[place] for place in places)
+
+
+def _nearest(sequence: ShownSequence, times_s: Sequence[float]) -> frozenset[int]:
+    """Return the numbers of a sequence's pictures that are nearest to some instants."""
+    own = np.array(sequence.times_s)
+    return frozenset(sequence.numbers[int(np.abs(own - time_s).argmin())] for time_s in times_s)
 
 
 def _only(sequence: ShownSequence, chosen: frozenset[int]) -> ShownSequence:

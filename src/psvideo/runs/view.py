@@ -1,16 +1,17 @@
 """The whole of ``psvideo view``: results, plates or a clip, served to a browser or written into one file."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from psvideo.compute.progress import Watch, unwatched
-from psvideo.page import Show, page_server, show_of, write_page
+from psvideo.page import Show, page_server, show_of, side_by_side, write_page
 from psvideo.page.serving import PageServer
 from psvideo.page.single_file import PageContents
 from psvideo.runs.caller import PYTHON, Caller
 
 
 def view(
-    path: Path | str,
+    path: Path | str | Sequence[Path | str],
     *,
     clip: Path | str | None = None,
     plan: Path | str | None = None,
@@ -19,7 +20,8 @@ def view(
 ) -> PageServer:
     """Return a server of the page that shows a result: it listens, and answers from ``serve_forever()`` on.
 
-    ``path`` is a folder of results or plates, or a clip; ``clip`` is what results or plates came from, left out:
+    ``path`` is a folder of results or plates, or a clip; or several folders of results, to be seen side by side.
+    ``clip`` is what results or plates came from, left out:
     looked for beside them; ``plan`` the clip's plan where it does not lie beside it. ``port`` is left out for a free
     one. Used in a ``with`` block, the server closes its port and releases its pictures at the end.
 
@@ -29,7 +31,7 @@ def view(
 
 
 def export_view(
-    path: Path | str,
+    path: Path | str | Sequence[Path | str],
     *,
     out: Path | str,
     clip: Path | str | None = None,
@@ -49,8 +51,13 @@ def export_view(
     return write_page(show, Path(out), width_px=width_px, count=count, force=force, watch=watch)
 
 
-def _show(path: Path | str, clip: Path | str | None, plan: Path | str | None, caller: Caller) -> Show:
-    show = show_of(Path(path), clip=None if clip is None else Path(clip), plan=None if plan is None else Path(plan))
+def _show(
+    path: Path | str | Sequence[Path | str], clip: Path | str | None, plan: Path | str | None, caller: Caller
+) -> Show:
+    paths = [Path(path)] if isinstance(path, Path | str) else [Path(one) for one in path]
+    of_clip, of_plan = None if clip is None else Path(clip), None if plan is None else Path(plan)
+    shows = [show_of(one, clip=None if place else of_clip, plan=of_plan) for place, one in enumerate(paths)]
+    show = side_by_side(shows, paths)
     for note in show.notes:
         caller.detail(note)
     return show

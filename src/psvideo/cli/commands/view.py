@@ -13,7 +13,13 @@ from psvideo.cli.options.clip_and_run import Force, Json, PlanPath, Quiet, Verbo
 
 
 def view(
-    path: Annotated[Path, typer.Argument(help="A folder of results (out/) or plates, or a clip.")],
+    paths: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="PATH...",
+            help="A folder of results (out/) or plates, or a clip; several folders of results are shown side by side.",
+        ),
+    ],
     clip: Annotated[
         Path | None,
         typer.Option(help="The clip that results or plates came from; left out: looked for beside them."),
@@ -38,7 +44,7 @@ def view(
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     if export is not None:
         held = export_view(
-            path,
+            paths,
             out=export,
             clip=clip,
             plan=plan,
@@ -51,8 +57,8 @@ def view(
         voice.result({"page": str(export), **held.record})
         voice.say(f"{export}: {held.words}")
         return
-    with serve(path, clip=clip, plan=plan, port=port, caller=voice.caller()) as server:
-        voice.say(f"{path}: {server.url} (this machine only; Ctrl-C ends it)")
+    with serve(paths, clip=clip, plan=plan, port=port, caller=voice.caller()) as server:
+        voice.say(f"{', '.join(map(str, paths))}: {server.url} (this machine only; Ctrl-C ends it)")
         voice.result({"url": server.url, "port": server.server_port})
         sys.stdout.flush()  # a program that reads a pipe wants the address now
         if not no_browser:

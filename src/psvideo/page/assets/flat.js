@@ -25,7 +25,7 @@ export class FlatStage {
   }
 
   draw(look, rect, cut) {
-    const block = look.blocks[look.sequence.id];
+    const block = look.blocks[look.main];
     this.small.width = block.width;
     this.small.height = block.height;
     this.small.getContext("2d").putImageData(painted(look, block), 0, 0);

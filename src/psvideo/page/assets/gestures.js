@@ -1,6 +1,6 @@
 // Mouse, pen and fingers on the pictures: lights are dragged, pictures moved and zoomed, pixels read.
 import { directionAt } from "./lights.js";
-import { RELIT, windowOf } from "./looks.js";
+import { isRelit, windowOf } from "./looks.js";
 import { discOf } from "./panes.js";
 
 const MOST_ZOOM = 32;
@@ -67,7 +67,7 @@ function begun(app, event) {
   if (!element) return null;
   const place = Number(element.dataset.place);
   const knob = event.target.closest(".knob");
-  const relit = element.dataset.content === RELIT && app.state.lights.length > 0;
+  const relit = isRelit(element.dataset.content) && app.state.lights.length > 0;
   if (place !== app.state.active) app.change({ active: place });
   if (knob) app.change({ selected: Number(knob.dataset.light) });
   const moves = event.shiftKey || event.button === 1 || event.button === 2 || !relit;

@@ -11,28 +11,44 @@ const MOST_POINTS = 20000;
 
 const MEASURED = ["normals", "albedo", "depth", "residual", "error", "position"]; // what valid is said of
 
+// Which of several results a content or a sequence belongs to: nothing for the first, "r2." for the second.
+export function resultOf(id) {
+  return id.match(/^r\d+\./)?.[0] ?? "";
+}
+
+// The same within its result: "normals" for "r2.normals".
+export function bare(id) {
+  return id.slice(resultOf(id).length);
+}
+
+export function isRelit(content) {
+  return bare(content) === RELIT;
+}
+
 // The things that a pane can show, in the order of the keys 1 to 9.
 export function contentsOf(index) {
-  const own = index.sequences.map((sequence) => ({ id: sequence.id, label: sequence.label, group: sequence.group }));
-  const relit = index.sequences.some((sequence) => sequence.id === "normals");
-  return relit ? [{ id: RELIT, label: "Relit", group: "Results" }, ...own] : own;
+  return index.sequences.flatMap(({ id, label, group }) => {
+    const own = { id, label, group };
+    return bare(id) === "normals" ? [{ id: resultOf(id) + RELIT, label: "Relit", group }, own] : [own];
+  });
 }
 
 export function sequenceOf(app, content) {
-  return app.sequences.get(content === RELIT ? "normals" : content);
+  return app.sequences.get(isRelit(content) ? `${resultOf(content)}normals` : content);
 }
 
 // The ids of all sequences that a pane's content is made from.
 export function needsOf(app, content) {
-  const ids = content === RELIT ? ["normals", "albedo", placeIdOf(app)] : [content];
-  if (app.state.markInvalid && (content === RELIT || MEASURED.includes(content))) ids.push("valid");
-  return ids.filter((id) => id && app.sequences.has(id));
+  const from = resultOf(content);
+  const ids = isRelit(content) ? ["normals", "albedo", placeIdOf(app, from)] : [bare(content)];
+  if (app.state.markInvalid && (isRelit(content) || MEASURED.includes(ids[0]))) ids.push("valid");
+  return ids.filter(Boolean).map((id) => from + id).filter((id) => app.sequences.has(id));
 }
 
 // Where near lights find the surface: in the points, else in the depth, else on a plane.
-function placeIdOf(app) {
+function placeIdOf(app, from) {
   if (!app.state.lights.some((light) => light.near)) return null;
-  return ["position", "depth"].find((id) => app.sequences.has(id)) ?? null;
+  return ["position", "depth"].find((id) => app.sequences.has(from + id)) ?? null;
 }
 
 // The number of a sequence's picture for a place on the scrubbed timeline; null where it has none.
@@ -73,10 +89,10 @@ export function windowOf(app, width, height) {
 
 // The exposure that is kept for the whole clip: the brightest hundredth of the first picture seen lies at 0.8.
 export function baseExposure(app, content, blocks) {
-  const light = content === RELIT ? "albedo" : content;
+  const light = isRelit(content) ? `${resultOf(content)}albedo` : content;
   const family = app.sequences.get(light)?.family ?? light;
-  if (!app.bases.has(family) && blocks[light]?.data) {
-    const [bright] = percentiles(blocks[light], [0.99]);
+  if (!app.bases.has(family) && blocks[bare(light)]?.data) {
+    const [bright] = percentiles(blocks[bare(light)], [0.99]);
     app.bases.set(family, bright > 1e-6 ? WHITE / bright : 1);
   }
   return app.bases.get(family) ?? 1;
@@ -84,21 +100,22 @@ export function baseExposure(app, content, blocks) {
 
 export function rangeOf(app, sequence, blocks) {
   if (sequence.kind !== "heat") return [0, 1];
-  if (!app.ranges.has(sequence.id) && blocks[sequence.id]?.data) {
-    const [low, high] = percentiles(blocks[sequence.id], [0.02, 0.98]);
-    if (high !== undefined) app.ranges.set(sequence.id, [sequence.from_zero ? 0 : low, high]);
+  if (!app.ranges.has(sequence.family) && blocks[bare(sequence.id)]?.data) {
+    const [low, high] = percentiles(blocks[bare(sequence.id)], [0.02, 0.98]);
+    if (high !== undefined) app.ranges.set(sequence.family, [sequence.from_zero ? 0 : low, high]);
   }
-  return app.ranges.get(sequence.id) ?? [0, 1];
+  return app.ranges.get(sequence.family) ?? [0, 1];
 }
 
 const PLANE = { id: null, kind: 0, middle: [0, 0, 0], scale: 1 };
 
 // How a point of the surface is found for near lights, in widths of the picture from the subject's middle.
-function placeOf(app, blocks, ySign, view) {
-  const id = placeIdOf(app);
+function placeOf(app, from, blocks, ySign, view) {
+  const id = placeIdOf(app, from);
   if (!id || !blocks[id]?.data) return PLANE;
-  if (!app.places.has(id)) app.places.set(id, id === "position" ? measured(blocks[id], ySign, view) : relief(blocks[id]));
-  const place = app.places.get(id);
+  const key = from + id;
+  if (!app.places.has(key)) app.places.set(key, id === "position" ? measured(blocks[id], ySign, view) : relief(blocks[id]));
+  const place = app.places.get(key);
   return id === "depth" ? { ...place, scale: app.state.relief } : place;
 }
 
@@ -127,8 +144,8 @@ function measured(block, ySign, { toCamera, origin }) {
 }
 
 // Points as they stand in the file, for showing their numbers as colours.
-function stored(app, block) {
-  const key = "position as stored";
+function stored(app, from, block) {
+  const key = `${from}position as stored`;
   if (!app.places.has(key)) app.places.set(key, measured(block, 1, toCameraOf(null)));
   return app.places.get(key);
 }
@@ -151,16 +168,19 @@ function aroundOf({ around, aroundTurn, aroundStrength }) {
 export function lookOf(app, content, blocks) {
   const sequence = sequenceOf(app, content);
   if (!blocks[sequence.id]?.data) return null;
-  const present = Object.fromEntries(Object.entries(blocks).filter(([, block]) => block?.data));
-  const kind = content === RELIT ? RELIT : sequence.kind;
+  const from = resultOf(content);
+  const own = Object.entries(blocks).filter(([id, block]) => block?.data && resultOf(id) === from);
+  const present = Object.fromEntries(own.map(([id, block]) => [bare(id), block]));
+  const main = bare(sequence.id);
+  const kind = isRelit(content) ? RELIT : sequence.kind;
   const { exposure, channels, lights, specular, exponent, markInvalid } = app.state;
   const ySign = sequence.y === "down" ? -1 : 1;
-  const view = toCameraOf(present[sequence.id].facts);
-  const place = kind === RELIT ? placeOf(app, present, ySign, view) : PLANE;
+  const view = toCameraOf(present[main].facts);
+  const place = kind === RELIT ? placeOf(app, from, present, ySign, view) : PLANE;
   return {
-    kind, sequence, blocks: present, channels, lights, exponent, aspect: app.index.height_px / app.index.width_px,
-    place: kind === "position" ? stored(app, present[sequence.id]) : place, ...view,
-    markInvalid: markInvalid && Boolean(present.valid) && MEASURED.includes(sequence.id),
+    kind, sequence, from, main, blocks: present, channels, lights, exponent, aspect: app.index.height_px / app.index.width_px,
+    place: kind === "position" ? stored(app, from, present[main]) : place, ...view,
+    markInvalid: markInvalid && Boolean(present.valid) && MEASURED.includes(main),
     specular, around: kind === RELIT ? aroundOf(app.state) : null,
     exposure: 2 ** exposure * baseExposure(app, content, present),
     range: rangeOf(app, sequence, present),

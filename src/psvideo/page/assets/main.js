@@ -2,7 +2,7 @@
 import { Source, fromPage, fromServer } from "./source.js";
 import { Loader } from "./loader.js";
 import { openStage } from "./stage.js";
-import { RELIT, contentsOf, lookOf, windowOf } from "./looks.js";
+import { RELIT, contentsOf, isRelit, lookOf, windowOf } from "./looks.js";
 import { buildPanes, paneCount, tellPanes } from "./panes.js";
 import { buildPanel, tellControls, tellLights } from "./panel.js";
 import { MOST_LIGHTS, newLight } from "./lights.js";
@@ -275,8 +275,8 @@ class App {
   }
 
   // Linear light of the relit picture that is shown, as floats; for whoever wants numbers.
-  relitValues() {
-    const look = lookOf(this, RELIT, this.loader.blocks());
+  relitValues(content = RELIT) {
+    const look = lookOf(this, content, this.loader.blocks());
     return this.stage.relitValues(look);
   }
 }
@@ -288,8 +288,10 @@ function scaled(rect, ratio) {
 
 function firstState(app) {
   const ids = app.contents.map(({ id }) => id);
-  const contents = [0, 1, 2, 3].map((place) => ids[Math.min(place, ids.length - 1)]);
-  return { at: 0, playing: false, layout: ids.length > 1 && app.index.kind !== "clip" ? "two" : "one", contents, active: 0, wipe: 0.5, exposure: 0,
+  const relit = ids.filter(isRelit); // of several results, each one's
+  const first = relit.length > 1 ? [...relit, ...ids.filter((id) => !isRelit(id))] : ids;
+  const contents = [0, 1, 2, 3].map((place) => first[Math.min(place, first.length - 1)]);
+  return { at: 0, playing: false, layout: relit.length > 2 ? "four" : ids.length > 1 && app.index.kind !== "clip" ? "two" : "one", contents, active: 0, wipe: 0.5, exposure: 0,
     channels: 0, lights: [newLight([])], selected: 0, specular: 0, exponent: 30, relief: 1, zoom: 1, centre: [0.5, 0.5],
     around: "none", aroundTurn: 0, aroundStrength: 0.6, dragged: false, markInvalid: app.sequences.has("valid") };
 }

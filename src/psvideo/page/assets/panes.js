@@ -1,6 +1,6 @@
 // The panes over the canvas: what each shows, its caption, its legend, and the handles of the lights.
 import { colourAt, paletteOf } from "./palettes.js";
-import { RELIT, numberFor, sequenceOf, windowOf } from "./looks.js";
+import { isRelit, numberFor, resultOf, sequenceOf, windowOf } from "./looks.js";
 
 const COUNTS = { one: 1, two: 2, four: 4, wipe: 2 };
 const HANDLE_REACH = 0.46;
@@ -68,15 +68,16 @@ export function tellPanes(app, blocks) {
     const number = numberFor(app, sequence, app.loader.shown.at);
     const block = blocks[sequence.id];
     element.classList.toggle("active", Number(element.dataset.place) === app.state.active && app.paneElements.length > 1);
-    element.querySelector(".caption").textContent = number === null ? "" : captionOf(sequence, number, block);
+    element.querySelector(".caption").textContent = number === null ? "" : captionOf(app, sequence, number, block);
     tellMessage(element.querySelector(".message"), messageOf(sequence, number, block));
     tellLegend(app, element.querySelector(".legend"), content, sequence);
     tellHandles(app, element, content);
   });
 }
 
-function captionOf(sequence, number, block) {
+function captionOf(app, sequence, number, block) {
   const words = [String(number)];
+  if (app.index.sequences.some(({ id }) => resultOf(id))) words.unshift(sequence.group);
   if (block?.facts.round !== undefined) words.push(`round ${block.facts.round}`);
   if (sequence.kind === "normals" || sequence.kind === "position") {
     words.push(sequence.space === "camera" ? "" : `${sequence.space} space`, sequence.y === "down" ? "y down" : "");
@@ -96,8 +97,8 @@ function tellMessage(element, text) {
 }
 
 function tellLegend(app, element, content, sequence) {
-  const range = app.ranges.get(sequence.id);
-  const shown = content !== RELIT && (sequence.kind === "mask" || (sequence.kind === "heat" && range));
+  const range = app.ranges.get(sequence.family);
+  const shown = !isRelit(content) && (sequence.kind === "mask" || (sequence.kind === "heat" && range));
   element.hidden = !shown;
   if (!shown) return;
   const text = sequence.kind === "mask" ? "mask" : `${range} ${sequence.unit}`;
@@ -144,15 +145,19 @@ export function discOf(app, element) {
   return { middle, radius: HANDLE_REACH * size };
 }
 
+function firstRelit(app) {
+  return app.paneElements.find((element) => isRelit(element.dataset.content));
+}
+
 function tellHandles(app, element, content) {
   const layer = element.querySelector(".handles");
-  const lights = content === RELIT ? app.state.lights : [];
+  const lights = isRelit(content) ? app.state.lights : [];
   const knobs = layer.getElementsByClassName("knob");
   while (knobs.length > lights.length) knobs[knobs.length - 1].remove();
   while (knobs.length < lights.length) layer.append(handle(app));
   const { middle, radius } = discOf(app, element);
   tellDisc(layer, lights.length > 0, middle, radius);
-  layer.querySelector(".disc")?.setAttribute("data-tip", app.state.dragged ? "" : "drag the light");
+  layer.querySelector(".disc")?.setAttribute("data-tip", app.state.dragged || element !== firstRelit(app) ? "" : "drag the light");
   lights.forEach((light, place) => {
     const knob = knobs[place];
     knob.dataset.light = place;

@@ -1,7 +1,7 @@
 // The pixel under the pointer: what every shown quantity says there, and what the new lights make of it.
 import { pixelAt } from "./block.js";
 import { lightUniforms, relitPixel } from "./lights.js";
-import { RELIT, lookOf, windowOf } from "./looks.js";
+import { isRelit, lookOf, resultOf, windowOf } from "./looks.js";
 import { figure } from "./panes.js";
 import { product } from "./matrix.js";
 
@@ -26,20 +26,24 @@ export function tellPixel(app, place) {
   for (const [id, block] of Object.entries(blocks)) {
     if (!block?.data) continue;
     const sequence = app.sequences.get(id);
-    rows.push([sequence.label, pixelAt(block, u, v).map((value) => figure(value)).join("  ") + (sequence.unit ? ` ${sequence.unit}` : "")]);
+    rows.push([named(app, sequence.label, sequence.group), pixelAt(block, u, v).map((value) => figure(value)).join("  ") + (sequence.unit ? ` ${sequence.unit}` : "")]);
   }
-  if (app.panes().includes(RELIT) && blocks.normals?.data) {
-    rows.push(["Relit", relitAt(app, blocks, u, v).map((value) => figure(value)).join("  ")]);
+  for (const content of new Set(app.panes().filter(isRelit))) {
+    const look = lookOf(app, content, blocks);
+    if (!look) continue;
+    const light = relitOf(look, u, v, lightUniforms(app.state.lights)).map((value) => figure(value));
+    rows.push([named(app, "Relit", look.sequence.group), light.join("  ")]);
   }
   list.replaceChildren(...rows.flatMap(([name, value]) => [term("dt", name), term("dd", value)]));
 }
 
-function term(kind, text) {
-  return Object.assign(document.createElement(kind), { textContent: text });
+// What is shown of which result, where there are several.
+function named(app, label, group) {
+  return app.index.sequences.some(({ id }) => resultOf(id)) ? `${label}, ${group}` : label;
 }
 
-function relitAt(app, blocks, u, v) {
-  return relitOf(lookOf(app, RELIT, blocks), u, v, lightUniforms(app.state.lights));
+function term(kind, text) {
+  return Object.assign(document.createElement(kind), { textContent: text });
 }
 
 // Linear light of the pixel at (u, v), as the shader computes it.

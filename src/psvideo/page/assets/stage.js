@@ -121,10 +121,10 @@ class Stage {
     gl.uniform4f(this.uniform("uWindow"), window.x, window.y, window.width, window.height);
     const uses = (name, id) => {
       gl.activeTexture(gl.TEXTURE0 + UNITS[name]);
-      gl.bindTexture(gl.TEXTURE_2D, id && blocks[id] ? this.texture(id, blocks[id], look.quick || look.sharp) : this.empty);
+      gl.bindTexture(gl.TEXTURE_2D, id && blocks[id] ? this.texture(look.from + id, blocks[id], look.quick || look.sharp) : this.empty);
     };
     const relit = look.kind === "relit";
-    uses("uMain", relit ? "normals" : sequence.id);
+    uses("uMain", relit ? "normals" : look.main);
     uses("uAlbedo", relit ? "albedo" : null);
     uses("uValid", look.markInvalid ? "valid" : null);
     uses("uPlace", relit ? look.place.id : null);
@@ -192,7 +192,7 @@ function wayOf(look, linear) {
   const relit = kind === "relit";
   const near = relit && lights.some((light) => light.near);
   return {
-    kind, linear, grey: !relit && blocks[look.sequence.id]?.channels === 1, channels: look.channels,
+    kind, linear, grey: !relit && blocks[look.main]?.channels === 1, channels: look.channels,
     albedo: Boolean(blocks.albedo), valid: look.markInvalid && kind !== "mask" && !linear, place: near ? look.place.kind : 0,
     lights: relit ? lights.length : 0, near, shine: relit && look.specular > 0,
     around: relit && Boolean(look.around),
