@@ -17,7 +17,7 @@ from psvideo.model.coded import Image
 from psvideo.plates.align.brightness import light_of
 from psvideo.plates.align.flow import Codes, Flags, Vectors, comparable, places
 from psvideo.plates.align.moving import SHADING_PX, Followed, Pair, window_of
-from psvideo.plates.align.moving_kernel import AFTER, AT_REST, BEFORE, BOTH, NOWHERE, blend_rows
+from psvideo.plates.align.moving_kernel import AFTER, AT_REST, BEFORE, BOTH, NOWHERE, blend_rows, ways_rows
 from psvideo.plates.align.packed import packed
 from psvideo.plates.align.unsure import unsure_of
 from psvideo.plates.light_plate import LightPlate
@@ -202,14 +202,13 @@ class _Side:
         within = cv2.erode(own, np.ones((5, min(5, own.shape[1])), np.uint8)) > 0
         return cls(plate=plate, within=within, everywhere=bool(within.all()))
 
-    def moved(self, x: Vectors, y: Vectors, wanted: Flags) -> tuple[Image, Flags | np.bool_]:
+    def moved(self, x: Vectors, y: Vectors, within: tuple[float, float]) -> tuple[Image, Flags | np.bool_]:
         """Return the plate at places of its own, and where it was seen there; clipped light stays clipped.
 
-        ``wanted`` says which places count; elsewhere anything may stand.
+        ``within`` are the first and the last row that count; elsewhere anything may stand.
         """
         rows = self.plate.shape[0]
-        used = y if wanted.all() else y[wanted]
-        first, last = (int(np.clip(edge, 0, rows - 1)) for edge in (used.min(), used.max()))
+        first, last = (int(np.clip(edge, 0, rows - 1)) for edge in within)
         first, last = max(first - MARGIN_ROWS, 0), min(last + 1 + MARGIN_ROWS, rows)
         shown, y_shown = self.plate.picture.rows(range(first, last)), y - np.float32(first)
         image = cv2.remap(shown, x, y_shown, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
@@ -241,34 +240,28 @@ def _fill(
 ) -> None:
     """Make one band of rows of the plate at an instant: of its source, and of a guess where that is nowhere."""
     own = ends.nearer
-    rows, cols = seen.shape
-    small = sources[0].shape[::-1]
-    scale_x, scale_y = (np.float32(own / few) for own, few in zip((cols, rows), small, strict=True))
-    x, y = places(band.stop - band.start, cols)
-    y += np.float32(band.start)
-    at = (x + 0.5) / scale_x - np.float32(0.5), (y + 0.5) / scale_y - np.float32(0.5)
-    given, taken = (
-        np.asarray(cv2.remap(source, *at, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE), np.uint8)
-        for source in sources
-    )
+    shape = band.stop - band.start, seen.shape[1]
+    given, taken = np.empty((2, *shape), np.uint8)
+    ways = np.empty((2, 2, *shape), np.float32)
+    within = np.full((2, 2), len(seen), np.float32)
+    spans_s = np.array([0 if side is None else motion.time_s - side.plate.time_s for side in sides], np.float32)
+    ways_rows(*sources, motion.velocity, spans_s, band.start, given, taken, ways, within)
     known = given != NOWHERE
     seen[band] = known & own.pixels_seen[band]
     flowing = (taken != AT_REST) & (taken != NOWHERE)
-    image[band] = own.picture.rows(range(band.start, band.stop))
+    if not flowing.all():
+        image[band] = own.picture.rows(range(band.start, band.stop))
     if not flowing.any():
         return
-    go_x, go_y = (cv2.remap(v, *at, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE) for v in motion.velocity)
     share = float(np.clip(ends.share, 0, 1))
-    weights = np.zeros((2, *taken.shape), np.float32)
+    weights = np.zeros((2, *shape), np.float32)
     moved: list[Image] = []
-    for place, (side, part, alone) in enumerate(zip(sides, (1 - share, share), (BEFORE, AFTER), strict=True)):
-        wanted = (taken == BOTH) | (taken == alone)
-        if side is None or not wanted.any():
+    for side, part, way, rows, weight in zip(sides, (1 - share, share), ways, within, weights, strict=True):
+        if side is None or rows[0] > rows[1]:
             moved.append(np.zeros_like(image[band]))
             continue
-        span_s = np.float32(motion.time_s - side.plate.time_s)
-        found, there = side.moved(x - span_s * scale_x * go_x, y - span_s * scale_y * go_y, wanted)
-        weights[place] = there * np.float32(max(part, 1e-6))
+        found, there = side.moved(*way, within=(float(rows[0]), float(rows[1])))
+        weight[:] = there * np.float32(max(part, 1e-6))
         moved.append(found)
     full = np.array(
         [*(np.inf if side is None else side.plate.saturation for side in sides), own.saturation], np.float32

@@ -88,6 +88,60 @@ def arriving_rows(flow: Floats, share: np.float32, per_s: np.float32, first: int
 
 
 @FUSED.kept
+def ways_rows(
+    source: Codes, guess: Codes, velocity: Floats, spans_s: Floats, first: int, given: Codes, taken: Codes,
+    ways: Floats, within: Floats,
+) -> None:  # fmt: skip
+    """Fill ``given`` and ``taken``, a band of rows of a picture (row, col) from its row ``first`` on, with what coarse
+    ``source`` and ``guess`` say; and ``ways`` (2, 2, row, col), the column and row in the plates before and after that
+    pixels came from and will go to, so many seconds ``spans_s`` (2,) since or, below 0, until then.
+
+    ``velocity`` (2, row, col) is of the coarse pixels, per second. ``within`` (2, 2) becomes the first and last row
+    that is wanted of either plate, infinite where none is; on entry its first number is how many rows the picture has.
+    """
+    own, other, flow, out = lent(source), lent(guess), lent(velocity), lent(ways)
+    cols = given.shape[1]
+    high, wide = _steps((int(within[0, 0]), cols), own.shape)
+    for side in range(2):
+        within[side, 0], within[side, 1] = np.float32(np.inf), -np.float32(np.inf)
+    for row in range(given.shape[0]):
+        y = np.float32(first + row)
+        coarse_y = (y + HALF) / high
+        small_row = min(int(coarse_y), own.shape[0] - 1)
+        at_row = min(max(coarse_y - HALF, ZERO), np.float32(own.shape[0] - 1))
+        top = int(at_row)
+        below, down = min(top + 1, own.shape[0] - 1), at_row - np.float32(top)
+        for col in range(cols):
+            coarse_x = (np.float32(col) + HALF) / wide
+            small_col = min(int(coarse_x), own.shape[1] - 1)
+            given[row, col] = own[small_row, small_col]
+            what = other[small_row, small_col]
+            taken[row, col] = what
+            at_col = min(max(coarse_x - HALF, ZERO), np.float32(own.shape[1] - 1))
+            left = int(at_col)
+            right, across = min(left + 1, own.shape[1] - 1), at_col - np.float32(left)
+            go_x = _level(flow[0], top, below, left, right, down, across) * wide
+            go_y = _level(flow[1], top, below, left, right, down, across) * high
+            for side in range(2):
+                out[side, 0, row, col] = np.float32(col) - spans_s[side] * go_x
+                there = y - spans_s[side] * go_y
+                out[side, 1, row, col] = there
+                if what == BOTH or what == BEFORE + side:
+                    within[side, 0] = min(within[side, 0], there)
+                    within[side, 1] = max(within[side, 1], there)
+
+
+@FUSED.inlined
+def _level(
+    plane: Floats, top: int, below: int, left: int, right: int, down: np.float32, across: np.float32
+) -> np.float32:
+    """A value between four."""
+    upper = plane[top, left] * (ONE - across) + plane[top, right] * across
+    lower = plane[below, left] * (ONE - across) + plane[below, right] * across
+    return upper * (ONE - down) + lower * down
+
+
+@FUSED.kept
 def blend_rows(
     taken: Codes, weights: Floats, before: Floats, after: Floats, full: Floats, seen: Flags, image: Floats
 ) -> None:
