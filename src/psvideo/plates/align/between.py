@@ -260,7 +260,7 @@ def _fill(
         if side is None or rows[0] > rows[1]:
             moved.append(np.zeros_like(image[band]))
             continue
-        found, there = side.moved(*way, within=(float(rows[0]), float(rows[1])))
+        found, there = side.moved(way[0], way[1], (float(rows[0]), float(rows[1])))
         weight[:] = there * np.float32(max(part, 1e-6))
         moved.append(found)
     full = np.array(

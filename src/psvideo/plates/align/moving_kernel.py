@@ -138,7 +138,7 @@ def _level(
     """A value between four."""
     upper = plane[top, left] * (ONE - across) + plane[top, right] * across
     lower = plane[below, left] * (ONE - across) + plane[below, right] * across
-    return upper * (ONE - down) + lower * down
+    return np.float32(upper * (ONE - down) + lower * down)
 
 
 @FUSED.kept

@@ -31,8 +31,8 @@ MOST_FIT_DEG = np.float32(24)
 """What residuals predict counts as no more around a point: a line of rows that went wrong is not its surroundings."""
 LEAST_REACH = np.float32(0.2)
 """Where fewer lights reach, residuals of noise predict more: as if no less than this share of them did."""
-MISFIT_OF_MOTION = 2.0
-"""Residuals predict so many times the angle by which motion turns normals."""
+MOVING_DEG, OF_MOTION = np.float32(0.5), 5
+"""Where motion turns normals by more, over so many points, residuals are its own, and no misfit of rig or surface."""
 LEAST_LIGHTS = 0.02
 """So many lights that do not reach a point, in the mean, must there be for light from around to be known."""
 
@@ -94,14 +94,13 @@ def step_of(shape: tuple[int, ...]) -> int:
 def signs_of(points: ThinSurface, one: Evidence, surface: Surface, turned_deg: Floats | None = None) -> Signs:
     """Return what speaks against the points' normals. ``turned_deg`` is by how much motion turns them, which is no
     misfit of rig or surface."""
-    weight = points.known.astype(np.float32)
-    around = _mean(weight, AROUND)
+    around = _mean(points.known.astype(np.float32), AROUND)
     fit = np.minimum(points.fit_deg, MOST_FIT_DEG)
     sums, counts = _indirect(points, one, surface)
     reach = np.clip(1 - counts / np.float32(len(one.plates)), LEAST_REACH, 1)
     squares = np.where(points.known, fit**2 - (points.fit_of_noise_deg / reach) ** 2, np.float32(0))
     if turned_deg is not None:
-        squares -= (np.float32(MISFIT_OF_MOTION) * turned_deg) ** 2
+        squares *= cv2.blur(turned_deg, (OF_MOTION, OF_MOTION)) < MOVING_DEG
     indirect = np.maximum(_mean(sums, AROUND) / np.maximum(_mean(counts, AROUND), LEAST_LIGHTS), 0)
     own = np.maximum(sums / np.maximum(counts, 1) - 2 * np.radians(points.noise_deg), 0)
     return Signs(
