@@ -187,6 +187,20 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
             "in the scene's space, with the camera of a USD file; a movie for eyes",
             "psvideo normals clip/ --rig rig.toml --space world --camera-to-world shot.usd --preview relit -o out/",
         ),
+        (
+            "all takes of a day by four processes, with one report over all",
+            "psvideo normals takes/* --rig rig.toml --workers 4 -o results/",
+        ),
+    ),
+    "farm": (
+        (
+            "a job of ten pieces for Deadline Cloud, or for openjd here",
+            "psvideo farm clip/ --rig rig.toml --pieces 10 -o job/",
+        ),
+        (
+            "shell commands for any other farm, with options of psvideo normals",
+            "psvideo farm clip/ --rig rig.toml --results out/ --commands -- --aov depth --fps 24",
+        ),
     ),
     "stills": (
         (

@@ -44,6 +44,7 @@ COMMANDS = (
     *_entries(
         SOLVE,
         normals="Write normals, albedo and validity for every round of flashes; does sync and split by itself.",
+        farm="Write a run as a job for a render farm: an Open Job Description, or a list of shell commands.",
         stills="Write normals, albedo and validity of photographs of a still scene, one per light; no plan is needed.",
     ),
     *_entries(

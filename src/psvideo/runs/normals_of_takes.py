@@ -14,7 +14,7 @@ from psvideo.report.of_takes import TakeResult, takes_page, takes_record, worst_
 from psvideo.runs.caller import PYTHON, Caller
 from psvideo.runs.cluster import Cluster, Shared, connected, solved_apart
 from psvideo.runs.normals import normals
-from psvideo.runs.output import MARK
+from psvideo.runs.output import MARK, rounds_of
 from psvideo.sync.open_take import open_take
 
 LEAST_ROUNDS = 128
@@ -136,8 +136,5 @@ def _counts(takes: Sequence[tuple[Path, Path]], workers: int, options: Mapping[s
     """Give into how many pieces each take is cut: enough for all workers, and none too short."""
     for clip, _ in takes:
         take = open_take(clip, plan=path_if_given("plan", options.get("plan")), frames=options.get("frames"))
-        plan = take.plan
-        lasts_s = len(take.numbers) * plan.camera.frame_period_s
-        rounds = lasts_s / plan.cycle_s * len(plan.dark_rounds) if plan.mode != "synced" else len(take.numbers)
         wanted = -(-4 * workers // len(takes))
-        yield max(min(wanted, int(rounds / LEAST_ROUNDS)), 1)
+        yield max(min(wanted, rounds_of(take) // LEAST_ROUNDS), 1)

@@ -83,6 +83,14 @@ def sequence_fps(plan: Plan, rate: Rate | Comb = "round") -> Fraction:
     return Fraction(results * len(plan.dark_rounds) / plan.cycle_s).limit_denominator(100_000)
 
 
+def rounds_of(take: Take) -> int:
+    """Return about how many rounds a take holds."""
+    plan = take.plan
+    if plan.mode == "synced":
+        return len(take.numbers) // len(plan.flashes)
+    return int(len(take.numbers) * plan.camera.frame_period_s / plan.cycle_s * len(plan.dark_rounds))
+
+
 def rate_of(
     fps: str | float | Fraction, plan: Plan, *, shutter: float | None = None, resync: Path | None = None, clip: str = ""
 ) -> Rate | Comb:
