@@ -155,7 +155,9 @@ def motion(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = Fa
         return Judgement(
             subject="motion",
             grade="bad" if share > MUCH_CHANGES and not aligned else "doubtful",
-            found=f"{100 * share:.0f} % of the picture changes from round to round faster than can be followed.",
+            found=f"{100 * share:.0f} % of the picture changes from round to round faster than can be followed, or "
+            "repeats itself meanwhile"
+            + ("; where the plates of a round do not fit together, nothing is trusted." if aligned else "."),
             advice="Move slower, raise the frame rate, or flash fewer lights; if nothing moved, light flickers.",
         )
     speed = float(np.quantile(speeds, OFTEN))
