@@ -10,7 +10,6 @@ import pytest
 from psvideo.compute import spilled
 from psvideo.errors import PsvideoError
 from psvideo.model.rig import Light
-from psvideo.solve.filling import filled
 from psvideo.solve.normals.illumination import illumination
 from psvideo.solve.normals.solving import Solving
 
@@ -36,7 +35,6 @@ def test_a_picture_that_is_worked_on_in_files_gives_the_same_surface(
     solving = Solving(half=True, error=True, residual=True, spare=tmp_path)
     held = solving.solve(plates_of(lights), lit)
     monkeypatch.setattr(spilled, "LARGE_PIXELS", 100)
-    monkeypatch.setattr(filled, "AT_A_TIME", 7)
     found = solving.solve(plates_of(lights), lit)
     assert held.source is not None
     assert (held.source > 1).any(), "something is filled"

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from psvideo.compute.spilled import let_go, planes_for
 from psvideo.model.surface import MEASURED, NO_LIGHT, ONE_LIGHT, TWO_LIGHTS, Surface
-from psvideo.solve.filling.growing import COURSE, LEFT_ALONE, SOLVED, THREE_LIGHTS, UNKNOWN, Picture, grow, queue_for
+from psvideo.solve.filling.growing import LEFT_ALONE, SOLVED, THREE_LIGHTS, UNKNOWN, Picture, grow, queue_for
 from psvideo.solve.filling.looking import Said, count_rows, look_rows, room_for
 from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.kernel import working_memory
@@ -27,8 +27,6 @@ root of the distance from it over the longer side of the picture. On the virtual
 four lights, a bear and a cat (DiLiGenT)."""
 THIN = 4
 """What is typical is looked for in every fourth row and column."""
-AT_A_TIME = 1 << 18
-"""So many pixels are filled before what a large picture was held in meanwhile is let go."""
 CLASSES = np.array([NO_LIGHT, ONE_LIGHT, TWO_LIGHTS, MEASURED], np.uint8)
 
 
@@ -53,9 +51,7 @@ def filled(surface: Surface, one: Evidence, *, solved: Mask, noise: float, threa
     planes, channels = np.moveaxis(surface.normals, -1, 0), _channels(surface.albedo)
     picture = Picture(normals=_bits(planes), albedo=_bits(channels), places=index, lights=lights)
     away = np.zeros(len(where), np.float32)
-    queue, course = queue_for(len(where)), np.zeros(COURSE, np.int64)
-    while grow(picture, said, where, queue, away, course, AT_A_TIME):
-        let_go(*planes, *channels, index)
+    grow(picture, said, where, queue_for(len(where)), away)
     let_go(*planes, *channels, index)
     source[wanted] = CLASSES[np.minimum(lights[wanted], THREE_LIGHTS)]
     return replace(surface, source=source, error_deg=_errors(surface, where, lights[wanted], away))

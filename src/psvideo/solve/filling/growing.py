@@ -28,7 +28,6 @@ MOST_STEPS = np.float32(50)
 UNCOLOURED = np.float32(0.01)  # the square of what is not known of the colour of a pixel without light
 ONWARD = np.float32(0.7)  # how far neighbours' bend is taken on: all of it would burst from noise
 FOREVER = 1 << 30
-COURSE = 5  # numbers by which a call goes on where the last one left off
 SOLVED, LEFT_ALONE = -1, -2  # of Picture.places
 THREE_LIGHTS, UNKNOWN = 3, 9  # of Picture.lights
 
@@ -72,30 +71,21 @@ WINDOW = np.exp(
 
 
 @FUSED.kept
-def grow(
-    picture: Picture, said: Said, where: NDArray[np.int32], queue: Queue, away: Floats, course: NDArray[np.int64],
-    most: int,
-) -> bool:  # fmt: skip
+def grow(picture: Picture, said: Said, where: NDArray[np.int32], queue: Queue, away: Floats) -> None:
     """Fill the pixels ``where`` (pixel, 2: row and column) of the picture, nearest first; for one thread.
 
-    ``away`` (pixel,) takes a pixel's distance from what is solved, in pixels of its own colour. So many pixels are
-    filled at a time, ``most``; returned is whether any is left. ``course`` (COURSE,), zeros at first, is where a call
-    leaves off for the next one.
+    ``away`` (pixel,) takes a pixel's distance from what is solved, in pixels of its own colour.
     """
     p = Picture(lent(picture.normals), lent(picture.albedo), lent(picture.places), lent(picture.lights))
     s = Said(lent(said.reached), lent(said.bright), lent(said.towards), lent(said.colour), said.noise)
     q = Queue(lent(queue.heads), lent(queue.following), lent(queue.pixels), lent(queue.distance))
     places, out = lent(where), lent(away)
-    begun, now, waiting, pushed, filled = course[0], course[1], course[2], course[3], 0
-    if course[4] == 0:
-        for pixel in range(len(places)):
-            pushed = _push_start(p, s, places, q, pixel, pushed)
-        waiting, course[4] = pushed, 1
+    pushed = 0
+    for pixel in range(len(places)):
+        pushed = _push_start(p, s, places, q, pixel, pushed)
+    begun, now, waiting = 0, 0, pushed
     while True:
         while waiting > 0:
-            if filled == most:
-                course[0], course[1], course[2], course[3] = begun, now, waiting, pushed
-                return True
             entry = q.heads[now % BUCKETS]
             if entry < 0:
                 now += 1
@@ -108,14 +98,13 @@ def grow(
                 continue
             _estimate(p, s, row, col, pixel)
             out[pixel] = np.float32(now) / np.float32(STEP)
-            filled += 1
             before = pushed
             pushed = _push_around(p, s, places, q, pixel, now, pushed)
             waiting += pushed - before
         while begun < len(places) and p.lights[places[begun, 0], places[begun, 1]] != UNKNOWN:
             begun += 1
         if begun == len(places):
-            return False
+            return
         q.distance[begun] = now
         pushed = _push(q, begun, now, pushed)
         waiting = 1
