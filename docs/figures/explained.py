@@ -107,8 +107,7 @@ def gallery_depth(folder: Path) -> Figure:
 
 def _lit(out: Path, light: tuple[float, float, float], colour: tuple[float, float, float]) -> Pixels:
     normals, albedo = exr(out / "normals"), exr(out / "albedo")
-    valid = exr(out / "valid") > 0
-    plain = Surface(normals=normals, albedo=albedo, residual=np.zeros(valid.shape, np.float32), valid=valid)
+    plain = Surface(normals=normals, albedo=albedo, residual=None, valid=albedo.max(axis=-1) > 0)
     return srgb(relight(plain, light, colour=colour), exposure=BRIGHT)
 
 
