@@ -1,7 +1,7 @@
 """Make docs/pictures/whole_bust.png: ``python -m bench.whole_pictures``.
 
-The demo's bust under three lights: what they measure alone, and the whole of it, with how every pixel got its normal and
-how far off that is. Errors run from 0 (dark) to 30 degrees (yellow); grey is measured, or not the subject.
+The demo's bust under three lights: what they measure alone, and the whole of it, with how every pixel got its normal
+and how far off that is. Errors run from 0 (dark) to 30 degrees (yellow); grey is measured, or not the subject.
 """
 
 import cv2
@@ -33,7 +33,8 @@ def main() -> None:
     case, _ = bust(LIGHTS)
     whole = Solving(error=True).solve(case.plates, case.lit)
     alone = Solving(fill=False).solve(case.plates, case.lit)
-    assert whole.source is not None and whole.error_deg is not None
+    assert whole.source is not None
+    assert whole.error_deg is not None
     filled = case.mask & (whole.source > MEASURED)
     off = np.zeros(case.mask.shape)
     off[filled] = angles_deg(whole.normals[filled], case.truth[filled])

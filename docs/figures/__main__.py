@@ -7,12 +7,11 @@ from pathlib import Path
 import cv2
 from docs.figures.explained import EXPLAINED
 from docs.figures.faults import FAULTS
-from docs.figures.over_time import OVER_TIME
 from docs.figures.python_page import PYTHON
 from docs.figures.staging import PICTURES
 from docs.figures.turning import TURNING
 
-FIGURES = EXPLAINED | FAULTS | OVER_TIME | PYTHON | TURNING
+FIGURES = EXPLAINED | FAULTS | PYTHON | TURNING
 
 
 def main(names: list[str]) -> None:

@@ -1,12 +1,13 @@
-"""The figure of docs/gallery.md that shows whole maps over time: the bust turning, relit picture by picture."""
+"""Make docs/pictures/gallery_turning.png, whole maps over time: ``python -m bench.film_picture``."""
 
+import tempfile
 import tomllib
-from collections.abc import Callable
 from pathlib import Path
 
+import cv2
 import numpy as np
 import tomlkit
-from docs.figures.staging import Figure, Image, exr, figure, psvideo, row
+from docs.figures.staging import PICTURES, Figure, Image, exr, figure, psvideo, row
 
 from psvideo.model.surface import Surface
 from psvideo.pictures.relighting import normal_colours, relight, srgb
@@ -16,6 +17,8 @@ TURN_DEG_PER_S = 40.0
 """At 120 frames a second and five lights: a quarter of a pixel from flash to flash."""
 SMALL = {"width_px": 320, "height_px": 180}
 FRAMES, SHOWN = 96, 6
+MIDDLE = slice(90, 230)
+"""The columns around the bust."""
 LAMP, FILL = (0.8, 0.35, 0.5), (-0.7, 0.3, 0.6)
 
 
@@ -27,22 +30,35 @@ def gallery_turning(folder: Path) -> Figure:
     scene["object"][0] |= {"motion": {"axis": [0.0, 1.0, 0.0], "spin_deg_per_s": TURN_DEG_PER_S}}
     folder.mkdir(parents=True)
     (folder / "scene.toml").write_text(tomlkit.dumps(scene), encoding="utf-8")
-    said = psvideo("synth", folder / "scene.toml", "-o", folder / "clip")
     clip, out = folder / "clip", folder / "out"
-    said += psvideo("normals", clip, "--rig", clip / "rig.toml", "-o", out, "--aov", "source")
+    said = psvideo("synth", folder / "scene.toml", "-o", clip)
+    said += psvideo("normals", clip, "--rig", clip / "rig.toml", "-o", out)
+    return shown(out, said)
+
+
+def shown(out: Path, said: str) -> Figure:
+    """Return the picture of a folder of results."""
     count = len(sorted((out / "normals").glob("*.exr")))
     places = np.linspace(0, count - 1, SHOWN).round().astype(int)
-    lit = [(f"result {place + 1}", srgb(_lit(out, place), exposure=1.5)) for place in places]
-    seen = [("", normal_colours(exr(out / "normals", place))) for place in places]
+    lit = [(f"result {place + 1}", srgb(_lit(out, place), exposure=1.5)[:, MIDDLE]) for place in places]
+    seen = [("", normal_colours(exr(out / "normals", place))[:, MIDDLE]) for place in places]
     return figure([row("A bust that turns, relit result by result", *lit), row("Its normals", *seen)], said)
 
 
 def _lit(out: Path, place: int) -> Image:
     normals, albedo = exr(out / "normals", place), exr(out / "albedo", place)
-    shown = albedo.max(axis=-1) > 0
-    surface = Surface(normals=normals, albedo=albedo, residual=None, valid=shown)
+    surface = Surface(normals=normals, albedo=albedo, residual=None, valid=albedo.max(axis=-1) > 0)
     return relight(surface, LAMP) + relight(surface, FILL, strength=0.35, colour=(0.62, 0.8, 1.0))
 
 
-OVER_TIME: dict[str, Callable[[Path], Figure]] = {"gallery_turning": gallery_turning}
-"""By the picture's name: docs/pictures/NAME.png."""
+def main() -> None:
+    """Write the picture, and print what psvideo said."""
+    with tempfile.TemporaryDirectory() as folder:
+        made = gallery_turning(Path(folder) / "film")
+    path = PICTURES / "gallery_turning.png"
+    cv2.imwrite(str(path), made.picture[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 9])
+    print(made.said)
+
+
+if __name__ == "__main__":
+    main()
