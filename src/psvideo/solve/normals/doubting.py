@@ -45,7 +45,8 @@ class Doubting:
         m^(1 + power) / (m + little) of these degrees: true errors depend less on how well the lights lie, and on how
         many there are, than what residuals predict; where it is little it is noise.
     indirect: how much of the angle counts by which light from around would turn the normal.
-    per_torn: by which share more it is where normals belong to no surface by a degree, with its root.
+    per_torn, most_torn_deg: by which share more it is where normals belong to no surface by a degree, with its root, up
+        to so many: along the outline of a thing before another there is more, and normals are as good as elsewhere.
 
     Fitted, with ``Judging.fit_share``, on a ball, a bear and a cat (DiLiGenT), a sphere with a wrong rig (Washington),
     another renderer's bunny, and eight virtual shapes of six materials, under 5 to 96 lights. Each subject left out and
@@ -57,6 +58,7 @@ class Doubting:
     little_deg: float = 1.2
     indirect: float = 1.0
     per_torn: float = 0.6
+    most_torn_deg: float = 3.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,7 +117,8 @@ def doubt_deg(signs: Signs, *, how: Doubting = Doubting()) -> Floats:
     misfit = np.float32(how.misfit_deg) * signs.misfit_deg ** np.float32(1 + how.misfit_power)
     misfit /= signs.misfit_deg + np.float32(how.little_deg)
     both = np.hypot(misfit, np.float32(how.indirect) * signs.indirect_deg)
-    return np.asarray(both * (1 + np.float32(how.per_torn) * np.sqrt(signs.torn_deg)), np.float32)
+    torn = np.minimum(signs.torn_deg, np.float32(how.most_torn_deg))
+    return np.asarray(both * (1 + np.float32(how.per_torn) * np.sqrt(torn)), np.float32)
 
 
 def _turned(surface: Surface, one: Evidence) -> Floats:
