@@ -4,12 +4,15 @@ import hashlib
 import itertools
 import json
 import shutil
+import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
+import psutil
 import pytest
 from numpy.typing import NDArray
 
@@ -269,6 +272,26 @@ def test_two_workers_give_the_bytes_of_one_process_and_takes_one_report(tmp_path
     assert digest(tmp_path / "all" / "clip") == digest(tmp_path / "one" / "clip")
     assert judged(tmp_path / "all" / "clip") == judged(tmp_path / "one" / "clip")
     assert "dark: could not be solved." in (tmp_path / "all" / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.campaign
+def test_a_worker_that_is_killed_is_replaced_and_its_piece_done_again(tmp_path: Path) -> None:
+    clip = filmed(tmp_path, frames=160)
+    ps.normals(clip, out=tmp_path / "one" / "clip", rig=clip / "rig.toml", preview=())
+    given = [str(clip), "--rig", str(clip / "rig.toml"), "-o", str(tmp_path / "two" / "clip"), "--no-preview", "-q"]
+    command = [sys.executable, "-m", "psvideo.cli.app", "normals", *given, "--workers", "2"]
+    running = subprocess.Popen(command)
+    notes = tmp_path / "two" / ".clip.partial" / ".pieces"
+    until_s = time.monotonic() + 300
+    while not (notes / "timing.json").is_file() and time.monotonic() < until_s:
+        time.sleep(0.05)
+    workers = psutil.Process(running.pid).children(recursive=True)
+    busy = [one for one in workers if any("spawn_main" in word for word in one.cmdline())]
+    assert len(busy) >= 2
+    busy[0].kill()
+    assert running.wait(timeout=300) == 0
+    assert digest(tmp_path / "two" / "clip") == digest(tmp_path / "one" / "clip")
+    assert judged(tmp_path / "two" / "clip") == judged(tmp_path / "one" / "clip")
 
 
 def test_what_cannot_be_shared_is_refused_in_a_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,121 @@
+"""Many machines: what the scheduler costs where workers only sleep, and by how much two workers beat one.
+
+``python -m bench.farm`` prints both. Sleeping workers are threads of this process, and their pieces take no time to
+speak of, so that what is left is dask's own work for every piece. The speed-up is of takes in compressed frames.
+"""
+
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from psvideo.runs import cluster
+from psvideo.runs.cluster import Shared, solved_apart
+from psvideo.runs.normals_of_takes import normals_of_takes
+from psvideo.synth.shoot import shoot
+
+TAKES, PIECES, WORKERS = 1000, 5, 20
+SLEEPS_S = 0.001
+SCENE = """
+schema = "psvideo-scene/1"
+name = "farm"
+frames = 48
+camera = { width_px = 480, height_px = 270, fps = 100, shutter_deg = 360, readout_s = 0.0097, width_m = 1.0 }
+ambient = { level = 0.02 }
+object = [{ mesh = "sphere" }]
+light = [
+  { name = "a", direction = [0.5, 0.0, 0.8] },
+  { name = "b", direction = [-0.5, 0.1, 0.8] },
+  { name = "c", direction = [0.1, 0.5, 0.8] },
+]
+"""
+
+
+class Overhead(NamedTuple):
+    """What so many pieces of so many takes cost the scheduler with so many workers, if they only sleep."""
+
+    takes: int
+    pieces: int
+    workers: int
+    seconds: float
+    ms_per_piece: float
+
+
+class SpeedUp(NamedTuple):
+    """How long takes last with one worker and with two, each with one thread."""
+
+    takes: int
+    one_s: float
+    two_s: float
+    times: float
+
+
+def asleep(take: Shared, number: int, *, after: object) -> int:
+    """Stand for a piece that is solved."""
+    time.sleep(SLEEPS_S)
+    return number
+
+
+def overhead(takes: int = TAKES, pieces: int = PIECES, workers: int = WORKERS) -> Overhead:
+    """Measure what dask does for pieces that take no time."""
+    from distributed import Client, LocalCluster
+
+    shared = [Shared(clip=Path(f"take{n}"), out=Path(f"out{n}"), pieces=pieces, options={}) for n in range(takes)]
+    solve, cluster.solve_piece = cluster.solve_piece, asleep
+    began_s = time.process_time()
+    try:
+        with (
+            LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                processes=False,
+                memory_limit=0,
+                dashboard_address="127.0.0.1:0",
+            ) as local,
+            Client(local, set_as_default=False) as client,
+        ):
+            began_s = time.process_time()
+            faults = [fault for _, fault in solved_apart(client, shared) if fault]
+            lasted_s = time.process_time() - began_s
+    finally:
+        cluster.solve_piece = solve
+    if faults:
+        raise RuntimeError(faults[0])
+    count = takes * (pieces + 1)
+    return Overhead(takes, pieces, workers, lasted_s, 1e3 * lasted_s / count)
+
+
+def speed_up(takes: int = 4) -> SpeedUp:
+    """Solve takes with one worker and with two, each of one thread."""
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        (folder / "farm.toml").write_text(SCENE, encoding="utf-8")
+        for n in range(takes):
+            shoot(folder / "farm.toml", folder / f"take{n}")
+        clips = [folder / f"take{n}" for n in range(takes)]
+        lasted_s = []
+        for workers in (1, 1, 2):  # the first one compiles
+            began_s = time.monotonic()
+            normals_of_takes(
+                clips, rig=clips[0] / "rig.toml", out=folder / "out", workers=workers, force=True, preview=()
+            )
+            lasted_s.append(time.monotonic() - began_s)
+    return SpeedUp(takes, lasted_s[1], lasted_s[2], lasted_s[1] / lasted_s[2])
+
+
+def rows() -> Iterator[Overhead]:
+    """Measure the scheduler."""
+    yield overhead()
+
+
+def main() -> int:
+    """Print both."""
+    print(overhead(), flush=True)
+    print(speed_up(), flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
