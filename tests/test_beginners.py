@@ -161,6 +161,17 @@ def angles(_: Path, lights: Path) -> None:
     lights.write_text("\n".join(["6", *(f"{name}.png,{place * 60},60" for place, name in enumerate(NAMES))]))
 
 
+def angles_and_distance(_: Path, lights: Path) -> None:
+    lights.write_text("\n".join(["6", *(f"{name}.png {place * 60} 60 1" for place, name in enumerate(NAMES))]))
+
+
+def jpegs_called_png(folder: Path, _: Path) -> None:
+    for file in folder.iterdir():
+        save(file.with_suffix(".jpg"), np.full((64, 64), 0.5), codes=255)
+        file.with_suffix(".jpg").replace(file)
+        file.write_bytes(file.read_bytes() + file.name.encode())
+
+
 PHOTOGRAPHS: dict[str, tuple[Spoil, str]] = {
     "one picture only": (only("shot 3"), "holds 1 picture of lights (shot 3.png). Normals need three at least"),
     "two pictures": (only("shot 3", "shot 7"), "Normals need three at least, each under another light"),
@@ -169,6 +180,8 @@ PHOTOGRAPHS: dict[str, tuple[Spoil, str]] = {
     "one picture under two names": (one_twice, "shot 3.png and shot 7.png are one and the same picture"),
     "decimal commas": (rewritten(lambda text: text.replace(".", ",")), "Expected numbers with points, such as 0.5"),
     "angles": (angles, "expected three numbers x y z of a direction"),
+    "angles and a distance": (angles_and_distance, "such as 0 60 1, look like angles in degrees"),
+    "JPEGs called PNG": (jpegs_called_png, "does not begin like a PNG file, but like JPEG. Give it the ending .jpg"),
     "z away from the camera": (
         rewritten(lambda text: text.replace(" 0.8", " -0.8")),
         "every light stands behind the subject (z is -0.87 at most)",
@@ -186,6 +199,19 @@ def test_photographs_and_lists_that_cannot_be_meant_are_refused_before_any_work(
     assert expected in str(fault.value)
     assert "\n" not in str(fault.value)
     assert not (tmp_path / "out").exists()
+
+
+def test_folders_with_spaces_and_umlauts_and_lists_with_windows_line_ends_are_read(tmp_path: Path) -> None:
+    folder, lights = photographs(tmp_path / "Fotos für Ärzte", lit()), listed(tmp_path / "Lichter 1.lp")
+    lights.write_bytes(b"\xef\xbb\xbf" + lights.read_bytes().replace(b"\n", b"\r\n"))
+    report = ps.stills(folder, lights=lights, out=tmp_path / "Ergebnis für später")
+    assert [light.name for light in report.lights] == NAMES
+
+
+def test_a_list_in_utf_16_is_named_so(tmp_path: Path) -> None:
+    (tmp_path / "lights.lp").write_text("1\n0 0 1\n", encoding="utf-16")
+    with pytest.raises(ps.PsvideoError, match=r"lights\.lp: is text in UTF-16\. Save it as UTF-8"):
+        ps.read_rig(tmp_path / "lights.lp")
 
 
 def test_a_table_with_semicolons_is_read_as_it_is_meant(tmp_path: Path) -> None:

@@ -327,5 +327,5 @@ def test_kinds_of_content_that_are_not_read_say_what_is(tmp_path: Path) -> None:
     with pytest.raises(PsvideoError, match="MINISWHITE"):
         decode("tiff", tmp_path / "white.tif")
     (tmp_path / "x.png").write_bytes(imagecodecs.jpeg8_encode(np.zeros((8, 8), np.uint8)))
-    with pytest.raises(PsvideoError, match="does not begin like a PNG"):
+    with pytest.raises(PsvideoError, match=r"does not begin like a PNG file, but like JPEG\. Give it the ending \.jpg"):
         decode("png", tmp_path / "x.png")

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from psvideo.calibrate.light_pictures import AMBIENT_NAMES, MASK_NAMES, ROOM_NAMES, LightFiles
-from psvideo.clip.folder import KINDS, number_of, unread_in
+from psvideo.clip.folder import KINDS, USUAL_KINDS, number_of, unread_in
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.contract import check_light_name
 from psvideo.formats.plan_toml import FRAMES
@@ -89,7 +89,7 @@ def _instead(folder: Path) -> str:
     """Say what was expected of a folder without pictures, and what may have been meant."""
     if (folder / FRAMES).is_dir() and (folder / "plan.toml").is_file():
         return "It is a clip with its plan: psvideo normals takes it."
-    kinds = ", ".join(sorted(KINDS))
+    kinds = ", ".join(USUAL_KINDS)
     expected = f"Expected still photographs, one per light ({kinds}), or a folder of plates per light."
     return f"{expected} {unread_in(folder)}".rstrip()
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from psvideo.clip import demosaic, parse_range
 from psvideo.clip.decode.decoders import decode
-from psvideo.clip.folder import KINDS
+from psvideo.clip.folder import KINDS, USUAL_KINDS
 from psvideo.clip.linear import linear_light
 from psvideo.clip.reading import looks
 from psvideo.clip.transfer import usual_transfer
@@ -203,7 +203,7 @@ def read_picture(path: Path, encoding: Encoding = Encoding()) -> tuple[NDArray[n
     Raises PsvideoError where it cannot be read.
     """
     if path.suffix.lower() not in KINDS or not path.is_file():
-        raise PsvideoError(f"{path}: is no picture that can be read; expected one of {', '.join(KINDS)}.")
+        raise PsvideoError(f"{path}: is no picture that can be read; expected one of {', '.join(USUAL_KINDS)}.")
     picture = decode(KINDS[path.suffix.lower()], path)
     image = linear_light(picture, encoding)
     if not np.isfinite(image).all():

@@ -21,6 +21,8 @@ KINDS = {
 }
 RAWS = ("dng", "raw")
 """Kinds that hold the sensor's own values: linear, with the levels and colour filters that the file states."""
+USUAL_KINDS = (*sorted(ending for ending, kind in KINDS.items() if kind != "raw"), "cameras' raw files")
+"""What messages list."""
 MOVIES = (".mov", ".mp4", ".mkv", ".mxf")
 TO_PICTURES = "export the pictures as 16-bit TIFF, PNG or DNG; a phone's camera can be set to JPEG or raw"
 TO_FOOTAGE = "export it with its maker's program, as DNG, EXR or ProRes"
@@ -114,7 +116,7 @@ def _nothing(folder: Path, images: list[Path]) -> str:
     if movies:
         return f"holds a movie and no numbered images. Name the movie itself: {folder / movies[0]}"
     found = f"holds images without a number at the end of the name ({images[0].name})" if images else "holds no images"
-    kinds = ", ".join(sorted(KINDS))
+    kinds = ", ".join(USUAL_KINDS)
     said = f"{found}; expected numbered frames such as name.0001.png ({kinds}) here or in frames/."
     return f"{said} {_instead(folder)}".rstrip()
 

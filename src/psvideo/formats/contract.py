@@ -57,10 +57,12 @@ def read_text(path: Path) -> str:
     try:
         if path.stat().st_size > MOST_BYTES:
             raise PsvideoError(f"{path}: is too large for a text that psvideo reads. Name the file that is meant.")
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8-sig")  # without the mark that Windows puts first
     except FileNotFoundError:
         raise PsvideoError(f"{path}: there is no such file. Check the name, or write the file first.") from None
     except UnicodeDecodeError as fault:
+        if path.read_bytes()[:2] in (b"\xff\xfe", b"\xfe\xff"):
+            raise PsvideoError(f"{path}: is text in UTF-16. Save it as UTF-8.") from None
         raise PsvideoError(f"{path}: is no text (byte {fault.start} is none of UTF-8). Name another file.") from None
     except OSError as fault:
         raise PsvideoError(f"{path}: cannot be read as text ({fault}). Check the file and its permissions.") from fault

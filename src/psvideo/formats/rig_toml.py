@@ -16,6 +16,7 @@ from pydantic import Field, field_validator, model_validator
 
 from psvideo.errors import PsvideoError
 from psvideo.formats.contract import Contract, check_light_name, parse_toml, read_text
+from psvideo.formats.list_rows import counted, refuse_angles
 from psvideo.formats.paths import path_of
 from psvideo.model.rig import Light, Rig, Vector
 
@@ -135,7 +136,7 @@ def read_rig(path: Path | str, *, plan_lights: Sequence[str] = ()) -> Rig:
         return _in_front(parse_rig(text, source=str(path)), path)
     rows = _numbers(path, text)
     if path.suffix == ".lp" or len(rows[0]) == 1:
-        rows = _counted(path, rows)
+        rows = counted(path, rows)
     if not rows:
         raise PsvideoError(f"{path}: says that it lists 0 lights; expected a line for every light.")
     short = next((place for place, row in enumerate(rows, start=1) if len(row) < 3), None)
@@ -150,6 +151,7 @@ def read_rig(path: Path | str, *, plan_lights: Sequence[str] = ()) -> Rig:
         raise PsvideoError(
             f"{path}: vector {int(np.argmin(lengths)) + 1} has no length; expected directions to lights."
         )
+    refuse_angles(path, vectors)
     beside = _diligent_strengths(path, len(rows))
     strengths = [tuple(row[3:6]) if len(row) == 6 else strength for row, strength in zip(rows, beside, strict=True)]
     names = _names(path, len(rows), plan_lights)
@@ -233,19 +235,6 @@ def is_number(word: str) -> bool:
         return bool(np.isfinite(float(word)))
     except ValueError:
         return False
-
-
-def _counted(path: Path, rows: list[list[float]]) -> list[list[float]]:
-    """Take the count off the top of a list and hold the list against it."""
-    count, vectors = rows[0][0], rows[1:]
-    if len(rows[0]) != 1 or count != len(vectors):
-        raise PsvideoError(
-            f"{path}: the first line says {rows[0]}, and {len(vectors)} lines follow; expected their count."
-        )
-    vectors = [row[-3:] for row in vectors]
-    if any(len(row) != 3 for row in vectors):
-        raise PsvideoError(f"{path}: expected three numbers x y z of a direction in every line after the first.")
-    return vectors
 
 
 def _diligent_strengths(path: Path, count: int) -> list[tuple[float, ...]]:

@@ -103,6 +103,8 @@ def sphere_lights(
         rig = replace(rig, plane=_plane_of(sightings, radius_m or 0.0))
     near = sum(light.position_m is not None for light in rig.lights)
     what = f"{near} near, with positions" if near else "as directions"
+    if not near and radius_m is not None and len(sightings) > 1:
+        what += ", as no light is so near that its rays cross in one point"
     note = f"{len(rig.lights)} of {len(found.lights)} lights were measured on {_spheres(len(sightings))}, {what}."
     whose = ", ".join(Path(one.called).name if isinstance(one, Place) else one.name for one in places)
     return KnownLights(

@@ -7,6 +7,7 @@ import av
 import numpy as np
 
 from psvideo.clip.decode.ffmpeg_planes import planes
+from psvideo.clip.decode.signatures import begins_like
 from psvideo.clip.record import CodedPicture, Header
 from psvideo.errors import PsvideoError
 
@@ -40,7 +41,7 @@ def _parse_header(path: Path, data: bytes) -> tuple[Header, int]:
     """Return what the header says, and where the picture's data end."""
     order = BYTE_ORDERS.get(data[:4])
     if order is None or len(data) < 2048:
-        raise PsvideoError(f"{path}: does not begin like a DPX file. Copy it again, or give it the name of its kind.")
+        raise PsvideoError(f"{path}: does not begin like a DPX file{begins_like(data)}.")
     offset, width_px, height_px = (struct.unpack_from(order + "I", data, at)[0] for at in (4, 772, 776))
     descriptor, bits = data[800], data[803]
     packing, encoding = struct.unpack_from(order + "HH", data, 804)

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import imagecodecs
 
+from psvideo.clip.decode.signatures import begins_like
 from psvideo.clip.record import CodedPicture, Header
 from psvideo.errors import PsvideoError
 
@@ -28,6 +29,8 @@ def decode(path: Path) -> CodedPicture:
 def _parse_header(path: Path, data: bytes) -> Header:
     if data.startswith(START) and END not in data[-TAIL:]:
         raise PsvideoError(f"{path}: ends before its end marker: it is truncated. Copy it again.")
+    if data[:2] != START:
+        raise PsvideoError(f"{path}: does not begin like a JPEG file{begins_like(data)}.")
     place = 2
     while data.startswith(START) and place + 9 < len(data):
         marker = data[place + 1]

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import imagecodecs
 
+from psvideo.clip.decode.signatures import begins_like
 from psvideo.clip.record import CodedPicture, Header
 from psvideo.errors import PsvideoError
 
@@ -38,7 +39,7 @@ def decode(path: Path) -> CodedPicture:
 
 def _parse_header(path: Path, data: bytes, tail: bytes) -> Header:
     if len(data) < 33 or not data.startswith(SIGNATURE) or data[12:16] != b"IHDR":
-        raise PsvideoError(f"{path}: does not begin like a PNG file. Copy it again, or give it the name of its kind.")
+        raise PsvideoError(f"{path}: does not begin like a PNG file{begins_like(data)}.")
     if END not in tail:
         raise PsvideoError(f"{path}: ends before its last chunk (IEND): it is truncated. Copy it again.")
     width_px, height_px, bits, colour_type = struct.unpack(">IIBB", data[16:26])
