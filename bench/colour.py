@@ -47,14 +47,15 @@ def rows() -> Iterator[Line]:
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         rig = _measured_rig(folder)
-        scene = _scene("colour", 160)
+        scene = scene_of("colour", 160)
         yield _crosstalk(scene, folder, rig)
         yield _standing(scene, folder, rig)
-        yield _moving("fan, 720 turns a minute, painted grey", _fan(grey=True), folder, rig)
-        yield _moving("fan, 720 turns a minute, in its own colours", _fan(grey=False), folder, rig)
+        yield _moving("fan, 720 turns a minute, painted grey", fan_scene(grey=True), folder, rig)
+        yield _moving("fan, 720 turns a minute, in its own colours", fan_scene(grey=False), folder, rig)
 
 
-def _scene(name: str, width_px: int) -> dict[str, Any]:
+def scene_of(name: str, width_px: int) -> dict[str, Any]:
+    """Return a scene of the repository, smaller and shorter."""
     scene: dict[str, Any] = tomlkit.parse(builtin_scene(name).read_text(encoding="utf-8")).unwrap()
     camera = scene["camera"]
     camera["height_px"] = round(camera["height_px"] * width_px / camera["width_px"])
@@ -63,9 +64,9 @@ def _scene(name: str, width_px: int) -> dict[str, Any]:
     return scene
 
 
-def _fan(*, grey: bool) -> dict[str, Any]:
+def fan_scene(*, grey: bool) -> dict[str, Any]:
     """Return the fan under the lamps of the scene of colours."""
-    fan, coloured = _scene("fan", 144), _scene("colour", 144)
+    fan, coloured = scene_of("fan", 144), scene_of("colour", 144)
     fan["frames"], fan["ambient"] = 20, {"level": 0.0}
     fan["light"] = coloured["light"]
     fan["strobe"] = {"clock_offset_ppm": 62.0, "dark_every": 4, "flash": coloured["strobe"]["flash"]}
@@ -76,7 +77,7 @@ def _fan(*, grey: bool) -> dict[str, Any]:
     return fan
 
 
-def _white(scene: dict[str, Any]) -> dict[str, Any]:
+def white_scene(scene: dict[str, Any]) -> dict[str, Any]:
     """Return a scene whose lamps flash white, one after the other, each as strong as its three LEDs together."""
     white = copy.deepcopy(scene)
     lamps: dict[str, dict[str, Any]] = {}
@@ -91,24 +92,25 @@ def _white(scene: dict[str, Any]) -> dict[str, Any]:
     return white
 
 
-def _filmed(scene: dict[str, Any], path: Path) -> Path:
+def filmed(scene: dict[str, Any], path: Path) -> Path:
+    """Film a scene, and return the clip."""
     path.with_suffix(".toml").write_text(tomlkit.dumps(scene), encoding="utf-8")
     return ps.shoot(path.with_suffix(".toml"), path, force=True).path
 
 
 def _measured_rig(folder: Path) -> Path:
     """Film a white card under one LED after the other, and measure their colours."""
-    scene = _scene("colour", 160)
+    scene = scene_of("colour", 160)
     scene["strobe"] = {"flash_s": 0.0008}
     scene["object"] = [{"mesh": "plane", "scale": 4.0, "albedo": 0.6}]
-    card = _filmed(scene, folder / "card")
+    card = filmed(scene, folder / "card")
     colours(card, rig=card / "rig.toml", out=folder / "rig.toml", albedo=0.6)
     return folder / "rig.toml"
 
 
 def _crosstalk(scene: dict[str, Any], folder: Path, rig: Path) -> Line:
     """Take the plates of a standing bust apart, and look for every other lamp's light in them."""
-    clip = _filmed(scene, folder / "standing")
+    clip = filmed(scene, folder / "standing")
     ps.split(clip, rig=rig, out=folder / "plates", force=True)
     stage = set_stage(read_scene(folder / "standing.toml"), folder)
     assert stage.still is not None
@@ -119,7 +121,7 @@ def _crosstalk(scene: dict[str, Any], folder: Path, rig: Path) -> Line:
         whole = Emission(rise_s=0.0, fall_s=0.0)
         truths.append(flash_plate(stage.still, white, {led.name: 1.0}, led.reference_duration_s or 1.0, whole).ravel())
         files = sorted((folder / "plates" / lamp).glob("*.exr"))
-        plates.append(np.mean([_picture(file) for file in files], axis=0).ravel())
+        plates.append(np.mean([picture_of(file) for file in files], axis=0).ravel())
     basis = np.stack([*truths, np.ones_like(truths[0])], axis=1)
     held = np.linalg.lstsq(basis, np.stack(plates, axis=1), rcond=None)[0][:3].T
     left = np.abs(held - np.diag(np.diag(held))).max()
@@ -141,7 +143,7 @@ def _main(light: dict[str, Any]) -> int:
 def _standing(scene: dict[str, Any], folder: Path, rig: Path) -> Line:
     coloured, white = (
         _errors(one, folder / name, given, fps="round")
-        for one, name, given in ((scene, "standing", rig), (_white(scene), "white", None))
+        for one, name, given in ((scene, "standing", rig), (white_scene(scene), "white", None))
     )
     means = [float(one.valid.mean()) for one in (coloured, white)]
     return Line(
@@ -157,14 +159,14 @@ def _standing(scene: dict[str, Any], folder: Path, rig: Path) -> Line:
 def _moving(what: str, scene: dict[str, Any], folder: Path, rig: Path) -> Line:
     coloured, white = (
         _errors(one, folder / name, given, fps="flash")
-        for one, name, given in ((scene, "fan", rig), (_white(scene), "white_fan", None))
+        for one, name, given in ((scene, "fan", rig), (white_scene(scene), "white_fan", None))
     )
     within = [float((one.all < WITHIN_DEG).mean()) for one in (coloured, white)]
     return Line(
         scene=what,
-        measure=f"blades' normals within {WITHIN_DEG:.0f} deg, one result per flash (mean error of valid ones)",
-        colours=f"{within[0]:.1%} ({coloured.valid.mean():.1f} deg)",
-        white=f"{within[1]:.1%} ({white.valid.mean():.1f} deg)",
+        measure=f"blades' normals within {WITHIN_DEG:.0f} deg, one result per flash (valid: share, mean error)",
+        colours=f"{within[0]:.1%} ({coloured.share:.0%}, {coloured.valid.mean():.1f} deg)",
+        white=f"{within[1]:.1%} ({white.share:.0%}, {white.valid.mean():.1f} deg)",
         bar="better",
         met=within[0] > within[1],
     )
@@ -180,7 +182,7 @@ class Errors(NamedTuple):
 
 def _errors(scene: dict[str, Any], path: Path, rig: Path | None, *, fps: str) -> Errors:
     """Film and solve a scene, and hold its normals against the truth of the flash that is nearest."""
-    clip = _filmed(scene, path)
+    clip = filmed(scene, path)
     out = path.with_name(path.name + "_out")
     report = ps.normals(clip, rig=rig or clip / "rig.toml", out=out, fps=fps, force=True)
     flashes = json.loads((clip / "truth" / "timing.json").read_text(encoding="utf-8"))["flashes"]
@@ -189,10 +191,10 @@ def _errors(scene: dict[str, Any], path: Path, rig: Path | None, *, fps: str) ->
     for instant, file in zip(report.instants, sorted((out / "normals").iterdir()), strict=True):
         nearest = min(times_s, key=lambda name: abs(times_s[name] - instant.time_s))
         still = clip / "truth" / "normals.exr"
-        truth = _picture(still if still.is_file() else clip / "truth" / "normals" / nearest)
-        off = np.degrees(np.arccos(np.clip((_picture(file) * truth).sum(axis=-1), -1, 1)))
+        truth = picture_of(still if still.is_file() else clip / "truth" / "normals" / nearest)
+        off = np.degrees(np.arccos(np.clip((picture_of(file) * truth).sum(axis=-1), -1, 1)))
         counts = _where(truth, moving=not still.is_file())
-        measured = _picture(out / "valid" / file.name.replace("_normals", "_valid")) > 0
+        measured = picture_of(out / "valid" / file.name.replace("_normals", "_valid")) > 0
         every.append(off[counts])
         valid.append(off[counts & measured])
     whole = np.concatenate(every)
@@ -211,6 +213,7 @@ def _where(truth: np.ndarray, *, moving: bool) -> np.ndarray:
     return np.asarray(seen & (np.hypot(x - (cols - 1) / 2, y - (rows - 1) / 2 + 0.09 * cols) < 0.3 * cols))
 
 
-def _picture(path: Path) -> np.ndarray:
+def picture_of(path: Path) -> np.ndarray:
+    """Return an EXR file's picture."""
     channels = OpenEXR.File(str(path)).channels()
     return np.asarray(next(iter(channels.values())).pixels, np.float32)
