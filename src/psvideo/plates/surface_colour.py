@@ -26,6 +26,8 @@ NEIGHBOURHOODS = (1 / 24, 1 / 8, 1 / 3, 2.0)
 """Widths, in shares of the picture's longer side, in which the flashes are asked to agree, the smallest first."""
 LEAST_PX = 11
 """... and no narrower than that, where pictures are small."""
+NARROW = 1 / 8
+"""Neighbourhoods in which many colours have become one by chance are wider than this."""
 AROUND = 1 / 4
 """How wide, in the same shares, the neighbourhood is in which all surfaces are to have the same colour."""
 ONE_COLOUR = 0.15
@@ -58,10 +60,9 @@ def colours_of(products: Image, where: Flags) -> tuple[Image, Flags]:
         sums = _sums(kept, share)
         rest, whole = _unexplained(sums)
         agree = rest <= CONTRADICTION**2 * whole
-        anywhere = share == NEIGHBOURHOODS[-1]
-        chosen = open_yet & (agree | anywhere)
+        chosen = open_yet & (agree | (share == NEIGHBOURHOODS[-1]))
         colour[chosen] = _colour(sums)[chosen]
-        agreed |= chosen & (not anywhere)
+        agreed |= chosen & (share <= NARROW)
         open_yet &= ~chosen
     resting = _colour(_sums(products * ~where[..., None], AROUND))
     same = _most(np.abs(colour - resting)) < ONE_COLOUR

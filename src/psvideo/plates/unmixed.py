@@ -95,9 +95,29 @@ def unmixed(one: Round, how: Unmixing) -> Round:
         colour = np.array(how.surface_colour or WHITE, np.float32)
         apart = [flashes.alone(place, how, colour / colour.max()) for place in range(len(one.plates))]
         by_name = {plate.light: plate for plates in apart for plate in plates}
-        return replace(one, plates=tuple(by_name[name] for name in how.shown.lights))
+        plates = tuple(by_name[name] for name in how.shown.lights)
+        off = [_unsure_alone(one, place, how) for place in range(len(one.plates))]
+        return replace(one, plates=plates, unsure=None if one.unsure is None else np.sum(off, axis=0))
     plates = tuple(flashes.together(how, how.shares))
-    return flashes.mended(plates, how) if how.alone else replace(one, plates=plates)
+    unsure = None if one.unsure is None else _unsure_together(one.unsure, how.shares)
+    apart_round = replace(one, plates=plates, unsure=unsure)
+    return flashes.mended(apart_round, how) if how.alone else apart_round
+
+
+def _unsure_together(unsure: Image, shares: FloatArray) -> Image:
+    """Return by how much lamps' plates may be off, (light, row, col), where the flashes may be, (slot, row, col)."""
+    weights = np.abs(shares).mean(axis=-1) ** 2  # (light, slot)
+    return np.asarray(np.sqrt(np.einsum("ls,srx->lrx", weights, unsure**2)), np.float32)
+
+
+def _unsure_alone(one: Round, place: int, how: Unmixing) -> Image:
+    """Return the same of the lights of one flash; 0 of all others."""
+    if one.unsure is None:
+        return np.zeros((), np.float32)
+    off = np.zeros((len(how.shown.lights), *one.unsure.shape[1:]), np.float32)
+    for light, row in zip(how.alone[place].lights, how.alone[place].inverse, strict=True):
+        off[light] = np.float32(np.linalg.norm(row)) * one.unsure[place]
+    return off
 
 
 class _Flashes:
@@ -141,20 +161,24 @@ class _Flashes:
             plates.append(self._like(place, how.shown.lights[shown], image, own.seen, most))
         return plates
 
-    def mended(self, plates: tuple[LightPlate, ...], how: Unmixing) -> Round:
-        """Return the round of the lamps, where the flashes contradict each other, out of the nearest flash alone."""
-        products = np.stack([plate.image for plate in plates])
-        wrong = self._moved() & (contradicted(products) | ~plates[0].seen)
+    def mended(self, one: Round, how: Unmixing) -> Round:
+        """Return a round of lamps, where its flashes contradict each other, out of the nearest flash alone."""
+        products = np.stack([plate.image for plate in one.plates])
+        wrong = self._moved() & (contradicted(products) | ~one.plates[0].seen)
         if not wrong.any():
-            return replace(self.one, plates=plates)
+            return one
         if how.surface_colour is None:
             colour, sure = colours_of(products, wrong)
         else:
             given = np.array(how.surface_colour, np.float32)
             colour, sure = given / given.max(), wrong
         alone = {plate.light: plate for plate in self.alone(self.nearest, how, colour)}
-        mended = tuple(_within(plate, alone[plate.light], wrong) for plate in plates)
-        return replace(self.one, plates=mended, doubtful=wrong & ~sure)
+        mended = tuple(_within(plate, alone[plate.light], wrong) for plate in one.plates)
+        unsure = one.unsure
+        if unsure is not None:
+            small = cv2.resize(wrong.astype(np.float32), unsure.shape[:0:-1], interpolation=cv2.INTER_AREA)
+            unsure = unsure + small * (_unsure_alone(self.one, self.nearest, how) - unsure)
+        return replace(one, plates=mended, doubtful=wrong & ~sure, unsure=unsure)
 
     def _moved(self) -> Flags:
         stood, (rows, cols) = self.one.stood, self.images[0].shape[:2]
