@@ -5,14 +5,13 @@ import tempfile
 from pathlib import Path
 
 import cv2
-from docs.figures.coloured import COLOURED
 from docs.figures.explained import EXPLAINED
 from docs.figures.faults import FAULTS
 from docs.figures.python_page import PYTHON
 from docs.figures.staging import PICTURES
 from docs.figures.turning import TURNING
 
-FIGURES = EXPLAINED | FAULTS | PYTHON | TURNING | COLOURED
+FIGURES = EXPLAINED | FAULTS | PYTHON | TURNING
 
 
 def main(names: list[str]) -> None:

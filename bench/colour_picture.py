@@ -1,26 +1,30 @@
-"""The figure of docs/colour.md: a bust and a fan under three lamps of three colours."""
+"""Make the picture of docs/colour.md, a bust and a fan under coloured lamps: ``python -m bench.colour_picture``."""
 
 import json
-from collections.abc import Callable
+import tempfile
 from pathlib import Path
 
-from bench.colour import fan_scene, filmed, picture_of, scene_of, white_scene
-from docs.figures.staging import Figure, Pixels, exr, figure, frames, psvideo, row
+import cv2
+from docs.figures.staging import PICTURES, Pixels, exr, frames, psvideo, row
 
 import psvideo as ps
+from bench.colour import fan_scene, filmed, picture_of, scene_of, white_scene
+from psvideo.pictures.contact import sheet
 from psvideo.pictures.relighting import normal_colours, srgb
 
 WIDE_PX = 240
+SHEET_PX = 720
+"""Narrower than others: guards are fine detail, and pictures are to stay small files."""
 PLACE = 7
 """Which result of the fan is shown, from 0."""
 BRIGHT = 1.4
 
 
-def colour_and_time(folder: Path) -> Figure:
+def colour_and_time(folder: Path) -> Pixels:
     """A standing bust taken apart, and a fan at the rate of flashes beside the same under white light."""
     folder.mkdir(parents=True)
     clip = filmed(scene_of("colour", WIDE_PX), folder / "bust")
-    said = psvideo("normals", clip, "--rig", clip / "rig.toml", "--plates", "-o", folder / "out")
+    psvideo("normals", clip, "--rig", clip / "rig.toml", "--plates", "-o", folder / "out")
     bust = [
         ("a frame", srgb(frames(clip)[PLACE], exposure=BRIGHT)),
         ("one lamp, taken apart", srgb(exr(folder / "out" / "plates" / "key"), exposure=BRIGHT)),
@@ -37,10 +41,8 @@ def colour_and_time(folder: Path) -> Figure:
         ("one white light per flash", _normals(white, folder / "by_time")[0]),
         ("truth", normal_colours(picture_of(clip / "truth" / "normals" / flash))),
     ]
-    return figure(
-        [row("A painted bust: colours exchanged between flashes", *bust), row("A fan, 720 turns a minute", *tiles)],
-        said,
-    )
+    strips = [row("A painted bust: colours exchanged between flashes", *bust), row("A fan, 720 turns a minute", *tiles)]
+    return sheet(strips, width_px=SHEET_PX)
 
 
 def _normals(clip: Path, out: Path) -> tuple[Pixels, float]:
@@ -57,5 +59,7 @@ def _flash_at(clip: Path, time_s: float) -> str:
     return Path(str(nearest["plate"])).name
 
 
-COLOURED: dict[str, Callable[[Path], Figure]] = {"colour_and_time": colour_and_time}
-"""By the picture's name: docs/pictures/NAME.png."""
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as temporary:
+        made = colour_and_time(Path(temporary) / "made")
+    cv2.imwrite(str(PICTURES / "colour_and_time.png"), made[..., ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 9])
