@@ -5,7 +5,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test campaigns test-all coverage checks blender bench docs clean
+.PHONY: demo test campaigns test-all test-faults coverage checks blender bench docs clean
 
 demo: $(VENV)/.installed
 	$(BIN)/psvideo demo --force
@@ -20,6 +20,10 @@ campaigns: $(VENV)/.installed-test
 	$(PYTEST) -m campaign
 
 test-all: test campaigns
+
+# What is killed, cut into pieces, damaged or full: the suites of faults, with their campaigns
+test-faults: $(VENV)/.installed-test
+	$(PYTEST) tests/test_killed.py tests/test_hostile.py tests/test_pieces.py tests/test_files.py tests/test_threads.py
 
 coverage: checks
 	$(PYTEST) -m "not campaign" --cov --cov-report term:skip-covered --cov-report html
