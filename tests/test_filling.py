@@ -207,3 +207,18 @@ def test_where_little_is_missing_little_is_read_again() -> None:
         assert all(one.read <= set(range(50, 60)) for one in watched)
     np.testing.assert_array_equal(found[0].normals, found[1].normals)
     np.testing.assert_array_equal(np.asarray(found[0].source), np.asarray(found[1].source))
+
+
+def test_filled_normals_are_unit_vectors_where_two_lights_shine_from_almost_one_direction() -> None:
+    y, x = np.mgrid[-1:1:48j, -1:1:48j]
+    z = np.sqrt(np.clip(1 - x * x - y * y, 0, None))
+    turned = np.deg2rad(1)
+    lights = np.array(
+        [(0.7, 0, 0.7), (0.7 * np.cos(turned), 0.7 * np.sin(turned), 0.7), (-0.8, 0.1, 0.5), (-0.7, -0.4, 0.5)]
+    )
+    lights /= np.linalg.norm(lights, axis=1, keepdims=True)
+    images = 0.6 * np.clip(np.stack([x, -y, z], axis=-1) @ lights.T, 0, None)
+    surface = ps.solve_images(np.moveaxis(images, -1, 0), lights, mask=z > 0.1)
+    length = np.linalg.norm(surface.normals[z > 0.1], axis=-1)
+    assert (surface.valid[z > 0.1]).mean() < 0.8
+    np.testing.assert_allclose(length, 1, atol=1e-3)

@@ -177,6 +177,9 @@ def _estimate(p: Picture, s: Said, row: int, col: int, pixel: int) -> None:
         nx, ny, nz, albedo = from_two(s, pixel, nx, ny, nz, albedo)
     elif count == 1:
         nx, ny, nz, albedo = from_one(s, pixel, nx, ny, nz, albedo)
+    # lights that shine from almost one direction, or straight along the normal, leave a vector that is no unit one
+    one = ONE / max(np.sqrt(nx * nx + ny * ny + nz * nz), TINY)
+    nx, ny, nz = nx * one, ny * one, nz * one
     if count > 0:
         reds, blues, _ = _colour_of(p, s, row, col)
     p.lights[row, col] = count
