@@ -21,8 +21,8 @@ from psvideo.synth.truth import as_seen
 
 Picture = NDArray[np.float32]
 LIGHT = "key"
-SIZE_PX = 200
-STEP_S = 0.2e-3
+SIZE_PX = 144
+STEP_S = 0.25e-3
 """Between the instants at which the fan is rendered for a continuous light."""
 FRAME = 12
 BANDS = 10
@@ -54,12 +54,13 @@ def rows() -> Iterator[Line]:
             yield _line("flash of 0.3 ms", turns, stage, *flashed(scene, Path(temporary)))
 
 
-def scene_at(turns: int, folder: Path) -> Path:
+def scene_at(turns: int, folder: Path, *, frames: int = 20) -> Path:
     """Write the fan smaller, without noise, ambient light and faults of its clock, at so many turns a minute."""
     scene = tomlkit.parse(builtin_scene("fan").read_text(encoding="utf-8")).unwrap()
     scene["camera"] |= {"width_px": SIZE_PX, "height_px": SIZE_PX, "full_well_e": 0.0}
     scene["strobe"] = {"flash_s": 0.0003}
     scene["ambient"] = {"level": 0.0}
+    scene["frames"] = frames
     scene["object"][0]["motion"]["spin_deg_per_s"] = 6.0 * turns
     path = folder / f"fan{turns}.toml"
     path.write_text(tomlkit.dumps(scene), encoding="utf-8")
@@ -100,7 +101,7 @@ def flashed(scene: Path, folder: Path) -> tuple[Picture, float]:
 
 
 def _line(what: str, turns: int, stage: Stage, picture: Picture, time_s: float) -> Line:
-    around_s: NDArray[np.float64] = np.arange(-35.0, 36.0) * STEP_S
+    around_s: NDArray[np.float64] = np.arange(-28.0, 29.0) * STEP_S
     views = np.stack([frozen(stage, time_s + float(since_s)) for since_s in around_s])
     bands = _bands(views)
     lags_s = [_lag_s(views[:, band], picture[band], around_s) for band in bands]

@@ -29,7 +29,7 @@ def rolling_fan(folder: Path) -> Figure:
     ]
     clip = folder / "slow" / "clip"
     clip.parent.mkdir()
-    said = psvideo("synth", scene_at(SLOW, clip.parent), "-o", clip)
+    said = psvideo("synth", scene_at(SLOW, clip.parent, frames=36), "-o", clip)
     said += psvideo("split", clip, "--fps", "12", "--shutter", "360", "-o", folder / "open")
     file = sorted((folder / "open" / LIGHT).iterdir())[1]
     with OpenEXR.File(str(file)) as read:
