@@ -176,6 +176,19 @@ def test_results_at_every_camera_frame_show_it_where_it_was_then(passing: Path, 
         ps.normals(passing, rig=passing / "rig.toml", out=tmp_path / "none", fps="frame", align="none")
 
 
+def test_a_part_of_the_frames_shows_the_same_instants_under_the_same_numbers(passing: Path, tmp_path: Path) -> None:
+    timing, light = tmp_path / "timing.json", "a"
+    ps.sync(passing, out=timing)
+    numbers = sorted(int(path.stem.split(".")[-1]) for path in (passing / "frames").iterdir())
+    for name, frames in (("all", None), ("part", f"{numbers[6]}-{numbers[-1]}")):
+        ps.split(passing, out=tmp_path / name, timing=timing, frames=frames, fps=24)
+    whole, part = ({path.name: path for path in (tmp_path / name / light).iterdir()} for name in ("all", "part"))
+    assert set(part) == set(whole) - {min(whole)}
+    for name, path in part.items():
+        apart = np.abs(exr(path, "Y") - exr(whole[name], "Y"))[8:-8, 16:-24]
+        assert apart.mean() < 0.001, "but for what flows from other flashes at the cut"
+
+
 def test_motion_vectors_are_named_and_signed_as_the_program_wants_them() -> None:
     """One pixel to the right and two up in a frame, three to the left and four down in the one before."""
     flat = np.zeros((2, 2, 3), np.float32)

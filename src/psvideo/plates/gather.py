@@ -150,8 +150,8 @@ def scheduled(take: Take, timing: Timing, aligning: Aligning, *, start_number: i
         return None
     camera, places = timed_camera(take.plan, timing), places_in_time(timing, take.clip.numbers)
     end_s = (max(places.values()) + 0.5) * camera.frame_period_s
-    flashes = used_of(take, timing).flashes
-    return schedule_of(take.plan, flashes, aligning.rate, start=start_number, end_s=end_s)
+    within = used_of(take, timing).flashes
+    return schedule_of(take.plan, timing.flashes, aligning.rate, start=start_number, end_s=end_s, within=within)
 
 
 def clip_plates(

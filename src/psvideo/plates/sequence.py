@@ -136,10 +136,15 @@ def light_plates(
         lit = {slot: held for slot, held in lit.items() if slot in needed}
 
 
-def coming(plan: Plan, flashes: tuple[Flash, ...], *, start: int = FIRST_NUMBER) -> dict[int, frozenset[str]]:
-    """Return by number which lights every round will have a plate of, AMBIENT among them where it has a dark slot."""
+def coming(
+    plan: Plan, flashes: tuple[Flash, ...], *, start: int = FIRST_NUMBER, within: tuple[Flash, ...] | None = None
+) -> dict[int, frozenset[str]]:
+    """Return by number which lights every round will have a plate of, AMBIENT among them where it has a dark slot.
+
+    ``within`` are the same flashes, complete where a part of the frames holds them; they number nothing.
+    """
     complete: dict[int, list[Flash]] = {}
-    for flash, number in zip(flashes, round_numbers(flashes, start=start), strict=True):
+    for flash, number in zip(within or flashes, round_numbers(flashes, start=start), strict=True):
         complete.setdefault(number, []).extend([flash] if flash.complete else [])
     makings = makings_of(plan)
     return {number: frozenset(_names(makings, held)) for number, held in complete.items()}

@@ -99,11 +99,22 @@ class Schedule:
         return tuple(dict.fromkeys(number for instants in self.by_round.values() for number, _ in instants))
 
 
-def schedule_of(plan: Plan, flashes: tuple[Flash, ...], comb: Comb, *, start: int, end_s: float) -> Schedule:
-    """Return which instants up to ``end_s``, where the clip ends, are shown from which round."""
-    lights = coming(plan, flashes, start=start)
+def schedule_of(
+    plan: Plan,
+    flashes: tuple[Flash, ...],
+    comb: Comb,
+    *,
+    start: int,
+    end_s: float,
+    within: tuple[Flash, ...] | None = None,
+) -> Schedule:
+    """Return which instants up to ``end_s``, where the clip ends, are shown from which round.
+
+    ``within`` are the same flashes, complete where the frames that are used hold them.
+    """
+    lights = coming(plan, flashes, start=start, within=within)
     times_s: dict[int, list[float]] = {}
-    for flash, number in zip(flashes, round_numbers(flashes, start=start), strict=True):
+    for flash, number in zip(within or flashes, round_numbers(flashes, start=start), strict=True):
         if flash.complete and flash.lit and lights[number] >= {*plan.lights}:
             times_s.setdefault(number, []).append(flash.start_s + 0.5 * flash.duration_s)
     count = comb.count_until(end_s)
