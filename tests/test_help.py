@@ -165,6 +165,7 @@ NOT_HERE = (
         "shot.usd",
         "camA",
         "camB",
+        "takes/*",
     ),
 )
 """What the examples' folder has not: a board, other footage, more lights, a plan without a marker."""
