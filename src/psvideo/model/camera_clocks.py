@@ -76,8 +76,9 @@ class CameraClocks:
         found = [camera for camera in self.cameras if camera.clip == clip]
         if len(found) != 1:
             names = ", ".join(camera.clip for camera in self.cameras)
+            odd = "are named alike" if found else "are others"
             raise UsageError(
-                f"`resync`: the clocks are those of {names}, and {len(found) or 'none'} of these is this clip, "
-                f"{clip!r}. Compare all cameras' clips again with psvideo sync, each under a name of its own."
+                f"`resync`: the clocks are those of {names}, which {odd}; expected one of this clip, {clip!r}. "
+                "Compare all cameras' clips again with psvideo sync, each under a name of its own."
             )
         return found[0]
