@@ -2,6 +2,7 @@
 
 import json
 import re
+import runpy
 import shlex
 import subprocess
 import sys
@@ -14,6 +15,7 @@ from typing import Any
 import pytest
 import typer
 
+import psvideo
 from psvideo.cli.app import application, main
 from psvideo.cli.examples import EXAMPLES
 from psvideo.cli.first_screen import COMMANDS
@@ -205,3 +207,11 @@ def test_help_before_a_command_is_help_for_it(capsys: pytest.CaptureFixture[str]
     asked = capsys.readouterr().out
     assert main(["strobe", "check", "--help"]) == 0
     assert asked == capsys.readouterr().out
+
+
+def test_python_m_psvideo_is_the_command(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(sys, "argv", ["psvideo", "--version"])
+    with pytest.raises(SystemExit) as done:
+        runpy.run_module("psvideo", run_name="__main__")
+    assert not done.value.code
+    assert capsys.readouterr().out == f"psvideo {psvideo.__version__}\n"

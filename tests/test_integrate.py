@@ -18,7 +18,18 @@ from scipy.sparse.linalg import lsqr
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
 from psvideo.model.surface import Surface
-from psvideo.solve.depth import Depth, Shaping, View, begun, depth_of, integrate, mesh_of, reservations, scaled
+from psvideo.solve.depth import (
+    Depth,
+    Shaping,
+    View,
+    begun,
+    depth_of,
+    integrate,
+    mesh_of,
+    reservations,
+    scale_note,
+    scaled,
+)
 from psvideo.solve.depth.cao2022 import SMOOTH, Integration
 from psvideo.solve.depth.multigrid import empty_grids, prepare, solve, weighed
 from psvideo.solve.depth.reweighting import write_board
@@ -308,7 +319,9 @@ def test_what_is_not_known_is_said() -> None:
     normals, _ = plane(PINHOLE, (0, 0, 1))
     both = surface(normals, two_plates())
     assert "orthographic" in reservations(begun(Shaping(view=View()), both))[0]
-    assert "relative" in reservations(begun(Shaping(view=PINHOLE), both))[0]
+    assert "relative" in scale_note(Shaping(view=PINHOLE))
+    assert "metres" in scale_note(Shaping(view=PINHOLE, plane=(0, 0, 1, 1)))
+    assert not reservations(begun(Shaping(view=PINHOLE), surface(normals, disc())))  # no fault of the take's
     said = reservations(begun(Shaping(view=PINHOLE, plane=(0, 0, 1, 1)), both))
     assert len(said) == 1
     assert "2 parts" in said[0]

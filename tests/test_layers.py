@@ -25,6 +25,7 @@ FLOORS = [
     {"page"},
     {"runs"},
     {"cli"},
+    {"__main__"},
 ]
 """Rooms from the bottom up. A room may use those below its floor, and none on its own."""
 
@@ -81,8 +82,8 @@ def test_no_room_reaches_itself_through_other_rooms() -> None:
     assert list(TopologicalSorter(graph).static_order()), "raises CycleError at a circle"
 
 
-def test_the_only_loose_module_is_errors() -> None:
-    assert {path.name for path in PACKAGE.glob("*.py")} == {"__init__.py", "errors.py"}
+def test_the_only_loose_modules_are_errors_and_what_python_m_runs() -> None:
+    assert {path.name for path in PACKAGE.glob("*.py")} == {"__init__.py", "__main__.py", "errors.py"}
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))

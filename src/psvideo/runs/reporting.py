@@ -36,11 +36,15 @@ LIBRARIES = ("numpy", "opencv-contrib-python-headless", "numba", "OpenEXR")
 
 @dataclass(frozen=True, kw_only=True)
 class Solved:
-    """What a normals run adds to a report: what it was solved with, by which solver, and what its validity means."""
+    """What a normals run adds to a report: what it was solved with, by which solver, and what its validity means.
+
+    ``depth``: what its depth is measured in; empty where there is none.
+    """
 
     lighting: Lighting
     solver: str
     trust: str
+    depth: str = ""
     warnings: tuple[str, ...] = ()
     aligned: bool = False
 
@@ -167,6 +171,8 @@ def _settings(take: Take, output: Output, solved: Solved | None) -> dict[str, st
         facts["Mask, SHA-256"] = solved.lighting.mask_sha256 or "no mask"
         facts["Solver"] = solved.solver
         facts["What valid means"] = output.caller.spell(solved.trust)
+        if solved.depth:
+            facts["What depth means"] = output.caller.spell(solved.depth)
     libraries = ", ".join(f"{name} {version_of(name)}" for name in LIBRARIES)
     facts["Made with"] = f"psvideo {__version__}, Python {platform.python_version()}, {libraries}"
     facts["Run in"] = str(Path.cwd())

@@ -25,6 +25,7 @@ from psvideo.runs.pieces import forget_pieces, pieced_together, pieces_begun, wr
 from psvideo.runs.plates import nothing_complete
 from psvideo.runs.reporting import Solved, run_report, write_report
 from psvideo.runs.solving import Found, Job, write_instants
+from psvideo.solve.depth import scale_note
 from psvideo.solve.instants import Instant
 from psvideo.solve.normals.solving import trust_note
 
@@ -108,6 +109,7 @@ def finished(job: Job, folder: Path, output: Output, found: Found, *, watch: Wat
         lighting=lighting,
         solver=method,
         trust=" ".join([trust_note(method, len(take.plan.lights)), *lighting.near_notes, *colours_said]),
+        depth="" if job.shaping is None else scale_note(job.shaping),
         warnings=(
             *lighting.doubts,
             *pass_doubts(job.asked, take.plan),
@@ -116,6 +118,8 @@ def finished(job: Job, folder: Path, output: Output, found: Found, *, watch: Wat
         ),
         aligned=job.over_time.aligning.align != "none",
     )
+    if solved.depth:
+        output.caller.say(output.caller.spell(solved.depth))
     report = run_report(take, timing, found.observed, output, solved=solved)
     write_text(folder / "timing.json", format_timing(timing))
     write_report(folder, report, [("One round", found.picture)])

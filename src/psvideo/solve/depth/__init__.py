@@ -8,7 +8,7 @@ gives it a scale, ``shaping`` keeps that over a clip, and ``mesh`` makes triangl
 from psvideo.solve.depth.cao2022 import Height, Integration, integrate
 from psvideo.solve.depth.mesh import Mesh, mesh_of
 from psvideo.solve.depth.scale import Depth, scaled
-from psvideo.solve.depth.shaping import Shaping, begun, depth_of, reservations
+from psvideo.solve.depth.shaping import Shaping, begun, depth_of, reservations, scale_note
 from psvideo.solve.depth.view import View, view_of
 
 __all__ = [
@@ -23,6 +23,7 @@ __all__ = [
     "integrate",
     "mesh_of",
     "reservations",
+    "scale_note",
     "scaled",
     "view_of",
 ]

@@ -98,6 +98,13 @@ def begun(shaping: Shaping, surface: Surface) -> Shaping:
     return replace(shaping, first=first, before=Before(height=height, normals=surface.normals))
 
 
+def scale_note(shaping: Shaping) -> str:
+    """Return in a sentence what a clip's depth is measured in: from normals alone nothing knows its scale."""
+    if shaping.metric:
+        return "Depth is in metres: its scale is the rig's [surface] plane's, or that of the depth given."
+    return "Depth is relative, its median 1, because the rig has no [surface] plane: give one (in metres) for scale."
+
+
 def reservations(shaping: Shaping) -> tuple[str, ...]:
     """Return in whole sentences what is not known of a clip's depth."""
     said = []
@@ -105,10 +112,6 @@ def reservations(shaping: Shaping) -> tuple[str, ...]:
         said.append(
             "Depth was integrated for an orthographic view, because the rig has no [camera] focal_px: it is relative, "
             "in widths of the picture about a median of 1, and bends a subject that is near the camera."
-        )
-    elif not shaping.metric:
-        said.append(
-            "Depth is relative, its median 1, because the rig has no [surface] plane: give one (in metres) for scale."
         )
     if shaping.first is not None and shaping.first.parts > 1:
         said.append(
