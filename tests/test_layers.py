@@ -2,6 +2,8 @@
 
 import ast
 import re
+from dataclasses import dataclass
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -44,16 +46,39 @@ SYNTH_NEVER_USES = ("psvideo.model.shutter", "psvideo.model.recipe")
 """The rooms under test are above it, or beside; of the model, it has a shutter of its own."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Module:
+    """What a file's syntax tree shows, read once for all tests: plain imports, modules and full names of those
+    by ``from``, public classes, and strings in which something looks like an option."""
+
+    plain: frozenset[str]
+    froms: frozenset[str]
+    names: frozenset[str]
+    classes: tuple[str, ...]
+    flags: tuple[str, ...]
+
+
+@cache
+def _read(path: Path) -> Module:
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    nodes = list(ast.walk(tree))
+    froms = [node for node in nodes if isinstance(node, ast.ImportFrom) and node.module]
+    texts = [node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)]
+    return Module(
+        plain=frozenset(alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names),
+        froms=frozenset(node.module for node in froms if node.module),
+        names=frozenset(f"{node.module}.{alias.name}" for node in froms for alias in node.names),
+        classes=tuple(
+            node.name for node in tree.body if isinstance(node, ast.ClassDef) and not node.name.startswith("_")
+        ),
+        flags=tuple(text for text in texts if re.search(r"(^|[\s`(])--[a-z]", text)),
+    )
+
+
 def _imports(path: Path) -> set[str]:
     """Return the dotted names inside psvideo that a file imports anywhere."""
-    found: set[str] = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "psvideo":
-            found.add(node.module)
-            found.update(f"{node.module}.{alias.name}" for alias in node.names)
-        elif isinstance(node, ast.Import):
-            found.update(alias.name for alias in node.names if alias.name.split(".")[0] == "psvideo")
-    return found
+    seen = _read(path)
+    return {name for name in seen.plain | seen.froms | seen.names if name.split(".")[0] == "psvideo"}
 
 
 def _rooms_used(path: Path) -> set[str]:
@@ -67,12 +92,14 @@ def _room(path: Path) -> str:
 MODULES = sorted(path for path in PACKAGE.rglob("*.py") if path != PACKAGE / "__init__.py")
 
 
-@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
-def test_a_module_imports_only_its_own_room_and_those_on_floors_below(path: Path) -> None:
+def test_modules_import_only_their_own_room_and_those_on_floors_below() -> None:
     floor = {room: height for height, rooms in enumerate(FLOORS) for room in rooms}
-    assert _room(path) in floor, "a new room: give it its place in FLOORS"
-    others = _rooms_used(path) - {_room(path)}
-    assert not {room for room in others if floor[room] >= floor[_room(path)]}
+    assert {_room(path) for path in MODULES} <= set(floor), "a new room: give it its place in FLOORS"
+    upward = {
+        path: {room for room in _rooms_used(path) - {_room(path)} if floor[room] >= floor[_room(path)]}
+        for path in MODULES
+    }
+    assert not {path: rooms for path, rooms in upward.items() if rooms}
 
 
 def test_no_room_reaches_itself_through_other_rooms() -> None:
@@ -86,10 +113,10 @@ def test_the_only_loose_modules_are_errors_and_what_python_m_runs() -> None:
     assert {path.name for path in PACKAGE.glob("*.py")} == {"__init__.py", "__main__.py", "errors.py"}
 
 
-@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
-def test_planning_strobe_and_virtual_shoot_know_model_formats_and_compute_alone(path: Path) -> None:
-    if _room(path) in BESIDE_THE_ROAD:
-        assert _rooms_used(path) <= {_room(path), "model", "formats", "compute", "errors"}
+@pytest.mark.parametrize("room", sorted(BESIDE_THE_ROAD))
+def test_planning_strobe_and_virtual_shoot_know_model_formats_and_compute_alone(room: str) -> None:
+    used = [_rooms_used(path) for path in MODULES if _room(path) == room]
+    assert set().union(*used) <= {room, "model", "formats", "compute", "errors"}
 
 
 def test_no_module_imports_itself_by_a_detour() -> None:
@@ -112,29 +139,20 @@ def test_the_virtual_shoot_has_a_shutter_of_its_own(path: Path) -> None:
 def test_only_the_clip_room_knows_decoders_and_only_export_knows_writers() -> None:
     decoders = {"rawpy", "av", "PyOpenColorIO"}
     for path in MODULES:
-        tree = ast.parse(path.read_text(encoding="utf-8"))
-        names = {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
+        seen = _read(path)
         if _room(path) not in {"clip", "export", "synth"} and path != PACKAGE / "formats" / "exr_files.py":
-            assert not names & (decoders | {"OpenEXR", "tifffile"}), path
-        froms = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module}
-        assert _room(path) == "export" or "pxr" not in froms, path
+            assert not seen.plain & (decoders | {"OpenEXR", "tifffile"}), path
+        assert _room(path) == "export" or "pxr" not in seen.froms, path
 
 
 NOT_OURS = {"strobe/stand_ins/emulated.py", "report/style.py", "export/farm_job.py", "runs/farm.py"}
 """Arguments of another program or of the commands that a farm runs, and variables of a style sheet."""
 
 
-@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
-def test_only_the_command_line_writes_flags(path: Path) -> None:
-    if _room(path) == "cli" or path.relative_to(PACKAGE).as_posix() in NOT_OURS:
-        return
-    texts = [
-        node.value
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(node, ast.Constant) and isinstance(node.value, str)
-    ]
-    flags = [text for text in texts if re.search(r"(^|[\s`(])--[a-z]", text)]
-    assert not flags, "name the parameter in backticks; the command line spells it as its option"
+def test_only_the_command_line_writes_flags() -> None:
+    """Others name the parameter in backticks; the command line spells it as its option."""
+    ours = [path for path in MODULES if _room(path) != "cli" and path.relative_to(PACKAGE).as_posix() not in NOT_OURS]
+    assert not {path: _read(path).flags for path in ours if _read(path).flags}
 
 
 FOR_COMMANDS = ("psvideo.runs.", "psvideo.cli.", "psvideo.model.", "psvideo.errors.")
@@ -199,19 +217,15 @@ def test_what_commands_may_call_is_called() -> None:
 
 def test_only_one_module_knows_serial_ports() -> None:
     for path in MODULES:
-        nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
-        names = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
-        names |= {node.module for node in nodes if isinstance(node, ast.ImportFrom) and node.module}
-        knows = any(name.split(".")[0] == "serial" for name in names)
+        knows = any(name.split(".")[0] == "serial" for name in _read(path).plain | _read(path).froms)
         assert knows == (path == PACKAGE / "strobe" / "link" / "controller.py"), path
 
 
 def test_no_two_classes_have_one_name() -> None:
     homes: dict[str, list[str]] = {}
     for path in MODULES:
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
-            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
-                homes.setdefault(node.name, []).append(str(path.relative_to(PACKAGE)))
+        for name in _read(path).classes:
+            homes.setdefault(name, []).append(str(path.relative_to(PACKAGE)))
     assert not {name: paths for name, paths in homes.items() if len(paths) > 1}
 
 
