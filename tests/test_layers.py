@@ -25,6 +25,7 @@ FLOORS = [
     {"report"},
     {"inspect"},
     {"page"},
+    {"live"},
     {"runs"},
     {"cli"},
     {"__main__"},

@@ -7,8 +7,8 @@ repeated without a word are found, and a robust fit over all frames sharpens the
 does not know exactly: readout, exposure, the LEDs' tails. The cycle's marker shows which light is which.
 """
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from psvideo.model.camera import Camera, FloatArray
 from psvideo.model.plan import Plan
 from psvideo.model.shutter import frames_touched
 from psvideo.model.timing import DroppedFrames, Flash, Order, Timing
-from psvideo.sync.rowfit.beat import Beat, train_until
+from psvideo.sync.rowfit.beat import Beat, train_between, train_until
 from psvideo.sync.rowfit.course import window_frames
 from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import Profiles
@@ -61,6 +61,45 @@ def find_timing(
         )
     if plan.mode == "synced":
         return _synced_timing(plan, indices, clip=clip, dropped=dropped)
+    strobe = find_strobe(plan, indices, profiles, clip=clip, first_light=first_light, doubt=doubt)
+    found, beat = strobe.found, strobe.found.fit.beat
+    numbered = np.asarray(indices if numbers is None else numbers, np.int64)
+    return _assemble(
+        plan,
+        found,
+        order=strobe.order,
+        clip=clip,
+        dropped=_all_dropped(dropped, numbered, np.asarray(indices), found.track.index),
+        repeated=tuple(int(number) for number in numbered[found.track.repeated]),
+        notes=(
+            *remarks(plan, found),
+            *remarks_on_lights(plan, found, beat, named=strobe.order != "guess"),
+            *remarks_on_frames(plan, found, np.asarray(indices)),
+        ),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class FoundStrobe:
+    """The fit of a clip whose beat names every flash, and how these names are known."""
+
+    found: ClipFit
+    order: Order
+
+
+def find_strobe(
+    plan: Plan,
+    indices: NDArray[np.int64],
+    profiles: FloatArray,
+    *,
+    clip: str = "clip",
+    first_light: str | None = None,
+    doubt: NDArray[np.floating] | None = None,
+) -> FoundStrobe:
+    """Return the strobe's clock against the camera's, from row profiles as ``find_timing`` takes them.
+
+    Raises NoStrobeError where the profiles do not look like the plan's strobe.
+    """
     rows = _as_profiles(plan, indices, profiles, doubt)
     hopeless = nothing_to_find(plan, rows)
     if hopeless:
@@ -70,20 +109,7 @@ def find_timing(
     if not verdict.believed:
         raise NoStrobeError(_not_found(plan, rows, found, clip))
     beat, order = _order_of_lights(plan, found, first_light)
-    numbered = np.asarray(indices if numbers is None else numbers, np.int64)
-    return _assemble(
-        plan,
-        replace(found, fit=replace(found.fit, beat=beat)),
-        order=order,
-        clip=clip,
-        dropped=_all_dropped(dropped, numbered, np.asarray(indices), found.track.index),
-        repeated=tuple(int(number) for number in numbered[found.track.repeated]),
-        notes=(
-            *remarks(plan, found),
-            *remarks_on_lights(plan, found, beat, named=order != "guess"),
-            *remarks_on_frames(plan, found, np.asarray(indices)),
-        ),
-    )
+    return FoundStrobe(found=replace(found, fit=replace(found.fit, beat=beat)), order=order)
 
 
 def _not_found(plan: Plan, rows: Profiles, found: ClipFit, clip: str) -> str:
@@ -153,7 +179,7 @@ def _all_dropped(
     return tuple(DroppedFrames(after=after, count=count) for after, count in sorted(counts.items()))
 
 
-def _fitted_camera(plan: Plan, fit: Fit) -> Camera:
+def fitted_camera(plan: Plan, fit: Fit) -> Camera:
     """Return the plan's camera with the shutter that was found; a readout within its error of 0 becomes 0."""
     beat = fit.beat
     may_be_none = beat.row_time_s < NO_READOUT * fit.errors_s.get("row_time_s", 0.0)
@@ -173,23 +199,9 @@ def _assemble(
 ) -> Timing:
     """List every flash that the clip saw any of, and mark those that its start or end cuts."""
     beat, index = found.fit.beat, found.rows.index
-    camera = _fitted_camera(plan, found.fit)
-    train = train_until(plan, beat.clock, (int(index[-1]) + 2) * camera.frame_period_s)
-    start_s = train.start_s + found.jitter.of(train.start_s)
-    first, last = frames_touched(camera, start_s, train.duration_s)
-    seen = (last >= index[0]) & (first <= index[-1])
-    complete = (first >= found.trusted[0]) & (last <= found.trusted[1])
-    flashes = tuple(
-        Flash(
-            index=number,
-            slot=int(train.slot[k]),
-            lights=plan.flashes[train.slot[k]].lights,
-            start_s=float(start_s[k]),
-            duration_s=float(train.duration_s[k]),
-            complete=bool(complete[k]),
-        )
-        for number, k in enumerate(np.flatnonzero(seen))
-    )
+    camera = fitted_camera(plan, found.fit)
+    span = int(index[0]), int(index[-1])
+    flashes = flashes_seen(plan, beat, camera, span, trusted=found.trusted, late=found.jitter.of)
     row_time_s = camera.row_time_s
     return Timing(
         clip=clip,
@@ -207,6 +219,40 @@ def _assemble(
         phase_error_s=found.fit.shift_error_s,
         row_time_error_s=found.fit.errors_s.get("row_time_s"),
         flashes=flashes,
+    )
+
+
+def flashes_seen(
+    plan: Plan,
+    beat: Beat,
+    camera: Camera,
+    span: tuple[int, int],
+    *,
+    trusted: tuple[int, int],
+    late: Callable[[FloatArray], FloatArray] = np.zeros_like,
+) -> tuple[Flash, ...]:
+    """Return the flashes of which the frames from the first to the last of a ``span`` saw any, in order.
+
+    Complete are those that no frame outside of ``trusted`` saw; ``late`` gives by how much flashes that start at given
+    times come late.
+    """
+    period_s = camera.frame_period_s
+    from_s = max(span[0] - 2, 0) * period_s
+    train = train_between(plan, beat.clock, from_s, (span[1] + 2) * period_s)
+    start_s = train.start_s + late(train.start_s)
+    first, last = frames_touched(camera, start_s, train.duration_s)
+    seen = (last >= span[0]) & (first <= span[1])
+    complete = (first >= trusted[0]) & (last <= trusted[1])
+    return tuple(
+        Flash(
+            index=number,
+            slot=int(train.slot[k]),
+            lights=plan.flashes[train.slot[k]].lights,
+            start_s=float(start_s[k]),
+            duration_s=float(train.duration_s[k]),
+            complete=bool(complete[k]),
+        )
+        for number, k in enumerate(np.flatnonzero(seen))
     )
 
 

@@ -1,0 +1,136 @@
+"""The live clock: followed frame by frame, held against the offline sync of the same frames and against the truth."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from memory_frame import MemoryFrame
+
+from psvideo.errors import UsageError
+from psvideo.live.follow import Follower, State, caught_up
+from psvideo.live.history import timing_of
+from psvideo.live.lock import check_followed, frames_to_lock, lock
+from psvideo.live.phase_filter import Measured, smoothed
+from psvideo.model.camera import FloatArray
+from psvideo.model.plan import Plan
+from psvideo.model.row_profiles import collect
+from psvideo.model.timing import Timing
+from psvideo.sync.find import find_timing
+from psvideo.synth import Exposure, Noise, TrueClock, expose
+from psvideo.synth.lamps.true_flashes import TrueFlash
+
+PlanMaker = Callable[..., Plan]
+FRAMES = 150
+LIVE_ROWS = 0.05
+"""So far may live and offline be apart, in rows."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Followed:
+    """What following a clip came to: the follower at its end, and every change of its state with its frame."""
+
+    follower: Follower
+    states: list[tuple[int, State]]
+
+    @property
+    def timing(self) -> Timing:
+        return timing_of([self.follower], clip="clip")
+
+
+def plates_of(plan: Plan) -> dict[int, np.ndarray]:
+    rng = np.random.default_rng(3)
+    shape = plan.camera.height_px, plan.camera.width_px
+    return {slot: (0.05 + 0.3 * rng.random(shape)).astype(np.float32) for slot in plan.lit_slots}
+
+
+def shoot(plan: Plan, *, frames: int = FRAMES, clock: TrueClock | None = None, **options: object) -> Exposure:
+    plates = options.pop("plates", plates_of(plan))
+    clock = clock or TrueClock(phase_s=0.0123, offset_ppm=30.0)
+    noise = Noise(full_well_e=20_000, read_e=8)
+    return expose(plates, plan, frames=frames, clock=clock, noise=noise, bits=12, **options)  # type: ignore[arg-type]
+
+
+def profiles_of(shot: Exposure) -> FloatArray:
+    return collect(MemoryFrame(n, image) for n, image in enumerate(shot.frames))[1]
+
+
+def followed(plan: Plan, values: FloatArray) -> Followed:
+    first = frames_to_lock(plan)
+    follower = caught_up(plan, lock(plan, np.arange(first), values[:first]), list(values[:first]))
+    states = [(first, follower.state)]
+    for number in range(first, len(values)):
+        follower.add(number, values[number])
+        if follower.state != states[-1][1]:
+            states.append((number, follower.state))
+    return Followed(follower=follower, states=states)
+
+
+def apart_rows(one: Timing, start_s: FloatArray, plan: Plan) -> FloatArray:
+    """Return how far every flash is from the nearest that starts at ``start_s``, in rows."""
+    nearest = np.abs(start_s[:, None] - one.start_s).argmin(axis=0)
+    apart: FloatArray = (one.start_s - start_s[nearest]) / plan.camera.row_time_s
+    return apart
+
+
+def switched_off(plan: Plan, slot: int, at_s: float) -> Callable[[TrueFlash], np.ndarray | None]:
+    plates = plates_of(plan)
+
+    def plate(flash: TrueFlash) -> np.ndarray | None:
+        gone = flash.slot == slot and flash.start_s > at_s
+        return None if flash.is_dark else plates[flash.slot] * np.float32(not gone)
+
+    return plate
+
+
+@pytest.mark.parametrize("what", ["drift", "drops", "gain", "switched off"])
+def test_live_agrees_with_offline_and_truth(make_plan: PlanMaker, what: str) -> None:
+    plan = make_plan(lights=("key", "left", "right", "top"), width_px=8, height_px=96)
+    shot = {
+        "drift": lambda: shoot(plan, clock=TrueClock(phase_s=0.0123, offset_ppm=30.0, drift_ppm_per_s=2.0)),
+        "drops": lambda: shoot(plan, dropped=[80, 81, 82, 120]),
+        "gain": lambda: shoot(plan, gain=[1.0] * 90 + [0.5] * 60),
+        "switched off": lambda: shoot(plan, plates=switched_off(plan, 1, 0.7)),
+    }[what]()
+    values = profiles_of(shot)
+    found = followed(plan, values)
+    assert found.follower.state == "locked"
+    assert found.timing.order == "marker"
+    assert np.abs(apart_rows(found.timing, np.array([flash.start_s for flash in shot.flashes]), plan)).max() < LIVE_ROWS
+    offline = find_timing(plan, np.arange(len(values)), values)
+    assert np.abs(apart_rows(found.timing, offline.start_s, plan)).max() < LIVE_ROWS
+    names = {round(flash.start_s / plan.dark_s): flash.lights for flash in offline.flashes}
+    assert all(names[round(flash.start_s / plan.dark_s)] == flash.lights for flash in found.timing.flashes)
+    assert sum(hole.count for hole in found.follower.holes) == (4 if what == "drops" else 0)
+
+
+@pytest.mark.parametrize("what", ["strobe restarted", "lens covered"])
+def test_a_lost_lock_is_said_within_a_few_frames(make_plan: PlanMaker, what: str) -> None:
+    plan = make_plan(width_px=8, height_px=96)
+    before = profiles_of(shoot(plan, frames=100))
+    if what == "strobe restarted":
+        after = profiles_of(shoot(plan, frames=60, clock=TrueClock(phase_s=0.0293, offset_ppm=30.0)))
+    else:
+        after = np.random.default_rng(1).normal(0, 1e-4, (60, plan.camera.height_px))
+    found = followed(plan, np.concatenate([before, after]))
+    doubted = next(number for number, state in found.states if state == "unsure")
+    lost = next(number for number, state in found.states if state == "lost")
+    assert 100 <= doubted < 106
+    assert lost < 135
+
+
+def test_the_smoothed_clock_is_better_than_the_filtered_one() -> None:
+    at_s = np.arange(200) / 15.0
+    true_s = 5e-7 * at_s**2
+    rng = np.random.default_rng(0)
+    points = [
+        Measured(at_s=t, late_s=late + noise, error_s=1e-6)
+        for t, late, noise in zip(at_s.tolist(), true_s.tolist(), rng.normal(0, 1e-6, 200).tolist(), strict=True)
+    ]
+    off = smoothed(points) - true_s
+    assert np.sqrt(np.mean(off**2)) < 0.3e-6
+
+
+def test_a_synced_plan_is_refused_in_one_paragraph(make_plan: PlanMaker) -> None:
+    with pytest.raises(UsageError, match="Record the take"):
+        check_followed(make_plan(mode="synced"))
