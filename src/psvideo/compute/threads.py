@@ -11,7 +11,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import TypeVar
+from typing import Generic, TypeVar
 
 from psvideo.errors import UsageError
 
@@ -44,18 +44,61 @@ def thread_count() -> int:
 def over_ranges(run: Callable[[int, int], Item], count: int, *, each: int, threads: int | None = None) -> list[Item]:
     """Call ``run(first, last)`` for ranges of ``each`` out of ``count``, side by side, and return its results in order.
 
-    The threads are kept for the next call: beginning and ending them costs as much as solving some rows. A ``run`` that
-    itself calls this does so in its own thread.
+    The calling thread works too, and every thread takes the next range when it has done one: to hand over each by
+    itself would cost as much as solving some rows. Of several errors the first range's is raised. A ``run`` that itself
+    calls this does so in its own thread.
 
     >>> over_ranges(lambda first, last: last - first, 5, each=2)
     [2, 2, 1]
     """
     firsts = range(0, count, max(each, 1))
-    lasts = [min(first + firsts.step, count) for first in firsts]
-    workers = min(threads or thread_count(), len(firsts))
-    if workers < 2 or threading.current_thread().name.startswith(RANGES):
-        return [run(first, last) for first, last in zip(firsts, lasts, strict=True)]
-    return list(_pool(workers).map(run, firsts, lasts))
+    helpers = min(threads or thread_count(), len(firsts)) - 1
+    if helpers < 1 or getattr(_inside, "ranges", False):
+        return [run(first, min(first + firsts.step, count)) for first in firsts]
+    shared = _Ranges(run, firsts, count)
+    waiting = [_pool(helpers).submit(shared.work) for _ in range(helpers)]
+    shared.work()
+    for one in waiting:
+        if not one.cancel():  # what has not begun would find nothing to do
+            one.result()
+    return shared.results()
+
+
+_inside = threading.local()
+"""Whether a thread works on ranges."""
+
+
+class _Ranges(Generic[Item]):
+    """Ranges that several threads take one after the other."""
+
+    def __init__(self, run: Callable[[int, int], Item], firsts: range, count: int) -> None:
+        self._run, self._count, self._firsts = run, count, firsts
+        self._next = iter(firsts)
+        self._lock = threading.Lock()
+        self._done: dict[int, Item] = {}
+        self._faults: dict[int, BaseException] = {}
+
+    def work(self) -> None:
+        """Work on ranges until none is left, or one has failed."""
+        _inside.ranges = True
+        try:
+            while (first := self._taken()) is not None:
+                try:
+                    self._done[first] = self._run(first, min(first + self._firsts.step, self._count))
+                except BaseException as fault:
+                    self._faults[first] = fault
+        finally:
+            _inside.ranges = False
+
+    def _taken(self) -> int | None:
+        with self._lock:
+            return None if self._faults else next(self._next, None)
+
+    def results(self) -> list[Item]:
+        """Return what every range gave, once all threads are done."""
+        if self._faults:
+            raise self._faults[min(self._faults)]
+        return [self._done[first] for first in self._firsts]
 
 
 @functools.cache

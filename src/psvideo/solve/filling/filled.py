@@ -12,8 +12,7 @@ from psvideo.model.surface import MEASURED, NO_LIGHT, ONE_LIGHT, TWO_LIGHTS, Sur
 from psvideo.solve.filling.growing import LEFT_ALONE, SOLVED, THREE_LIGHTS, UNKNOWN, Picture, grow, queue_for
 from psvideo.solve.filling.looking import Said, count_rows, look_rows, room_for
 from psvideo.solve.normals.evidence import Evidence
-from psvideo.solve.normals.kernel import working_memory
-from psvideo.solve.normals.task import Bytes, Floats, Mask, Samples, Task
+from psvideo.solve.normals.task import Bytes, Floats, Mask, Samples, Task, Work
 
 MOST_LIGHTS_AROUND = 5
 """A pixel that light reaches is of the subject where so many of the nine around it are lit or solved: noise is not."""
@@ -102,8 +101,8 @@ def _lit(solved: Mask, one: Evidence, threads: int | None) -> Bytes:
     counts = np.zeros(solved.shape, np.uint8)
     asked = np.ascontiguousarray(~solved).view(np.uint8)
 
-    def count(given: Task, first: int, last: int) -> None:
-        count_rows(given, working_memory(given), asked, counts, first, last)
+    def count(given: Task, work: Work, first: int, last: int) -> None:
+        count_rows(given, work, asked, counts, first, last)
 
     one.in_bands(count, threads, needed=np.asarray(~solved.all(axis=1)))
     return ((counts > 0) | solved).view(np.uint8)
@@ -123,8 +122,8 @@ def holes_in(subject: Mask) -> Mask:
 def _said(one: Evidence, index: NDArray[np.int32], pixels: int, noise: float, threads: int | None) -> Said:
     said = room_for(pixels, noise)
 
-    def look(given: Task, first: int, last: int) -> None:
-        look_rows(given, working_memory(given), index, said, first, last)
+    def look(given: Task, work: Work, first: int, last: int) -> None:
+        look_rows(given, work, index, said, first, last)
 
     one.in_bands(look, threads, needed=np.asarray((index >= 0).any(axis=1)))
     return said

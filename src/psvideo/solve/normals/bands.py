@@ -2,8 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +13,8 @@ from psvideo.model.surface import Surface
 from psvideo.plates.mixture import Mixture, rows_maker
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.task import Mask, Result, Samples, Task
+
+Memory = TypeVar("Memory")
 
 BAND_PIXELS = 1 << 16
 """Pixels of one band; fewer are solved before a thread has started."""
@@ -70,15 +71,17 @@ class ShownPlates:
 
     def in_bands(
         self,
-        run: Callable[[Task, int, int], None],
+        run: Callable[[Task, Memory, int, int], None],
         given: Task,
+        memory: Callable[[Task], Memory],
         *,
         threads: int | None,
         step: int = 1,
         needed: NDArray[np.bool_] | None = None,
     ) -> None:
-        """Call ``run(task, first, last)`` for bands of rows side by side; it needs every ``step``-th row, of those
-        that are ``needed`` (row,), and reads no others.
+        """Call ``run(task, memory, first, last)`` for bands of rows side by side; it needs every ``step``-th row, of
+        those that are ``needed`` (row,), and reads no others. ``memory`` is what makes room to work in, of which no two
+        calls at a time have the same.
 
         Plates that are not made yet are made band by band; the task finds the rows where they would lie if the whole
         plates did. (Numba's own thread pool may abort when two use it.)
@@ -86,7 +89,12 @@ class ShownPlates:
         rows, cols = self.shape[:2]
         make = self.makes
         if make is None:
-            over_ranges(partial(run, given), rows, each=BAND_PIXELS // cols, threads=threads)
+            over_ranges(
+                lambda first, last: run(given, memory(given), first, last),
+                rows,
+                each=BAND_PIXELS // cols,
+                threads=threads,
+            )
             return
 
         lights, samples = len(self.samples), int(np.prod(self.shape[1:]))
@@ -96,13 +104,14 @@ class ShownPlates:
             held = np.empty((lights, made_rows, *self.shape[1:]), np.float32)
             begins = np.array([plate.ctypes.data for plate in held], np.intp)
             begins = np.pad(begins, (0, len(given.plates) - lights), mode="edge")
+            room = memory(given)
             for first in range(begin, end, made_rows):
                 last = min(first + made_rows, end)
                 wanted = np.arange(-(-first // step) * step, last, step)
                 wanted = wanted if needed is None else wanted[needed[wanted]]
                 if len(wanted):
                     make(wanted, first, held)
-                    run(given._replace(plates=begins - first * held.strides[1]), first, last)
+                    run(given._replace(plates=begins - first * held.strides[1]), room, first, last)
 
         over_ranges(bands, rows, each=-(-BANDS_ROWS // made_rows) * made_rows, threads=threads)
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from psvideo.compute.spilled import let_go
 from psvideo.model.surface import Surface
 from psvideo.solve.normals.evidence import Evidence
-from psvideo.solve.normals.task import Floats, Samples, Task
+from psvideo.solve.normals.task import Floats, Samples, Task, Work
 
 GRID_PX = 480
 """The grid has at most so many points along the longer side."""
@@ -158,13 +158,12 @@ def _mean(plane: Floats, width: int) -> Floats:
 def _indirect(points: ThinSurface, one: Evidence, surface: Surface) -> tuple[Floats, Floats]:
     """Return at every point the light from lamps that do not reach it, in units of albedo, summed, and their number."""
     from psvideo.solve.normals.judging_kernel import indirect_rows
-    from psvideo.solve.normals.kernel import working_memory
 
     sums, counts = np.zeros_like(points.noise_deg), np.zeros_like(points.noise_deg)
     planes, albedo = stored(surface)
 
-    def look(given: Task, first: int, last: int) -> None:
-        indirect_rows(given, working_memory(given), planes, albedo, sums, counts, first, last, points.step)
+    def look(given: Task, work: Work, first: int, last: int) -> None:
+        indirect_rows(given, work, planes, albedo, sums, counts, first, last, points.step)
         let_go(*(plane[first:last] for plane in (*planes, *albedo)))
 
     one.in_bands(look, step=points.step)

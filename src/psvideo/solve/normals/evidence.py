@@ -7,7 +7,7 @@ from pathlib import Path
 from psvideo.plates.mixture import Mixture
 from psvideo.solve.normals.bands import ShownPlates
 from psvideo.solve.normals.illumination import Illumination
-from psvideo.solve.normals.task import Floats, Mask, Samples, Task, Usable, task
+from psvideo.solve.normals.task import Floats, Mask, Samples, Task, Usable, Work, task
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,14 +29,16 @@ class Evidence:
 
     def in_bands(
         self,
-        run: Callable[[Task, int, int], None],
+        run: Callable[[Task, Work, int, int], None],
         threads: int | None = None,
         *,
         step: int = 1,
         needed: Mask | None = None,
     ) -> None:
-        """Call ``run(task, first, last)`` for bands of rows, of which it needs every ``step``-th, and of these those
-        ``needed`` (row,); pictures that are not made are made band by band."""
+        """Call ``run(task, work, first, last)`` for bands of rows, of which it needs every ``step``-th, and of these
+        those ``needed`` (row,); pictures that are not made are made band by band."""
+        from psvideo.solve.normals.kernel import working_memory  # loads the compiler
+
         shown = ShownPlates.of(self.plates)
         given = task(shown.samples, self.lit, self.seen, self.mask, self.usable, self.black_level, self.scale)
-        shown.in_bands(run, given, threads=threads, step=step, needed=needed)
+        shown.in_bands(run, given, working_memory, threads=threads, step=step, needed=needed)

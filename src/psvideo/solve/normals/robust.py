@@ -121,12 +121,12 @@ def solve(
     given = _balanced(task(shown.samples, lit, seen, mask, usable, black_level, scale))
 
     def run(into: Samples, unexplained: Floats, how: Weights, step: int) -> None:
-        def band(one: Task, first: int, last: int) -> None:
-            kernel.solve_rows(one, result, into, unexplained, kernel.working_memory(one), how, first, last, step)
+        def band(one: Task, memory: kernel.Memory, first: int, last: int) -> None:
+            kernel.solve_rows(one, result, into, unexplained, memory, how, first, last, step)
             let_rows_go(result, cols, first, last)
             let_go(predicted[first * cols : last * cols])
 
-        shown.in_bands(band, given, threads=threads, step=step)
+        shown.in_bands(band, given, kernel.working_memory, threads=threads, step=step)
 
     noise = (0.0, 0.0) if plate_noise is None else (plate_noise.read / channels, plate_noise.photon / channels)
     if misfit is None:

@@ -12,7 +12,7 @@ from psvideo.model.surface import Surface
 from psvideo.plates.mixture import Mixture
 from psvideo.solve.normals.bands import ShownPlates, check_arrays, surface_of
 from psvideo.solve.normals.illumination import Illumination
-from psvideo.solve.normals.task import EVERYTHING, Mask, Samples, Task, Usable, empty_result, let_rows_go, task
+from psvideo.solve.normals.task import EVERYTHING, Mask, Samples, Task, Usable, Work, empty_result, let_rows_go, task
 
 __all__ = ["EVERYTHING", "Usable", "solve"]
 
@@ -58,9 +58,9 @@ def solve(
     result = empty_result(rows * cols, lit.intensities.shape[1], half=half, residual=residual, spare=spare)
     given = task(shown.samples, lit, seen, mask, usable, black_level, scale)
 
-    def solve_band(one: Task, first: int, last: int) -> None:
-        solve_rows(one, result, working_memory(one), first, last)
+    def solve_band(one: Task, work: Work, first: int, last: int) -> None:
+        solve_rows(one, result, work, first, last)
         let_rows_go(result, cols, first, last)
 
-    shown.in_bands(solve_band, given, threads=threads)
+    shown.in_bands(solve_band, given, working_memory, threads=threads)
     return surface_of(result, None, shown.shape, half=half)
