@@ -21,7 +21,7 @@ from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat, FoundClock
 from psvideo.sync.rowfit.profiles import WORTH_A_THREAD, Profiles, equations
 
-COUNTS = (1, 2, 3, 8)
+COUNTS = (1, 3, 8)
 TALL = """
 schema = "psvideo-scene/1"
 name = "tall"
