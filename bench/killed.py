@@ -1,28 +1,27 @@
-"""Runs that are killed at random moments, or find the disk full, and go on by ``--resume``: are the files the same?
+"""Runs that something stops at a random moment, and that go on by ``--resume``: are the files the same?
 
-A warm process forks one for every run, so that a moment costs a run and no more. After a kill no folder that is not
-whole may lie under its final name; after the next run nothing else may be left. A full disk is one on which no file can
-grow beyond a random size: the run ends with one paragraph. ``python -m bench.killed --moments 100`` tries so many.
+A warm process forks one for every run, so that a moment costs a run and no more. Whatever happens, no folder that is
+not whole may lie under its final name, and a run that can still speak ends with one paragraph; after the next run
+nothing else may be left. ``python -m bench.killed --moments 100`` tries every fault so often on every command.
 """
 
 import argparse
 import hashlib
-import os
 import resource
-import signal
+import shutil
+import subprocess
 import sys
 import tempfile
 import time
-import traceback
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import Literal, NamedTuple, NoReturn, get_args
+from typing import NamedTuple
 
 import numpy as np
 
-from psvideo.cli.app import main as psvideo
+from bench.faults import FAULTS, HANGS_S, Fault, Scene, forked
 from psvideo.synth.shoot import shoot
 
 SCENE = """
@@ -53,23 +52,25 @@ ALL = (
     "beauty",
 )
 COMMANDS: dict[str, tuple[str, ...]] = {
+    "sync": ("sync", "{clip}"),
     "split": ("split", "{clip}", "--flashes", "--beauty"),
     "normals": ("normals", "{clip}", "--rig", "{clip}/rig.toml", "--plates"),
     "normals, all": ("normals", "{clip}", "--rig", "{clip}/rig.toml", "--multipart", *ALL),
+    "page": ("view", "{clip}/../results", "--export"),
 }
+"""What is stopped; ``-o`` and the output follow, and of a page the output alone."""
+AGAIN = {"sync": "--force", "page": "--force"}
+"""How commands that write one file go on; the others by --resume."""
 PER_RUN = ("report.json", "report.html")
 """They hold the command, and with it the output's name and --resume."""
-MOMENTS = 40
-CRASHED = 70
-"""The exit status where an error came out of the program."""
-How = Literal["killed", "disk full"]
+MOMENTS = 10
 
 
 class Survival(NamedTuple):
     """One command: how often it was stopped, and what was wrong afterwards."""
 
     command: str
-    how: How
+    how: str
     stopped: int
     ended_before: int
     same_bytes: int
@@ -84,109 +85,100 @@ class Trial:
     faults: tuple[str, ...]
 
 
-def forked(words: Sequence[str], *, kill_after_s: float | None = None, most_bytes: int = -1) -> tuple[int, str]:
-    """Run a command in a fork of this process; return its exit status, negative for a signal, and what it said.
-
-    It is killed after ``kill_after_s``, or cannot write files longer than ``most_bytes``.
-    """
-    reading, writing = os.pipe()
-    child = os.fork()
-    if child == 0:
-        os.dup2(writing, 2)
-        sys.stdout = sys.stderr = os.fdopen(2, "w", buffering=1)
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # writing fails instead
-        resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, -1))
-        _end_with(words)
-    os.close(writing)
-    if kill_after_s is not None:
-        time.sleep(kill_after_s)
-        os.kill(child, signal.SIGKILL)
-    with os.fdopen(reading, "rb") as said:
-        text = said.read().decode()
-    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), text
-
-
-def _end_with(words: Sequence[str]) -> NoReturn:
-    """Run a command and end this process, whatever comes: nothing of the process that was forked may go on here."""
-    status = CRASHED
-    try:
-        status = psvideo([*words, "-q"])
-    except BaseException:
-        traceback.print_exc()
-    finally:
-        sys.stderr.flush()
-        os._exit(status)
-
-
 def digest(out: Path) -> dict[str, str]:
     """Return a checksum of every file of a run but what depends on its name."""
+    if out.is_file():
+        return {"": hashlib.sha256(out.read_bytes()).hexdigest()}
     files = [path for path in sorted(out.rglob("*")) if path.is_file() and path.name not in PER_RUN]
     return {str(path.relative_to(out)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
 
 
-def trials(name: str, folder: Path, *, how: How, moments: int, seed: int) -> Iterator[Trial]:
-    """Stop a command at so many random moments of its length, or sizes of a file, and go on with it each time."""
-    words = [word.format(clip=folder / "clip") for word in COMMANDS[name]]
+def trials(name: str, clip: Path, folder: Path, *, how: str, moments: int, seed: int) -> Iterator[Trial]:
+    """Stop a command at so many random moments of its length, or in so many random ways, and go on with it."""
+    words = [word.format(clip=clip) for word in COMMANDS[name]]
+    results = clip.with_name("results")
+    if name == "page" and not results.exists():
+        forked([*(word.format(clip=clip) for word in COMMANDS["normals"]), "-o", str(results)])
     rng = np.random.default_rng(seed)
     for once in ("compiled", "whole"):
         began_s = time.monotonic()
-        status, said = forked([*words, "-o", str(folder / once / "out")])
+        status, said = forked(_into(name, words, folder / once / "out"))
         if status != 0:
             raise RuntimeError(f"{name}: the run that nobody stops fails: {said}")
     length_s, whole = time.monotonic() - began_s, digest(folder / "whole" / "out")
-    largest = max(path.stat().st_size for path in (folder / "whole" / "out").rglob("*"))
+    sizes = [path.stat().st_size for path in (folder / "whole").rglob("*")]
     for number in range(moments):
         out = folder / f"place{number}" / "out"
         out.parent.mkdir()
-        command = [*words, "-o", str(out)]
-        if how == "killed":
-            after_s = float(rng.uniform(0, length_s))
-            stopped = forked(command, kill_after_s=after_s)[0] == -signal.SIGKILL
-            faults, when = [], f"killed after {after_s:.2f} s"
-        else:
-            most_bytes = int(largest ** rng.uniform(0, 1))
-            status, said = forked(command, most_bytes=most_bytes)
-            stopped, when = status != 0, f"with files of {most_bytes} bytes at most"
-            faults = (
-                [] if status in (0, 1) and "Traceback" not in said else [f"{when}, ends with {status}: {said[-300:]}"]
-            )
-        yield Trial(was_stopped=stopped, faults=(*faults, *_afterwards(command, out, whole, when)))
-
-
-def _afterwards(command: Sequence[str], out: Path, whole: dict[str, str], when: str) -> Iterator[str]:
-    """Go on with a run that was stopped, and give what is wrong."""
-    if out.exists() and digest(out) != whole:
-        yield f"{when}, a folder that is not whole lies under its final name"
-    status, said = forked([*command, "--resume"])
-    if status != 0:
-        yield f"{when}, --resume ends with {status}: {said[-300:]}"
-    elif digest(out) != whole:
-        yield f"{when}, --resume gives other bytes"
-    if left := [path.name for path in out.parent.iterdir() if path != out]:
-        yield f"{when} and resumed, {', '.join(left)} is left"
-
-
-def filmed(folder: Path) -> None:
-    """Film the clip that all runs work on, and make everything compile that they need."""
-    (folder / "killed.toml").write_text(SCENE, encoding="utf-8")
-    shoot(folder / "killed.toml", folder / "clip")
-
-
-def survivals(moments: int, *, seed: int = 1) -> Iterator[Survival]:
-    """Stop every command so often in either way."""
-    for name, how in product(COMMANDS, get_args(How)):
-        with tempfile.TemporaryDirectory() as place:
-            filmed(Path(place))
-            found = list(trials(name, Path(place), how=how, moments=moments, seed=seed))
-        stopped = sum(one.was_stopped for one in found)
-        yield Survival(
-            command=name,
-            how=how,
-            stopped=stopped,
-            ended_before=len(found) - stopped,
-            same_bytes=sum(not one.faults for one in found),
-            faults="; ".join(fault for one in found for fault in one.faults),
+        scene = Scene(
+            clip=clip,
+            out=out,
+            length_s=length_s,
+            largest_bytes=max(sizes),
+            total_bytes=sum(sizes),
+            peak_bytes=resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss << 10,
         )
+        fault = FAULTS[how](rng, scene)
+        try:
+            yield _stopped(_into(name, words, out), out, whole, fault, AGAIN.get(name, "--resume"))
+        finally:
+            if out.parent.is_mount():
+                subprocess.run(["umount", str(out.parent)], check=True)
+
+
+def _into(name: str, words: Sequence[str], out: Path) -> list[str]:
+    return [*words, str(out)] if name == "page" else [*words, "-o", str(out)]
+
+
+def _stopped(command: Sequence[str], out: Path, whole: dict[str, str], fault: Fault, again: str) -> Trial:
+    """Run a command into a fault, go on with it, and return what was wrong."""
+    began_s = time.monotonic()
+    status, said = forked(command, fault)
+    wrong = []
+    if time.monotonic() - began_s > HANGS_S:
+        wrong.append("hangs")
+    if "Traceback" in said or (status not in (0, 1) and not fault.silent):
+        wrong.append(f"ends with {status}: {said[-1000:]}")
+    elif status == 1 and not said.strip() and not fault.silent:
+        wrong.append("ends without a word")
+    if out.exists() and digest(out) != whole:
+        wrong.append("what is not whole lies under its final name")
+    was_stopped = not out.exists()
+    status, said = forked([*command, *([] if was_stopped and again == "--force" else [again])])
+    if status != 0:
+        wrong.append(f"{again} ends with {status}: {said[-1000:]}")
+    elif digest(out) != whole:
+        wrong.append(f"{again} gives other bytes")
+    if left := [path.name for path in out.parent.iterdir() if path != out]:
+        wrong.append(f"{', '.join(left)} is left in the end")
+    return Trial(was_stopped=was_stopped, faults=tuple(f"{fault.when}: {one}" for one in wrong))
+
+
+def filmed(folder: Path) -> Path:
+    """Film the clip that all runs work on."""
+    (folder / "killed.toml").write_text(SCENE, encoding="utf-8")
+    return shoot(folder / "killed.toml", folder / "clip").path
+
+
+def survivals(
+    moments: int, *, seed: int = 1, commands: Sequence[str] = (*COMMANDS,), hows: Sequence[str] = (*FAULTS,)
+) -> Iterator[Survival]:
+    """Stop every command so often in every way."""
+    with tempfile.TemporaryDirectory() as place:
+        clip = filmed(Path(place))
+        for name, how in product(commands, hows):
+            folder = Path(place) / "trials"
+            found = list(trials(name, clip, folder, how=how, moments=moments, seed=seed))
+            shutil.rmtree(folder)
+            stopped = sum(one.was_stopped for one in found)
+            yield Survival(
+                command=name,
+                how=how,
+                stopped=stopped,
+                ended_before=len(found) - stopped,
+                same_bytes=sum(not one.faults for one in found),
+                faults="; ".join(fault for one in found for fault in one.faults),
+            )
 
 
 def rows() -> Iterator[Survival]:
@@ -199,9 +191,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--moments", type=int, default=MOMENTS)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--command", choices=COMMANDS, action="append")
+    parser.add_argument("--fault", choices=FAULTS, action="append")
     asked = parser.parse_args()
     wrong = False
-    for one in survivals(asked.moments, seed=asked.seed):
+    for one in survivals(
+        asked.moments, seed=asked.seed, commands=asked.command or [*COMMANDS], hows=asked.fault or [*FAULTS]
+    ):
         wrong = wrong or bool(one.faults)
         print(
             f"{one.command}, {one.how}: stopped {one.stopped}, ended before {one.ended_before}, same bytes "

@@ -1,7 +1,10 @@
 """Damaged and hostile files are read or refused with one paragraph that names them: no crash, no hang, no flood."""
 
+import os
 import struct
 import zlib
+from collections.abc import Callable
+from fractions import Fraction
 from itertools import islice
 from pathlib import Path
 
@@ -9,13 +12,22 @@ import numpy as np
 import pytest
 import tifffile
 from bench.hostile import Outcome, changed, outcomes
-from bench.hostile_files import good_files
+from bench.hostile_files import SCENE, good_files
+from bench.hostile_runs import tried
+from PIL import ExifTags, Image
 
+from psvideo.clip.decode import exr
 from psvideo.clip.decode.decoders import decode, read_header
-from psvideo.errors import PsvideoError
+from psvideo.clip.stated import Stated, stated_by
+from psvideo.errors import PsvideoError, UsageError
+from psvideo.export.tags import sha256_of
+from psvideo.formats.exr_files import write_exr
+from psvideo.formats.paths import path_of
 from psvideo.formats.plan_toml import read_plan
 from psvideo.formats.rig_toml import read_rig
 from psvideo.formats.timing_json import read_timing
+from psvideo.sync.open_take import open_take
+from psvideo.synth.shoot import shoot
 
 SUFFIXES = {"exr": ".exr", "tiff": ".tif", "png": ".png", "mp4": ".mp4", "raw": ".dng", "oiio": ".tif"}
 """By the beginning of a folder's name: the name of files there that have none of their own."""
@@ -115,3 +127,55 @@ def test_a_list_of_no_lights_is_no_rig(tmp_path: Path) -> None:
     path.write_text("0\n", encoding="utf-8")
     with pytest.raises(PsvideoError, match=r"lights\.lp: .* 0 lights"):
         read_rig(path)
+
+
+def test_a_profile_that_divides_by_zero_and_tags_without_words_say_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "photograph.jpg"
+    curve = b"para" + bytes(4) + struct.pack(">HH", 1, 0) + struct.pack(">3i", 1 << 16, 0, 1 << 16)
+    profile = bytes(128) + struct.pack(">I4sII", 1, b"rTRC", 144, len(curve)) + curve
+    tags = Image.Exif()
+    tags[ExifTags.Base.Make], tags[ExifTags.Base.Model] = "\t", "model"
+    Image.new("RGB", (8, 8)).save(path, icc_profile=profile, exif=tags)
+    assert stated_by(path) == Stated()
+
+
+def test_a_rate_that_divides_by_zero_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "rate.exr"
+    write_exr(path, {"Y": np.zeros((4, 4), np.float32)}, fps=Fraction(24, 1))
+    data = path.read_bytes()
+    place = data.index(struct.pack("<iI", 24, 1))
+    path.write_bytes(data[:place] + bytes(8) + data[place + 8 :])
+    with pytest.raises(PsvideoError, match=r"rate\.exr: cannot be read as OpenEXR"):
+        exr.contents(path)
+
+
+@pytest.mark.parametrize("read", [read_plan, read_rig, exr.contents, sha256_of, lambda path: decode("png", path)])
+def test_a_pipe_is_refused_where_a_file_is_expected(read: Callable[[Path], object], tmp_path: Path) -> None:
+    path = tmp_path / "pipe"
+    os.mkfifo(path)
+    with pytest.raises(PsvideoError, match="pipe: is a pipe, and a file is expected"):
+        read(path)
+
+
+def test_a_name_that_is_no_text_is_refused(tmp_path: Path) -> None:
+    for name in (os.fsdecode(b"\xff"), "a\0b"):
+        with pytest.raises(UsageError, match="this name is no text in UTF-8"):
+            path_of("clip", tmp_path / name)
+
+
+def test_frames_that_are_a_thousand_years_apart_are_not_one_take(tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(SCENE.format(kind="png16", camera=""), encoding="utf-8")
+    clip = shoot(scene, tmp_path / "clip").path
+    last = max((clip / "frames").iterdir())
+    last.rename(last.with_name("hostile.3000000000000.png"))
+    with pytest.raises(PsvideoError, match=r"after number 2 there are 2999999999997 missing, and 3 frames are there"):
+        open_take(clip)
+    assert len(open_take(clip, frames="1-2").numbers) == 2
+
+
+@pytest.mark.campaign
+def test_whole_commands_do_no_harm_on_hostile_folders(tmp_path: Path) -> None:
+    found = [one for _, one in islice(tried(tmp_path, seed=5), 60)]
+    assert not [f"{' '.join(one.words)}: {one.why}: {one.fault}: {one.said}" for one in found if one.fault]
+    assert {one.status for one in found} >= {0, 1}

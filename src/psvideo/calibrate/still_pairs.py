@@ -10,6 +10,7 @@ from psvideo.calibrate.light_files import bears, find_stills
 from psvideo.calibrate.light_pictures import MASK_NAMES, LightFiles
 from psvideo.errors import PsvideoError
 from psvideo.formats.contract import check_light_name
+from psvideo.formats.paths import check_file
 
 FEWEST = 3
 LISTED = 6
@@ -86,8 +87,12 @@ def _refuse_few(folder: Path, files: Sequence[Path]) -> None:
             f"{folder}: holds {len(files)} picture{'' if len(files) == 1 else 's'} of lights "
             f"({', '.join(file.name for file in files)}). Normals need three at least, each under another light."
         )
+    sizes = [file.stat().st_size for file in files]
     seen: dict[str, Path] = {}
-    for file in files:
+    for file, size in zip(files, sizes, strict=True):
+        if sizes.count(size) == 1:
+            continue
+        check_file(file)
         with file.open("rb") as opened:
             first = seen.setdefault(hashlib.file_digest(opened, "sha256").hexdigest(), file)
         if first is not file:

@@ -13,6 +13,7 @@ from typing import Annotated
 import typer
 
 from psvideo.cli.console import compiling_said
+from psvideo.cli.ending import nobody_reads, paragraph_on, say_any_name, stoppable
 from psvideo.cli.first_screen import COMMANDS, Entry
 from psvideo.cli.spelling import spelled
 from psvideo.cli.teaching import PROGRAM, command_called, teach, words_typed
@@ -80,9 +81,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     A fault is printed as one paragraph on stderr.
     """
     _share_one_heap()
+    say_any_name()
     words = words_typed(sys.argv[1:] if arguments is None else arguments, os.environ)
-    with compiling_said(quiet="-q" in words or "--quiet" in words):
-        return _ended(words)
+    with compiling_said(quiet="-q" in words or "--quiet" in words), stoppable():
+        try:
+            return _ended(words)
+        except (OSError, MemoryError, ImportError, RuntimeError) as fault:
+            return _broken_off(fault)
 
 
 def _ended(words: Sequence[str]) -> int:
@@ -104,6 +109,18 @@ def _ended(words: Sequence[str]) -> int:
             return 1
         return end.code if isinstance(end.code, int) else 0
     return 0
+
+
+def _broken_off(fault: Exception) -> int:
+    """Say what the machine refused; a fault that is not the machine's goes on to where it is seen."""
+    said = paragraph_on(fault)
+    if said is None:
+        raise fault
+    if said:
+        print(f"psvideo: {spelled(said)}", file=sys.stderr)
+    else:
+        nobody_reads()
+    return PsvideoError.exit_status
 
 
 def _no_command(word: str, names: Sequence[str]) -> str:

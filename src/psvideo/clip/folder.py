@@ -6,6 +6,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from psvideo.errors import PsvideoError
+from psvideo.formats.paths import check_text
 from psvideo.formats.plan_toml import FRAMES
 
 KINDS = {
@@ -61,6 +62,7 @@ def find_sequence(folder: Path) -> NumberedImages:
     if not frames:
         raise PsvideoError(f"{folder}: {_nothing(folder, images)}")
     _refuse_mixture(frames)
+    check_text(frames[0])
     numbers = tuple(_number(file) for file in frames)
     passed_over = tuple(image for image in images if image not in set(frames))
     return NumberedImages(

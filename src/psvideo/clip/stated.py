@@ -13,9 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PIL import ExifTags, Image, UnidentifiedImageError
+from PIL import ExifTags, Image
 
 from psvideo.clip.transfer import DISPLAYED, find_curve, to_light
+from psvideo.formats.paths import check_file
 from psvideo.model.camera import FloatArray
 from psvideo.model.turn import EXIF, UPRIGHT, Turn
 
@@ -50,9 +51,9 @@ class Stated:
 
 def stated_by(path: Path) -> Stated:
     """Return what a file says of itself; nothing where it is of a kind that says nothing, or cannot be read."""
-    unreadable = (OSError, UnidentifiedImageError, Image.DecompressionBombError, ValueError, SyntaxError)
-    with contextlib.suppress(*unreadable), warnings.catch_warnings():
+    with contextlib.suppress(Exception), warnings.catch_warnings():  # Pillow may raise anything over damaged tags
         warnings.simplefilter("ignore")  # of tags that are damaged: what they say is left out
+        check_file(path)
         with Image.open(path) as picture:
             exif = picture.getexif()
             taken = {**exif, **exif.get_ifd(ExifTags.IFD.Exif)}

@@ -10,6 +10,7 @@ from pathlib import Path
 from psvideo import __version__
 from psvideo.errors import PsvideoError
 from psvideo.formats.exr_files import Attribute
+from psvideo.formats.paths import check_file
 
 CODE = re.compile(r"(\d\d):(\d\d):(\d\d):(\d\d)")
 MOST_FRAMES = 30
@@ -77,6 +78,7 @@ class Tags:
 def sha256_of(path: Path) -> str:
     """Return the SHA-256 of a file in hexadecimal digits."""
     try:
+        check_file(path)
         return hashlib.sha256(path.read_bytes()).hexdigest()
     except OSError as fault:
         raise PsvideoError(f"{path}: cannot be read ({fault.strerror}). Check the file and its permissions.") from fault

@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from psvideo.errors import PsvideoError, nearest
+from psvideo.formats.paths import check_file
 
 
 class Contract(BaseModel):
@@ -55,6 +56,7 @@ def read_text(path: Path) -> str:
         )
         raise PsvideoError(f"{path}: is a folder, and a file is expected. {advice}")
     try:
+        check_file(path)
         if path.stat().st_size > MOST_BYTES:
             raise PsvideoError(f"{path}: is too large for a text that psvideo reads. Name the file that is meant.")
         return path.read_text(encoding="utf-8-sig")  # without the mark that Windows puts first

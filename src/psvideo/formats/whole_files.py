@@ -1,12 +1,18 @@
 """Files appear whole or not at all: written beside their final name, then renamed."""
 
 import contextlib
+import glob
 import os
+import platform
+import sys
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
 from psvideo.errors import PsvideoError, UsageError
+
+HERE = f"{zlib.crc32(platform.node().encode()):08x}"
+"""This computer, in names of files that are being written: others may write into the same folder over a network."""
 
 
 @contextlib.contextmanager
@@ -15,7 +21,7 @@ def whole_file(path: Path) -> Iterator[Path]:
 
     A full disk or a folder that cannot be written becomes a PsvideoError that names the file.
     """
-    beside = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    beside = path.with_name(f".{path.name}.{os.getpid()}-{HERE}.partial")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield beside
@@ -51,16 +57,46 @@ def marked_png(data: bytes) -> bytes:
 
 
 def refuse_existing(path: Path, *, force: bool, mark: str | None = None) -> None:
-    """Raise UsageError where an output exists already and ``force`` does not allow to replace it.
+    """Raise UsageError where an output exists already and ``force`` does not allow to replace it; what earlier runs
+    that were killed left beside it is removed.
 
     ``mark`` is a word that a file of this kind holds: what does not is not replaced, even with ``force``.
     """
+    _remove_left(path)
     if not path.exists():
         return
     if not force:
         raise UsageError(f"{path}: exists already. Name another output, or give `force` to replace it.")
-    if mark is not None and not (path.is_file() and mark.encode() in path.read_bytes()[:4096]):
+    if mark is not None and not (path.is_file() and mark.encode() in _beginning(path)):
         raise UsageError(
             f"{path}: exists and is nothing that this command wrote (no {mark!r} in it), so it is not replaced, not "
             "even with `force`. Name another output."
         )
+
+
+def _beginning(path: Path) -> bytes:
+    with path.open("rb") as file:
+        return file.read(4096)
+
+
+def _remove_left(path: Path) -> None:
+    """Remove what processes of this computer that are no more had begun to write under this name."""
+    end = f"-{HERE}.partial"
+    for left in path.parent.glob(f".{glob.escape(path.name)}.*{end}"):
+        process = left.name.removesuffix(end).rpartition(".")[2]
+        if process.isdecimal() and not _runs(int(process)):
+            with contextlib.suppress(OSError):
+                left.unlink()
+
+
+def _runs(process: int) -> bool:
+    """Return whether a process of this number may be running."""
+    if sys.platform == "win32":
+        return True  # there the same call would end it
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        return True
+    return True

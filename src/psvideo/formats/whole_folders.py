@@ -47,7 +47,8 @@ def whole_folder(
                 shutil.rmtree(old, ignore_errors=True)
             if settings:
                 write_text(beside / SETTINGS, settings)
-            yield beside
+            with _still_there(beside, path, settings):
+                yield beside
             _replace(beside, path)
 
 
@@ -65,7 +66,8 @@ def begun_folder(path: Path, *, mark: str, force: bool = False, settings: str = 
         with _held(beside, path, shared=True):
             if _noted(beside) != settings:
                 write_text(beside / SETTINGS, settings)
-            yield beside
+            with _still_there(beside, path, settings):
+                yield beside
 
 
 def forget_begun(path: Path) -> None:
@@ -79,6 +81,23 @@ def forget_begun(path: Path) -> None:
 def begun(path: Path) -> Path:
     """Return the hidden folder in which an output is written until it is whole; it need not be there."""
     return _beside(path.resolve())
+
+
+@contextlib.contextmanager
+def _still_there(beside: Path, path: Path, settings: str) -> Iterator[None]:
+    """Raise PsvideoError where somebody removed the hidden folder while a block wrote into it: what came afterwards is
+    not the whole, and is removed too."""
+    try:
+        yield
+    finally:
+        gone = _noted(beside) != settings
+        if gone:
+            shutil.rmtree(beside, ignore_errors=True)
+    if gone:
+        raise PsvideoError(
+            f"{path}: the folder {beside.name} in which it was written was removed meanwhile, with what had been "
+            "finished. Nothing was left under that name: run the command again."
+        )
 
 
 @contextlib.contextmanager

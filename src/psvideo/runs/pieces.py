@@ -17,6 +17,7 @@ import numpy as np
 
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import UsageError
+from psvideo.export.result_files import is_written
 from psvideo.model.shutter import frames_touched
 from psvideo.model.timing import Timing, places_in_time, timed_camera
 from psvideo.plates.align.comb import Schedule
@@ -66,7 +67,7 @@ def write_piece(job: Job, folder: Path, piece: str, *, watch: Watch = unwatched)
     """Solve one piece into a folder that is not finished, and note what it found; return that."""
     numbers = piece_named(piece, Succession(job).numbers)
     note_timing(folder, job.timing)
-    return _written(job, folder, numbers, watch=watch)
+    return _written(job, folder, numbers, beginning_of(job) if numbers else None, watch=watch)
 
 
 def pieces_begun(folder: Path) -> bool:
@@ -76,9 +77,11 @@ def pieces_begun(folder: Path) -> bool:
 
 def pieced_together(job: Job, folder: Path, *, watch: Watch = unwatched) -> Found:
     """Solve what no piece has solved yet, and return what all of them found."""
-    missing = [*_missing(Succession(job).numbers, [numbers for numbers, _ in noted(folder)])]
+    done = [numbers for numbers, found in noted(folder) if _is_there(job, folder, found)]
+    missing = [*_missing(Succession(job).numbers, done)]
+    beginning = beginning_of(job) if missing else None
     for numbers in missing:
-        _written(job, folder, numbers, watch=watch)
+        _written(job, folder, numbers, beginning, watch=watch)
     whole = Found(observed=observing(job.take, job.lighting.rig, job.lighting.masks))
     until = 0
     for numbers, found in noted(folder):
@@ -93,6 +96,12 @@ def forget_pieces(folder: Path) -> None:
     shutil.rmtree(folder / FOLDER, ignore_errors=True)
 
 
+def _is_there(job: Job, folder: Path, found: Found) -> bool:
+    """Return whether the files of all instants that were noted are there: somebody may have removed some."""
+    clip = job.take.clip.name
+    return all(is_written(folder, clip, one.number, job.delivery) for one in found.observed.facts)
+
+
 def _missing(numbers: range, done: Iterable[range]) -> Iterator[range]:
     """Give the ranges of numbers that are in none of those done, which are in order."""
     start = numbers.start
@@ -104,8 +113,7 @@ def _missing(numbers: range, done: Iterable[range]) -> Iterator[range]:
         yield range(start, numbers.stop)
 
 
-def _written(job: Job, folder: Path, numbers: range, *, watch: Watch) -> Found:
-    beginning = beginning_of(job) if numbers else None
+def _written(job: Job, folder: Path, numbers: range, beginning: Beginning | None, *, watch: Watch) -> Found:
     if beginning is None:
         return Found(observed=observing(job.take, job.lighting.rig, job.lighting.masks))
     piece = Pieces(job=job, beginning=beginning).of(numbers)
@@ -126,11 +134,11 @@ class Pieces:
         frames = self._frames(numbers)
         if frames[0] == self.job.take.numbers[0]:
             begins_here = self.beginning.number in numbers
-            part = Part(numbers=frames, whites={} if begins_here else self.beginning.whites)
+            part = Part(numbers=frames, whites={} if begins_here else dict(self.beginning.whites))
             return Piece(numbers=numbers, part=part, beginning=None if begins_here else self.beginning)
         complete = [flash.index for flash in used_of(self.job.take, self.job.timing, frames).flashes if flash.complete]
         ambient = ambient_before(self.job.take, self.job.timing, complete[0]) if complete else None
-        part = Part(numbers=frames, whites=self.beginning.whites, ambient=ambient)
+        part = Part(numbers=frames, whites=dict(self.beginning.whites), ambient=ambient)
         return Piece(numbers=numbers, part=part, beginning=self.beginning)
 
     def _frames(self, numbers: range) -> tuple[int, ...]:

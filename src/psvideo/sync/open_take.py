@@ -4,8 +4,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from psvideo.clip import Clip, Take, open_clip, parse_range
+from psvideo.clip.record import holes
+from psvideo.errors import PsvideoError
 from psvideo.formats.paths import path_if_given, path_of
 from psvideo.strobe.runlog import as_played
+
+MOST_MISSING, MOST_MISSING_SHARE = 10_000, 100
+"""Where more frames are missing in a row than the first, and than so many times those that are there, it is not one
+take: every flash in between would be counted."""
 
 
 def open_take(path: Path | str, *, plan: Path | str | None = None, frames: str | None = None) -> Take:
@@ -41,7 +47,19 @@ def open_take(path: Path | str, *, plan: Path | str | None = None, frames: str |
     """
     clip = _as_played(open_clip(path_of("path", path), plan=path_if_given("plan", plan)))
     numbers = clip.numbers if frames is None else parse_range(frames, clip.numbers)
+    _refuse_gulf(clip, numbers)
     return Take(clip=clip, numbers=numbers)
+
+
+def _refuse_gulf(clip: Clip, numbers: tuple[int, ...]) -> None:
+    """Raise PsvideoError where numbers are so far apart that they cannot be of one take."""
+    most = max(MOST_MISSING, MOST_MISSING_SHARE * len(numbers))
+    for before, count in holes(numbers):
+        if count > most:
+            raise PsvideoError(
+                f"{clip.path}: after number {before} there are {count} missing, and {len(numbers)} frames are there. "
+                "Expected the frames of one take: move the others elsewhere, or say with `frames` which are meant."
+            )
 
 
 def _as_played(clip: Clip) -> Clip:

@@ -13,6 +13,7 @@ from typing import TypeVar
 
 from psvideo.clip.record import CodedPicture, Header, PictureInFile
 from psvideo.errors import PsvideoError
+from psvideo.formats.paths import check_file
 
 Read = TypeVar("Read")
 
@@ -55,6 +56,7 @@ def _module(kind: str) -> ModuleType:
 def guarded(read: Callable[[Path], Read], file: Path) -> Read:
     """Call a decoder; its library may raise anything over a damaged file, and all of it means the same."""
     try:
+        check_file(file)
         if file.stat().st_size == 0:
             raise PsvideoError(f"{file}: is empty (0 bytes). Copy it again from the camera's card.")
         return read(file)

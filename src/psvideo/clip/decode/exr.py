@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from psvideo.clip.decode.exr_chunks import is_cut_short
 from psvideo.clip.record import CodedPicture, Header, shot_of
 from psvideo.errors import PsvideoError
+from psvideo.formats.paths import check_file
 
 GREY_NAMES = ("Y", "L", "V")
 OF_THE_CONTAINER = ("type", "name", "chunkCount", "pixelAspectRatio", "screenWindowWidth")
@@ -121,12 +122,21 @@ def _usual_order(channel: Any) -> tuple[str, int, str]:
 
 def _open(path: Path, *, header_only: bool) -> Any:
     """Open a file; OpenEXR reports damage in several ways, which all end here."""
-    if is_cut_short(path):
+    try:
+        check_file(path)
+        cut_short = is_cut_short(path)
+    except OSError as fault:
+        raise PsvideoError(
+            f"{path}: cannot be read ({fault.strerror or fault}). Check the file and its disk."
+        ) from fault
+    if cut_short:
         raise PsvideoError(f"{path}: ends before its last rows: it is truncated. Copy it again.")
     try:
         file = OpenEXR.File(str(path), separate_channels=True, header_only=header_only)
         file.header()
-    except (RuntimeError, ValueError, TypeError) as fault:
+    except MemoryError:
+        raise
+    except Exception as fault:  # of attributes that make no sense too: a rate of 0/0 divides by zero
         raise PsvideoError(
             f"{path}: cannot be read as OpenEXR; it is truncated, damaged or of another kind ({fault}). Copy it again."
         ) from fault

@@ -21,6 +21,7 @@ from psvideo.clip.decode.movie_times import UNEVEN, Places, places_of, promised_
 from psvideo.clip.decode.yuv import CODES, HIGHEST, LOWEST, LUMA_WEIGHTS, signal_range, to_rgb
 from psvideo.clip.record import CodedPicture, Header
 from psvideo.errors import PsvideoError
+from psvideo.formats.paths import check_file
 
 VIDEO_RANGE, FULL_RANGE = 1, 2  # FFmpeg's AVCOL_RANGE_MPEG and AVCOL_RANGE_JPEG
 UNTAGGED = 2  # matrix coefficients "unspecified" (H.273)
@@ -147,6 +148,7 @@ def _safe_start(stream: VideoStream, timestamp: int) -> int:
 @contextmanager
 def _opened(path: Path) -> Iterator[tuple[InputContainer, VideoStream]]:
     """Open a movie and its first video stream."""
+    check_file(path)
     try:
         with av.open(str(path), options=AS_RECORDED) as container:
             if not container.streams.video:

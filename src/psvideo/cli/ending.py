@@ -1,0 +1,79 @@
+"""How commands end before their time: by a signal, a reader that is gone, or a machine that has no more to give."""
+
+import contextlib
+import errno
+import io
+import os
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from types import FrameType
+
+from psvideo.errors import PsvideoError
+
+ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+"""Ctrl-C; what systems and farms send to end a program; a terminal that is closed."""
+NO_MEMORY = (
+    "there is not enough memory{said}. Nothing half-made was left under a final name. Close other programs, compute "
+    "with fewer threads (PSVIDEO_THREADS=1), or take a machine with more memory; split and normals go on with `resume`."
+)
+UNMAPPED = ("failed to map segment", "Cannot allocate memory", "can't start new thread", "MemoryError")
+"""What loaders and systems say where an address space is full, in errors of many kinds."""
+
+
+@contextlib.contextmanager
+def stoppable() -> Iterator[None]:
+    """In this block, what asks a program to end stops it as Ctrl-C does: what it writes is closed, lights become dark.
+    A second such signal ends it at once, which costs no more than a kill. Signals that are ignored stay so (nohup)."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    asked = False
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        nonlocal asked
+        if asked:
+            os._exit(PsvideoError.exit_status)
+        asked = True
+        raise KeyboardInterrupt
+
+    before = {number: signal.getsignal(number) for number in ENDING}
+    heard = [number for number, handler in before.items() if handler not in (signal.SIG_IGN, None)]
+    for number in heard:
+        signal.signal(number, stop)
+    try:
+        yield
+    finally:
+        for number in heard:
+            signal.signal(number, before[number])
+
+
+def say_any_name() -> None:
+    """Let names of files be printed that are no text, with their bytes as numbers."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def paragraph_on(fault: BaseException) -> str | None:
+    """Return what is to be said of a fault of the machine, empty where nobody is there to read it; None for others."""
+    if isinstance(fault, OSError) and fault.errno == errno.EPIPE:
+        return ""
+    if isinstance(fault, MemoryError) or any(word in str(fault) for word in UNMAPPED):
+        return NO_MEMORY.format(said=f" ({fault})" if str(fault) else "")
+    if isinstance(fault, OSError):
+        where = f"{fault.filename}: " if fault.filename is not None else ""
+        return (
+            f"{where}cannot be read or written ({fault.strerror or fault}). Check the file, its folder and its disk, "
+            "then run the command again."
+        )
+    return None
+
+
+def nobody_reads() -> None:
+    """Send what is still to be printed nowhere, so that the interpreter does not complain at its end."""
+    with contextlib.suppress(OSError, ValueError, io.UnsupportedOperation):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+        os.close(nowhere)

@@ -1,0 +1,82 @@
+"""How commands end before their time: signals, readers that are gone, machines that have no more to give."""
+
+import errno
+import os
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import psvideo
+from psvideo.cli import app
+from psvideo.cli.ending import ENDING, paragraph_on, stoppable
+
+
+@pytest.mark.parametrize("number", ENDING)
+def test_what_asks_a_program_to_end_stops_it_as_ctrl_c_does(number: int) -> None:
+    before = signal.getsignal(number)
+    with pytest.raises(KeyboardInterrupt), stoppable():
+        os.kill(os.getpid(), number)
+    assert signal.getsignal(number) == before
+
+
+def test_signals_that_are_ignored_stay_so() -> None:
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with stoppable():
+            os.kill(os.getpid(), signal.SIGHUP)
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+def test_a_second_signal_ends_a_command_at_once() -> None:
+    script = (
+        "import os, signal, time\nfrom psvideo.cli.ending import stoppable\nwith stoppable():\n try:\n"
+        "  os.kill(os.getpid(), signal.SIGTERM)\n finally:\n  os.kill(os.getpid(), signal.SIGINT)\n  time.sleep(60)\n"
+    )
+    assert subprocess.run([sys.executable, "-c", script], timeout=30, check=False).returncode == 1
+
+
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        (MemoryError("Unable to allocate 9 GiB"), "not enough memory (Unable to allocate 9 GiB)"),
+        (ImportError("lib.so: failed to map segment from shared object"), "not enough memory"),
+        (RuntimeError("can't start new thread"), "not enough memory"),
+        (OSError(errno.EIO, "Input/output error", "/disk/a.exr"), "/disk/a.exr: cannot be read or written (Input/"),
+    ],
+)
+def test_what_the_machine_refuses_is_said_in_one_paragraph(
+    fault: Exception, said: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def refused(words: list[str]) -> int:
+        raise fault
+
+    monkeypatch.setattr(app, "_ended", refused)
+    assert app.main(["info", "clip"]) == 1
+    error = capsys.readouterr().err
+    assert said in error
+    assert error.count("\n") == 1
+
+
+def test_a_fault_of_the_program_is_not_hidden(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert paragraph_on(RuntimeError("generator raised StopIteration")) is None
+
+
+def test_a_reader_that_is_gone_ends_a_command_without_a_word(capfd: pytest.CaptureFixture[str]) -> None:
+    command = f"{sys.executable} -m psvideo.cli.app capture-plan --list | true"
+    subprocess.run(command, shell=True, check=False, timeout=60)
+    assert "Traceback" not in (error := capfd.readouterr().err)
+    assert "Exception ignored" not in error
+
+
+def test_no_run_asks_what_time_it_is() -> None:
+    """So that a clock that jumps changes nothing; only the strobe's log holds it, and the day of a measurement."""
+    root = Path(psvideo.__file__).parent
+    asking = re.compile(r"\btime\.time\(|\b(datetime\.now|utcnow|localtime)\(")
+    found = [path.relative_to(root) for path in root.rglob("*.py") if asking.search(path.read_text(encoding="utf-8"))]
+    assert found
+    assert all("strobe" in path.parts for path in found)
