@@ -329,4 +329,4 @@ def test_ripples_of_an_average_of_hundreds_of_dark_slots_die_out() -> None:
         swing = 1 + 0.1 * (index % 2)  # so that there is always a level to follow
         averaged = ambient.update(averaged, dark(index, LEVEL * swing * (waves if index < 3 else 1)))
     assert averaged is not None
-    assert rms(averaged.image - LEVEL * swing) < 1.5e-3
+    assert rms(averaged.level.coded.light() - LEVEL * swing) < 1.5e-3

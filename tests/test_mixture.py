@@ -16,6 +16,7 @@ from psvideo.model.plan import Plan
 from psvideo.model.row_profiles import row_light
 from psvideo.model.timing import Flash, Timing
 from psvideo.plates.align.packed import packed
+from psvideo.plates.level import Level
 from psvideo.plates.mixture import Mixture, combined, made
 from psvideo.plates.split import split
 
@@ -49,7 +50,7 @@ def shot(name: str, *, frames: int = 3, seed: int = 0) -> Mixture:
     pictures = [Coded(codes=codes_of(name, rng, shape), tone=TONES[name][1]) for _ in range(frames)]
     coefficients = rng.uniform(0.03, 1.2, (frames, ROWS)) * (rng.random((frames, ROWS)) > 0.4)
     coefficients[:, 7] = 0.0
-    light = tuple(rng.uniform(0, 0.1, shape).astype(np.float32) for _ in range(2))
+    light = tuple(Level.of(rng.uniform(-0.01, 0.1, shape).astype(np.float32)) for _ in range(2))
     taken = rng.uniform(0, 2, (2, ROWS))
     return Mixture(frames=tuple(pictures), coefficients=coefficients, levels=light, taken=taken)
 
@@ -68,7 +69,7 @@ def in_numpy(picture: Mixture) -> tuple[np.ndarray, np.ndarray]:
     )
     assert picture.taken is not None
     for takes, level in zip(picture.taken, picture.levels, strict=True):
-        total = total - takes[by_row] * level
+        total = total - takes[by_row] * level.coded.light()
     total[~picture.coefficients.any(axis=0)] = 0
     return np.where(clipped, 1.0, total), clipped
 
@@ -95,6 +96,16 @@ def test_parts_of_a_picture_are_those_of_the_whole(name: str) -> None:
     assert np.array_equal(picture.reader()(5, 12), image[5:12])
     grey = image.reshape(ROWS // 2, 2, COLS // 2, 2, -1).mean(axis=(1, 3, 4))
     assert np.abs(picture.halved() - grey).max() < 1e-6
+
+
+def test_ambient_light_in_16_bits_is_good_to_half_a_step_of_its_row() -> None:
+    light = np.random.default_rng(4).uniform(-0.002, 0.03, (ROWS, COLS, 3)).astype(np.float32)
+    light[3] = 0.25
+    level = Level.of(light)
+    off = np.abs(level.coded.light() - light).reshape(ROWS, -1).max(axis=1)
+    assert (off <= 0.51 * np.ptp(light.reshape(ROWS, -1), axis=1) / 65535 + 3e-8).all()
+    narrow = light.reshape(ROWS, COLS // 2, -1).mean(axis=-1)
+    assert np.abs(level.narrow - narrow).max() < 1e-7
 
 
 @pytest.mark.parametrize("name", TONES)

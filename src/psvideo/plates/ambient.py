@@ -17,6 +17,7 @@ from psvideo.model.coded import Image
 from psvideo.plates.ambient_blocks import block_px, block_rows, no_blocks, over_bands, times_rows
 from psvideo.plates.ambient_change import AmbientChange
 from psvideo.plates.ambient_kernel import blend_rows, look_rows
+from psvideo.plates.level import Level
 from psvideo.plates.mains import Mains, RowLight
 from psvideo.plates.split import Plate
 
@@ -28,13 +29,13 @@ LONGEST_MEMORY = 16
 class Ambient:
     """What one exposure collects of the ambient light, from the dark slots up to one of them.
 
-    ``image`` is averaged over ``slots`` (row, block) and holds for the moments ``middle_s`` (row,); ``coarse`` is its
+    ``level`` is averaged over ``slots`` (row, block) and holds for the moments ``middle_s`` (row,); ``coarse`` is its
     mean over blocks. ``known`` (row,) is False where no dark slot was seen yet: nothing can be taken off there. The
-    image is free of the ripple of ``mains``, where one is known. ``steady``: since the slot before nothing changed that
+    level is free of the ripple of ``mains``, where one is known. ``steady``: since the slot before nothing changed that
     is worth interpolating.
     """
 
-    image: Image
+    level: Level
     coarse: Image
     slots: Image
     middle_s: FloatArray
@@ -50,7 +51,7 @@ def update(ambient: Ambient | None, dark: Plate) -> Ambient:
     if ambient is None:
         slots = np.broadcast_to(dark.seen[:, None], (len(dark.seen), coarse.shape[1])).astype(np.float32)
         return Ambient(
-            image=dark.image,
+            level=Level.of(dark.image),
             coarse=coarse,
             slots=slots,
             middle_s=rows.opened.middle_s,
@@ -66,9 +67,9 @@ def update(ambient: Ambient | None, dark: Plate) -> Ambient:
     change = AmbientChange.between(ambient.coarse, coarse, whole, block=block_px(dark.picture.shape))
     again = ~ambient.known | first_ripple(ambient.mains, mains)
     restarts = change.restarts[blocks] | again[:, None]
-    image, reduced, slots = _blended(ambient, dark, change.gain, restarts, factor)
+    level, reduced, slots = _blended(ambient, dark, change.gain, restarts, factor)
     return Ambient(
-        image=image,
+        level=level,
         coarse=reduced,
         slots=slots,
         middle_s=np.where(dark.seen, rows.opened.middle_s, ambient.middle_s),
@@ -94,22 +95,22 @@ def _looked_at(dark: Plate) -> tuple[RowLight, Image]:
 
 def _blended(
     ambient: Ambient, dark: Plate, gain: Image, restarts: NDArray[np.bool_], factor: FloatArray
-) -> tuple[Image, Image, Image]:
+) -> tuple[Level, Image, Image]:
     """Return the average with one more dark slot, its rows times a factor; its mean over blocks; and how many slots it
     spans then."""
-    image, coarse, slots = (np.empty_like(one) for one in (ambient.image, ambient.coarse, ambient.slots))
-    bound, block = dark.picture.bound(), block_px(image.shape)
-    old, out = (picture.reshape(len(image), -1) for picture in (ambient.image, image))
+    shape = dark.picture.shape
+    level, coarse, slots = Level.room(shape), np.empty_like(ambient.coarse), np.empty_like(ambient.slots)
+    bound, block, old, new = dark.picture.bound(), block_px(shape), ambient.level.planes, level.planes
     factors, seen = factor.astype(np.float32), np.ascontiguousarray(dark.seen)
 
     def blend(first: int, last: int) -> None:
         bound.run(
             blend_rows, first, last, block, LONGEST_MEMORY, factors, seen, restarts, gain, old, ambient.slots, first,
-            last, out, slots, coarse,
+            last, new, slots, coarse,
         )  # fmt: skip
 
-    over_bands(blend, image.shape)
-    return image, coarse, slots
+    over_bands(blend, shape)
+    return level, coarse, slots
 
 
 def first_ripple(before: Mains, after: Mains) -> bool:

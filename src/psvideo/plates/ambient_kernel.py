@@ -9,9 +9,12 @@ from numpy.typing import NDArray
 from psvideo.compute.compiled import FUSED, REORDERED
 from psvideo.compute.memory import lent
 from psvideo.model.camera import FloatArray
-from psvideo.plates.mixing_kernel import Floats, MixtureArrays, lent_mix, mix_row
+from psvideo.plates.level import pack_row, unpack_row
+from psvideo.plates.mixing_kernel import Codes, Floats, MixtureArrays, lent_mix, mix_row
 
 Flags = NDArray[np.bool_]
+Planes = tuple[Codes, Floats, Floats, Floats]
+"""Of a Level."""
 ONE, HALF = np.float32(1), np.float32(0.5)
 
 
@@ -33,22 +36,24 @@ def look_rows(
 @FUSED.kept
 def blend_rows(
     mix: MixtureArrays, block: int, longest: float, factor: Floats, seen: Flags, restarts: Flags, gain: Floats,
-    old: Floats, old_slots: Floats, first: int, last: int, image: Floats, slots: Floats, coarse: Floats,
+    old: Planes, old_slots: Floats, first: int, last: int, new: Planes, slots: Floats, coarse: Floats,
 ) -> None:  # fmt: skip
-    """Average some rows of the pictures before, ``old`` (row, sample), brought to a new level, with one more, ``mix``
+    """Average some rows of the pictures before, ``old`` (of a Level), brought to a new level, with one more, ``mix``
     times ``factor`` (row,); keep what was where nothing is ``seen`` (row,).
 
     gain: (row, col, channel) of blocks, the new level, which changes steadily between their middles. old_slots,
     restarts: (row, block), how many pictures the average spans, ``longest`` at most, and where it begins again. Filled
-    are ``image`` and ``slots`` like the old ones, and ``coarse`` like the gain with the image's means over blocks.
+    are ``new`` and ``slots`` like the old ones, and ``coarse`` like the gain with the means over blocks.
     """
-    given, before, out, levels, found = lent_mix(mix), lent(old), lent(image), lent(gain), lent(coarse)
+    given, levels, found = lent_mix(mix), lent(gain), lent(coarse)
+    codes, least, step, narrow = lent(new[0]), lent(new[1]), lent(new[2]), lent(new[3])
     samples, cols, channels = given.samples, given.samples // levels.shape[2], levels.shape[2]
-    line, total = np.empty(samples, np.float32), np.zeros(samples, np.float32)
+    line, total, then = np.empty(samples, np.float32), np.zeros(samples, np.float32), np.empty(samples, np.float32)
     share, shares = np.empty(slots.shape[1], np.float32), np.empty(samples, np.float32)
     above, below, level = np.empty(samples, np.float32), np.empty(samples, np.float32), np.empty(samples, np.float32)
     held = -2
     for row in range(first, last):
+        unpack_row(old[0][row], old[1][row], old[2][row], then)
         if seen[row]:
             for place in range(len(share)):
                 spanned = min(old_slots[row, place] + ONE, np.float32(longest))
@@ -64,16 +69,16 @@ def blend_rows(
                 _across(levels[min(upper + 1, levels.shape[0] - 1)], block, below)
                 held = upper
             mix_row(given, row, line)
-            own, then = factor[row], before[row]
+            own = factor[row]
             for sample in range(samples):  # loops over few arrays each become vectors
                 level[sample] = above[sample] + part * (below[sample] - above[sample])
             for sample in range(samples):
                 there = then[sample] * level[sample]
-                out[row, sample] = there + (line[sample] * own - there) * shares[sample]
+                then[sample] = there + (line[sample] * own - there) * shares[sample]
         else:
             slots[row] = old_slots[row]
-            out[row] = before[row]
-        _into_blocks(out[row], total, row, block, len(seen), found)
+        pack_row(then, codes[row], least, step, narrow[row], row, channels)
+        _into_blocks(then, total, row, block, len(seen), found)
 
 
 @REORDERED.inlined

@@ -9,7 +9,7 @@ import numpy as np
 from psvideo.model.timing import Timing
 from psvideo.plates.ambient import Ambient, first_ripple, update
 from psvideo.plates.mains import Exposures
-from psvideo.plates.mixture import made
+from psvideo.plates.mixture import shown_level
 from psvideo.plates.split import Plate
 
 
@@ -77,7 +77,7 @@ def subtract(
         if after is not None and not plate.flash.is_dark:
             plate = _without(plate, before or after, after)
         elif after is not None:
-            plate = replace(plate, picture=made(after.image), seen=after.known)
+            plate = replace(plate, picture=shown_level(after.level), seen=after.known)
         yield plate
         del plate
 
@@ -100,7 +100,7 @@ def _without(plate: Plate, before: Ambient, after: Ambient) -> Plate:
     exposures = plate.exposures * (1.0 if ripple is None else ripple.swing(opened))
     seen = plate.seen & (before.known | after.known)
     if before is after:
-        picture = plate.picture.without((after.image,), exposures[None])
+        picture = plate.picture.without((after.level,), exposures[None])
     else:
-        picture = plate.picture.without((before.image, after.image), np.stack([1 - late, late]) * exposures)
+        picture = plate.picture.without((before.level, after.level), np.stack([1 - late, late]) * exposures)
     return replace(plate, picture=picture.within(seen), shares=np.zeros_like(plate.shares), seen=seen)

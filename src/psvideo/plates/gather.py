@@ -25,7 +25,7 @@ from psvideo.plates.ambient_off import subtract, with_darks_ahead
 from psvideo.plates.ambient_regression import Separated
 from psvideo.plates.ambient_shown import AHEAD, ambient_shown, dark_plates, placed, used_of
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixture import made
+from psvideo.plates.mixture import made, shown_level
 from psvideo.plates.nearest_rows import has_blind_time, with_nearest_rows
 from psvideo.plates.part import Part
 from psvideo.plates.sequence import AMBIENT, FIRST_NUMBER, Round, check_separable, coming, gathered, light_plates
@@ -197,7 +197,7 @@ def first_ambient(take: Take, timing: Timing) -> LightPlate | None:
     dark = next(dark_plates(take, timing), None)
     if dark is None:
         return None
-    plate = _colour_of(take.clip)(replace(dark, picture=made(update(None, dark).image)))
+    plate = _colour_of(take.clip)(replace(dark, picture=shown_level(update(None, dark).level)))
     shown = LightPlate(light=AMBIENT, number=0, time_s=plate.time_s, picture=plate.picture, seen=plate.seen)
     return upright(shown, take.clip.turn)
 

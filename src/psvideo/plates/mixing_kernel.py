@@ -17,6 +17,9 @@ from psvideo.compute.memory import decoded, lent, pointer
 
 Floats = NDArray[np.float32]
 Places = NDArray[np.intp]
+Codes = NDArray[np.uint16]
+EMPTY = np.empty(0, np.uint16)
+NOTHING, WHOLE, CLIPPED = range(3)
 
 COUNTS = np.float32(0.02)
 """A clipped sample clips the plate where so much of it counts; less is a neighbour's tail that is taken off."""
@@ -37,7 +40,10 @@ class MixtureArrays(NamedTuple):
     zero: Floats
     gain: Floats
     most: np.float32
-    levels: Places  # (level,) addresses of float32 pictures, which are taken off
+    levels: Places  # (level,) addresses of the codes of pictures that are taken off, of 16 bits
+    least: Floats  # (level, row), and
+    step: Floats  # (level, row): their light is least + step * code
+    narrow: Places  # (level,) addresses of (row, col // 2), the same over two columns and all channels
     taken: Floats  # (level, row)
     ceiling: np.float32  # what a clipped sample becomes
     clips_from: np.float32  # light from which on a sample is
@@ -64,55 +70,10 @@ def mix_pictures(mix: MixtureArrays, shares: Floats, taken: Floats, rows: Places
         for picture in range(made.shape[0]):
             one = MixtureArrays(
                 given.frames, given.like, given.samples, each[picture], given.table, given.halves, given.zero,
-                given.gain, given.most, given.levels, off[picture], given.ceiling, given.clips_from,
+                given.gain, given.most, given.levels, given.least, given.step, given.narrow, off[picture],
+                given.ceiling, given.clips_from,
             )  # fmt: skip
             mix_row(one, row, made[picture, row - first])
-
-
-@FUSED.kept
-def mix_thinned(mix: MixtureArrays, first: int, last: int, step: int, channels: int, out: Floats) -> None:
-    """Make every ``step``-th row, and of it every ``step``-th pixel: ``out`` (row, sample).
-
-    ``first`` and ``last`` count rows of ``out``.
-    """
-    given, made = lent_mix(mix), lent(out)
-    whole = np.empty(given.samples, np.float32)
-    for row in range(first, last):
-        mix_row(given, step * row, whole)
-        for sample in range(made.shape[1]):
-            made[row, sample] = whole[sample // channels * step * channels + sample % channels]
-
-
-@FUSED.kept
-def mix_halved(mix: MixtureArrays, first: int, last: int, channels: int, out: Floats) -> None:
-    """Make pairs of rows, and of them the mean over two by two pixels and all channels: ``out`` (row // 2, col // 2).
-
-    ``first`` and ``last`` count rows of ``out``.
-    """
-    given, made = lent_mix(mix), lent(out)
-    upper, lower = np.empty(given.samples, np.float32), np.empty(given.samples, np.float32)
-    share = np.float32(1 / (4 * channels))
-    for row in range(first, last):
-        mix_row(given, 2 * row, upper)
-        mix_row(given, 2 * row + 1, lower)
-        for sample in range(given.samples):
-            upper[sample] += lower[sample]
-        _add_neighbours(upper, made[row], channels, share)
-
-
-@FUSED.inlined
-def _add_neighbours(pairs: Floats, out: Floats, channels: int, share: np.float32) -> None:
-    """Two neighbouring pixels' channels added up, times their share."""
-    if channels == 3:
-        for col in range(out.shape[0]):
-            a, b, c = pairs[6 * col], pairs[6 * col + 1], pairs[6 * col + 2]
-            out[col] = (a + b + c + pairs[6 * col + 3] + pairs[6 * col + 4] + pairs[6 * col + 5]) * share
-        return
-    for col in range(out.shape[0]):
-        total = np.float32(0)
-        for sample in range(2 * col * channels, 2 * (col + 1) * channels):
-            total += pairs[sample]
-        out[col] = total * share
 
 
 def _some_reach(codes: NDArray[Any], limit: np.float32, most: np.float32) -> bool:
@@ -142,13 +103,17 @@ def lent_mix(mix: MixtureArrays) -> MixtureArrays:
     """The same without reference counts."""
     return MixtureArrays(
         lent(mix.frames), lent(mix.like), mix.samples, lent(mix.coefficients), lent(mix.table), mix.halves,
-        lent(mix.zero), lent(mix.gain), mix.most, lent(mix.levels), lent(mix.taken), mix.ceiling, mix.clips_from,
+        lent(mix.zero), lent(mix.gain), mix.most, lent(mix.levels), lent(mix.least), lent(mix.step), lent(mix.narrow),
+        lent(mix.taken), mix.ceiling, mix.clips_from,
     )  # fmt: skip
 
 
 @FUSED.called
-def mix_row(mix: MixtureArrays, row: int, out: Floats) -> None:
-    """Make one row: frames added, levels taken off, the ceiling where a sample that counts was clipped."""
+def mix_row(mix: MixtureArrays, row: int, out: Floats) -> int:
+    """Make one row: frames added, levels taken off, the ceiling where a sample that counts was clipped.
+
+    Returned is NOTHING where no frame saw it, and it is 0; CLIPPED where a sample is clipped; else WHOLE.
+    """
     begun, holds_clipped = False, False
     level, place = _next_level(mix, 0, row), row % mix.zero.shape[1]
     for frame in range(mix.frames.shape[0]):
@@ -168,7 +133,11 @@ def mix_row(mix: MixtureArrays, row: int, out: Floats) -> None:
             if begun:
                 _add_linear(codes, zero, scale, mix.most, out)
             elif level < mix.levels.shape[0]:
-                _begin_with_level(codes, zero, scale, mix.most, _level_row(mix, level, row), mix.taken[level, row], out)
+                share, least = (
+                    mix.taken[level, row] * mix.step[level, row],
+                    mix.taken[level, row] * mix.least[level, row],
+                )
+                _begin_with_level(codes, zero, scale, mix.most, _level_row(mix, level, row), share, least, out)
                 level = _next_level(mix, level + 1, row)
             else:
                 _begin_linear(codes, zero, scale, mix.most, out)
@@ -176,12 +145,14 @@ def mix_row(mix: MixtureArrays, row: int, out: Floats) -> None:
         begun = True
     if not begun:
         out[:] = np.float32(0)
-        return
+        return NOTHING
     while level < mix.levels.shape[0]:
-        _take_off(_level_row(mix, level, row), mix.taken[level, row], out)
+        share, least = _share_of(mix, level, row)
+        _take_off(_level_row(mix, level, row), share, least, out)
         level = _next_level(mix, level + 1, row)
     if holds_clipped:
         _mark_clipped(mix, row, out)
+    return CLIPPED if holds_clipped else WHOLE
 
 
 @FUSED.inlined
@@ -191,10 +162,17 @@ def _row_of(mix: MixtureArrays, frame: int, row: int) -> Any:
 
 
 @FUSED.inlined
-def _level_row(mix: MixtureArrays, level: int, row: int) -> Floats:
+def _level_row(mix: MixtureArrays, level: int, row: int) -> Codes:
     end = (row + 1) * mix.samples
-    picture: Floats = carray(pointer(mix.levels[level], mix.taken), end)
-    return picture[row * mix.samples : end]
+    codes: Codes = carray(pointer(mix.levels[level], EMPTY), end)
+    return codes[row * mix.samples : end]
+
+
+@FUSED.inlined
+def _share_of(mix: MixtureArrays, level: int, row: int) -> tuple[np.float32, np.float32]:
+    """By what a level's codes are multiplied to be taken off, and what is taken off of every sample beside."""
+    taken = mix.taken[level, row]
+    return taken * mix.step[level, row], taken * mix.least[level, row]
 
 
 @FUSED.inlined
@@ -277,12 +255,13 @@ def _begin_linear(codes: NDArray[Any], zero: np.float32, scale: np.float32, most
 
 @FUSED.inlined
 def _begin_with_level(
-    codes: NDArray[Any], zero: np.float32, scale: np.float32, most: np.float32, level: Floats, share: np.float32,
-    out: Floats,
+    codes: NDArray[Any], zero: np.float32, scale: np.float32, most: np.float32, level: Codes, share: np.float32,
+    least: np.float32, out: Floats,
 ) -> None:  # fmt: skip
-    """The same, and take a level off."""
+    """The same, and take a level off: its codes times ``share``, and ``least``."""
     for sample in range(out.shape[0]):
-        out[sample] = (min(np.float32(codes[sample]), most) - zero) * scale - share * level[sample]
+        light = (min(np.float32(codes[sample]), most) - zero) * scale - least
+        out[sample] = light - share * np.float32(level[sample])
 
 
 @FUSED.inlined
@@ -292,9 +271,9 @@ def _add_linear(codes: NDArray[Any], zero: np.float32, scale: np.float32, most: 
 
 
 @FUSED.inlined
-def _take_off(level: Floats, share: np.float32, out: Floats) -> None:
+def _take_off(level: Codes, share: np.float32, least: np.float32, out: Floats) -> None:
     for sample in range(out.shape[0]):
-        out[sample] -= share * level[sample]
+        out[sample] = out[sample] - least - share * np.float32(level[sample])
 
 
 @FUSED.inlined

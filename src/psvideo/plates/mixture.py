@@ -3,7 +3,7 @@
     picture[row] = sum_n coefficients[n, row] * frames[n][row]  -  sum_m taken[m, row] * levels[m][row]
 
 Frames stay in the codes in which they were read, which several pictures share: a picture that is not made costs nothing
-beside them. Levels are what is known of the ambient light, in linear light.
+beside them. Levels are what is known of the ambient light.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,7 +17,9 @@ from psvideo.compute.threads import over_ranges
 from psvideo.model.camera import FloatArray
 from psvideo.model.clipping import SATURATED
 from psvideo.model.coded import IDENTITY, Coded, Image
-from psvideo.plates.mixing_kernel import COUNTS, MixtureArrays, mix_halved, mix_pictures, mix_rows, mix_thinned
+from psvideo.plates.level import Level
+from psvideo.plates.mixing_kernel import COUNTS, MixtureArrays, mix_pictures, mix_rows
+from psvideo.plates.thinning_kernel import mix_halved, mix_thinned
 
 BAND_SAMPLES = 1 << 20
 """Samples of one band of rows, which a thread makes at a time."""
@@ -36,14 +38,14 @@ class Reader(Protocol):
 class Mixture:
     """A picture, (row, col) or (row, col, channel), in linear light.
 
-    frames: pictures in codes, all of one shape and type. coefficients: (frame, row). levels: pictures in light, of the
+    frames: pictures in codes, all of one shape and type. coefficients: (frame, row). levels: ambient light of the
     same shape; taken: (level, row). A sample becomes ``ceiling`` where any that counts was
     ``clips_from`` or more. Rows without coefficients are 0.
     """
 
     frames: tuple[Coded, ...]
     coefficients: FloatArray
-    levels: tuple[Image, ...] = ()
+    levels: tuple[Level, ...] = ()
     taken: FloatArray | None = None
     ceiling: float = 1.0
     clips_from: float = SATURATED
@@ -117,7 +119,7 @@ class Mixture:
         _in_bands(band, rows, 2 * bound.mix.samples)
         return grey
 
-    def without(self, levels: tuple[Image, ...], taken: FloatArray) -> "Mixture":
+    def without(self, levels: tuple[Level, ...], taken: FloatArray) -> "Mixture":
         """Return the picture with levels taken off, each row with its own share; ``taken`` is (level, row)."""
         return replace(self, levels=(*self.levels, *levels), taken=_joined(self.taken, taken))
 
@@ -153,7 +155,10 @@ class Mixture:
             zero=np.stack([frame.tone.zero for frame in frames]).astype(np.float32),
             gain=np.stack([frame.tone.gain for frame in frames]).astype(np.float32),
             most=np.float32(min(frame.tone.most for frame in frames)),
-            levels=np.array([level.ctypes.data for level in self.levels], np.intp),
+            levels=np.array([level.codes.ctypes.data for level in self.levels], np.intp),
+            least=_rows_of([level.least for level in self.levels], self.shape[0]),
+            step=_rows_of([level.step for level in self.levels], self.shape[0]),
+            narrow=np.array([level.narrow.ctypes.data for level in self.levels], np.intp),
             taken=np.ascontiguousarray(taken, np.float32),
             ceiling=np.float32(self.ceiling),
             clips_from=np.float32(self.clips_from),
@@ -179,7 +184,7 @@ class ReadyMixture:
 
     mix: MixtureArrays
     frames: tuple[Coded, ...]
-    levels: tuple[Image, ...]
+    levels: tuple[Level, ...]
 
     def run(self, loop: Callable[..., None], first: int, last: int, *arguments: object) -> None:
         """Call ``loop(mix, *arguments)``, which takes the frames' rows from the first up to the last.
@@ -216,7 +221,7 @@ class _Parts:
     ``shares`` (picture, frame, row) and ``taken`` (picture, level, row)."""
 
     frames: tuple[Coded, ...]
-    levels: tuple[Image, ...]
+    levels: tuple[Level, ...]
     shares: FloatArray
     taken: FloatArray
 
@@ -276,6 +281,15 @@ def made(image: Image) -> Mixture:
     """Return a picture that lies in memory already."""
     coded = Coded(codes=np.ascontiguousarray(image, np.float32))
     return Mixture(frames=(coded,), coefficients=np.ones((1, len(image))), clips_from=np.inf)
+
+
+def shown_level(level: Level) -> Mixture:
+    """Return ambient light as a picture."""
+    return Mixture(frames=(level.coded,), coefficients=np.ones((1, len(level.codes))), clips_from=np.inf)
+
+
+def _rows_of(levels: Sequence[Image], rows: int) -> Image:
+    return np.stack(levels) if levels else np.zeros((0, rows), np.float32)
 
 
 def _joined(before: FloatArray | None, more: FloatArray) -> FloatArray:

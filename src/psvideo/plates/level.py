@@ -1,0 +1,100 @@
+"""Ambient light as plates take it off: in 16 bits, each row over its own range.
+
+A row's codes are good to half a 65535th of what it spans: of ambient light that is 2 % of saturation a fiftieth of the
+last bit of a 16-bit code, and what reading it costs beside every plate is halved.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.compute.compiled import FUSED
+from psvideo.compute.memory import lent
+from psvideo.model.coded import Coded, Image, Tone
+
+MOST_CODE = np.float32(65535)
+TINY = np.float32(1e-12)
+HALF = np.float32(0.5)
+Codes = NDArray[np.uint16]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Level:
+    """Ambient light, (row, col) or (row, col, channel), in codes: ``light = least + step * code``, both (row,).
+
+    narrow: (row, col // 2), its mean over two columns each and over channels.
+    """
+
+    codes: Codes
+    least: Image
+    step: Image
+    narrow: Image
+
+    @classmethod
+    def room(cls, shape: tuple[int, ...]) -> "Level":
+        """Return room for ambient light of a shape."""
+        rows, cols = shape[:2]
+        return cls(
+            codes=np.empty(shape, np.uint16),
+            least=np.empty(rows, np.float32),
+            step=np.empty(rows, np.float32),
+            narrow=np.empty((rows, cols // 2), np.float32),
+        )
+
+    @classmethod
+    def of(cls, image: Image) -> "Level":
+        """Return a picture of ambient light in codes."""
+        level = cls.room(image.shape)
+        pack_rows(np.ascontiguousarray(image, np.float32).reshape(len(image), -1), *level.planes, level.channels)
+        return level
+
+    @property
+    def channels(self) -> int:
+        """How many samples a pixel has."""
+        return int(np.prod(self.codes.shape[2:]))
+
+    @property
+    def planes(self) -> tuple[Codes, Image, Image, Image]:
+        """The codes as (row, sample), and what else is known of rows, as compiled loops take them."""
+        return self.codes.reshape(len(self.codes), -1), self.least, self.step, self.narrow
+
+    @property
+    def coded(self) -> Coded:
+        """The light as a picture in codes."""
+        zero, gain = -self.least.astype(np.float64) / self.step, self.step.astype(np.float64)
+        return Coded(codes=self.codes, tone=Tone(zero=zero[:, None], gain=gain[:, None]))
+
+
+@FUSED.kept
+def pack_rows(light: Image, codes: Codes, least: Image, step: Image, narrow: Image, channels: int) -> None:
+    """Pack every row of ``light`` (row, sample)."""
+    given, out, low, high, grey = lent(light), lent(codes), lent(least), lent(step), lent(narrow)
+    for row in range(given.shape[0]):
+        pack_row(given[row], out[row], low, high, grey[row], row, channels)
+
+
+@FUSED.inlined
+def pack_row(line: Image, codes: Codes, least: Image, step: Image, narrow: Image, row: int, channels: int) -> None:
+    """Pack one row of light, ``line`` (sample,); ``least`` and ``step`` are those of all rows."""
+    low, high = line[0], line[0]
+    for sample in range(line.shape[0]):
+        low, high = min(low, line[sample]), max(high, line[sample])
+    one = max((high - low) / MOST_CODE, TINY)
+    least[row], step[row] = low, one
+    per = np.float32(1) / one
+    for sample in range(line.shape[0]):
+        codes[sample] = np.uint16((line[sample] - low) * per + HALF)
+    share = np.float32(1 / (2 * channels))
+    for col in range(narrow.shape[0]):
+        total = np.float32(0)
+        for sample in range(2 * col * channels, 2 * (col + 1) * channels):
+            total += line[sample]
+        narrow[col] = total * share
+
+
+@FUSED.inlined
+def unpack_row(codes: Codes, least: np.float32, step: np.float32, line: Image) -> None:
+    """Fill ``line`` with the light of a row."""
+    for sample in range(line.shape[0]):
+        line[sample] = least + step * np.float32(codes[sample])

@@ -1,0 +1,84 @@
+"""The compiled loops that make small pictures of plates: every so many rows and columns, or means over pixels."""
+
+import numpy as np
+from numba.np.numpy_support import carray
+
+from psvideo.compute.compiled import FUSED
+from psvideo.compute.memory import lent, pointer
+from psvideo.plates.mixing_kernel import CLIPPED, WHOLE, Floats, MixtureArrays, lent_mix, mix_row
+
+HALF = np.float32(0.5)
+
+
+@FUSED.kept
+def mix_thinned(mix: MixtureArrays, first: int, last: int, step: int, channels: int, out: Floats) -> None:
+    """Make every ``step``-th row, and of it every ``step``-th pixel: ``out`` (row, sample).
+
+    ``first`` and ``last`` count rows of ``out``.
+    """
+    given, made = lent_mix(mix), lent(out)
+    whole = np.empty(given.samples, np.float32)
+    for row in range(first, last):
+        mix_row(given, step * row, whole)
+        for sample in range(made.shape[1]):
+            made[row, sample] = whole[sample // channels * step * channels + sample % channels]
+
+
+@FUSED.kept
+def mix_halved(mix: MixtureArrays, first: int, last: int, channels: int, out: Floats) -> None:
+    """Make pairs of rows, and of them the mean over two by two pixels and all channels: ``out`` (row // 2, col // 2).
+
+    ``first`` and ``last`` count rows of ``out``. Levels are taken off as they are kept for this, and whole where a
+    sample is clipped.
+    """
+    given, made = lent_mix(mix), lent(out)
+    bare = _without_levels(given)
+    upper, lower = np.empty(given.samples, np.float32), np.empty(given.samples, np.float32)
+    share = np.float32(1 / (4 * channels))
+    for row in range(first, last):
+        above, below = mix_row(bare, 2 * row, upper), mix_row(bare, 2 * row + 1, lower)
+        whole = above != CLIPPED and below != CLIPPED
+        if not whole:
+            mix_row(given, 2 * row, upper)
+            mix_row(given, 2 * row + 1, lower)
+        for sample in range(given.samples):
+            upper[sample] += lower[sample]
+        _add_neighbours(upper, made[row], channels, share)
+        for level in range(given.levels.shape[0] if whole else 0):
+            if above == WHOLE:
+                _take_off_narrow(given, level, 2 * row, made[row])
+            if below == WHOLE:
+                _take_off_narrow(given, level, 2 * row + 1, made[row])
+
+
+@FUSED.inlined
+def _without_levels(mix: MixtureArrays) -> MixtureArrays:
+    return MixtureArrays(
+        mix.frames, mix.like, mix.samples, mix.coefficients, mix.table, mix.halves, mix.zero, mix.gain, mix.most,
+        mix.levels[:0], mix.least[:0], mix.step[:0], mix.narrow[:0], mix.taken[:0], mix.ceiling, mix.clips_from,
+    )  # fmt: skip
+
+
+@FUSED.inlined
+def _take_off_narrow(mix: MixtureArrays, level: int, row: int, out: Floats) -> None:
+    share = mix.taken[level, row] * HALF
+    if share != np.float32(0):
+        end = (row + 1) * out.shape[0]
+        narrow: Floats = carray(pointer(mix.narrow[level], mix.taken), end)[row * out.shape[0] : end]
+        for col in range(out.shape[0]):
+            out[col] -= share * narrow[col]
+
+
+@FUSED.inlined
+def _add_neighbours(pairs: Floats, out: Floats, channels: int, share: np.float32) -> None:
+    """Two neighbouring pixels' channels added up, times their share."""
+    if channels == 3:
+        for col in range(out.shape[0]):
+            a, b, c = pairs[6 * col], pairs[6 * col + 1], pairs[6 * col + 2]
+            out[col] = (a + b + c + pairs[6 * col + 3] + pairs[6 * col + 4] + pairs[6 * col + 5]) * share
+        return
+    for col in range(out.shape[0]):
+        total = np.float32(0)
+        for sample in range(2 * col * channels, 2 * (col + 1) * channels):
+            total += pairs[sample]
+        out[col] = total * share
