@@ -15,7 +15,7 @@ from psvideo.model.coded import Coded, Image, Tone
 
 MOST_CODE = np.float32(65535)
 TINY = np.float32(1e-12)
-HALF = np.float32(0.5)
+HALF, SIXTH = np.float32(0.5), np.float32(1 / 6)
 Codes = NDArray[np.uint16]
 
 
@@ -77,20 +77,39 @@ def pack_rows(light: Image, codes: Codes, least: Image, step: Image, narrow: Ima
 @FUSED.inlined
 def pack_row(line: Image, codes: Codes, least: Image, step: Image, narrow: Image, row: int, channels: int) -> None:
     """Pack one row of light, ``line`` (sample,); ``least`` and ``step`` are those of all rows."""
-    low, high = line[0], line[0]
-    for sample in range(line.shape[0]):
-        low, high = min(low, line[sample]), max(high, line[sample])
+    low, high = _ends(line)
     one = max((high - low) / MOST_CODE, TINY)
     least[row], step[row] = low, one
     per = np.float32(1) / one
     for sample in range(line.shape[0]):
         codes[sample] = np.uint16((line[sample] - low) * per + HALF)
+    if channels == 3:
+        for col in range(narrow.shape[0]):
+            a, b, c = line[6 * col], line[6 * col + 1], line[6 * col + 2]
+            narrow[col] = (a + b + c + line[6 * col + 3] + line[6 * col + 4] + line[6 * col + 5]) * SIXTH
+        return
     share = np.float32(1 / (2 * channels))
     for col in range(narrow.shape[0]):
         total = np.float32(0)
         for sample in range(2 * col * channels, 2 * (col + 1) * channels):
             total += line[sample]
         narrow[col] = total * share
+
+
+@FUSED.inlined
+def _ends(line: Image) -> tuple[np.float32, np.float32]:
+    """The least and the largest of a row's numbers, by their bits in an order that integers have: floats are compared
+    one by one."""
+    bits = line.view(np.int32)
+    low, high = np.int32(0x7FFFFFFF), np.int32(-0x7FFFFFFF)
+    for sample in range(bits.shape[0]):
+        place = np.int32(bits[sample] ^ ((bits[sample] >> 31) & 0x7FFFFFFF))
+        low = place if place < low else low
+        high = place if place > high else high
+    ends = np.empty(2, np.int32)
+    ends[0], ends[1] = low ^ ((low >> 31) & 0x7FFFFFFF), high ^ ((high >> 31) & 0x7FFFFFFF)
+    both = ends.view(np.float32)
+    return both[0], both[1]
 
 
 @FUSED.inlined
