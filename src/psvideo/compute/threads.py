@@ -11,7 +11,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from psvideo.errors import UsageError
 
@@ -56,12 +56,19 @@ def over_ranges(run: Callable[[int, int], Item], count: int, *, each: int, threa
     if helpers < 1 or getattr(_inside, "ranges", False):
         return [run(first, min(first + firsts.step, count)) for first in firsts]
     shared = _Ranges(run, firsts, count)
-    waiting = [_pool(helpers).submit(shared.work) for _ in range(helpers)]
+    at_hand = [shared]
+    waiting = [_pool(helpers).submit(_help, at_hand) for _ in range(helpers)]
     shared.work()
+    at_hand.clear()  # a helper that comes late finds nothing, and until then holds nothing that the ranges are of
     for one in waiting:
-        if not one.cancel():  # what has not begun would find nothing to do
+        if not one.cancel():
             one.result()
     return shared.results()
+
+
+def _help(at_hand: "list[_Ranges[Any]]") -> None:
+    for shared in at_hand[:]:
+        shared.work()
 
 
 _inside = threading.local()
