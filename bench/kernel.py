@@ -15,7 +15,7 @@ import numpy as np
 from bench.table import Row
 from psvideo.compute.compiled import FUSED
 from psvideo.model.coded import Coded, Tone
-from psvideo.plates.level import Level
+from psvideo.plates.ambient_level import AmbientLevel
 from psvideo.plates.mixture import Mixture
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.kernel import solve_rows, working_memory
@@ -65,7 +65,7 @@ def _round_rows() -> Iterator[Row]:
     base = rng.integers(9_000, 40_000, (ROWS, COLS, 3)).astype(np.uint16)
     tone = Tone(gain=np.full((1, 1), 1 / 65535))
     frames = [Coded(codes=np.roll(base, 7 * n, axis=1), tone=tone) for n in range(FRAMES_OF_A_ROUND)]
-    dark = Level.of(np.full(base.shape, 0.02, np.float32))
+    dark = AmbientLevel.of(np.full(base.shape, 0.02, np.float32))
     plates = []
     for light in range(lights):
         first = (np.arange(ROWS) < ROWS * (light + 1) // lights).astype(np.float64)  # a dark row that rolls

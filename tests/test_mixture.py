@@ -16,7 +16,7 @@ from psvideo.model.plan import Plan
 from psvideo.model.row_profiles import row_light
 from psvideo.model.timing import Flash, Timing
 from psvideo.plates.align.packed import packed
-from psvideo.plates.level import Level
+from psvideo.plates.ambient_level import AmbientLevel
 from psvideo.plates.mixture import Mixture, combined, made
 from psvideo.plates.split import split
 
@@ -50,7 +50,7 @@ def shot(name: str, *, frames: int = 3, seed: int = 0) -> Mixture:
     pictures = [Coded(codes=codes_of(name, rng, shape), tone=TONES[name][1]) for _ in range(frames)]
     coefficients = rng.uniform(0.03, 1.2, (frames, ROWS)) * (rng.random((frames, ROWS)) > 0.4)
     coefficients[:, 7] = 0.0
-    light = tuple(Level.of(rng.uniform(-0.01, 0.1, shape).astype(np.float32)) for _ in range(2))
+    light = tuple(AmbientLevel.of(rng.uniform(-0.01, 0.1, shape).astype(np.float32)) for _ in range(2))
     taken = rng.uniform(0, 2, (2, ROWS))
     return Mixture(frames=tuple(pictures), coefficients=coefficients, levels=light, taken=taken)
 
@@ -101,7 +101,7 @@ def test_parts_of_a_picture_are_those_of_the_whole(name: str) -> None:
 def test_ambient_light_in_16_bits_is_good_to_half_a_step_of_its_row() -> None:
     light = np.random.default_rng(4).uniform(-0.002, 0.03, (ROWS, COLS, 3)).astype(np.float32)
     light[3] = 0.25
-    level = Level.of(light)
+    level = AmbientLevel.of(light)
     off = np.abs(level.coded.light() - light).reshape(ROWS, -1).max(axis=1)
     assert (off <= 0.51 * np.ptp(light.reshape(ROWS, -1), axis=1) / 65535 + 3e-8).all()
     narrow = light.reshape(ROWS, COLS // 2, -1).mean(axis=-1)

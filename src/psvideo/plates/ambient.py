@@ -17,7 +17,7 @@ from psvideo.model.coded import Image
 from psvideo.plates.ambient_blocks import block_px, block_rows, no_blocks, over_bands, times_rows
 from psvideo.plates.ambient_change import AmbientChange
 from psvideo.plates.ambient_kernel import blend_rows, look_rows
-from psvideo.plates.level import Level
+from psvideo.plates.ambient_level import AmbientLevel
 from psvideo.plates.mains import Mains, RowLight
 from psvideo.plates.split import Plate
 
@@ -35,7 +35,7 @@ class Ambient:
     is worth interpolating.
     """
 
-    level: Level
+    level: AmbientLevel
     coarse: Image
     slots: Image
     middle_s: FloatArray
@@ -51,7 +51,7 @@ def update(ambient: Ambient | None, dark: Plate) -> Ambient:
     if ambient is None:
         slots = np.broadcast_to(dark.seen[:, None], (len(dark.seen), coarse.shape[1])).astype(np.float32)
         return Ambient(
-            level=Level.of(dark.image),
+            level=AmbientLevel.of(dark.image),
             coarse=coarse,
             slots=slots,
             middle_s=rows.opened.middle_s,
@@ -95,11 +95,11 @@ def _looked_at(dark: Plate) -> tuple[RowLight, Image]:
 
 def _blended(
     ambient: Ambient, dark: Plate, gain: Image, restarts: NDArray[np.bool_], factor: FloatArray
-) -> tuple[Level, Image, Image]:
+) -> tuple[AmbientLevel, Image, Image]:
     """Return the average with one more dark slot, its rows times a factor; its mean over blocks; and how many slots it
     spans then."""
     shape = dark.picture.shape
-    level, coarse, slots = Level.room(shape), np.empty_like(ambient.coarse), np.empty_like(ambient.slots)
+    level, coarse, slots = AmbientLevel.room(shape), np.empty_like(ambient.coarse), np.empty_like(ambient.slots)
     bound, block, old, new = dark.picture.bound(), block_px(shape), ambient.level.planes, level.planes
     factors, seen = factor.astype(np.float32), np.ascontiguousarray(dark.seen)
 

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 from psvideo.compute.compiled import FUSED, REORDERED
 from psvideo.compute.memory import lent
 from psvideo.model.camera import FloatArray
-from psvideo.plates.level import pack_row, unpack_row
+from psvideo.plates.ambient_level import pack_row, unpack_row
 from psvideo.plates.mixing_kernel import Codes, Floats, MixtureArrays, lent_mix, mix_row
 
 Flags = NDArray[np.bool_]
 Planes = tuple[Codes, Floats, Floats, Floats]
-"""Of a Level."""
+"""Of an AmbientLevel."""
 ONE, HALF = np.float32(1), np.float32(0.5)
 
 
@@ -38,7 +38,7 @@ def blend_rows(
     mix: MixtureArrays, block: int, longest: float, factor: Floats, seen: Flags, restarts: Flags, gain: Floats,
     old: Planes, old_slots: Floats, first: int, last: int, new: Planes, slots: Floats, coarse: Floats,
 ) -> None:  # fmt: skip
-    """Average some rows of the pictures before, ``old`` (of a Level), brought to a new level, with one more, ``mix``
+    """Average some rows of the pictures before, ``old`` (of an AmbientLevel), brought to a new level, with one more, ``mix``
     times ``factor`` (row,); keep what was where nothing is ``seen`` (row,).
 
     gain: (row, col, channel) of blocks, the new level, which changes steadily between their middles. old_slots,

@@ -17,7 +17,7 @@ from psvideo.compute.threads import over_ranges
 from psvideo.model.camera import FloatArray
 from psvideo.model.clipping import SATURATED
 from psvideo.model.coded import IDENTITY, Coded, Image
-from psvideo.plates.level import Level
+from psvideo.plates.ambient_level import AmbientLevel
 from psvideo.plates.mixing_kernel import COUNTS, MixtureArrays, mix_pictures, mix_rows
 from psvideo.plates.thinning_kernel import mix_halved, mix_thinned
 
@@ -45,7 +45,7 @@ class Mixture:
 
     frames: tuple[Coded, ...]
     coefficients: FloatArray
-    levels: tuple[Level, ...] = ()
+    levels: tuple[AmbientLevel, ...] = ()
     taken: FloatArray | None = None
     ceiling: float = 1.0
     clips_from: float = SATURATED
@@ -119,7 +119,7 @@ class Mixture:
         _in_bands(band, rows, 2 * bound.mix.samples)
         return grey
 
-    def without(self, levels: tuple[Level, ...], taken: FloatArray) -> "Mixture":
+    def without(self, levels: tuple[AmbientLevel, ...], taken: FloatArray) -> "Mixture":
         """Return the picture with levels taken off, each row with its own share; ``taken`` is (level, row)."""
         return replace(self, levels=(*self.levels, *levels), taken=_joined(self.taken, taken))
 
@@ -184,7 +184,7 @@ class ReadyMixture:
 
     mix: MixtureArrays
     frames: tuple[Coded, ...]
-    levels: tuple[Level, ...]
+    levels: tuple[AmbientLevel, ...]
 
     def run(self, loop: Callable[..., None], first: int, last: int, *arguments: object) -> None:
         """Call ``loop(mix, *arguments)``, which takes the frames' rows from the first up to the last.
@@ -221,7 +221,7 @@ class _Parts:
     ``shares`` (picture, frame, row) and ``taken`` (picture, level, row)."""
 
     frames: tuple[Coded, ...]
-    levels: tuple[Level, ...]
+    levels: tuple[AmbientLevel, ...]
     shares: FloatArray
     taken: FloatArray
 
@@ -283,7 +283,7 @@ def made(image: Image) -> Mixture:
     return Mixture(frames=(coded,), coefficients=np.ones((1, len(image))), clips_from=np.inf)
 
 
-def shown_level(level: Level) -> Mixture:
+def shown_level(level: AmbientLevel) -> Mixture:
     """Return ambient light as a picture."""
     return Mixture(frames=(level.coded,), coefficients=np.ones((1, len(level.codes))), clips_from=np.inf)
 

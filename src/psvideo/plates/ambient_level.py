@@ -20,7 +20,7 @@ Codes = NDArray[np.uint16]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Level:
+class AmbientLevel:
     """Ambient light, (row, col) or (row, col, channel), in codes: ``light = least + step * code``, both (row,).
 
     narrow: (row, col // 2), its mean over two columns each and over channels.
@@ -32,7 +32,7 @@ class Level:
     narrow: Image
 
     @classmethod
-    def room(cls, shape: tuple[int, ...]) -> "Level":
+    def room(cls, shape: tuple[int, ...]) -> "AmbientLevel":
         """Return room for ambient light of a shape."""
         rows, cols = shape[:2]
         return cls(
@@ -43,7 +43,7 @@ class Level:
         )
 
     @classmethod
-    def of(cls, image: Image) -> "Level":
+    def of(cls, image: Image) -> "AmbientLevel":
         """Return a picture of ambient light in codes."""
         level = cls.room(image.shape)
         pack_rows(np.ascontiguousarray(image, np.float32).reshape(len(image), -1), *level.planes, level.channels)
