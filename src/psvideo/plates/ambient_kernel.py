@@ -38,8 +38,8 @@ def blend_rows(
     mix: MixtureArrays, block: int, longest: float, factor: Floats, seen: Flags, restarts: Flags, gain: Floats,
     old: Planes, old_slots: Floats, first: int, last: int, new: Planes, slots: Floats, coarse: Floats,
 ) -> None:  # fmt: skip
-    """Average some rows of the pictures before, ``old`` (of an AmbientLevel), brought to a new level, with one more, ``mix``
-    times ``factor`` (row,); keep what was where nothing is ``seen`` (row,).
+    """Average some rows of the light before, ``old``, brought to a new level, with one more picture, ``mix`` times
+    ``factor`` (row,); keep what was where nothing is ``seen`` (row,).
 
     gain: (row, col, channel) of blocks, the new level, which changes steadily between their middles. old_slots,
     restarts: (row, block), how many pictures the average spans, ``longest`` at most, and where it begins again. Filled
