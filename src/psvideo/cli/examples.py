@@ -52,6 +52,13 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("the real firmware on an emulated chip, its edges in a file", "psvideo strobe emulate --trace edges.csv"),
         ("a board in plain Python, on every system", "psvideo strobe emulate --board python"),
     ),
+    "live": (
+        ("see on a finished clip what the set will see", "psvideo live clip/ --rig rig.toml"),
+        (
+            "is live timing as good as sync? every frame looked at, none waited for",
+            "psvideo live clip/ --pace fastest --timing-out timing.json",
+        ),
+    ),
     "check": (
         ("can this take be used, and if not, what is to change on set?", "psvideo check clip/"),
         ("hold the plates against the rig as well", "psvideo check clip/ --rig rig.toml"),

@@ -36,6 +36,7 @@ COMMANDS = (
     *_entries(MEASURE, calibrate="Measure cameras and lights before a shoot."),
     *_entries(
         SPLIT,
+        live="Follow the strobe while the camera runs, and solve the newest round: what the crew sees on the set.",
         check="Judge a take in seconds, one line for each thing: exit status 0 where it can be used, 1 where not.",
         info="Say what a file or folder is, and whether it fits together: exit status 1 where it does not.",
         sync="Find phase, clock offset, light order and dropped frames of a strobed clip, from the picture alone.",

@@ -44,3 +44,5 @@ NEAR_ITERATIONS = 1
 """How often near lights' surface is made again where nobody says otherwise: one leaves what the plane's distance
 costs."""
 MOST_ITERATIONS = 10
+Pace = Literal["own", "fastest"]
+"""How fast a finished clip is played: as it was filmed, or as fast as it is taken."""

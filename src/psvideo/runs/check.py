@@ -21,10 +21,11 @@ from psvideo.model.plan import Plan
 from psvideo.model.timing import DroppedFrames, Timing
 from psvideo.plates.gather import gather
 from psvideo.plates.naming import named_by_rig
+from psvideo.report.judge.every_line import judgements
 from psvideo.report.judgement import Judgement
 from psvideo.runs.caller import PYTHON, Caller
 from psvideo.runs.checked import Check, write_page
-from psvideo.runs.reporting import judgements, observing
+from psvideo.runs.reporting import observing
 from psvideo.sync.open_take import open_take
 from psvideo.sync.take_timing import find_take_timing
 

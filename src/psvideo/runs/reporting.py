@@ -14,16 +14,11 @@ from psvideo import __version__
 from psvideo.clip import Clip, Masks, Take
 from psvideo.export.tags import sha256_of
 from psvideo.formats.whole_files import write_text
-from psvideo.model.plan import Plan
 from psvideo.model.rig import Light, Rig
 from psvideo.model.timing import Timing
 from psvideo.plates.unmixed import slot_names
 from psvideo.report.html import report_page
-from psvideo.report.judge.light import ambient, exposure, lamps
-from psvideo.report.judge.of_rig import rig
-from psvideo.report.judge.result import accuracy, focus, steadiness, validity
-from psvideo.report.judge.time import coverage, motion, timing_and_order
-from psvideo.report.judgement import Judgement
+from psvideo.report.judge.every_line import judgements
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rigpoints import rig_points
 from psvideo.report.run_report import LightFacts, RunReport, report_record
@@ -62,26 +57,6 @@ def observing(take: Take, rig: Rig | None = None, masks: Masks | None = None) ->
         points = rig_points(clip.shown_plan, rig, channels=clip.channels, **size)
     watched = "" if take.unmixing is None else slot_names(clip.plan)[0]
     return Observed(lights=clip.plan.lights, watched=watched, masks=masks, points=points)
-
-
-def judgements(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = False) -> tuple[Judgement, ...]:
-    """Return one line per thing that decides whether a take can be used."""
-    on_time = tuple(timing_and_order(timing, plan.mode))
-    if not observed.facts:
-        return on_time
-    return (
-        *on_time,
-        *coverage(plan, timing, observed),
-        *exposure(observed),
-        *lamps(observed, timed=all(one.grade == "good" for one in on_time)),
-        ambient(observed),
-        motion(plan, timing, observed, aligned=aligned),
-        focus(observed),
-        *rig(observed),
-        *accuracy(observed),
-        *validity(observed),
-        *steadiness(observed.facts),
-    )
 
 
 def run_report(

@@ -1,0 +1,71 @@
+"""psvideo live: normals and relit light while the camera runs."""
+
+import json as texts
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from psvideo.cli.console import Voice
+from psvideo.cli.options.clip_and_run import FirstLight, Force, Json, PlanPath, Quiet, Verbose
+from psvideo.model.choices import Pace
+
+if TYPE_CHECKING:
+    from psvideo.live.status import LiveStatus
+
+
+def live(
+    source: Annotated[
+        str, typer.Argument(help="What to watch: a finished clip, which is played at its own pace.", show_default=False)
+    ],
+    plan: PlanPath = None,
+    rig: Annotated[
+        Path | None, typer.Option("--rig", help="Where the lights are; left out: plates, and no normals.")
+    ] = None,
+    first_light: FirstLight = None,
+    timing_out: Annotated[
+        Path | None, typer.Option("--timing-out", help="Where to write timing.json of all that was followed.")
+    ] = None,
+    pace: Annotated[
+        Pace,
+        typer.Option("--pace", help="A clip's own pace, or fastest: every round is solved, nothing is left out."),
+    ] = "own",
+    seconds: Annotated[
+        float | None, typer.Option("--seconds", min=0.0, help="End after so many seconds of footage.")
+    ] = None,
+    force: Force = False,
+    json: Json = False,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+) -> None:
+    """Follow the strobe while the camera runs, and solve the newest round: what the crew sees on the set."""
+    from psvideo.runs.live import live as watch
+
+    voice = Voice(json=json, verbose=verbose, quiet=quiet)
+    summary = watch(
+        source,
+        plan=plan,
+        rig=rig,
+        first_light=first_light,
+        timing_out=timing_out,
+        pace=pace,
+        seconds=seconds,
+        force=force,
+        said=lambda status: _say(voice, status),
+        caller=voice.caller(),
+    )
+    if sys.stderr.isatty() and not (json or quiet):
+        print(file=sys.stderr)
+    voice.say(summary.words)
+    if json:
+        print(texts.dumps(summary.record), flush=True)
+
+
+def _say(voice: Voice, status: "LiveStatus") -> None:
+    """Say how things stand: a line that is written over on a terminal, one line of JSON a second for machines."""
+    if voice.json:
+        print(texts.dumps(status.record), flush=True)
+    elif not voice.quiet:
+        over = "\r\x1b[K" if sys.stderr.isatty() else ""
+        print(f"{over}{status.line}", end="" if over else "\n", file=sys.stderr, flush=True)

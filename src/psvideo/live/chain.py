@@ -1,0 +1,244 @@
+"""The chain without threads or clocks: frames in, the strobe followed, the newest round solved when somebody asks."""
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.errors import NoStrobeError
+from psvideo.live.follow import LATEST, Follower, State, caught_up
+from psvideo.live.history import timing_now
+from psvideo.live.lock import LONGEST_S, Lock, frames_to_lock, lock
+from psvideo.live.ring import Ring, RingFrame, ring_of
+from psvideo.live.rounds import LiveRounds
+from psvideo.live.smaller import Smaller, smaller_plan, smaller_rig, smaller_timing
+from psvideo.model.camera import FloatArray
+from psvideo.model.coded import Coded
+from psvideo.model.intensity import lights_as_planned
+from psvideo.model.plan import Plan
+from psvideo.model.rig import Rig
+from psvideo.model.row_profiles import LOST, row_light
+from psvideo.model.surface import Surface
+from psvideo.model.timing import Timing
+from psvideo.plates.sequence import Round
+from psvideo.solve.instants import surfaces
+from psvideo.solve.near_surface import near_surface_of
+from psvideo.solve.normals.solving import Solving
+
+Search = Callable[[Callable[[], "Lock | str"], Callable[["Lock | str"], None]], None]
+"""Runs a search, now or beside what else goes on, and hands what it gives to the second function."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LiveFrame:
+    """A frame as a source gives it: its place in time by the source's numbers, and when it came, by this machine."""
+
+    index: int
+    coded: Coded
+    came_s: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class NewestRound:
+    """The newest result: its plates, the surface where there is a rig, and when the last of its frames came.
+
+    ``step`` is by how much its picture is smaller than the camera's.
+    """
+
+    round: Round
+    surface: Surface | None
+    came_s: float
+    step: int
+    timing: Timing
+    frame: Coded
+
+
+def search_here(run: Callable[[], "Lock | str"], done: Callable[["Lock | str"], None]) -> None:
+    """Search at once, while frames wait."""
+    done(run())
+
+
+def _set() -> threading.Event:
+    event = threading.Event()
+    event.set()
+    return event
+
+
+@dataclass(kw_only=True)
+class Chain:
+    """What happens to every frame, and what is made of the newest. ``take`` and ``solve`` may run in two threads.
+
+    ``lost_frames`` counts frames that never came, by the source's numbers or by the picture; ``gaps`` are those of the
+    numbers, by the last place before each. ``why`` says why no strobe was found the last time that one was looked for.
+    """
+
+    plan: Plan
+    cfa: str | None = None
+    rig: Rig | None = None
+    first_light: str | None = None
+    step: int = 1
+    search: Search = search_here
+    seen: int = 0
+    lost_frames: int = 0
+    why: str = ""
+    gaps: dict[int, int] = field(default_factory=dict)
+    followed: list[Follower] = field(default_factory=list)
+    follower: Follower | None = None
+    _ring: Ring | None = None
+    _rounds: LiveRounds | None = None
+    _pending: deque[tuple[int, FloatArray, FloatArray | None]] = field(default_factory=deque)
+    _idle: threading.Event = field(default_factory=_set)
+    _last: int | None = None
+    _wanted: int = 0
+    _guard: threading.RLock = field(default_factory=threading.RLock)
+
+    @property
+    def state(self) -> State:
+        """Whether the strobe is found, doubted, or looked for."""
+        return "seeking" if self.follower is None else self.follower.state
+
+    def take(self, frame: LiveFrame) -> None:
+        """Take in one more frame."""
+        mean, clipped = row_light(frame.coded)
+        doubt = LOST * clipped if clipped.any() else None
+        small = Smaller(step=self.step, cfa=self.cfa).of(frame.coded)
+        with self._guard:
+            self._count(frame.index)
+            self._pending.append((frame.index, mean, doubt))
+            while len(self._pending) > 1 and self._too_old(self._pending[0][0]):
+                self._pending.popleft()
+            place = frame.index if self.follower is None else self._follow(frame.index, mean, doubt)
+            self._ring = self._ring or ring_of(self.plan)
+            self._ring.add(place, RingFrame(coded=small, came_s=frame.came_s))
+        if self.state in ("seeking", "lost"):
+            self._look()
+
+    def wait(self, most_s: float) -> None:
+        """Wait until a search that is under way is over, and no longer than ``most_s``."""
+        self._idle.wait(most_s)
+
+    def solve(self) -> NewestRound | None:
+        """Return what the newest whole round gives, None where there is no new one or no strobe is followed."""
+        with self._guard:
+            follower, ring, step = self.follower, self._ring, self.step
+            if follower is None or follower.state == "lost" or ring is None or not ring.frames:
+                return None
+            held = {place: frame for place, frame in ring.frames.items() if _fits(frame, self.plan, step)}
+            if not held:
+                return None
+            timing = timing_now(follower, (min(held), max(held)))
+        plan = smaller_plan(self.plan, step)
+        if self._rounds is None or self._rounds.plan != plan:
+            before = FIRST if self._rounds is None else self._rounds.number
+            self._rounds = LiveRounds(plan=plan, number=before)
+        small = smaller_timing(timing, step, self.plan.camera.height_px)
+        one = self._rounds.newest({place: frame.coded for place, frame in held.items()}, small)
+        if one is None:
+            return None
+        last = max(held)
+        return NewestRound(
+            round=one,
+            surface=None if self.rig is None else self._surface(one, plan, step),
+            came_s=held[last].came_s,
+            step=step,
+            timing=small,
+            frame=held[last].coded,
+        )
+
+    def _surface(self, one: Round, plan: Plan, step: int) -> Surface | None:
+        assert self.rig is not None  # noqa: S101
+        rig = smaller_rig(self.rig, step)
+        size = {"height_px": plan.camera.height_px, "width_px": plan.camera.width_px}
+        near = near_surface_of(rig, lights_as_planned(rig, plan), **size)
+        solved = surfaces([one], plan, rig, solving=Solving(fill=False), near=near, one_by_one=True)
+        return next((instant.surface for instant in solved), None)
+
+    def _count(self, index: int) -> None:
+        self.seen += 1
+        if self._last is not None and index > self._last + 1:
+            self.lost_frames += index - self._last - 1
+            self.gaps[self._last] = index - self._last - 1
+        self._last = index
+
+    def _too_old(self, index: int) -> bool:
+        most = max(round(LONGEST_S / self.plan.camera.frame_period_s), frames_to_lock(self.plan))
+        return self._idle.is_set() and (self._last or 0) - index >= most
+
+    def _follow(self, index: int, mean: FloatArray, doubt: FloatArray | None) -> int:
+        follower = self.follower
+        assert follower is not None  # noqa: S101
+        holes, before = len(follower.holes), follower.state
+        place = follower.add(index, mean, doubt)
+        for hole in follower.holes[holes:]:
+            self.lost_frames += hole.count
+            first = hole.before + follower.extra - hole.count
+            if self._ring is not None:
+                self._ring.moved({at: at + hole.count if at >= first else at for at in self._ring.frames})
+        if follower.state == "lost" and before != "lost":
+            self._wanted = index + frames_to_lock(self.plan) - LATEST
+        return place
+
+    def _look(self) -> None:
+        """Search for the strobe in the latest frames, once there are enough that came since it was last looked for."""
+        with self._guard:
+            newest = self._pending[-1][0]
+            fresh = [one for one in self._pending if one[0] > self._wanted - frames_to_lock(self.plan)]
+            if not self._idle.is_set() or newest < self._wanted or len(fresh) < frames_to_lock(self.plan):
+                return
+            self._idle.clear()
+            index = np.array([one[0] for one in fresh], np.int64)
+            values = np.stack([one[1] for one in fresh])
+            doubts = _stacked([one[2] for one in fresh], values)
+
+        def run() -> Lock | str:
+            try:
+                return lock(self.plan, index, values, doubt=doubts, first_light=self.first_light)
+            except NoStrobeError as fault:
+                return str(fault)
+
+        def done(found: Lock | str) -> None:
+            try:
+                self._looked(found, index)
+            finally:
+                self._idle.set()
+
+        self.search(run, done)
+
+    def _looked(self, found: "Lock | str", index: NDArray[np.int64]) -> None:
+        """Begin to follow what was found, from the frames that it was found in up to the newest."""
+        with self._guard:
+            if isinstance(found, str):
+                self.why = found
+                self._wanted = (self._last or 0) + frames_to_lock(self.plan) // 2
+                return
+            self.why = ""
+            known = [one for one in self._pending if index[0] <= one[0] <= index[-1]]
+            later = [one for one in self._pending if one[0] > index[-1]]
+            follower = caught_up(self.plan, found, [one[1] for one in known], [one[2] for one in known])
+            follower.extra += int(found.places[-1] - index[-1])
+            places = dict(zip(index.tolist(), found.places.tolist(), strict=True))
+            for number, mean, doubt in later:
+                places[number] = follower.add(number, mean, doubt)
+            self.follower = follower
+            self.followed.append(follower)
+            if self._ring is not None and len(self.followed) == 1:
+                self._ring.moved(places)
+            elif self._ring is not None:
+                self._ring.frames.clear()
+
+
+FIRST = LiveRounds.number
+
+
+def _stacked(doubts: list[FloatArray | None], values: FloatArray) -> FloatArray | None:
+    if all(one is None for one in doubts):
+        return None
+    return np.stack([np.zeros(values.shape[1]) if one is None else one for one in doubts])
+
+
+def _fits(frame: RingFrame, plan: Plan, step: int) -> bool:
+    """Tell whether a frame has the size that is made now, and not the one before."""
+    return frame.coded.shape[0] == plan.camera.height_px // step

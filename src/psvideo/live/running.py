@@ -1,0 +1,182 @@
+"""The chain with threads and a clock: frames taken as they come, results made beside that, a status every second."""
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from psvideo.live.chain import Chain, NewestRound, search_here
+from psvideo.live.quality import Quality
+from psvideo.live.smaller import smaller_plan
+from psvideo.live.source import LiveSource
+from psvideo.live.status import LiveStatus, LiveSummary
+
+IDLE_S = 0.002
+STATUS_S = 1.0
+SEARCH_S = 60.0
+"""A search that is under way when the source ends is waited for no longer than this."""
+Shown = Callable[[NewestRound], None]
+Said = Callable[[LiveStatus], None]
+Taken = Callable[..., None]
+
+
+def search_beside(run: Callable[[], object], done: Callable[[object], None]) -> None:
+    """Search in a thread of its own, while frames are taken."""
+    threading.Thread(target=lambda: done(run()), name="psvideo search", daemon=True).start()
+
+
+@dataclass(kw_only=True)
+class Running:
+    """One live run. ``shown`` gets every new result, ``said`` a status each second, ``taken`` every frame."""
+
+    chain: Chain
+    source: LiveSource
+    quality: Quality
+    shown: Shown
+    said: Said
+    taken: Taken = lambda frame: None
+    seconds: float | None = None
+    notes: list[str] = field(default_factory=list)
+    results: int = 0
+    first_lock_s: float | None = None
+    _ages_s: list[float] = field(default_factory=list)
+    _busy_s: float = 0.0
+    _stop: threading.Event = field(default_factory=threading.Event)
+    _fault: BaseException | None = None
+
+    def stop(self) -> None:
+        """End the run soon, from any thread."""
+        self._stop.set()
+
+    def run(self) -> LiveSummary:
+        """Take the source's frames to their end, or until stopped, and return what it came to."""
+        began_s = time.monotonic()
+        if self.source.paced:
+            self._beside(began_s)
+        else:
+            self._one_by_one(began_s)
+        if self._fault is not None:
+            raise self._fault
+        return self._summary(time.monotonic() - began_s)
+
+    def _one_by_one(self, began_s: float) -> None:
+        """Take and solve in turn: for a clip that is played as fast as it goes, so that nothing depends on time."""
+        self.chain.search = search_here
+        for frame in self.source.frames():
+            self._take(frame)
+            self._solve()
+            if self._stop.is_set() or self._over(frame.index):
+                break
+        self.said(self._status(time.monotonic() - began_s, 1.0, (0, 0)))
+
+    def _beside(self, began_s: float) -> None:
+        self.chain.search = search_beside  # type: ignore[assignment]
+        threads = [threading.Thread(target=self._guarded, args=(run,), daemon=True) for run in (self._read, self._make)]
+        for thread in threads:
+            thread.start()
+        before, said_s = (0, 0), time.monotonic()
+        while not self._stop.wait(STATUS_S):
+            now_s = time.monotonic()
+            status = self._status(now_s - began_s, now_s - said_s, before)
+            self._adapt(status, now_s - said_s)
+            before, said_s = (self.chain.seen, self.results), now_s
+            self.said(status)
+        for thread in threads:
+            thread.join()
+        self.chain.wait(SEARCH_S)  # a short clip may end before the strobe is found in it
+        self._solve()
+
+    def _guarded(self, run: Callable[[], None]) -> None:
+        try:
+            run()
+        except BaseException as fault:  # handed to whoever called
+            self._fault = fault
+        finally:
+            self._stop.set()
+
+    def _read(self) -> None:
+        for frame in self.source.frames():
+            self._take(frame)
+            if self._stop.is_set() or self._over(frame.index):
+                break
+
+    def _make(self) -> None:
+        while not self._stop.is_set():
+            if not self._solve():
+                time.sleep(IDLE_S)
+
+    def _take(self, frame: object) -> None:
+        self.taken(frame)
+        self.chain.take(frame)  # type: ignore[arg-type]
+        if self.first_lock_s is None and self.chain.follower is not None:
+            self.first_lock_s = self.chain.seen * self.chain.plan.camera.frame_period_s
+
+    def _solve(self) -> bool:
+        began_s = time.monotonic()
+        newest = self.chain.solve()
+        if newest is None:
+            return False
+        self.results += 1
+        self.shown(newest)
+        self._ages_s.append(time.monotonic() - newest.came_s)
+        self._busy_s += time.monotonic() - began_s
+        return True
+
+    def _over(self, index: int) -> bool:
+        return self.seconds is not None and (index + 1) * self.chain.plan.camera.frame_period_s >= self.seconds
+
+    def _adapt(self, status: LiveStatus, last_s: float) -> None:
+        """Make the picture smaller where there was no time for it, and say so."""
+        busy, self._busy_s = self._busy_s / last_s, 0.0
+        if status.state != "locked" or status.age_s is None or self.results < 2 * status.results_per_s:
+            return
+        plan = self.chain.plan
+        rounds_per_s = len(plan.dark_rounds) / plan.cycle_s
+        quality = self.quality.after(
+            age_s=status.age_s, rate=status.results_per_s, rounds_per_s=rounds_per_s, busy=busy
+        )
+        if quality.step != self.quality.step:
+            word = "smaller, to keep up" if quality.step > self.quality.step else "larger: there is time for it"
+            camera = smaller_plan(plan, quality.step).camera
+            self.notes.append(f"The live picture is now {camera.width_px} x {camera.height_px} pixels, {word}.")
+            self.chain.step = quality.step
+        self.quality = quality
+
+    def _status(self, at_s: float, last_s: float, before: tuple[int, int]) -> LiveStatus:
+        chain, follower = self.chain, self.chain.follower
+        camera = smaller_plan(chain.plan, chain.step).camera
+        latest = self._ages_s[len(self._ages_s) - max(self.results - before[1], 0) :]
+        return LiveStatus(
+            at_s=round(at_s, 3),
+            state=chain.state,
+            fps=(chain.seen - before[0]) / last_s,
+            frames=chain.seen,
+            lost=chain.lost_frames,
+            results=self.results,
+            results_per_s=(self.results - before[1]) / last_s,
+            age_s=float(np.median(latest)) if latest else None,
+            phase_error_rows=None if follower is None else follower.error_rows,
+            clock_offset_ppm=None if follower is None else follower.clock.offset_ppm,
+            width_px=camera.width_px,
+            height_px=camera.height_px,
+            why=chain.why,
+            notes=tuple(self.notes),
+        )
+
+    def _summary(self, seconds: float) -> LiveSummary:
+        chain, follower = self.chain, self.chain.follower
+        ages = self._ages_s
+        return LiveSummary(
+            seconds=seconds,
+            frames=chain.seen,
+            lost=chain.lost_frames,
+            locks=len(chain.followed),
+            first_lock_s=self.first_lock_s,
+            results=self.results,
+            ages_s=(float(np.median(ages)), max(ages)) if ages and self.source.paced else None,
+            phase_error_rows=None if follower is None else follower.error_rows,
+            clock_offset_ppm=None if follower is None else follower.clock.offset_ppm,
+            notes=tuple(self.notes),
+        )

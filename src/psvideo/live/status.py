@@ -1,0 +1,97 @@
+"""How things stand: one record a second for machines, one line for people, and what it came to at the end."""
+
+from dataclasses import asdict, dataclass
+
+from psvideo.live.follow import State
+
+SAID: dict[State, str] = {
+    "seeking": "looking for the strobe",
+    "locked": "locked",
+    "unsure": "not sure of the strobe",
+    "lost": "STROBE LOST, looking for it",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class LiveStatus:
+    """The last second. ``age_s`` is from a frame's coming to its picture, None where there was none.
+
+    ``phase_error_rows`` and ``clock_offset_ppm`` are None while nothing is followed; ``why`` says then why not.
+    ``width_px`` and ``height_px`` are the live picture's; ``late_s`` is by how much the source's frames come late.
+    """
+
+    at_s: float
+    state: State
+    fps: float
+    frames: int
+    lost: int
+    results: int
+    results_per_s: float
+    age_s: float | None
+    phase_error_rows: float | None
+    clock_offset_ppm: float | None
+    width_px: int
+    height_px: int
+    why: str = ""
+    recorded: int | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def line(self) -> str:
+        """One line for a terminal."""
+        parts = [SAID[self.state], f"{self.fps:.1f} fps"]
+        if self.phase_error_rows is not None and self.clock_offset_ppm is not None:
+            parts.append(f"+-{self.phase_error_rows:.2g} row, {self.clock_offset_ppm:+.1f} ppm")
+        parts.append(f"{self.frames} frames, {self.lost} lost")
+        parts.append(f"{self.results_per_s:.1f} results/s at {self.width_px} x {self.height_px}")
+        if self.age_s is not None:
+            parts.append(f"{1e3 * self.age_s:.0f} ms old")
+        if self.recorded is not None:
+            parts.append(f"{self.recorded} recorded")
+        return " | ".join(parts)
+
+    @property
+    def record(self) -> dict[str, object]:
+        """The same for machines."""
+        return asdict(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LiveSummary:
+    """What a live run came to. ``locks`` is how often the strobe was found, ``first_lock_s`` in how much footage.
+
+    ``results`` were made; ``ages_s`` are the median and the largest age of a picture, None where nothing was made.
+    """
+
+    seconds: float
+    frames: int
+    lost: int
+    locks: int
+    first_lock_s: float | None
+    results: int
+    ages_s: tuple[float, float] | None
+    phase_error_rows: float | None
+    clock_offset_ppm: float | None
+    recorded: int | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def words(self) -> str:
+        """The summary in two or three sentences."""
+        text = f"{self.frames} frames in {self.seconds:.1f} s, {self.lost} lost; {self.results} results."
+        if self.phase_error_rows is not None and self.clock_offset_ppm is not None:
+            after = "" if self.first_lock_s is None else f" after {self.first_lock_s:.1f} s of footage"
+            again = "" if self.locks == 1 else f", and found again {self.locks - 1} times"
+            text += (
+                f" The strobe was found{after}{again}; it runs "
+                f"{self.clock_offset_ppm:+.1f} ppm against the camera, its flashes known to "
+                f"{self.phase_error_rows:.2g} row."
+            )
+        if self.ages_s is not None:
+            text += f" Pictures were {1e3 * self.ages_s[0]:.0f} ms old (at most {1e3 * self.ages_s[1]:.0f} ms)."
+        return text
+
+    @property
+    def record(self) -> dict[str, object]:
+        """The same for machines."""
+        return {"done": True, **asdict(self)}

@@ -1,0 +1,30 @@
+"""All judgements of a take, line by line: what check says on the set, and the report after a run."""
+
+from psvideo.model.plan import Plan
+from psvideo.model.timing import Timing
+from psvideo.report.judge.light import ambient, exposure, lamps
+from psvideo.report.judge.of_rig import rig
+from psvideo.report.judge.result import accuracy, focus, steadiness, validity
+from psvideo.report.judge.time import coverage, motion, timing_and_order
+from psvideo.report.judgement import Judgement
+from psvideo.report.observe.observed import Observed
+
+
+def judgements(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = False) -> tuple[Judgement, ...]:
+    """Return one line per thing that decides whether a take can be used."""
+    on_time = tuple(timing_and_order(timing, plan.mode))
+    if not observed.facts:
+        return on_time
+    return (
+        *on_time,
+        *coverage(plan, timing, observed),
+        *exposure(observed),
+        *lamps(observed, timed=all(one.grade == "good" for one in on_time)),
+        ambient(observed),
+        motion(plan, timing, observed, aligned=aligned),
+        focus(observed),
+        *rig(observed),
+        *accuracy(observed),
+        *validity(observed),
+        *steadiness(observed.facts),
+    )

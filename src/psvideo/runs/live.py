@@ -1,0 +1,99 @@
+"""The whole of ``psvideo live``: a source in, the newest result shown, what it came to and its timing out."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from psvideo.clip import open_clip
+from psvideo.errors import NoStrobeError
+from psvideo.formats.paths import path_if_given, path_of
+from psvideo.formats.rig_toml import read_rig
+from psvideo.formats.timing_json import format_timing
+from psvideo.formats.whole_files import refuse_existing, write_text
+from psvideo.live.chain import Chain, NewestRound
+from psvideo.live.history import timing_of
+from psvideo.live.lock import check_followed
+from psvideo.live.quality import first_quality
+from psvideo.live.running import Running
+from psvideo.live.source import LiveSource, played_clip
+from psvideo.live.status import LiveStatus, LiveSummary
+from psvideo.model.choices import Pace
+from psvideo.model.intensity import lights_as_planned
+from psvideo.model.rig import Rig
+from psvideo.model.timing import DroppedFrames, Timing
+from psvideo.plates.sequence import check_separable
+from psvideo.runs.caller import PYTHON, Caller, say_of_clip
+
+
+def live(
+    source: Path | str,
+    *,
+    plan: Path | str | None = None,
+    rig: Path | str | None = None,
+    first_light: str | None = None,
+    timing_out: Path | str | None = None,
+    pace: Pace = "own",
+    seconds: float | None = None,
+    force: bool = False,
+    said: Callable[[LiveStatus], None] = lambda status: None,
+    shown: Callable[[NewestRound], None] = lambda newest: None,
+    caller: Caller = PYTHON,
+) -> LiveSummary:
+    """Follow a source's strobe while its frames come, and show the newest result.
+
+    - ``source``: a finished clip, which is played. ``plan`` names the plan where it does not lie beside it.
+    - ``rig``: where the lights are; without it there are plates and no normals.
+    - ``timing_out``: a timing.json to write at the end, of all that was followed; ``force`` replaces one.
+    - ``pace``: a clip's "own", or "fastest". ``seconds`` ends the run after so much footage.
+
+    ``said`` gets how things stand once a second, ``shown`` every result.
+
+    Raises
+    ------
+    UsageError
+        Where a file to write exists, or the plan's strobe cannot be followed.
+    PsvideoError
+        Where the source cannot be read or does not fit the plan, or no strobe was found in it.
+    """
+    clip = open_clip(path_of("source", source), plan=path_if_given("plan", plan))
+    say_of_clip(clip, caller)
+    opened = played_clip(clip, pace=pace)
+    check_followed(opened.plan)
+    check_separable(opened.plan)
+    known = None if rig is None else read_rig(path_of("rig", rig), plan_lights=opened.plan.lights)
+    timing_path = path_if_given("timing_out", timing_out)
+    if timing_path is not None:
+        refuse_existing(timing_path, force=force)
+    running = _running(opened, known, first_light, seconds, said, shown)
+    summary = running.run()
+    if running.chain.follower is None:
+        why = running.chain.why or f"{opened.name}: {summary.frames} frames are too few to find the strobe in."
+        raise NoStrobeError(why)
+    if timing_path is not None:
+        write_text(timing_path, format_timing(_timing(running.chain, opened)))
+    return summary
+
+
+def _running(
+    source: LiveSource,
+    rig: Rig | None,
+    first_light: str | None,
+    seconds: float | None,
+    said: Callable[[LiveStatus], None],
+    shown: Callable[[NewestRound], None],
+) -> Running:
+    if rig is not None:
+        lights_as_planned(rig, source.plan)
+    camera = source.plan.camera
+    quality = first_quality(camera.width_px, camera.height_px, mosaic=source.cfa is not None)
+    chain = Chain(plan=source.plan, cfa=source.cfa, rig=rig, first_light=first_light, step=quality.step)
+    return Running(chain=chain, source=source, quality=quality, shown=shown, said=said, seconds=seconds)
+
+
+def _timing(chain: Chain, source: LiveSource) -> Timing:
+    """Return the timing of all that was followed, frames named by their files' numbers."""
+    missing = dict(chain.gaps)
+    for follower in chain.followed:
+        for hole in follower.holes:
+            missing[hole.before - 1] = missing.get(hole.before - 1, 0) + hole.count
+    dropped = [DroppedFrames(after=at + source.first_number, count=count) for at, count in sorted(missing.items())]
+    return timing_of(chain.followed, clip=source.name, dropped=dropped)

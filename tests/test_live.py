@@ -1,0 +1,161 @@
+"""The live chain on a virtual clip: what it shows, what it writes and what it says."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import psvideo as ps
+from psvideo.cli.app import main
+from psvideo.live.chain import NewestRound
+from psvideo.live.quality import Quality, first_quality
+from psvideo.live.smaller import Smaller, smaller_plan, smaller_timing
+from psvideo.model.coded import Coded, Tone
+from psvideo.model.recipe import flash_recipe
+from psvideo.model.shutter import row_weights
+from psvideo.model.timing import timed_camera
+from psvideo.runs.live import live
+from psvideo.synth.shoot import shoot
+
+SCENE = """
+schema = "psvideo-scene/1"
+name = "sphere"
+frames = 110
+seed = 3
+[camera]
+width_px = 96
+height_px = 72
+fps = 100
+shutter_deg = 360.0
+readout_s = 0.01
+width_m = 1.6
+[strobe]
+flash_s = 0.001
+clock_offset_ppm = 40.0
+[[light]]
+name = "key"
+direction = [0.5, 0.4, 0.8]
+[[light]]
+name = "left"
+direction = [-0.6, 0.2, 0.8]
+[[light]]
+name = "top"
+direction = [0.1, -0.5, 0.8]
+[[object]]
+mesh = "sphere"
+albedo = 0.8
+"""
+LIVE_ROWS = 0.05
+
+
+@pytest.fixture(scope="module")
+def clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("live")
+    (folder / "scene.toml").write_text(SCENE, encoding="utf-8")
+    shoot(folder / "scene.toml", folder / "clip")
+    return folder / "clip"
+
+
+@pytest.fixture(scope="module")
+def results(clip: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[list[NewestRound], Path]:
+    """What the live chain makes of the clip, and the timing that it wrote."""
+    out = tmp_path_factory.mktemp("timing") / "timing.json"
+    shown: list[NewestRound] = []
+    live(clip, rig=clip / "rig.toml", timing_out=out, pace="fastest", shown=shown.append)
+    return shown, out
+
+
+def degrees_apart(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    there = (np.linalg.norm(one, axis=-1) > 0.5) & (np.linalg.norm(other, axis=-1) > 0.5)
+    return np.degrees(np.arccos(np.clip((one * other).sum(axis=-1)[there], -1, 1)))
+
+
+def test_live_normals_are_those_of_the_offline_run(clip: Path, results: tuple[list[NewestRound], Path]) -> None:
+    take = ps.open_take(clip)
+    offline = list(ps.solve(take, ps.read_rig(clip / "rig.toml"), align="none", fill=False))
+    assert len(results[0]) > 12
+    for newest in results[0][::5]:
+        same = min(offline, key=lambda instant: abs(instant.round.time_s - newest.round.time_s))
+        assert abs(same.round.time_s - newest.round.time_s) < 1e-6
+        assert newest.surface is not None
+        apart = degrees_apart(newest.surface.normals, same.surface.normals)
+        assert apart.size > 500
+        assert np.percentile(apart, 99) < 0.2
+
+
+def test_the_written_timing_agrees_with_sync(clip: Path, results: tuple[list[NewestRound], Path]) -> None:
+    written, offline = ps.read_timing(results[1]), ps.find_timing(ps.open_take(clip))
+    assert written.order == "marker"
+    apart_s = np.abs(offline.start_s[:, None] - written.start_s)
+    assert apart_s.min(axis=0).max() / offline.row_time_s < LIVE_ROWS
+    same = [
+        offline.flashes[k].lights == one.lights for k, one in zip(apart_s.argmin(axis=0), written.flashes, strict=True)
+    ]
+    assert all(same)
+    assert len(written.flashes) == len(offline.flashes)
+
+
+def test_the_command_says_how_things_stand_and_ends_with_a_summary(
+    clip: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["live", str(clip), "--pace", "fastest", "--seconds", "0.9", "--json"]) == 0
+    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert lines[0]["state"] == "locked"
+    assert lines[-1]["done"]
+    assert lines[-1]["frames"] == 90
+    assert lines[-1]["lost"] == 0
+    assert lines[-1]["results"] > 4
+
+
+def test_a_clip_without_the_plans_strobe_ends_in_one_paragraph(clip: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["live", str(clip), "--pace", "fastest", "--seconds", "0.3"]) == 1
+    said = capsys.readouterr().err.strip()
+    assert "too few" in said
+    assert main(["live", str(clip.parent / "none")]) == 1
+    assert "there is no such clip" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("upward", [False, True])
+def test_a_smaller_frame_sees_flashes_when_its_rows_did(
+    clip: Path, results: tuple[list[NewestRound], Path], upward: bool
+) -> None:
+    """The mean of the rows' weights is the small row's weight, but for the corners of the trapezoid."""
+    take, timing = ps.open_take(clip), ps.read_timing(results[1])
+    if upward:
+        timing = replace(timing, row_time_s=-timing.row_time_s)
+    camera = timed_camera(take.plan, timing)
+    small = smaller_timing(timing, 4, camera.height_px)
+    cell = timed_camera(smaller_plan(take.plan, 4), small)
+    frames = range(10, 14)
+    whole = row_weights(camera, timing.start_s, timing.duration_s, frames=frames)
+    mean = whole.reshape(*whole.shape[:2], -1, 4).mean(axis=-1)
+    assert np.abs(row_weights(cell, small.start_s, small.duration_s, frames=frames) - mean).max() < 0.08
+    assert (
+        np.abs((row_weights(cell, small.start_s, small.duration_s, frames=frames) - mean).mean(axis=-1)).max() < 3e-3
+    ), "half a row late is 7e-3"
+    assert flash_recipe(cell, small, small.flashes[8], frozenset(range(40))).seen.all()
+
+
+def test_a_mosaic_becomes_colour_in_sixteenths_of_a_code() -> None:
+    codes = np.zeros((4, 8), np.uint8)
+    codes[::2, ::2], codes[::2, 1::2], codes[1::2, ::2], codes[1::2, 1::2] = 10, 20, 21, 40
+    codes[0, 6] = 255
+    tone = Tone(zero=np.full((1, 1), 4.0), gain=np.full((1, 1), 1 / 251))
+    small = Smaller(step=2, cfa="RGGB").of(Coded(codes=codes, tone=tone))
+    assert small.codes.dtype == np.uint16
+    assert np.allclose(small.light()[0, 0] * 251, [6, 16.5, 36], atol=0.05)
+    assert small.light()[0, 3, 0] >= 0.998, "a cell with a clipped sample is clipped"
+
+
+def test_quality_steps_down_where_there_is_no_time_and_up_where_there_is() -> None:
+    at_first = first_quality(1280, 720, mosaic=True)
+    assert at_first == Quality(step=2, least=2)
+    late = at_first.after(age_s=0.3, rate=15, rounds_per_s=20, busy=0.5)
+    assert late.step == 4
+    calm = late
+    for _ in range(5):
+        calm = calm.after(age_s=0.05, rate=20, rounds_per_s=20, busy=0.1)
+    assert calm.step == 2
+    assert calm.after(age_s=0.05, rate=20, rounds_per_s=20, busy=0.1).step == 2, "no finer than the mosaic's cells"
