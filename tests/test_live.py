@@ -69,7 +69,7 @@ def results(clip: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[list[
 
 def degrees_apart(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     there = (np.linalg.norm(one, axis=-1) > 0.5) & (np.linalg.norm(other, axis=-1) > 0.5)
-    return np.degrees(np.arccos(np.clip((one * other).sum(axis=-1)[there], -1, 1)))
+    return np.asarray(np.degrees(np.arccos(np.clip((one * other).sum(axis=-1)[there], -1, 1))))
 
 
 def test_live_normals_are_those_of_the_offline_run(clip: Path, results: tuple[list[NewestRound], Path]) -> None:

@@ -151,8 +151,8 @@ class Chain:
     def _surface(self, one: Round, plan: Plan, step: int) -> Surface | None:
         assert self.rig is not None  # noqa: S101
         rig = smaller_rig(self.rig, step)
-        size = {"height_px": plan.camera.height_px, "width_px": plan.camera.width_px}
-        near = near_surface_of(rig, lights_as_planned(rig, plan), **size)
+        camera, lights = plan.camera, lights_as_planned(rig, plan)
+        near = near_surface_of(rig, lights, height_px=camera.height_px, width_px=camera.width_px)
         solved = surfaces([one], plan, rig, solving=Solving(fill=False), near=near, one_by_one=True)
         return next((instant.surface for instant in solved), None)
 

@@ -12,7 +12,7 @@ from psvideo.model.timing import Flash, Timing, timed_camera
 from psvideo.plates.ambient import Ambient, update
 from psvideo.plates.ambient_off import subtract
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixture import made
+from psvideo.plates.mixture import shown_level
 from psvideo.plates.sequence import AMBIENT, FIRST_NUMBER, Round, gathered, light_plates
 from psvideo.plates.split import plate_of
 
@@ -62,7 +62,9 @@ class LiveRounds:
             return None
         ambient = self.ambient
         time_s = float(ambient.middle_s.mean())
-        return LightPlate(light=AMBIENT, number=number, time_s=time_s, picture=made(ambient.image), seen=ambient.known)
+        return LightPlate(
+            light=AMBIENT, number=number, time_s=time_s, picture=shown_level(ambient.level), seen=ambient.known
+        )
 
 
 def _newest_whole(flashes: tuple[Flash, ...], plan: Plan) -> list[Flash]:

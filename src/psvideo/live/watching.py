@@ -64,4 +64,4 @@ def _counts(image: NDArray[np.float32], saturation: float) -> list[int]:
     thin = image[::2, ::2]
     bright = thin if thin.ndim == 2 else thin.max(axis=2)
     place = np.clip(np.sqrt(np.clip(bright / saturation, 0, 1)) * (HISTOGRAM - 1), 0, HISTOGRAM - 1).astype(np.intp)
-    return np.bincount(place.ravel(), minlength=HISTOGRAM).tolist()
+    return [int(count) for count in np.bincount(place.ravel(), minlength=HISTOGRAM)]
