@@ -12,8 +12,8 @@ from psvideo.errors import NoStrobeError
 from psvideo.live.follow import LATEST, Follower, State, caught_up
 from psvideo.live.history import timing_now
 from psvideo.live.lock import LONGEST_S, Lock, frames_to_lock, lock
+from psvideo.live.newest_round import LiveRounds
 from psvideo.live.ring import Ring, RingFrame, ring_of
-from psvideo.live.rounds import LiveRounds
 from psvideo.live.smaller import Smaller, smaller_plan, smaller_rig, smaller_timing
 from psvideo.model.camera import FloatArray
 from psvideo.model.coded import Coded
