@@ -256,6 +256,7 @@ def test_the_command_writes_rig_and_picture_and_speaks_json(tmp_path: Path, caps
         (["--circle", "1,2"], "x,y,radius"),
         (["--focal-mm", "50"], "go together"),
         (["--radius-mm", "0.05"], "millimetres"),
+        (["--radius-mm", "small"], "1.5in"),
     ):
         assert main([*words, "--force", *bad]) == 2
         assert expected in capsys.readouterr().err

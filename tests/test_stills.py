@@ -349,8 +349,13 @@ def test_chrome_balls_may_be_named_picture_by_picture_or_by_patterns(tmp_path: P
             (both / f"{name}_{file.name}").write_bytes(file.read_bytes())
     report = ps.stills(folder, sphere=[both / "left_*.png", both / "right_*.png"], out=tmp_path / "patterns")
     assert error_deg(tmp_path / "patterns") < 1.5
-    assert "6 of 6 lights were measured on 2 spheres" in remarks(report)
+    assert "6 of 6 lights were measured on 2 spheres, as directions; `radius_mm` and the lens" in remarks(report)
     assert "belong to lights by name" in remarks(report), "called by what the star stands for"
+    for file in two.iterdir():
+        save16(file, cv2.imread(str(file), cv2.IMREAD_UNCHANGED)[:250] / 65535)
+    lens = {"radius_mm": 40.0, "focal_px": 900.0}
+    said = remarks(ps.stills(folder, sphere=[one, two], **lens, out=tmp_path / "cropped"))
+    assert "the pictures of the spheres are 256 x 256 and 256 x 250 pixels, so they were cropped" in said
     with pytest.raises(ps.PsvideoError, match=r"middle_\*\.png: fits no picture"):
         ps.stills(folder, sphere=[both / "middle_*.png"], out=tmp_path / "none")
 

@@ -26,12 +26,14 @@ SAME_LENS = 1.01
 @dataclass(frozen=True, kw_only=True)
 class KnownLights:
     """Lights before they are paired with pictures. ``called`` are the names by which pictures may be found, ``own``
-    whether the lights have names of their own to keep, ``whose`` what messages call the source."""
+    whether the lights have names of their own to keep, ``whose`` what messages call the source. ``size_px`` (width,
+    height) are the pictures on which positions rest: photographs of another size lack the same lens's axis."""
 
     rig: Rig
     called: tuple[str, ...]
     own: bool
     whose: str
+    size_px: tuple[int, int] | None = None
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
 
@@ -97,19 +99,52 @@ def sphere_lights(
             )
         names, first = opened.names, first or path
         sightings += sight_spheres(opened.sets, looking, where=path, room=opened.room)
-    found = calibrate_lights(sightings, radius_m=radius_m)
+    cut = _cut_differently(sightings)
+    found = calibrate_lights(sightings, radius_m=None if cut else radius_m)
     rig = found.rig
     if any(light.position_m is not None for light in rig.lights):
         rig = replace(rig, plane=_plane_of(sightings, radius_m or 0.0))
     near = sum(light.position_m is not None for light in rig.lights)
-    what = f"{near} near, with positions" if near else "as directions"
-    if not near and radius_m is not None and len(sightings) > 1:
-        what += ", as no light is so near that its rays cross in one point"
+    what = f"{near} near, with positions" if near else _why_directions(sightings, radius_m, cut)
     note = f"{len(rig.lights)} of {len(found.lights)} lights were measured on {_spheres(len(sightings))}, {what}."
     whose = ", ".join(Path(one.called).name if isinstance(one, Place) else one.name for one in places)
     return KnownLights(
-        rig=rig, called=rig.names, own=False, whose=whose, notes=(*notes, note), warnings=tuple(found.warnings)
+        rig=rig,
+        called=rig.names,
+        own=False,
+        whose=whose,
+        size_px=_size_px(sightings[0]) if near else None,
+        notes=(*notes, note),
+        warnings=tuple(found.warnings),
     )
+
+
+def _size_px(sighting: Sighting) -> tuple[int, int]:
+    rows, cols = sighting.picture.shape
+    return cols, rows
+
+
+def _cut_differently(sightings: Sequence[Sighting]) -> str:
+    """Return the sizes of the spheres' pictures where they differ: nobody knows then where the lens's axis is in them."""
+    sizes = dict.fromkeys(map(_size_px, sightings))
+    return " and ".join(f"{cols} x {rows}" for cols, rows in sizes) if len(sizes) > 1 else ""
+
+
+def _why_directions(sightings: Sequence[Sighting], radius_m: float | None, cut: str) -> str:
+    """Return why lights seen on these spheres have no positions."""
+    if len(sightings) < 2:
+        return "as directions"
+    if cut:
+        return (
+            f"as directions: the pictures of the spheres are {cut} pixels, so they were cropped, and positions need to "
+            "know where the lens's axis is. Give whole pictures"
+        )
+    lacking = ["`radius_mm`"] if radius_m is None else []
+    if sightings[0].outline.view.focal_px is None:
+        lacking.append("the lens (`focal_px`, or `focal_mm` with `sensor_mm`)")
+    if lacking:
+        return f"as directions; {' and '.join(lacking)} would give those that stand near a position"
+    return "as directions, as no light is so near that its rays cross in one point"
 
 
 def lens_stated(stated: Sequence[Stated]) -> float | None:

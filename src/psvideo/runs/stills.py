@@ -14,7 +14,7 @@ from psvideo.calibrate.still_pairs import Pairs, pair_stills
 from psvideo.clip import Clip, Take, decoded_once
 from psvideo.clip.stills import Photographs, look_at
 from psvideo.compute.progress import Watch, unwatched
-from psvideo.errors import UsageError
+from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.asked import Asked, delivery_of
 from psvideo.formats.light_lists import write_rig
 from psvideo.formats.paths import path_if_given, path_of
@@ -203,6 +203,7 @@ def _opened(
     """Return the photographs as a clip; plan and rig are written into ``place``."""
     files = (*pairs.files, *([pairs.dark] if pairs.dark else []))
     pictures = look_at(files, transfer=transfer)
+    _check_size(folder, pictures, known)
     rig = known.in_order(pairs.names)
     glance = glance_at(pictures, rig.lights)
     exposures, note, warning = exposures_of(glance, pictures, len(pairs.files))
@@ -230,6 +231,18 @@ def _opened(
     clip = pictures.clip(folder, plan, place / PLAN, notes=notes)
     warned = (*clip.warnings, *known.warnings, *(said for said in (doubt, warning) if said))
     return _Opened(clip=replace(clip, warnings=warned), rig=rig, rig_path=place / RIG)
+
+
+def _check_size(folder: Path, pictures: Photographs, known: KnownLights) -> None:
+    """Raise PsvideoError where lights' positions rest on pictures of another size: crops lose the lens's axis."""
+    size_px = pictures.header.turn.size(pictures.header.width_px, pictures.header.height_px)
+    if known.size_px is not None and known.size_px != size_px:
+        raise PsvideoError(
+            f"{folder}: the photographs are {size_px[0]} x {size_px[1]} pixels and those of the spheres "
+            f"{known.size_px[0]} x {known.size_px[1]}. Expected one size, whole pictures of one camera: near lights are "
+            "placed along the lens's axis, which crops lose. Give pictures that are not cropped nor scaled, or leave "
+            "`radius_mm` out for directions."
+        )
 
 
 def _through_lens(rig: Rig, pictures: Photographs, looking: Looking) -> tuple[Rig, tuple[str, ...]]:

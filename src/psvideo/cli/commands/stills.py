@@ -10,7 +10,7 @@ from psvideo.cli.options.calibrate import Circles, FocalMm, FocalPx, RadiusMm, S
 from psvideo.cli.options.clip_and_run import Force, Json, Quiet, Verbose
 from psvideo.cli.options.delivery import AovOption, EncodeOption, MeshOption, Plates, ProgramOption
 from psvideo.cli.options.solving import Fill, SolverOption
-from psvideo.cli.options.typed import parse_circle
+from psvideo.cli.options.typed import parse_circle, parse_radius_mm
 
 
 def stills(
@@ -73,7 +73,7 @@ def stills(
         focal_px=focal_px,
         focal_mm=focal_mm,
         sensor_mm=sensor_mm,
-        radius_mm=radius_mm,
+        radius_mm=None if radius_mm is None else parse_radius_mm(radius_mm),
         circle=[parse_circle(text) for text in circle or ()],
         solver=solver,
         fill=fill,

@@ -15,7 +15,11 @@ SensorMm = Annotated[
     float | None, typer.Option(help="Width in mm of the sensor's part that the picture shows.", min=0.1)
 ]
 RadiusMm = Annotated[
-    float | None, typer.Option(help="The spheres' radius in mm: with two or more, near lights get positions.")
+    str | None,
+    typer.Option(
+        metavar="LENGTH",
+        help="The spheres' radius in mm, or with its unit (4cm, 1.5in): with two or more, near lights get positions.",
+    ),
 ]
 Circles = Annotated[
     list[str] | None,

@@ -83,6 +83,18 @@ def parse_metres(text: str, *, option: str) -> float:
     return float(found[1]) / {"m": 1, "cm": 100, "mm": 1000}[(found[2] or "m").lower()]
 
 
+def parse_radius_mm(text: str) -> float:
+    """Return a length in millimetres from ``40``, ``40mm``, ``4cm``, ``0.04m`` or ``1.5in``.
+
+    >>> parse_radius_mm("40"), parse_radius_mm("4 cm"), parse_radius_mm("1.5in")
+    (40.0, 40.0, 38.1)
+    """
+    found = re.fullmatch(rf"\s*({NUMBER})\s*(m|cm|mm|in|inch|\")?\s*", text, re.IGNORECASE)
+    if found is None:
+        raise UsageError(f"--radius-mm {text!r} is not a length. Write it as 40, 40mm, 4cm or 1.5in.")
+    return float(found[1]) * {"m": 1000, "cm": 10, "mm": 1}.get((found[2] or "mm").lower(), 25.4)
+
+
 def parse_size_px(text: str, *, option: str = "--size") -> tuple[int, int]:
     """Return (width, height) from ``1920x1080``."""
     found = re.fullmatch(r"\s*(\d{1,6})\s*[x×*]\s*(\d{1,6})\s*", text, re.IGNORECASE)

@@ -10,7 +10,7 @@ import typer
 from psvideo.cli.console import Voice
 from psvideo.cli.options.calibrate import Circles, FocalMm, FocalPx, RadiusMm, SensorMm, Spheres, Transfer
 from psvideo.cli.options.clip_and_run import FirstLight, Force, Frames, Json, PlanPath, Quiet, Verbose
-from psvideo.cli.options.typed import parse_circle, parse_point
+from psvideo.cli.options.typed import parse_circle, parse_point, parse_radius_mm
 
 if TYPE_CHECKING:
     from psvideo.calibrate.mirror.lights import MeasuredLight, MirrorCalibration
@@ -56,7 +56,7 @@ def mirror_sphere(
         focal_mm=focal_mm,
         sensor_mm=sensor_mm,
         principal_px=None if principal_px is None else parse_point(principal_px, option="--principal-px"),
-        radius_mm=radius_mm,
+        radius_mm=None if radius_mm is None else parse_radius_mm(radius_mm),
         outline_picture=outline_picture,
         transfer=transfer,
         plan=plan,
