@@ -229,3 +229,18 @@ def test_wiring_that_cannot_be_is_refused(make_plan: MakePlan, lines: dict[str, 
 def test_more_lights_than_lines_are_refused(make_plan: MakePlan) -> None:
     with pytest.raises(PsvideoError, match="4 lights and this board has 3 lines with direct wiring"):
         make_program(make_plan(lights=("a", "b", "c", "d")), DIRECT)
+
+
+def test_lights_that_always_flash_together_may_share_a_line(make_plan: MakePlan) -> None:
+    exchanged = [
+        {f"{lamp}_{'rgb'[(n + k) % 3]}": 1.0 for n, lamp in enumerate(("key", "left", "top"))} for k in (0, 1, 2)
+    ]
+    plan = replace(make_plan(), flashes=tuple(PlannedFlash(lights=lit, duration_s=0.0008) for lit in (*exchanged, {})))
+    with pytest.raises(PsvideoError, match="wire 3 lines, and say `line` key_r,left_g,top_b=0, `line` key_g,left_b,"):
+        make_program(plan, UNO)
+    lines = {light: line for line, lit in enumerate(exchanged) for light in lit}
+    program = make_program(plan, UNO, lines=lines)
+    assert [[one.line for one in slot.lit] for slot in program.slots] == [[0], [1], [2], []]
+    assert [set(flash.lit) for flash in program.played.flashes] == [*map(set, exchanged), set()]
+    with pytest.raises(UsageError, match="do not flash together"):
+        make_program(plan, UNO, lines=lines | {"key_r": 1})

@@ -32,6 +32,7 @@ from psvideo.strobe.stand_ins import python_board_server, toolchain
 from psvideo.strobe.stand_ins.emulated import play_script
 from psvideo.strobe.stand_ins.python_board import PythonBoard
 from psvideo.synth import read_scene
+from psvideo.synth.scenes import builtin_scene
 from psvideo.synth.shotplan import true_plan
 
 STARTS_WITHIN_S = 60.0
@@ -80,9 +81,11 @@ def picture(path: Path) -> np.ndarray:
     return pixels.astype(np.float64)
 
 
-def play_plan(plan: Path, cycles: int, trace: Path, *, board: toolchain.AvrBoard) -> None:
+def play_plan(
+    plan: Path, cycles: int, trace: Path, *, board: toolchain.AvrBoard, lines: dict[str, int] | None = None
+) -> None:
     """Play a plan on the firmware in emulation, as fast as it goes."""
-    program = make_program(read_plan(plan), capabilities(BOARDS[board], "gated"))
+    program = make_program(read_plan(plan), capabilities(BOARDS[board], "gated"), lines=lines)
     upload = [f"send {format_request(request).decode().strip()}" for request in program.upload()]
     ms = cycles * program.cycle_ticks // 2000 + 50
     said = play_script(
@@ -120,6 +123,34 @@ def test_from_a_plan_through_the_firmware_to_normals(
         cosine = (picture(out / "normals" / f"clip_normals.{number}.exr") * true_normals).sum(axis=-1)[valid]
         assert valid.sum() > 0.5 * mask.sum()
         assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).mean() < 1.0
+
+
+def test_nine_coloured_leds_on_three_lines_give_normals_through_the_firmware(tmp_path: Path) -> None:
+    scene, plan, trace = tmp_path / "scene.toml", tmp_path / "plan.toml", tmp_path / "trace.csv"
+    text = builtin_scene("colour").read_text(encoding="utf-8")
+    for old, new in (
+        ("480", "96"),
+        ("360\n", "72\n"),
+        ("frames = 40", "frames = 16"),
+        ("dark_every = 8", "dark_every = 2"),
+    ):
+        text = text.replace(old, new, 1)
+    scene.write_text(text)
+    wanted = true_plan(read_scene(scene))
+    plan.write_text(format_plan(wanted))
+    lit = [flash.lit for flash in wanted.flashes if flash.lit]
+    lines = {light: line for line, lights in enumerate(lit) for light in lights}
+    play_plan(plan, 6, trace, board="atmega328p", lines=lines)
+    assert read_trace(trace).lights == (0, 1, 2)
+    wired = [word for line, lights in enumerate(lit) for word in ("--line", f"{','.join(lights)}={line}")]
+    clip, out = tmp_path / "clip", tmp_path / "out"
+    assert main(["synth", str(scene), "--trace", str(trace), *wired, "-o", str(clip), "-q"]) == 0
+    assert main(["normals", str(clip), "--rig", str(clip / "rig.toml"), "--no-preview", "-o", str(out), "-q"]) == 0
+    normals, valid = (picture(min((out / what).iterdir())) for what in ("normals", "valid"))
+    true, mask = picture(clip / "truth" / "normals.exr"), picture(clip / "truth" / "mask.exr") > 0.99
+    solid = mask & (valid > 0)
+    assert solid.sum() > 0.3 * mask.sum()
+    assert np.degrees(np.arccos(np.clip((normals * true).sum(axis=-1)[solid], -1, 1))).mean() < 2
 
 
 def _true_offset_ppm(plan: Path, trace: Path) -> float:

@@ -157,7 +157,7 @@ def test_lights_hang_on_the_lines_that_are_named(tmp_path: Path) -> None:
     usual, _ = film(tmp_path, scene, "usual", ideal_edges(plan, 40))
     swapped, _ = film(tmp_path, scene, "swapped", ideal_edges(plan, 40, lines=(5, 0, 1)), key=5)
     np.testing.assert_array_equal(usual, swapped)
-    assert wired_lines(plan, {"top": 0}) == {1: "key", 2: "left", 0: "top"}
+    assert wired_lines(plan, {"top": 0}) == {1: ("key",), 2: ("left",), 0: ("top",)}
 
 
 def test_a_run_that_was_stopped_and_begun_again_starts_its_cycle_again(tmp_path: Path) -> None:
@@ -191,7 +191,7 @@ UNFIT: dict[str, tuple[Change, dict[str, object], dict[str, int], type[PsvideoEr
     "no light at all": (lambda e: [], {}, {}, PsvideoError, "no light was ever on"),
     "a line without a light": (lambda e: [(c, 7, v) for c, _, v in e], {}, {}, PsvideoError, "line 7 is lit"),
     "a light that is not there": (lambda e: e, {}, {"kye": 0}, UsageError, "did you mean 'key'"),
-    "two lights on a line": (lambda e: e, {}, {"key": 1, "left": 1}, UsageError, "same line"),
+    "two lights on a line": (lambda e: e, {}, {"key": 1, "left": 1}, PsvideoError, "key and left on line 1"),
     "jitter as well": (lambda e: e, {"jitter_s": 1e-6}, {}, UsageError, "jitter_s"),
     "a synced scene": (lambda e: e, {"mode": "synced"}, {}, UsageError, "mode synced"),
 }

@@ -74,7 +74,8 @@ def make_program(
 ) -> Program:
     """Return a plan as a program for a board.
 
-    ``lines`` wires lights to lines; lights that it leaves out take the free lines in the plan's order. Raises
+    ``lines`` wires lights to lines; lights that it leaves out take the free lines in the plan's order. Lights that
+    always flash together, at one power, may share a line. Raises
     PsvideoError, with every number that is over a limit, where the board cannot play the plan; UsageError where the
     wiring cannot be.
     """
@@ -132,15 +133,39 @@ def wire(plan: Plan, caps: Capabilities, given: Mapping[str, int]) -> dict[str, 
                 f"{caps.lines - 1}."
             )
         twin = next((other for other, taken in given.items() if taken == line and other != name), None)
-        if twin is not None:
-            raise UsageError(f"`line` {name}={line}: {twin} has line {line} already. Give every light its own line.")
-    if len(plan.lights) > caps.lines:
+        if twin is not None and _powers(plan, twin) != _powers(plan, name):
+            raise UsageError(
+                f"`line` {name}={line}: {twin} has line {line} already, and the two do not flash together at one power "
+                "in every flash. Give each its own line."
+            )
+    free = [line for line in range(caps.lines) if line not in given.values()]
+    others = [name for name in plan.lights if name not in given]
+    if len(others) > len(free):
         raise PsvideoError(
             f"The plan has {len(plan.lights)} lights and this board has {caps.lines} lines with {caps.wiring} wiring. "
-            "Take another wiring or board, or plan fewer lights."
+            f"{_how_with_fewer(plan, caps)}Take another wiring or board, or plan fewer lights."
         )
-    free = iter(line for line in range(caps.lines) if line not in given.values())
-    return {name: given[name] if name in given else next(free) for name in plan.lights}
+    rest = dict(zip(others, free, strict=False))
+    return {name: given[name] if name in given else rest[name] for name in plan.lights}
+
+
+def _powers(plan: Plan, light: str) -> tuple[float, ...]:
+    """Return a light's power in every flash of the list."""
+    return tuple(flash.lights.get(light, 0.0) for flash in plan.flashes)
+
+
+def _how_with_fewer(plan: Plan, caps: Capabilities) -> str:
+    """Return how lights that always flash together share lines, where that is enough; else nothing."""
+    together: dict[tuple[float, ...], list[str]] = {}
+    for name in plan.lights:
+        together.setdefault(_powers(plan, name), []).append(name)
+    if not len(together) <= caps.lines < len(plan.lights):
+        return ""
+    words = ", ".join(f"`line` {','.join(names)}={line}" for line, names in enumerate(together.values()))
+    return (
+        f"Lights that always flash together, at one power, can hang on one line, each with a driver of its own: wire "
+        f"{len(together)} lines, and say {words}. "
+    )
 
 
 def _lack_of_room(plan: Plan, caps: Capabilities) -> Iterator[str]:
@@ -170,7 +195,7 @@ def _make_slot(plan: Plan, number: int, dark: int, caps: Capabilities, lines: Ma
     bursts = find_bursts(list(lit.values()), duration, caps)
     if len(set(lit.values())) > caps.powers or bursts is None:
         return _power_fault(name, lit, duration, caps)
-    pairs = sorted((lines[light], on) for light, on in zip(lit, bursts.on, strict=True))
+    pairs = sorted({(lines[light], on) for light, on in zip(lit, bursts.on, strict=True)})
     slot = Slot(
         slot=0,
         duration=duration,

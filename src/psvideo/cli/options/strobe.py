@@ -34,7 +34,7 @@ LineWords = Annotated[
     list[str] | None,
     typer.Option(
         "--line",
-        help="Which line a light is wired to, such as key=0; may be repeated.",
+        help="Which line a light is wired to, such as key=0 (key,rim=0: both hang on one); may be repeated.",
         autocompletion=offer_lines,
     ),
 ]

@@ -245,19 +245,20 @@ def parse_point(text: str, *, option: str) -> tuple[float, float]:
 
 
 def parse_lines(words: Sequence[str] | None) -> dict[str, int]:
-    """Return light names and lines out of ``key=0``.
+    """Return light names and lines out of ``key=0``, or ``key,rim=0`` for lights that share one.
 
-    >>> parse_lines(["key=0", "left=3"])
-    {'key': 0, 'left': 3}
+    >>> parse_lines(["key=0", "left,rim=3"])
+    {'key': 0, 'left': 3, 'rim': 3}
     """
     lines: dict[str, int] = {}
     for word in words or ():
-        name, _, line = word.rpartition("=")
-        if not name or not line.isdecimal():
-            raise UsageError(f"--line {word}: expected a light's name and a line's number, such as key=0.")
-        if name in lines:
-            raise UsageError(f"--line {word}: {name} is wired to line {lines[name]} already.")
-        lines[name] = int(line)
+        names, _, line = word.rpartition("=")
+        for name in names.split(","):
+            if not name or not line.isdecimal():
+                raise UsageError(f"--line {word}: expected a light's name and a line's number, such as key=0.")
+            if name in lines:
+                raise UsageError(f"--line {word}: {name} is wired to line {lines[name]} already.")
+            lines[name] = int(line)
     return lines
 
 

@@ -85,7 +85,10 @@ def run(
         refuse_existing(log_path, force=force, mark=LOG_MARK)
     planned = read_plan(path)
     cycles, known = _length(planned, seconds, rounds), board_called(board)
-    _warn_of_flashing(planned, path, warned=yes or port == EMULATED, confirm=confirm, caller=caller)
+    if port == EMULATED:
+        caller.say("The board is emulated: nothing flashes.")
+    else:
+        _warn_of_flashing(planned, path, warned=yes, confirm=confirm, caller=caller)
     with opened_port(port, board=known) as opened:
         link = Link(opened)
         ready = prepare(link, wiring=wiring)

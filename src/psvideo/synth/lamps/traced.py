@@ -14,7 +14,7 @@ from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.trace_csv import Trace, merged_pulses, read_trace
 from psvideo.model.plan import Plan
 from psvideo.synth.lamps.emission import Emission
-from psvideo.synth.lamps.traced_slots import Pulse, check_lines, flash_pulses, wired_lines
+from psvideo.synth.lamps.traced_slots import Pulse, Wired, check_lines, flash_pulses, wired_lines
 from psvideo.synth.lamps.true_flashes import TrueClock, TrueFlash, clip_end_s, is_complete
 from psvideo.synth.scene import Scene
 
@@ -100,15 +100,15 @@ class _Maker:
     trace: Trace
     clock: TrueClock
     first: int
-    wired: Mapping[int, str]
+    wired: Wired
 
     def flash(self, slot: int, group: Sequence[Pulse]) -> tuple[TrueFlash, tuple[TrueFlash, ...]]:
         """Return a flash as a whole, and its parts of lights that burst alike."""
         start, end = group[0][0], max(off for _, off, _ in group)
-        trains = {self.wired[line]: [(on, off) for on, off, its in group if its == line] for _, _, line in group}
+        trains = {line: [(on, off) for on, off, its in group if its == line] for _, _, line in group}
         alike: dict[tuple[tuple[int, int], ...], list[str]] = {}
-        for name, train in trains.items():
-            alike.setdefault(tuple(train), []).append(name)
+        for line, train in trains.items():
+            alike.setdefault(tuple(train), []).extend(self.wired[line])
         parts = tuple(self._part(slot, start, end, train, names) for train, names in alike.items())
         powers = {name: power for part in parts for name, power in part.lights.items()}
         return replace(parts[0], lights=powers), parts

@@ -19,23 +19,28 @@ TIME_TOLERANCE = 0.01
 """Traces and plans agree when times do within this share: boards count ticks, and their clocks run a little off."""
 
 
-def wired_lines(plan: Plan, given: Mapping[str, int]) -> dict[int, str]:
-    """Return which light hangs on which line: the plan's order, but for those that are given."""
+Wired = Mapping[int, tuple[str, ...]]
+"""Which lights hang on which line: one, but where several that flash together share it."""
+
+
+def wired_lines(plan: Plan, given: Mapping[str, int]) -> Wired:
+    """Return which lights hang on which line: the plan's order, but for those that are given."""
     for name in given:
         if name not in plan.lights:
             raise UsageError(f"`line` {name}={given[name]}: the plan has no such light; {nearest(name, plan.lights)}")
     free = iter(n for n in range(len(plan.lights) + max(given.values(), default=0) + 1) if n not in given.values())
-    wired = {given[name] if name in given else next(free): name for name in plan.lights}
-    if len(wired) < len(plan.lights):
-        raise UsageError("`line`: two lights have the same line. Give every light a line of its own.")
+    wired: dict[int, tuple[str, ...]] = {}
+    for name in plan.lights:
+        line = given[name] if name in given else next(free)
+        wired[line] = (*wired.get(line, ()), name)
     return wired
 
 
-def check_lines(path: Path, trace: Trace, wired: Mapping[int, str]) -> None:
+def check_lines(path: Path, trace: Trace, wired: Wired) -> None:
     """Raise PsvideoError where a line is lit on which no light hangs."""
     unknown = [line for line in trace.lights if line not in wired]
     if unknown:
-        shown = ", ".join(f"{name} on line {line}" for line, name in sorted(wired.items()))
+        shown = ", ".join(f"{' and '.join(names)} on line {line}" for line, names in sorted(wired.items()))
         raise PsvideoError(
             f"{path}: line {unknown[0]} is lit, and no light of the plan hangs on it ({shown}). Name the lines with "
             "`line` NAME=NUMBER, or take the trace of this plan."
@@ -43,7 +48,7 @@ def check_lines(path: Path, trace: Trace, wired: Mapping[int, str]) -> None:
 
 
 def flash_pulses(
-    path: Path, plan: Plan, trace: Trace, wired: Mapping[int, str], pulses: Sequence[Pulse]
+    path: Path, plan: Plan, trace: Trace, wired: Wired, pulses: Sequence[Pulse]
 ) -> Iterator[tuple[int, list[Pulse]]]:
     """Yield each flash's slot and pulses. A pause longer than any within a cycle begins a new run at the cycle's start.
 
@@ -55,7 +60,7 @@ def flash_pulses(
     place = 0
     before_s: float | None = None
     for number, group in enumerate(_groups(pulses, 0.5 * plan.dark_s * trace.hz), start=1):
-        begin_s, names = group[0][0] / trace.hz, {wired[line] for _, _, line in group}
+        begin_s, names = group[0][0] / trace.hz, {name for _, _, line in group for name in wired[line]}
         pause_s = None if before_s is None else begin_s - before_s
         if pause_s is not None and _is_later(pause_s, max(pauses_s)) and not _other_lights(plan, lit[0], names):
             place, pause_s = 0, None
