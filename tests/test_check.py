@@ -320,7 +320,7 @@ def test_watching_reports_every_take_and_ends_well_with_ctrl_c(shot: Callable[[s
         finally:
             watching.kill()
     assert watching.returncode == 0
-    assert "2 take(s) checked: 1 usable, 0 not, 1 could not be read." in rest
+    assert "2 takes checked: 1 usable, 0 not, 1 could not be read." in rest
     assert re.search(r"good: This take is usable\.", said)
     assert re.search(r"broken: cannot be checked yet", said)
     assert "Traceback" not in said + rest

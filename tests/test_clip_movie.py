@@ -17,6 +17,7 @@ from psvideo.clip.decode.yuv import CODES, HIGHEST, LOWEST, to_rgb
 from psvideo.clip.record import CodedPicture
 from psvideo.errors import PsvideoError
 from psvideo.formats.plan_toml import format_plan
+from psvideo.inspect.describe import describe
 from psvideo.model.camera import Encoding
 from psvideo.model.plan import Plan
 from psvideo.sync.take_timing import find_take_timing
@@ -344,6 +345,9 @@ def test_the_rate_at_which_a_phone_shot_slow_motion_counts(shared_data: Path, pl
     movie = shared_data / "movies" / "video_phone" / "androidx_sample_sef_slow_motion.mp4"
     if not movie.is_file():
         pytest.skip("the real movies are not there")
+    of_itself = " ".join(finding.text for finding in describe(movie).findings)
+    assert "64 frames, 30 frames a second, shot at 240: movie, 320 x 240 pixels" in of_itself
+    assert "there is no plan.toml" in of_itself
     slow = open_clip(movie, plan=plan_for(rows=240, cols=320, fps=Fraction(240)))
     assert not any("frames per second" in warning for warning in slow.warnings)
     wrong = open_clip(movie, plan=plan_for(rows=240, cols=320, fps=Fraction(120)))

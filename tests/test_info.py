@@ -73,7 +73,7 @@ def test_a_clip_that_fits_says_so(shot: Path) -> None:
     assert (found.kind, found.fits) == ("clip folder", True)
     assert {finding.level for finding in found.findings} == {"ok"}
     said = lines(found, "ok")
-    for part in ("40 frames, numbered 1 to 40: png, 16 x 12 pixels", "9 whole round(s)", "has the plan's 3 light(s)"):
+    for part in ("40 frames, numbered 1 to 40: png, 16 x 12 pixels", "9 whole rounds", "has the plan's 3 lights"):
         assert part in said
     assert found.facts["frames"] == 40
 
@@ -82,7 +82,7 @@ def test_the_rounds_of_a_clip_are_counted_by_its_plan(shot: Path, plan: Plan) ->
     """40 frames of 1001/120000 s, and four flashes a round, each with its dark time."""
     round_s = sum(flash.duration_s + plan.dark_s for flash in plan.flashes)
     expected = int(40 * 1001 / 120000 / round_s)
-    assert f"{expected} whole round(s)" in lines(describe(shot), "ok")
+    assert f"{expected} whole round" in lines(describe(shot), "ok")
 
 
 def no_change(shot: Path, plan: Plan) -> None:
@@ -125,7 +125,7 @@ def test_what_does_not_fit_is_a_fault(shot: Path, plan: Plan, name: str) -> None
 
 
 WARNINGS: dict[str, tuple[Callable[[Path, Plan], Any], str]] = {
-    "dropped frames": (lambda shot, plan: (shot / "frames/shot.0017.png").unlink(), "1 frame(s) dropped: 1 after 16"),
+    "dropped frames": (lambda shot, plan: (shot / "frames/shot.0017.png").unlink(), "1 frame dropped: 1 after 16"),
     "saturation": (
         lambda shot, plan: put_frames(shot / "frames", range(1, 41), share=1.0),
         "100.0% of the pixels are saturated",
@@ -157,7 +157,7 @@ def test_what_may_cost_accuracy_is_a_warning(shot: Path, plan: Plan, name: str) 
 
 
 @pytest.mark.parametrize(
-    ("frames", "level", "message"), [(8, "ok", "2 round(s)"), (9, "warn", "1 frame(s)"), (3, "FAULT", "1 are")]
+    ("frames", "level", "message"), [(8, "ok", "2 rounds"), (9, "warn", "1 frame "), (3, "FAULT", "1 are")]
 )
 def test_a_synced_clip_has_one_frame_per_flash(
     tmp_path: Path, plan: Plan, frames: int, level: str, message: str
@@ -201,7 +201,7 @@ def test_a_timing_says_how_sure_it_is(tmp_path: Path) -> None:
     doubtful = make_timing(order="guess", clock_offset_ppm=-1003.0, dropped_frames=(DroppedFrames(after=16, count=2),))
     (tmp_path / "timing.json").write_text(format_timing(doubtful))
     said = lines(describe(tmp_path / "timing.json"), "warn")
-    for part in ("is a guess", "misnamed by 1000/1001", "2 frame(s) dropped, after 16"):
+    for part in ("is a guess", "misnamed by 1000/1001", "2 frames dropped, after 16"):
         assert part in said
 
 
@@ -238,7 +238,7 @@ def test_results_hold_the_same_numbers(tmp_path: Path) -> None:
             put_exr(tmp_path / name / f"shot_{name}.{number}.exr", channels)
     found = describe(tmp_path)
     assert (found.kind, found.fits) == ("results folder", True)
-    assert "normals: 2 file(s), numbered 1001 to 1002, 16 x 12, channels R, G, B" in lines(found, "ok")
+    assert "normals: 2 files, numbered 1001 to 1002, 16 x 12, channels R, G, B" in lines(found, "ok")
     (tmp_path / "albedo" / "shot_albedo.1002.exr").unlink()
     assert "albedo/ and normals/ do not hold the same numbers (1 differ)" in lines(describe(tmp_path), "FAULT")
 
@@ -252,7 +252,7 @@ def test_results_say_their_space_direction_colour_and_rate(tmp_path: Path) -> No
     found = describe(tmp_path)
     said = "normals in world space, y down (DirectX); albedo in lin_awg4_scene, linear; 24 results a second"
     assert said in lines(found, "ok")
-    assert "error: 1 file(s), numbered 1001 to 1001, 16 x 12, channels Y, in °" in lines(found, "ok")
+    assert "error: 1 file, numbered 1001 to 1001, 16 x 12, channels Y, in °" in lines(found, "ok")
     (tmp_path / "delivery.json").write_text('{"schema": "psvideo-delivery/1"}', encoding="utf-8")
     assert describe(tmp_path / "delivery.json").kind == "results folder"
     assert (found.facts["space"], found.facts["y"], found.facts["colour"]) == ("world", "down", "lin_awg4_scene")
@@ -305,7 +305,7 @@ def test_photographs_with_a_plan_of_their_own_fit(shared_data: Path, tmp_path: P
     still = dataclasses.replace(plan, mode="synced", flashes=lights, camera=camera)
     found = describe(shared_data / "uw_psm" / "cat", plan=put_plan(tmp_path, still))
     assert found.fits
-    assert "12 frames, 12 flashes a round: 1 round(s)" in lines(found, "ok")
+    assert "12 frames, 12 flashes a round: 1 round" in lines(found, "ok")
     assert "cat.mask.png" in lines(found, "ok")
 
 

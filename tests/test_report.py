@@ -121,7 +121,7 @@ def test_a_good_take_is_called_usable_and_every_line_good(reported: Callable[...
         ("sun", "not usable as it is: ambient", "ambient", r"5\d % of the signal"),
         ("spinning", "usable, with reservations", "motion", r"picture moves, by up to 1\.\d px from flash to flash"),
         ("passing", "usable, with reservations", "motion", r"by up to 1\.[34] px from flash to flash"),
-        ("dropped", "usable, with reservations", "frames", r"2 frame\(s\) are missing \(2 after number 9\)"),
+        ("dropped", "usable, with reservations", "frames", r"2 frames are missing \(2 after number 9\)"),
         ("cut", "not usable as it is: rows", "rows", r"dark time of 7 ms is shorter.*plates are cut.*at least 10 ms"),
         ("half_open", "usable, with reservations", "rows", r"180 degrees only.*other rounds.*Shoot at 360 degrees"),
         ("noisy", "usable, with reservations", "validity", r"reach [89]\d %.*error is too large. Give more light"),
@@ -226,7 +226,7 @@ def test_a_page_asks_for_nothing_and_shows_all(shot: Callable[[str], Path], tmp_
     assert not re.search(r"(src|href)=\"(?!data:)|url\(|@import|<script", page)
     assert not re.search(r"\bnan\b|\binf\b", page)
     body = page[page.index("<h1>") :]
-    assert body.index("with reservations") < body.index("2 frame(s) are missing") < body.index("<h2>")
+    assert body.index("with reservations") < body.index("2 frames are missing") < body.index("<h2>")
     for words in ("What was shot", "Phase locked", "key", "half of the subject below", "Over time", "SHA-256"):
         assert words in body
     assert f"psvideo {' '.join(map(str, command))}" in body

@@ -41,7 +41,7 @@ def test_an_emulated_run_needs_no_board_and_leaves_a_log(plan_file: Path, capsys
     log = plan_file.with_name("strobe.json")
     assert run("strobe", "run", plan_file, "--port", "emulated", "--rounds", "5", "--log", log, "--line", "left=7") == 0
     said = capsys.readouterr()
-    assert "Played 1 whole cycles of 19 round(s) each." in said.out
+    assert "Played 1 whole cycle of 19 rounds." in said.out
     assert "FLASHING LIGHT" not in said.err, "an emulated board flashes nothing"
     found = read_log(log)
     assert (found.cycles, found.ended, found.board, found.wiring) == (1, "done", "atmega328p", "gated")

@@ -111,15 +111,6 @@ def print_report(voice: Voice, report: "RunReport") -> None:
         voice.warn(sentence)
 
 
-def counted(count: int, thing: str) -> str:
-    """Return a number with its noun.
-
-    >>> counted(1, "plate"), counted(0, "plate")
-    ('1 plate', '0 plates')
-    """
-    return f"{count} {thing}" if count == 1 else f"{count} {thing}s"
-
-
 def plain(words: "Sequence[Item] | None") -> "list[Item]":
     """Return the words of an option that may be given several times, as plain text and each once."""
     return [getattr(word, "value", word) for word in dict.fromkeys(words or ())]

@@ -17,6 +17,7 @@ from psvideo.clip.linear import in_codes
 from psvideo.clip.record import Clip, CodedPicture, Frame, Header, PictureInFile
 from psvideo.compute.threads import in_order, thread_count
 from psvideo.errors import PsvideoError, UsageError
+from psvideo.model.units import counted
 
 Picture = CodedPicture | PictureInFile
 CHECKED_ROWS = 256
@@ -152,4 +153,4 @@ def looks(head: Header) -> str:
     """Say a picture's size, channels and depth: what all frames of a clip have in common."""
     depth = f"{head.bits} bits" if head.bits else "floating point"
     filters = f", filters {head.cfa}" if head.cfa else ""
-    return f"{head.width_px} x {head.height_px} pixels, {head.channels} channel(s), {depth}{filters}"
+    return f"{head.width_px} x {head.height_px} pixels, {counted(head.channels, 'channel')}, {depth}{filters}"

@@ -10,9 +10,12 @@ from psvideo.clip.opening import open_clip
 from psvideo.clip.reading import looks, read_frames
 from psvideo.clip.record import Clip
 from psvideo.errors import PsvideoError
+from psvideo.formats.plan_toml import find_plan
+from psvideo.inspect.about_movie import movie_findings
 from psvideo.inspect.about_plan import length_finding, plan_findings, rig_findings
 from psvideo.inspect.findings import Description, Fact, Finding, caught, fault, ok, warn
 from psvideo.model.clipping import SATURATED
+from psvideo.model.units import counted
 
 MANY = 3
 SATURATED_SHARE = 0.01
@@ -25,9 +28,18 @@ def describe_clip(path: Path, plan: Path | None) -> Description:
     try:
         clip = open_clip(path, plan=plan)
     except PsvideoError as error:
-        return Description(path=path, kind=what, findings=(fault(error),))
+        own = () if path.is_dir() or _has_plan(path, plan) else tuple(caught(movie_findings(path)))
+        return Description(path=path, kind=what, findings=(*own, fault(error)))
     findings = tuple(caught(_findings(clip)))
     return Description(path=path, kind=what, facts=_facts(clip), findings=findings)
+
+
+def _has_plan(path: Path, plan: Path | None) -> bool:
+    try:
+        find_plan(path, given=plan)
+    except PsvideoError:
+        return False
+    return True
 
 
 def _facts(clip: Clip) -> dict[str, Fact]:
@@ -75,7 +87,7 @@ def _hole_findings(clip: Clip) -> Iterator[Finding]:
     if clip.plan.mode == "synced":
         yield ok(f"the numbers have holes ({shown}{more}): these frames, and the flashes in them, are missing")
     else:
-        yield warn(f"{sum(count for _, count in found)} frame(s) dropped: {shown}{more}")
+        yield warn(f"{counted(sum(count for _, count in found), 'frame')} dropped: {shown}{more}")
 
 
 def _likeness_findings(clip: Clip) -> Iterator[Finding]:

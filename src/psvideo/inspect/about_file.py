@@ -18,6 +18,7 @@ from psvideo.formats.timing_json import read_timing
 from psvideo.inspect.about_output import describe_output
 from psvideo.inspect.about_plan import plan_findings, rig_findings
 from psvideo.inspect.findings import Description, Fact, Finding, fault, ok, warn
+from psvideo.model.units import counted
 from psvideo.strobe.runlog import as_played, read_log
 
 MISNAMED_PPM = (900.0, 1100.0)
@@ -114,7 +115,7 @@ def _timing(path: Path) -> tuple[dict[str, Fact], list[Finding]]:
     dropped = sum(hole.count for hole in timing.dropped_frames)
     if dropped:
         findings.append(
-            warn(f"{dropped} frame(s) dropped, after {', '.join(str(h.after) for h in timing.dropped_frames)}")
+            warn(f"{counted(dropped, 'frame')} dropped, after {', '.join(str(h.after) for h in timing.dropped_frames)}")
         )
     facts: dict[str, Fact] = {
         "clip": timing.clip,

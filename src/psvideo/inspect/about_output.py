@@ -10,6 +10,7 @@ from psvideo.errors import PsvideoError
 from psvideo.formats.timing_json import read_timing
 from psvideo.inspect.findings import Description, Fact, Finding, caught, fault, ok, warn
 from psvideo.model.quantities import ALWAYS, QUANTITIES
+from psvideo.model.units import counted
 
 
 def is_plates(folder: Path) -> bool:
@@ -58,7 +59,7 @@ def _findings(folder: Path, sequences: dict[str, list[Path]], kind: str) -> Iter
         span = f"numbered {min(numbers)} to {max(numbers)}, " if numbers else ""
         size = f"{attributes['width_px']} x {attributes['height_px']}"
         unit = f", in {QUANTITIES[name].unit}" if name in QUANTITIES and QUANTITIES[name].unit else ""
-        yield ok(f"{name}: {len(files)} file(s), {span}{size}, channels {', '.join(channels)}{unit}")
+        yield ok(f"{name}: {counted(len(files), 'file')}, {span}{size}, channels {', '.join(channels)}{unit}")
     said = _said_in_headers(sequences)
     if said["space"] is not None:
         yield ok(_in_words(said))
@@ -68,13 +69,17 @@ def _findings(folder: Path, sequences: dict[str, list[Path]], kind: str) -> Iter
         yield from _plates_are_there(folder)
 
 
+SLOWEST = Fraction(1, 2)
+"""Results a second below which they are no film, but photographs: their rate says nothing."""
+
+
 def _in_words(said: dict[str, Fact]) -> str:
     """Say in which frame and colours results are, and how fast they go."""
     direction = {"up": "y up (OpenGL)", "down": "y down (DirectX)"}.get(str(said["y"]), "y is not said")
     parts = [f"normals in {said['space']} space, {direction}"]
     if said["colour"] is not None:
         parts.append(f"albedo in {said['colour']}, linear")
-    if said["fps"] is not None:
+    if said["fps"] is not None and Fraction(str(said["fps"])) >= SLOWEST:
         parts.append(f"{float(Fraction(str(said['fps']))):.6g} results a second")
     if said["time_code"] is not None:
         parts.append(f"from time code {said['time_code']}")
@@ -99,7 +104,7 @@ def _plates_are_there(folder: Path) -> Iterator[Finding]:
     plates = [flash.plate for flash in read_timing(folder / "timing.json").flashes if flash.plate]
     missing = [plate for plate in plates if not (folder / plate).is_file()]
     if missing:
-        yield fault(f"timing.json lists {missing[0]} and {len(missing) - 1} more plate(s) that are not here")
+        yield fault(f"timing.json lists {missing[0]} and {counted(len(missing) - 1, 'more plate')} that are not here")
     elif plates:
         yield ok(f"all {len(plates)} plates that timing.json lists are here")
     for plate in plates:

@@ -9,6 +9,7 @@ from psvideo.formats.rig_toml import read_rig
 from psvideo.inspect.findings import Finding, fault, ok, warn
 from psvideo.model.marker import has_marker
 from psvideo.model.plan import Plan
+from psvideo.model.units import counted
 
 ROUNDING = 1e-4
 
@@ -43,18 +44,19 @@ def length_finding(plan: Plan, numbers: tuple[int, ...]) -> Finding:
     per_cycle = len(plan.cycle_slots)
     flashes = int(seconds / plan.cycle_s * per_cycle)
     rounds = int(seconds / plan.cycle_s * len(plan.dark_rounds))
-    text = f"{seconds:.4g} s at {float(plan.camera.fps):.6g} fps: about {flashes} flashes, {rounds} whole round(s)"
+    whole = counted(rounds, "whole round")
+    text = f"{seconds:.4g} s at {float(plan.camera.fps):.6g} fps: about {flashes} flashes, {whole}"
     if rounds < 1:
         return fault(f"{text}, which is too short: a round lasts {plan.cycle_s / len(plan.dark_rounds):.4g} s")
     return ok(text)
 
 
 def _synced_length(per_round: int, frames: int, span: int) -> Finding:
-    text = f"{frames} frames, {per_round} flashes a round: {frames // per_round} round(s)"
+    text = f"{frames} frames, {per_round} flashes a round: {counted(frames // per_round, 'round')}"
     if frames < per_round:
         return fault(f"{text}; a synced clip has one frame per flash, so {per_round - frames} are missing")
     if frames % per_round and frames == span:
-        return warn(f"{text}, and {frames % per_round} frame(s) of a round that is cut")
+        return warn(f"{text}, and {counted(frames % per_round, 'frame')} of a round that is cut")
     return ok(text)
 
 
@@ -67,7 +69,7 @@ def rig_findings(rig_path: Path, plan: Plan) -> Iterator[Finding]:
         yield fault(error if str(rig_path) in str(error) else f"{rig_path}: {error}")
         return
     others = [name for name in rig.names if name not in plan.lights]
-    yield ok(f"{rig_path.name} has the plan's {len(plan.lights)} light(s)")
+    yield ok(f"{rig_path.name} has the plan's {counted(len(plan.lights), 'light')}")
     if others:
         yield warn(f"{rig_path.name} has lights that the plan does not flash: {', '.join(others)}")
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from psvideo.inspect.findings import Finding
+from psvideo.model.units import counted
 from psvideo.strobe.link.controller import serial_ports
 
 ENOUGH_MEMORY_GB = 2.0
@@ -61,7 +62,9 @@ def _graphics() -> Finding:
     """Say what graphics processor there is. Nothing in psvideo runs on one, so none is never a fault."""
     found = [name for name, sign in DRIVERS.items() if sign.exists()]
     nodes = sorted(Path("/dev/dri").glob("renderD*")) if Path("/dev/dri").is_dir() else []
-    what = f"{' and '.join(found)} driver" if found else f"{len(nodes)} render node(s)" if nodes else "none found"
+    what = (
+        f"{' and '.join(found)} driver" if found else f"{counted(len(nodes), 'render node')}" if nodes else "none found"
+    )
     text = f"{what}; psvideo computes on none, and a page in the browser uses what the browser has"
     return Finding(name="GPU", level="ok", text=text)
 

@@ -6,6 +6,15 @@ NTSC = Fraction(1000, 1001)
 """What broadcast rates are slower than whole ones by."""
 
 
+def counted(count: int, thing: str) -> str:
+    """Return a number with its noun.
+
+    >>> counted(1, "plate"), counted(0, "plate")
+    ('1 plate', '0 plates')
+    """
+    return f"{count} {thing}" if count == 1 else f"{count} {thing}s"
+
+
 def show_seconds(seconds: float) -> str:
     """Return a time as people write it, with four figures.
 

@@ -125,7 +125,7 @@ def _size_px(sighting: Sighting) -> tuple[int, int]:
 
 
 def _cut_differently(sightings: Sequence[Sighting]) -> str:
-    """Return the sizes of the spheres' pictures where they differ: nobody knows then where the lens's axis is in them."""
+    """Return the sizes of the spheres' pictures where they differ: where the lens's axis is in them is not known."""
     sizes = dict.fromkeys(map(_size_px, sightings))
     return " and ".join(f"{cols} x {rows}" for cols, rows in sizes) if len(sizes) > 1 else ""
 

@@ -239,9 +239,9 @@ def _check_size(folder: Path, pictures: Photographs, known: KnownLights) -> None
     if known.size_px is not None and known.size_px != size_px:
         raise PsvideoError(
             f"{folder}: the photographs are {size_px[0]} x {size_px[1]} pixels and those of the spheres "
-            f"{known.size_px[0]} x {known.size_px[1]}. Expected one size, whole pictures of one camera: near lights are "
-            "placed along the lens's axis, which crops lose. Give pictures that are not cropped nor scaled, or leave "
-            "`radius_mm` out for directions."
+            f"{known.size_px[0]} x {known.size_px[1]}. Expected one size, whole pictures of one camera: near lights "
+            "are placed along the lens's axis, which crops lose. Give pictures that are neither cropped nor scaled, "
+            "or leave `radius_mm` out for directions."
         )
 
 

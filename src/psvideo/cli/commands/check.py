@@ -13,6 +13,7 @@ import typer
 from psvideo.cli.console import Voice
 from psvideo.cli.options.clip_and_run import FirstLight, Json, OrderRig, PlanPath, Quiet, Verbose
 from psvideo.errors import UsageError
+from psvideo.model.units import counted
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -101,8 +102,8 @@ def _follow(voice: Voice, checks: "Iterator[Check | Unread]") -> None:
         read = [usable for usable in last.values() if usable is not None]
         _note(
             voice,
-            f"{len(last)} take(s) checked: {sum(read)} usable, {len(read) - sum(read)} not, {len(last) - len(read)} "
-            "could not be read.",
+            f"{counted(len(last), 'take')} checked: {sum(read)} usable, {len(read) - sum(read)} not, "
+            f"{len(last) - len(read)} could not be read.",
         )
 
 

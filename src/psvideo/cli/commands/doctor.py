@@ -9,6 +9,7 @@ import typer
 
 from psvideo.cli.console import Voice
 from psvideo.cli.options.clip_and_run import Json, Quiet, Verbose
+from psvideo.model.units import counted
 
 if TYPE_CHECKING:
     from psvideo.inspect.findings import Finding
@@ -38,9 +39,13 @@ def doctor(
     missing = sum(finding.level == "missing" for finding in found.findings)
     notes = sum(finding.level == "note" for finding in found.findings)
     voice.say("")
-    voice.say("All that psvideo needs is here." if found.well else f"{missing} thing(s) are missing: see above.")
+    voice.say(
+        "All that psvideo needs is here."
+        if found.well
+        else f"{counted(missing, 'thing')} {'is' if missing == 1 else 'are'} missing: see above."
+    )
     if notes:
-        voice.say(f"{notes} thing(s) marked -- are needed for some work only.")
+        voice.say(f"{counted(notes, 'thing')} marked -- {'is' if notes == 1 else 'are'} needed for some work only.")
     if not found.well:
         raise typer.Exit(1)
 

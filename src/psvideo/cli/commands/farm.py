@@ -5,8 +5,9 @@ from typing import Annotated
 
 import typer
 
-from psvideo.cli.console import Voice, counted
+from psvideo.cli.console import Voice
 from psvideo.cli.options.clip_and_run import ClipPath, Force, Json, PlanPath, Quiet
+from psvideo.model.units import counted
 
 
 def farm(

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from psvideo.cli.commands.sync import describe_timing
-from psvideo.cli.console import Voice, counted, plain, print_report
+from psvideo.cli.console import Voice, plain, print_report
 from psvideo.cli.options.clip_and_run import (
     ClipPaths,
     FirstLight,
@@ -59,6 +59,7 @@ from psvideo.cli.options.solving import (
     SolverOption,
 )
 from psvideo.cli.options.typed import chosen_previews, parse_instants, parse_weights
+from psvideo.model.units import counted
 
 
 def normals(

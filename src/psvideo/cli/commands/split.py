@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from psvideo.cli.commands.sync import describe_timing
-from psvideo.cli.console import Voice, counted, plain, print_report
+from psvideo.cli.console import Voice, plain, print_report
 from psvideo.cli.options.clip_and_run import (
     ClipPath,
     FirstLight,
@@ -25,6 +25,7 @@ from psvideo.cli.options.delivery import CodecOption, CompressionOption, PlatesP
 from psvideo.cli.options.solving import FpsOption, ResyncOption, ShutterOption
 from psvideo.cli.options.typed import parse_instants, parse_weights
 from psvideo.model.choices import SplitMethod
+from psvideo.model.units import counted
 
 
 def split(

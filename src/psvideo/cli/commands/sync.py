@@ -18,6 +18,7 @@ from psvideo.cli.options.clip_and_run import (
 )
 from psvideo.cli.options.typed import parse_starts_s
 from psvideo.errors import UsageError
+from psvideo.model.units import counted
 
 if TYPE_CHECKING:
     from psvideo.model.camera_clocks import CameraClocks
@@ -140,7 +141,7 @@ def describe_timing(timing: "Timing") -> str:
         lines.append(f"The strobe's clock is off by {timing.clock_offset_ppm:+.1f} ppm. {timing.how_sure}")
     lines.append(ORDER_SENTENCE[timing.order])
     lines += [timing.order_note] if timing.order_note else []
-    lines += [f"{hole.count} frame(s) missing after number {hole.after}." for hole in timing.dropped_frames]
+    lines += [f"{counted(hole.count, 'frame')} missing after number {hole.after}." for hole in timing.dropped_frames]
     lines += [f"Frame {number} repeats the one before it." for number in timing.repeated_frames]
     return "\n".join(lines)
 

@@ -14,6 +14,7 @@ from typing import TypeVar
 from psvideo.clip.record import CodedPicture, Header, PictureInFile
 from psvideo.errors import PsvideoError
 from psvideo.formats.paths import check_file
+from psvideo.model.units import counted
 
 Read = TypeVar("Read")
 
@@ -34,8 +35,9 @@ def decode(kind: str, file: Path) -> CodedPicture:
     head = picture.header
     if picture.codes.shape != (head.height_px, head.width_px, 3)[: 2 if head.channels == 1 else 3]:
         raise PsvideoError(
-            f"{file}: says that it is {head.width_px} x {head.height_px} pixels of {head.channels} channel(s), and "
-            f"holds an array of {picture.codes.shape}: it is damaged. Copy it again from the camera's card."
+            f"{file}: says that it is {head.width_px} x {head.height_px} pixels of "
+            f"{counted(head.channels, 'channel')}, and holds an array of {picture.codes.shape}: it is damaged. "
+            "Copy it again from the camera's card."
         )
     return picture
 

@@ -7,6 +7,7 @@ import numpy as np
 from psvideo.model.motion_cost import cost_words
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
+from psvideo.model.units import counted
 from psvideo.report.judge.light import NOTICED
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.observed import Observed
@@ -129,7 +130,8 @@ def _dropped(timing: Timing, observed: Observed) -> Iterator[Judgement]:
         yield Judgement(
             subject="frames",
             grade="doubtful",
-            found=f"{missing} frame(s) are missing ({where}{more}); rows that they held are not valid"
+            found=f"{counted(missing, 'frame')} {'is' if missing == 1 else 'are'} missing ({where}{more}); the rows "
+            "there are not valid"
             + (f", which spoils {len(spoilt)} of {len(observed.facts)} rounds." if grave else "."),
             advice="Use a faster card or a lower data rate, and copy the take again before shooting it again.",
         )
@@ -137,7 +139,8 @@ def _dropped(timing: Timing, observed: Observed) -> Iterator[Judgement]:
         yield Judgement(
             subject="frames",
             grade="doubtful",
-            found=f"{len(again)} frame(s) repeat the one before (first: number {again[0]}).",
+            found=f"{counted(len(again), 'frame')} {'repeats' if len(again) == 1 else 'repeat'} the one before (first: "
+            f"number {again[0]}).",
             advice="Export the take without frame-rate conversion.",
         )
 

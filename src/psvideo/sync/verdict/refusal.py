@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from psvideo.model.plan import UNKNOWN_CLOCK_PPM, Plan
+from psvideo.model.units import counted
 from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.search import search
@@ -32,7 +33,7 @@ def nothing_to_find(plan: Plan, rows: Profiles) -> str:
     least = least_frames(plan)
     if len(rows.value) < least:
         return (
-            f"holds {len(rows.value)} frame(s); finding the timing of a strobe with {len(plan.lit_slots)} lit "
+            f"holds {counted(len(rows.value), 'frame')}; finding the timing of a strobe with {len(plan.lit_slots)} lit "
             f"flash(es) a round needs at least {least}, and 50 or more make it certain."
         )
     changes = _changes(rows)

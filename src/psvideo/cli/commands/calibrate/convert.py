@@ -5,8 +5,9 @@ from typing import Annotated
 
 import typer
 
-from psvideo.cli.console import Voice, counted
+from psvideo.cli.console import Voice
 from psvideo.cli.options.clip_and_run import Force, Json, Quiet, Verbose
+from psvideo.model.units import counted
 
 
 def convert(

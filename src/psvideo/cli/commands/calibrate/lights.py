@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from psvideo.cli.console import Voice, counted
+from psvideo.cli.console import Voice
 from psvideo.cli.options.calibrate import FocalPx, Pictures, RigIn, RigOut, Transfer
 from psvideo.cli.options.clip_and_run import FirstLight, Force, Frames, Json, PlanPath, Quiet, Verbose
 from psvideo.cli.options.typed import parse_box, parse_circle
 from psvideo.model.choices import Prior
+from psvideo.model.units import counted
 
 if TYPE_CHECKING:
     from psvideo.calibrate.flat_field import FlatLight

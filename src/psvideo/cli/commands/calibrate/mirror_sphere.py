@@ -11,6 +11,7 @@ from psvideo.cli.console import Voice
 from psvideo.cli.options.calibrate import Circles, FocalMm, FocalPx, RadiusMm, SensorMm, Spheres, Transfer
 from psvideo.cli.options.clip_and_run import FirstLight, Force, Frames, Json, PlanPath, Quiet, Verbose
 from psvideo.cli.options.typed import parse_circle, parse_point, parse_radius_mm
+from psvideo.model.units import counted
 
 if TYPE_CHECKING:
     from psvideo.calibrate.mirror.lights import MeasuredLight, MirrorCalibration
@@ -78,7 +79,7 @@ def describe(found: MirrorCalibration) -> str:
         x, y, radius = sighting.outline.place[:3]
         lines.append(
             f"{sighting.where}: sphere at {x:.1f}, {y:.1f} with radius {radius:.1f} px "
-            f"(+- {sighting.outline.error_px:.2f}), {sighting.sets} frame(s)"
+            f"(+- {sighting.outline.error_px:.2f}), {counted(sighting.sets, 'frame')}"
         )
     lines += [_line(light) for light in found.lights]
     lines.append(

@@ -10,6 +10,7 @@ import typer
 
 from psvideo.cli.console import Voice
 from psvideo.cli.options.clip_and_run import Frames, Json, PlanPath, Quiet, Verbose
+from psvideo.model.units import counted
 
 if TYPE_CHECKING:
     from psvideo.calibrate.stripes.readout import Led, Readout
@@ -130,8 +131,8 @@ def describe_readout(found: Readout, led: Led) -> str:
             f"readout {found.readout_s * ms:.4f} ms +- {found.error_s * ms:.4f} ms for {found.rows} rows "
             f"(standard error; {found.error_s / found.readout_s:.3%})",
             f"  from the stripes  +- {found.stripes_error_s * ms:.4f} ms: one period in {found.rows_per_period:.4f} +- "
-            f"{found.rows_per_period_error:.4f} rows of the picture, {found.periods:.1f} periods, {found.frames} "
-            f"frame(s), contrast {found.contrast:.0%}{spread}",
+            f"{found.rows_per_period_error:.4f} rows of the picture, {found.periods:.1f} periods, "
+            f"{counted(found.frames, 'frame')}, contrast {found.contrast:.0%}{spread}",
             f"  from the LED      +- {found.clock_error_s * ms:.4f} ms: {led.rate_hz:g} Hz within "
             f"{led.tolerance_ppm:g} ppm",
             f"{direction} ({found.direction_reason}).",

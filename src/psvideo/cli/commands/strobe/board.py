@@ -17,6 +17,7 @@ from psvideo.cli.console import Voice
 from psvideo.cli.options.clip_and_run import Force, Json, Quiet, Verbose
 from psvideo.cli.options.typed import parse_lines
 from psvideo.errors import PsvideoError, UsageError
+from psvideo.model.units import counted
 from psvideo.strobe.link.ports import AUTO
 
 if TYPE_CHECKING:
@@ -153,7 +154,9 @@ def _is_everybody_warned(plan: Path, warning: str) -> bool:
 def _print_run(voice: Voice, played: StrobeRun, log: Path | None) -> None:
     outcome = played.outcome
     how = {"done": "Played", "stopped": "Stopped after"}.get(outcome.ended, "Broken off after")
-    voice.say(f"{how} {outcome.cycles} whole cycles of {len(played.program.played.dark_rounds)} round(s) each.")
+    voice.say(
+        f"{how} {counted(outcome.cycles, 'whole cycle')} of {counted(len(played.program.played.dark_rounds), 'round')}."
+    )
     if outcome.clock is not None and outcome.clock.gain_error_ppm <= WORTH_SAYING_PPM:
         clock = outcome.clock
         voice.say(
