@@ -353,8 +353,8 @@ def test_chrome_balls_may_be_named_picture_by_picture_or_by_patterns(tmp_path: P
     assert "belong to lights by name" in remarks(report), "called by what the star stands for"
     for file in two.iterdir():
         save16(file, cv2.imread(str(file), cv2.IMREAD_UNCHANGED)[:250] / 65535)
-    lens = {"radius_mm": 40.0, "focal_px": 900.0}
-    said = remarks(ps.stills(folder, sphere=[one, two], **lens, out=tmp_path / "cropped"))
+    out = tmp_path / "cropped"
+    said = remarks(ps.stills(folder, sphere=[one, two], radius_mm=40.0, focal_px=900.0, out=out))
     assert "the pictures of the spheres are 256 x 256 and 256 x 250 pixels, so they were cropped" in said
     with pytest.raises(ps.PsvideoError, match=r"middle_\*\.png: fits no picture"):
         ps.stills(folder, sphere=[both / "middle_*.png"], out=tmp_path / "none")
