@@ -352,7 +352,7 @@ def test_chrome_balls_may_be_named_picture_by_picture_or_by_patterns(tmp_path: P
     assert "6 of 6 lights were measured on 2 spheres, as directions; `radius_mm` and the lens" in remarks(report)
     assert "belong to lights by name" in remarks(report), "called by what the star stands for"
     for file in two.iterdir():
-        save16(file, cv2.imread(str(file), cv2.IMREAD_UNCHANGED)[:250] / 65535)
+        save16(file, np.asarray(Image.open(file), np.float64)[:250] / 65535)
     out = tmp_path / "cropped"
     said = remarks(ps.stills(folder, sphere=[one, two], radius_mm=40.0, focal_px=900.0, out=out))
     assert "the pictures of the spheres are 256 x 256 and 256 x 250 pixels, so they were cropped" in said
