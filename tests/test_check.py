@@ -289,6 +289,17 @@ def heeds_ctrl_c() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
+def test_several_takes_are_checked_and_one_that_cannot_be_read_does_not_keep_the_others(
+    shot: Callable[[str], Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = tmp_path / "checks.html"
+    assert run("check", tmp_path / "takes" / "nothing", shot("good"), "--report", page) == 1
+    said = capsys.readouterr().out
+    assert "nothing: cannot be checked yet" in said
+    assert "2 takes checked: 1 usable, 0 not, 1 could not be read." in said
+    assert "nothing" in page.read_text(encoding="utf-8")
+
+
 def test_watching_reports_every_take_and_ends_well_with_ctrl_c(shot: Callable[[str], Path], tmp_path: Path) -> None:
     folder, page = tmp_path / "takes", tmp_path / "checks.html"
     folder.mkdir()

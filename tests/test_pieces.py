@@ -1,11 +1,13 @@
 """A run that is cut into pieces gives the bytes that it gives at one go, wherever it is cut."""
 
+import contextlib
 import hashlib
 import itertools
 import json
 import shutil
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 from typing import Any
@@ -25,7 +27,7 @@ from psvideo.model.shutter import row_weights
 from psvideo.plates.align import held
 from psvideo.report.observe.observed import InstantFacts, Observed
 from psvideo.report.observe.worst import Thumbnail, Worst
-from psvideo.runs import pieces
+from psvideo.runs import cluster, pieces
 from psvideo.runs.piece_notes import noted, write_notes
 from psvideo.runs.pieces import cut, piece_named
 from psvideo.runs.solving import Found
@@ -288,17 +290,88 @@ def test_a_worker_that_is_killed_is_replaced_and_its_piece_done_again(tmp_path: 
     given = [str(clip), "--rig", str(clip / "rig.toml"), "-o", str(tmp_path / "two" / "clip"), "--no-preview", "-q"]
     command = [sys.executable, "-m", "psvideo.cli.app", "normals", *given, "--workers", "2"]
     running = subprocess.Popen(command)
-    notes = tmp_path / "two" / ".clip.partial" / ".pieces"
-    until_s = time.monotonic() + 300
-    while not (notes / "timing.json").is_file() and time.monotonic() < until_s:
-        time.sleep(0.05)
-    workers = psutil.Process(running.pid).children(recursive=True)
-    busy = [one for one in workers if any("spawn_main" in word for word in one.cmdline())]
+    busy = _when_solving(tmp_path / "two" / ".clip.partial", psutil.Process(running.pid))
     assert len(busy) >= 2
     busy[0].kill()
     assert running.wait(timeout=300) == 0
     assert digest(tmp_path / "two" / "clip") == digest(tmp_path / "one" / "clip")
     assert judged(tmp_path / "two" / "clip") == judged(tmp_path / "one" / "clip")
+
+
+def test_a_piece_hangs_that_takes_far_longer_than_the_others_did() -> None:
+    looks = cluster.Hanging(ours={"a", "b"})
+    assert looks.workers({"one": ["a", "theirs"], "two": ["b"]}, 0.0) == []
+    assert looks.workers({"one": ["a", "theirs"], "two": []}, 100.0) == []
+    assert looks.workers({"one": ["a", "theirs"]}, cluster.HANGS_TIMES * 100.0) == []
+    assert looks.workers({"one": ["a", "theirs"]}, cluster.HANGS_TIMES * 100.0 + 1) == ["one"]
+    assert looks.workers({"one": ["theirs"], "two": ["a"]}, cluster.HANGS_TIMES * 100.0 + 2) == []
+    assert looks.longest_s == 100.0, "a piece that hung is none that was done"
+
+
+@pytest.mark.campaign
+def test_a_worker_that_hangs_is_replaced_and_its_piece_done_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clip = filmed(tmp_path, frames=160)
+    given: dict[str, Any] = {"rig": clip / "rig.toml", "preview": ()}
+    ps.normals(clip, out=tmp_path / "one" / "clip", **given)
+    for name, value in {"HANGS_S": 15.0, "HANGS_TIMES": 3.0, "LOOKS_EVERY_S": 1.0}.items():
+        monkeypatch.setattr(cluster, name, value)
+    stopped: list[psutil.Process] = []
+
+    def stop_one() -> None:
+        busy = _when_solving(tmp_path / "two" / ".clip.partial", psutil.Process())
+        busy[0].suspend()
+        stopped.append(busy[0])
+
+    stopping = threading.Thread(target=stop_one)
+    stopping.start()
+    ps.normals_of_takes([clip], out=tmp_path / "two" / "clip", workers=2, pieces=4, **given)
+    stopping.join()
+    assert stopped
+    assert not stopped[0].is_running()
+    assert digest(tmp_path / "two" / "clip") == digest(tmp_path / "one" / "clip")
+
+
+@pytest.mark.campaign
+def test_a_scheduler_that_is_killed_leaves_a_run_that_resume_ends(tmp_path: Path) -> None:
+    clip = filmed(tmp_path, frames=160)
+    given = [str(clip), "--rig", str(clip / "rig.toml"), "--no-preview", "-q", "-o"]
+    normals = [sys.executable, "-m", "psvideo.cli.app", "normals", *given]
+    subprocess.run([*normals, str(tmp_path / "one" / "clip")], check=True)
+    where = tmp_path / "scheduler.json"
+    dask, file = str(Path(sys.executable).with_name("dask")), ["--scheduler-file", str(where)]
+    here = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
+    scheduler = subprocess.Popen([dask, "scheduler", *here, *file], stderr=subprocess.DEVNULL)
+    while not where.is_file():
+        time.sleep(0.05)
+    worker = subprocess.Popen([dask, "worker", *file, "--nthreads", "1"], stderr=subprocess.DEVNULL)
+    address = json.loads(where.read_text(encoding="utf-8"))["address"]
+    try:
+        out = tmp_path / "two" / "clip"
+        running = subprocess.Popen([*normals, str(out), "--scheduler", address], stderr=subprocess.PIPE, text=True)
+        _when_solving(tmp_path / "two" / ".clip.partial", psutil.Process(worker.pid))
+        scheduler.kill()
+        _, said = running.communicate(timeout=120)
+    finally:
+        for one in (*psutil.Process(worker.pid).children(recursive=True), worker, scheduler):
+            with contextlib.suppress(psutil.NoSuchProcess):
+                one.kill()
+            one.wait()
+    assert running.returncode == 1
+    assert "The cluster's scheduler is gone." in said
+    assert "Traceback" not in said
+    subprocess.run([*normals, str(out), "--resume"], check=True)
+    assert digest(out) == digest(tmp_path / "one" / "clip")
+    assert not [*out.parent.glob(".*")]
+
+
+def _when_solving(beside: Path, parent: psutil.Process) -> list[psutil.Process]:
+    """Return the processes of workers below another, once the first piece of a run was noted."""
+    until_s = time.monotonic() + 300
+    while not (beside / ".pieces" / "timing.json").is_file() and time.monotonic() < until_s:
+        time.sleep(0.05)
+    return [one for one in parent.children(recursive=True) if any("spawn_main" in word for word in one.cmdline())]
 
 
 def test_what_cannot_be_shared_is_refused_in_a_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -62,6 +62,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "check": (
         ("can this take be used, and if not, what is to change on set?", "psvideo check clip/"),
         ("hold the plates against the rig as well", "psvideo check clip/ --rig rig.toml"),
+        ("a day's takes, and a page of them", "psvideo check takes/* --report checks.html"),
         (
             "every take that is copied into a folder, with one plan for all, and a page that others may look at",
             "psvideo check --watch takes/ --plan plan.toml --report checks.html",

@@ -1,6 +1,6 @@
-"""Every new take below a folder, checked as it comes: the watch that a set keeps while it shoots."""
+"""Many takes checked: those that are named, or every new one below a folder as it comes while a set shoots."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +17,31 @@ class Unread:
 
     path: Path
     fault: str
+
+
+def check_takes(
+    clips: Sequence[Path | str],
+    *,
+    plan: Path | str | None = None,
+    rig: Path | str | None = None,
+    first_light: str | None = None,
+    report: Path | str | None = None,
+    caller: Caller = PYTHON,
+) -> Iterator[Check | Unread]:
+    """Check takes one after the other; one that cannot be read does not keep the others.
+
+    ``report`` is a page (HTML) of all checks, outside of the takes; the other parameters are those of ``check``. Raises
+    UsageError where the report would lie in a take.
+    """
+    paths, page = [Path(clip) for clip in clips], None if report is None else Path(report)
+    for path in paths:
+        refuse_inside(page, path)
+    plan_path, rig_path = (None if path is None else Path(path) for path in (plan, rig))
+    found: dict[Path, Check | Unread] = {}
+    for path in paths:
+        found[path] = _one(path, plan_path, rig_path, first_light, caller)
+        _keep(page, found)
+        yield found[path]
 
 
 def check_folder(
@@ -55,8 +80,7 @@ def _checks(
     first_light: str | None,
     caller: Caller,
 ) -> Iterator[Check | Unread]:
-    checks: dict[Path, Check] = {}
-    failed: dict[Path, str] = {}
+    found: dict[Path, Check | Unread] = {}
     there = True
     for path in whole_takes(folder, interval_s=interval_s, existing=existing):
         if path is None:
@@ -64,13 +88,22 @@ def _checks(
                 there = not there
                 caller.say(f"{folder}: {'is there again.' if there else 'cannot be reached; waiting for it.'}")
             continue
-        checks.pop(path, None)
-        failed.pop(path, None)
-        try:
-            checks[path] = judged(path, plan=plan, rig=rig, first_light=first_light, caller=caller)
-        except (PsvideoError, OSError) as fault:
-            gone = not path.exists()
-            failed[path] = f"{path}: was removed before it could be checked." if gone else caller.spell(str(fault))
-        if page is not None:
-            write_page(page, list(checks.values()), failed)
-        yield checks[path] if path in checks else Unread(path=path, fault=failed[path])
+        found.pop(path, None)  # the newest comes last
+        found[path] = _one(path, plan, rig, first_light, caller)
+        _keep(page, found)
+        yield found[path]
+
+
+def _one(path: Path, plan: Path | None, rig: Path | None, first_light: str | None, caller: Caller) -> Check | Unread:
+    try:
+        return judged(path, plan=plan, rig=rig, first_light=first_light, caller=caller)
+    except (PsvideoError, OSError) as fault:
+        gone = f"{path}: was removed before it could be checked."
+        return Unread(path=path, fault=caller.spell(str(fault)) if path.exists() else gone)
+
+
+def _keep(page: Path | None, found: Mapping[Path, Check | Unread]) -> None:
+    """Write the page of all checks so far, if there is one."""
+    if page is not None:
+        checks = [one for one in found.values() if isinstance(one, Check)]
+        write_page(page, checks, {one.path: one.fault for one in found.values() if isinstance(one, Unread)})

@@ -5,8 +5,11 @@ hung had begun is done again by another. Where the scheduler dies, everything th
 """
 
 import contextlib
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+import logging
+import threading
+import time
+from collections.abc import Container, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +32,11 @@ RETRIES = 2
 """A piece is tried so many times more where a worker fails at it for other reasons than its footage."""
 ANSWERS_S = 10
 """Within this a scheduler answers."""
+HANGS_S, HANGS_TIMES = 600.0, 10.0
+"""A piece hangs that takes longer than this, and than so many times the longest that was done (the first ones may find
+a take's timing); a disk that is gone holds a process so without end."""
+LOOKS_EVERY_S = 10.0
+LOGGERS = ("distributed", "tornado", "tornado.application", "asyncio")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,18 +83,12 @@ def connected(cluster: Cluster) -> "Iterator[Client]":
     from distributed import Client, LocalCluster
 
     if cluster.scheduler is not None:
-        try:
-            client = Client(cluster.scheduler, timeout=ANSWERS_S, set_as_default=False)
-        except (OSError, ValueError) as fault:
-            raise PsvideoError(
-                f"{cluster.scheduler}: no scheduler answers there ({fault}). Start one with: dask scheduler, and on "
-                "each computer: dask worker tcp://HOST:8786; all need psvideo, and the same paths."
-            ) from fault
-        with client:
+        with _unlogged(), _joined(cluster.scheduler) as client:
             yield client
         return
     count = cluster.workers or 1
     with (
+        _unlogged(),
         dask.config.set(SETTINGS),
         LocalCluster(
             n_workers=count,
@@ -99,6 +101,37 @@ def connected(cluster: Cluster) -> "Iterator[Client]":
         Client(local, set_as_default=False) as client,
     ):
         yield client
+
+
+def _joined(address: str) -> "Client":
+    """Return a client of the scheduler at an address; raises PsvideoError where none answers."""
+    from distributed import Client
+
+    try:
+        return Client(address, timeout=ANSWERS_S, set_as_default=False)
+    except (OSError, ValueError) as fault:
+        raise PsvideoError(
+            f"{address}: no scheduler answers there ({fault}). Start one with: dask scheduler, and on each computer: "
+            "dask worker tcp://HOST:8786; all need psvideo, and the same paths."
+        ) from fault
+
+
+@contextlib.contextmanager
+def _unlogged() -> Iterator[None]:
+    """In this block, keep what dask logs of a lost scheduler or worker from the terminal: it is said in a sentence."""
+    with contextlib.ExitStack() as stack:
+        for name in LOGGERS:
+            logger = logging.getLogger(name)
+            logger.addFilter(_nothing)
+            stack.callback(logger.removeFilter, _nothing)
+            for handler in logger.handlers:
+                handler.addFilter(_nothing)
+                stack.callback(handler.removeFilter, _nothing)
+        yield
+
+
+def _nothing(_: logging.LogRecord) -> bool:
+    return False
 
 
 def solved_apart(client: "Client", takes: Sequence[Shared], *, watch: Watch = unwatched) -> Iterator[tuple[int, str]]:
@@ -122,13 +155,56 @@ def solved_apart(client: "Client", takes: Sequence[Shared], *, watch: Watch = un
         place_of |= {future.key: place for future in (timed, *pieces)}
         futures += [timed, *pieces]
     done = as_completed(futures, loop=client.loop, raise_errors=False)
-    for future in watch(done, total=len(futures), what="solving", unit="pieces"):
-        place = place_of[future.key]
-        left[place] -= 1
-        if future.status != "finished" and place not in faults:
-            faults[place] = _fault(future)
-        if left[place] == 0:
-            yield place, faults.get(place, "")
+    with _hanging_replaced(client, place_of):
+        for future in watch(done, total=len(futures), what="solving", unit="pieces"):
+            place = place_of[future.key]
+            left[place] -= 1
+            if future.status != "finished" and place not in faults:
+                faults[place] = _fault(future)
+            if left[place] == 0:
+                yield place, faults.get(place, "")
+
+
+@dataclass
+class Hanging:
+    """Which of our pieces hang, from looks at what every worker has to do. since_s: when it was seen first."""
+
+    ours: Container[str]
+    since_s: dict[tuple[str, str], float] = field(default_factory=dict)
+    longest_s: float = 0.0
+
+    def workers(self, processing: Mapping[str, Sequence[str]], now_s: float) -> list[str]:
+        """Return the workers whose pieces take too long, by what each has now; they count as replaced afterwards."""
+        now = {(worker, key) for worker, keys in processing.items() for key in keys if key in self.ours}
+        done = [self.since_s.pop(one) for one in {*self.since_s} - now]
+        self.longest_s = max([self.longest_s, *(now_s - since for since in done)])
+        for one in now:
+            self.since_s.setdefault(one, now_s)
+        most_s = max(HANGS_S, HANGS_TIMES * self.longest_s)
+        hanging = sorted({worker for (worker, _), since in self.since_s.items() if now_s - since > most_s})
+        self.since_s = {one: since for one, since in self.since_s.items() if one[0] not in hanging}
+        return hanging
+
+
+@contextlib.contextmanager
+def _hanging_replaced(client: "Client", ours: Container[str]) -> Iterator[None]:
+    """In this block, workers on which a piece hangs are started again, and the scheduler gives it to another."""
+    ended = threading.Event()
+
+    def look() -> None:
+        hanging = Hanging(ours=ours)
+        while not ended.wait(LOOKS_EVERY_S):
+            with contextlib.suppress(OSError, TimeoutError, ValueError):  # none answers; or a worker without a nanny
+                workers = hanging.workers(client.processing(), time.monotonic())
+                if workers:
+                    client.restart_workers(workers, timeout=ANSWERS_S, raise_for_error=False)
+
+    looking = threading.Thread(target=look, name="psvideo workers", daemon=True)
+    looking.start()
+    try:
+        yield
+    finally:
+        ended.set()
 
 
 def solve_piece(take: Shared, number: int, *, after: object) -> int:

@@ -1,5 +1,6 @@
 """psvideo check: on the set, in seconds: can this take be used, and if not, what to change?"""
 
+import contextlib
 import json as json_text
 import os
 import sys
@@ -27,8 +28,9 @@ COLOURS = {"good": "32", "doubtful": "33", "bad": "31", "unknown": "2"}
 
 
 def check(
-    clip: Annotated[
-        Path | None, typer.Argument(help="A clip: a folder of numbered frames with plan.toml, or a movie file.")
+    clips: Annotated[
+        list[Path] | None,
+        typer.Argument(help="A clip: a folder of numbered frames with plan.toml, or a movie file. Or several."),
     ] = None,
     watch: Annotated[
         Path | None,
@@ -51,13 +53,19 @@ def check(
 ) -> None:
     """Judge a take in seconds, one line for each thing: exit status 0 where it can be used, 1 where not."""
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
-    if (clip is None) == (watch is None):
+    if (not clips) == (watch is None):
         raise UsageError("Name either a clip to check, or a folder of takes with --watch FOLDER.")
-    if clip is not None:
+    if clips and len(clips) > 1:
+        from psvideo.runs.check_folder import check_takes
+
+        several = check_takes(clips, plan=plan, rig=rig, first_light=first_light, report=report, caller=voice.caller())
+        if not _follow(voice, several):
+            raise typer.Exit(1)
+    elif clips:
         from psvideo.runs.check import check as judge
 
         found = judge(
-            clip,
+            clips[0],
             plan=plan,
             rig=rig,
             first_light=first_light,
@@ -85,12 +93,13 @@ def check(
         _follow(voice, checks)
 
 
-def _follow(voice: Voice, checks: "Iterator[Check | Unread]") -> None:
-    """Say of take after take what was found until Ctrl-C, and end with a line that sums up."""
+def _follow(voice: Voice, checks: "Iterator[Check | Unread]") -> bool:
+    """Say of take after take what was found, to the last or until Ctrl-C, and end with a line that sums up; return
+    whether all can be used."""
     from psvideo.runs.checked import Check
 
     last: dict[Path, bool | None] = {}
-    try:
+    with contextlib.suppress(KeyboardInterrupt):
         for found in checks:
             if isinstance(found, Check):
                 last[found.path] = found.usable
@@ -98,13 +107,13 @@ def _follow(voice: Voice, checks: "Iterator[Check | Unread]") -> None:
             else:
                 last[found.path] = None
                 _print_fault(voice, found.path, found.fault)
-    except KeyboardInterrupt:
-        read = [usable for usable in last.values() if usable is not None]
-        _note(
-            voice,
-            f"{counted(len(last), 'take')} checked: {sum(read)} usable, {len(read) - sum(read)} not, "
-            f"{len(last) - len(read)} could not be read.",
-        )
+    read = [usable for usable in last.values() if usable is not None]
+    _note(
+        voice,
+        f"{counted(len(last), 'take')} checked: {sum(read)} usable, {len(read) - sum(read)} not, "
+        f"{len(last) - len(read)} could not be read.",
+    )
+    return all(last.values())
 
 
 def _note(voice: Voice, text: str) -> None:
