@@ -5,11 +5,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.compute.compiled import EXACT
+from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import decoded, encoded
 
 Halves = NDArray[np.float16]
 Codes = NDArray[np.uint16]
+Floats = NDArray[np.float32]
 
 
 def relit(normals: tuple[Halves, ...], albedo: tuple[Halves, ...], light: NDArray[np.float32], factor: int) -> Halves:
@@ -29,21 +30,35 @@ def _bits(plane: Halves) -> Codes:
     return np.ascontiguousarray(plane).view(np.uint16)
 
 
-@EXACT.kept
+@FUSED.kept
 def _relit(
     xs: Codes, ys: Codes, zs: Codes, reds: Codes, greens: Codes, blues: Codes, light: Any, factor: int, out: Codes
 ) -> None:
     share = np.float32(1.0) / np.float32(factor * factor)
+    cols = out.shape[1] * factor
+    facing, total = np.empty(cols, np.float32), np.empty((3, cols), np.float32)
     for row in range(out.shape[0]):
-        for col in range(out.shape[1]):
-            red, green, blue = np.float32(0), np.float32(0), np.float32(0)
-            for i in range(row * factor, (row + 1) * factor):
+        total[:] = np.float32(0)
+        for i in range(row * factor, (row + 1) * factor):
+            _face(xs[i], ys[i], zs[i], light[0] * share, light[1] * share, light[2] * share, facing)
+            _add(reds[i], facing, total[0])
+            _add(greens[i], facing, total[1])
+            _add(blues[i], facing, total[2])
+        for channel in range(3):
+            for col in range(out.shape[1]):
+                light_of = np.float32(0)
                 for j in range(col * factor, (col + 1) * factor):
-                    facing = decoded(xs[i, j]) * light[0] + decoded(ys[i, j]) * light[1] + decoded(zs[i, j]) * light[2]
-                    facing = max(facing, np.float32(0)) * share
-                    red += decoded(reds[i, j]) * facing
-                    green += decoded(greens[i, j]) * facing
-                    blue += decoded(blues[i, j]) * facing
-            out[row, col, 0] = encoded(red, out)
-            out[row, col, 1] = encoded(green, out)
-            out[row, col, 2] = encoded(blue, out)
+                    light_of += total[channel, j]
+                out[row, col, channel] = encoded(light_of, out)
+
+
+@FUSED.inlined
+def _face(xs: Codes, ys: Codes, zs: Codes, x: np.float32, y: np.float32, z: np.float32, facing: Floats) -> None:
+    for col in range(facing.shape[0]):  # loops over few arrays each become vectors
+        facing[col] = max(decoded(xs[col]) * x + decoded(ys[col]) * y + decoded(zs[col]) * z, np.float32(0))
+
+
+@FUSED.inlined
+def _add(albedo: Codes, facing: Floats, total: Floats) -> None:
+    for col in range(facing.shape[0]):
+        total[col] += decoded(albedo[col]) * facing[col]
