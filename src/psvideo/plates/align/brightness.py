@@ -17,6 +17,7 @@ FEWEST = 64
 EXPLAINED = 0.5
 """Brightness is evened out where it leaves less than this share of the usual block's change unexplained: what moves
 changes few blocks, but these a lot."""
+EVERY_CODE = np.arange(256, dtype=np.float32)
 ROOT_TOE = float(np.sqrt(TOE))
 SCALE = 255 / (float(np.sqrt(1 + TOE)) - ROOT_TOE)
 
@@ -35,10 +36,13 @@ def evened(before: Sketch, after: Sketch) -> Sketch:
         return after
     gain = float(np.median(light_of(one[lit]) / light_of(other[lit])))
     change = float(np.median(np.abs(other[lit] - one[lit])))
+    most = float(np.abs(_brightened(EVERY_CODE, gain) - EVERY_CODE).max())
+    if most <= (1 - EXPLAINED) * change:  # so little that it leaves more: at rest
+        return after
     left = float(np.median(np.abs(_brightened(other[lit], gain) - one[lit])))
     if left >= EXPLAINED * change:
         return after
-    table = np.rint(_brightened(np.arange(256, dtype=np.float32), gain)).astype(np.uint8)
+    table = np.rint(_brightened(EVERY_CODE, gain)).astype(np.uint8)
     codes = table[after.codes]
     codes = np.where(after.codes < NEAR_WHITE, codes, np.maximum(codes, before.codes))  # clipped: so bright at least
     codes = np.where(np.maximum(codes, before.codes) < LIT, before.codes, codes)  # nearly black: noise cut off at zero

@@ -59,6 +59,8 @@ def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging =
 
     What robust solving predicted is in ``error_deg`` already; of least squares noise and residuals say what is known.
     """
+    from psvideo.compute.medians import weighted_median
+
     spread = _Spread.of(surface, one.lit, noise, how)
     points = spread.points(surface)
     turned_deg = moved_deg(points, one)
@@ -69,8 +71,8 @@ def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging =
     at_points = spread.judged(points.surface, doubt, 1, how, limit_deg=0.0)[0][points.known].astype(np.float32)
     limit_deg, misfit = how.most_error_deg, surface.misfit
     if at_points.size:
-        albedo = _brightness(points.surface.albedo)[points.known]
-        typical, by_noise = (_typical(each, albedo) for each in (at_points, points.noise_deg[points.known]))
+        albedo = _brightness(points.surface.albedo)[points.known]  # what is bright shows more of the subject
+        typical, by_noise = (weighted_median(each, albedo) for each in (at_points, points.noise_deg[points.known]))
         beyond_deg = float(np.sqrt(max(typical**2 - by_noise**2, 0.0)))
         limit_deg = max(limit_deg, min(beyond_deg, how.most_typical_deg))
         misfit = None if misfit is None else replace(misfit, error_deg=beyond_deg)
@@ -201,13 +203,6 @@ class _Spread:
 
 def _brightness(albedo: NDArray[np.floating]) -> Floats:
     return np.asarray(albedo if albedo.ndim == 2 else albedo.mean(axis=-1, dtype=np.float32), np.float32)
-
-
-def _typical(each: Floats, weight: Floats) -> float:
-    """Return the weighted median: what is bright shows more of the subject than a dim backdrop does."""
-    order = np.argsort(each)
-    upto = np.cumsum(weight[order], dtype=np.float64)
-    return float(each[order[np.searchsorted(upto, upto[-1] / 2)]])
 
 
 def _every(planes: NDArray[np.floating], step: int) -> NDArray[np.floating]:
