@@ -19,10 +19,15 @@ from psvideo.export.space import Space
 from psvideo.export.tags import Tags
 from psvideo.model.plan import Plan
 from psvideo.model.quantities import QUANTITIES
+from psvideo.model.rig import Light, Rig
 from psvideo.model.surface import Surface
 from psvideo.model.timing import Flash
 from psvideo.plates.align.comb import comb_of, schedule_of
+from psvideo.plates.light_plate import LightPlate
+from psvideo.plates.mixture import made
+from psvideo.plates.sequence import Round
 from psvideo.runs.output import rate_of, sequence_fps
+from psvideo.runs.relit import TILT, TURN_S, blur_of
 
 PlanMaker = Callable[..., Plan]
 
@@ -187,6 +192,34 @@ def test_a_part_of_the_frames_shows_the_same_instants_under_the_same_numbers(pas
     for name, path in part.items():
         apart = np.abs(exr(path, "Y") - exr(whole[name], "Y"))[8:-8, 16:-24]
         assert apart.mean() < 0.001, "but for what flows from other flashes at the cut"
+
+
+def test_the_relit_movie_is_blurred_as_the_plates_are(make_plan: PlanMaker) -> None:
+    """Of a matte surface that moves: what it shows under a further light is blurred as under that one it would be."""
+    plan, fps = make_plan(lights=("a", "b", "c", "d"), dark=False), Fraction(24)
+    ways = np.array([[0.5, 0.2, 0.85], [-0.5, 0.2, 0.85], [0.0, -0.5, 0.85], [0.1, 0.4, 0.9]])
+    rig = Rig(
+        lights=tuple(Light(name=n, direction=tuple(d), intensity=(1.4,)) for n, d in zip("abcd", ways, strict=True))
+    )
+    normal = np.array([0.1, -0.2, 0.97])
+    albedo, blurred = np.zeros((2, 12, 16, 3), np.float32)
+    albedo[:, 4:8], blurred[:, 2:10] = (0.6, 0.4, 0.2), (0.3, 0.2, 0.1)
+
+    def plates(surface: np.ndarray) -> tuple[LightPlate, ...]:
+        rows = np.ones(12, bool)
+        lit = [np.asarray(1.4 * (way @ normal) * surface, np.float32) for way in ways]
+        return tuple(
+            LightPlate(light=name, number=1007, time_s=0.1, picture=made(image), seen=rows)
+            for name, image in zip("abcd", lit, strict=True)
+        )
+
+    sharp = plates(albedo)
+    assert blur_of(Round(number=1007, plates=sharp, open_plates=sharp), plan, rig, fps) is None
+    added = blur_of(Round(number=1007, plates=sharp, open_plates=plates(blurred)), plan, rig, fps)
+    assert added is not None
+    angle = 2 * np.pi * 1007 / 24 / TURN_S
+    light = np.array([TILT * np.cos(angle), TILT * np.sin(angle), np.sqrt(1 - TILT**2)])
+    np.testing.assert_allclose(added, (blurred - albedo) * (normal @ light), atol=1e-5)
 
 
 def test_motion_vectors_are_named_and_signed_as_the_program_wants_them() -> None:

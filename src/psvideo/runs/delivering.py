@@ -159,10 +159,11 @@ def surface_job(
     *,
     depth: Callable[[], Depth] | None,
     ambient: LightPlate | None,
+    blur: NDArray[np.float32] | None = None,
 ) -> Callable[[], None]:
     """Return what writes one instant's surface: it holds the surface and the plates' sum, but no plate.
 
-    ``depth`` integrates the normals, and ``ambient`` is as for ``beauty_of``.
+    ``depth`` integrates the normals, ``ambient`` is as for ``beauty_of``, and ``blur`` as for ``keep_relit``.
     """
     one = instant.round
     there = replace(delivery, space=delivery.space.at(one.time_s, one.number, clip.plan.camera.fps))
@@ -185,7 +186,7 @@ def surface_job(
     if "relit" not in delivery.previews:
         return written
 
-    shown = partial(keep_relit, folder, one.number, instant.surface, there.space, tags.fps)
+    shown = partial(keep_relit, folder, one.number, instant.surface, there.space, tags.fps, blur)
     return partial(_in_turn, shown, written)
 
 

@@ -42,6 +42,7 @@ class Solved:
     depth: str = ""
     warnings: tuple[str, ...] = ()
     aligned: bool = False
+    opened: bool = False
 
 
 def observing(take: Take, rig: Rig | None = None, masks: Masks | None = None) -> Observed:
@@ -75,7 +76,8 @@ def run_report(
         )
         for name in clip.plan.lights
     )
-    judged = judgements(clip.plan, timing, observed, aligned=solved is not None and solved.aligned)
+    how = {} if solved is None else {"aligned": solved.aligned, "opened": solved.opened}
+    judged = judgements(clip.plan, timing, observed, **how)
     warnings = (*clip.warnings, *(() if solved is None else solved.warnings))
     spell = output.caller.spell
     return RunReport(

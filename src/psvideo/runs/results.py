@@ -14,6 +14,7 @@ from psvideo.export.result_files import mesh_file
 from psvideo.export.usd.usd_animation import write_animation
 from psvideo.formats.timing_json import format_timing
 from psvideo.formats.whole_files import write_text
+from psvideo.plates.align.comb import Comb
 from psvideo.plates.sequence import coming
 from psvideo.plates.unmixed import unmixing_note
 from psvideo.report.observe.observed import InstantFacts
@@ -117,6 +118,7 @@ def finished(job: Job, folder: Path, output: Output, found: Found, *, watch: Wat
             *world_doubts(delivery, lighting.rig, take.clip.width_px, metric=metric),
         ),
         aligned=job.over_time.aligning.align != "none",
+        opened=isinstance(job.over_time.aligning.rate, Comb) and job.over_time.aligning.rate.open_s > 0,
     )
     if solved.depth:
         output.caller.say(output.caller.spell(solved.depth))

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +28,7 @@ from psvideo.runs.depths import shape_of
 from psvideo.runs.lighting import Lighting
 from psvideo.runs.look import look
 from psvideo.runs.output import tags_of
+from psvideo.runs.relit import blur_of
 from psvideo.runs.reporting import observing
 from psvideo.solve.depth import Shaping, reservations
 from psvideo.solve.instants import Instant, denoised, surfaces
@@ -187,7 +188,8 @@ def write_instants(
                 if not (resume and is_written(folder, job.take.clip.name, number, job.delivery)):
                     # the surface only: plates are many times larger, and must not wait for the files
                     clip = job.take.clip
-                    write(surface_job(folder, clip, instant, job.delivery, job.tags, depth=shaped, ambient=ambient))
+                    written = partial(surface_job, folder, clip, instant, job.delivery, job.tags)
+                    write(written(depth=shaped, ambient=ambient, blur=_blur_of(job, instant)))
                 del shaped  # it holds the surface too
                 if beside is not None:
                     beside(folder, instant)
@@ -197,6 +199,13 @@ def write_instants(
             del instant  # its plates would be held while the next round gathers
     found.reserved = () if shaping is None else reservations(shaping)
     return found
+
+
+def _blur_of(job: Job, instant: Instant) -> NDArray[np.float32] | None:
+    """Return what an open shutter adds to the relit movie's picture, where one is made."""
+    if "relit" not in job.delivery.previews:
+        return None
+    return blur_of(instant.round, job.take.plan, job.lighting.rig, job.tags.fps)
 
 
 def _write_light_by_light(

@@ -10,7 +10,9 @@ from psvideo.report.judgement import Judgement
 from psvideo.report.observe.observed import Observed
 
 
-def judgements(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = False) -> tuple[Judgement, ...]:
+def judgements(
+    plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = False, opened: bool = False
+) -> tuple[Judgement, ...]:
     """Return one line per thing that decides whether a take can be used."""
     on_time = tuple(timing_and_order(timing, plan.mode))
     if not observed.facts:
@@ -21,7 +23,7 @@ def judgements(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool 
         *exposure(observed),
         *lamps(observed, timed=all(one.grade == "good" for one in on_time)),
         ambient(observed),
-        motion(plan, timing, observed, aligned=aligned),
+        motion(plan, timing, observed, aligned=aligned, opened=opened),
         focus(observed),
         *rig(observed),
         *accuracy(observed),

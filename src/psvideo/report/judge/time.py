@@ -145,8 +145,8 @@ def _dropped(timing: Timing, observed: Observed) -> Iterator[Judgement]:
         )
 
 
-def motion(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = False) -> Judgement:
-    """Judge how far the fastest parts move from flash to flash, and within one flash."""
+def motion(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = False, opened: bool = False) -> Judgement:
+    """Judge how far the fastest parts move from flash to flash, and within one flash; ``opened``: by an open shutter."""
     shares = [one.moving_share for one in observed.facts if one.moving_share is not None]
     speeds = [one.speed_px_s for one in observed.facts if one.speed_px_s is not None]
     if not shares:
@@ -160,7 +160,8 @@ def motion(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = Fa
             grade="bad" if share > MUCH_CHANGES and not aligned else "doubtful",
             found=f"{100 * share:.0f} % of the picture changes from round to round faster than can be followed, or "
             "repeats itself meanwhile"
-            + ("; where the plates of a round do not fit together, nothing is trusted." if aligned else "."),
+            + ("; where the plates of a round do not fit together, nothing is trusted." if aligned else ".")
+            + (" The open shutter shows the single flashes there, and no blur between them." if opened else ""),
             advice="Move slower, raise the frame rate, or flash fewer lights; if nothing moved, light flickers.",
         )
     speed = float(np.quantile(speeds, OFTEN))
