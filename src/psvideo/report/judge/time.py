@@ -146,7 +146,7 @@ def _dropped(timing: Timing, observed: Observed) -> Iterator[Judgement]:
 
 
 def motion(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = False, opened: bool = False) -> Judgement:
-    """Judge how far the fastest parts move from flash to flash, and within one flash; ``opened``: by an open shutter."""
+    """Judge how far the fastest parts move from flash to flash, and within one; ``opened``: under an open shutter."""
     shares = [one.moving_share for one in observed.facts if one.moving_share is not None]
     speeds = [one.speed_px_s for one in observed.facts if one.speed_px_s is not None]
     if not shares:
