@@ -15,11 +15,14 @@ from psvideo.clip import Take, keeping_near, open_clip, read_frames
 from psvideo.clip.decode import movie
 from psvideo.clip.decode.yuv import CODES, HIGHEST, LOWEST, to_rgb
 from psvideo.clip.record import CodedPicture
-from psvideo.errors import PsvideoError
+from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.plan_toml import format_plan
 from psvideo.inspect.describe import describe
 from psvideo.model.camera import Encoding
 from psvideo.model.plan import Plan
+from psvideo.plates.align.rounds import Aligning
+from psvideo.plates.gather import scheduled
+from psvideo.runs.output import take_rate
 from psvideo.sync.take_timing import find_take_timing
 from psvideo.synth import TrueClock, expose
 
@@ -311,6 +314,16 @@ def test_frames_of_a_rate_that_changes_are_taken_at_their_own_times(tmp_path: Pa
     off_s = [np.abs(truth_s - flash.start_s).min() for flash in timing.flashes if flash.complete]
     assert len(off_s) > 10
     assert max(off_s) < 1e-4
+    take = Take(clip=clip, numbers=clip.numbers)
+    due = scheduled(take, timing, Aligning(rate=take_rate("frame", take)), start_number=1001)
+    assert due is not None
+    shown = {number: time_s for round_ in due.by_round.values() for number, time_s in round_}
+    assert set(shown) < {1001 + number for number in clip.numbers}, "every result is a frame's, none between"
+    assert len(shown) + sum(due.left_out) == len(clip.numbers)
+    middle_s = clip.plan.camera.middle_s
+    assert all(at_s == pytest.approx(middle_s + (n - 1001) / float(RATE), abs=1e-9) for n, at_s in shown.items())
+    with pytest.raises(UsageError, match="vary in rate"):
+        take_rate("frame", take, shutter=180)
 
 
 def test_a_rate_that_changes_is_refused_where_every_frame_is_to_have_its_flash(

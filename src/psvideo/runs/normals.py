@@ -35,7 +35,7 @@ from psvideo.report.run_report import RunReport
 from psvideo.runs.caller import PYTHON, Caller, say_kept, say_of_clip
 from psvideo.runs.delivering import metric_delivery
 from psvideo.runs.lighting import read_lighting
-from psvideo.runs.output import Output, rate_of
+from psvideo.runs.output import Output, take_rate
 from psvideo.runs.piece_notes import noted_timing
 from psvideo.runs.results import normals_run, piece_run
 from psvideo.runs.solving import Job, OverTime
@@ -187,9 +187,7 @@ def normals(
         require_usd()
     _check_numbers(near_iterations=near_iterations, depth=depth, depth_scale=depth_scale, denoise=denoise)
     take = open_take(clip_path, plan=path_if_given("plan", plan), frames=frames)
-    rate = rate_of(
-        fps, take.clip.filmed_plan, shutter=shutter, resync=path_if_given("resync", resync), clip=take.clip.name
-    )
+    rate = take_rate(fps, take, shutter=shutter, resync=path_if_given("resync", resync))
     over_time = OverTime(aligning=Aligning(align=align, rate=rate), denoise=denoise)
     say_of_clip(take.clip, caller)
     lighting = read_lighting(

@@ -115,6 +115,20 @@ def rate_of(
     return comb_of(exact, camera, shutter_deg=shutter, clocks=clocks, clip=clip)
 
 
+def take_rate(
+    fps: str | float | Fraction, take: Take, *, shutter: float | None = None, resync: Path | None = None
+) -> Rate | Comb:
+    """Return which instants of a take are asked for, as ``rate_of``; "frame" is each of its frames, also where a
+    movie's rate varies: their numbers count places of the common step then."""
+    clip = take.clip
+    if fps != "frame" or resync is not None or clip.places_per_frame == 1:
+        return rate_of(fps, clip.filmed_plan, shutter=shutter, resync=resync, clip=clip.name)
+    if shutter is not None:
+        raise UsageError("`shutter`: this movie's frames vary in rate. Give a steady `fps` with it, such as 24.")
+    only = tuple(number - clip.numbers[0] for number in clip.numbers)
+    return replace(comb_of(clip.plan.camera.fps, clip.plan.camera), only=only)
+
+
 def tags_of(clip: Clip, rig_path: Path | None = None, space: Space = CAMERA_SPACE, rate: Rate | Comb = "round") -> Tags:
     """Return what every file of a run says of itself."""
     return Tags(

@@ -17,7 +17,7 @@ from psvideo.plates.sequence import FIRST_NUMBER
 from psvideo.plates.timed import timing_of
 from psvideo.report.run_report import RunReport
 from psvideo.runs.caller import PYTHON, Caller, say_kept, say_of_clip
-from psvideo.runs.output import Output, rate_of
+from psvideo.runs.output import Output, take_rate
 from psvideo.runs.plates import Extras, split_run
 from psvideo.runs.solving import OverTime
 from psvideo.sync.open_take import open_take
@@ -101,9 +101,7 @@ def split(
     )
     take = open_take(path_of("clip", clip), plan=path_if_given("plan", plan), frames=frames)
     say_of_clip(take.clip, caller)
-    rate = rate_of(
-        fps, take.clip.filmed_plan, shutter=shutter, resync=path_if_given("resync", resync), clip=take.clip.name
-    )
+    rate = take_rate(fps, take, shutter=shutter, resync=path_if_given("resync", resync))
     over_time = OverTime(aligning=Aligning(rate=rate))
     known = None if rig is None else read_rig(path_of("rig", rig), plan_lights=take.plan.lights)
     unmixing = None if known is None else unmixing_of(take.plan, known, channels=take.clip.channels)

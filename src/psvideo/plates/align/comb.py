@@ -30,13 +30,15 @@ class Comb:
     """Instants at a steady rate: number ``k``, from 0, is at ``first_s + k / fps`` on the camera's clock.
 
     ``open_s`` is how long a shutter is to be open about each, 0 where results are to be sharp. ``clock`` is the
-    camera's against another one's, on whose clock the instants are then steady.
+    camera's against another one's, on whose clock the instants are then steady. ``only`` are the instants that are
+    shown, ``k`` ascending, where not all of them are.
     """
 
     fps: Fraction
     first_s: float
     open_s: float = 0.0
     clock: CameraClock | None = None
+    only: tuple[int, ...] | None = None
 
     def time_s(self, k: int) -> float:
         """Return instant ``k`` in seconds on the camera's clock."""
@@ -118,15 +120,16 @@ def schedule_of(
         if flash.complete and flash.lit and lights[number] >= {*plan.lights}:
             times_s.setdefault(number, []).append(flash.start_s + 0.5 * flash.duration_s)
     count = comb.count_until(end_s)
+    shown = range(count) if comb.only is None else comb.only
     if not times_s:
-        return Schedule(by_round={}, left_out=(count, 0, 0))
+        return Schedule(by_round={}, left_out=(len(shown), 0, 0))
     numbers = list(times_s)
     middles_s = np.array([np.mean(times) for times in times_s.values()])
     reach_s = REACH * plan.cycle_s / len(plan.dark_rounds)
     first_s, last_s = min(times_s[numbers[0]]), max(times_s[numbers[-1]])
     by_round: dict[int, list[tuple[int, float]]] = {}
     left_out = [0, 0, 0]
-    for k in range(count):
+    for k in shown:
         times = np.array(comb.samples_s(k))
         nearest = np.abs(middles_s - times[:, None]).argmin(axis=1)
         where = 0 if times[0] < first_s else 2 if times[-1] > last_s else 1
