@@ -1,7 +1,5 @@
 """psvideo: the commands, assembled, and how faults become one paragraph and an exit status."""
 
-import contextlib
-import ctypes
 import os
 import shlex
 import sys
@@ -17,15 +15,11 @@ from psvideo.cli.ending import nobody_reads, paragraph_on, say_any_name, stoppab
 from psvideo.cli.first_screen import COMMANDS, Entry
 from psvideo.cli.spelling import spelled
 from psvideo.cli.teaching import PROGRAM, command_called, teach, words_typed
+from psvideo.compute.heap import share_one_heap
 from psvideo.errors import PsvideoError, UsageError, nearest
 
 STOPPED = 130
 """What the command line library ends with when the user interrupts."""
-M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8
-"""glibc's numbers of the settings (malloc.h)."""
-MOST_IN_HEAP_BYTES, MOST_SPARE_BYTES = 32 << 20, 1 << 30
-"""Pictures up to so many bytes, the most that glibc allows, lie in the heap, and so much of it may be free: a run's
-pictures come and go in the same memory, which the system would clear each time that it is given back."""
 
 
 def application(arguments: Sequence[str]) -> typer.Typer:
@@ -80,7 +74,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     A fault is printed as one paragraph on stderr.
     """
-    _share_one_heap()
+    share_one_heap()
     say_any_name()
     words = words_typed(sys.argv[1:] if arguments is None else arguments, os.environ)
     with compiling_said(quiet="-q" in words or "--quiet" in words), stoppable():
@@ -128,19 +122,6 @@ def _no_command(word: str, names: Sequence[str]) -> str:
     if Path(word).exists():
         return f"{word}: the command comes first. psvideo info {shlex.quote(word)} says what it is."
     return f"there is no command {word!r}; {nearest(word, names)} psvideo -h shows what each does."
-
-
-def _share_one_heap() -> None:
-    """Let all threads allocate from one heap, where the C library is glibc.
-
-    By default each thread has a heap of its own, which keeps what was freed in it: pictures that one thread makes and
-    another drops would cost memory several times.
-    """
-    with contextlib.suppress(OSError, AttributeError, TypeError):  # another C library, or none to be called by name
-        mallopt = ctypes.CDLL(None).mallopt
-        mallopt(M_ARENA_MAX, 1)
-        mallopt(M_MMAP_THRESHOLD, MOST_IN_HEAP_BYTES)
-        mallopt(M_TRIM_THRESHOLD, MOST_SPARE_BYTES)
 
 
 if __name__ == "__main__":

@@ -27,8 +27,10 @@ def look_at_plates(one: Round) -> Pixels:
 
 
 def _plates(one: Round) -> Strip:
-    shown = [
-        (plate.light, smaller_by_rows(plate.picture.reader(), plate.shape, SHOWN_WIDTH_PX)) for plate in one.plates
-    ]
-    exposure = exposure_for(shown[0][1])
-    return Strip("Plates, one per light", [Tile(light, srgb(picture, exposure=exposure)) for light, picture in shown])
+    tiles: list[Tile] = []
+    exposure: float | None = None
+    for plate in one.plates:  # one after the other: in linear light each takes as much as all of them as pixels
+        shown = smaller_by_rows(plate.picture.reader(), plate.shape, SHOWN_WIDTH_PX)
+        exposure = exposure_for(shown) if exposure is None else exposure
+        tiles.append(Tile(plate.light, srgb(shown, exposure=exposure)))
+    return Strip("Plates, one per light", tiles)

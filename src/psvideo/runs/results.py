@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.heap import give_back
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.mesh_files import animation_name
@@ -101,6 +102,7 @@ def _checked(job: Job, output: Output) -> Job:
 def finished(job: Job, folder: Path, output: Output, found: Found, *, watch: Watch = unwatched) -> NormalsResult:
     """Make of the files of all instants what needs them all, timing.json and the report; return it."""
     take, timing, lighting, delivery = job.take, job.timing, job.lighting, job.delivery
+    give_back()  # movies' libraries come where pictures were
     if found.picture is None:
         raise PsvideoError(nothing_complete(take.clip, timing))
     method = job.solving.method(len(take.plan.lights))

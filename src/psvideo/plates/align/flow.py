@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.coded import Image
+from psvideo.plates.align.sketch_kernel import root_rows
 from psvideo.plates.light_plate import LightPlate
 
 Codes = NDArray[np.uint8]
@@ -69,15 +70,14 @@ def sketch_of(plate: LightPlate, *, white: float) -> Sketch:
     seen, grey = plate.seen, plate.picture.halved() if halved else _grey(plate.image)
     if halved:
         seen = np.asarray(seen[: rows // 2 * 2].reshape(-1, 2).all(axis=1))
-    shown = grey * np.float32(1 / white)  # and from here on in the same memory
-    np.clip(shown, 0, 1, out=shown)
-    shown += np.float32(TOE)
-    cv2.sqrt(shown, shown)
-    shown -= np.float32(np.sqrt(TOE))
-    shown *= np.float32(255 / (np.sqrt(1 + TOE) - np.sqrt(TOE)))
+    shown: Vectors = np.empty(grey.shape[:2], np.float32)
+    codes: Codes = np.empty(grey.shape[:2], np.uint8)
+    root = float(np.sqrt(TOE))
+    scale = np.float32(255 / (np.sqrt(1 + TOE) - root))
+    light = np.ascontiguousarray(grey)
+    root_rows(light, np.float32(1 / white), np.float32(TOE), np.float32(root), scale, shown, codes)
     size = max(shown.shape[1] // BLOCK_PX, 1), max(shown.shape[0] // BLOCK_PX, 1)
     blocks = np.asarray(cv2.resize(shown, size, interpolation=cv2.INTER_AREA), np.float32)
-    codes = (shown + np.float32(0.5)).astype(np.uint8)
     return Sketch(number=plate.number, time_s=plate.time_s, codes=codes, seen=seen, blocks=blocks, white=white)
 
 

@@ -1,0 +1,31 @@
+"""The C library's heap: one for all threads, in which pictures come and go in the same memory."""
+
+import contextlib
+import ctypes
+
+M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8
+"""glibc's numbers of the settings (malloc.h)."""
+MOST_IN_HEAP_BYTES, MOST_SPARE_BYTES = 32 << 20, 1 << 30
+"""Pictures up to so many bytes, the most that glibc allows, lie in the heap, and so much of it may be free: a run's
+pictures come and go in the same memory, which the system would clear each time that it is given back."""
+ELSEWHERE = (OSError, AttributeError, TypeError)
+"""Another C library, or none to be called by name."""
+
+
+def share_one_heap() -> None:
+    """Let all threads allocate from one heap, where the C library is glibc.
+
+    By default each thread has a heap of its own, which keeps what was freed in it: pictures that one thread makes and
+    another drops would cost memory several times.
+    """
+    with contextlib.suppress(*ELSEWHERE):
+        mallopt = ctypes.CDLL(None).mallopt
+        mallopt(M_ARENA_MAX, 1)
+        mallopt(M_MMAP_THRESHOLD, MOST_IN_HEAP_BYTES)
+        mallopt(M_TRIM_THRESHOLD, MOST_SPARE_BYTES)
+
+
+def give_back() -> None:
+    """Give what is free back to the system: what comes next is of another kind and would lie beside it."""
+    with contextlib.suppress(*ELSEWHERE):
+        ctypes.CDLL(None).malloc_trim(0)
