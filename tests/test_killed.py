@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from bench.faults import FAULTS
-from bench.killed import COMMANDS, filmed, trials
+from bench.killed import COMMANDS, NOT_TRIED, filmed, trials
 
 from psvideo.errors import PsvideoError
 from psvideo.formats.whole_files import HERE, refuse_existing
@@ -22,6 +22,8 @@ LARGEST_PROCESS = 1 << 22
 def test_a_run_that_was_stopped_at_random_goes_on_to_the_same_bytes(name: str, how: str, tmp_path: Path) -> None:
     if how == "disk full" and not (os.getuid() == 0 and shutil.which("mount")):
         pytest.skip("only root may put a small disk under the output")
+    if (name, how) in NOT_TRIED:
+        pytest.skip("a page without its clip is another page")
     found = list(trials(name, filmed(tmp_path), tmp_path / "trials", how=how, moments=2, seed=3))
     assert not [fault for one in found for fault in one.faults]
 

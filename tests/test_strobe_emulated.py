@@ -4,6 +4,7 @@ from collections.abc import Callable
 from itertools import pairwise
 
 import pytest
+from bench.strobe_faults import darkness
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -273,3 +274,21 @@ def test_nothing_lights_before_it_is_run() -> None:
         controller = make()
         controller.advance(10**9)
         assert controller.edges == []
+
+
+def test_under_random_faults_it_is_dark_within_the_time_that_it_promises() -> None:
+    for row in darkness(60, seed=2):
+        assert row.dark_in_time == row.schedules, row
+
+
+@pytest.mark.campaign
+def test_under_many_random_faults_it_is_dark_within_the_time_that_it_promises() -> None:
+    assert all(row.dark_in_time == row.schedules > 100 for row in darkness(1000, seed=3))
+
+
+def test_a_board_that_did_not_go_dark_would_be_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(PythonBoard, "_fail", lambda controller, fault: None)
+    monkeypatch.setattr(PythonBoard, "_happens", lambda controller, until: False)
+    monkeypatch.setattr(PythonBoard, "lit", frozenset({1}))
+    *_, all_of_them = darkness(5, seed=2)
+    assert all_of_them.dark_in_time == 0
