@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from live_clip import live_clip
 
 import psvideo as ps
 from psvideo.cli.app import main
@@ -17,45 +18,13 @@ from psvideo.model.recipe import flash_recipe
 from psvideo.model.shutter import row_weights
 from psvideo.model.timing import timed_camera
 from psvideo.runs.live import live
-from psvideo.synth.shoot import shoot
 
-SCENE = """
-schema = "psvideo-scene/1"
-name = "sphere"
-frames = 110
-seed = 3
-[camera]
-width_px = 96
-height_px = 72
-fps = 100
-shutter_deg = 360.0
-readout_s = 0.01
-width_m = 1.6
-[strobe]
-flash_s = 0.001
-clock_offset_ppm = 40.0
-[[light]]
-name = "key"
-direction = [0.5, 0.4, 0.8]
-[[light]]
-name = "left"
-direction = [-0.6, 0.2, 0.8]
-[[light]]
-name = "top"
-direction = [0.1, -0.5, 0.8]
-[[object]]
-mesh = "sphere"
-albedo = 0.8
-"""
 LIVE_ROWS = 0.05
 
 
 @pytest.fixture(scope="module")
 def clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("live")
-    (folder / "scene.toml").write_text(SCENE, encoding="utf-8")
-    shoot(folder / "scene.toml", folder / "clip")
-    return folder / "clip"
+    return live_clip(tmp_path_factory.mktemp("live"))
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +69,7 @@ def test_the_written_timing_agrees_with_sync(clip: Path, results: tuple[list[New
 def test_the_command_says_how_things_stand_and_ends_with_a_summary(
     clip: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["live", str(clip), "--pace", "fastest", "--seconds", "0.9", "--json"]) == 0
+    assert main(["live", str(clip), "--pace", "fastest", "--seconds", "0.9", "--no-page", "--json"]) == 0
     lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert lines[0]["state"] == "locked"
     assert lines[-1]["done"]
@@ -110,10 +79,10 @@ def test_the_command_says_how_things_stand_and_ends_with_a_summary(
 
 
 def test_a_clip_without_the_plans_strobe_ends_in_one_paragraph(clip: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["live", str(clip), "--pace", "fastest", "--seconds", "0.3"]) == 1
+    assert main(["live", str(clip), "--pace", "fastest", "--seconds", "0.3", "--no-page"]) == 1
     said = capsys.readouterr().err.strip()
     assert "too few" in said
-    assert main(["live", str(clip.parent / "none")]) == 1
+    assert main(["live", str(clip.parent / "none"), "--no-page"]) == 1
     assert "there is no such clip" in capsys.readouterr().err
 
 

@@ -45,7 +45,7 @@ class LiveFrame:
 class NewestRound:
     """The newest result: its plates, the surface where there is a rig, and when the last of its frames came.
 
-    ``step`` is by how much its picture is smaller than the camera's.
+    ``step`` is by how much its picture is smaller than the camera's, ``frame`` the newest frame, at ``place`` in time.
     """
 
     round: Round
@@ -54,6 +54,7 @@ class NewestRound:
     step: int
     timing: Timing
     frame: Coded
+    place: int
 
 
 def search_here(run: Callable[[], "Lock | str"], done: Callable[["Lock | str"], None]) -> None:
@@ -146,6 +147,7 @@ class Chain:
             step=step,
             timing=small,
             frame=held[last].coded,
+            place=last,
         )
 
     def _surface(self, one: Round, plan: Plan, step: int) -> Surface | None:

@@ -29,7 +29,9 @@ def search_beside(run: Callable[[], object], done: Callable[[object], None]) -> 
 
 @dataclass(kw_only=True)
 class Running:
-    """One live run. ``shown`` gets every new result, ``said`` a status each second, ``taken`` every frame."""
+    """One live run. ``shown`` gets every new result, ``said`` a status each second, ``taken`` every frame.
+
+    ``status`` is the last one that was said."""
 
     chain: Chain
     source: LiveSource
@@ -41,6 +43,7 @@ class Running:
     notes: list[str] = field(default_factory=list)
     results: int = 0
     first_lock_s: float | None = None
+    status: LiveStatus | None = None
     _ages_s: list[float] = field(default_factory=list)
     _busy_s: float = 0.0
     _stop: threading.Event = field(default_factory=threading.Event)
@@ -148,7 +151,7 @@ class Running:
         chain, follower = self.chain, self.chain.follower
         camera = smaller_plan(chain.plan, chain.step).camera
         latest = self._ages_s[len(self._ages_s) - max(self.results - before[1], 0) :]
-        return LiveStatus(
+        self.status = LiveStatus(
             at_s=round(at_s, 3),
             state=chain.state,
             fps=(chain.seen - before[0]) / last_s,
@@ -164,6 +167,7 @@ class Running:
             why=chain.why,
             notes=tuple(self.notes),
         )
+        return self.status
 
     def _summary(self, seconds: float) -> LiveSummary:
         chain, follower = self.chain, self.chain.follower

@@ -7,10 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.live.chain import NewestRound
+from psvideo.live.status import LiveStatus
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Rig
 from psvideo.report.judge.every_line import judgements
-from psvideo.report.judgement import Judgement
+from psvideo.report.judgement import Judgement, gravest_first, verdict_of
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rigpoints import rig_points
 
@@ -65,3 +66,16 @@ def _counts(image: NDArray[np.float32], saturation: float) -> list[int]:
     bright = thin if thin.ndim == 2 else thin.max(axis=2)
     place = np.clip(np.sqrt(np.clip(bright / saturation, 0, 1)) * (HISTOGRAM - 1), 0, HISTOGRAM - 1).astype(np.intp)
     return [int(count) for count in np.bincount(place.ravel(), minlength=HISTOGRAM)]
+
+
+def told(status: LiveStatus | None, watching: Watching) -> dict[str, object]:
+    """Return what a page says beside its pictures: how things stand, the gravest lines first, histograms by light."""
+    lines = (*gravest_first(watching.lines), *(one for one in watching.lines if one.grade in ("good", "unknown")))
+    return {
+        "state": "seeking" if status is None else status.state,
+        "line": "" if status is None else status.line,
+        "verdict": verdict_of(watching.lines) if watching.lines else "",
+        "lines": [{"subject": one.subject, "grade": one.grade, "sentence": one.sentence} for one in lines],
+        "histograms": watching.histograms,
+        "lights": list(watching.plan.lights),
+    }

@@ -10,10 +10,17 @@ EXPORT = re.compile(r"^export ", re.MULTILINE)
 
 def assets() -> dict[str, bytes]:
     """Return ``index.html``, ``style.css`` and ``main.js``, which holds all modules."""
-    found = {entry.name: entry.read_bytes() for entry in files("psvideo.page").joinpath("assets").iterdir()}
-    scripts = {name: content.decode() for name, content in found.items() if name.endswith(".js")}
-    others = {name: content for name, content in found.items() if not name.endswith(".js")}
-    return others | {"main.js": joined(scripts, "main.js").encode()}
+    others = {name: content for name, content in _found().items() if not name.endswith(".js")}
+    return others | {"main.js": joined(scripts(), "main.js").encode()}
+
+
+def scripts() -> dict[str, str]:
+    """Return the page's modules by name."""
+    return {name: content.decode() for name, content in _found().items() if name.endswith(".js")}
+
+
+def _found() -> dict[str, bytes]:
+    return {entry.name: entry.read_bytes() for entry in files("psvideo.page").joinpath("assets").iterdir()}
 
 
 def joined(scripts: Mapping[str, str], first: str) -> str:

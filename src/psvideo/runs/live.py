@@ -1,6 +1,7 @@
 """The whole of ``psvideo live``: a source in, the newest result shown, what it came to and its timing out."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
 from psvideo.clip import open_clip
@@ -12,14 +13,20 @@ from psvideo.formats.whole_files import refuse_existing, write_text
 from psvideo.live.chain import Chain, NewestRound
 from psvideo.live.history import timing_of
 from psvideo.live.lock import check_followed
+from psvideo.live.newest_pictures import NewestPictures
+from psvideo.live.page_server import live_page
 from psvideo.live.quality import first_quality
 from psvideo.live.running import Running
+from psvideo.live.smaller import smaller_plan
 from psvideo.live.source import LiveSource, played_clip
 from psvideo.live.status import LiveStatus, LiveSummary
+from psvideo.live.watching import Watching, told
 from psvideo.model.choices import Pace
 from psvideo.model.intensity import lights_as_planned
+from psvideo.model.plan import Plan
 from psvideo.model.rig import Rig
-from psvideo.model.timing import DroppedFrames, Timing
+from psvideo.model.timing import DroppedFrames, Timing, timed_camera
+from psvideo.page.serving import ADDRESS
 from psvideo.plates.sequence import check_separable
 from psvideo.runs.caller import PYTHON, Caller, say_of_clip
 
@@ -34,6 +41,11 @@ def live(
     pace: Pace = "own",
     seconds: float | None = None,
     force: bool = False,
+    page: bool = False,
+    host: str = ADDRESS,
+    port: int | None = None,
+    token: str | None = None,
+    opened: Callable[[str], None] = lambda url: None,
     said: Callable[[LiveStatus], None] = lambda status: None,
     shown: Callable[[NewestRound], None] = lambda newest: None,
     caller: Caller = PYTHON,
@@ -44,6 +56,8 @@ def live(
     - ``rig``: where the lights are; without it there are plates and no normals.
     - ``timing_out``: a timing.json to write at the end, of all that was followed; ``force`` replaces one.
     - ``pace``: a clip's "own", or "fastest". ``seconds`` ends the run after so much footage.
+    - ``page``: serve the live page, on this machine alone unless another ``host`` is named, then to those alone who
+      know the ``token`` (left out, one is made); ``port`` left out: a free one. ``opened`` gets its address.
 
     ``said`` gets how things stand once a second, ``shown`` every result.
 
@@ -56,21 +70,52 @@ def live(
     """
     clip = open_clip(path_of("source", source), plan=path_if_given("plan", plan))
     say_of_clip(clip, caller)
-    opened = played_clip(clip, pace=pace)
-    check_followed(opened.plan)
-    check_separable(opened.plan)
-    known = None if rig is None else read_rig(path_of("rig", rig), plan_lights=opened.plan.lights)
+    played = played_clip(clip, pace=pace)
+    check_followed(played.plan)
+    check_separable(played.plan)
+    known = None if rig is None else read_rig(path_of("rig", rig), plan_lights=played.plan.lights)
     timing_path = path_if_given("timing_out", timing_out)
     if timing_path is not None:
         refuse_existing(timing_path, force=force)
-    running = _running(opened, known, first_light, seconds, said, shown)
-    summary = running.run()
+    running = _running(played, known, first_light, seconds, said, shown)
+    with _page(running, played.plan, known, caller, opened, host, port, token) if page else nullcontext():
+        summary = running.run()
     if running.chain.follower is None:
-        why = running.chain.why or f"{opened.name}: {summary.frames} frames are too few to find the strobe in."
+        why = running.chain.why or f"{played.name}: {summary.frames} frames are too few to find the strobe in."
         raise NoStrobeError(why)
     if timing_path is not None:
-        write_text(timing_path, format_timing(_timing(running.chain, opened)))
+        write_text(timing_path, format_timing(_timing(running.chain, played)))
     return summary
+
+
+@contextmanager
+def _page(
+    running: Running,
+    plan: Plan,
+    rig: Rig | None,
+    caller: Caller,
+    opened: Callable[[str], None],
+    host: str,
+    port: int | None,
+    token: str | None,
+) -> Iterator[None]:
+    """Serve the live page while the block runs: every result is put there, and some are judged."""
+    watching, pictures = Watching(plan=plan, rig=rig, spell=caller.spell), NewestPictures()
+    shown = running.shown
+
+    def show(newest: NewestRound) -> None:
+        small = smaller_plan(plan, newest.step)
+        pictures.put(newest, timed_camera(small, newest.timing))
+        watching.look(newest, small)
+        shown(newest)
+
+    running.shown = show
+    server = live_page(pictures, lambda: told(running.status, watching), host=host, port=port, token=token)
+    try:
+        opened(server.url)
+        yield
+    finally:
+        server.close()
 
 
 def _running(

@@ -2,6 +2,7 @@
 
 import json as texts
 import sys
+import webbrowser
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -34,6 +35,15 @@ def live(
     seconds: Annotated[
         float | None, typer.Option("--seconds", min=0.0, help="End after so many seconds of footage.")
     ] = None,
+    no_page: Annotated[bool, typer.Option("--no-page", help="Serve no page.")] = False,
+    no_browser: Annotated[bool, typer.Option("--no-browser", help="Do not open the page in a browser.")] = False,
+    port: Annotated[int | None, typer.Option(help="The page's port; left out: a free one.")] = None,
+    host: Annotated[
+        str, typer.Option(help="The address that the page answers on; others than this machine's need the token.")
+    ] = "127.0.0.1",
+    token: Annotated[
+        str | None, typer.Option(help="What the page's address must hold on another host; left out: one is made.")
+    ] = None,
     force: Force = False,
     json: Json = False,
     verbose: Verbose = False,
@@ -52,6 +62,11 @@ def live(
         pace=pace,
         seconds=seconds,
         force=force,
+        page=not no_page,
+        host=host,
+        port=port,
+        token=token,
+        opened=lambda url: _open(voice, url, browser=not no_browser),
         said=lambda status: _say(voice, status),
         caller=voice.caller(),
     )
@@ -60,6 +75,15 @@ def live(
     voice.say(summary.words)
     if json:
         print(texts.dumps(summary.record), flush=True)
+
+
+def _open(voice: Voice, url: str, *, browser: bool) -> None:
+    """Say where the page is, and open it."""
+    if voice.json:
+        print(texts.dumps({"url": url}), flush=True)
+    voice.say(f"{url} (Ctrl-C ends it)")
+    if browser:
+        webbrowser.open(url)
 
 
 def _say(voice: Voice, status: "LiveStatus") -> None:

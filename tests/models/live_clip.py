@@ -1,0 +1,41 @@
+"""A short clip of a sphere, filmed by the virtual shoot: what the live chain is tried on."""
+
+from pathlib import Path
+
+from psvideo.synth.shoot import shoot
+
+SCENE = """
+schema = "psvideo-scene/1"
+name = "sphere"
+frames = 110
+seed = 3
+[camera]
+width_px = 96
+height_px = 72
+fps = 100
+shutter_deg = 360.0
+readout_s = 0.01
+width_m = 1.6
+[strobe]
+flash_s = 0.001
+clock_offset_ppm = 40.0
+[[light]]
+name = "key"
+direction = [0.5, 0.4, 0.8]
+[[light]]
+name = "left"
+direction = [-0.6, 0.2, 0.8]
+[[light]]
+name = "top"
+direction = [0.1, -0.5, 0.8]
+[[object]]
+mesh = "sphere"
+albedo = 0.8
+"""
+
+
+def live_clip(folder: Path) -> Path:
+    """Film the sphere into a folder and return the clip."""
+    (folder / "scene.toml").write_text(SCENE, encoding="utf-8")
+    shoot(folder / "scene.toml", folder / "clip")
+    return folder / "clip"

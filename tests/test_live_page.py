@@ -1,0 +1,176 @@
+"""The live page: who may see it, what a viewer gets and when, and in a browser the surface as it was solved."""
+
+import json
+import threading
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from live_clip import live_clip
+
+import psvideo as ps
+from psvideo.errors import UsageError
+from psvideo.live.chain import NewestRound
+from psvideo.live.newest_pictures import NewestPictures, lit_rows
+from psvideo.live.page_server import LivePage, live_page
+from psvideo.live.smaller import smaller_plan
+from psvideo.live.watching import Watching, told
+from psvideo.model.camera import Camera
+from psvideo.model.timing import timed_camera
+from psvideo.runs.live import live
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Playwright
+
+Served = tuple[LivePage, NewestPictures, list[NewestRound], Camera]
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    """A page with the first result of a clip, and all its results."""
+    clip = live_clip(tmp_path_factory.mktemp("live"))
+    results: list[NewestRound] = []
+    live(clip, rig=clip / "rig.toml", pace="fastest", shown=results.append)
+    plan = ps.open_take(clip).plan
+    camera = timed_camera(smaller_plan(plan, results[0].step), results[0].timing)
+    watching, pictures = Watching(plan=plan), NewestPictures()
+    for newest in results:
+        watching.look(newest, plan)
+    pictures.put(results[0], camera)
+    page = live_page(pictures, lambda: told(None, watching), port=0)
+    yield page, pictures, results, camera
+    page.close()
+
+
+def connected(url: str, **options: Any) -> Any:
+    from websockets.sync.client import connect
+
+    address, _, query = url.replace("http", "ws").partition("?")
+    return connect(f"{address}newest{'?' if query else ''}{query}", **options)
+
+
+Pictures = dict[str, tuple[dict[str, Any], np.ndarray]]
+
+
+def asked(viewer: Any, seen: int, plate: str = "left") -> tuple[dict[str, Any], Pictures]:
+    """Ask for what is newer than what was seen; return what is told, and the pictures by name, with their facts."""
+    viewer.send(json.dumps({"seen": seen, "plate": plate}))
+    status = json.loads(viewer.recv(timeout=10))
+    pictures = {}
+    for _ in range(status["pictures"]):
+        block = viewer.recv(timeout=10)
+        length = int.from_bytes(block[4:8], "little")
+        facts = json.loads(block[8 : 8 + length])
+        pixels = np.frombuffer(block, np.float16, offset=8 + length)
+        pictures[facts["id"]] = facts, pixels.reshape(facts["height"], facts["width"], facts["channels"])
+    return status, pictures
+
+
+def fetched(url: str, **headers: str) -> tuple[int, bytes]:
+    try:
+        with urllib.request.urlopen(urllib.request.Request(url, headers=headers), timeout=10) as answer:
+            return answer.status, answer.read()
+    except urllib.error.HTTPError as fault:
+        return fault.code, fault.read()
+
+
+def test_a_viewer_gets_the_newest_and_not_what_came_between(served: Served) -> None:
+    page, pictures, results, camera = served
+    with connected(page.url) as viewer:
+        first, shown = asked(viewer, 0)
+        assert results[0].surface is not None
+        assert np.abs(shown["normals"][1] - results[0].surface.normals).max() < 1e-3
+        assert shown["plate"][0]["light"] == "left"
+        assert [line["subject"] for line in first["lines"]][:2] == ["timing", "order"]
+        assert sum(first["histograms"]["key"]) > 1000
+        for newest in results[1:4]:
+            pictures.put(newest, camera)
+        later, shown = asked(viewer, first["number"])
+        assert later["number"] == first["number"] + 3
+        assert results[3].surface is not None
+        assert np.abs(shown["normals"][1] - results[3].surface.normals).max() < 1e-3
+        assert asked(viewer, later["number"])[1] == {}, "what was seen is not sent again"
+
+
+def test_two_viewers_and_one_that_comes_and_goes(served: Served) -> None:
+    page, pictures, results, camera = served
+    with connected(page.url) as one, connected(page.url) as two:
+        number = asked(one, 0)[0]["number"]
+        assert asked(two, 0, "top")[1]["plate"][0]["light"] == "top"
+        later = threading.Timer(0.2, lambda: pictures.put(results[5], camera))
+        later.start()
+        with connected(page.url) as gone:
+            gone.send(json.dumps({"seen": number, "plate": ""}))
+        assert asked(one, number)[0]["number"] == number + 1, "who waits gets the next as it comes"
+        assert asked(two, number)[0]["number"] == number + 1
+
+
+def test_only_this_machine_sees_it_without_a_token(served: Served) -> None:
+    page = served[0]
+    assert fetched(page.url)[0] == 200
+    assert fetched(page.url, Host="evil.example:80")[0] == 403
+    from websockets.exceptions import InvalidStatus
+
+    with pytest.raises(InvalidStatus), connected(page.url, origin="http://evil.example"):
+        pass
+
+
+def test_another_host_needs_the_token() -> None:
+    page = live_page(NewestPictures(), dict, host="0.0.0.0", port=0)
+    try:
+        here = page.url.replace("0.0.0.0", "127.0.0.1")
+        assert fetched(here)[0] == 200
+        status, sentence = fetched(here.partition("?")[0])
+        assert status == 403
+        assert b"open the address that psvideo live printed" in sentence
+        assert fetched(f"{here.partition('?')[0]}?token=guess")[0] == 403
+    finally:
+        page.close()
+
+
+def test_a_port_that_is_taken_is_named(served: Served) -> None:
+    port = int(served[0].url.rstrip("/").rpartition(":")[2])
+    with pytest.raises(UsageError, match=f"`port` {port}: cannot be used"):
+        live_page(NewestPictures(), dict, port=port)
+
+
+def test_the_frame_is_marked_where_lights_and_the_dark_row_are(served: Served) -> None:
+    _, _, results, camera = served
+    for newest in results[2:6]:
+        rows = lit_rows(newest, camera)
+        assert (rows[0][0], rows[-1][1]) == (0, camera.height_px)
+        assert all(before[1] == after[0] for before, after in pairwise(rows))
+        frame = newest.frame.light()
+        for first, last, name in rows:
+            inside = frame[max(first + 4, 24) : min(last - 4, 48)]  # rows that the sphere crosses
+            if inside.size:
+                assert (float(inside.max()) > 0.1) == bool(name)
+
+
+def test_the_browser_relights_the_surface_that_was_solved(
+    served: Served, playwright: "Playwright", chromium: str
+) -> None:
+    page, pictures, results, camera = served
+    newest = results[-1]
+    pictures.put(newest, camera)
+    software = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+    browser = playwright.chromium.launch(executable_path=chromium, args=software)
+    try:
+        tab = browser.new_page(viewport={"width": 640, "height": 400})
+        tab.goto(page.url)
+        tab.wait_for_selector("body[data-drawn]", timeout=20_000)
+        found = tab.evaluate("Array.from(psvideoLive.relit().values)")
+        assert tab.locator("#state").inner_text()
+        assert tab.locator("#lines li").count() >= 8
+    finally:
+        browser.close()
+    assert newest.surface is not None
+    normals, albedo = newest.surface.normals, newest.surface.albedo
+    direction = np.array([0.45, 0.5, np.sqrt(1 - 0.45**2 - 0.5**2)])
+    expected = albedo * np.maximum(normals @ direction, 0)[..., None]
+    relit = np.reshape(found, (*normals.shape[:2], 4))[..., :3]
+    assert np.abs(relit - expected).max() < 2e-3
