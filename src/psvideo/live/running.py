@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from psvideo.live.chain import Chain, NewestRound, search_here
+from psvideo.live.chain import Chain, LiveFrame, NewestRound, search_here
 from psvideo.live.quality import Quality
+from psvideo.live.recording import Recording
 from psvideo.live.smaller import smaller_plan
 from psvideo.live.source import LiveSource
 from psvideo.live.status import LiveStatus, LiveSummary
@@ -19,7 +20,6 @@ SEARCH_S = 60.0
 """A search that is under way when the source ends is waited for no longer than this."""
 Shown = Callable[[NewestRound], None]
 Said = Callable[[LiveStatus], None]
-Taken = Callable[..., None]
 
 
 def search_beside(run: Callable[[], object], done: Callable[[object], None]) -> None:
@@ -29,7 +29,8 @@ def search_beside(run: Callable[[], object], done: Callable[[object], None]) -> 
 
 @dataclass(kw_only=True)
 class Running:
-    """One live run. ``shown`` gets every new result, ``said`` a status each second, ``taken`` every frame.
+    """One live run. ``shown`` gets every new result, ``said`` a status each second, ``recording``
+    every frame.
 
     ``status`` is the last one that was said."""
 
@@ -38,7 +39,7 @@ class Running:
     quality: Quality
     shown: Shown
     said: Said
-    taken: Taken = lambda frame: None
+    recording: Recording | None = None
     seconds: float | None = None
     notes: list[str] = field(default_factory=list)
     results: int = 0
@@ -110,9 +111,10 @@ class Running:
             if not self._solve():
                 time.sleep(IDLE_S)
 
-    def _take(self, frame: object) -> None:
-        self.taken(frame)
-        self.chain.take(frame)  # type: ignore[arg-type]
+    def _take(self, frame: LiveFrame) -> None:
+        if self.recording is not None:
+            self.recording.take(frame)
+        self.chain.take(frame)
         if self.first_lock_s is None and self.chain.follower is not None:
             self.first_lock_s = self.chain.seen * self.chain.plan.camera.frame_period_s
 
@@ -165,7 +167,8 @@ class Running:
             width_px=camera.width_px,
             height_px=camera.height_px,
             why=chain.why,
-            notes=tuple(self.notes),
+            recorded=None if self.recording is None else self.recording.written,
+            notes=self.all_notes,
         )
         return self.status
 
@@ -182,5 +185,12 @@ class Running:
             ages_s=(float(np.median(ages)), max(ages)) if ages and self.source.paced else None,
             phase_error_rows=None if follower is None else follower.error_rows,
             clock_offset_ppm=None if follower is None else follower.clock.offset_ppm,
-            notes=tuple(self.notes),
+            recorded=None if self.recording is None else self.recording.written,
+            notes=self.all_notes,
         )
+
+    @property
+    def all_notes(self) -> tuple[str, ...]:
+        """What there is to say of the run."""
+        ended = "" if self.recording is None else self.recording.ended
+        return (*self.notes, ended) if ended else tuple(self.notes)

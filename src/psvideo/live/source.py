@@ -2,7 +2,8 @@
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from pathlib import Path
 
 from psvideo.clip import Clip, read_frames
 from psvideo.errors import PsvideoError
@@ -10,13 +11,17 @@ from psvideo.live.chain import LiveFrame
 from psvideo.model.choices import Pace
 from psvideo.model.plan import Plan
 
+PLAIN = ("png", "tiff")
+"""Kinds of files that say nothing of their codes: the plan does."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class LiveSource:
     """A source of frames. ``frames`` gives them, each with its place in time by the source's own count or time stamps.
 
     ``first_number`` is what the first frame's file is called by, where there is one. ``cfa`` is the filter pattern of a
-    mosaic. ``paced``: frames come when they are due, and not as soon as somebody wants them.
+    mosaic. ``plan_path`` is the plan's file where the frames are plain codes that it explains. ``paced``: frames come
+    when they are due, and not as soon as somebody wants them.
     """
 
     name: str
@@ -24,6 +29,7 @@ class LiveSource:
     frames: Callable[[], Iterator[LiveFrame]]
     cfa: str | None = None
     first_number: int = 0
+    plan_path: Path | None = None
     paced: bool = True
 
 
@@ -47,5 +53,12 @@ def played_clip(clip: Clip, *, pace: Pace = "own") -> LiveSource:
                 time.sleep(max(due_s - time.monotonic(), 0.0))
             yield LiveFrame(index=frame.index, coded=frame.coded, came_s=time.monotonic())
 
-    source = LiveSource(name=clip.name, plan=clip.plan, frames=frames, cfa=clip.cfa, first_number=clip.numbers[0])
-    return replace(source, paced=pace == "own")
+    return LiveSource(
+        name=clip.name,
+        plan=clip.plan,
+        frames=frames,
+        cfa=clip.cfa,
+        first_number=clip.numbers[0],
+        plan_path=clip.plan_path if clip.kind in PLAIN and clip.header.bits in (8, 16) else None,
+        paced=pace == "own",
+    )

@@ -87,6 +87,8 @@ class LiveSummary:
                 f"{self.clock_offset_ppm:+.1f} ppm against the camera, its flashes known to "
                 f"{self.phase_error_rows:.2g} row."
             )
+        if self.recorded is not None:
+            text += f" {self.recorded} frames were recorded."
         if self.ages_s is not None:
             text += f" Pictures were {1e3 * self.ages_s[0]:.0f} ms old (at most {1e3 * self.ages_s[1]:.0f} ms)."
         return text

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
+from dataclasses import replace
 from pathlib import Path
 
 from psvideo.clip import open_clip
@@ -16,6 +17,7 @@ from psvideo.live.lock import check_followed
 from psvideo.live.newest_pictures import NewestPictures
 from psvideo.live.page_server import live_page
 from psvideo.live.quality import first_quality
+from psvideo.live.recording import recording
 from psvideo.live.running import Running
 from psvideo.live.smaller import smaller_plan
 from psvideo.live.source import LiveSource, played_clip
@@ -38,6 +40,7 @@ def live(
     rig: Path | str | None = None,
     first_light: str | None = None,
     timing_out: Path | str | None = None,
+    record: Path | str | None = None,
     pace: Pace = "own",
     seconds: float | None = None,
     force: bool = False,
@@ -55,6 +58,7 @@ def live(
     - ``source``: a finished clip, which is played. ``plan`` names the plan where it does not lie beside it.
     - ``rig``: where the lights are; without it there are plates and no normals.
     - ``timing_out``: a timing.json to write at the end, of all that was followed; ``force`` replaces one.
+    - ``record``: a clip folder to record the frames into, whole or not at all.
     - ``pace``: a clip's "own", or "fastest". ``seconds`` ends the run after so much footage.
     - ``page``: serve the live page, on this machine alone unless another ``host`` is named, then to those alone who
       know the ``token`` (left out, one is made); ``port`` left out: a free one. ``opened`` gets its address.
@@ -78,8 +82,15 @@ def live(
     if timing_path is not None:
         refuse_existing(timing_path, force=force)
     running = _running(played, known, first_light, seconds, said, shown)
-    with _page(running, played.plan, known, caller, opened, host, port, token) if page else nullcontext():
+    record_path = path_if_given("record", record)
+    with (
+        _page(running, played.plan, known, caller, opened, host, port, token) if page else nullcontext(),
+        nullcontext() if record_path is None else recording(record_path, played, force=force) as recorded,
+    ):
+        running.recording = recorded
         summary = running.run()
+    if recorded is not None:
+        summary = replace(summary, recorded=recorded.written, notes=running.all_notes)
     if running.chain.follower is None:
         why = running.chain.why or f"{played.name}: {summary.frames} frames are too few to find the strobe in."
         raise NoStrobeError(why)

@@ -28,6 +28,9 @@ def live(
     timing_out: Annotated[
         Path | None, typer.Option("--timing-out", help="Where to write timing.json of all that was followed.")
     ] = None,
+    record: Annotated[
+        Path | None, typer.Option("--record", help="A clip folder to record the frames into, whole or not at all.")
+    ] = None,
     pace: Annotated[
         Pace,
         typer.Option("--pace", help="A clip's own pace, or fastest: every round is solved, nothing is left out."),
@@ -59,6 +62,7 @@ def live(
         rig=rig,
         first_light=first_light,
         timing_out=timing_out,
+        record=record,
         pace=pace,
         seconds=seconds,
         force=force,
@@ -72,6 +76,8 @@ def live(
     )
     if sys.stderr.isatty() and not (json or quiet):
         print(file=sys.stderr)
+    for note in summary.notes:
+        voice.warn(note)
     voice.say(summary.words)
     if json:
         print(texts.dumps(summary.record), flush=True)

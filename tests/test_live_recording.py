@@ -1,0 +1,78 @@
+"""Recording live: a clip as any other, whole or not at all, whatever the disk does."""
+
+import errno
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from live_clip import live_clip
+
+import psvideo as ps
+from psvideo.cli.app import main
+from psvideo.clip import read_frames
+from psvideo.live import recording
+from psvideo.live.chain import LiveFrame
+from psvideo.live.recording import Recording
+from psvideo.model.coded import Coded
+from psvideo.runs.live import live
+
+
+@pytest.fixture(scope="module")
+def clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return live_clip(tmp_path_factory.mktemp("live"))
+
+
+def test_normals_of_the_recording_are_those_of_the_clip(clip: Path, tmp_path: Path) -> None:
+    shutil.copytree(clip, tmp_path / "holed")
+    (tmp_path / "holed" / "frames" / sorted(path.name for path in (clip / "frames").iterdir())[70]).unlink()
+    summary = live(tmp_path / "holed", record=tmp_path / "rec", pace="fastest")
+    assert (summary.recorded, summary.lost) == (109, 1)
+    takes = [ps.open_take(path) for path in (tmp_path / "holed", tmp_path / "rec")]
+    assert takes[1].clip.dropped[0][1] == 1
+    pairs = zip(*(read_frames(take.clip) for take in takes), strict=True)
+    assert all(np.array_equal(one.image, other.image) and one.index == other.index for one, other in pairs)
+    rig = ps.read_rig(clip / "rig.toml")
+    timing = ps.find_timing(takes[0])
+    solved = [list(ps.solve(take, rig, timing)) for take in takes]
+    assert len(solved[0]) > 10
+    for one, other in zip(*solved, strict=True):
+        assert one.surface.normals.tobytes() == other.surface.normals.tobytes()
+
+
+def test_a_disk_that_fills_leaves_what_was_recorded_whole(
+    clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write, room = recording.write_codes, iter(range(60))
+
+    def full(path: Path, codes: np.ndarray) -> None:
+        write(path, codes)
+        if next(room, None) is None:
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(recording, "write_codes", full)
+    words = ["live", str(clip), "--record", str(tmp_path / "rec"), "--pace", "fastest", "--no-page"]
+    assert main(words) == 0
+    said = " ".join(capsys.readouterr().err.split())
+    assert "Recording ended after 60 frames, which are whole" in said
+    assert "No space left on device" in said
+    assert len(ps.open_take(tmp_path / "rec").numbers) == 60
+    assert main(words) == 2, "what is there is not replaced"
+    assert "exists already" in capsys.readouterr().err
+
+
+def test_a_disk_that_is_too_slow_ends_the_recording_without_a_hole(tmp_path: Path) -> None:
+    record = Recording(folder=tmp_path / "rec", most_bytes=10 * 64)
+    (tmp_path / "rec" / "frames").mkdir(parents=True)
+    for index in range(20):
+        record.take(LiveFrame(index=index, coded=Coded(codes=np.zeros((8, 8), np.uint8)), came_s=0.0))
+    record.over()
+    record.write()
+    assert record.written == 10
+    assert "too slow for this camera: recording ended after 10 frames" in record.ended
+
+
+def test_nothing_appears_where_no_frame_was_recorded(clip: Path, tmp_path: Path) -> None:
+    with pytest.raises(ps.PsvideoError, match="there is no such clip"):
+        live(clip / "none", record=tmp_path / "rec", pace="fastest")
+    assert not (tmp_path / "rec").exists()
