@@ -16,6 +16,7 @@ from psvideo.live.smaller import Smaller, smaller_plan, smaller_timing
 from psvideo.model.coded import Coded, Tone
 from psvideo.model.recipe import flash_recipe
 from psvideo.model.shutter import row_weights
+from psvideo.model.surface import Surface
 from psvideo.model.timing import timed_camera
 from psvideo.runs.live import live
 
@@ -36,20 +37,20 @@ def results(clip: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[list[
     return shown, out
 
 
-def degrees_apart(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    there = (np.linalg.norm(one, axis=-1) > 0.5) & (np.linalg.norm(other, axis=-1) > 0.5)
-    return np.asarray(np.degrees(np.arccos(np.clip((one * other).sum(axis=-1)[there], -1, 1))))
+def degrees_apart(one: Surface, other: Surface) -> np.ndarray:
+    cosine = (one.normals * other.normals).sum(axis=-1)[one.valid & other.valid]
+    return np.asarray(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
 
 
 def test_live_normals_are_those_of_the_offline_run(clip: Path, results: tuple[list[NewestRound], Path]) -> None:
     take = ps.open_take(clip)
-    offline = list(ps.solve(take, ps.read_rig(clip / "rig.toml"), align="none", fill=False))
+    offline = list(ps.solve(take, ps.read_rig(clip / "rig.toml"), align="none"))
     assert len(results[0]) > 12
     for newest in results[0][::5]:
         same = min(offline, key=lambda instant: abs(instant.round.time_s - newest.round.time_s))
         assert abs(same.round.time_s - newest.round.time_s) < 1e-6
         assert newest.surface is not None
-        apart = degrees_apart(newest.surface.normals, same.surface.normals)
+        apart = degrees_apart(newest.surface, same.surface)
         assert apart.size > 500
         assert np.percentile(apart, 99) < 0.2
 

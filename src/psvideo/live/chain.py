@@ -155,7 +155,7 @@ class Chain:
         rig = smaller_rig(self.rig, step)
         camera, lights = plan.camera, lights_as_planned(rig, plan)
         near = near_surface_of(rig, lights, height_px=camera.height_px, width_px=camera.width_px)
-        solved = surfaces([one], plan, rig, solving=Solving(fill=False), near=near, one_by_one=True)
+        solved = surfaces([one], plan, rig, solving=Solving(), near=near, one_by_one=True)
         return next((instant.surface for instant in solved), None)
 
     def _count(self, index: int) -> None:

@@ -16,6 +16,8 @@ from psvideo.live.status import LiveStatus, LiveSummary
 
 IDLE_S = 0.002
 STATUS_S = 1.0
+SLOW = 0.9
+"""A source that gives less than this share of the plan's frames is slow, and said to be."""
 SEARCH_S = 60.0
 """A search that is under way when the source ends is waited for no longer than this."""
 Shown = Callable[[NewestRound], None]
@@ -47,6 +49,7 @@ class Running:
     status: LiveStatus | None = None
     _ages_s: list[float] = field(default_factory=list)
     _busy_s: float = 0.0
+    _slow: bool = False
     _stop: threading.Event = field(default_factory=threading.Event)
     _fault: BaseException | None = None
 
@@ -138,7 +141,14 @@ class Running:
         if status.state != "locked" or status.age_s is None or self.results < 2 * status.results_per_s:
             return
         plan = self.chain.plan
-        rounds_per_s = len(plan.dark_rounds) / plan.cycle_s
+        pace = min(status.fps * plan.camera.frame_period_s, 1.0)
+        rounds_per_s = pace * len(plan.dark_rounds) / plan.cycle_s
+        if pace < SLOW and not self._slow:
+            self._slow = True
+            self.notes.append(
+                f"{self.source.name}: its frames come at {status.fps:.1f} a second, and the plan says "
+                f"{float(plan.camera.fps):.5g}: what sends or reads them does not keep up."
+            )
         quality = self.quality.after(
             age_s=status.age_s, rate=status.results_per_s, rounds_per_s=rounds_per_s, busy=busy
         )

@@ -127,7 +127,7 @@ def read_movie(path: Path, timestamps: Sequence[int]) -> Iterator[CodedPicture]:
                 continue
             if frame.pts > wanted[0] or frame.is_corrupt:  # a damaged frame is painted over, and flagged
                 break
-            yield _picture(path, frame)
+            yield picture_of(path, frame)
             wanted.popleft()
             if not wanted:
                 return
@@ -185,7 +185,7 @@ def _sealed(path: Path) -> str:
     return ""
 
 
-def _picture(path: Path, frame: av.VideoFrame) -> CodedPicture:
+def picture_of(path: Path, frame: av.VideoFrame) -> CodedPicture:
     """Take a decoded frame's planes and make R'G'B' codes of them."""
     if frame.interlaced_frame:
         raise PsvideoError(f"{path}: is interlaced; expected whole frames. Record progressive footage.")

@@ -1,0 +1,130 @@
+"""Frames of a stream as they come: pipes, network streams and video devices, by FFmpeg, in their own codes.
+
+A stream's time stamps say where its frames are in time. They are judged: a stamp that goes back, or leaps, is a stream
+that began again, and is put after what came before by the machine's clock.
+"""
+
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+
+import av
+
+from psvideo.clip.decode.movie import picture_of
+from psvideo.clip.linear import in_codes
+from psvideo.clip.reading import looks
+from psvideo.clip.record import CodedPicture, Frame
+from psvideo.errors import PsvideoError
+from psvideo.model.camera import Camera
+
+STANDARD_INPUT = "-"
+OPEN_S = 20.0
+"""A stream that has not begun after so long is not there."""
+LEAP_S = 5.0
+"""Stamps that leap by more are another stream's."""
+JUDGED = 48
+"""Frames by which a stream's rate is held against the plan's."""
+OFF = 0.02
+DEVICES = {"/dev/video": "v4l2"}
+
+
+@dataclass(kw_only=True)
+class Stamps:
+    """Turns time stamps in seconds into places in time; ``restarts`` counts streams that began again."""
+
+    rate_hz: float
+    restarts: int = 0
+    _zero_s: float = 0.0
+    _stamp_s: float | None = None
+    _place: int = -1
+    _came_s: float = 0.0
+
+    def place(self, stamp_s: float | None, came_s: float) -> int:
+        """Return a frame's place, later than that of the one before, from its stamp and when it came."""
+        if stamp_s is None:
+            self._place += 1
+        elif self._stamp_s is None or not -1e-9 < stamp_s - self._stamp_s < LEAP_S:
+            missed = 0 if self._stamp_s is None else max(round((came_s - self._came_s) * self.rate_hz) - 1, 0)
+            self.restarts += self._stamp_s is not None
+            self._place += 1 + missed
+            self._zero_s = stamp_s - self._place / self.rate_hz
+        else:
+            self._place = max(round((stamp_s - self._zero_s) * self.rate_hz), self._place + 1)
+        self._stamp_s, self._came_s = stamp_s, came_s
+        return self._place
+
+
+def read_stream(source: str, camera: Camera, *, raw: str | None = None) -> Iterator[Frame]:
+    """Give a stream's frames at their places in time: of a URL, a device, or standard input (``-``).
+
+    ``raw`` is FFmpeg's name of the pixel format of frames that come as bare bytes, such as gray or gray16le. Raises
+    PsvideoError where nothing comes, or what comes is not the camera's.
+    """
+    name = "standard input" if source == STANDARD_INPUT else source
+    stamps, steps = Stamps(rate_hz=float(camera.fps)), list[int]()
+    first: CodedPicture | None = None
+    before = 0
+    for stamp_s, picture in _decoded(source, name, camera, raw):
+        _check(name, picture, camera, first)
+        place = stamps.place(stamp_s, time.monotonic())
+        if first is not None and len(steps) < JUDGED:
+            steps.append(place - before)
+            _check_rate(name, steps, camera)
+        first, before = first or picture, place
+        yield Frame(index=place, number=place, coded=in_codes(picture, camera.encoding))
+    if first is None:
+        raise PsvideoError(f"{name}: ended before its first frame. Start what sends it, then psvideo live again.")
+
+
+def _decoded(source: str, name: str, camera: Camera, raw: str | None) -> Iterator[tuple[float | None, CodedPicture]]:
+    options = {"fflags": "nobuffer", "flags": "low_delay"}
+    kind = next((kind for begin, kind in DEVICES.items() if source.startswith(begin)), None)
+    if raw is not None:
+        kind = "rawvideo"
+        options = {
+            "video_size": f"{camera.width_px}x{camera.height_px}",
+            "pixel_format": raw,
+            "framerate": str(camera.fps),
+        }
+    file = sys.stdin.buffer if source == STANDARD_INPUT else source
+    try:
+        with av.open(file, format=kind, options=options, timeout=(OPEN_S, None)) as container:
+            if not container.streams.video:
+                raise PsvideoError(f"{name}: holds no video; expected the camera's frames.")
+            stream = container.streams.video[0]
+            for frame in container.decode(stream):
+                base_s = frame.time_base or stream.time_base
+                stamp_s = None if frame.pts is None or base_s is None else float(frame.pts * base_s)
+                yield stamp_s, picture_of(Path(name), frame)
+    except (av.FFmpegError, OSError, UnicodeDecodeError) as fault:
+        raise PsvideoError(
+            f"{name}: cannot be read ({fault}). Expected y4m or another stream that FFmpeg knows; say with `raw` which "
+            "pixels bare bytes hold, such as gray or gray16le, and check that the sender runs."
+        ) from fault
+
+
+def _check(name: str, picture: CodedPicture, camera: Camera, first: CodedPicture | None) -> None:
+    """Refuse frames of another size than planned, or of another kind than the first."""
+    head = picture.header
+    if (head.width_px, head.height_px) != (camera.width_px, camera.height_px):
+        raise PsvideoError(
+            f"{name}: sends {head.width_px} x {head.height_px} pixels, and the plan says {camera.width_px} x "
+            f"{camera.height_px}. Set the camera to the plan's size, or use the plan of this mode."
+        )
+    if first is not None and looks(head) != looks(first.header):
+        raise PsvideoError(
+            f"{name}: sends {looks(head)} all of a sudden, and began with {looks(first.header)}. Somebody changed the "
+            "camera's mode: start psvideo live again."
+        )
+
+
+def _check_rate(name: str, steps: list[int], camera: Camera) -> None:
+    usual = median(steps)
+    if len(steps) == JUDGED and usual > 1 + OFF:
+        raise PsvideoError(
+            f"{name}: its time stamps are {float(camera.fps / round(usual)):.6g} frames a second, and the plan says "
+            f"{float(camera.fps):.6g}. Correct fps in the plan, or set the camera to it."
+        )
