@@ -11,6 +11,7 @@ from live_clip import live_clip
 import psvideo as ps
 from psvideo.cli.app import main
 from psvideo.clip import read_frames
+from psvideo.export import code_files
 from psvideo.live import recording
 from psvideo.live.chain import LiveFrame
 from psvideo.live.recording import Recording
@@ -43,7 +44,7 @@ def test_normals_of_the_recording_are_those_of_the_clip(clip: Path, tmp_path: Pa
 def test_a_disk_that_fills_leaves_what_was_recorded_whole(
     clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    write, room = recording.write_codes, iter(range(60))
+    write, room = code_files.write_codes, iter(range(60))
 
     def full(path: Path, codes: np.ndarray) -> None:
         write(path, codes)

@@ -91,7 +91,7 @@ def _decoded(source: str, name: str, camera: Camera, raw: str | None) -> Iterato
         }
     file = sys.stdin.buffer if source == STANDARD_INPUT else source
     try:
-        with av.open(file, format=kind, options=options, timeout=(OPEN_S, None)) as container:
+        with av.open(file, mode="r", format=kind, options=options, timeout=(OPEN_S, None)) as container:
             if not container.streams.video:
                 raise PsvideoError(f"{name}: holds no video; expected the camera's frames.")
             stream = container.streams.video[0]
