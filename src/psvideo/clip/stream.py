@@ -32,7 +32,7 @@ DEVICES = {"/dev/video": "v4l2"}
 
 
 @dataclass(kw_only=True)
-class Stamps:
+class StreamPlaces:
     """Turns time stamps in seconds into places in time; ``restarts`` counts streams that began again."""
 
     rate_hz: float
@@ -64,7 +64,7 @@ def read_stream(source: str, camera: Camera, *, raw: str | None = None) -> Itera
     PsvideoError where nothing comes, or what comes is not the camera's.
     """
     name = "standard input" if source == STANDARD_INPUT else source
-    stamps, steps = Stamps(rate_hz=float(camera.fps)), list[int]()
+    stamps, steps = StreamPlaces(rate_hz=float(camera.fps)), list[int]()
     first: CodedPicture | None = None
     before = 0
     for stamp_s, picture in _decoded(source, name, camera, raw):
