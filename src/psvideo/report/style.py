@@ -40,6 +40,8 @@ svg path,svg line{fill:none;stroke-width:1.8}svg .area{fill:var(--c0);opacity:.7
     )
     + """
 details summary{cursor:pointer;color:var(--soft);margin:.8rem 0 .4rem}
+@media(max-width:600px){.lines tr{display:grid;grid-template-columns:auto 1fr;border-bottom:1px solid var(--rule)}
+.lines td,.lines th{border:0}.lines td:last-child{grid-column:1/-1;padding-top:0}}
 @media print{main{max-width:none}section{break-inside:avoid}}
 """
 )

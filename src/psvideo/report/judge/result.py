@@ -61,12 +61,14 @@ def validity(observed: Observed) -> Iterator[Judgement]:
     off_deg = _off_deg(observed) or 0.0
     grade: Grade = "bad" if max(shares) < HARDLY_VALID and not (enough and off_deg > COMMON_DEG) else "doubtful"
     if enough:
+        said = any(one.grade != "good" for one in accuracy(observed))
         yield Judgement(
             subject="validity",
             grade=grade,
             found=f"Three lights reach {100 * np.median(reached):.0f} % of the subject, and {found}: elsewhere its "
             "predicted error is too large.",
-            advice='Give more light, or use more lights; `aov=["error"]` says how far off each pixel may be.',
+            advice="Give more light, or use more lights"
+            + ("." if said else '; `aov=["error"]` says how far off each pixel may be.'),
         )
         return
     yield Judgement(
