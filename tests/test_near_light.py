@@ -172,10 +172,39 @@ def test_alternating_with_integrated_depth_takes_off_what_a_plane_cannot_know(
     assert error_deg(1) < 0.2 * with_plane
 
 
-def test_a_wall_behind_the_subject_is_found_by_how_light_falls_off() -> None:
-    def room(u: Array, v: Array) -> Array:
-        return np.where(np.abs(u - MIDDLE) < 0.25 * SIZE, relief(u, v), 1.5 * FAR_M + 0.3 * (v - MIDDLE) / SIZE)
+def room(u: Array, v: Array) -> Array:
+    """A relief before a wall that leans."""
+    return np.where(np.abs(u - MIDDLE) < 0.25 * SIZE, relief(u, v), 1.5 * FAR_M + 0.3 * (v - MIDDLE) / SIZE)
 
+
+def test_an_outline_is_drawn_by_the_light_of_single_pixels() -> None:
+    points, normals = surface(room)
+    rig = ring_rig(8, 2)
+    rng = np.random.default_rng(4)
+    plates = [plate + rng.normal(0, 0.0003, plate.shape).astype(np.float32) for plate in filmed(rig, points, normals)]
+    found = ps.solve_images(np.stack(plates), rig)
+    apart = np.degrees(np.linalg.norm(found.normals - normals, axis=-1))
+    from_edge = np.abs(np.abs(np.arange(SIZE) - MIDDLE) - 0.25 * SIZE)
+    beside = np.broadcast_to((from_edge > 1) & (from_edge < 0.12 * SIZE), (SIZE, SIZE))
+    assert np.mean(apart[beside] > 5) < 0.01, "a third, where distances are those of squares of pixels"
+
+
+@pytest.mark.parametrize("noise", [0.001, 0.003, 0.006])
+def test_what_is_far_and_dim_is_in_doubt_and_never_a_confident_wrong_answer(noise: float) -> None:
+    """At the most noise nothing says how far the wall is, and normals are off by nine degrees."""
+    points, normals = surface(room)
+    rig = ring_rig(8, 2)
+    rng = np.random.default_rng(5)
+    plates = [plate + rng.normal(0, noise, plate.shape).astype(np.float32) for plate in filmed(rig, points, normals)]
+    found = ps.solve_images(np.stack(plates), rig)
+    wall = np.broadcast_to(np.abs(np.arange(SIZE) - MIDDLE) > 0.32 * SIZE, (SIZE, SIZE))
+    apart = np.degrees(np.linalg.norm(found.normals - normals, axis=-1))
+    assert found.error_deg is not None
+    assert np.mean(apart[wall] < found.error_deg[wall]) > 0.68
+    assert np.mean(apart[found.valid] > 10) < 0.03
+
+
+def test_a_wall_behind_the_subject_is_found_by_how_light_falls_off() -> None:
     points, normals = surface(room)
     rig = ring_rig(8, 2)
     rng = np.random.default_rng(4)

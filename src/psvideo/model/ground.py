@@ -27,12 +27,15 @@ class Ground:
     depth_m: (row, col) float32, along the camera's axis, above 0 in every pixel.
     middle_m: (3,), the point of the surface in the picture's middle; lights without an axis shine there.
     focal_px, principal_px: focal lengths (x, y) and principal point (col, row).
+    unsure: the standard deviation of the depth's logarithm, on a grid of its own over the picture; None where the depth
+    is taken as given.
     """
 
     depth_m: NDArray[np.float32]
     middle_m: FloatArray
     focal_px: tuple[float, float]
     principal_px: tuple[float, float]
+    unsure: NDArray[np.float32] | None = None
 
     def with_depth(self, depth_m: NDArray[np.floating]) -> "Ground":
         """Return the ground with another depth where ``depth_m`` (row, col) is above 0; elsewhere it stays."""

@@ -8,20 +8,19 @@ the plane stays there.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.ground import Ground, every_ray, spread
-from psvideo.model.near_light import near_field
+from psvideo.model.ground import Ground, spread
 from psvideo.model.rig import Light
-from psvideo.plates.mixture import Mixture
+from psvideo.solve.falloff_costs import Plates, around, falloff_costs, light_at
 from psvideo.solve.near_surface import NearSurface
-from psvideo.solve.normals.plate_noise import LEAST, noise_of
-from psvideo.solve.normals.task import Samples
+from psvideo.solve.normals.plate_noise import noise_of
+from psvideo.solve.swept_outlines import FINE_POINTS, outlined, sides_of
 
 LEAST_LIGHTS = 5
 """With four there is one number over for the distance, and nothing to see a highlight by."""
@@ -31,8 +30,6 @@ RATIOS = np.geomspace(0.5, 2.5, 25)
 """Of the plane's distance, 7 % apart; between them a parabola is laid."""
 AROUND = 5
 """Costs are averaged over squares of so many points."""
-OWN_SHARE = 0.005
-"""What surfaces are off by from the model where nothing is wrong."""
 STAY = 0.05
 """The cost of standing off the plane by a factor e, squared; little beside what tells one distance from another."""
 LEAST_GAIN = 0.005
@@ -40,11 +37,12 @@ LEAST_GAIN = 0.005
 PLANE_HOLDS, LEAST_POINTS = 0.06, 25
 """A part of so many points that is found no farther than this share from the plane is on it: somebody measured it, and
 normals say more of the relief than distances do."""
+ON_PLANE, RELIEF = 0.8, 0.1
+"""What is thought of distances beforehand: so much of what is seen stands off the plane by so much, as a share."""
+SURE = 0.01
+"""Better than to this share no distance is known."""
 JUMP = 0.08
 """Between neighbours of a point, depth that differs by more than this share is another part's."""
-SATURATED = 0.98
-
-Plates = Sequence[Samples] | Sequence[Mixture]
 
 
 def swept(
@@ -56,36 +54,67 @@ def swept(
     """
     if near.shaping.known_m is not None or sum(light.position_m is not None for light in lights) < LEAST_LIGHTS:
         return near
-    found = _depth_m(near.ground, lights, plates, seen)
+    rows, cols = near.ground.depth_m.shape
+    fine = max(-(-max(rows, cols) // FINE_POINTS), 1)
+    each = max(-(-max(rows, cols) // (POINTS * fine)), 1)
+    light, dark = light_at(plates, fine, seen), noise_of(plates).dark
+    found = _distances(near.ground, lights, around(light, each), each * fine, noise=dark / each)
     if found is None:
         return near
-    depth_m, apart = found
+    if found.on_plane:
+        return replace(near, ground=replace(near.ground, unsure=found.unsure))
+    closer, farther = (_wide(side, each * fine, (rows, cols))[::fine, ::fine] for side in sides_of(found.depth_m))
+    drawn, torn = outlined(near.ground, lights, light, (closer, farther), step=fine, noise=dark)
+    unsure = np.maximum(cv2.resize(found.unsure, torn.shape[::-1], interpolation=cv2.INTER_LINEAR), torn)
+    ground = replace(near.ground, unsure=unsure)
+    depth_m = _wide(drawn, fine, (rows, cols))
+    apart = _wide(_jumps(drawn).view(np.uint8), fine, (rows, cols)) > 0
     shaping = replace(near.shaping, known_m=depth_m)
-    return replace(near, ground=near.ground.with_depth(depth_m), shaping=shaping, apart=apart)
+    return replace(near, ground=ground.with_depth(depth_m), shaping=shaping, apart=apart)
 
 
-def _depth_m(
-    ground: Ground, lights: Sequence[Light], plates: Plates, seen: NDArray[np.bool_] | None
-) -> tuple[NDArray[np.float32], NDArray[np.bool_]] | None:
-    """Return the depth (row, col), and where it jumps; None where all of the surface stands on the plane."""
-    rows, cols = ground.depth_m.shape
-    step = max(-(-max(rows, cols) // POINTS), 1)
-    light = np.stack([_thin(plate, step) for plate in plates], axis=-1).astype(np.float64)
-    light[light >= SATURATED] = -1
-    if seen is not None:
-        shown = seen[:, ::step, None] if seen.ndim == 2 else seen[:, ::step, ::step]
-        light[~np.broadcast_to(np.moveaxis(shown, 0, -1), light.shape)] = -1
+@dataclass(frozen=True, kw_only=True)
+class Distances:
+    """What the sweep found at points (row, col): ``depth_m``, ``unsure``, the standard deviation of its logarithm, and
+    whether all of the surface stands on the plane."""
+
+    depth_m: NDArray[np.float32]
+    unsure: NDArray[np.float32]
+    on_plane: bool
+
+
+def _distances(
+    ground: Ground, lights: Sequence[Light], light: NDArray[np.float64], step: int, *, noise: float
+) -> Distances | None:
+    """Return the distances of every ``step``-th row and column from their light (row, col, light); None where too few
+    lights reach anything."""
     plane_m = ground.depth_m[::step, ::step].astype(np.float64)
-    costs, reached = _costs(ground, lights, light, plane_m, step, noise=noise_of(plates).dark)
+    costs, reached = _costs(ground, lights, light, plane_m, step, noise=noise)
     if not reached.any():
         return None
     found = np.where(reached, plane_m * np.exp(_best(costs)), 0).astype(np.float32)
-    deep = cv2.medianBlur(spread(found), 3)
-    logs, beside = np.log(deep), np.ones((3, 3), np.uint8)
-    jumps = np.asarray(cv2.dilate(logs, beside) - cv2.erode(logs, beside)) > JUMP
-    if _on_plane(deep / plane_m, reached, jumps):
-        return None
-    return _wide(deep, step, (rows, cols)), _wide(jumps.view(np.uint8), step, (rows, cols)) > 0
+    deep = np.asarray(cv2.medianBlur(spread(found), 3), np.float32)
+    on_plane = _on_plane(deep / plane_m, reached, _jumps(deep))
+    return Distances(depth_m=deep, unsure=_unsure(costs, len(lights)), on_plane=on_plane)
+
+
+def _unsure(costs: NDArray[np.float64], lights: int) -> NDArray[np.float32]:
+    """Return the standard deviation of the logarithm of the distance, from how much worse others explain the light.
+
+    Before the light is looked at, most things are near the plane that somebody measured, and some are anywhere.
+    """
+    logs = np.log(RATIOS)[:, None, None]
+    before = ON_PLANE * np.exp(-0.5 * (logs / RELIEF) ** 2) + (1 - ON_PLANE) * RELIEF
+    likely = before * np.exp(-0.5 * lights * AROUND**2 * (costs - costs.min(axis=0)))
+    likely /= likely.sum(axis=0)
+    mean = (likely * logs).sum(axis=0)
+    return np.asarray(np.sqrt((likely * (logs - mean) ** 2).sum(axis=0) + SURE**2), np.float32)
+
+
+def _jumps(depth_m: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """Tell between which neighbours no surface runs."""
+    logs, beside = np.log(depth_m), np.ones((3, 3), np.uint8)
+    return np.asarray(cv2.dilate(logs, beside) - cv2.erode(logs, beside)) > JUMP
 
 
 def _on_plane(ratio: NDArray[np.float64], reached: NDArray[np.bool_], jumps: NDArray[np.bool_]) -> bool:
@@ -104,33 +133,14 @@ def _wide(points: NDArray[Any], step: int, shape: tuple[int, int]) -> NDArray[An
     return np.ascontiguousarray(padded[: shape[0], : shape[1]])
 
 
-def _thin(plate: Samples | Mixture, step: int) -> NDArray[np.float32]:
-    """Return every so many rows and columns of a plate, (row, col), its channels' mean."""
-    some = plate.thinned(step) if isinstance(plate, Mixture) else plate[::step, ::step]
-    some = np.asarray(some, np.float32)
-    return some if some.ndim == 2 else some.mean(axis=-1)
-
-
 def _costs(
     ground: Ground, lights: Sequence[Light], light: NDArray[np.float64], plane_m: NDArray[np.float64], step: int, *,
     noise: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:  # fmt: skip
     """Return how badly every distance explains the points' light, (ratio, row, col), averaged over neighbours, and
     which points enough lights reach."""
-    from psvideo.solve.sweeping_kernel import sweep_points
-
-    field = near_field(lights, ground)
-    x, y = every_ray(ground.focal_px, ground.principal_px, *ground.depth_m.shape)
-    rays = np.empty((*plane_m.shape, 3))
-    rays[..., 0], rays[..., 1], rays[..., 2] = x[:, ::step], y[::step], -1
-    strengths = [float(np.mean(light.by_channel)) for light in lights]
-    lamps = np.stack([np.array(strengths), field.anisotropy, field.is_near.astype(np.float64)], axis=-1)
-    costs = np.empty((len(RATIOS), plane_m.size))
-    dark = max(noise, LEAST)
-    sweep_points(
-        light.reshape(-1, len(lights)), rays.reshape(-1, 3), plane_m.ravel(), RATIOS, field.positions_m, field.axes,
-        lamps, dark, OWN_SHARE, costs,
-    )  # fmt: skip
+    every = np.ones(plane_m.shape, np.bool_)
+    costs = falloff_costs(ground, lights, light, plane_m, RATIOS, at=every, step=step, noise=noise)
     planes = costs.reshape(len(RATIOS), *plane_m.shape)
     reached = planes[0] > 0
     known = cv2.blur(reached.astype(np.float64), (AROUND, AROUND))

@@ -18,6 +18,7 @@ from psvideo.solve.normals.doubting import Doubting, Signs, ThinSurface, bits, d
 from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.moving_doubt import MovingDoubt, moved_deg, moving_doubt_deg
+from psvideo.solve.normals.near_spread import NearSpread, near_spread
 from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.task import LIGHTS, Floats, Mask, Samples, Spread
 
@@ -61,7 +62,8 @@ def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging =
     """
     from psvideo.compute.medians import weighted_median
 
-    spread = _Spread.of(surface, one.lit, noise, how)
+    near = near_spread(one.lit, _thin_shape(surface))
+    spread = _Spread.of(surface, one.lit, noise, how, near)
     points = spread.points(surface)
     turned_deg = moved_deg(points, one)
     doubt = doubt_deg(signs_of(points, one, surface, turned_deg), how=how.doubting)
@@ -76,10 +78,17 @@ def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging =
         beyond_deg = float(np.sqrt(max(typical**2 - by_noise**2, 0.0)))
         limit_deg = max(limit_deg, min(beyond_deg, how.most_typical_deg))
         misfit = None if misfit is None else replace(misfit, error_deg=beyond_deg)
-    if moving is not None:
-        doubt = np.hypot(doubt, moving)
+    for more in (moving, near.doubt_deg if near.doubt_deg.size else None):
+        doubt = doubt if more is None else np.hypot(doubt, more)
     error, trusted = spread.judged(surface, doubt, points.step, how, limit_deg=limit_deg, spare=one.spare)
     return replace(surface, valid=trusted, error_deg=error, misfit=misfit)
+
+
+def _thin_shape(surface: Surface) -> tuple[int, int]:
+    """Return the shape of the points at which a surface is judged."""
+    step = step_of(surface.valid.shape)
+    rows, cols = surface.valid.shape
+    return -(-rows // step), -(-cols // step)
 
 
 def looked_at(
@@ -87,7 +96,7 @@ def looked_at(
 ) -> tuple[ThinSurface, Signs]:
     """Return the points at which a surface is judged, and what speaks against their normals: what constants are fitted
     to."""
-    points = _Spread.of(surface, one.lit, noise, how).points(surface)
+    points = _Spread.of(surface, one.lit, noise, how, near_spread(one.lit, _thin_shape(surface))).points(surface)
     return points, signs_of(points, one, surface)
 
 
@@ -109,7 +118,7 @@ class _Spread:
     of_residual: float
 
     @classmethod
-    def of(cls, surface: Surface, lit: Illumination, noise: PlateNoise, how: Judging) -> "_Spread":
+    def of(cls, surface: Surface, lit: Illumination, noise: PlateNoise, how: Judging, near: NearSpread) -> "_Spread":
         strength, lights = lit.intensities.mean(axis=1), len(lit.intensities)
         matrix = lit.directions * strength[:, None]
         channels = 1 if surface.albedo.ndim == 2 else surface.albedo.shape[-1]
@@ -125,6 +134,8 @@ class _Spread:
                 inverse=np.linalg.inv(matrix.T @ matrix).astype(np.float32),
                 variances=np.array(variances, np.float32),
                 scale=np.float32(np.degrees(how.held)),
+                dim=near.dim,
+                wider=near.wider,
             ),
             of_noise=how.fit_noise * float(np.sqrt(of_noise)),
             of_residual=how.fit_noise / how.held * float(np.sqrt(of_residual)),

@@ -27,9 +27,10 @@ def judge_rows(
     fit: (row, col), the error in degrees that residuals predict, or residuals, or empty.
     factors: of the error that noise makes, what of ``fit`` is noise; how much of the rest counts; by what residuals
     become degrees where noise does, 0 where they are that already; and the error up to which a normal is trusted.
-    doubt: of every ``step``-th row and column, degrees to be added; or empty.
+    doubt: of every ``step``-th row and column, as of ``spread.dim`` and ``wider``, degrees to be added; or empty.
     """
     n, a, f, d, out, kept = lent(normals), lent(albedo), lent(fit), lent(doubt), lent(error), lent(trusted)
+    dim, wider = lent(spread.dim), lent(spread.wider)
     channels, cols = len(a), out.shape[1]
     share, scale = ONE / np.float32(channels), spread.scale * spread.scale
     v, inverse = spread.variances, spread.inverse  # numbers outside the loops, which then become vectors
@@ -38,18 +39,23 @@ def judge_rows(
     of_noise, counts, degrees_of, limit = factors[0] * factors[0], factors[1], factors[2], factors[3]
     trace, holds_fit = xx + yy + zz, f.size > 0
     beyond, sizes = np.zeros(cols, np.float32), np.zeros(cols, np.float32)
+    near = dim.size > 0
+    reaching, turning = np.ones(cols, np.float32), np.ones(cols, np.float32)
     for row in range(first, last):
         if d.size:
             _fill_between(d, row, step, beyond)
+        if near:
+            _fill_between(dim, row, step, reaching)
+            _fill_between(wider, row, step, turning)
         sizes[:] = ZERO
         for channel in range(channels):
             for col in range(cols):
                 sizes[col] += decoded(a[channel, row, col]) * share
         for col in range(cols):
             x, y, z = decoded(n[0, row, col]), decoded(n[1, row, col]), decoded(n[2, row, col])
-            size = max(sizes[col], TINY)
+            size = max(sizes[col] * reaching[col], TINY)
             along = x * x * xx + y * y * yy + z * z * zz + TWO * (x * y * xy + x * z * xz + y * z * yz)
-            wide = max(trace - along, ZERO) * scale
+            wide = max(trace - along, ZERO) * scale * turning[col]
             noise = (read + photon * size) / (size * size)
             more = beyond[col]
             if holds_fit:

@@ -122,11 +122,15 @@ class Spread(NamedTuple):
 
     inverse: (3, 3), of the lights' normal equations. scale: degrees that hold a share of errors, per radian.
     variances: of a dark sample, per unit of albedo, of its square; the last instead of that for what residuals say.
+    dim, wider: of near lights, at the points of a grid: irradiance over that in the middle, and by how much more noise
+        spreads there for the lights' directions; empty for distant lights.
     """
 
     inverse: Floats
     variances: Floats
     scale: np.float32
+    dim: Floats
+    wider: Floats
 
 
 class Work(NamedTuple):
