@@ -58,6 +58,8 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
             "is live timing as good as sync? every frame looked at, none waited for",
             "psvideo live clip/ --pace fastest --timing-out timing.json",
         ),
+        ("a camera's stream on the network", "psvideo live udp://127.0.0.1:5000 --plan plan.toml --rig rig.toml"),
+        ("a folder that a recorder is writing", "psvideo live frames/ --growing --plan plan.toml --rig rig.toml"),
     ),
     "check": (
         ("can this take be used, and if not, what is to change on set?", "psvideo check clip/"),

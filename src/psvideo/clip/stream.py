@@ -25,10 +25,15 @@ OPEN_S = 20.0
 """A stream that has not begun after so long is not there."""
 LEAP_S = 5.0
 """Stamps that leap by more are another stream's."""
-JUDGED = 48
+JUDGED = 24
 """Frames by which a stream's rate is held against the plan's."""
 OFF = 0.02
 DEVICES = {"/dev/video": "v4l2"}
+
+
+def is_device(source: str) -> bool:
+    """Tell whether a name is that of a video device, such as /dev/video0."""
+    return source.startswith(tuple(DEVICES))
 
 
 @dataclass(kw_only=True)
@@ -80,7 +85,7 @@ def read_stream(source: str, camera: Camera, *, raw: str | None = None) -> Itera
 
 
 def _decoded(source: str, name: str, camera: Camera, raw: str | None) -> Iterator[tuple[float | None, CodedPicture]]:
-    options = {"fflags": "nobuffer", "flags": "low_delay"}
+    options = {"flags": "low_delay"}
     kind = next((kind for begin, kind in DEVICES.items() if source.startswith(begin)), None)
     if raw is not None:
         kind = "rawvideo"

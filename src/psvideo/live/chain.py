@@ -28,8 +28,8 @@ from psvideo.solve.instants import surfaces
 from psvideo.solve.near_surface import near_surface_of
 from psvideo.solve.normals.solving import Solving
 
-Search = Callable[[Callable[[], "Lock | str"], Callable[["Lock | str"], None]], None]
-"""Runs a search, now or beside what else goes on, and hands what it gives to the second function."""
+Search = Callable[[Callable[[], None]], None]
+"""Runs a search: now, or beside what else goes on."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,9 +57,9 @@ class NewestRound:
     place: int
 
 
-def search_here(run: Callable[[], "Lock | str"], done: Callable[["Lock | str"], None]) -> None:
+def search_here(run: Callable[[], None]) -> None:
     """Search at once, while frames wait."""
-    done(run())
+    run()
 
 
 def _set() -> threading.Event:
@@ -73,7 +73,8 @@ class Chain:
     """What happens to every frame, and what is made of the newest. ``take`` and ``solve`` may run in two threads.
 
     ``lost_frames`` counts frames that never came, by the source's numbers or by the picture; ``gaps`` are those of the
-    numbers, by the last place before each. ``why`` says why no strobe was found the last time that one was looked for.
+    numbers, by the last place before each. ``why`` says why no strobe was found the last time that one
+    was looked for; ``fault`` is what went wrong in looking.
     """
 
     plan: Plan
@@ -85,6 +86,7 @@ class Chain:
     seen: int = 0
     lost_frames: int = 0
     why: str = ""
+    fault: Exception | None = None
     gaps: dict[int, int] = field(default_factory=dict)
     followed: list[Follower] = field(default_factory=list)
     follower: Follower | None = None
@@ -195,23 +197,21 @@ class Chain:
             values = np.stack([one[1] for one in fresh])
             doubts = _stacked([one[2] for one in fresh], values)
 
-        def run() -> Lock | str:
+        def run() -> None:
             try:
-                return lock(self.plan, index, values, doubt=doubts, first_light=self.first_light)
+                found: Lock | str = lock(self.plan, index, values, doubt=doubts, first_light=self.first_light)
             except NoStrobeError as fault:
-                return str(fault)
+                found = str(fault)
+            except Exception as fault:  # handed to whoever waits for the run
+                self.fault, found = fault, str(fault)
+            self._looked(found, index)
 
-        def done(found: Lock | str) -> None:
-            try:
-                self._looked(found, index)
-            finally:
-                self._idle.set()
-
-        self.search(run, done)
+        self.search(run)
 
     def _looked(self, found: "Lock | str", index: NDArray[np.int64]) -> None:
         """Begin to follow what was found, from the frames that it was found in up to the newest."""
         with self._guard:
+            self._idle.set()
             if isinstance(found, str):
                 self.why = found
                 self._wanted = (self._last or 0) + frames_to_lock(self.plan) // 2

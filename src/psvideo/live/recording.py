@@ -108,8 +108,8 @@ def recording(path: Path, source: LiveSource, *, force: bool) -> Iterator[Record
     """
     if source.plan_path is None:
         raise UsageError(
-            f"`record` {path}: {source.name} does not come as plain codes of 8 or 16 bits that the plan explains (a "
-            "movie, DNG, EXR or DPX), and is a recording already: copy it."
+            f"`record` {path}: {source.name} does not come as codes of 8 or 16 bits that the plan explains. Copy a "
+            "clip as it is, and record from a pipe whose bare bytes `raw` names, such as gray or gray16le."
         )
     with whole_folder(path, mark=PLAN, force=force) as folder:
         (folder / FRAMES).mkdir(exist_ok=True)

@@ -24,9 +24,9 @@ Shown = Callable[[NewestRound], None]
 Said = Callable[[LiveStatus], None]
 
 
-def search_beside(run: Callable[[], object], done: Callable[[object], None]) -> None:
+def search_beside(run: Callable[[], None]) -> None:
     """Search in a thread of its own, while frames are taken."""
-    threading.Thread(target=lambda: done(run()), name="psvideo search", daemon=True).start()
+    threading.Thread(target=run, name="psvideo search", daemon=True).start()
 
 
 @dataclass(kw_only=True)
@@ -64,8 +64,9 @@ class Running:
             self._beside(began_s)
         else:
             self._one_by_one(began_s)
-        if self._fault is not None:
-            raise self._fault
+        fault = self._fault or self.chain.fault
+        if fault is not None:
+            raise fault
         return self._summary(time.monotonic() - began_s)
 
     def _one_by_one(self, began_s: float) -> None:
@@ -79,7 +80,7 @@ class Running:
         self.said(self._status(time.monotonic() - began_s, 1.0, (0, 0)))
 
     def _beside(self, began_s: float) -> None:
-        self.chain.search = search_beside  # type: ignore[assignment]
+        self.chain.search = search_beside
         threads = [threading.Thread(target=self._guarded, args=(run,), daemon=True) for run in (self._read, self._make)]
         for thread in threads:
             thread.start()
@@ -118,6 +119,8 @@ class Running:
         if self.recording is not None:
             self.recording.take(frame)
         self.chain.take(frame)
+        if self.chain.fault is not None:
+            self.stop()
         if self.first_lock_s is None and self.chain.follower is not None:
             self.first_lock_s = self.chain.seen * self.chain.plan.camera.frame_period_s
 

@@ -21,7 +21,7 @@ class LiveSource:
 
     ``first_number`` is what the first frame's file is called by, where there is one. ``cfa`` is the filter pattern of a
     mosaic. ``plan_path`` is the plan's file where the frames are plain codes that it explains. ``paced``: frames come
-    when they are due, and not as soon as somebody wants them.
+    when they are due, and not as soon as somebody wants them. ``warnings`` say what is odd about it.
     """
 
     name: str
@@ -31,6 +31,7 @@ class LiveSource:
     first_number: int = 0
     plan_path: Path | None = None
     paced: bool = True
+    warnings: tuple[str, ...] = ()
 
 
 def played_clip(clip: Clip, *, pace: Pace = "own") -> LiveSource:
@@ -61,4 +62,5 @@ def played_clip(clip: Clip, *, pace: Pace = "own") -> LiveSource:
         first_number=clip.numbers[0],
         plan_path=clip.plan_path if clip.kind in PLAIN and clip.header.bits in (8, 16) else None,
         paced=pace == "own",
+        warnings=clip.warnings,
     )

@@ -5,7 +5,6 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 
-from psvideo.clip import open_clip
 from psvideo.errors import NoStrobeError
 from psvideo.formats.paths import path_if_given, path_of
 from psvideo.formats.rig_toml import read_rig
@@ -20,7 +19,8 @@ from psvideo.live.quality import first_quality
 from psvideo.live.recording import recording
 from psvideo.live.running import Running
 from psvideo.live.smaller import smaller_plan
-from psvideo.live.source import LiveSource, played_clip
+from psvideo.live.source import LiveSource
+from psvideo.live.sources import opened_source
 from psvideo.live.status import LiveStatus, LiveSummary
 from psvideo.live.watching import Watching, told
 from psvideo.model.choices import Pace
@@ -30,7 +30,7 @@ from psvideo.model.rig import Rig
 from psvideo.model.timing import DroppedFrames, Timing, timed_camera
 from psvideo.page.serving import ADDRESS
 from psvideo.plates.sequence import check_separable
-from psvideo.runs.caller import PYTHON, Caller, say_of_clip
+from psvideo.runs.caller import PYTHON, Caller
 
 
 def live(
@@ -40,6 +40,8 @@ def live(
     rig: Path | str | None = None,
     first_light: str | None = None,
     timing_out: Path | str | None = None,
+    growing: bool = False,
+    raw: str | None = None,
     record: Path | str | None = None,
     pace: Pace = "own",
     seconds: float | None = None,
@@ -55,7 +57,10 @@ def live(
 ) -> LiveSummary:
     """Follow a source's strobe while its frames come, and show the newest result.
 
-    - ``source``: a finished clip, which is played. ``plan`` names the plan where it does not lie beside it.
+    - ``source``: a finished clip, which is played; a URL (udp, rtsp, srt, …), a video device, or "-" for standard
+      input. ``plan`` names the plan where it does not lie beside it.
+    - ``growing``: the source is a folder that a recorder is writing. ``raw``: FFmpeg's name of the pixels that bare
+      bytes hold, such as gray or gray16le.
     - ``rig``: where the lights are; without it there are plates and no normals.
     - ``timing_out``: a timing.json to write at the end, of all that was followed; ``force`` replaces one.
     - ``record``: a clip folder to record the frames into, whole or not at all.
@@ -72,9 +77,9 @@ def live(
     PsvideoError
         Where the source cannot be read or does not fit the plan, or no strobe was found in it.
     """
-    clip = open_clip(path_of("source", source), plan=path_if_given("plan", plan))
-    say_of_clip(clip, caller)
-    played = played_clip(clip, pace=pace)
+    played = opened_source(str(source), plan=path_if_given("plan", plan), pace=pace, growing=growing, raw=raw)
+    for warning in played.warnings:
+        caller.warn(warning)
     check_followed(played.plan)
     check_separable(played.plan)
     known = None if rig is None else read_rig(path_of("rig", rig), plan_lights=played.plan.lights)

@@ -18,7 +18,11 @@ if TYPE_CHECKING:
 
 def live(
     source: Annotated[
-        str, typer.Argument(help="What to watch: a finished clip, which is played at its own pace.", show_default=False)
+        str,
+        typer.Argument(
+            help="What to watch: a clip, played at its own pace; a URL (udp, rtsp, srt); a video device; - for a pipe.",
+            show_default=False,
+        ),
     ],
     plan: PlanPath = None,
     rig: Annotated[
@@ -27,6 +31,13 @@ def live(
     first_light: FirstLight = None,
     timing_out: Annotated[
         Path | None, typer.Option("--timing-out", help="Where to write timing.json of all that was followed.")
+    ] = None,
+    growing: Annotated[
+        bool, typer.Option("--growing", help="The source is a folder that a recorder is still writing.")
+    ] = False,
+    raw: Annotated[
+        str | None,
+        typer.Option("--raw", help="What bare bytes hold, as FFmpeg calls it: gray, gray16le, rgb24 and others."),
     ] = None,
     record: Annotated[
         Path | None, typer.Option("--record", help="A clip folder to record the frames into, whole or not at all.")
@@ -62,6 +73,8 @@ def live(
         rig=rig,
         first_light=first_light,
         timing_out=timing_out,
+        growing=growing,
+        raw=raw,
         record=record,
         pace=pace,
         seconds=seconds,

@@ -1,0 +1,80 @@
+"""A folder that a recorder is still writing: its frames in the order of their numbers, as soon as each is whole."""
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from psvideo.clip.decode.decoders import opened
+from psvideo.clip.folder import KINDS, number_of
+from psvideo.clip.linear import in_codes
+from psvideo.clip.reading import looks
+from psvideo.clip.record import CodedPicture, Frame, PictureInFile
+from psvideo.errors import PsvideoError
+from psvideo.formats.plan_toml import FRAMES
+from psvideo.model.camera import Camera
+
+LOOK_S = 0.004
+"""Between two looks into the folder."""
+WHOLE_S = 2.0
+"""A file that cannot be decoded for so long is damaged, and not merely still being written."""
+QUIET_S = 10.0
+"""After so long without a new frame the recorder has ended."""
+
+
+def read_growing(folder: Path, camera: Camera, *, quiet_s: float = QUIET_S) -> Iterator[Frame]:
+    """Give the frames that appear in a folder or its ``frames/``, until none has for ``quiet_s``.
+
+    Numbers that are left out count as dropped frames. Raises PsvideoError where the folder is not there, where frames
+    are not the camera's, and where a file stays unreadable.
+    """
+    if not folder.is_dir():
+        raise PsvideoError(f"{folder}: there is no such folder. Name the one that the recorder writes into.")
+    done, first, look = -1, None, ""
+    heard_s = time.monotonic()
+    while time.monotonic() - heard_s < quiet_s:
+        new = _new_files(folder, done)
+        for number, file in new:
+            picture = _whole(file)
+            head = picture.header
+            if (head.width_px, head.height_px) != (camera.width_px, camera.height_px) or look not in ("", looks(head)):
+                expected = look or f"{camera.width_px} x {camera.height_px} pixels"
+                raise PsvideoError(
+                    f"{file}: is {looks(head)}; expected {expected}, as the plan and the frames before say. Use the "
+                    "plan of this mode, and an empty folder for each take."
+                )
+            first, look, done = number if first is None else first, looks(head), number
+            yield Frame(index=number - first, number=number, coded=in_codes(picture, camera.encoding))
+        if new:
+            heard_s = time.monotonic()
+        else:
+            time.sleep(LOOK_S)
+    if first is None:
+        raise PsvideoError(
+            f"{folder}: no frame appeared in {quiet_s:g} s; expected numbered images ({', '.join(sorted(KINDS)[:6])}, "
+            "…). Start the recorder, then psvideo live again."
+        )
+
+
+def _new_files(folder: Path, after: int) -> list[tuple[int, Path]]:
+    """Return the numbered images beyond a number, in order; hidden files are not yet whole."""
+    places = (folder / FRAMES, folder) if (folder / FRAMES).is_dir() else (folder,)
+    found = [
+        (number, file)
+        for place in places
+        for file in place.iterdir()
+        if file.suffix.lower() in KINDS and not file.name.startswith(".")
+        if (number := number_of(file)) is not None and number > after
+    ]
+    return sorted(found)
+
+
+def _whole(file: Path) -> CodedPicture | PictureInFile:
+    """Decode a file, again and again while it is being written."""
+    began_s = time.monotonic()
+    while True:
+        try:
+            return opened(KINDS[file.suffix.lower()], file)
+        except PsvideoError:
+            if time.monotonic() - began_s > WHOLE_S:
+                raise
+            time.sleep(LOOK_S)

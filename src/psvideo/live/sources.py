@@ -1,0 +1,54 @@
+"""What a user names as a source, opened: a finished clip, a folder that grows, a pipe, a stream, a device."""
+
+import time
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+
+from psvideo.clip import Frame, open_clip
+from psvideo.clip.growing import read_growing
+from psvideo.clip.stream import STANDARD_INPUT, is_device, read_stream
+from psvideo.errors import UsageError
+from psvideo.formats.plan_toml import read_plan
+from psvideo.live.chain import LiveFrame
+from psvideo.live.source import LiveSource, played_clip
+from psvideo.model.choices import Pace
+from psvideo.model.plan import Plan
+
+PLAIN = ("gray", "rgb", "gbr")
+"""Pixels, as FFmpeg calls them, that are codes as the plan explains them."""
+SCHEMES = ("udp://", "rtsp://", "rtsps://", "srt://", "rtp://", "tcp://", "rtmp://", "http://", "https://")
+
+
+def opened_source(
+    source: str, *, plan: Path | None, pace: Pace = "own", growing: bool = False, raw: str | None = None
+) -> LiveSource:
+    """Return a source by what a user calls it: ``-``, a URL, a video device, a clip, or with ``growing`` a folder.
+
+    Raises UsageError where what is needed for it was not given.
+    """
+    if growing:
+        return _live(source, plan, lambda camera_plan: read_growing(Path(source), camera_plan.camera))
+    if source == STANDARD_INPUT or is_device(source) or source.lower().startswith(SCHEMES):
+        return _live(source, plan, lambda camera_plan: read_stream(source, camera_plan.camera, raw=raw), raw)
+    if raw is not None:
+        raise UsageError("`raw` says what bare bytes from standard input or the network hold; a clip's files say it.")
+    return played_clip(open_clip(Path(source), plan=plan), pace=pace)
+
+
+def _live(
+    source: str, plan: Path | None, read: Callable[[Plan], Iterable[Frame]], raw: str | None = None
+) -> LiveSource:
+    if plan is None:
+        raise UsageError(
+            f"{source}: nothing lies beside frames that come as they are taken, so the plan must be named: `plan`."
+        )
+    planned = read_plan(plan)
+
+    def frames() -> Iterator[LiveFrame]:
+        for frame in read(planned):
+            yield LiveFrame(index=frame.index, coded=frame.coded, came_s=time.monotonic())
+
+    name = "standard input" if source == STANDARD_INPUT else source
+    encoding = planned.camera.encoding
+    explained = plan if raw is not None and raw.startswith(PLAIN) else None
+    return LiveSource(name=name, plan=planned, frames=frames, cfa=encoding.cfa, first_number=1, plan_path=explained)

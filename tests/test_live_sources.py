@@ -1,0 +1,173 @@
+"""Where live frames come from: a pipe, the network, a folder that grows; and what goes wrong with each."""
+
+import io
+import json
+import shutil
+import socket
+import threading
+import time
+from fractions import Fraction
+from pathlib import Path
+from types import SimpleNamespace
+
+import av
+import numpy as np
+import pytest
+from live_clip import live_clip
+
+import psvideo as ps
+from psvideo.cli.app import main
+from psvideo.clip import read_frames
+from psvideo.clip.growing import read_growing
+from psvideo.clip.stream import StreamPlaces, read_stream
+
+Pictures = list[np.ndarray]
+
+
+@pytest.fixture(scope="module")
+def clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return live_clip(tmp_path_factory.mktemp("live"))
+
+
+@pytest.fixture(scope="module")
+def pictures(clip: Path) -> Pictures:
+    frames = read_frames(ps.open_take(clip).clip)
+    return [np.asarray(frame.coded.codes) for frame in frames]
+
+
+def grey(pictures: Pictures) -> Pictures:
+    return [one if one.ndim == 2 else one[..., 1] for one in pictures]
+
+
+def piped(monkeypatch: pytest.MonkeyPatch, data: bytes) -> None:
+    monkeypatch.setattr("sys.stdin", SimpleNamespace(buffer=io.BytesIO(data)))
+
+
+def y4m(pictures: Pictures, *, rate: int = 100) -> bytes:
+    rows, cols = pictures[0].shape
+    head = f"YUV4MPEG2 W{cols} H{rows} F{rate}:1 Ip A1:1 Cmono16\n".encode()
+    return head + b"".join(b"FRAME\n" + one.tobytes() for one in pictures)
+
+
+def test_a_pipe_of_y4m_is_followed(
+    clip: Path, pictures: Pictures, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    piped(monkeypatch, y4m(grey(pictures)))
+    plan = str(clip / "plan.toml")
+    assert main(["live", "-", "--plan", plan, "--rig", str(clip / "rig.toml"), "--no-page", "--json"]) == 0
+    summary = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert (summary["frames"], summary["lost"], summary["locks"]) == (len(pictures), 0, 1)
+    assert abs(summary["clock_offset_ppm"] - 40) < 2
+    assert summary["results"] >= 1
+
+
+def test_bare_bytes_are_recorded_as_they_came(
+    clip: Path, pictures: Pictures, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sent = grey(pictures)
+    piped(monkeypatch, b"".join(one.tobytes() for one in sent))
+    words = ["live", "-", "--raw", "gray16le", "--plan", str(clip / "plan.toml"), "--no-page", "-q"]
+    assert main([*words, "--record", str(tmp_path / "rec")]) == 0
+    kept = [np.asarray(frame.coded.codes) for frame in read_frames(ps.open_take(tmp_path / "rec").clip)]
+    assert len(kept) == len(sent)
+    assert all(np.array_equal(one, other) for one, other in zip(kept, sent, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (b"", "cannot be read"),
+        (b"not a movie" * 100, "cannot be read"),
+        ("small", "sends 48 x 36 pixels, and the plan says 96 x 72"),
+        ("slow", "its time stamps are 50 frames a second, and the plan says 100"),
+    ],
+)
+def test_what_is_wrong_with_a_pipe_is_one_paragraph(
+    clip: Path,
+    pictures: Pictures,
+    data: bytes | str,
+    words: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    if data == "small":
+        data = y4m([one[::2, ::2] for one in grey(pictures)[:3]])
+    elif data == "slow":
+        data = y4m(grey(pictures), rate=50)
+    piped(monkeypatch, data)  # type: ignore[arg-type]
+    assert main(["live", "-", "--plan", str(clip / "plan.toml"), "--no-page"]) == 1
+    said = capsys.readouterr().err
+    assert words in said
+    assert "Traceback" not in said
+
+
+def test_frames_as_they_are_taken_need_a_plan_by_name(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["live", "-", "--no-page"]) == 2
+    assert "--plan" in capsys.readouterr().err
+
+
+def test_stamps_say_where_frames_are_and_a_restart_is_seen() -> None:
+    places = StreamPlaces(rate_hz=100)
+    stamps = [5.0, 5.01, 5.02, 5.05, 5.06, 0.0, 0.01, 90.0]
+    came = [0.0, 0.01, 0.02, 0.05, 0.06, 0.30, 0.31, 0.32]
+    assert [places.place(stamp, at) for stamp, at in zip(stamps, came, strict=True)] == [0, 1, 2, 5, 6, 30, 31, 32]
+    assert places.restarts == 2
+
+
+def test_a_stream_over_the_network_arrives_frame_by_frame(clip: Path, pictures: Pictures) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    over = threading.Event()
+
+    def send() -> None:
+        with av.open(f"udp://127.0.0.1:{port}?pkt_size=1316", "w", format="mpegts") as out:
+            stream = out.add_stream("mpeg2video", rate=Fraction(50))
+            stream.width, stream.height, stream.pix_fmt = 96, 72, "yuv420p"
+            stream.bit_rate, stream.gop_size = 8_000_000, 1
+            for number in range(500):
+                picture = (grey(pictures)[number % 100] >> 8).astype(np.uint8)
+                frame = av.VideoFrame.from_ndarray(picture, format="gray").reformat(format="yuv420p")
+                frame.pts = number
+                out.mux(stream.encode(frame))
+                if over.wait(0.01):
+                    return
+
+    sender = threading.Thread(target=send, daemon=True)
+    camera = ps.read_plan(clip / "plan.toml").camera
+    camera = type(camera)(**{**vars(camera), "fps": Fraction(50)})
+    sender.start()
+    places = []
+    for frame in read_stream(f"udp://127.0.0.1:{port}?timeout=8000000", camera):
+        places.append(frame.index)
+        if len(places) == 40:
+            break
+    over.set()
+    sender.join()
+    assert places == list(range(40))
+
+
+def test_a_folder_is_read_while_it_is_written(clip: Path, tmp_path: Path) -> None:
+    names = sorted(path.name for path in (clip / "frames").iterdir())[:12]
+    folder = tmp_path / "frames"
+    folder.mkdir()
+
+    def write() -> None:
+        for place, name in enumerate(names):
+            if place == 5:
+                continue  # a frame that the recorder dropped
+            whole = (clip / "frames" / name).read_bytes()
+            (folder / name).write_bytes(whole[: len(whole) // 2])
+            time.sleep(0.01)
+            shutil.copyfile(clip / "frames" / name, folder / name)
+
+    writer = threading.Thread(target=write)
+    writer.start()
+    take = ps.open_take(clip)
+    found = list(read_growing(tmp_path, take.plan.camera, quiet_s=0.4))
+    writer.join()
+    assert [frame.index for frame in found] == [0, 1, 2, 3, 4, 6, 7, 8, 9, 10, 11]
+    known = {frame.index: frame.image for frame in read_frames(take.clip, take.numbers[:12])}
+    assert all(np.array_equal(frame.image, known[frame.index]) for frame in found)
+    with pytest.raises(ps.PsvideoError, match="no frame appeared"):
+        list(read_growing(clip / "truth", take.plan.camera, quiet_s=0.02))
