@@ -18,7 +18,7 @@ from live_clip import live_clip
 import psvideo as ps
 from psvideo.cli.app import main
 from psvideo.clip import read_frames
-from psvideo.clip.growing import read_growing
+from psvideo.clip.growing_folder import read_growing
 from psvideo.clip.stream import StreamPlaces, read_stream
 
 Pictures = list[np.ndarray]

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from psvideo.clip import Frame, open_clip
-from psvideo.clip.growing import read_growing
+from psvideo.clip.growing_folder import read_growing
 from psvideo.clip.stream import STANDARD_INPUT, is_device, read_stream
 from psvideo.errors import UsageError
 from psvideo.formats.plan_toml import read_plan
