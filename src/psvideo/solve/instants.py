@@ -87,6 +87,7 @@ def surfaces(
         shown = None if seen.all() else seen
 
         unsure = _unsure(one, shares)
+        moves = None if one.motion is None else one.motion.moves
 
         here = None if near is None else swept(near.at(one.number), scaled, plates, seen=shown)
         lit = light(ground=None if here is None else here.ground)
@@ -94,7 +95,7 @@ def surfaces(
         def solve(found: Illumination) -> Surface:
             nonlocal lit
             lit = found
-            return solving.solve(plates, found, seen=shown, mask=mask, unsure=unsure)
+            return solving.solve(plates, found, seen=shown, mask=mask, unsure=unsure, moves=moves)
 
         surface = solve(lit) if here is None else solve_near(here, lambda ground: light(ground=ground), solve)
         if one.doubtful is not None:

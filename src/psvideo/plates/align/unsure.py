@@ -4,12 +4,12 @@ What both plates show alike along the motion is sure. Where they differ, shading
 is not the true one; the plate at the instant then lies somewhere between them, the nearer in time to one the likelier.
 """
 
-import cv2
 import numpy as np
 
 from psvideo.plates.align.brightness import ROOT_TOE, SCALE
 from psvideo.plates.align.flow import Codes, Vectors, noise_between
 from psvideo.plates.align.moving import Followed, Pair, window_of
+from psvideo.plates.align.own_means import own_mean
 
 WINDOW_PX = 5
 """Plates are compared over so many pixels of their sketches."""
@@ -25,9 +25,9 @@ def unsure_of(pair: Pair, before: Codes, after: Codes, motion: Followed) -> Vect
     one, other = before.astype(np.float32), after.astype(np.float32)
     windows = (window_of(WINDOW_PX, motion.step),) * 2
     noise = np.float32(NOISE_FACTOR * noise_between(pair.before, pair.after) ** 2)
-    square = cv2.blur((other - one) ** 2, windows) - noise
+    square = own_mean((other - one) ** 2, windows, motion.moves) - noise
     since_s, until_s = motion.time_s - pair.before.time_s, pair.after.time_s - motion.time_s
     share = min(abs(since_s), abs(until_s)) / (since_s + until_s)
-    per_code = cv2.blur(one + other, windows) / np.float32(SCALE) + np.float32(2 * ROOT_TOE)
+    per_code = own_mean(one + other, windows, motion.moves) / np.float32(SCALE) + np.float32(2 * ROOT_TOE)
     per_code *= np.float32(share * pair.before.white / SCALE)
     return np.asarray(np.sqrt(np.maximum(square, 0)) * per_code, np.float32)

@@ -14,7 +14,8 @@ from psvideo.solve.normals.task import Floats, Mask, Samples, Task, Usable, Work
 class Evidence:
     """Plates, lights, and which samples to look at; ``spare``, a folder in whose files large pictures are worked on.
 
-    ``unsure`` (light, row, col), on a grid of its own over the picture, is by how much plates may be off for motion.
+    ``unsure`` (light, row, col), on a grid of its own over the picture, is by how much plates may be off for motion;
+    ``moves`` (row, col), on that grid, where something was followed.
     """
 
     plates: Sequence[Samples] | Sequence[Mixture]
@@ -23,6 +24,7 @@ class Evidence:
     seen: Mask | None = None
     mask: Mask | None = None
     unsure: Floats | None = None
+    moves: Mask | None = None
     black_level: float = 0.0
     scale: float = 1.0
     spare: Path | None = None

@@ -7,7 +7,8 @@ import numpy as np
 
 from psvideo.solve.normals.doubting import ThinSurface
 from psvideo.solve.normals.evidence import Evidence
-from psvideo.solve.normals.task import Floats
+from psvideo.plates.align.own_means import own_mean
+from psvideo.solve.normals.task import Floats, Mask
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,8 +49,17 @@ def moved_deg(points: ThinSurface, one: Evidence) -> Floats | None:
     return np.asarray(np.degrees(np.sqrt(turned) / np.maximum(size, np.float32(1e-6))) * points.known, np.float32)
 
 
-def moving_doubt_deg(turned_deg: Floats, known: Floats, *, how: MovingDoubt = MovingDoubt()) -> Floats:
-    """Return by how many degrees normals may be off for motion, (row, col) of the points."""
-    size = (how.around_px, how.around_px)
-    around = cv2.blur(np.minimum(turned_deg, 60), size) / np.maximum(cv2.blur(known, size), np.float32(1e-6))
+def moving_doubt_deg(
+    turned_deg: Floats, known: Floats, moves: Mask | None = None, *, how: MovingDoubt = MovingDoubt()
+) -> Floats:
+    """Return by how many degrees normals may be off for motion, (row, col) of the points.
+
+    What moves and what stands still, on a grid of its own, ``moves``, do not speak for each other.
+    """
+    size, own = (how.around_px, how.around_px), np.zeros(known.shape, np.bool_)
+    if moves is not None:
+        grown = cv2.resize(moves.astype(np.uint8), known.shape[::-1], interpolation=cv2.INTER_NEAREST)
+        own = grown > 0
+    turned = own_mean(np.minimum(turned_deg, np.float32(60)), size, own)
+    around = turned / np.maximum(own_mean(known, size, own), np.float32(1e-6))
     return np.asarray(np.float32(how.own) * turned_deg + around * around / np.float32(how.around_deg), np.float32)

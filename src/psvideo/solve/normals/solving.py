@@ -57,12 +57,13 @@ class Solving:
         seen: Mask | None = None,
         mask: Mask | None = None,
         unsure: Floats | None = None,
+        moves: Mask | None = None,
     ) -> Surface:
         """Return the surface that explains one plate per light; see the solvers for the arguments, and ``Evidence`` for
-        what is unsure of the plates."""
+        what is unsure of the plates and ``moves``."""
         from psvideo.solve.filling.filled import filled
 
-        solved, one, noise = self.measured(plates, lit, seen=seen, mask=mask, unsure=unsure)
+        solved, one, noise = self.measured(plates, lit, seen=seen, mask=mask, unsure=unsure, moves=moves)
         known = judged(solved, one, noise)
         known = replace(
             known,
@@ -81,12 +82,15 @@ class Solving:
         seen: Mask | None = None,
         mask: Mask | None = None,
         unsure: Floats | None = None,
+        moves: Mask | None = None,
     ) -> tuple[Surface, Evidence, PlateNoise]:
         """Return every pixel that three measurements solve, well or not, and what it is judged by."""
         noise = noise_of(plates)
         usable = _usable(noise, lit.intensities.shape[1], self.method(len(plates)))
         solved = self._solved(plates, lit, usable, noise, seen, mask)
-        one = Evidence(plates=plates, lit=lit, usable=usable, seen=seen, mask=mask, unsure=unsure, spare=self.spare)
+        one = Evidence(
+            plates=plates, lit=lit, usable=usable, seen=seen, mask=mask, unsure=unsure, moves=moves, spare=self.spare
+        )
         return solved, one, noise
 
     def _solved(
