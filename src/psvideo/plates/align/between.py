@@ -33,8 +33,11 @@ DARK = 0.003
 """Light that is no shadow's edge, as a share of a sketch's white: noise makes as much."""
 SHADED = 0.25
 """... nor do those of which one is darker, as a whole, than this share of the other: a shadow passed."""
-BLENDED = 0.25
-"""Plates that are alike in detail differ by shading, which turns evenly: their blend is off by so much less."""
+TURNED = 20.0
+"""What turns is shaded in its detail too, which differs by no more codes: both plates show it all the same."""
+BLENDED, BLENDED_UNLIKE = 0.25, 0.8
+"""Plates that are alike in detail differ by shading, which turns evenly: their blend is off by so much less than the
+nearer one would be, and where detail differs as well, by a little less."""
 REST = 3.0
 """What stands still while its shading changes by more codes is blended by time."""
 ENOUGH = 4
@@ -74,7 +77,8 @@ def taken_of(pair: Pair, motion: Followed) -> Taken:
     alike = unlike < np.where(np.abs(shading) < EVENLY, np.float32(UNLIKE**2), np.float32(BARE**2))
     alike &= ~_shaded(before, after, wide)
     nearer = BEFORE if spans_s[0] <= spans_s[1] else AFTER
-    source = np.where(motion.moves, np.where(alike, BOTH, nearer), AT_REST).astype(np.uint8)
+    turns = alike | (unlike < np.float32(TURNED**2))
+    source = np.where(motion.moves, np.where(turns, BOTH, nearer), AT_REST).astype(np.uint8)
     source[~motion.moves & alike & (np.abs(shading) > REST)] = BOTH
     gone = [_outside(way) for way in ways]
     for hidden, span_s in zip(gone, (spans_s[0], -spans_s[1]), strict=True):
@@ -83,7 +87,7 @@ def taken_of(pair: Pair, motion: Followed) -> Taken:
     source[gone[1] & ~gone[0]] = BEFORE
     hidden = gone[0] != gone[1]
     unsure = unsure_of(pair, before, after, motion) * ~hidden
-    unsure[source == BOTH] *= np.float32(BLENDED)
+    unsure[source == BOTH] *= np.where(alike[source == BOTH], np.float32(BLENDED), np.float32(BLENDED_UNLIKE))
     return Taken(alike=alike, sure=alike | hidden, source=source, unsure=unsure)
 
 
