@@ -33,11 +33,11 @@ DARK = 0.003
 """Light that is no shadow's edge, as a share of a sketch's white: noise makes as much."""
 SHADED = 0.25
 """... nor do those of which one is darker, as a whole, than this share of the other: a shadow passed."""
-TURNED = 20.0
+TURNED = 40.0
 """What turns is shaded in its detail too, which differs by no more codes: both plates show it all the same."""
-BLENDED, BLENDED_UNLIKE = 0.25, 0.8
-"""Plates that are alike in detail differ by shading, which turns evenly: their blend is off by so much less than the
-nearer one would be, and where detail differs as well, by a little less."""
+BLENDED, BLENDED_UNLIKE = np.float32(0.25), np.float32(0.8)
+"""Shading turns evenly: by what it differs between two plates, their blend is off so much less than the nearer one
+would be; by what their detail differs, or by a shadow, only a little less."""
 REST = 3.0
 """What stands still while its shading changes by more codes is blended by time."""
 ENOUGH = 4
@@ -75,7 +75,8 @@ def taken_of(pair: Pair, motion: Followed) -> Taken:
     shading = cv2.blur(apart, wide)
     unlike = cv2.blur((apart - shading) ** 2, narrow)
     alike = unlike < np.where(np.abs(shading) < EVENLY, np.float32(UNLIKE**2), np.float32(BARE**2))
-    alike &= ~_shaded(before, after, wide)
+    shaded = _shaded(before, after, wide)
+    alike &= ~shaded
     nearer = BEFORE if spans_s[0] <= spans_s[1] else AFTER
     turns = alike | (unlike < np.float32(TURNED**2))
     source = np.where(motion.moves, np.where(turns, BOTH, nearer), AT_REST).astype(np.uint8)
@@ -87,8 +88,17 @@ def taken_of(pair: Pair, motion: Followed) -> Taken:
     source[gone[1] & ~gone[0]] = BEFORE
     hidden = gone[0] != gone[1]
     unsure = unsure_of(pair, before, after, motion) * ~hidden
-    unsure[source == BOTH] *= np.where(alike[source == BOTH], np.float32(BLENDED), np.float32(BLENDED_UNLIKE))
+    unsure *= np.where(source == BOTH, _off_of_blend(alike, shading, unlike, shaded), 1)
     return Taken(alike=alike, sure=alike | hidden, source=source, unsure=unsure)
+
+
+def _off_of_blend(alike: Flags, shading: Vectors, unlike: Vectors, shaded: Flags) -> Vectors:
+    """Return by which share of what two plates differ their blend may be off. ``shading`` is by how much they differ as
+    a whole, and ``unlike`` the square of what their detail does."""
+    level, unlike = shading * shading, np.maximum(unlike, np.float32(0))  # sums that run along rows round
+    squares = (BLENDED**2 * level + BLENDED_UNLIKE**2 * unlike) / np.maximum(level + unlike, np.float32(1e-6))
+    share = np.where(shaded, BLENDED_UNLIKE, np.sqrt(squares))
+    return np.asarray(np.where(alike, BLENDED, share), np.float32)
 
 
 def without_doubtful(shown: Sequence[Taken], motion: Followed, others: int) -> list[Codes]:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
 from psvideo.plates.align.correlation import displacements
-from psvideo.plates.align.flow import FINE_PIXELS, Codes, Flags, Sketch, Vectors, comparable, flow_from
+from psvideo.plates.align.flow import FINE_PIXELS, Codes, Flags, Sketch, Vectors, comparable, flow_from, places
 from psvideo.plates.align.moving_kernel import arriving_rows, unlike_rows
 
 MOST_FLOWS = 4
@@ -26,6 +26,13 @@ WINDOW_PX, FINE_PX = 9, 3
 EXPLAINED, MARGIN, GAIN = 0.65, 0.05, 0.25
 """What moves leaves less than this share of what rest leaves unexplained, less this much of every light; or less than
 that by so much of every light."""
+FINE_EXPLAINED = 0.7
+"""... and over the finer window less than this share: else outlines carry what is beside them along."""
+GROWN, GROWN_PX = 2, 27
+"""So often what is beside moving parts joins them, where it moves along as well as it rests, over such a window."""
+UNEXPLAINED, MOST = 0.3, 0.1
+"""What is unlike by more of every light is explained by neither; so much more of the window must move than rest there.
+"""
 STILL_CODES, STILL_LIGHTS, STILL_SHARE = 3.0, 2, 0.7
 """Pixels that change by less, under two lights at least and so many of all, are at rest: what changes under the others
 is a shadow, or something else that passes."""
@@ -39,6 +46,7 @@ FAR = 2
 COARSE = 2
 """Of sketches of FINE_PIXELS every so many rows and columns get a velocity: flow is found as coarsely there."""
 BAND_PIXELS = 1 << 16
+LEAST = np.float32(1e-6)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,12 +106,46 @@ def followed_at(pairs: Sequence[Pair], time_s: float) -> Followed:
     if np.mean(np.minimum(best, wide_rest) > PUZZLING * lights.count) > PUZZLED:
         for proposed in lights.proposed_far():
             _take_better(lights, proposed, velocity, best)
+    fine_rest = lights.mean(rest, FINE_PX)
     fine = lights.mean(lights.unlike(velocity), FINE_PX)
-    moves = best < np.maximum(EXPLAINED * wide_rest - MARGIN * lights.count, wide_rest - GAIN * lights.count)
-    moves &= fine < lights.mean(rest, FINE_PX)
-    moves &= lights.still() < max(STILL_LIGHTS, STILL_SHARE * lights.count)
+    stirs = lights.still() < max(STILL_LIGHTS, STILL_SHARE * lights.count)
+    moves = _clearly(best, wide_rest, lights.count) & (fine < np.float32(FINE_EXPLAINED) * fine_rest) & stirs
+    for _ in range(GROWN):
+        moves = _grown(lights, moves, velocity, (wide_rest, fine_rest), stirs)
     velocity *= moves
     return Followed(time_s=time_s, velocity=velocity, moves=moves, step=lights.step)
+
+
+def _clearly(unlike: Vectors, other: Vectors, count: int) -> Flags:
+    """Return where one motion explains clearly more than another."""
+    return np.asarray(unlike < np.maximum(EXPLAINED * other - MARGIN * count, other - GAIN * count))
+
+
+def _grown(lights: "_Lights", moves: Flags, velocity: Vectors, rest: tuple[Vectors, Vectors], stirs: Flags) -> Flags:
+    """Return ``moves`` with those beside it that move along as well as they rest, and put their ``velocity`` in: what
+    is bare shows no motion of its own, and follows the most of what is around it.
+
+    What neither explains may be hidden by what moves: it joins where there is more of that before and behind it.
+    """
+    size = window_of(GROWN_PX, lights.step)
+    around = _mean(moves.astype(np.float32), size)
+    near = np.stack([_mean(plane * moves, size) for plane in velocity]) / np.maximum(around, LEAST)
+    unlike = lights.unlike(near)
+    wide, fine = lights.mean(unlike, WINDOW_PX), lights.mean(unlike, FINE_PX)
+    rests = _clearly(rest[0], wide, lights.count)
+    most = around - _mean(rests.astype(np.float32), size)
+    half = np.float32(lights.spans_s.sum(axis=1).mean() / 2) * near
+    ends = np.minimum(_shifted(most, half), _shifted(most, -half))
+    joins = (most > 0) & (fine < rest[1] + np.float32(MARGIN * lights.count)) & stirs & ~moves & ~rests
+    joins &= (wide <= np.float32(UNEXPLAINED * lights.count)) | (ends > MOST)
+    np.copyto(velocity, near, where=joins)
+    return moves | joins
+
+
+def _shifted(values: Vectors, way: Vectors) -> Vectors:
+    x, y = places(*values.shape)
+    x, y = x + way[0], y + way[1]
+    return np.asarray(cv2.remap(values, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)
 
 
 def _take_better(lights: "_Lights", proposed: Vectors, velocity: Vectors, best: Vectors) -> None:

@@ -1,4 +1,4 @@
-"""Means over windows in which what moves and what stands still do not mix: what shows beside an outline is not its own."""
+"""Means over windows in which what moves and what stands still do not mix, so that neither speaks for the other."""
 
 import cv2
 import numpy as np

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from psvideo.plates.align.own_means import own_mean
 from psvideo.solve.normals.doubting import ThinSurface
 from psvideo.solve.normals.evidence import Evidence
-from psvideo.plates.align.own_means import own_mean
 from psvideo.solve.normals.task import Floats, Mask
 
 
