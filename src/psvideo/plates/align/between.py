@@ -267,20 +267,26 @@ def _fill(
         image[band] = own.picture.rows(range(band.start, band.stop))
     if not flowing.any():
         return
+    cols = np.flatnonzero(flowing.any(axis=0))
+    part = slice(int(cols[0]), int(cols[-1]) + 1)
+    # elsewhere in the band everything is as it is
+    taken, ways, flowing = np.ascontiguousarray(taken[:, part]), np.ascontiguousarray(ways[..., part]), flowing[:, part]
+    own_part = np.ascontiguousarray(image[band, part])
     share = float(np.clip(ends.share, 0, 1))
-    weights = np.zeros((2, *shape), np.float32)
+    weights = np.zeros((2, *taken.shape), np.float32)
     moved: list[Image] = []
-    for side, part, way, rows, weight in zip(sides, (1 - share, share), ways, within, weights, strict=True):
+    for side, counts, way, rows, weight in zip(sides, (1 - share, share), ways, within, weights, strict=True):
         if side is None or rows[0] > rows[1]:
-            moved.append(np.zeros_like(image[band]))
+            moved.append(np.zeros_like(own_part))
             continue
         found, there = side.moved(way[0], way[1], (float(rows[0]), float(rows[1])))
-        weight[:] = there * np.float32(max(part, 1e-6))
+        weight[:] = there * np.float32(max(counts, 1e-6))
         moved.append(found)
     full = np.array(
         [*(np.inf if side is None else side.plate.saturation for side in sides), own.saturation], np.float32
     )
-    seen[band] = np.where(flowing, own.rows_seen[band, None], seen[band])
-    one, other, blended = (part.reshape(*taken.shape, -1) for part in (*moved, image[band]))
-    blend_rows(taken, weights, one, other, full, seen[band], blended)
-    seen[band] &= known
+    shown = np.where(flowing, own.rows_seen[band, None], seen[band, part])
+    one, other, blended = (picture.reshape(*taken.shape, -1) for picture in (*moved, own_part))
+    blend_rows(taken, weights, one, other, full, shown, blended)
+    image[band, part] = own_part
+    seen[band, part] = shown & known[:, part]

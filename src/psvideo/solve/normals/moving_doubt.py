@@ -23,9 +23,9 @@ class MovingDoubt:
     px from flash to flash: nine tenths of what is measured is off by no more than twice what is predicted.
     """
 
-    own: float = 1.6
-    around_deg: float = 3.0
-    around_px: int = 27
+    own: float = 1.4
+    around_deg: float = 6.0
+    around_px: int = 15
 
 
 def moved_deg(points: ThinSurface, one: Evidence) -> Floats | None:
