@@ -36,7 +36,9 @@ def costs(clip: Filmed, how: Aligning) -> Cost:
     """Return what the second round shows, solved as runs do."""
     one = clip.shown(how)[1]
     seen = np.stack([plate.pixels_seen for plate in one.plates])
-    surface = Solving(error=True).solve([plate.image for plate in one.plates], clip.lit, seen=seen, unsure=one.unsure)
+    moves = None if one.motion is None else one.motion.moves
+    images = [plate.image for plate in one.plates]
+    surface = Solving(error=True).solve(images, clip.lit, seen=seen, unsure=one.unsure, moves=moves)
     truth, subject = clip.truth(one.time_s)
     good = subject & surface.valid
     trusted = angles_deg(surface.normals[good], truth[good])

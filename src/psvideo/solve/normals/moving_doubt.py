@@ -24,8 +24,8 @@ class MovingDoubt:
     """
 
     own: float = 1.4
-    around_deg: float = 6.0
-    around_px: int = 15
+    around_deg: float = 3.5
+    around_px: int = 27
 
 
 def moved_deg(points: ThinSurface, one: Evidence) -> Floats | None:
