@@ -70,10 +70,10 @@ def taken_of(pair: Pair, motion: Followed) -> Taken:
     spans_s = motion.time_s - pair.before.time_s, pair.after.time_s - motion.time_s
     ways = motion.way(spans_s[0]), motion.way(-spans_s[1])
     before, after = (_along(codes, way) for codes, way in zip((one, other), ways, strict=True))
-    apart = cv2.subtract(after, before, dtype=cv2.CV_32F)
+    apart = np.asarray(cv2.subtract(after, before, dtype=cv2.CV_32F), np.float32)
     wide, narrow = ((window_of(size_px, motion.step),) * 2 for size_px in (SHADING_PX, ALIKE_PX))
-    shading = cv2.blur(apart, wide)
-    unlike = cv2.blur((apart - shading) ** 2, narrow)
+    shading = np.asarray(cv2.blur(apart, wide), np.float32)
+    unlike = np.asarray(cv2.blur((apart - shading) ** 2, narrow), np.float32)
     alike = unlike < np.where(np.abs(shading) < EVENLY, np.float32(UNLIKE**2), np.float32(BARE**2))
     shaded = _shaded(before, after, wide)
     alike &= ~shaded

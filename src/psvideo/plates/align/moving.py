@@ -129,7 +129,9 @@ def _grown(lights: "_Lights", moves: Flags, velocity: Vectors, rest: tuple[Vecto
     """
     size = window_of(GROWN_PX, lights.step)
     around = _mean(moves.astype(np.float32), size)
-    near = np.stack([_mean(plane * moves, size) for plane in velocity]) / np.maximum(around, LEAST)
+    near = np.empty_like(velocity)
+    for plane, own in zip(near, velocity, strict=True):
+        plane[:] = _mean(own * moves, size) / np.maximum(around, LEAST)
     unlike = lights.unlike(near)
     wide, fine = lights.mean(unlike, WINDOW_PX), lights.mean(unlike, FINE_PX)
     rests = _clearly(rest[0], wide, lights.count)
