@@ -39,11 +39,12 @@ class Line(NamedTuple):
 SCENES: dict[str, tuple[str, int, dict[str, Any]]] = {
     "bust, turning 30 degrees a second": ("bust", 192, {"axis": [0.0, 1.0, 0.0], "spin_deg_per_s": 30.0}),
     "fan, 20 turns a minute": ("fan", 144, {"axis": [0.0, 0.0, 1.0], "spin_deg_per_s": 120.0}),
+    "fan, 120 turns a minute": ("fan", 144, {"axis": [0.0, 0.0, 1.0], "spin_deg_per_s": 720.0}),
     "fan, 720 turns a minute": ("fan", 144, {"axis": [0.0, 0.0, 1.0], "spin_deg_per_s": 4320.0}),
 }
 
 
-def _scene(name: str, width_px: int, motion: dict[str, Any], folder: Path) -> Path:
+def small_scene(name: str, width_px: int, motion: dict[str, Any], folder: Path) -> Path:
     """Write a scene of the repository smaller, without ambient light, its first object moving."""
     scene = tomlkit.parse(builtin_scene(name).read_text(encoding="utf-8")).unwrap()
     camera = scene["camera"]
@@ -62,20 +63,20 @@ def rows() -> Iterator[Line]:
     for what, (name, width_px, motion) in SCENES.items():
         with tempfile.TemporaryDirectory() as temporary:
             folder = Path(temporary)
-            scene = _scene(name, width_px, motion, folder)
+            scene = small_scene(name, width_px, motion, folder)
             clip = ps.shoot(scene, folder / "clip").path
             stage = set_stage(read_scene(scene), builtin_scene(name).parent)
-            sharp = _beauties(clip, folder / "round", fps="round")
+            sharp = beauties(clip, folder / "round", fps="round")
             yield _line(what, 180, stage, clip, folder, sharp)
 
 
 def _line(what: str, angle: int, stage: Stage, clip: Path, folder: Path, rounds: dict[float, np.ndarray]) -> Line:
-    found = _beauties(clip, folder / f"open{angle}", fps=FPS, shutter=angle)
-    plain = _beauties(clip, folder / f"sharp{angle}", fps=FPS)
+    found = beauties(clip, folder / f"open{angle}", fps=FPS, shutter=angle)
+    plain = beauties(clip, folder / f"sharp{angle}", fps=FPS)
     gained: list[tuple[float, float, float]] = []
     for time_s, image in found.items():
         open_s = angle / 360 / FPS
-        views = [_lit(stage, time_s + open_s * ((n + 0.5) / VIEWS - 0.5)) for n in range(VIEWS)]
+        views = [lit_at(stage, time_s + open_s * ((n + 0.5) / VIEWS - 0.5)) for n in range(VIEWS)]
         truth = np.mean(views, axis=0)
         within = [one for at_s, one in rounds.items() if abs(at_s - time_s) <= 0.5 * open_s]
         nearest = min(rounds, key=lambda at_s: abs(at_s - time_s))
@@ -94,7 +95,7 @@ def _line(what: str, angle: int, stage: Stage, clip: Path, folder: Path, rounds:
     )
 
 
-def _beauties(clip: Path, out: Path, **options: Any) -> dict[float, np.ndarray]:
+def beauties(clip: Path, out: Path, **options: Any) -> dict[float, np.ndarray]:
     """Run, and return the beauty plates by their instants."""
     report = ps.normals(clip, rig=clip / "rig.toml", out=out, aov=["beauty"], fill=False, **options)
     files = sorted((out / "beauty").iterdir())
@@ -102,7 +103,7 @@ def _beauties(clip: Path, out: Path, **options: Any) -> dict[float, np.ndarray]:
     return {one.time_s: picture for one, picture in zip(report.instants, pictures, strict=True)}
 
 
-def _lit(stage: Stage, time_s: float) -> np.ndarray:
+def lit_at(stage: Stage, time_s: float) -> np.ndarray:
     """Return the scene under all lights at once, each as strong as in its flash."""
     flash = next(one for one in stage.plan.flashes if one.lit)
     powers = dict.fromkeys(stage.plan.lights, 1.0)
