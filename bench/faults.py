@@ -19,6 +19,7 @@ from typing import NoReturn
 
 import numpy as np
 
+from psvideo.cli import ending
 from psvideo.cli.app import main as psvideo
 
 CRASHED = 70
@@ -108,6 +109,7 @@ def _no_memory(rng: np.random.Generator, scene: Scene) -> Fault:
 
     def inside() -> None:
         pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+        ending.LEAST_BYTES = 0  # so that memory ends in the middle
         resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + more_bytes, -1))
 
     return Fault(when=f"with {more_bytes >> 20} MB more memory at most", inside=inside)

@@ -62,6 +62,14 @@ def test_what_the_machine_refuses_is_said_in_one_paragraph(
     assert error.count("\n") == 1
 
 
+def test_too_few_addresses_are_refused_at_once(capfd: pytest.CaptureFixture[str]) -> None:
+    command = f"ulimit -v 700000; {sys.executable} -m psvideo.cli.app normals clip --rig rig.toml -o out"
+    assert subprocess.run(command, shell=True, check=False, timeout=60).returncode == 1
+    error = capfd.readouterr().err
+    assert "this process may use 683 MB of addresses (ulimit -v), and psvideo needs 1200 MB at least" in error
+    assert error.count("\n") == 1
+
+
 def test_a_fault_of_the_program_is_not_hidden(monkeypatch: pytest.MonkeyPatch) -> None:
     assert paragraph_on(RuntimeError("generator raised StopIteration")) is None
 

@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from psvideo.cli.console import compiling_said
-from psvideo.cli.ending import nobody_reads, paragraph_on, say_any_name, stoppable
+from psvideo.cli.ending import check_addresses, nobody_reads, paragraph_on, say_any_name, stoppable
 from psvideo.cli.first_screen import COMMANDS, Entry
 from psvideo.cli.spelling import spelled
 from psvideo.cli.teaching import PROGRAM, command_called, teach, words_typed
@@ -91,6 +91,7 @@ def _ended(words: Sequence[str]) -> int:
         print(f"psvideo: {_no_command(called, names)}", file=sys.stderr)
         return UsageError.exit_status
     try:
+        check_addresses()
         application(words)(args=words, prog_name=PROGRAM, obj=words)
     except PsvideoError as fault:
         print(f"psvideo: {spelled(str(fault))}", file=sys.stderr)

@@ -8,9 +8,13 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator
+from importlib import import_module
 from types import FrameType
 
 from psvideo.errors import PsvideoError
+
+if sys.platform != "win32":
+    import resource
 
 ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 """Ctrl-C; what systems and farms send to end a program; a terminal that is closed."""
@@ -18,8 +22,10 @@ NO_MEMORY = (
     "there is not enough memory{said}. Nothing half-made was left under a final name. Close other programs, compute "
     "with fewer threads (PSVIDEO_THREADS=1), or take a machine with more memory; split and normals go on with `resume`."
 )
-UNMAPPED = ("failed to map segment", "Cannot allocate memory", "can't start new thread", "MemoryError")
+UNMAPPED = ("failed to map segment", "Cannot allocate memory", "can't start new thread", "libllvmlite")
 """What loaders and systems say where an address space is full, in errors of many kinds."""
+LEAST_BYTES = 1200 << 20
+"""Addresses that a run's libraries take before its first picture (measured: 1,000 MB), with room for small ones."""
 
 
 @contextlib.contextmanager
@@ -47,6 +53,25 @@ def stoppable() -> Iterator[None]:
     finally:
         for number in heard:
             signal.signal(number, before[number])
+
+
+def check_addresses() -> None:
+    """Raise PsvideoError where a process may use too few addresses; load what would wait for more without end later.
+
+    OpenBLAS, which SciPy loads, asks for its buffers again and again until it gets them.
+    """
+    if sys.platform == "win32":
+        return
+    most_bytes = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if most_bytes == resource.RLIM_INFINITY:
+        return
+    if most_bytes < LEAST_BYTES:
+        raise PsvideoError(
+            f"this process may use {most_bytes >> 20} MB of addresses (ulimit -v), and psvideo needs "
+            f"{LEAST_BYTES >> 20} MB at least, most of which are never filled. Nothing was written. Set a higher "
+            "limit, or one on memory in use (a cgroup's), then run the command again."
+        )
+    import_module("scipy.linalg")
 
 
 def say_any_name() -> None:
