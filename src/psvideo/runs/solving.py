@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -187,9 +187,8 @@ def write_instants(
                 _write_light_by_light(job, folder, instant, write, resume=resume)
                 if not (resume and is_written(folder, job.take.clip.name, number, job.delivery)):
                     # the surface only: plates are many times larger, and must not wait for the files
-                    clip = job.take.clip
-                    written = partial(surface_job, folder, clip, instant, job.delivery, job.tags)
-                    write(written(depth=shaped, ambient=ambient, blur=_blur_of(job, instant)))
+                    clip, out, tags, blur = job.take.clip, job.delivery, job.tags, _blur_of(job, instant)
+                    write(surface_job(folder, clip, instant, out, tags, depth=shaped, ambient=ambient, blur=blur))
                 del shaped  # it holds the surface too
                 if beside is not None:
                     beside(folder, instant)
