@@ -98,6 +98,7 @@ def test_what_names_no_single_camera_is_not_guessed(typed: str) -> None:
 
 def test_an_unknown_camera_gets_the_nearest_names_and_how_to_measure() -> None:
     assert nearest_names("Sony F56")[0] in {"Sony F55", "Sony F65"}
+    assert nearest_names("Acme Oculus 9") == (), "of another maker, and unlike"
     with pytest.raises(UsageError) as refusal:
         find_mode("Sonny F66", fps=None, size_px=None)
     message = str(refusal.value)

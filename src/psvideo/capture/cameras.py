@@ -54,6 +54,10 @@ class CameraMode:
         return f"{self.make} {self.model}"
 
 
+ALIKE = 0.75
+"""A name shares its maker or most of its letters with what was typed, or it is another camera's."""
+
+
 @cache
 def camera_modes() -> tuple[CameraMode, ...]:
     """Return the whole table, in the order of makes and models."""
@@ -96,14 +100,15 @@ def find_model(wanted: str) -> tuple[CameraMode, ...]:
 
 
 def nearest_names(wanted: str, *, count: int = 4) -> tuple[str, ...]:
-    """Return the names in the table that come closest to what was typed, best first."""
+    """Return the names in the table that come close to what was typed, best first; none where nothing is like it."""
     key, words = _key(wanted), _words(wanted)
 
     def likeness(name: str) -> float:
         shared = sum(word in _key(name) for word in words) / max(len(words), 1)
         return shared + max(difflib.SequenceMatcher(None, key, part).ratio() for part in _keys(_by_name()[name][0]))
 
-    return tuple(sorted(_by_name(), key=likeness, reverse=True)[:count])
+    found = {name: likeness(name) for name in _by_name()}
+    return tuple(sorted((name for name in found if found[name] >= ALIKE), key=lambda name: -found[name])[:count])
 
 
 def find_mode(wanted: str, *, fps: Fraction | None, size_px: tuple[int, int] | None) -> CameraMode:
@@ -111,8 +116,9 @@ def find_mode(wanted: str, *, fps: Fraction | None, size_px: tuple[int, int] | N
     modes = find_model(wanted)
     if not modes:
         names = ", ".join(repr(name) for name in nearest_names(wanted))
+        near = f"the nearest are {names}" if names else "nor is any like it"
         raise UsageError(
-            f"`camera` {wanted!r} is not in the table; the nearest are {names} (all: `list_cameras`). For a camera "
+            f"`camera` {wanted!r} is not in the table; {near} (all: `list_cameras`). For a camera "
             f"that is not there the readout time is needed. {HOW_TO_MEASURE}"
         )
     fitting = [mode for mode in modes if fits(mode, fps=fps, size_px=size_px)]
