@@ -17,6 +17,7 @@ TABLES = (
     "killed",
     "soak",
     "view",
+    "live",
     "timing",
     "compression",
     "strobe",

@@ -38,7 +38,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     plan = ps.open_take(clip).plan
     camera = timed_camera(smaller_plan(plan, results[0].step), results[0].timing)
     watching, pictures = Watching(plan=plan), NewestPictures()
-    for newest in results:
+    for newest in (*results, *results):
         watching.look(newest, plan)
     pictures.put(results[0], camera)
     page = live_page(pictures, lambda: told(None, watching), port=0)

@@ -109,22 +109,33 @@ def _average(
     top: np.float32,
     small: NDArray[Any],
 ) -> None:
-    """Fill ``small`` (row, col, channel) with the means of cells."""
+    """Fill ``small`` (row, col, channel) with the means of cells.
+
+    Samples of one place in the pattern lie at even distances, and each such comb is summed by itself: a loop without
+    choices in it.
+    """
     rows, cols, channels = small.shape
-    total, count = np.empty(channels, np.float32), np.empty(channels, np.float32)
-    over = np.empty(channels, np.uint8)
+    planes = codes.shape[2]
+    total, most = np.empty((channels, cols), np.float32), np.empty((channels, cols), np.float32)
+    count = np.zeros(channels, np.float32)
+    for i in range(step):
+        for j in range(step):
+            for k in range(planes):
+                count[channel_of[i & 1, j & 1, k]] += np.float32(1.0)
     for row in range(rows):
-        for col in range(cols):
-            total[:], count[:], over[:] = 0.0, 0.0, 0
-            for i in range(row * step, row * step + step):
-                for j in range(col * step, col * step + step):
-                    for k in range(codes.shape[2]):
-                        channel = channel_of[i & 1, j & 1, k]
-                        code = np.float32(codes[i, j, k])
-                        total[channel] += code
-                        count[channel] += np.float32(1.0)
-                        if code >= clips:
-                            over[channel] = 1
-            for channel in range(channels):
-                mean = total[channel] / count[channel] * scale
-                small[row, col, channel] = top if over[channel] else mean
+        total[:], most[:] = 0.0, 0.0
+        for i in range(row * step, row * step + step):
+            line = codes[i].reshape(-1)
+            for j in range(step):
+                for k in range(planes):
+                    channel = channel_of[i & 1, j & 1, k]
+                    sums, highest = total[channel], most[channel]
+                    for col in range(cols):
+                        code = np.float32(line[(col * step + j) * planes + k])
+                        sums[col] += code
+                        highest[col] = max(highest[col], code)
+        for channel in range(channels):
+            factor = scale / count[channel]
+            for col in range(cols):
+                over = most[channel, col] >= clips
+                small[row, col, channel] = top if over else total[channel, col] * factor

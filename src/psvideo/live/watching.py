@@ -15,7 +15,7 @@ from psvideo.report.judgement import Judgement, gravest_first, verdict_of
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rigpoints import rig_points
 
-EVERY = 3
+EVERY = 4
 """Of so many rounds one is looked at."""
 ENOUGH = 4
 """Rounds by which the lines are made."""
