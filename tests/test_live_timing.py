@@ -1,13 +1,14 @@
 """The live clock: followed frame by frame, held against the offline sync of the same frames and against the truth."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 from memory_frame import MemoryFrame
 
 from psvideo.errors import UsageError
+from psvideo.live.chain import Chain, LiveFrame
 from psvideo.live.follow import Follower, State, caught_up
 from psvideo.live.history import timing_of
 from psvideo.live.lock import check_followed, frames_to_lock, lock
@@ -117,6 +118,24 @@ def test_a_lost_lock_is_said_within_a_few_frames(make_plan: PlanMaker, what: str
     lost = next(number for number, state in found.states if state == "lost")
     assert 100 <= doubted < 106
     assert lost < 135
+
+
+def test_a_strobe_that_was_started_again_is_found_again(make_plan: PlanMaker) -> None:
+    plan = make_plan(width_px=8, height_px=96)
+    again = shoot(plan, frames=100, clock=TrueClock(phase_s=0.0353, offset_ppm=-20.0))
+    chain = Chain(plan=plan)
+    states = []
+    for index, image in enumerate([*shoot(plan, frames=90).frames, *again.frames]):
+        chain.take(LiveFrame(index=index, coded=MemoryFrame(index, image).coded, came_s=0.0))
+        if not states or states[-1][1] != chain.state:
+            states.append((index, chain.state))
+    assert [state for _, state in states] == ["seeking", "locked", "unsure", "lost", "locked"]
+    assert states[-1][0] < 90 + 24 + 48 + 16, "what came since the loss is enough to look in"
+    timing = timing_of(chain.followed, clip="clip")
+    later = replace(timing, flashes=tuple(one for one in timing.flashes if one.start_s > 1.25))
+    true_s = np.array([flash.start_s for flash in again.flashes]) + 90 * plan.camera.frame_period_s
+    assert len(later.flashes) > 20
+    assert np.abs(apart_rows(later, true_s, plan)).max() < LIVE_ROWS
 
 
 def test_the_smoothed_clock_is_better_than_the_filtered_one() -> None:

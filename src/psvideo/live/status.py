@@ -39,7 +39,8 @@ class LiveStatus:
     @property
     def line(self) -> str:
         """One line for a terminal."""
-        parts = [SAID[self.state], f"{self.fps:.1f} fps"]
+        comes = f"{self.fps:.1f} fps" if self.fps or not self.frames else "NO FRAMES COME"
+        parts = [SAID[self.state], comes]
         if self.phase_error_rows is not None and self.clock_offset_ppm is not None:
             parts.append(f"+-{self.phase_error_rows:.2g} row, {self.clock_offset_ppm:+.1f} ppm")
         parts.append(f"{self.frames} frames, {self.lost} lost")
