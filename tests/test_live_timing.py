@@ -124,7 +124,7 @@ def test_a_strobe_that_was_started_again_is_found_again(make_plan: PlanMaker) ->
     plan = make_plan(width_px=8, height_px=96)
     again = shoot(plan, frames=100, clock=TrueClock(phase_s=0.0353, offset_ppm=-20.0))
     chain = Chain(plan=plan)
-    states = []
+    states: list[tuple[int, State]] = []
     for index, image in enumerate([*shoot(plan, frames=90).frames, *again.frames]):
         chain.take(LiveFrame(index=index, coded=MemoryFrame(index, image).coded, came_s=0.0))
         if not states or states[-1][1] != chain.state:
