@@ -37,7 +37,7 @@ TURNED = 40.0
 """What turns is shaded in its detail too, which differs by no more codes: both plates show it all the same."""
 BLENDED, BLENDED_UNLIKE = np.float32(0.25), np.float32(0.8)
 """Shading turns evenly: by what it differs between two plates, their blend is off so much less than the nearer one
-would be; by what their detail differs, or by a shadow, only a little less."""
+would be; by what their detail differs, by a shadow, or by more than is even, only a little less."""
 REST = 3.0
 """What stands still while its shading changes by more codes is blended by time."""
 ENOUGH = 4
@@ -97,7 +97,7 @@ def _off_of_blend(alike: Flags, shading: Vectors, unlike: Vectors, shaded: Flags
     a whole, and ``unlike`` the square of what their detail does."""
     level, unlike = shading * shading, np.maximum(unlike, np.float32(0))  # sums that run along rows round
     squares = (BLENDED**2 * level + BLENDED_UNLIKE**2 * unlike) / np.maximum(level + unlike, np.float32(1e-6))
-    share = np.where(shaded, BLENDED_UNLIKE, np.sqrt(squares))
+    share = np.where(shaded | (np.abs(shading) > EVENLY), BLENDED_UNLIKE, np.sqrt(squares))
     return np.asarray(np.where(alike, BLENDED, share), np.float32)
 
 

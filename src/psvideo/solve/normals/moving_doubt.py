@@ -23,8 +23,8 @@ class MovingDoubt:
     px from flash to flash: nine tenths of what is measured is off by no more than twice what is predicted.
     """
 
-    own: float = 1.4
-    around_deg: float = 3.5
+    own: float = 1.6
+    around_deg: float = 3.0
     around_px: int = 27
 
 
