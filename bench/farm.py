@@ -4,6 +4,7 @@
 speak of, so that what is left is dask's own work for every piece. The speed-up is of takes in compressed frames.
 """
 
+import resource
 import sys
 import tempfile
 import time
@@ -16,8 +17,9 @@ from psvideo.runs.cluster import Shared, solved_apart
 from psvideo.runs.normals_of_takes import normals_of_takes
 from psvideo.synth.shoot import shoot
 
-TAKES, PIECES, WORKERS = 1000, 5, 20
+TAKES, PIECES, WORKERS = 1000, 5, (20, 200)
 SLEEPS_S = 0.001
+WHOSE = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
 SCENE = """
 schema = "psvideo-scene/1"
 name = "farm"
@@ -44,12 +46,15 @@ class Overhead(NamedTuple):
 
 
 class SpeedUp(NamedTuple):
-    """How long takes last with one worker and with two, each with one thread."""
+    """How long takes last with one worker and with two, each with one thread; and the processor time that all of it
+    took, which says on a busy machine how much more two workers do for the same."""
 
     takes: int
     one_s: float
     two_s: float
     times: float
+    one_cpu_s: float
+    two_cpu_s: float
 
 
 def asleep(take: Shared, number: int, *, after: object) -> int:
@@ -58,7 +63,7 @@ def asleep(take: Shared, number: int, *, after: object) -> int:
     return number
 
 
-def overhead(takes: int = TAKES, pieces: int = PIECES, workers: int = WORKERS) -> Overhead:
+def overhead(takes: int = TAKES, pieces: int = PIECES, workers: int = WORKERS[0]) -> Overhead:
     """Measure what dask does for pieces that take no time."""
     from distributed import Client, LocalCluster
 
@@ -95,24 +100,32 @@ def speed_up(takes: int = 4) -> SpeedUp:
         for n in range(takes):
             shoot(folder / "farm.toml", folder / f"take{n}")
         clips = [folder / f"take{n}" for n in range(takes)]
-        lasted_s = []
+        lasted_s, cpu_s = [], []
         for workers in (1, 1, 2):  # the first one compiles
-            began_s = time.monotonic()
+            began_s, began_cpu_s = time.monotonic(), _cpu_s()
             normals_of_takes(
                 clips, rig=clips[0] / "rig.toml", out=folder / "out", workers=workers, force=True, preview=()
             )
             lasted_s.append(time.monotonic() - began_s)
-    return SpeedUp(takes, lasted_s[1], lasted_s[2], lasted_s[1] / lasted_s[2])
+            cpu_s.append(_cpu_s() - began_cpu_s)
+    return SpeedUp(takes, lasted_s[1], lasted_s[2], lasted_s[1] / lasted_s[2], cpu_s[1], cpu_s[2])
+
+
+def _cpu_s() -> float:
+    """Return the processor time of this process and of the workers that have ended."""
+    return sum(used.ru_utime + used.ru_stime for used in map(resource.getrusage, WHOSE))
 
 
 def rows() -> Iterator[Overhead]:
-    """Measure the scheduler."""
-    yield overhead()
+    """Measure the scheduler with a few workers, and with hundreds."""
+    for workers in WORKERS:
+        yield overhead(workers=workers)
 
 
 def main() -> int:
     """Print both."""
-    print(overhead(), flush=True)
+    for row in rows():
+        print(row, flush=True)
     print(speed_up(), flush=True)
     return 0
 

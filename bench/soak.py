@@ -58,7 +58,7 @@ class Flatness(NamedTuple):
 
 @dataclass
 class Gauge:
-    """Looks at this process again and again."""
+    """Looks at this process again and again: at memory of its own, not at files that it maps."""
 
     memory_mb: list[float] = field(default_factory=list)
     handles: list[int] = field(default_factory=list)
@@ -66,8 +66,8 @@ class Gauge:
 
     def look(self) -> None:
         """Take down what this process has now."""
-        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
-        self.memory_mb.append(pages * os.sysconf("SC_PAGE_SIZE") / 1e6)
+        lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
+        self.memory_mb.append(next(int(line.split()[1]) / 1e3 for line in lines if line.startswith("RssAnon")))
         self.handles.append(len(os.listdir("/proc/self/fd")) - 1)  # noqa: PTH208 - iterdir would open one more
 
     def flatness(self, what: str, amount: str) -> Flatness:
@@ -100,16 +100,18 @@ def long_take(folder: Path, frames: int) -> Path:
 
 def through_the_chain(folder: Path, frames: int) -> Flatness:
     """Solve a long take and look at this process at every hundredth frame or round."""
-    clip, gauge = long_take(folder, frames), Gauge()
+    clip, gauges = long_take(folder, frames), [Gauge()]
 
     def watch(items: Iterable[Item], *, total: int, what: str, unit: str = "frames") -> Iterator[Item]:
+        gauges.append(Gauge())
         for count, item in enumerate(items):
             yield item
             if count % 20 == 0:
-                gauge.look()
+                gauges[-1].look()
 
     report = normals(clip, rig=clip / "rig.toml", out=folder / "out", aov=["depth"], preview=(), watch=watch)
-    return gauge.flatness("a take through normals", f"{frames} frames, {len(report.instants)} results")
+    longest = max(gauges, key=lambda gauge: len(gauge.handles))
+    return longest.flatness("a take through normals", f"{frames} frames, {len(report.instants)} results")
 
 
 def with_the_page_open(folder: Path, minutes: float) -> Flatness:

@@ -94,16 +94,19 @@ def test_a_picture_of_an_impossible_size_is_refused_before_it_is_decoded(size: t
             read("png", path)
 
 
-def test_a_tiff_page_that_names_itself_as_the_next_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "loop.tif"
+@pytest.mark.parametrize(
+    ("kind", "name", "said"), [("tiff", "loop.tif", "holds .* pictures"), ("dng", "loop.dng", "holds no raw")]
+)
+def test_a_tiff_page_that_names_itself_as_the_next_is_refused(kind: str, name: str, said: str, tmp_path: Path) -> None:
+    path = tmp_path / name
     tifffile.imwrite(path, np.zeros((8, 8, 3), np.uint16), photometric="rgb")
     data = bytearray(path.read_bytes())
     first = struct.unpack_from("<I", data, 4)[0]
     after = first + 2 + 12 * struct.unpack_from("<H", data, first)[0]
     struct.pack_into("<I", data, after, first)
     path.write_bytes(data)
-    with pytest.raises(PsvideoError, match=r"loop\.tif: holds .* pictures"):
-        decode("tiff", path)
+    with pytest.raises(PsvideoError, match=f"{name}: {said}"):
+        decode(kind, path)
 
 
 @pytest.mark.parametrize("text", ["[" * 100_000, "9" * 10_000, '"text"', "{"])

@@ -8,6 +8,7 @@ and DefaultCrop. White balance, colour matrices and opcodes are not applied.
 
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ import rawpy
 import tifffile
 from numpy.typing import NDArray
 
-from psvideo.clip.decode.tiff import LINEAR_RAW, MOSAIC, check_places, pixels, sample_bits
+from psvideo.clip.decode.tiff import LINEAR_RAW, MOSAIC, MOST_PAGES, check_places, pixels, sample_bits
 from psvideo.clip.record import CodedPicture, Header, Levels, shot_of
 from psvideo.errors import PsvideoError
 
@@ -67,8 +68,8 @@ def decode(path: Path) -> CodedPicture:
 
 def _raw_page(path: Path, file: tifffile.TiffFile) -> tifffile.TiffPage:
     """Return the full-size raw picture, which is the first page or among the first page's children."""
-    pages = [page.aspage() for page in file.pages]
-    pages += [child.aspage() for page in pages for child in page.pages or ()]
+    pages = [page.aspage() for page in islice(file.pages, MOST_PAGES)]  # a damaged page may name itself as the next
+    pages += [child.aspage() for page in pages for child in islice(page.pages or (), MOST_PAGES)]
     raw = [page for page in pages if page.photometric in (MOSAIC, LINEAR_RAW) and not page.is_reduced]
     if not raw:
         raise PsvideoError(f"{path}: holds no raw picture. Expected a DNG straight from the camera or its converter.")
