@@ -1,6 +1,7 @@
 """The surface at one instant, as photometric stereo gives it: which way every pixel faces, and how much it reflects."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,18 @@ MEASURED, TWO_LIGHTS, ONE_LIGHT, NO_LIGHT = np.uint8(1), np.uint8(2), np.uint8(3
 normals around it, or those alone. 0 is what the picture does not show."""
 
 
+class Reflectance(NamedTuple):
+    """What a subject shows beyond n . l: c^2 as a share of its albedo; h^8, h^32 and h^128 in units of albedo.
+
+    c is n . l, and h is n . half way between light and camera.
+    """
+
+    curve: float
+    broad: float
+    middle: float
+    narrow: float
+
+
 @dataclass(frozen=True, kw_only=True)
 class Misfit:
     """What the lights leave unexplained in a typical pixel of one picture, whichever pixel that is.
@@ -21,10 +34,12 @@ class Misfit:
     share: of the pixel's own light, as a standard deviation; noise and a rig that is wrong make it. The solver never
         takes it for less than 0.3 %.
     error_deg: the normal's predicted standard error there, without what noise makes of it.
+    reflectance: what the subject shows beyond n . l, None where that explains little.
     """
 
     share: float
     error_deg: float
+    reflectance: Reflectance | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

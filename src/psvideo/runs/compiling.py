@@ -21,11 +21,13 @@ frames = {frames}
 camera = {{ width_px = 96, height_px = 120, fps = 100, shutter_deg = 360, readout_s = 0.0097, width_m = 1.0, {camera} }}
 output = {{ kind = "{kind}" }}
 ambient = {{ level = 0.02 }}
-object = [{{ mesh = "sphere", albedo = {{ pattern = "noise" }}{motion} }}]
+object = [{{ mesh = "sphere", albedo = {{ pattern = "noise" }}{motion}{gloss} }}]
 light = [{lights}]
 """
 RING = [(0.5, 0.0), (-0.5, 0.1), (0.1, 0.5), (-0.1, -0.5), (0.4, 0.4), (-0.4, 0.4), (-0.4, -0.4), (0.4, -0.4)]
 """The lights' x and y; z is 0.8."""
+
+GLOSS = ", specular = { strength = 0.3, roughness = 0.35 }"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,6 +38,7 @@ class SmallTake:
     kind: str = "png16"
     camera: str = "full_well_e = 30000"
     motion: str = ""
+    gloss: str = ""
     aov: tuple[Aov, ...] = ()
 
     @property
@@ -47,12 +50,13 @@ class SmallTake:
             camera=self.camera,
             kind=self.kind,
             motion=self.motion,
+            gloss=self.gloss,
             lights=", ".join(lights),
         )
 
 
 USUAL = (
-    SmallTake(lights=8, aov=("residual", "error", "depth", "beauty")),
+    SmallTake(lights=8, aov=("residual", "error", "depth", "beauty"), gloss=GLOSS),
     SmallTake(lights=4, motion=", motion = { velocity_m_per_s = [0.4, 0.0, 0.0] }"),
     SmallTake(lights=3, kind="png8", camera='bits = 8, transfer = "srgb"'),
     SmallTake(lights=4, kind="dng", camera='cfa = "RGGB"'),

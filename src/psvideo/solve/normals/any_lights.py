@@ -55,7 +55,7 @@ def add_start(task: Task, w: Floats, v: Floats, m: Floats, e: Floats, n: int) ->
 
 @FUSED.inlined
 def find_scale(
-    task: Task, noise: np.float32, share: np.float32, w: Floats, v: Floats, m: Floats, e: Floats, n: int
+    matrix: Floats, noise: np.float32, share: np.float32, w: Floats, v: Floats, m: Floats, e: Floats, n: int
 ) -> None:
     """Residuals without their sign, and in SCALE their median as a standard deviation, at least a camera's noise.
 
@@ -64,7 +64,7 @@ def find_scale(
     for i in range(n):
         v[TO + i], v[FROM + i] = ZERO, ZERO
     for light in range(len(e)):
-        lamp, there, errors = of_light(task.matrix, light), m[light], e[light]
+        lamp, there, errors = of_light(matrix, light), m[light], e[light]
         for i in range(n):
             x, y, z = at(lamp, i)
             error = abs(there[i] - (x * w[X + i] + y * w[Y + i] + z * w[Z + i]))
@@ -82,7 +82,7 @@ def find_scale(
 
 @FUSED.inlined
 def add_weighted(
-    task: Task, tukey: bool, width: np.float32, last: bool, w: Floats, v: Floats, m: Floats, e: Floats, n: int
+    matrix: Floats, tukey: bool, width: np.float32, last: bool, w: Floats, v: Floats, m: Floats, e: Floats, n: int
 ) -> None:
     """The normal equations, every measurement weighed by how well the last solution explains it.
 
@@ -97,4 +97,4 @@ def add_weighted(
             square = (error[i] * v[FROM + i]) ** 2  # of what is OUT: infinite
             inside = max(ONE - square, ZERO)
             error[i] = inside * inside if tukey else ONE / (ONE + square)
-    add_equations(task.matrix, w, m, e, n)
+    add_equations(matrix, w, m, e, n)

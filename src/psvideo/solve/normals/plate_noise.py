@@ -70,7 +70,7 @@ def _fine(plate: Samples | Mixture, black_level: float, scale: float, pixels: in
         return np.zeros(0), np.zeros(0)
     step = max((rows - 2) // ROWS, 1)
     firsts = np.arange(0, rows - 2, step)
-    part = _rows_of(plate, (firsts + np.arange(3)[:, None]).ravel())
+    part = rows_of(plate, (firsts + np.arange(3)[:, None]).ravel())
     part = part[..., min(1, plate.shape[2] - 1)] if len(plate.shape) == 3 else part
     top, middle, bottom = np.split((part.astype(np.float64) - black_level) * scale, 3)
     down = top - 2 * middle + bottom
@@ -81,5 +81,6 @@ def _fine(plate: Samples | Mixture, black_level: float, scale: float, pixels: in
     return (fine**2 / 36).ravel()[::every], level.ravel()[::every]
 
 
-def _rows_of(plate: Samples | Mixture, rows: NDArray[np.intp]) -> Samples:
+def rows_of(plate: Samples | Mixture, rows: NDArray[np.intp]) -> Samples:
+    """Return some rows of a plate, made or not."""
     return plate.rows(rows) if isinstance(plate, Mixture) else plate[rows]

@@ -8,17 +8,19 @@ without the brightest few.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from psvideo.compute.spilled import let_go, planes_for
-from psvideo.model.surface import Misfit, Surface
+from psvideo.model.surface import Misfit, Reflectance, Surface
 from psvideo.plates.mixture import Mixture
 from psvideo.solve.normals.bands import ShownPlates, check_arrays, surface_of
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.plate_noise import PlateNoise
+from psvideo.solve.normals.reflectance import reflectance_of
 from psvideo.solve.normals.task import (
     FEW,
     Floats,
@@ -120,24 +122,32 @@ def solve(
     predicted = planes_for((rows * cols,), np.uint16 if half else np.float32, pixels=rows * cols, folder=spare)
     given = _balanced(task(shown.samples, lit, seen, mask, usable, black_level, scale))
 
-    def run(into: Samples, unexplained: Floats, how: Weights, step: int) -> None:
+    def run(into: Samples, unexplained: Floats, how: Weights, step: int, reflecting: bool) -> None:
         def band(one: Task, memory: kernel.Memory, first: int, last: int) -> None:
             kernel.solve_rows(one, result, into, unexplained, memory, how, first, last, step)
             let_rows_go(result, cols, first, last)
             let_go(predicted[first * cols : last * cols])
 
-        shown.in_bands(band, given, kernel.working_memory, threads=threads, step=step)
+        memory_of = partial(kernel.working_memory, reflecting=reflecting)
+        shown.in_bands(band, given, memory_of, threads=threads, step=step)
 
     noise = (0.0, 0.0) if plate_noise is None else (plate_noise.read / channels, plate_noise.photon / channels)
     if misfit is None:
         step, unexplained = max(rows * cols // SAMPLE_PIXELS, 1), np.zeros(rows * cols, np.float32)
         how = _weights(reweighting, noise, limit_deg=EVERYTHING_DEG, common=0.0)
-        run(predicted, unexplained, how, step)
+        run(predicted, unexplained, how, step, False)
         found = surface_of(result, predicted, shown.shape, half=half)
         misfit = _typical(found, unexplained.reshape(rows, cols), step)
+        if misfit is not None:
+            model = reflectance_of(
+                plates, lit, found, usable, step=step, seen=seen, black_level=black_level, scale=scale
+            )
+            misfit = replace(misfit, reflectance=model)
+    model = None if misfit is None else misfit.reflectance
     limit_deg = max(reweighting.most_error_deg, 0.0 if misfit is None else _limit_deg(reweighting, misfit))
-    how = _weights(reweighting, noise, limit_deg=limit_deg, common=0.0 if misfit is None else misfit.share)
-    run(predicted if error else predicted[:0], np.zeros(0, np.float32), how, 1)
+    common, unit = 0.0 if misfit is None else misfit.share, 1 / float(given.albedo_scale)
+    how = _weights(reweighting, noise, limit_deg=limit_deg, common=common, model=model, unit=unit)
+    run(predicted if error else predicted[:0], np.zeros(0, np.float32), how, 1, model is not None)
     surface = surface_of(result, predicted if error else None, shown.shape, half=half)
     return replace(surface, misfit=misfit)
 
@@ -146,7 +156,11 @@ def _limit_deg(reweighting: Reweighting, misfit: Misfit) -> float:
     return min(reweighting.beside_typical * misfit.error_deg, MOST_TYPICAL_DEG)
 
 
-def _weights(reweighting: Reweighting, noise: tuple[float, float], *, limit_deg: float, common: float) -> Weights:
+def _weights(
+    reweighting: Reweighting, noise: tuple[float, float], *,
+    limit_deg: float, common: float, model: Reflectance | None = None, unit: float = 1.0,
+) -> Weights:  # fmt: skip
+    curve, *shine = (0.0,) * 4 if model is None else model
     tukey = reweighting.loss == "tukey"
     return Weights(
         rounds=reweighting.rounds,
@@ -161,6 +175,10 @@ def _weights(reweighting: Reweighting, noise: tuple[float, float], *, limit_deg:
         common=np.float32(common),
         read=np.float32(noise[0]),
         photon=np.float32(noise[1]),
+        curve=np.float32(curve),
+        broad=np.float32(shine[0] * unit),
+        middle=np.float32(shine[1] * unit),
+        narrow=np.float32(shine[2] * unit),
     )
 
 

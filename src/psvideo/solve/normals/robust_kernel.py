@@ -40,6 +40,7 @@ from psvideo.solve.normals.few_lights import EIGHT, FOUR, begin_few, reweigh_few
 from psvideo.solve.normals.measuring import all_seen, combine, gather_one, gather_three, hide_unseen
 from psvideo.solve.normals.near_kernel import at, place_lights
 from psvideo.solve.normals.odd_of_four import TWO, drop_odd_of_four
+from psvideo.solve.normals.reflecting import KEPT, reflecting
 from psvideo.solve.normals.task import FEW, LIGHTS, Floats, Result, Samples, Task, Weights
 
 STEP = 128  # pixels that are solved together: few enough that all of their planes stay in the nearest cache
@@ -65,10 +66,14 @@ class Memory(NamedTuple):
     flat: Floats
     matrix: Floats
     per_strength: Floats
+    gradient: Floats  # (light, 3, pixel) where the subject's reflectance is known, else (0, 0)
+    matte: Floats  # (light, pixel): measurements without highlights
+    kept: Floats
 
 
-def working_memory(task: Task) -> Memory:
-    """Return memory for one thread."""
+def working_memory(task: Task, *, reflecting: bool = False) -> Memory:
+    """Return memory for one thread; ``reflecting`` where the subject's reflectance is known."""
+    lights = len(task.matrix)
     plain = kernel.working_memory(task)
     return Memory(
         planes=np.zeros_like(plain.planes),
@@ -79,6 +84,9 @@ def working_memory(task: Task) -> Memory:
         flat=plain.measurements.reshape(-1),
         matrix=plain.matrix,
         per_strength=plain.per_strength,
+        gradient=np.zeros((lights, 3, BLOCK) if reflecting else (0, 0), np.float32),
+        matte=np.full((lights, BLOCK) if reflecting else (0, 0), MISSING, np.float32),
+        kept=np.zeros(KEPT if reflecting else 0, np.float32),
     )
 
 
@@ -98,7 +106,8 @@ def solve_rows(
     predicted, unexplained = lent(error), lent(misfit)
     w, v, values = lent(memory.planes), lent(memory.more), lent(memory.values)
     m, e = lent(memory.measurements), lent(memory.errors)
-    flat = lent(memory.flat)
+    flat, gradient = lent(memory.flat), lent(memory.gradient)
+    matte, kept = lent(memory.matte), lent(memory.kept)
     for row in range(-(-first // step) * step, last, step):
         for col in range(0, t.cols, STEP):
             n = min(STEP, t.cols - col)
@@ -107,7 +116,7 @@ def solve_rows(
                 w[X : X + n], w[Y : Y + n], w[Z : Z + n] = ZERO, ZERO, ZERO
                 v[DOUBT : DOUBT + n], v[UNEXPLAINED : UNEXPLAINED + n] = NO_ERROR, ZERO
             else:
-                summed = _solve_block(t, weights, w, v, values, m, e, flat, row, col, n)
+                summed = _solve_block(t, weights, w, v, values, m, e, flat, gradient, matte, kept, row, col, n)
             start = row * t.cols + col
             kernel.store_block(t, out, w, values, m, start, n, summed)
             for i in range(min(n, len(predicted))):
@@ -126,6 +135,9 @@ def _solve_block(
     m: Floats,
     e: Floats,
     flat: Floats,
+    gradient: Floats,
+    matte: Floats,
+    kept: Floats,
     row: int,
     col: int,
     n: int,
@@ -158,13 +170,15 @@ def _solve_block(
             _reweigh(task, weights, weights.signal_noise, weights.tukey, weights.width, False, few, w, v, m, e, flat, n)
             solve_equations(w, n, SOUND_SQUARED, True)
     share = LIGHTS if weights.read > ZERO else weights.signal_noise
-    _reweigh(task, weights, share, False, TWO, True, few, w, v, m, e, flat, n)
+    again = not done and reflecting(task, weights, share, gradient, matte, kept, w, v, values, m, e, n)
+    if not again:
+        _reweigh(task, weights, share, False, TWO, True, few, w, v, m, e, flat, n)
     _predict_error(weights, min(task.lights, LEAST_CHECKED), w, v, n)
     if task.mask.size:
         for i in range(n):
-            kept = ONE if task.mask[row, col + i] else ZERO
-            w[X + i], w[Y + i], w[Z + i] = w[X + i] * kept, w[Y + i] * kept, w[Z + i] * kept
-    return summed and (done or task.lights > DROPPED_FROM)
+            inside = ONE if task.mask[row, col + i] else ZERO
+            w[X + i], w[Y + i], w[Z + i] = w[X + i] * inside, w[Y + i] * inside, w[Z + i] * inside
+    return summed and not again and (done or task.lights > DROPPED_FROM)
 
 
 @FUSED.inlined
@@ -193,8 +207,8 @@ def _reweigh(
     if few:
         reweigh_few(task.matrix, tukey, width, weights.noise, share, w, v, flat, n)
     else:
-        find_scale(task, weights.noise, share, w, v, m, e, n)
-        add_weighted(task, tukey, width, last, w, v, m, e, n)
+        find_scale(task.matrix, weights.noise, share, w, v, m, e, n)
+        add_weighted(task.matrix, tukey, width, last, w, v, m, e, n)
 
 
 @FUSED.inlined

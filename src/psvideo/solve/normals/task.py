@@ -24,6 +24,9 @@ PIXEL_CONDITION = 12.0  # beyond it, with the lights that shadow leaves, albedo 
 FEW = 9
 """Up to so many distant lights a pixel's measurements stay in registers (``few_lights.py``)."""
 
+BROAD, MIDDLE, NARROW = 8, 32, 128
+"""The powers of the cosine that are a subject's highlights (``reflectance.py``)."""
+
 LIGHTS = np.float32(0.003)
 """Lights and lenses are never known better than this share of the signal."""
 
@@ -115,6 +118,10 @@ class Weights(NamedTuple):
     common: np.float32
     read: np.float32  # the noise variance of a dark measurement, and per unit of light; 0 where noise is not known
     photon: np.float32
+    curve: np.float32  # what the subject reflects beyond n . l: the numbers of reflectance.Reflectance, in g's unit
+    broad: np.float32
+    middle: np.float32
+    narrow: np.float32
 
 
 class Spread(NamedTuple):

@@ -1,0 +1,135 @@
+"""What a whole subject reflects beyond n . l is found from all of it, and used where a pixel is explained better."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from psvideo.model.ground import Ground
+from psvideo.model.rig import Light
+from psvideo.model.surface import Reflectance, Surface
+from psvideo.solve.normals import robust
+from psvideo.solve.normals.illumination import Illumination, illumination
+from psvideo.solve.normals.reflectance import reflectance_of
+from psvideo.solve.normals.solving import Solving
+from psvideo.solve.normals.task import Usable
+
+Array = NDArray[np.float64]
+SIZE = 64
+
+
+def ring(lights: int, slant_deg: float) -> Array:
+    """Unit directions evenly around the camera's axis."""
+    around, slant = 0.3 + np.arange(lights) * 2 * np.pi / lights, np.radians(slant_deg)
+    up = np.full(lights, np.cos(slant))
+    return np.stack([np.sin(slant) * np.cos(around), np.sin(slant) * np.sin(around), up], axis=-1)
+
+
+WAYS = np.concatenate([ring(8, 45), ring(4, 20)])
+
+
+def waves() -> Array:
+    """Normals of a wavy sheet that faces the camera."""
+    v, u = np.mgrid[:SIZE, :SIZE] / SIZE
+    down, across = np.gradient(0.05 * np.sin(6 * np.pi * u) * np.cos(5 * np.pi * v), 1 / SIZE)
+    normals = np.stack([-across, down, np.ones_like(down)], axis=-1)
+    return np.asarray(normals / np.linalg.norm(normals, axis=-1, keepdims=True))
+
+
+def shot(normals: Array, sent: Array, *, gloss: Array | float) -> list[NDArray[np.float32]]:
+    """Plates of a brown surface with highlights as wide as varnish makes them; sent: (light, row, col, 3)."""
+    rng, size = np.random.default_rng(1), np.linalg.norm(sent, axis=-1, keepdims=True)
+    half = sent / size + np.array([0.0, 0.0, 1.0])
+    half /= np.linalg.norm(half, axis=-1, keepdims=True)
+    cosine = np.maximum((sent * normals).sum(axis=-1), 0)
+    shine = gloss * size[..., 0] * np.maximum((half * normals).sum(axis=-1), 0) ** 25 * (cosine > 0)
+    plates = cosine[..., None] * np.array([0.55, 0.45, 0.35]) + shine[..., None]
+    return list((plates + rng.normal(0, 0.001, plates.shape)).astype(np.float32))
+
+
+def distant() -> tuple[Illumination, Array]:
+    lit = Illumination(directions=WAYS, intensities=np.full((len(WAYS), 3), 1.2))
+    return lit, 1.2 * np.broadcast_to(WAYS[:, None, None], (len(WAYS), SIZE, SIZE, 3))
+
+
+def off_deg(found: NDArray[np.floating], truth: Array) -> Array:
+    cosines = np.clip((found.astype(np.float64) * truth).sum(axis=-1), -1, 1)
+    return np.asarray(np.degrees(np.arccos(cosines)))
+
+
+def without_model(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(robust, "reflectance_of", lambda *_, **__: None)
+
+
+def test_a_sheen_that_the_whole_subject_has_turns_no_normal(monkeypatch: pytest.MonkeyPatch) -> None:
+    lit, sent = distant()
+    normals = waves()
+    plates = shot(normals, sent, gloss=0.15)
+    found = Solving(error=True).solve(plates, lit)
+    assert found.valid.mean() > 0.99
+    off = off_deg(found.normals, normals)
+    albedo = found.albedo[found.valid].mean(axis=0)
+    np.testing.assert_allclose(albedo, [0.55, 0.45, 0.35], atol=0.03)
+    without_model(monkeypatch)
+    before = off_deg(Solving().solve(plates, lit).normals, normals)
+    assert off.mean() < 0.35 * before.mean()
+    assert off.mean() < 0.4
+
+
+def test_the_matte_part_of_a_subject_stays_matte(monkeypatch: pytest.MonkeyPatch) -> None:
+    lit, sent = distant()
+    normals = waves()
+    half = np.arange(SIZE) < SIZE // 2
+    plates = shot(normals, sent, gloss=np.where(half, 0.15, np.zeros((SIZE, SIZE))))
+    off = off_deg(Solving().solve(plates, lit).normals, normals)
+    without_model(monkeypatch)
+    before = off_deg(Solving().solve(plates, lit).normals, normals)
+    assert off[:, half].mean() < 0.8 * before[:, half].mean()
+    assert off[:, ~half].mean() <= 1.05 * before[:, ~half].mean()
+
+
+def test_a_matte_subject_is_solved_as_before_to_the_byte(monkeypatch: pytest.MonkeyPatch) -> None:
+    lit, sent = distant()
+    plates = shot(waves(), sent, gloss=0.0)
+    plates[0][20:24, 20:24] += 0.3
+    found = Solving().solve(plates, lit)
+    without_model(monkeypatch)
+    before = Solving().solve(plates, lit)
+    assert found.normals.tobytes() == before.normals.tobytes()
+    assert found.albedo.tobytes() == before.albedo.tobytes()
+
+
+def test_near_lights_show_the_same_sheen() -> None:
+    focal, middle, depth = 2.0 * SIZE, (SIZE - 1) / 2, 1.0
+    ground = Ground(
+        depth_m=np.full((SIZE, SIZE), depth, np.float32),
+        middle_m=np.array([0.0, 0.0, -depth]),
+        focal_px=(focal, focal),
+        principal_px=(middle, middle),
+    )
+    where = [way * 0.8 - np.array([0.0, 0.0, depth]) for way in WAYS]
+    lights = [
+        Light(name=str(k), position_m=(float(x), float(y), float(z)), intensity=(0.64, 0.64, 0.64))
+        for k, (x, y, z) in enumerate(where)
+    ]
+    lit = illumination(lights, channels=3, ground=ground)
+    rows, cols = np.mgrid[:SIZE, :SIZE] - middle
+    points = np.stack([cols / focal * depth, -rows / focal * depth, np.full((SIZE, SIZE), -depth)], axis=-1)
+    away = np.stack(where)[:, None, None] - points
+    sent = 0.64 * away / np.linalg.norm(away, axis=-1, keepdims=True) ** 3
+    near = seen_in(shot(waves(), sent, gloss=0.15), lit)
+    far_lit, far_sent = distant()
+    far = seen_in(shot(waves(), far_sent, gloss=0.15), far_lit)
+    assert far is not None
+    assert near is not None
+    assert far.middle > 0.05
+    np.testing.assert_allclose(near, far, atol=0.06)
+
+
+def seen_in(plates: list[NDArray[np.float32]], lit: Illumination) -> Reflectance | None:
+    """Return what is found of a subject whose normals are known."""
+    found = Surface(
+        normals=waves().astype(np.float32),
+        albedo=np.full((SIZE, SIZE, 3), 0.5, np.float32),
+        valid=np.ones((SIZE, SIZE), bool),
+    )
+    return reflectance_of(plates, lit, found, Usable(dark_level=0.003), step=1, seen=None, black_level=0.0, scale=1.0)
