@@ -32,7 +32,8 @@ GLOSS = ", specular = { strength = 0.3, roughness = 0.35 }"
 
 @dataclass(frozen=True, kw_only=True)
 class SmallTake:
-    """A take that makes loops compile: how many lights it has, its files and camera, and what is asked of it."""
+    """A take that makes loops compile: its number of lights, its files and camera, what is asked of it, and whether it
+    is watched live too."""
 
     lights: int
     kind: str = "png16"
@@ -40,13 +41,14 @@ class SmallTake:
     motion: str = ""
     gloss: str = ""
     aov: tuple[Aov, ...] = ()
+    live: bool = False
 
     @property
     def scene(self) -> str:
         """The scene as its file would hold it."""
         lights = [f'{{ name = "l{n}", direction = [{x}, {y}, 0.8] }}' for n, (x, y) in enumerate(RING[: self.lights])]
         return SCENE.format(
-            frames=6 * (self.lights + 1),
+            frames=FRAMES_LIVE if self.live else 6 * (self.lights + 1),
             camera=self.camera,
             kind=self.kind,
             motion=self.motion,
@@ -55,11 +57,14 @@ class SmallTake:
         )
 
 
+FRAMES_LIVE = 72
+"""Enough to find the strobe in, and to follow it."""
+
 USUAL = (
-    SmallTake(lights=8, aov=("residual", "error", "depth", "beauty"), gloss=GLOSS),
+    SmallTake(lights=8, aov=("residual", "error", "depth", "beauty"), gloss=GLOSS, live=True),
     SmallTake(lights=4, motion=", motion = { velocity_m_per_s = [0.4, 0.0, 0.0] }"),
     SmallTake(lights=3, kind="png8", camera='bits = 8, transfer = "srgb"'),
-    SmallTake(lights=4, kind="dng", camera='cfa = "RGGB"'),
+    SmallTake(lights=4, kind="dng", camera='cfa = "RGGB"', live=True),
     SmallTake(lights=3, kind="exr"),
 )
 """What usual footage runs through: 16 and 8 bits, mosaics, floats; few lights and many; at rest and moving."""
@@ -77,6 +82,7 @@ def compile_ahead(*, watch: Watch = unwatched) -> None:
 
 def run_small(take: SmallTake) -> None:
     """Film a small take and run the whole of ``normals`` on it, timing and all, in a folder that is gone afterwards."""
+    from psvideo.runs.live import live
     from psvideo.runs.normals import normals
     from psvideo.synth.shoot import shoot
 
@@ -86,6 +92,8 @@ def run_small(take: SmallTake) -> None:
         scene.write_text(take.scene, encoding="utf-8")
         shoot(scene, clip)
         normals(clip, rig=clip / "rig.toml", out=Path(folder) / "out", aov=take.aov, caller=quiet)
+        if take.live:
+            live(clip, rig=clip / "rig.toml", pace="fastest", caller=quiet)
 
 
 def _unsaid(_: str) -> None: ...
