@@ -168,7 +168,7 @@ BROKEN_LATER: dict[str, tuple[Callable[[Path], object], str]] = {
         lambda file: write_png(file, dtype=np.uint8),
         r"8 bits.*first frame, shot\.8\.png, is .* 16 bits",
     ),
-    "a folder": (become_a_folder, "cannot be read"),
+    "a folder": (become_a_folder, "is a folder, and a file is expected"),
 }
 
 

@@ -86,8 +86,8 @@ def parse_metres(text: str, *, option: str) -> float:
 def parse_radius_mm(text: str) -> float:
     """Return a length in millimetres from ``40``, ``40mm``, ``4cm``, ``0.04m`` or ``1.5in``.
 
-    >>> parse_radius_mm("40"), parse_radius_mm("4 cm"), parse_radius_mm("1.5in")
-    (40.0, 40.0, 38.1)
+    >>> parse_radius_mm("40"), parse_radius_mm("4 cm"), parse_radius_mm("2in")
+    (40.0, 40.0, 50.8)
     """
     found = re.fullmatch(rf"\s*({NUMBER})\s*(m|cm|mm|in|inch|\")?\s*", text, re.IGNORECASE)
     if found is None:

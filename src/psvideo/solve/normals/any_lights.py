@@ -54,6 +54,17 @@ def add_start(task: Task, w: Floats, v: Floats, m: Floats, e: Floats, n: int) ->
 
 
 @FUSED.inlined
+def fill_residuals(matrix: Floats, w: Floats, m: Floats, e: Floats, n: int) -> None:
+    """Residuals without their sign, OUT of what is not there."""
+    for light in range(len(e)):
+        lamp, there, errors = of_light(matrix, light), m[light], e[light]
+        for i in range(n):
+            x, y, z = at(lamp, i)
+            error = abs(there[i] - (x * w[X + i] + y * w[Y + i] + z * w[Z + i]))
+            errors[i] = error if there[i] > ABSENT else OUT
+
+
+@FUSED.inlined
 def find_scale(
     matrix: Floats, noise: np.float32, share: np.float32, w: Floats, v: Floats, m: Floats, e: Floats, n: int
 ) -> None:

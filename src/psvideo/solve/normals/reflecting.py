@@ -5,17 +5,14 @@ gradient J (light, 3, pixel) at g: a step of Gauss and Newton is what reweighted
 lights.
 """
 
-from typing import Any
-
 import numpy as np
-from numba.extending import overload
 
 from psvideo.compute.compiled import FUSED
-from psvideo.solve.normals.any_lights import add_weighted, find_scale
+from psvideo.solve.normals.any_lights import add_weighted, fill_residuals, find_scale
 from psvideo.solve.normals.blocks import ABSENT, BLOCK, COUNT, MISSING, ONE, TINY, ZERO, X, Y, Z
 from psvideo.solve.normals.equations import OUT, SCALE, solve_equations
 from psvideo.solve.normals.near_kernel import at, of_light
-from psvideo.solve.normals.task import BROAD, MIDDLE, NARROW, Floats, Task, Weights
+from psvideo.solve.normals.task import BROAD, MIDDLE, NARROW, Floats, Weights
 
 STEPS = 4
 FARTHEST = np.float32(0.3)  # so far, beside its length, does g go in one step
@@ -25,56 +22,41 @@ FAR_OFF = np.float32(1.5)  # the residual, over the pixel's own without the mode
 TWO, TO_BROAD, TO_MIDDLE, TO_NARROW = np.float32(2), np.float32(BROAD), np.float32(MIDDLE), np.float32(NARROW)
 LEAST_BRIGHT = np.float32(0.55)  # of what is less, high powers are nothing, and numbers too small to be quick
 _MATTE_X, _MATTE_Y, _MATTE_Z, _BEFORE, _AFTER, _SPREAD, _HOLDS, _OLD_X, _OLD_Y, _OLD_Z = (BLOCK * k for k in range(10))
-KEPT = 10 * BLOCK
+_UNIT_X, _UNIT_Y, _UNIT_Z, _PER_SIZE, _GAIN_X, _GAIN_Y, _GAIN_Z, _SHINE = (BLOCK * k for k in range(10, 18))
+KEPT = 18 * BLOCK
 """What ``reflecting`` keeps of a block."""
 _SOUND_SQUARED = np.float32(1e4)
 
 
+@FUSED.called
 def reflecting(
-    task: Task, weights: Weights, share: np.float32, gradient: Floats, matte: Floats, kept: Floats,
-    w: Floats, v: Floats, values: Floats, m: Floats, e: Floats, n: int,
+    matrix: Floats, per_strength: Floats, weights: Weights, share: np.float32, gradient: Floats, matte: Floats,
+    kept: Floats, w: Floats, v: Floats, values: Floats, m: Floats, e: Floats, n: int,
 ) -> bool:  # fmt: skip
-    """Solve a solved block again under the subject's model, where that explains the pixel better; True where done.
+    """Solve a solved block again under the subject's model, where that explains the pixel better; True.
 
     SCALE and the weighted normal equations are left as ``predict_error`` takes them, and values (light * channel,
-    pixel) without what the model adds, for the albedo. Nothing is done where ``gradient`` (light, 3, pixel) is a plane
-    (no model is known), which compiles to nothing. Compiled only.
+    pixel) without what the model adds, for the albedo. Nothing it takes has a type that pictures decide, so that it is
+    compiled once for all of them.
     """
-    raise NotImplementedError
-
-
-@overload(reflecting, jit_options={"forceinline": True}, strict=False)
-def _reflecting(
-    task: Any, weights: Any, share: Any, gradient: Any, matte: Any, kept: Any,
-    w: Any, v: Any, values: Any, m: Any, e: Any, n: Any,
-) -> Any:  # fmt: skip
-    if gradient.ndim != 3:
-        return lambda task, weights, share, gradient, matte, kept, w, v, values, m, e, n: False
-    return lambda task, weights, share, gradient, matte, kept, w, v, values, m, e, n: _solve_again(
-        task, weights, share, gradient, matte, kept, w, v, values, m, e, n
-    )
-
-
-@FUSED.inlined
-def _solve_again(
-    task: Task, weights: Weights, share: np.float32, gradient: Floats, matte: Floats, kept: Floats,
-    w: Floats, v: Floats, values: Floats, m: Floats, e: Floats, n: int,
-) -> bool:  # fmt: skip
     noise, least = weights.noise, weights.signal_noise
-    find_scale(task.matrix, noise, least, w, v, m, e, n)
+    find_scale(matrix, noise, least, w, v, m, e, n)
     for i in range(n):
         kept[_MATTE_X + i], kept[_MATTE_Y + i], kept[_MATTE_Z + i] = w[X + i], w[Y + i], w[Z + i]
         kept[_SPREAD + i], kept[_HOLDS + i] = ONE / (FAR_OFF * v[SCALE + i]), ONE
     _add_up(kept, _BEFORE, e, n)
-    for _ in range(STEPS):
-        _fill_gradient(task, weights, gradient, matte, kept, w, m, n)
+    for step in range(STEPS):
+        _fill_gradient(matrix, per_strength, weights, gradient, matte, kept, w, m, n)
         for i in range(n):
             kept[_OLD_X + i], kept[_OLD_Y + i], kept[_OLD_Z + i] = w[X + i], w[Y + i], w[Z + i]
-        find_scale(gradient, noise, least, w, v, matte, e, n)
+        if step == 0:
+            find_scale(gradient, noise, least, w, v, matte, e, n)
+        else:
+            fill_residuals(gradient, w, matte, e, n)
         add_weighted(gradient, weights.tukey, weights.width, False, w, v, matte, e, n)
         solve_equations(w, n, _SOUND_SQUARED, True)
         _shorten(kept, w, n)
-    _fill_gradient(task, weights, gradient, matte, kept, w, m, n)
+    _fill_gradient(matrix, per_strength, weights, gradient, matte, kept, w, m, n)
     find_scale(gradient, noise, least, w, v, matte, e, n)
     _add_up(kept, _AFTER, e, n)
     for i in range(n):
@@ -84,10 +66,10 @@ def _solve_again(
         w[X + i] = kept[_MATTE_X + i] + holds * (w[X + i] - kept[_MATTE_X + i])
         w[Y + i] = kept[_MATTE_Y + i] + holds * (w[Y + i] - kept[_MATTE_Y + i])
         w[Z + i] = kept[_MATTE_Z + i] + holds * (w[Z + i] - kept[_MATTE_Z + i])
-    _fill_gradient(task, weights, gradient, matte, kept, w, m, n)
+    _fill_gradient(matrix, per_strength, weights, gradient, matte, kept, w, m, n)
     find_scale(gradient, noise, share, w, v, matte, e, n)
     add_weighted(gradient, False, TWO, True, w, v, matte, e, n)
-    _take_off(task, weights, kept, w, values, n)
+    _take_off(matrix, per_strength, weights, kept, values, n)
     return True
 
 
@@ -98,7 +80,8 @@ def _add_up(kept: Floats, plane: int, e: Floats, n: int) -> None:
     for light in range(len(e)):
         for i in range(n):
             error = e[light, i]
-            square = (error * kept[_SPREAD + i]) ** 2
+            share = error * kept[_SPREAD + i]
+            square = share * share
             kept[plane + i] += square / (ONE + square) if error < OUT else ZERO
 
 
@@ -117,33 +100,41 @@ def _shorten(kept: Floats, w: Floats, n: int) -> None:
 def _shine(weights: Weights, cosine: np.float32) -> tuple[np.float32, np.float32]:
     """What varnish mirrors at a cosine to half way, and what it gains with the cosine."""
     two = cosine * cosine
-    seven = two * two * two * cosine
-    eight = seven * cosine
-    near = max(cosine, LEAST_BRIGHT) ** 2
-    near_eight = near * near * near * near
-    sixteen = near_eight * near_eight
+    four = two * two
+    seven = four * two * cosine
+    least = max(cosine, LEAST_BRIGHT)
+    far_two = least * least
+    far_four = far_two * far_two
+    far_eight = far_four * far_four
+    sixteen = far_eight * far_eight
+    thirty_one = sixteen * far_eight * far_four * far_two * least
     thirty_two = sixteen * sixteen
-    before = thirty_two / max(cosine, LEAST_BRIGHT)
     ninety_six = thirty_two * thirty_two * thirty_two
-    much = weights.broad * eight + weights.middle * thirty_two + weights.narrow * ninety_six * thirty_two
-    more = weights.broad * TO_BROAD * seven + weights.middle * TO_MIDDLE * before
-    more += weights.narrow * TO_NARROW * ninety_six * before
+    much = weights.broad * four * four + weights.middle * thirty_two + weights.narrow * ninety_six * thirty_two
+    more = weights.broad * TO_BROAD * seven + weights.middle * TO_MIDDLE * thirty_one
+    more += weights.narrow * TO_NARROW * ninety_six * thirty_one
     return much, more
 
 
 @FUSED.inlined
 def _fill_gradient(
-    task: Task, weights: Weights, gradient: Floats, matte: Floats, kept: Floats, w: Floats, m: Floats, n: int
-) -> None:
-    """What each measurement gains by a little more of g, in each direction, at g; and measurements without shine."""
+    matrix: Floats, per_strength: Floats, weights: Weights, gradient: Floats, matte: Floats, kept: Floats, w: Floats,
+    m: Floats, n: int,
+) -> None:  # fmt: skip
+    """What each measurement gains by a little more of g, in each direction, at g; and measurements without shine.
+
+    The long loop writes into ``kept`` alone, so that the compiler sees that nothing overlaps and makes vectors of it.
+    """
+    for i in range(n):
+        a, b, c = w[X + i], w[Y + i], w[Z + i]
+        per_size = ONE / np.sqrt(max(a * a + b * b + c * c, TINY * TINY))
+        kept[_UNIT_X + i], kept[_UNIT_Y + i], kept[_UNIT_Z + i] = a * per_size, b * per_size, c * per_size
+        kept[_PER_SIZE + i] = per_size
     for light in range(len(gradient)):
-        lamp, per = of_light(task.matrix, light), task.per_strength[light]
-        gx, gy, gz = gradient[light, 0], gradient[light, 1], gradient[light, 2]
+        lamp, per = of_light(matrix, light), per_strength[light]
         for i in range(n):
             (x, y, z), one = at(lamp, i), at(per, i)
-            a, b, c = w[X + i], w[Y + i], w[Z + i]
-            per_size = ONE / np.sqrt(max(a * a + b * b + c * c, TINY * TINY))
-            a, b, c = a * per_size, b * per_size, c * per_size
+            a, b, c, per_size = kept[_UNIT_X + i], kept[_UNIT_Y + i], kept[_UNIT_Z + i], kept[_PER_SIZE + i]
             dx, dy, dz = x * one, y * one, z * one
             cosine = a * dx + b * dy + c * dz
             to_half = ONE / np.sqrt(TWO + TWO * dz)
@@ -155,28 +146,39 @@ def _fill_gradient(
             along = cosine + curve * cosine * cosine - by_cosine * cosine - by_half * half
             by_half *= to_half
             strength = ONE / one if x * x + y * y + z * z > ZERO else ZERO
-            gx[i] = strength * (along * a + (by_cosine + by_half) * dx)
-            gy[i] = strength * (along * b + (by_cosine + by_half) * dy)
-            gz[i] = strength * (along * c + (by_cosine + by_half) * dz + by_half)
-            matte[light, i] = m[light, i] - strength * holds * much if m[light, i] > ABSENT else MISSING
+            kept[_GAIN_X + i] = strength * (along * a + (by_cosine + by_half) * dx)
+            kept[_GAIN_Y + i] = strength * (along * b + (by_cosine + by_half) * dy)
+            kept[_GAIN_Z + i] = strength * (along * c + (by_cosine + by_half) * dz + by_half)
+            kept[_SHINE + i] = strength * holds * much
+        gradient[light, 0, :n] = kept[_GAIN_X : _GAIN_X + n]
+        gradient[light, 1, :n] = kept[_GAIN_Y : _GAIN_Y + n]
+        gradient[light, 2, :n] = kept[_GAIN_Z : _GAIN_Z + n]
+        there, without = m[light], matte[light]
+        for i in range(n):
+            without[i] = there[i] - kept[_SHINE + i] if there[i] > ABSENT else MISSING
 
 
 @FUSED.inlined
-def _take_off(task: Task, weights: Weights, kept: Floats, w: Floats, values: Floats, n: int) -> None:
-    """Leave of every sample what a matte surface would show: highlights are alike in all channels, the curve is not."""
-    channels = task.tone.shape[1]
-    for light in range(task.lights):
-        lamp, per = of_light(task.matrix, light), task.per_strength[light]
+def _take_off(matrix: Floats, per_strength: Floats, weights: Weights, kept: Floats, values: Floats, n: int) -> None:
+    """Leave of every sample what a matte surface would show: highlights are alike in all channels, the curve is not.
+
+    The unit normals are those that ``_fill_gradient`` left.
+    """
+    lights = len(matrix)
+    channels = len(values) // lights
+    for light in range(lights):
+        lamp, per = of_light(matrix, light), per_strength[light]
         for i in range(n):
             (x, y, z), one = at(lamp, i), at(per, i)
-            a, b, c = w[X + i], w[Y + i], w[Z + i]
-            size = np.sqrt(max(a * a + b * b + c * c, TINY * TINY))
-            cosine = (a * x + b * y + c * z) * one / size
-            half = max((cosine + c / size) / np.sqrt(TWO + TWO * z * one), ZERO)
+            c = kept[_UNIT_Z + i]
+            cosine = (kept[_UNIT_X + i] * x + kept[_UNIT_Y + i] * y + c * z) * one
+            half = max((cosine + c) / np.sqrt(TWO + TWO * z * one), ZERO)
             holds = kept[_HOLDS + i] if cosine > ZERO else ZERO
             much, _ = _shine(weights, half)
-            matte = ONE / (ONE + holds * weights.curve * cosine)
-            for channel in range(channels):
-                value = values[light * channels + channel, i]
-                without = (value - holds * much / one) * matte
-                values[light * channels + channel, i] = without if value > ABSENT else MISSING
+            kept[_SHINE + i] = holds * much / one
+            kept[_GAIN_X + i] = ONE / (ONE + holds * weights.curve * cosine)
+        for channel in range(channels):
+            plane = values[light * channels + channel]
+            for i in range(n):
+                without = (plane[i] - kept[_SHINE + i]) * kept[_GAIN_X + i]
+                plane[i] = without if plane[i] > ABSENT else MISSING

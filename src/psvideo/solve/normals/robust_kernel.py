@@ -66,7 +66,7 @@ class Memory(NamedTuple):
     flat: Floats
     matrix: Floats
     per_strength: Floats
-    gradient: Floats  # (light, 3, pixel) where the subject's reflectance is known, else (0, 0)
+    gradient: Floats  # (light, 3, pixel) where the subject's reflectance is known, else of no light
     matte: Floats  # (light, pixel): measurements without highlights
     kept: Floats
 
@@ -84,8 +84,8 @@ def working_memory(task: Task, *, reflecting: bool = False) -> Memory:
         flat=plain.measurements.reshape(-1),
         matrix=plain.matrix,
         per_strength=plain.per_strength,
-        gradient=np.zeros((lights, 3, BLOCK) if reflecting else (0, 0), np.float32),
-        matte=np.full((lights, BLOCK) if reflecting else (0, 0), MISSING, np.float32),
+        gradient=np.zeros((lights if reflecting else 0, 3, BLOCK), np.float32),
+        matte=np.full((lights if reflecting else 0, BLOCK), MISSING, np.float32),
         kept=np.zeros(KEPT if reflecting else 0, np.float32),
     )
 
@@ -170,8 +170,10 @@ def _solve_block(
             _reweigh(task, weights, weights.signal_noise, weights.tukey, weights.width, False, few, w, v, m, e, flat, n)
             solve_equations(w, n, SOUND_SQUARED, True)
     share = LIGHTS if weights.read > ZERO else weights.signal_noise
-    again = not done and reflecting(task, weights, share, gradient, matte, kept, w, v, values, m, e, n)
-    if not again:
+    again = not done and gradient.size > 0
+    if again:
+        reflecting(task.matrix, task.per_strength, weights, share, gradient, matte, kept, w, v, values, m, e, n)
+    else:
         _reweigh(task, weights, share, False, TWO, True, few, w, v, m, e, flat, n)
     _predict_error(weights, min(task.lights, LEAST_CHECKED), w, v, n)
     if task.mask.size:
