@@ -38,7 +38,8 @@ def nothing() -> None:
 @dataclass(frozen=True, kw_only=True)
 class Fault:
     """One fault: ``when`` names it for people. ``inside`` is called in the process before the command; ``outside``,
-    with that process's number, in the one that looks on, ``after_s`` after the beginning; ``mended`` at the end."""
+    with that process's number, in the one that looks on, ``after_s`` after the beginning; ``mended`` at the end.
+    ``may_abort``: LLVM, which loads compiled loops, ends a process by itself where it gets no memory for them."""
 
     when: str
     after_s: float | None = None
@@ -46,6 +47,7 @@ class Fault:
     outside: Callable[[int], None] = field(default=lambda _: None)
     mended: Callable[[], None] = nothing
     silent: bool = False
+    may_abort: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,7 +114,7 @@ def _no_memory(rng: np.random.Generator, scene: Scene) -> Fault:
         ending.LEAST_BYTES = 0  # so that memory ends in the middle
         resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + more_bytes, -1))
 
-    return Fault(when=f"with {more_bytes >> 20} MB more memory at most", inside=inside)
+    return Fault(when=f"with {more_bytes >> 20} MB more memory at most", inside=inside, may_abort=True)
 
 
 def _vanishing(rng: np.random.Generator, scene: Scene) -> Fault:

@@ -9,6 +9,7 @@ import argparse
 import hashlib
 import resource
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -139,7 +140,8 @@ def _stopped(command: Sequence[str], out: Path, whole: dict[str, str], fault: Fa
     wrong = []
     if time.monotonic() - began_s > HANGS_S:
         wrong.append("hangs")
-    if "Traceback" in said or (status not in (0, 1) and not fault.silent):
+    ends = (0, 1, -signal.SIGABRT) if fault.may_abort else (0, 1)
+    if "Traceback" in said or (status not in ends and not fault.silent):
         wrong.append(f"ends with {status}: {said[-1000:]}")
     elif status == 1 and not said.strip() and not fault.silent:
         wrong.append("ends without a word")
