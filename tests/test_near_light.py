@@ -26,6 +26,7 @@ from psvideo.solve.near_surface import NearSurface, solve_near
 from psvideo.solve.normals import robust, woodham1980
 from psvideo.solve.normals.illumination import Illumination, illumination
 from psvideo.solve.normals.near_kernel import place_lights
+from psvideo.solve.normals.near_spread import near_spread
 from psvideo.solve.normals.task import Floats, Near
 from psvideo.solve.sweeping import swept
 
@@ -187,6 +188,30 @@ def test_an_outline_is_drawn_by_the_light_of_single_pixels() -> None:
     from_edge = np.abs(np.abs(np.arange(SIZE) - MIDDLE) - 0.25 * SIZE)
     beside = np.broadcast_to((from_edge > 1) & (from_edge < 0.12 * SIZE), (SIZE, SIZE))
     assert np.mean(apart[beside] > 5) < 0.01, "a third, where distances are those of squares of pixels"
+
+
+def test_noise_turns_normals_by_the_light_that_their_place_gets() -> None:
+    rig = ring_rig(8, 2)
+    depth_m = np.full((SIZE, SIZE), FAR_M, np.float32)
+    depth_m[:, : SIZE // 4] = 1.6 * FAR_M
+    ground = ground_of(rig, height_px=SIZE, width_px=SIZE).with_depth(depth_m)
+    found = near_spread(illumination(rig.lights, channels=1, ground=ground), (SIZE, SIZE))
+    rng = np.random.default_rng(6)
+
+    def turned(row: int, col: int) -> float:
+        """The typical angle that noise makes of a normal that faces the camera, tried a thousand times."""
+        point = depth_m[row, col] * rays(np.array(float(col)), np.array(float(row)))
+        shown = [filmed(rig, point[None], np.array([axis]), 1.0) for axis in (*np.eye(3), *-np.eye(3))]
+        vectors = np.array([[float(plate[0]) for plate in plates] for plates in shown])
+        lamps = (vectors[:3] - vectors[3:]).T  # what each axis is lit by from either side
+        noisy = lamps[:, 2] + rng.normal(0, 1e-4, (1000, len(lamps)))
+        g = noisy @ np.linalg.pinv(lamps).T
+        return float(np.sqrt(np.mean((g[:, 0] ** 2 + g[:, 1] ** 2) / g[:, 2] ** 2)))
+
+    middle, wall = (SIZE // 2, SIZE // 2), (SIZE // 2, SIZE // 10)
+    foretold = np.sqrt(found.wider[wall]) / found.dim[wall] / (np.sqrt(found.wider[middle]) / found.dim[middle])
+    assert foretold > 2
+    assert foretold == pytest.approx(turned(*wall) / turned(*middle), rel=0.1)
 
 
 @pytest.mark.parametrize("noise", [0.001, 0.003, 0.006])
