@@ -32,8 +32,8 @@ _SOUND_SQUARED = np.float32(1e4)
 def reflecting(
     matrix: Floats, per_strength: Floats, weights: Weights, share: np.float32, gradient: Floats, matte: Floats,
     kept: Floats, w: Floats, v: Floats, values: Floats, m: Floats, e: Floats, n: int,
-) -> bool:  # fmt: skip
-    """Solve a solved block again under the subject's model, where that explains the pixel better; True.
+) -> None:  # fmt: skip
+    """Solve a solved block again under the subject's model, where that explains the pixel better.
 
     SCALE and the weighted normal equations are left as ``predict_error`` takes them, and values (light * channel,
     pixel) without what the model adds, for the albedo. Nothing it takes has a type that pictures decide, so that it is
@@ -70,7 +70,6 @@ def reflecting(
     find_scale(gradient, noise, share, w, v, matte, e, n)
     add_weighted(gradient, False, TWO, True, w, v, matte, e, n)
     _take_off(matrix, per_strength, weights, kept, values, n)
-    return True
 
 
 @FUSED.inlined
