@@ -247,6 +247,8 @@ def _end_with(words: Sequence[str], writing: int, fault: Fault) -> NoReturn:
         os.dup2(writing, 2)
         os.close(writing)
         sys.stdout = sys.stderr = os.fdopen(2, "w", buffering=1)
+        for number in ending.ENDING:  # what comes before the program listens, or after its end, strikes nothing
+            signal.signal(number, lambda *_: None)
         fault.inside()
         status = psvideo([*words, *(("-v",) if fault.when.startswith("nobody") else ("-q",))])
     except BaseException:

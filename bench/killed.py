@@ -142,7 +142,7 @@ def _stopped(command: Sequence[str], out: Path, whole: dict[str, str], fault: Fa
         wrong.append("hangs")
     ends = (0, 1, -signal.SIGABRT) if fault.may_abort else (0, 1)
     if "Traceback" in said or (status not in ends and not fault.silent):
-        wrong.append(f"ends with {status}: {said[-1000:]}")
+        wrong.append(f"ends with {status}: {said[-4000:]}")
     elif status == 1 and not said.strip() and not fault.silent:
         wrong.append("ends without a word")
     if out.exists() and digest(out) != whole:
@@ -150,7 +150,7 @@ def _stopped(command: Sequence[str], out: Path, whole: dict[str, str], fault: Fa
     was_stopped = not out.exists()
     status, said = forked([*command, *([] if was_stopped and again == "--force" else [again])])
     if status != 0:
-        wrong.append(f"{again} ends with {status}: {said[-1000:]}")
+        wrong.append(f"{again} ends with {status}: {said[-4000:]}")
     elif digest(out) != whole:
         wrong.append(f"{again} gives other bytes")
     if left := [path.name for path in out.parent.iterdir() if path != out]:

@@ -2,10 +2,13 @@
 
 import os
 import shutil
+import signal
+import sys
 from pathlib import Path
+from types import FrameType
 
 import pytest
-from bench.faults import FAULTS
+from bench.faults import FAULTS, Fault, forked
 from bench.killed import COMMANDS, NOT_TRIED, filmed, trials
 
 from psvideo.errors import PsvideoError
@@ -25,7 +28,8 @@ def test_a_run_that_was_stopped_at_random_goes_on_to_the_same_bytes(name: str, h
     if (name, how) in NOT_TRIED:
         pytest.skip("a page without its clip is another page")
     found = list(trials(name, filmed(tmp_path), tmp_path / "trials", how=how, moments=2, seed=3))
-    assert not [fault for one in found for fault in one.faults]
+    faults = [fault for one in found for fault in one.faults]
+    assert not faults, "\n\n".join(faults)
 
 
 def test_a_folder_that_was_removed_while_it_was_written_is_not_taken_for_whole(tmp_path: Path) -> None:
@@ -51,3 +55,32 @@ def test_what_a_process_that_is_no_more_had_begun_is_removed_by_the_next(tmp_pat
         path.touch()
     refuse_existing(tmp_path / "timing.json", force=False)
     assert {*tmp_path.iterdir()} == {own, elsewhere}
+
+
+def _terminated_at(call: int) -> Fault:
+    """SIGTERM at the n-th call of a Python function, counted from when the program listens to it."""
+
+    def inside() -> None:
+        calls = 0
+        before = signal.getsignal(signal.SIGTERM)
+
+        def count(frame: FrameType, event: str, _: object) -> None:
+            nonlocal calls
+            calls += event == "call" and signal.getsignal(signal.SIGTERM) is not before
+            if calls == call:
+                calls += 1
+                os.kill(os.getpid(), signal.SIGTERM)
+
+        sys.setprofile(count)
+
+    return Fault(when=f"SIGTERM at call {call}", inside=inside)
+
+
+def test_a_signal_at_any_call_ends_a_command_with_one_sentence(tmp_path: Path) -> None:
+    forked(["info", str(tmp_path)])  # loads what every later process has from its parent
+    ends = [
+        (call, *forked(["info", str(tmp_path)], _terminated_at(call)))
+        for call in (*range(1, 31), *range(31, 4500, 193))
+    ]
+    assert [end for end in ends if end[1] != 1 or "Traceback" in end[2] or not end[2].strip()] == []
+    assert sum("psvideo: stopped." in end[2] for end in ends) > len(ends) / 2

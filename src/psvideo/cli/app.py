@@ -74,10 +74,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     A fault is printed as one paragraph on stderr.
     """
+    say_any_name()  # before signals are heard: a stream that is interrupted while it changes prints no more
+    try:
+        with stoppable():
+            return _run(arguments)
+    except KeyboardInterrupt:  # the command line library catches it only inside a command
+        return _stopped()
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     share_one_heap()
-    say_any_name()
     words = words_typed(sys.argv[1:] if arguments is None else arguments, os.environ)
-    with compiling_said(quiet="-q" in words or "--quiet" in words), stoppable():
+    with compiling_said(quiet="-q" in words or "--quiet" in words):
         try:
             return _ended(words)
         except (OSError, MemoryError, ImportError, RuntimeError) as fault:
@@ -98,12 +106,14 @@ def _ended(words: Sequence[str]) -> int:
         return fault.exit_status
     except SystemExit as end:
         if end.code == STOPPED:
-            print(
-                "psvideo: stopped. What was finished is kept; split and normals go on with --resume.", file=sys.stderr
-            )
-            return 1
+            return _stopped()
         return end.code if isinstance(end.code, int) else 0
     return 0
+
+
+def _stopped() -> int:
+    print("psvideo: stopped. What was finished is kept; split and normals go on with --resume.", file=sys.stderr)
+    return PsvideoError.exit_status
 
 
 def _broken_off(fault: Exception) -> int:

@@ -18,6 +18,8 @@ if sys.platform != "win32":
 
 ENDING = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 """Ctrl-C; what systems and farms send to end a program; a terminal that is closed."""
+LATER_S = 0.01
+"""A stop that Python dropped is raised again after so long: not where it was dropped, and not felt."""
 NO_MEMORY = (
     "there is not enough memory{said}. Nothing half-made was left under a final name. Close other programs, compute "
     "with fewer threads (PSVIDEO_THREADS=1), or take a machine with more memory; split and normals go on with `resume`."
@@ -31,19 +33,41 @@ LEAST_BYTES = 1200 << 20
 @contextlib.contextmanager
 def stoppable() -> Iterator[None]:
     """In this block, what asks a program to end stops it as Ctrl-C does: what it writes is closed, lights become dark.
-    A second such signal ends it at once, which costs no more than a kill. Signals that are ignored stay so (nohup)."""
+    A second such signal ends it at once, which costs no more than a kill. Signals that are ignored stay so (nohup).
+
+    Python drops what is raised while it clears something away; a stop that fell there is asked for again.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    asked = False
+    asked, is_dropping = False, False
+    later: list[threading.Timer] = []
+    say_dropped = sys.unraisablehook
 
     def stop(number: int, frame: FrameType | None) -> None:
         nonlocal asked
+        if is_dropping:
+            stop_later(number)
+            return
         if asked:
             os._exit(PsvideoError.exit_status)
         asked = True
-        raise KeyboardInterrupt
+        raise KeyboardInterrupt(number)
 
+    def stop_later(number: int) -> None:
+        later.append(threading.Timer(LATER_S, signal.raise_signal, (number,)))
+        later[-1].start()
+
+    def dropped(what: "sys.UnraisableHookArgs") -> None:
+        nonlocal asked, is_dropping
+        if not (isinstance(what.exc_value, KeyboardInterrupt) and what.exc_value.args):
+            say_dropped(what)
+            return
+        asked, is_dropping = False, True
+        stop_later(*what.exc_value.args)
+        is_dropping = False
+
+    sys.unraisablehook = dropped
     before = {number: signal.getsignal(number) for number in ENDING}
     heard = [number for number, handler in before.items() if handler not in (signal.SIG_IGN, None)]
     for number in heard:
@@ -51,8 +75,11 @@ def stoppable() -> Iterator[None]:
     try:
         yield
     finally:
+        for timer in later:
+            timer.cancel()
         for number in heard:
             signal.signal(number, before[number])
+        sys.unraisablehook = say_dropped
 
 
 def check_addresses() -> None:
