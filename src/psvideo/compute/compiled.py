@@ -24,11 +24,12 @@ from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
 from numba.core.dispatcher import Dispatcher
 from numba.core.runtime.nrt import rtsys
 
+from psvideo.compute.parts import PART
+
 Function = TypeVar("Function", bound=Callable[..., Any])
 _Cache: Any = FunctionCache
 _Files: Any = IndexDataCacheFile
 _NoCache: Any = NullCache
-_PART: dict[str, Any] = {"nogil": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 LOG = logging.getLogger("psvideo.compiling")
 """Says, as information, when a loop was kept nowhere and is being compiled."""
 _UNREADABLE = (OSError, EOFError, pickle.UnpicklingError, AttributeError, ImportError)
@@ -102,12 +103,12 @@ class Arithmetic:
 
     def called(self, function: Function) -> Function:
         """Compile a function that only compiled ones call, once for all of them."""
-        part: Function = numba.njit(**_PART, **self._options)(function)
+        part: Function = numba.njit(**PART, **self._options)(function)
         return part
 
     def inlined(self, function: Function) -> Function:
         """Compile a function into the compiled functions that call it."""
-        part: Function = numba.njit(**_PART, forceinline=True, **self._options)(function)
+        part: Function = numba.njit(**PART, forceinline=True, **self._options)(function)
         return part
 
     @property

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import decoded, lent, pointer
+from psvideo.compute.parts import INLINED
 
 Floats = NDArray[np.float32]
 Places = NDArray[np.intp]
@@ -81,7 +82,7 @@ def _some_reach(codes: NDArray[Any], limit: np.float32, most: np.float32) -> boo
     raise NotImplementedError
 
 
-@overload(_some_reach, jit_options={"forceinline": True}, strict=False)
+@overload(_some_reach, jit_options=INLINED, strict=False)
 def _some_reach_of(codes: Any, limit: Any, most: Any) -> Callable[[Any, np.float32, np.float32], bool]:
     def of_integers(codes: Any, limit: np.float32, most: np.float32) -> bool:
         largest = codes[0]

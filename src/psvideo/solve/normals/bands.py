@@ -64,6 +64,18 @@ class ShownPlates:
             return cls(samples=stand_ins, makes=rows_maker(mixtures))
         return cls(samples=[np.ascontiguousarray(plate) for plate in plates])
 
+    def as_floats(self) -> "ShownPlates":
+        """Return the same where codes are made into floats band by band."""
+        codes = self.samples
+        if self.makes is not None or codes[0].dtype == np.float32:
+            return self
+
+        def make(rows: NDArray[np.intp], first: int, into: Image) -> None:
+            for plate, part in zip(codes, into, strict=True):
+                part[rows - first] = plate[rows]
+
+        return ShownPlates(samples=[np.broadcast_to(np.float32(0), plate.shape) for plate in codes], makes=make)
+
     @property
     def shape(self) -> tuple[int, ...]:
         """A plate's shape."""

@@ -11,7 +11,6 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numba.extending import overload
 
 from psvideo.compute.compiled import FUSED
 from psvideo.solve.normals.blocks import ABSENT, BLOCK, COUNT, ONE, THREE, XX, XY, XZ, YY, YZ, ZERO, ZZ, X, Y, Z
@@ -147,9 +146,10 @@ def _store_equations(w: Floats, i: int, lamps: Any, weights: Any, m: Any) -> Non
 
 
 @FUSED.called
-def _begin(
+def begin_few(
     matrix: Floats, per_strength: Floats, darkest: np.float32, brightest: np.float32, w: Floats, m: Floats, n: int
 ) -> None:
+    """The normal equations of the start, as ``choose_start`` and ``add_start`` give them. ``m`` is flat."""
     lamps, per = _lamps(matrix), _of_lights(per_strength)
     for i in range(n):
         here, count = _of_pixel(m, i), w[COUNT + i]
@@ -164,7 +164,7 @@ def _begin(
 
 
 @FUSED.called
-def _reweigh(
+def reweigh_few(
     matrix: Floats, tukey: bool, width: np.float32, noise: np.float32, signal_noise: np.float32,
     w: Floats, v: Floats, m: Floats, n: int,
 ) -> None:  # fmt: skip
@@ -181,44 +181,3 @@ def _reweigh(
         v[SCALE + i] = scale
         weights = _weights(errors, ONE / (width * scale), tukey)
         _store_equations(w, i, lamps, weights, here)
-
-
-def begin_few(
-    matrix: Floats, per_strength: Floats, darkest: np.float32, brightest: np.float32, w: Floats, m: Floats, n: int
-) -> None:
-    """The normal equations of the start, as ``choose_start`` and ``add_start`` give them.
-
-    Nothing is done where lights are near: matrix (light, 3, pixel). ``m`` is flat. Compiled only.
-    """
-    raise NotImplementedError
-
-
-def reweigh_few(
-    matrix: Floats, tukey: bool, width: np.float32, noise: np.float32, signal_noise: np.float32,
-    w: Floats, v: Floats, m: Floats, n: int,
-) -> None:  # fmt: skip
-    """SCALE and the weighted normal equations, as ``find_scale`` and ``add_weighted`` give them.
-
-    Nothing is done where lights are near. Compiled only.
-    """
-    raise NotImplementedError
-
-
-@overload(begin_few, jit_options={"forceinline": True}, strict=False)
-def _begin_few(matrix: Any, per_strength: Any, darkest: Any, brightest: Any, w: Any, m: Any, n: Any) -> Any:
-    if matrix.ndim != 2:
-        return lambda matrix, per_strength, darkest, brightest, w, m, n: None
-    return lambda matrix, per_strength, darkest, brightest, w, m, n: _begin(
-        matrix, per_strength, darkest, brightest, w, m, n
-    )
-
-
-@overload(reweigh_few, jit_options={"forceinline": True}, strict=False)
-def _reweigh_few(
-    matrix: Any, tukey: Any, width: Any, noise: Any, signal_noise: Any,     w: Any, v: Any, m: Any, n: Any,
-) -> Any:  # fmt: skip
-    if matrix.ndim != 2:
-        return lambda matrix, tukey, width, noise, signal_noise, w, v, m, n: None
-    return lambda matrix, tukey, width, noise, signal_noise, w, v, m, n: _reweigh(
-        matrix, tukey, width, noise, signal_noise, w, v, m, n
-    )

@@ -13,6 +13,7 @@ from numba import types
 from numba.extending import overload
 
 from psvideo.compute.compiled import FUSED
+from psvideo.compute.parts import INLINED
 from psvideo.model import near_light
 from psvideo.solve.normals.task import Floats, Near
 
@@ -68,7 +69,7 @@ def place_lights(matrix: Floats, per_strength: Floats, near: Near, row: int, col
     raise NotImplementedError
 
 
-@overload(place_lights, jit_options={"forceinline": True}, strict=False)
+@overload(place_lights, jit_options=INLINED, strict=False)
 def _place_lights(matrix: Any, per_strength: Any, near: Any, row: Any, col: Any, n: Any) -> Any:
     if matrix.ndim == 2:
         return lambda matrix, per_strength, near, row, col, n: None
@@ -80,7 +81,7 @@ def at(numbers: Any, pixel: int) -> Any:
     raise NotImplementedError
 
 
-@overload(at, jit_options={"forceinline": True}, strict=False)
+@overload(at, jit_options=INLINED, strict=False)
 def _at(numbers: Any, pixel: Any) -> Callable[[Any, int], Any]:
     if isinstance(numbers, types.Float) or (
         isinstance(numbers, types.UniTuple) and isinstance(numbers.dtype, types.Float)

@@ -115,6 +115,7 @@ def solve(
     """
     shown = ShownPlates.of(plates)
     check_arrays(shown.samples, lit, seen, mask)
+    shown = shown.as_floats()  # one kind of samples, and so one loop to compile
     from psvideo.solve.normals import robust_kernel as kernel
 
     (rows, cols), channels = shown.shape[:2], lit.intensities.shape[1]  # which are combined
@@ -124,11 +125,13 @@ def solve(
 
     def run(into: Samples, unexplained: Floats, how: Weights, step: int, reflecting: bool) -> None:
         def band(one: Task, memory: kernel.Memory, first: int, last: int) -> None:
-            kernel.solve_rows(one, result, into, unexplained, memory, how, first, last, step)
+            kernel.solve_rows(
+                one, kernel.as_bytes(result), half, into.view(np.uint8), unexplained, memory, how, first, last, step
+            )
             let_rows_go(result, cols, first, last)
             let_go(predicted[first * cols : last * cols])
 
-        memory_of = partial(kernel.working_memory, reflecting=reflecting)
+        memory_of = partial(kernel.working_memory, reflecting=reflecting, residual=residual)
         shown.in_bands(band, given, memory_of, threads=threads, step=step)
 
     noise = (0.0, 0.0) if plate_noise is None else (plate_noise.read / channels, plate_noise.photon / channels)

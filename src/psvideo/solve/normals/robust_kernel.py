@@ -41,7 +41,7 @@ from psvideo.solve.normals.measuring import all_seen, combine, gather_one, gathe
 from psvideo.solve.normals.near_kernel import at, place_lights
 from psvideo.solve.normals.odd_of_four import TWO, drop_odd_of_four
 from psvideo.solve.normals.reflecting import KEPT, reflecting
-from psvideo.solve.normals.task import FEW, LIGHTS, Floats, Result, Samples, Task, Weights
+from psvideo.solve.normals.task import FEW, LIGHTS, Bytes, Floats, Result, Task, Weights, empty_result
 
 STEP = 128  # pixels that are solved together: few enough that all of their planes stay in the nearest cache
 SMALL_SAMPLE = np.float32(1.9)  # the median of few residuals of a fit that follows them falls short by so much
@@ -64,17 +64,24 @@ class Memory(NamedTuple):
     measurements: Floats
     errors: Floats
     flat: Floats
-    matrix: Floats
-    per_strength: Floats
+    matrix: Floats  # (light, 3, pixel): what lights send to every pixel
+    per_strength: Floats  # (light, pixel)
+    block: Result  # of one block, in float32
     gradient: Floats  # (light, 3, pixel) where the subject's reflectance is known, else of no light
     matte: Floats  # (light, pixel): measurements without highlights
     kept: Floats
 
 
-def working_memory(task: Task, *, reflecting: bool = False) -> Memory:
-    """Return memory for one thread; ``reflecting`` where the subject's reflectance is known."""
+def working_memory(task: Task, *, reflecting: bool, residual: bool) -> Memory:
+    """Return memory for one thread; ``reflecting`` where the subject's reflectance is known, ``residual`` where
+    residuals are wanted."""
     lights = len(task.matrix)
     plain = kernel.working_memory(task)
+    matrix, per_strength = np.zeros((lights, 3, BLOCK), np.float32), np.zeros((lights, BLOCK), np.float32)
+    matrix[:], per_strength[:] = (
+        task.matrix[..., None],
+        task.per_strength[:, None],
+    )  # near lights' change with the block
     return Memory(
         planes=np.zeros_like(plain.planes),
         more=np.zeros(9 * BLOCK, np.float32),
@@ -82,24 +89,36 @@ def working_memory(task: Task, *, reflecting: bool = False) -> Memory:
         measurements=plain.measurements,
         errors=np.full((len(plain.measurements), BLOCK), OUT, np.float32),
         flat=plain.measurements.reshape(-1),
-        matrix=plain.matrix,
-        per_strength=plain.per_strength,
+        matrix=matrix,
+        per_strength=per_strength,
+        block=empty_result(BLOCK, task.tone.shape[1], half=False, residual=residual),
         gradient=np.zeros((lights if reflecting else 0, 3, BLOCK), np.float32),
         matte=np.full((lights if reflecting else 0, BLOCK), MISSING, np.float32),
         kept=np.zeros(KEPT if reflecting else 0, np.float32),
     )
 
 
+def as_bytes(result: Result) -> Result:
+    """Return a result as ``solve_rows`` takes it."""
+    return Result(
+        normals=result.normals.view(np.uint8),
+        albedo=result.albedo.view(np.uint8),
+        valid=result.valid,
+        residual=result.residual.view(np.uint8),
+    )
+
+
 @FUSED.kept
 def solve_rows(
-    task: Task, result: Result, error: Samples, misfit: Floats, memory: Memory, weights: Weights,
+    task: Task, result: Result, half: bool, error: Bytes, misfit: Floats, memory: Memory, weights: Weights,
     first: int, last: int, step: int,
 ) -> None:  # fmt: skip
     """Solve the rows from ``first`` up to ``last``; no two calls may share rows, and any number may run at once.
 
     Only every ``step``-th row of the picture is solved. ``error`` (pixel,) or empty takes the predicted error in
     degrees, ``misfit`` (pixel,) or empty the share of a pixel's light that its lights leave unexplained, 0 where
-    too few are usable to judge.
+    too few are usable to judge. ``result`` and ``error`` are the bytes of half floats, or of float32, so that one loop,
+    compiled once, writes both.
     """
     t = kernel.lent_task(task, memory.matrix, memory.per_strength)
     out = Result(lent(result.normals), lent(result.albedo), lent(result.valid), lent(result.residual))
@@ -107,6 +126,10 @@ def solve_rows(
     w, v, values = lent(memory.planes), lent(memory.more), lent(memory.values)
     m, e = lent(memory.measurements), lent(memory.errors)
     flat, gradient = lent(memory.flat), lent(memory.gradient)
+    block = Result(
+        lent(memory.block.normals), lent(memory.block.albedo), lent(memory.block.valid), lent(memory.block.residual)
+    )
+    sent, per = lent(task.matrix), lent(task.per_strength)
     matte, kept = lent(memory.matte), lent(memory.kept)
     for row in range(-(-first // step) * step, last, step):
         for col in range(0, t.cols, STEP):
@@ -116,18 +139,47 @@ def solve_rows(
                 w[X : X + n], w[Y : Y + n], w[Z : Z + n] = ZERO, ZERO, ZERO
                 v[DOUBT : DOUBT + n], v[UNEXPLAINED : UNEXPLAINED + n] = NO_ERROR, ZERO
             else:
-                summed = _solve_block(t, weights, w, v, values, m, e, flat, gradient, matte, kept, row, col, n)
+                summed = _solve_block(
+                    t, sent, per, weights, w, v, values, m, e, flat, gradient, matte, kept, row, col, n
+                )
             start = row * t.cols + col
-            kernel.store_block(t, out, w, values, m, start, n, summed)
-            for i in range(min(n, len(predicted))):
-                predicted[start + i] = encoded(v[DOUBT + i] if out.valid[start + i] else ZERO, predicted)
+            kernel.store_block(t, block, w, values, m, 0, n, summed)
+            for i in range(n):
+                v[DOUBT + i] = v[DOUBT + i] if block.valid[i] else ZERO
             for i in range(min(n, len(unexplained))):
-                unexplained[start + i] = v[UNEXPLAINED + i] if out.valid[start + i] else ZERO
+                unexplained[start + i] = v[UNEXPLAINED + i] if block.valid[i] else ZERO
+            _hand_out(block, v, out, predicted, half, start, n)
+
+
+@FUSED.called
+def _hand_out(block: Result, v: Floats, out: Result, predicted: Bytes, half: bool, start: int, n: int) -> None:
+    """Write a solved block where it goes."""
+    for axis in range(3):
+        _write(block.normals[axis], out.normals[axis], half, start, n)
+    for channel in range(len(block.albedo)):
+        _write(block.albedo[channel], out.albedo[channel], half, start, n)
+    if out.residual.size:
+        _write(block.residual, out.residual, half, start, n)
+    if predicted.size:
+        _write(v[DOUBT : DOUBT + n], predicted, half, start, n)
+    out.valid[start : start + n] = block.valid[:n]
+
+
+@FUSED.called
+def _write(values: Floats, plane: Bytes, half: bool, start: int, n: int) -> None:
+    if half:
+        halves = plane.view(np.uint16)[start : start + n]
+        for i in range(n):
+            halves[i] = encoded(values[i], halves)
+    else:
+        plane.view(np.float32)[start : start + n] = values[:n]
 
 
 @FUSED.inlined
 def _solve_block(
     task: Task,
+    sent: Floats,
+    per: Floats,
     weights: Weights,
     w: Floats,
     v: Floats,
@@ -147,8 +199,9 @@ def _solve_block(
     Returned is whether three channels' sums are left as well (``colour_kernel.py``), of what counts in every pixel.
     """
     start, channels = row * task.cols + col, task.tone.shape[1]
-    place_lights(task.matrix, task.per_strength, task.near, row, col, n)
     distant = task.near.depth.size == 0
+    if not distant:
+        place_lights(task.matrix, task.per_strength, task.near, row, col, n)
     plain = distant and channels == 3 and all_seen(task.seen, row, col, n)
     summed = plain and kernel.solve_colours(task, w, values, m, start, n)
     if summed:
@@ -160,21 +213,23 @@ def _solve_block(
     few = len(m) == FEW and distant
     if not done:
         if few:
-            begin_few(task.matrix, task.per_strength, weights.darkest, weights.brightest, w, flat, n)
+            begin_few(sent, per, weights.darkest, weights.brightest, w, flat, n)
         else:
             choose_start(task, weights, w, v, m, e, n)
             add_start(task, w, v, m, e, n)
         solve_equations(w, n, SOUND_SQUARED, False)
         drop_odd_of_four(task, weights.noise, weights.signal_noise, weights.contradiction, w, v, m, e, n)
         for _ in range(weights.rounds):
-            _reweigh(task, weights, weights.signal_noise, weights.tukey, weights.width, False, few, w, v, m, e, flat, n)
+            _reweigh(
+                task, sent, weights, weights.signal_noise, weights.tukey, weights.width, False, few, w, v, m, e, flat, n
+            )
             solve_equations(w, n, SOUND_SQUARED, True)
     share = LIGHTS if weights.read > ZERO else weights.signal_noise
     again = not done and gradient.size > 0
     if again:
         reflecting(task.matrix, task.per_strength, weights, share, gradient, matte, kept, w, v, values, m, e, n)
     else:
-        _reweigh(task, weights, share, False, TWO, True, few, w, v, m, e, flat, n)
+        _reweigh(task, sent, weights, share, False, TWO, True, few, w, v, m, e, flat, n)
     _predict_error(weights, min(task.lights, LEAST_CHECKED), w, v, n)
     if task.mask.size:
         for i in range(n):
@@ -199,15 +254,15 @@ def _read_usable(task: Task, w: Floats, values: Floats, m: Floats, row: int, col
 
 @FUSED.inlined
 def _reweigh(
-    task: Task, weights: Weights, share: np.float32, tukey: bool, width: np.float32, last: bool, few: bool,
-    w: Floats, v: Floats, m: Floats, e: Floats, flat: Floats, n: int,
+    task: Task, sent: Floats, weights: Weights, share: np.float32, tukey: bool, width: np.float32, last: bool,
+    few: bool, w: Floats, v: Floats, m: Floats, e: Floats, flat: Floats, n: int,
 ) -> None:  # fmt: skip
     """SCALE and the normal equations, every measurement weighed by how well the last solution explains it.
 
     share: of a pixel's light, what is left over at least.
     """
     if few:
-        reweigh_few(task.matrix, tukey, width, weights.noise, share, w, v, flat, n)
+        reweigh_few(sent, tukey, width, weights.noise, share, w, v, flat, n)
     else:
         find_scale(task.matrix, weights.noise, share, w, v, m, e, n)
         add_weighted(task.matrix, tukey, width, last, w, v, m, e, n)
