@@ -216,7 +216,7 @@ def test_threads_end_when_reading_is_broken_off(shot: Path) -> None:
 def test_no_more_than_the_frames_asked_for_are_decoded_ahead(shot: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     decoded: list[str] = []
 
-    def counted(kind: str, file: Path) -> CodedPicture:
+    def counted(kind: str, file: Path, **_: bool) -> CodedPicture:
         decoded.append(file.name)
         return decode(kind, file)
 

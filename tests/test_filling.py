@@ -187,6 +187,10 @@ class ReadRows:
         self.read.update(range(len(self))[rows])
         return np.asarray(self.codes[rows])
 
+    def some(self, rows: np.ndarray) -> np.ndarray:
+        self.read.update(rows.tolist())
+        return np.asarray(self.codes[rows[0] : rows[-1] + 1])
+
 
 def test_where_little_is_missing_little_is_read_again() -> None:
     """A hole in ten rows: only these are made of the frames once more, and what comes out is the same."""

@@ -3,15 +3,18 @@
 import collections
 import contextlib
 import hashlib
+import shutil
 import weakref
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+import tifffile
 
 from psvideo.cli.app import main
 from psvideo.clip import kept, reading
+from psvideo.clip.decode import tiff
 from psvideo.clip.decode.decoders import decode
 from psvideo.clip.record import CodedPicture
 from psvideo.report.observe.observed import Observed
@@ -44,7 +47,7 @@ def decoded(monkeypatch: pytest.MonkeyPatch) -> collections.Counter[str]:
     """How often each file was decoded since the test began."""
     count: collections.Counter[str] = collections.Counter()
 
-    def counted(kind: str, file: Path) -> CodedPicture:
+    def counted(kind: str, file: Path, **_: bool) -> CodedPicture:
         count.update([file.name])
         return decode(kind, file)
 
@@ -138,3 +141,21 @@ def test_plates_are_let_go_while_their_surface_waits_to_be_written(
     assert len(jobs) == len(alive) == 2
     assert alive == [0, 0]
     assert not any(plate() is not None for plate in plates)
+
+
+def test_frames_that_stay_in_their_files_give_the_same_bytes(
+    clip: Path, timing: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Rows are read again for every step that wants them."""
+    plain, results = tmp_path / "clip", []
+    (plain / "frames").mkdir(parents=True)
+    for name in ("plan.toml", "rig.toml"):
+        shutil.copy(clip / name, plain)
+    for file in (clip / "frames").iterdir():
+        tifffile.imwrite(plain / "frames" / f"{file.stem}.tif", decode(file.suffix[1:], file).codes)
+    whole = ("normals", plain, "--rig", plain / "rig.toml", "--timing", timing, "-q")
+    for name, from_bytes in (("memory", 1 << 30), ("files", 1)):
+        monkeypatch.setattr(tiff, "OF_CLIP_STAYS_FROM_BYTES", from_bytes)
+        assert run(*whole, "-o", tmp_path / name, "--align", "flow", "--aov", "error") == 0
+        results.append(pictures(tmp_path / name))
+    assert results[0] == results[1] != {}

@@ -32,14 +32,17 @@ def read_frames(
     threads: int | None = None,
     kept: Kept | None = None,
     keep: bool = False,
+    in_files: bool = False,
 ) -> Iterator[Frame]:
     """Give the clip's frames in their codes, in ascending order, each decoded once; ``numbers`` chooses some of them.
 
     Up to ``ahead`` frames are decoded in advance by ``threads``, left out by half of those that compute: rebuilding,
     solving and encoding want the others. So memory does not grow with the clip. The threads end when the iterator is
     used up, closed, or ends in an error. Frames that are in ``kept`` are read back from there; with ``keep`` the others
-    are put into it once they are decoded, unless their files hold plain codes themselves. Raises PsvideoError that
-    names the file where a frame is missing, damaged, or of another size or depth than the first.
+    are put into it once they are decoded, unless their files hold plain codes themselves. ``in_files``: frames stay in
+    their files where they lie there as they would in memory, and rows are read whenever somebody wants them; for those
+    who hold many. Raises PsvideoError that names the file where a frame is missing, damaged, or of another size or
+    depth than the first.
     """
     chosen = clip.numbers if numbers is None else tuple(sorted(set(numbers)))
     absent = set(chosen) - set(clip.numbers)
@@ -47,7 +50,7 @@ def read_frames(
         raise UsageError(f"{clip.path}: has no frame number {min(absent)}; {_span(clip.numbers)}.")
     if not chosen:
         return iter(())
-    decoded = _decoder(clip, [number for number in chosen if kept is None or number not in kept])
+    decoded = _decoder(clip, [number for number in chosen if kept is None or number not in kept], in_files)
     keep = keep and not holds_plain_codes(clip)
     jobs = (partial(_picture, clip, number, decoded, kept, keep) for number in chosen)
     workers = 1 if clip.is_movie else threads or max(thread_count() // 2, 1)
@@ -82,10 +85,10 @@ def _span(numbers: tuple[int, ...]) -> str:
     return f"its {len(numbers)} frames are numbered {numbers[0]} to {numbers[-1]}"
 
 
-def _decoder(clip: Clip, numbers: list[int]) -> Callable[[int], Picture]:
+def _decoder(clip: Clip, numbers: list[int], in_files: bool) -> Callable[[int], Picture]:
     """Return what decodes a frame; a movie's are asked for in the order of ``numbers``."""
     if not clip.is_movie:
-        return lambda number: opened(clip.kind, clip.file_of(number))
+        return lambda number: opened(clip.kind, clip.file_of(number), of_clip=in_files)
     from psvideo.clip.decode.movie import read_movie
 
     pictures = read_movie(clip.path, [clip.timestamps[bisect_left(clip.numbers, number)] for number in numbers])

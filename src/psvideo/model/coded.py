@@ -91,6 +91,9 @@ class StoredCodes(Protocol):
     def __getitem__(self, rows: slice) -> NDArray[Any]:
         """Read some rows that follow each other."""
 
+    def some(self, rows: NDArray[np.intp]) -> NDArray[Any]:
+        """Read rows, which rise: returned are all from the first to the last, of which only these hold anything."""
+
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
         """Read the whole picture."""
 

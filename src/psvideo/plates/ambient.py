@@ -87,7 +87,7 @@ def _looked_at(dark: Plate) -> tuple[RowLight, Image]:
     block = block_px(shape)
 
     def look(first: int, last: int) -> None:
-        bound.run(look_rows, first, last, block, first, last, means, clipped, coarse)
+        bound.run(look_rows, range(first, last), block, first, last, means, clipped, coarse)
 
     over_bands(look, shape)
     return RowLight.of(dark, means, clipped), coarse
@@ -105,8 +105,8 @@ def _blended(
 
     def blend(first: int, last: int) -> None:
         bound.run(
-            blend_rows, first, last, block, LONGEST_MEMORY, factors, seen, restarts, gain, old, ambient.slots, first,
-            last, new, slots, coarse,
+            blend_rows, range(first, last), block, LONGEST_MEMORY, factors, seen, restarts, gain, old, ambient.slots,
+            first, last, new, slots, coarse,
         )  # fmt: skip
 
     over_bands(blend, shape)

@@ -175,7 +175,8 @@ def clip_plates(
     if not come_often:
         _decode_ahead(take, numbers, watch)
     ahead = 1 if holds_plain_codes(clip) else AHEAD
-    decoded = read_frames(clip, numbers, ahead=ahead, threads=thread_count(), kept=take.kept)
+    in_files = take.plan.mode != "synced"  # of flashes few frames are held at a time, of photographs all
+    decoded = read_frames(clip, numbers, ahead=ahead, threads=thread_count(), kept=take.kept, in_files=in_files)
     frames = placed(watch(decoded, total=len(numbers), what="rebuilding flashes"), places)
     single = (split if method == "weights" else hudon2015.split)(frames, camera, here)
     known = None if part is None else part.ambient

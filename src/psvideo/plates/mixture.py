@@ -79,7 +79,7 @@ class Mixture:
 
         def read(first: int, last: int, into: Image | None = None) -> Image:
             band = np.empty((last - first, *self.shape[1:]), np.float32) if into is None else into
-            bound.run(mix_rows, first, last, np.arange(first, last), band.reshape(last - first, -1))
+            bound.run(mix_rows, range(first, last), np.arange(first, last), band.reshape(last - first, -1))
             return band
 
         return read
@@ -102,8 +102,8 @@ class Mixture:
         each = max(THINNED_SAMPLES // bound.mix.samples // stride, 1)
         for first in range(0, rows, each):
             last = min(first + each, rows)
-            ends = stride * first, stride * (last - 1) + 1
-            bound.run(mix_thinned, *ends, first, last, stride, channels, image.reshape(rows, -1))
+            some = range(stride * first, stride * (last - 1) + 1, stride)
+            bound.run(mix_thinned, some, first, last, stride, channels, image.reshape(rows, -1))
         return image
 
     def halved(self) -> Image:
@@ -114,7 +114,7 @@ class Mixture:
         channels = 1 if len(self.shape) == 2 else self.shape[2]
 
         def band(first: int, last: int) -> None:
-            bound.run(mix_halved, 2 * first, 2 * last, first, last, channels, grey)
+            bound.run(mix_halved, range(2 * first, 2 * last), first, last, channels, grey)
 
         _in_bands(band, rows, 2 * bound.mix.samples)
         return grey
@@ -163,7 +163,7 @@ class Mixture:
             ceiling=np.float32(self.ceiling),
             clips_from=np.float32(self.clips_from),
         )
-        return ReadyMixture(mix=mix, frames=frames, levels=self.levels)
+        return ReadyMixture(mix=mix, frames=frames, levels=self.levels, counts=self.coefficients != 0)
 
     def _into(self, image: Image, rows: range | NDArray[np.intp]) -> None:
         if not len(rows):
@@ -173,29 +173,38 @@ class Mixture:
 
         def band(first: int, last: int) -> None:
             some = places[first:last]
-            bound.run(mix_rows, some.min(), some.max() + 1, some, flat[first:last])
+            bound.run(mix_rows, np.sort(some), some, flat[first:last])
 
         _in_bands(band, len(rows), bound.mix.samples)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ReadyMixture:
-    """A picture as a compiled loop takes it, beside what it is made of."""
+    """A picture as a compiled loop takes it, beside what it is made of; ``counts`` (frame, row) are the frames' rows
+    that it takes."""
 
     mix: MixtureArrays
     frames: tuple[Coded, ...]
     levels: tuple[AmbientLevel, ...]
+    counts: NDArray[np.bool_]
 
-    def run(self, loop: Callable[..., None], first: int, last: int, *arguments: object) -> None:
-        """Call ``loop(mix, *arguments)``, which takes the frames' rows from the first up to the last.
+    def run(self, loop: Callable[..., None], rows: range | NDArray[np.intp], *arguments: object) -> None:
+        """Call ``loop(mix, *arguments)``, which takes the frames' ``rows`` (at least one, in rising order).
 
-        Where frames stay in their files, these rows are read, and held no longer than the loop runs.
+        Where frames stay in their files, these rows are read as far as they count, and held no longer than the loop
+        runs.
         """
         if len(self.mix.frames) == len(self.frames):  # all of them lie in memory
             loop(self.mix, *arguments)
             return
-        held = [frame.codes[first:last] for frame in self.frames]
-        begins = np.array([rows.ctypes.data - first * rows.strides[0] for rows in held], np.intp)
+        wanted = np.asarray(rows, np.intp)
+        first = wanted[0]
+        held: dict[int, NDArray[np.generic]] = {}
+        begins = np.zeros(len(self.frames), np.intp)
+        for place in np.flatnonzero(self.counts[:, wanted].any(axis=1)).tolist():
+            codes = self.frames[place].codes
+            held[place] = codes[first : wanted[-1] + 1] if isinstance(codes, np.ndarray) else codes.some(wanted)
+            begins[place] = held[place].ctypes.data - first * held[place].strides[0]
         loop(self.mix._replace(frames=begins), *arguments)
 
 
@@ -257,12 +266,13 @@ def rows_maker(pictures: Sequence[Mixture]) -> Callable[[NDArray[np.intp], int, 
         return make_each
     parts = _Parts.of(pictures)
     together = replace(pictures[0], frames=parts.frames, coefficients=parts.shares[0], levels=parts.levels, taken=None)
-    bound = together.bound()
+    counts: NDArray[np.bool_] = np.logical_or.reduce(parts.shares != 0)
+    bound = replace(together.bound(), counts=counts)
     shares, taken = (np.ascontiguousarray(part, np.float32) for part in (parts.shares, parts.taken))
 
     def make(rows: NDArray[np.intp], first: int, into: Image) -> None:
         flat = into.reshape(*into.shape[:2], -1)
-        bound.run(mix_pictures, rows[0], rows[-1] + 1, shares, taken, rows, first, flat)
+        bound.run(mix_pictures, rows, shares, taken, rows, first, flat)
 
     return make
 

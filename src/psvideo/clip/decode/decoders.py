@@ -6,6 +6,7 @@ here can read is asked here too.
 """
 
 from collections.abc import Callable
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -42,12 +43,13 @@ def decode(kind: str, file: Path) -> CodedPicture:
     return picture
 
 
-def opened(kind: str, file: Path) -> CodedPicture | PictureInFile:
-    """Decode one picture, or leave it in its file where it is large and lies there as it would in memory."""
+def opened(kind: str, file: Path, *, of_clip: bool = False) -> CodedPicture | PictureInFile:
+    """Decode one picture, or leave it in its file where it is large and lies there as it would in memory. ``of_clip``:
+    one of many of which a few are held at a time, which stay in their files from a smaller size on."""
     if kind == "tiff":
         from psvideo.clip.decode import tiff
 
-        return guarded(tiff.opened, file)
+        return guarded(partial(tiff.opened, of_clip=of_clip), file)
     return decode(kind, file)
 
 

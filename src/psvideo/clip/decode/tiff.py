@@ -19,6 +19,9 @@ logging.getLogger("tifffile").addHandler(logging.NullHandler())
 
 STAYS_FROM_BYTES = 1 << 27
 """Samples of so many bytes and more (22 megapixels in colour) stay in their file where they lie there as they are."""
+OF_CLIP_STAYS_FROM_BYTES = 1 << 20
+"""The same of a clip's frames, of which a round and a half would be held: smaller ones cost less than reading them
+piece by piece."""
 MOST_PAGES = 32
 """A picture and its thumbnails are fewer."""
 NATIVE = "<" if sys.byteorder == "little" else ">"
@@ -38,16 +41,22 @@ def decode(path: Path) -> CodedPicture:
         return _decoded(page, _header(path, page))
 
 
-def opened(path: Path) -> CodedPicture | PictureInFile:
-    """Return a picture; where it is large and lies in its file as it would in memory, it is left there."""
+def opened(path: Path, *, of_clip: bool = False) -> CodedPicture | PictureInFile:
+    """Return a picture; where it is large and lies in its file as it would in memory, it is left there. ``of_clip``:
+    one of many of which a few are held at a time."""
     with tifffile.TiffFile(path) as file:
         page = _only_page(path, file)
         head = _header(path, page)
         plain = bool(page.is_memmappable) and page.planarconfig == 1 and page.samplesperpixel == head.channels
-        if not plain or file.byteorder != NATIVE or page.nbytes < STAYS_FROM_BYTES:
+        if (
+            not plain
+            or file.byteorder != NATIVE
+            or page.nbytes < (OF_CLIP_STAYS_FROM_BYTES if of_clip else STAYS_FROM_BYTES)
+        ):
             return _decoded(page, head)
         shape = (page.imagelength, page.imagewidth, *((head.channels,) if head.channels > 1 else ()))
-        return PictureInFile(header=head, codes=RowsInFile.at(path, page.dataoffsets[0], np.dtype(page.dtype), shape))
+        begin, kind = page.dataoffsets[0], np.dtype(page.dtype)
+        return PictureInFile(header=head, codes=RowsInFile.at(path, begin, kind, shape, stays_open=of_clip))
 
 
 def _decoded(page: tifffile.TiffPage, head: Header) -> CodedPicture:
