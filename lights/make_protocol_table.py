@@ -34,7 +34,13 @@ def _opening(table: dict[str, Any]) -> Iterator[str]:
 
 def _words(table: dict[str, Any]) -> Iterator[str]:
     yield from (f"#define ERROR_{name.upper()} {code}" for name, code in table["error"].items())
-    for kind, one in (("states", "state"), ("faults", "fault"), ("resets", "reset"), ("wirings", "wiring")):
+    for kind, one in (
+        ("states", "state"),
+        ("faults", "fault"),
+        ("resets", "reset"),
+        ("wirings", "wiring"),
+        ("ways", "way"),
+    ):
         names = table[kind]["names"]
         yield ""
         yield from (f"#define {one.upper()}_{name.upper()} {place}" for place, name in enumerate(names))

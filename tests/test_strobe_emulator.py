@@ -443,3 +443,74 @@ def test_the_trace_names_pins_and_lights(tmp_path: Path) -> None:
     for light, pin in (("0", "S0"), ("1", "S1")):
         assert trace.edges[pin][0] < trace.edges["X0"][0] == trace.edges[light][0], "selected in the dark"
         assert trace.edges[pin][-1] > trace.edges["X0"][-1] == trace.edges[light][-1]
+
+
+SLOW = plan_of(({"a": 1.0}, 0.014), ({"b": 1.0}, 0.014), ({}, 0.014), dark_s=0.05)
+"""64 ms a step, so that a request falls into the same step on every board."""
+TRIMS = ((100, "later 700"), (320, "sooner 20000"), (320, "later 0"), (295, "later 3"))
+
+
+@pytest.mark.parametrize(("board", "wiring"), [("atmega328p", "gated"), ("atmega2560", "direct")])
+def test_a_trim_moves_flashes_as_the_python_board_does(board: AvrBoard, wiring: WiringName, tmp_path: Path) -> None:
+    program = program_of(SLOW, wiring, board=board)
+    script = f"wait 20\n{upload(program, wiring)}\nsend RUN 0\n"
+    script += (
+        "".join(f"wait {ms}\nsend TRIM {trim}\nsend TRIM later 9\n" for ms, trim in TRIMS)
+        + "wait 1700\nsend STAT\nsend STOP\n"
+    )
+    printed = play_script(script, board=board, wiring=wiring, trace=tmp_path / "trace.csv")
+    said = [line.partition(" < ")[2] for line in printed]
+    python = PythonPlayer(board)
+    assert codes(said) == codes(python.play(script))
+    trace, edges = read_trace(tmp_path / "trace.csv"), python.controller.edges
+    first_cycle = min(int(trace.edges[str(line)][0]) for line in trace.lights)
+    for line in (0, 1):
+        wanted = np.array([edge.tick for edge in edges if edge.line == line]) - edges[0].tick
+        got = trace.edges[str(line)] - first_cycle
+        assert len(wanted) > 20
+        np.testing.assert_array_equal(got, CYCLES_PER_TICK * wanted)
+        assert (np.diff(wanted)[::2] == 28_000).all(), "a flash is as long as it was"
+    apart = np.diff([edge.tick for edge in edges if edge.line == 0 and edge.level])
+    cycle = program.cycle_ticks
+    assert apart.min() == cycle * 0.98, "20,000 ppm less"
+    assert abs(apart[-6:].sum() - 6 * cycle * (1 + 3e-6)) <= 1, "a share of a tick is not lost"
+
+
+@pytest.mark.parametrize(
+    ("trim", "code"),
+    [
+        ("later 20000", "OK"),
+        ("later 20001", "E 7"),
+        ("sooner 10000", "OK"),
+        ("sooner 20000", "E 9"),
+        ("slower 1", "E 6"),
+        ("later -1", "E 6"),
+        ("later", "E 5"),
+    ],
+)
+def test_a_trim_never_passes_a_limit(trim: str, code: str) -> None:
+    program = program_of(plan_of(({"a": 1.0}, 0.002), ({}, 0.002), dark_s=0.000_23))
+    script = f"{upload(program)}\nsend TRIM {trim}\nsend RUN 0\nsend TRIM {trim}\n"
+    chip, python = both(script, board="atmega328p")
+    assert chip == python
+    assert chip[-1].startswith(code)
+    assert chip[-3].startswith("E 8"), "before the run there is nothing to trim"
+
+
+def test_a_trim_that_makes_a_light_shine_too_long_is_refused() -> None:
+    program = program_of(plan_of(({"a": 1.0}, 0.002), dark_s=0.002_01))
+    script = f"{upload(program)}\nsend RUN 0\nwait 40\nsend TRIM sooner 2000\nwait 30\nsend TRIM sooner 3000\n"
+    chip, python = both(script, board="atmega328p")
+    assert chip == python
+    assert [reply[:3] for reply in chip[-2:]] == ["OK ", "E 9"]
+
+
+def test_a_run_that_is_trimmed_ends_behind_its_last_cycle() -> None:
+    program = program_of(SLOW)
+    script = f"{upload(program)}\nsend RUN 4\n"
+    script += "wait 20\nsend TRIM sooner 20000\nwait 710\nsend STAT\nwait 60\nsend STAT\n"
+    chip, python = both(script, board="atmega328p")
+    assert chip == python
+    assert "state=running" in chip[-2]
+    assert "state=idle" in chip[-1]
+    assert "cycles=4" in chip[-1]

@@ -184,3 +184,19 @@ def test_any_cycle_that_is_taken_is_played_to_the_tick(
     begin = min(trace.edges[line][0] - edges[0] for line, edges in expected.items())
     for line, edges in expected.items():
         assert np.abs(trace.edges[line] - begin - edges).max() <= BAR_CYCLES
+
+
+def test_trimmed_steps_are_never_late_where_bursts_are_shortest(
+    emulate: Callable[..., list[str]], upload: Callable[..., list[str]], tmp_path: Path
+) -> None:
+    lit = ([40, 40, 40], [0, 40, 40], [40, 0, 40], [0, 0, 40])
+    slots = [slot(n, 1000, 420, 80, *on) for n, on in enumerate(lit)]
+    script = [*upload(slots, wiring="direct"), "send RUN 0", "wait 12", "send TRIM sooner 10000", "flood 150 STAT"]
+    script += ["bytes 0a", "wait 40", "send TRIM later 20000", "flood 150 STAT", "bytes 0a", "wait 40", "send STAT"]
+    said = emulate(script, board="atmega2560", wiring="direct", trace=tmp_path / "t.csv")
+    assert "state=running fault=none" in said[-1]
+    trace = read_trace(tmp_path / "t.csv")
+    starts = [trace.pulses(line)[:, 0] for line in (0, 1, 2)]
+    assert len(starts[2]) > 1000
+    assert set(starts[0][:-9]) <= set(starts[2]), "all outputs keep step"
+    assert set(starts[1][:-9]) <= set(starts[2])

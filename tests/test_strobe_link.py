@@ -46,6 +46,8 @@ from psvideo.strobe.link.messages import (
     Status,
     Steps,
     Stop,
+    Trim,
+    Trimmed,
     Wiring,
 )
 from psvideo.strobe.link.protocol import find_command, format_reply, format_request, parse_reply, parse_words
@@ -62,6 +64,7 @@ REPLIES: list[Reply] = [
     Renewed(),
     Armed(check=65535, cycle=120_000_000),
     Started(start=2**40),
+    Trimmed(way="sooner", ppm=20_000),
     Status(state="fault", fault="silent", reset="brownout", interlock="open", cycle=7, step=3, cycles=7),
     ClockReading(nonce=Nonce("a1Z"), cycle=0, ticks=2**63),
 ]
@@ -72,6 +75,7 @@ REQUEST = st.one_of(
     st.builds(Stop),
     st.builds(Keep, ms=SMALL),
     st.builds(Run, cycles=SMALL),
+    st.builds(Trim, way=st.sampled_from(messages.WAYS), ppm=SMALL),
     st.builds(Wiring, wiring=st.sampled_from(messages.WIRINGS)),
     st.builds(Clk, nonce=st.from_regex(r"[A-Za-z0-9]{1,8}", fullmatch=True)),
     st.builds(Steps, first=SMALL, slots=st.lists(SMALL, min_size=1, max_size=6).map(tuple)),
@@ -105,6 +109,7 @@ def test_words_numbers_and_names_are_those_of_the_table() -> None:
     for kind, names in ((messages.State, "states"), (messages.Fault, "faults"), (messages.Reset, "resets")):
         assert list(get_args(kind)) == TABLE[names]["names"]
     assert list(messages.WIRINGS) == TABLE["wirings"]["names"]
+    assert list(messages.WAYS) == TABLE["ways"]["names"]
 
 
 def test_boards_and_limits_are_those_of_the_table() -> None:
@@ -112,6 +117,7 @@ def test_boards_and_limits_are_those_of_the_table() -> None:
     assert (table["max_flash_us"], table["min_dark_us"]) == (boards.MAX_FLASH_US, boards.MIN_DARK_US)
     assert (table["max_line_ppm"], table["max_total_ppm"]) == (boards.MAX_LINE_PPM, boards.MAX_TOTAL_PPM)
     assert list(boards.KEEP_MS) == table["keep_ms"]
+    assert table["max_trim_ppm"] == boards.MAX_TRIM_PPM
     assert table["max_cycle_s"] == limits.LONGEST_CYCLE_S
     assert list(BOARDS) == list(TABLE["board"])
     for name, board in BOARDS.items():

@@ -113,6 +113,13 @@ def test_each_limit_has_its_number(line: bytes, code: Error | None) -> None:
     assert answer.endswith(b"\n")
 
 
+def test_it_takes_no_trim_but_none() -> None:
+    pico = running()
+    assert pico.feed(b"TRIM later 0\n", 20 * MS) == b"OK way=later ppm=0\n"
+    assert pico.feed(b"TRIM sooner 1\n", 21 * MS).startswith(b"E 7 ")
+    assert pico.feed(b"TRIM less 1\n", 22 * MS).startswith(b"E 6 ")
+
+
 def test_it_plays_what_it_was_sent_and_is_idle_afterwards() -> None:
     pico = running(2)
     pico.feed(b"ID\n", 20 * MS)

@@ -24,6 +24,7 @@ static const char state_names[] PROGMEM = STATE_NAMES;
 static const char fault_names[] PROGMEM = FAULT_NAMES;
 static const char reset_names[] PROGMEM = RESET_NAMES;
 static const char wiring_names[] PROGMEM = WIRING_NAMES;
+static const char way_names[] PROGMEM = WAY_NAMES;
 static const char interlock_names[] PROGMEM = "closed open";
 
 static uint64_t line_time;
@@ -185,6 +186,29 @@ static void answer_RUN(const char *keys) {
     uint64_t start = control_run(cycles);
     reply_ok(keys);
     reply_long_number(start);
+}
+
+static void answer_TRIM(const char *keys) {
+    uint32_t ppm;
+    const char *reason;
+    int8_t way = words_find(words_next(), way_names);
+    if (way < 0) {
+        reply_error(ERROR_NUMBER, PSTR("way"));
+        return;
+    }
+    if (refuse_number(words_next(), &ppm)) return;
+    if (ppm > MAX_TRIM_PPM) {
+        reply_error(ERROR_RANGE, PSTR("ppm > max_trim_ppm"));
+        return;
+    }
+    uint8_t code = control_trim(way == WAY_SOONER, ppm, &reason);
+    if (code) {
+        reply_error(code, reason);
+        return;
+    }
+    reply_ok(keys);
+    reply_word(way_names, way);
+    reply_number(ppm);
 }
 
 static void answer_STOP(const char *keys) {

@@ -1,5 +1,6 @@
 #include "control.h"
 
+#include <avr/pgmspace.h>
 #include <stdbool.h>
 
 #include "board.h"
@@ -14,7 +15,8 @@ uint8_t control_fault = FAULT_NONE;
 
 static position_t position;
 static uint32_t cycle_ticks, cycles_wanted;
-static uint32_t cycle_start; /* the time's low half: a cycle is shorter than half its range */
+static uint32_t step_start; /* the time's low half: a step is shorter than half its range */
+static trim_t trim;
 static uint32_t last_poll;
 
 void control_show(uint64_t now) {
@@ -41,44 +43,51 @@ uint64_t control_run(uint32_t cycles) {
     position = (position_t){0};
     cycles_wanted = cycles;
     last_poll = now;
-    cycle_start = now + START_DELAY;
+    step_start = now + START_DELAY;
+    trim_start(&trim, program_parts());
     control_state = STATE_RUNNING;
     player_start(now, START_DELAY, cycles);
     return now + START_DELAY;
 }
 
-static void find_step(void) {
-    int32_t since = last_poll - cycle_start;
-    position.step = since < 0 ? 0 : program_step_at(since);
-}
-
 void control_poll(uint64_t now) {
     if (control_state != STATE_RUNNING) return;
     last_poll = now;
-    while ((int32_t)(last_poll - cycle_start - cycle_ticks) >= 0) {
-        cycle_start += cycle_ticks;
+    for (;;) {
+        uint32_t length = program_step_ticks(position.step) + trim_extra(&trim);
+        if ((int32_t)(last_poll - step_start - length) < 0) return;
+        step_start += length;
+        trim_pass(&trim);
+        if (++position.step < program_step_count) continue;
+        position.step = 0;
         position.cycle = ++position.cycles;
         if (position.cycle == cycles_wanted) {
             player_stop();
-            position.step = 0;
             control_state = STATE_IDLE;
             return;
         }
     }
 }
 
-static void darken(void) {
-    player_stop();
-    if (control_state == STATE_RUNNING) find_step();
+uint8_t control_trim(bool sooner, uint32_t ppm, const char **reason) {
+    share_t share;
+    if ((int32_t)(trim.step - trim.from) < 0) return *reason = PSTR("the trim before does not count yet"), ERROR_STATE;
+    uint8_t code = program_share(cycle_ticks, sooner, ppm, &share, reason);
+    if (code) return code;
+    do control_poll(clock_now());
+    while (player_is_beyond(trim.step));
+    trim_set(&trim, share, trim.step + 2);
+    player_trim(share, trim.from);
+    return 0;
 }
 
 void control_stop(void) {
-    darken();
+    player_stop();
     if (control_state != STATE_FAULT) control_state = STATE_IDLE;
 }
 
 void control_fail(uint8_t fault) {
-    darken();
+    player_stop();
     control_fault = fault;
     control_state = STATE_FAULT;
 }
@@ -89,6 +98,5 @@ void control_clear(void) {
 }
 
 position_t control_position(void) {
-    if (control_state == STATE_RUNNING) find_step();
     return position;
 }

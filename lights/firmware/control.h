@@ -2,6 +2,7 @@
 #ifndef CONTROL_H
 #define CONTROL_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
 typedef struct {
@@ -15,6 +16,8 @@ extern uint8_t control_fault; /* FAULT_... */
 void control_arm(uint32_t cycle_ticks);
 /* Returns the time of the first flash's start. */
 uint64_t control_run(uint32_t cycles);
+/* Make the steps behind the next one longer or shorter. Returns 0 or the error's code, and what was wrong. */
+uint8_t control_trim(bool sooner, uint32_t ppm, const char **reason_in_flash);
 /* Dark, and idle unless a fault is latched. */
 void control_stop(void);
 /* Dark, and in fault until cleared. */

@@ -35,11 +35,19 @@ typedef struct {
     uint32_t cycles;    /* that are still to begin behind this one */
     uint16_t waits;     /* whole segments that are left of a long wait */
     uint8_t step;
+    uint8_t settled; /* the low byte of how many steps it asked the length of */
     bool counts, rises; /* are cycles counted; does the edge that it waits for rise */
     volatile bool done, served;
 } output_t;
 
 static output_t outputs[EXACT_OUTPUTS];
+static trim_t trim;
+static bool trims;                /* was this run trimmed at all? */
+static volatile uint8_t settled;  /* the low byte of how many steps have their length */
+static volatile bool wanted;      /* is there a trim to be taken over? Then interrupts read what follows: */
+static volatile uint32_t wanted_from;
+static share_t wanted_share;
+static int32_t extra, next_extra; /* ticks of the step settled last, and of the one behind it */
 static volatile bool late;
 static bool gated;
 
@@ -141,6 +149,47 @@ PER_OUTPUT void load(uint8_t n) {
     if (n == 0) select(slot->lit);
 }
 
+/* Work out by how much the step is longer that comes behind the one just settled. */
+static void settle_next(void) {
+    if (wanted) {
+        if (!trims) trim.step = wanted_from - (uint8_t)((uint8_t)wanted_from - settled);
+        trims = true;
+        trim_set(&trim, wanted_share, wanted_from);
+        wanted = false;
+    }
+    if (!trims) return;
+    next_extra = trim_extra(&trim);
+    trim_pass(&trim);
+}
+
+/* By how much the step is longer that is played. The output that asks first settles it for all: all others ask before
+ * the step is over, and so before any asks for the next. Interrupts wait for a few instructions only. */
+PER_OUTPUT int32_t extra_of_step(output_t *output) {
+    uint8_t step = output->settled++;
+    bool first = false;
+    int32_t ticks;
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
+        if (step == settled) {
+            first = true;
+            settled++;
+            extra = next_extra;
+        }
+        ticks = extra;
+    }
+    if (first && (trims || wanted)) settle_next();
+    return ticks;
+}
+
+bool player_is_beyond(uint32_t step) {
+    return (int8_t)(settled - (uint8_t)step) > 1;
+}
+
+void player_trim(share_t share, uint32_t from) {
+    wanted_share = share;
+    wanted_from = from;
+    wanted = true;
+}
+
 PER_OUTPUT void finish(uint8_t n) {
     outputs[n].done = true;
     ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
@@ -173,7 +222,7 @@ PER_OUTPUT void serve(uint8_t n) {
         short_way[n].more--;
         output->rises = true;
     } else {
-        ticks = output->part->rest;
+        ticks = output->part->rest + extra_of_step(output);
         if (!next_step(output)) {
             finish(n);
             return;
@@ -200,6 +249,7 @@ ISR(__vector_long_c, ISR_NOBLOCK) {
 PER_OUTPUT void start_output(uint8_t n, uint16_t from, uint32_t ticks, uint32_t cycles) {
     output_t *output = &outputs[n];
     output->step = 0;
+    output->settled = 0;
     output->counts = cycles;
     output->cycles = cycles - 1;
     output->done = false;
@@ -215,6 +265,10 @@ PER_OUTPUT void start_output(uint8_t n, uint16_t from, uint32_t ticks, uint32_t 
 void player_start(uint64_t from, uint32_t ticks, uint32_t cycles) {
     gated = program_wiring == WIRING_GATED;
     late = false;
+    trims = wanted = false;
+    settled = 0;
+    extra = next_extra = 0;
+    trim_start(&trim, program_parts());
     for (uint8_t n = 0; n < EXACT_OUTPUTS; n++) outputs[n].done = true;
     start_output(0, from, ticks, cycles);
     if (gated) return;

@@ -5,11 +5,19 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "trim.h"
+
 /* Pins to outputs, all dark. */
 void player_boot(void);
 
 /* Begin `ticks` after `from`, which is not long ago; `cycles` 0: until stopped. */
 void player_start(uint64_t from, uint32_t ticks, uint32_t cycles);
+
+/* Make the steps from the number `from` on (counted from the run's start) longer by a share. */
+void player_trim(share_t share, uint32_t from);
+
+/* Is a step behind `step` being played already? */
+bool player_is_beyond(uint32_t step);
 
 /* Dark at once, in the middle of a flash too. */
 void player_stop(void);

@@ -175,12 +175,34 @@ uint8_t program_check(uint32_t check, uint32_t *cycle, const char **reason) {
     return 0;
 }
 
-uint8_t program_step_at(uint32_t ticks) {
-    uint8_t step = 0;
-    for (; step + 1 < program_step_count; step++) {
-        uint32_t length = slot_of(step)->duration + slot_of(step)->dark;
-        if (ticks < length) break;
-        ticks -= length;
+uint32_t program_step_ticks(uint8_t step) {
+    return slot_of(step)->duration + slot_of(step)->dark;
+}
+
+uint32_t program_parts(void) {
+    return (uint32_t)PPM * program_step_count;
+}
+
+uint8_t program_share(uint32_t cycle, bool sooner, uint32_t ppm, share_t *share, const char **reason) {
+    uint8_t code;
+    uint64_t moved = (uint64_t)cycle * ppm; /* in parts, of a whole cycle's steps together */
+    uint32_t parts = program_parts(), ticks = moved / PPM + 1;
+    share->whole = moved / parts;
+    share->rest = moved % parts;
+    if (sooner) {
+        share->whole = -share->whole;
+        if (share->rest) {
+            share->whole--;
+            share->rest = parts - share->rest;
+        }
     }
-    return step;
+    for (uint8_t step = 0; step < program_step_count; step++) {
+        if ((int32_t)(slot_of(step)->dark + share->whole - 2 * MIN_DARK) < 0) REFUSE(ERROR_LIMIT, "dark < 2 min_dark");
+    }
+    if (sooner) {
+        if ((code = refuse_shares(cycle - ticks, reason))) return code;
+    } else if (cycle + ticks > MAX_CYCLE) {
+        REFUSE(ERROR_LIMIT, "cycle > max_cycle");
+    }
+    return 0;
 }

@@ -6,6 +6,7 @@
 #include <stdint.h>
 
 #include "board.h"
+#include "trim.h"
 
 #define MAX_FLASH (MAX_FLASH_US * TICKS_PER_US)
 #define MAX_PERIOD MAX_FLASH
@@ -54,7 +55,13 @@ uint8_t program_set_slot(const upload_t *upload, const char **reason_in_flash);
 /* May the cycle be played? `cycle` becomes its length. Returns as above. */
 uint8_t program_check(uint32_t check, uint32_t *cycle, const char **reason_in_flash);
 
-/* In which step a time within the cycle lies. */
-uint8_t program_step_at(uint32_t ticks);
+/* How long a step is as uploaded. */
+uint32_t program_step_ticks(uint8_t step);
+
+/* Into how many parts a tick is cut, so that every step's share of a trim is a whole number of them. */
+uint32_t program_parts(void);
+
+/* What a trim by so many ppm is for a step of a cycle that lasts `cycle`. Returns as above. */
+uint8_t program_share(uint32_t cycle, bool sooner, uint32_t ppm, share_t *share, const char **reason_in_flash);
 
 #endif

@@ -48,6 +48,10 @@
 #define WIRING_DIRECT 1
 #define WIRING_NAMES "gated direct"
 
+#define WAY_LATER 0
+#define WAY_SOONER 1
+#define WAY_NAMES "later sooner"
+
 #define MANY_WORDS 255
 /* X(name, fewest words, most words, states in which it is taken, keys of the reply) */
 #define COMMANDS(X) \
@@ -60,6 +64,7 @@
     X(STEPS, 2, MANY_WORDS, 1 << STATE_IDLE, "steps") \
     X(ARM, 1, 1, 1 << STATE_IDLE, "check cycle") \
     X(RUN, 1, 1, 1 << STATE_ARMED, "start") \
+    X(TRIM, 2, 2, 1 << STATE_RUNNING, "way ppm") \
     X(STOP, 0, 0, 1 << STATE_IDLE | 1 << STATE_ARMED | 1 << STATE_RUNNING | 1 << STATE_FAULT, "state cycles") \
     X(STAT, 0, 0, 1 << STATE_IDLE | 1 << STATE_ARMED | 1 << STATE_RUNNING | 1 << STATE_FAULT, "state fault reset interlock cycle step cycles") \
     X(CLK, 1, 1, 1 << STATE_IDLE | 1 << STATE_ARMED | 1 << STATE_RUNNING | 1 << STATE_FAULT, "nonce cycle ticks") \
@@ -72,6 +77,7 @@
 #define LEAST_KEEP_MS 100
 #define MOST_KEEP_MS 2000
 #define MAX_CYCLE_S 60UL
+#define MAX_TRIM_PPM 20000UL
 
 #ifdef __AVR_ATmega328P__
 #define BOARD_NAME "atmega328p"

@@ -52,6 +52,7 @@ COMMANDS = {  # fewest and most words, states, the reply's keys
     "STEPS": (2, ANY, ("idle",), "steps"),
     "ARM": (1, 1, ("idle",), "check cycle"),
     "RUN": (1, 1, ("armed",), "start"),
+    "TRIM": (2, 2, ("running",), "way ppm"),
     "STOP": (0, 0, EVERY, "state cycles"),
     "STAT": (0, 0, EVERY, "state fault reset interlock cycle step cycles"),
     "CLK": (1, 1, EVERY, "nonce cycle ticks"),
@@ -551,6 +552,13 @@ class Controller:
         self.start = self.hardware.start([table.lead_address for table in self.tables])
         self.state = "running"
         return (self.start,)
+
+    def _answer_trim(self, way, word):
+        if way not in ("later", "sooner"):
+            raise RefusedError("number", f"way {way[:20]}")
+        if number(word):
+            raise RefusedError("range", "this board's DMA plays by itself and takes no trim")
+        return way, word
 
     def _answer_stop(self):
         self._darken("fault" if self.state == "fault" else "idle")

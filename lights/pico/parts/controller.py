@@ -196,6 +196,13 @@ class Controller:
         self.state = "running"
         return (self.start,)
 
+    def _answer_trim(self, way, word):
+        if way not in ("later", "sooner"):
+            raise RefusedError("number", f"way {way[:20]}")
+        if number(word):
+            raise RefusedError("range", "this board's DMA plays by itself and takes no trim")
+        return way, word
+
     def _answer_stop(self):
         self._darken("fault" if self.state == "fault" else "idle")
         return self.state, self.cycle

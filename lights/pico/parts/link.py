@@ -34,6 +34,7 @@ COMMANDS = {  # fewest and most words, states, the reply's keys
     "STEPS": (2, ANY, ("idle",), "steps"),
     "ARM": (1, 1, ("idle",), "check cycle"),
     "RUN": (1, 1, ("armed",), "start"),
+    "TRIM": (2, 2, ("running",), "way ppm"),
     "STOP": (0, 0, EVERY, "state cycles"),
     "STAT": (0, 0, EVERY, "state fault reset interlock cycle step cycles"),
     "CLK": (1, 1, EVERY, "nonce cycle ticks"),

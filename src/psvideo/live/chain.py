@@ -2,7 +2,8 @@
 
 import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -118,6 +119,20 @@ class Chain:
             self._ring.add(place, RingFrame(coded=small, came_s=frame.came_s))
         if self.state in ("seeking", "lost"):
             self._look()
+
+    @contextmanager
+    def at_rest(self) -> Iterator[None]:
+        """Let no frame be taken while the block runs."""
+        with self._guard:
+            yield
+
+    def camera_s(self, host_s: float) -> float:
+        """Return a time of this machine's clock (not before the newest frame came) on the camera's clock."""
+        if self._ring is None or not self._ring.frames:
+            return 0.0
+        camera, newest = self.plan.camera, max(self._ring.frames)
+        ended_s = newest * camera.frame_period_s + camera.exposure_s + abs(camera.readout_s or 0.0)
+        return ended_s + max(host_s - self._ring.frames[newest].came_s, 0.0)
 
     def wait(self, most_s: float) -> None:
         """Wait until a search that is under way is over, and no longer than ``most_s``."""

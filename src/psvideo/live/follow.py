@@ -13,6 +13,7 @@ import numpy as np
 
 from psvideo.live.lock import Lock
 from psvideo.live.phase_filter import Measured, PhaseFilter, started
+from psvideo.live.trims import Trims, trimmed
 from psvideo.live.window import HeldFrame, Window, window_of
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
@@ -67,6 +68,7 @@ class Follower:
     span: tuple[int, int] | None = None
     holes: list[Hole] = field(default_factory=list)
     measured: list[Measured] = field(default_factory=list)
+    trims: Trims = field(default_factory=Trims)
     share: float = 1.0
     _light: FloatArray | None = None
     _learnt: Profiles | None = None
@@ -86,6 +88,11 @@ class Follower:
         at_s = self.phase.at_s if self.span is None else self.span[1] * self.window.period_s
         row_time_s = self.beat.row_time_s or self.window.period_s / self.plan.camera.height_px
         return self.phase.error_at_s(at_s) / row_time_s
+
+    def trimmed(self, at_s: float, ppm: float) -> None:
+        """Foresee that the strobe, from a time on, comes later by so many ppm of the time that passes."""
+        since_s = self.window.frames[0].index * self.window.period_s if self.window.frames else at_s
+        self.phase = trimmed(self.phase, self.trims, at_s, ppm, since_s=since_s)
 
     def add(self, index: int, value: FloatArray, doubt: FloatArray | None = None) -> int:
         """Take in the frame that is numbered ``index`` and return its place in time; ``value`` (row,) is its profile.
@@ -181,7 +188,7 @@ class Follower:
         self._usual = float(np.median(self._losses(learnt)))
 
     def _late_s(self, at_s: float) -> float:
-        """Return by how much flashes come later at a time than the lock's own clock says."""
+        """Return by how much flashes come later at a time than the lock's own clock says, trims left aside."""
         base, now = self.lock.beat.clock, self.clock
         strobe_s = (at_s - base.phase_s) / base.rate
         return now.phase_s + strobe_s * now.rate - at_s
@@ -219,4 +226,6 @@ def _shift(plan: Plan, rows: Profiles, beat: Beat, rest: FloatArray) -> tuple[fl
     known = np.full((1, 1), shortest_s**-2.0)
     shift_s = float(scores.sum() / (hessian[0, 0] + known[0, 0]))
     most_s = HELD * shortest_s
-    return float(np.clip(shift_s, -most_s, most_s)), float(np.sqrt(sandwich(hessian, scores, known)[0, 0]))
+    least_s = (hessian[0, 0] + known[0, 0]) ** -0.5  # where few rows show the phase, none of them may differ
+    error_s = max(float(np.sqrt(sandwich(hessian, scores, known)[0, 0])), float(least_s))
+    return float(np.clip(shift_s, -most_s, most_s)), error_s

@@ -57,7 +57,7 @@ def _timing(follower: Follower, flashes: tuple[Flash, ...], beat: Beat, *, clip:
 
 def _clock_of(follower: Follower) -> FoundClock:
     """Return the lock's clock, bent to what all windows say."""
-    base, points = follower.lock.beat.clock, follower.measured
+    base, points, trims = follower.lock.beat.clock, follower.measured, follower.trims
     if len(points) < 2:
         return follower.clock
     late_s = smoothed(points)
@@ -65,4 +65,5 @@ def _clock_of(follower: Follower) -> FoundClock:
     knots = np.unique(
         np.concatenate([[0], np.searchsorted(at_s, np.arange(at_s[0], at_s[-1], KNOT_S)), [len(at_s) - 1]])
     )
-    return base.bent(at_s[knots], late_s[knots])
+    knot_s = np.union1d(at_s[knots], trims.at_s)
+    return base.bent(knot_s, np.interp(knot_s, at_s[knots], late_s[knots]) + trims.late_s(knot_s))

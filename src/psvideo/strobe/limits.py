@@ -11,6 +11,7 @@ from psvideo.strobe.link.messages import Capabilities, Refusal, Slot
 
 LONGEST_DARK_TICKS = 2**31 - 1
 LONGEST_CYCLE_S = 60
+PPM = 1_000_000
 CHECKED_LINES = 8
 
 
@@ -94,18 +95,37 @@ def total_ppm(steps: Sequence[Slot]) -> int:
     return lit * 1_000_000 // cycle_ticks(steps)
 
 
-def cycle_refusal(steps: Sequence[Slot], caps: Capabilities) -> Refusal | None:
-    """Return why a controller does not arm a cycle, None where it does."""
+def cycle_refusal(steps: Sequence[Slot], caps: Capabilities, *, longer: int = 0) -> Refusal | None:
+    """Return why a controller does not play a cycle that is ``longer`` by some ticks, None where it does."""
+    ticks = cycle_ticks(steps) + longer
     for line in range(caps.lines):
-        share = share_ppm(steps, line)
+        share = sum(lit_ticks(slot, line) for slot in steps) * PPM // ticks
         if share > caps.max_line_ppm:
             return _refuse(Error.LIMIT, f"line {line} on for {share} ppm > max_line_ppm {caps.max_line_ppm}")
-    if total_ppm(steps) > caps.max_total_ppm:
-        return _refuse(Error.LIMIT, f"total {total_ppm(steps)} ppm > max_total_ppm {caps.max_total_ppm}")
+    total = sum(lit_ticks(slot, lit.line) for slot in steps for lit in slot.lit) * PPM // ticks
+    if total > caps.max_total_ppm:
+        return _refuse(Error.LIMIT, f"total {total} ppm > max_total_ppm {caps.max_total_ppm}")
     longest = LONGEST_CYCLE_S * 10**12 // caps.tick_ps
-    if cycle_ticks(steps) > longest:
-        return _refuse(Error.LIMIT, f"cycle {cycle_ticks(steps)} > {longest}")
+    if ticks > longest:
+        return _refuse(Error.LIMIT, f"cycle {ticks} > {longest}")
     return None
+
+
+def trim_share(steps: Sequence[Slot], ppm: int) -> tuple[int, int]:
+    """Return by how many ticks a trim makes each step longer, and how many millionths of the steps' number are left.
+
+    >>> trim_share([Slot(slot=0, duration=1600, dark=15_080, period=1600)], -100)
+    (-2, 332000)
+    """
+    return divmod(cycle_ticks(steps) * ppm, PPM * len(steps))
+
+
+def trim_refusal(steps: Sequence[Slot], caps: Capabilities, ppm: int) -> Refusal | None:
+    """Return why a controller does not make a cycle's steps longer (or shorter, below 0) by so many ppm."""
+    if min(slot.dark for slot in steps) + trim_share(steps, ppm)[0] < 2 * caps.min_dark:
+        return _refuse(Error.LIMIT, f"dark < 2 min_dark {2 * caps.min_dark}")
+    ticks = cycle_ticks(steps) * abs(ppm) // PPM + 1
+    return cycle_refusal(steps, caps, longer=-ticks if ppm < 0 else ticks)
 
 
 def cycle_check(steps: Sequence[Slot]) -> int:

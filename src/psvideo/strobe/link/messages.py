@@ -15,9 +15,11 @@ Fault = Literal["none", "silent", "interlock", "late", "watchdog"]
 Reset = Literal["power", "external", "brownout", "watchdog", "other"]
 WiringName = Literal["gated", "direct"]
 Interlock = Literal["closed", "open"]
+Way = Literal["later", "sooner"]
 Nonce = NewType("Nonce", str)
 STATES: tuple[State, ...] = get_args(State)
 WIRINGS: tuple[WiringName, ...] = get_args(WiringName)
+WAYS: tuple[Way, ...] = get_args(Way)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,6 +112,14 @@ class Started(Reply):
     """Running; ``start`` is the tick of the first flash."""
 
     start: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trimmed(Reply):
+    """The steps behind the one that is played are longer (flashes come later) or shorter by so many ppm."""
+
+    way: Way
+    ppm: int
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -257,6 +267,17 @@ class Run(Request):
 
 
 @dataclass(frozen=True, kw_only=True)
+class Trim(Request):
+    """Make the steps that come longer than uploaded (``later``) or shorter (``sooner``), until the run ends."""
+
+    name = "TRIM"
+    reply = Trimmed
+    states = ("running",)
+    way: Way
+    ppm: int
+
+
+@dataclass(frozen=True, kw_only=True)
 class Stop(Request):
     """Dark, at once."""
 
@@ -291,5 +312,5 @@ class Clear(Request):
 
 
 REQUESTS: Mapping[str, type[Request]] = {
-    kind.name: kind for kind in (Id, Caps, Wiring, Keep, New, Slot, Steps, Arm, Run, Stop, Stat, Clk, Clear)
+    kind.name: kind for kind in (Id, Caps, Wiring, Keep, New, Slot, Steps, Arm, Run, Trim, Stop, Stat, Clk, Clear)
 }

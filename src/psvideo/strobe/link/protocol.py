@@ -9,7 +9,19 @@ from dataclasses import fields
 from typing import Any, TypeVar, get_args
 
 from psvideo.strobe.link.lines import Error, LineError, seal, unseal
-from psvideo.strobe.link.messages import REQUESTS, WIRINGS, Lit, Nonce, Refusal, Reply, Request, Slot, WiringName
+from psvideo.strobe.link.messages import (
+    REQUESTS,
+    WAYS,
+    WIRINGS,
+    Lit,
+    Nonce,
+    Refusal,
+    Reply,
+    Request,
+    Slot,
+    Way,
+    WiringName,
+)
 
 LARGEST_NUMBER = 4_294_967_295
 LONGEST_NONCE = 8
@@ -86,7 +98,14 @@ def _wiring(word: str) -> WiringName:
     raise LineError(Error.NUMBER, f"wiring {word[:20]}")
 
 
-ONE: Mapping[Any, Callable[[str], Any]] = {int: _number, Nonce: _nonce, WiringName: _wiring}
+def _way(word: str) -> Way:
+    for way in WAYS:
+        if word == way:
+            return way
+    raise LineError(Error.NUMBER, f"way {word[:20]}")
+
+
+ONE: Mapping[Any, Callable[[str], Any]] = {int: _number, Nonce: _nonce, WiringName: _wiring, Way: _way}
 MANY: Mapping[Any, Callable[[str], Any]] = {tuple[int, ...]: _number, tuple[Lit, ...]: _lit}
 
 

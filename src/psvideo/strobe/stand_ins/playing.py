@@ -1,9 +1,10 @@
 """A cycle of slots as edges, lazily: what the outputs of the Python board do from the start of a run on."""
 
 import heapq
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
+from psvideo.strobe.limits import PPM, trim_share
 from psvideo.strobe.link.messages import Slot
 
 
@@ -26,10 +27,37 @@ class Moment:
     edge: Edge | None = None
 
 
-def moments(steps: Sequence[Slot], *, start: int, cycles: int) -> Iterator[Moment]:
+@dataclass(kw_only=True)
+class Trimming:
+    """How much longer than uploaded every step of a run is, in whole ticks; a share of a tick is carried on.
+
+    ``ppm`` holds from the step ``since`` on, counted from the run's start, and ``before`` until then.
+    """
+
+    steps: Sequence[Slot]
+    ppm: int = 0
+    before: int = 0
+    since: int = 0
+    _carried: int = 0
+
+    def trim(self, ppm: int, *, step: int) -> None:
+        """Make the steps behind the next one longer by so many ppm, while ``step`` is played."""
+        self.before, self.ppm, self.since = self.ppm, ppm, step + 2
+
+    def extra(self, step: int) -> int:
+        """Return by how many ticks a step is longer; to be asked once of each."""
+        whole, rest = trim_share(self.steps, self.ppm if step >= self.since else self.before)
+        more, self._carried = divmod(self._carried + rest, PPM * len(self.steps))
+        return whole + more
+
+
+def moments(
+    steps: Sequence[Slot], *, start: int, cycles: int, extra: Callable[[int], int] = lambda step: 0
+) -> Iterator[Moment]:
     """Yield a run's moments in order of time; 0 cycles never end. The last is the begin of the cycle after the last.
 
-    Every time is counted in whole ticks from the run's start, so nothing accumulates.
+    Every time is counted in whole ticks from the run's start, so nothing accumulates. ``extra`` says by how many ticks
+    a step, counted from the run's start, is longer; asked when its last edge was taken.
     """
     tick, cycle = start, 0
     while cycles == 0 or cycle < cycles:
@@ -37,7 +65,7 @@ def moments(steps: Sequence[Slot], *, start: int, cycles: int) -> Iterator[Momen
             yield Moment(tick=tick, cycle=cycle, step=step)
             for edge in slot_edges(slot, tick):
                 yield Moment(tick=edge.tick, cycle=cycle, step=step, edge=edge)
-            tick += slot.duration + slot.dark
+            tick += slot.duration + slot.dark + extra(cycle * len(steps) + step)
         cycle += 1
     yield Moment(tick=tick, cycle=cycle, step=0)
 

@@ -10,10 +10,10 @@ from dataclasses import replace
 
 from psvideo.strobe.link.boards import Board
 from psvideo.strobe.link.lines import LONGEST_REQUEST, Error, LineError, LineReader, TextLine, unseal
-from psvideo.strobe.link.messages import Fault, Interlock, Refusal, Reply, Reset, Run, State, Stop
+from psvideo.strobe.link.messages import Fault, Interlock, Refusal, Reply, Reset, Run, State, Stop, Trim
 from psvideo.strobe.link.protocol import find_command, format_reply, parse_words
-from psvideo.strobe.stand_ins.playing import Edge, Moment, moments
-from psvideo.strobe.stand_ins.rules import after_reset, answer
+from psvideo.strobe.stand_ins.playing import Edge, Moment, Trimming, moments
+from psvideo.strobe.stand_ins.rules import after_reset, answer, signed_ppm
 
 START_DELAY_MS = 10
 PS_PER_MS = 10**9
@@ -32,6 +32,7 @@ class PythonBoard:
         self._lit: set[int] = set()
         self._moments: Iterator[Moment] = iter(())
         self._next: Moment | None = None
+        self._trimming = Trimming(steps=())
         self._reader = LineReader(LONGEST_REQUEST)
         self._memory = after_reset(board, unit, cause="power")
 
@@ -146,16 +147,26 @@ class PythonBoard:
         if self.state not in kind.states:
             return Refusal(code=Error.STATE, text=self.state)
         start = self._now + self._ticks(START_DELAY_MS)
+        if kind is Trim and self._played < self._trimming.since:
+            return Refusal(code=Error.STATE, text="the trim before does not count yet")
         request = parse_words(kind, words)
         self._memory, reply = answer(self._memory, request, ticks=self._now - self._born, start=start - self._born)
         if isinstance(request, Stop):
             self._darken()
         if isinstance(request, Run):
-            self._moments = moments(self._memory.sequence or (), start=start, cycles=request.cycles)
+            steps = self._memory.sequence or ()
+            self._trimming = Trimming(steps=steps)
+            self._moments = moments(steps, start=start, cycles=request.cycles, extra=self._trimming.extra)
             self._next = next(self._moments)
+        if isinstance(request, Trim) and isinstance(reply, Reply):
+            self._trimming.trim(signed_ppm(request), step=self._played)
         if isinstance(reply, Reply):
             self._heard = self._now
         return reply
+
+    @property
+    def _played(self) -> int:
+        return self._memory.cycle * len(self._memory.steps) + self._memory.step
 
     def _ticks(self, time_ms: int) -> int:
         return time_ms * PS_PER_MS // self.board.tick_ps

@@ -5,9 +5,9 @@ Time, edges and bytes are ``python_board``'s; what is right stands in lights/pro
 
 from dataclasses import dataclass, replace
 
-from psvideo.strobe.limits import cycle_check, cycle_refusal, cycle_ticks, slot_refusal
+from psvideo.strobe.limits import cycle_check, cycle_refusal, cycle_ticks, slot_refusal, trim_refusal
 from psvideo.strobe.link import messages as m
-from psvideo.strobe.link.boards import KEEP_AFTER_RESET_MS, KEEP_MS, Board, capabilities
+from psvideo.strobe.link.boards import KEEP_AFTER_RESET_MS, KEEP_MS, MAX_TRIM_PPM, Board, capabilities
 from psvideo.strobe.link.lines import Error
 
 FIRMWARE = "python-1"
@@ -72,6 +72,8 @@ def answer(memory: ControllerMemory, request: m.Request, *, ticks: int, start: i
             return _upload(memory, request)
         case m.Run():
             return replace(memory, state="running", cycle=0, step=0, cycles=0), m.Started(start=start)
+        case m.Trim():
+            return memory, _trim(memory, request)
         case m.Stop():
             state: m.State = "fault" if memory.state == "fault" else "idle"
             return replace(memory, state=state), m.Stopped(state=state, cycles=memory.cycles)
@@ -152,6 +154,18 @@ def _arm(memory: ControllerMemory, request: m.Arm) -> Answer:
     if memory.interlock == "open":
         return memory, _refuse(Error.INTERLOCK, "interlock open")
     return replace(memory, state="armed"), m.Armed(check=check, cycle=cycle_ticks(sequence))
+
+
+def _trim(memory: ControllerMemory, request: m.Trim) -> m.Reply | m.Refusal:
+    if request.ppm > MAX_TRIM_PPM:
+        return _refuse(Error.RANGE, f"ppm {request.ppm} > max_trim_ppm {MAX_TRIM_PPM}")
+    refusal = trim_refusal(memory.sequence or (), memory.caps, signed_ppm(request))
+    return refusal or m.Trimmed(way=request.way, ppm=request.ppm)
+
+
+def signed_ppm(trim: m.Trim) -> int:
+    """Return by how many ppm a trim makes steps longer, below 0 where shorter."""
+    return trim.ppm if trim.way == "later" else -trim.ppm
 
 
 def _refuse(code: Error, text: str) -> m.Refusal:

@@ -1,0 +1,120 @@
+"""Genlock through the picture: the strobe is trimmed until the dark row stands where it is wanted, and stays there."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from strobed_loop import StrobedLoop
+
+from psvideo.errors import UsageError
+from psvideo.live.genlock import check_holds, rows_around, target_of
+from psvideo.live.holding import Holding
+from psvideo.model.plan import Plan
+from psvideo.strobe.link.exchange import RefusedError
+
+PlanMaker = Callable[..., Plan]
+HOLDS_ROWS = 2.0
+
+
+def held_plan(make_plan: PlanMaker, *, height_px: int = 72, readout: float = 0.9) -> Plan:
+    """A plan whose flashes come every other frame."""
+    plan = make_plan(
+        width_px=4,
+        height_px=height_px,
+        fps=Fraction(50),
+        duration_s=0.002,
+        readout=readout,
+        clock_tolerance_ppm=3000.0,
+        mode="half-rate",
+    )
+    return replace(plan, dark_s=2 * plan.camera.frame_period_s - 0.002)
+
+
+def holding_of(loop: StrobedLoop, wanted: str) -> Holding:
+    return Holding(chain=loop.chain, target=target_of(loop.plan.camera, wanted), ask=loop.ask)
+
+
+def off_rows(loop: StrobedLoop, holding: Holding) -> float:
+    return loop.true_row().short_of(holding.target, rows_around(loop.plan.camera))
+
+
+def lock(loop: StrobedLoop) -> None:
+    for _ in loop.film(4.0):
+        if loop.chain.state == "locked":
+            return
+    raise AssertionError(loop.chain.why)
+
+
+@pytest.mark.parametrize(("wanted", "seconds"), [("20", 12.0), ("edge", 3.0), ("50-70", 3.0)])
+def test_the_dark_row_is_where_it_is_wanted_after_three_seconds_and_stays(
+    make_plan: PlanMaker, wanted: str, seconds: float
+) -> None:
+    def drifting(at_s: float) -> float:
+        return 900 + 30 * math.sin(at_s / 7)
+
+    loop = StrobedLoop(plan=held_plan(make_plan), offset_ppm=drifting, jitter_s=2e-6, seed=len(wanted))
+    lock(loop)
+    holding = holding_of(loop, wanted)
+    assert abs(off_rows(loop, holding)) > 5, "it was elsewhere before"
+    began_s = loop.host_s
+    off = [(at_s, off_rows(loop, holding)) for at_s in loop.film(3.0 + seconds, holding)]
+    late = np.array([rows for at_s, rows in off if at_s > began_s + 3.0])
+    assert np.abs(late).max() < HOLDS_ROWS
+    assert len(loop.chain.followed) == 1, "the lock is kept through every trim"
+    assert -1000 < holding.ppm < -800
+
+
+def test_the_trim_is_released_when_the_strobe_is_lost_and_it_is_held_again_when_found(make_plan: PlanMaker) -> None:
+    loop = StrobedLoop(plan=held_plan(make_plan), offset_ppm=lambda at_s: -400.0)
+    lock(loop)
+    holding = holding_of(loop, "30")
+    for _ in loop.film(2.5, holding):
+        pass
+    assert holding.ppm != 0
+    loop.blind = True
+    for _ in loop.film(1.5, holding):
+        pass
+    assert (loop.chain.state, holding.ppm, holding.short_rows) == ("lost", 0, None)
+    loop.blind = False
+    for _ in loop.film(5.5, holding):
+        pass
+    assert loop.chain.state == "locked"
+    assert abs(off_rows(loop, holding)) < HOLDS_ROWS
+
+
+def test_a_trim_that_the_board_refuses_leaves_the_one_before_and_says_why(make_plan: PlanMaker) -> None:
+    def refuse(request: object) -> object:
+        raise RefusedError("dark < 2 min_dark", code=9)
+
+    loop = StrobedLoop(plan=held_plan(make_plan), offset_ppm=lambda at_s: 900.0)
+    lock(loop)
+    holding = replace(holding_of(loop, "30"), ask=refuse)
+    for _ in loop.film(0.5, holding):
+        pass
+    assert (holding.ppm, holding.note) == (0, "dark < 2 min_dark")
+    assert loop.chain.follower is not None
+    assert loop.chain.follower.trims.ppm == []
+
+
+def test_what_cannot_be_held_is_refused_in_one_paragraph(make_plan: PlanMaker) -> None:
+    plan = held_plan(make_plan)
+    check_holds(plan)
+    with pytest.raises(UsageError, match="rolls through the picture"):
+        check_holds(make_plan())
+    with pytest.raises(UsageError, match="shutter"):
+        check_holds(replace(plan, camera=replace(plan.camera, exposure_s=0.01)))
+    for wanted in ("72", "30-20", "top", "-4", "3-80"):
+        with pytest.raises(UsageError, match="rows are 0 to 71"):
+            target_of(plan.camera, wanted)
+
+
+def test_the_rows_to_keep_free_have_the_dark_row_farthest_from_them(make_plan: PlanMaker) -> None:
+    camera = held_plan(make_plan).camera
+    assert rows_around(camera) == pytest.approx(80)
+    assert target_of(camera, "20-40").row == pytest.approx(70)
+    assert target_of(camera, "edge").row == pytest.approx(76)
+    upward = replace(camera, readout_s=-0.018)
+    assert target_of(upward, "10").row == 61
