@@ -9,11 +9,11 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from psvideo.runs import cluster
-from psvideo.runs.cluster import Shared, solved_apart
+from psvideo.runs.cluster import done_apart
 from psvideo.runs.normals_of_takes import normals_of_takes
 from psvideo.synth.shoot import shoot
 
@@ -57,35 +57,34 @@ class SpeedUp(NamedTuple):
     two_cpu_s: float
 
 
-def asleep(take: Shared, number: int, *, after: object) -> int:
-    """Stand for a piece that is solved."""
-    time.sleep(SLEEPS_S)
-    return number
+@dataclass(frozen=True, kw_only=True)
+class Asleep:
+    """Stands for a take that is solved in so many pieces."""
+
+    pieces: int
+
+    def do(self, number: int) -> None:
+        """Stand for a piece that is solved."""
+        time.sleep(SLEEPS_S)
 
 
 def overhead(takes: int = TAKES, pieces: int = PIECES, workers: int = WORKERS[0]) -> Overhead:
     """Measure what dask does for pieces that take no time."""
     from distributed import Client, LocalCluster
 
-    shared = [Shared(clip=Path(f"take{n}"), out=Path(f"out{n}"), pieces=pieces, options={}) for n in range(takes)]
-    solve, cluster.solve_piece = cluster.solve_piece, asleep
-    began_s = time.process_time()
-    try:
-        with (
-            LocalCluster(
-                n_workers=workers,
-                threads_per_worker=1,
-                processes=False,
-                memory_limit=0,
-                dashboard_address="127.0.0.1:0",
-            ) as local,
-            Client(local, set_as_default=False) as client,
-        ):
-            began_s = time.process_time()
-            faults = [fault for _, fault in solved_apart(client, shared) if fault]
-            lasted_s = time.process_time() - began_s
-    finally:
-        cluster.solve_piece = solve
+    with (
+        LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=False,
+            memory_limit=0,
+            dashboard_address="127.0.0.1:0",
+        ) as local,
+        Client(local, set_as_default=False) as client,
+    ):
+        began_s = time.process_time()
+        faults = [fault for _, fault in done_apart(client, [Asleep(pieces=pieces)] * takes) if fault]
+        lasted_s = time.process_time() - began_s
     if faults:
         raise RuntimeError(faults[0])
     count = takes * (pieces + 1)

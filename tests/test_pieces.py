@@ -19,6 +19,7 @@ import pytest
 from numpy.typing import NDArray
 
 import psvideo as ps
+from psvideo.cli.app import main
 from psvideo.errors import AllDoneError, PsvideoError, UsageError
 from psvideo.formats.whole_folders import begun_folder, whole_folder
 from psvideo.model.plan import Plan
@@ -281,6 +282,31 @@ def test_two_workers_give_the_bytes_of_one_process_and_takes_one_report(tmp_path
     assert digest(tmp_path / "all" / "clip") == digest(tmp_path / "one" / "clip")
     assert judged(tmp_path / "all" / "clip") == judged(tmp_path / "one" / "clip")
     assert "dark: could not be solved." in (tmp_path / "all" / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("how", [[], pytest.param(["--workers", "2"], marks=pytest.mark.campaign)])
+def test_split_of_several_takes_gives_the_bytes_of_one_at_a_time(
+    how: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    clip = filmed(tmp_path, frames=40)
+    shutil.copytree(clip, tmp_path / "again")
+    (tmp_path / "dark").mkdir()
+    shutil.copy(clip / "plan.toml", tmp_path / "dark")
+    cv2.imwrite(str(tmp_path / "dark" / "dark.0001.png"), np.zeros((HEIGHT, WIDTH), np.uint16))
+    for name in ("clip", "again"):
+        ps.split(tmp_path / name, out=tmp_path / "one" / name, beauty=True)
+    takes = [str(tmp_path / name) for name in ("clip", "again", "dark")]
+    for again in ([], ["--resume"]):
+        assert main(["split", *takes, "-o", str(tmp_path / "all"), "--beauty", *how, *again]) == 1
+        said = capsys.readouterr()
+        named = [Path(line.split(":")[0]).name for line in said.out.splitlines()[-3:]]
+        assert named == ["dark", "again", "clip"], said.out
+        assert ("all done" in said.out) == (not how and bool(again)), "workers say nothing"
+    for name in ("clip", "again"):
+        assert digest(tmp_path / "all" / name) == digest(tmp_path / "one" / name)
+    assert "dark: could not be solved." in (tmp_path / "all" / "report.html").read_text(encoding="utf-8")
+    with pytest.raises(UsageError, match="exists already"):
+        ps.split_of_takes(takes, out=tmp_path / "all", workers=2)
 
 
 @pytest.mark.campaign

@@ -28,6 +28,7 @@ if TYPE_CHECKING:  # what editors and type checkers see; _HOMES is the same for 
     from psvideo.runs.normals import normals as normals
     from psvideo.runs.normals_of_takes import normals_of_takes as normals_of_takes
     from psvideo.runs.split import split as split
+    from psvideo.runs.split_of_takes import split_of_takes as split_of_takes
     from psvideo.runs.stills import stills as stills
     from psvideo.runs.sync import sync as sync
     from psvideo.runs.sync_cameras import sync_cameras as sync_cameras
@@ -63,6 +64,7 @@ _HOMES = {
     "solve": "psvideo.solve.of_take",
     "solve_images": "psvideo.solve.images",
     "split": "psvideo.runs.split",
+    "split_of_takes": "psvideo.runs.split_of_takes",
     "stills": "psvideo.runs.stills",
     "sync": "psvideo.runs.sync",
     "sync_cameras": "psvideo.runs.sync_cameras",
@@ -88,6 +90,7 @@ __all__ = [  # noqa: RUF022  (in the order of the work)
     "split",
     "normals",
     "normals_of_takes",
+    "split_of_takes",
     "stills",
     "check",
     "shoot",

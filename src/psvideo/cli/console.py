@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, TypeVar
 if TYPE_CHECKING:
     import typer
 
+    from psvideo.report.of_takes import TakeResult
     from psvideo.report.run_report import RunReport
     from psvideo.runs.caller import Caller
 
@@ -109,6 +110,19 @@ def print_report(voice: Voice, report: "RunReport") -> None:
     voice.say(report.verdict)
     for sentence in report.findings:
         voice.warn(sentence)
+
+
+def print_takes(voice: Voice, results: "Sequence[TakeResult]") -> None:
+    """Say what became of several takes, the worst first, and end with a fault where one could not be used."""
+    import typer
+
+    from psvideo.report.of_takes import takes_record
+
+    voice.result(takes_record(results))
+    for one in results:
+        voice.say(f"{one.out}: {one.fault or one.verdict}")
+    if any(one.fault for one in results):
+        raise typer.Exit(1)
 
 
 def plain(words: "Sequence[Item] | None") -> "list[Item]":

@@ -10,8 +10,7 @@ import threading
 import time
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Protocol
 
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.compute.threads import THREADS, thread_count
@@ -63,14 +62,15 @@ def require_dask() -> None:
         raise UsageError(EXTRA) from None
 
 
-@dataclass(frozen=True, kw_only=True)
-class Shared:
-    """A take to be solved in so many pieces, into ``out``, with the other ``options`` of ``runs.normals.normals``."""
+class Shared(Protocol):
+    """A take to be done by workers: piece 0, and after it, in any order, pieces 1 to ``pieces``."""
 
-    clip: Path
-    out: Path
-    pieces: int
-    options: Mapping[str, Any]
+    @property
+    def pieces(self) -> int:
+        """Return how many pieces there are beside the first."""
+
+    def do(self, number: int) -> None:
+        """Do one piece, in a worker, whose results are the folder that it writes."""
 
 
 @contextlib.contextmanager
@@ -134,8 +134,8 @@ def _nothing(_: logging.LogRecord) -> bool:
     return False
 
 
-def solved_apart(client: "Client", takes: Sequence[Shared], *, watch: Watch = unwatched) -> Iterator[tuple[int, str]]:
-    """Have takes solved in pieces, and give the place of each, and what is wrong with it or nothing, as it is done.
+def done_apart(client: "Client", takes: Sequence[Shared], *, watch: Watch = unwatched) -> Iterator[tuple[int, str]]:
+    """Have takes done in pieces, and give the place of each, and what is wrong with it or nothing, as it is done.
 
     Raises PsvideoError where the scheduler is gone.
     """
@@ -146,9 +146,9 @@ def solved_apart(client: "Client", takes: Sequence[Shared], *, watch: Watch = un
     faults: dict[int, str] = {}
     futures: list[Future] = []
     for place, take in enumerate(takes):
-        timed = client.submit(solve_piece, take, 0, after=None, pure=False, retries=RETRIES)
+        timed = client.submit(do_piece, take, 0, after=None, pure=False, retries=RETRIES)
         pieces = [
-            client.submit(solve_piece, take, number, after=timed, pure=False, retries=RETRIES)
+            client.submit(do_piece, take, number, after=timed, pure=False, retries=RETRIES)
             for number in range(1, take.pieces + 1)
         ]
         left[place] = 1 + len(pieces)
@@ -207,12 +207,9 @@ def _hanging_replaced(client: "Client", ours: Container[str]) -> Iterator[None]:
         ended.set()
 
 
-def solve_piece(take: Shared, number: int, *, after: object) -> int:
-    """Solve one piece of a take, in a worker; return how many instants it has. ``after`` is what it waits for."""
-    from psvideo.runs.normals import normals
-
-    report = normals(take.clip, out=take.out, piece=f"{number}/{take.pieces}", **take.options)
-    return len(report.instants)
+def do_piece(take: Shared, number: int, *, after: object) -> None:
+    """Do one piece of a take, in a worker. ``after`` is what it waits for."""
+    take.do(number)
 
 
 def _fault(future: "Future") -> str:

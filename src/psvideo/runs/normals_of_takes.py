@@ -1,20 +1,19 @@
 """Several takes in one go, or one by several processes: ``psvideo normals takes/* -o results/``."""
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from psvideo.compute.progress import Watch, unwatched
-from psvideo.errors import AllDoneError, PsvideoError, UsageError
-from psvideo.formats.paths import path_if_given, path_of
-from psvideo.formats.whole_files import write_text
-from psvideo.formats.whole_folders import forget_begun, refuse_folder
-from psvideo.report.of_takes import TakeResult, takes_page, takes_record, worst_first
+from psvideo.errors import UsageError
+from psvideo.formats.paths import path_if_given
+from psvideo.report.of_takes import TakeResult
 from psvideo.runs.caller import PYTHON, Caller
-from psvideo.runs.cluster import Cluster, Shared, connected, solved_apart
+from psvideo.runs.cluster import Cluster
 from psvideo.runs.normals import normals
-from psvideo.runs.output import MARK, rounds_of
+from psvideo.runs.output import rounds_of
+from psvideo.runs.several_takes import Takes, apart, one_by_one, several_takes
 from psvideo.sync.open_take import open_take
 
 LEAST_ROUNDS = 128
@@ -70,71 +69,54 @@ def normals_of_takes(
     """
     if piece is not None:
         raise UsageError("`piece` is solved by one process, of one clip. Leave it out here.")
-    folder = path_of("out", out)
-    takes = _outputs([path_of("clips", clip) for clip in clips], folder)
-    for _, place in takes:
-        if not resume:
-            refuse_folder(place, mark=MARK, force=force)
+    takes = several_takes(clips, out=out, force=force, resume=resume)
     whole = {name: value.resolve() if isinstance(value, Path) else value for name, value in options.items()}
-    given = {**whole, "force": force}
+    given: dict[str, Any] = {**whole, "force": force}
     if workers is None and scheduler is None:
-        found = [_solved(clip, place, given, resume=resume, watch=watch, caller=caller) for clip, place in takes]
-    else:
-        cluster = Cluster(workers=workers, scheduler=scheduler)
-        cluster.check()
-        if not resume:
-            for _, place in takes:
-                forget_begun(place)
-        with connected(cluster) as client:
-            there = len(client.scheduler_info()["workers"]) or 1
-            shared = [
-                Shared(clip=clip.resolve(), out=place.resolve(), pieces=pieces or count, options=given)
-                for (clip, place), count in zip(takes, _counts(takes, there, options), strict=True)
-            ]
-            found = []
-            for number, fault in solved_apart(client, shared, watch=watch):
-                clip, place = takes[number]
-                if fault:
-                    found.append(TakeResult(clip=clip, out=place, fault=fault))
-                else:
-                    found.append(_solved(clip, place, given, resume=True, watch=unwatched, caller=caller))
-    results = worst_first(found)
-    if len(takes) > 1:
-        write_text(folder / "report.json", json.dumps(takes_record(results), indent=1) + "\n")
-        write_text(folder / "report.html", takes_page(results))
-    return results
+
+        def solve(clip: Path, place: Path) -> None:
+            normals(clip, out=place, resume=resume, watch=watch, caller=caller, **given)
+
+        return takes.reported([*one_by_one(takes, solve, caller=caller)])
+
+    def share(there: int) -> list[TakeInPieces]:
+        counts = [pieces] * len(takes.of) if pieces else _counts(takes, there, options)
+        return [
+            TakeInPieces(clip=clip.resolve(), out=place.resolve(), pieces=count, options=given)
+            for (clip, place), count in zip(takes.of, counts, strict=True)
+        ]
+
+    def put_together(clip: Path, place: Path) -> None:
+        normals(clip, out=place, resume=True, caller=caller, **given)
+
+    found: list[TakeResult] = []
+    cluster = Cluster(workers=workers, scheduler=scheduler)
+    for clip, place, fault in apart(takes, share, cluster=cluster, resume=resume, watch=watch):
+        if fault:
+            found.append(TakeResult(clip=clip, out=place, fault=caller.spell(fault)))
+            continue
+        one = Takes(of=((clip, place),), folder=place)
+        found += one_by_one(one, put_together, caller=caller)
+    return takes.reported(found)
 
 
-def _outputs(clips: Sequence[Path], out: Path) -> list[tuple[Path, Path]]:
-    """Return every clip with its folder of results."""
-    if not clips:
-        raise UsageError("`clips`: names no clip. Expected one or several folders of frames, or movie files.")
-    if len(clips) == 1:
-        return [(clips[0], out)]
-    names = [clip.stem if clip.is_file() else clip.resolve().name for clip in clips]
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise UsageError(f"`clips`: several are named {twice[0]!r}, and their results would lie in one folder.")
-    return [(clip, out / name) for clip, name in zip(clips, names, strict=True)]
+@dataclass(frozen=True, kw_only=True)
+class TakeInPieces:
+    """A take to be solved in so many pieces, into ``out``, with the other ``options`` of ``normals``."""
+
+    clip: Path
+    out: Path
+    pieces: int
+    options: Mapping[str, Any]
+
+    def do(self, number: int) -> None:
+        """Find the take's timing and what is global (number 0), or solve one piece."""
+        normals(self.clip, out=self.out, piece=f"{number}/{self.pieces}", **self.options)
 
 
-def _solved(
-    clip: Path, out: Path, options: Mapping[str, Any], *, resume: bool, watch: Watch, caller: Caller
-) -> TakeResult:
-    try:
-        normals(clip, out=out, resume=resume, watch=watch, caller=caller, **options)
-    except AllDoneError as done:
-        caller.say(str(done))
-    except UsageError:
-        raise
-    except PsvideoError as fault:
-        return TakeResult(clip=clip, out=out, fault=caller.spell(str(fault)))
-    return TakeResult.of(clip, out, json.loads((out / "report.json").read_text(encoding="utf-8")))
-
-
-def _counts(takes: Sequence[tuple[Path, Path]], workers: int, options: Mapping[str, Any]) -> Iterator[int]:
+def _counts(takes: Takes, workers: int, options: Mapping[str, Any]) -> Iterator[int]:
     """Give into how many pieces each take is cut: enough for all workers, and none too short."""
-    for clip, _ in takes:
+    for clip, _ in takes.of:
         take = open_take(clip, plan=path_if_given("plan", options.get("plan")), frames=options.get("frames"))
-        wanted = -(-4 * workers // len(takes))
+        wanted = -(-4 * workers // len(takes.of))
         yield max(min(wanted, rounds_of(take) // LEAST_ROUNDS), 1)

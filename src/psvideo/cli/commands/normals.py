@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from psvideo.cli.commands.sync import describe_timing
-from psvideo.cli.console import Voice, plain, print_report
+from psvideo.cli.console import Voice, plain, print_report, print_takes
 from psvideo.cli.options.clip_and_run import (
     ClipPaths,
     FirstLight,
@@ -113,7 +113,6 @@ def normals(
     quiet: Quiet = False,
 ) -> None:
     """Write normals, albedo and validity for every round of flashes; does sync and split by itself."""
-    from psvideo.report.of_takes import takes_record
     from psvideo.report.run_report import report_record
     from psvideo.runs.normals import normals as solve
     from psvideo.runs.normals_of_takes import normals_of_takes
@@ -160,11 +159,7 @@ def normals(
     told: dict[str, Any] = {"force": force, "resume": resume, "watch": voice.track, "caller": voice.caller(context)}
     if many:
         results = normals_of_takes(clips, out=out, workers=workers, scheduler=scheduler, piece=piece, **told, **options)
-        voice.result(takes_record(results))
-        for one in results:
-            voice.say(f"{one.out}: {one.fault or one.verdict}")
-        if any(one.fault for one in results):
-            raise typer.Exit(1)
+        print_takes(voice, results)
         return
     report = solve(clips[0], out=out, piece=piece, **told, **options)
     voice.result(report_record(report))

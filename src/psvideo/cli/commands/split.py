@@ -1,14 +1,14 @@
 """psvideo split: one clean sequence per light."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from psvideo.cli.commands.sync import describe_timing
-from psvideo.cli.console import Voice, plain, print_report
+from psvideo.cli.console import Voice, plain, print_report, print_takes
 from psvideo.cli.options.clip_and_run import (
-    ClipPath,
+    ClipPaths,
     FirstLight,
     Force,
     Frames,
@@ -17,9 +17,11 @@ from psvideo.cli.options.clip_and_run import (
     PlanPath,
     Quiet,
     Resume,
+    Scheduler,
     StartNumber,
     TimingPath,
     Verbose,
+    Workers,
 )
 from psvideo.cli.options.delivery import CodecOption, CompressionOption, PlatesPreviewOption, Weights, WithAmbient
 from psvideo.cli.options.solving import FpsOption, ResyncOption, ShutterOption
@@ -30,7 +32,7 @@ from psvideo.model.units import counted
 
 def split(
     context: typer.Context,
-    clip: ClipPath,
+    clips: ClipPaths,
     out: Annotated[Path, typer.Option("-o", "--out", help="The folder of plates to write.")],
     plan: PlanPath = None,
     timing: TimingPath = None,
@@ -53,6 +55,8 @@ def split(
     start_number: StartNumber = 1001,
     force: Force = False,
     resume: Resume = False,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     json: Json = False,
     verbose: Verbose = False,
     quiet: Quiet = False,
@@ -60,11 +64,10 @@ def split(
     """Rebuild one plate per flash and write one EXR sequence per light, ambient light taken off."""
     from psvideo.formats.timing_json import timing_record
     from psvideo.runs.split import split as rebuild
+    from psvideo.runs.split_of_takes import split_of_takes
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
-    report = rebuild(
-        clip,
-        out=out,
+    options: dict[str, Any] = dict(  # noqa: C408, as they are called below
         plan=plan,
         timing=timing,
         frames=frames,
@@ -82,11 +85,12 @@ def split(
         preview_codec=preview_codec,
         compression=compression,
         start_number=start_number,
-        force=force,
-        resume=resume,
-        watch=voice.track,
-        caller=voice.caller(context),
     )
+    told: dict[str, Any] = {"force": force, "resume": resume, "watch": voice.track, "caller": voice.caller(context)}
+    if len(clips) > 1 or workers is not None or scheduler is not None:
+        print_takes(voice, split_of_takes(clips, out=out, workers=workers, scheduler=scheduler, **told, **options))
+        return
+    report = rebuild(clips[0], out=out, **told, **options)
     voice.result(timing_record(report.timing))
     voice.say(describe_timing(report.timing))
     print_report(voice, report)

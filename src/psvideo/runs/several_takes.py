@@ -1,0 +1,99 @@
+"""What commands over several takes share: a folder for each, one process or a cluster, one report over all."""
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from psvideo.compute.progress import Watch, unwatched
+from psvideo.errors import AllDoneError, PsvideoError, UsageError
+from psvideo.formats.paths import path_of
+from psvideo.formats.whole_files import write_text
+from psvideo.formats.whole_folders import forget_begun, refuse_folder
+from psvideo.report.of_takes import TakeResult, takes_page, takes_record, worst_first
+from psvideo.runs.caller import Caller
+from psvideo.runs.cluster import Cluster, Shared, connected, done_apart
+from psvideo.runs.output import MARK
+
+
+@dataclass(frozen=True, kw_only=True)
+class Takes:
+    """Takes, each with its folder of results, ``of``, in the folder of all."""
+
+    of: tuple[tuple[Path, Path], ...]
+    folder: Path
+
+    def reported(self, found: Sequence[TakeResult]) -> tuple[TakeResult, ...]:
+        """Return what became of the takes, the worst first; of several, write one report over all."""
+        results = worst_first(found)
+        if len(self.of) > 1:
+            write_text(self.folder / "report.json", json.dumps(takes_record(results), indent=1) + "\n")
+            write_text(self.folder / "report.html", takes_page(results))
+        return results
+
+
+def several_takes(clips: Sequence[Path | str], *, out: Path | str, force: bool, resume: bool) -> Takes:
+    """Return every clip with its folder of results: ``out`` of one, folders of it, named after the clips, of several.
+
+    Raises UsageError where no clip is named, two are named alike, or one of the folders exists and is neither to be
+    replaced (``force``) nor gone on with (``resume``).
+    """
+    paths, folder = [path_of("clips", clip) for clip in clips], path_of("out", out)
+    if not paths:
+        raise UsageError("`clips`: names no clip. Expected one or several folders of frames, or movie files.")
+    names = [clip.stem if clip.is_file() else clip.resolve().name for clip in paths]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise UsageError(f"`clips`: several are named {twice[0]!r}, and their results would lie in one folder.")
+    places = [folder] if len(paths) == 1 else [folder / name for name in names]
+    if not resume:
+        for place in places:
+            refuse_folder(place, mark=MARK, force=force)
+    return Takes(of=tuple(zip(paths, places, strict=True)), folder=folder)
+
+
+def one_by_one(takes: Takes, do: Callable[[Path, Path], object], *, caller: Caller) -> Iterator[TakeResult]:
+    """Do takes in this process, one after the other; one that cannot be used does not keep the others.
+
+    ``do`` is called with a clip and its folder. UsageError goes on: it would be the same for every take.
+    """
+    for clip, place in takes.of:
+        try:
+            do(clip, place)
+        except AllDoneError as done:
+            caller.say(str(done))
+        except UsageError:
+            raise
+        except PsvideoError as fault:
+            yield TakeResult(clip=clip, out=place, fault=caller.spell(str(fault)))
+            continue
+        yield result_of(clip, place)
+
+
+def apart(
+    takes: Takes,
+    share: Callable[[int], Sequence[Shared]],
+    *,
+    cluster: Cluster,
+    resume: bool,
+    watch: Watch = unwatched,
+) -> Iterator[tuple[Path, Path, str]]:
+    """Have takes done by a cluster, and give each with its folder and what is wrong, or nothing, as it is done.
+
+    ``share`` is called with the number of workers and returns what each take is shared out as. Without ``resume`` what
+    earlier runs had begun is forgotten first. Raises UsageError where the cluster cannot be used, PsvideoError where no
+    scheduler answers, or where it is gone.
+    """
+    cluster.check()
+    if not resume:
+        for _, place in takes.of:
+            forget_begun(place)
+    with connected(cluster) as client:
+        workers = len(client.scheduler_info()["workers"]) or 1
+        for number, fault in done_apart(client, share(workers), watch=watch):
+            yield *takes.of[number], fault
+
+
+def result_of(clip: Path, out: Path) -> TakeResult:
+    """Return what the report of a take's folder says."""
+    return TakeResult.of(clip, out, json.loads((out / "report.json").read_text(encoding="utf-8")))

@@ -1,0 +1,95 @@
+"""Several takes split in one go, by one process or several: ``psvideo split takes/* -o plates/``."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from psvideo.compute.progress import Watch, unwatched
+from psvideo.errors import AllDoneError
+from psvideo.report.of_takes import TakeResult
+from psvideo.runs.caller import PYTHON, Caller
+from psvideo.runs.cluster import Cluster
+from psvideo.runs.several_takes import apart, one_by_one, result_of, several_takes
+from psvideo.runs.split import split
+
+
+def split_of_takes(
+    clips: Sequence[Path | str],
+    *,
+    out: Path | str,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    force: bool = False,
+    resume: bool = False,
+    watch: Watch = unwatched,
+    caller: Caller = PYTHON,
+    **options: Any,
+) -> tuple[TakeResult, ...]:
+    """Write what ``split`` writes of several takes, to the same bytes; each take is done by one process.
+
+    - ``clips``: one, whose plates go into ``out``; or several, whose plates go into folders of ``out`` that are named
+      after them, with one report over all, ``report.html``.
+    - ``workers``: so many processes on this computer; ``scheduler``: the workers of a dask cluster, by its address,
+      such as ``"tcp://HOST:8786"``, which see the same files under the same paths. Both need the extra
+      ``psvideo[dask]``. With neither, one take is split after the other here.
+    - ``force``, ``resume`` and all other ``options`` are those of ``split``. Takes that are done already are left as
+      they are with ``resume``.
+
+    ``watch`` is handed the loop over takes, or those of every take, and ``caller`` the sentences that come on the way.
+
+    Returns
+    -------
+    tuple of TakeResult
+        Of each take ``verdict``, ``usable``, ``findings`` and how many ``instants`` it has, or ``fault``, a sentence,
+        where it could not be split; the worst first.
+
+    Raises
+    ------
+    UsageError
+        Where parameters do not fit together, or an output exists, before any work is done.
+    PsvideoError
+        Where no scheduler answers, or it is gone; what was written is kept for ``resume``.
+
+    Examples
+    --------
+    >>> import psvideo as ps
+    >>> results = ps.split_of_takes(["take3/"], out="plates/")
+    >>> [(one.clip.name, one.fault, one.instants) for one in results]
+    [('take3', '', 2)]
+    """
+    takes = several_takes(clips, out=out, force=force, resume=resume)
+    whole = {name: value.resolve() if isinstance(value, Path) else value for name, value in options.items()}
+    given: dict[str, Any] = {**whole, "force": force}
+    if workers is None and scheduler is None:
+
+        def here(clip: Path, place: Path) -> None:
+            split(clip, out=place, resume=resume, watch=watch, caller=caller, **given)
+
+        return takes.reported([*one_by_one(takes, here, caller=caller)])
+    shared = [TakeWhole(clip=clip.resolve(), out=place.resolve(), options=given) for clip, place in takes.of]
+    cluster = Cluster(workers=workers, scheduler=scheduler)
+    done = apart(takes, lambda _: shared, cluster=cluster, resume=resume, watch=watch)
+    return takes.reported(
+        [
+            TakeResult(clip=clip, out=place, fault=caller.spell(fault)) if fault else result_of(clip, place)
+            for clip, place, fault in done
+        ]
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class TakeWhole:
+    """A take to be split by one worker, into ``out``, with the other ``options`` of ``split``."""
+
+    clip: Path
+    out: Path
+    options: Mapping[str, Any]
+    pieces: int = 0
+
+    def do(self, number: int) -> None:
+        """Split the take. What a worker that died had begun is gone on with, or is there already."""
+        try:
+            split(self.clip, out=self.out, resume=not self.options["force"], **self.options)
+        except AllDoneError:
+            return
