@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from psvideo.clip import Take, keeping_near, open_clip, read_frames
-from psvideo.clip.decode import movie
+from psvideo.clip.decode import movie, yuv
 from psvideo.clip.decode.yuv import CODES, HIGHEST, LOWEST, to_rgb
 from psvideo.clip.record import CodedPicture
 from psvideo.errors import PsvideoError, UsageError
@@ -125,6 +125,22 @@ def test_noise_below_black_and_highlights_above_white_are_kept() -> None:
     codes = to_rgb(luma, chroma, chroma, bits=8, matrix=1, video_range=True)[..., 1]
     signal = LOWEST + codes[0] * (HIGHEST - LOWEST) / CODES
     assert signal.tolist() == pytest.approx([-12 / 219, 0, 1, 238 / 219], abs=3e-5)
+
+
+@pytest.mark.parametrize("halved", [(1, 1), (1, 2), (2, 2)], ids=["4:4:4", "4:2:2", "4:2:0"])
+def test_rows_are_converted_alike_however_many_at_a_time(
+    halved: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Chroma is interpolated across the bands' edges. OpenCV may round half a code of 65,535 either way at the end of
+    what it is given."""
+    rows, cols = 37, 23
+    sizes = [(rows, cols), *[(-(-rows // halved[0]), -(-cols // halved[1]))] * 2]
+    planes = [np.random.default_rng(1).integers(0, 1024, size).astype(np.uint16) for size in sizes]
+    found = []
+    for band_rows in (2, 8, 64):
+        monkeypatch.setattr(yuv, "BAND_ROWS", band_rows)
+        found.append(to_rgb(*planes, bits=10, matrix=1, video_range=True))
+    assert np.abs(np.diff(np.stack(found).astype(int), axis=0)).max() <= 1
 
 
 def test_chroma_is_interpolated_where_it_stands() -> None:

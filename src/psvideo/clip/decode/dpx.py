@@ -33,7 +33,7 @@ def decode(path: Path) -> CodedPicture:
             found = planes(path, next(container.decode(video=0)))
     except av.FFmpegError as fault:
         raise PsvideoError(f"{path}: cannot be decoded ({fault.strerror}). Copy it again.") from fault
-    codes = found[0] if head.channels == 1 else np.stack(found[:3], axis=-1)
+    codes = found[0].copy() if head.channels == 1 else np.stack(found[:3], axis=-1)
     return CodedPicture(header=head, codes=codes)
 
 

@@ -40,7 +40,8 @@ PLANAR = ("gray", "yuv", "gbr")
 
 
 def planes(path: Path, frame: av.VideoFrame) -> list[NDArray[Any]]:
-    """Return a frame's components as 2D arrays: R, G, B or Y, U, V (or Y alone), alpha last.
+    """Return a frame's components as 2D arrays, in its own memory where that can be: R, G, B or Y, U, V (or Y alone),
+    alpha last.
 
     Raises PsvideoError for a layout that is not read here.
     """
@@ -60,4 +61,4 @@ def _plane(frame: av.VideoFrame, part: Any) -> NDArray[Any]:
     order = ">" if frame.format.name.endswith("be") else "<"
     code = np.dtype("u1") if part.bits <= 8 else np.dtype(f"{order}u2")
     rows = np.frombuffer(plane, code).reshape(-1, plane.line_size // code.itemsize)
-    return rows[: part.height, : part.width].astype(code.newbyteorder("="))
+    return rows[: part.height, : part.width].astype(code.newbyteorder("="), copy=False)

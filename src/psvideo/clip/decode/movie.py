@@ -211,7 +211,7 @@ def picture_of(path: Path, frame: av.VideoFrame) -> CodedPicture:
         warnings=tuple(warning for warning in (alpha, askew) if warning),
     )
     if not is_yuv:
-        return CodedPicture(header=header, codes=found[0] if len(found) < 3 else np.stack(found[:3], axis=-1))
+        return CodedPicture(header=header, codes=found[0].copy() if len(found) < 3 else np.stack(found[:3], axis=-1))
     matrix, warnings = _matrix(path, frame)
     codes = to_rgb(found[0], found[1], found[2], bits=bits, matrix=matrix, video_range=video_range)
     span = (HIGHEST - LOWEST) / CODES

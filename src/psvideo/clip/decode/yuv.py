@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 LOWEST, HIGHEST = -0.25, 1.25
 CODES = 65535
+BAND_ROWS = 32
+"""Rows that are converted at a time, an even number: what is made on the way stays in a core's second cache."""
 
 LUMA_WEIGHTS = {
     1: ("BT.709", 0.2126, 0.0722),
@@ -35,9 +37,14 @@ def to_rgb(luma: Codes, blue: Codes, red: Codes, *, bits: int, matrix: int, vide
 
     Chroma samples stand on even columns (as MPEG-2, H.264 and H.265 place them) and, in 4:2:0, between two rows.
     """
-    height_px, width_px = luma.shape
-    planes = [_full_size(_in_16_bits(plane, bits), height_px, width_px) for plane in (luma, blue, red)]
-    return np.asarray(cv2.transform(cv2.merge(planes), _to_codes(bits, matrix, video_range)), np.uint16)
+    rows, cols = luma.shape
+    codes = np.empty((rows, cols, 3), np.uint16)
+    matrix_to_codes = _to_codes(bits, matrix, video_range)
+    for first in range(0, rows, BAND_ROWS):
+        band = range(first, min(first + BAND_ROWS, rows))
+        planes = [_band(plane, band, rows, cols, bits) for plane in (luma, blue, red)]
+        cv2.transform(cv2.merge(planes), matrix_to_codes, dst=codes[band.start : band.stop])
+    return codes
 
 
 def _to_codes(bits: int, matrix: int, video_range: bool) -> NDArray[np.float32]:
@@ -66,13 +73,20 @@ def _in_16_bits(plane: Codes, bits: int) -> NDArray[np.uint16]:
     return plane.astype(np.uint16) << np.uint16(16 - bits)
 
 
-def _full_size(plane: NDArray[np.uint16], height_px: int, width_px: int) -> NDArray[np.uint16]:
-    if plane.shape[0] != height_px:
-        doubled = cv2.resize(plane, (plane.shape[1], 2 * plane.shape[0]), interpolation=cv2.INTER_LINEAR)
-        plane = np.asarray(doubled[:height_px], np.uint16)
-    if plane.shape[1] == width_px:
+def _band(plane: Codes, band: range, rows: int, cols: int, bits: int) -> NDArray[np.uint16]:
+    """Return some rows of a plane, at 16 bits and at the full size of ``rows`` and ``cols``."""
+    if plane.shape[0] == rows:
+        return _full_width(_in_16_bits(plane[band.start : band.stop], bits), cols)
+    first, last = max(band.start // 2 - 1, 0), min((band.stop + 1) // 2 + 1, len(plane))  # with the rows beside
+    some = _in_16_bits(plane[first:last], bits)
+    doubled = cv2.resize(some, (some.shape[1], 2 * len(some)), interpolation=cv2.INTER_LINEAR)
+    return _full_width(np.asarray(doubled[band.start - 2 * first : band.stop - 2 * first], np.uint16), cols)
+
+
+def _full_width(plane: NDArray[np.uint16], cols: int) -> NDArray[np.uint16]:
+    if plane.shape[1] == cols:
         return plane
     wide = np.repeat(plane, 2, axis=1)
     if plane.shape[1] > 1:
         wide[:, 1:-2:2] = cv2.addWeighted(plane[:, :-1], 0.5, plane[:, 1:], 0.5, 0)
-    return np.ascontiguousarray(wide[:, :width_px])
+    return np.ascontiguousarray(wide[:, :cols])
