@@ -72,6 +72,20 @@ def test_too_few_addresses_are_refused_at_once(capfd: pytest.CaptureFixture[str]
     assert error.count("\n") == 1
 
 
+def test_a_thread_that_gets_no_memory_for_taking_up_its_job_ends_the_command(capfd: pytest.CaptureFixture[str]) -> None:
+    script = (
+        "from concurrent.futures import Future, ThreadPoolExecutor\nfrom psvideo.cli import app\n"
+        "def starve(self): raise MemoryError\n"
+        "Future.set_running_or_notify_cancel = starve\n"
+        "app._ended = lambda words: ThreadPoolExecutor(1).submit(print).result()\n"
+        "app.main(['info', 'clip'])\n"
+    )
+    assert subprocess.run([sys.executable, "-c", script], timeout=60, check=False).returncode == 1
+    error = capfd.readouterr().err
+    assert "there is not enough memory" in error
+    assert error.count("\n") == 1
+
+
 def test_a_fault_of_the_program_is_not_hidden(monkeypatch: pytest.MonkeyPatch) -> None:
     assert paragraph_on(RuntimeError("generator raised StopIteration")) is None
 

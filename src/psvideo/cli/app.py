@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from psvideo.cli.console import compiling_said
-from psvideo.cli.ending import check_addresses, nobody_reads, paragraph_on, say_any_name, stoppable
+from psvideo.cli.ending import check_addresses, nobody_reads, paragraph_on, say_any_name, starving_said, stoppable
 from psvideo.cli.first_screen import COMMANDS, Entry
 from psvideo.cli.spelling import spelled
 from psvideo.cli.teaching import PROGRAM, command_called, teach, words_typed
@@ -85,7 +85,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run(arguments: Sequence[str] | None) -> int:
     share_one_heap()
     words = words_typed(sys.argv[1:] if arguments is None else arguments, os.environ)
-    with compiling_said(quiet="-q" in words or "--quiet" in words):
+    with compiling_said(quiet="-q" in words or "--quiet" in words), starving_said():
         try:
             return _ended(words)
         except (OSError, MemoryError, ImportError, RuntimeError) as fault:

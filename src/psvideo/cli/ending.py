@@ -3,6 +3,7 @@
 import contextlib
 import errno
 import io
+import logging
 import os
 import signal
 import sys
@@ -11,6 +12,7 @@ from collections.abc import Iterator
 from importlib import import_module
 from types import FrameType
 
+from psvideo.cli.spelling import spelled
 from psvideo.errors import PsvideoError
 
 if sys.platform != "win32":
@@ -26,6 +28,8 @@ NO_MEMORY = (
 )
 UNMAPPED = ("failed to map segment", "Cannot allocate memory", "can't start new thread", "libllvmlite")
 """What loaders and systems say where an address space is full, in errors of many kinds."""
+STDERR = 2
+"""Its number; written to directly where there is no memory for more."""
 LEAST_BYTES = 1200 << 20
 """Addresses that a run's libraries take before its first picture (measured: 1,000 MB), with room for small ones."""
 
@@ -80,6 +84,29 @@ def stoppable() -> Iterator[None]:
         for number in heard:
             signal.signal(number, before[number])
         sys.unraisablehook = say_dropped
+
+
+class _Starved(logging.Handler):
+    """Ends the process with a sentence where a pool's thread got no memory outside of its job: whoever waits for that
+    job would wait without end. Nothing is lost that a kill would not lose."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if record.exc_info and isinstance(record.exc_info[1], MemoryError):
+            os.write(STDERR, b"psvideo: " + spelled(NO_MEMORY.format(said="")).encode() + b"\n")
+            os._exit(PsvideoError.exit_status)
+        if logging.lastResort is not None:
+            logging.lastResort.handle(record)
+
+
+@contextlib.contextmanager
+def starving_said() -> Iterator[None]:
+    """In this block, a thread of a pool that gets no memory ends the process with a sentence."""
+    handler, pools = _Starved(), logging.getLogger("concurrent.futures")
+    pools.addHandler(handler)
+    try:
+        yield
+    finally:
+        pools.removeHandler(handler)
 
 
 def check_addresses() -> None:
