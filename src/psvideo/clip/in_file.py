@@ -2,9 +2,11 @@
 
 import os
 import sys
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +15,9 @@ from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError
 
+LOOKED_AT_EACH_S = 0.01
+"""How often an open file is looked at for whether it was written again: each look costs a thread half as much as
+reading some rows."""
 NEAR_ROWS = 3
 """Rows that lie no farther apart are read together with those between."""
 
@@ -85,6 +90,7 @@ class FoundFile:
     def __init__(self, path: Path, *, stays_open: bool = False) -> None:
         self._path = path
         self._state = _state(path.stat())
+        self._looked_s = -inf
         self._opened: int | None = None
         if stays_open and sys.platform != "win32":  # where one place in an open file is all threads'
             self._opened = os.open(path, os.O_RDONLY)
@@ -101,7 +107,9 @@ class FoundFile:
         another one than was found, or cannot be read."""
         try:
             if self._opened is not None:
-                self._check(self._opened)
+                if (now_s := time.monotonic()) - self._looked_s > LOOKED_AT_EACH_S:
+                    self._check(self._opened)
+                    self._looked_s = now_s
                 if not _filled(partial(_from_open, self._opened), into, begin):
                     raise self._changed()
                 return
