@@ -38,7 +38,7 @@ def test_slow_leds_show_on_a_subject_that_tumbles_with_everything_else_unknown()
     assert off_rows < 3 * timing.phase_error_rows
 
 
-@pytest.mark.parametrize("share", [0.3, 0.5])
+@pytest.mark.parametrize("share", [0.3, pytest.param(0.5, marks=pytest.mark.campaign)])
 def test_stripes_that_keep_pace_with_the_dark_row_are_timed(share: float) -> None:
     plan = plan_of(lights=tuple("abcde"), durations_s=(0.0016,), height_px=160, readout=0.9)
     scene = rolling_stripes(speed=1.1, share=share, pitch=1.0, light=0.3)
@@ -47,6 +47,7 @@ def test_stripes_that_keep_pace_with_the_dark_row_are_timed(share: float) -> Non
     assert timing.phase_error_rows < 0.02
 
 
+@pytest.mark.campaign
 def test_stripes_that_feign_another_shutter_are_refused() -> None:
     plan = plan_of(lights=tuple("abcdefgh"), shutter=0.5, height_px=48)
     case = Case(plan=plan, scene=rolling_stripes(share=0.5, pitch=1.0), frames=64)

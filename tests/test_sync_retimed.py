@@ -76,6 +76,10 @@ def rms_rows(timing: Timing, plan: Plan, frames: int) -> float:
     return float(np.sqrt(np.mean(np.square(error_s)))) / plan.camera.row_time_s
 
 
+MORE_LEFT_OUT = (("4/3", 1), ("18/17", 0), ("5/2", 1))
+MORE_REPEATED = (("4/5", 0.0), ("2/5", 0.015))
+
+
 def assert_placed(timing: Timing, shown: NDArray[np.int64]) -> None:
     """Every frame is at its own place in time, and those that show a moment again are called repeated."""
     assert timing.repeated_frames == tuple(int(n) for n in np.flatnonzero(np.diff(shown) == 0) + 1)
@@ -83,7 +87,10 @@ def assert_placed(timing: Timing, shown: NDArray[np.int64]) -> None:
     assert places == {n: shown[n] - shown[0] for n in range(len(shown)) if n not in timing.repeated_frames}
 
 
-@pytest.mark.parametrize(("step", "lead"), [("6/5", 0), ("4/3", 1), ("12/11", 5), ("18/17", 0), ("5/2", 1)])
+@pytest.mark.parametrize(
+    ("step", "lead"),
+    [("6/5", 0), ("12/11", 5), *(pytest.param(*one, marks=pytest.mark.campaign) for one in MORE_LEFT_OUT)],
+)
 def test_frames_left_out_in_a_pattern_are_numbered_and_bridged(step: str, lead: int, plan: Plan) -> None:
     shown = pattern(step, lead)
     timing = retimed(plan, shown)
@@ -99,7 +106,10 @@ def test_a_clip_of_every_second_frame_is_found_and_said(plan: Plan) -> None:
     assert any("fps in the plan is 2 times too high" in note for note in timing.notes)
 
 
-@pytest.mark.parametrize(("step", "recoded"), [("4/5", 0.0), ("4/5", 0.015), ("2/5", 0.015), ("9/10", 0.015)])
+@pytest.mark.parametrize(
+    ("step", "recoded"),
+    [("4/5", 0.015), ("9/10", 0.015), *(pytest.param(*one, marks=pytest.mark.campaign) for one in MORE_REPEATED)],
+)
 def test_frames_repeated_in_a_pattern_are_numbered(step: str, recoded: float, plan: Plan) -> None:
     shown = pattern(step)
     timing = retimed(plan, shown, recoded=recoded)

@@ -5,14 +5,14 @@ import numpy as np
 from psvideo.compute.compiled import FUSED
 from psvideo.solve.normals.blocks import ABSENT, COUNT, LIMIT, ONE, THREE, ZERO, X, Y, Z
 from psvideo.solve.normals.equations import FROM, HALF, LOWER, OUT, RANK, SCALE, TO, UPPER, add_equations, halve
-from psvideo.solve.normals.few_lights import FOUR, LITTLE, SIGMA_OF_MEDIAN
+from psvideo.solve.normals.few_lights import FOUR, LITTLE, SIGMA_OF_MEDIAN, median_few
 from psvideo.solve.normals.near_kernel import at, of_light
 from psvideo.solve.normals.task import FEW, Floats, Task, Weights
 
 MANY = np.float32(FEW)  # usable measurements beyond which the weight narrows
 
 
-@FUSED.inlined
+@FUSED.called
 def choose_start(task: Task, weights: Weights, w: Floats, v: Floats, m: Floats, e: Floats, n: int) -> None:
     """Between which brightnesses (LOWER, UPPER) the start looks: all but the darkest and brightest few, four at least.
 
@@ -41,7 +41,7 @@ def choose_start(task: Task, weights: Weights, w: Floats, v: Floats, m: Floats, 
         v[UPPER + i] = v[TO + i]
 
 
-@FUSED.inlined
+@FUSED.called
 def add_start(task: Task, w: Floats, v: Floats, m: Floats, e: Floats, n: int) -> None:
     """The normal equations of the start's measurements, with a little of the others."""
     for light in range(len(e)):
@@ -53,7 +53,7 @@ def add_start(task: Task, w: Floats, v: Floats, m: Floats, e: Floats, n: int) ->
     add_equations(task.matrix, w, m, e, n)
 
 
-@FUSED.inlined
+@FUSED.called
 def fill_residuals(matrix: Floats, w: Floats, m: Floats, e: Floats, n: int) -> None:
     """Residuals without their sign, OUT of what is not there."""
     for light in range(len(e)):
@@ -64,7 +64,7 @@ def fill_residuals(matrix: Floats, w: Floats, m: Floats, e: Floats, n: int) -> N
             errors[i] = error if there[i] > ABSENT else OUT
 
 
-@FUSED.inlined
+@FUSED.called
 def find_scale(
     matrix: Floats, noise: np.float32, share: np.float32, w: Floats, v: Floats, m: Floats, e: Floats, n: int
 ) -> None:
@@ -81,17 +81,20 @@ def find_scale(
             error = abs(there[i] - (x * w[X + i] + y * w[Y + i] + z * w[Z + i]))
             errors[i] = error if there[i] > ABSENT else OUT
             v[TO + i] += error if there[i] > ABSENT else ZERO
-    for i in range(n):
-        v[RANK + i] = np.floor(HALF * (w[COUNT + i] + THREE))
-        v[TO + i] = v[TO + i] / max(w[COUNT + i] - v[RANK + i] + ONE, ONE)  # so many are as large or larger
-    halve(v, e, n)
+    if len(e) == FEW:
+        median_few(e, w, v, n)
+    else:
+        for i in range(n):
+            v[RANK + i] = np.floor(HALF * (w[COUNT + i] + THREE))
+            v[TO + i] = v[TO + i] / max(w[COUNT + i] - v[RANK + i] + ONE, ONE)  # so many are as large or larger
+        halve(v, e, n)
     for i in range(n):
         length = np.sqrt(w[X + i] ** 2 + w[Y + i] ** 2 + w[Z + i] ** 2)
         least = noise + share * length
         v[SCALE + i] = max(SIGMA_OF_MEDIAN * HALF * (v[FROM + i] + v[TO + i]), least)
 
 
-@FUSED.inlined
+@FUSED.called
 def add_weighted(
     matrix: Floats, tukey: bool, width: np.float32, last: bool, w: Floats, v: Floats, m: Floats, e: Floats, n: int
 ) -> None:

@@ -20,7 +20,7 @@ FROM, TO, RANK, COUNTED, LOWER, UPPER, SCALE, ODD, DOUBT = (BLOCK * plane for pl
 RIGHT_X, RIGHT_Y, RIGHT_Z = LOW, HIGH, SUM  # the equations' right sides, in planes of w that are free by now
 
 
-@FUSED.inlined
+@FUSED.called
 def add_equations(matrix: Floats, w: Floats, m: Floats, weights: Floats, n: int) -> None:
     """The normal equations of every pixel; ``m`` and ``weights`` are (light, pixel), of whole threes of lights."""
     for k in range(0, len(m), 3):

@@ -15,7 +15,7 @@ EXPLAINED_SQUARED = np.float32(4.5**2)  # of 128 pixels under eight lights, nois
 ROUGHLY = np.float32(1e4)  # the condition squared up to which a pixel counts as solved
 
 
-@FUSED.inlined
+@FUSED.called
 def explained(
     task: Task, read: np.float32, photon: np.float32, w: Floats, v: Floats, m: Floats, e: Floats, n: int
 ) -> bool:
@@ -31,7 +31,7 @@ def explained(
     return explains(task, read, photon, w, v, m, n)
 
 
-@FUSED.inlined
+@FUSED.called
 def explains(task: Task, read: np.float32, photon: np.float32, w: Floats, v: Floats, m: Floats, n: int) -> bool:
     """Whether g explains every usable measurement of a block to its noise; DOUBT becomes 0."""
     odd = np.int32(0)

@@ -14,7 +14,7 @@ import numpy as np
 
 from psvideo.compute.compiled import FUSED
 from psvideo.solve.normals.blocks import ABSENT, BLOCK, COUNT, ONE, THREE, XX, XY, XZ, YY, YZ, ZERO, ZZ, X, Y, Z
-from psvideo.solve.normals.equations import HALF, OUT, RIGHT_X, RIGHT_Y, RIGHT_Z, SCALE
+from psvideo.solve.normals.equations import FROM, HALF, OUT, RIGHT_X, RIGHT_Y, RIGHT_Z, SCALE, TO
 from psvideo.solve.normals.near_kernel import of_light  # noqa: F401 (in a text below)
 from psvideo.solve.normals.task import FEW, Floats
 
@@ -113,6 +113,7 @@ def _bright(m: np.float32, per: np.float32) -> np.float32:
 
 
 _of_pixel = _of_each(f"planes[k * {BLOCK} + i]", "planes, i")
+_of_planes = _of_each("planes[k, i]", "planes, i")
 _lamps = _of_each("of_light(matrix, k)", "matrix")
 _of_lights = _of_each("numbers[k]", "numbers")
 _brights = _of_each("_bright(m[k], per[k])", "m, per")
@@ -143,6 +144,15 @@ def _store_equations(w: Floats, i: int, lamps: Any, weights: Any, m: Any) -> Non
     sums = _sums(lamps, weights, m)
     w[XX + i], w[XY + i], w[XZ + i], w[YY + i], w[YZ + i], w[ZZ + i] = sums[:6]
     w[RIGHT_X + i], w[RIGHT_Y + i], w[RIGHT_Z + i] = sums[6:]
+
+
+@FUSED.called
+def median_few(e: Floats, w: Floats, v: Floats, n: int) -> None:
+    """The median of residuals e (light, pixel) of what is not fitted, into FROM and TO, as ``halve`` leaves it."""
+    for i in range(n):
+        median = _median(_sorted(_of_planes(e, i)), np.floor(HALF * (w[COUNT + i] + THREE)))
+        v[FROM + i] = median if median < OUT else ZERO
+        v[TO + i] = v[FROM + i]
 
 
 @FUSED.called

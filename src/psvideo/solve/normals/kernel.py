@@ -124,7 +124,7 @@ def _solve_block(
     return summed
 
 
-@FUSED.inlined
+@FUSED.called
 def solve_colours(task: Task, w: Floats, values: Floats, m: Floats, start: int, n: int) -> bool:
     """Solve a block of three channels as if all measurements were usable; False where one is not."""
     return gather_all(task, w, values, start, n) and solve_all(task, w, values, m, n)
@@ -201,7 +201,7 @@ def _solve_normal_equations(w: Floats, n: int, condition_squared: np.float32) ->
         w[X + i], w[Y + i], w[Z + i] = x * scale, y * scale, z * scale
 
 
-@FUSED.inlined
+@FUSED.called
 def store_block(
     task: Task, result: Result, w: Floats, values: Floats, m: Floats, start: int, n: int, summed: bool
 ) -> None:

@@ -19,7 +19,7 @@ TINIEST = np.float32(1e-18)
 BEST, SQUARES = LOWER, RANK  # planes of v that are free at this step
 
 
-@FUSED.inlined
+@FUSED.called
 def drop_odd_of_four(
     task: Task,
     noise: np.float32,

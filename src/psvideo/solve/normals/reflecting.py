@@ -22,16 +22,29 @@ FAR_OFF = np.float32(1.5)  # the residual, over the pixel's own without the mode
 TWO, TO_BROAD, TO_MIDDLE, TO_NARROW = np.float32(2), np.float32(BROAD), np.float32(MIDDLE), np.float32(NARROW)
 LEAST_BRIGHT = np.float32(0.55)  # of what is less, high powers are nothing, and numbers too small to be quick
 _MATTE_X, _MATTE_Y, _MATTE_Z, _BEFORE, _AFTER, _SPREAD, _HOLDS, _OLD_X, _OLD_Y, _OLD_Z = (BLOCK * k for k in range(10))
-_UNIT_X, _UNIT_Y, _UNIT_Z, _PER_SIZE, _GAIN_X, _GAIN_Y, _GAIN_Z, _SHINE = (BLOCK * k for k in range(10, 18))
-KEPT = 18 * BLOCK
-"""What ``reflecting`` keeps of a block."""
+_UNIT_X, _UNIT_Y, _UNIT_Z, _PER_SIZE, _GAIN, _SHINE = (BLOCK * k for k in range(10, 16))
+KEPT, OF_LIGHT = 16, 4
+"""Planes that ``reflecting`` keeps of a block: so many, then so many per light, its gradient and its shine."""
 _SOUND_SQUARED = np.float32(1e4)
 
 
 @FUSED.called
+def find_ways(matrix: Floats, per_strength: Floats, ways: Floats, n: int) -> None:
+    """What the model needs to know of the lights (light, 5, pixel): unit directions, what makes a unit vector of the
+    sum with the camera's, strengths (0 of a copy)."""
+    for light in range(len(ways)):
+        lamp, per, way = of_light(matrix, light), per_strength[light], ways[light]
+        for i in range(n):
+            (x, y, z), one = at(lamp, i), at(per, i)
+            way[0, i], way[1, i], way[2, i] = x * one, y * one, z * one
+            way[3, i] = ONE / np.sqrt(TWO + TWO * z * one)
+            way[4, i] = ONE / one if x * x + y * y + z * z > ZERO else ZERO
+
+
+@FUSED.called
 def reflecting(
-    matrix: Floats, per_strength: Floats, weights: Weights, share: np.float32, gradient: Floats, matte: Floats,
-    kept: Floats, w: Floats, v: Floats, values: Floats, m: Floats, e: Floats, n: int,
+    matrix: Floats, ways: Floats, lights: int, weights: Weights, share: np.float32, kept: Floats, matte: Floats,
+    w: Floats, v: Floats, values: Floats, m: Floats, e: Floats, n: int,
 ) -> None:  # fmt: skip
     """Solve a solved block again under the subject's model, where that explains the pixel better.
 
@@ -40,13 +53,14 @@ def reflecting(
     compiled once for all of them.
     """
     noise, least = weights.noise, weights.signal_noise
+    gradient = kept[BLOCK * KEPT :].reshape(len(ways), OF_LIGHT, BLOCK)
     find_scale(matrix, noise, least, w, v, m, e, n)
     for i in range(n):
         kept[_MATTE_X + i], kept[_MATTE_Y + i], kept[_MATTE_Z + i] = w[X + i], w[Y + i], w[Z + i]
         kept[_SPREAD + i], kept[_HOLDS + i] = ONE / (FAR_OFF * v[SCALE + i]), ONE
     _add_up(kept, _BEFORE, e, n)
     for step in range(STEPS):
-        _fill_gradient(matrix, per_strength, weights, gradient, matte, kept, w, m, n)
+        _fill_gradient(ways, lights, weights, kept, matte, w, m, n)
         for i in range(n):
             kept[_OLD_X + i], kept[_OLD_Y + i], kept[_OLD_Z + i] = w[X + i], w[Y + i], w[Z + i]
         if step == 0:
@@ -56,23 +70,26 @@ def reflecting(
         add_weighted(gradient, weights.tukey, weights.width, False, w, v, matte, e, n)
         solve_equations(w, n, _SOUND_SQUARED, True)
         _shorten(kept, w, n)
-    _fill_gradient(matrix, per_strength, weights, gradient, matte, kept, w, m, n)
-    find_scale(gradient, noise, least, w, v, matte, e, n)
+    _fill_gradient(ways, lights, weights, kept, matte, w, m, n)
+    fill_residuals(gradient, w, matte, e, n)
     _add_up(kept, _AFTER, e, n)
+    wholly = True
     for i in range(n):
         gained = (kept[_BEFORE + i] - kept[_AFTER + i]) / (CLEARLY * max(kept[_BEFORE + i], TINY))
         holds = min(max(gained, ZERO), ONE) if w[COUNT + i] >= FROM_MEASUREMENTS else ZERO
         kept[_HOLDS + i] = holds
+        wholly &= holds == ONE
         w[X + i] = kept[_MATTE_X + i] + holds * (w[X + i] - kept[_MATTE_X + i])
         w[Y + i] = kept[_MATTE_Y + i] + holds * (w[Y + i] - kept[_MATTE_Y + i])
         w[Z + i] = kept[_MATTE_Z + i] + holds * (w[Z + i] - kept[_MATTE_Z + i])
-    _fill_gradient(matrix, per_strength, weights, gradient, matte, kept, w, m, n)
+    if not wholly:
+        _fill_gradient(ways, lights, weights, kept, matte, w, m, n)
     find_scale(gradient, noise, share, w, v, matte, e, n)
     add_weighted(gradient, False, TWO, True, w, v, matte, e, n)
-    _take_off(matrix, per_strength, weights, kept, values, n)
+    _take_off(ways, lights, weights, kept, values, n)
 
 
-@FUSED.inlined
+@FUSED.called
 def _add_up(kept: Floats, plane: int, e: Floats, n: int) -> None:
     """Add up residuals, each as a share of one: a measurement that is far off counts as one, however far."""
     kept[plane : plane + n] = ZERO
@@ -115,11 +132,10 @@ def _shine(weights: Weights, cosine: np.float32) -> tuple[np.float32, np.float32
     return much, more
 
 
-@FUSED.inlined
+@FUSED.called
 def _fill_gradient(
-    matrix: Floats, per_strength: Floats, weights: Weights, gradient: Floats, matte: Floats, kept: Floats, w: Floats,
-    m: Floats, n: int,
-) -> None:  # fmt: skip
+    ways: Floats, lights: int, weights: Weights, kept: Floats, matte: Floats, w: Floats, m: Floats, n: int
+) -> None:
     """What each measurement gains by a little more of g, in each direction, at g; and measurements without shine.
 
     The long loop writes into ``kept`` alone, so that the compiler sees that nothing overlaps and makes vectors of it.
@@ -129,14 +145,13 @@ def _fill_gradient(
         per_size = ONE / np.sqrt(max(a * a + b * b + c * c, TINY * TINY))
         kept[_UNIT_X + i], kept[_UNIT_Y + i], kept[_UNIT_Z + i] = a * per_size, b * per_size, c * per_size
         kept[_PER_SIZE + i] = per_size
-    for light in range(len(gradient)):
-        lamp, per = of_light(matrix, light), per_strength[light]
+    for light in range(lights):
+        begin = BLOCK * (KEPT + OF_LIGHT * light)
+        way, line = ways[light], kept[begin : begin + BLOCK * OF_LIGHT]
         for i in range(n):
-            (x, y, z), one = at(lamp, i), at(per, i)
             a, b, c, per_size = kept[_UNIT_X + i], kept[_UNIT_Y + i], kept[_UNIT_Z + i], kept[_PER_SIZE + i]
-            dx, dy, dz = x * one, y * one, z * one
+            dx, dy, dz, to_half, strength = way[0, i], way[1, i], way[2, i], way[3, i], way[4, i]
             cosine = a * dx + b * dy + c * dz
-            to_half = ONE / np.sqrt(TWO + TWO * dz)
             half = max((cosine + c) * to_half, ZERO)
             holds = kept[_HOLDS + i] if cosine > ZERO else ZERO
             much, more = _shine(weights, half)
@@ -144,40 +159,34 @@ def _fill_gradient(
             by_cosine = ONE + TWO * curve * cosine
             along = cosine + curve * cosine * cosine - by_cosine * cosine - by_half * half
             by_half *= to_half
-            strength = ONE / one if x * x + y * y + z * z > ZERO else ZERO
-            kept[_GAIN_X + i] = strength * (along * a + (by_cosine + by_half) * dx)
-            kept[_GAIN_Y + i] = strength * (along * b + (by_cosine + by_half) * dy)
-            kept[_GAIN_Z + i] = strength * (along * c + (by_cosine + by_half) * dz + by_half)
-            kept[_SHINE + i] = strength * holds * much
-        gradient[light, 0, :n] = kept[_GAIN_X : _GAIN_X + n]
-        gradient[light, 1, :n] = kept[_GAIN_Y : _GAIN_Y + n]
-        gradient[light, 2, :n] = kept[_GAIN_Z : _GAIN_Z + n]
+            line[i] = strength * (along * a + (by_cosine + by_half) * dx)
+            line[BLOCK + i] = strength * (along * b + (by_cosine + by_half) * dy)
+            line[2 * BLOCK + i] = strength * (along * c + (by_cosine + by_half) * dz + by_half)
+            line[3 * BLOCK + i] = strength * holds * much
         there, without = m[light], matte[light]
         for i in range(n):
-            without[i] = there[i] - kept[_SHINE + i] if there[i] > ABSENT else MISSING
+            without[i] = there[i] - line[3 * BLOCK + i] if there[i] > ABSENT else MISSING
 
 
-@FUSED.inlined
-def _take_off(matrix: Floats, per_strength: Floats, weights: Weights, kept: Floats, values: Floats, n: int) -> None:
+@FUSED.called
+def _take_off(ways: Floats, lights: int, weights: Weights, kept: Floats, values: Floats, n: int) -> None:
     """Leave of every sample what a matte surface would show: highlights are alike in all channels, the curve is not.
 
     The unit normals are those that ``_fill_gradient`` left.
     """
-    lights = len(matrix)
-    channels = len(values) // lights
+    channels = len(values) // len(ways)
     for light in range(lights):
-        lamp, per = of_light(matrix, light), per_strength[light]
+        way = ways[light]
         for i in range(n):
-            (x, y, z), one = at(lamp, i), at(per, i)
             c = kept[_UNIT_Z + i]
-            cosine = (kept[_UNIT_X + i] * x + kept[_UNIT_Y + i] * y + c * z) * one
-            half = max((cosine + c) / np.sqrt(TWO + TWO * z * one), ZERO)
+            cosine = kept[_UNIT_X + i] * way[0, i] + kept[_UNIT_Y + i] * way[1, i] + c * way[2, i]
+            half = max((cosine + c) * way[3, i], ZERO)
             holds = kept[_HOLDS + i] if cosine > ZERO else ZERO
             much, _ = _shine(weights, half)
-            kept[_SHINE + i] = holds * much / one
-            kept[_GAIN_X + i] = ONE / (ONE + holds * weights.curve * cosine)
+            kept[_SHINE + i] = holds * much * way[4, i]
+            kept[_GAIN + i] = ONE / (ONE + holds * weights.curve * cosine)
         for channel in range(channels):
             plane = values[light * channels + channel]
             for i in range(n):
-                without = (plane[i] - kept[_SHINE + i]) * kept[_GAIN_X + i]
+                without = (plane[i] - kept[_SHINE + i]) * kept[_GAIN + i]
                 plane[i] = without if plane[i] > ABSENT else MISSING

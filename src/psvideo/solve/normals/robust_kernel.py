@@ -40,7 +40,7 @@ from psvideo.solve.normals.few_lights import EIGHT, FOUR, begin_few, reweigh_few
 from psvideo.solve.normals.measuring import all_seen, combine, gather_one, gather_three, hide_unseen
 from psvideo.solve.normals.near_kernel import at, place_lights
 from psvideo.solve.normals.odd_of_four import TWO, drop_odd_of_four
-from psvideo.solve.normals.reflecting import KEPT, reflecting
+from psvideo.solve.normals.reflecting import KEPT, OF_LIGHT, find_ways, reflecting
 from psvideo.solve.normals.task import FEW, LIGHTS, Bytes, Floats, Result, Task, Weights, empty_result
 
 STEP = 128  # pixels that are solved together: few enough that all of their planes stay in the nearest cache
@@ -67,9 +67,11 @@ class Memory(NamedTuple):
     matrix: Floats  # (light, 3, pixel): what lights send to every pixel
     per_strength: Floats  # (light, pixel)
     block: Result  # of one block, in float32
-    gradient: Floats  # (light, 3, pixel) where the subject's reflectance is known, else of no light
+    ways: (
+        Floats  # (light, 5, pixel) where the subject's reflectance is known, else of no light: ``reflecting.find_ways``
+    )
     matte: Floats  # (light, pixel): measurements without highlights
-    kept: Floats
+    kept: Floats  # flat: what else ``reflecting`` keeps
 
 
 def working_memory(task: Task, *, reflecting: bool, residual: bool) -> Memory:
@@ -92,9 +94,9 @@ def working_memory(task: Task, *, reflecting: bool, residual: bool) -> Memory:
         matrix=matrix,
         per_strength=per_strength,
         block=empty_result(BLOCK, task.tone.shape[1], half=False, residual=residual),
-        gradient=np.zeros((lights if reflecting else 0, 3, BLOCK), np.float32),
+        ways=np.zeros((lights if reflecting else 0, 5, BLOCK), np.float32),
         matte=np.full((lights if reflecting else 0, BLOCK), MISSING, np.float32),
-        kept=np.zeros(KEPT if reflecting else 0, np.float32),
+        kept=np.zeros(BLOCK * (KEPT + OF_LIGHT * lights) if reflecting else 0, np.float32),
     )
 
 
@@ -125,12 +127,13 @@ def solve_rows(
     predicted, unexplained = lent(error), lent(misfit)
     w, v, values = lent(memory.planes), lent(memory.more), lent(memory.values)
     m, e = lent(memory.measurements), lent(memory.errors)
-    flat, gradient = lent(memory.flat), lent(memory.gradient)
+    flat, ways = lent(memory.flat), lent(memory.ways)
+    matte, kept = lent(memory.matte), lent(memory.kept)
     block = Result(
         lent(memory.block.normals), lent(memory.block.albedo), lent(memory.block.valid), lent(memory.block.residual)
     )
     sent, per = lent(task.matrix), lent(task.per_strength)
-    matte, kept = lent(memory.matte), lent(memory.kept)
+    find_ways(t.matrix, t.per_strength, ways, BLOCK)  # near lights' change with the block
     for row in range(-(-first // step) * step, last, step):
         for col in range(0, t.cols, STEP):
             n = min(STEP, t.cols - col)
@@ -139,9 +142,7 @@ def solve_rows(
                 w[X : X + n], w[Y : Y + n], w[Z : Z + n] = ZERO, ZERO, ZERO
                 v[DOUBT : DOUBT + n], v[UNEXPLAINED : UNEXPLAINED + n] = NO_ERROR, ZERO
             else:
-                summed = _solve_block(
-                    t, sent, per, weights, w, v, values, m, e, flat, gradient, matte, kept, row, col, n
-                )
+                summed = _solve_block(t, sent, per, weights, w, v, values, m, e, flat, ways, matte, kept, row, col, n)
             start = row * t.cols + col
             kernel.store_block(t, block, w, values, m, 0, n, summed)
             for i in range(n):
@@ -187,7 +188,7 @@ def _solve_block(
     m: Floats,
     e: Floats,
     flat: Floats,
-    gradient: Floats,
+    ways: Floats,
     matte: Floats,
     kept: Floats,
     row: int,
@@ -202,6 +203,7 @@ def _solve_block(
     distant = task.near.depth.size == 0
     if not distant:
         place_lights(task.matrix, task.per_strength, task.near, row, col, n)
+        find_ways(task.matrix, task.per_strength, ways, n)
     plain = distant and channels == 3 and all_seen(task.seen, row, col, n)
     summed = plain and kernel.solve_colours(task, w, values, m, start, n)
     if summed:
@@ -225,9 +227,9 @@ def _solve_block(
             )
             solve_equations(w, n, SOUND_SQUARED, True)
     share = LIGHTS if weights.read > ZERO else weights.signal_noise
-    again = not done and gradient.size > 0
+    again = not done and ways.size > 0
     if again:
-        reflecting(task.matrix, task.per_strength, weights, share, gradient, matte, kept, w, v, values, m, e, n)
+        reflecting(task.matrix, ways, task.lights, weights, share, kept, matte, w, v, values, m, e, n)
     else:
         _reweigh(task, sent, weights, share, False, TWO, True, few, w, v, m, e, flat, n)
     _predict_error(weights, min(task.lights, LEAST_CHECKED), w, v, n)
@@ -238,7 +240,7 @@ def _solve_block(
     return summed and not again and (done or task.lights > DROPPED_FROM)
 
 
-@FUSED.inlined
+@FUSED.called
 def _read_usable(task: Task, w: Floats, values: Floats, m: Floats, row: int, col: int, n: int) -> None:
     """Read a block's measurements; what is saturated, unseen or in shadow is MISSING, and COUNT is what remains."""
     start, channels = row * task.cols + col, task.tone.shape[1]
