@@ -207,6 +207,58 @@ def test_all_of_it_works_where_no_folder_can_be_written_for_compiled_code(
     assert out.is_file() if command == "sync" else list((out / "normals").iterdir())
 
 
+UNUSUAL = """
+import logging, sys
+from pathlib import Path
+import cv2
+import numpy as np
+import psvideo as ps
+from psvideo.runs.compiling import GLOSS, SmallTake
+folder = Path(sys.argv[1])
+logging.getLogger("psvideo.compiling").setLevel(logging.INFO)
+logging.getLogger("psvideo.compiling").addHandler(logging.StreamHandler(sys.stdout))
+moving = ", motion = { velocity_m_per_s = [0.4, 0.0, 0.0] }"
+inside = np.zeros((120, 96), np.uint8)
+inside[20:100, 20:80] = 255
+cv2.imwrite(str(folder / "mask.png"), inside)
+takes = (
+    (SmallTake(lights=4), {"mask": folder / "mask.png"}),
+    (SmallTake(lights=8, gloss=GLOSS), {"mask": folder / "mask.png", "float32": True}),
+    (SmallTake(lights=5, kind="exr"), {"fill": False}),
+    (SmallTake(lights=8), {"solver": "least-squares", "aov": ("residual", "error")}),
+    (SmallTake(lights=3), {"solver": "robust"}),
+    (SmallTake(lights=6, kind="png8", camera='bits = 8, transfer = "srgb"', motion=moving), {}),
+    (SmallTake(lights=8, kind="dng", camera='cfa = "RGGB"', motion=moving), {"aov": ("depth",)}),
+)
+for number, (take, how) in enumerate(takes):
+    clip = folder / f"clip{number}"
+    (folder / "scene.toml").write_text(take.scene)
+    ps.shoot(folder / "scene.toml", clip)
+    ps.normals(clip, rig=clip / "rig.toml", out=folder / f"out{number}", **how)
+for lights in (3, 4, 5, 9, 12):
+    around = np.arange(lights) * 2 * np.pi / lights
+    ways = np.stack([0.5 * np.cos(around), 0.5 * np.sin(around), np.full(lights, 0.75**0.5)], axis=-1)
+    y, x = np.mgrid[-0.6:0.6:48j, -0.6:0.6:48j]
+    normals = np.stack([x, -y, np.sqrt(1 - x * x - y * y)], axis=-1)
+    grey = np.maximum(np.einsum("rcx,lx->lrc", normals, ways), 0) * 0.6
+    for images in (grey, np.stack([grey] * 3, axis=-1)):
+        ps.solve_images(images, ways)
+        ps.solve_images((images * 65535).astype(np.uint16), ways, white_level=65535, mask=x > -0.5)
+        ps.solve_images((images * 255).astype(np.uint8), ways, white_level=255, solver="robust")
+"""
+
+
+@pytest.mark.campaign
+def test_after_installing_no_run_compiles_however_unusual(tmp_path: Path) -> None:
+    package = tmp_path / "there" / "psvideo"
+    shutil.copytree(SOURCE, package, ignore=shutil.ignore_patterns("__pycache__"))
+    environment = os.environ | {"PYTHONPATH": str(package.parent), "NUMBA_CACHE_DIR": str(tmp_path / "kept")}
+    subprocess.run([sys.executable, "-m", "psvideo.runs.compiling"], env=environment, check=True)
+    command = [sys.executable, "-c", UNUSUAL, str(tmp_path)]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (0, ""), done.stderr
+
+
 COMPILE = """
 import numpy as np
 from psvideo.solve.depth.checkerboard import empty_board, settle
