@@ -19,6 +19,12 @@ from psvideo.synth.shoot import shoot
 
 TAKES, PIECES, WORKERS = 1000, 5, (20, 200)
 SLEEPS_S = 0.001
+WATCHING_OFF = {
+    "distributed.admin.system-monitor.interval": "1h",
+    "distributed.worker.memory.monitor-interval": "1h",
+    "distributed.worker.profile.enabled": False,
+}
+"""What workers watch of themselves, each on its own computer: hundreds in one process would do nothing else."""
 WHOSE = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
 SCENE = """
 schema = "psvideo-scene/1"
@@ -70,9 +76,11 @@ class Asleep:
 
 def overhead(takes: int = TAKES, pieces: int = PIECES, workers: int = WORKERS[0]) -> Overhead:
     """Measure what dask does for pieces that take no time."""
+    import dask
     from distributed import Client, LocalCluster
 
     with (
+        dask.config.set(WATCHING_OFF),
         LocalCluster(
             n_workers=workers,
             threads_per_worker=1,
