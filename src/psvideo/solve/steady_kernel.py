@@ -186,7 +186,8 @@ def _decide(votes: Bytes, i: int, own: int, block: int, work: Floats) -> None:
     source = SOURCES[min(int(reached + HALF), 4)]
     before = max(block - count, 0) if votes[HAS_BEFORE, i] else 0
     known = count + before > 0
-    measured = np.float32(votes[REACHED, i]) >= SURELY * np.float32(rounds)
+    here = np.float32(votes[REACHED, i]) >= SURELY * np.float32(rounds)
+    measured = here or (votes[HAS_BEFORE, i] > 0 and reached >= SURELY)  # or else the mean is of fewer lights
     if source != own and not (known and (source != MEASURED or measured)) and source != 0:
         source = own
     trusted = (source == MEASURED) & (sure >= HALF)
