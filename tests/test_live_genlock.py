@@ -1,22 +1,31 @@
 """Genlock through the picture: the strobe is trimmed until the dark row stands where it is wanted, and stays there."""
 
 import math
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
 from strobed_loop import StrobedLoop
 
 from psvideo.errors import UsageError
+from psvideo.formats.plan_toml import format_plan
+from psvideo.live.chain import Chain
 from psvideo.live.genlock import check_holds, rows_around, target_of
 from psvideo.live.holding import Holding
 from psvideo.model.plan import Plan
+from psvideo.runs.caller import PYTHON
+from psvideo.runs.live_strobe import held_strobe
+from psvideo.strobe.link.boards import BOARDS
 from psvideo.strobe.link.exchange import RefusedError
+from psvideo.strobe.stand_ins.python_board_port import PythonBoardPort
 
 PlanMaker = Callable[..., Plan]
 HOLDS_ROWS = 2.0
+UNO = BOARDS["atmega328p"]
 
 
 def held_plan(make_plan: PlanMaker, *, height_px: int = 72, readout: float = 0.9) -> Plan:
@@ -118,3 +127,45 @@ def test_the_rows_to_keep_free_have_the_dark_row_farthest_from_them(make_plan: P
     assert target_of(camera, "edge").row == pytest.approx(76)
     upward = replace(camera, readout_s=-0.018)
     assert target_of(upward, "10").row == 61
+
+
+def test_a_board_is_played_and_held_while_the_live_view_runs_and_dark_afterwards(
+    make_plan: PlanMaker, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    port, path = PythonBoardPort(UNO), tmp_path / "plan.toml"
+    notes: list[str] = []
+    monkeypatch.setattr("psvideo.runs.strobe.port._open", lambda *_: port)
+    path.write_text(format_plan(held_plan(make_plan)))
+    chain = Chain(plan=held_plan(make_plan))
+    with held_strobe(chain, path, lock="edge", port="emulated", yes=True, noted=notes.append, caller=PYTHON) as holding:
+        assert wait_until(lambda: port._controller.state == "running")
+        assert (holding.ppm, holding.short_rows) == (0, None)
+    assert (port._controller.state, notes) == ("idle", [])
+
+
+def test_a_board_that_is_lost_is_a_sentence_and_not_the_end(
+    make_plan: PlanMaker, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    port = PythonBoardPort(UNO)
+    notes: list[str] = []
+    monkeypatch.setattr("psvideo.runs.strobe.port._open", lambda *_: port)
+    path = tmp_path / "plan.toml"
+    path.write_text(format_plan(held_plan(make_plan)))
+    chain = Chain(plan=held_plan(make_plan))
+    with held_strobe(chain, path, lock="edge", port="emulated", yes=True, noted=notes.append, caller=PYTHON) as holding:
+        assert wait_until(lambda: port._controller.state == "running")
+        port._controller.restart("power", port._now())
+        assert wait_until(lambda: holding.ended)
+    assert "restarted" in notes[0]
+    with (
+        pytest.raises(UsageError, match="name `plan`"),
+        held_strobe(chain, None, lock="edge", port="emulated", yes=True, noted=notes.append, caller=PYTHON),
+    ):
+        pass
+
+
+def wait_until(true: Callable[[], bool]) -> bool:
+    end_s = time.monotonic() + 20
+    while not true() and time.monotonic() < end_s:
+        time.sleep(0.01)
+    return true()

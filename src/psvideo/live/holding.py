@@ -23,7 +23,8 @@ class Holding:
     """Holds the dark row of a chain's strobe at a target. ``ask`` sends a trim to the board.
 
     ``ppm`` is the trim that the board has; ``short_rows`` by how much the dark row was off its target when it was last
-    looked at, None while nothing is followed; ``note`` says why the board refused, where it did.
+    looked at, None while nothing is followed; ``note`` says why the board refused, where it did, ``ended`` that it
+    plays no more.
     """
 
     chain: Chain
@@ -32,6 +33,7 @@ class Holding:
     ppm: int = 0
     short_rows: float | None = None
     note: str = ""
+    ended: bool = False
     _asked_s: float = field(default=-EVERY_S)
 
     def beat(self, host_s: float) -> None:

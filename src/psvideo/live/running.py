@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from psvideo.live.chain import Chain, LiveFrame, NewestRound, search_here
+from psvideo.live.holding import Holding
 from psvideo.live.quality import Quality
 from psvideo.live.recording import Recording
 from psvideo.live.smaller import smaller_plan
@@ -42,6 +43,7 @@ class Running:
     shown: Shown
     said: Said
     recording: Recording | None = None
+    holding: Holding | None = None
     seconds: float | None = None
     notes: list[str] = field(default_factory=list)
     results: int = 0
@@ -181,6 +183,8 @@ class Running:
             height_px=camera.height_px,
             why=chain.why,
             recorded=None if self.recording is None else self.recording.written,
+            off_rows=None if self.holding is None else self.holding.short_rows,
+            trim_ppm=None if self.holding is None or self.holding.ended else self.holding.ppm,
             notes=self.all_notes,
         )
         return self.status
@@ -206,4 +210,5 @@ class Running:
     def all_notes(self) -> tuple[str, ...]:
         """What there is to say of the run."""
         ended = "" if self.recording is None else self.recording.ended
-        return (*self.notes, ended) if ended else tuple(self.notes)
+        refused = "" if self.holding is None else self.holding.note
+        return (*self.source.notes, *self.notes, *filter(None, (ended, refused)))

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from psvideo.clip import Clip, read_frames
@@ -21,7 +21,8 @@ class LiveSource:
 
     ``first_number`` is what the first frame's file is called by, where there is one. ``cfa`` is the filter pattern of a
     mosaic. ``plan_path`` is the plan's file where the frames are plain codes that it explains. ``paced``: frames come
-    when they are due, and not as soon as somebody wants them. ``warnings`` say what is odd about it.
+    when they are due, and not as soon as somebody wants them. ``warnings`` say what is odd about it, ``notes``
+    what happened to it on the way.
     """
 
     name: str
@@ -32,6 +33,7 @@ class LiveSource:
     plan_path: Path | None = None
     paced: bool = True
     warnings: tuple[str, ...] = ()
+    notes: list[str] = field(default_factory=list)
 
 
 def played_clip(clip: Clip, *, pace: Pace = "own") -> LiveSource:

@@ -2,9 +2,11 @@
 
 import time
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 from psvideo.clip import Frame, open_clip
+from psvideo.clip.genicam import is_genicam, read_genicam
 from psvideo.clip.growing_folder import read_growing
 from psvideo.clip.stream import STANDARD_INPUT, is_device, read_stream
 from psvideo.errors import UsageError
@@ -22,12 +24,17 @@ SCHEMES = ("udp://", "rtsp://", "rtsps://", "srt://", "rtp://", "tcp://", "rtmp:
 def opened_source(
     source: str, *, plan: Path | None, pace: Pace = "own", growing: bool = False, raw: str | None = None
 ) -> LiveSource:
-    """Return a source by what a user calls it: ``-``, a URL, a video device, a clip, or with ``growing`` a folder.
+    """Return a source by what users call it: ``-``, a URL, a device, ``genicam``, a clip, with ``growing`` a folder.
 
     Raises UsageError where what is needed for it was not given.
     """
     if growing:
         return _live(source, plan, lambda camera_plan: read_growing(Path(source), camera_plan.camera))
+    if is_genicam(source):
+        notes: list[str] = []
+        found = _live(source, plan, lambda camera_plan: read_genicam(source, camera_plan.camera, noted=notes.append))
+        explained = found.plan.camera.encoding.white_level is not None
+        return replace(found, plan_path=plan if explained else None, notes=notes)
     if source == STANDARD_INPUT or is_device(source) or source.lower().startswith(SCHEMES):
         return _live(source, plan, lambda camera_plan: read_stream(source, camera_plan.camera, raw=raw), raw)
     if raw is not None:

@@ -17,7 +17,8 @@ class LiveStatus:
     """The last second. ``age_s`` is from a frame's coming to its picture, None where there was none.
 
     ``phase_error_rows`` and ``clock_offset_ppm`` are None while nothing is followed; ``why`` says then why not.
-    ``width_px`` and ``height_px`` are the live picture's; ``late_s`` is by how much the source's frames come late.
+    ``width_px`` and ``height_px`` are the live picture's; ``off_rows`` is how far the dark row
+    is from where the strobe is to hold it, and ``trim_ppm`` by how much the board's steps are longer; None without.
     """
 
     at_s: float
@@ -34,6 +35,8 @@ class LiveStatus:
     height_px: int
     why: str = ""
     recorded: int | None = None
+    off_rows: float | None = None
+    trim_ppm: int | None = None
     notes: tuple[str, ...] = ()
 
     @property
@@ -47,6 +50,9 @@ class LiveStatus:
         parts.append(f"{self.results_per_s:.1f} results/s at {self.width_px} x {self.height_px}")
         if self.age_s is not None:
             parts.append(f"{1e3 * self.age_s:.0f} ms old")
+        if self.trim_ppm is not None:
+            off = "dark row not held" if self.off_rows is None else f"dark row {-self.off_rows:+.1f} rows off"
+            parts.append(f"{off}, trim {self.trim_ppm:+d} ppm")
         if self.recorded is not None:
             parts.append(f"{self.recorded} recorded")
         return " | ".join(parts)

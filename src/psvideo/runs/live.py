@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from psvideo.errors import NoStrobeError
@@ -31,6 +32,8 @@ from psvideo.model.timing import DroppedFrames, Timing, timed_camera
 from psvideo.page.serving import ADDRESS
 from psvideo.plates.sequence import check_separable
 from psvideo.runs.caller import PYTHON, Caller
+from psvideo.runs.live_strobe import held_strobe
+from psvideo.strobe.link.ports import AUTO
 
 
 def live(
@@ -43,6 +46,9 @@ def live(
     growing: bool = False,
     raw: str | None = None,
     record: Path | str | None = None,
+    lock: str | None = None,
+    strobe: str = AUTO,
+    yes: bool = False,
     pace: Pace = "own",
     seconds: float | None = None,
     force: bool = False,
@@ -64,6 +70,9 @@ def live(
     - ``rig``: where the lights are; without it there are plates and no normals.
     - ``timing_out``: a timing.json to write at the end, of all that was followed; ``force`` replaces one.
     - ``record``: a clip folder to record the frames into, whole or not at all.
+    - ``lock``: play the plan on the board at the port ``strobe`` ("auto": by USB identity), and trim its period so that
+      the dark row stands still: at the frame's "edge", at a row ("300"), or far from some rows ("200-500").
+      ``yes``: everybody in the room has been warned of the flashing.
     - ``pace``: a clip's "own", or "fastest". ``seconds`` ends the run after so much footage.
     - ``page``: serve the live page, on this machine alone unless another ``host`` is named, then to those alone who
       know the ``token`` (left out, one is made); ``port`` left out: a free one. ``opened`` gets its address.
@@ -88,10 +97,14 @@ def live(
         refuse_existing(timing_path, force=force)
     running = _running(played, known, first_light, seconds, said, shown)
     record_path = path_if_given("record", record)
+    plan_path = path_if_given("plan", plan) or played.plan_path
+    held = partial(held_strobe, running.chain, port=strobe, yes=yes, noted=running.notes.append, caller=caller)
     with (
         _page(running, played.plan, known, caller, opened, host, port, token) if page else nullcontext(),
         nullcontext() if record_path is None else recording(record_path, played, force=force) as recorded,
+        nullcontext() if lock is None else held(plan_path, lock=lock) as holding,
     ):
+        running.holding = holding
         running.recording = recorded
         summary = running.run()
     if recorded is not None:

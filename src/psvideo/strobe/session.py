@@ -114,10 +114,18 @@ def cycles_for(plan: Plan, *, seconds: float | None, rounds: int | None) -> int 
 
 
 def run_program(
-    link: Link, program: Program, *, cycles: int | None, seconds: float | None, watch: Callable[[RunProgress], None]
+    link: Link,
+    program: Program,
+    *,
+    cycles: int | None,
+    seconds: float | None,
+    watch: Callable[[RunProgress], None],
+    every_s: float = ASK_EVERY_S,
+    stopped: Callable[[], bool] = lambda: False,
 ) -> Outcome:
     """Upload a program and play it for ``cycles`` cycles (None: until stopped), at most for ``seconds``.
 
+    ``watch`` is called about every ``every_s``, and may ask the board itself; then ``stopped`` says whether to end.
     In every case the board is stopped. Ctrl-C ends a run well. Raises PsvideoError where nothing was played;
     what goes wrong after the first flash stands in the outcome, so that it can be logged.
     """
@@ -127,7 +135,16 @@ def run_program(
             link.ask(request, request.reply)
         record.start_tick = link.ask(Run(cycles=cycles or 0), Started).start
         record.began_s = time.monotonic()
-        record.fault = _follow(link, record, program.played, cycles=cycles, seconds=seconds, watch=watch)
+        record.fault = _follow(
+            link,
+            record,
+            program.played,
+            cycles=cycles,
+            seconds=seconds,
+            watch=watch,
+            every_s=every_s,
+            stopped=stopped,
+        )
         if record.fault is not None:
             record.ended, record.message = "fault", _went_dark(link.port.name, record)
     except KeyboardInterrupt:
@@ -171,6 +188,8 @@ def _follow(
     cycles: int | None,
     seconds: float | None,
     watch: Callable[[RunProgress], None],
+    every_s: float,
+    stopped: Callable[[], bool],
 ) -> str | None:
     """Ask for clock and status again and again until the run is over; return what fault ended it, if one did."""
     lasts_s = cycles * played.cycle_s if seconds is None and cycles is not None else seconds
@@ -188,9 +207,9 @@ def _follow(
         elapsed_s = time.monotonic() - began_s
         left_s = None if lasts_s is None else max(lasts_s - elapsed_s, 0.0)
         watch(RunProgress(elapsed_s=elapsed_s, cycles=status.cycles, flash_rate_hz=rate_hz, left_s=left_s))
-        if status.state == "idle" or (seconds is not None and elapsed_s >= seconds):
+        if status.state == "idle" or stopped() or (seconds is not None and elapsed_s >= seconds):
             return None
-        pause_s = ASK_EVERY_S if seconds is None else min(ASK_EVERY_S, seconds - elapsed_s)
+        pause_s = every_s if seconds is None else min(every_s, seconds - elapsed_s)
         time.sleep(max(pause_s, 0.0))
 
 

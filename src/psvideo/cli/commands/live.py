@@ -3,6 +3,7 @@
 import json as texts
 import sys
 import webbrowser
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,7 +11,10 @@ import typer
 
 from psvideo.cli.console import Voice
 from psvideo.cli.options.clip_and_run import FirstLight, Force, Json, PlanPath, Quiet, Verbose
+from psvideo.cli.options.strobe import Yes
+from psvideo.errors import UsageError
 from psvideo.model.choices import Pace
+from psvideo.strobe.link.ports import AUTO
 
 if TYPE_CHECKING:
     from psvideo.live.status import LiveStatus
@@ -20,10 +24,10 @@ def live(
     source: Annotated[
         str,
         typer.Argument(
-            help="What to watch: a clip, played at its own pace; a URL (udp, rtsp, srt); a video device; - for a pipe.",
+            help="What to watch: a clip, played at its pace; a URL (udp, rtsp, srt); a device; genicam; - for a pipe.",
             show_default=False,
         ),
-    ],
+    ] = "",
     plan: PlanPath = None,
     rig: Annotated[
         Path | None, typer.Option("--rig", help="Where the lights are; left out: plates, and no normals.")
@@ -32,6 +36,7 @@ def live(
     timing_out: Annotated[
         Path | None, typer.Option("--timing-out", help="Where to write timing.json of all that was followed.")
     ] = None,
+    list_all: Annotated[bool, typer.Option("--list", help="Show cameras, video devices and boards.")] = False,
     growing: Annotated[
         bool, typer.Option("--growing", help="The source is a folder that a recorder is still writing.")
     ] = False,
@@ -42,6 +47,15 @@ def live(
     record: Annotated[
         Path | None, typer.Option("--record", help="A clip folder to record the frames into, whole or not at all.")
     ] = None,
+    lock: Annotated[
+        str | None,
+        typer.Option(
+            "--lock",
+            help="Play the plan on a board and hold the dark row: edge, a row (300), or away from rows (200-500).",
+        ),
+    ] = None,
+    strobe: Annotated[str, typer.Option("--strobe", help="The board's port for --lock.")] = AUTO,
+    yes: Yes = False,
     pace: Annotated[
         Pace,
         typer.Option("--pace", help="A clip's own pace, or fastest: every round is solved, nothing is left out."),
@@ -67,6 +81,11 @@ def live(
     from psvideo.runs.live import live as watch
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
+    if list_all:
+        _list(voice)
+        return
+    if not source:
+        raise UsageError("Name what to watch: a clip, a URL, a device; psvideo live --list shows what there is.")
     summary = watch(
         source,
         plan=plan,
@@ -76,6 +95,9 @@ def live(
         growing=growing,
         raw=raw,
         record=record,
+        lock=lock,
+        strobe=strobe,
+        yes=yes,
         pace=pace,
         seconds=seconds,
         force=force,
@@ -94,6 +116,18 @@ def live(
     voice.say(summary.words)
     if json:
         print(texts.dumps(summary.record), flush=True)
+
+
+def _list(voice: Voice) -> None:
+    """Show what there is to watch, and to flash."""
+    from psvideo.runs.live_sources import on_set
+
+    found = on_set()
+    voice.result({"found": [asdict(one) for one in found]})
+    for one in found:
+        voice.say(f"{one.kind}: {one.name}  {one.label}".rstrip())
+    if not found:
+        voice.say("No camera, video device or board found. GenICam cameras need psvideo[genicam].")
 
 
 def _open(voice: Voice, url: str, *, browser: bool) -> None:

@@ -88,7 +88,7 @@ def run(
     if port == EMULATED:
         caller.say("The board is emulated: nothing flashes.")
     else:
-        _warn_of_flashing(planned, path, warned=yes, confirm=confirm, caller=caller)
+        warn_of_flashing(planned, path, warned=yes, confirm=confirm, caller=caller)
     with opened_port(port, board=known) as opened:
         link = Link(opened)
         ready = prepare(link, wiring=wiring)
@@ -112,10 +112,13 @@ def _length(plan: Plan, seconds: float | None, rounds: int | None) -> int | None
     return cycles_for(plan, seconds=seconds, rounds=rounds)
 
 
-def _warn_of_flashing(
+def warn_of_flashing(
     plan: Plan, path: Path, *, warned: bool, confirm: Callable[[str], bool] | None, caller: Caller
 ) -> None:
-    """Warn of the flashing before the first flash, and have it confirmed once for each plan."""
+    """Warn of the flashing before the first flash, and have it confirmed once for each plan.
+
+    Raises UsageError where nobody confirmed and nobody can be asked, PsvideoError where the answer was no.
+    """
     warning = seizure_warning(plan) if plan.mode != "synced" else None
     if warning is None:
         return
