@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from psvideo.compute.threads import over_ranges
 from psvideo.model.coded import Image
 from psvideo.plates.align.brightness import light_of
-from psvideo.plates.align.flow import Codes, Flags, Vectors, comparable, places
+from psvideo.plates.align.flow import Codes, Flags, Vectors, comparable, noise_between, places
+from psvideo.plates.align.lone_edges import InstantSketch
 from psvideo.plates.align.moving import SHADING_PX, Followed, Pair, window_of
 from psvideo.plates.align.moving_kernel import AFTER, AT_REST, BEFORE, BOTH, NOWHERE, blend_rows, ways_rows
 from psvideo.plates.align.packed import packed
@@ -55,13 +56,14 @@ MARGIN_ROWS = 5
 @dataclass(frozen=True, kw_only=True)
 class Taken:
     """Of one light (row, col): where its plates ``alike`` show the same along the motion, ``source``, what a pixel is
-    to be taken from, and where that is ``sure``; and by how much it may be off, in units of the plates' light,
-    ``unsure``."""
+    to be taken from, and where that is ``sure``; by how much it may be off, in units of the plates' light,
+    ``unsure``; and what it ``shows`` at the instant."""
 
     alike: Flags
     sure: Flags
     source: Codes
     unsure: Vectors
+    shows: InstantSketch
 
 
 def taken_of(pair: Pair, motion: Followed) -> Taken:
@@ -87,9 +89,25 @@ def taken_of(pair: Pair, motion: Followed) -> Taken:
     source[gone[0] & ~gone[1]] = AFTER
     source[gone[1] & ~gone[0]] = BEFORE
     hidden = gone[0] != gone[1]
-    unsure = unsure_of(pair, before, after, motion) * ~hidden
+    noise = noise_between(pair.before, pair.after)
+    unsure = unsure_of(pair, before, after, motion, noise) * ~hidden
     unsure *= np.where(source == BOTH, _off_of_blend(alike, shading, unlike, shaded), 1)
-    return Taken(alike=alike, sure=alike | hidden, source=source, unsure=unsure)
+    return Taken(
+        alike=alike,
+        sure=alike | hidden,
+        source=source,
+        unsure=unsure,
+        shows=InstantSketch(codes=_shown(before, after, source, spans_s), white=pair.before.white, noise=noise),
+    )
+
+
+def _shown(before: Codes, after: Codes, source: Codes, spans_s: tuple[float, float]) -> Codes:
+    """Return the sketch of what is taken of two plates, moved to the instant."""
+    share = float(np.clip(spans_s[0] / (spans_s[0] + spans_s[1]), 0, 1))
+    nearer = before if spans_s[0] <= spans_s[1] else after
+    shown = np.where(source == BOTH, cv2.addWeighted(before, 1 - share, after, share, 0), nearer)
+    shown = np.where(source == BEFORE, before, shown)
+    return np.asarray(np.where(source == AFTER, after, shown), np.uint8)
 
 
 def _off_of_blend(alike: Flags, shading: Vectors, unlike: Vectors, shaded: Flags) -> Vectors:

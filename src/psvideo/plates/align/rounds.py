@@ -15,6 +15,7 @@ from psvideo.plates.align.brightness import evened
 from psvideo.plates.align.comb import Comb, Schedule
 from psvideo.plates.align.flow import Codes, Vectors
 from psvideo.plates.align.held import Around, DueInstant, Held
+from psvideo.plates.align.lone_edges import InstantSketch, unsure_by_lone_edges
 from psvideo.plates.align.moving import Followed, Pair, followed_at
 from psvideo.plates.align.moving_kernel import NOWHERE
 from psvideo.plates.light_plate import LightPlate
@@ -169,18 +170,29 @@ def _make_moving(held: Held, instant: DueInstant) -> None:
     guesses = sources = [one.source for one in shown]
     if not instant.guessed:
         sources = without_doubtful(shown, motion, len(held.lights) - len(lights))
-    instant.unsure = _unsure(shown, sources, lights, held.lights)
+    instant.unsure = _unsure(held, instant, dict(zip(lights, shown, strict=True)), sources)
     for light, source, guess in zip(lights, sources, guesses, strict=True):
         _hand_on(instant, _moved_to(held.sure_around(light, instant), source, guess, motion))
         instant.moving.remove(light)
         held.let_go()
 
 
-def _unsure(shown: Sequence[Taken], sources: Sequence[Codes], moving: Sequence[str], lights: Sequence[str]) -> Vectors:
-    """Return by how much every light's plate may be off, (light, row, col); what is left out or stands is not."""
-    unsure = np.zeros((len(lights), *sources[0].shape), np.float32)
-    for light, one, source in zip(moving, shown, sources, strict=True):
-        unsure[lights.index(light)] = one.unsure * (source != NOWHERE)
+def _unsure(held: Held, instant: DueInstant, taken: dict[str, Taken], sources: Sequence[Codes]) -> Vectors:
+    """Return by how much every light's plate may be off, (light, row, col): where its two plates disagree, and where
+    the lights do; what is left out is not."""
+    moves = np.zeros(sources[0].shape, np.bool_) if instant.motion is None else instant.motion.moves
+    shape = moves.shape
+    shown = {light: one.shows for light, one in taken.items()}
+    for light in held.lights:
+        sketch = held.shots[light][instant.round].sketch
+        if light not in shown and sketch is not None:
+            shown[light] = InstantSketch.standing(sketch, shape)
+    unsure = np.zeros((len(held.lights), *shape), np.float32)
+    for light, off in zip(shown, unsure_by_lone_edges(list(shown.values()), moves), strict=True):
+        unsure[held.lights.index(light)] = off
+    for (light, one), source in zip(taken.items(), sources, strict=True):
+        own = unsure[held.lights.index(light)]
+        own[:] = np.hypot(own, one.unsure) * (source != NOWHERE)
     return unsure
 
 

@@ -7,7 +7,7 @@ is not the true one; the plate at the instant then lies somewhere between them, 
 import numpy as np
 
 from psvideo.plates.align.brightness import ROOT_TOE, SCALE
-from psvideo.plates.align.flow import Codes, Vectors, noise_between
+from psvideo.plates.align.flow import Codes, Vectors
 from psvideo.plates.align.moving import Followed, Pair, window_of
 from psvideo.plates.align.own_means import own_mean
 
@@ -17,15 +17,14 @@ NOISE_FACTOR = 1.6
 """Squares of a change below so many times those that noise makes of it are noise."""
 
 
-def unsure_of(pair: Pair, before: Codes, after: Codes, motion: Followed) -> Vectors:
+def unsure_of(pair: Pair, before: Codes, after: Codes, motion: Followed, noise: float) -> Vectors:
     """Return the standard error of a light's plate at an instant, (row, col) of the velocities, in units of its light.
 
-    ``before`` and ``after`` are the codes of its sketches, moved to the instant.
+    ``before`` and ``after`` are the codes of its sketches, moved to the instant, and ``noise`` is that of their change.
     """
     one, other = before.astype(np.float32), after.astype(np.float32)
     windows = (window_of(WINDOW_PX, motion.step),) * 2
-    noise = np.float32(NOISE_FACTOR * noise_between(pair.before, pair.after) ** 2)
-    square = own_mean((other - one) ** 2, windows, motion.moves) - noise
+    square = own_mean((other - one) ** 2, windows, motion.moves) - np.float32(NOISE_FACTOR * noise**2)
     since_s, until_s = motion.time_s - pair.before.time_s, pair.after.time_s - motion.time_s
     share = min(abs(since_s), abs(until_s)) / (since_s + until_s)
     per_code = own_mean(one + other, windows, motion.moves) / np.float32(SCALE) + np.float32(2 * ROOT_TOE)

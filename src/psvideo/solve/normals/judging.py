@@ -66,12 +66,11 @@ def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging =
     spread = _Spread.of(surface, one.lit, noise, how, near)
     points = spread.points(surface)
     turned_deg = moved_deg(points, one)
-    doubt = doubt_deg(signs_of(points, one, surface, turned_deg), how=how.doubting)
-    moving = (
-        None
-        if turned_deg is None
-        else moving_doubt_deg(turned_deg, points.known.astype(np.float32), one.moves, how=how.moving)
-    )
+    signs = signs_of(points, one, surface, turned_deg)
+    doubt, moving = doubt_deg(signs, how=how.doubting), None
+    if turned_deg is not None:
+        known = points.known.astype(np.float32)
+        moving = moving_doubt_deg(turned_deg, signs.torn_deg, known, one.moves, how=how.moving)
     at_points = spread.judged(points.surface, doubt, 1, how, limit_deg=0.0)[0][points.known].astype(np.float32)
     limit_deg, misfit = how.most_error_deg, surface.misfit
     if at_points.size:
