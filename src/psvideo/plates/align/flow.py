@@ -29,7 +29,7 @@ LEAST_WHITE = 1 / 16
 FINEST_SCALE, FINE_PIXELS = 1, 250_000
 """Flow is found on half the sketch and enlarged where sketches have so many pixels: good to a twentieth of one."""
 REFINED, DESCENTS = 1, 12
-"""Rounds of refinement and steps of every patch there: 5 and 16 take half as long again, and gain a 150th of a pixel."""
+"""Rounds of refinement and steps of a patch there: 5 and 16 take half as long again, and gain a 150th of a pixel."""
 BLOCK_PX, AROUND = 4, 4
 """Change is looked for in the means of blocks, over so many of them together."""
 LEAST_CHANGE = 1.5
