@@ -92,10 +92,10 @@ def filmed(lefts: tuple[int, int, int], changed: float) -> tuple[np.ndarray, flo
             image = 0.35 * square(2.2, left, 1.0)
             if number == 1:
                 image[30:35, left : left + SIDE] *= changed
-            image = np.asarray(image + rng.normal(0, 0.002, image.shape), np.float32)
+            noisy = np.asarray(image + rng.normal(0, 0.002, image.shape), np.float32)
             time_s = (4 * (number - 2) + n - 1) * 0.009
             seen = np.ones(ROWS, np.bool_)
-            plates.append(LightPlate(light=name, number=number, time_s=time_s, picture=made(image), seen=seen))
+            plates.append(LightPlate(light=name, number=number, time_s=time_s, picture=made(noisy), seen=seen))
     one = list(aligned(plates, LIGHTS, Aligning(), first=1))[1]
     lit = Illumination(directions=directions, intensities=np.ones((3, 1)), names=LIGHTS)
     surface = Solving().solve([plate.image for plate in one.plates], lit, unsure=one.unsure)
