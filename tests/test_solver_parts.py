@@ -4,10 +4,12 @@ import itertools
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.symmetric import adjugate
-from psvideo.solve.normals import few_lights
+from psvideo.solve.normals import equations, few_lights
+from psvideo.solve.normals.blocks import BLOCK, COUNT, PLANES
 from psvideo.solve.normals.task import FEW
 
 
@@ -49,3 +51,23 @@ def test_few_lights_sort_and_choose_in_registers() -> None:
 
     values = np.random.default_rng(2).permutation(FEW).astype(np.float32)
     assert [chosen(tuple(values), np.float32(rank + 1)) for rank in range(len(values))] == sorted(values.tolist())
+
+
+@FUSED.kept
+def medians(e: NDArray[np.float32], w: NDArray[np.float32], v: NDArray[np.float32], n: int) -> None:
+    few_lights.median_few(e, w, v, n)
+
+
+def test_the_median_of_few_residuals_is_that_of_those_that_no_fit_makes_small() -> None:
+    random = np.random.default_rng(4)
+    e = np.full((FEW, BLOCK), equations.OUT, np.float32)
+    w, v = np.zeros(PLANES * BLOCK, np.float32), np.zeros(9 * BLOCK, np.float32)
+    counts = np.arange(BLOCK) % (FEW + 1)
+    for pixel, count in enumerate(counts.tolist()):
+        e[random.permutation(FEW)[:count], pixel] = random.random(count)
+        w[COUNT + pixel] = count
+    medians(e, w, v, BLOCK)
+    wanted = [np.sort(e[:, pixel])[(max(count, 3) + 3) // 2 - 1] for pixel, count in enumerate(counts.tolist())]
+    for plane in (equations.FROM, equations.TO):
+        np.testing.assert_array_equal(v[plane : plane + BLOCK][counts > 2], np.array(wanted, np.float32)[counts > 2])
+        assert (v[plane : plane + BLOCK] < equations.OUT).all()

@@ -46,6 +46,7 @@ class SmallTake:
     gloss: str = ""
     aov: tuple[Aov, ...] = ()
     live: bool = False
+    float32: bool = False
 
     @property
     def scene(self) -> str:
@@ -69,7 +70,7 @@ USUAL = (
     SmallTake(lights=4, motion=", motion = { velocity_m_per_s = [0.4, 0.0, 0.0] }", aov=("depth",)),
     SmallTake(lights=3, kind="png8", camera='bits = 8, transfer = "srgb"'),
     SmallTake(lights=4, kind="dng", camera='cfa = "RGGB"', live=True),
-    SmallTake(lights=3, kind="exr"),
+    SmallTake(lights=3, kind="exr", float32=True),
 )
 """What usual footage runs through: 16 and 8 bits, mosaics, floats; few lights and many; at rest and moving."""
 
@@ -152,7 +153,7 @@ def run_small(take: SmallTake) -> None:
         scene, clip = Path(folder) / "small.toml", Path(folder) / "clip"
         scene.write_text(take.scene, encoding="utf-8")
         shoot(scene, clip)
-        normals(clip, rig=clip / "rig.toml", out=Path(folder) / "out", aov=take.aov, caller=quiet)
+        normals(clip, rig=clip / "rig.toml", out=Path(folder) / "out", aov=take.aov, float32=take.float32, caller=quiet)
         if take.live:
             live(clip, rig=clip / "rig.toml", pace="fastest", caller=quiet)
 

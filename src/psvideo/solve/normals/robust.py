@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -33,9 +33,6 @@ from psvideo.solve.normals.task import (
     let_rows_go,
     task,
 )
-
-if TYPE_CHECKING:
-    pass
 
 USABLE = Usable(shadow_ratio=0.4)
 """Least squares needs every measurement; here one that is dark beside the others may go sooner."""
