@@ -56,12 +56,12 @@ class Doubting:
     predicted from the others: ``python -m bench predicted``.
     """
 
-    misfit_deg: float = 3.7
+    misfit_deg: float = 3.5
     misfit_power: float = 0.1
     little_deg: float = 1.2
     indirect: float = 1.0
     per_torn: float = 0.6
-    most_torn_deg: float = 3.0
+    most_torn_deg: float = 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
