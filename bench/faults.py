@@ -29,6 +29,7 @@ CAPABILITIES_V3 = 0x20080522
 OVERRIDES = 0b110
 """CAP_DAC_OVERRIDE and CAP_DAC_READ_SEARCH: what lets root write where nobody may (capabilities(7))."""
 SMALLEST_BYTES = 64
+PAGE_BYTES = 4096
 
 
 def nothing() -> None:
@@ -94,10 +95,13 @@ def _no_large_files(rng: np.random.Generator, scene: Scene) -> Fault:
 
 
 def _small_disk(rng: np.random.Generator, scene: Scene) -> Fault:
-    """Put a disk of a random size under the output; the run that goes on finds a larger one."""
-    pages = int(rng.integers(2, max(scene.total_bytes // 4096, 3)))
+    return small_disk(int(rng.integers(2, max(scene.total_bytes // PAGE_BYTES, 3))), scene)
+
+
+def small_disk(pages: int, scene: Scene) -> Fault:
+    """Put a disk of so many pages under the output; the run that goes on finds a larger one."""
     place = scene.out.parent
-    size = ("mount", "-t", "tmpfs", "-o", f"size={pages * 4096}", "tmpfs", str(place))
+    size = ("mount", "-t", "tmpfs", "-o", f"size={pages * PAGE_BYTES}", "tmpfs", str(place))
     subprocess.run(size, check=True)
 
     def mended() -> None:

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bench.faults import FAULTS, HANGS_S, Fault, Scene, forked
+from bench.faults import FAULTS, HANGS_S, PAGE_BYTES, Fault, Scene, forked, small_disk
 from psvideo.synth.shoot import shoot
 
 SCENE = """
@@ -66,6 +66,8 @@ NOT_TRIED = {("page", "clip vanishes")}
 """A page shows the clip beside results where it is there; without it it is another page."""
 PER_RUN = ("report.json", "report.html")
 """They hold the command, and with it the output's name and --resume."""
+EVERY_PAGE = "disk full at every page"
+"""Disks of every size in turn, so that each page that is written is once the one for which there is no room."""
 MOMENTS = 10
 
 
@@ -97,7 +99,10 @@ def digest(out: Path) -> dict[str, str]:
 
 
 def trials(name: str, clip: Path, folder: Path, *, how: str, moments: int, seed: int) -> Iterator[Trial]:
-    """Stop a command at so many random moments of its length, or in so many random ways, and go on with it."""
+    """Stop a command at so many random moments of its length, or in so many random ways, and go on with it.
+
+    ``how`` is one of FAULTS, or EVERY_PAGE, which is tried as often as the output has pages, whatever ``moments``.
+    """
     words = [word.format(clip=clip) for word in COMMANDS[name]]
     results = clip.with_name("results")
     if name == "page" and not results.exists():
@@ -110,6 +115,8 @@ def trials(name: str, clip: Path, folder: Path, *, how: str, moments: int, seed:
             raise RuntimeError(f"{name}: the run that nobody stops fails: {said}")
     length_s, whole = time.monotonic() - began_s, digest(folder / "whole" / "out")
     sizes = [path.stat().st_size for path in (folder / "whole").rglob("*")]
+    if how == EVERY_PAGE:
+        moments = sum(-(-size // PAGE_BYTES) for size in sizes)
     for number in range(moments):
         out = folder / f"place{number}" / "out"
         out.parent.mkdir()
@@ -121,7 +128,7 @@ def trials(name: str, clip: Path, folder: Path, *, how: str, moments: int, seed:
             total_bytes=sum(sizes),
             peak_bytes=resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss << 10,
         )
-        fault = FAULTS[how](rng, scene)
+        fault = small_disk(1 + number, scene) if how == EVERY_PAGE else FAULTS[how](rng, scene)
         try:
             yield _stopped(_into(name, words, out), out, whole, fault, AGAIN.get(name, "--resume"))
         finally:
@@ -198,7 +205,7 @@ def main() -> int:
     parser.add_argument("--moments", type=int, default=MOMENTS)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--command", choices=COMMANDS, action="append")
-    parser.add_argument("--fault", choices=FAULTS, action="append")
+    parser.add_argument("--fault", choices=[*FAULTS, EVERY_PAGE], action="append")
     asked = parser.parse_args()
     wrong = False
     for one in survivals(

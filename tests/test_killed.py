@@ -4,12 +4,13 @@ import os
 import shutil
 import signal
 import sys
+from itertools import product
 from pathlib import Path
 from types import FrameType
 
 import pytest
 from bench.faults import FAULTS, Fault, forked
-from bench.killed import COMMANDS, NOT_TRIED, filmed, trials
+from bench.killed import COMMANDS, EVERY_PAGE, NOT_TRIED, filmed, trials
 
 from psvideo.errors import PsvideoError
 from psvideo.formats.whole_files import HERE, refuse_existing
@@ -20,10 +21,9 @@ LARGEST_PROCESS = 1 << 22
 
 
 @pytest.mark.campaign
-@pytest.mark.parametrize("how", FAULTS)
-@pytest.mark.parametrize("name", COMMANDS)
+@pytest.mark.parametrize(("name", "how"), [*product(COMMANDS, FAULTS), ("sync", EVERY_PAGE)])
 def test_a_run_that_was_stopped_at_random_goes_on_to_the_same_bytes(name: str, how: str, tmp_path: Path) -> None:
-    if how == "disk full" and not (os.getuid() == 0 and shutil.which("mount")):
+    if how in {"disk full", EVERY_PAGE} and not (os.getuid() == 0 and shutil.which("mount")):
         pytest.skip("only root may put a small disk under the output")
     if (name, how) in NOT_TRIED:
         pytest.skip("a page without its clip is another page")
