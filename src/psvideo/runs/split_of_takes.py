@@ -56,7 +56,7 @@ def split_of_takes(
     >>> import psvideo as ps
     >>> results = ps.split_of_takes(["take3/"], out="plates/")
     >>> [(one.clip.name, one.fault, one.instants) for one in results]
-    [('take3', '', 2)]
+    [('take3', '', 3)]
     """
     takes = several_takes(clips, out=out, force=force, resume=resume)
     whole = {name: value.resolve() if isinstance(value, Path) else value for name, value in options.items()}
