@@ -22,7 +22,7 @@ MOVING_FACTOR = 2.0
 LEAST_VALID, HARDLY_VALID = 0.6, 0.2
 """Shares of the subject: three lights that stand well reach more of most subjects than the first."""
 HARDLY_ANY = 0.05
-"""The same where enough lights reach: what keeps normals from being trusted there has its own line: accuracy, noise."""
+"""The same where enough lights reach: what keeps normals from being trusted there is noise."""
 MOST_FLICKER_PERCENT = 1.0
 AT_REST = 0.05
 """Noise is judged by results between which less of the picture than this moves."""
@@ -60,7 +60,8 @@ def validity(observed: Observed) -> Iterator[Judgement]:
         return
     reached = [one.measured_share for one in known if one.measured_share is not None]
     enough = bool(reached) and float(np.median(reached)) >= LEAST_VALID
-    grade: Grade = "bad" if max(shares) < (HARDLY_ANY if enough else HARDLY_VALID) else "doubtful"
+    least_any, by_misfit = HARDLY_ANY if enough else HARDLY_VALID, enough and (_off_deg(observed) or 0.0) > COMMON_DEG
+    grade: Grade = "bad" if max(shares) < least_any and not by_misfit else "doubtful"
     if enough:
         said = any(one.grade != "good" for one in accuracy(observed))
         yield Judgement(
