@@ -65,19 +65,6 @@ def test_light_by_way_of_other_surfaces_is_seen_where_lights_do_not_reach() -> N
     assert np.median(predicted) > 1.5 * np.median(without)
 
 
-def test_what_lights_leave_unexplained_is_doubted_where_it_is() -> None:
-    lights, (normals, inside) = ring(8, 30), ball()
-    rng, (rows, cols) = np.random.default_rng(3), np.mgrid[:SIZE, :SIZE] - SIZE // 2
-    shade = np.maximum(np.einsum("rcx,lx->lrc", normals, lights), 0)
-    shade += (np.hypot(rows, cols) < 5) * rng.uniform(-0.2, 0.2, (8, 1, 1))
-    plates = [(0.5 * one + rng.normal(0, 0.002, one.shape)).astype(np.float32) for one in shade]
-    lit = Illumination(directions=lights, intensities=np.ones((8, 1)))
-    surface = Solving(error=True).solve(plates, lit, mask=inside)
-    assert surface.error_deg is not None
-    at, beside = (surface.error_deg[SIZE // 2, SIZE // 2 + away] for away in (0, 11))
-    assert at > 3 * beside
-
-
 def test_a_rig_that_is_wrong_is_predicted_and_makes_few_pixels_invalid() -> None:
     lights = ring(8, 35)
     across = np.random.default_rng(2).normal(size=lights.shape)

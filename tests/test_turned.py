@@ -28,8 +28,6 @@ from psvideo.model.camera import Encoding
 from psvideo.model.rig import Rig
 from psvideo.model.turn import EXIF, of_matrix
 
-TRUSTED_DEG = 5.0
-"""Up to this predicted error a normal is trusted."""
 ONE = 65536
 MATRICES = {
     "clockwise": (EXIF[6], (0, 1, -1, 0)),
@@ -187,13 +185,11 @@ def test_a_turned_movie_gives_upright_results_of_the_same_surface(
     film: Callable[[str], Path], tmp_path: Path, name: str
 ) -> None:
     turn, matrix = MATRICES[name]
-    plain, shown = (solved(film(one), tmp_path / one, "--align", "none", "--aov", "error") for one in ("upright", name))
+    plain, shown = (solved(film(one), tmp_path / one, "--align", "none") for one in ("upright", name))
     albedo, valid, age = (turn.upright(read(plain, what)) for what in ("albedo", "valid", "age"))
     assert read(shown, "normals").shape[:2] == ((64, 48) if turn.transposed else (48, 64))
     same = (read(shown, "valid") == valid)[..., 0]
-    errors_deg = np.stack([turn.upright(read(plain, "error")), read(shown, "error")])[..., 0]
-    assert np.abs(errors_deg[:, ~same] / TRUSTED_DEG - 1).max() < 0.1, "turned plates are rounded to 16-bit codes"
-    assert same.mean() > 0.98
+    assert same.mean() > 0.99
     solid = same & (valid[..., 0] == 1)
     assert solid.sum() > 400
     normals = turned(turn.upright(read(plain, "normals")), matrix)

@@ -21,8 +21,6 @@ MOVING_FACTOR = 2.0
 """Where the picture moves, so many times more may be left unexplained: no rig explains what moved between flashes."""
 LEAST_VALID, HARDLY_VALID = 0.6, 0.2
 """Shares of the subject: three lights that stand well reach more of most subjects than the first."""
-HARDLY_ANY = 0.05
-"""The same where enough lights reach: what keeps normals from being trusted there is noise."""
 MOST_FLICKER_PERCENT = 1.0
 AT_REST = 0.05
 """Noise is judged by results between which less of the picture than this moves."""
@@ -60,8 +58,8 @@ def validity(observed: Observed) -> Iterator[Judgement]:
         return
     reached = [one.measured_share for one in known if one.measured_share is not None]
     enough = bool(reached) and float(np.median(reached)) >= LEAST_VALID
-    least_any, by_misfit = HARDLY_ANY if enough else HARDLY_VALID, enough and (_off_deg(observed) or 0.0) > COMMON_DEG
-    grade: Grade = "bad" if max(shares) < least_any and not by_misfit else "doubtful"
+    off_deg = _off_deg(observed) or 0.0
+    grade: Grade = "bad" if max(shares) < HARDLY_VALID and not (enough and off_deg > COMMON_DEG) else "doubtful"
     if enough:
         said = any(one.grade != "good" for one in accuracy(observed))
         yield Judgement(

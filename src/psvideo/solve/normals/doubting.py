@@ -22,9 +22,6 @@ GRID_PX = 480
 TORN, NEAR, AROUND = 5, 9, 27
 """Slopes are added up along the edges of squares of so many points, averaged over those of the second; the rest is
 averaged over the largest."""
-NEARBY, LITTLE_MISFIT_DEG = np.float32(0.37), np.float32(0.02)
-"""Residuals close by count with this power beside those farther around: sheen and shadows have edges, a rig's errors
-have none. Fitted with ``Doubting``."""
 LEAST_FACING, MOST_TORN = np.float32(0.25), np.float32(0.5)
 """Slopes are those of normals that face the camera at least so much; and around four points they count up to so much,
 since where one thing is before another they say nothing of either."""
@@ -57,11 +54,11 @@ class Doubting:
     """
 
     misfit_deg: float = 3.5
-    misfit_power: float = 0.1
+    misfit_power: float = 0.18
     little_deg: float = 1.2
     indirect: float = 1.0
     per_torn: float = 0.6
-    most_torn_deg: float = 2.0
+    most_torn_deg: float = 3.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,18 +96,17 @@ def step_of(shape: tuple[int, ...]) -> int:
 def signs_of(points: ThinSurface, one: Evidence, surface: Surface, turned_deg: Floats | None = None) -> Signs:
     """Return what speaks against the points' normals. ``turned_deg`` is by how much motion turns them, which is no
     misfit of rig or surface."""
+    around = _mean(points.known.astype(np.float32), AROUND)
     fit = np.minimum(points.fit_deg, MOST_FIT_DEG)
     sums, counts = _indirect(points, one, surface)
     reach = np.clip(1 - counts / np.float32(len(one.plates)), LEAST_REACH, 1)
     squares = np.where(points.known, fit**2 - (points.fit_of_noise_deg / reach) ** 2, np.float32(0))
     if turned_deg is not None:
         squares *= cv2.blur(turned_deg, (OF_MOTION, OF_MOTION)) < MOVING_DEG
-    near, around = (_root_mean(squares, points.known, width) for width in (NEAR, AROUND))
-    closer = (near + LITTLE_MISFIT_DEG) / (around + LITTLE_MISFIT_DEG)
     indirect = np.maximum(_mean(sums, AROUND) / np.maximum(_mean(counts, AROUND), LEAST_LIGHTS), 0)
     own = np.maximum(sums / np.maximum(counts, 1) - 2 * np.radians(points.noise_deg), 0)
     return Signs(
-        misfit_deg=np.asarray(around * closer**NEARBY, np.float32),
+        misfit_deg=np.sqrt(np.maximum(_mean(squares, AROUND) / around, 0)),
         indirect_deg=np.degrees(indirect + own) * _turned(points.surface, one),
         torn_deg=np.sqrt(np.maximum(_torn_squared(points) - (TORN_OF_NOISE * points.noise_deg) ** 2, 0)),
     )
@@ -157,11 +153,6 @@ def _torn_squared(points: ThinSurface) -> Floats:
 def _mean(plane: Floats, width: int) -> Floats:
     """Return means over squares; of nothing a little, so that it can be divided by."""
     return np.asarray(cv2.blur(plane, (width, width), borderType=cv2.BORDER_CONSTANT) + np.float32(1e-9), np.float32)
-
-
-def _root_mean(squares: Floats, known: NDArray[np.bool_], width: int) -> Floats:
-    share = _mean(known.astype(np.float32), width)
-    return np.asarray(np.sqrt(np.maximum(_mean(squares, width) / share, 0)), np.float32)
 
 
 def _indirect(points: ThinSurface, one: Evidence, surface: Surface) -> tuple[Floats, Floats]:

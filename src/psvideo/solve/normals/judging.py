@@ -40,7 +40,7 @@ class Judging:
 
     most_error_deg: float = 5.0
     most_typical_deg: float = 6.5
-    fit_share: float = 0.2
+    fit_share: float = 0.1
     fit_noise: float = 1.95
     held: float = 1.15
     least_share: float = 0.001
