@@ -3,14 +3,17 @@
 Numba optimises every function by itself and makes machine code of it, which nobody ever runs where it is part of
 another, and optimises it again there. Here a part is optimised once, as what it is part of is: that takes a third off
 the wait, and runs as fast (docs/decisions/first-run.md). The two classes follow ``JITCodeLibrary`` in numba's
-``core/codegen.py``.
+``core/codegen.py``, which is no public name: other versions than those that were tried compile parts in the usual way.
 """
 
 from typing import Any
 
+import numba
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
+TRIED = ((0, 68),)
+"""Versions of numba of which all that is compiled here was held against what it is in pure Python."""
 _Library: Any = JITCodeLibrary
 _Compiler: Any = Compiler
 
@@ -52,12 +55,8 @@ class _PartCompiler(_Compiler):  # type: ignore[misc]
         super().__init__(typing, target, library or _Part(target.codegen(), "part"), *rest)
 
 
-PART: dict[str, Any] = {
-    "nogil": True,
-    "no_cpython_wrapper": True,
-    "no_cfunc_wrapper": True,
-    "pipeline_class": _PartCompiler,
-}
+_COMPILER: dict[str, Any] = {"pipeline_class": _PartCompiler} if numba.version_info.short in TRIED else {}
+PART: dict[str, Any] = {"nogil": True, "no_cpython_wrapper": True, "no_cfunc_wrapper": True, **_COMPILER}
 """Numba's options for a part."""
-INLINED: Any = {"forceinline": True, "pipeline_class": _PartCompiler}
+INLINED: Any = {"forceinline": True, **_COMPILER}
 """Numba's options for an ``overload`` that becomes part of what calls it."""
