@@ -1,6 +1,7 @@
 """Movies: depth, matrix and range against BT.709's own arithmetic; timestamps, holes, seeking, damage."""
 
 import dataclasses
+import struct
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from fractions import Fraction
 from pathlib import Path
@@ -28,6 +29,7 @@ from psvideo.synth import TrueClock, expose
 
 PlanMaker = Callable[..., Plan]
 RATE = Fraction(120000, 1001)
+ONE = 1 << 16
 BT709, BT601, BT2020 = (0.2126, 0.0722), (0.299, 0.114), (0.2627, 0.0593)
 MATRIX_TAGS = {BT709: 1, BT601: 6, BT2020: 9}
 
@@ -262,22 +264,106 @@ def test_gaps_in_the_timestamps_are_dropped_frames(tmp_path: Path, plan_for: Cal
     assert [frame.index for frame in read_frames(clip)] == places
 
 
-@pytest.mark.parametrize("reordered", ["0", "2"])
-def test_frames_that_an_edit_list_hides_are_frames(
-    tmp_path: Path, plan_for: Callable[..., Path], reordered: str
-) -> None:
-    """Frames before time zero are hidden by an edit list, and players begin at the fifth; the camera did not."""
-    with av.open(str(tmp_path / "x.mp4"), "w", options={"avoid_negative_ts": "disabled"}) as container:
+def shot_before_time_zero(path: Path, *, reordered: str, hidden: int = 4) -> None:
+    """Write twelve frames; those before time zero are hidden by an edit list, as where a phone's movie was cut."""
+    with av.open(str(path), "w", options={"avoid_negative_ts": "disabled"}) as container:
         stream: Any = container.add_stream("libx264", rate=RATE, options={"bf": reordered, "qp": "0", "threads": "1"})
         stream.width, stream.height, stream.pix_fmt = 48, 32, "yuv420p"
         stream.codec_context.time_base = 1 / RATE
         for place, frame in enumerate(grey_ramp(12)):
-            frame.pts, frame.time_base = place - 4, 1 / RATE
+            frame.pts, frame.time_base = place - hidden, 1 / RATE
             container.mux(stream.encode(frame))
         container.mux(stream.encode(None))
-    frames = list(read_frames(open_clip(tmp_path / "x.mp4", plan=plan_for(rows=32, cols=48))))
-    assert [frame.index for frame in frames] == list(range(12))
-    assert frames[0].image[0, 0, 1] == pytest.approx((40 - 16) / 219, abs=2e-3)
+
+
+def with_edits(path: Path, edits: Sequence[tuple[float, int]]) -> None:
+    """Write another edit list into a movie of one stream: seconds and the first frame (-1: nothing) of every edit.
+
+    The boxes are those of ISO/IEC 14496-12; what follows the first one in ``edts`` becomes free space.
+    """
+    data = path.read_bytes()
+    at = data.index(b"elst") - 4
+    (movie_hz,) = struct.unpack_from(">I", data, data.index(b"mvhd") + 16)
+    (media_hz,) = struct.unpack_from(">I", data, data.index(b"mdhd") + 16)
+    rows = b"".join(
+        struct.pack(">IiI", round(long_s * movie_hz), round(first / float(RATE) * media_hz) if first >= 0 else -1, ONE)
+        for long_s, first in edits
+    )
+    box = struct.pack(">I4sII", 16 + len(rows), b"elst", 0, len(edits)) + rows
+    more = len(box) - struct.unpack_from(">I", data, at)[0]
+    data = data[:at] + box + data[at + len(box) - more :]
+    for parent in (b"edts", b"trak", b"moov"):
+        place = data.index(parent) - 4
+        data = data[:place] + struct.pack(">I", struct.unpack_from(">I", data, place)[0] + more) + data[place + 4 :]
+    path.write_bytes(data)
+
+
+@pytest.mark.parametrize("reordered", ["0", "2"])
+def test_frames_that_an_edit_list_hides_are_left_out_and_said(
+    tmp_path: Path, plan_for: Callable[..., Path], reordered: str
+) -> None:
+    shot_before_time_zero(tmp_path / "x.mp4", reordered=reordered)
+    clip = open_clip(tmp_path / "x.mp4", plan=plan_for(rows=32, cols=48))
+    frames = list(read_frames(clip))
+    assert [frame.index for frame in frames] == list(range(8)), "zero is the first frame that is shown"
+    assert frames[0].image[0, 0, 1] == pytest.approx((40 + 8 * 4 - 16) / 219, abs=2e-3)
+    assert any("its edit list hides 4 of the 12 frames" in warning for warning in clip.warnings)
+
+
+@pytest.mark.parametrize(
+    ("edits", "places"),
+    [
+        ([(12, 0)], range(12)),
+        ([(0, 0)], range(12)),
+        ([(1, -1), (12, 0)], range(12)),
+        ([(5, 3)], range(3, 8)),
+        ([(3, 0), (4, 6)], [0, 1, 2, 6, 7, 8, 9]),
+        ([(4, 6), (3, 0), (3, 0)], [0, 1, 2, 6, 7, 8, 9]),
+    ],
+    ids=["whole", "no length", "late", "middle", "cut", "turned round"],
+)
+def test_every_edit_shows_its_frames_once_at_the_times_at_which_they_were_taken(
+    tmp_path: Path, plan_for: Callable[..., Path], edits: list[tuple[float, int]], places: Sequence[int]
+) -> None:
+    write_movie(tmp_path / "x.mov", in_10_bits(grey_ramp(12)), codec="prores", matrix=1)
+    with_edits(tmp_path / "x.mov", [(frames / float(RATE), first) for frames, first in edits])
+    clip = open_clip(tmp_path / "x.mov", plan=plan_for(rows=32, cols=48))
+    assert clip.numbers == tuple(place - places[0] for place in places)
+    shown = [round((float(frame.image[16, 24, 1]) * 219 + 16 - 40) / 8) for frame in read_frames(clip)]
+    assert shown == list(places)
+    assert ["hides" in warning for warning in clip.warnings] == [True] * (len(places) < 12)
+
+
+def test_a_movie_whose_edits_show_nothing_is_refused(tmp_path: Path, plan_for: Callable[..., Path]) -> None:
+    write_movie(tmp_path / "x.mov", in_10_bits(grey_ramp(12)), codec="prores", matrix=1)
+    with_edits(tmp_path / "x.mov", [(0.02, 40)])
+    with pytest.raises(PsvideoError, match="edit list shows none of its 12 frames"):
+        open_clip(tmp_path / "x.mov", plan=plan_for(rows=32, cols=48))
+
+
+def test_covers_are_no_footage_and_of_several_streams_the_first_counts(
+    tmp_path: Path, plan_for: Callable[..., Path]
+) -> None:
+    """A movie may hold a picture for its shelf and a second camera's stream."""
+    with av.open(str(tmp_path / "x.mp4"), "w") as container:
+        cover: Any = container.add_stream("mjpeg", rate=RATE)
+        cover.width, cover.height, cover.pix_fmt = 16, 16, "yuvj420p"
+        cover.disposition = av.stream.Disposition.attached_pic
+        streams: list[Any] = [container.add_stream("libx264", rate=RATE, options={"qp": "0"}) for _ in range(2)]
+        for stream, (rows, cols) in zip(streams, ((32, 48), (16, 16)), strict=True):
+            stream.width, stream.height, stream.pix_fmt = cols, rows, "yuv420p"
+        (still,) = grey_ramp(1, rows=16, cols=16)
+        still.pts = 0
+        container.mux(cover.encode(still.reformat(format="yuvj420p")))
+        for stream, size in zip(streams, ((32, 48), (16, 16)), strict=True):
+            for place, frame in enumerate(grey_ramp(4, rows=size[0], cols=size[1])):
+                frame.pts, frame.time_base = place, 1 / RATE
+                container.mux(stream.encode(frame))
+            container.mux(stream.encode(None))
+        container.mux(cover.encode(None))
+    clip = open_clip(tmp_path / "x.mp4", plan=plan_for(rows=32, cols=48))
+    assert clip.numbers == tuple(range(4))
+    assert any("holds 2 video streams; the first one counts" in warning for warning in clip.warnings)
 
 
 def test_uneven_timestamps_are_refused(tmp_path: Path, plan_for: Callable[..., Path]) -> None:

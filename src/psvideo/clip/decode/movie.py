@@ -13,21 +13,24 @@ from pathlib import Path
 import av
 import numpy as np
 from av.container import InputContainer
+from av.stream import Disposition
 from av.video.stream import VideoStream
 
 from psvideo.clip.decode.ffmpeg_planes import planes
+from psvideo.clip.decode.movie_edits import edits_of
 from psvideo.clip.decode.movie_tags import capture_rate_hz, compression_warning, gamut_of, shot_by, transfer_of, turn_of
 from psvideo.clip.decode.movie_times import UNEVEN, Places, places_of, promised_frames, stamps_of
 from psvideo.clip.decode.yuv import CODES, HIGHEST, LOWEST, LUMA_WEIGHTS, signal_range, to_rgb
 from psvideo.clip.record import CodedPicture, Header
 from psvideo.errors import PsvideoError
 from psvideo.formats.paths import check_file
+from psvideo.model.units import counted
 
 VIDEO_RANGE, FULL_RANGE = 1, 2  # FFmpeg's AVCOL_RANGE_MPEG and AVCOL_RANGE_JPEG
 UNTAGGED = 2  # matrix coefficients "unspecified" (H.273)
 HD_HEIGHT_PX = 720
 MOST_REORDERED = 16  # frames by which H.264 and H.265 may put decoding before showing
-AS_RECORDED = {"ignore_editlist": "1"}  # all frames that the camera wrote, also those that an edit list would hide
+AS_RECORDED = {"ignore_editlist": "1"}  # times as the camera wrote them; movie_edits says which frames count
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,24 +63,29 @@ def index_movie(path: Path) -> Movie:
     """Read a movie's header, first frame and timestamps. Raises PsvideoError where it is damaged or truncated."""
     with _opened(path) as (container, stream):
         stamps = stamps_of(container, stream)
-        found = places_of(path, stamps.timestamps)
+        shown = _shown(path, container, stream, stamps.timestamps)
+        found = places_of(path, shown)
         promised = promised_frames(container, stream, found.period * found.per_frame)
         time_base_s = float(stream.time_base or 1)
         code = container.metadata.get("timecode") or stream.metadata.get("timecode")
         capture_rate = capture_rate_hz(container.metadata | stream.metadata)
         shot = shot_by(container.metadata | stream.metadata)
         codec = stream.codec_context.codec.canonical_name
+        others = len(_moving(container)) - 1
     held, timestamps = len(stamps.timestamps), found.timestamps
+    hidden = held - len(shown)
     if not held:
         raise PsvideoError(f"{path}: holds no frame that can be found; it is truncated or damaged. Copy it again.")
-    if held < promised and found.places[-1] + 1 + found.left_out < promised:
+    if held < promised and found.places[-1] + 1 + found.left_out + hidden < promised:
         raise PsvideoError(
             f"{path}: holds {held} frames, and its header promises {promised}: it is truncated. Copy it again."
         )
     header = next(read_movie(path, timestamps[:1])).header
     coding = compression_warning(codec, header.bits or 0, frames=held, whole_frames=stamps.whole_frames)
     uneven = _left_out(found) if found.left_out else None
-    warnings = tuple(warning for warning in (coding, uneven, _strays(found)) if warning)
+    cut = _cut(hidden, held) if hidden else None
+    several = SEVERAL.format(counted(others + 1, "video stream")) if others else None
+    warnings = tuple(warning for warning in (coding, cut, several, uneven, _strays(found)) if warning)
     return Movie(
         header=replace(header, time_code=code, shot=shot, warnings=header.warnings + warnings),
         timestamps=timestamps,
@@ -87,6 +95,25 @@ def index_movie(path: Path) -> Movie:
         capture_rate_hz=capture_rate,
         per_frame=found.per_frame,
         rates_hz=_rates_hz(found, time_base_s) if found.per_frame > 1 else None,
+    )
+
+
+def _shown(path: Path, container: InputContainer, stream: VideoStream, timestamps: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the timestamps of those frames that the movie's edit list shows."""
+    edits = edits_of(path, stream.id) if "mov" in container.format.name else None
+    shown = timestamps if edits is None else edits.shown(timestamps)
+    if timestamps and not shown:
+        raise PsvideoError(
+            f"{path}: its edit list shows none of its {counted(len(timestamps), 'frame')}. Undo the cuts, or name the "
+            "movie that the camera recorded."
+        )
+    return shown
+
+
+def _cut(hidden: int, held: int) -> str:
+    return (
+        f"the movie was cut: its edit list hides {hidden} of the {counted(held, 'frame')} that the file holds. They "
+        "are left out; undo the cuts to use them"
     )
 
 
@@ -151,9 +178,9 @@ def _opened(path: Path) -> Iterator[tuple[InputContainer, VideoStream]]:
     check_file(path)
     try:
         with av.open(str(path), options=AS_RECORDED) as container:
-            if not container.streams.video:
+            if not (moving := _moving(container)):
                 raise PsvideoError(f"{path}: holds no video. Name the movie that the camera recorded.")
-            stream = container.streams.video[0]
+            stream = moving[0]
             if stream.codec_context is None:
                 raise PsvideoError(f"{path}: {_sealed(path) or 'is coded in a way that is not read'}. {IN_THE_CLEAR}")
             stream.thread_type = "AUTO"
@@ -169,6 +196,12 @@ def _opened(path: Path) -> Iterator[tuple[InputContainer, VideoStream]]:
         ) from fault
 
 
+def _moving(container: InputContainer) -> list[VideoStream]:
+    """Return the streams of moving pictures: a cover or a thumbnail is none."""
+    return [stream for stream in container.streams.video if not stream.disposition & Disposition.attached_pic]
+
+
+SEVERAL = "the movie holds {}; the first one counts. Where another is meant, export it by itself"
 IN_THE_CLEAR = "Expected a movie as the camera recorded it: ProRes, DNxHR, H.264 or H.265, without protection."
 ENCRYPTED = b"encv"
 """The sample entry of encrypted video (ISO/IEC 14496-12, 8.12)."""
