@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 import pytest
+from lit_ball import LIT_BALL
 
 from psvideo.cli.app import main
 
@@ -29,19 +30,7 @@ clock_offset_ppm = 40.0
 marker = {marker}
 [ambient]
 level = {ambient}
-[[light]]
-name = "key"
-direction = [0.5, 0.4, 0.8]
-[[light]]
-name = "left"
-direction = [-0.6, 0.2, 0.8]
-[[light]]
-name = "top"
-direction = [0.1, -0.5, 0.8]
-[[object]]
-mesh = "sphere"
-albedo = 0.8
-"""
+{lit_ball}"""
 
 
 def picture(path: Path) -> np.ndarray:
@@ -52,7 +41,8 @@ def picture(path: Path) -> np.ndarray:
 def film(folder: Path, *, shutter: float = 360.0, marker: bool = True, ambient: float = 0.0, frames: int = 48) -> Path:
     scene = folder / "scene.toml"
     scene.write_text(
-        SCENE.format(shutter=shutter, marker=str(marker).lower(), ambient=ambient, frames=frames), encoding="utf-8"
+        SCENE.format(shutter=shutter, marker=str(marker).lower(), ambient=ambient, frames=frames, lit_ball=LIT_BALL),
+        encoding="utf-8",
     )
     assert main(["synth", str(scene), "-o", str(folder / "clip"), "-q"]) == 0
     return folder / "clip"

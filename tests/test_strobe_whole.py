@@ -18,6 +18,7 @@ import numpy as np
 import OpenEXR
 import pytest
 import serial
+from lit_ball import LIT_BALL
 
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
@@ -60,19 +61,7 @@ flash_s = 0.0008
 dark_every = 2
 clock_tolerance_ppm = 500
 clock_offset_ppm = {CAMERA_SECOND_PPM}
-[[light]]
-name = "key"
-direction = [0.5, 0.4, 0.8]
-[[light]]
-name = "left"
-direction = [-0.6, 0.2, 0.8]
-[[light]]
-name = "top"
-direction = [0.1, -0.5, 0.8]
-[[object]]
-mesh = "sphere"
-albedo = 0.8
-"""
+{LIT_BALL}"""
 
 
 def picture(path: Path) -> np.ndarray:

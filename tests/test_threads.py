@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from lit_ball import LIT_BALL
 
 from psvideo.cli.app import main
 from psvideo.compute.threads import THREADS, in_order, over_ranges, thread_count, writing
@@ -22,7 +23,7 @@ from psvideo.sync.rowfit.beat import Beat, FoundClock
 from psvideo.sync.rowfit.profiles import WORTH_A_THREAD, Profiles, equations
 
 COUNTS = (1, 3, 8)
-TALL = """
+TALL = f"""
 schema = "psvideo-scene/1"
 name = "tall"
 frames = 28
@@ -37,19 +38,7 @@ width_m = 0.2
 [strobe]
 flash_s = 0.001
 clock_offset_ppm = 40.0
-[[light]]
-name = "key"
-direction = [0.5, 0.4, 0.8]
-[[light]]
-name = "left"
-direction = [-0.6, 0.2, 0.8]
-[[light]]
-name = "top"
-direction = [0.1, -0.5, 0.8]
-[[object]]
-mesh = "sphere"
-albedo = 0.8
-"""
+{LIT_BALL}"""
 """Enough samples for several parts of the fit and several bands of the solution, in pictures that cost little."""
 BUSY = "while True: pass"
 PER_RUN = ("report.json", "report.html")

@@ -2,9 +2,11 @@
 
 from pathlib import Path
 
+from lit_ball import LIT_BALL
+
 from psvideo.synth.shoot import shoot
 
-SCENE = """
+SCENE = f"""
 schema = "psvideo-scene/1"
 name = "sphere"
 frames = 110
@@ -19,19 +21,7 @@ width_m = 1.6
 [strobe]
 flash_s = 0.001
 clock_offset_ppm = 40.0
-[[light]]
-name = "key"
-direction = [0.5, 0.4, 0.8]
-[[light]]
-name = "left"
-direction = [-0.6, 0.2, 0.8]
-[[light]]
-name = "top"
-direction = [0.1, -0.5, 0.8]
-[[object]]
-mesh = "sphere"
-albedo = 0.8
-"""
+{LIT_BALL}"""
 
 
 def live_clip(folder: Path) -> Path:
