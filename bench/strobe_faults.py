@@ -16,7 +16,8 @@ import numpy as np
 from psvideo.strobe.limits import cycle_check
 from psvideo.strobe.link.boards import BOARDS, Board
 from psvideo.strobe.link.lines import seal
-from psvideo.strobe.link.messages import Lit, Reset, Slot
+from psvideo.strobe.link.requests import Lit, Slot
+from psvideo.strobe.link.words import Reset
 from psvideo.strobe.stand_ins.playing import Edge
 from psvideo.strobe.stand_ins.python_board import PythonBoard
 

@@ -16,8 +16,9 @@ from hypothesis import HealthCheck, settings
 from psvideo.model.camera import Camera
 from psvideo.model.plan import Plan, PlannedFlash, default_dark_s
 from psvideo.strobe.limits import cycle_check
-from psvideo.strobe.link.messages import Arm, Slot, Steps, WiringName
 from psvideo.strobe.link.protocol import format_request
+from psvideo.strobe.link.requests import Arm, Slot, Steps
+from psvideo.strobe.link.words import WiringName
 from psvideo.strobe.stand_ins.toolchain import AVR_BOARDS, AvrBoard, build
 
 if TYPE_CHECKING:

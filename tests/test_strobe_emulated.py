@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from psvideo.strobe.limits import cycle_check
 from psvideo.strobe.link.boards import BOARDS
 from psvideo.strobe.link.lines import LONGEST_REPLY, Error, LineReader, seal
-from psvideo.strobe.link.messages import Lit, Reset, Slot
+from psvideo.strobe.link.requests import Lit, Slot
+from psvideo.strobe.link.words import Reset
 from psvideo.strobe.stand_ins.playing import Edge
 from psvideo.strobe.stand_ins.python_board import PythonBoard
 

@@ -17,8 +17,8 @@ from psvideo.formats.trace_csv import Trace, TraceWriter, read_trace
 from psvideo.model.camera import Camera
 from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.strobe.link.boards import BOARDS, capabilities
-from psvideo.strobe.link.messages import WiringName
 from psvideo.strobe.link.protocol import format_request
+from psvideo.strobe.link.words import WiringName
 from psvideo.strobe.program import Program, make_program
 from psvideo.strobe.stand_ins import toolchain
 from psvideo.strobe.stand_ins.emulated import play_script

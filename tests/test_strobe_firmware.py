@@ -13,8 +13,9 @@ import pytest
 from psvideo.formats.trace_csv import read_trace
 from psvideo.strobe.link.boards import BOARDS, capabilities
 from psvideo.strobe.link.lines import LONGEST_REPLY, LONGEST_REQUEST, Error, seal
-from psvideo.strobe.link.messages import Caps, Lit, Slot, WiringName
 from psvideo.strobe.link.protocol import format_reply
+from psvideo.strobe.link.requests import Caps, Lit, Slot
+from psvideo.strobe.link.words import WiringName
 from psvideo.strobe.stand_ins.python_board import PythonBoard
 from psvideo.strobe.stand_ins.toolchain import AvrBoard
 

@@ -10,7 +10,9 @@ import pytest
 from psvideo.formats.trace_csv import Trace, read_trace
 from psvideo.strobe.limits import cycle_refusal, cycle_ticks, slot_refusal
 from psvideo.strobe.link.boards import BOARDS, capabilities
-from psvideo.strobe.link.messages import WIRINGS, Capabilities, Lit, Slot, WiringName
+from psvideo.strobe.link.replies import Capabilities
+from psvideo.strobe.link.requests import Lit, Slot
+from psvideo.strobe.link.words import WIRINGS, WiringName
 from psvideo.strobe.stand_ins.playing import moments
 from psvideo.strobe.stand_ins.toolchain import AvrBoard
 

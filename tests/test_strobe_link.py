@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from psvideo.strobe import limits
-from psvideo.strobe.link import boards, lines, messages
+from psvideo.strobe.link import boards, lines, words
 from psvideo.strobe.link.boards import BOARDS
 from psvideo.strobe.link.lines import (
     LONGEST_REPLY,
@@ -24,33 +24,35 @@ from psvideo.strobe.link.lines import (
     seal,
     unseal,
 )
-from psvideo.strobe.link.messages import (
-    REQUESTS,
+from psvideo.strobe.link.protocol import find_command, format_reply, format_request, parse_reply, parse_words
+from psvideo.strobe.link.replies import (
     Armed,
     Capabilities,
-    Clk,
     ClockReading,
-    Id,
     Identity,
-    Keep,
-    Lit,
-    New,
-    Nonce,
     Refusal,
     Renewed,
     Reply,
+    Started,
+    Status,
+    Trimmed,
+)
+from psvideo.strobe.link.requests import (
+    REQUESTS,
+    Clk,
+    Id,
+    Keep,
+    Lit,
+    New,
     Request,
     Run,
     Slot,
-    Started,
-    Status,
     Steps,
     Stop,
     Trim,
-    Trimmed,
     Wiring,
 )
-from psvideo.strobe.link.protocol import find_command, format_reply, format_request, parse_reply, parse_words
+from psvideo.strobe.link.words import Nonce
 
 TABLE: dict[str, Any] = tomllib.loads(
     (Path(__file__).resolve().parents[1] / "lights" / "protocol.toml").read_text(encoding="utf-8")
@@ -75,8 +77,8 @@ REQUEST = st.one_of(
     st.builds(Stop),
     st.builds(Keep, ms=SMALL),
     st.builds(Run, cycles=SMALL),
-    st.builds(Trim, way=st.sampled_from(messages.WAYS), ppm=SMALL),
-    st.builds(Wiring, wiring=st.sampled_from(messages.WIRINGS)),
+    st.builds(Trim, way=st.sampled_from(words.WAYS), ppm=SMALL),
+    st.builds(Wiring, wiring=st.sampled_from(words.WIRINGS)),
     st.builds(Clk, nonce=st.from_regex(r"[A-Za-z0-9]{1,8}", fullmatch=True)),
     st.builds(Steps, first=SMALL, slots=st.lists(SMALL, min_size=1, max_size=6).map(tuple)),
     st.builds(
@@ -100,16 +102,16 @@ def test_every_command_of_the_table_has_its_record_and_no_other() -> None:
 
 
 def test_words_numbers_and_names_are_those_of_the_table() -> None:
-    assert TABLE["protocol"] == messages.PROTOCOL
+    assert TABLE["protocol"] == words.PROTOCOL
     assert (TABLE["line"]["longest_request"], TABLE["line"]["longest_reply"]) == (LONGEST_REQUEST, LONGEST_REPLY)
     assert {error.name.lower(): error.value for error in Error} == TABLE["error"]
     text, crc = TABLE["checksum"]["example"]
     assert crc16(text.encode()) == crc
     assert (TABLE["checksum"]["polynomial"], TABLE["checksum"]["start"]) == (0x1021, lines.CRC_START)
-    for kind, names in ((messages.State, "states"), (messages.Fault, "faults"), (messages.Reset, "resets")):
+    for kind, names in ((words.State, "states"), (words.Fault, "faults"), (words.Reset, "resets")):
         assert list(get_args(kind)) == TABLE[names]["names"]
-    assert list(messages.WIRINGS) == TABLE["wirings"]["names"]
-    assert list(messages.WAYS) == TABLE["ways"]["names"]
+    assert list(words.WIRINGS) == TABLE["wirings"]["names"]
+    assert list(words.WAYS) == TABLE["ways"]["names"]
 
 
 def test_boards_and_limits_are_those_of_the_table() -> None:

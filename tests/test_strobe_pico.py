@@ -15,8 +15,8 @@ from rp2040 import Chip, board_of
 from psvideo.strobe.limits import cycle_check
 from psvideo.strobe.link.boards import BOARDS, capabilities
 from psvideo.strobe.link.lines import LONGEST_REPLY, LONGEST_REQUEST, Error, LineReader, seal
-from psvideo.strobe.link.messages import Lit, Slot
 from psvideo.strobe.link.protocol import format_reply
+from psvideo.strobe.link.requests import Lit, Slot
 from psvideo.strobe.stand_ins.playing import Edge
 from psvideo.strobe.stand_ins.python_board import PythonBoard
 

@@ -15,7 +15,7 @@ from pico import PROGRAM, random_slot
 from pioemu import State, emulate  # type: ignore[attr-defined]
 from rp2040 import MOV_PINS_NULL, Chip, board_of
 
-from psvideo.strobe.link.messages import Lit, Slot
+from psvideo.strobe.link.requests import Lit, Slot
 from psvideo.strobe.stand_ins.playing import moments
 
 LEAD = 1_250_000

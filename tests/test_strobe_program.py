@@ -16,8 +16,10 @@ from psvideo.strobe.bursts import POWER_TOLERANCE, find_bursts
 from psvideo.strobe.limits import cycle_refusal, slot_refusal
 from psvideo.strobe.link.boards import BOARDS, capabilities
 from psvideo.strobe.link.lines import LONGEST_REQUEST
-from psvideo.strobe.link.messages import Armed, Run, Started, Wiring, WiringName
 from psvideo.strobe.link.protocol import format_request, parse_reply
+from psvideo.strobe.link.replies import Armed, Started
+from psvideo.strobe.link.requests import Run, Wiring
+from psvideo.strobe.link.words import WiringName
 from psvideo.strobe.program import Program, make_program, to_ticks
 from psvideo.strobe.stand_ins.playing import Edge
 from psvideo.strobe.stand_ins.python_board import PythonBoard

@@ -21,8 +21,9 @@ from psvideo.strobe.link.controller import OpenPort
 from psvideo.strobe.link.exchange import Link, NoReplyError, RefusedError
 from psvideo.strobe.link.greeting import greet
 from psvideo.strobe.link.lines import seal
-from psvideo.strobe.link.messages import Capabilities, Caps, Clear, Cleared, Keep, KeepSet, Run, Slot, Started
 from psvideo.strobe.link.ports import SerialPort, choose_port
+from psvideo.strobe.link.replies import Capabilities, Cleared, KeepSet, Started
+from psvideo.strobe.link.requests import Caps, Clear, Keep, Run, Slot
 from psvideo.strobe.program import Program, make_program
 from psvideo.strobe.session import Outcome, RunProgress, cycles_for, prepare, run_program
 from psvideo.strobe.stand_ins.python_board import PythonBoard

@@ -26,8 +26,8 @@ from psvideo.formats.plan_toml import format_plan, read_plan
 from psvideo.formats.trace_csv import read_trace
 from psvideo.strobe.limits import cycle_check
 from psvideo.strobe.link.boards import BOARDS, capabilities
-from psvideo.strobe.link.messages import Lit, Slot
 from psvideo.strobe.link.protocol import format_request
+from psvideo.strobe.link.requests import Lit, Slot
 from psvideo.strobe.program import make_program
 from psvideo.strobe.stand_ins import python_board_server, toolchain
 from psvideo.strobe.stand_ins.emulated import play_script

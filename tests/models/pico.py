@@ -7,8 +7,8 @@ from pathlib import Path
 from rp2040 import Chip, board_of, load_program
 
 from psvideo.strobe.limits import cycle_check
-from psvideo.strobe.link.messages import Arm, Lit, Slot, Steps
 from psvideo.strobe.link.protocol import format_request
+from psvideo.strobe.link.requests import Arm, Lit, Slot, Steps
 from psvideo.strobe.stand_ins.playing import Edge
 
 MAIN = Path(__file__).resolve().parents[2] / "lights" / "pico" / "main.py"

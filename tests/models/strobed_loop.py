@@ -12,8 +12,9 @@ from psvideo.live.holding import Holding
 from psvideo.model.plan import Plan
 from psvideo.strobe.link.boards import BOARDS, capabilities
 from psvideo.strobe.link.exchange import RefusedError
-from psvideo.strobe.link.messages import Refusal, Request, Run, Stat
 from psvideo.strobe.link.protocol import format_request, parse_reply
+from psvideo.strobe.link.replies import Refusal
+from psvideo.strobe.link.requests import Request, Run, Stat
 from psvideo.strobe.program import make_program
 from psvideo.strobe.stand_ins.playing import Edge
 from psvideo.strobe.stand_ins.python_board import PythonBoard

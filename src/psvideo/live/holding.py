@@ -7,7 +7,7 @@ from psvideo.live.chain import Chain
 from psvideo.live.genlock import EVERY_S, DarkRow, WantedRow, dark_row, next_trim_ppm, rows_around
 from psvideo.strobe.link.exchange import RefusedError
 from psvideo.strobe.link.lines import Error
-from psvideo.strobe.link.messages import Trim
+from psvideo.strobe.link.requests import Trim
 
 STEPS_UNTIL = 1.5
 """A trim counts from the step behind the next one on: so many steps later, in the mean."""

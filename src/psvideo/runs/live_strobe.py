@@ -15,8 +15,8 @@ from psvideo.runs.caller import Caller
 from psvideo.runs.strobe.port import opened_port
 from psvideo.runs.strobe.run import warn_of_flashing
 from psvideo.strobe.link.exchange import Link
-from psvideo.strobe.link.messages import Trimmed
 from psvideo.strobe.link.ports import EMULATED
+from psvideo.strobe.link.replies import Trimmed
 from psvideo.strobe.program import Program, make_program
 from psvideo.strobe.session import Outcome, prepare, run_program
 

@@ -8,7 +8,7 @@ flash gives ``bursts * on`` ticks of light exactly. At least two bursts make a f
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from psvideo.strobe.link.messages import Capabilities
+from psvideo.strobe.link.replies import Capabilities
 
 POWER_TOLERANCE = 0.005
 """A power is played when it is met within this share of itself; what was really played goes into the log."""

@@ -7,7 +7,8 @@ import struct
 from collections.abc import Sequence
 
 from psvideo.strobe.link.lines import Error, crc16
-from psvideo.strobe.link.messages import Capabilities, Refusal, Slot
+from psvideo.strobe.link.replies import Capabilities, Refusal
+from psvideo.strobe.link.requests import Slot
 
 LONGEST_DARK_TICKS = 2**31 - 1
 LONGEST_CYCLE_S = 60
@@ -18,7 +19,7 @@ CHECKED_LINES = 8
 def lit_ticks(slot: Slot, line: int) -> int:
     """Return for how many ticks of one flash a line is on.
 
-    >>> from psvideo.strobe.link.messages import Lit
+    >>> from psvideo.strobe.link.requests import Lit
     >>> lit_ticks(Slot(slot=0, duration=250, dark=200, period=100, lit=(Lit(line=1, on=40),)), 1)
     120
     """

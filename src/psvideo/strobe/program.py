@@ -23,7 +23,8 @@ from psvideo.strobe.limits import (
     slot_refusal,
     total_ppm,
 )
-from psvideo.strobe.link.messages import Arm, Capabilities, Lit, New, Request, Slot, Steps
+from psvideo.strobe.link.replies import Capabilities
+from psvideo.strobe.link.requests import Arm, Lit, New, Request, Slot, Steps
 
 PS_PER_S = 10**12
 STEPS_A_LINE = 20

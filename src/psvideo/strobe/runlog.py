@@ -15,7 +15,7 @@ from psvideo.formats.contract import Contract, check_schema, read_json
 from psvideo.model.plan import UNKNOWN_CLOCK_PPM, Plan, PlannedFlash
 from psvideo.strobe.clock import ClockFit
 from psvideo.strobe.limits import lit_ticks
-from psvideo.strobe.link.messages import WiringName
+from psvideo.strobe.link.words import WiringName
 from psvideo.strobe.program import PS_PER_S, Program
 from psvideo.strobe.session import Ended, Outcome, Ready
 

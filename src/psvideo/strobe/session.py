@@ -16,22 +16,9 @@ from psvideo.model.plan import Plan
 from psvideo.strobe.clock import ClockFit, ClockQuery, fit_clock
 from psvideo.strobe.link.exchange import Link
 from psvideo.strobe.link.greeting import START_WITHIN_S, greet
-from psvideo.strobe.link.messages import (
-    Capabilities,
-    Caps,
-    Clear,
-    Cleared,
-    Identity,
-    Run,
-    Started,
-    Stat,
-    Status,
-    Stop,
-    Stopped,
-    Wiring,
-    WiringName,
-    WiringSet,
-)
+from psvideo.strobe.link.replies import Capabilities, Cleared, Identity, Started, Status, Stopped, WiringSet
+from psvideo.strobe.link.requests import Caps, Clear, Run, Stat, Stop, Wiring
+from psvideo.strobe.link.words import WiringName
 from psvideo.strobe.program import Program
 
 Ended = Literal["done", "stopped", "fault", "lost"]

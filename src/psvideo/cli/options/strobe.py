@@ -10,7 +10,7 @@ import typer
 from psvideo.cli.options.completing import offer_boards, offer_lines, offer_ports
 from psvideo.errors import UsageError, nearest
 from psvideo.strobe.link.boards import BOARDS
-from psvideo.strobe.link.messages import WIRINGS, WiringName
+from psvideo.strobe.link.words import WIRINGS, WiringName
 from psvideo.strobe.stand_ins.toolchain import StandIn
 
 PlanFile = Annotated[Path, typer.Argument(help="The plan to play: plan.toml.")]

@@ -10,7 +10,8 @@ from psvideo.model.plan import Plan
 from psvideo.runs.strobe.port import opened_port
 from psvideo.strobe.link.boards import BOARDS, Board, board_called, capabilities
 from psvideo.strobe.link.exchange import Link
-from psvideo.strobe.link.messages import Capabilities, WiringName
+from psvideo.strobe.link.replies import Capabilities
+from psvideo.strobe.link.words import WiringName
 from psvideo.strobe.program import Program, make_program
 from psvideo.strobe.program_words import program_cautions
 from psvideo.strobe.seizures import seizure_warning

@@ -11,7 +11,7 @@ from psvideo.formats.trace_csv import SCHEMA, TraceWriter
 from psvideo.formats.whole_files import refuse_existing, whole_file
 from psvideo.runs.caller import PYTHON, Caller
 from psvideo.strobe.link.boards import BOARDS
-from psvideo.strobe.link.messages import WiringName
+from psvideo.strobe.link.words import WiringName
 from psvideo.strobe.stand_ins.emulated import Emulation, emulated_board
 from psvideo.strobe.stand_ins.python_board import PythonBoard
 from psvideo.strobe.stand_ins.python_board_server import TRACE_HZ, open_port, serve

@@ -9,8 +9,9 @@ from psvideo.strobe.link.boards import BOARDS, Board
 from psvideo.strobe.link.controller import OpenPort
 from psvideo.strobe.link.exchange import Link, Port
 from psvideo.strobe.link.greeting import greet
-from psvideo.strobe.link.messages import Identity, Stat, Status, Stop, Stopped
 from psvideo.strobe.link.ports import AUTO, EMULATED
+from psvideo.strobe.link.replies import Identity, Status, Stopped
+from psvideo.strobe.link.requests import Stat, Stop
 from psvideo.strobe.stand_ins.python_board_port import PythonBoardPort
 
 

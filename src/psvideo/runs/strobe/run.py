@@ -13,8 +13,8 @@ from psvideo.runs.strobe.port import opened_port
 from psvideo.strobe import confirmed
 from psvideo.strobe.link.boards import board_called
 from psvideo.strobe.link.exchange import Link
-from psvideo.strobe.link.messages import WiringName
 from psvideo.strobe.link.ports import AUTO, EMULATED
+from psvideo.strobe.link.words import WiringName
 from psvideo.strobe.program import Program, make_program
 from psvideo.strobe.program_words import describe_program, program_cautions
 from psvideo.strobe.runlog import RunLog, format_log, plan_sha256, run_log

@@ -4,7 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from psvideo.errors import UsageError, nearest
-from psvideo.strobe.link.messages import Capabilities, WiringName
+from psvideo.strobe.link.replies import Capabilities
+from psvideo.strobe.link.words import WiringName
 
 MAX_FLASH_US = 50_000
 MIN_DARK_US = 100

@@ -10,8 +10,10 @@ from typing import Protocol, TypeVar
 
 from psvideo.errors import PsvideoError
 from psvideo.strobe.link.lines import LONGEST_REPLY, Error, LineError, LineReader, TextLine
-from psvideo.strobe.link.messages import Arm, Clk, ClockReading, Nonce, Refusal, Reply, Request, Run, Stop
 from psvideo.strobe.link.protocol import format_request, parse_reply
+from psvideo.strobe.link.replies import ClockReading, Refusal, Reply
+from psvideo.strobe.link.requests import Arm, Clk, Request, Run, Stop
+from psvideo.strobe.link.words import Nonce
 
 REPLY_WITHIN_S = 0.5
 TRIES = 4

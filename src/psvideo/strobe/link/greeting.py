@@ -5,8 +5,10 @@ from itertools import chain, repeat
 
 from psvideo.errors import PsvideoError
 from psvideo.strobe.link.exchange import Link
-from psvideo.strobe.link.messages import PROTOCOL, Id, Identity
 from psvideo.strobe.link.protocol import format_request
+from psvideo.strobe.link.replies import Identity
+from psvideo.strobe.link.requests import Id
+from psvideo.strobe.link.words import PROTOCOL
 
 START_WITHIN_S = 7.0
 """A board that restarts when its port is opened is in its boot loader for one to two seconds."""

@@ -1,6 +1,7 @@
 """Messages into lines and lines into messages, on both sides of the strobe link. Opens no port.
 
-``lines`` makes whole lines out of bytes, ``messages`` holds the records; what is right stands in lights/protocol.md.
+``lines`` makes whole lines out of bytes, ``requests`` and ``replies`` hold the records; what is right stands in
+lights/protocol.md.
 """
 
 import re
@@ -9,19 +10,9 @@ from dataclasses import fields
 from typing import Any, TypeVar, get_args
 
 from psvideo.strobe.link.lines import Error, LineError, seal, unseal
-from psvideo.strobe.link.messages import (
-    REQUESTS,
-    WAYS,
-    WIRINGS,
-    Lit,
-    Nonce,
-    Refusal,
-    Reply,
-    Request,
-    Slot,
-    Way,
-    WiringName,
-)
+from psvideo.strobe.link.replies import Refusal, Reply
+from psvideo.strobe.link.requests import REQUESTS, Lit, Request, Slot
+from psvideo.strobe.link.words import WAYS, WIRINGS, Nonce, Way, WiringName
 
 LARGEST_NUMBER = 4_294_967_295
 LONGEST_NONCE = 8
@@ -35,7 +26,7 @@ REFUSAL = re.compile(r"E ([0-9]{1,3})(?: (.*))?\Z")
 def format_request(request: Request, *, sealed: bool = True) -> bytes:
     """Return a request as the bytes of its line, with a checksum where it is ``sealed``.
 
-    >>> from psvideo.strobe.link.messages import Lit, Slot
+    >>> from psvideo.strobe.link.requests import Lit, Slot
     >>> format_request(Slot(slot=0, duration=1600, dark=16685, period=80, lit=(Lit(line=2, on=40),)), sealed=False)
     b'SLOT 0 1600 16685 80 2:40\\n'
     """

@@ -13,7 +13,7 @@ from typing import Literal
 
 from psvideo.errors import PsvideoError
 from psvideo.formats.whole_files import whole_file
-from psvideo.strobe.link.messages import WiringName
+from psvideo.strobe.link.words import WiringName
 from psvideo.strobe.stand_ins.toolchain import AvrBoard, Built, build
 
 STOPS_WITHIN_S = 10.0

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from psvideo.strobe.limits import PPM, trim_share
-from psvideo.strobe.link.messages import Slot
+from psvideo.strobe.link.requests import Slot
 
 
 @dataclass(frozen=True, kw_only=True, order=True)

@@ -10,8 +10,10 @@ from dataclasses import replace
 
 from psvideo.strobe.link.boards import Board
 from psvideo.strobe.link.lines import LONGEST_REQUEST, Error, LineError, LineReader, TextLine, unseal
-from psvideo.strobe.link.messages import Fault, Interlock, Refusal, Reply, Reset, Run, State, Stop, Trim
 from psvideo.strobe.link.protocol import find_command, format_reply, parse_words
+from psvideo.strobe.link.replies import Refusal, Reply
+from psvideo.strobe.link.requests import Run, Stop, Trim
+from psvideo.strobe.link.words import Fault, Interlock, Reset, State
 from psvideo.strobe.stand_ins.playing import Edge, Moment, Trimming, moments
 from psvideo.strobe.stand_ins.rules import after_reset, answer, signed_ppm
 
