@@ -107,6 +107,30 @@ def test_an_unknown_camera_gets_the_nearest_names_and_how_to_measure() -> None:
     assert "`readout_s`" in message
 
 
+@pytest.mark.parametrize(
+    ("typed", "maker"),
+    [
+        ("Sony FX9", "Sony"),
+        ("iPhone 16 Pro", "Apple"),
+        ("iphone13", "Apple"),
+        ("galaxy s24", "Samsung"),
+        ("RED Monstro", "RED"),
+        ("Blackmagic Pyxis 6K", "Blackmagic"),
+        ("Canon R5 Mark II", "Canon"),
+        ("Lumix S9", "Panasonic"),
+    ],
+)
+def test_an_unknown_model_gets_the_nearest_of_its_maker_and_of_no_other(typed: str, maker: str) -> None:
+    near = nearest_names(typed)
+    assert near
+    assert {name.split()[0] for name in near} == {maker}
+
+
+@pytest.mark.parametrize("typed", ["Pixel 8", "ARRI Alexa Mini LF", "Xiaomi 14", "Nokia 3310"])
+def test_a_maker_who_is_not_in_the_table_gets_no_other_makers_cameras(typed: str) -> None:
+    assert nearest_names(typed) == ()
+
+
 def test_a_mode_is_found_by_its_rate_whether_120_or_119_88_is_typed() -> None:
     by_name = find_mode("z9", fps=Fraction(120), size_px=(3840, 2160))
     assert by_name == find_mode("z9", fps=Fraction(120_000, 1001), size_px=(3840, 2160))

@@ -100,15 +100,29 @@ def find_model(wanted: str) -> tuple[CameraMode, ...]:
 
 
 def nearest_names(wanted: str, *, count: int = 4) -> tuple[str, ...]:
-    """Return the names in the table that come close to what was typed, best first; none where nothing is like it."""
+    """Return the names in the table that come close to what was typed, best first; none where nothing is like it.
+
+    Where the maker was named, or the maker's word for a series (iPhone, Galaxy), they are all of this maker.
+    """
     key, words = _key(wanted), _words(wanted)
 
     def likeness(name: str) -> float:
-        shared = sum(word in _key(name) for word in words) / max(len(words), 1)
+        shared = sum(word in _key(name) for word in words if not word.isdigit()) / max(len(words), 1)
         return shared + max(difflib.SequenceMatcher(None, key, part).ratio() for part in _keys(_by_name()[name][0]))
 
-    found = {name: likeness(name) for name in _by_name()}
+    makers = _makers_named(words)
+    found = {name: likeness(name) for name, modes in _by_name().items() if not makers or modes[0].make in makers}
     return tuple(sorted((name for name in found if found[name] >= ALIKE), key=lambda name: -found[name])[:count])
+
+
+def _makers_named(words: Sequence[str]) -> set[str]:
+    """Return the makers of which the maker's or a series' first word is among these."""
+    return {
+        mode.make
+        for mode in camera_modes()
+        for name in (mode.make, mode.model)
+        if (first := _words(name)[0]) in words and first.isalpha() and len(first) > 2
+    }
 
 
 def find_mode(wanted: str, *, fps: Fraction | None, size_px: tuple[int, int] | None) -> CameraMode:
