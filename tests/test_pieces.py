@@ -281,7 +281,7 @@ def test_two_workers_give_the_bytes_of_one_process_and_takes_one_report(tmp_path
     assert results[1].instants == len(judged(tmp_path / "one" / "clip")["instants"])
     assert digest(tmp_path / "all" / "clip") == digest(tmp_path / "one" / "clip")
     assert judged(tmp_path / "all" / "clip") == judged(tmp_path / "one" / "clip")
-    assert "dark: could not be solved." in (tmp_path / "all" / "report.html").read_text(encoding="utf-8")
+    assert "dark: failed." in (tmp_path / "all" / "report.html").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("how", [[], pytest.param(["--workers", "2"], marks=pytest.mark.campaign)])
@@ -304,7 +304,7 @@ def test_split_of_several_takes_gives_the_bytes_of_one_at_a_time(
         assert ("all done" in said.out) == (not how and bool(again)), "workers say nothing"
     for name in ("clip", "again"):
         assert digest(tmp_path / "all" / name) == digest(tmp_path / "one" / name)
-    assert "dark: could not be solved." in (tmp_path / "all" / "report.html").read_text(encoding="utf-8")
+    assert "dark: failed." in (tmp_path / "all" / "report.html").read_text(encoding="utf-8")
     with pytest.raises(UsageError, match="exists already"):
         ps.split_of_takes(takes, out=tmp_path / "all", workers=2)
 

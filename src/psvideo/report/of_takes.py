@@ -24,7 +24,7 @@ class TakeResult:
     clip, out
         The footage, and the folder of its results.
     usable
-        Whether nothing speaks against it; False where it could not be solved.
+        Whether nothing speaks against it; False where it failed.
     findings
         What to distrust and what to change on set, the gravest first.
     instants
@@ -58,8 +58,8 @@ class TakeResult:
 
 
 def worst_first(results: Iterable[TakeResult]) -> tuple[TakeResult, ...]:
-    """Return takes in the order in which to look at them: those that could not be solved, that are not usable, and then
-    by what speaks against them."""
+    """Return takes in the order in which to look at them: those that failed, that are not usable, and then by what
+    speaks against them."""
     return tuple(sorted(results, key=_badness))
 
 
@@ -90,14 +90,14 @@ def take_row(one: TakeResult) -> dict[str, object]:
 def takes_page(results: Sequence[TakeResult]) -> str:
     """Return the report as one self-contained HTML page, with links to every take's own."""
     usable, failed = sum(one.usable for one in results), sum(bool(one.fault) for one in results)
-    said = f"{len(results)} takes: {usable} usable, {len(results) - usable - failed} not, {failed} not solved."
+    said = f"{len(results)} takes: {usable} usable, {len(results) - usable - failed} not, {failed} failed."
     body = f"<p>{said}</p>" + "".join(map(_take, results))
     return PAGE.format(title="Takes", style=STYLE, head="", body=body, version=__version__)
 
 
 def _take(one: TakeResult) -> str:
     kind = "bad" if not one.usable else "good" if not one.findings else "doubtful"
-    words = "could not be solved." if one.fault else one.verdict
+    words = "failed." if one.fault else one.verdict
     items = "".join(f"<li>{html.escape(sentence)}</li>" for sentence in (one.findings or (one.fault,)) if sentence)
     valid = "" if one.valid_share is None else f", {100 * one.valid_share:.0f} % valid"
     link = f'<p class="soft"><a href="{quote(one.out.name)}/report.html">{one.instants} results{valid}</a></p>'
