@@ -2,21 +2,22 @@
 # Install what the tests look at psvideo's work with, where that is allowed:
 # - the browser in which they open psvideo's page (Debian's chromium), as root or with sudo that asks nothing, on a system
 #   with apt-get; elsewhere say what to install;
-# - three.js beside tests/clients/package.json, where npm is there; elsewhere its test is skipped.
+# - three.js and MicroPython beside tests/clients/package.json, where npm is there; elsewhere their tests are skipped.
 # Says nothing and is quick where all is there.
 set -eu
 cd "$(dirname "$0")"
 
 packages="chromium"
 three="clients/node_modules/three/package.json"
+micropython="clients/node_modules/@micropython/micropython-webassembly-pyscript/package.json"
 
 there() {
     command -v chromium >/dev/null || command -v chromium-browser >/dev/null || command -v google-chrome >/dev/null
 }
 
-if [ ! -e "$three" ] && command -v npm >/dev/null; then
+if { [ ! -e "$three" ] || [ ! -e "$micropython" ]; } && command -v npm >/dev/null; then
     npm install --prefix clients --silent --no-audit --no-fund --no-package-lock >/dev/null 2>&1 ||
-        echo "npm cannot install three.js: the test that reads normals with it is skipped." >&2
+        echo "npm cannot install three.js and MicroPython: the tests that use them are skipped." >&2
 fi
 
 there && exit 0
