@@ -234,6 +234,34 @@ def test_relighting_from_the_rti_planes_gives_back_the_photographs(tmp_path: Pat
         assert np.abs(shown[..., 0] - coded)[ball()[1]].mean() < 0.06
 
 
+def read_ptm(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return a .ptm's six numbers per pixel and its colours, as sections 2 and 3 of its description say."""
+    header, data = path.read_bytes().split(b"\n", 6)[:6], path.read_bytes().split(b"\n", 6)[6]
+    assert header[:2] == [b"PTM_1.2", b"PTM_FORMAT_LRGB"]
+    cols, rows = int(header[2]), int(header[3])
+    scale, bias = np.array(header[4].split(), float), np.array([int(word) for word in header[5].split()])
+    assert len(data) == rows * cols * 9
+    codes = np.frombuffer(data, np.uint8).astype(np.float64)
+    numbers = (codes[: rows * cols * 6].reshape(rows, cols, 6) - bias) * scale
+    return numbers[::-1], codes[rows * cols * 6 :].reshape(rows, cols, 3)[::-1]
+
+
+def test_relighting_from_the_ptm_gives_back_coloured_photographs(tmp_path: Path) -> None:
+    """One quarter is redder, another bluer, so that nothing may be turned round."""
+    tint = np.ones((SIZE, SIZE, 3))
+    tint[: SIZE // 2, : SIZE // 2, 1:] *= 0.4
+    tint[SIZE // 2 :, SIZE // 2 :, :2] *= 0.4
+    pictures = [picture[..., None] * tint for picture in lit()]
+    folder = photographs(tmp_path / "photos", [picture[..., ::-1] for picture in pictures])
+    ps.stills(folder, lights=listed(tmp_path / "l.lp"), out=tmp_path / "out")
+    numbers, colour = read_ptm(tmp_path / "out" / "rti" / "relight.ptm")
+    for (u, v, _), picture in zip(LIGHTS, pictures, strict=True):
+        level = numbers @ np.array([u * u, v * v, u * v, u, v, 1])
+        shown = np.clip(level[..., None] * colour / 255, 0, 255) / 255
+        coded = as_srgb(np.clip(picture * 0.8 / np.percentile(picture, 99), 0, 1))
+        assert np.abs(shown - coded)[ball()[1]].mean() < 0.06
+
+
 BAD: dict[str, tuple[str, ...]] = {
     "unknown light": ("names 9.png, and no picture is called so", "Pictures without a light: shot 22.png"),
     "too few lights": ("holds 6 pictures of lights", "lists 5 lights"),

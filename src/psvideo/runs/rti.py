@@ -1,4 +1,5 @@
-"""Photographs as a relightable picture for the web: a polynomial texture map in the files that Relight writes.
+"""Photographs as a relightable picture: a polynomial texture map in the files that Relight writes for the web, and as
+.ptm for programs on the desk.
 
 The light of every pixel is a polynomial of the light's direction, times the pixel's colour (T. Malzbender, D. Gelb and
 H. Wolters, "Polynomial texture maps", SIGGRAPH 2001). OpenLIME, the viewer of museums and archives, shows ``info.json``
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
+from psvideo.export.ptm_file import write_ptm
 from psvideo.formats.whole_files import whole_file, write_text
 from psvideo.model.camera import FloatArray
 from psvideo.model.rig import Rig, directions, intensities
@@ -24,6 +26,7 @@ from psvideo.solve.passes.plate_rows import BAND_PIXELS, PlateRows
 Floats = NDArray[np.float32]
 Pixels = NDArray[np.uint8]
 FOLDER = "rti"
+PTM = "relight.ptm"
 LARGEST_PX = 4096
 """The longer side of the planes: graphics cards hold textures of so many pixels everywhere."""
 QUALITY = 95
@@ -39,7 +42,7 @@ ZERO, ONE = np.zeros(3), np.ones(3)
 
 
 def write_rti(folder: Path, one: Round, rig: Rig) -> None:
-    """Write ``rti/info.json`` and its planes of a round whose plates stand in the order of the rig's distant lights."""
+    """Write ``rti/`` of a round whose plates stand in the order of the rig's distant lights: planes, and a .ptm."""
     rows = PlateRows.of([plate.picture for plate in one.plates], None)
     step = max(-(-max(rows.shape[:2]) // LARGEST_PX), 1)
     lamps = directions(rig.lights)
@@ -53,17 +56,18 @@ def write_rti(folder: Path, one: Round, rig: Rig) -> None:
     target.mkdir(parents=True, exist_ok=True)
     scale, bias = [1.0] * RED_GREEN_BLUE, [0.0] * RED_GREEN_BLUE
     _write_plane(target / "plane_0.jpg", base)
-    shape = base.shape
-    del base
+    ends = [np.percentile(terms[..., n], CUT_PERCENT) for n in range(TERMS)]
+    low, high = np.stack(ends, axis=-1)
+    span = np.maximum(high - low, 1e-3)
+    write_ptm(target / PTM, base, terms, low, span)
+    scale += [float(f"{value:.6g}") for value in span]
+    bias += [float(f"{value:.6g}") for value in -low / span]
     for number, first in enumerate(range(0, TERMS, 3), start=1):
-        low, high = np.percentile(terms[..., first : first + 3].reshape(-1, 3), CUT_PERCENT, axis=0)
-        span = np.maximum(high - low, 1e-3)
-        scale += [float(f"{value:.6g}") for value in span]
-        bias += [float(f"{value:.6g}") for value in -low / span]
-        _write_plane(target / f"plane_{number}.jpg", _codes(terms[..., first : first + 3], low, span))
+        part = slice(first, first + 3)
+        _write_plane(target / f"plane_{number}.jpg", _codes(terms[..., part], low[part], span[part]))
     info = {
-        "width": shape[1],
-        "height": shape[0],
+        "width": base.shape[1],
+        "height": base.shape[0],
         "format": "jpg",
         "type": "ptm",
         "colorspace": "lrgb",

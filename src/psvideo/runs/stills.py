@@ -90,7 +90,8 @@ def stills(
       pixels.
     - ``transfer``: how the files code light. Left out: as their ICC profile or PNG chunk says, else sRGB for 8 bits and
       linear for 16 bits, EXR and DNG. The report says which, and what speaks against it.
-    - ``rti``: write ``rti/`` too, a polynomial texture map that OpenLIME shows in a web page (of distant lights).
+    - ``rti``: write ``rti/`` too, a polynomial texture map that OpenLIME shows in a web page, and the same as ``.ptm``
+      (of distant lights).
     - ``solver``, ``fill``, ``preset``, ``aov``, ``mesh``, ``encode``, ``plates``, ``force``: as for ``normals``.
 
     Pictures are paired with lights by name where the names fit, else by order; the report says which. Written into

@@ -49,7 +49,10 @@ def stills(
     encode: EncodeOption = None,
     plates: Plates = False,
     rti: Annotated[
-        bool, typer.Option("--rti/--no-rti", help="Write rti/ too: relighting that OpenLIME shows in a web page.")
+        bool,
+        typer.Option(
+            "--rti/--no-rti", help="Write rti/ too: relighting for web pages (OpenLIME), and a .ptm for RTIViewer."
+        ),
     ] = True,
     force: Force = False,
     json: Json = False,
