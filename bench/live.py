@@ -1,15 +1,22 @@
-"""Live: processor time of every frame and of every result, a mosaic of 8 bits under four lights, by stage."""
+"""Live: processor time of every frame and of every result, a mosaic of 8 bits under four lights, by stage.
 
+``python -m bench.live --seconds 60 --size 720 --fps 120`` films by the clock on the wall instead, with the page open in
+Chromium, on a machine on which nothing else runs; left out, both modes one after the other.
+"""
+
+import argparse
+import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from fractions import Fraction
 from functools import partial
 from typing import TypeVar
 
 import numpy as np
 
-from bench.table import Row
+from bench import live_wall
+from bench.live_scene import CFA, coded, frames, plan_of, rig
+from bench.table import Row, table
 from psvideo.live.chain import LiveFrame, NewestRound
 from psvideo.live.follow import caught_up
 from psvideo.live.history import timing_now
@@ -19,19 +26,12 @@ from psvideo.live.newest_round import LiveRounds
 from psvideo.live.ring import RingFrame, ring_of
 from psvideo.live.smaller import Smaller, smaller_plan, smaller_timing
 from psvideo.live.watching import EVERY, Watching
-from psvideo.model.camera import Camera
-from psvideo.model.coded import Coded, Tone
-from psvideo.model.plan import Plan, PlannedFlash
-from psvideo.model.rig import Light, Rig
 from psvideo.model.row_profiles import row_light
 from psvideo.model.timing import timed_camera
 from psvideo.solve.instants import surfaces
 from psvideo.solve.normals.solving import Solving
-from psvideo.synth import Noise, TrueClock, expose
 
 Given = TypeVar("Given")
-DIRECTIONS = {"key": (0.48, 0.36, 0.8), "left": (-0.6, 0.0, 0.8), "top": (0.0, 0.6, 0.8), "low": (0.0, -0.6, 0.8)}
-TONE = Tone(zero=np.full((1, 1), 4.0), gain=np.full((1, 1), 1 / 251))
 FRAMES = 72
 MODES = ((1280, 720, 120, 15, 2), (1920, 1080, 60, 10, 4))
 """Width, height, frames a second, results a second that are asked for, and by how much the picture is made smaller."""
@@ -50,9 +50,9 @@ class Spent:
         self.each_s.setdefault(stage, []).append(time.process_time() - began)
         return given
 
-    def mean_s(self, stage: str) -> float:
-        """Return a stage's mean cost, its first call, which may compile, left out."""
-        return float(np.mean(self.each_s[stage][1:]))
+    def usual_s(self, stage: str) -> float:
+        """Return what a stage usually costs: the median, as its first calls may compile."""
+        return float(np.median(self.each_s[stage]))
 
 
 def rows() -> Iterator[Row]:
@@ -61,12 +61,12 @@ def rows() -> Iterator[Row]:
         spent = _spent(width_px, height_px, fps, step)
         name = f"{width_px} x {height_px} at {fps}"
         for stage in ("row profiles", "made smaller", "clock followed"):
-            yield Row(f"{name}: a frame, {stage}", f"{1e3 * spent.mean_s(stage):.2f} ms", "", None)
+            yield Row(f"{name}: a frame, {stage}", f"{1e3 * spent.usual_s(stage):.2f} ms", "", None)
         for stage in ("plates and normals", "packed for the page", "judged (every fourth)"):
-            yield Row(f"{name}: a result, {stage}", f"{1e3 * spent.mean_s(stage):.1f} ms", "", None)
-        frame_s = sum(spent.mean_s(stage) for stage in ("row profiles", "made smaller", "clock followed"))
-        result_s = spent.mean_s("plates and normals") + spent.mean_s("packed for the page")
-        result_s += spent.mean_s("judged (every fourth)") / EVERY
+            yield Row(f"{name}: a result, {stage}", f"{1e3 * spent.usual_s(stage):.1f} ms", "", None)
+        frame_s = sum(spent.usual_s(stage) for stage in ("row profiles", "made smaller", "clock followed"))
+        result_s = spent.usual_s("plates and normals") + spent.usual_s("packed for the page")
+        result_s += spent.usual_s("judged (every fourth)") / EVERY
         second = fps * frame_s + results * result_s
         words = f"{name}: a second, {results} results of {width_px // step} x {height_px // step}"
         yield Row(words, f"{second:.2f} processor seconds", "<= 2", second <= 2)
@@ -79,21 +79,20 @@ def rows() -> Iterator[Row]:
 
 
 def _spent(width_px: int, height_px: int, fps: int, step: int) -> Spent:
-    plan = _plan(width_px, height_px, fps)
-    frames, spent = _frames(plan), Spent()
-    rig = Rig(lights=tuple(Light(name=name, direction=at) for name, at in DIRECTIONS.items()))
+    plan, known, spent = plan_of(width_px, height_px, fps), rig(), Spent()
+    filmed = [LiveFrame(index=n, coded=coded(codes), came_s=0.0) for n, codes in enumerate(frames(plan, FRAMES))]
     small, rounds = smaller_plan(plan, step), LiveRounds(plan=smaller_plan(plan, step))
-    watching, pictures = Watching(plan=plan, rig=rig), NewestPictures()
-    profiles = np.stack([row_light(frame.coded)[0] for frame in frames])
+    watching, pictures = Watching(plan=plan, rig=known), NewestPictures()
+    profiles = np.stack([row_light(frame.coded)[0] for frame in filmed])
     first = frames_to_lock(plan)
     for _ in range(2):
         found = spent.on("lock", lambda: lock(plan, np.arange(first), profiles[:first]))
     follower, ring, smaller = (
         caught_up(plan, found, list(profiles[:first])),
         ring_of(plan),
-        Smaller(step=step, cfa="RGGB"),
+        Smaller(step=step, cfa=CFA),
     )
-    for frame in frames:
+    for frame in filmed:
         mean, _ = spent.on("row profiles", partial(row_light, frame.coded))
         coded = spent.on("made smaller", partial(smaller.of, frame.coded))
         if frame.index >= first:
@@ -105,7 +104,7 @@ def _spent(width_px: int, height_px: int, fps: int, step: int) -> Spent:
         one = rounds.newest(held, timing)
         if one is None:
             continue
-        surface = next(surfaces([one], small, rig, solving=Solving(), one_by_one=True)).surface
+        surface = next(surfaces([one], small, known, solving=Solving(), one_by_one=True)).surface
         spent.each_s.setdefault("plates and normals", []).append(time.process_time() - began)
         newest = NewestRound(
             round=one, surface=surface, came_s=0.0, step=step, timing=timing, frame=coded, place=frame.index
@@ -117,29 +116,19 @@ def _spent(width_px: int, height_px: int, fps: int, step: int) -> Spent:
     return spent
 
 
-def _plan(width_px: int, height_px: int, fps: int) -> Plan:
-    camera = Camera(width_px=width_px, height_px=height_px, fps=Fraction(fps), exposure_s=1 / fps, readout_s=0.97 / fps)
-    flashes = [PlannedFlash(lights={name: 1.0}, duration_s=0.1 / fps) for name in DIRECTIONS]
-    flashes.append(PlannedFlash(lights={}, duration_s=0.1 / fps))
-    return Plan(camera=camera, flashes=tuple(flashes), dark_s=1.002 / fps)
+def main() -> int:
+    """Measure by the wall's clock, against the bars, and what every stage costs by itself beside it."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--seconds", type=float, default=60.0)
+    parser.add_argument("--size", type=int, choices=[size for _, size, *_ in MODES], help="rows of a frame")
+    parser.add_argument("--fps", type=int)
+    asked = parser.parse_args()
+    for _, size, fps, *_ in MODES:
+        if asked.size in (None, size):
+            print(table(live_wall.rows(size, asked.fps or fps, asked.seconds)), flush=True)
+    print(table(rows()), flush=True)
+    return 0
 
 
-def _frames(plan: Plan) -> list[LiveFrame]:
-    """Return frames of a relief under the plan's lights: a mosaic in 8 bits, black at 4."""
-    rows, cols = plan.camera.height_px, plan.camera.width_px
-    y, x = np.mgrid[0:rows, 0:cols].astype(np.float32) * (9.0 / rows)
-    normals = np.stack([0.4 * np.sin(3 * x), 0.4 * np.cos(2 * y), np.ones_like(x)], -1)
-    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-    lit = [0.8 * np.maximum(normals @ np.array(at, np.float32), 0) for at in DIRECTIONS.values()]
-    plates = {slot: lit[slot].astype(np.float32) for slot in plan.lit_slots}
-    noise = Noise(full_well_e=10_000, read_e=5)
-    clock = TrueClock(phase_s=0.003, offset_ppm=25.0)
-    shot = expose(plates, plan, frames=FRAMES, clock=clock, ambient=0.02, noise=noise)
-    return [
-        LiveFrame(
-            index=place,
-            coded=Coded(codes=np.clip(np.rint(image * 251 + 4), 0, 255).astype(np.uint8), tone=TONE),
-            came_s=0.0,
-        )
-        for place, image in enumerate(shot.frames)
-    ]
+if __name__ == "__main__":
+    sys.exit(main())

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from psvideo.live.chain import NewestRound
 from psvideo.model.camera import Camera
-from psvideo.model.shutter import row_weights
+from psvideo.model.shutter import frames_touched, row_weights
 from psvideo.page.picture import Look, PagePicture, block, shown
 
 LARGE, SMALL = Look(width_px=640), Look(width_px=320, quick=True)
@@ -63,7 +63,8 @@ def _picture(name: str, newest: NewestRound, camera: Camera) -> PagePicture:
     if surface is not None and name == "albedo":
         return _light("albedo", surface.albedo, LARGE, {})
     if name == "frame":
-        return _light("frame", newest.frame.light(), SMALL, {"rows": lit_rows(newest, camera)})
+        facts = {"rows": lit_rows(newest, camera), "place": newest.place, "ended": last_place(newest, camera)}
+        return _light("frame", newest.frame.light(), SMALL, facts)
     asked = name.removeprefix("plate ")
     plate = next((one for one in newest.round.plates if one.light == asked), newest.round.plates[0])
     return _light("plate", plate.image, SMALL, {"light": plate.light})
@@ -77,6 +78,13 @@ def _light(name: str, image: NDArray[np.float32], look: Look, facts: Mapping[str
 
 def _planes(image: NDArray[np.float32]) -> list[NDArray[np.float32]]:
     return [image] if image.ndim == 2 else [image[..., channel] for channel in range(image.shape[2])]
+
+
+def last_place(newest: NewestRound, camera: Camera) -> int:
+    """Return the place in time of the last frame that a light's plate of the round was seen in."""
+    last = max(newest.round.plates, key=lambda plate: plate.time_s)
+    flash = min(newest.timing.flashes, key=lambda one: abs(one.start_s + one.duration_s / 2 - last.time_s))
+    return int(frames_touched(camera, np.array([flash.start_s]), np.array([flash.duration_s]))[1][0])
 
 
 def lit_rows(newest: NewestRound, camera: Camera) -> list[tuple[int, int, str]]:

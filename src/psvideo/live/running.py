@@ -83,7 +83,10 @@ class Running:
 
     def _beside(self, began_s: float) -> None:
         self.chain.search = search_beside
-        threads = [threading.Thread(target=self._guarded, args=(run,), daemon=True) for run in (self._read, self._make)]
+        threads = [
+            threading.Thread(target=self._guarded, args=(run,), name=name, daemon=True)
+            for run, name in ((self._read, "psvideo frames"), (self._make, "psvideo results"))
+        ]
         for thread in threads:
             thread.start()
         before, said_s = (0, 0), time.monotonic()

@@ -50,36 +50,66 @@ function drawPanes() {
     labels.push(labelled(name, (cell.x + 8) / scale, (cell.y + 8) / scale));
     if (one.main === "frame") labels.push(...bands(rect, scale));
   });
-  at("labels").replaceChildren(...labels);
+  putMarks(labels);
 }
 
 function labelled(text, left, top) {
-  const span = document.createElement("span");
-  span.textContent = text;
-  span.style.left = `${left}px`;
-  span.style.top = `${top}px`;
-  return span;
+  return { kind: "span", text, name: "", style: `left: ${left}px; top: ${top}px` };
+}
+
+// Have just these marks over the picture; what stays as it was is not touched, as browsers lay out and paint anew what is.
+function putMarks(marks) {
+  const box = at("labels");
+  while (box.children.length > marks.length) box.lastChild.remove();
+  marks.forEach((mark, place) => {
+    const key = JSON.stringify(mark);
+    let node = box.children[place];
+    if (node && node.dataset.key === key) return;
+    if (!node || node.localName !== mark.kind) {
+      const made = document.createElement(mark.kind);
+      if (node) node.replaceWith(made);
+      else box.append(made);
+      node = made;
+    }
+    node.dataset.key = key;
+    node.className = mark.name;
+    node.style.cssText = mark.style;
+    if (node.textContent !== mark.text) node.textContent = mark.text;
+  });
 }
 
 // Which rows of the frame which light reached, beside the frame; the dark row is where none did.
 function bands(rect, scale) {
   const { rows, height } = held.frame.facts;
   return rows.flatMap(([first, last, name]) => {
-    const mark = document.createElement("i");
-    mark.className = name ? "" : "dark";
-    mark.style.left = `${(rect.x + rect.width) / scale - 6}px`;
-    mark.style.top = `${(rect.y + first / height * rect.height) / scale}px`;
-    mark.style.height = `${(last - first) / height * rect.height / scale}px`;
+    const left = (rect.x + rect.width) / scale - 6;
+    const top = (rect.y + first / height * rect.height) / scale;
+    const tall = (last - first) / height * rect.height / scale;
+    const mark = { kind: "i", text: "", name: name ? "" : "dark", style: `left: ${left}px; top: ${top}px; height: ${tall}px` };
     const middle = (rect.y + (first + last) / 2 / height * rect.height) / scale - 10;
     return [mark, labelled(name || "dark row", rect.x / scale + 4, middle)];
   });
 }
 
+const known = {};
+
+// Whether what is told under a name differs from what was told before.
+function isNew(name, told) {
+  const text = JSON.stringify(told);
+  const changed = known[name] !== text;
+  known[name] = text;
+  return changed;
+}
+
+function write(node, text) {
+  if (node.textContent !== text) node.textContent = text;
+}
+
 function showStatus(told) {
   at("state").dataset.state = told.state;
-  at("state").textContent = told.state === "locked" ? told.verdict || "Locked" : SENTENCES[told.state];
-  at("facts").textContent = told.line;
-  at("lines").replaceChildren(...told.lines.map(({ subject, grade, sentence }) => {
+  write(at("state"), told.state === "locked" ? told.verdict || "Locked" : SENTENCES[told.state]);
+  write(at("facts"), told.line);
+  if (isNew("lines", told.lines)) at("lines").replaceChildren(...told.lines.map(({ subject, grade, sentence }) => {
     const line = document.createElement("li");
     const word = document.createElement("b");
     line.className = grade;
@@ -87,7 +117,7 @@ function showStatus(told) {
     line.append(word, sentence);
     return line;
   }));
-  showHistograms(told.histograms);
+  if (isNew("histograms", told.histograms)) showHistograms(told.histograms);
   const names = told.lights.join();
   if (names !== at("plate").dataset.names) {
     at("plate").dataset.names = names;
@@ -154,6 +184,7 @@ function connect() {
       drawPanes();
       drawn += 1;
       document.body.dataset.drawn = String(drawn);
+      if (held.frame) document.dispatchEvent(new CustomEvent("drawn", { detail: held.frame.facts }));
       askNext();
     });
   };
