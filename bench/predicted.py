@@ -74,6 +74,7 @@ class Seen:
             misfit_deg=self.signs.misfit_deg[some],
             indirect_deg=self.signs.indirect_deg[some],
             torn_deg=self.signs.torn_deg[some],
+            lost_deg=self.signs.lost_deg[some],
         )
         return Seen(self.subject, self.lights, self.true_deg[some], self.noise_deg[some], self.fit_deg[some], signs)
 
@@ -189,7 +190,10 @@ def _looked(subject: str, case: Case) -> Seen:
         noise_deg=points.noise_deg[known],
         fit_deg=np.sqrt(sure)[known],
         signs=Signs(
-            misfit_deg=signs.misfit_deg[known], indirect_deg=signs.indirect_deg[known], torn_deg=signs.torn_deg[known]
+            misfit_deg=signs.misfit_deg[known],
+            indirect_deg=signs.indirect_deg[known],
+            torn_deg=signs.torn_deg[known],
+            lost_deg=signs.lost_deg[known],
         ),
     )
 

@@ -58,6 +58,14 @@ def test_of_noise_alone_two_thirds_are_within_the_predicted_error(lights: int) -
     assert np.median(predicted) < 2.2 * np.median(errors)
 
 
+@pytest.mark.parametrize("lights", [5, 12])
+def test_what_is_lost_in_heavy_noise_is_not_taken_for_light_by_way_of_other_surfaces(lights: int) -> None:
+    surface, errors, predicted = judged(ring(lights, 30), noise=0.02)
+    assert 0.6 <= (errors <= predicted).mean() <= 0.85
+    assert surface.misfit is not None
+    assert surface.misfit.error_deg < surface.misfit.noise_deg
+
+
 def test_light_by_way_of_other_surfaces_is_seen_where_lights_do_not_reach() -> None:
     _, errors, predicted = judged(ring(8, 55), indirect=0.06)
     _, _, without = judged(ring(8, 55))

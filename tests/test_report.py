@@ -58,6 +58,7 @@ SCENES = {
     "cut": FIVE_LIGHTS.replace("flash_s = 0.001", "flash_s = 0.001\ndark_s = 0.007"),
     "half_open": FIVE_LIGHTS.replace("shutter_deg = 360.0", "shutter_deg = 180.0"),
     "noisy": all_strengths(FIVE_LIGHTS, 0.15).replace("full_well_e = 20000.0", "full_well_e = 1500.0"),
+    "noisier": all_strengths(FIVE_LIGHTS, 0.12).replace("full_well_e = 20000.0", "full_well_e = 1500.0"),
 }
 
 
@@ -125,6 +126,7 @@ def test_a_good_take_is_called_usable_and_every_line_good(reported: Callable[...
         ("cut", "not usable as it is: rows", "rows", r"dark time of 7 ms is shorter.*plates are cut.*at least 10 ms"),
         ("half_open", "usable, with reservations", "rows", r"180 degrees only.*other rounds.*Shoot at 360 degrees"),
         ("noisy", "usable, with reservations", "validity", r"reach [89]\d %.*error is too large. Give more light"),
+        ("noisier", "not usable as it is: validity", "validity", r"reach 8\d %.* [89] % of .*Give more light"),
     ],
 )  # fmt: skip
 def test_the_first_lines_say_what_spoils_a_take_and_what_to_change(

@@ -12,6 +12,7 @@ import pytest
 from psvideo.model.camera import Camera
 from psvideo.model.plan import Plan, PlannedFlash, assemble_plan
 from psvideo.model.rig import Light, Rig
+from psvideo.model.surface import Misfit
 from psvideo.model.timing import DroppedFrames, Timing
 from psvideo.plates.ambient_regression import Separated
 from psvideo.plates.light_plate import LightPlate
@@ -38,8 +39,9 @@ class Footage:
         share of it that the first light clips, or all of them do. gains: of each light, (light,) or (round, light).
     noise: of saturation. dark: a part of the subject where only two lights reach. ambient: by round, as a share of what
         an exposure holds. blur_px, shift_px: of the picture, and how far it moves from round to round.
-    claimed_deg, turned_deg, claimed_gain: by how much the rig's directions are off, each its own way; by how much all
-        are turned around the axis; what it says of the first light's strength. solved: whether normals are needed.
+    claimed_deg, turned_deg, claimed_tilt_deg, claimed_gain: by how much the rig's directions are off, each its own way;
+        by how much all are turned around the axis, and around the picture's rows; what it says of the first light's
+        strength. solved: whether normals are needed.
     """
 
     shape: str = "ball"
@@ -57,6 +59,7 @@ class Footage:
     shift_px: float = 0.0
     claimed_deg: float = 0.0
     turned_deg: float = 0.0
+    claimed_tilt_deg: float = 0.0
     claimed_gain: float = 1.0
     unseen: float = 0.0
     borrowed: float = 0.0
@@ -92,6 +95,8 @@ class Footage:
         off, turn = np.radians(self.claimed_deg), np.radians(self.turned_deg)
         claimed = np.cos(off) * ways + np.sin(off) * across
         claimed = claimed @ np.array([[np.cos(turn), np.sin(turn), 0], [-np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
+        tilt = np.radians(self.claimed_tilt_deg)
+        claimed = claimed @ np.array([[1, 0, 0], [0, np.cos(tilt), np.sin(tilt)], [0, -np.sin(tilt), np.cos(tilt)]])
         gains = np.where(np.arange(len(ways)) == 0, self.claimed_gain, 1.0)
         lights = tuple(
             Light(name=f"light{n}", direction=(float(way[0]), float(way[1]), float(way[2])), intensity=(float(gain),))
@@ -301,6 +306,9 @@ SOLVED = [
     _by("turned around", rig_of, "rig", {"turned_deg": 31}, {"turned_deg": 35}, "doubtful bad", shape="waves",
         lights=3),
     _by("accuracy", accuracy, "accuracy", {"claimed_deg": 1}, {"claimed_deg": 5}, shape="waves", lights=8),
+    _by("noise alone", validity, "validity", {"noise": 0.025}, {"noise": 0.032}, "doubtful bad"),
+    _by("weak beside the rig", lamps, "lights", {"gains": [1, 0.15, 1]}, {"gains": [1, 0.1, 1]}, "good bad", lights=3),
+    _by("away", rig_of, "rig", {"claimed_tilt_deg": 40}, {"claimed_tilt_deg": 50}, "good bad"),
     _by("validity", validity, "validity", {"dark": 0.35}, {"dark": 0.45}),
     _by("validity lost", validity, "validity", {"dark": 0.75}, {"dark": 0.85}, "doubtful bad"),
     _by("noise", steadiness, "noise", {"noise": 0.015}, {"noise": 0.022}, "nothing doubtful",
@@ -310,6 +318,12 @@ SOLVED = [
     _by("flicker", steadiness, "flicker", {"gains": [[1.0] * 3, [1.008] * 3]}, {"gains": [[1.0] * 3, [1.013] * 3]},
         rounds=2, lights=3),
 ]  # fmt: skip
+
+
+def test_a_subject_that_clips_everywhere_is_called_so_and_is_told_to_look_again() -> None:
+    lines = exposure(Footage(shape="waves", stops=3, noise=0).observed(0))
+    assert graded(lines, "clipping") == "bad"
+    assert "10 %" in next(line.advice for line in lines if line.subject == "clipping")
 
 
 @pytest.mark.parametrize("case", LIT, ids=lambda case: case.name)
@@ -324,6 +338,19 @@ def test_light_on_both_sides_of_a_threshold_is_told_apart(case: Threshold, seed:
 def test_results_on_both_sides_of_a_threshold_are_told_apart(case: Threshold, seed: int) -> None:
     assert graded(case.judge(replace(case.good, solved=True).observed(seed)), case.subject) == case.grade
     assert graded(case.judge(replace(case.worse, solved=True).observed(seed)), case.subject) == case.worse_grade
+
+
+def test_what_is_left_beyond_noise_makes_a_take_doubtful_and_then_bad_whatever_is_to_blame() -> None:
+    one = Footage().observed(0)
+
+    def said(off_deg: float) -> tuple[str, str]:
+        misfit = Misfit(share=0.1, error_deg=off_deg / result.MEAN_OF_HELD)
+        one.facts[:] = [replace(facts, misfit=misfit, valid_share=0.1, measured_share=1.0) for facts in one.facts]
+        return graded(accuracy(one), "accuracy"), graded(validity(one), "validity")
+
+    assert [said(off_deg) for off_deg in (2.9, 3.1, 11.9, 12.1)] == [
+        ("good", "bad"), ("doubtful", "doubtful"), ("doubtful", "doubtful"), ("bad", "bad")
+    ]  # fmt: skip
 
 
 def timed(**changed: Any) -> str:

@@ -34,11 +34,13 @@ class Misfit:
     share: of the pixel's own light, as a standard deviation; noise and a rig that is wrong make it. The solver never
         takes it for less than 0.3 %.
     error_deg: the normal's predicted standard error there, without what noise makes of it.
+    noise_deg: what noise makes of it.
     reflectance: what the subject shows beyond n . l, None where that explains little.
     """
 
     share: float
     error_deg: float
+    noise_deg: float = 0.0
     reflectance: Reflectance | None = None
 
 

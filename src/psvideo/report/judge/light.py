@@ -26,6 +26,8 @@ NOTICED, MOST_SWING = 0.05, 0.1
 """Ambient light of more than the first share that changes from dark slot to dark slot by more than the second."""
 NO_LIGHT, WEAK_LIGHT = 0.01, 1 / 8
 """Shares of the brightest lamp's light."""
+CHECKED_FROM = 5
+"""With fewer lights than these nothing shows that one of them gives less than the rig says, and all normals lean."""
 MISSED = 0.5
 """A flash that gives less than this share of its lamp's usual light did not fire as it should."""
 UNSTEADY = 0.02
@@ -136,7 +138,7 @@ def lamps(observed: Observed, *, timed: bool = True) -> Iterator[Judgement]:
     level = np.array([one.levels for one in facts])
     usual = np.median(level, axis=0)
     relative = usual / max(float(usual.max()), 1e-12)
-    said = list(_weak(observed.lights, relative, _brightest(observed)))
+    said = list(_weak(observed.lights, relative, _brightest(observed), _claimed(observed)))
     alive = usual > NO_LIGHT * usual.max()
     whole = np.array([one.unseen_share == 0 for one in facts])
     if timed and whole.any():
@@ -160,7 +162,21 @@ def _brightest(observed: Observed) -> NDArray[np.float64]:
     return np.asarray(tops / tops.max())
 
 
-def _weak(lights: Sequence[str], relative: NDArray[np.float64], brightest: NDArray[np.float64]) -> Iterator[Judgement]:
+def _claimed(observed: Observed) -> NDArray[np.float64]:
+    """Return what the rig says that every lamp gives, as a share of the strongest; zeros where that is not known, or
+    where there are enough others to find out."""
+    if observed.points is None or len(observed.lights) >= CHECKED_FROM:
+        return np.zeros(len(observed.lights))
+    strengths = np.linalg.norm(observed.points.vectors, axis=2).mean(axis=0)
+    return np.asarray(strengths / max(float(strengths.max()), 1e-12))
+
+
+def _weak(
+    lights: Sequence[str],
+    relative: NDArray[np.float64],
+    brightest: NDArray[np.float64],
+    claimed: NDArray[np.float64],
+) -> Iterator[Judgement]:
     """Say which lamps give little. One that comes from the side gives the subject little, and its parts enough."""
     dim = (relative < WEAK_LIGHT) & (brightest < WEAK_LIGHT)
     weak = [light for light, share, is_dim in zip(lights, relative, dim, strict=True) if is_dim and share >= NO_LIGHT]
@@ -174,13 +190,21 @@ def _weak(lights: Sequence[str], relative: NDArray[np.float64], brightest: NDArr
         )
     if relative.max() <= 0:  # nothing is lit, which is said once
         return
-    for light, share, is_dim in zip(lights, relative, dim, strict=True):
+    for light, share, is_dim, says in zip(lights, relative, dim, claimed, strict=True):
         if share < NO_LIGHT:
             yield Judgement(
                 subject="lights",
                 grade="bad",
                 found=f"The light {light!r} gives no light ({100 * max(share, 0):.1f} % of the strongest).",
                 advice="Check its cable, driver and line, and that the plan names it as the board does.",
+            )
+        elif is_dim and says >= WEAK_LIGHT:
+            yield Judgement(
+                subject="lights",
+                grade="bad",
+                found=f"The light {light!r} is weak: {100 * share:.0f} % of the strongest, where the rig says "
+                f"{100 * says:.0f} %. With {len(lights)} lights all normals lean away from it.",
+                advice="Raise its power, or measure the lights' strengths again.",
             )
         elif is_dim and len(weak) <= NAMED:
             yield Judgement(

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from psvideo.report.judge.light import NAMED
-from psvideo.report.judge.result import AT_REST, NOISY_DEG, moves
+from psvideo.report.judge.result import AT_REST, NOISY_DEG, by_noise_deg, moves
 from psvideo.report.judgement import Grade, Judgement
 from psvideo.report.observe.observed import InstantFacts, Observed
 from psvideo.report.observe.rigfit import RigFit
@@ -17,6 +17,8 @@ LEFT_OVER = 0.1
 STRENGTH_MISFIT, BY_STRENGTH, OTHER_STRENGTH = 0.05, 0.5, 1.25
 """Less is enough where other strengths of some lights, half of them at most, take half of it away."""
 AGREE, DISAGREE = 0.3, -0.1
+MOST_AWAY = 0.05
+"""Of measured normals, the share that may face away from the camera: what a camera sees faces it."""
 TOO_FAR_DEG, AGREE_FAR = 8.0, 0.15
 """Slopes of normals that are so far off agree badly under the right rig too: then they must agree by the second. (A
 bear's under eight lights in one plane: 0.21; five lights of which each is taken for the next: 0.11.)"""
@@ -26,9 +28,9 @@ def rig(observed: Observed) -> Iterator[Judgement]:
     """Judge whether the rig's directions and strengths can have made these plates."""
     fit = observed.rig_fit
     wrong = None if fit is None else _misfit(observed.lights, fit)
-    crossed = _crossed(observed)
-    if wrong or crossed:
-        yield from (one for one in (wrong, crossed) if one)
+    crossed, away = _crossed(observed), _away(observed)
+    if wrong or crossed or away:
+        yield from (one for one in (wrong, crossed, away) if one)
     elif fit is not None:
         yield _explained(fit)
     elif observed.slopes:
@@ -96,7 +98,21 @@ def _crossed(observed: Observed) -> Judgement | None:
     )
 
 
+def _away(observed: Observed) -> Judgement | None:
+    share = float(np.median(observed.away)) if observed.away else 0.0
+    if share <= MOST_AWAY or not quiet(observed.facts):
+        return None
+    return Judgement(
+        subject="rig",
+        grade="bad",
+        found=f"{100 * share:.0f} % of the normals face away from the camera, which sees none of such a surface: "
+        "directions or strengths of the lights are wrong.",
+        advice="Use the rig file of this set-up; check that lights have the same names in plan and rig, and that each "
+        "gives what the rig says.",
+    )
+
+
 def quiet(facts: Sequence[InstantFacts]) -> bool:
     """Tell whether normals are steady enough to be held against each other."""
     known = [one.change.normals_deg for one in facts if one.change is not None and (one.moving_share or 0.0) < AT_REST]
-    return not known or float(np.median(known)) < NOISY_DEG
+    return by_noise_deg(facts) < NOISY_DEG and (not known or float(np.median(known)) < NOISY_DEG)

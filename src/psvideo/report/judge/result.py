@@ -12,6 +12,9 @@ SOFT_PX = 1.5
 """Sharpest edges that are softer are never worse than doubtful: a smooth subject has no others."""
 COMMON_DEG = 3.0
 """What a typical normal may be off by beyond noise."""
+LOST_DEG = 12.0
+"""From here on a normal says little of the surface: photographs under directions that were 1 to 8 degrees off came to
+10, and a bear under eight lights nearly in one plane to 18."""
 MEAN_OF_HELD = 0.83
 """Predicted errors hold two thirds of the true ones; this is the mean as a share of it, for errors in two directions
 (Rayleigh)."""
@@ -59,7 +62,8 @@ def validity(observed: Observed) -> Iterator[Judgement]:
     reached = [one.measured_share for one in known if one.measured_share is not None]
     enough = bool(reached) and float(np.median(reached)) >= LEAST_VALID
     off_deg = _off_deg(observed) or 0.0
-    grade: Grade = "bad" if max(shares) < HARDLY_VALID and not (enough and off_deg > COMMON_DEG) else "doubtful"
+    by_surface = enough and max(COMMON_DEG, by_noise_deg(observed.facts)) < off_deg <= LOST_DEG
+    grade: Grade = "bad" if max(shares) < HARDLY_VALID and not by_surface else "doubtful"
     if enough:
         said = any(one.grade != "good" for one in accuracy(observed))
         yield Judgement(
@@ -83,7 +87,7 @@ def validity(observed: Observed) -> Iterator[Judgement]:
 def accuracy(observed: Observed) -> Iterator[Judgement]:
     """Judge how far off a typical normal is by more than noise, and what makes it so."""
     error_deg = _off_deg(observed)
-    if error_deg is None:
+    if error_deg is None or error_deg < by_noise_deg(observed.facts):  # what noise hides cannot be told from it
         return
     amount = f"about {error_deg:.0f} degrees" if error_deg > 1.5 else "no more than about a degree"
     found = f"Beyond noise, a typical normal is off by {amount}"
@@ -99,7 +103,7 @@ def accuracy(observed: Observed) -> Iterator[Judgement]:
     )
     yield Judgement(
         subject="accuracy",
-        grade="doubtful",
+        grade="bad" if error_deg > LOST_DEG else "doubtful",
         found=f"{found}: {cause}.",
         advice='Measure the lights on a sphere beside the subject; `aov=["error"]` says how far off each pixel may be.'
         if by_rig
@@ -111,6 +115,12 @@ def _off_deg(observed: Observed) -> float | None:
     """Return how far off a typical normal is by more than noise, in the mean; None where nothing says so."""
     known = [one.misfit.error_deg for one in observed.facts if one.misfit is not None]
     return MEAN_OF_HELD * float(np.median(known)) if known else None
+
+
+def by_noise_deg(facts: Sequence[InstantFacts]) -> float:
+    """Return by how much noise turns a typical normal, in the mean; 0 where nothing says so."""
+    known = [one.misfit.noise_deg for one in facts if one.misfit is not None]
+    return MEAN_OF_HELD * float(np.median(known)) if known else 0.0
 
 
 def steadiness(facts: Sequence[InstantFacts]) -> Iterator[Judgement]:

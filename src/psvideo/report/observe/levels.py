@@ -70,6 +70,8 @@ class Levels:
         tops = [one.quantile(TARGET_QUANTILE) / max(one.quantile(1 - clipped), 2.0**-STOPS) for one in whole]
         if tops:
             return float(np.clip(HEADROOM / max(float(np.median(tops)), 1.0), LEAST_POWER, 0.9))
+        if clipped == 1:  # nothing says by how much
+            return LEAST_POWER
         shares = np.linspace(0.5, 0.98, 13) * (1 - clipped)
         levels = np.array([self.quantile(float(share)) for share in shares])
         slope, start = np.polyfit(shares, levels, 1)

@@ -20,7 +20,7 @@ from psvideo.report.observe.levels import BINS, Counts, Levels, count_levels
 from psvideo.report.observe.motion import Glimpse, Motion, glimpse, motion
 from psvideo.report.observe.rigfit import RigFit
 from psvideo.report.observe.rigpoints import RigPoints
-from psvideo.report.observe.slopes import slope_agreement
+from psvideo.report.observe.slopes import share_away, slope_agreement
 from psvideo.report.observe.steadiness import Change, Sample, change, sample_of
 from psvideo.report.observe.thinned import step_of, thin_surface, thinned
 from psvideo.report.observe.worst import Thumbnail, Worst
@@ -192,6 +192,7 @@ class Observed:
     counts: dict[str, Counts] = field(default_factory=dict)
     blurs_px: list[float] = field(default_factory=list)
     slopes: list[float] = field(default_factory=list)
+    away: list[float] = field(default_factory=list)
     light_at_points: list[NDArray[np.float64]] = field(default_factory=list)
     ambient_measured: dict[int, float] = field(default_factory=dict)
     beyond_mask: list[float] = field(default_factory=list)
@@ -250,6 +251,7 @@ class Observed:
             self.counts[light] = self.counts.get(light, np.zeros(BINS + 2, np.int64)) + counted
         self.blurs_px += other.blurs_px
         self.slopes += other.slopes
+        self.away += other.away
         self.light_at_points += other.light_at_points
         self.ambient_measured |= other.ambient_measured
         self.beyond_mask += other.beyond_mask
@@ -277,6 +279,7 @@ class Observed:
             agreement = slope_agreement(surface)
             if agreement is not None:
                 self.slopes.append(agreement)
+            self.away.append(share_away(surface))
         if self.points is not None and one.lights == self.lights:
             self.light_at_points.append(self.points.light(one))
 

@@ -9,12 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.surface import Surface
+from psvideo.report.observe.thinned import thin_surface
 
 WIDTH_PX = 320
-LEAST_PIXELS = 400
+LEAST_PIXELS, LEAST_AWAY = 400, 50
 STEEPEST = 4.0
 """Slopes beyond this lie on outlines, where neighbouring pixels show different things."""
 BLUR_PX = 1.5
+AWAY = -0.1
+"""Normals whose z is below this face away from the camera: noise at an outline does less."""
 LEAST_AVERAGED = 3
 """Of so many rows and columns, evenly, the mean of a larger square is taken."""
 
@@ -37,6 +40,13 @@ def slope_agreement(surface: Surface) -> float | None:
     along = np.gradient(slope_y, axis=1)[inside]
     total = float((across**2).sum() + (along**2).sum())
     return float(2 * (across * along).sum() / total) if total > 1e-12 else None
+
+
+def share_away(surface: Surface) -> float:
+    """Return which share of the normals that three lights gave faces away from the camera."""
+    some = thin_surface(surface)
+    count = int(some.measured.sum())
+    return float((some.normals[..., 2] < AWAY)[some.measured].sum() / count) if count >= LEAST_AWAY else 0.0
 
 
 def _thinned(surface: Surface, step: int) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:

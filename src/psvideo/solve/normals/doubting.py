@@ -64,11 +64,13 @@ class Doubting:
 @dataclass(frozen=True, kw_only=True)
 class Signs:
     """What is looked for, (row, col) of the points, in degrees: what residuals predict beyond noise, by which angle
-    light from around would turn the normal, and by which normals around belong to no surface."""
+    light from around would turn the normal, by which normals around belong to no surface, and what noise makes more
+    where some lights are not used."""
 
     misfit_deg: Floats
     indirect_deg: Floats
     torn_deg: Floats
+    lost_deg: Floats
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,6 +111,7 @@ def signs_of(points: ThinSurface, one: Evidence, surface: Surface, turned_deg: F
         misfit_deg=np.sqrt(np.maximum(_mean(squares, AROUND) / around, 0)),
         indirect_deg=np.degrees(indirect + own) * _turned(points.surface, one),
         torn_deg=np.sqrt(np.maximum(_torn_squared(points) - (TORN_OF_NOISE * points.noise_deg) ** 2, 0)),
+        lost_deg=points.noise_deg * np.sqrt(1 / reach - 1),
     )
 
 
@@ -118,7 +121,7 @@ def doubt_deg(signs: Signs, *, how: Doubting = Doubting()) -> Floats:
     misfit /= signs.misfit_deg + np.float32(how.little_deg)
     both = np.hypot(misfit, np.float32(how.indirect) * signs.indirect_deg)
     torn = np.minimum(signs.torn_deg, np.float32(how.most_torn_deg))
-    return np.asarray(both * (1 + np.float32(how.per_torn) * np.sqrt(torn)), np.float32)
+    return np.asarray(np.hypot(both * (1 + np.float32(how.per_torn) * np.sqrt(torn)), signs.lost_deg), np.float32)
 
 
 def _turned(surface: Surface, one: Evidence) -> Floats:

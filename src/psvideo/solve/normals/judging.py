@@ -75,10 +75,11 @@ def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging =
     limit_deg, misfit = how.most_error_deg, surface.misfit
     if at_points.size:
         albedo = _brightness(points.surface.albedo)[points.known]  # what is bright shows more of the subject
-        typical, by_noise = (weighted_median(each, albedo) for each in (at_points, points.noise_deg[points.known]))
+        noise_deg = np.hypot(points.noise_deg, signs.lost_deg)[points.known]
+        typical, by_noise = (weighted_median(each, albedo) for each in (at_points, noise_deg))
         beyond_deg = float(np.sqrt(max(typical**2 - by_noise**2, 0.0)))
         limit_deg = max(limit_deg, min(beyond_deg, how.most_typical_deg))
-        misfit = None if misfit is None else replace(misfit, error_deg=beyond_deg)
+        misfit = None if misfit is None else replace(misfit, error_deg=beyond_deg, noise_deg=by_noise)
     for more in (moving, near.doubt_deg if near.doubt_deg.size else None):
         doubt = doubt if more is None else np.hypot(doubt, more)
     error, trusted = spread.judged(surface, doubt, points.step, how, limit_deg=limit_deg, spare=one.spare)

@@ -117,9 +117,9 @@ def indirect_rows(
                     lx, ly, lz = at(lamp, i)
                     cosine = (lx * nx + ly * ny + lz * nz) * one
                     level *= one * t.albedo_scale
-                    hindered = (cosine <= facing) | (level < max(t.dark * t.albedo_scale, SHADOWED * size * cosine))
-                    if hindered:
-                        grazing = max(cosine, ZERO) if cosine <= facing else ZERO
+                    shadowed = (cosine > facing) & (level < SHADOWED * size * cosine)
+                    if shadowed | (cosine <= facing) | (level < t.dark * t.albedo_scale):  # or lost in noise
+                        grazing = ZERO if shadowed else max(cosine, ZERO)
                         share = level / size - grazing
                         sum_of += min(max(share, -MOST_INDIRECT), MOST_INDIRECT)
                         number += ONE
