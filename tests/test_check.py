@@ -289,12 +289,14 @@ def heeds_ctrl_c() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
+@pytest.mark.parametrize("how", [[], pytest.param(["--workers", "2"], marks=pytest.mark.campaign)])
 def test_several_takes_are_checked_and_one_that_cannot_be_read_does_not_keep_the_others(
-    shot: Callable[[str], Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    how: list[str], shot: Callable[[str], Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     page = tmp_path / "checks.html"
-    assert run("check", tmp_path / "takes" / "nothing", shot("good"), "--report", page) == 1
+    assert run("check", tmp_path / "takes" / "nothing", shot("good"), "--report", page, *how) == 1
     said = capsys.readouterr().out
+    assert f"{shot('good')}: This take is usable" in said
     assert "nothing: cannot be checked yet" in said
     assert "2 takes checked: 1 usable, 0 not, 1 could not be read." in said
     assert "nothing" in page.read_text(encoding="utf-8")
@@ -344,6 +346,7 @@ def test_a_page_among_the_footage_is_refused(shot: Callable[[str], Path], capsys
     assert run("check", clip, "--report", clip / "check.html") == 2
     assert "among the footage" in capsys.readouterr().err
     assert run("check", "--watch", clip.parent, "--report", clip / "check.html") == 2
+    assert run("check", "--watch", clip.parent, "--workers", "2") == 2
     assert run("check") == 2
     assert run("check", clip, "--watch", clip) == 2
     assert run("check", "--watch", clip / "nowhere") == 2

@@ -1,14 +1,20 @@
 """Many takes checked: those that are named, or every new one below a folder as it comes while a set shoots."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
+from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.runs.caller import PYTHON, Caller
 from psvideo.runs.check import judged, refuse_inside
 from psvideo.runs.checked import Check, write_page
+from psvideo.runs.cluster import Cluster, called_apart, connected
 from psvideo.runs.takes import whole_takes
+
+AS_IT_IS = Caller(spell=str)
+"""In a worker, sentences keep their parameters' own names: the caller's words for them are put in here."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,22 +32,48 @@ def check_takes(
     rig: Path | str | None = None,
     first_light: str | None = None,
     report: Path | str | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    watch: Watch = unwatched,
     caller: Caller = PYTHON,
 ) -> Iterator[Check | Unread]:
-    """Check takes one after the other; one that cannot be read does not keep the others.
+    """Check takes one after the other, or several at a time; one that cannot be read does not keep the others.
 
-    ``report`` is a page (HTML) of all checks, outside of the takes; the other parameters are those of ``check``. Raises
-    UsageError where the report would lie in a take.
+    ``report`` is a page (HTML) of all checks, outside of the takes. ``workers`` checks with so many processes on this
+    computer, ``scheduler`` with the workers of a dask cluster, by its address, which see the same files under the same
+    paths: takes come as they are done, and both need the extra ``psvideo[dask]``. ``watch`` is handed the loop over
+    takes that are shared out; the other parameters are those of ``check``. Raises UsageError where the report would
+    lie in a take, and where the cluster cannot be used; PsvideoError where no scheduler answers, or it is gone.
     """
     paths, page = [Path(clip) for clip in clips], None if report is None else Path(report)
     for path in paths:
         refuse_inside(page, path)
     plan_path, rig_path = (None if path is None else Path(path) for path in (plan, rig))
+    one = partial(_one, plan=plan_path, rig=rig_path, first_light=first_light, caller=caller)
+    checks: Iterator[tuple[Path, Check | Unread]] = ((path, one(path)) for path in paths)
+    if workers is not None or scheduler is not None:
+        cluster = Cluster(workers=workers, scheduler=scheduler)
+        cluster.check()
+        checks = _shared_out(cluster, paths, partial(one, caller=AS_IT_IS), caller=caller, watch=watch)
     found: dict[Path, Check | Unread] = {}
-    for path in paths:
-        found[path] = _one(path, plan_path, rig_path, first_light, caller)
+    for path, found[path] in checks:
         _keep(page, found)
         yield found[path]
+
+
+def _shared_out(
+    cluster: Cluster, paths: Sequence[Path], one: Callable[[Path], Check | Unread], *, caller: Caller, watch: Watch
+) -> Iterator[tuple[Path, Check | Unread]]:
+    """Give each take with what a worker found of it. Workers may run elsewhere: they get whole paths."""
+    given = {path.resolve(): path for path in paths}
+    with connected(cluster) as client:
+        for whole, check in called_apart(client, one, [*given], watch=watch):
+            path = given[whole]
+            if isinstance(check, Check):
+                yield path, replace(check, path=path)
+            else:
+                fault = check.fault if isinstance(check, Unread) else check
+                yield path, Unread(path=path, fault=caller.spell(fault))
 
 
 def check_folder(

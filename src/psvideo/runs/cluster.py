@@ -8,9 +8,9 @@ import contextlib
 import logging
 import threading
 import time
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.compute.threads import THREADS, thread_count
@@ -18,6 +18,9 @@ from psvideo.errors import PsvideoError, UsageError
 
 if TYPE_CHECKING:
     from distributed import Client, Future
+
+Value = TypeVar("Value")
+Result = TypeVar("Result")
 
 EXTRA = (
     "`workers` and `scheduler` need dask, an extra: python -m pip install 'psvideo[dask]'. Without it one process "
@@ -207,6 +210,23 @@ def _hanging_replaced(client: "Client", ours: Container[str]) -> Iterator[None]:
         ended.set()
 
 
+def called_apart(
+    client: "Client", call: Callable[[Value], Result], values: Sequence[Value], *, watch: Watch = unwatched
+) -> Iterator[tuple[Value, Result | str]]:
+    """Have a function called with each value by a worker, and give the value with the result, or with what is wrong.
+
+    Values and results are small, and no result is a str. Raises PsvideoError where the scheduler is gone.
+    """
+    from distributed import as_completed
+
+    futures = [client.submit(call, value, pure=False, retries=RETRIES) for value in values]
+    value_of = {future.key: value for future, value in zip(futures, values, strict=True)}
+    done = as_completed(futures, loop=client.loop, raise_errors=False)
+    with _hanging_replaced(client, value_of):
+        for future in watch(done, total=len(futures), what="checking", unit="takes"):
+            yield value_of[future.key], future.result() if future.status == "finished" else _fault(future)
+
+
 def do_piece(take: Shared, number: int, *, after: object) -> None:
     """Do one piece of a take, in a worker. ``after`` is what it waits for."""
     take.do(number)
@@ -215,8 +235,8 @@ def do_piece(take: Shared, number: int, *, after: object) -> None:
 def _fault(future: "Future") -> str:
     if future.status in ("cancelled", "lost"):
         raise PsvideoError(
-            "The cluster's scheduler is gone. What was solved is kept beside the outputs: run the command again with "
-            "`resume`, here or on a cluster."
+            "The cluster's scheduler is gone. Run the command again, here or on a cluster; what was written is kept "
+            "beside the outputs for `resume`."
         )
     fault = future.exception()
     return str(fault) if isinstance(fault, PsvideoError) else f"{type(fault).__name__}: {fault}"

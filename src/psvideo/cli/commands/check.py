@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from psvideo.cli.console import Voice
-from psvideo.cli.options.clip_and_run import FirstLight, Json, OrderRig, PlanPath, Quiet, Verbose
+from psvideo.cli.options.clip_and_run import FirstLight, Json, OrderRig, PlanPath, Quiet, Scheduler, Verbose, Workers
 from psvideo.errors import UsageError
 from psvideo.model.units import counted
 
@@ -47,6 +47,8 @@ def check(
     plan: PlanPath = None,
     rig: OrderRig = None,
     first_light: FirstLight = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     json: Json = False,
     verbose: Verbose = False,
     quiet: Quiet = False,
@@ -55,10 +57,23 @@ def check(
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     if (not clips) == (watch is None):
         raise UsageError("Name either a clip to check, or a folder of takes with --watch FOLDER.")
-    if clips and len(clips) > 1:
+    apart = workers is not None or scheduler is not None
+    if watch is not None and apart:
+        raise UsageError("--watch checks takes as they come, in this process: leave out --workers and --scheduler.")
+    if clips and (len(clips) > 1 or apart):
         from psvideo.runs.check_folder import check_takes
 
-        several = check_takes(clips, plan=plan, rig=rig, first_light=first_light, report=report, caller=voice.caller())
+        several = check_takes(
+            clips,
+            plan=plan,
+            rig=rig,
+            first_light=first_light,
+            report=report,
+            workers=workers,
+            scheduler=scheduler,
+            watch=voice.track,
+            caller=voice.caller(),
+        )
         if not _follow(voice, several):
             raise typer.Exit(1)
     elif clips:

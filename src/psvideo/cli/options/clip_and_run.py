@@ -37,10 +37,10 @@ PieceOption = Annotated[
     typer.Option("--piece", help="Solve a piece alone: 3/10, or 0/10 for what all share; --resume ends the run."),
 ]
 Workers = Annotated[
-    int | None, typer.Option("--workers", min=1, help="Solve with so many processes (a dask cluster on this computer).")
+    int | None, typer.Option("--workers", min=1, help="Work with so many processes (a dask cluster on this computer).")
 ]
 Scheduler = Annotated[
-    str | None, typer.Option("--scheduler", help="Solve with the workers of a dask scheduler: tcp://HOST:8786.")
+    str | None, typer.Option("--scheduler", help="Work with the workers of a dask scheduler: tcp://HOST:8786.")
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for machines.")]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Say more.")]
