@@ -218,6 +218,10 @@ def test_rgb_movies_come_out_with_every_bit_in_the_right_channel(
         ("x.mov", "libx264", {"bf": "0", "qp": "0"}),
         ("x.mkv", "libx264", {"bf": "2", "qp": "0"}),
         ("x.mkv", "ffv1", {}),
+        ("x.AVI", "ffv1", {}),
+        ("x.m4v", "libx264", {"bf": "2", "qp": "0"}),
+        ("x.webm", "libvpx-vp9", {"lossless": "1"}),
+        ("x.mts", "libx264", {"bf": "2", "qp": "0"}),
     ],
 )
 def test_frames_come_in_the_order_of_time_and_are_found_by_number(
@@ -533,6 +537,14 @@ def test_truncated_movies_are_refused_by_name(
     (tmp_path / name).write_bytes(data[: int(len(data) * share)])
     with pytest.raises(PsvideoError, match=rf"{name}.*(truncated|holds|is empty)"):
         list(read_frames(open_clip(tmp_path / name, plan=plan)))
+
+
+def test_a_movie_whose_container_does_not_say_the_order_of_its_frames_says_so(
+    tmp_path: Path, plan_for: Callable[..., Path]
+) -> None:
+    write_movie(tmp_path / "x.avi", grey_ramp(12), codec="libx264", options={"bf": "2", "qp": "0"})
+    with pytest.raises(PsvideoError, match=r"or .*AVI does not say.* \.mkv"):
+        list(read_frames(open_clip(tmp_path / "x.avi", plan=plan_for(rows=32, cols=48))))
 
 
 def test_damage_in_the_middle_of_a_movie_stops_there(tmp_path: Path, plan_for: Callable[..., Path]) -> None:

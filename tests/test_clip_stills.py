@@ -15,6 +15,7 @@ import OpenEXR
 import pytest
 import tifffile
 from numpy.typing import NDArray
+from PIL import Image
 
 from psvideo.clip.decode import tiff
 from psvideo.clip.decode.decoders import decode, opened, read_header
@@ -340,3 +341,34 @@ def test_kinds_of_content_that_are_not_read_say_what_is(tmp_path: Path) -> None:
     (tmp_path / "x.png").write_bytes(imagecodecs.jpeg8_encode(np.zeros((8, 8), np.uint8)))
     with pytest.raises(PsvideoError, match=r"does not begin like a PNG file, but like JPEG\. Give it the ending \.jpg"):
         decode("png", tmp_path / "x.png")
+
+
+@pytest.mark.parametrize(
+    ("mode", "said"),
+    [("1", "no more than 2 shades of grey"), ("P", "no more than 256 colours"), ("L", None), ("RGB", None)],
+)
+def test_pngs_of_few_shades_are_read_with_a_warning(tmp_path: Path, mode: str, said: str | None) -> None:
+    ramp = np.repeat(np.arange(0, 256, 4)[None], 8, axis=0).astype(np.uint8)
+    Image.fromarray(ramp).convert(mode).save(tmp_path / "x.png")
+    found = read_header("png", tmp_path / "x.png").warnings
+    assert [said is not None and said in warning for warning in found] == [True] * (said is not None)
+
+
+def test_a_jpeg_for_printing_is_refused_as_such(tmp_path: Path) -> None:
+    Image.new("CMYK", (16, 16)).save(tmp_path / "x.jpg")
+    with pytest.raises(PsvideoError, match=r"x\.jpg: has 4 channels \(CMYK, for printing\) of 8 bits; expected grey"):
+        read_header("jpeg", tmp_path / "x.jpg")
+
+
+@pytest.mark.parametrize(("start", "name"), [(b"\0\0\0\x18ftypheic", "HEIC"), (b"RIFF\0\0\0\0WEBP", "WebP")])
+def test_a_phone_s_picture_under_another_ending_is_named(tmp_path: Path, start: bytes, name: str) -> None:
+    (tmp_path / "x.jpg").write_bytes(start + bytes(100))
+    with pytest.raises(PsvideoError, match=f"like a JPEG file, but like {name}, which is not read"):
+        read_header("jpeg", tmp_path / "x.jpg")
+
+
+def test_an_exr_whose_colour_is_in_differences_says_that_it_is_read_as_grey(tmp_path: Path) -> None:
+    planes = {name: np.full((8, 8), 0.25, np.float16) for name in ("Y", "RY", "BY")}
+    OpenEXR.File({"type": OpenEXR.scanlineimage}, planes).write(str(tmp_path / "x.exr"))
+    (warning,) = read_header("exr", tmp_path / "x.exr").warnings
+    assert "(RY, BY)" in warning

@@ -24,7 +24,7 @@ RAWS = ("dng", "raw")
 """Kinds that hold the sensor's own values: linear, with the levels and colour filters that the file states."""
 USUAL_KINDS = (*sorted(ending for ending, kind in KINDS.items() if kind != "raw"), "cameras' raw files")
 """What messages list."""
-MOVIES = (".mov", ".mp4", ".mkv", ".mxf")
+MOVIES = (".mov", ".mp4", ".mkv", ".mxf", ".m4v", ".3gp", ".avi", ".webm", ".mts", ".m2ts", ".mpg")
 TO_PICTURES = "export the pictures as 16-bit TIFF, PNG or DNG; a phone's camera can be set to JPEG or raw"
 TO_FOOTAGE = "export it with its maker's program, as DNG, EXR or ProRes"
 UNREAD = {

@@ -22,6 +22,7 @@ from psvideo.errors import PsvideoError
 from psvideo.formats.paths import check_file
 
 GREY_NAMES = ("Y", "L", "V")
+LUMINANCE = "the EXR files hold colour as differences (RY, BY), which are left out: they are read as grey (Y)"
 OF_THE_CONTAINER = ("type", "name", "chunkCount", "pixelAspectRatio", "screenWindowWidth")
 
 
@@ -171,9 +172,9 @@ def _picture_in(layer: str, found: list[str]) -> tuple[str, ...]:
 def _header(file: Any, names: tuple[str, ...]) -> Header:
     attributes = file.header()
     width_px, height_px = _size(attributes["displayWindow"])
-    warnings: tuple[str, ...] = ()
-    if "A" in {channel.name.rpartition(".")[2] for channel in attributes["channels"]}:
-        warnings = ("the EXR files' alpha channel is left out",)
+    kinds = {channel.name.rpartition(".")[2] for channel in attributes["channels"]}
+    alpha = ("the EXR files' alpha channel is left out",) if "A" in kinds else ()
+    chroma = (LUMINANCE,) if {"RY", "BY"} <= kinds and len(names) == 1 else ()
     return Header(
         width_px=width_px,
         height_px=height_px,
@@ -182,7 +183,7 @@ def _header(file: Any, names: tuple[str, ...]) -> Header:
         colour=attributes.get("colorInteropID"),
         time_code=_time_code(attributes.get("timeCode")),
         shot=shot_of(attributes),
-        warnings=warnings,
+        warnings=alpha + chroma,
     )
 
 

@@ -7,6 +7,7 @@ import imagecodecs
 from psvideo.clip.decode.signatures import begins_like
 from psvideo.clip.record import CodedPicture, Header
 from psvideo.errors import PsvideoError
+from psvideo.model.units import counted
 
 START, END = b"\xff\xd8", b"\xff\xd9"
 TAIL = 1024
@@ -38,9 +39,12 @@ def _parse_header(path: Path, data: bytes) -> Header:
             height_px, width_px = (int.from_bytes(data[place + at : place + at + 2]) for at in (5, 7))
             channels = data[place + 9]
             if data[place + 4] != 8 or channels not in (1, 3):
-                break
+                raise PsvideoError(
+                    f"{path}: has {counted(channels, 'channel')}{' (CMYK, for printing)' * (channels == 4)} of "
+                    f"{data[place + 4]} bits; expected grey or RGB of 8 bits. Export it as such."
+                )
             return Header(width_px=width_px, height_px=height_px, channels=channels, bits=8, warnings=(LOSSY,))
         place += 2 if marker in NO_LENGTH else 2 + int.from_bytes(data[place + 2 : place + 4])
     raise PsvideoError(
-        f"{path}: is truncated or no JPEG of 8 bits with 1 or 3 channels. Copy it again, or export another kind."
+        f"{path}: is truncated: it does not say how large its picture is. Copy it again, or export another kind."
     )

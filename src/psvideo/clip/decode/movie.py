@@ -144,8 +144,10 @@ def read_movie(path: Path, timestamps: Sequence[int]) -> Iterator[CodedPicture]:
 
     Raises PsvideoError where one of them cannot be decoded or does not come.
     """
-    wanted = deque(timestamps)
+    wanted, unordered = deque(timestamps), ""
     with _opened(path) as (container, stream):
+        if container.format.name == "avi" and not stream.codec_context.codec.intra_only:
+            unordered = ", or its frames are coded out of their order, which AVI does not say (repack it as .mkv)"
         if wanted[0] > (stream.start_time or 0):
             with contextlib.suppress(av.PermissionError):  # the index names no whole frame before: from the first on
                 container.seek(_safe_start(stream, wanted[0]), stream=stream)
@@ -159,8 +161,8 @@ def read_movie(path: Path, timestamps: Sequence[int]) -> Iterator[CodedPicture]:
             if not wanted:
                 return
     raise PsvideoError(
-        f"{path}: the frame with timestamp {wanted[0]} cannot be decoded; the movie is truncated or damaged there. "
-        "Copy it again, or choose other frames with `frames`."
+        f"{path}: the frame with timestamp {wanted[0]} cannot be decoded; the movie is truncated or damaged "
+        f"there{unordered}. Copy it again, or choose other frames with `frames`."
     )
 
 
