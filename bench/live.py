@@ -107,7 +107,14 @@ def _spent(width_px: int, height_px: int, fps: int, step: int) -> Spent:
         surface = next(surfaces([one], small, known, solving=Solving(), one_by_one=True)).surface
         spent.each_s.setdefault("plates and normals", []).append(time.process_time() - began)
         newest = NewestRound(
-            round=one, surface=surface, came_s=0.0, step=step, timing=timing, frame=coded, place=frame.index
+            round=one,
+            surface=surface,
+            came_s=0.0,
+            step=step,
+            timing=timing,
+            frame=coded,
+            place=frame.index,
+            ended=frame.index,
         )
         pictures.put(newest, timed_camera(small, timing))
         spent.on("packed for the page", partial(pictures.packed, "key"))

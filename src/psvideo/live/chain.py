@@ -16,14 +16,15 @@ from psvideo.live.lock import LONGEST_S, Lock, frames_to_lock, lock
 from psvideo.live.newest_round import LiveRounds
 from psvideo.live.ring import Ring, RingFrame, ring_of
 from psvideo.live.smaller import Smaller, smaller_plan, smaller_rig, smaller_timing
-from psvideo.model.camera import FloatArray
+from psvideo.model.camera import Camera, FloatArray
 from psvideo.model.coded import Coded
 from psvideo.model.intensity import lights_as_planned
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Rig
 from psvideo.model.row_profiles import LOST, row_light
+from psvideo.model.shutter import frames_touched
 from psvideo.model.surface import Surface
-from psvideo.model.timing import Timing
+from psvideo.model.timing import Timing, timed_camera
 from psvideo.plates.sequence import Round
 from psvideo.solve.instants import surfaces
 from psvideo.solve.near_surface import near_surface_of
@@ -44,9 +45,10 @@ class LiveFrame:
 
 @dataclass(frozen=True, kw_only=True)
 class NewestRound:
-    """The newest result: its plates, the surface where there is a rig, and when the last of its frames came.
+    """The newest result: its plates, the surface where there is a rig, and when the last frame that showed it came.
 
-    ``step`` is by how much its picture is smaller than the camera's, ``frame`` the newest frame, at ``place`` in time.
+    ``ended`` is that frame's place in time, ``frame`` the newest frame, at ``place``; ``step`` by how much pictures are
+    smaller than the camera's.
     """
 
     round: Round
@@ -56,6 +58,7 @@ class NewestRound:
     timing: Timing
     frame: Coded
     place: int
+    ended: int
 
 
 def search_here(run: Callable[[], None]) -> None:
@@ -157,14 +160,16 @@ class Chain:
         if one is None:
             return None
         last = max(held)
+        ended = min(_ended(one, timed_camera(plan, small), small), last)
         return NewestRound(
             round=one,
             surface=None if self.rig is None else self._surface(one, plan, step),
-            came_s=held[last].came_s,
+            came_s=held.get(ended, held[last]).came_s,
             step=step,
             timing=small,
             frame=held[last].coded,
             place=last,
+            ended=ended,
         )
 
     def _surface(self, one: Round, plan: Plan, step: int) -> Surface | None:
@@ -254,6 +259,13 @@ def _stacked(doubts: list[FloatArray | None], values: FloatArray) -> FloatArray 
     if all(one is None for one in doubts):
         return None
     return np.stack([np.zeros(values.shape[1]) if one is None else one for one in doubts])
+
+
+def _ended(one: Round, camera: Camera, timing: Timing) -> int:
+    """Return the place in time of the last frame that shows any light of a round."""
+    time_s = max(plate.time_s for plate in one.plates)
+    flash = min(timing.flashes, key=lambda flash: abs(flash.start_s + flash.duration_s / 2 - time_s))
+    return int(frames_touched(camera, np.array([flash.start_s]), np.array([flash.duration_s]))[1][0])
 
 
 def _fits(frame: RingFrame, plan: Plan, step: int) -> bool:

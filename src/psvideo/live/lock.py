@@ -11,10 +11,13 @@ from psvideo.model.plan import Plan
 from psvideo.model.timing import Order
 from psvideo.sync.find import find_strobe, fitted_camera
 from psvideo.sync.rowfit.beat import Beat, FoundClock
+from psvideo.sync.rowfit.fit import FLASH_ROWS
 from psvideo.sync.rowfit.seed import SEED_FRAMES
 
 LONGEST_S = 2.0
 """Older profiles than this are not looked at: whatever spoiled them is to be forgotten."""
+LOCK_ROWS = 180
+"""A sixth of 1080, which gives the phase to 0.02 of theirs; more where a flash would not span ``FLASH_ROWS``."""
 SLOPE_S = 0.2
 """Over so long before its end a bent clock's rate is read."""
 UNSURE = 3.0
@@ -54,6 +57,14 @@ def frames_to_lock(plan: Plan) -> int:
     return max(SEED_FRAMES, int(1.5 * plan.marker_s / plan.camera.frame_period_s) + 2)
 
 
+def rows_to_lock(plan: Plan) -> int:
+    """Return to how many rows frames may be averaged: the finder's time goes with them, and who follows gets surer."""
+    camera = plan.camera
+    reads_s = camera.frame_period_s if camera.readout_s is None else abs(camera.readout_s)
+    shortest_s = min(plan.flashes[slot].duration_s for slot in plan.lit_slots)
+    return max(LOCK_ROWS, int(FLASH_ROWS * reads_s / shortest_s) + 1)
+
+
 def lock(
     plan: Plan,
     index: NDArray[np.int64],
@@ -67,7 +78,9 @@ def lock(
     Raises NoStrobeError where they do not show the plan's strobe.
     """
     begin = int(index[0])
-    strobe = find_strobe(plan, index - begin, profiles, clip="live", first_light=first_light, doubt=doubt)
+    strobe = find_strobe(
+        plan, index - begin, profiles, clip="live", first_light=first_light, doubt=doubt, most_rows=rows_to_lock(plan)
+    )
     fit, places = strobe.found.fit, strobe.found.track.index
     period_s = plan.camera.frame_period_s
     span_s = float(places[-1] + 1) * period_s

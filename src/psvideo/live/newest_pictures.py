@@ -1,6 +1,7 @@
 """The newest pictures for pages: packed when somebody asks for them, once for all who do, and never an older one."""
 
 import threading
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -10,12 +11,15 @@ from numpy.typing import NDArray
 
 from psvideo.live.chain import NewestRound
 from psvideo.model.camera import Camera
-from psvideo.model.shutter import frames_touched, row_weights
-from psvideo.page.picture import Look, PagePicture, block, shown
+from psvideo.model.coded import Coded
+from psvideo.model.shutter import row_weights
+from psvideo.page.picture import Look, PagePicture, block, halves, picked, shown
 
 LARGE, SMALL = Look(width_px=640), Look(width_px=320, quick=True)
 BRIGHT = 0.8
 """The brightest hundredth of a picture is shown at so much of white."""
+REMEMBERED = 64
+"""Results of which it is known when they came, and drawn pictures that are counted."""
 LIT = 0.5
 """A row that saw less of every flash is part of the dark row."""
 
@@ -28,6 +32,8 @@ class NewestPictures:
     _newest: NewestRound | None = None
     _camera: Camera | None = None
     _packed: dict[str, bytes] = field(default_factory=dict)
+    _came_s: dict[int, float] = field(default_factory=dict)
+    _drawn: deque[tuple[float, float]] = field(default_factory=lambda: deque(maxlen=REMEMBERED))
     _changed: threading.Condition = field(default_factory=threading.Condition)
 
     def put(self, newest: NewestRound, camera: Camera) -> None:
@@ -35,6 +41,8 @@ class NewestPictures:
         with self._changed:
             self._newest, self._camera, self._packed = newest, camera, {}
             self.number += 1
+            self._came_s[self.number] = newest.came_s
+            self._came_s.pop(self.number - REMEMBERED, None)
             self._changed.notify_all()
 
     def wait(self, seen: int, most_s: float) -> int:
@@ -42,6 +50,18 @@ class NewestPictures:
         with self._changed:
             self._changed.wait_for(lambda: self.number != seen, most_s)
             return self.number
+
+    def drawn(self, number: int, at_s: float) -> None:
+        """Note that a page has drawn a result, at a time of this machine's clock."""
+        with self._changed:
+            if number in self._came_s:
+                self._drawn.append((at_s, at_s - self._came_s[number]))
+
+    def drawn_age_s(self, since_s: float) -> float | None:
+        """Return how old results were when pages had drawn them since a time, the median; None where none was drawn."""
+        with self._changed:
+            ages_s = [age_s for at_s, age_s in self._drawn if at_s > since_s]
+        return float(np.median(ages_s)) if ages_s else None
 
     def packed(self, plate: str) -> tuple[int, list[bytes]]:
         """Return the newest number and its pictures as blocks: normals and albedo, one light's plate, the frame."""
@@ -59,32 +79,38 @@ class NewestPictures:
 def _picture(name: str, newest: NewestRound, camera: Camera) -> PagePicture:
     surface = newest.surface
     if surface is not None and name == "normals":
-        return PagePicture(pixels=shown(_planes(surface.normals), LARGE, directions=True), facts={"id": "normals"})
+        return PagePicture(pixels=_pixels(surface.normals, LARGE, directions=True), facts={"id": "normals"})
     if surface is not None and name == "albedo":
         return _light("albedo", surface.albedo, LARGE, {})
     if name == "frame":
-        facts = {"rows": lit_rows(newest, camera), "place": newest.place, "ended": last_place(newest, camera)}
-        return _light("frame", newest.frame.light(), SMALL, facts)
+        facts = {"rows": lit_rows(newest, camera), "place": newest.place, "ended": newest.ended}
+        return _light("frame", _thinned(newest.frame).light(), SMALL, facts)
     asked = name.removeprefix("plate ")
     plate = next((one for one in newest.round.plates if one.light == asked), newest.round.plates[0])
     return _light("plate", plate.image, SMALL, {"light": plate.light})
 
 
+def _thinned(frame: Coded) -> Coded:
+    """Return the pixels of a frame that are shown; a mosaic of levels is made light first."""
+    if frame.shape[1] <= SMALL.width_px or frame.tone.zero.size > 1:
+        return frame
+    return Coded(codes=picked(np.asarray(frame.codes), SMALL.width_px), tone=frame.tone)
+
+
 def _light(name: str, image: NDArray[np.float32], look: Look, facts: Mapping[str, object]) -> PagePicture:
     bright = float(np.percentile(image[::8, ::8], 99))
     exposure = BRIGHT / bright if bright > 1e-6 else 1.0
-    return PagePicture(pixels=shown(_planes(image), look), facts={"id": name, "exposure": exposure} | dict(facts))
+    return PagePicture(pixels=_pixels(image, look), facts={"id": name, "exposure": exposure} | dict(facts))
 
 
-def _planes(image: NDArray[np.float32]) -> list[NDArray[np.float32]]:
-    return [image] if image.ndim == 2 else [image[..., channel] for channel in range(image.shape[2])]
-
-
-def last_place(newest: NewestRound, camera: Camera) -> int:
-    """Return the place in time of the last frame that a light's plate of the round was seen in."""
-    last = max(newest.round.plates, key=lambda plate: plate.time_s)
-    flash = min(newest.timing.flashes, key=lambda one: abs(one.start_s + one.duration_s / 2 - last.time_s))
-    return int(frames_touched(camera, np.array([flash.start_s]), np.array([flash.duration_s]))[1][0])
+def _pixels(image: NDArray[np.float32], look: Look, *, directions: bool = False) -> NDArray[np.floating]:
+    """Return a picture as it is shown: as it is, or made smaller where it is wider than is looked at."""
+    if image.shape[1] > look.width_px and look.quick:
+        return halves(picked(image, look.width_px))
+    if image.shape[1] > look.width_px:
+        planes = [image] if image.ndim == 2 else [image[..., channel] for channel in range(image.shape[2])]
+        return shown(planes, look, directions=directions)
+    return halves(image)
 
 
 def lit_rows(newest: NewestRound, camera: Camera) -> list[tuple[int, int, str]]:

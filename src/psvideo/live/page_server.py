@@ -9,6 +9,7 @@ import hmac
 import json
 import secrets
 import threading
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from http import HTTPStatus
@@ -89,9 +90,13 @@ class LivePage:
         from websockets.exceptions import ConnectionClosed
 
         self.viewers += 1
+        before = 0
         with contextlib.suppress(ConnectionClosed):  # a browser may go at any moment
             for message in connection:
                 asked = _asked(message)
+                if asked[0] != before:
+                    self.pictures.drawn(asked[0], time.monotonic())
+                before = asked[0]
                 self.pictures.wait(asked[0], WAIT_S)
                 number, blocks = self.pictures.packed(asked[1])
                 blocks = [] if number == asked[0] else blocks

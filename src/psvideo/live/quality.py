@@ -10,6 +10,8 @@ MOST_AGE_S = 0.2
 """From the end of an exposure to the picture it may take so long."""
 LEAST_RATE = 15.0
 """Results a second that look like motion; fewer are enough only where the strobe's rounds come more slowly."""
+MOST_RATE = 17.0
+"""More results a second nobody sees: they would only take time from frames and pages."""
 MOST_BUSY, SPARE_BUSY = 0.9, 0.2
 """Share of the time that solving may take; below the second, four times as many pixels find room."""
 CALM = 5

@@ -9,13 +9,14 @@ import numpy as np
 
 from psvideo.live.chain import Chain, LiveFrame, NewestRound, search_here
 from psvideo.live.holding import Holding
-from psvideo.live.quality import Quality
+from psvideo.live.quality import MOST_RATE, Quality
 from psvideo.live.recording import Recording
 from psvideo.live.smaller import smaller_plan
 from psvideo.live.source import LiveSource
 from psvideo.live.status import LiveStatus, LiveSummary
 
-IDLE_S = 0.002
+IDLE_S = 0.1
+"""Whoever waits for a frame looks so often whether the run is over."""
 STATUS_S = 1.0
 SLOW = 0.9
 """A source that gives less than this share of the plan's frames is slow, and said to be."""
@@ -32,16 +33,17 @@ def search_beside(run: Callable[[], None]) -> None:
 
 @dataclass(kw_only=True)
 class Running:
-    """One live run. ``shown`` gets every new result, ``said`` a status each second, ``recording``
-    every frame.
+    """One live run. ``shown`` gets every new result, ``said`` a status each second, ``recording`` every frame.
 
-    ``status`` is the last one that was said."""
+    ``drawn_age_s`` says how old results were when pages had drawn them since a time, None where none did; ``status`` is
+    the last one that was said."""
 
     chain: Chain
     source: LiveSource
     quality: Quality
     shown: Shown
     said: Said
+    drawn_age_s: Callable[[float], float | None] = lambda since_s: None
     recording: Recording | None = None
     holding: Holding | None = None
     seconds: float | None = None
@@ -53,6 +55,7 @@ class Running:
     _busy_s: float = 0.0
     _slow: bool = False
     _stop: threading.Event = field(default_factory=threading.Event)
+    _came: threading.Event = field(default_factory=threading.Event)
     _fault: BaseException | None = None
 
     def stop(self) -> None:
@@ -116,14 +119,21 @@ class Running:
                 break
 
     def _make(self) -> None:
+        """Solve when a frame has come, and no more often than looks like motion: other time is the frames'."""
+        due_s = 0.0
         while not self._stop.is_set():
-            if not self._solve():
-                time.sleep(IDLE_S)
+            if not self._came.wait(IDLE_S) or self._stop.wait(max(due_s - time.monotonic(), 0.0)):
+                continue
+            self._came.clear()
+            began_s = time.monotonic()
+            if self._solve():
+                due_s = began_s + 1 / MOST_RATE
 
     def _take(self, frame: LiveFrame) -> None:
         if self.recording is not None:
             self.recording.take(frame)
         self.chain.take(frame)
+        self._came.set()
         if self.chain.fault is not None:
             self.stop()
         if self.first_lock_s is None and self.chain.follower is not None:
@@ -171,6 +181,8 @@ class Running:
         chain, follower = self.chain, self.chain.follower
         camera = smaller_plan(chain.plan, chain.step).camera
         latest = self._ages_s[len(self._ages_s) - max(self.results - before[1], 0) :]
+        made_s = float(np.median(latest)) if latest else None
+        drawn_s = self.drawn_age_s(time.monotonic() - last_s)
         self.status = LiveStatus(
             at_s=round(at_s, 3),
             state=chain.state,
@@ -179,7 +191,7 @@ class Running:
             lost=chain.lost_frames,
             results=self.results,
             results_per_s=(self.results - before[1]) / last_s,
-            age_s=float(np.median(latest)) if latest else None,
+            age_s=made_s if drawn_s is None else drawn_s,
             phase_error_rows=None if follower is None else follower.error_rows,
             clock_offset_ppm=None if follower is None else follower.clock.offset_ppm,
             width_px=camera.width_px,

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.compute.compiled import EXACT
+from psvideo.live.smaller_kernel import average
 from psvideo.model.clipping import SATURATED
 from psvideo.model.coded import Coded, Tone
 from psvideo.model.plan import Plan
@@ -43,7 +43,7 @@ class Smaller:
         scale, clips, top = _scale(tone, codes.dtype)
         kind = np.float32 if codes.dtype.kind == "f" else np.uint16
         small = np.empty((codes.shape[0] // step, codes.shape[1] // step, channels), kind)
-        _average(planes, step, channel_of, np.float32(scale), np.float32(clips), np.float32(top), small)
+        average(planes, step, channel_of, np.float32(scale), np.float32(clips), np.float32(top), small)
         even = replace(tone, zero=tone.zero[:1, :1] * scale, gain=tone.gain[:1, :1] / scale, most=tone.most * scale)
         return Coded(codes=small[..., 0] if channels == 1 else small, tone=even)
 
@@ -97,45 +97,3 @@ def _scale(tone: Tone, kind: np.dtype[Any]) -> tuple[float, float, float]:
     scale = 1.0 if kind.kind == "f" else float(min(FINER, 65535 // max(int(most), 1)))
     top = max(clips, min(most, 1.0 / float(tone.gain[0, 0]) + float(tone.zero[0, 0]))) * scale
     return max(scale, 1.0), clips, np.ceil(top) if kind.kind != "f" else top
-
-
-@EXACT.kept
-def _average(
-    codes: NDArray[Any],
-    step: int,
-    channel_of: NDArray[np.int64],
-    scale: np.float32,
-    clips: np.float32,
-    top: np.float32,
-    small: NDArray[Any],
-) -> None:
-    """Fill ``small`` (row, col, channel) with the means of cells.
-
-    Samples of one place in the pattern lie at even distances, and each such comb is summed by itself: a loop without
-    choices in it.
-    """
-    rows, cols, channels = small.shape
-    planes = codes.shape[2]
-    total, most = np.empty((channels, cols), np.float32), np.empty((channels, cols), np.float32)
-    count = np.zeros(channels, np.float32)
-    for i in range(step):
-        for j in range(step):
-            for k in range(planes):
-                count[channel_of[i & 1, j & 1, k]] += np.float32(1.0)
-    for row in range(rows):
-        total[:], most[:] = 0.0, 0.0
-        for i in range(row * step, row * step + step):
-            line = codes[i].reshape(-1)
-            for j in range(step):
-                for k in range(planes):
-                    channel = channel_of[i & 1, j & 1, k]
-                    sums, highest = total[channel], most[channel]
-                    for col in range(cols):
-                        code = np.float32(line[(col * step + j) * planes + k])
-                        sums[col] += code
-                        highest[col] = max(highest[col], code)
-        for channel in range(channels):
-            factor = scale / count[channel]
-            for col in range(cols):
-                over = most[channel, col] >= clips
-                small[row, col, channel] = top if over else total[channel, col] * factor

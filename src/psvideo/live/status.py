@@ -14,7 +14,8 @@ SAID: dict[State, str] = {
 
 @dataclass(frozen=True, kw_only=True)
 class LiveStatus:
-    """The last second. ``age_s`` is from a frame's coming to its picture, None where there was none.
+    """The last second. ``age_s`` is from the coming of a result's last frame until pages had drawn it (where none is
+    open, until it was made), None where there was none.
 
     ``phase_error_rows`` and ``clock_offset_ppm`` are None while nothing is followed; ``why`` says then why not.
     ``width_px`` and ``height_px`` are the live picture's; ``off_rows`` is how far the dark row

@@ -9,15 +9,18 @@ import json
 import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.halves import halves_of
 from psvideo.pictures.relighting import smaller
 
 MAGIC = b"PSVB"
 HALF_MAX = 65504.0
 Plane = NDArray[np.floating]
+Number = TypeVar("Number", bound=np.generic)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +46,7 @@ def shown(planes: Sequence[Plane], look: Look, *, directions: bool = False, full
     is no direction, weighs nothing. ``full`` keeps 32 bits. What is no number becomes 0.
     """
     if look.quick and planes[0].shape[1] > look.width_px:
-        planes = [_picked(plane, look.width_px) for plane in planes]
+        planes = [picked(plane, look.width_px) for plane in planes]
     if planes[0].shape[1] <= look.width_px and all(plane.dtype == np.float16 for plane in planes) and not full:
         return _finite(np.stack(planes, axis=-1))
     small = np.stack([_smaller(plane, look.width_px) for plane in planes], axis=-1)
@@ -54,9 +57,15 @@ def shown(planes: Sequence[Plane], look: Look, *, directions: bool = False, full
     return small.astype(np.float32) if full else np.clip(small, -HALF_MAX, HALF_MAX).astype(np.float16)
 
 
-def _picked(plane: Plane, width_px: int) -> Plane:
-    """Return every second, third or so pixel of a plane, as many as fit the width."""
-    rows, cols = plane.shape
+def halves(image: NDArray[np.float32]) -> NDArray[np.float16]:
+    """Return a picture (row, col[, channel]) of finite numbers as pixels (row, col, channel) in half floats."""
+    rows, cols = image.shape[:2]
+    return halves_of(image.reshape(rows, -1))[0].reshape(rows, cols, -1)
+
+
+def picked(plane: NDArray[Number], width_px: int) -> NDArray[Number]:
+    """Return every second, third or so pixel of a picture (row, col[, channel]), as many as fit the width."""
+    rows, cols = plane.shape[:2]
     height_px = max(round(rows * width_px / cols), 1)
     row = ((np.arange(height_px) + 0.5) * rows / height_px).astype(np.intp)
     step = cols // width_px

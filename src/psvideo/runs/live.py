@@ -138,7 +138,7 @@ def _page(
         watching.look(newest, small)
         shown(newest)
 
-    running.shown = show
+    running.shown, running.drawn_age_s = show, pictures.drawn_age_s
     server = live_page(pictures, lambda: told(running.status, watching), host=host, port=port, token=token)
     try:
         opened(server.url)

@@ -95,12 +95,15 @@ def find_strobe(
     clip: str = "clip",
     first_light: str | None = None,
     doubt: NDArray[np.floating] | None = None,
+    most_rows: int | None = None,
 ) -> FoundStrobe:
     """Return the strobe's clock against the camera's, from row profiles as ``find_timing`` takes them.
 
-    Raises NoStrobeError where the profiles do not look like the plan's strobe.
+    Neighbouring rows are averaged to ``most_rows`` where there are more: less time, and a little less sure. Raises
+    NoStrobeError where the profiles do not look like the plan's strobe.
     """
     rows = _as_profiles(plan, indices, profiles, doubt)
+    rows = rows if most_rows is None else rows.binned(most_rows)
     hopeless = nothing_to_find(plan, rows)
     if hopeless:
         raise NoStrobeError(f"{clip}: {hopeless}")
