@@ -187,6 +187,9 @@ class ReadRows:
         self.read.update(range(len(self))[rows])
         return np.asarray(self.codes[rows])
 
+    def opened(self) -> None:
+        """In no file."""
+
     def some(self, rows: np.ndarray) -> np.ndarray:
         self.read.update(rows.tolist())
         return np.asarray(self.codes[rows[0] : rows[-1] + 1])

@@ -1,6 +1,9 @@
 """Pictures that are made of rows of frames in their codes, against plain numpy."""
 
+import os
 from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,12 +12,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from memory_frame import MemoryFrame
 
+from psvideo.clip import in_file
+from psvideo.clip.in_file import RowsInFile
+from psvideo.errors import PsvideoError
 from psvideo.model.camera import Camera
 from psvideo.model.clipping import SATURATED
 from psvideo.model.coded import Coded, Tone
 from psvideo.model.plan import Plan
 from psvideo.model.row_profiles import row_light
 from psvideo.model.timing import Flash, Timing
+from psvideo.plates import ready_mixture
 from psvideo.plates.align.packed import packed
 from psvideo.plates.ambient_level import AmbientLevel
 from psvideo.plates.mixture import Mixture, combined, made
@@ -96,6 +103,44 @@ def test_parts_of_a_picture_are_those_of_the_whole(name: str) -> None:
     assert np.array_equal(picture.reader()(5, 12), image[5:12])
     grey = image.reshape(ROWS // 2, 2, COLS // 2, 2, -1).mean(axis=(1, 3, 4))
     assert np.abs(picture.halved() - grey).max() < 1e-6
+
+
+def left_in_files(picture: Mixture, folder: Path, *, stays_open: bool = True) -> Mixture:
+    """The same picture of frames that lie in files, behind some bytes of something else."""
+    frames = []
+    for place, frame in enumerate(picture.frames):
+        codes = np.asarray(frame.codes)
+        path = folder / f"{place}.codes"
+        path.write_bytes(b"before" + codes.tobytes())
+        found = RowsInFile.at(path, 6, codes.dtype, codes.shape, stays_open=stays_open)
+        frames.append(replace(frame, codes=found))
+    return replace(picture, frames=tuple(frames))
+
+
+@pytest.mark.parametrize("how", ["by the loop", "before it", "opened for each"])
+@pytest.mark.parametrize("name", TONES)
+def test_frames_in_files_give_the_same_picture(
+    name: str, how: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if how == "before it":
+        monkeypatch.setattr(ready_mixture, "READER", 0)
+    held = shot(name, seed=2)
+    there = left_in_files(held, tmp_path, stays_open=how != "opened for each")
+    assert np.array_equal(there.image(), held.image())
+    assert np.array_equal(there.rows(np.array([9, 2, 30])), held.rows(np.array([9, 2, 30])))
+    assert np.array_equal(there.thinned(4), held.thinned(4))
+    assert np.array_equal(there.halved(), held.halved())
+
+
+def test_a_file_that_is_cut_short_while_a_loop_reads_it_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(in_file, "LOOKED_AT_EACH_S", 60.0)
+    picture = left_in_files(shot("12 bits of 16"), tmp_path)
+    picture.image()
+    os.truncate(tmp_path / "1.codes", 5000)
+    with pytest.raises(PsvideoError, match=r"1\.codes: was changed while it was worked on"):
+        picture.image()
 
 
 def test_ambient_light_in_16_bits_is_good_to_half_a_step_of_its_row() -> None:

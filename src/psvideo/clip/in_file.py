@@ -68,6 +68,12 @@ class RowsInFile:
             self.file.read(into[one:other], begin + one)
         return codes
 
+    def opened(self) -> tuple[int, int] | None:
+        """Return the open file and the byte at which the picture begins; None where the file is opened for every
+        reading. Raises PsvideoError where it is another one."""
+        opened = self.file.opened()
+        return None if opened is None else (opened, self.offset)
+
     def _room(self, rows: int) -> NDArray[Any]:
         return np.empty((rows, *self.shape[1:]), self.kind)
 
@@ -102,15 +108,20 @@ class FoundFile:
         if opened is not None:
             os.close(opened)
 
+    def opened(self) -> int | None:
+        """Return the file while it stays open, else None. Raises PsvideoError where it is another one than was found;
+        that is looked at now and then."""
+        if self._opened is not None and (now_s := time.monotonic()) - self._looked_s > LOOKED_AT_EACH_S:
+            self._check(self._opened)
+            self._looked_s = now_s
+        return self._opened
+
     def read(self, into: memoryview, begin: int) -> None:
         """Read as many bytes as there is room for, from the byte ``begin`` on. Raises PsvideoError where the file is
         another one than was found, or cannot be read."""
         try:
-            if self._opened is not None:
-                if (now_s := time.monotonic()) - self._looked_s > LOOKED_AT_EACH_S:
-                    self._check(self._opened)
-                    self._looked_s = now_s
-                if not _filled(partial(_from_open, self._opened), into, begin):
+            if (opened := self.opened()) is not None:
+                if not _filled(partial(_from_open, opened), into, begin):
                     raise self._changed()
                 return
             with self._path.open("rb", buffering=0) as file:

@@ -1,4 +1,4 @@
-"""Memory as compiled loops see it: arrays elsewhere, half floats as they are stored, arrays lent to threads."""
+"""Memory as compiled loops see it: arrays elsewhere, half floats as they are stored, arrays lent, rows of files."""
 
 from typing import Any
 
@@ -53,9 +53,24 @@ def _decoded(typing_context: Any, value: Any) -> Any:
     return types.float32(value), generate
 
 
+def _read_at(typing_context: Any, function: Any, opened: Any, into: Any, count: Any, begin: Any) -> Any:
+    """Call the C library's ``pread``, which lies at the address ``function``, on an ``opened`` file: read up to
+    ``count`` bytes from the byte ``begin`` on to the address ``into``, and return how many came; 0 or less: none."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        word, address = context.get_value_type(types.intp), _ir.IntType(8).as_pointer()
+        kind = _ir.FunctionType(word, [_ir.IntType(32), address, word, word])
+        called, file, place, size, first = arguments
+        file, place = builder.trunc(file, _ir.IntType(32)), builder.inttoptr(place, address)
+        return builder.call(builder.inttoptr(called, kind.as_pointer()), [file, place, size, first])
+
+    return types.intp(*[types.intp] * 5), generate
+
+
 pointer: Any = intrinsic(_pointer)
 encoded: Any = intrinsic(_encoded)
 decoded: Any = intrinsic(_decoded)
+read_at: Any = intrinsic(_read_at)
 
 
 @FUSED.inlined

@@ -91,6 +91,10 @@ class StoredCodes(Protocol):
     def __getitem__(self, rows: slice) -> NDArray[Any]:
         """Read some rows that follow each other."""
 
+    def opened(self) -> tuple[int, int] | None:
+        """Return the open file in which they lie as they would in memory, and the byte at which they begin; None where
+        rows are read by ``some`` only."""
+
     def some(self, rows: NDArray[np.intp]) -> NDArray[Any]:
         """Read rows, which rise: returned are all from the first to the last, of which only these hold anything."""
 

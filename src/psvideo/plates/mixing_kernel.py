@@ -13,7 +13,7 @@ from numba.np.numpy_support import carray
 from numpy.typing import NDArray
 
 from psvideo.compute.compiled import FUSED
-from psvideo.compute.memory import decoded, lent, pointer
+from psvideo.compute.memory import decoded, lent, pointer, read_at
 from psvideo.compute.parts import INLINED
 
 Floats = NDArray[np.float32]
@@ -26,8 +26,22 @@ COUNTS = np.float32(0.02)
 """A clipped sample clips the plate where so much of it counts; less is a neighbour's tail that is taken off."""
 
 
+class InFiles(NamedTuple):
+    """How rows are read of pictures that lie in open files: each when it is added, into room that stays in a core's
+    first cache."""
+
+    opened: Places  # (frame,) files; empty where pictures lie in memory
+    reader: int  # the address of the C library's pread
+    room: int  # that of room for a row
+    missed: Places  # (1,) becomes 1 where a row could not be read whole
+
+
+NO_FILES = InFiles(np.empty(0, np.intp), 0, 0, np.zeros(1, np.intp))
+
+
 class MixtureArrays(NamedTuple):
-    """What to add up, in plain arrays; addresses are those of pictures' first samples.
+    """What to add up, in plain arrays; addresses are those of pictures' first samples, of those in files the bytes at
+    which they begin.
 
     like: any array of the codes' type. samples: of a row. zero, gain: (frame, row, col) patterns, of the tone.
     """
@@ -48,6 +62,7 @@ class MixtureArrays(NamedTuple):
     taken: Floats  # (level, row)
     ceiling: np.float32  # what a clipped sample becomes
     clips_from: np.float32  # light from which on a sample is
+    files: InFiles = NO_FILES
 
 
 @FUSED.kept
@@ -72,7 +87,7 @@ def mix_pictures(mix: MixtureArrays, shares: Floats, taken: Floats, rows: Places
             one = MixtureArrays(
                 given.frames, given.like, given.samples, each[picture], given.table, given.halves, given.zero,
                 given.gain, given.most, given.levels, given.least, given.step, given.narrow, off[picture],
-                given.ceiling, given.clips_from,
+                given.ceiling, given.clips_from, given.files,
             )  # fmt: skip
             mix_row(one, row, made[picture, row - first])
 
@@ -102,10 +117,11 @@ def _some_reach_of(codes: Any, limit: Any, most: Any) -> Callable[[Any, np.float
 @FUSED.inlined
 def lent_mix(mix: MixtureArrays) -> MixtureArrays:
     """The same without reference counts."""
+    files = InFiles(lent(mix.files.opened), mix.files.reader, mix.files.room, lent(mix.files.missed))
     return MixtureArrays(
         lent(mix.frames), lent(mix.like), mix.samples, lent(mix.coefficients), lent(mix.table), mix.halves,
         lent(mix.zero), lent(mix.gain), mix.most, lent(mix.levels), lent(mix.least), lent(mix.step), lent(mix.narrow),
-        lent(mix.taken), mix.ceiling, mix.clips_from,
+        lent(mix.taken), mix.ceiling, mix.clips_from, files,
     )  # fmt: skip
 
 
@@ -159,7 +175,23 @@ def mix_row(mix: MixtureArrays, row: int, out: Floats) -> int:
 @FUSED.inlined
 def _row_of(mix: MixtureArrays, frame: int, row: int) -> Any:
     end = (row + 1) * mix.samples
+    if mix.files.opened.shape[0]:
+        size = mix.samples * mix.like.itemsize
+        _read(mix.files, mix.files.opened[frame], mix.frames[frame] + row * size, size)
+        return carray(pointer(mix.files.room, mix.like), mix.samples)[0 : mix.samples]
     return carray(pointer(mix.frames[frame], mix.like), end)[row * mix.samples : end]
+
+
+@FUSED.called
+def _read(files: InFiles, opened: int, begin: int, size: int) -> None:
+    """Read so many bytes of a file; a part may come at a time."""
+    done = 0
+    while done < size:
+        came = read_at(files.reader, opened, files.room + done, size - done, begin + done)
+        if came <= 0:
+            files.missed[0] = 1
+            return
+        done += came
 
 
 @FUSED.inlined

@@ -19,6 +19,7 @@ from psvideo.model.clipping import SATURATED
 from psvideo.model.coded import IDENTITY, Coded, Image
 from psvideo.plates.ambient_level import AmbientLevel
 from psvideo.plates.mixing_kernel import COUNTS, MixtureArrays, mix_pictures, mix_rows
+from psvideo.plates.ready_mixture import ReadyMixture
 from psvideo.plates.thinning_kernel import mix_halved, mix_thinned
 
 BAND_SAMPLES = 1 << 20
@@ -176,36 +177,6 @@ class Mixture:
             bound.run(mix_rows, np.sort(some), some, flat[first:last])
 
         _in_bands(band, len(rows), bound.mix.samples)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ReadyMixture:
-    """A picture as a compiled loop takes it, beside what it is made of; ``counts`` (frame, row) are the frames' rows
-    that it takes."""
-
-    mix: MixtureArrays
-    frames: tuple[Coded, ...]
-    levels: tuple[AmbientLevel, ...]
-    counts: NDArray[np.bool_]
-
-    def run(self, loop: Callable[..., None], rows: range | NDArray[np.intp], *arguments: object) -> None:
-        """Call ``loop(mix, *arguments)``, which takes the frames' ``rows`` (at least one, in rising order).
-
-        Where frames stay in their files, these rows are read as far as they count, and held no longer than the loop
-        runs.
-        """
-        if len(self.mix.frames) == len(self.frames):  # all of them lie in memory
-            loop(self.mix, *arguments)
-            return
-        wanted = np.asarray(rows, np.intp)
-        first = wanted[0]
-        held: dict[int, NDArray[np.generic]] = {}
-        begins = np.zeros(len(self.frames), np.intp)
-        for place in np.flatnonzero(self.counts[:, wanted].any(axis=1)).tolist():
-            codes = self.frames[place].codes
-            held[place] = codes[first : wanted[-1] + 1] if isinstance(codes, np.ndarray) else codes.some(wanted)
-            begins[place] = held[place].ctypes.data - first * held[place].strides[0]
-        loop(self.mix._replace(frames=begins), *arguments)
 
 
 def combined(pictures: Sequence[Mixture], shares: Sequence[float], *, ceiling: float) -> Mixture:

@@ -56,6 +56,7 @@ def _without_levels(mix: MixtureArrays) -> MixtureArrays:
     return MixtureArrays(
         mix.frames, mix.like, mix.samples, mix.coefficients, mix.table, mix.halves, mix.zero, mix.gain, mix.most,
         mix.levels[:0], mix.least[:0], mix.step[:0], mix.narrow[:0], mix.taken[:0], mix.ceiling, mix.clips_from,
+        mix.files,
     )  # fmt: skip
 
 
