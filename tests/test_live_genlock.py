@@ -9,17 +9,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from strobed_loop import StrobedLoop
 
 from psvideo.errors import UsageError
 from psvideo.formats.plan_toml import format_plan
 from psvideo.live.chain import Chain
-from psvideo.live.genlock import check_holds, rows_around, target_of
+from psvideo.live.genlock import STEP_PPM, DarkRow, WantedRow, check_holds, next_trim_ppm, rows_around, target_of
 from psvideo.live.holding import Holding
 from psvideo.model.plan import Plan
 from psvideo.runs.caller import PYTHON
 from psvideo.runs.live_strobe import held_strobe
-from psvideo.strobe.link.boards import BOARDS
+from psvideo.strobe.link.boards import BOARDS, MAX_TRIM_PPM
 from psvideo.strobe.link.exchange import RefusedError
 from psvideo.strobe.stand_ins.python_board_port import PythonBoardPort
 
@@ -169,3 +171,26 @@ def wait_until(true: Callable[[], bool]) -> bool:
     while not true() and time.monotonic() < end_s:
         time.sleep(0.01)
     return true()
+
+
+@given(
+    now_ppm=st.integers(-MAX_TRIM_PPM, MAX_TRIM_PPM),
+    row=st.floats(0, 79),
+    wanted=st.floats(0, 79),
+    slip_ppm=st.floats(-50_000, 50_000),
+)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_no_trim_leaves_a_boards_range_or_jumps(
+    make_plan: PlanMaker, now_ppm: int, row: float, wanted: float, slip_ppm: float
+) -> None:
+    camera = held_plan(make_plan).camera
+    trim = next_trim_ppm(now_ppm, DarkRow(row=row, slip_ppm=slip_ppm), WantedRow(row=wanted), camera)
+    assert abs(trim) <= MAX_TRIM_PPM
+    assert abs(trim - now_ppm) <= STEP_PPM
+
+
+def test_a_trim_takes_off_what_slips_and_pulls_the_shorter_way(make_plan: PlanMaker) -> None:
+    camera = held_plan(make_plan).camera
+    assert next_trim_ppm(0, DarkRow(row=20, slip_ppm=300.0), WantedRow(row=20), camera) == -300
+    assert next_trim_ppm(0, DarkRow(row=2, slip_ppm=0.0), WantedRow(row=78), camera) < 0
+    assert next_trim_ppm(0, DarkRow(row=78, slip_ppm=0.0), WantedRow(row=2), camera) > 0
