@@ -131,7 +131,7 @@ def _texture(tree, found: Results, quantity: str, colour_space: str):
     node.image, node.interpolation = _image(found, quantity, colour_space), "Closest"
     node.extension = "CLIP"
     user = node.image_user
-    user.frame_start, user.frame_duration, user.frame_offset = 1, found.count, found.first - 1
+    user.frame_start, user.frame_duration, user.frame_offset = found.first, found.count, found.first - 1
     user.use_auto_refresh = True
     return node
 
@@ -205,8 +205,12 @@ def _sun(light: dict, found: Results, made, place: Matrix) -> None:
 
 
 def _set_timing(scene, found: Results) -> None:
-    scene.frame_start, scene.frame_end = 1, found.count
-    scene.frame_set(1)
+    first = found.first if found.count > 1 else 1
+    scene.frame_start, scene.frame_end = (
+        first,
+        first + found.count - 1,
+    )  # as the files are numbered, and as USD and Nuke do
+    scene.frame_set(first)
     if found.fps is not None:
         rate = found.fps[0] / found.fps[1]
         scene.render.fps = max(round(rate), 1)

@@ -116,7 +116,9 @@ def _nothing(folder: Path, images: list[Path]) -> str:
     """Say why a folder holds no clip."""
     movies = sorted(file.name for file in folder.iterdir() if file.suffix.lower() in MOVIES)
     if movies:
-        return f"holds a movie and no numbered images. Name the movie itself: {folder / movies[0]}"
+        held = "a movie" if len(movies) == 1 else f"{len(movies)} movies"
+        itself = "the movie itself" if len(movies) == 1 else "one of them"
+        return f"holds {held} and no numbered images. Name {itself}: {folder / movies[0]}"
     found = f"holds images without a number at the end of the name ({images[0].name})" if images else "holds no images"
     kinds = ", ".join(USUAL_KINDS)
     said = f"{found}; expected numbered frames such as name.0001.png ({kinds}) here or in frames/."
