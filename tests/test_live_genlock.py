@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from psvideo.runs.caller import PYTHON
 from psvideo.runs.live_strobe import held_strobe
 from psvideo.strobe.link.boards import BOARDS, MAX_TRIM_PPM
 from psvideo.strobe.link.exchange import RefusedError
+from psvideo.strobe.runlog import RunLog, as_played, format_log
 from psvideo.strobe.stand_ins.python_board_port import PythonBoardPort
 
 PlanMaker = Callable[..., Plan]
@@ -139,10 +141,18 @@ def test_a_board_is_played_and_held_while_the_live_view_runs_and_dark_afterwards
     monkeypatch.setattr("psvideo.runs.strobe.port._open", lambda *_: port)
     path.write_text(format_plan(held_plan(make_plan)))
     chain = Chain(plan=held_plan(make_plan))
-    with held_strobe(chain, path, lock="edge", port="emulated", yes=True, noted=notes.append, caller=PYTHON) as holding:
+    logs: list[RunLog] = []
+    given: dict[str, Any] = {"lock": "edge", "port": "emulated", "yes": True, "noted": notes.append, "caller": PYTHON}
+    with held_strobe(chain, path, **given, logged=logs.append) as holding:
         assert wait_until(lambda: port._controller.state == "running")
         assert (holding.ppm, holding.short_rows) == (0, None)
+        assert holding._trimmed(-900)
     assert (port._controller.state, notes) == ("idle", [])
+    assert (logs[0].ended, logs[0].most_trim_ppm, logs[0].plan) == ("done", 900, "plan.toml")
+    (tmp_path / "strobe.json").write_text(format_log(logs[0]))
+    played = as_played(chain.plan, path)
+    assert played.warning is None
+    assert played.plan.clock_range_ppm == logs[0].tolerance_ppm + 100 + 900, "the search reaches what it was trimmed to"
 
 
 def test_a_board_that_is_lost_is_a_sentence_and_not_the_end(

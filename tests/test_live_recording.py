@@ -10,11 +10,12 @@ from live_clip import live_clip
 
 import psvideo as ps
 from psvideo.cli.app import main
-from psvideo.clip import read_frames
+from psvideo.clip import open_clip, read_frames
 from psvideo.export import code_files
 from psvideo.live import recording
 from psvideo.live.chain import LiveFrame
 from psvideo.live.recording import Recording
+from psvideo.live.source import played_clip
 from psvideo.model.coded import Coded
 from psvideo.runs.live import live
 
@@ -71,6 +72,14 @@ def test_a_disk_that_is_too_slow_ends_the_recording_without_a_hole(tmp_path: Pat
     record.write()
     assert record.written == 10
     assert "too slow for this camera: recording ended after 10 frames" in record.ended
+
+
+def test_the_log_of_a_strobe_that_was_played_meanwhile_lies_in_the_recording(clip: Path, tmp_path: Path) -> None:
+    source = played_clip(open_clip(clip), pace="fastest")
+    with recording.recording(tmp_path / "rec", source, force=False) as record:
+        record.take(next(source.frames()))
+        record.log = "what was played"
+    assert (tmp_path / "rec" / "strobe.json").read_text(encoding="utf-8") == "what was played"
 
 
 def test_nothing_appears_where_no_frame_was_recorded(clip: Path, tmp_path: Path) -> None:

@@ -22,15 +22,16 @@ def trim_by(ppm: int) -> Trim:
 class Holding:
     """Holds the dark row of a chain's strobe at a target. ``ask`` sends a trim to the board.
 
-    ``ppm`` is the trim that the board has; ``short_rows`` by how much the dark row was off its target when it was last
-    looked at, None while nothing is followed; ``note`` says why the board refused, where it did, ``ended`` that it
-    plays no more.
+    ``ppm`` is the trim that the board has, ``most_ppm`` the largest that it ever had, either way; ``short_rows`` by how
+    much the dark row was off its target when it was last looked at, None while nothing is followed; ``note`` says why
+    the board refused, where it did, ``ended`` that it plays no more.
     """
 
     chain: Chain
     target: WantedRow
     ask: Callable[[Trim], object]
     ppm: int = 0
+    most_ppm: int = 0
     short_rows: float | None = None
     note: str = ""
     ended: bool = False
@@ -71,5 +72,5 @@ class Holding:
                 raise
             self.note = str(refused)
             return False
-        self.ppm = ppm
+        self.ppm, self.most_ppm = ppm, max(self.most_ppm, abs(ppm))
         return True

@@ -33,6 +33,7 @@ MOST_WAITING_BYTES = 256_000_000
 class Recording:
     """Takes frames and writes them beside. ``written`` counts them; ``ended`` says why recording ended early.
 
+    ``log`` is what the strobe's log is to say, where the strobe was played meanwhile; "": what lies beside the plan.
     ``waits``: a frame waits for room, as of a clip that is played as fast as it goes; else recording ends.
     """
 
@@ -40,6 +41,7 @@ class Recording:
     waits: bool = False
     written: int = 0
     ended: str = ""
+    log: str = ""
     most_bytes: int = MOST_WAITING_BYTES
     _queue: deque[tuple[int, NDArray[Any]]] = field(default_factory=deque)
     _bytes: int = 0
@@ -103,8 +105,9 @@ class Recording:
 def recording(path: Path, source: LiveSource, *, force: bool) -> Iterator[Recording]:
     """Give what records a source into a clip folder; when the block ends, the folder appears under its name.
 
-    The plan lies in it as it lay before, and the strobe's log if there was one beside. Raises UsageError where the
-    folder exists, or the source's frames are not plain codes, and PsvideoError where not one frame was recorded.
+    The plan lies in it as it lay before, and the strobe's log: the recording's own, or the one beside the plan. Raises
+    UsageError where the folder exists, or the source's frames are not plain codes, and PsvideoError where not one frame
+    was recorded.
     """
     if source.plan_path is None:
         raise UsageError(
@@ -125,5 +128,7 @@ def recording(path: Path, source: LiveSource, *, force: bool) -> Iterator[Record
         finally:
             record.over()
             writer.join()
+            if record.log:
+                (folder / LOG_NAME).write_text(record.log, encoding="utf-8")
         if not record.written:
             raise PsvideoError(f"{path}: not one frame was recorded. {record.ended}".rstrip())

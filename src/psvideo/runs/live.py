@@ -34,6 +34,7 @@ from psvideo.plates.sequence import check_separable
 from psvideo.runs.caller import PYTHON, Caller
 from psvideo.runs.live_strobe import held_strobe
 from psvideo.strobe.link.ports import AUTO
+from psvideo.strobe.runlog import RunLog, format_log
 
 
 def live(
@@ -98,7 +99,14 @@ def live(
     running = _running(played, known, first_light, seconds, said, shown)
     record_path = path_if_given("record", record)
     plan_path = path_if_given("plan", plan) or played.plan_path
-    held = partial(held_strobe, running.chain, port=strobe, yes=yes, noted=running.notes.append, caller=caller)
+
+    def logged(log: RunLog) -> None:
+        if running.recording is not None:
+            running.recording.log = format_log(log)
+
+    held = partial(
+        held_strobe, running.chain, port=strobe, yes=yes, noted=running.notes.append, caller=caller, logged=logged
+    )
     with (
         _page(running, played.plan, known, caller, opened, host, port, token) if page else nullcontext(),
         nullcontext() if record_path is None else recording(record_path, played, force=force) as recorded,

@@ -18,6 +18,7 @@ from psvideo.strobe.link.exchange import Link
 from psvideo.strobe.link.ports import EMULATED
 from psvideo.strobe.link.replies import Trimmed
 from psvideo.strobe.program import Program, make_program
+from psvideo.strobe.runlog import RunLog, run_log
 from psvideo.strobe.session import Outcome, prepare, run_program
 
 
@@ -31,12 +32,14 @@ def held_strobe(
     yes: bool,
     noted: Callable[[str], None],
     caller: Caller,
+    logged: Callable[[RunLog], None] = lambda log: None,
 ) -> Iterator[Holding]:
     """Play the plan on the board at a port while the block runs, its dark row held where ``lock`` says.
 
-    In every case the lights are dark afterwards. A board that is lost in the middle is a sentence for ``noted``, and
-    the block goes on. Raises UsageError where the plan's dark row cannot be held or nobody confirmed that people are
-    warned, PsvideoError where the board cannot play the plan or does not answer.
+    In every case the lights are dark afterwards, and ``logged`` gets the log of what was played. A board that is lost
+    in the middle is a sentence for ``noted``, and the block goes on. Raises UsageError where the plan's dark row cannot
+    be held or nobody confirmed that people are warned, PsvideoError where the board cannot play the plan or does not
+    answer.
     """
     if plan_path is None:
         raise UsageError("`lock` plays the plan on the board, and this source has no plan.toml beside it: name `plan`.")
@@ -47,10 +50,15 @@ def held_strobe(
         warn_of_flashing(plan, plan_path, warned=yes, confirm=None, caller=caller)
     with opened_port(port) as opened:
         link = Link(opened)
-        program = make_program(plan, prepare(link).caps, source=str(plan_path))
+        ready = prepare(link)
+        program = make_program(plan, ready.caps, source=str(plan_path))
         holding = Holding(chain=chain, target=target, ask=lambda trim: link.ask(trim, Trimmed))
         over = threading.Event()
-        player = threading.Thread(target=_play, args=(link, program, holding, over, noted), daemon=True)
+
+        def ended(outcome: Outcome) -> None:
+            logged(run_log(plan_path, ready, program, outcome, most_trim_ppm=holding.most_ppm))
+
+        player = threading.Thread(target=_play, args=(link, program, holding, over, noted, ended), daemon=True)
         player.start()
         try:
             yield holding
@@ -59,7 +67,14 @@ def held_strobe(
             player.join()
 
 
-def _play(link: Link, program: Program, holding: Holding, over: threading.Event, noted: Callable[[str], None]) -> None:
+def _play(
+    link: Link,
+    program: Program,
+    holding: Holding,
+    over: threading.Event,
+    noted: Callable[[str], None],
+    ended: Callable[[Outcome], None],
+) -> None:
     """Play until it is over, and trim on the way; what runs in a thread."""
     try:
         outcome: Outcome = run_program(
@@ -71,6 +86,7 @@ def _play(link: Link, program: Program, holding: Holding, over: threading.Event,
             every_s=EVERY_S / 3,
             stopped=over.is_set,
         )
+        ended(outcome)
         if outcome.message is not None:
             noted(outcome.message)
     except PsvideoError as fault:

@@ -65,10 +65,11 @@ class RunLog(Contract):
     ended: Ended
     fault: str | None = None
     clock: Clock | None = None
+    most_trim_ppm: float = Field(ge=0, default=0.0)
 
 
-def run_log(plan_path: Path, ready: Ready, program: Program, outcome: Outcome) -> RunLog:
-    """Return the log of a run."""
+def run_log(plan_path: Path, ready: Ready, program: Program, outcome: Outcome, *, most_trim_ppm: float = 0.0) -> RunLog:
+    """Return the log of a run; ``most_trim_ppm`` is by how much its steps were made longer or shorter at most."""
     flashes = [
         PlayedFlash(
             duration_ticks=slot.duration,
@@ -98,6 +99,7 @@ def run_log(plan_path: Path, ready: Ready, program: Program, outcome: Outcome) -
         ended=outcome.ended,
         fault=outcome.fault,
         clock=_clock(outcome.clock),
+        most_trim_ppm=most_trim_ppm,
     )
 
 
@@ -113,8 +115,8 @@ def plan_sha256(path: Path) -> str:
 
 
 def log_record(log: RunLog) -> dict[str, object]:
-    """Return the log as what strobe.json holds."""
-    return log.model_dump(by_alias=True)
+    """Return the log as what strobe.json holds; a strobe that nobody trimmed has no word on trims."""
+    return log.model_dump(by_alias=True, exclude=None if log.most_trim_ppm else {"most_trim_ppm"})
 
 
 def format_log(log: RunLog) -> str:
@@ -181,11 +183,13 @@ def _played(plan: Plan, log: RunLog) -> Plan:
 
 
 def clock_range_ppm(plan: Plan, log: RunLog) -> float:
-    """Return how far the strobe's clock may be from the camera's: what the board is rated for and what the plan says.
+    """Return how far the strobe's clock may be from the camera's: what the board is rated for and what the plan says,
+    and by how much its steps were trimmed.
 
     What was measured against the host does not narrow it: the host's clock is not the camera's.
     """
-    return min(max(log.tolerance_ppm + CAMERA_CLOCK_PPM, plan.clock_range_ppm), UNKNOWN_CLOCK_PPM)
+    untrimmed_ppm = max(log.tolerance_ppm + CAMERA_CLOCK_PPM, plan.clock_range_ppm)
+    return min(untrimmed_ppm + log.most_trim_ppm, UNKNOWN_CLOCK_PPM)
 
 
 def _clock_words(log: RunLog) -> str:
