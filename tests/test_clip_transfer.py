@@ -107,9 +107,17 @@ def test_light_under_a_log_curve_is_counted_from_black_to_white_after_the_curve(
 
 def test_levels_that_the_curve_turns_round_are_refused() -> None:
     with pytest.raises(
-        PsvideoError, match="white_level 4095 is no brighter than black_level 0 under the curve 'logc3'"
+        PsvideoError, match="white_level 20 is no brighter than black_level 0 under the curve 'logc3'"
     ):
-        linear_light(picture([0]), Encoding(transfer="logc3", white_level=4095))
+        linear_light(picture([0], bits=8), Encoding(transfer="logc3", white_level=20))
+
+
+@pytest.mark.parametrize(("curve", "bits", "white"), [("srgb", 10, 1023), ("slog3", 10, 940), ("logc3", 12, 3700)])
+def test_codes_of_fewer_bits_in_a_file_of_16_are_those_of_the_curve(curve: str, bits: int, white: int) -> None:
+    codes = np.linspace(0.1 * white, white, 7).astype(int)
+    held = linear_light(picture(codes, bits=16), Encoding(transfer=curve, black_level=4, white_level=white))
+    plain = linear_light(picture(codes, bits=bits), Encoding(transfer=curve, black_level=4, white_level=white))
+    assert np.array_equal(held, plain)
 
 
 def test_black_levels_by_position_are_taken_off_by_position() -> None:

@@ -109,7 +109,7 @@ FAULTS: dict[str, tuple[Callable[[Path, Plan], Any], str]] = {
         lambda shot, plan: put_rig(shot, ("key", "left")),
         "rig.toml: The rig has no light named 'right'",
     ),
-    "levels": (lambda shot, plan: put_plan(shot, plan, transfer="logc3", white_level=4095), "no brighter than"),
+    "levels": (lambda shot, plan: put_plan(shot, plan, transfer="logc3", white_level=20), "no brighter than"),
     "colour filters": (lambda shot, plan: put_plan(shot, plan, cfa="RGGB"), "is a colour picture"),
     "curve": (lambda shot, plan: put_plan(shot, plan, transfer="filmlook"), "no curve that this psvideo knows"),
 }

@@ -78,6 +78,25 @@ class Scale:
     clamped: bool
 
 
+DEPTHS = (8, 10, 12, 14)
+"""Bits that cameras record, and that files of 16 bits may hold as they are, at their lower end."""
+
+
+def depth_held(bits: int, encoding: Encoding) -> int:
+    """Return how many bits the codes have that a file of ``bits`` bits holds, where a curve encodes light.
+
+    A plan's white level says so: no curve puts saturation into the lower half of its codes, so a file of 16 bits whose
+    white is 1023 holds 10 bits as they are. Without a curve it makes no difference.
+
+    >>> depth_held(16, Encoding(transfer="srgb", white_level=1023))
+    10
+    """
+    white = encoding.white_level
+    if white is None or not find_curve(encoding.transfer).source or white > 2 ** (bits - 1) - 1:
+        return bits
+    return next((depth for depth in DEPTHS if depth < bits and white <= 2**depth - 1), bits)
+
+
 def _scale(head: Header, encoding: Encoding) -> Scale:
     """Return a picture's scale.
 
@@ -86,6 +105,7 @@ def _scale(head: Header, encoding: Encoding) -> Scale:
     """
     largest = 2 ** (head.bits or 0) - 1
     if head.signal_per_code is None:
+        largest = 2 ** depth_held(head.bits or 0, encoding) - 1
         return Scale(signal_at_0=0.0, signal_per_code=1 / largest, largest=largest, clamped=True)
     if not (head.video_range and find_curve(encoding.transfer).on_codes):
         return Scale(signal_at_0=head.signal_at_0, signal_per_code=head.signal_per_code, largest=largest, clamped=False)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from psvideo.clip.decode.decoders import read_header
 from psvideo.clip.decode.yuv import signal_range
 from psvideo.clip.folder import MOVIES, RAWS, find_sequence, unread
+from psvideo.clip.linear import depth_held
 from psvideo.clip.record import Clip, Header
 from psvideo.clip.transfer import DISPLAYED, disagreement, find_curve
 from psvideo.errors import PsvideoError
@@ -62,7 +63,7 @@ def _open_folder(path: Path, plan_path: Path | None) -> Clip:
         colour=header.colour or find_curve(encoding.transfer).colour,
         encoding=encoding,
         warnings=header.warnings + _curve_warnings(sequence.kind, plan, header),
-        notes=((passed_over,) if sequence.passed_over else ()) + _turn_note(header),
+        notes=((passed_over,) if sequence.passed_over else ()) + _depth_note(header, encoding) + _turn_note(header),
     )
 
 
@@ -119,6 +120,17 @@ def _movie_colour(encoding: Encoding, header: Header) -> str:
     """Return the colour of a movie's light: by its tag where its curve goes with several gamuts, else the curve's."""
     curve = find_curve(encoding.transfer)
     return (header.colour or curve.colour) if curve.name in DISPLAYED else curve.colour
+
+
+def _depth_note(header: Header, encoding: Encoding) -> tuple[str, ...]:
+    """Say where the plan's white level shows that files hold fewer bits than they could."""
+    held = depth_held(header.bits, encoding) if header.bits and header.signal_per_code is None else header.bits
+    if held == header.bits:
+        return ()
+    return (
+        f"by the plan's white_level the files hold {held} bits in {header.bits}; the curve is taken off codes of "
+        f"0 to {2**held - 1}",
+    )
 
 
 def _turn_note(header: Header) -> tuple[str, ...]:
