@@ -124,7 +124,9 @@ def _movie_colour(encoding: Encoding, header: Header) -> str:
 
 def _depth_note(header: Header, encoding: Encoding) -> tuple[str, ...]:
     """Say where the plan's white level shows that files hold fewer bits than they could."""
-    held = depth_held(header.bits, encoding) if header.bits and header.signal_per_code is None else header.bits
+    if header.bits is None or header.signal_per_code is not None:
+        return ()
+    held = depth_held(header.bits, encoding)
     if held == header.bits:
         return ()
     return (
