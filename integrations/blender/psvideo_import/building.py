@@ -206,10 +206,8 @@ def _sun(light: dict, found: Results, made, place: Matrix) -> None:
 
 def _set_timing(scene, found: Results) -> None:
     first = found.first if found.count > 1 else 1
-    scene.frame_start, scene.frame_end = (
-        first,
-        first + found.count - 1,
-    )  # as the files are numbered, and as USD and Nuke do
+    # as the files are numbered, and as USD and Nuke do
+    scene.frame_start, scene.frame_end = first, first + found.count - 1
     scene.frame_set(first)
     if found.fps is not None:
         rate = found.fps[0] / found.fps[1]
