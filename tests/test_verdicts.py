@@ -41,7 +41,8 @@ class Footage:
         an exposure holds. blur_px, shift_px: of the picture, and how far it moves from round to round.
     claimed_deg, turned_deg, claimed_tilt_deg, claimed_gain: by how much the rig's directions are off, each its own way;
         by how much all are turned around the axis, and around the picture's rows; what it says of the first light's
-        strength. solved: whether normals are needed.
+        strength. near: how many picture widths away the lights stand, which the rig takes for distant. solved: whether
+        normals are needed.
     """
 
     shape: str = "ball"
@@ -60,6 +61,7 @@ class Footage:
     claimed_deg: float = 0.0
     turned_deg: float = 0.0
     claimed_tilt_deg: float = 0.0
+    near: float = 0.0
     claimed_gain: float = 1.0
     unseen: float = 0.0
     borrowed: float = 0.0
@@ -106,7 +108,8 @@ class Footage:
 
     def _plates(self, ways: np.ndarray, number: int) -> list[np.ndarray]:
         normals, albedo = SHAPES[self.shape](self.shift_px * number)
-        shades = [albedo * np.maximum(normals @ way, 0) for way in ways]
+        shades = [albedo * (_fallen(normals, way * self.near) if self.near else normals @ way) for way in ways]
+        shades = [np.maximum(shade, 0) for shade in shades]
         if self.backdrop:
             shades = [np.where(albedo > 0, one, self.backdrop * way[2]) for one, way in zip(shades, ways, strict=True)]
         if self.dark:
@@ -146,6 +149,14 @@ class Footage:
             whole = np.ones(SIZE, np.bool_)
             dark = LightPlate(light=AMBIENT, number=1001 + n, time_s=float(n), picture=made(level), seen=whole)
         return Round(number=1001 + n, plates=taken, ambient=dark)
+
+
+def _fallen(normals: np.ndarray, lamp: np.ndarray) -> np.ndarray:
+    """Return n . l under a lamp that stands there, in picture widths from the middle, 1 head on at that distance."""
+    rows, cols = np.mgrid[:SIZE, :SIZE] / (SIZE - 1) - 0.5
+    towards = lamp - np.stack([cols, -rows, 0 * cols], axis=-1)
+    away = np.linalg.norm(towards, axis=-1)
+    return np.asarray(np.sum(normals * towards, axis=-1) * (lamp @ lamp) / away**3)
 
 
 def ring(lights: int) -> np.ndarray:
@@ -309,6 +320,8 @@ SOLVED = [
     _by("noise alone", validity, "validity", {"noise": 0.025}, {"noise": 0.032}, "doubtful bad"),
     _by("weak beside the rig", lamps, "lights", {"gains": [1, 0.15, 1]}, {"gains": [1, 0.1, 1]}, "good bad", lights=3),
     _by("away", rig_of, "rig", {"claimed_tilt_deg": 40}, {"claimed_tilt_deg": 50}, "good bad"),
+    _by("near", rig_of, "rig", {"near": 18}, {"near": 14}, shape="waves"),
+    _by("near lost", rig_of, "rig", {"near": 4.2}, {"near": 3.3}, "doubtful bad", shape="waves"),
     _by("validity", validity, "validity", {"dark": 0.35}, {"dark": 0.45}),
     _by("validity lost", validity, "validity", {"dark": 0.75}, {"dark": 0.85}, "doubtful bad"),
     _by("noise", steadiness, "noise", {"noise": 0.015}, {"noise": 0.022}, "nothing doubtful",

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from psvideo.report.judge.light import NAMED
-from psvideo.report.judge.result import AT_REST, NOISY_DEG, by_noise_deg, moves
+from psvideo.report.judge.result import AT_REST, COMMON_DEG, LOST_DEG, NOISY_DEG, by_noise_deg, moves
 from psvideo.report.judgement import Grade, Judgement
 from psvideo.report.observe.observed import InstantFacts, Observed
 from psvideo.report.observe.rigfit import RigFit
@@ -19,6 +19,9 @@ STRENGTH_MISFIT, BY_STRENGTH, OTHER_STRENGTH = 0.05, 0.5, 1.25
 AGREE, DISAGREE = 0.3, -0.1
 MOST_AWAY = 0.05
 """Of measured normals, the share that may face away from the camera: what a camera sees faces it."""
+NEARER = 0.7
+"""Lamps stand near where that leaves less than this share of what is left over. (Photographs: 0.88 and more; lamps ten
+widths away that a rig takes for distant: 0.2 to 0.5.)"""
 TOO_FAR_DEG, AGREE_FAR = 8.0, 0.15
 """Slopes of normals that are so far off agree badly under the right rig too: then they must agree by the second. (A
 bear's under eight lights in one plane: 0.21; five lights of which each is taken for the next: 0.11.)"""
@@ -28,9 +31,9 @@ def rig(observed: Observed) -> Iterator[Judgement]:
     """Judge whether the rig's directions and strengths can have made these plates."""
     fit = observed.rig_fit
     wrong = None if fit is None else _misfit(observed.lights, fit)
-    crossed, away = _crossed(observed), _away(observed)
-    if wrong or crossed or away:
-        yield from (one for one in (wrong, crossed, away) if one)
+    found = (wrong, _crossed(observed), _away(observed), None if fit is None else _near(fit))
+    if any(found):
+        yield from (one for one in found if one)
     elif fit is not None:
         yield _explained(fit)
     elif observed.slopes:
@@ -78,6 +81,19 @@ def _misfit(lights: Sequence[str], fit: RigFit) -> Judgement | None:
         found=f"{found}.",
         advice="Use the rig file of this set-up; calibrate again if a light or the camera was moved; check that lights "
         "have the same names in plan and rig.",
+    )
+
+
+def _near(fit: RigFit) -> Judgement | None:
+    near = fit.near
+    if near is None or near.misfit > NEARER * fit.misfit or near.lean_deg <= COMMON_DEG:
+        return None
+    return Judgement(
+        subject="rig",
+        grade="bad" if near.lean_deg > LOST_DEG else "doubtful",
+        found=f"The lights stand near: they fall off over the picture as if {near.widths:.0f} of its widths away, and "
+        f"the rig takes them for distant. Normals lean by about {near.lean_deg:.0f} degrees for it.",
+        advice="Write where the lights stand into the rig (`position_m`), or move them farther away.",
     )
 
 

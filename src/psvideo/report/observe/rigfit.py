@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.camera import FloatArray
+from psvideo.report.observe.nearness import Nearness, nearness
 
 SHADOW = 0.08
 """A pixel is reached by all lights where each gives at least this share of the brightest."""
@@ -24,12 +25,14 @@ LEAST_POINTS = 60
 class RigFit:
     """What a few thousand points said of the rig. ``misfit`` is the median share of a point's light that no normal
     explains, ``own_misfit`` the share that no rig at all would explain (shadows, gloss, motion), ``scaled_misfit`` what
-    is left once every light's strength is free, and ``strengths`` (light,) what they come out as, 1 for the median."""
+    is left once every light's strength is free, and ``strengths`` (light,) what they come out as, 1 for the median.
+    ``near`` is how near lamps stand that the rig takes for distant, None where it says where they stand."""
 
     misfit: float
     own_misfit: float
     scaled_misfit: float
     strengths: tuple[float, ...]
+    near: Nearness | None = None
 
     @property
     def excess(self) -> float:
@@ -37,9 +40,10 @@ class RigFit:
         return float(np.sqrt(max(self.misfit**2 - self.own_misfit**2, 0.0)))
 
 
-def rig_fit(light: FloatArray, vectors: FloatArray) -> RigFit | None:
+def rig_fit(light: FloatArray, vectors: FloatArray, places: FloatArray | None = None) -> RigFit | None:
     """Judge a rig by points: ``light`` (point, light) is unclipped, ``vectors`` (point or 1, light, 3) what the rig
-    sends there. None for three lights, or where too few points are reached by all of them."""
+    sends there, and ``places`` (point, 2) where they lie, x right and y up in widths of the picture. None for three
+    lights, or where too few points are reached by all of them."""
     count = light.shape[1]
     peak = light.max(axis=1)
     reached = (light.min(axis=1) > SHADOW * peak) & (peak > LEAST_LIGHT * 1e-3)
@@ -58,7 +62,11 @@ def rig_fit(light: FloatArray, vectors: FloatArray) -> RigFit | None:
     h = unit_free * h
     true = 1 / np.maximum(np.abs(h), 1e-3 * np.abs(h).max())
     strengths = tuple(float(value) for value in true / np.median(true))
-    return RigFit(misfit=misfit, own_misfit=own, scaled_misfit=float(np.sqrt(max(share, 0))), strengths=strengths)
+    near = None
+    if places is not None and len(vectors) == 1:
+        near = nearness(unit, beyond[0], vectors[0], places[reached])
+    scaled = float(np.sqrt(max(share, 0)))
+    return RigFit(misfit=misfit, own_misfit=own, scaled_misfit=scaled, strengths=strengths, near=near)
 
 
 def _beyond(vectors: FloatArray) -> FloatArray:

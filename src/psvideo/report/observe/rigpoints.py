@@ -43,7 +43,8 @@ class RigPoints:
         if not light:
             return None
         vectors = self.vectors if len(self.vectors) == 1 else np.concatenate([self.vectors] * len(light))
-        return rig_fit(np.concatenate(light), vectors)
+        places = np.stack([self.cols, -self.rows], axis=1) / max(int(self.cols.max()), 1)
+        return rig_fit(np.concatenate(light), vectors, np.concatenate([places] * len(light)))
 
 
 def rig_points(plan: Plan, rig: Rig, *, height_px: int, width_px: int, channels: int) -> RigPoints:
