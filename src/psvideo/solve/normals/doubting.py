@@ -33,6 +33,8 @@ LEAST_REACH = np.float32(0.2)
 """Where fewer lights reach, residuals of noise predict more: as if no less than this share of them did."""
 MOVING_DEG, OF_MOTION = np.float32(0.5), 5
 """Where motion turns normals by more, over so many points, residuals are its own, and no misfit of rig or surface."""
+WELL_SPREAD = np.float32(5)
+"""What ``flatter`` is measured by: a ring of any number of lights 30 degrees around the camera spreads 4.9."""
 LEAST_LIGHTS = 0.02
 """So many lights that do not reach a point, in the mean, must there be for light from around to be known."""
 
@@ -42,35 +44,43 @@ class Doubting:
     """How much the signs count.
 
     misfit_deg, misfit_power, little_deg: the error m that residuals predict beyond noise counts as
-        m^(1 + power) / (m + little) of these degrees: true errors depend less on how well the lights lie, and on how
-        many there are, than what residuals predict; where it is little it is noise.
+        m^(1 + power) / (m + little) of these degrees: true errors depend less on it than in proportion; where it is
+        little it is noise.
+    flat_power: the more so the flatter the lights lie: with this power of by how much they spread light that no matte
+        surface gives more than well-spread lights do, for how it spreads does not average out.
     indirect: how much of the angle counts by which light from around would turn the normal.
-    per_torn, most_torn_deg: by which share more it is where normals belong to no surface by a degree, with its root, up
-        to so many: along the outline of a thing before another there is more, and normals are as good as elsewhere.
+    torn, torn_beside, torn_alone_deg: how much more it is for each degree by which normals belong to no surface; these
+        count up to a share of the other doubt, and little more: along creases and the outline of a thing before another
+        there are more, where normals are as good as elsewhere.
 
     Fitted, with ``Judging.fit_share``, on a ball, a bear and a cat (DiLiGenT), a sphere with a wrong rig (Washington),
-    another renderer's bunny, and eight virtual shapes of six materials, under 5 to 96 lights. Each subject left out and
-    predicted from the others: ``python -m bench predicted``.
+    another renderer's bunny, and virtual shapes of eight materials and under wrong rigs, under 5 to 96 lights, spread
+    or nearly in a plane, and, with less weight, on five photographed objects of which all lights are the truth for some
+    of them. Each subject left out and predicted from the others: ``python -m bench predicted``.
     """
 
-    misfit_deg: float = 3.5
-    misfit_power: float = 0.18
-    little_deg: float = 1.2
+    misfit_deg: float = 1.6
+    misfit_power: float = 0.4
+    little_deg: float = 0.1
+    flat_power: float = 0.5
     indirect: float = 1.0
-    per_torn: float = 0.6
-    most_torn_deg: float = 3.0
+    torn: float = 1.85
+    torn_beside: float = 0.6
+    torn_alone_deg: float = 0.2
 
 
 @dataclass(frozen=True, kw_only=True)
 class Signs:
     """What is looked for, (row, col) of the points, in degrees: what residuals predict beyond noise, by which angle
     light from around would turn the normal, by which normals around belong to no surface, and what noise makes more
-    where some lights are not used."""
+    where some lights are not used. ``flatter`` is by how much more than well-spread lights all of them spread into the
+    normal what no matte surface gives, 1 at least."""
 
     misfit_deg: Floats
     indirect_deg: Floats
     torn_deg: Floats
     lost_deg: Floats
+    flatter: Floats
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,16 +122,30 @@ def signs_of(points: ThinSurface, one: Evidence, surface: Surface, turned_deg: F
         indirect_deg=np.degrees(indirect + own) * _turned(points.surface, one),
         torn_deg=np.sqrt(np.maximum(_torn_squared(points) - (TORN_OF_NOISE * points.noise_deg) ** 2, 0)),
         lost_deg=points.noise_deg * np.sqrt(1 / reach - 1),
+        flatter=_flatter(points.surface, one),
     )
 
 
 def doubt_deg(signs: Signs, *, how: Doubting = Doubting()) -> Floats:
     """Return by how many degrees normals may be off beyond noise, (row, col) of the points."""
     misfit = np.float32(how.misfit_deg) * signs.misfit_deg ** np.float32(1 + how.misfit_power)
-    misfit /= signs.misfit_deg + np.float32(how.little_deg)
+    misfit *= signs.flatter ** np.float32(how.flat_power) / (signs.misfit_deg + np.float32(how.little_deg))
     both = np.hypot(misfit, np.float32(how.indirect) * signs.indirect_deg)
-    torn = np.minimum(signs.torn_deg, np.float32(how.most_torn_deg))
-    return np.asarray(np.hypot(both * (1 + np.float32(how.per_torn) * np.sqrt(torn)), signs.lost_deg), np.float32)
+    most_torn = np.float32(how.torn_beside) * both + np.float32(how.torn_alone_deg)
+    torn = np.float32(how.torn) * np.minimum(signs.torn_deg, most_torn)
+    return np.asarray(np.hypot(both + torn, signs.lost_deg), np.float32)
+
+
+def _flatter(surface: Surface, one: Evidence) -> Floats:
+    """Return by how much more than well-spread lights these turn a normal for what is wrong of a light's share, however
+    many there are."""
+    strength = one.lit.intensities.mean(axis=1)
+    matrix = one.lit.directions * (strength / strength.mean())[:, None]
+    inverse = np.linalg.inv(matrix.T @ matrix).astype(np.float32)
+    normals = surface.normals.astype(np.float32)
+    along = np.einsum("rcx,xy,rcy->rc", normals, inverse, normals)
+    spread = np.sqrt(np.float32(len(matrix)) * np.maximum(np.trace(inverse) - along, 0))
+    return np.maximum(spread / WELL_SPREAD, np.float32(1))
 
 
 def _turned(surface: Surface, one: Evidence) -> Floats:

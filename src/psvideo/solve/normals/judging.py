@@ -27,9 +27,8 @@ from psvideo.solve.normals.task import LIGHTS, Floats, Mask, Samples, Spread
 class Judging:
     """How errors are predicted and when a normal is trusted.
 
-    most_error_deg, most_typical_deg: a normal is trusted where its predicted error is at most the first, or what the
-        lights' misfit makes typical of the picture where that is more, up to the last: a rig that is wrong is no
-        pixel's fault.
+    most_error_deg: a normal is trusted where its predicted error is at most this: of such normals hardly any is off by
+        twice as much.
     fit_share: how much of what residuals predict counts in the pixel itself, beyond ``fit_noise`` times what noise
         makes: so much do residuals predict of nothing but noise. (Robust solving corrects them for few lights, where
         what is not matte does not average out.)
@@ -39,8 +38,7 @@ class Judging:
     """
 
     most_error_deg: float = 5.0
-    most_typical_deg: float = 6.5
-    fit_share: float = 0.1
+    fit_share: float = 0.2
     fit_noise: float = 1.95
     held: float = 1.15
     least_share: float = 0.001
@@ -72,17 +70,16 @@ def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging =
         known = points.known.astype(np.float32)
         moving = moving_doubt_deg(turned_deg, signs.torn_deg, known, one.moves, how=how.moving)
     at_points = spread.judged(points.surface, doubt, 1, how, limit_deg=0.0)[0][points.known].astype(np.float32)
-    limit_deg, misfit = how.most_error_deg, surface.misfit
+    misfit = surface.misfit
     if at_points.size:
         albedo = _brightness(points.surface.albedo)[points.known]  # what is bright shows more of the subject
         noise_deg = np.hypot(points.noise_deg, signs.lost_deg)[points.known]
         typical, by_noise = (weighted_median(each, albedo) for each in (at_points, noise_deg))
         beyond_deg = float(np.sqrt(max(typical**2 - by_noise**2, 0.0)))
-        limit_deg = max(limit_deg, min(beyond_deg, how.most_typical_deg))
         misfit = None if misfit is None else replace(misfit, error_deg=beyond_deg, noise_deg=by_noise)
     for more in (moving, near.doubt_deg if near.doubt_deg.size else None):
         doubt = doubt if more is None else np.hypot(doubt, more)
-    error, trusted = spread.judged(surface, doubt, points.step, how, limit_deg=limit_deg, spare=one.spare)
+    error, trusted = spread.judged(surface, doubt, points.step, how, limit_deg=how.most_error_deg, spare=one.spare)
     return replace(surface, valid=trusted, error_deg=error, misfit=misfit)
 
 

@@ -132,9 +132,8 @@ def trust_note(method: Method, lights: int) -> str:
     """Return in one sentence what a valid normal of this solver and so many lights can be relied on for."""
     how = Judging()
     trusted = (
-        f"A normal is valid where it was measured and its predicted error is at most {how.most_error_deg:g} degrees, "
-        "or what is typical of the picture beyond noise where that is more (up to "
-        f"{how.most_typical_deg:g}): where rig or surface spoil all pixels alike, the judgement of accuracy says so. "
+        f"A normal is valid where it was measured and its predicted error is at most {how.most_error_deg:g} degrees. "
+        "Where rig or surface spoil all pixels alike, the judgement of accuracy says so. "
     )
     if lights == 3:
         return trusted + (
