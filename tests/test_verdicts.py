@@ -41,8 +41,9 @@ class Footage:
         an exposure holds. blur_px, shift_px: of the picture, and how far it moves from round to round.
     claimed_deg, turned_deg, claimed_tilt_deg, claimed_gain: by how much the rig's directions are off, each its own way;
         by how much all are turned around the axis, and around the picture's rows; what it says of the first light's
-        strength. near: how many picture widths away the lights stand, which the rig takes for distant. solved: whether
-        normals are needed.
+        strength. near: how many picture widths away the lights stand, which the rig takes for distant. recorded: by
+        which curve: "srgb" where sRGB was read as light, "undone" where light was read as sRGB. solved: whether normals
+        are needed.
     """
 
     shape: str = "ball"
@@ -62,6 +63,7 @@ class Footage:
     turned_deg: float = 0.0
     claimed_tilt_deg: float = 0.0
     near: float = 0.0
+    recorded: str = "linear"
     claimed_gain: float = 1.0
     unseen: float = 0.0
     borrowed: float = 0.0
@@ -81,7 +83,7 @@ class Footage:
         for n in range(self.rounds):
             clean = self._plates(ways, n)
             noisy = [(one + rng.normal(0, self.noise, one.shape)).astype(np.float32) for one in clean]
-            plates = [np.minimum(one, 1.0) for one in noisy]
+            plates = [BENT[self.recorded](np.minimum(one, 1.0)) for one in noisy]
             one = self._round(names, plates, clean, n)
             if self.measured is not None:
                 stood = np.arange(100).reshape(10, 10) < 100 * self.measured
@@ -149,6 +151,21 @@ class Footage:
             whole = np.ones(SIZE, np.bool_)
             dark = LightPlate(light=AMBIENT, number=1001 + n, time_s=float(n), picture=made(level), seen=whole)
         return Round(number=1001 + n, plates=taken, ambient=dark)
+
+
+def _to_srgb(light: np.ndarray) -> np.ndarray:
+    held = np.clip(light, 0, 1)
+    return np.asarray(np.where(held < 0.0031308, 12.92 * held, 1.055 * held ** (1 / 2.4) - 0.055), np.float32)
+
+
+def _from_srgb(signal: np.ndarray) -> np.ndarray:
+    held = np.clip(signal, 0, 1)
+    return np.asarray(np.where(held < 0.04045, held / 12.92, ((held + 0.055) / 1.055) ** 2.4), np.float32)
+
+
+BENT: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+    "linear": np.asarray, "srgb": _to_srgb, "undone": _from_srgb
+}  # fmt: skip
 
 
 def _fallen(normals: np.ndarray, lamp: np.ndarray) -> np.ndarray:
@@ -320,6 +337,8 @@ SOLVED = [
     _by("noise alone", validity, "validity", {"noise": 0.025}, {"noise": 0.032}, "doubtful bad"),
     _by("weak beside the rig", lamps, "lights", {"gains": [1, 0.15, 1]}, {"gains": [1, 0.1, 1]}, "good bad", lights=3),
     _by("away", rig_of, "rig", {"claimed_tilt_deg": 40}, {"claimed_tilt_deg": 50}, "good bad"),
+    _by("sRGB as light", rig_of, "rig", {"recorded": "linear"}, {"recorded": "srgb"}, noise=0.0005),
+    _by("light as sRGB", rig_of, "rig", {"recorded": "linear"}, {"recorded": "undone"}),
     _by("near", rig_of, "rig", {"near": 18}, {"near": 14}, shape="waves"),
     _by("near lost", rig_of, "rig", {"near": 4.2}, {"near": 3.3}, "doubtful bad", shape="waves"),
     _by("validity", validity, "validity", {"dark": 0.35}, {"dark": 0.45}),

@@ -22,6 +22,9 @@ MOST_AWAY = 0.05
 NEARER = 0.7
 """Lamps stand near where that leaves less than this share of what is left over. (Photographs: 0.88 and more; lamps ten
 widths away that a rig takes for distant: 0.2 to 0.5.)"""
+UNDONE, REDONE = 0.7, 0.25
+"""Plates were read by another curve where that leaves less than these shares of what is left over. (sRGB read as light:
+0.3 to 0.8; photographs in light: 1.7 and more. Light read as sRGB: 0.05 to 0.15; photographs in sRGB: 0.6 and more.)"""
 TOO_FAR_DEG, AGREE_FAR = 8.0, 0.15
 """Slopes of normals that are so far off agree badly under the right rig too: then they must agree by the second. (A
 bear's under eight lights in one plane: 0.21; five lights of which each is taken for the next: 0.11.)"""
@@ -31,7 +34,7 @@ def rig(observed: Observed) -> Iterator[Judgement]:
     """Judge whether the rig's directions and strengths can have made these plates."""
     fit = observed.rig_fit
     wrong = None if fit is None else _misfit(observed.lights, fit)
-    found = (wrong, _crossed(observed), _away(observed), None if fit is None else _near(fit))
+    found = (wrong, _crossed(observed), _away(observed), fit and (_curve(fit) or _near(fit)))
     if any(found):
         yield from (one for one in found if one)
     elif fit is not None:
@@ -94,6 +97,24 @@ def _near(fit: RigFit) -> Judgement | None:
         found=f"The lights stand near: they fall off over the picture as if {near.widths:.0f} of its widths away, and "
         f"the rig takes them for distant. Normals lean by about {near.lean_deg:.0f} degrees for it.",
         advice="Write where the lights stand into the rig (`position_m`), or move them farther away.",
+    )
+
+
+def _curve(fit: RigFit) -> Judgement | None:
+    curves, by_distance = fit.curves, fit.misfit if fit.near is None else fit.near.misfit
+    if curves is None or min(curves.undone, curves.redone) > by_distance:
+        return None
+    undone = curves.undone <= UNDONE * fit.misfit
+    if not undone and curves.redone > REDONE * fit.misfit:
+        return None
+    read, recorded, left = ("light", "sRGB", curves.undone) if undone else ("sRGB", "light", curves.redone)
+    return Judgement(
+        subject="rig",
+        grade="doubtful",
+        found=f"The plates were read as {read}, but fit the lights better if they were recorded as {recorded}: "
+        f"{100 * left:.1f} % of their light is left over instead of {100 * fit.misfit:.1f} %. All normals lean for it.",
+        advice=f'Say how the footage was recorded (`transfer = "{"srgb" if undone else "linear"}"` in the plan\'s '
+        "[camera]).",
     )
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from psvideo.model.camera import FloatArray
 from psvideo.report.observe.nearness import Nearness, nearness
+from psvideo.report.observe.other_curves import OtherCurves, other_curves
 
 SHADOW = 0.08
 """A pixel is reached by all lights where each gives at least this share of the brightest."""
@@ -26,13 +27,15 @@ class RigFit:
     """What a few thousand points said of the rig. ``misfit`` is the median share of a point's light that no normal
     explains, ``own_misfit`` the share that no rig at all would explain (shadows, gloss, motion), ``scaled_misfit`` what
     is left once every light's strength is free, and ``strengths`` (light,) what they come out as, 1 for the median.
-    ``near`` is how near lamps stand that the rig takes for distant, None where it says where they stand."""
+    ``near`` is how near lamps stand that the rig takes for distant, ``curves`` what is left over under other transfer
+    curves; both None where it says where they stand."""
 
     misfit: float
     own_misfit: float
     scaled_misfit: float
     strengths: tuple[float, ...]
     near: Nearness | None = None
+    curves: OtherCurves | None = None
 
     @property
     def excess(self) -> float:
@@ -62,11 +65,12 @@ def rig_fit(light: FloatArray, vectors: FloatArray, places: FloatArray | None = 
     h = unit_free * h
     true = 1 / np.maximum(np.abs(h), 1e-3 * np.abs(h).max())
     strengths = tuple(float(value) for value in true / np.median(true))
-    near = None
+    near = curves = None
     if places is not None and len(vectors) == 1:
         near = nearness(unit, beyond[0], vectors[0], places[reached])
+        curves = other_curves(light[reached], beyond[0])
     scaled = float(np.sqrt(max(share, 0)))
-    return RigFit(misfit=misfit, own_misfit=own, scaled_misfit=scaled, strengths=strengths, near=near)
+    return RigFit(misfit=misfit, own_misfit=own, scaled_misfit=scaled, strengths=strengths, near=near, curves=curves)
 
 
 def _beyond(vectors: FloatArray) -> FloatArray:

@@ -145,7 +145,7 @@ def _flatter(surface: Surface, one: Evidence) -> Floats:
     normals = surface.normals.astype(np.float32)
     along = np.einsum("rcx,xy,rcy->rc", normals, inverse, normals)
     spread = np.sqrt(np.float32(len(matrix)) * np.maximum(np.trace(inverse) - along, 0))
-    return np.maximum(spread / WELL_SPREAD, np.float32(1))
+    return np.asarray(np.maximum(spread / WELL_SPREAD, np.float32(1)), np.float32)
 
 
 def _turned(surface: Surface, one: Evidence) -> Floats:
