@@ -2,6 +2,7 @@
 
 import io
 import shutil
+import sys
 import tempfile
 from pathlib import Path
 
@@ -12,7 +13,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from psvideo.clip import Kept, keeping_near
-from psvideo.clip.record import CodedPicture, Header
+from psvideo.clip import kept as kept_module
+from psvideo.clip.record import CodedPicture, Header, PictureInFile
 from psvideo.errors import PsvideoError
 
 KINDS = st.sampled_from([np.uint8, np.uint16, np.float32])
@@ -39,7 +41,7 @@ def test_what_is_kept_comes_back_bit_for_bit_in_any_order(arrays: list[np.ndarra
             back = kept.get(number)
             assert back.header == put[number].header, "every frame keeps its own levels"
             assert back.codes.dtype == put[number].codes.dtype
-            assert back.codes.tobytes() == put[number].codes.tobytes()
+            assert np.asarray(back.codes).tobytes() == put[number].codes.tobytes()
         assert kept.bytes_held == sum(codes.nbytes for codes in arrays)
 
 
@@ -87,6 +89,30 @@ def test_a_picture_that_the_disk_does_not_give_back_is_said(tmp_path: Path) -> N
         file.truncate(50)
         with pytest.raises(PsvideoError, match="temporary file that holds decoded frames cannot be read back"):
             kept.get(3)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="all threads share one place in an open file there")
+def test_a_picture_may_stay_in_the_file_while_rows_of_it_are_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Until the last picture is gone, also when the store is; what the disk does not give back is said."""
+    codes = np.arange(600, dtype=np.uint16).reshape(10, 20, 3)
+    with keeping_near(tmp_path / "out") as kept:
+        kept.put(2, picture(codes))
+        kept.put(3, picture(codes[::-1]))
+        assert isinstance(kept.get(3, in_file=True), CodedPicture), "so small a one is read"
+        monkeypatch.setattr(kept_module, "STAYS_FROM_BYTES", 1)
+        found = kept.get(3, in_file=True)
+    assert isinstance(found, PictureInFile)
+    assert np.array_equal(found.codes[2:7], codes[::-1][2:7])
+    assert found.codes.dtype == codes.dtype
+    with tempfile.TemporaryFile(dir=tmp_path, buffering=0) as file:
+        kept = Kept(file, most_bytes=10**6)
+        kept.put(3, picture(codes))
+        found = kept.get(3, in_file=True)
+        file.truncate(50)
+        with pytest.raises(PsvideoError, match="temporary file that holds decoded frames cannot be read back"):
+            np.asarray(found.codes)
 
 
 @pytest.mark.parametrize("end", [None, PsvideoError, KeyboardInterrupt])

@@ -1,6 +1,7 @@
 """Movies: depth, matrix and range against BT.709's own arithmetic; timestamps, holes, seeking, damage."""
 
 import dataclasses
+import gc
 import struct
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from fractions import Fraction
@@ -256,6 +257,20 @@ def test_frames_of_a_movie_that_are_kept_are_not_decoded_again(
     assert sorted(asked) == list(clip.timestamps)
     assert [frame.index for frame in frames] == list(range(24))
     assert all(np.array_equal(one.image, again.image) for one, again in zip(early, frames[3:8], strict=True))
+
+
+@pytest.mark.parametrize("matrix", [1, 2], ids=["tagged", "untagged"])
+def test_a_decoded_frame_is_gone_once_its_codes_are_made(tmp_path: Path, matrix: int) -> None:
+    """By itself: until Python looks for circles, dozens of frames would be held."""
+    write_movie(tmp_path / "x.mkv", grey_ramp(8), matrix=matrix)
+    stamps = movie.index_movie(tmp_path / "x.mkv").timestamps
+    gc.collect()
+    gc.disable()
+    try:
+        assert len(list(movie.read_movie(tmp_path / "x.mkv", stamps))) == 8
+        assert not any(isinstance(one, av.VideoFrame) for one in gc.get_objects())
+    finally:
+        gc.enable()
 
 
 @pytest.mark.parametrize("name", ["x.mp4", "x.mkv", "x.mov"])

@@ -5,10 +5,9 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import partial
 from math import inf
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +32,7 @@ class RowsInFile:
     offset: int
     kind: np.dtype[Any]
     shape: tuple[int, ...]
-    file: "FoundFile" = field(repr=False)
+    file: "OpenFile" = field(repr=False)
 
     @classmethod
     def at(
@@ -86,6 +85,16 @@ class RowsInFile:
         return replace(self, kind=np.dtype(kind))
 
 
+class OpenFile(Protocol):
+    """A file that is read at any place by any thread."""
+
+    def opened(self) -> int | None:
+        """Return the file while it stays open, else None. Raises PsvideoError where it is another one than it was."""
+
+    def read(self, into: memoryview, begin: int) -> None:
+        """Read as many bytes as there is room for, from the byte ``begin`` on. Raises PsvideoError where it cannot."""
+
+
 class FoundFile:
     """A file as it was found, read at any place by any thread.
 
@@ -121,7 +130,7 @@ class FoundFile:
         another one than was found, or cannot be read."""
         try:
             if (opened := self.opened()) is not None:
-                if not _filled(partial(_from_open, opened), into, begin):
+                if not read_whole(opened, into, begin):
                     raise self._changed()
                 return
             with self._path.open("rb", buffering=0) as file:
@@ -159,5 +168,6 @@ def _filled(read: Callable[[memoryview, int], int], into: memoryview, begin: int
     return True
 
 
-def _from_open(opened: int, into: memoryview, begin: int) -> int:
-    return os.preadv(opened, [into], begin)
+def read_whole(opened: int, into: memoryview, begin: int) -> bool:
+    """Fill all of the room from the byte ``begin`` of an open file on; return whether it was long enough."""
+    return _filled(lambda some, first: os.preadv(opened, [some], first), into, begin)

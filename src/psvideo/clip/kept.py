@@ -6,21 +6,27 @@ it stays behind. What does not fit is not kept, and is decoded again where it is
 """
 
 import contextlib
+import os
 import shutil
+import sys
 import tempfile
 import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
 from io import FileIO
+from math import prod
 from pathlib import Path
 
 import numpy as np
 
-from psvideo.clip.record import CodedPicture, Header
+from psvideo.clip.in_file import RowsInFile, read_whole
+from psvideo.clip.record import CodedPicture, Header, PictureInFile
 from psvideo.errors import PsvideoError
 
 SHARE_OF_FREE_SPACE = 0.5
 """What kept pictures may take of the disk's free space; the run's own files need room too."""
+STAYS_FROM_BYTES = 1 << 20
+"""Pictures of so many bytes and more may stay in the file while they are worked on."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,6 +47,7 @@ class Kept:
 
     def __init__(self, file: FileIO, *, most_bytes: int) -> None:
         self._file = file
+        self._shown = None if sys.platform == "win32" else _Shown(file)
         self._most_bytes = most_bytes
         self._places: dict[int, _Place] = {}
         self._lock = threading.Lock()
@@ -60,6 +67,7 @@ class Kept:
         with self._lock:
             self._most_bytes = 0
             self._places.clear()
+            self._shown = None
             self._file.close()
 
     def put(self, number: int, picture: CodedPicture) -> None:
@@ -81,9 +89,15 @@ class Kept:
             )
             self.bytes_held += codes.nbytes
 
-    def get(self, number: int) -> CodedPicture:
-        """Return a kept picture as it was put. Raises PsvideoError where the disk does not give it back."""
-        place = self._places[number]
+    def get(self, number: int, *, in_file: bool = False) -> CodedPicture | PictureInFile:
+        """Return a kept picture as it was put. Raises PsvideoError where the disk does not give it back.
+
+        ``in_file``: it may stay in the file, of which rows are read whenever somebody wants them.
+        """
+        place, shown = self._places[number], self._shown
+        if in_file and shown is not None and prod(place.shape) * place.dtype.itemsize >= STAYS_FROM_BYTES:
+            rows = RowsInFile(offset=place.offset, kind=place.dtype, shape=place.shape, file=shown)
+            return PictureInFile(header=place.header, codes=rows)
         codes = np.empty(place.shape, place.dtype)
         try:
             with self._lock:
@@ -94,6 +108,29 @@ class Kept:
         if read != codes.nbytes:
             raise PsvideoError(f"{_UNREADABLE} ({read} of {codes.nbytes} bytes of frame {number}). {_ADVICE}")
         return CodedPicture(header=place.header, codes=codes)
+
+
+class _Shown:
+    """The file as those see it who read rows of its pictures; open until the last of them is gone."""
+
+    def __init__(self, file: FileIO) -> None:
+        self._opened = os.dup(file.fileno())
+
+    def __del__(self) -> None:
+        os.close(self._opened)
+
+    def opened(self) -> int:
+        """Return the file, which is open, and nobody else's."""
+        return self._opened
+
+    def read(self, into: memoryview, begin: int) -> None:
+        """Read as many bytes as there is room for, from the byte ``begin`` on."""
+        try:
+            whole = read_whole(self._opened, into, begin)
+        except OSError as fault:
+            raise PsvideoError(f"{_UNREADABLE} ({fault.strerror or fault}). {_ADVICE}") from fault
+        if not whole:
+            raise PsvideoError(f"{_UNREADABLE} (it ends at byte {begin} or after). {_ADVICE}")
 
 
 def _write_all(file: FileIO, data: memoryview) -> None:

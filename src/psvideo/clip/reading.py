@@ -40,9 +40,9 @@ def read_frames(
     solving and encoding want the others. So memory does not grow with the clip. The threads end when the iterator is
     used up, closed, or ends in an error. Frames that are in ``kept`` are read back from there; with ``keep`` the others
     are put into it once they are decoded, unless their files hold plain codes themselves. ``in_files``: frames stay in
-    their files where they lie there as they would in memory, and rows are read whenever somebody wants them; for those
-    who hold many. Raises PsvideoError that names the file where a frame is missing, damaged, or of another size or
-    depth than the first.
+    their files, or in that of ``kept``, where they lie there as they would in memory, and rows are read whenever
+    somebody wants them; for those who hold many. Raises PsvideoError that names the file where a frame is missing,
+    damaged, or of another size or depth than the first.
     """
     chosen = clip.numbers if numbers is None else tuple(sorted(set(numbers)))
     absent = set(chosen) - set(clip.numbers)
@@ -52,7 +52,7 @@ def read_frames(
         return iter(())
     decoded = _decoder(clip, [number for number in chosen if kept is None or number not in kept], in_files)
     keep = keep and not holds_plain_codes(clip)
-    jobs = (partial(_picture, clip, number, decoded, kept, keep) for number in chosen)
+    jobs = (partial(_picture, clip, number, decoded, kept, keep, in_files) for number in chosen)
     workers = 1 if clip.is_movie else threads or max(thread_count() // 2, 1)
     return _as_frames(clip, in_order(jobs, ahead=ahead, threads=workers, name="decode"))
 
@@ -96,11 +96,11 @@ def _decoder(clip: Clip, numbers: list[int], in_files: bool) -> Callable[[int], 
 
 
 def _picture(
-    clip: Clip, number: int, decoded: Callable[[int], Picture], kept: Kept | None, keep: bool
+    clip: Clip, number: int, decoded: Callable[[int], Picture], kept: Kept | None, keep: bool, in_files: bool
 ) -> tuple[int, Picture]:
     """Read a frame's picture back where it is kept, else decode it, and keep it if that is wanted."""
     if kept is not None and number in kept:
-        return number, kept.get(number)
+        return number, kept.get(number, in_file=in_files)
     picture = decoded(number)
     _check_like_first(clip, picture.header, _name(clip, number))
     _check_finite(picture, _name(clip, number))

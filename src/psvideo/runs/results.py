@@ -56,6 +56,7 @@ def normals_run(
     every instant into the folder. What pieces have found already is taken over where the run is resumed.
     """
     job = _checked(job, output)
+    give_back()  # frames as they were decoded for their timing lie otherwise than what comes
     with folder_of(output) as folder:
         if pieces_begun(folder):
             found = pieced_together(job, folder, watch=watch)

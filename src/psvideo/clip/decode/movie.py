@@ -18,7 +18,15 @@ from av.video.stream import VideoStream
 
 from psvideo.clip.decode.ffmpeg_planes import planes
 from psvideo.clip.decode.movie_edits import edits_of
-from psvideo.clip.decode.movie_tags import capture_rate_hz, compression_warning, gamut_of, shot_by, transfer_of, turn_of
+from psvideo.clip.decode.movie_tags import (
+    capture_rate_hz,
+    compression_warning,
+    gamut_of,
+    shot_by,
+    side_data_of,
+    transfer_of,
+    turn_of,
+)
 from psvideo.clip.decode.movie_times import UNEVEN, Places, places_of, promised_frames, stamps_of
 from psvideo.clip.decode.yuv import CODES, HIGHEST, LOWEST, LUMA_WEIGHTS, signal_range, to_rgb
 from psvideo.clip.record import CodedPicture, Header
@@ -259,7 +267,7 @@ def _matrix(path: Path, frame: av.VideoFrame) -> tuple[int, tuple[str, ...]]:
     tagged = UNTAGGED if frame.colorspace is None else int(frame.colorspace)
     if tagged in LUMA_WEIGHTS:
         return tagged, ()
-    if tagged == UNTAGGED and frame.side_data.get("DOVI_METADATA") is not None:
+    if tagged == UNTAGGED and side_data_of(frame).get("DOVI_METADATA") is not None:
         raise PsvideoError(
             f"{path}: is Dolby Vision whose picture stands for light only together with its metadata (profile 5), "
             "which is not read; expected HLG, PQ or SDR. Record or export one of these."

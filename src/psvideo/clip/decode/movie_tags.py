@@ -8,6 +8,7 @@ from typing import Any
 
 import av
 import numpy as np
+from av.sidedata.sidedata import SideDataContainer
 
 from psvideo.clip.record import shot_of
 from psvideo.model.turn import UPRIGHT, Turn, of_matrix
@@ -47,9 +48,20 @@ def shot_by(metadata: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
     return shot_of({name: metadata[keys[0]] for name, keys in first.items() if keys})
 
 
+def side_data_of(frame: av.VideoFrame) -> Mapping[str, Any]:
+    """Return what comes with a frame beside its picture.
+
+    PyAV's own ``frame.side_data`` ties frame and data into a circle, so that every frame's memory stays (8 MB of 1080p
+    ProRes) until Python happens to look for circles.
+    """
+    container: Any = SideDataContainer
+    found: Mapping[str, Any] = container(frame)
+    return found
+
+
 def turn_of(frame: av.VideoFrame) -> tuple[Turn, str | None]:
     """Return how the container wants its frames turned, and a warning where it wants what is no quarter turn."""
-    found: Any = frame.side_data.get("DISPLAYMATRIX")
+    found = side_data_of(frame).get("DISPLAYMATRIX")
     if found is None:
         return UPRIGHT, None
     (a, b, _), (c, d, _), _ = (np.frombuffer(bytes(found), np.int32).reshape(3, 3) / FIXED_ONE).round(3).tolist()
