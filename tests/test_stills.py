@@ -20,6 +20,7 @@ from psvideo.clip.decode import tiff
 from psvideo.clip.decode.decoders import decode
 from psvideo.clip.stated import stated_by
 from psvideo.errors import PsvideoError
+from psvideo.inspect.describe import describe
 
 SIZE, RADIUS = 64, 27
 ANGLES = np.radians(np.arange(0, 360, 60))
@@ -315,6 +316,17 @@ def test_the_command_says_what_it_assumed(tmp_path: Path, capsys: pytest.Capture
     assert "read as 'srgb'" in said.out + said.err
     assert "say --transfer linear" in said.err
     assert main(words) == 2
+
+
+def test_info_says_what_a_folder_of_photographs_is_read_as_and_what_differs(tmp_path: Path) -> None:
+    folder = with_exposures(tmp_path / "photos", lit(), [0.02, 0.01, 0.02, 0.02, 0.02, 0.02])
+    save8(folder / "ambient.jpg", np.zeros((SIZE, SIZE)))
+    said = [finding.text for finding in describe(folder).findings]
+    assert said[0] == "as photographs, 6 lights: shot 3.jpg to shot 22.jpg, jpeg, 64 x 64 pixels, 1 channel, 8 bits"
+    assert said[1].startswith("read as 'srgb', the usual curve")
+    assert "exposures differ by up to a factor 2, as EXIF says" in said
+    assert "ambient.jpg shows ambient light" in said
+    assert "need none: psvideo stills" in said[-1]
 
 
 def test_what_a_file_says_of_itself_is_read(tmp_path: Path) -> None:

@@ -18,6 +18,8 @@ MOST_STOPS = 6.0
 """A flash of a 64th of the exposure needs 64 times the light of a lamp that would do if it were left on."""
 
 MOST_LOST = 0.2
+TENTHS_PX = 10
+"""Shorter ways are said in tenths of a pixel."""
 """Where motion costs more of the normals than this share, people should know before they shoot."""
 
 
@@ -201,10 +203,10 @@ def _about_motion(figures: ShootFigures) -> Iterator[Caution]:
     step_px = figures.motion_per_flash_px
     if step_px is None or step_px < LEAST_PX:
         return
-    grave = motion_cost(step_px).lost > MOST_LOST
+    grave, shown_px = motion_cost(step_px).lost > MOST_LOST, round(step_px, 1 if step_px < TENTHS_PX else None)
     yield (_warning if grave else _note)(
         "motion",
-        f"What moves goes {step_px:.2g} px from flash to flash: {cost_words(step_px)}. Move slower, raise the frame "
+        f"What moves goes {shown_px:g} px from flash to flash: {cost_words(step_px)}. Move slower, raise the frame "
         "rate, flash fewer lights, or show the subject smaller.",
     )
 

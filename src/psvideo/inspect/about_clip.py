@@ -12,6 +12,7 @@ from psvideo.clip.record import Clip
 from psvideo.errors import PsvideoError
 from psvideo.formats.plan_toml import find_plan
 from psvideo.inspect.about_movie import movie_findings
+from psvideo.inspect.about_photographs import photograph_findings
 from psvideo.inspect.about_plan import length_finding, plan_findings, rig_findings
 from psvideo.inspect.findings import Description, Fact, Finding, caught, fault, ok, warn
 from psvideo.model.clipping import SATURATED
@@ -28,7 +29,8 @@ def describe_clip(path: Path, plan: Path | None) -> Description:
     try:
         clip = open_clip(path, plan=plan)
     except PsvideoError as error:
-        own = () if path.is_dir() or _has_plan(path, plan) else tuple(caught(movie_findings(path)))
+        of_itself = photograph_findings if path.is_dir() else movie_findings
+        own = () if _has_plan(path, plan) else tuple(caught(of_itself(path)))
         return Description(path=path, kind=what, findings=(*own, fault(error)))
     findings = tuple(caught(_findings(clip)))
     return Description(path=path, kind=what, facts=_facts(clip), findings=findings)
