@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from psvideo.clip.linear import linear_light
 from psvideo.clip.record import CodedPicture, Header
-from psvideo.clip.transfer import CURVES, TransferCurve, find_curve, to_light
+from psvideo.clip.transfer import CURVES, TransferCurve, disagreement, find_curve, to_light
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import Encoding
 
@@ -142,3 +142,24 @@ def test_video_range_is_not_expanded_for_curves_that_are_defined_on_recorded_cod
         0.18 / 0.9008, abs=1e-4
     )
     assert linear_light(picture([64, 502, 940], bits=10, **scale), Encoding())[0].tolist() == pytest.approx([0, 0.5, 1])
+
+
+@pytest.mark.parametrize(
+    ("plan", "tag", "kind", "words"),
+    [
+        ("srgb", None, "jpeg", None),
+        ("linear", None, "jpeg", "do not hold linear light"),
+        ("linear", None, "png", None),
+        ("hlg", None, "png", None),
+        ("rec709", "rec709", "movie", None),
+        ("srgb", "rec709", "movie", "tagged with the transfer 'rec709'"),
+        ("slog3", "rec709", "movie", None),
+        ("slog3", "hlg", "movie", "write transfer = 'hlg'"),
+        ("hlg", "hlg", "movie", None),
+        ("linear", "st2084", "movie", "tagged with the transfer 'st2084'"),
+    ],
+)
+def test_a_plan_is_held_against_the_files_own_word(plan: str, tag: str | None, kind: str, words: str | None) -> None:
+    said = disagreement(plan, tagged=tag, kind=kind)
+    assert (said is None) == (words is None)
+    assert words is None or words in (said or "")

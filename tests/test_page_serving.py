@@ -92,6 +92,7 @@ def test_the_report_beside_the_results_is_shown_and_may_run_nothing(tmp_path: Pa
         thread = threading.Thread(target=one.serve_forever)
         thread.start()
         status, body, headers = ask(one, "/report.html")
+        assert ask(one, "/report.json")[0] == ask(one, "/other.html")[0] == 404
         one.shutdown()
         thread.join()
     assert (status, body) == (200, b"<!doctype html><p>found</p>")
