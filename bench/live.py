@@ -25,7 +25,7 @@ from psvideo.live.newest_pictures import NewestPictures
 from psvideo.live.newest_round import LiveRounds
 from psvideo.live.ring import RingFrame, ring_of
 from psvideo.live.smaller import Smaller, smaller_plan, smaller_timing
-from psvideo.live.watching import EVERY, Watching
+from psvideo.live.watching import LOOK_S, Watching
 from psvideo.model.row_profiles import row_light
 from psvideo.model.timing import timed_camera
 from psvideo.solve.instants import surfaces
@@ -62,12 +62,12 @@ def rows() -> Iterator[Row]:
         name = f"{width_px} x {height_px} at {fps}"
         for stage in ("row profiles", "made smaller", "clock followed"):
             yield Row(f"{name}: a frame, {stage}", f"{1e3 * spent.usual_s(stage):.2f} ms", "", None)
-        for stage in ("plates and normals", "packed for the page", "judged (every fourth)"):
+        for stage in ("plates and normals", "packed for the page", "judged (four times a second)"):
             yield Row(f"{name}: a result, {stage}", f"{1e3 * spent.usual_s(stage):.1f} ms", "", None)
         frame_s = sum(spent.usual_s(stage) for stage in ("row profiles", "made smaller", "clock followed"))
         result_s = spent.usual_s("plates and normals") + spent.usual_s("packed for the page")
-        result_s += spent.usual_s("judged (every fourth)") / EVERY
-        second = fps * frame_s + results * result_s
+        judged_s = spent.usual_s("judged (four times a second)") / LOOK_S
+        second = fps * frame_s + results * result_s + judged_s
         words = f"{name}: a second, {results} results of {width_px // step} x {height_px // step}"
         yield Row(words, f"{second:.2f} processor seconds", "<= 2", second <= 2)
         yield Row(
@@ -118,8 +118,8 @@ def _spent(width_px: int, height_px: int, fps: int, step: int) -> Spent:
         )
         pictures.put(newest, timed_camera(small, timing))
         spent.on("packed for the page", partial(pictures.packed, "key"))
-        watching._passed = EVERY - 1
-        spent.on("judged (every fourth)", partial(watching.look, newest, small))
+        watching._looked_s = float("-inf")
+        spent.on("judged (four times a second)", partial(watching.look, newest, small))
     return spent
 
 

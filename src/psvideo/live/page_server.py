@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from websockets.sync.server import Server, ServerConnection
 
 SOCKET = "/newest"
+BALL = "ball"
+"""What a page says for a click on the button that finds lights."""
 WAIT_S = 1.0
 """A viewer who has seen the newest hears how things stand after so long."""
 LOCAL = (ADDRESS, "localhost")
@@ -35,12 +37,16 @@ Told = Callable[[], Mapping[str, object]]
 
 @dataclass(kw_only=True)
 class LivePage:
-    """Serves the newest ``pictures``, and what ``told`` gives beside them, until it is closed."""
+    """Serves the newest ``pictures``, and what ``told`` gives beside them, until it is closed.
+
+    ``ball`` is called where a viewer wants the lights found on a chrome ball.
+    """
 
     pictures: NewestPictures
     told: Told
     host: str
     token: str
+    ball: Callable[[], None] = lambda: None
     viewers: int = 0
     _server: "Server | None" = None
     _files: dict[str, bytes] = field(default_factory=dict)
@@ -93,6 +99,9 @@ class LivePage:
         before = 0
         with contextlib.suppress(ConnectionClosed):  # a browser may go at any moment
             for message in connection:
+                if message == BALL:
+                    self.ball()
+                    continue
                 asked = _asked(message)
                 if asked[0] != before:
                     self.pictures.drawn(asked[0], time.monotonic())
@@ -107,9 +116,15 @@ class LivePage:
 
 
 def live_page(
-    pictures: NewestPictures, told: Told, *, host: str = ADDRESS, port: int | None = None, token: str | None = None
+    pictures: NewestPictures,
+    told: Told,
+    *,
+    host: str = ADDRESS,
+    port: int | None = None,
+    token: str | None = None,
+    ball: Callable[[], None] = lambda: None,
 ) -> LivePage:
-    """Return the page's server, which answers already.
+    """Return the page's server, which answers already; ``ball`` is called for a click that is to find lights.
 
     On another ``host`` than this machine's own a ``token`` is needed; left out, one is made. Raises UsageError where
     the port is taken or the library for it is missing.
@@ -122,7 +137,7 @@ def live_page(
             "pip install 'psvideo[live]'), or use `no_page`."
         ) from None
     secret = "" if host in LOCAL and token is None else token or secrets.token_urlsafe(12)
-    page = LivePage(pictures=pictures, told=told, host=host, token=secret, _files=_files())
+    page = LivePage(pictures=pictures, told=told, host=host, token=secret, ball=ball, _files=_files())
     reason: str | None = None
     for candidate in (LIVE_PORT, 0) if port is None else (port,):
         try:

@@ -20,6 +20,8 @@ IDLE_S = 0.1
 STATUS_S = 1.0
 SLOW = 0.9
 """A source that gives less than this share of the plan's frames is slow, and said to be."""
+SETTLES_S = 3.0
+"""After the first results, which wait for what is loaded once, until it is judged whether there is time for more."""
 SEARCH_S = 60.0
 """A search that is under way when the source ends is waited for no longer than this."""
 Shown = Callable[[NewestRound], None]
@@ -54,6 +56,7 @@ class Running:
     _ages_s: list[float] = field(default_factory=list)
     _busy_s: float = 0.0
     _slow: bool = False
+    _settled_s: float | None = None
     _stop: threading.Event = field(default_factory=threading.Event)
     _came: threading.Event = field(default_factory=threading.Event)
     _fault: BaseException | None = None
@@ -156,7 +159,10 @@ class Running:
     def _adapt(self, status: LiveStatus, last_s: float) -> None:
         """Make the picture smaller where there was no time for it, and say so."""
         busy, self._busy_s = self._busy_s / last_s, 0.0
-        if status.state != "locked" or status.age_s is None or self.results < 2 * status.results_per_s:
+        if status.state != "locked" or status.age_s is None:
+            return
+        self._settled_s = status.at_s + SETTLES_S if self._settled_s is None else self._settled_s
+        if status.at_s < self._settled_s:
             return
         plan = self.chain.plan
         pace = min(status.fps * plan.camera.frame_period_s, 1.0)

@@ -11,12 +11,13 @@ from psvideo.live.status import LiveStatus
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Rig
 from psvideo.report.judge.every_line import judgements
+from psvideo.report.judge.powers import power_words
 from psvideo.report.judgement import Judgement, gravest_first, verdict_of
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rigpoints import rig_points
 
-EVERY = 4
-"""Of so many rounds one is looked at."""
+LOOK_S = 0.25
+"""So far apart are rounds that are looked at, in the footage's time: to look costs as much as to solve."""
 ENOUGH = 4
 """Rounds by which the lines are made."""
 HISTOGRAM = 64
@@ -24,22 +25,24 @@ HISTOGRAM = 64
 
 @dataclass(kw_only=True)
 class Watching:
-    """Looks at some of the rounds; ``lines`` are the judgements of the last few, ``histograms`` each light's counts."""
+    """Looks at some of the rounds; ``lines`` are the judgements of the last few, ``histograms`` each light's counts,
+    ``powers`` what to set each light's power to."""
 
     plan: Plan
     rig: Rig | None = None
     spell: Callable[[str], str] = str
     lines: tuple[Judgement, ...] = ()
     histograms: dict[str, list[int]] = field(default_factory=dict)
+    powers: dict[str, str] = field(default_factory=dict)
     _observed: Observed | None = None
     _step: int = 0
-    _passed: int = 0
+    _looked_s: float = float("-inf")
 
     def look(self, newest: NewestRound, plan: Plan) -> None:
         """Look at a round of a picture of the plan's size, and judge once there are enough."""
-        self._passed += 1
-        if self._passed % EVERY:
+        if abs(newest.round.time_s - self._looked_s) < LOOK_S:
             return
+        self._looked_s = newest.round.time_s
         if self._observed is None or self._step != newest.step:
             self._step, self._observed = newest.step, self._fresh(plan, newest)
         self._observed.add(newest.round, newest.surface)
@@ -48,6 +51,7 @@ class Watching:
             whole = replace(newest.timing, flashes=tuple(one for one in newest.timing.flashes if one.complete))
             found = judgements(plan, whole, self._observed)
             self.lines = tuple(one.spelled(self.spell) for one in found)
+            self.powers = power_words(plan, self._observed)
             self._observed = None
 
     def _fresh(self, plan: Plan, newest: NewestRound) -> Observed:
@@ -77,5 +81,6 @@ def told(status: LiveStatus | None, watching: Watching) -> dict[str, object]:
         "verdict": verdict_of(watching.lines) if watching.lines else "",
         "lines": [{"subject": one.subject, "grade": one.grade, "sentence": one.sentence} for one in lines],
         "histograms": watching.histograms,
+        "powers": watching.powers,
         "lights": list(watching.plan.lights),
     }

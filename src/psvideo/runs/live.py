@@ -8,9 +8,10 @@ from pathlib import Path
 
 from psvideo.errors import NoStrobeError
 from psvideo.formats.paths import path_if_given, path_of
-from psvideo.formats.rig_toml import read_rig
+from psvideo.formats.rig_toml import format_rig, read_rig
 from psvideo.formats.timing_json import format_timing
 from psvideo.formats.whole_files import refuse_existing, write_text
+from psvideo.live.ball_lights import BallLights
 from psvideo.live.chain import Chain, NewestRound
 from psvideo.live.history import timing_of
 from psvideo.live.lock import check_followed
@@ -43,6 +44,7 @@ def live(
     plan: Path | str | None = None,
     rig: Path | str | None = None,
     first_light: str | None = None,
+    rig_out: Path | str | None = None,
     timing_out: Path | str | None = None,
     growing: bool = False,
     raw: str | None = None,
@@ -69,6 +71,7 @@ def live(
     - ``growing``: the source is a folder that a recorder is writing. ``raw``: FFmpeg's name of the pixels that bare
       bytes hold, such as gray or gray16le.
     - ``rig``: where the lights are; without it there are plates and no normals.
+    - ``rig_out``: a rig.toml to write when lights are found on a chrome ball, by a click on the page.
     - ``timing_out``: a timing.json to write at the end, of all that was followed; ``force`` replaces one.
     - ``record``: a clip folder to record the frames into, whole or not at all.
     - ``lock``: play the plan on the board at the port ``strobe`` ("auto": by USB identity), and trim its period so that
@@ -97,6 +100,7 @@ def live(
     if timing_path is not None:
         refuse_existing(timing_path, force=force)
     running = _running(played, known, first_light, seconds, said, shown)
+    kept = _keeper(path_if_given("rig_out", rig_out), force=force)
     record_path = path_if_given("record", record)
     plan_path = path_if_given("plan", plan) or played.plan_path
 
@@ -108,7 +112,7 @@ def live(
         held_strobe, running.chain, port=strobe, yes=yes, noted=running.notes.append, caller=caller, logged=logged
     )
     with (
-        _page(running, played.plan, known, caller, opened, host, port, token) if page else nullcontext(),
+        _page(running, played.plan, known, caller, opened, kept, host, port, token) if page else nullcontext(),
         nullcontext() if record_path is None else recording(record_path, played, force=force) as recorded,
         nullcontext() if lock is None else held(plan_path, lock=lock) as holding,
     ):
@@ -125,6 +129,19 @@ def live(
     return summary
 
 
+def _keeper(path: Path | None, *, force: bool) -> Callable[[Rig], str]:
+    """Return what writes a rig that was found live, and says what became of it."""
+    if path is None:
+        return lambda rig: "Lights found, and used from now on. With `rig_out` they are written, too."
+    refuse_existing(path, force=force)
+
+    def write(rig: Rig) -> str:
+        write_text(path, format_rig(rig))
+        return f"Lights found, used from now on, and written to {path}."
+
+    return write
+
+
 @contextmanager
 def _page(
     running: Running,
@@ -132,6 +149,7 @@ def _page(
     rig: Rig | None,
     caller: Caller,
     opened: Callable[[str], None],
+    kept: Callable[[Rig], str],
     host: str,
     port: int | None,
     token: str | None,
@@ -140,14 +158,25 @@ def _page(
     watching, pictures = Watching(plan=plan, rig=rig, spell=caller.spell), NewestPictures()
     shown = running.shown
 
+    def use(found: Rig) -> str:
+        running.chain.rig = watching.rig = found
+        return kept(found)
+
+    ball = BallLights(rig=rig, found=use)
+
     def show(newest: NewestRound) -> None:
         small = smaller_plan(plan, newest.step)
         pictures.put(newest, timed_camera(small, newest.timing))
         watching.look(newest, small)
+        ball.look(newest)
         shown(newest)
 
     running.shown, running.drawn_age_s = show, pictures.drawn_age_s
-    server = live_page(pictures, lambda: told(running.status, watching), host=host, port=port, token=token)
+
+    def say() -> dict[str, object]:
+        return told(running.status, watching) | {"ball": [caller.spell(words) for words in ball.words]}
+
+    server = live_page(pictures, say, host=host, port=port, token=token, ball=ball.ask)
     try:
         opened(server.url)
         yield

@@ -32,6 +32,9 @@ def live(
     rig: Annotated[
         Path | None, typer.Option("--rig", help="Where the lights are; left out: plates, and no normals.")
     ] = None,
+    rig_out: Annotated[
+        Path | None, typer.Option("--rig-out", help="Where to write lights that a click on the page finds on a ball.")
+    ] = None,
     first_light: FirstLight = None,
     timing_out: Annotated[
         Path | None, typer.Option("--timing-out", help="Where to write timing.json of all that was followed.")
@@ -90,6 +93,7 @@ def live(
         source,
         plan=plan,
         rig=rig,
+        rig_out=rig_out,
         first_light=first_light,
         timing_out=timing_out,
         growing=growing,

@@ -117,7 +117,8 @@ function showStatus(told) {
     line.append(word, sentence);
     return line;
   }));
-  if (isNew("histograms", told.histograms)) showHistograms(told.histograms);
+  if (isNew("histograms", [told.histograms, told.powers])) showHistograms(told.histograms, told.powers || {});
+  if (isNew("ball", told.ball || [])) showBall(told.ball || []);
   const names = told.lights.join();
   if (names !== at("plate").dataset.names) {
     at("plate").dataset.names = names;
@@ -125,19 +126,30 @@ function showStatus(told) {
   }
 }
 
-function showHistograms(histograms) {
+function showBall(words) {
+  at("ball-words").hidden = words.length === 0;
+  at("ball-words").replaceChildren(...words.map((sentence) => {
+    const line = document.createElement("li");
+    line.textContent = sentence;
+    return line;
+  }));
+}
+
+function showHistograms(histograms, powers) {
   const box = at("histograms");
   const names = Object.keys(histograms);
   if (box.children.length !== names.length) {
     box.replaceChildren(...names.map((name) => {
       const figure = document.createElement("figure");
       const caption = document.createElement("figcaption");
-      caption.textContent = name;
       figure.append(document.createElement("canvas"), caption);
       return figure;
     }));
   }
-  names.forEach((name, place) => drawHistogram(box.children[place].firstChild, histograms[name]));
+  names.forEach((name, place) => {
+    drawHistogram(box.children[place].firstChild, histograms[name]);
+    write(box.children[place].lastChild, powers[name] ? `${name}: ${powers[name]}` : name);
+  });
 }
 
 function drawHistogram(canvas, counts) {
@@ -190,6 +202,7 @@ function connect() {
   };
 }
 
+at("ball").onclick = () => { if (socket && socket.readyState === WebSocket.OPEN) socket.send("ball"); };
 at("plate").onchange = () => { chosen = at("plate").value; };
 at("viewer").onpointermove = (moved) => {
   const box = at("viewer").getBoundingClientRect();

@@ -1,0 +1,36 @@
+"""What to set each lamp's power to, so that the subject's brightest parts lie just below saturation."""
+
+import numpy as np
+
+from psvideo.model.plan import Plan
+from psvideo.report.observe.levels import TARGET_QUANTILE, Levels
+from psvideo.report.observe.observed import Observed
+
+RIGHT = 1.12
+"""A power within this factor of the right one is right: a sixth of a stop."""
+FAINTEST = 1 / 32
+"""Lamps that give less of what they should are not told what to set: something else is wrong."""
+
+
+def power_words(plan: Plan, observed: Observed) -> dict[str, str]:
+    """Return for every light that was seen what to set its power to, as a sentence."""
+    levels = {light: observed.levels(light) for light in plan.lights if light in observed.counts}
+    whole = [one for one in levels.values() if one.clipped_share <= 1 - TARGET_QUANTILE]
+    return {light: _words(_planned(plan, light), one, whole) for light, one in levels.items()}
+
+
+def _planned(plan: Plan, light: str) -> float:
+    return max(flash.lights.get(light, 0.0) for flash in plan.flashes)
+
+
+def _words(planned: float, levels: Levels, whole: list[Levels]) -> str:
+    factor = levels.right_power(whole)
+    wanted = planned * factor
+    if factor > 1 / FAINTEST:
+        return "gives hardly any light: does it fire?"
+    if 1 / RIGHT <= factor <= RIGHT:
+        return f"power {100 * planned:.0f} % is right"
+    if wanted <= 1:
+        return f"set its power to {100 * wanted:.0f} % (now {100 * planned:.0f} %)"
+    more = f"bring it nearer or open the aperture by {np.log2(wanted):.1f} stops"
+    return more if planned == 1 else f"set its power to 100 % (now {100 * planned:.0f} %), and {more}"
