@@ -2,6 +2,7 @@
 
 import os
 import struct
+import subprocess
 import sys
 from collections.abc import Callable
 from itertools import product
@@ -15,7 +16,7 @@ import OpenEXR
 import pytest
 import tifffile
 from numpy.typing import NDArray
-from PIL import Image
+from PIL import Image, ImageCms
 
 from psvideo.clip.decode import tiff
 from psvideo.clip.decode.decoders import decode, opened, read_header
@@ -352,6 +353,16 @@ def test_pngs_of_few_shades_are_read_with_a_warning(tmp_path: Path, mode: str, s
     Image.fromarray(ramp).convert(mode).save(tmp_path / "x.png")
     found = read_header("png", tmp_path / "x.png").warnings
     assert [said is not None and said in warning for warning in found] == [True] * (said is not None)
+
+
+def test_what_a_library_remarks_on_odd_profiles_stays_off_the_terminal(tmp_path: Path) -> None:
+    profile = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+    Image.new("L", (8, 8)).save(tmp_path / "x.png", icc_profile=profile)
+    code = (
+        f"from psvideo.clip.decode import png; from pathlib import Path; png.decode(Path({str(tmp_path / 'x.png')!r}))"
+    )
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert ran.stderr == ""
 
 
 def test_a_jpeg_for_printing_is_refused_as_such(tmp_path: Path) -> None:

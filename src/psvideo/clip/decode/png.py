@@ -3,6 +3,7 @@
 Decoded by imagecodecs, which raises on a truncated or damaged file, where others deliver the rest as black.
 """
 
+import logging
 import struct
 from pathlib import Path
 
@@ -11,6 +12,8 @@ import imagecodecs
 from psvideo.clip.decode.signatures import begins_like
 from psvideo.clip.record import CodedPicture, Header
 from psvideo.errors import PsvideoError
+
+logging.getLogger("imagecodecs").addHandler(logging.NullHandler())  # its remarks on odd profiles are no user's concern
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 END = b"IEND\xaeB`\x82"
