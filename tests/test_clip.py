@@ -82,6 +82,18 @@ def test_images_without_a_number_are_left_aside_and_named(shot: Path) -> None:
     assert clip.notes == ("left aside, having no number at the end: shot.mask.png",)
 
 
+def test_numbers_in_brackets_count_where_no_name_ends_in_a_number(
+    tmp_path: Path, write_plan: Callable[..., None]
+) -> None:
+    """Windows numbers so what is renamed at once; browsers so the copies of a file."""
+    write_plan(tmp_path)
+    for name in ("shot (2).png", "shot (10).png"):
+        write_png(tmp_path / name)
+    assert [file.name for file in open_clip(tmp_path).files] == ["shot (2).png", "shot (10).png"]
+    write_png(tmp_path / "shot.0001.png")
+    assert [file.name for file in open_clip(tmp_path).files] == ["shot.0001.png"]
+
+
 def touch(*names: str) -> Callable[[Path], None]:
     def put(shot: Path) -> None:
         for name in names:

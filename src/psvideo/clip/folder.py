@@ -34,6 +34,8 @@ UNREAD = {
 }
 """What cameras write and psvideo does not read, and what to do with it."""
 NUMBERED = re.compile(r"(.*?)(\d+)", re.DOTALL)
+BRACKETED = re.compile(r"(.*?)\((\d+)\)", re.DOTALL)
+"""As Windows names many files at once, ``shot (12)``; where a name ends in a number, such files are copies."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,9 +94,8 @@ def _images(folder: Path) -> list[Path]:
 
 
 def _numbered(images: list[Path]) -> list[Path]:
-    return sorted(
-        (image for image in images if NUMBERED.fullmatch(image.stem)), key=lambda image: (_number(image), image)
-    )
+    found = [[image for image in images if kind.fullmatch(image.stem)] for kind in (NUMBERED, BRACKETED)]
+    return sorted(found[0] or found[1], key=lambda image: (_number(image), image))
 
 
 def _number(file: Path) -> int:
@@ -103,12 +104,12 @@ def _number(file: Path) -> int:
 
 def number_of(file: Path) -> int | None:
     """Return the number that ends a file's stem, None where there is none."""
-    digits = _parts(file)[1]
-    return int(digits) if digits else None
+    match = NUMBERED.fullmatch(file.stem)
+    return int(match[2]) if match else None
 
 
 def _parts(file: Path) -> tuple[str, str]:
-    match = NUMBERED.fullmatch(file.stem)
+    match = NUMBERED.fullmatch(file.stem) or BRACKETED.fullmatch(file.stem)
     return (match[1], match[2]) if match else (file.stem, "")
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from psvideo.clip.folder import KINDS, MOVIES, NUMBERED
+from psvideo.clip.folder import BRACKETED, KINDS, MOVIES, NUMBERED
 
 DEEPEST = 4
 """Folders in folders that are looked into: cards put takes a few levels down."""
@@ -62,7 +62,7 @@ def _entries(folder: Path) -> tuple[list[os.DirEntry[str]], list[os.DirEntry[str
 
 def _is_frame(name: str) -> bool:
     stem, dot, suffix = name.rpartition(".")
-    return (dot + suffix).lower() in KINDS and NUMBERED.fullmatch(stem) is not None
+    return (dot + suffix).lower() in KINDS and any(kind.fullmatch(stem) for kind in (NUMBERED, BRACKETED))
 
 
 def _state(entries: list[os.DirEntry[str]]) -> State:
