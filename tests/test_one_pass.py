@@ -159,3 +159,15 @@ def test_frames_that_stay_in_their_files_give_the_same_bytes(
         assert run(*whole, "-o", tmp_path / name, "--align", "flow", "--aov", "error") == 0
         results.append(pictures(tmp_path / name))
     assert results[0] == results[1] != {}
+
+
+def test_kept_frames_that_stay_in_their_file_give_the_same_bytes(
+    clip: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Decoded for their timing, and read row by row for plates."""
+    results = []
+    for name, from_bytes in (("memory", 1 << 30), ("file", 1)):
+        monkeypatch.setattr(kept, "STAYS_FROM_BYTES", from_bytes)
+        assert run("normals", clip, "--rig", clip / "rig.toml", "-o", tmp_path / name, "-q", "--no-preview") == 0
+        results.append(pictures(tmp_path / name))
+    assert results[0] == results[1] != {}
