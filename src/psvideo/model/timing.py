@@ -9,6 +9,7 @@ import numpy as np
 from psvideo.model.camera import Camera, FloatArray
 from psvideo.model.plan import HasLights, Plan
 from psvideo.model.shutter import Pulse
+from psvideo.model.units import show_seconds
 
 Order = Literal["marker", "rig", "given", "guess"]
 
@@ -94,9 +95,7 @@ class Timing:
         rows = f"{self.phase_error_rows:.2g} row"
         if self.phase_error_s is None:
             return f"Flash times are known to {rows}." if self.phase_error_rows else ""
-        times = (
-            f"{self.phase_error_s * 1e6:.2g} us" if self.phase_error_s < 1e-3 else f"{self.phase_error_s * 1e3:.2g} ms"
-        )
+        times = show_seconds(self.phase_error_s, figures=2)
         return f"Flash times are known to {times}, {rows}." if self.row_time_s else f"Flash times are known to {times}."
 
     @property

@@ -15,15 +15,16 @@ def counted(count: int, thing: str) -> str:
     return f"{count} {thing}" if count == 1 else f"{count} {thing}s"
 
 
-def show_seconds(seconds: float) -> str:
-    """Return a time as people write it, with four figures.
+def show_seconds(seconds: float, *, figures: int = 4) -> str:
+    """Return a time as people write it, with so many figures.
 
-    >>> show_seconds(0.0008), show_seconds(0.000_05), show_seconds(1.5)
-    ('0.8 ms', '50 us', '1.5 s')
+    >>> show_seconds(0.0008), show_seconds(0.000_05), show_seconds(1.5), show_seconds(0.000_157, figures=2)
+    ('0.8 ms', '50 us', '1.5 s', '0.16 ms')
     """
     if abs(seconds) >= 1:
-        return f"{seconds:.4g} s"
-    return f"{seconds * 1e3:.4g} ms" if abs(seconds) >= 1e-4 or seconds == 0 else f"{seconds * 1e6:.4g} us"
+        return f"{seconds:.{figures}g} s"
+    in_ms = abs(seconds) >= 1e-4 or seconds == 0
+    return f"{seconds * 1e3:.{figures}g} ms" if in_ms else f"{seconds * 1e6:.{figures}g} us"
 
 
 def show_rate(fps: Fraction) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 
 from psvideo.model.camera import Camera, FloatArray
 from psvideo.model.plan import Plan
+from psvideo.model.units import show_seconds
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import brightnesses, predictions
@@ -187,8 +188,9 @@ def _sureness(plan: Plan, found: ClipFit) -> str:
         )
     if error_s > UNSURE * shortest_s:
         return (
-            f"The flashes' times are known to +- {error_s * 1e6:.2g} us only, and flashes last {shortest_s * 1e6:.3g} "
-            "us: the clip is too short or too noisy, or its subject moves too much, to measure them better."
+            f"The flashes' times are known to +- {show_seconds(error_s, figures=2)} only, and flashes last "
+            f"{show_seconds(shortest_s, figures=3)}: the clip is too short or too noisy, or its subject moves too "
+            "much, to measure them better."
         )
     return ""
 
