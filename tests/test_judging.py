@@ -6,6 +6,7 @@ from bench.accuracy_whole import bust
 
 from psvideo.compute.medians import weighted_median
 from psvideo.model.surface import Surface
+from psvideo.report.observe.slopes import slope_agreement
 from psvideo.solve.normals.doubting import Signs, ThinSurface, doubt_deg, signs_of
 from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.illumination import Illumination
@@ -131,3 +132,34 @@ def test_a_weighted_median_is_that_of_the_sorted_numbers(count: int) -> None:
         order = np.argsort(numbers)
         upto = np.cumsum(weights[order], dtype=np.float64)
         assert weighted_median(numbers, weights) == numbers[order[np.searchsorted(upto, upto[-1] / 2)]]
+
+
+def gentle(noise_deg: float, *, curved: float = 0.25, mirrored: bool = False) -> Surface:
+    """Return a dome that is hardly curved, or a wall, with so much noise in each normal."""
+    rng = np.random.default_rng(5)
+    row, col = np.mgrid[:120, :160].astype(np.float32)
+    x, y = (col - 79.5) / 80, (59.5 - row) / 80
+    slopes = np.stack([-curved * x * (1 + y**2), -curved * y * (1 + x**2)], axis=-1)
+    normals = np.concatenate([-slopes, np.ones((120, 160, 1))], axis=-1)
+    normals = normals + np.radians(noise_deg) * rng.normal(size=normals.shape)
+    normals *= [-1 if mirrored else 1, 1, 1]
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    return Surface(
+        normals=normals.astype(np.float32),
+        albedo=np.full((120, 160), 0.5, np.float32),
+        valid=np.ones((120, 160), np.bool_),
+        residual=np.zeros((120, 160), np.float32),
+    )
+
+
+def test_noise_does_not_make_a_gently_curved_surface_none() -> None:
+    noisy = slope_agreement(gentle(4.0))
+    assert noisy is not None
+    assert noisy > 0.3
+    turned = slope_agreement(gentle(4.0, mirrored=True))
+    assert turned is not None
+    assert turned < -0.1
+
+
+def test_a_wall_whose_normals_differ_by_noise_alone_says_nothing_of_the_rig() -> None:
+    assert slope_agreement(gentle(1.5, curved=0.0)) is None

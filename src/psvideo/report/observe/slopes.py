@@ -4,6 +4,8 @@ For heights z(x, y) with slopes p and q, dp/dy = dq/dx. Normals found with mirro
 this, even with three lights, which explain any brightness. Both sides are held against each other by correlation.
 """
 
+from typing import NamedTuple
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +18,12 @@ LEAST_PIXELS, LEAST_AWAY = 400, 50
 STEEPEST = 4.0
 """Slopes beyond this lie on outlines, where neighbouring pixels show different things."""
 BLUR_PX = 1.5
+BY_CHANCE = 3.0
+"""Standard errors by which noise may disagree."""
+WIDER, CLEAR, NOISE_FALLS = (2, 4, 8), 0.3, 2.8
+"""Slopes that agree less than the second are smoothed so much wider while that takes away more than the third part of
+their squares: noise falls to a sixteenth each time, and noise enough to hide a surface's agreement takes so much with
+it; what wrong lights make of a shape stays. What is noise to the end (a wall, a box's faces) says nothing."""
 AWAY = -0.1
 """Normals whose z is below this face away from the camera: noise at an outline does less."""
 LEAST_AVERAGED = 3
@@ -25,11 +33,34 @@ LEAST_AVERAGED = 3
 def slope_agreement(surface: Surface) -> float | None:
     """Return the correlation of dp/dy with dq/dx: near 1 for a surface, 0 for noise, below it for wrong lights.
 
-    None where too few neighbouring normals are there.
+    None where too few neighbouring normals are there, or where they show nothing but noise.
     """
     step = max(surface.valid.shape[1] // WIDTH_PX, 1)
     valid, normals = _thinned(surface, step)
-    blurred = np.asarray(cv2.GaussianBlur(normals * valid[..., None], (0, 0), BLUR_PX))
+    found = _turning(valid, normals, BLUR_PX)
+    for times in WIDER:
+        if found is None or not -found.chance < found.agreement < CLEAR:
+            break
+        wider = _turning(valid, normals, times * BLUR_PX)
+        if wider is None or found.power < NOISE_FALLS * wider.power:
+            break
+        found = wider
+    else:
+        return None
+    return None if found is None else found.agreement
+
+
+class _Turning(NamedTuple):
+    """The correlation of dp/dy with dq/dx, their mean square, and how far noise alone may bring the correlation."""
+
+    agreement: float
+    power: float
+    chance: float
+
+
+def _turning(valid: NDArray[np.bool_], normals: NDArray[np.float32], blur_px: float) -> _Turning | None:
+    """Return how slopes turn where normals are smoothed so far; None where too few are there."""
+    blurred = np.asarray(cv2.GaussianBlur(normals * valid[..., None], (0, 0), blur_px))
     depth = np.maximum(blurred[..., 2], 1e-6)
     slope_x, slope_y = -blurred[..., 0] / depth, -blurred[..., 1] / depth
     gentle = valid & (np.hypot(slope_x, slope_y) < STEEPEST) & (blurred[..., 2] > 0)
@@ -39,7 +70,11 @@ def slope_agreement(surface: Surface) -> float | None:
     across = -np.gradient(slope_x, axis=0)[inside]  # y points up, rows down
     along = np.gradient(slope_y, axis=1)[inside]
     total = float((across**2).sum() + (along**2).sum())
-    return float(2 * (across * along).sum() / total) if total > 1e-12 else None
+    if total <= 1e-12:
+        return None
+    apart = len(across) / (4 * np.pi * blur_px**2)  # so many of them know nothing of each other
+    agreement = float(2 * (across * along).sum() / total)
+    return _Turning(agreement, total / len(across), BY_CHANCE / float(np.sqrt(max(apart, 1.0))))
 
 
 def share_away(surface: Surface) -> float:
