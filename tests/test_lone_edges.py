@@ -1,5 +1,6 @@
 """What goes through its own period between flashes looks alike in each light's plates: edges give it away."""
 
+import cv2
 import numpy as np
 import pytest
 
@@ -45,6 +46,12 @@ def test_where_every_light_shows_its_own_square_all_their_light_is_unsure() -> N
 def test_the_edge_of_a_shadow_counts_a_tenth_of_that_of_a_square() -> None:
     shadow, lit = (np.max(doubts(sketches([square(code, 50), square(120, 50), square(120, 50)]))) for code in (8, 200))
     assert shadow < 0.1 * lit
+
+
+@pytest.mark.parametrize("soft_px", [0.6, 1.0])
+def test_beside_a_shadow_that_only_one_light_throws_nothing_is_unsure(soft_px: float) -> None:
+    shadow = cv2.GaussianBlur(square(4, 50), (0, 0), soft_px)
+    assert not np.any(doubts(sketches([shadow, square(120, 50), square(120, 50)])))
 
 
 def test_less_of_it_counts_where_all_lights_agree_with_a_motion() -> None:

@@ -20,8 +20,9 @@ ALONE = 2.5
 """An edge is alone where it is so many times what any other light shows of it: shading makes edges differ by less."""
 LEAST_EDGE, OF_NOISE = 0.04, 2.7
 """Edges of a smaller step in the logarithm of light are none, nor those of less than so much of the noise."""
-SHADOW, SHADOW_PX = 0.12, 5
-"""Where light falls below this share of what it is within such a window it is the edge of a shadow, which is alone."""
+SHADOW, SHADOW_PX, PENUMBRA_PX = 0.12, 5, 5
+"""Where light falls below this share of what it is within such a window it is the edge of a shadow, which is alone; so
+is what lies around it within a second window, where the smoothing leaves steps of it."""
 LEAST_LIT = 0.04
 """What shows less light, as a share of white, says nothing of edges."""
 FEWEST = 3
@@ -89,5 +90,6 @@ def _edges(codes: Codes, noise: float) -> tuple[Vectors, Vectors, Vectors]:
     least = np.float32(LEAST_EDGE) + np.float32(OF_NOISE / SCALE * noise) / np.sqrt(light + np.float32(TOE))
     window = np.ones((SHADOW_PX, SHADOW_PX), np.uint8)
     dim, bright = cv2.erode(light, window), cv2.dilate(light, window)
-    here = (dim > np.float32(SHADOW) * bright) & (bright > np.float32(LEAST_LIT))
+    shadow = cv2.dilate((dim <= np.float32(SHADOW) * bright).astype(np.uint8), np.ones((PENUMBRA_PX,) * 2, np.uint8))
+    here = (shadow == 0) & (bright > np.float32(LEAST_LIT))
     return np.hypot(across, down).astype(np.float32), least, here.astype(np.float32)
