@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from bench.accuracy_whole import bust
 
-from psvideo.compute.medians import weighted_median
 from psvideo.model.surface import Surface
 from psvideo.report.observe.slopes import slope_agreement
 from psvideo.solve.normals.doubting import Signs, ThinSurface, doubt_deg, signs_of
@@ -120,18 +119,6 @@ def test_normals_that_belong_to_no_surface_are_doubted_and_steep_ones_are_not() 
     # 2 / 96 of a slope around every four points, over a radius of two and a half, as an angle
     assert np.median(swirl.torn_deg[middle]) == pytest.approx(np.degrees(2 / SIZE * 2.5), rel=0.25)
     assert (doubt_of_swirl[middle] > 1.5 * doubt_of_dome[middle]).all()
-
-
-@pytest.mark.parametrize("count", [1, 2, 3, 1000])
-def test_a_weighted_median_is_that_of_the_sorted_numbers(count: int) -> None:
-    rng = np.random.default_rng(count)
-    for digits in (1, 7):  # with numbers that are alike, and without
-        numbers = rng.gamma(2, 1, count).round(digits).astype(np.float32)
-        weights = rng.uniform(0.1, 1, count).astype(np.float32) * (rng.random(count) > 0.3)
-        weights[0] = 0.5
-        order = np.argsort(numbers)
-        upto = np.cumsum(weights[order], dtype=np.float64)
-        assert weighted_median(numbers, weights) == numbers[order[np.searchsorted(upto, upto[-1] / 2)]]
 
 
 def gentle(noise_deg: float, *, curved: float = 0.25, mirrored: bool = False) -> Surface:

@@ -380,7 +380,7 @@ def test_what_is_left_beyond_noise_makes_a_take_doubtful_and_then_bad_whatever_i
         one.facts[:] = [replace(facts, misfit=misfit, valid_share=0.1, measured_share=1.0) for facts in one.facts]
         return graded(accuracy(one), "accuracy"), graded(validity(one), "validity")
 
-    assert [said(off_deg) for off_deg in (2.9, 3.1, 11.9, 12.1)] == [
+    assert [said(off_deg) for off_deg in (2.9, 3.1, 14.9, 15.1)] == [
         ("good", "bad"), ("doubtful", "doubtful"), ("doubtful", "doubtful"), ("bad", "bad")
     ]  # fmt: skip
 

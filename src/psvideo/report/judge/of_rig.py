@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from psvideo.report.judge.light import NAMED
-from psvideo.report.judge.result import AT_REST, COMMON_DEG, LOST_DEG, NOISY_DEG, by_noise_deg, moves
+from psvideo.report.judge.result import AT_REST, COMMON_DEG, NOISY_DEG, by_noise_deg, moves
 from psvideo.report.judgement import Grade, Judgement
 from psvideo.report.observe.observed import InstantFacts, Observed
 from psvideo.report.observe.rigfit import RigFit
@@ -22,6 +22,7 @@ MOST_AWAY = 0.05
 NEARER = 0.7
 """Lamps stand near where that leaves less than this share of what is left over. (Photographs: 0.88 and more; lamps ten
 widths away that a rig takes for distant: 0.2 to 0.5.)"""
+LOST_LEAN_DEG = 12.0
 UNDONE, REDONE = 0.7, 0.25
 """Plates were read by another curve where that leaves less than these shares of what is left over. (sRGB read as light:
 0.3 to 0.8; photographs in light: 1.7 and more. Light read as sRGB: 0.05 to 0.15; photographs in sRGB: 0.6 and more.)"""
@@ -93,7 +94,7 @@ def _near(fit: RigFit) -> Judgement | None:
         return None
     return Judgement(
         subject="rig",
-        grade="bad" if near.lean_deg > LOST_DEG else "doubtful",
+        grade="bad" if near.lean_deg > LOST_LEAN_DEG else "doubtful",
         found=f"The lights stand near: they fall off over the picture as if {near.widths:.0f} of its widths away, and "
         f"the rig takes them for distant. Normals lean by about {near.lean_deg:.0f} degrees for it.",
         advice="Write where the lights stand into the rig (`position_m`), or move them farther away.",

@@ -12,9 +12,9 @@ SOFT_PX = 1.5
 """Sharpest edges that are softer are never worse than doubtful: a smooth subject has no others."""
 COMMON_DEG = 3.0
 """What a typical normal may be off by beyond noise."""
-LOST_DEG = 12.0
+LOST_DEG = 15.0
 """From here on a normal says little of the surface: photographs under directions that were 1 to 8 degrees off came to
-10, and a bear under eight lights nearly in one plane to 18."""
+13, and a bear under eight lights nearly in one plane to 18."""
 MEAN_OF_HELD = 0.83
 """Predicted errors hold two thirds of the true ones; this is the mean as a share of it, for errors in two directions
 (Rayleigh)."""

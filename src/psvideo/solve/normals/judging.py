@@ -49,6 +49,7 @@ class Judging:
 NOTHING = np.zeros((0, 0), np.float32)
 MANY_LIGHTS = 8
 """Beyond so many lights residuals are not taken to average out."""
+MOST_USUAL_DEG = 30.0
 SURE = 1.5
 """In a single pixel residuals count from so many times what noise makes of them."""
 
@@ -58,8 +59,6 @@ def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging =
 
     What robust solving predicted is in ``error_deg`` already; of least squares noise and residuals say what is known.
     """
-    from psvideo.compute.medians import weighted_median
-
     near = near_spread(one.lit, _thin_shape(surface))
     spread = _Spread.of(surface, one.lit, noise, how, near)
     points = spread.points(surface)
@@ -74,13 +73,19 @@ def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging =
     if at_points.size:
         albedo = _brightness(points.surface.albedo)[points.known]  # what is bright shows more of the subject
         noise_deg = np.hypot(points.noise_deg, signs.lost_deg)[points.known]
-        typical, by_noise = (weighted_median(each, albedo) for each in (at_points, noise_deg))
+        typical, by_noise = (_usual(each, albedo) for each in (at_points, noise_deg))
         beyond_deg = float(np.sqrt(max(typical**2 - by_noise**2, 0.0)))
         misfit = None if misfit is None else replace(misfit, error_deg=beyond_deg, noise_deg=by_noise)
     for more in (moving, near.doubt_deg if near.doubt_deg.size else None):
         doubt = doubt if more is None else np.hypot(doubt, more)
     error, trusted = spread.judged(surface, doubt, points.step, how, limit_deg=how.most_error_deg, spare=one.spare)
     return replace(surface, valid=trusted, error_deg=error, misfit=misfit)
+
+
+def _usual(errors_deg: Floats, weights: Floats) -> float:
+    """Return the mean error; where hardly anything is known it counts as MOST_USUAL_DEG."""
+    each = np.minimum(errors_deg.astype(np.float64), MOST_USUAL_DEG)
+    return float((each * weights).sum() / max(float(weights.sum(dtype=np.float64)), 1e-12))
 
 
 def _thin_shape(surface: Surface) -> tuple[int, int]:
