@@ -18,6 +18,7 @@ TABLES = (
     "soak",
     "view",
     "live",
+    "genlock",
     "timing",
     "compression",
     "strobe",

@@ -1,0 +1,69 @@
+"""The dark row held for ten minutes: a board in Python that drifts and jitters, filmed, followed and trimmed in a loop.
+
+Time is virtual, the board's clock and the camera's apart: 900 ppm and a warm-up of 5 ppm a minute, a wander of 30 ppm
+in 44 s, flashes that jitter by 2 microseconds. ``python -m bench.genlock --minutes 10``; by hours where it is asked.
+"""
+
+import argparse
+import math
+import sys
+from collections.abc import Iterator
+from fractions import Fraction
+from pathlib import Path
+
+from bench.table import Row, table
+
+sys.path.append(str(Path(__file__).parents[1] / "tests" / "models"))  # the loop that the tests film in
+
+from strobed_loop import StrobedLoop
+
+from psvideo.live.genlock import rows_around, target_of
+from psvideo.live.holding import Holding
+from psvideo.model.camera import Camera
+from psvideo.model.plan import Plan, PlannedFlash
+
+MINUTES = 10.0
+APART_PPM, WARMS_PPM, WANDERS_PPM, JITTER_S = 900.0, 5.0, 30.0, 2e-6
+WITHIN_ROWS, AFTER_S = 2.0, 3.0
+ROW = "20"
+
+
+def rows(minutes: float = MINUTES) -> Iterator[Row]:
+    """Hold the dark row for so long and yield how far it ever was from where it should be."""
+    loop = StrobedLoop(plan=_plan(), offset_ppm=_offset_ppm, jitter_s=JITTER_S, seed=2)
+    for _ in loop.film(4.0):
+        if loop.chain.state == "locked":
+            break
+    holding = Holding(chain=loop.chain, target=target_of(loop.plan.camera, ROW), ask=loop.ask)
+    around, began_s = rows_around(loop.plan.camera), loop.host_s
+    worst = 0.0
+    for at_s in loop.film(AFTER_S + 60 * minutes, holding):
+        if at_s > began_s + AFTER_S:
+            worst = max(worst, abs(loop.true_row().short_of(holding.target, around)))
+    name = f"{minutes:g} minutes, from {AFTER_S:g} s on"
+    yield Row(f"{name}: farthest from the row", f"{worst:.2f} rows", f"<= {WITHIN_ROWS:g}", worst <= WITHIN_ROWS)
+    yield Row(f"{name}: locks lost", str(len(loop.chain.followed) - 1), "0", len(loop.chain.followed) == 1)
+    yield Row(f"{name}: largest trim", f"{holding.most_ppm} ppm", "", None)
+
+
+def _offset_ppm(at_s: float) -> float:
+    return APART_PPM + WARMS_PPM * at_s / 60 + WANDERS_PPM * math.sin(at_s / 7)
+
+
+def _plan() -> Plan:
+    camera = Camera(width_px=4, height_px=72, fps=Fraction(50), exposure_s=0.02, readout_s=0.018)
+    flashes = [PlannedFlash(lights={name: 1.0}, duration_s=0.002) for name in ("key", "left", "right")]
+    flashes.append(PlannedFlash(lights={}, duration_s=0.002))
+    return Plan(camera=camera, flashes=tuple(flashes), dark_s=0.038, clock_tolerance_ppm=3000.0, mode="half-rate")
+
+
+def main() -> int:
+    """Hold it for as long as is asked for."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--minutes", type=float, default=MINUTES)
+    print(table(rows(parser.parse_args().minutes)))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
