@@ -353,6 +353,15 @@ def test_every_edit_shows_its_frames_once_at_the_times_at_which_they_were_taken(
     assert ["hides" in warning for warning in clip.warnings] == [True] * (len(places) < 12)
 
 
+def test_an_edit_that_shows_a_moment_of_a_frame_shows_that_frame(tmp_path: Path, plan_for: Callable[..., Path]) -> None:
+    """As players do and FFmpeg; a movie's clock rounds by a tenth of a frame here, and a little is added for that."""
+    write_movie(tmp_path / "x.mov", in_10_bits(grey_ramp(12)), codec="prores", matrix=1)
+    with_edits(tmp_path / "x.mov", [(5.3 / float(RATE), 2)])
+    assert len(open_clip(tmp_path / "x.mov", plan=plan_for(rows=32, cols=48)).numbers) == 6
+    with av.open(str(tmp_path / "x.mov")) as container:
+        assert len(list(container.decode(video=0))) == 6
+
+
 def test_a_movie_whose_edits_show_nothing_is_refused(tmp_path: Path, plan_for: Callable[..., Path]) -> None:
     write_movie(tmp_path / "x.mov", in_10_bits(grey_ramp(12)), codec="prores", matrix=1)
     with_edits(tmp_path / "x.mov", [(0.02, 40)])

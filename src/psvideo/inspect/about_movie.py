@@ -14,7 +14,7 @@ def movie_findings(path: Path) -> Iterator[Finding]:
 
     movie = index_movie(path)
     head = movie.header
-    missing = 0 if movie.rates_hz is not None else movie.places[-1] + 1 - len(movie.places)
+    missing = 0 if movie.rates_hz is not None else movie.places[-1] - movie.places[0] + 1 - len(movie.places)
     gaps = f", {missing} missing" if missing else ""
     rate = "" if movie.rate_hz is None else f", {movie.rate_hz:.4g} frames a second"
     if movie.rates_hz is not None:

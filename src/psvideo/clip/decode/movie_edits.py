@@ -22,16 +22,17 @@ ONE = 65536
 
 @dataclass(frozen=True, kw_only=True)
 class Edits:
-    """The spans of a track that play, [begin, end) in the units of its timestamps."""
+    """The spans of a track that play, [begin, end) in the units of its timestamps, rounded by up to ``rounding``."""
 
     spans: tuple[tuple[float, float], ...]
+    rounding: float
 
     def shown(self, timestamps: Sequence[int]) -> tuple[int, ...]:
-        """Return those timestamps, in ascending order, whose frames play by more than half."""
+        """Return those timestamps, in ascending order, that lie in a span: as players do, and FFmpeg."""
         if len(timestamps) < 2:
             return tuple(timestamps)
-        half = float(np.median(np.diff(timestamps))) / 2
-        return tuple(stamp for stamp in timestamps if any(begin <= stamp + half < end for begin, end in self.spans))
+        late = min(self.rounding, float(np.median(np.diff(timestamps))) / 2)
+        return tuple(stamp for stamp in timestamps if any(begin <= stamp + late < end for begin, end in self.spans))
 
 
 def edits_of(path: Path, track: int) -> Edits | None:
@@ -57,7 +58,7 @@ def _edits(found: dict[int, dict[bytes, bytes]], track: int) -> Edits | None:
         long = units * per_unit * rate or float("inf")
         spans.append((float(begin), begin + long))
         shown += long
-    return None if not spans or shown > length - per_unit else Edits(spans=tuple(spans))
+    return None if not spans or shown > length - per_unit else Edits(spans=tuple(spans), rounding=per_unit)
 
 
 def _entries(body: bytes) -> Iterator[tuple[int, int, float]]:
