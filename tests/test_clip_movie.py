@@ -336,10 +336,11 @@ def test_frames_that_an_edit_list_hides_are_left_out_and_said(
         ([(0, 0)], range(12)),
         ([(1, -1), (12, 0)], range(12)),
         ([(5, 3)], range(3, 8)),
+        ([(5, 3)] * 3, range(3, 8)),
         ([(3, 0), (4, 6)], [0, 1, 2, 6, 7, 8, 9]),
         ([(4, 6), (3, 0), (3, 0)], [0, 1, 2, 6, 7, 8, 9]),
     ],
-    ids=["whole", "no length", "late", "middle", "cut", "turned round"],
+    ids=["whole", "no length", "late", "middle", "three times", "cut", "turned round"],
 )
 def test_every_edit_shows_its_frames_once_at_the_times_at_which_they_were_taken(
     tmp_path: Path, plan_for: Callable[..., Path], edits: list[tuple[float, int]], places: Sequence[int]

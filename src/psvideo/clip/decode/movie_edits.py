@@ -14,6 +14,7 @@ from typing import BinaryIO
 import numpy as np
 
 CONTAINERS = {b"moov", b"trak", b"edts", b"mdia"}
+DEEPEST = 3
 WANTED = {b"mvhd", b"tkhd", b"elst", b"mdhd"}
 MOST_BYTES = 1 << 20
 """Longer descriptions are none that a camera writes: an edit takes 12 or 20 bytes."""
@@ -40,7 +41,12 @@ def edits_of(path: Path, track: int) -> Edits | None:
     try:
         with path.open("rb") as file:
             return _edits(_by_track(file, path.stat().st_size), track)
-    except (OSError, struct.error, KeyError):  # no such file of boxes, or damaged: the decoder says so if it matters
+    except (
+        OSError,
+        struct.error,
+        KeyError,
+        IndexError,
+    ):  # no such file of boxes, or damaged: the decoder says so if it matters
         return None
 
 
@@ -51,14 +57,14 @@ def _edits(found: dict[int, dict[bytes, bytes]], track: int) -> Edits | None:
     unit_hz, _ = _scale_and_length(found[0][b"mvhd"])
     media_hz, length = _scale_and_length(parts[b"mdhd"])
     per_unit = media_hz / unit_hz if unit_hz else 0.0
-    spans, shown = [], 0.0
+    spans = []
     for units, begin, rate in _entries(parts[b"elst"]):
         if begin < 0 or rate <= 0:  # nothing, or one frame that stands still
             continue
         long = units * per_unit * rate or float("inf")
         spans.append((float(begin), begin + long))
-        shown += long
-    return None if not spans or shown > length - per_unit else Edits(spans=tuple(spans), rounding=per_unit)
+    whole = len(spans) == 1 and spans[0][1] - spans[0][0] > length - per_unit  # only begins where its frames do
+    return None if not spans or whole else Edits(spans=tuple(spans), rounding=per_unit)
 
 
 def _entries(body: bytes) -> Iterator[tuple[int, int, float]]:
@@ -86,7 +92,7 @@ def _by_track(file: BinaryIO, end: int) -> dict[int, dict[bytes, bytes]]:
     return found
 
 
-def _boxes(file: BinaryIO, begin: int, end: int) -> Iterator[tuple[bytes, bytes]]:
+def _boxes(file: BinaryIO, begin: int, end: int, deep: int = DEEPEST) -> Iterator[tuple[bytes, bytes]]:
     while begin + 8 <= end:
         file.seek(begin)
         size, kind = struct.unpack(">I4s", file.read(8))
@@ -97,8 +103,8 @@ def _boxes(file: BinaryIO, begin: int, end: int) -> Iterator[tuple[bytes, bytes]
         size = size or end - begin
         if size < head:
             return
-        if kind in CONTAINERS:
-            yield from _boxes(file, begin + head, min(begin + size, end))
+        if kind in CONTAINERS and deep:
+            yield from _boxes(file, begin + head, min(begin + size, end), deep - 1)
         elif kind in WANTED and size < MOST_BYTES:
             yield kind, file.read(size - head)
         begin += size
