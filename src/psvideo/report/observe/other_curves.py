@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from psvideo.clip.transfer import find_curve, to_light
 from psvideo.model.camera import FloatArray
+from psvideo.pictures.relighting import srgb_share
 
-CURVE = "srgb"
+STEPS = 1025
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,12 +25,11 @@ class OtherCurves:
 def other_curves(light: FloatArray, beyond: FloatArray) -> OtherCurves:
     """Return what points (point, light), 1.0 = saturation, leave over under other curves; ``beyond`` projects to what
     no normal explains, (light, light)."""
-    signals = np.linspace(0, 1, 1025)
-    by_light = np.asarray(to_light(find_curve(CURVE), signals), np.float64)
-    held = np.clip(light, 0, 1)
+    steps = np.linspace(0, 1, STEPS) ** 2.4  # as finely where sRGB is steep
+    signals = srgb_share(steps.astype(np.float32))
     return OtherCurves(
-        undone=_left_over(np.interp(held, signals, by_light), beyond),
-        redone=_left_over(np.interp(held, by_light, signals), beyond),
+        undone=_left_over(np.interp(light, signals, steps), beyond),
+        redone=_left_over(np.interp(light, steps, signals), beyond),
     )
 
 
