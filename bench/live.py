@@ -62,11 +62,11 @@ def rows() -> Iterator[Row]:
         name = f"{width_px} x {height_px} at {fps}"
         for stage in ("row profiles", "made smaller", "clock followed"):
             yield Row(f"{name}: a frame, {stage}", f"{1e3 * spent.usual_s(stage):.2f} ms", "", None)
-        for stage in ("plates and normals", "packed for the page", "judged (four times a second)"):
+        for stage in ("plates and normals", "packed for the page", "judged (now and then)"):
             yield Row(f"{name}: a result, {stage}", f"{1e3 * spent.usual_s(stage):.1f} ms", "", None)
         frame_s = sum(spent.usual_s(stage) for stage in ("row profiles", "made smaller", "clock followed"))
         result_s = spent.usual_s("plates and normals") + spent.usual_s("packed for the page")
-        judged_s = spent.usual_s("judged (four times a second)") / LOOK_S
+        judged_s = spent.usual_s("judged (now and then)") / LOOK_S
         second = fps * frame_s + results * result_s + judged_s
         words = f"{name}: a second, {results} results of {width_px // step} x {height_px // step}"
         yield Row(words, f"{second:.2f} processor seconds", "<= 2", second <= 2)
@@ -94,10 +94,10 @@ def _spent(width_px: int, height_px: int, fps: int, step: int) -> Spent:
     )
     for frame in filmed:
         mean, _ = spent.on("row profiles", partial(row_light, frame.coded))
-        coded = spent.on("made smaller", partial(smaller.of, frame.coded))
+        thinner = spent.on("made smaller", partial(smaller.of, frame.coded))
         if frame.index >= first:
             spent.on("clock followed", partial(follower.add, frame.index, mean))
-        ring.add(frame.index, RingFrame(coded=coded, came_s=0.0))
+        ring.add(frame.index, RingFrame(coded=thinner, came_s=0.0))
         timing = smaller_timing(timing_now(follower, (min(ring.frames), max(ring.frames))), step, height_px)
         held = {place: one.coded for place, one in ring.frames.items()}
         began = time.process_time()
@@ -112,14 +112,14 @@ def _spent(width_px: int, height_px: int, fps: int, step: int) -> Spent:
             came_s=0.0,
             step=step,
             timing=timing,
-            frame=coded,
+            frame=thinner,
             place=frame.index,
             ended=frame.index,
         )
         pictures.put(newest, timed_camera(small, timing))
         spent.on("packed for the page", partial(pictures.packed, "key"))
         watching._looked_s = float("-inf")
-        spent.on("judged (four times a second)", partial(watching.look, newest, small))
+        spent.on("judged (now and then)", partial(watching.look, newest, small))
     return spent
 
 

@@ -132,6 +132,8 @@ def _table(found: Watched, camera: Camera, seconds: float) -> Iterator[Row]:
     lost = int(end["lost"]) + int(found.camera["dropped"])
     yield Row(f"{name}: frames that came / were lost", f"{end['frames']} / {lost}", "0 lost", lost == 0)
     steady = _steady(found)
+    if len(steady) < 2:
+        raise RuntimeError(f"{name}: hardly a picture was drawn; is something else running on this machine?")
     rate = (len(steady) - 1) / (steady[-1, 0] - steady[0, 0])
     least = LEAST_RESULTS.get(size, 10.0)
     yield Row(f"{name}: results drawn a second", f"{rate:.1f}", f">= {least:g}", bool(rate >= least))

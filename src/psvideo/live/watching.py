@@ -16,7 +16,7 @@ from psvideo.report.judgement import Judgement, gravest_first, verdict_of
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rigpoints import rig_points
 
-LOOK_S = 0.25
+LOOK_S = 0.4
 """So far apart are rounds that are looked at, in the footage's time: to look costs as much as to solve."""
 ENOUGH = 4
 """Rounds by which the lines are made."""
