@@ -437,3 +437,10 @@ def test_validity_is_counted_over_the_subject_filled_or_not_before_a_dim_backdro
         (facts,) = replace(one, backdrop=backdrop).observed(0).facts
         assert facts.valid_share is not None
         assert 0.48 < facts.valid_share < 0.58, "of the ball; what is behind it counts neither way"
+
+
+def test_a_light_of_which_no_frame_showed_the_subject_is_not_called_dead() -> None:
+    one = Footage(rounds=2).observed(0)
+    one.counts[one.lights[0]] = np.zeros_like(one.counts[one.lights[0]])
+    one.facts = [replace(fact, levels=(0.0, *fact.levels[1:])) for fact in one.facts]
+    assert [line.grade for line in lamps(one)] == ["good"]

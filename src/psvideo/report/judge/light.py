@@ -138,7 +138,9 @@ def lamps(observed: Observed, *, timed: bool = True) -> Iterator[Judgement]:
     level = np.array([one.levels for one in facts])
     usual = np.median(level, axis=0)
     relative = usual / max(float(usual.max()), 1e-12)
-    said = list(_weak(observed.lights, relative, _brightest(observed), _claimed(observed)))
+    known = _shown(observed)
+    named = [light for light, is_known in zip(observed.lights, known, strict=True) if is_known]
+    said = list(_weak(named, relative[known], _brightest(observed)[known], _claimed(observed)[known]))
     alive = usual > NO_LIGHT * usual.max()
     whole = np.array([one.unseen_share == 0 for one in facts])
     if timed and whole.any():
@@ -147,7 +149,7 @@ def lamps(observed: Observed, *, timed: bool = True) -> Iterator[Judgement]:
         said += _unsteady(observed.lights, shown, level[whole], usual, alive)
     yield from said
     if not said:
-        spread = -np.log2(max(relative.min(), 1e-9))
+        spread = -np.log2(max(relative[known].min(), 1e-9))
         yield Judgement(
             subject="lights",
             grade="good",
@@ -169,6 +171,12 @@ def _claimed(observed: Observed) -> NDArray[np.float64]:
         return np.zeros(len(observed.lights))
     strengths = np.linalg.norm(observed.points.vectors, axis=2).mean(axis=0)
     return np.asarray(strengths / max(float(strengths.max()), 1e-12))
+
+
+def _shown(observed: Observed) -> NDArray[np.bool_]:
+    """Return of which lights any of the subject was seen, (light,): of others nothing can be said."""
+    counted = np.array([observed.levels(light).total > 0 for light in observed.lights], np.bool_)
+    return counted | (not counted.any())
 
 
 def _weak(
