@@ -2,16 +2,20 @@
 
 import errno
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from psvideo.compute import spilled
 from psvideo.errors import PsvideoError
 from psvideo.model.rig import Light
+from psvideo.solve.normals.bands import ShownPlates
 from psvideo.solve.normals.illumination import illumination
 from psvideo.solve.normals.solving import Solving
+from psvideo.solve.normals.task import Usable, task
 
 DIRECTIONS = [(0.5, 0.0, 0.8), (-0.5, 0.1, 0.8), (0.1, 0.5, 0.8), (-0.1, -0.5, 0.8), (0.3, 0.3, 0.8)]
 
@@ -61,3 +65,21 @@ def test_a_disk_without_room_is_said_before_anything_is_solved(tmp_path: Path, m
     monkeypatch.setattr(spilled, "LARGE_PIXELS", 100)
     with pytest.raises(PsvideoError, match=r"one of 0 MB has no room \(No space left on device\)"):
         spilled.planes_for((3, 200), np.float16, pixels=200, folder=tmp_path)
+
+
+def test_where_few_rows_are_wanted_there_is_room_for_few() -> None:
+    """A sample of rows lies at the distances of the picture: room for eight of them would be that of 248."""
+    lit = illumination([Light(name=str(n), direction=one) for n, one in enumerate(DIRECTIONS[:5])], channels=1)
+    shown = ShownPlates.of([np.ones((310, 7000), np.uint16)] * 5).as_floats()
+    made: list[tuple[list[int], int]] = []
+
+    def make(rows: NDArray[np.intp], first: int, into: NDArray[np.float32]) -> None:
+        made.append((rows.tolist(), into.shape[1]))
+
+    given = task(shown.samples, lit, None, None, Usable(), 0.0, 1.0)
+    run = replace(shown, makes=make)
+    for step in (1, 31):
+        made.clear()
+        run.in_bands(lambda *_: None, given, lambda _: None, threads=1, step=step)
+        assert sorted(row for rows, _ in made for row in rows) == list(range(0, 310, step))
+        assert {room for _, room in made} == {max(step, 8 // step * step)}

@@ -110,7 +110,8 @@ class ShownPlates:
             return
 
         lights, samples = len(self.samples), int(np.prod(self.shape[1:]))
-        made_rows = step * max(MADE_SAMPLES // (lights * samples), LEAST_MADE_ROWS)
+        made_rows = max(MADE_SAMPLES // (lights * samples), LEAST_MADE_ROWS)
+        made_rows = step * max(made_rows // step, 1)  # there is room for the rows between as well
 
         def bands(begin: int, end: int) -> None:
             held = np.empty((lights, made_rows, *self.shape[1:]), np.float32)
