@@ -20,10 +20,12 @@ STEEPEST = 4.0
 BLUR_PX = 1.5
 BY_CHANCE = 3.0
 """Standard errors by which noise may disagree."""
-WIDER, CLEAR, NOISE_FALLS = (2, 4, 8), 0.3, 2.8
-"""Slopes that agree less than the second are smoothed so much wider while that takes away more than the third part of
-their squares: noise falls to a sixteenth each time, and noise enough to hide a surface's agreement takes so much with
-it; what wrong lights make of a shape stays. What is noise to the end (a wall, a box's faces) says nothing."""
+WIDER, CLEAR = (2, 4, 8), 0.3
+"""Slopes that agree less than the second are smoothed so much wider as long as noise explains it."""
+NOISE_LEFT, MORE = 1 / 16, 1.5
+"""Noise keeps so much of its square each time. Where a surface's own slopes agree (or, under mirrored lights, disagree)
+and noise hides it, that is the surface's share, and what is left is at most that and so much of the rest: what leaves
+1.5 times more is a shape that wrong lights made. What is noise to the end (a wall, a box's faces) says nothing."""
 AWAY = -0.1
 """Normals whose z is below this face away from the camera: noise at an outline does less."""
 LEAST_AVERAGED = 3
@@ -42,7 +44,8 @@ def slope_agreement(surface: Surface) -> float | None:
         if found is None or not -found.chance < found.agreement < CLEAR:
             break
         wider = _turning(valid, normals, times * BLUR_PX)
-        if wider is None or found.power < NOISE_FALLS * wider.power:
+        share = abs(found.agreement)
+        if wider is None or wider.power > MORE * (share + (1 - share) * NOISE_LEFT) * found.power:
             break
         found = wider
     else:
