@@ -19,6 +19,7 @@ from psvideo.formats.plan_toml import format_plan
 from psvideo.live.chain import Chain
 from psvideo.live.genlock import STEP_PPM, DarkRow, WantedRow, check_holds, next_trim_ppm, rows_around, target_of
 from psvideo.live.holding import Holding
+from psvideo.live.trims import Trims
 from psvideo.model.plan import Plan
 from psvideo.runs.caller import PYTHON
 from psvideo.runs.live_strobe import held_strobe
@@ -26,6 +27,7 @@ from psvideo.strobe.link.boards import BOARDS, MAX_TRIM_PPM
 from psvideo.strobe.link.exchange import RefusedError
 from psvideo.strobe.runlog import RunLog, as_played, format_log
 from psvideo.strobe.stand_ins.python_board_port import PythonBoardPort
+from psvideo.sync.rowfit.beat import FoundClock
 
 PlanMaker = Callable[..., Plan]
 HOLDS_ROWS = 2.0
@@ -174,6 +176,19 @@ def test_a_board_that_is_lost_is_a_sentence_and_not_the_end(
         held_strobe(chain, None, lock="edge", port="emulated", yes=True, noted=notes.append, caller=PYTHON),
     ):
         pass
+
+
+def test_a_trim_counts_from_its_moment_though_minutes_of_another_lie_before_it() -> None:
+    trims = Trims()
+    trims.add(10.0, -900.0)
+    trims.add(600.0, 1000.0)
+    clock = trims.bent(FoundClock(phase_s=0.0, offset_ppm=0.0), since_s=599.0)
+    strobe_s = np.linspace(600.4, 600.7, 30_001)
+    comes_s = strobe_s + clock.bend(strobe_s)
+    assert (comes_s[0], comes_s[-1]) < (600.0, 600.2), "half a second sooner than without trims"
+    slope_ppm = 1e6 * np.diff(clock.bend(strobe_s)) / np.diff(strobe_s)
+    np.testing.assert_allclose(slope_ppm[comes_s[1:] < 600.0], -900, atol=0.1)
+    np.testing.assert_allclose(slope_ppm[comes_s[:-1] > 600.0], 1000, atol=0.1)
 
 
 def wait_until(true: Callable[[], bool]) -> bool:
