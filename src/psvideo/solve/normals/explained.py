@@ -6,35 +6,40 @@ There nothing is to be weighed down, least squares is the best estimate (Gauss a
 import numpy as np
 
 from psvideo.compute.compiled import FUSED
-from psvideo.solve.normals.blocks import ABSENT, ONE, ZERO, X, Y, Z
-from psvideo.solve.normals.equations import DOUBT, add_equations, solve_equations
+from psvideo.solve.normals.blocks import ABSENT, COUNT, HIGH, LOW, ONE, THREE, ZERO, X, Y, Z
+from psvideo.solve.normals.equations import add_equations, solve_equations
 from psvideo.solve.normals.near_kernel import at, of_light
-from psvideo.solve.normals.task import LIGHTS, Floats, Task
+from psvideo.solve.normals.task import LIGHTS, Floats, Indices, Task
 
-EXPLAINED_SQUARED = np.float32(4.5**2)  # of 128 pixels under eight lights, noise spoils none in 99 of 100 blocks
+EXPLAINED_SQUARED = np.float32(4.5**2)  # of eight measurements, noise spoils none in 9999 of 10,000 pixels
 ROUGHLY = np.float32(1e4)  # the condition squared up to which a pixel counts as solved
+FAR_OFF_SQUARED = np.float32(3.0**2)  # noise takes 0.0027 of all measurements so far
+MOST_FAR_OFF = np.float32(0.01)
+ODD, FAR_OFF = LOW, HIGH  # planes of w that are free by then
 
 
 @FUSED.called
-def explained(
-    task: Task, read: np.float32, photon: np.float32, w: Floats, v: Floats, m: Floats, e: Floats, n: int
-) -> bool:
-    """Solve a block by least squares over its usable measurements; True where that explains every one of them.
-
-    read, photon: the variance of a dark measurement, and what light adds to it.
-    """
+def solve_plainly(task: Task, w: Floats, m: Floats, e: Floats, n: int) -> None:
+    """Solve a block by least squares over its usable measurements."""
     for light in range(len(e)):
         for i in range(n):
             e[light, i] = ONE if m[light, i] > ABSENT else ZERO
     add_equations(task.matrix, w, m, e, n)
     solve_equations(w, n, ROUGHLY, False)
-    return explains(task, read, photon, w, v, m, n)
 
 
 @FUSED.called
-def explains(task: Task, read: np.float32, photon: np.float32, w: Floats, v: Floats, m: Floats, n: int) -> bool:
-    """Whether g explains every usable measurement of a block to its noise; DOUBT becomes 0."""
-    odd = np.int32(0)
+def list_unexplained(
+    task: Task, read: np.float32, photon: np.float32, w: Floats, m: Floats, listed: Indices, n: int
+) -> int:
+    """List the pixels with a usable measurement that g does not explain to its noise, and return how many they are.
+
+    All are listed where the others' measurements are farther off than noise would take so many: a surface that is not
+    matte turns their normals too. (Of the noise a fit of three numbers takes its part.) All are listed as well where
+    too few lights reach one of them, for shadows end there. Three measurements are always explained.
+    read, photon: the variance of a dark measurement, and what light adds to it.
+    """
+    w[ODD : ODD + n], w[FAR_OFF : FAR_OFF + n] = ZERO, ZERO
     for light in range(task.lights):
         lamp = of_light(task.matrix, light)
         for i in range(n):
@@ -42,6 +47,21 @@ def explains(task: Task, read: np.float32, photon: np.float32, w: Floats, v: Flo
             a, b, c = w[X + i], w[Y + i], w[Z + i]
             error = m[light, i] - (x * a + y * b + z * c)
             variance = read + photon * max(m[light, i], ZERO) + LIGHTS * LIGHTS * (a * a + b * b + c * c)
-            odd = np.int32(odd | (m[light, i] > ABSENT) & (error * error > EXPLAINED_SQUARED * variance))
-    v[DOUBT : DOUBT + n] = ZERO
-    return bool(odd == 0)
+            there = m[light, i] > ABSENT
+            w[ODD + i] = ONE if there & (error * error > EXPLAINED_SQUARED * variance) else w[ODD + i]
+            left = FAR_OFF_SQUARED * variance * (w[COUNT + i] - THREE)
+            w[FAR_OFF + i] += ONE if there & (error * error * w[COUNT + i] > left) else ZERO
+    count, far_off, measured, unsolved = 0, ZERO, ZERO, False
+    for i in range(n):
+        listed[count] = i
+        checked = w[COUNT + i] > THREE
+        odd = (w[ODD + i] > ZERO) & checked
+        count += odd
+        unsolved |= (w[ODD + i] > ZERO) & (w[COUNT + i] < THREE)
+        far_off += w[FAR_OFF + i] if checked & (not odd) else ZERO
+        measured += w[COUNT + i] if checked & (not odd) else ZERO
+    if unsolved or (count and far_off > MOST_FAR_OFF * measured):
+        for i in range(n):
+            listed[i] = i
+        return n
+    return count

@@ -8,8 +8,8 @@ from numba.np.numpy_support import carray
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import flattened, pointer
-from psvideo.solve.normals.blocks import ABSENT, BLOCK, MISSING, ONE, SUM, XX, YY, ZERO, ZZ
-from psvideo.solve.normals.near_kernel import place_lights
+from psvideo.solve.normals.blocks import ABSENT, BLOCK, COUNT, LIMIT, MISSING, ONE, SUM, TINY, XX, YY, ZERO, ZZ
+from psvideo.solve.normals.near_kernel import at, place_lights
 from psvideo.solve.normals.task import Bytes, Floats, Samples, Task
 
 
@@ -106,3 +106,37 @@ def read_block(task: Task, values: Floats, row: int, col: int, n: int) -> None:
     else:
         gather_three(task, values, start, n)
     hide_unseen(task, values, row, col, n)
+
+
+@FUSED.called
+def read_usable(task: Task, w: Floats, values: Floats, m: Floats, row: int, col: int, n: int) -> None:
+    """Read a block's measurements; what is saturated, unseen or in shadow is MISSING, and COUNT is what remains."""
+    start, channels = row * task.cols + col, task.tone.shape[1]
+    if channels == 1:
+        gather_one(task, values, start, n)
+    else:
+        gather_three(task, values, start, n)
+    hide_unseen(task, values, row, col, n)
+    if channels > 1:
+        combine(task, w, values, m, n)
+    _hide_shadows(task, w, m, n)
+
+
+@FUSED.inlined
+def _hide_shadows(task: Task, w: Floats, m: Floats, n: int) -> None:
+    """What is dark beside the pixel's own mean becomes MISSING; COUNT is what remains."""
+    w[SUM : SUM + n], w[COUNT : COUNT + n] = ZERO, ZERO
+    for light in range(task.lights):
+        plane, per = m[light], task.per_strength[light]
+        for i in range(n):
+            w[SUM + i] += max(plane[i] * at(per, i), ZERO) if plane[i] > ABSENT else ZERO
+            w[COUNT + i] += ONE if plane[i] > ABSENT else ZERO
+    for i in range(n):
+        w[LIMIT + i] = max(task.dark, task.ratio * w[SUM + i] / (w[COUNT + i] + TINY))
+        w[COUNT + i] = ZERO
+    for light in range(task.lights):
+        plane, per = m[light], task.per_strength[light]
+        for i in range(n):
+            lit = plane[i] * at(per, i) > w[LIMIT + i]
+            plane[i] = plane[i] if lit else MISSING
+            w[COUNT + i] += ONE if lit else ZERO

@@ -21,7 +21,7 @@ CLEARLY = np.float32(0.2)  # where a pixel's residuals come down by so much, in 
 FAR_OFF = np.float32(1.5)  # the residual, over the pixel's own without the model, that counts half
 TWO, TO_BROAD, TO_MIDDLE, TO_NARROW = np.float32(2), np.float32(BROAD), np.float32(MIDDLE), np.float32(NARROW)
 LEAST_BRIGHT = np.float32(0.55)  # of what is less, high powers are nothing, and numbers too small to be quick
-_MATTE_X, _MATTE_Y, _MATTE_Z, _BEFORE, _AFTER, _SPREAD, _HOLDS, _OLD_X, _OLD_Y, _OLD_Z = (BLOCK * k for k in range(10))
+_MATTE_X, _MATTE_Y, _MATTE_Z, _BEFORE, _AFTER, _SPREAD, HOLDS, _OLD_X, _OLD_Y, _OLD_Z = (BLOCK * k for k in range(10))
 _UNIT_X, _UNIT_Y, _UNIT_Z, _PER_SIZE, _GAIN, _SHINE = (BLOCK * k for k in range(10, 16))
 KEPT, OF_LIGHT = 16, 4
 """Planes that ``reflecting`` keeps of a block: so many, then so many per light, its gradient and its shine."""
@@ -42,22 +42,21 @@ def find_ways(matrix: Floats, per_strength: Floats, ways: Floats, n: int) -> Non
 
 
 @FUSED.called
-def reflecting(
-    matrix: Floats, ways: Floats, lights: int, weights: Weights, share: np.float32, kept: Floats, matte: Floats,
-    w: Floats, v: Floats, values: Floats, m: Floats, e: Floats, n: int,
+def reflect(
+    matrix: Floats, ways: Floats, lights: int, weights: Weights, kept: Floats, matte: Floats,
+    w: Floats, v: Floats, m: Floats, e: Floats, n: int,
 ) -> None:  # fmt: skip
-    """Solve a solved block again under the subject's model, where that explains the pixel better.
+    """Solve solved pixels again under the subject's model, where that explains them better.
 
-    SCALE and the weighted normal equations are left as ``predict_error`` takes them, and values (light * channel,
-    pixel) without what the model adds, for the albedo. Nothing it takes has a type that pictures decide, so that it is
-    compiled once for all of them.
+    How far the model holds in each is left in the plane HOLDS of ``kept``. Nothing it takes has a type that pictures
+    decide, so that it is compiled once for all of them.
     """
     noise, least = weights.noise, weights.signal_noise
     gradient = kept[BLOCK * KEPT :].reshape(len(ways), OF_LIGHT, BLOCK)
     find_scale(matrix, noise, least, w, v, m, e, n)
     for i in range(n):
         kept[_MATTE_X + i], kept[_MATTE_Y + i], kept[_MATTE_Z + i] = w[X + i], w[Y + i], w[Z + i]
-        kept[_SPREAD + i], kept[_HOLDS + i] = ONE / (FAR_OFF * v[SCALE + i]), ONE
+        kept[_SPREAD + i], kept[HOLDS + i] = ONE / (FAR_OFF * v[SCALE + i]), ONE
     _add_up(kept, _BEFORE, e, n)
     for step in range(STEPS):
         _fill_gradient(ways, lights, weights, kept, matte, w, m, n)
@@ -73,18 +72,25 @@ def reflecting(
     _fill_gradient(ways, lights, weights, kept, matte, w, m, n)
     fill_residuals(gradient, w, matte, e, n)
     _add_up(kept, _AFTER, e, n)
-    wholly = True
     for i in range(n):
         gained = (kept[_BEFORE + i] - kept[_AFTER + i]) / (CLEARLY * max(kept[_BEFORE + i], TINY))
         holds = min(max(gained, ZERO), ONE) if w[COUNT + i] >= FROM_MEASUREMENTS else ZERO
-        kept[_HOLDS + i] = holds
-        wholly &= holds == ONE
+        kept[HOLDS + i] = holds
         w[X + i] = kept[_MATTE_X + i] + holds * (w[X + i] - kept[_MATTE_X + i])
         w[Y + i] = kept[_MATTE_Y + i] + holds * (w[Y + i] - kept[_MATTE_Y + i])
         w[Z + i] = kept[_MATTE_Z + i] + holds * (w[Z + i] - kept[_MATTE_Z + i])
-    if not wholly:
-        _fill_gradient(ways, lights, weights, kept, matte, w, m, n)
-    find_scale(gradient, noise, share, w, v, matte, e, n)
+
+
+@FUSED.called
+def weigh_reflecting(
+    ways: Floats, lights: int, weights: Weights, share: np.float32, kept: Floats, matte: Floats,
+    w: Floats, v: Floats, values: Floats, m: Floats, e: Floats, n: int,
+) -> None:  # fmt: skip
+    """SCALE and the weighted normal equations under the model as far as it holds; values (light * channel, pixel) are
+    left without what the model adds, for the albedo."""
+    gradient = kept[BLOCK * KEPT :].reshape(len(ways), OF_LIGHT, BLOCK)
+    _fill_gradient(ways, lights, weights, kept, matte, w, m, n)
+    find_scale(gradient, weights.noise, share, w, v, matte, e, n)
     add_weighted(gradient, False, TWO, True, w, v, matte, e, n)
     _take_off(ways, lights, weights, kept, values, n)
 
@@ -153,7 +159,7 @@ def _fill_gradient(
             dx, dy, dz, to_half, strength = way[0, i], way[1, i], way[2, i], way[3, i], way[4, i]
             cosine = a * dx + b * dy + c * dz
             half = max((cosine + c) * to_half, ZERO)
-            holds = kept[_HOLDS + i] if cosine > ZERO else ZERO
+            holds = kept[HOLDS + i] if cosine > ZERO else ZERO
             much, more = _shine(weights, half)
             curve, by_half = weights.curve * holds, more * holds * per_size
             by_cosine = ONE + TWO * curve * cosine
@@ -181,7 +187,7 @@ def _take_off(ways: Floats, lights: int, weights: Weights, kept: Floats, values:
             c = kept[_UNIT_Z + i]
             cosine = kept[_UNIT_X + i] * way[0, i] + kept[_UNIT_Y + i] * way[1, i] + c * way[2, i]
             half = max((cosine + c) * way[3, i], ZERO)
-            holds = kept[_HOLDS + i] if cosine > ZERO else ZERO
+            holds = kept[HOLDS + i] if cosine > ZERO else ZERO
             much, _ = _shine(weights, half)
             kept[_SHINE + i] = holds * much * way[4, i]
             kept[_GAIN + i] = ONE / (ONE + holds * weights.curve * cosine)

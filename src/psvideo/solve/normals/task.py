@@ -18,6 +18,7 @@ Floats = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
 Samples = NDArray[Any]  # of float32 or uint16
 Mask = NDArray[np.bool_]
+Indices = NDArray[np.uint32]
 
 PIXEL_CONDITION = 12.0  # beyond it, with the lights that shadow leaves, albedo begins to burst in real creases
 

@@ -1,0 +1,82 @@
+"""Compiled part of the robust solver: some pixels of a block put side by side, from all blocks of a row, to be solved
+together."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from psvideo.compute.compiled import FUSED
+from psvideo.solve.normals.blocks import BLOCK, COUNT, LIMIT, MISSING, PLANES, X, Y, Z
+from psvideo.solve.normals.equations import OUT
+from psvideo.solve.normals.reflecting import KEPT, OF_LIGHT
+from psvideo.solve.normals.task import Floats, Indices, Task
+
+WHOLE = 16  # pixels are filled up to whole vectors of so many: what is left over would be solved one by one
+
+
+class Room(NamedTuple):
+    """What a block of pixels is solved in; planes are BLOCK long."""
+
+    planes: Floats  # those of ``blocks.py``
+    more: Floats  # those of ``equations.py``
+    values: Floats  # (light * channel, pixel)
+    measurements: Floats  # (light, pixel): the channels combined
+    errors: Floats  # (light, pixel)
+    matrix: Floats  # (light, 3, pixel): what lights send to every pixel
+    per_strength: Floats  # (light, pixel)
+    ways: Floats  # (light, 5, pixel) where the subject's reflectance is known, else of no light
+    matte: Floats  # (light, pixel): measurements without highlights
+    kept: Floats  # what else ``reflecting.py`` keeps
+
+
+def room_for(task: Task, *, reflecting: bool) -> Room:
+    """Return memory for one thread; ``reflecting`` where the subject's reflectance is known."""
+    lights, channels = task.tone.shape[:2]
+    values = np.full((lights * channels, BLOCK), MISSING, np.float32)
+    modelled = lights if reflecting else 0
+    return Room(
+        planes=np.zeros(PLANES * BLOCK, np.float32),
+        more=np.zeros(9 * BLOCK, np.float32),
+        values=values,
+        measurements=values if channels == 1 else np.full((lights, BLOCK), MISSING, np.float32),
+        errors=np.full((lights, BLOCK), OUT, np.float32),
+        matrix=np.repeat(task.matrix[..., None], BLOCK, axis=-1),  # near lights' change with the block
+        per_strength=np.repeat(task.per_strength[:, None], BLOCK, axis=-1),
+        ways=np.zeros((modelled, 5, BLOCK), np.float32),
+        matte=np.full((modelled, BLOCK), MISSING, np.float32),
+        kept=np.zeros(BLOCK * (KEPT + OF_LIGHT * lights) if reflecting else 0, np.float32),
+    )
+
+
+@FUSED.inlined
+def put_side_by_side(block: Room, listed: Indices, count: int, distant: bool, apart: Room, waiting: int) -> None:
+    """Copy the listed pixels of a block behind those that are ``waiting``."""
+    for plane in (X, Y, Z, COUNT, LIMIT):
+        for k in range(count):
+            apart.planes[plane + waiting + k] = block.planes[plane + listed[k]]
+    for light in range(len(block.measurements)):
+        _pick(block.measurements[light], listed, count, apart.measurements[light, waiting:])
+    for plane in range(len(block.values)):
+        _pick(block.values[plane], listed, count, apart.values[plane, waiting:])
+    for light in range(0 if distant else len(block.measurements)):
+        for axis in range(3):
+            _pick(block.matrix[light, axis], listed, count, apart.matrix[light, axis, waiting:])
+        _pick(block.per_strength[light], listed, count, apart.per_strength[light, waiting:])
+    for light in range(0 if distant else len(block.ways)):
+        for number in range(5):
+            _pick(block.ways[light, number], listed, count, apart.ways[light, number, waiting:])
+
+
+@FUSED.inlined
+def _pick(plane: Floats, listed: Indices, n: int, into: Floats) -> None:
+    for k in range(n):
+        into[k] = plane[listed[k]]
+
+
+@FUSED.inlined
+def fill_up(apart: Room, waiting: int, distant: bool, listed: Indices) -> int:
+    """Copy the first pixel behind the others up to whole vectors; return how many pixels that makes."""
+    more = -waiting % WHOLE
+    listed[:more] = np.uint32(0)
+    put_side_by_side(apart, listed, more, distant, apart, waiting)
+    return waiting + more

@@ -1,0 +1,68 @@
+"""Compiled part of the robust solver: from a trimmed start, by weights that follow what is left over (IRLS).
+
+A pixel's result does not depend on which pixels lie beside it.
+"""
+
+import numpy as np
+
+from psvideo.compute.compiled import FUSED
+from psvideo.compute.memory import flattened
+from psvideo.solve.normals.any_lights import add_start, add_weighted, choose_start, find_scale
+from psvideo.solve.normals.apart import Room
+from psvideo.solve.normals.equations import solve_equations
+from psvideo.solve.normals.few_lights import begin_few, reweigh_few
+from psvideo.solve.normals.odd_of_four import TWO, drop_odd_of_four
+from psvideo.solve.normals.reflecting import reflect, weigh_reflecting
+from psvideo.solve.normals.task import Floats, Task, Weights
+
+SOUND_SQUARED = np.float32(1e4)  # while weights change, the last solution is kept where they leave a worse condition
+
+
+@FUSED.called
+def solve_reweighted(task: Task, sent: Floats, per: Floats, weights: Weights, room: Room, few: bool, n: int) -> None:
+    """Leave g in the planes X, Y, Z, and in DOUBT what four measurements say against each other.
+
+    sent, per: the lights of all pixels where they are ``few``.
+    """
+    w, v, m, e = room.planes, room.more, room.measurements, room.errors
+    if few:
+        begin_few(sent, per, weights.darkest, weights.brightest, w, flattened(m), n)
+    else:
+        choose_start(task, weights, w, v, m, e, n)
+        add_start(task, w, v, m, e, n)
+    solve_equations(w, n, SOUND_SQUARED, False)
+    drop_odd_of_four(task, weights.noise, weights.signal_noise, weights.contradiction, w, v, m, e, n)
+    for _ in range(weights.rounds):
+        _reweigh(task, sent, weights, weights.signal_noise, weights.tukey, weights.width, False, few, room, n)
+        solve_equations(w, n, SOUND_SQUARED, True)
+
+
+@FUSED.called
+def weigh(
+    task: Task, sent: Floats, weights: Weights, share: np.float32, modelled: bool, room: Room, few: bool, n: int
+) -> None:
+    """SCALE and the weighted normal equations of solved pixels; before, where they are to be ``modelled``, they are
+    solved again under the subject's model, and their samples left without what that adds.
+
+    share: of a pixel's light, what is left over at least.
+    """
+    if modelled:
+        w, v, m, e, kept, matte = room.planes, room.more, room.measurements, room.errors, room.kept, room.matte
+        reflect(task.matrix, room.ways, task.lights, weights, kept, matte, w, v, m, e, n)
+        weigh_reflecting(room.ways, task.lights, weights, share, kept, matte, w, v, room.values, m, e, n)
+    else:
+        _reweigh(task, sent, weights, share, False, TWO, True, few, room, n)
+
+
+@FUSED.inlined
+def _reweigh(
+    task: Task, sent: Floats, weights: Weights, share: np.float32, tukey: bool, width: np.float32, last: bool,
+    few: bool, room: Room, n: int,
+) -> None:  # fmt: skip
+    """SCALE and the normal equations, every measurement weighed by how well the last solution explains it."""
+    w, v, m, e = room.planes, room.more, room.measurements, room.errors
+    if few:
+        reweigh_few(sent, tukey, width, weights.noise, share, w, v, flattened(m), n)
+    else:
+        find_scale(task.matrix, weights.noise, share, w, v, m, e, n)
+        add_weighted(task.matrix, tukey, width, last, w, v, m, e, n)
