@@ -78,6 +78,8 @@ function putMarks(marks) {
   });
 }
 
+const BELOW_NAME = 32; // the pane's own name stands above
+
 // Which rows of the frame which light reached, beside the frame; the dark row is where none did.
 function bands(rect, scale) {
   const { rows, height } = held.frame.facts;
@@ -87,7 +89,7 @@ function bands(rect, scale) {
     const tall = (last - first) / height * rect.height / scale;
     const mark = { kind: "i", text: "", name: name ? "" : "dark", style: `left: ${left}px; top: ${top}px; height: ${tall}px` };
     const middle = (rect.y + (first + last) / 2 / height * rect.height) / scale - 10;
-    return [mark, labelled(name || "dark row", rect.x / scale + 4, middle)];
+    return [mark, labelled(name || "dark row", rect.x / scale + 4, Math.max(middle, rect.y / scale + BELOW_NAME))];
   });
 }
 
