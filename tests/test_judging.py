@@ -1,5 +1,6 @@
 """Predicted errors are true: of noise alone, under a wrong rig, and where light comes by way of other surfaces."""
 
+import cv2
 import numpy as np
 import pytest
 from bench.accuracy_whole import bust
@@ -150,3 +151,13 @@ def test_noise_does_not_make_a_gently_curved_surface_none() -> None:
 
 def test_a_wall_whose_normals_differ_by_noise_alone_says_nothing_of_the_rig() -> None:
     assert slope_agreement(gentle(1.5, curved=0.0)) is None
+
+
+def test_paint_that_shows_through_a_dome_is_not_taken_for_noise() -> None:
+    dome = gentle(0.3, curved=1.0)
+    paint = np.random.default_rng(6).normal(size=(120, 160, 2)).astype(np.float32)
+    dome.normals[..., :2] += 0.2 * cv2.GaussianBlur(paint, (0, 0), 1.0)
+    dome.normals[...] /= np.linalg.norm(dome.normals, axis=-1, keepdims=True)
+    agreement = slope_agreement(dome)
+    assert agreement is not None
+    assert agreement < 0.2
