@@ -268,6 +268,21 @@ def test_two_runs_into_one_folder_are_refused_and_pieces_are_not(tmp_path: Path)
             pass
 
 
+def test_pieces_replace_what_is_finished_where_that_is_forced(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    with whole_folder(out, mark="timing.json", settings="a") as folder:
+        (folder / "timing.json").touch()
+        (folder / "old").touch()
+    with pytest.raises(AllDoneError), begun_folder(out, mark="timing.json", settings="a"):
+        pass
+    with begun_folder(out, mark="timing.json", force=True, settings="a") as folder:
+        (folder / "timing.json").touch()
+    assert (out / "old").is_file()
+    with whole_folder(out, mark="timing.json", force=True, resume=True, settings="a"):
+        pass
+    assert [path.name for path in out.iterdir() if not path.name.startswith(".")] == ["timing.json"]
+
+
 def test_two_workers_give_the_bytes_of_one_process_and_takes_one_report(tmp_path: Path) -> None:
     clip = filmed(tmp_path, frames=60)
     given: dict[str, Any] = {"rig": clip / "rig.toml", "preview": ()}

@@ -145,12 +145,12 @@ def refuse_folder(path: Path, *, mark: str, force: bool, resume: bool = False, s
 
     ``force`` replaces only what a run like this wrote: a folder that holds ``mark`` and no footage, or nothing at all.
     ``resume`` goes on with a stopped run of the same ``settings``; where there is none, and the folder was finished
-    with these, AllDoneError is raised.
+    with these and is not to be replaced, AllDoneError is raised.
     """
     stopped = _beside(path.resolve()).is_dir()
     if resume and stopped:
         _refuse_other_settings(path, settings)
-    elif resume and settings and _noted(path) == settings:
+    elif resume and settings and not force and _noted(path) == settings:
         raise AllDoneError(
             f"{path}: all done. The run ended well, with the same footage and settings, so nothing was written."
         )
