@@ -20,6 +20,8 @@ from bench.live_browser import Tab, browser
 PAGE_PX = (1366, 768)
 IN_DOCS = (928, 522)
 MOST_S = 90.0
+EVEN_S = 6.0
+"""After the first results, which wait for what is loaded once."""
 LINES = "document.querySelectorAll('#lines li').length"
 
 
@@ -30,6 +32,7 @@ def live_pictures(clip: Path, pictures: Path) -> list[Path]:
         _wait(tab, "document.getElementById('state')?.dataset.state === 'seeking'")
         seeking = _taken(tab, pictures / "live_seeking.png")
         _wait(tab, f"{LINES} > 8")
+        time.sleep(EVEN_S)
         return [seeking, _taken(tab, pictures / "live.png")]
 
 
