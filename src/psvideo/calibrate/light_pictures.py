@@ -20,6 +20,7 @@ from psvideo.clip.transfer import usual_transfer
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import Encoding
 from psvideo.model.clipping import LOSSY_MARGIN, SATURATED
+from psvideo.plates.sequence import Round
 
 CLIPPED_FROM = SATURATED - LOSSY_MARGIN
 """From this share of the sensor's range on a pixel of a picture, which may be a JPEG, counts as clipped."""
@@ -96,6 +97,18 @@ def light_pictures(
         saturated=clipped,
         seen=np.ones(stacked.shape[:2], np.bool_) if seen is None else seen,
         ambient=ambient,
+    )
+
+
+def pictures_of_round(one: Round) -> LightPictures:
+    """Return what a round's plates show, from which ambient light was taken; rows count that all of a plate shows."""
+    return light_pictures(
+        one.lights,
+        [plate.image for plate in one.plates],
+        ambient=None if one.ambient is None else one.ambient.image,
+        ambient_is_off=True,
+        saturation=[plate.saturation for plate in one.plates],
+        seen=np.stack([plate.pixels_seen.all(axis=1) for plate in one.plates]),
     )
 
 

@@ -4,9 +4,7 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
-from psvideo.calibrate.light_pictures import LightPictures, light_pictures
+from psvideo.calibrate.light_pictures import pictures_of_round
 from psvideo.calibrate.mirror.lights import MirrorCalibration, calibrate_lights
 from psvideo.calibrate.sphere.sighting import Looking, sight_spheres
 from psvideo.errors import PsvideoError
@@ -26,19 +24,7 @@ def lights_on_ball(newest: NewestRound, rig: Rig | None) -> MirrorCalibration:
     if rig is not None and rig.focal_px is not None:
         lens = smaller_rig(rig, newest.step)
         looking = Looking(focal_px=rig.focal_px[0] / newest.step, principal_px=lens.principal_px)
-    return calibrate_lights(sight_spheres([_pictures(newest)], looking, where=WHERE))
-
-
-def _pictures(newest: NewestRound) -> LightPictures:
-    one = newest.round
-    return light_pictures(
-        one.lights,
-        [plate.image for plate in one.plates],
-        ambient=None if one.ambient is None else one.ambient.image,
-        ambient_is_off=True,
-        saturation=[plate.saturation for plate in one.plates],
-        seen=np.stack([plate.pixels_seen.all(axis=1) for plate in one.plates]),
-    )
+    return calibrate_lights(sight_spheres([pictures_of_round(newest.round)], looking, where=WHERE))
 
 
 @dataclass(kw_only=True)

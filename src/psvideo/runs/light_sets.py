@@ -16,7 +16,7 @@ from psvideo.calibrate.light_pictures import (
     LightFiles,
     LightPictures,
     averaged,
-    light_pictures,
+    pictures_of_round,
     read_picture,
     read_sets,
 )
@@ -30,7 +30,6 @@ from psvideo.formats.plan_toml import read_plan
 from psvideo.model.camera import Encoding
 from psvideo.plates.align.rounds import UNMOVED
 from psvideo.plates.gather import gather
-from psvideo.plates.sequence import Round
 from psvideo.runs.caller import PYTHON, Caller
 from psvideo.sync.open_take import open_take
 from psvideo.sync.take_timing import find_take_timing
@@ -205,7 +204,7 @@ def _of_clip(take: Take, reading: Reading, watch: Watch) -> LightSets:
     timing = find_take_timing(take, first_light=reading.first_light, watch=watch)
     plan = take.plan
     whole = gather(take, timing, aligning=UNMOVED, watch=watch)
-    sets = map(_as_pictures, islice(whole, None if reading.frames else reading.most))
+    sets = map(pictures_of_round, islice(whole, None if reading.frames else reading.most))
     guessed = (_guess(take, timing.order_note),) if timing.order == "guess" else ()
     return LightSets(
         name=take.clip.name,
@@ -220,17 +219,6 @@ def _guess(take: Take, note: str) -> str:
     return (
         f"{take.clip.path}: the plan has no marker, so which light is which is a guess ({note or 'nothing shows it'}). "
         "Name the light of the first complete flash with `first_light`."
-    )
-
-
-def _as_pictures(one: Round) -> LightPictures:
-    return light_pictures(
-        one.lights,
-        [plate.image for plate in one.plates],
-        ambient=None if one.ambient is None else one.ambient.image,
-        ambient_is_off=True,
-        saturation=[plate.saturation for plate in one.plates],
-        seen=np.stack([plate.seen for plate in one.plates]),
     )
 
 
