@@ -9,6 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import linprog  # type: ignore[attr-defined]
 
+import psvideo as ps
 from psvideo.cli.app import main
 from psvideo.model.surface import Misfit, Surface
 from psvideo.report.judge.result import accuracy
@@ -391,3 +392,27 @@ def test_the_command_says_which_solver_it_used_and_predicts_errors_with_either(t
     assert main([*command, "--aov", "error", "--solver", "robust", "--force"]) == 0
     assert json.loads((out / "report.json").read_text())["solver"] == "robust"
     assert len(list((out / "error").iterdir())) == len(list((out / "normals").iterdir())) > 0
+
+
+def test_the_colour_of_pixels_that_are_solved_apart_is_their_own() -> None:
+    """One light is too bright in a part, another shadowed in another, on a surface of one colour."""
+    directions = np.array([[0.5, 0.3, 0.8], [-0.5, 0.3, 0.8], [0, -0.6, 0.8], [0.3, -0.3, 0.9], [-0.4, -0.3, 0.85]])
+    directions = np.vstack([directions, [[0.1, 0.6, 0.8], [0.6, -0.1, 0.8], [0, 0, 1]]])
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    row, col = np.mgrid[:48, :64]
+    normals = np.stack([(col - 32) / 60, (24 - row) / 60, np.ones((48, 64))], axis=-1)
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    colour = np.array([0.6, 0.4, 0.2])
+    images = np.moveaxis(np.clip(normals @ directions.T, 0, None), -1, 0)[..., None] * colour
+    images[2, 10:30, 20:40] *= 1.8
+    images[5, 5:12, 5:50] = 0
+    images += np.random.default_rng(1).normal(0, 0.001, images.shape)
+    surface = ps.solve_images(np.clip(images, 0, None).astype(np.float32), directions, solver="robust")
+    albedo = np.asarray(surface.albedo, np.float64)
+    for struck in (np.s_[12:28, 22:38], np.s_[6:11, 6:19]):
+        assert surface.valid[struck].all()
+        np.testing.assert_allclose(
+            albedo[struck] / albedo[struck].sum(axis=-1, keepdims=True),
+            np.broadcast_to(colour / 1.2, albedo[struck].shape),
+            atol=0.01,
+        )
