@@ -127,3 +127,12 @@ def test_memory_grows_with_the_picture_and_not_with_the_clip(tmp_path: Path) -> 
     assert sum(steps) <= MOST_GROWTH_MB
     assert (large[-1] - long[-1]) * 2**20 <= MOST_BYTES_PER_SAMPLE * samples
     assert len(list((tmp_path / "long" / "out" / "normals").iterdir())) == MANY // FRAMES_A_ROUND - 2
+
+
+@pytest.mark.parametrize(("said", "huge"), [({}, "0"), ({"NUMPY_MADVISE_HUGEPAGE": "1"}, "1")])
+def test_the_command_line_leaves_huge_pages_alone_unless_the_user_wants_them(said: dict[str, str], huge: str) -> None:
+    ask = "from psvideo.cli.app import main; main(['--version']); import numpy as np; "
+    ask += "print(int(np._core.multiarray._set_madvise_hugepage(False)))"
+    kept = {name: value for name, value in os.environ.items() if name != "NUMPY_MADVISE_HUGEPAGE"}
+    done = subprocess.run([sys.executable, "-c", ask], capture_output=True, text=True, check=True, env=kept | said)
+    assert done.stdout.split()[-1] == huge

@@ -2,6 +2,7 @@
 
 import contextlib
 import ctypes
+import os
 
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8
 """glibc's numbers of the settings (malloc.h)."""
@@ -23,6 +24,15 @@ def share_one_heap() -> None:
         mallopt(M_ARENA_MAX, 1)
         mallopt(M_MMAP_THRESHOLD, MOST_IN_HEAP_BYTES)
         mallopt(M_TRIM_THRESHOLD, MOST_SPARE_BYTES)
+
+
+def keep_pages_small() -> None:
+    """Let numpy, which reads this when it is first imported, not ask for huge pages, unless the user did.
+
+    In a heap that is used again and again, every huge page that a picture once touched stays as a whole: eight lights
+    at 1080p held 595 MB where they hold 428, and frames cost up to a tenth more processor time.
+    """
+    os.environ.setdefault("NUMPY_MADVISE_HUGEPAGE", "0")
 
 
 def give_back() -> None:
