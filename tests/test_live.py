@@ -11,7 +11,6 @@ from live_clip import live_clip
 import psvideo as ps
 from psvideo.cli.app import main
 from psvideo.live.chain import NewestRound
-from psvideo.live.quality import Quality, first_quality
 from psvideo.live.smaller import Smaller, smaller_plan, smaller_timing
 from psvideo.model.coded import Coded, Tone
 from psvideo.model.recipe import flash_recipe
@@ -117,15 +116,3 @@ def test_a_mosaic_becomes_colour_in_sixteenths_of_a_code() -> None:
     assert small.codes.dtype == np.uint16
     assert np.allclose(small.light()[0, 0] * 251, [6, 16.5, 36], atol=0.05)
     assert small.light()[0, 3, 0] >= 0.998, "a cell with a clipped sample is clipped"
-
-
-def test_quality_steps_down_where_there_is_no_time_and_up_where_there_is() -> None:
-    at_first = first_quality(1280, 720, mosaic=True)
-    assert at_first == Quality(step=2, least=2)
-    late = at_first.after(age_s=0.3, rate=15, rounds_per_s=20, busy=0.5)
-    assert late.step == 4
-    calm = late
-    for _ in range(5):
-        calm = calm.after(age_s=0.05, rate=20, rounds_per_s=20, busy=0.1)
-    assert calm.step == 2
-    assert calm.after(age_s=0.05, rate=20, rounds_per_s=20, busy=0.1).step == 2, "no finer than the mosaic's cells"

@@ -1,10 +1,12 @@
-"""Quality that steps down instead of falling behind: how much smaller than the camera's the live picture is.
+"""Quality that steps down instead of falling behind, and grows back: by how much the live picture is made smaller.
 
-Results are to come often and soon. Where they do not, the picture is made smaller, step by step, until they do; where
-there has been time to spare for a while, larger again. Every change is said.
+A pure function of what was measured in each second. Where results come late or seldom, or frames wait, the picture is
+made smaller. Where a larger one would leave time to spare, by what results have cost, it grows by one size; after a
+growth that did not hold it waits twice as long before the next. Every change is said.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 MOST_AGE_S = 0.2
 """From the end of an exposure to the picture it may take so long."""
@@ -12,42 +14,134 @@ LEAST_RATE = 15.0
 """Results a second that look like motion; fewer are enough only where the strobe's rounds come more slowly."""
 MOST_RATE = 17.0
 """More results a second nobody sees: they would only take time from frames and pages."""
-MOST_BUSY, SPARE_BUSY = 0.9, 0.2
-"""Share of the time that solving may take; below the second, four times as many pixels find room."""
-CALM = 5
-"""Seconds with time to spare until the picture is made larger."""
+MOST_BEHIND_S = 0.1
+"""Frames that are fetched so much later than they were wait somewhere, and cameras have room for half a second."""
+MOST_BUSY, SPARE_BUSY = 0.9, 0.65
+"""Share of the time that making results may take; and that it would take at the next larger size, for that to be
+tried. Between them lies what the guess may be wrong by."""
+SPARE_AGE = 0.75
+"""Share of ``MOST_AGE_S`` that the guess of the age at the next larger size may come to."""
+LATE = 2
+"""Seconds in a row without time until the picture is made smaller: one second may be anybody's."""
+CALM, LONGEST_CALM = 3, 96
+"""Seconds in a row with time to spare until the picture is made larger: at first, and after many vain growths."""
+HELD = 60
+"""Seconds after which a larger size has held: growing is as quick as at first again."""
+FRESH = 1
+"""Seconds after a change that are not judged: the ring fills, and what a size needs is made."""
 FIRST_PIXELS = 250_000
 """The picture begins at no more pixels than this."""
-MOST_STEP = 8
+STEPS = (1, 2, 3, 4, 6, 8)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LiveSecond:
+    """What was measured in a second in which there were results.
+
+    ``age_s``: from the coming of a result's last frame until it was drawn; ``made_age_s``: until it was made;
+    ``made_s``: what making one took (medians). ``rate``: results a second; ``rounds_per_s``: what the strobe gives.
+    ``behind_s``: by how much later frames were fetched than in the seconds before.
+    """
+
+    age_s: float
+    made_age_s: float
+    made_s: float
+    rate: float
+    rounds_per_s: float
+    behind_s: float = 0.0
+
+    @property
+    def busy(self) -> float:
+        """Share of the second that making results took."""
+        return self.made_s * self.rate
+
+    @property
+    def is_late(self) -> bool:
+        """Whether there was no time for what was done; few results count where it was making them that took long."""
+        few = self.rate < 0.9 * min(LEAST_RATE, self.rounds_per_s) and self.busy > MOST_BUSY / 2
+        return few or self.age_s > MOST_AGE_S or self.busy > MOST_BUSY or self.behind_s > MOST_BEHIND_S
+
+    def spares(self, made_s: float) -> bool:
+        """Tell whether there would be time to spare if making a result took so long, and drawing it as much longer."""
+        drawing_s = max(self.age_s - self.made_age_s, 0.0) * made_s / max(self.made_s, 1e-9)
+        age_s = self.made_age_s + made_s - self.made_s + drawing_s
+        busy = made_s * min(MOST_RATE, self.rounds_per_s)
+        return busy <= SPARE_BUSY and age_s <= SPARE_AGE * MOST_AGE_S and not self.is_late
 
 
 @dataclass(frozen=True, kw_only=True)
 class Quality:
-    """The live picture's ``step``: a pixel of it is so many of the camera's wide. ``least`` is the finest there is."""
+    """The live picture's ``step``: a pixel of it is so many of the camera's wide; ``steps`` are those that there are.
+
+    ``made_s``: what a result cost at the sizes that were tried, by step. ``late``, ``calm``: seconds in a row without
+    time, and with time to spare; ``wait``: so many of the latter let it grow; ``since``: seconds at this step, and
+    ``grew``: whether it was a growth that led here.
+    """
 
     step: int
-    least: int = 1
+    steps: tuple[int, ...] = STEPS
+    made_s: Mapping[int, float] = field(default_factory=dict)
+    late: int = 0
     calm: int = 0
+    wait: int = CALM
+    since: int = FRESH
+    grew: bool = False
 
-    def after(self, *, age_s: float, rate: float, rounds_per_s: float, busy: float) -> "Quality":
-        """Return the quality after a second in which results were so old and came so often.
+    def after(self, second: LiveSecond) -> "Quality":
+        """Return the quality after a second."""
+        if self.since < FRESH:
+            return replace(self, since=self.since + 1)
+        held = self.since + 1 >= HELD
+        now = replace(
+            self,
+            made_s={**self.made_s, self.step: second.made_s},
+            since=self.since + 1,
+            wait=CALM if held and self.grew else self.wait,
+            grew=self.grew and not held,
+            late=self.late + 1 if second.is_late else 0,
+        )
+        larger = self._next(-1)
+        spare = larger != self.step and second.spares(now.foretold_s(larger))
+        now = replace(now, calm=self.calm + 1 if spare else 0)
+        if now.late >= LATE:
+            return now._smaller(second)
+        if now.calm >= now.wait:
+            return replace(now, step=larger, calm=0, late=0, since=0, grew=True)
+        return now
 
-        ``rate`` is results a second, ``busy`` the share of the second that making them took.
-        """
-        wanted = 0.9 * min(LEAST_RATE, rounds_per_s)
-        if (age_s > MOST_AGE_S or rate < wanted or busy > MOST_BUSY) and self.step < MOST_STEP:
-            return replace(self, step=2 * self.step, calm=0)
-        if busy < SPARE_BUSY and self.step > self.least:
-            if self.calm + 1 >= CALM:
-                return replace(self, step=self.step // 2, calm=0)
-            return replace(self, calm=self.calm + 1)
-        return replace(self, calm=0)
+    def foretold_s(self, step: int) -> float:
+        """Return what a result will cost at a finer step: as a straight line through this size's cost and that of the
+        next smaller one that was tried, and never more than each pixel's share of all."""
+        here_s, pixels = self.made_s[self.step], _pixels(step) / _pixels(self.step)
+        smaller = min((one for one in self.made_s if one > self.step), default=None)
+        if smaller is None:
+            return here_s * pixels
+        slope_s = max(here_s - self.made_s[smaller], 0.0) / (_pixels(self.step) - _pixels(smaller))
+        return min(here_s * pixels, here_s + slope_s * (_pixels(step) - _pixels(self.step)))
+
+    def _smaller(self, second: LiveSecond) -> "Quality":
+        """Return the next smaller size, or the one below it where that would not help enough."""
+        step = self._next(1)
+        wanted_s = MOST_BUSY / max(min(LEAST_RATE, second.rounds_per_s), 1e-9)
+        if second.made_s * _pixels(step) / _pixels(self.step) > wanted_s:
+            step = replace(self, step=step)._next(1)
+        if step == self.step:
+            return self
+        wait = min(2 * self.wait, LONGEST_CALM) if self.grew else self.wait
+        return replace(self, step=step, late=0, calm=0, since=0, grew=False, wait=wait)
+
+    def _next(self, way: int) -> int:
+        at = self.steps.index(self.step) + way
+        return self.steps[min(max(at, 0), len(self.steps) - 1)]
 
 
 def first_quality(width_px: int, height_px: int, *, mosaic: bool) -> Quality:
     """Return the quality to begin with; a mosaic becomes colour by cells of two pixels at least."""
-    least = 2 if mosaic else 1
-    step = least
-    while width_px * height_px / step**2 > FIRST_PIXELS and step < MOST_STEP:
-        step *= 2
-    return Quality(step=step, least=least)
+    steps = STEPS[1:] if mosaic else STEPS
+    step = next((one for one in steps if width_px * height_px * _pixels(one) <= FIRST_PIXELS), steps[-1])
+    return Quality(step=step, steps=steps)
+
+
+def _pixels(step: int) -> float:
+    """Return a picture's pixels as a share of the camera's."""
+    return 1.0 / step**2

@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from psvideo.live.behind import Behind
 from psvideo.live.chain import Chain, LiveFrame, NewestRound, search_here
 from psvideo.live.holding import Holding
-from psvideo.live.quality import MOST_RATE, Quality
+from psvideo.live.quality import MOST_RATE, LiveSecond, Quality
 from psvideo.live.recording import Recording
 from psvideo.live.smaller import smaller_plan
 from psvideo.live.source import LiveSource
@@ -54,7 +55,9 @@ class Running:
     first_lock_s: float | None = None
     status: LiveStatus | None = None
     _ages_s: list[float] = field(default_factory=list)
-    _busy_s: float = 0.0
+    _made_s: list[float] = field(default_factory=list)
+    _making_since_s: float | None = None
+    _behind: Behind | None = None
     _slow: bool = False
     _settled_s: float | None = None
     _stop: threading.Event = field(default_factory=threading.Event)
@@ -99,8 +102,8 @@ class Running:
         while not self._stop.wait(STATUS_S):
             now_s = time.monotonic()
             status = self._status(now_s - began_s, now_s - said_s, before)
-            self._adapt(status, now_s - said_s)
-            before, said_s = (self.chain.seen, self.results), now_s
+            self._adapt(status)
+            before, said_s = (status.frames, status.results), now_s
             self.said(status)
         for thread in threads:
             thread.join()
@@ -133,6 +136,8 @@ class Running:
                 due_s = began_s + 1 / MOST_RATE
 
     def _take(self, frame: LiveFrame) -> None:
+        self._behind = self._behind or Behind(period_s=self.chain.plan.camera.frame_period_s)
+        self._behind.take(frame.index, frame.came_s)
         if self.recording is not None:
             self.recording.take(frame)
         self.chain.take(frame)
@@ -143,45 +148,68 @@ class Running:
             self.first_lock_s = self.chain.seen * self.chain.plan.camera.frame_period_s
 
     def _solve(self) -> bool:
-        began_s = time.monotonic()
-        newest = self.chain.solve()
-        if newest is None:
-            return False
+        began_s = self._making_since_s = time.monotonic()
+        try:
+            newest = self.chain.solve()
+            if newest is None:
+                return False
+            self.shown(newest)
+        finally:
+            self._making_since_s = None
         self.results += 1
-        self.shown(newest)
         self._ages_s.append(time.monotonic() - newest.came_s)
-        self._busy_s += time.monotonic() - began_s
+        self._made_s.append(time.monotonic() - began_s)
         return True
 
     def _over(self, index: int) -> bool:
         return self.seconds is not None and (index + 1) * self.chain.plan.camera.frame_period_s >= self.seconds
 
-    def _adapt(self, status: LiveStatus, last_s: float) -> None:
-        """Make the picture smaller where there was no time for it, and say so."""
-        busy, self._busy_s = self._busy_s / last_s, 0.0
-        if status.state != "locked" or status.age_s is None:
+    def _adapt(self, status: LiveStatus) -> None:
+        """Make the picture smaller where there was no time for it, larger where there is, and say so."""
+        measured = self._measured(status)
+        if status.state != "locked" or measured is None:
             return
         self._settled_s = status.at_s + SETTLES_S if self._settled_s is None else self._settled_s
         if status.at_s < self._settled_s:
             return
         plan = self.chain.plan
-        pace = min(status.fps * plan.camera.frame_period_s, 1.0)
-        rounds_per_s = pace * len(plan.dark_rounds) / plan.cycle_s
-        if pace < SLOW and not self._slow:
+        if self._pace(status) < SLOW and not self._slow:
             self._slow = True
             self.notes.append(
                 f"{self.source.name}: its frames come at {status.fps:.1f} a second, and the plan says "
                 f"{float(plan.camera.fps):.5g}: what sends or reads them does not keep up."
             )
-        quality = self.quality.after(
-            age_s=status.age_s, rate=status.results_per_s, rounds_per_s=rounds_per_s, busy=busy
-        )
+        quality = self.quality.after(measured)
         if quality.step != self.quality.step:
             word = "smaller, to keep up" if quality.step > self.quality.step else "larger: there is time for it"
             camera = smaller_plan(plan, quality.step).camera
             self.notes.append(f"The live picture is now {camera.width_px} x {camera.height_px} pixels, {word}.")
             self.chain.step = quality.step
         self.quality = quality
+
+    def _measured(self, status: LiveStatus) -> LiveSecond | None:
+        """Return what the last second's results came to; None where none was made, nor was being made all the time."""
+        plan, since_s = self.chain.plan, self._making_since_s
+        behind_s = 0.0 if self._behind is None else self._behind.second_s()
+        made_s, self._made_s = self._made_s, []
+        if not made_s and since_s is not None and self.results and time.monotonic() - since_s > STATUS_S:
+            made_s = [time.monotonic() - since_s]
+        if not made_s:
+            return None
+        ages_s = self._ages_s[-len(made_s) :] if status.age_s is not None else made_s
+        made_age_s = float(np.median(ages_s))
+        return LiveSecond(
+            age_s=made_age_s if status.age_s is None else status.age_s,
+            made_age_s=made_age_s,
+            made_s=float(np.median(made_s)),
+            rate=status.results_per_s,
+            rounds_per_s=self._pace(status) * len(plan.dark_rounds) / plan.cycle_s,
+            behind_s=behind_s,
+        )
+
+    def _pace(self, status: LiveStatus) -> float:
+        """Return which share of the plan's frames came, at most all."""
+        return min(status.fps * self.chain.plan.camera.frame_period_s, 1.0)
 
     def _status(self, at_s: float, last_s: float, before: tuple[int, int]) -> LiveStatus:
         chain, follower = self.chain, self.chain.follower

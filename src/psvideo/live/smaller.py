@@ -2,7 +2,8 @@
 
 Rows that are averaged opened one after the other; ``smaller_plan`` and ``smaller_timing`` say of the small picture when
 its rows open and flashes come, so that recipes hold for it as for any. A mosaic becomes colour on the way: of each
-colour the mean of its samples in a cell. A cell with a clipped sample is clipped.
+colour the mean of its samples in a cell, which lie around the cell's middle where it is an odd number of pixels wide. A
+cell with a clipped sample is clipped.
 """
 
 from dataclasses import dataclass, replace

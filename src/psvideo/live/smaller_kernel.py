@@ -30,31 +30,86 @@ def average(
     total, most = np.empty((channels, cols), np.float32), np.empty((channels, cols), np.float32)
     piled, highest = np.empty((2, wide), np.float32), np.empty((2, wide), np.float32)
     whole = step > 2 or planes > 1 or codes.itemsize > 1  # else cells are so small that it costs more than it saves
-    count = np.zeros(channels, np.float32)
-    for i in range(step):
-        for j in range(step):
-            for k in range(planes):
-                count[channel_of[i & 1, j & 1, k]] += np.float32(1.0)
+    turns = 1 + (step & 1)  # cells after which the pattern begins again
     for row in range(rows):
         total[:], most[:] = 0.0, 0.0
+        down = row * step & 1
         if whole:  # rows of one place in the pattern are added up first, where they lie
             piled[:], highest[:] = 0.0, 0.0
             for i in range(step):
                 _pile(codes[row * step + i].reshape(-1), piled[i & 1], highest[i & 1])
-        for i in range(2):
-            line = codes[row * step + i].reshape(-1)
+        if turns == 2:
+            _odd_cells(piled, highest, channel_of, step, down, total, most)
+        else:
+            for i in range(2):
+                line = codes[row * step + i].reshape(-1)
+                for j in range(step):
+                    for k in range(planes):
+                        channel, first = channel_of[i & 1, j & 1, k], j * planes + k
+                        if whole:
+                            _gather(piled[i], highest[i], first, step * planes, total[channel], most[channel])
+                        else:
+                            _gather(line, line, first, step * planes, total[channel], most[channel])
+        for channel in range(channels):
+            for turn in range(turns):
+                count = _samples(channel_of, step, down, turn * step & 1, channel)
+                _finish(total[channel], most[channel], turn, turns, scale / count, clips, top, small[row, :, channel])
+
+
+@EXACT.inlined
+def _finish(
+    total: Floats,
+    most: Floats,
+    first: int,
+    stride: int,
+    factor: np.float32,
+    clips: np.float32,
+    top: np.float32,
+    small: NDArray[Any],
+) -> None:
+    """Write every so many cells from the first on."""
+    if stride == 1:
+        for col in range(total.shape[0]):
+            small[col] = top if most[col] >= clips else total[col] * factor
+    else:
+        for col in range(first, total.shape[0], stride):
+            small[col] = top if most[col] >= clips else total[col] * factor
+
+
+@EXACT.inlined
+def _odd_cells(
+    piled: NDArray[Any],
+    highest: NDArray[Any],
+    channel_of: NDArray[np.int64],
+    step: int,
+    down: int,
+    total: NDArray[Any],
+    most: NDArray[Any],
+) -> None:
+    """Add a row of cells that begin on either column of the pattern in turn, and on its row ``down``."""
+    planes = channel_of.shape[2]
+    for i in range(2):
+        for turn in range(2):
             for j in range(step):
                 for k in range(planes):
-                    channel, first = channel_of[i & 1, j & 1, k], j * planes + k
-                    if whole:
-                        _gather(piled[i], highest[i], first, step * planes, total[channel], most[channel])
-                    else:
-                        _gather(line, line, first, step * planes, total[channel], most[channel])
-        for channel in range(channels):
-            factor = scale / count[channel]
-            for col in range(cols):
-                over = most[channel, col] >= clips
-                small[row, col, channel] = top if over else total[channel, col] * factor
+                    channel = channel_of[(i + down) & 1, (j + turn * step) & 1, k]
+                    first = (turn * step + j) * planes + k
+                    for cell in range((total.shape[1] + 1 - turn) // 2):
+                        at, col = first + 2 * step * planes * cell, 2 * cell + turn
+                        total[channel, col] += piled[i, at]
+                        most[channel, col] = max(most[channel, col], highest[i, at])
+
+
+@EXACT.inlined
+def _samples(channel_of: NDArray[np.int64], step: int, down: int, right: int, channel: int) -> np.float32:
+    """Return how many of a cell's samples are of a channel, if the cell begins there in the pattern."""
+    count = np.float32(0.0)
+    for i in range(step):
+        for j in range(step):
+            for k in range(channel_of.shape[2]):
+                if channel_of[(i + down) & 1, (j + right) & 1, k] == channel:
+                    count += np.float32(1.0)
+    return count
 
 
 @EXACT.inlined
