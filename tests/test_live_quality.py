@@ -108,7 +108,7 @@ def test_one_bad_second_changes_nothing() -> None:
 
 def test_frames_that_wait_make_the_picture_smaller_before_the_camera_drops_any() -> None:
     quick = machine(0.001, 0.05)
-    slow = Quality(step=2)
+    slow = first_quality(1280, 720, mosaic=True)
     behind = Behind(period_s=1 / 120)
     at_s, index = 0.0, 0
     for second in range(12):

@@ -29,6 +29,8 @@ HELD = 60
 """Seconds after which a larger size has held: growing is as quick as at first again."""
 FRESH = 1
 """Seconds after a change that are not judged: the ring fills, and what a size needs is made."""
+PER_PIXEL = 0.5
+"""Share of a result's cost that is taken to grow with its pixels until that is known: a fifth to 0.7 were measured."""
 FIRST_PIXELS = 250_000
 """The picture begins at no more pixels than this."""
 STEPS = (1, 2, 3, 4, 6, 8)
@@ -73,51 +75,52 @@ class LiveSecond:
 class Quality:
     """The live picture's ``step``: a pixel of it is so many of the camera's wide; ``steps`` are those that there are.
 
-    ``made_s``: what a result cost at the sizes that were tried, by step. ``late``, ``calm``: seconds in a row without
-    time, and with time to spare; ``wait``: so many of the latter let it grow; ``since``: seconds at this step, and
-    ``grew``: whether it was a growth that led here.
+    ``late``, ``calm``: seconds in a row without time, and with time to spare; ``wait``: so many of the latter let it
+    grow. ``since``: seconds at this step; ``grew``: whether it was a growth that led here, and is not yet known to
+    hold; ``before_s``: what a result cost just before it. ``dearer``: how much dearer results got when the picture grew
+    to a step, of those that it grew to.
     """
 
     step: int
     steps: tuple[int, ...] = STEPS
-    made_s: Mapping[int, float] = field(default_factory=dict)
     late: int = 0
     calm: int = 0
     wait: int = CALM
     since: int = FRESH
     grew: bool = False
+    before_s: float | None = None
+    dearer: Mapping[int, float] = field(default_factory=dict)
 
     def after(self, second: LiveSecond) -> "Quality":
         """Return the quality after a second."""
         if self.since < FRESH:
             return replace(self, since=self.since + 1)
-        held = self.since + 1 >= HELD
+        held = self.grew and self.since + 1 >= HELD
         now = replace(
             self,
-            made_s={**self.made_s, self.step: second.made_s},
-            since=self.since + 1,
-            wait=CALM if held and self.grew else self.wait,
-            grew=self.grew and not held,
             late=self.late + 1 if second.is_late else 0,
+            wait=CALM if held else self.wait,
+            since=self.since + 1,
+            grew=self.grew and not held,
+            before_s=None,
+            dearer=self.dearer
+            if self.before_s is None
+            else {**self.dearer, self.step: second.made_s / max(self.before_s, 1e-9)},
         )
-        larger = self._next(-1)
-        spare = larger != self.step and second.spares(now.foretold_s(larger))
+        larger = now._next(-1)
+        spare = larger != self.step and second.spares(second.made_s * now.dearer_by(larger))
         now = replace(now, calm=self.calm + 1 if spare else 0)
         if now.late >= LATE:
             return now._smaller(second)
         if now.calm >= now.wait:
-            return replace(now, step=larger, calm=0, late=0, since=0, grew=True)
+            return replace(now, step=larger, calm=0, late=0, since=0, grew=True, before_s=second.made_s)
         return now
 
-    def foretold_s(self, step: int) -> float:
-        """Return what a result will cost at a finer step: as a straight line through this size's cost and that of the
-        next smaller one that was tried, and never more than each pixel's share of all."""
-        here_s, pixels = self.made_s[self.step], _pixels(step) / _pixels(self.step)
-        smaller = min((one for one in self.made_s if one > self.step), default=None)
-        if smaller is None:
-            return here_s * pixels
-        slope_s = max(here_s - self.made_s[smaller], 0.0) / (_pixels(self.step) - _pixels(smaller))
-        return min(here_s * pixels, here_s + slope_s * (_pixels(step) - _pixels(self.step)))
+    def dearer_by(self, larger: int) -> float:
+        """Return by how much dearer a result will be at a larger size: as it was the last time, or by half of what its
+        pixels say where it never was; never more than by all of them."""
+        pixels = _pixels(larger) / _pixels(self.step)
+        return float(min(max(self.dearer.get(larger, 1 + PER_PIXEL * (pixels - 1)), 1.0), pixels))
 
     def _smaller(self, second: LiveSecond) -> "Quality":
         """Return the next smaller size, or the one below it where that would not help enough."""
@@ -128,7 +131,7 @@ class Quality:
         if step == self.step:
             return self
         wait = min(2 * self.wait, LONGEST_CALM) if self.grew else self.wait
-        return replace(self, step=step, late=0, calm=0, since=0, grew=False, wait=wait)
+        return replace(self, step=step, late=0, calm=0, since=0, grew=False, wait=wait, before_s=None)
 
     def _next(self, way: int) -> int:
         at = self.steps.index(self.step) + way
