@@ -1,6 +1,7 @@
 """How large the live picture is: by measured times alone, on machines that are simulated second by second."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -101,6 +102,28 @@ def test_a_minute_of_other_work_costs_size_for_that_minute() -> None:
     assert after.step == 2
 
 
+def test_viewers_who_are_late_whatever_they_are_sent_do_not_make_the_picture_small() -> None:
+    """A browser without a graphics card beside other work: what takes it long is its own window."""
+
+    def on(step: int) -> LiveSecond:
+        made = machine(0.002, 0.1)(step)
+        return replace(made, age_s=made.made_age_s + 0.25)
+
+    _, steps = steps_over(first_quality(1280, 720, mosaic=True), 600, on)
+    assert max(steps) == 3
+    assert np.mean(np.array(steps) == 2) > 0.9
+
+
+def test_viewers_who_draw_small_pictures_sooner_get_small_ones() -> None:
+    def on(step: int) -> LiveSecond:
+        made = machine(0.002, 0.1)(step)
+        return replace(made, age_s=made.made_age_s + 1.2 / step**2)
+
+    small, _ = steps_over(first_quality(1280, 720, mosaic=True), 60, on)
+    assert on(small.step).age_s < MOST_AGE_S
+    assert changes(steps_over(small, 600, on)[1]) <= 2 * 600 / LONGEST_CALM + 2
+
+
 def test_one_bad_second_changes_nothing() -> None:
     calm, _ = steps_over(Quality(step=2), 10, machine(0.002, 0.1))
     assert calm.after(machine(0.002, 0.1, load=30)(2)).after(machine(0.002, 0.1)(2)).step == 2
@@ -118,7 +141,7 @@ def test_frames_that_wait_make_the_picture_smaller_before_the_camera_drops_any()
             behind.take(index, at_s)
             index += 1
         measured = quick(slow.step)
-        slow = slow.after(LiveSecond(**{**vars(measured), "behind_s": behind.second_s()}))
+        slow = slow.after(replace(measured, behind_s=behind.second_s()))
         if slow.step > 2:
             break
     assert 6 <= second <= 8, "a camera holds half a second of frames, and 0.2 s more wait after each"

@@ -29,6 +29,9 @@ HELD = 60
 """Seconds after which a larger size has held: growing is as quick as at first again."""
 FRESH = 1
 """Seconds after a change that are not judged: the ring fills, and what a size needs is made."""
+HELPS = 0.8
+"""A smaller picture that is drawn no sooner than after this share of the time before does not help its viewers: what
+they lack is not the picture's size. Then it is judged for ``LONGEST_CALM`` seconds by when it is made."""
 PER_PIXEL = 0.5
 """Share of a result's cost that is taken to grow with its pixels until that is known: a fifth to 0.7 were measured."""
 FIRST_PIXELS = 250_000
@@ -63,6 +66,11 @@ class LiveSecond:
         few = self.rate < 0.9 * min(LEAST_RATE, self.rounds_per_s) and self.busy > MOST_BUSY / 2
         return few or self.age_s > MOST_AGE_S or self.busy > MOST_BUSY or self.behind_s > MOST_BEHIND_S
 
+    @property
+    def as_made(self) -> "LiveSecond":
+        """The same second, for viewers who draw what there is as soon as it is made."""
+        return replace(self, age_s=self.made_age_s)
+
     def spares(self, made_s: float) -> bool:
         """Tell whether there would be time to spare if making a result took so long, and drawing it as much longer."""
         drawing_s = max(self.age_s - self.made_age_s, 0.0) * made_s / max(self.made_s, 1e-9)
@@ -78,7 +86,8 @@ class Quality:
     ``late``, ``calm``: seconds in a row without time, and with time to spare; ``wait``: so many of the latter let it
     grow. ``since``: seconds at this step; ``grew``: whether it was a growth that led here, and is not yet known to
     hold; ``before_s``: what a result cost just before it. ``dearer``: how much dearer results got when the picture grew
-    to a step, of those that it grew to.
+    to a step, of those that it grew to. ``drawn_s``: how old pictures were when they were made smaller for that alone;
+    ``by_made``: seconds in which it does not count when they are drawn.
     """
 
     step: int
@@ -90,11 +99,21 @@ class Quality:
     grew: bool = False
     before_s: float | None = None
     dearer: Mapping[int, float] = field(default_factory=dict)
+    drawn_s: float | None = None
+    by_made: int = 0
 
     def after(self, second: LiveSecond) -> "Quality":
         """Return the quality after a second."""
         if self.since < FRESH:
             return replace(self, since=self.since + 1)
+        if self.drawn_s is not None:
+            helped = second.age_s <= HELPS * self.drawn_s
+            return replace(self, drawn_s=None, by_made=0 if helped else LONGEST_CALM).after(second)
+        if self.by_made:
+            return replace(self, by_made=self.by_made - 1)._judged(second.as_made)
+        return self._judged(second)
+
+    def _judged(self, second: LiveSecond) -> "Quality":
         held = self.grew and self.since + 1 >= HELD
         now = replace(
             self,
@@ -131,7 +150,8 @@ class Quality:
         if step == self.step:
             return self
         wait = min(2 * self.wait, LONGEST_CALM) if self.grew else self.wait
-        return replace(self, step=step, late=0, calm=0, since=0, grew=False, wait=wait, before_s=None)
+        drawn_s = None if second.as_made.is_late else second.age_s
+        return replace(self, step=step, late=0, calm=0, since=0, grew=False, wait=wait, before_s=None, drawn_s=drawn_s)
 
     def _next(self, way: int) -> int:
         at = self.steps.index(self.step) + way
