@@ -1,5 +1,7 @@
 """Predicted errors are true: of noise alone, under a wrong rig, and where light comes by way of other surfaces."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from psvideo.report.observe.slopes import slope_agreement
 from psvideo.solve.normals.doubting import Signs, ThinSurface, doubt_deg, signs_of
 from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.indirect import indirect_of
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.task import Usable
 
@@ -107,7 +110,7 @@ def doubted(turned: np.ndarray) -> tuple[Signs, np.ndarray]:
     one = Evidence(plates=plates, lit=lit, usable=Usable(dark_level=0.003, shadow_ratio=0.0))
     level = np.full(inside.shape, 2, np.float32)
     points = ThinSurface(step=1, surface=surface, noise_deg=0 * level, fit_deg=level, fit_of_noise_deg=0 * level)
-    signs = signs_of(points, one, surface)
+    signs = signs_of(points, replace(one, indirect=indirect_of(one, surface)))
     return signs, doubt_deg(signs)
 
 

@@ -12,10 +12,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.compute.spilled import let_go
 from psvideo.model.surface import Surface
 from psvideo.solve.normals.evidence import Evidence
-from psvideo.solve.normals.task import Floats, Samples, Task, Work
+from psvideo.solve.normals.task import Floats, Samples
 
 GRID_PX = 480
 """The grid has at most so many points along the longer side."""
@@ -105,12 +104,14 @@ def step_of(shape: tuple[int, ...]) -> int:
     return max(-(-max(shape[:2]) // GRID_PX), 1)
 
 
-def signs_of(points: ThinSurface, one: Evidence, surface: Surface, turned_deg: Floats | None = None) -> Signs:
+def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = None) -> Signs:
     """Return what speaks against the points' normals. ``turned_deg`` is by how much motion turns them, which is no
-    misfit of rig or surface."""
+    misfit of rig or surface. Raises ValueError where nobody looked for light from around."""
+    if one.indirect is None:
+        raise ValueError("`indirect` expected in the evidence: see indirect.py")
     around = _mean(points.known.astype(np.float32), AROUND)
     fit = np.minimum(points.fit_deg, MOST_FIT_DEG)
-    sums, counts = _indirect(points, one, surface)
+    sums, counts = one.indirect
     reach = np.clip(1 - counts / np.float32(len(one.plates)), LEAST_REACH, 1)
     squares = np.where(points.known, fit**2 - (points.fit_of_noise_deg / reach) ** 2, np.float32(0))
     if turned_deg is not None:
@@ -180,21 +181,6 @@ def _torn_squared(points: ThinSurface) -> Floats:
 def _mean(plane: Floats, width: int) -> Floats:
     """Return means over squares; of nothing a little, so that it can be divided by."""
     return np.asarray(cv2.blur(plane, (width, width), borderType=cv2.BORDER_CONSTANT) + np.float32(1e-9), np.float32)
-
-
-def _indirect(points: ThinSurface, one: Evidence, surface: Surface) -> tuple[Floats, Floats]:
-    """Return at every point the light from lamps that do not reach it, in units of albedo, summed, and their number."""
-    from psvideo.solve.normals.judging_kernel import indirect_rows
-
-    sums, counts = np.zeros_like(points.noise_deg), np.zeros_like(points.noise_deg)
-    planes, albedo = stored(surface)
-
-    def look(given: Task, work: Work, first: int, last: int) -> None:
-        indirect_rows(given, work, planes, albedo, sums, counts, first, last, points.step)
-        let_go(*(plane[first:last] for plane in (*planes, *albedo)))
-
-    one.in_bands(look, step=points.step)
-    return sums, counts
 
 
 def stored(surface: Surface) -> tuple[Samples, Samples]:

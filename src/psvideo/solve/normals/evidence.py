@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from psvideo.plates.mixture import Mixture
 from psvideo.solve.normals.bands import ShownPlates
@@ -10,12 +11,20 @@ from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.task import Floats, Mask, Samples, Task, Usable, Work, task
 
 
+class Indirect(NamedTuple):
+    """Light that comes by way of other surfaces, as far as it shows: at every point at which a surface is judged, the
+    light of lamps that do not reach it, in units of albedo, summed, and their number."""
+
+    sums: Floats
+    counts: Floats
+
+
 @dataclass(frozen=True, kw_only=True)
 class Evidence:
     """Plates, lights, and which samples to look at; ``spare``, a folder in whose files large pictures are worked on.
 
     ``unsure`` (light, row, col), on a grid of its own over the picture, is by how much plates may be off for motion;
-    ``moves`` (row, col), on that grid, where something was followed.
+    ``moves`` (row, col), on that grid, where something was followed. ``indirect`` is what the solver saw on its way.
     """
 
     plates: Sequence[Samples] | Sequence[Mixture]
@@ -25,6 +34,7 @@ class Evidence:
     mask: Mask | None = None
     unsure: Floats | None = None
     moves: Mask | None = None
+    indirect: Indirect | None = None
     black_level: float = 0.0
     scale: float = 1.0
     spare: Path | None = None

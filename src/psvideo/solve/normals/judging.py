@@ -63,7 +63,7 @@ def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging =
     spread = _Spread.of(surface, one.lit, noise, how, near)
     points = spread.points(surface)
     turned_deg = moved_deg(points, one)
-    signs = signs_of(points, one, surface, turned_deg)
+    signs = signs_of(points, one, turned_deg)
     doubt, moving = doubt_deg(signs, how=how.doubting), None
     if turned_deg is not None:
         known = points.known.astype(np.float32)
@@ -101,7 +101,7 @@ def looked_at(
     """Return the points at which a surface is judged, and what speaks against their normals: what constants are fitted
     to."""
     points = _Spread.of(surface, one.lit, noise, how, near_spread(one.lit, _thin_shape(surface))).points(surface)
-    return points, signs_of(points, one, surface)
+    return points, signs_of(points, one)
 
 
 def emptied(surface: Surface) -> Surface:

@@ -8,7 +8,6 @@ without the brightest few.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -24,11 +23,13 @@ from psvideo.solve.normals.reflectance import reflectance_of
 from psvideo.solve.normals.task import (
     FEW,
     Floats,
+    Looks,
     Mask,
     Samples,
     Task,
     Usable,
     Weights,
+    Work,
     empty_result,
     let_rows_go,
     task,
@@ -91,6 +92,7 @@ def solve(
     misfit: Misfit | None = None,
     plate_noise: PlateNoise | None = None,
     spare: Path | None = None,
+    looks: Looks | None = None,
     threads: int | None = None,
 ) -> Surface:
     """Return the surface that explains most of the plates, one per light.
@@ -120,16 +122,24 @@ def solve(
     predicted = planes_for((rows * cols,), np.uint16 if half else np.float32, pixels=rows * cols, folder=spare)
     given = _balanced(task(shown.samples, lit, seen, mask, usable, black_level, scale))
 
-    def run(into: Samples, unexplained: Floats, how: Weights, step: int, reflecting: bool) -> None:
-        def band(one: Task, memory: kernel.Memory, first: int, last: int) -> None:
+    def run(
+        into: Samples, unexplained: Floats, how: Weights, step: int, reflecting: bool, looks: Looks | None = None
+    ) -> None:
+        def memory(one: Task) -> tuple[kernel.Memory, Work | None]:
+            own = kernel.working_memory(one, reflecting=reflecting, residual=residual)
+            return own, None if looks is None else looks.memory()
+
+        def band(one: Task, room: tuple[kernel.Memory, Work | None], first: int, last: int) -> None:
+            own, beside = room
             kernel.solve_rows(
-                one, kernel.as_bytes(result), half, into.view(np.uint8), unexplained, memory, how, first, last, step
+                one, kernel.as_bytes(result), half, into.view(np.uint8), unexplained, own, how, first, last, step
             )
+            if looks is not None and beside is not None:
+                looks.look(one, result, beside, first, last)
             let_rows_go(result, cols, first, last)
             let_go(predicted[first * cols : last * cols])
 
-        memory_of = partial(kernel.working_memory, reflecting=reflecting, residual=residual)
-        shown.in_bands(band, given, memory_of, threads=threads, step=step)
+        shown.in_bands(band, given, memory, threads=threads, step=step)
 
     noise = (0.0, 0.0) if plate_noise is None else (plate_noise.read / channels, plate_noise.photon / channels)
     if misfit is None:
@@ -147,7 +157,7 @@ def solve(
     limit_deg = max(reweighting.most_error_deg, 0.0 if misfit is None else _limit_deg(reweighting, misfit))
     common, unit = 0.0 if misfit is None else misfit.share, 1 / float(given.albedo_scale)
     how = _weights(reweighting, noise, limit_deg=limit_deg, common=common, model=model, unit=unit)
-    run(predicted if error else predicted[:0], np.zeros(0, np.float32), how, 1, model is not None)
+    run(predicted if error else predicted[:0], np.zeros(0, np.float32), how, 1, model is not None, looks)
     surface = surface_of(result, predicted if error else None, shown.shape, half=half)
     return replace(surface, misfit=misfit)
 

@@ -13,9 +13,10 @@ from psvideo.plates.mixture import Mixture
 from psvideo.solve.normals import robust, woodham1980
 from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.indirect import IndirectLook
 from psvideo.solve.normals.judging import Judging, emptied, judged
 from psvideo.solve.normals.plate_noise import LEAST, PlateNoise, noise_of
-from psvideo.solve.normals.task import Floats, Mask, Samples, Usable
+from psvideo.solve.normals.task import Floats, Looks, Mask, Samples, Usable
 
 Plates = Sequence[Samples] | Sequence[Mixture]
 Method = Literal["least-squares", "robust"]
@@ -87,11 +88,12 @@ class Solving:
         """Return every pixel that three measurements solve, well or not, and what it is judged by."""
         noise = noise_of(plates)
         usable = _usable(noise, lit.intensities.shape[1], self.method(len(plates)))
-        solved = self._solved(plates, lit, usable, noise, seen, mask)
         one = Evidence(
             plates=plates, lit=lit, usable=usable, seen=seen, mask=mask, unsure=unsure, moves=moves, spare=self.spare
         )
-        return solved, one, noise
+        looks = IndirectLook.of(one)
+        solved = self._solved(plates, lit, usable, noise, seen, mask, looks)
+        return solved, replace(one, indirect=looks.found), noise
 
     def _solved(
         self,
@@ -101,6 +103,7 @@ class Solving:
         noise: PlateNoise,
         seen: Mask | None,
         mask: Mask | None,
+        looks: Looks,
     ) -> Surface:
         """Return what the solver makes of the plates."""
         if self.method(len(plates)) == "robust":
@@ -115,10 +118,19 @@ class Solving:
                 reweighting=EVERYTHING,
                 plate_noise=noise,
                 spare=self.spare,
+                looks=looks,
             )
         residual = self.residual or len(plates) > 3  # three measurements leave none
         return woodham1980.solve(
-            plates, lit, seen=seen, mask=mask, half=self.half, residual=residual, usable=usable, spare=self.spare
+            plates,
+            lit,
+            seen=seen,
+            mask=mask,
+            half=self.half,
+            residual=residual,
+            usable=usable,
+            spare=self.spare,
+            looks=looks,
         )
 
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -149,6 +149,16 @@ class Work(NamedTuple):
     measurements: Floats  # (light, pixel): the channels combined
     matrix: Floats  # the task's; for near lights (light, 3, pixel)
     per_strength: Floats  # the task's; for near lights (light, pixel)
+
+
+class Looks(Protocol):
+    """Looks at rows that a solver has solved, while their samples are there; see ``indirect.py``."""
+
+    def memory(self) -> Work:
+        """Return room for one thread."""
+
+    def look(self, shown: Task, result: Result, work: Work, first: int, last: int) -> None:
+        """Look at rows of the result, whose samples lie where ``shown.plates`` say."""
 
 
 def task(

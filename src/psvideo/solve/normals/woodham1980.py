@@ -12,7 +12,18 @@ from psvideo.model.surface import Surface
 from psvideo.plates.mixture import Mixture
 from psvideo.solve.normals.bands import ShownPlates, check_arrays, surface_of
 from psvideo.solve.normals.illumination import Illumination
-from psvideo.solve.normals.task import EVERYTHING, Mask, Samples, Task, Usable, Work, empty_result, let_rows_go, task
+from psvideo.solve.normals.task import (
+    EVERYTHING,
+    Looks,
+    Mask,
+    Samples,
+    Task,
+    Usable,
+    Work,
+    empty_result,
+    let_rows_go,
+    task,
+)
 
 __all__ = ["EVERYTHING", "Usable", "solve"]
 
@@ -29,6 +40,7 @@ def solve(
     half: bool = False,
     residual: bool = True,
     spare: Path | None = None,
+    looks: Looks | None = None,
     threads: int | None = None,
 ) -> Surface:
     """Return the surface that explains one plate per light.
@@ -40,6 +52,7 @@ def solve(
     mask: True where to solve, shape (row, col); by default everywhere.
     half: give half floats instead of float32.
     spare: a folder in whose files large pictures are worked on.
+    looks: what else looks at rows once they are solved, while their samples are there.
 
     Of three channels, one normal: each channel counts by its own brightness in the pixel; then each gets its
     least-squares albedo for that normal. A pixel is valid where three or more usable measurements remain, their lights
@@ -58,9 +71,15 @@ def solve(
     result = empty_result(rows * cols, lit.intensities.shape[1], half=half, residual=residual, spare=spare)
     given = task(shown.samples, lit, seen, mask, usable, black_level, scale)
 
-    def solve_band(one: Task, work: Work, first: int, last: int) -> None:
+    def memory(one: Task) -> tuple[Work, Work | None]:
+        return working_memory(one), None if looks is None else looks.memory()
+
+    def solve_band(one: Task, room: tuple[Work, Work | None], first: int, last: int) -> None:
+        work, beside = room
         solve_rows(one, result, work, first, last)
+        if looks is not None and beside is not None:
+            looks.look(one, result, beside, first, last)
         let_rows_go(result, cols, first, last)
 
-    shown.in_bands(solve_band, given, working_memory, threads=threads)
+    shown.in_bands(solve_band, given, memory, threads=threads)
     return surface_of(result, None, shown.shape, half=half)

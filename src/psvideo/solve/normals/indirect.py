@@ -1,0 +1,61 @@
+"""Light where lamps do not reach, looked for while a solver has the rows: reading plates again would cost as much."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from psvideo.model.surface import Surface
+from psvideo.solve.normals.bands import ShownPlates
+from psvideo.solve.normals.doubting import step_of, stored
+from psvideo.solve.normals.evidence import Evidence, Indirect
+from psvideo.solve.normals.task import Result, Samples, Task, Work, task
+
+
+@dataclass(frozen=True, kw_only=True)
+class IndirectLook:
+    """What is looked at of rows that were just solved: every ``step``-th, under the lights as they are (``given``)."""
+
+    given: Task
+    rows: int
+    step: int
+    found: Indirect
+
+    @classmethod
+    def of(cls, one: Evidence) -> "IndirectLook":
+        """Begin with a round."""
+        samples = ShownPlates.of(one.plates).as_floats().samples
+        rows, cols = samples[0].shape[:2]
+        step = step_of((rows, cols))
+        sums, counts = np.zeros((2, -(-rows // step), -(-cols // step)), np.float32)
+        given = task(samples, one.lit, one.seen, one.mask, one.usable, one.black_level, one.scale)
+        return cls(given=given, rows=rows, step=step, found=Indirect(sums, counts))
+
+    def memory(self) -> Work:
+        """Return room for one thread."""
+        from psvideo.solve.normals.kernel import working_memory  # loads the compiler
+
+        return working_memory(self.given)
+
+    def look(self, shown: Task, result: Result, work: Work, first: int, last: int) -> None:
+        """Look at solved rows, whose samples lie where the solver's task says."""
+        shape = (-1, self.rows, self.given.cols)
+        planes, albedo = result.normals.reshape(shape), result.albedo.reshape(shape)
+        self._look(shown, planes, albedo, work, first, last)
+
+    def _look(self, shown: Task, planes: Samples, albedo: Samples, work: Work, first: int, last: int) -> None:
+        from psvideo.solve.normals.judging_kernel import indirect_rows
+
+        given = self.given._replace(plates=shown.plates[: len(self.given.plates)], like=shown.like)
+        indirect_rows(given, work, planes, albedo, *self.found, first, last, self.step)
+
+
+def indirect_of(one: Evidence, surface: Surface) -> Indirect:
+    """Return the same of a surface that was solved before; its plates are read for it."""
+    looks = IndirectLook.of(one)
+    planes, albedo = stored(surface)
+
+    def look(given: Task, work: Work, first: int, last: int) -> None:
+        looks._look(given, planes, albedo, work, first, last)
+
+    one.in_bands(look, step=looks.step)
+    return looks.found
