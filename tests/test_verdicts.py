@@ -310,6 +310,12 @@ def rig_of(one: Observed) -> list[Judgement]:
     return list(judge_rig(one))
 
 
+def rig_but_leaning(one: Observed) -> list[Judgement]:
+    """Judge the rig by all but how its normals lean, which shows sooner: the other lines hold where nothing bends."""
+    one.leans.clear()
+    return rig_of(one)
+
+
 def accuracy(one: Observed) -> list[Judgement]:
     return list(result.accuracy(one))
 
@@ -327,16 +333,21 @@ def levels(share: float) -> list[float]:
 
 
 SOLVED = [
-    _by("rig", rig_of, "rig", {"claimed_deg": 15}, {"claimed_deg": 26}, shape="waves", lights=8),
-    _by("rig lost", rig_of, "rig", {"claimed_deg": 26}, {"claimed_deg": 40}, "doubtful bad", shape="waves", lights=8),
+    _by("rig", rig_but_leaning, "rig", {"claimed_deg": 15}, {"claimed_deg": 26}, shape="waves", lights=8),
+    _by("rig lost", rig_but_leaning, "rig", {"claimed_deg": 26}, {"claimed_deg": 40}, "doubtful bad", shape="waves",
+        lights=8),
     _by("strength", rig_of, "rig", {"claimed_gain": 1.15}, {"claimed_gain": 1.4}, shape="waves"),
-    _by("turned", rig_of, "rig", {"turned_deg": 24}, {"turned_deg": 27}, shape="waves", lights=3),
-    _by("turned around", rig_of, "rig", {"turned_deg": 31}, {"turned_deg": 35}, "doubtful bad", shape="waves",
+    _by("turned", rig_but_leaning, "rig", {"turned_deg": 24}, {"turned_deg": 27}, shape="waves", lights=3),
+    _by("turned around", rig_but_leaning, "rig", {"turned_deg": 31}, {"turned_deg": 35}, "doubtful bad", shape="waves",
         lights=3),
     _by("accuracy", accuracy, "accuracy", {"claimed_deg": 1}, {"claimed_deg": 5}, shape="waves", lights=8),
     _by("noise alone", validity, "validity", {"noise": 0.025}, {"noise": 0.032}, "doubtful bad"),
     _by("weak beside the rig", lamps, "lights", {"gains": [1, 0.15, 1]}, {"gains": [1, 0.1, 1]}, "good bad", lights=3),
-    _by("away", rig_of, "rig", {"claimed_tilt_deg": 40}, {"claimed_tilt_deg": 50}, "good bad"),
+    _by("tilted", rig_of, "rig", {"claimed_tilt_deg": 5}, {"claimed_tilt_deg": 9}, lights=3),
+    _by("tilted much", rig_of, "rig", {"claimed_tilt_deg": 14}, {"claimed_tilt_deg": 19}, "doubtful bad", lights=8),
+    _by("rolled", rig_of, "rig", {"turned_deg": 8}, {"turned_deg": 10}, lights=4),
+    _by("each its own way", rig_of, "rig", {"claimed_deg": 3}, {"claimed_deg": 12}, lights=3),
+    _by("away", rig_but_leaning, "rig", {"claimed_tilt_deg": 40}, {"claimed_tilt_deg": 50}, "good bad"),
     _by("sRGB as light", rig_of, "rig", {"recorded": "linear"}, {"recorded": "srgb"}, noise=0.0005),
     _by("light as sRGB", rig_of, "rig", {"recorded": "linear"}, {"recorded": "undone"}),
     _by("near", rig_of, "rig", {"near": 18}, {"near": 14}, shape="waves"),

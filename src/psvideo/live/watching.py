@@ -15,6 +15,7 @@ from psvideo.report.judge.powers import power_words
 from psvideo.report.judgement import Judgement, gravest_first, verdict_of
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rigpoints import rig_points
+from psvideo.report.observe.yuille1997 import Lens
 
 LOOK_S = 0.4
 """So far apart are rounds that are looked at, in the footage's time: to look costs as much as to solve."""
@@ -56,12 +57,11 @@ class Watching:
 
     def _fresh(self, plan: Plan, newest: NewestRound) -> Observed:
         points = None
+        size = {"height_px": plan.camera.height_px, "width_px": plan.camera.width_px}
         if self.rig is not None and all(light.direction is not None for light in self.rig.lights):
             channels = 1 if len(newest.round.plates[0].shape) == 2 else 3
-            camera = plan.camera
-            size = {"height_px": camera.height_px, "width_px": camera.width_px}
             points = rig_points(plan, self.rig, channels=channels, **size)
-        return Observed(lights=plan.lights, points=points)
+        return Observed(lights=plan.lights, points=points, lens=Lens.of(self.rig, **size))
 
 
 def _counts(image: NDArray[np.float32], saturation: float) -> list[int]:

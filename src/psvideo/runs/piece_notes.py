@@ -17,6 +17,7 @@ from psvideo.formats.whole_files import whole_file, write_text
 from psvideo.model.timing import Timing
 from psvideo.report.observe.observed import InstantFacts, Observed
 from psvideo.report.observe.worst import Thumbnail, Worst
+from psvideo.report.observe.yuille1997 import Lean
 from psvideo.runs.solving import Found
 
 FOLDER = ".pieces"
@@ -25,6 +26,7 @@ TIMING = "timing.json"
 BESIDE_TIMING = ("row_time_error_s", "phase_error_s", "notes")
 """What a timing's own file does not hold."""
 FACTS = TypeAdapter(tuple[InstantFacts, ...])
+LEANS = TypeAdapter(tuple[Lean, ...])
 
 
 def write_notes(folder: Path, numbers: range, found: Found) -> None:
@@ -38,6 +40,7 @@ def write_notes(folder: Path, numbers: range, found: Found) -> None:
         "blurs_px": seen.blurs_px,
         "slopes": seen.slopes,
         "away": seen.away,
+        "leans": [asdict(one) for one in seen.leans],
         "ambient_measured": list(seen.ambient_measured.items()),
         "beyond_mask": seen.beyond_mask,
         "worst": [{"number": one.number, "badness": one.badness, "why": one.why} for one in seen.thumbnails],
@@ -98,6 +101,7 @@ def _read(path: Path) -> tuple[range, Found]:
             blurs_px=record["blurs_px"],
             slopes=record["slopes"],
             away=record["away"],
+            leans=list(LEANS.validate_python(record["leans"])),
             light_at_points=[arrays[f"light{n}"] for n in range(len(lights))],
             ambient_measured={int(begins): share for begins, share in record["ambient_measured"]},
             beyond_mask=record["beyond_mask"],

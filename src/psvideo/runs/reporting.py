@@ -21,6 +21,7 @@ from psvideo.report.html import report_page
 from psvideo.report.judge.every_line import judgements
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rigpoints import rig_points
+from psvideo.report.observe.yuille1997 import Lens
 from psvideo.report.run_report import LightFacts, RunReport, report_record
 from psvideo.runs.lighting import Lighting
 from psvideo.runs.output import Output
@@ -53,11 +54,11 @@ def observing(take: Take, rig: Rig | None = None, masks: Masks | None = None) ->
     clip = take.clip
     points = None
     near = rig is not None and any(light.position_m is not None for light in rig.lights)
+    size = {"height_px": clip.height_px, "width_px": clip.width_px}
     if rig is not None and not (near and None in (rig.focal_px, rig.principal_px, rig.plane)):
-        size = {"height_px": clip.height_px, "width_px": clip.width_px}
         points = rig_points(clip.shown_plan, rig, channels=clip.channels, **size)
     watched = "" if take.unmixing is None else slot_names(clip.plan)[0]
-    return Observed(lights=clip.plan.lights, watched=watched, masks=masks, points=points)
+    return Observed(lights=clip.plan.lights, watched=watched, masks=masks, points=points, lens=Lens.of(rig, **size))
 
 
 def run_report(

@@ -5,10 +5,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from psvideo.report.judge.light import NAMED
-from psvideo.report.judge.result import AT_REST, COMMON_DEG, NOISY_DEG, by_noise_deg, moves
+from psvideo.report.judge.result import AT_REST, COMMON_DEG, LOST_DEG, NOISY_DEG, by_noise_deg, moves
 from psvideo.report.judgement import Grade, Judgement
 from psvideo.report.observe.observed import InstantFacts, Observed
 from psvideo.report.observe.rigfit import RigFit
+from psvideo.report.observe.yuille1997 import Lean
 
 MISFIT, LOST_MISFIT = 0.135, 0.25
 """Shares of the light that another rig would explain and this one cannot. A rig that was off by 1 to 5 degrees left
@@ -26,6 +27,15 @@ LOST_LEAN_DEG = 12.0
 UNDONE, REDONE = 0.7, 0.25
 """Plates were read by another curve where that leaves less than these shares of what is left over. (sRGB read as light:
 0.3 to 0.8; photographs in light: 1.7 and more. Light read as sRGB: 0.05 to 0.15; photographs in sRGB: 0.6 and more.)"""
+LEANS_DEG, BY_LEANING = 6.0, 0.1
+"""Normals would be one surface's if all were changed by more than the first; that says something of the rig where it
+leaves less over by the second, a share of what it leaves."""
+SURELY_LEANING = 0.5
+"""Photographs gain less, of what is glossy or in each other's light: there the angle is rough."""
+REST, EXACT_LIGHTS = 1 / 3, 3
+"""A rig is turned as a whole where so little of the change is none; what is wrong of three lights is one change as
+well. More lights that are each wrong in a way of their own make normals that no such change mends."""
+TURNED = ("tilted up or down", "swung to the left or right", "rolled around the line of sight")
 TOO_FAR_DEG, AGREE_FAR = 8.0, 0.15
 """Slopes of normals that are so far off agree badly under the right rig too: then they must agree by the second. (A
 bear's under eight lights in one plane: 0.21; five lights of which each is taken for the next: 0.11.)"""
@@ -36,15 +46,16 @@ def rig(observed: Observed) -> Iterator[Judgement]:
     fit = observed.rig_fit
     wrong = None if fit is None else _misfit(observed.lights, fit)
     found = (wrong, _crossed(observed), _away(observed), fit and (_curve(fit) or _near(fit)))
-    if any(found):
-        yield from (one for one in found if one)
+    leaning = None if any(found) else _leaning(observed)
+    if any(found) or leaning is not None:
+        yield from (one for one in (*found, leaning) if one)
     elif fit is not None:
         yield _explained(fit)
     elif observed.slopes:
         yield Judgement(
             subject="rig",
             grade="good",
-            found="The normals fit together as one surface's; with three lights no more of the rig can be checked.",
+            found="The normals fit together as one surface's; three lights show no more of the rig.",
         )
 
 
@@ -148,6 +159,35 @@ def _away(observed: Observed) -> Judgement | None:
         advice="Use the rig file of this set-up; check that lights have the same names in plan and rig, and that each "
         "gives what the rig says.",
     )
+
+
+def _leaning(observed: Observed) -> Judgement | None:
+    if not observed.leans or not quiet(observed.facts) or moves(observed.facts):
+        return None
+    usual = sorted(observed.leans, key=lambda one: one.lean_deg)[len(observed.leans) // 2]
+    if usual.lean_deg <= LEANS_DEG or usual.gain <= BY_LEANING:
+        return None
+    whole = usual.rest_deg < REST * usual.lean_deg
+    exact = whole or len(observed.lights) == EXACT_LIGHTS
+    return Judgement(
+        subject="rig",
+        grade="bad" if exact and usual.lean_deg > LOST_DEG and usual.gain > SURELY_LEANING else "doubtful",
+        found=_leaning_words(usual, whole=whole, exact=exact),
+        advice="Measure the lights again with the camera where it stands. If the picture is cropped at one side, or "
+        "the lens is shifted, write `focal_px` and `principal_px` into the rig.",
+    )
+
+
+def _leaning_words(usual: Lean, *, whole: bool, exact: bool) -> str:
+    not_so = "would be those of one surface, and as they are they are not"
+    if whole:
+        axis, angle_deg = int(np.abs(usual.turn_deg).argmax()), float(np.linalg.norm(usual.turn_deg))
+        return (
+            f"The rig seems {TURNED[axis]} as a whole by about {angle_deg:.0f} degrees: normals turned back by as much "
+            f"{not_so}."
+        )
+    by = f" by about {usual.lean_deg:.0f} degrees" if exact else ""
+    return f"The rig's directions are off: normals that lean otherwise{by} {not_so}."
 
 
 def quiet(facts: Sequence[InstantFacts]) -> bool:

@@ -24,6 +24,7 @@ from psvideo.report.observe.slopes import share_away, slope_agreement
 from psvideo.report.observe.steadiness import Change, Sample, change, sample_of
 from psvideo.report.observe.thinned import step_of, thin_surface, thinned
 from psvideo.report.observe.worst import Thumbnail, Worst
+from psvideo.report.observe.yuille1997 import Lean, Lens, lean
 from psvideo.solve.filling.filled import holes_in
 from psvideo.solve.passes.alpha_matte import lit_from
 
@@ -173,7 +174,8 @@ def _brightest(image: NDArray[np.float32]) -> NDArray[np.float32]:
 class Observed:
     """What was seen of a take so far; ``add`` takes in one round after the other.
 
-    ``masks`` are where to look, None for all that is lit; ``points`` is where the rig is held against the plates.
+    ``masks`` are where to look, None for all that is lit; ``lens`` is how the picture was seen, None where that is not
+    known; ``points`` is where the rig is held against the plates.
     ``only`` are the numbers of rounds that are noted, None for all; the others serve to hold these against.
     ``ambient_measured`` (by window's first frame) is in which share of the picture ambient light could be measured
     without a dark slot. ``first`` is the number of the clip's first round, and ``white`` what motion takes for white,
@@ -184,6 +186,7 @@ class Observed:
     lights: tuple[str, ...]
     watched: str = ""
     masks: Masks | None = None
+    lens: Lens | None = None
     points: RigPoints | None = None
     only: range | None = None
     first: int | None = None
@@ -193,6 +196,7 @@ class Observed:
     blurs_px: list[float] = field(default_factory=list)
     slopes: list[float] = field(default_factory=list)
     away: list[float] = field(default_factory=list)
+    leans: list[Lean] = field(default_factory=list)
     light_at_points: list[NDArray[np.float64]] = field(default_factory=list)
     ambient_measured: dict[int, float] = field(default_factory=dict)
     beyond_mask: list[float] = field(default_factory=list)
@@ -252,6 +256,7 @@ class Observed:
         self.blurs_px += other.blurs_px
         self.slopes += other.slopes
         self.away += other.away
+        self.leans += other.leans
         self.light_at_points += other.light_at_points
         self.ambient_measured |= other.ambient_measured
         self.beyond_mask += other.beyond_mask
@@ -280,6 +285,9 @@ class Observed:
             if agreement is not None:
                 self.slopes.append(agreement)
             self.away.append(share_away(surface))
+            found = lean(surface, lens=self.lens)
+            if found is not None:
+                self.leans.append(found)
         if self.points is not None and one.lights == self.lights:
             self.light_at_points.append(self.points.light(one))
 

@@ -44,10 +44,9 @@ def slope_agreement(surface: Surface) -> float | None:
 
     None where too few neighbouring normals are there, or where they show nothing but noise.
     """
-    step = max(surface.valid.shape[1] // WIDTH_PX, 1)
-    valid, normals = _thinned(surface, step)
+    valid, normals = thinned_normals(surface, width_step(surface))
     found = _turning(valid, normals, BLUR_PX)
-    if found is not None and found.power > TOO_MUCH * _by_noise(valid, normals):
+    if found is not None and found.power > TOO_MUCH * noise_of_slopes(valid, normals):
         return found.agreement
     for times in WIDER:
         if found is None or not -found.chance < found.agreement < CLEAR:
@@ -62,6 +61,11 @@ def slope_agreement(surface: Surface) -> float | None:
     return None if found is None else found.agreement
 
 
+def width_step(surface: Surface) -> int:
+    """Return how many pixels of a surface its slopes are averaged over."""
+    return max(int(surface.valid.shape[1]) // WIDTH_PX, 1)
+
+
 class _Turning(NamedTuple):
     """The correlation of dp/dy with dq/dx, their mean square, and how far noise alone may bring the correlation."""
 
@@ -70,7 +74,7 @@ class _Turning(NamedTuple):
     chance: float
 
 
-def _by_noise(valid: NDArray[np.bool_], normals: NDArray[np.float32]) -> float:
+def noise_of_slopes(valid: NDArray[np.bool_], normals: NDArray[np.float32]) -> float:
     """Return the mean square by which slopes turn for noise alone, as far as the finest detail shows it.
 
     White noise of a standard error s, smoothed by a Gaussian of width b, has derivatives of the mean square
@@ -108,7 +112,7 @@ def share_away(surface: Surface) -> float:
     return float((some.normals[..., 2] < AWAY)[some.measured].sum() / count) if count >= LEAST_AWAY else 0.0
 
 
-def _thinned(surface: Surface, step: int) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
+def thinned_normals(surface: Surface, step: int) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
     """Return validity and normals averaged over squares of ``step`` pixels; valid where all of a square is."""
     rows, cols = (size // step for size in surface.valid.shape)
     fine = max(step // LEAST_AVERAGED, 1)

@@ -1,0 +1,186 @@
+"""Which one change of all normals would make them a surface's, and how much nearer to one it would bring them.
+
+A rig whose directions are wrong as a whole (turned, tilted, or three of them each its own way) changes every normal b
+to A b by one matrix, which any number of plates explains. Slopes of a surface do not turn in circles, and that is
+linear in two rows of A's cofactors: c1 . (b x db/dx) + c2 . (b x db/dy) = 0, with (1, 0, 0) and (0, 1, 0) for a right
+rig (A. Yuille and D. Snow, "Shape and albedo from multiple images using integrability", CVPR 1997). What these rows
+leave open are slopes that all grow alike, or by one slant: there A is taken for a turn.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from psvideo.model.camera import FloatArray
+from psvideo.model.rig import Rig
+from psvideo.model.surface import Surface
+from psvideo.report.observe.slopes import (
+    BLUR_PX,
+    LEAST_PIXELS,
+    NORMAL_MEDIAN,
+    noise_of_slopes,
+    thinned_normals,
+    width_step,
+)
+
+MOST_POINTS = 12_000
+FACING = 0.2
+CREASE = 0.25
+"""Normals that turn by more radians from pixel to pixel show a crease, or one thing before another."""
+BESIDE_PX = 7
+CLEAR = 32.0
+"""A point tells something where its normals turn by so many times the square that noise makes of them."""
+OUTLIER = 2.0
+"""Residuals are taken for Cauchy's, so many times their median wide."""
+ROUNDS, ENOUGH = 30, 1e-4
+RIDGE = 1e-3
+"""Of the mean square: what the points do not tell stays as it is."""
+LEAST_TOLD = 0.02
+"""A cylinder, the edges of a few faces and two waves tell less of some changes. (Balls: 0.04; most things: 0.4.)"""
+WIDEST, A_LITTLE = 1.5, 0.01
+"""A picture's width over the focal length is no more than a lens of 24 mm gives on film. Of a lens that is not known it
+may be anything up to this: what is seen beside the axis looks turned."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lean:
+    """One change of all normals. ``lean_deg`` is how far it turns one in the mean, and ``gain`` by how much less it
+    leaves over than the normals as they are, as a share of what it leaves. ``turn_deg`` (x, y, z) is the turn in it,
+    the axis times the angle, and ``rest_deg`` how far what is no turn turns a normal in the mean."""
+
+    lean_deg: float
+    gain: float
+    turn_deg: tuple[float, float, float]
+    rest_deg: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lens:
+    """How a picture was seen: its ``width`` over the focal length, and where the axis meets it, ``right`` of its middle
+    and ``up``, in widths of the picture."""
+
+    width: float
+    right: float = 0.0
+    up: float = 0.0
+
+    @classmethod
+    def of(cls, rig: Rig | None, *, height_px: int, width_px: int) -> "Lens | None":
+        """Return the lens that a rig names, None where it names none."""
+        if rig is None or rig.focal_px is None or rig.principal_px is None:
+            return None
+        col, row = rig.principal_px
+        middle = ((width_px - 1) / 2, (height_px - 1) / 2)
+        return cls(
+            width=width_px / rig.focal_px[0], right=(col - middle[0]) / width_px, up=(middle[1] - row) / width_px
+        )
+
+
+def lean(surface: Surface, *, lens: Lens | None = None) -> Lean | None:
+    """Return the change that makes measured normals a surface's; None where too few of them bend,
+    or all along the same few ways.
+
+    lens: how the picture was seen; None where that is not known: by any lens, its axis in the middle of the picture.
+    """
+    n, ways, x, y = _bending(surface)
+    if len(n) < LEAST_PIXELS:
+        return None
+    far = _crossed(n, ways)
+    if lens is None:
+        by_lens = (_crossed(*_in_view(n, ways, x, y, A_LITTLE)) - far) / A_LITTLE
+        lens = Lens(width=float(np.clip(_fitted(far, by_lens).more, 0, WIDEST)))
+    found = _fitted(_crossed(*_in_view(n, ways, x - lens.right, y - lens.up, lens.width)), None)
+    return _described(found.rows, found.gain, n) if found.told > LEAST_TOLD else None
+
+
+def _bending(surface: Surface) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return normals (point, 3) that bend by more than noise and in one piece, how they change over a picture's width
+    to the right and upwards, (2, point, 3), and where they lie, x and y in such widths from the picture's middle."""
+    valid, small = thinned_normals(surface, width_step(surface))
+    noise = noise_of_slopes(valid, small)
+    blurred = np.asarray(cv2.GaussianBlur(small * valid[..., None], (0, 0), BLUR_PX), np.float64)
+    normals = blurred / np.maximum(np.linalg.norm(blurred, axis=-1, keepdims=True), 1e-6)
+    right, up = np.gradient(normals, axis=1), -np.gradient(normals, axis=0)
+    bend = (right**2).sum(axis=-1) + (up**2).sum(axis=-1)
+    around = np.ones((BESIDE_PX, BESIDE_PX), np.uint8)
+    whole = cv2.erode((valid & (normals[..., 2] > FACING)).astype(np.uint8), around, borderValue=0) > 0
+    torn = cv2.dilate((whole & (bend > CREASE**2)).astype(np.uint8), around) > 0
+    down, across = np.nonzero(whole & ~torn & (bend > CLEAR * noise))
+    each = -(-max(len(down), 1) // MOST_POINTS)
+    down, across = down[::each], across[::each]
+    rows, cols = valid.shape
+    ways = cols * np.stack([right[down, across], up[down, across]])
+    return normals[down, across], ways, (across - (cols - 1) / 2) / cols, ((rows - 1) / 2 - down) / cols
+
+
+def _in_view(
+    n: FloatArray, ways: FloatArray, x: FloatArray, y: FloatArray, wide: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return normals and their changes as a view from far away would have them: along a ray (wide x, wide y, -1) slopes
+    of the logarithm of depth are as n1 and n2 over n3 - wide (x n1 + y n2)."""
+    seen, changes = n.copy(), ways.copy()
+    seen[:, 2] -= wide * (x * n[:, 0] + y * n[:, 1])
+    changes[..., 2] -= wide * (x * ways[..., 0] + y * ways[..., 1] + n[:, :2].T)
+    return seen, changes
+
+
+def _crossed(n: FloatArray, ways: FloatArray) -> FloatArray:
+    """Return b x db/dx and b x db/dy, (point, 6); what faces the camera counts for more."""
+    facing = np.maximum(n[:, 2:] / np.linalg.norm(n, axis=1, keepdims=True), FACING)
+    return np.asarray(np.hstack([np.cross(n, ways[0]), np.cross(n, ways[1])]) * facing)
+
+
+class _Fitted(NamedTuple):
+    """``rows``, c1 and c2 (2, 3); how much of one ``more`` unknown; how much less that leaves over, as a share; and how
+    well these are ``told`` from each other, 1 at best."""
+
+    rows: FloatArray
+    more: float
+    gain: float
+    told: float
+
+
+def _fitted(crossed: FloatArray, more: FloatArray | None) -> _Fitted:
+    """Find c1 = (1 + a, b, c) and c2 = (d, 1 - a, e): their size is left open. ``more`` (point, 6): what one unknown
+    adds to ``crossed``."""
+    still = crossed[:, 0] + crossed[:, 4]
+    terms = [crossed[:, 0] - crossed[:, 4], *crossed[:, [1, 2, 3, 5]].T]
+    terms += [] if more is None else [more[:, 0] + more[:, 4]]
+    slopes = np.stack(terms, axis=1)
+    found = np.zeros(len(terms))
+    for _ in range(ROUNDS):
+        left = still + slopes @ found
+        width = OUTLIER * float(np.median(np.abs(left))) / NORMAL_MEDIAN + 1e-12
+        weights = 1 / (1 + (left / width) ** 2)
+        squares = np.einsum("p,pi,pj->ij", weights, slopes, slopes)
+        pull = np.einsum("p,pi,p->i", weights, slopes, still)
+        before, found = found, -np.linalg.solve(squares + RIDGE * np.diag(np.diag(squares) + 1e-12), pull)
+        if np.abs(found - before).max() < ENOUGH:
+            break
+    sizes = np.sqrt(np.diag(squares)) + 1e-12
+    told = float(np.linalg.eigvalsh(squares / sizes / sizes[:, None])[0])
+    cost, none = (float(np.mean(np.log1p((one / width) ** 2))) for one in (left, still))
+    a, b, c, d, e = found[:5]
+    rows = np.array([[1 + a, b, c], [d, 1 - a, e]])
+    return _Fitted(rows=rows, more=float(found[-1]), gain=none / max(cost, 1e-12) - 1, told=told)
+
+
+def _described(rows: FloatArray, gain: float, normals: FloatArray) -> Lean:
+    across = np.cross(*rows)
+    cofactors = np.vstack([rows, across / np.linalg.norm(across)])
+    left, sizes, right = np.linalg.svd(cofactors)
+    turn = np.asarray(cv2.Rodrigues(left @ np.diag([1, 1, np.linalg.det(left @ right)]) @ right)[0]).ravel()
+    return Lean(
+        lean_deg=_turned_deg(normals, np.linalg.inv(cofactors)),
+        gain=gain,
+        turn_deg=(float(np.degrees(turn[0])), float(np.degrees(turn[1])), float(np.degrees(turn[2]))),
+        rest_deg=_turned_deg(normals, right.T @ np.diag(1 / np.maximum(sizes, 1e-6)) @ right),
+    )
+
+
+def _turned_deg(normals: FloatArray, by: FloatArray) -> float:
+    """Return how far a matrix turns normals (point, 3) in the mean."""
+    turned = normals @ by
+    cosines = (turned * normals).sum(axis=1) / np.maximum(np.linalg.norm(turned, axis=1), 1e-12)
+    return float(np.degrees(np.arccos(np.clip(cosines, -1, 1))).mean())
