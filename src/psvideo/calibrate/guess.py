@@ -7,6 +7,7 @@ belong to a surface (integrability; A. Yuille and D. Snow, "Shape and albedo fro
 CVPR 1997) fixes the rotation up to convex or concave; the subject is taken to bulge towards the camera.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -53,48 +54,54 @@ def guess_rig(pictures: LightPictures, *, prior: Prior | None = None) -> Guess:
 
     Raises PsvideoError where there is too little to go by, or where the prior contradicts the pictures.
     """
-    lights = len(pictures.names)
-    chosen: Prior = prior or ("equal-lights" if lights >= LEAST_FOR_EQUAL_LIGHTS else "equal-albedo")
-    if lights < 3 or (chosen == "equal-lights" and lights < LEAST_FOR_EQUAL_LIGHTS):
-        raise PsvideoError(
-            f"{lights} lights do not show their directions by themselves: expected three or more, and six or more of "
-            "equal strength for `prior='equal-lights'`. Calibrate on a sphere instead."
-        )
+    chosen = _prior(len(pictures.names), prior)
     grey = pictures.grey.astype(np.float64)
     mask = _lit_by_all(pictures, grey)
-    values = grey[:, mask]
-    factor, codes, explained = _factorised(values)
+    factor, codes, explained = _factorised(grey[:, mask])
     if explained < LEAST_EXPLAINED:
         raise PsvideoError(
             f"A matte surface explains {explained:.1%} of these pictures; expected {LEAST_EXPLAINED:.0%} or more. "
             "Gloss, shadows or near lights spoil a guess: show a matte thing alone, or calibrate on a sphere."
         )
-    square = _metric(factor if chosen == "equal-lights" else codes)
-    bend = _root(square)
+    bend = _root(_metric(factor if chosen == "equal-lights" else codes))
     if chosen == "equal-lights":
-        directions, surface = factor @ bend, codes @ np.linalg.inv(bend).T
+        lit, surface = factor @ bend, codes @ np.linalg.inv(bend).T
     else:
-        directions, surface = factor @ np.linalg.inv(bend).T, codes @ bend
-    turn = _upright(surface, mask)
-    directions = directions @ turn.T
-    lengths = np.linalg.norm(directions, axis=1)
-    equal = lengths if chosen == "equal-lights" else np.linalg.norm(surface, axis=1)
+        lit, surface = factor @ np.linalg.inv(bend).T, codes @ bend
+    lit = lit @ _upright(surface, mask).T
+    equal = np.linalg.norm(lit if chosen == "equal-lights" else surface, axis=1)
     spread = float(equal.std() / equal.mean())
     if spread > MOST_SPREAD:
         raise PsvideoError(
             f"What `prior` {chosen} takes for equal comes out unequal by {spread:.0%}, so directions cannot be "
             "guessed. Try the other `prior`, take out gloss and shadow, or calibrate on a sphere."
         )
+    return Guess(rig=_rig_of(pictures.names, lit), prior=chosen, explained=explained, spread=spread)
+
+
+def _prior(lights: int, wished: Prior | None) -> Prior:
+    """Return what is taken for equal. Raises PsvideoError where so many lights do not show their directions."""
+    chosen: Prior = wished or ("equal-lights" if lights >= LEAST_FOR_EQUAL_LIGHTS else "equal-albedo")
+    if lights < (LEAST_FOR_EQUAL_LIGHTS if chosen == "equal-lights" else 3):
+        raise PsvideoError(
+            f"{lights} lights do not show their directions by themselves: expected three or more, and six or more of "
+            "equal strength for `prior='equal-lights'`. Calibrate on a sphere instead."
+        )
+    return chosen
+
+
+def _rig_of(names: Sequence[str], lit: FloatArray) -> Rig:
+    """Return lights whose vectors (light, 3) are direction times strength, their mean strength 1."""
+    lengths = np.linalg.norm(lit, axis=1)
     strengths = lengths / lengths.mean()
-    rig = Rig(
+    return Rig(
         lights=tuple(
             Light(
                 name=name, direction=_vector(way / length), intensity=(float(f"{strength:.6g}"),), error_deg=ERROR_DEG
             )
-            for name, way, length, strength in zip(pictures.names, directions, lengths, strengths, strict=True)
+            for name, way, length, strength in zip(names, lit, lengths, strengths, strict=True)
         )
     )
-    return Guess(rig=rig, prior=chosen, explained=explained, spread=spread)
 
 
 def _vector(values: FloatArray) -> tuple[float, float, float]:

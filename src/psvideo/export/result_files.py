@@ -1,6 +1,6 @@
 """Results as files: one EXR sequence per quantity, ``normals/<clip>_normals.<number>.exr`` and so on."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -153,12 +153,16 @@ def write_surface(
             compression=delivery.compression,
         )
     if delivery.png16:
-        texts = {key: str(value) for key, value in attributes["normals"].items()}
-        planes = planes_of("normals", made)
-        normals = encode_normals(np.stack([planes[channel] for channel in "RGB"], axis=-1))
-        write_png16(folder / result_name(clip, "normals", number, suffix="png"), normals, texts=texts)
-        mask = np.where(surface.valid, np.uint16(PNG_MAX), np.uint16(0))
-        write_png16(folder / result_name(clip, "valid", number, suffix="png"), mask, texts=texts)
+        _write_maps(folder, clip, number, made, {key: str(value) for key, value in attributes["normals"].items()})
+
+
+def _write_maps(folder: Path, clip: str, number: int, made: Made, texts: Mapping[str, str]) -> None:
+    """Write normals and validity as 16-bit PNG files, with what EXR files say in their headers as texts."""
+    planes = planes_of("normals", made)
+    normals = encode_normals(np.stack([planes[channel] for channel in "RGB"], axis=-1))
+    write_png16(folder / result_name(clip, "normals", number, suffix="png"), normals, texts=texts)
+    mask = np.where(made.surface.valid, np.uint16(PNG_MAX), np.uint16(0))
+    write_png16(folder / result_name(clip, "valid", number, suffix="png"), mask, texts=texts)
 
 
 def _write_meshes(folder: Path, clip: str, number: int, surface: Surface, depth: Depth, delivery: Delivery) -> None:

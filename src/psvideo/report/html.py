@@ -8,13 +8,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.pictures.charts import Axes, ChartLine, line_chart, stops_chart
+from psvideo.pictures.charts import stops_chart
 from psvideo.pictures.relighting import normal_colours
 from psvideo.report.judgement import Judgement, gravest_first, usable
 from psvideo.report.observe.levels import STOPS, TARGET_QUANTILE
 from psvideo.report.observe.observed import InstantFacts
 from psvideo.report.observe.worst import Thumbnail, badness
-from psvideo.report.run_report import RunReport, steadiness_of
+from psvideo.report.over_time import over_time
+from psvideo.report.run_report import RunReport
 from psvideo.report.style import STYLE
 
 Pixels = NDArray[np.uint8]
@@ -31,7 +32,7 @@ def report_page(report: RunReport, pictures: Sequence[tuple[str, Pixels]]) -> st
         _section("What was shot", _table(report.shot)),
         _section("Timing", _timing(report)),
         _section("Lights and exposure", _lights(report)),
-        _section("Over time", _over_time(report)),
+        _section("Over time", over_time(report.instants, [light.name for light in report.lights])),
         _section("Worst results", _worst(report)),
         _section("To make this again", _table(report.settings)),
     ]
@@ -110,53 +111,6 @@ def _lights(report: RunReport) -> str:
         f"{condition}<p>Light on the subject in stops below saturation (0 is saturation, -1 half of it):</p>"
         f'<div class="grid4">{charts}</div>'
     )
-
-
-def _over_time(report: RunReport) -> str:
-    facts = report.instants
-    if not facts:
-        return "<p>No result.</p>"
-    x = np.array([one.time_s for one in facts])
-    names = [light.name for light in report.lights]
-    whole = [one.levels if len(one.levels) == len(names) else (np.nan,) * len(names) for one in facts]
-    levels = 100 * np.array(whole, np.float64)
-    usual = np.maximum(np.nanmedian(levels, axis=0), 1e-9) if np.isfinite(levels).any() else np.ones(len(names))
-    charts = []
-    valid = np.array([np.nan if one.valid_share is None else 100 * one.valid_share for one in facts])
-    unseen = np.array([100 * one.unseen_share for one in facts])
-    clipped = np.array([100 * one.clipped_share for one in facts])
-    shares = [ChartLine(name="saturated", y=clipped), ChartLine(name="rows unseen", y=unseen)]
-    if np.isfinite(valid).any():
-        shares.insert(0, ChartLine(name="valid", y=valid))
-    axes = Axes(x=x, unit=" %", low=0, high=100, label="Valid and saturated shares of the subject, unseen rows")
-    charts.append((axes, shares))
-    lines = [ChartLine(name=name, y=100 * levels[:, n] / usual[n]) for n, name in enumerate(names)]
-    spread = max(5.0, float(np.nanmax(np.abs([line.y - 100 for line in lines]))) if np.isfinite(levels).any() else 0)
-    span = min(100.0, spread)
-    axes = Axes(x=x, unit=" %", low=100 - span, high=100 + span, label="Each light's level, against its own median")
-    charts.append((axes, lines))
-    change = np.array([np.nan if one.change is None else one.change.level_percent for one in facts])
-    turn = np.array([np.nan if one.change is None else one.change.normals_deg for one in facts])
-    if np.isfinite(turn).any():
-        most = max(float(np.nanmax(np.abs(change))), 0.5)
-        axes = Axes(x=x, unit=" %", low=-most, high=most, label="Flicker: change of light at rest, result to result")
-        charts.append((axes, [ChartLine(name="light", y=change)]))
-        high = max(float(np.nanmax(turn)), 0.1)
-        axes = Axes(x=x, unit="°", low=0, high=high, label="Noise: change of normals at rest, result to result")
-        charts.append((axes, [ChartLine(name="normals", y=turn)]))
-    drawn = "".join(
-        f"<figure>{line_chart(axes, lines)}<figcaption>{html.escape(axes.label)}</figcaption></figure>"
-        for axes, lines in charts
-    )
-    steady = steadiness_of(facts)
-    words = (
-        ""
-        if steady is None
-        else f"<p>At rest, in the median from result to result: normals {steady.normals_deg:.2f} degrees, albedo "
-        f"{steady.albedo_percent:.2f} %, its level {steady.level_percent:.2f} % (worst: "
-        f"{', '.join(map(str, steady.worst))}).</p>"
-    )
-    return f'<div class="grid2">{drawn}</div>{words}'
 
 
 def _worst(report: RunReport) -> str:

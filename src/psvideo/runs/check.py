@@ -18,6 +18,7 @@ from psvideo.formats.rig_toml import read_rig
 from psvideo.model.clipping import SATURATED
 from psvideo.model.colours import unmixing_of
 from psvideo.model.plan import Plan
+from psvideo.model.rig import Rig
 from psvideo.model.timing import DroppedFrames, Timing
 from psvideo.plates.gather import gather
 from psvideo.plates.naming import named_by_rig
@@ -130,19 +131,7 @@ def judged(
         else:
             timing = timing if known is None else named_by_rig(take, timing, known)
             timing = _with_later_holes(timing, clip, window)
-            unmixing = None if known is None else unmixing_of(clip.plan, known, channels=clip.channels)
-            apart = take.unmixed(unmixing)
-            observed = observing(apart, known if unmixing is None else unmixing.rig)
-            for one in gather(apart, timing, watch=watch, each_window=observed.look_at_window):
-                observed.add(one)
-                del one
-            if not observed.facts:
-                raise PsvideoError(
-                    f"{path}: its first {len(window)} frames hold no round in which a light is complete. Film longer: "
-                    "a round needs as many frames as it has flashes, and one or two more."
-                )
-            seen = Judgement(subject="strobe", grade="good", found=_strobe_words(clip.plan, timing))
-            lines = (seen, *judgements(apart.plan, timing, observed), *_steady_later(take, later))
+            lines = (*_lines_of(take, timing, known, watch=watch), *_steady_later(take, later))
             notes = timing.notes
     return Check(
         clip=clip.name,
@@ -153,6 +142,24 @@ def judged(
         judgements=tuple(one.spelled(caller.spell) for one in lines),
         notes=tuple(map(caller.spell, (*clip.warnings, *notes))),
     )
+
+
+def _lines_of(take: Take, timing: Timing, known: Rig | None, *, watch: Watch) -> tuple[Judgement, ...]:
+    """Judge a take's frames whose flashes are known. Raises PsvideoError where they hold no whole round."""
+    plan = take.clip.plan
+    unmixing = None if known is None else unmixing_of(plan, known, channels=take.clip.channels)
+    apart = take.unmixed(unmixing)
+    observed = observing(apart, known if unmixing is None else unmixing.rig)
+    for one in gather(apart, timing, watch=watch, each_window=observed.look_at_window):
+        observed.add(one)
+        del one
+    if not observed.facts:
+        raise PsvideoError(
+            f"{take.clip.path}: its first {len(take.numbers)} frames hold no round in which a light is complete. Film "
+            "longer: a round needs as many frames as it has flashes, and one or two more."
+        )
+    seen = Judgement(subject="strobe", grade="good", found=_strobe_words(plan, timing))
+    return (seen, *judgements(apart.plan, timing, observed))
 
 
 def _store(clip: Clip, window: Sequence[int]) -> AbstractContextManager[Kept | None]:

@@ -74,31 +74,9 @@ def sphere_lights(
     With near lights the surface is taken to be as far away as the spheres. Raises PsvideoError where no sphere is
     found, one is cut off, or no light is measured.
     """
-    notes: tuple[str, ...] = ()
     places = places_of(spheres)
-    if looking.focal_px is None and looking.focal_widths is None:
-        lens_px = lens_stated([stated_by(file) for place in places for file in _files_of(place)])
-        if lens_px is not None:
-            looking = replace(looking, focal_px=lens_px)
-            notes = (f"The spheres were seen through a lens of {lens_px:.6g} pixels, as their EXIF says.",)
-    sightings: list[Sighting] = []
-    names: tuple[str, ...] = ()
-    first = ""
-    for place in places:
-        path = place.called if isinstance(place, Place) else str(place)
-        reading = Reading(transfer=transfer)
-        if isinstance(place, Place):
-            opened = pictures_of(place, reading)
-        else:
-            opened = sets_of(place, reading, watch=watch, caller=caller)
-        if names and opened.names != names:
-            raise PsvideoError(
-                f"{path}: shows the lights {', '.join(opened.names[:3])}, …, and {first} "
-                f"{', '.join(names[:3])}, …. Expected the same names in every folder of sphere pictures, one for each "
-                "light."
-            )
-        names, first = opened.names, first or path
-        sightings += sight_spheres(opened.sets, looking, where=path, room=opened.room)
+    looking, notes = _through_its_lens(looking, places)
+    sightings = _sighted(places, looking, transfer=transfer, watch=watch, caller=caller)
     cut = _cut_differently(sightings)
     found = calibrate_lights(sightings, radius_m=None if cut else radius_m)
     rig = found.rig
@@ -117,6 +95,42 @@ def sphere_lights(
         notes=(*notes, note),
         warnings=tuple(found.warnings),
     )
+
+
+def _through_its_lens(looking: Looking, places: Sequence[Path | Place]) -> tuple[Looking, tuple[str, ...]]:
+    """Return how the camera looks, by the focal length that EXIF states where none is known, and a note of it."""
+    if looking.focal_px is not None or looking.focal_widths is not None:
+        return looking, ()
+    lens_px = lens_stated([stated_by(file) for place in places for file in _files_of(place)])
+    if lens_px is None:
+        return looking, ()
+    note = f"The spheres were seen through a lens of {lens_px:.6g} pixels, as their EXIF says."
+    return replace(looking, focal_px=lens_px), (note,)
+
+
+def _sighted(
+    places: Sequence[Path | Place], looking: Looking, *, transfer: str | None, watch: Watch, caller: Caller
+) -> list[Sighting]:
+    """Return the spheres of all places. Raises PsvideoError where places show other lights than the first."""
+    sightings: list[Sighting] = []
+    names: tuple[str, ...] = ()
+    first = ""
+    reading = Reading(transfer=transfer)
+    for place in places:
+        path = place.called if isinstance(place, Place) else str(place)
+        if isinstance(place, Place):
+            opened = pictures_of(place, reading)
+        else:
+            opened = sets_of(place, reading, watch=watch, caller=caller)
+        if names and opened.names != names:
+            raise PsvideoError(
+                f"{path}: shows the lights {', '.join(opened.names[:3])}, …, and {first} "
+                f"{', '.join(names[:3])}, …. Expected the same names in every folder of sphere pictures, one for each "
+                "light."
+            )
+        names, first = opened.names, first or path
+        sightings += sight_spheres(opened.sets, looking, where=path, room=opened.room)
+    return sightings
 
 
 def _size_px(sighting: Sighting) -> tuple[int, int]:
