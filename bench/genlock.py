@@ -2,11 +2,13 @@
 
 Time is virtual, the board's clock and the camera's apart: 900 ppm and a warm-up of 5 ppm a minute, a wander of 30 ppm
 in 44 s, flashes that jitter by 2 microseconds. ``python -m bench.genlock --minutes 10``; by hours where it is asked.
+``--firmware`` takes the boards' own program in emulation in place of the board in Python.
 """
 
 import argparse
 import math
 import sys
+import tempfile
 from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
@@ -15,6 +17,7 @@ from bench.table import Row, table
 
 sys.path.append(str(Path(__file__).parents[1] / "tests" / "models"))  # the loop that the tests film in
 
+from firmware_board import firmware_board
 from strobed_loop import StrobedLoop
 
 from psvideo.live.genlock import rows_around, target_of
@@ -29,8 +32,18 @@ ROW = "20"
 
 
 def rows(minutes: float = MINUTES) -> Iterator[Row]:
-    """Hold the dark row for so long and yield how far it ever was from where it should be."""
-    loop = StrobedLoop(plan=_plan(), offset_ppm=_offset_ppm, jitter_s=JITTER_S, seed=2)
+    """Hold the dark row of the board in Python for so long and yield how far it ever was from where it should be."""
+    yield from _held(StrobedLoop(plan=_plan(), offset_ppm=_offset_ppm, jitter_s=JITTER_S, seed=2), minutes)
+
+
+def firmware_rows(minutes: float = MINUTES) -> Iterator[Row]:
+    """Yield the same of the firmware."""
+    with tempfile.TemporaryDirectory() as folder, firmware_board(Path(folder)) as board:
+        loop = StrobedLoop(plan=_plan(), offset_ppm=_offset_ppm, jitter_s=JITTER_S, seed=2, board=board)
+        yield from _held(loop, minutes)
+
+
+def _held(loop: StrobedLoop, minutes: float) -> Iterator[Row]:
     for _ in loop.film(4.0):
         if loop.chain.state == "locked":
             break
@@ -61,7 +74,9 @@ def main() -> int:
     """Hold it for as long as is asked for."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--minutes", type=float, default=MINUTES)
-    print(table(rows(parser.parse_args().minutes)))
+    parser.add_argument("--firmware", action="store_true", help="the boards' program in emulation")
+    asked = parser.parse_args()
+    print(table((firmware_rows if asked.firmware else rows)(asked.minutes)))
     return 0
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from firmware_board import TICK_CYCLES, firmware_board
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from strobed_loop import StrobedLoop
@@ -80,6 +81,29 @@ def test_the_dark_row_is_where_it_is_wanted_after_three_seconds_and_stays(
     assert np.abs(late).max() < HOLDS_ROWS
     assert len(loop.chain.followed) == 1, "the lock is kept through every trim"
     assert -1000 < holding.ppm < -800
+
+
+def test_the_boards_firmware_is_filmed_followed_trimmed_and_dark_once_its_host_is_silent(
+    make_plan: PlanMaker, tmp_path: Path
+) -> None:
+    """The whole loop: its own edges light what the camera sees, and its serial line and steps take their time."""
+    with firmware_board(tmp_path) as board:
+        loop = StrobedLoop(plan=held_plan(make_plan), offset_ppm=lambda at_s: 900.0, jitter_s=2e-6, board=board)
+        lock(loop)
+        holding = holding_of(loop, "60")
+        assert abs(off_rows(loop, holding)) > 5, "it was elsewhere before"
+        began_s = loop.host_s
+        off = [(at_s, off_rows(loop, holding)) for at_s in loop.film(3.8, holding)]
+        late = np.array([rows for at_s, rows in off if at_s > began_s + 3.0])
+        assert np.abs(late).max() < HOLDS_ROWS
+        assert len(loop.chain.followed) == 1, "the lock is kept through every trim"
+        assert -1000 < holding.ppm < -800
+        silent = board.cycle // TICK_CYCLES
+        board.take_edges()
+        board.advance(silent + 4 * 10**6)
+        edges = board.take_edges()
+        assert edges[-1].level == 0
+        assert edges[-1].tick < silent + 2.2 * 10**6, "a second of the keep-alive, and the flash in which it ends"
 
 
 def test_the_trim_is_released_when_the_strobe_is_lost_and_it_is_held_again_when_found(make_plan: PlanMaker) -> None:

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "board.h"
+#include "trace.h"
 
 #define LONGEST 4096
 #define CYCLES_PER_MS (CPU_HZ / 1000)
@@ -100,6 +101,11 @@ static bool obey(const char *line) {
     const char *rest;
     char *text;
     if (!*line || *line == '#' || script_act(line)) return true;
+    if ((rest = after(line, "until"))) {
+        wait_until(strtoull(rest, &text, 10));
+        printf("%" PRIu64 " @\n", board_cycle());
+        return text != rest && !*text;
+    }
     if ((rest = after(line, "bytes"))) return transmit_hex(rest);
     if ((rest = after(line, "send"))) {
         if (!ask(rest)) printf("%" PRIu64 " ! no reply\n", board_cycle());
@@ -124,10 +130,11 @@ bool script_play(FILE *script) {
         number++;
         line[strcspn(line, "\r\n")] = 0;
         if (!obey(line)) {
-            fprintf(stderr, "emulator: line %d of the script is %s; expected send, bytes, wait, poll, flood, open, close, "
+            fprintf(stderr, "emulator: line %d of the script is %s; expected send, bytes, wait, until, poll, flood, open, close, "
                             "hang or reset as in script.h.\n", number, line);
             return false;
         }
+        trace_flush(); /* before the answer: whoever hears that finds every edge */
         fflush(stdout);
     }
     return true;

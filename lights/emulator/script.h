@@ -5,6 +5,7 @@
  *   wait MS           let virtual milliseconds pass
  *   poll MS TEXT      the request again and again for so long, each after the reply to the one before
  *   flood MS TEXT     the same without waiting for replies: the line is never quiet
+ *   until CYCLE       let virtual time pass until a CPU cycle, and print "CYCLE @" once the trace has its edges
  *   open, close       the interlock's contact
  *   hang              the program gets stuck
  *   reset             somebody presses the reset button

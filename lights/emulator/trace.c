@@ -20,6 +20,10 @@ void trace_edge(uint64_t cycle, char kind, int number, int level) {
     fprintf(file, "%d,%d\n", number, level);
 }
 
+void trace_flush(void) {
+    if (file) fflush(file);
+}
+
 bool trace_close(void) {
     if (!file) return true;
     bool whole = !ferror(file);

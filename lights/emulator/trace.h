@@ -11,6 +11,9 @@ bool trace_open(const char *file, const char *board, uint32_t hz, const char *wi
 /* Note that a pin ("X0", "S3") or a light ("0") changed to level at a CPU cycle. */
 void trace_edge(uint64_t cycle, char kind, int number, int level);
 
+/* Write out what is buffered, so that whoever reads the trace meanwhile finds every edge until now. */
+void trace_flush(void);
+
 /* Write out what is buffered and close. False where something could not be written. */
 bool trace_close(void);
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 from memory_frame import MemoryFrame
@@ -11,6 +12,7 @@ from psvideo.live.genlock import DarkRow, dark_row
 from psvideo.live.holding import Holding
 from psvideo.model.plan import Plan
 from psvideo.strobe.link.boards import BOARDS, capabilities
+from psvideo.strobe.link.boards import Board as KnownBoard
 from psvideo.strobe.link.exchange import RefusedError
 from psvideo.strobe.link.protocol import format_request, parse_reply
 from psvideo.strobe.link.replies import Refusal
@@ -22,26 +24,43 @@ from psvideo.synth.camera.sensor import expose_frames
 from psvideo.synth.lamps.true_flashes import TrueFlash
 
 WITHOUT_EDGES_S = 0.002
+ALIVE_S = 0.1
+"""The host asks the board how it goes so often, as a session does, so that the board knows that there is one."""
+
+
+class Board(Protocol):
+    """What is asked, and flashes: the board in plain Python, or the firmware in emulation."""
+
+    board: KnownBoard
+
+    def feed(self, data: bytes, now: int) -> bytes:
+        """Return the answer to a line that comes at a tick."""
+
+    def advance(self, now: int) -> None:
+        """Let time pass until a tick."""
+
+    def take_edges(self) -> list[Edge]:
+        """Return the edges since this was last called."""
 
 
 @dataclass(kw_only=True)
 class StrobedLoop:
     """A board whose clock is off by ``offset_ppm(camera time)`` against the camera's, and jitters.
 
-    ``edges`` are those that the board made since they were last looked at, ``heard`` how often it was asked.
+    ``starts_s`` are the middles of the latest flashes in camera time; ``board`` left out is the one in plain Python.
     """
 
     plan: Plan
     offset_ppm: Callable[[float], float]
     jitter_s: float = 0.0
     seed: int = 0
+    board: Board = field(default_factory=lambda: PythonBoard(BOARDS["atmega328p"]))
     starts_s: list[float] = field(default_factory=list)
     board_s: float = 0.0
     camera_s: float = 0.0
 
     def __post_init__(self) -> None:
-        self.board = PythonBoard(BOARDS["atmega328p"])
-        self.program = make_program(self.plan, capabilities(BOARDS["atmega328p"], "gated"))
+        self.program = make_program(self.plan, capabilities(self.board.board, "gated"))
         self.rng = np.random.default_rng(self.seed)
         for request in (*self.program.upload(), Run(cycles=0)):
             self.ask(request)
@@ -98,7 +117,7 @@ class StrobedLoop:
 
     def _flashes(self) -> Iterator[TrueFlash]:
         """Let the board's time pass, a little at a time, and yield its flashes in camera time."""
-        tick_s, held, index = self.board.board.tick_ps * 1e-12, {}, 0
+        tick_s, held, index, heard_s = self.board.board.tick_ps * 1e-12, {}, 0, 0.0
         slot_of = {self.program.lines[self.plan.flashes[slot].lit[0]]: slot for slot in self.plan.lit_slots}
         while True:
             self.board_s += WITHOUT_EDGES_S
@@ -106,8 +125,10 @@ class StrobedLoop:
                 self.camera_s,
                 self.camera_s + WITHOUT_EDGES_S * (1 + 1e-6 * self.offset_ppm(self.camera_s)),
             )
-            self.ask(Stat())
-            edge: Edge
+            if self.board_s - heard_s >= ALIVE_S:
+                heard_s = self.board_s
+                self.ask(Stat())
+            self.board.advance(self._ticks())
             for edge in self.board.take_edges():
                 share = (edge.tick * tick_s - (self.board_s - WITHOUT_EDGES_S)) / WITHOUT_EDGES_S
                 at_s = before_s + share * (self.camera_s - before_s)
