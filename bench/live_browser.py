@@ -45,6 +45,12 @@ class Tab:
         """Go to a page."""
         self._asked("Page.navigate", url=url)
 
+    def pointer(self, x_px: float, y_px: float, *, click: bool = False) -> None:
+        """Move the mouse to a place in the page, and click there."""
+        for kind in ("mouseMoved", *(("mousePressed", "mouseReleased") if click else ())):
+            pressed = {"button": "left", "clickCount": 1} if kind != "mouseMoved" else {}
+            self._asked("Input.dispatchMouseEvent", type=kind, x=x_px, y=y_px, **pressed)
+
     def picture(self) -> str:
         """Return what the page looks like, as PNG in base 64."""
         return str(self._asked("Page.captureScreenshot", format="png")["data"])

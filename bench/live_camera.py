@@ -65,6 +65,7 @@ def main() -> None:
     parser.add_argument("--fps", type=float, required=True)
     parser.add_argument("--seconds", type=float, required=True)
     parser.add_argument("--late", type=float, required=True, help="seconds from a frame's begin to its last row's end")
+    parser.add_argument("--form", default="BayerRG8", help="the pixel format, by GenICam's name")
     parser.add_argument("--bare", action="store_true", help="bare bytes, without numbers")
     parser.add_argument("--out", type=Path, required=True)
     asked = parser.parse_args()
@@ -73,7 +74,7 @@ def main() -> None:
     out, count = sys.stdout.fileno(), round(asked.seconds * asked.fps)
     buffers, began_s = Buffers(), time.monotonic() + WARM_S
     if not asked.bare:
-        mode = {"format": "BayerRG8", "shape": shape, "type": loop.dtype.str}
+        mode = {"format": asked.form, "shape": shape, "type": loop.dtype.str}
         _send(out, json.dumps(mode).encode() + b"\n")
 
     def expose() -> None:

@@ -6,6 +6,7 @@ and because one that crashes must take nothing else with it. Run as ``python -m 
 
 import json
 import os
+import re
 import struct
 import sys
 from collections.abc import Iterator
@@ -13,6 +14,8 @@ from typing import Any, BinaryIO
 
 HEAD = struct.Struct("<QQQ")
 """What stands before a frame's bytes: the camera's number of it, its time stamp, and how many bytes follow."""
+WHERE = re.compile(r" : \w+Exception ")
+"""Behind a fault's words stands where in the runtime's sources it was thrown."""
 WAIT_MS = 5000
 """A camera from which nothing comes for so long has stopped."""
 
@@ -39,9 +42,13 @@ def _opened(serial: str, features: dict[str, str]) -> Any:
     camera.Open()
     for name, value in features.items():
         node = camera.GetNodeMap().GetNode(name)
-        if node is None:
+        if node is None or not getattr(node, "IsValid", lambda: True)():  # newer runtimes give one of nothing
             raise LookupError(f"it has no feature {name}")
-        node.FromString(value)
+        try:
+            node.FromString(value)
+        except Exception as fault:  # the runtime raises what it likes, with where in its sources
+            why = WHERE.split(" ".join(str(fault).split()))[0].rstrip(". ")
+            raise ValueError(f"its feature {name} cannot be set to {value} ({why})") from None
     return camera
 
 

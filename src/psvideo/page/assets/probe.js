@@ -52,8 +52,8 @@ export function relitOf(look, u, v, lights) {
   const ySign = look.sequence.y === "down" ? -1 : 1;
   const [x, y, z] = pixelAt(normals, u, v);
   const normal = product(look.toCamera, [x, y * ySign, z]);
-  const ground = albedo ? pixelAt(albedo, u, v) : [0.7, 0.7, 0.7];
-  return relitPixel(normal, ground, pointOf(look, u, v, ySign), lights, look.specular, look.exponent, look.around);
+  const ground = albedo ? pixelAt(albedo, u, v) : [0.7];
+  return relitPixel(normal, ground.length === 1 ? Array(3).fill(ground[0]) : ground, pointOf(look, u, v, ySign), lights, look.specular, look.exponent, look.around);
 }
 
 function pointOf(look, u, v, ySign) {

@@ -11,8 +11,9 @@ void main() {
   gl_Position = vec4(corner, 0.0, 1.0);
 }`;
 
-// `way`: kind (one of KINDS), grey, channels, linear, albedo, valid, place (0 a plane, 1 points, 2 depth), lights (their
-// number), near (whether any is), shine (whether there are highlights), around (whether light comes from all around).
+// `way`: kind (one of KINDS), grey (the albedo, where it is relit), channels, linear, albedo, valid, place (0 a plane,
+// 1 points, 2 depth), lights (their number), near (whether any is), shine (whether there are highlights), around
+// (whether light comes from all around).
 export function fragment(way) {
   return `#version 300 es
 precision highp float;
@@ -89,7 +90,7 @@ vec3 relit(vec2 at) {
   vec3 n = texture(uMain, at).xyz * vec3(1.0, uYSign, 1.0);
   float size = length(n);
   n = uToCamera * (n / max(size, 1e-6));
-  vec3 albedo = ${way.albedo ? "texture(uAlbedo, at).rgb" : "vec3(0.7)"};
+  vec3 albedo = ${way.albedo ? `texture(uAlbedo, at)${way.grey ? ".rrr" : ".rgb"}` : "vec3(0.7)"};
   ${way.near ? "vec3 place = pointAt(at);" : ""}
   vec3 light = vec3(0.0);
   ${Array.from({ length: way.lights }, (_, index) => lightText(way, index)).join("\n  ")}

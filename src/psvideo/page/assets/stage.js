@@ -192,7 +192,7 @@ function wayOf(look, linear) {
   const relit = kind === "relit";
   const near = relit && lights.some((light) => light.near);
   return {
-    kind, linear, grey: !relit && blocks[look.main]?.channels === 1, channels: look.channels,
+    kind, linear, grey: blocks[relit ? "albedo" : look.main]?.channels === 1, channels: look.channels,
     albedo: Boolean(blocks.albedo), valid: look.markInvalid && kind !== "mask" && !linear, place: near ? look.place.kind : 0,
     lights: relit ? lights.length : 0, near, shine: relit && look.specular > 0,
     around: relit && Boolean(look.around),
