@@ -20,7 +20,7 @@ from psvideo.plates.mixture import made
 from psvideo.plates.sequence import AMBIENT, Round
 from psvideo.report.judge import light, result, time
 from psvideo.report.judge.of_rig import rig as judge_rig
-from psvideo.report.judgement import Judgement
+from psvideo.report.judgement import Judgement, verdict_of
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rigpoints import rig_points
 from psvideo.solve.normals.illumination import Illumination
@@ -291,7 +291,7 @@ LIT = [
     _by("clips much of three", exposure, "clipping", {"clip": 0.09}, {"clip": 0.11}, "doubtful bad", noise=0, lights=3),
     _by("all clip", exposure, "clipping", {"clip": 0.16}, {"clip": 0.3}, "doubtful bad", noise=0, clip_all=True),
     _by("weak", lamps, "lights", {"gains": [1, 0.15, 1, 1, 1]}, {"gains": [1, 0.1, 1, 1, 1]}),
-    _by("dead", lamps, "lights", {"gains": [1, 0.012, 1, 1, 1]}, {"gains": [1, 0.008, 1, 1, 1]}, "doubtful bad"),
+    _by("dead", lamps, "lights", {"gains": [1, 0.012, 1]}, {"gains": [1, 0.008, 1]}, "doubtful bad", lights=3),
     _by("missed", lamps, "lights", {"gains": missing(1, 0.55)}, {"gains": missing(1, 0.45)}, rounds=12),
     _by("missed often", lamps, "lights", {"gains": missing(1, 0.3)}, {"gains": missing(2, 0.3)}, "doubtful bad",
         rounds=12),
@@ -448,6 +448,17 @@ def test_validity_is_counted_over_the_subject_filled_or_not_before_a_dim_backdro
         (facts,) = replace(one, backdrop=backdrop).observed(0).facts
         assert facts.valid_share is not None
         assert 0.48 < facts.valid_share < 0.58, "of the ball; what is behind it counts neither way"
+
+
+def test_a_dead_light_among_enough_others_is_named_and_left_out_and_the_rig_is_still_checked() -> None:
+    dead = Footage(lights=6, gains=[1, 1, 0, 1, 1, 1], solved=True).observed(0)
+    (line,) = lamps(dead)
+    assert (line.grade, line.found) == (
+        "doubtful", "The light 'light2' gives no light (0.0 % of the strongest); normals come from the other 5."
+    )  # fmt: skip
+    assert verdict_of([line, *rig_of(dead), *validity(dead)]) == "This take is usable, with reservations."
+    wrong = Footage(shape="waves", lights=6, gains=[1, 1, 0, 1, 1, 1], claimed_deg=40, solved=True).observed(0)
+    assert graded(rig_but_leaning(wrong), "rig") in ("doubtful", "bad")
 
 
 def test_a_light_of_which_no_frame_showed_the_subject_is_not_called_dead() -> None:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.levels import TARGET_QUANTILE, Levels
-from psvideo.report.observe.observed import InstantFacts, Observed
+from psvideo.report.observe.observed import NO_LIGHT, InstantFacts, Observed
 
 DIM_STOPS, DARK_STOPS = -3.5, -6.0
 """A take whose brightest lamp's brightest parts stay so far below saturation is noisy, or lost in noise."""
@@ -24,8 +24,10 @@ MEASURED, FAINT_AMBIENT = 0.8, 0.02
 MOST_AMBIENT, LOST_AMBIENT = 0.1, 0.5
 NOTICED, MOST_SWING = 0.05, 0.1
 """Ambient light of more than the first share that changes from dark slot to dark slot by more than the second."""
-NO_LIGHT, WEAK_LIGHT = 0.01, 1 / 8
-"""Shares of the brightest lamp's light."""
+WEAK_LIGHT = 1 / 8
+"""Of the brightest lamp's light."""
+LEAST_LIGHTS = 3
+"""Where so many others fire, one that does not is missed by what they do not reach; shadow and it look the same."""
 CHECKED_FROM = 5
 """With fewer lights than these nothing shows that one of them gives less than the rig says, and all normals lean."""
 MISSED = 0.5
@@ -141,7 +143,7 @@ def lamps(observed: Observed, *, timed: bool = True) -> Iterator[Judgement]:
     known = _shown(observed)
     named = [light for light, is_known in zip(observed.lights, known, strict=True) if is_known]
     said = list(_weak(named, relative[known], _brightest(observed)[known], _claimed(observed)[known]))
-    alive = usual > NO_LIGHT * usual.max()
+    alive = observed.firing
     whole = np.array([one.unseen_share == 0 for one in facts])
     if timed and whole.any():
         shown = [one for one in facts if one.unseen_share == 0]
@@ -200,10 +202,13 @@ def _weak(
         return
     for light, share, is_dim, says in zip(lights, relative, dim, claimed, strict=True):
         if share < NO_LIGHT:
+            others = int((relative >= NO_LIGHT).sum())
+            enough = others >= LEAST_LIGHTS
             yield Judgement(
                 subject="lights",
-                grade="bad",
-                found=f"The light {light!r} gives no light ({100 * max(share, 0):.1f} % of the strongest).",
+                grade="doubtful" if enough else "bad",
+                found=f"The light {light!r} gives no light ({100 * max(share, 0):.1f} % of the strongest)"
+                + (f"; normals come from the other {others}." if enough else "."),
                 advice="Check its cable, driver and line, and that the plan names it as the board does.",
             )
         elif is_dim and says >= WEAK_LIGHT:

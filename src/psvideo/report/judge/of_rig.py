@@ -35,6 +35,13 @@ SURELY_LEANING = 0.5
 REST, EXACT_LIGHTS = 1 / 3, 3
 """A rig is turned as a whole where so little of the change is none; what is wrong of three lights is one change as
 well. More lights that are each wrong in a way of their own make normals that no such change mends."""
+MOST_FLAT = 6.5
+"""Lights of a larger condition number lie nearly in a plane: gloss and light from around lean normals under the right
+rig as well, on photographs by 9 to 15 degrees."""
+FLAT = (
+    "Normals that lean otherwise, by about {:.0f} degrees, would be those of one surface: the lights lie nearly in a "
+    "plane, so that gloss, light from around or a rig that is a little off turn all of them."
+)
 TURNED = ("tilted up or down", "swung to the left or right", "rolled around the line of sight")
 TOO_FAR_DEG, AGREE_FAR = 8.0, 0.15
 """Slopes of normals that are so far off agree badly under the right rig too: then they must agree by the second. (A
@@ -44,7 +51,8 @@ bear's under eight lights in one plane: 0.21; five lights of which each is taken
 def rig(observed: Observed) -> Iterator[Judgement]:
     """Judge whether the rig's directions and strengths can have made these plates."""
     fit = observed.rig_fit
-    wrong = None if fit is None else _misfit(observed.lights, fit)
+    firing = [light for light, fires in zip(observed.lights, observed.firing, strict=True) if fires]
+    wrong = None if fit is None else _misfit(firing, fit)
     found = (wrong, _crossed(observed), _away(observed), fit and (_curve(fit) or _near(fit)))
     leaning = None if any(found) else _leaning(observed)
     if any(found) or leaning is not None:
@@ -168,14 +176,24 @@ def _leaning(observed: Observed) -> Judgement | None:
     if usual.lean_deg <= LEANS_DEG or usual.gain <= BY_LEANING:
         return None
     whole = usual.rest_deg < REST * usual.lean_deg
-    exact = whole or len(observed.lights) == EXACT_LIGHTS
+    flat = _nearly_in_a_plane(observed)
+    exact = whole or int(observed.firing.sum()) == EXACT_LIGHTS
     return Judgement(
         subject="rig",
-        grade="bad" if exact and usual.lean_deg > LOST_DEG and usual.gain > SURELY_LEANING else "doubtful",
-        found=_leaning_words(usual, whole=whole, exact=exact),
-        advice="Measure the lights again with the camera where it stands. If the picture is cropped at one side, or "
-        "the lens is shifted, write `focal_px` and `principal_px` into the rig.",
+        grade="bad" if exact and not flat and usual.lean_deg > LOST_DEG and usual.gain > SURELY_LEANING else "doubtful",
+        found=FLAT.format(usual.lean_deg) if flat else _leaning_words(usual, whole=whole, exact=exact),
+        advice="Add lights from other sides, farther from the plane of these."
+        if flat
+        else "Measure the lights again with the camera where it stands. If the picture is cropped at one side, or the "
+        "lens is shifted, write `focal_px` and `principal_px` into the rig.",
     )
+
+
+def _nearly_in_a_plane(observed: Observed) -> bool:
+    if observed.points is None:
+        return False
+    sizes = np.linalg.svd(observed.points.vectors[:, observed.firing].mean(axis=0), compute_uv=False)
+    return bool(sizes[0] > MOST_FLAT * sizes[-1])
 
 
 def _leaning_words(usual: Lean, *, whole: bool, exact: bool) -> str:

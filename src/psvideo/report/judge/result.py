@@ -24,6 +24,8 @@ MOVING_FACTOR = 2.0
 """Where the picture moves, so many times more may be left unexplained: no rig explains what moved between flashes."""
 LEAST_VALID, HARDLY_VALID = 0.6, 0.2
 """Shares of the subject: three lights that stand well reach more of most subjects than the first."""
+NONE_VALID = 0.02
+"""With less, what is good for a look is all that is left: no more than a pixel here and there."""
 MOST_FLICKER_PERCENT = 1.0
 AT_REST = 0.05
 """Noise is judged by results between which less of the picture than this moves."""
@@ -55,7 +57,7 @@ def validity(observed: Observed) -> Iterator[Judgement]:
         return
     shares = [one.valid_share or 0.0 for one in known]
     usual, least = float(np.median(shares)), min(shares)
-    found = f"{100 * usual:.0f} % of the subject has a normal to be trusted"
+    found = f"{_percent(usual)} of the subject has a normal to be trusted"
     if usual >= LEAST_VALID:
         yield Judgement(subject="validity", grade="good", found=f"{found} ({100 * least:.0f} % in the worst round).")
         return
@@ -65,14 +67,15 @@ def validity(observed: Observed) -> Iterator[Judgement]:
     by_surface = enough and max(COMMON_DEG, by_noise_deg(observed.facts)) < off_deg <= LOST_DEG
     grade: Grade = "bad" if max(shares) < HARDLY_VALID and not by_surface else "doubtful"
     if enough:
-        said = any(one.grade != "good" for one in accuracy(observed))
+        none = usual < NONE_VALID
         yield Judgement(
             subject="validity",
             grade=grade,
-            found=f"Three lights reach {100 * np.median(reached):.0f} % of the subject, and {found}: elsewhere its "
-            "predicted error is too large.",
-            advice="Give more light, or use more lights"
-            + ("." if said else '; `aov=["error"]` says how far off each pixel may be.'),
+            found=f"{found[0].upper()}{found[1:]}, though three lights reach {100 * np.median(reached):.0f} %: "
+            "elsewhere the predicted error is too large."
+            + (" These normals serve a look, and no measurement." if none else ""),
+            advice=_trusting(observed),
+            decisive=none,
         )
         return
     yield Judgement(
@@ -82,6 +85,17 @@ def validity(observed: Observed) -> Iterator[Judgement]:
         advice="Give the subject more light, place the lights nearer to the camera's axis, or use more of them, so "
         "that three reach every part.",
     )
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %" if share >= 0.01 else "hardly any"
+
+
+def _trusting(observed: Observed) -> str:
+    """Say what would make more normals to be trusted: what accuracy says is to blame, or more light where noise is."""
+    if any(one.grade != "good" for one in accuracy(observed)):
+        return "Do what is said of accuracy; more light does not help."
+    return 'Give more light, or use more lights; `aov=["error"]` says how far off each pixel may be.'
 
 
 def accuracy(observed: Observed) -> Iterator[Judgement]:

@@ -33,6 +33,8 @@ LIT = 0.01
 of dark takes, than a sixth of their brightest hundredth."""
 DARKEST = 1 / 6
 FAINT = 2.0**-12
+NO_LIGHT = 0.01
+"""A lamp that gives less than this share of the strongest does not fire."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -267,9 +269,18 @@ class Observed:
         return Levels(self.counts.get(light, np.zeros(BINS + 2, np.int64)))
 
     @property
+    def firing(self) -> NDArray[np.bool_]:
+        """Which lights give light at all, (light,)."""
+        known = [one.levels for one in self.facts if len(one.levels) == len(self.lights)]
+        if not known:
+            return np.ones(len(self.lights), np.bool_)
+        usual = np.median(np.array(known), axis=0)
+        return np.asarray(usual >= NO_LIGHT * usual.max(), np.bool_)
+
+    @property
     def rig_fit(self) -> RigFit | None:
-        """What the points say of the rig so far; None where it cannot be said."""
-        return None if self.points is None else self.points.fit(self.light_at_points)
+        """What the points say of the rig so far, by the lights that fire; None where it cannot be said."""
+        return None if self.points is None else self.points.fit(self.light_at_points, self.firing)
 
     @property
     def thumbnails(self) -> tuple[Thumbnail, ...]:

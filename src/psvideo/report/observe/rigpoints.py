@@ -38,13 +38,14 @@ class RigPoints:
             columns.append(np.where(known, value, 0.0))
         return np.stack(columns, axis=1)
 
-    def fit(self, light: list[FloatArray]) -> RigFit | None:
-        """Judge the rig by the light of several rounds."""
+    def fit(self, light: list[FloatArray], firing: NDArray[np.bool_]) -> RigFit | None:
+        """Judge the rig by the light of several rounds and the lights that fire, (light,)."""
         if not light:
             return None
-        vectors = self.vectors if len(self.vectors) == 1 else np.concatenate([self.vectors] * len(light))
+        vectors = self.vectors[:, firing]
+        vectors = vectors if len(vectors) == 1 else np.concatenate([vectors] * len(light))
         places = np.stack([self.cols, -self.rows], axis=1) / max(int(self.cols.max()), 1)
-        return rig_fit(np.concatenate(light), vectors, np.concatenate([places] * len(light)))
+        return rig_fit(np.concatenate(light)[:, firing], vectors, np.concatenate([places] * len(light)))
 
 
 def rig_points(plan: Plan, rig: Rig, *, height_px: int, width_px: int, channels: int) -> RigPoints:
