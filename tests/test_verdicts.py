@@ -21,6 +21,7 @@ from psvideo.plates.sequence import AMBIENT, Round
 from psvideo.report.judge import light, result, time
 from psvideo.report.judge.of_rig import rig as judge_rig
 from psvideo.report.judgement import Judgement, verdict_of
+from psvideo.report.observe.motion import glimpse, motion
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rigpoints import rig_points
 from psvideo.solve.normals.illumination import Illumination
@@ -466,3 +467,20 @@ def test_a_light_of_which_no_frame_showed_the_subject_is_not_called_dead() -> No
     one.counts[one.lights[0]] = np.zeros_like(one.counts[one.lights[0]])
     one.facts = [replace(fact, levels=(0.0, *fact.levels[1:])) for fact in one.facts]
     assert [line.grade for line in lamps(one)] == ["good"]
+
+
+def test_what_is_clipped_does_not_seem_to_move_where_the_rows_that_two_frames_share_roll() -> None:
+    """Two halves of a flash, each below saturation, add up to more than a whole one that is clipped."""
+
+    def plate(number: int) -> LightPlate:
+        light = 2 * tiles(0)[1]
+        shared = (np.arange(SIZE) - 24 * number) % SIZE < 24
+        clipped = np.where(shared[:, None], light, np.minimum(light, 1)).astype(np.float32)
+        return LightPlate(
+            light="a", number=number, time_s=float(number), picture=made(clipped), seen=np.ones(SIZE, np.bool_)
+        )
+
+    one = glimpse(plate(0))
+    found = motion(one, glimpse(plate(1), one.white))
+    assert found is not None
+    assert (found.speed_px_s, found.share) == (0, 0)

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from psvideo.report.judge.light import NAMED
+from psvideo.report.judge.light import LOST_CLIPPED, NAMED
 from psvideo.report.judge.result import AT_REST, COMMON_DEG, LOST_DEG, NOISY_DEG, by_noise_deg, moves
 from psvideo.report.judgement import Grade, Judgement
 from psvideo.report.observe.observed import InstantFacts, Observed
@@ -170,7 +170,7 @@ def _away(observed: Observed) -> Judgement | None:
 
 
 def _leaning(observed: Observed) -> Judgement | None:
-    if not observed.leans or not quiet(observed.facts) or moves(observed.facts):
+    if not observed.leans or not quiet(observed.facts) or moves(observed.facts) or _clips(observed):
         return None
     usual = sorted(observed.leans, key=lambda one: one.lean_deg)[len(observed.leans) // 2]
     if usual.lean_deg <= LEANS_DEG or usual.gain <= BY_LEANING:
@@ -187,6 +187,11 @@ def _leaning(observed: Observed) -> Judgement | None:
         else "Measure the lights again with the camera where it stands. If the picture is cropped at one side, or the "
         "lens is shifted, write `focal_px` and `principal_px` into the rig.",
     )
+
+
+def _clips(observed: Observed) -> bool:
+    """Tell whether so much is clipped that normals of few lights are left, which lean for that."""
+    return float(np.median([one.clipped_share for one in observed.facts])) > LOST_CLIPPED
 
 
 def _nearly_in_a_plane(observed: Observed) -> bool:

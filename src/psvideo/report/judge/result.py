@@ -24,8 +24,8 @@ MOVING_FACTOR = 2.0
 """Where the picture moves, so many times more may be left unexplained: no rig explains what moved between flashes."""
 LEAST_VALID, HARDLY_VALID = 0.6, 0.2
 """Shares of the subject: three lights that stand well reach more of most subjects than the first."""
-NONE_VALID = 0.02
-"""With less, what is good for a look is all that is left: no more than a pixel here and there."""
+NONE_VALID, NONE_SAID = 0.02, 0.005
+"""With less than the first, what is good for a look is all that is left; less than the second is hardly any."""
 MOST_FLICKER_PERCENT = 1.0
 AT_REST = 0.05
 """Noise is judged by results between which less of the picture than this moves."""
@@ -81,14 +81,14 @@ def validity(observed: Observed) -> Iterator[Judgement]:
     yield Judgement(
         subject="validity",
         grade=grade,
-        found=f"Only {found}.",
+        found=f"Only {found}." if usual >= NONE_SAID else f"{found[0].upper()}{found[1:]}.",
         advice="Give the subject more light, place the lights nearer to the camera's axis, or use more of them, so "
         "that three reach every part.",
     )
 
 
 def _percent(share: float) -> str:
-    return f"{100 * share:.0f} %" if share >= 0.01 else "hardly any"
+    return f"{100 * share:.0f} %" if share >= NONE_SAID else "hardly any"
 
 
 def _trusting(observed: Observed) -> str:

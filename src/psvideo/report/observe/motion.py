@@ -50,7 +50,10 @@ class Motion:
 
 
 def glimpse(plate: LightPlate, white: float | None = None) -> Glimpse:
-    """Return what to keep of a plate; ``white`` is the light of the brightest code, left out: the plate's own."""
+    """Return what to keep of a plate; ``white`` is the light of the brightest code, left out: the plate's own.
+
+    What is clipped is white: in rows that two frames share it would seem brighter, and they roll.
+    """
     rows, cols = plate.shape[:2]
     step = max(round(cols / (2 * WIDTH_PX)), 1)
     step *= 2 if -(-cols // step) > WIDTH_PX else 1
@@ -58,7 +61,7 @@ def glimpse(plate: LightPlate, white: float | None = None) -> Glimpse:
     grey = np.ascontiguousarray(some if some.ndim == 2 else some[..., 1])
     if step > 1:
         grey = np.asarray(cv2.resize(grey, (cols // step, len(grey)), interpolation=cv2.INTER_AREA), np.float32)
-    white = white or max(1.2 * float(np.percentile(grey[::2, ::2], 99.5)), 1e-3)
+    white = white or min(max(1.2 * float(np.percentile(grey[::2, ::2], 99.5)), 1e-3), plate.saturation)
     light = np.clip(grey / np.float32(white), 0, 1) + np.float32(TOE)
     scale = np.float32(255 / (np.sqrt(1 + TOE) - np.sqrt(TOE)))
     codes = ((np.sqrt(light) - np.float32(np.sqrt(TOE))) * scale + np.float32(0.5)).astype(np.uint8)

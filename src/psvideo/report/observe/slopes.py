@@ -81,6 +81,8 @@ def noise_of_slopes(valid: NDArray[np.bool_], normals: NDArray[np.float32]) -> f
     s^2 / (8 pi b^4).
     """
     inside = cv2.erode(valid.astype(np.uint8), np.ones((7, 7), np.uint8), borderValue=0) > 0
+    if not inside.any():
+        return 0.0
     left = [np.median(np.abs(cv2.filter2D(normals[..., axis], -1, FINEST)[inside])) for axis in (0, 1)]
     errors = np.array(left) / (6 * NORMAL_MEDIAN)
     return float((errors**2).sum() / (8 * np.pi * BLUR_PX**4))
