@@ -4,6 +4,7 @@ import io
 import shutil
 import sys
 import tempfile
+from collections import deque
 from pathlib import Path
 
 import numpy as np
@@ -113,6 +114,40 @@ def test_a_picture_may_stay_in_the_file_while_rows_of_it_are_read(
         file.truncate(50)
         with pytest.raises(PsvideoError, match="temporary file that holds decoded frames cannot be read back"):
             np.asarray(found.codes)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="all threads share one place in an open file there")
+def test_passing_pictures_stay_in_the_file_while_they_are_held_and_others_take_their_places(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    each = [np.full((10, 20, 3), number, np.uint16) for number in range(50)]
+    with keeping_near(tmp_path / "out") as kept:
+        assert isinstance(kept.passing(picture(each[0])), CodedPicture), "so small a one stays in memory"
+        monkeypatch.setattr(kept_module, "STAYS_FROM_BYTES", 1)
+        held: deque[CodedPicture | PictureInFile] = deque(maxlen=3)
+        for number, codes in enumerate(each):
+            held.append(kept.passing(picture(codes)))
+            assert [int(np.asarray(one.codes).max()) for one in held] == [*range(max(number - 2, 0), number + 1)]
+        assert all(isinstance(one, PictureInFile) for one in held)
+        assert kept.bytes_held <= 4 * each[0].nbytes, "the file is as long as what is held at a time"
+        kept.put(7, picture(each[7]))
+        held.clear()
+        held.extend(kept.passing(picture(codes)) for codes in each[:3])
+        assert np.array_equal(kept.get(7).codes, each[7])
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="all threads share one place in an open file there")
+def test_a_passing_picture_for_which_there_is_no_room_stays_in_memory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(kept_module, "STAYS_FROM_BYTES", 1)
+    codes = np.arange(200, dtype=np.uint16).reshape(10, 20)
+    with io.FileIO(str(tmp_path / "file"), "w+") as file:
+        kept = Kept(file, most_bytes=codes.nbytes)
+        first, second = kept.passing(picture(codes)), kept.passing(picture(codes + 1))
+        assert isinstance(first, PictureInFile) and isinstance(second, CodedPicture)
+        assert np.array_equal(np.asarray(first.codes), codes)
+        assert np.array_equal(second.codes, codes + 1)
 
 
 @pytest.mark.parametrize("end", [None, PsvideoError, KeyboardInterrupt])

@@ -50,6 +50,7 @@ class Kept:
         self._shown = None if sys.platform == "win32" else _Shown(file)
         self._most_bytes = most_bytes
         self._places: dict[int, _Place] = {}
+        self._free: dict[int, list[int]] = {}
         self._lock = threading.Lock()
         self.bytes_held = 0
         self.missed = 0
@@ -67,6 +68,7 @@ class Kept:
         with self._lock:
             self._most_bytes = 0
             self._places.clear()
+            self._free.clear()
             self._shown = None
             self._file.close()
 
@@ -88,6 +90,29 @@ class Kept:
                 offset=self.bytes_held, shape=codes.shape, dtype=codes.dtype, header=picture.header
             )
             self.bytes_held += codes.nbytes
+
+    def passing(self, picture: CodedPicture) -> CodedPicture | PictureInFile:
+        """Return a picture that stays in the file for as long as somebody holds it; the next one then takes its place.
+
+        A small one is returned as it is, and so is one for which there is no room.
+        """
+        codes, shown = np.ascontiguousarray(picture.codes), self._shown
+        if shown is None or codes.nbytes < STAYS_FROM_BYTES:
+            return picture
+        free = self._free.setdefault(codes.nbytes, [])
+        with self._lock:
+            offset = free.pop() if free else self.bytes_held
+            if offset + codes.nbytes > self._most_bytes:
+                return picture
+            self.bytes_held = max(self.bytes_held, offset + codes.nbytes)
+            try:
+                self._file.seek(offset)
+                _write_all(self._file, codes.data.cast("B"))
+            except OSError:
+                self._most_bytes = 0
+                return picture
+        rows = RowsInFile(offset=offset, kind=codes.dtype, shape=codes.shape, file=_Passing(shown, offset, free))
+        return PictureInFile(header=picture.header, codes=rows)
 
     def get(self, number: int, *, in_file: bool = False) -> CodedPicture | PictureInFile:
         """Return a kept picture as it was put. Raises PsvideoError where the disk does not give it back.
@@ -131,6 +156,24 @@ class _Shown:
             raise PsvideoError(f"{_UNREADABLE} ({fault.strerror or fault}). {_ADVICE}") from fault
         if not whole:
             raise PsvideoError(f"{_UNREADABLE} (it ends at byte {begin} or after). {_ADVICE}")
+
+
+class _Passing:
+    """The same for one picture, whose place is free once nobody holds it."""
+
+    def __init__(self, shown: _Shown, offset: int, free: list[int]) -> None:
+        self._shown, self._offset, self._free = shown, offset, free
+
+    def __del__(self) -> None:
+        self._free.append(self._offset)
+
+    def opened(self) -> int:
+        """Return the file, which is open, and nobody else's."""
+        return self._shown.opened()
+
+    def read(self, into: memoryview, begin: int) -> None:
+        """Read as many bytes as there is room for, from the byte ``begin`` on."""
+        self._shown.read(into, begin)
 
 
 def _write_all(file: FileIO, data: memoryview) -> None:

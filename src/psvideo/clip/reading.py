@@ -40,7 +40,7 @@ def read_frames(
     solving and encoding want the others. So memory does not grow with the clip. The threads end when the iterator is
     used up, closed, or ends in an error. Frames that are in ``kept`` are read back from there; with ``keep`` the others
     are put into it once they are decoded, unless their files hold plain codes themselves. ``in_files``: frames stay in
-    their files, or in that of ``kept``, where they lie there as they would in memory, and rows are read whenever
+    their files, where they lie there as they would in memory, or else in that of ``kept``, and rows are read whenever
     somebody wants them; for those who hold many. Raises PsvideoError that names the file where a frame is missing,
     damaged, or of another size or depth than the first.
     """
@@ -106,6 +106,8 @@ def _picture(
     _check_finite(picture, _name(clip, number))
     if kept is not None and keep and isinstance(picture, CodedPicture):
         kept.put(number, picture)
+    elif kept is not None and in_files and isinstance(picture, CodedPicture):
+        return number, kept.passing(picture)
     return number, picture
 
 

@@ -47,10 +47,10 @@ def say_kept(kept: Kept | None, caller: Caller) -> None:
     """Say how much disk the decoded frames took, and which of them found no room there."""
     if kept is None:
         return
-    caller.detail(
-        f"{len(kept)} decoded frames ({kept.bytes_held / 1e9:.2f} GB) were kept in a temporary file beside the output "
-        "and read back; the file is gone."
-    )
+    which = f"{len(kept)} decoded frames ({kept.bytes_held / 1e9:.2f} GB) were kept in"
+    if kept.bytes_held and not len(kept):
+        which = f"Decoded frames ({kept.bytes_held / 1e9:.2f} GB at a time) passed through"
+    caller.detail(f"{which} a temporary file beside the output; the file is gone.")
     if kept.missed:
         caller.warn(
             f"{kept.missed} decoded frames found no room on the output's disk, half of whose free space may be taken, "
