@@ -145,7 +145,8 @@ def test_a_passing_picture_for_which_there_is_no_room_stays_in_memory(
     with io.FileIO(str(tmp_path / "file"), "w+") as file:
         kept = Kept(file, most_bytes=codes.nbytes)
         first, second = kept.passing(picture(codes)), kept.passing(picture(codes + 1))
-        assert isinstance(first, PictureInFile) and isinstance(second, CodedPicture)
+        assert isinstance(first, PictureInFile)
+        assert isinstance(second, CodedPicture)
         assert np.array_equal(np.asarray(first.codes), codes)
         assert np.array_equal(second.codes, codes + 1)
 
