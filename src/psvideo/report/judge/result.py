@@ -24,8 +24,8 @@ MOVING_FACTOR = 2.0
 """Where the picture moves, so many times more may be left unexplained: no rig explains what moved between flashes."""
 LEAST_VALID, HARDLY_VALID = 0.6, 0.2
 """Shares of the subject: three lights that stand well reach more of most subjects than the first."""
-NONE_VALID, NONE_SAID = 0.02, 0.005
-"""With less than the first, what is good for a look is all that is left; less than the second is hardly any."""
+NONE_VALID = 0.02
+"""With less, what is good for a look is all that is left."""
 MOST_FLICKER_PERCENT = 1.0
 AT_REST = 0.05
 """Noise is judged by results between which less of the picture than this moves."""
@@ -57,7 +57,7 @@ def validity(observed: Observed) -> Iterator[Judgement]:
         return
     shares = [one.valid_share or 0.0 for one in known]
     usual, least = float(np.median(shares)), min(shares)
-    found = f"{_percent(usual)} of the subject has a normal to be trusted"
+    found = f"{100 * usual:.0f} % of the subject has a normal to be trusted"
     if usual >= LEAST_VALID:
         yield Judgement(subject="validity", grade="good", found=f"{found} ({100 * least:.0f} % in the worst round).")
         return
@@ -71,7 +71,7 @@ def validity(observed: Observed) -> Iterator[Judgement]:
         yield Judgement(
             subject="validity",
             grade=grade,
-            found=f"{found[0].upper()}{found[1:]}, though three lights reach {100 * np.median(reached):.0f} %: "
+            found=f"{found}, though three lights reach {100 * np.median(reached):.0f} %: "
             "elsewhere the predicted error is too large."
             + (" These normals serve a look, and no measurement." if none else ""),
             advice=_trusting(observed),
@@ -81,14 +81,10 @@ def validity(observed: Observed) -> Iterator[Judgement]:
     yield Judgement(
         subject="validity",
         grade=grade,
-        found=f"Only {found}." if usual >= NONE_SAID else f"{found[0].upper()}{found[1:]}.",
+        found=f"Only {found}.",
         advice="Give the subject more light, place the lights nearer to the camera's axis, or use more of them, so "
         "that three reach every part.",
     )
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.0f} %" if share >= NONE_SAID else "hardly any"
 
 
 def _trusting(observed: Observed) -> str:
