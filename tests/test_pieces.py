@@ -222,6 +222,7 @@ def test_what_a_piece_found_is_read_back_as_it_was(tmp_path: Path) -> None:
         blurs_px=[0.7],
         leans=[Lean(lean_deg=1 / 3, gain=0.2, turn_deg=(0.1, 0.2, 0.3), rest_deg=0.1)],
         light_at_points=[np.random.default_rng(1).random((4, 2))],
+        in_shadow=[0.04],
         ambient_measured={128: 0.25},
         worst=Worst([worst]),
     )
@@ -231,7 +232,7 @@ def test_what_a_piece_found_is_read_back_as_it_was(tmp_path: Path) -> None:
     seen = found.observed
     assert (numbers, found.reserved, seen.facts) == (range(1003, 1004), ("No scale.",), [facts])
     assert (seen.blurs_px, seen.ambient_measured) == ([0.7], {128: 0.25})
-    assert seen.leans == observed.leans
+    assert (seen.leans, seen.in_shadow) == (observed.leans, [0.04])
     assert all(np.array_equal(seen.counts[light], observed.counts[light]) for light in observed.counts)
     assert np.array_equal(seen.light_at_points[0], observed.light_at_points[0])
     assert found.picture is not None

@@ -24,6 +24,7 @@ from psvideo.report.judgement import Judgement, verdict_of
 from psvideo.report.observe.motion import glimpse, motion
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rigpoints import rig_points
+from psvideo.report.observe.shadow import shadow_light
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.solving import Solving
 
@@ -428,6 +429,24 @@ def test_times_rows_and_motion_on_both_sides_of_a_threshold_are_told_apart() -> 
     assert covered("frames", dropped_frames=(DroppedFrames(after=3, count=1),)) == "doubtful"
     assert [moved(px) for px in (0, 1, 2, 4, 5)] == ["good", "good", "doubtful", "doubtful", "bad"]
     assert moved(5, aligned=True) == "doubtful"
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize(("around", "grade"), [(0.0, "unknown"), (0.025, "unknown"), (0.06, "doubtful")])
+def test_light_that_is_left_in_attached_shadow_is_said_where_no_dark_slot_shows_it(
+    around: float, grade: str, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    ways = ring(6) * [1.7, 1.7, 0.6]
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    normals, albedo = ball(0)
+    shades = [albedo * (np.maximum(normals @ way, 0) + around) for way in ways]
+    plates = [(shade + rng.normal(0, 0.001, shade.shape)).astype(np.float32) for shade in shades]
+    surface = Solving().solve(plates, Illumination(directions=ways, intensities=np.ones((6, 1))))
+    left = shadow_light(np.array(plates), np.ones((6, SIZE, SIZE), np.bool_), surface, ways, step=1)
+    assert left is not None
+    one = Observed(lights=("a",), in_shadow=[left])
+    assert light.ambient(one).grade == grade
 
 
 @pytest.mark.parametrize(("ambient", "said"), [(0.03, False), (0.08, True)])

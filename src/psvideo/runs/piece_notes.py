@@ -41,6 +41,7 @@ def write_notes(folder: Path, numbers: range, found: Found) -> None:
         "slopes": seen.slopes,
         "away": seen.away,
         "leans": [asdict(one) for one in seen.leans],
+        "in_shadow": seen.in_shadow,
         "ambient_measured": list(seen.ambient_measured.items()),
         "beyond_mask": seen.beyond_mask,
         "worst": [{"number": one.number, "badness": one.badness, "why": one.why} for one in seen.thumbnails],
@@ -103,6 +104,7 @@ def _read(path: Path) -> tuple[range, Found]:
             away=record["away"],
             leans=list(LEANS.validate_python(record["leans"])),
             light_at_points=[arrays[f"light{n}"] for n in range(len(lights))],
+            in_shadow=record["in_shadow"],
             ambient_measured={int(begins): share for begins, share in record["ambient_measured"]},
             beyond_mask=record["beyond_mask"],
             worst=Worst(

@@ -20,6 +20,7 @@ from psvideo.report.observe.levels import BINS, Counts, Levels, count_levels
 from psvideo.report.observe.motion import Glimpse, Motion, glimpse, motion
 from psvideo.report.observe.rigfit import RigFit
 from psvideo.report.observe.rigpoints import RigPoints
+from psvideo.report.observe.shadow import shadow_light
 from psvideo.report.observe.slopes import share_away, slope_agreement
 from psvideo.report.observe.steadiness import Change, Sample, change, sample_of
 from psvideo.report.observe.thinned import step_of, thin_surface, thinned
@@ -180,8 +181,9 @@ class Observed:
     known; ``points`` is where the rig is held against the plates.
     ``only`` are the numbers of rounds that are noted, None for all; the others serve to hold these against.
     ``ambient_measured`` (by window's first frame) is in which share of the picture ambient light could be measured
-    without a dark slot. ``first`` is the number of the clip's first round, and ``white`` what motion takes for white,
-    found with its first plate.
+    without a dark slot; ``in_shadow`` which share of a lamp's light is left where it cannot reach.
+    ``first`` is the number of the clip's first round, and ``white`` what motion takes for white, found with its first
+    plate.
     ``watched`` is whose plates motion is looked for in, as they pass; left out, the first light's.
     """
 
@@ -199,6 +201,7 @@ class Observed:
     slopes: list[float] = field(default_factory=list)
     away: list[float] = field(default_factory=list)
     leans: list[Lean] = field(default_factory=list)
+    in_shadow: list[float] = field(default_factory=list)
     light_at_points: list[NDArray[np.float64]] = field(default_factory=list)
     ambient_measured: dict[int, float] = field(default_factory=dict)
     beyond_mask: list[float] = field(default_factory=list)
@@ -246,7 +249,7 @@ class Observed:
             counted = count_levels(bright[seen.subject & shown], plate.saturation)
             self.counts[plate.light] = self.counts.get(plate.light, np.zeros(BINS + 2, np.int64)) + counted
         if (one.number - self.first + 1).bit_count() == 1:
-            self._look_closely(one, surface)
+            self._look_closely(one, surface, seen)
         if surface is not None:
             self.worst.offer(facts, surface)
 
@@ -259,6 +262,7 @@ class Observed:
         self.slopes += other.slopes
         self.away += other.away
         self.leans += other.leans
+        self.in_shadow += other.in_shadow
         self.light_at_points += other.light_at_points
         self.ambient_measured |= other.ambient_measured
         self.beyond_mask += other.beyond_mask
@@ -287,7 +291,7 @@ class Observed:
         """Small pictures of the worst instants, the worst first."""
         return self.worst.thumbnails
 
-    def _look_closely(self, one: Round, surface: Surface | None) -> None:
+    def _look_closely(self, one: Round, surface: Surface | None, seen: Seen) -> None:
         blur_px = sharpest_blur_px(middle_of(one.plates[0].picture))
         if blur_px is not None:
             self.blurs_px.append(blur_px)
@@ -299,8 +303,17 @@ class Observed:
             found = lean(surface, lens=self.lens)
             if found is not None:
                 self.leans.append(found)
+            self._look_into_shadow(one, surface, seen)
         if self.points is not None and one.lights == self.lights:
             self.light_at_points.append(self.points.light(one))
+
+    def _look_into_shadow(self, one: Round, surface: Surface, seen: Seen) -> None:
+        if self.points is None or one.lights != self.lights or len(self.points.vectors) > 1:
+            return
+        step, ways = step_of(*surface.valid.shape), self.points.vectors[0]
+        found = shadow_light(seen.bright, seen.shown, surface, ways, step=step)
+        if found is not None:
+            self.in_shadow.append(found)
 
     def _look_for_motion(self, plate: LightPlate) -> None:
         before = self._glimpse
