@@ -5,6 +5,7 @@ where a surface turns. Where nothing moves, or motion explains nothing better, t
 """
 
 import functools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -22,7 +23,7 @@ from psvideo.plates.align.moving_kernel import AFTER, AT_REST, BEFORE, BOTH, NOW
 from psvideo.plates.align.packed import packed
 from psvideo.plates.align.unsure import unsure_of
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixture import made
+from psvideo.plates.mixture import Reader, made
 
 UNLIKE = 10.0
 """Plates whose detail differs by more codes along the motion do not show the same thing."""
@@ -198,12 +199,16 @@ def plate_at(ends: Ends, source: Codes, motion: Followed, *, number: int, guess:
     """
     own = ends.nearer
     rows, cols = own.shape[:2]
-    sides = [_Side.of(ends.before), _Side.of(ends.after)]
+    share = float(np.clip(ends.share, 0, 1))
+    sides = [
+        None if plate is None else _Side.of(plate, motion, max(counts, 1e-6))
+        for plate, counts in ((ends.before, 1 - share), (ends.after, share))
+    ]
     image = np.empty(own.shape, np.float32)
     seen = np.empty((rows, cols), np.bool_)
 
     def fill(top: int, bottom: int) -> None:
-        _fill(slice(top, bottom), image, seen, ends, sides, (source, source if guess is None else guess), motion)
+        _fill(range(top, bottom), image, seen, own, sides, (source, source if guess is None else guess), motion)
 
     over_ranges(fill, rows, each=BAND_ROWS)
     return LightPlate(
@@ -219,41 +224,67 @@ def plate_at(ends: Ends, source: Codes, motion: Followed, *, number: int, guess:
 
 @dataclass(frozen=True, kw_only=True)
 class _Side:
-    """A plate, of whose picture only those rows are made that move into a band, and what lies well within what was
-    seen, by rows, (row, 1), or by pixels."""
+    """A plate, of whose picture only those rows are made that move into a band, what it counts where both plates are
+    taken, and what lies well within what was seen, by rows, (row, 1), or by pixels; None where that is everywhere."""
 
     plate: LightPlate
-    within: Flags
-    everywhere: bool
+    read: Reader
+    span_s: float
+    weight: np.float32
+    within: Flags | None
 
     @classmethod
-    def of(cls, plate: LightPlate | None) -> "_Side | None":
-        if plate is None:
-            return None
+    def of(cls, plate: LightPlate, motion: Followed, weight: float) -> "_Side":
         own = plate.own.astype(np.uint8)
-        within = cv2.erode(own, np.ones((5, min(5, own.shape[1])), np.uint8)) > 0
-        return cls(plate=plate, within=within, everywhere=bool(within.all()))
+        within = cv2.erode(own, np.ones((5, min(5, own.shape[1])), np.uint8)).reshape(own.shape) > 0
+        return cls(
+            plate=plate,
+            read=plate.picture.reader(),
+            span_s=motion.time_s - plate.time_s,
+            weight=np.float32(weight),
+            within=None if within.all() else within,
+        )
 
-    def moved(self, x: Vectors, y: Vectors, within: tuple[float, float]) -> tuple[Image, Flags | np.bool_]:
-        """Return the plate at places of its own, and where it was seen there; clipped light stays clipped.
+    def around(self, band: range, velocity: Vectors) -> "_Rows":
+        """Return the plate's rows of a band, and those that move into it."""
+        rows, high = self.plate.shape[0], self.plate.shape[0] / velocity.shape[1]
+        some = velocity[1, max(int(band.start / high) - 1, 0) : int(band.stop / high) + 2]
+        ways = self.span_s * high * np.array([some.min(), some.max(), 0], np.float64)
+        first = max(math.floor(band.start - ways.max()) - MARGIN_ROWS, 0)
+        last = min(math.ceil(band.stop - ways.min()) + MARGIN_ROWS, rows)
+        first, last = min(first, band.start), max(last, band.stop)
+        return _Rows(side=self, first=first, light=self.read(first, last))
 
-        ``within`` are the first and the last row that count; elsewhere anything may stand.
-        """
-        rows = self.plate.shape[0]
-        first, last = (int(np.clip(edge, 0, rows - 1)) for edge in within)
-        first, last = max(first - MARGIN_ROWS, 0), min(last + 1 + MARGIN_ROWS, rows)
-        shown, y_shown = self.plate.picture.rows(range(first, last)), y - np.float32(first)
-        image = cv2.remap(shown, x, y_shown, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
-        if shown.max() >= self.plate.saturation:
-            clipped = (_brightest(shown) >= self.plate.saturation).astype(np.uint8)
-            wider = cv2.dilate(clipped, np.ones((5, 5), np.uint8))
-            touched = cv2.remap(wider, x, y_shown, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE) > 0
-            image[touched] = self.plate.saturation
-        if self.everywhere:
-            return np.asarray(image, np.float32), np.True_
+    def weights(self, x: Vectors, y: Vectors) -> Vectors:
+        """Return what the plate counts at places of its own, or, (1, 1), at all: 0 where it was not seen."""
+        if self.within is None:
+            return np.full((1, 1), self.weight)
         known = zip((y, x), self.within.shape, strict=True)
         row, col = (np.clip(np.rint(at).astype(np.intp), 0, most - 1) for at, most in known)
-        return np.asarray(image, np.float32), self.within[row, col]
+        return self.within[row, col] * self.weight
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Rows:
+    """Some rows of a side's plate, from the first on."""
+
+    side: _Side
+    first: int
+    light: Image
+
+    def of(self, band: range) -> Image:
+        return self.light[band.start - self.first : band.stop - self.first]
+
+    def moved(self, x: Vectors, y: Vectors) -> Image:
+        """Return the plate at places of its own; clipped light stays clipped."""
+        light, full, y_shown = self.light, self.side.plate.saturation, y - np.float32(self.first)
+        image = np.asarray(cv2.remap(light, x, y_shown, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE), np.float32)
+        if light.max() >= full:
+            clipped = (_brightest(light) >= full).astype(np.uint8)
+            wider = cv2.dilate(clipped, np.ones((5, 5), np.uint8))
+            touched = cv2.remap(wider, x, y_shown, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE) > 0
+            image[touched] = full
+        return image
 
 
 def _brightest(image: Image) -> Image:
@@ -262,49 +293,52 @@ def _brightest(image: Image) -> Image:
 
 
 def _fill(
-    band: slice,
+    band: range,
     image: Image,
     seen: Flags,
-    ends: Ends,
-    sides: list[_Side | None],
+    own: LightPlate,
+    sides: Sequence[_Side | None],
     sources: tuple[Codes, Codes],
     motion: Followed,
 ) -> None:
     """Make one band of rows of the plate at an instant: of its source, and of a guess where that is nowhere."""
-    own = ends.nearer
-    shape = band.stop - band.start, seen.shape[1]
-    given, taken = np.empty((2, *shape), np.uint8)
-    ways = np.empty((2, 2, *shape), np.float32)
-    within = np.full((2, 2), len(seen), np.float32)
-    spans_s = np.array([0 if side is None else motion.time_s - side.plate.time_s for side in sides], np.float32)
-    ways_rows(*sources, motion.velocity, spans_s, band.start, given, taken, ways, within)
-    known = given != NOWHERE
-    seen[band] = known & own.pixels_seen[band]
-    flowing = (taken != AT_REST) & (taken != NOWHERE)
-    if not flowing.all():
-        image[band] = own.picture.rows(range(band.start, band.stop))
-    if not flowing.any():
+    some, part = slice(band.start, band.stop), _part(sources, band, image.shape)
+    seen[some] = own.pixels_seen[some]
+    if not part:
+        image[some] = own.picture.rows(band)
         return
-    cols = np.flatnonzero(flowing.any(axis=0))
-    part = slice(int(cols[0]), int(cols[-1]) + 1)
-    # elsewhere in the band everything is as it is
-    taken, ways, flowing = np.ascontiguousarray(taken[:, part]), np.ascontiguousarray(ways[..., part]), flowing[:, part]
-    own_part = np.ascontiguousarray(image[band, part])
-    share = float(np.clip(ends.share, 0, 1))
-    weights = np.zeros((2, *taken.shape), np.float32)
-    moved: list[Image] = []
-    for side, counts, way, rows, weight in zip(sides, (1 - share, share), ways, within, weights, strict=True):
-        if side is None or rows[0] > rows[1]:
-            moved.append(np.zeros_like(own_part))
-            continue
-        found, there = side.moved(way[0], way[1], (float(rows[0]), float(rows[1])))
-        weight[:] = there * np.float32(max(counts, 1e-6))
-        moved.append(found)
-    full = np.array(
-        [*(np.inf if side is None else side.plate.saturation for side in sides), own.saturation], np.float32
-    )
-    shown = np.where(flowing, own.rows_seen[band, None], seen[band, part])
-    one, other, blended = (picture.reshape(*taken.shape, -1) for picture in (*moved, own_part))
-    blend_rows(taken, weights, one, other, full, shown, blended)
-    image[band, part] = own_part
-    seen[band, part] = shown & known[:, part]
+    size = len(band), len(part)
+    given, taken = np.empty((2, *size), np.uint8)
+    ways = np.empty((2, 2, *size), np.float32)
+    spans_s = np.array([0 if side is None else side.span_s for side in sides], np.float32)
+    ways_rows(*sources, motion.velocity, spans_s, image.shape[:2], band.start, part.start, given, taken, ways)
+    moved = [np.zeros((*size, *image.shape[2:]), np.float32)] * len(sides)
+    weights = [np.zeros((1, 1), np.float32)] * len(sides)
+    for number, (side, way) in enumerate(zip(sides, ways, strict=True)):
+        if side is not None:
+            rows = side.around(band, motion.velocity)
+            if side.plate is own:
+                image[some] = rows.of(band)
+            moved[number], weights[number] = rows.moved(*way), side.weights(*way)
+    flowing = (taken != AT_REST) & (taken != NOWHERE)
+    known = seen[some, part.start : part.stop]
+    known[:] = np.where(flowing, own.rows_seen[some, None], known) & (given != NOWHERE)
+    full = [*(np.inf if side is None else side.plate.saturation for side in sides), own.saturation]
+    one, other, blended = (picture.reshape(*picture.shape[:2], -1) for picture in (*moved, image[some]))
+    blend_rows(
+        taken, np.array(np.broadcast_arrays(*weights)), one, other, np.array(full, np.float32),
+        np.ascontiguousarray(own.rows_seen[some]), part.start, blended, seen[some],
+    )  # fmt: skip
+
+
+def _part(sources: tuple[Codes, Codes], band: range, shape: tuple[int, ...]) -> range:
+    """Return the columns of a band between which anything is not as the nearer plate has it."""
+    small_rows, small_cols = sources[0].shape
+    high = shape[0] / small_rows
+    near = slice(max(int(band.start / high) - 1, 0), int(band.stop / high) + 2)
+    changed = [np.any(source[near] != AT_REST, axis=0) for source in sources]
+    cols = np.flatnonzero(changed[0] | changed[1])
+    if not len(cols):
+        return range(0)
+    wide = shape[1] / small_cols
+    return range(max(int(cols[0] * wide) - 1, 0), min(math.ceil((cols[-1] + 1) * wide) + 1, shape[1]))

@@ -89,46 +89,38 @@ def arriving_rows(flow: Floats, share: np.float32, per_s: np.float32, first: int
 
 @FUSED.kept
 def ways_rows(
-    source: Codes, guess: Codes, velocity: Floats, spans_s: Floats, first: int, given: Codes, taken: Codes,
-    ways: Floats, within: Floats,
+    source: Codes, guess: Codes, velocity: Floats, spans_s: Floats, shape: tuple[int, int], first: int, left: int,
+    given: Codes, taken: Codes, ways: Floats,
 ) -> None:  # fmt: skip
-    """Fill ``given`` and ``taken``, a band of rows of a picture (row, col) from its row ``first`` on, with what coarse
-    ``source`` and ``guess`` say; and ``ways`` (2, 2, row, col), the column and row in the plates before and after that
-    pixels came from and will go to, so many seconds ``spans_s`` (2,) since or, below 0, until then.
-
-    ``velocity`` (2, row, col) is of the coarse pixels, per second. ``within`` (2, 2) becomes the first and last row
-    that is wanted of either plate, infinite where none is; on entry its first number is how many rows the picture has.
+    """Fill ``given`` and ``taken``, a part of a picture of a ``shape`` (row, col) from its row ``first`` and its column
+    ``left`` on, with what coarse ``source`` and ``guess`` say; and ``ways`` (2, 2, row, col), the column and row in the
+    plates before and after that pixels came from and will go to, so many seconds ``spans_s`` (2,) since or, below 0,
+    until then. ``velocity`` (2, row, col) is of the coarse pixels, per second.
     """
     own, other, flow, out = lent(source), lent(guess), lent(velocity), lent(ways)
-    cols = given.shape[1]
-    high, wide = _steps((int(within[0, 0]), cols), own.shape)
-    for side in range(2):
-        within[side, 0], within[side, 1] = np.float32(np.inf), -np.float32(np.inf)
-    for row in range(given.shape[0]):
+    known, shown = lent(given), lent(taken)
+    high, wide = _steps(shape, own.shape)
+    last_row, last_col = own.shape[0] - 1, own.shape[1] - 1
+    since, until = spans_s[0], spans_s[1]
+    for row in range(known.shape[0]):
         y = np.float32(first + row)
         coarse_y = (y + HALF) / high
-        small_row = min(int(coarse_y), own.shape[0] - 1)
-        at_row = min(max(coarse_y - HALF, ZERO), np.float32(own.shape[0] - 1))
+        small_row = min(int(coarse_y), last_row)
+        at_row = min(max(coarse_y - HALF, ZERO), np.float32(last_row))
         top = int(at_row)
-        below, down = min(top + 1, own.shape[0] - 1), at_row - np.float32(top)
-        for col in range(cols):
-            coarse_x = (np.float32(col) + HALF) / wide
-            small_col = min(int(coarse_x), own.shape[1] - 1)
-            given[row, col] = own[small_row, small_col]
-            what = other[small_row, small_col]
-            taken[row, col] = what
-            at_col = min(max(coarse_x - HALF, ZERO), np.float32(own.shape[1] - 1))
-            left = int(at_col)
-            right, across = min(left + 1, own.shape[1] - 1), at_col - np.float32(left)
-            go_x = _level(flow[0], top, below, left, right, down, across) * wide
-            go_y = _level(flow[1], top, below, left, right, down, across) * high
-            for side in range(2):
-                out[side, 0, row, col] = np.float32(col) - spans_s[side] * go_x
-                there = y - spans_s[side] * go_y
-                out[side, 1, row, col] = there
-                if what == BOTH or what == BEFORE + side:
-                    within[side, 0] = min(within[side, 0], there)
-                    within[side, 1] = max(within[side, 1], there)
+        below, down = min(top + 1, last_row), at_row - np.float32(top)
+        for col in range(known.shape[1]):
+            x = np.float32(left + col)
+            coarse_x = (x + HALF) / wide
+            small_col = min(int(coarse_x), last_col)
+            known[row, col], shown[row, col] = own[small_row, small_col], other[small_row, small_col]
+            at_col = min(max(coarse_x - HALF, ZERO), np.float32(last_col))
+            before = int(at_col)
+            behind, across = min(before + 1, last_col), at_col - np.float32(before)
+            go_x = _level(flow[0], top, below, before, behind, down, across) * wide
+            go_y = _level(flow[1], top, below, before, behind, down, across) * high
+            out[0, 0, row, col], out[0, 1, row, col] = x - since * go_x, y - since * go_y
+            out[1, 0, row, col], out[1, 1, row, col] = x - until * go_x, y - until * go_y
 
 
 @FUSED.inlined
@@ -143,36 +135,39 @@ def _level(
 
 @FUSED.kept
 def blend_rows(
-    taken: Codes, weights: Floats, before: Floats, after: Floats, full: Floats, seen: Flags, image: Floats
-) -> None:
-    """Fill ``image`` (row, col, channel) with what is taken of plates before and after, as they were moved there.
+    taken: Codes, weights: Floats, before: Floats, after: Floats, full: Floats, rows_seen: Flags, left: int,
+    image: Floats, seen: Flags,
+) -> None:  # fmt: skip
+    """Fill ``image`` (row, col, channel) from its column ``left`` on with what is taken of plates before and after, as
+    they were moved there.
 
-    ``taken`` (row, col) is AT_REST (image stays), BEFORE, AFTER, BOTH or NOWHERE; ``weights`` (2, row, col) what either
-    counts where both are taken, 0 where it is not known; ``full`` the values from which on either is clipped, and what
-    clipped light becomes. ``seen`` (row, col) says where anything may be known, and afterwards is; elsewhere the image
-    stays.
+    ``taken`` (row, col) is AT_REST (image stays), BEFORE, AFTER, BOTH or NOWHERE; ``weights`` (2, row, col), or one
+    each for all, what either counts where both are taken, 0 where it is not known; ``full`` the values from which on
+    either is clipped, and what clipped light becomes. ``rows_seen`` (row,) says where anything may be known of what is
+    moved, and ``seen`` (row, col) becomes False where nothing is; there the image stays.
     """
     code, weight, one, other = lent(taken), lent(weights), lent(before), lent(after)
-    for row in range(taken.shape[0]):
-        for col in range(taken.shape[1]):
-            what = code[row, col]
-            if what != AT_REST and what != NOWHERE:
-                early = weight[0, row, col] if what != AFTER else ZERO
-                late = weight[1, row, col] if what != BEFORE else ZERO
-                total = early + late
-                known = seen[row, col] and total > ZERO
-                seen[row, col] = known
-                if not known:
-                    continue
-                per, clipped = ONE / total, False
-                early, late = early * per, late * per
-                for channel in range(image.shape[2]):
-                    first, second = one[row, col, channel], other[row, col, channel]
-                    if (early > ZERO and first >= full[0]) or (late > ZERO and second >= full[1]):
-                        clipped = True
-                    image[row, col, channel] = early * first + late * second
-                if clipped:
-                    for channel in range(image.shape[2]):
-                        image[row, col, channel] = full[2]
-            elif what == NOWHERE:
-                seen[row, col] = False
+    made, known = lent(image), lent(seen)
+    everywhere = weight.shape[1] < code.shape[0] or weight.shape[2] < code.shape[1]
+    for row in range(code.shape[0]):
+        for place in range(code.shape[1]):
+            what, col = code[row, place], left + place
+            if what == AT_REST:
+                continue
+            at = (0, 0) if everywhere else (row, place)
+            early = weight[0, at[0], at[1]] if what != AFTER else ZERO
+            late = weight[1, at[0], at[1]] if what != BEFORE else ZERO
+            total = early + late
+            if what == NOWHERE or not (rows_seen[row] and total > ZERO):
+                known[row, col] = False
+                continue
+            per, clipped = ONE / total, False
+            early, late = early * per, late * per
+            for channel in range(made.shape[2]):
+                first, second = one[row, place, channel], other[row, place, channel]
+                if (early > ZERO and first >= full[0]) or (late > ZERO and second >= full[1]):
+                    clipped = True
+                made[row, col, channel] = early * first + late * second
+            if clipped:
+                for channel in range(made.shape[2]):
+                    made[row, col, channel] = full[2]
