@@ -38,7 +38,7 @@ HELD = 0.33
 """A correction moves the clock by no more than this share of a flash."""
 STEP_COST = 0.02
 """What every frame that is taken for missing costs, in mean losses of a frame: cycles may look alike."""
-GLOBALS = 4
+GLOBALS = 5
 """Times that the fit could set free and that are held here: exposure, row time, rise and fall."""
 
 

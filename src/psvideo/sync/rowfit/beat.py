@@ -59,7 +59,8 @@ class FoundClock:
 class Beat:
     """All the times of a clip. ``row_time_s`` is never negative: ``upward``: the bottom row comes first.
 
-    ``beat_hz`` are the frequencies at which ambient light flickers.
+    ``beat_hz`` are the frequencies at which ambient light flickers, ``blur_s`` the standard deviation by which rows are
+    blurred, as a time.
     """
 
     clock: FoundClock
@@ -69,6 +70,7 @@ class Beat:
     rise_s: float = 0.0
     fall_s: float = 0.0
     beat_hz: tuple[float, ...] = ()
+    blur_s: float = 0.0
 
     def with_phase(self, phase_s: float) -> "Beat":
         """Return the same beat with its cycle beginning elsewhere."""

@@ -12,7 +12,19 @@ from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
-from psvideo.sync.rowfit.refine import CAUCHY, GLOBALS, Fit, believable, explained, mean_error, projected, scaled
+from psvideo.sync.rowfit.refine import (
+    CAUCHY,
+    EDGES,
+    GLOBALS,
+    Fit,
+    believable,
+    explained,
+    mean_error,
+    projected,
+    refine,
+    scaled,
+    times_moved,
+)
 
 LEAST_WINDOWS = 4
 CLEARLY = 5.0
@@ -29,6 +41,23 @@ class _Knots:
     penalty: FloatArray
 
 
+def fitted(plan: Plan, rows: Profiles, beat: Beat, free: tuple[str, ...]) -> Fit:
+    """Fit a clock, bent where the clip shows that, and the times named in ``free``, from a beat that is near."""
+    if beat.clock.knot_s and len(rows.window_start) >= LEAST_WINDOWS:
+        rest = unexplained(plan, rows, beat)
+        rough = Fit(
+            beat=beat,
+            rest=rest,
+            weight=scaled(rows, rest, 0.0) ** -2.0,
+            shift_error_s=0.0,
+            errors_s={},
+            explained=explained(rows, rest),
+        )
+        return bend(plan, rows, rough, free=free)
+    straight = replace(beat, clock=replace(beat.clock, knot_s=(), bend_s=()))
+    return bend(plan, rows, refine(plan, rows, straight, free=free), free=free)
+
+
 def bend(plan: Plan, rows: Profiles, fit: Fit, *, free: tuple[str, ...] = (), steps: int = 6) -> Fit:
     """Return the fit with the clock's drift in it; unchanged where nothing shows any."""
     if len(rows.window_start) < LEAST_WINDOWS:
@@ -41,7 +70,7 @@ def bend(plan: Plan, rows: Profiles, fit: Fit, *, free: tuple[str, ...] = (), st
         scale = scaled(rows, rest, 0.02 if step == 0 and fit.beat.clock.knot_s else 0.0)
         trust = 1.0 / (1.0 + (rest / (CAUCHY * scale)) ** 2)
         weight = trust / scale**2
-        rest, hessian, scores = projected(plan, rows, beat, weight, basis, tails=bool({"rise_s", "fall_s"} & set(free)))
+        rest, hessian, scores = projected(plan, rows, beat, weight, basis, tails=bool(EDGES & set(free)))
         inflation = _inflation(hessian, scores, rows)
         strength, gain = _wandering(hessian / inflation, scores.sum(axis=0) / inflation, beat, knots)
         if gain < CLEARLY and not fit.beat.clock.knot_s:
@@ -141,7 +170,12 @@ def _bands(matrix: FloatArray) -> FloatArray:
 def _moved(rows: Profiles, beat: Beat, knots: _Knots, free: tuple[str, ...], move: FloatArray) -> Beat:
     size = len(knots.at_s)
     clock = beat.clock.bent(knots.at_s, move[:size])
-    times_s = {name: max(getattr(beat, name) + float(move[size + n]), 0.0) for n, name in enumerate(free)}
-    if "exposure_s" in times_s:
-        times_s["exposure_s"] = min(times_s["exposure_s"], rows.period_s)
-    return replace(beat, clock=clock, **times_s)
+    return replace(beat, clock=clock, **times_moved(rows, beat, free, move[size:]))
+
+
+def rms_apart_s(rows: Profiles, one: Beat, other: Beat) -> float:
+    """Return how far two clocks are apart at the windows' ends."""
+    strobe_s = (rows.ends_s - one.clock.phase_s) / one.clock.rate
+    straight_s = other.clock.phase_s + strobe_s * other.clock.rate
+    apart_s = straight_s + other.clock.bend(straight_s) - rows.ends_s - one.clock.bend(rows.ends_s)
+    return float(np.sqrt(np.mean(apart_s**2)))

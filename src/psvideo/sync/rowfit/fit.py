@@ -6,15 +6,16 @@ import numpy as np
 
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
-from psvideo.sync.rowfit.bend import LEAST_WINDOWS, bend
+from psvideo.sync.rowfit.bend import fitted, rms_apart_s
 from psvideo.sync.rowfit.course import followed, window_frames
+from psvideo.sync.rowfit.freed import freed
 from psvideo.sync.rowfit.jitter import STEADY, Jitter, disagreement_s, jitter, shift_error_s
 from psvideo.sync.rowfit.plateau import centred
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
-from psvideo.sync.rowfit.refine import Fit, clearest, explained, refine, robust_loss, scaled
+from psvideo.sync.rowfit.refine import Fit, explained
 from psvideo.sync.rowfit.restless import across, restless
-from psvideo.sync.rowfit.seed import find_seed, gain_of
-from psvideo.sync.rowfit.softness import BELIEVED, BLURRED, cleared, misfit, within_blur
+from psvideo.sync.rowfit.seed import find_seed
+from psvideo.sync.rowfit.softness import misfit
 from psvideo.sync.rowfit.track import FrameTrack
 
 TRACK_ROWS = 60
@@ -23,17 +24,8 @@ ENOUGH_SAMPLES = 250_000
 """Row means that the last fit needs; a clip that has more gets its rows averaged, which bounds memory and time."""
 FLASH_ROWS = 8
 """Rows that a flash must still span after that."""
-CLEAR = 5.0
-"""A time leaves the plan's value only when it is off by so many standard errors."""
-BETTER, LEAST_GAIN = 1e-3, 30.0
-"""And only where that takes away such a share of the robust loss, and so much of it: a subject that moves in step with
-the dark row bends errors and estimates alike."""
-STILL, PLAIN = 0.95, 0.3
-"""Where a fit takes away less of the robust loss than the first (a subject that moves), a time that leaves the plan's
-value must take away this share of what is left; else it is as likely that the subject feigns it."""
 SURER = 0.8
 """Share of the standard error that must be left before brightnesses are fitted again in windows half as long."""
-TAILS = {"rise_s", "fall_s"}
 MOST_WINDOWS = 400
 MAINS_HZ = (100.0, 120.0)
 MAINS_EXPLAINS = 0.8
@@ -87,19 +79,22 @@ def find(plan: Plan, rows: Profiles, *, measured: tuple[str, ...] = ()) -> ClipF
         doubt=None if rows.doubt is None else np.ascontiguousarray(rows.doubt[keep]),
     ).windowed(window)
     free = measured if plan.camera.readout_s is not None else ("row_time_s", *measured)
-    fit = _fit(plan, fine, tracked.beat, free)
+    fit = fitted(plan, fine, tracked.beat, free)
     fine, fit = _restless(plan, fine, fit, free)
     fit = _with_mains(plan, fine, fit, free)
     fine, fit, apart_s = _in_short_windows(plan, fine, fit, free)
-    freed, unsure_s, soft_s = _believed(plan, fine, fit, free)
-    if freed.errors_s:
-        freed, apart_s = _with_window_errors(plan, fine, freed)
-    apart_s = float(np.hypot(unsure_s, apart_s))
-    fit, slack_s = centred(plan, fine, freed)
+    differing = freed(plan, fine, fit, free)
+    fit = differing.fit
+    if fit.errors_s:
+        fit, apart_s = _with_window_errors(plan, fine, fit)
+    apart_s = float(np.hypot(differing.unsure_s, apart_s))
+    fit, slack_s = centred(plan, fine, fit)
     plain, as_seen = _as_seen(plan, fine, fit)
-    stray = jitter(plan, fine, fit) if fine.restless is None else STEADY
+    stray = jitter(plan, plain, as_seen) if slack_s == 0.0 else STEADY
     known_s = max(fit.shift_error_s, shift_error_s(plan, fine, fit), slack_s)
-    if stray is STEADY:
+    if stray is not STEADY:
+        known_s = min(known_s, stray.mean_error_s)
+    else:
         apart_rows_s = disagreement_s(plan, fine, fit) if fine.restless is None else 0.0
         known_s = float(np.hypot(known_s * misfit(plan, fine, fit), apart_rows_s))
     error_s = float(np.sqrt(known_s**2 + stray.error_s**2 + apart_s**2))
@@ -112,7 +107,7 @@ def find(plan: Plan, rows: Profiles, *, measured: tuple[str, ...] = ()) -> ClipF
         strayed=course.strayed,
         trusted=course.trusted,
         slack_s=slack_s,
-        soft_s=soft_s,
+        soft_s=differing.soft_s,
         across=across(plan, fine, fit),
     )
 
@@ -130,7 +125,7 @@ def _restless(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> tu
         rows = restless(plan, rows, fit.beat)
         if rows.restless is None:
             break
-        fit = _fit(plan, rows, fit.beat, free)
+        fit = fitted(plan, rows, fit.beat, free)
     return rows, fit
 
 
@@ -149,10 +144,10 @@ def _in_short_windows(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...
     Return too how far apart the times are with and without: an error that neither of the two fits can know of.
     """
     if rows.restless is not None:
-        return rows, fit, _rms_apart_s(rows, fit.beat, _fit(plan, _other_windows(rows), fit.beat, free).beat)
+        return rows, fit, rms_apart_s(rows, fit.beat, fitted(plan, _other_windows(rows), fit.beat, free).beat)
     short = rows.windowed(max(window_frames(plan) // 2, len(rows.value) // MOST_WINDOWS))
-    other = _fit(plan, short, fit.beat, free)
-    apart_s = _rms_apart_s(rows, fit.beat, other.beat)
+    other = fitted(plan, short, fit.beat, free)
+    apart_s = rms_apart_s(rows, fit.beat, other.beat)
     taken, better = (short, other) if other.shift_error_s < SURER * fit.shift_error_s else (rows, fit)
     return taken, better, apart_s
 
@@ -162,12 +157,12 @@ def _with_window_errors(plan: Plan, rows: Profiles, fit: Fit) -> tuple[Fit, floa
 
     Return too how far apart the flashes' times are then.
     """
-    other = _fit(plan, _other_windows(rows), fit.beat, tuple(fit.errors_s))
+    other = fitted(plan, _other_windows(rows), fit.beat, tuple(fit.errors_s))
     errors_s = {
         name: float(np.hypot(error_s, getattr(other.beat, name) - getattr(fit.beat, name)))
         for name, error_s in fit.errors_s.items()
     }
-    return replace(fit, errors_s=errors_s), _rms_apart_s(rows, fit.beat, other.beat)
+    return replace(fit, errors_s=errors_s), rms_apart_s(rows, fit.beat, other.beat)
 
 
 def _other_windows(rows: Profiles) -> Profiles:
@@ -176,93 +171,6 @@ def _other_windows(rows: Profiles) -> Profiles:
     return rows.windowed(
         max(len(rows.value) // (2 * many) if rows.restless is None else 2 * len(rows.value) // many, 1)
     )
-
-
-def _rms_apart_s(rows: Profiles, one: Beat, other: Beat) -> float:
-    """Return how far two clocks are apart at the windows' ends."""
-    strobe_s = (rows.ends_s - one.clock.phase_s) / one.clock.rate
-    straight_s = other.clock.phase_s + strobe_s * other.clock.rate
-    apart_s = straight_s + other.clock.bend(straight_s) - rows.ends_s - one.clock.bend(rows.ends_s)
-    return float(np.sqrt(np.mean(apart_s**2)))
-
-
-def _believed(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> tuple[Fit, float, float]:
-    """Free what the picture contradicts, but only where blurred rows do not look the same.
-
-    Return too how unsure the times are for it, and how soft the edges are where that was not taken for tails. A tail
-    moves the start of its flash by as much as it is long, a blur does not: where both would do, a wrong tail is worse.
-    """
-    names = _may_differ(plan)
-    freed, unsure_s = _freed(plan, rows, fit, free, names)
-    soft_s = 0.0
-    if TAILS & set(freed.errors_s) and not (plan.rise_s > 0 or plan.fall_s > 0):
-        without, without_s = _freed(plan, rows, fit, free, tuple(name for name in names if name not in TAILS))
-        share = cleared(plan, rows, without, freed)
-        if share < BELIEVED:
-            soft_s = max(freed.beat.rise_s, freed.beat.fall_s)
-            freed, unsure_s = without, float(np.hypot(without_s, BLURRED * soft_s))
-        else:
-            unsure_s = float(np.hypot(unsure_s, (1 - share) * _rms_apart_s(rows, without.beat, freed.beat)))
-    blurred = set(freed.errors_s) > set(free) and within_blur(rows, fit.beat, freed.beat)
-    if blurred and cleared(plan, rows, fit, freed) < BELIEVED:
-        return fit, BLURRED * soft_s, soft_s
-    return freed, unsure_s, soft_s
-
-
-def _freed(
-    plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...], may_differ: tuple[str, ...]
-) -> tuple[Fit, float]:
-    """Free the plan's values where the picture clearly contradicts them, one after another, the clearest first.
-
-    Return too how unsure the times are where the subject moves so much that with and without both may be right.
-    """
-    refused: set[str] = set()
-    unsure_s, wider_s = 0.0, dict[str, float]()
-    while True:
-        names = tuple(name for name in may_differ if name not in free and name not in refused)
-        name = clearest(plan, rows, fit, free, names, at_least=LEAST_GAIN)
-        if name is None:
-            errors_s = {n: float(np.hypot(error_s, wider_s.get(n, 0.0))) for n, error_s in fit.errors_s.items()}
-            return (replace(fit, errors_s=errors_s) if wider_s else fit), unsure_s
-        tried = _fit(plan, rows, fit.beat, (*free, name))
-        before = robust_loss(rows, fit.rest, fit.rest)
-        gain = before - robust_loss(rows, tried.rest, fit.rest)
-        off_s = abs(getattr(tried.beat, name) - getattr(fit.beat, name))
-        clear = gain > max(BETTER * before, LEAST_GAIN) and off_s > CLEAR * tried.errors_s[name]
-        if not clear or not _plausible(plan, tried.beat):
-            refused.add(name)
-            continue
-        if rows.restless is None and gain < PLAIN * before and gain_of(rows, tried.rest) < STILL:
-            unsure_s = float(np.hypot(unsure_s, _rms_apart_s(rows, fit.beat, tried.beat) / np.sqrt(2)))
-            wider_s[name] = off_s / np.sqrt(2)
-        fit, free = tried, (*free, name)
-
-
-def _plausible(plan: Plan, beat: Beat) -> bool:
-    """Tell whether a beat's tails are tails: no longer than the shortest flash, unless the plan says so."""
-    longest_s = max(min(plan.flashes[slot].duration_s for slot in plan.lit_slots), plan.rise_s, plan.fall_s)
-    return max(beat.rise_s, beat.fall_s) <= longest_s
-
-
-def _fit(plan: Plan, rows: Profiles, beat: Beat, free: tuple[str, ...]) -> Fit:
-    if beat.clock.knot_s and len(rows.window_start) >= LEAST_WINDOWS:
-        rest = unexplained(plan, rows, beat)
-        rough = Fit(
-            beat=beat,
-            rest=rest,
-            weight=scaled(rows, rest, 0.0) ** -2.0,
-            shift_error_s=0.0,
-            errors_s={},
-            explained=explained(rows, rest),
-        )
-        return bend(plan, rows, rough, free=free)
-    straight = replace(beat, clock=replace(beat.clock, knot_s=(), bend_s=()))
-    return bend(plan, rows, refine(plan, rows, straight, free=free), free=free)
-
-
-def _may_differ(plan: Plan) -> tuple[str, ...]:
-    names = ("exposure_s", "row_time_s", "rise_s", "fall_s")
-    return names if plan.camera.readout_s != 0 else tuple(name for name in names if name != "row_time_s")
 
 
 def _with_mains(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> Fit:
@@ -279,4 +187,4 @@ def _with_mains(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> 
     window_s = float(np.median(np.diff(rows.ends_s)))
     if least > MAINS_EXPLAINS * float(np.median([left(hz + swings / window_s) for swings in OTHER_SWINGS])):
         return fit
-    return _fit(plan, rows, replace(fit.beat, beat_hz=(hz,)), free)
+    return fitted(plan, rows, replace(fit.beat, beat_hz=(hz,)), free)

@@ -213,6 +213,7 @@ def losses_by_row(
             flashes.unknowns,
             flashes.rise_s,
             flashes.fall_s,
+            flashes.blur_s,
         )
         for row in range(height):
             row_rest(rows, moved, weight, row, design, rest)
@@ -265,8 +266,10 @@ def edges(
                     if u > 0:
                         light = right[u]
                         since_s, d = open_s - flashes.start_s[j], flashes.duration_s[j]
-                        _, opening = given_off(since_s, d, flashes.rise_s, flashes.fall_s)
-                        _, closing = given_off(since_s + rows.exposure_s, d, flashes.rise_s, flashes.fall_s)
+                        _, opening = given_off(since_s, d, flashes.rise_s, flashes.fall_s, flashes.blur_s)
+                        _, closing = given_off(
+                            since_s + rows.exposure_s, d, flashes.rise_s, flashes.fall_s, flashes.blur_s
+                        )
                         pull[j, 0] += weight[n, row] * light * opening * rest
                         pull[j, 1] -= weight[n, row] * light * closing * rest
                         stiff[j, 0] += weight[n, row] * (light * opening) ** 2

@@ -141,7 +141,13 @@ def compiled_flashes(plan: Plan, rows: Profiles, beat: Beat) -> row_model.Flashe
     train = train_between(plan, beat.clock, float(start_s[0]), until_s)
     unknown = slot_unknowns(plan)
     return row_model.Flashes(
-        train.start_s, train.duration_s, unknown[train.slot], int(unknown.max()) + 1, beat.rise_s, beat.fall_s
+        train.start_s,
+        train.duration_s,
+        unknown[train.slot],
+        int(unknown.max()) + 1,
+        beat.rise_s,
+        beat.fall_s,
+        beat.blur_s,
     )
 
 
@@ -224,7 +230,7 @@ def residuals_of(plan: Plan, timing: Timing, index: IntArray, value: FloatArray)
     unknown = slot_unknowns(plan)
     slots = [flash.slot for flash in timing.flashes]
     flashes = row_model.Flashes(
-        timing.start_s, timing.duration_s, unknown[slots], int(unknown.max()) + 1, timing.rise_s, timing.fall_s
+        timing.start_s, timing.duration_s, unknown[slots], int(unknown.max()) + 1, timing.rise_s, timing.fall_s, 0.0
     )
     rest = np.empty(value.shape)
     kernel.rests(rows, flashes, np.ones(value.shape), 0, height, rest)

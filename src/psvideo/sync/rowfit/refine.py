@@ -1,6 +1,7 @@
 """Sharpening: robust Gauss-Newton steps on a clock that runs straight, the shutter's times with it where asked for."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -8,7 +9,7 @@ from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.profiles import Profiles, equations, unexplained
-from psvideo.sync.rowfit.row_model import EXPOSURE, FALL, RISE, ROW_TIME
+from psvideo.sync.rowfit.row_model import BLUR, EXPOSURE, FALL, RISE, ROW_TIME
 
 CAUCHY = 2.4
 """Residuals of this many standard deviations are trusted half as much (95 % efficiency for Gaussian noise)."""
@@ -23,8 +24,12 @@ LAG = 3
 """Residuals of frames so far apart may still err together (a subject that moves): Newey and West 1987."""
 CLUSTER, LEAST_CLUSTERS = 12, 8
 """Or whole stretches of frames err together; that needs so many of them to be seen."""
-GLOBALS = {"exposure_s": EXPOSURE, "row_time_s": ROW_TIME, "rise_s": RISE, "fall_s": FALL}
+GLOBALS = {"exposure_s": EXPOSURE, "row_time_s": ROW_TIME, "rise_s": RISE, "fall_s": FALL, "blur_s": BLUR}
 """The times, beside the clock's, that can be set free, and the signal of each."""
+EDGES = {"rise_s", "fall_s", "blur_s"}
+"""Those that make edges soft: what they change is worked out only where one is free."""
+LEAST_BLUR_ROWS = 0.3
+"""A blur that is free stays this large, which is next to none: it changes what lies so near an edge, and no row may."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,7 +67,7 @@ def refine(
         scale = scaled(rows, rest, first_scale * 0.4**step)
         trust = 1.0 / (1.0 + (rest / (CAUCHY * scale)) ** 2)
         weight = trust / scale**2
-        rest, hessian, scores = projected(plan, rows, beat, weight, basis, tails=bool({"rise_s", "fall_s"} & set(free)))
+        rest, hessian, scores = projected(plan, rows, beat, weight, basis, tails=bool(EDGES & set(free)))
         move = np.linalg.solve(hessian + prior(plan, rows, unit_s, free), scores.sum(axis=0))
         beat, rest, gained = _step(plan, rows, beat, free, _held(plan, move, free), weight, rest)
         if step > 6 and (not gained or (np.abs(move) < 1e-5 * unit_s).all()):
@@ -256,12 +261,19 @@ def _step(
 def _moved(rows: Profiles, beat: Beat, free: tuple[str, ...], move: FloatArray) -> Beat:
     pivot_s, half_s = _pivot(rows)
     clock = beat.clock.shifted(float(move[0]), float(move[1]) / half_s * 1e6, pivot_s=pivot_s)
-    times_s = {name: max(getattr(beat, name) + float(move[2 + n]), 0.0) for n, name in enumerate(free)}
+    return replace(beat, clock=clock, **times_moved(rows, beat, free, move[2:]))
+
+
+def times_moved(rows: Profiles, beat: Beat, free: tuple[str, ...], move: FloatArray) -> dict[str, Any]:
+    """Return the times named in ``free`` after a step, within the bounds of what a camera and LEDs can do."""
+    times_s = {name: max(getattr(beat, name) + float(move[n]), 0.0) for n, name in enumerate(free)}
     if "exposure_s" in times_s:
         times_s["exposure_s"] = min(times_s["exposure_s"], rows.period_s)
+    if "blur_s" in times_s:
+        times_s["blur_s"] = max(times_s["blur_s"], LEAST_BLUR_ROWS * beat.row_time_s)
     if "row_time_s" in times_s:
         times_s["row_time_s"] = min(times_s["row_time_s"], 1.02 * rows.period_s / (rows.place.max() + 1))
-    return replace(beat, clock=clock, **times_s)
+    return times_s
 
 
 def scaled(rows: Profiles, rest: FloatArray, share: float) -> FloatArray:

@@ -15,7 +15,7 @@ from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.profiles import Profiles, compiled_flashes, compiled_rows, unexplained
-from psvideo.sync.rowfit.refine import Fit, robust_loss
+from psvideo.sync.rowfit.refine import LAST_SCALE, Fit, robust_loss
 from psvideo.sync.rowfit.row_model import Flashes, Rows, seen_of
 
 SPLIT = 0.3
@@ -33,16 +33,19 @@ ELSEWHERE = 8
 
 
 def restless(plan: Plan, rows: Profiles, beat: Beat) -> Profiles:
-    """Return the profiles with how much each row's flashes differ, as the residuals of a first fit show it."""
+    """Return the profiles with how much each row's flashes differ, as the residuals of a first fit show it.
+
+    Noise is no smaller than a fit takes it for: compression leaves rows in the dark without any.
+    """
     plain = replace(rows, restless=None)
     rest = unexplained(plan, plain, beat)
     whole, split = np.full(rest.shape, np.nan), np.full(rest.shape, np.nan)
     _parts(compiled_rows(plain, beat), compiled_flashes(plan, plain, beat), rest, whole, split)
-    ratio = np.zeros(len(rows.place))
+    ratio, least = np.zeros(len(rows.place)), (LAST_SCALE * rows.spread) ** 2
     for row in range(len(ratio)):
         near = slice(max(row - NEAR_ROWS, 0), row + NEAR_ROWS + 1)
         noise = _variance(split[:, near])
-        ratio[row] = _variance(whole[:, row]) / noise if noise > 0.0 else 1.0
+        ratio[row] = _variance(whole[:, row]) / max(noise, float(least[row])) if noise > 0.0 else 1.0
     return replace(rows, restless=np.maximum(ratio - 1, 0.0)) if (ratio > CLEARLY).any() else plain
 
 

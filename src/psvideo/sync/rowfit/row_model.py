@@ -2,7 +2,8 @@
 
 A row's mean in frame n is ``ambient + sum_k (F(close - s_k) - F(open - s_k)) * brightness[slot of k]``, F being the
 share of its light that a flash has given off (an exponential rise and fall, 1/e times, round a square pulse). The
-flashes' weights equal ``shutter.row_weights`` where there are no tails; a test holds the two together.
+flashes' weights equal ``shutter.row_weights`` where there are no tails; a test holds the two together. Compression and
+scaling blur rows as if every flash were spread out evenly to either side, which is a time as well.
 """
 
 from typing import NamedTuple
@@ -17,9 +18,11 @@ IntArray = NDArray[np.int64]
 
 REACH = 9.0
 """After so many fall times a flash is taken to be over."""
-LEFT, RIGHT, EXPOSURE, ROW_TIME, RISE, FALL = range(6)
-"""The signals of a step: the shift at a window's left and right end, exposure, row time, rise and fall time."""
-SIGNALS = 6
+LEFT, RIGHT, EXPOSURE, ROW_TIME, RISE, FALL, BLUR = range(7)
+"""The signals of a step: the shift at a window's left and right end, exposure, row time, rise and fall time, blur."""
+SIGNALS = 7
+SPREAD = 3.0**0.5
+"""Three points, at these standard deviations with weights 1, 4 and 1, blur as a Gaussian (Gauss-Hermite quadrature)."""
 
 
 class Rows(NamedTuple):
@@ -48,11 +51,24 @@ class Flashes(NamedTuple):
     unknowns: int
     rise_s: float
     fall_s: float
+    blur_s: float
+    """The standard deviation by which rows are blurred, as a time."""
 
 
 @EXACT.kept
-def given_off(since_s: float, duration_s: float, rise_s: float, fall_s: float) -> tuple[float, float]:
+def given_off(since_s: float, duration_s: float, rise_s: float, fall_s: float, blur_s: float) -> tuple[float, float]:
     """Return the share of its light that a flash has given off, and the rate at which it does so now."""
+    share, rate = _sharp(since_s, duration_s, rise_s, fall_s)
+    if blur_s <= 0.0:
+        return share, rate
+    before, rate_before = _sharp(since_s - SPREAD * blur_s, duration_s, rise_s, fall_s)
+    after, rate_after = _sharp(since_s + SPREAD * blur_s, duration_s, rise_s, fall_s)
+    return (before + 4.0 * share + after) / 6.0, (rate_before + 4.0 * rate + rate_after) / 6.0
+
+
+@EXACT.kept
+def _sharp(since_s: float, duration_s: float, rise_s: float, fall_s: float) -> tuple[float, float]:
+    """Return the share and the rate where nothing is blurred."""
     if since_s <= 0.0:
         return 0.0, 0.0
     reached, whole = 1.0, duration_s
@@ -84,19 +100,20 @@ def see(rows: Rows, flashes: Flashes, frame: int, row: int, k: int, design: Floa
     design[0] = 1.0
     open_s = rows.frame_start_s[frame] + rows.row_place[row] * rows.row_time_s
     close_s = open_s + rows.exposure_s
-    tail_s = REACH * flashes.fall_s
+    near_s = SPREAD * flashes.blur_s
+    tail_s = REACH * flashes.fall_s + near_s
     while k < len(flashes.start_s) and flashes.start_s[k] + flashes.duration_s[k] + tail_s <= open_s:
         k += 1
     j = k
-    while j < len(flashes.start_s) and flashes.start_s[j] < close_s:
+    while j < len(flashes.start_s) and flashes.start_s[j] - near_s < close_s:
         u = flashes.unknown[j]
         if u > 0:
             start_s, duration_s = flashes.start_s[j], flashes.duration_s[j]
-            if flashes.rise_s == 0.0 and flashes.fall_s == 0.0:
+            if flashes.rise_s == 0.0 and flashes.fall_s == 0.0 and flashes.blur_s == 0.0:
                 design[u] += max(min(close_s, start_s + duration_s) - max(open_s, start_s), 0.0) / duration_s
             else:
-                after, _ = given_off(close_s - start_s, duration_s, flashes.rise_s, flashes.fall_s)
-                before, _ = given_off(open_s - start_s, duration_s, flashes.rise_s, flashes.fall_s)
+                after, _ = given_off(close_s - start_s, duration_s, flashes.rise_s, flashes.fall_s, flashes.blur_s)
+                before, _ = given_off(open_s - start_s, duration_s, flashes.rise_s, flashes.fall_s, flashes.blur_s)
                 design[u] += after - before
         j += 1
     for b in range(len(rows.beat_hz)):
@@ -113,30 +130,35 @@ def slopes(
     """Fill ``signals`` (SIGNALS,) with how the model's value changes with each unknown time."""
     open_s = rows.frame_start_s[frame] + rows.row_place[row] * rows.row_time_s
     close_s = open_s + rows.exposure_s
-    rise_s, fall_s = flashes.rise_s, flashes.fall_s
+    rise_s, fall_s, blur_s = flashes.rise_s, flashes.fall_s, flashes.blur_s
     probe_s = 0.01 * flashes.duration_s[0]
-    tail_s = REACH * fall_s
+    near_s = SPREAD * blur_s
+    tail_s = REACH * fall_s + near_s
     signals[:] = 0.0
     j = k
     while j > 0 and flashes.start_s[j - 1] + flashes.duration_s[j - 1] + tail_s + REACH * probe_s > open_s:
         j -= 1
     closing = opening = 0.0
-    while j < len(flashes.start_s) and flashes.start_s[j] < close_s:
+    while j < len(flashes.start_s) and flashes.start_s[j] - near_s < close_s:
         u = flashes.unknown[j]
         if u > 0:
             d = flashes.duration_s[j]
             since_close, since_open = close_s - flashes.start_s[j], open_s - flashes.start_s[j]
-            after, after_rate = given_off(since_close, d, rise_s, fall_s)
-            before, before_rate = given_off(since_open, d, rise_s, fall_s)
+            after, after_rate = given_off(since_close, d, rise_s, fall_s, blur_s)
+            before, before_rate = given_off(since_open, d, rise_s, fall_s, blur_s)
             closing += brightness[u] * after_rate
             opening += brightness[u] * before_rate
             if tails:
-                a, _ = given_off(since_close, d, rise_s + probe_s, fall_s)
-                b, _ = given_off(since_open, d, rise_s + probe_s, fall_s)
+                a, _ = given_off(since_close, d, rise_s + probe_s, fall_s, blur_s)
+                b, _ = given_off(since_open, d, rise_s + probe_s, fall_s, blur_s)
                 signals[RISE] += brightness[u] * (a - b - after + before) / probe_s
-                a, _ = given_off(since_close, d, rise_s, fall_s + probe_s)
-                b, _ = given_off(since_open, d, rise_s, fall_s + probe_s)
+                a, _ = given_off(since_close, d, rise_s, fall_s + probe_s, blur_s)
+                b, _ = given_off(since_open, d, rise_s, fall_s + probe_s, blur_s)
                 signals[FALL] += brightness[u] * (a - b - after + before) / probe_s
+                if blur_s > 0.0:
+                    a, _ = given_off(since_close, d, rise_s, fall_s, blur_s + probe_s)
+                    b, _ = given_off(since_open, d, rise_s, fall_s, blur_s + probe_s)
+                    signals[BLUR] += brightness[u] * (a - b - after + before) / probe_s
         j += 1
     signals[EXPOSURE] = closing
     signals[ROW_TIME] = (closing - opening) * rows.row_place[row]
@@ -149,8 +171,10 @@ def seen_of(rows: Rows, flashes: Flashes, frame: int, row: int, j: int) -> float
     if flashes.unknown[j] == 0:
         return 0.0
     since_s = rows.frame_start_s[frame] + rows.row_place[row] * rows.row_time_s - flashes.start_s[j]
-    after, _ = given_off(since_s + rows.exposure_s, flashes.duration_s[j], flashes.rise_s, flashes.fall_s)
-    before, _ = given_off(since_s, flashes.duration_s[j], flashes.rise_s, flashes.fall_s)
+    after, _ = given_off(
+        since_s + rows.exposure_s, flashes.duration_s[j], flashes.rise_s, flashes.fall_s, flashes.blur_s
+    )
+    before, _ = given_off(since_s, flashes.duration_s[j], flashes.rise_s, flashes.fall_s, flashes.blur_s)
     return after - before
 
 

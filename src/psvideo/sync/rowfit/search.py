@@ -80,7 +80,7 @@ def losses(plan: Plan, rows: Profiles, clocks: list[FoundClock], start: Beat, *,
     train = plan.train(begin * cycle, (end - begin) * cycle)
     unknown = slot_unknowns(plan)
     flashes = row_model.Flashes(
-        train.start_s, train.duration_s, unknown[train.slot], int(unknown.max()) + 1, start.rise_s, start.fall_s
+        train.start_s, train.duration_s, unknown[train.slot], int(unknown.max()) + 1, start.rise_s, start.fall_s, 0.0
     )
     seen = compiled_rows(rows, start)._replace(row_place=place)
     phase_s, rate = np.array([c.phase_s for c in clocks]), np.array([c.rate for c in clocks])

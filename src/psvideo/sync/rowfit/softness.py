@@ -29,6 +29,8 @@ REACHES_ROWS = 3.0
 """A blur reaches so many rows: what differs by more is no blur."""
 OUTLIER = 6.0
 """Residuals count as no more standard deviations than this."""
+CHANCE = 2.0
+"""Standard errors by which noise alone may make edges differ from what is elsewhere."""
 FEW = 50
 """Fewer samples at edges, or elsewhere, say nothing."""
 
@@ -53,7 +55,8 @@ def cleared(plan: Plan, rows: Profiles, before: Fit, after: Fit) -> float:
     first, last = (np.log1p((rest / scale) ** 2) for rest in (before.rest, after.rest))
     excess = float(first[edges].mean() - last[~edges].mean())
     gain = float(first[edges].mean() - last[edges].mean())
-    return 1.0 if excess <= gain else max(gain / excess, 0.0)
+    chance = CHANCE * float(np.sqrt(last[edges].var() / edges.sum() + last[~edges].var() / (~edges).sum()))
+    return 1.0 if excess <= gain + chance else max(gain / excess, 0.0)
 
 
 def within_blur(rows: Profiles, one: Beat, other: Beat) -> bool:
