@@ -150,7 +150,7 @@ def _list(names: Sequence[str]) -> str:
 
 
 def _shown(known: Sequence[str], files: Sequence[Path]) -> str:
-    return f"{files[0].name} shows {known[0]!r}, {files[-1].name} shows {known[-1]!r}"
+    return f"{files[0].name} shows {known[0]!r}, and so on to {files[-1].name}, which shows {known[-1]!r}"
 
 
 def _own_names(files: Sequence[Path]) -> tuple[str, ...]:

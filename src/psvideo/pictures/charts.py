@@ -100,7 +100,7 @@ def _names(ends: list[tuple[float, int, str]], right: int) -> list[str]:
     """Write each series' name at its end, moved apart where they would meet."""
     parts, last = [], -np.inf
     for y, n, name in sorted(ends):
-        last = max(y + 4, last + 13)
+        last = max(y + 4, last + 15)
         shown = html.escape(name if len(name) <= 11 else name[:10] + "…")
         parts.append(
             f'<line class="s{n % 8}" stroke-dasharray="{DASHES[n % 8]}" x1="{right + 4}" x2="{right + 22}" '
@@ -114,7 +114,7 @@ def stops_chart(shares: Values, name: str, *, stops: int) -> str:
     hidden = (stops - SHOWN_STOPS) * (len(shares) - 1) // stops
     inner, clipped, stops = shares[hidden:-1].copy(), float(shares[-1]), SHOWN_STOPS
     inner[0] += shares[:hidden].sum()
-    left, right, bottom = 8, STOP_WIDE - 56, STOP_TALL - 22
+    left, right, bottom = 8, STOP_WIDE - 66, STOP_TALL - 22
     tallest = max(float(inner.max()), 1e-9)
     step = (right - left) / len(inner)
     heights = inner / tallest * (bottom - TOP)
@@ -135,9 +135,9 @@ def stops_chart(shares: Values, name: str, *, stops: int) -> str:
         f"Light of {name} in stops below saturation; {percent} clipped",
         f'<path class="area" d="M{left},{bottom} {corners}L{right},{bottom}Z"/>'
         f'<line class="grid" x1="{left}" x2="{STOP_WIDE - 8}" y1="{bottom}" y2="{bottom}"/>{ticks}'
-        f'<rect class="clip" x="{right + 10}" y="{bottom - high:.1f}" width="30" height="{high:.1f}"/>'
-        f'<text x="{right + 25}" y="{bottom + 15}" text-anchor="middle">clipped</text>'
-        f'<text x="{right + 25}" y="{max(bottom - high - 4, 12):.1f}" text-anchor="middle">{percent}</text>',
+        f'<rect class="clip" x="{right + 20}" y="{bottom - high:.1f}" width="30" height="{high:.1f}"/>'
+        f'<text x="{right + 35}" y="{bottom + 15}" text-anchor="middle">clipped</text>'
+        f'<text x="{right + 35}" y="{max(bottom - high - 4, 12):.1f}" text-anchor="middle">{percent}</text>',
     )
 
 

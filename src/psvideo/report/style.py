@@ -30,7 +30,7 @@ figure{margin:1rem 0}figcaption{color:var(--soft);font-size:.87rem}img{max-width
 .grid4{display:grid;grid-template-columns:repeat(auto-fill,minmax(250px,1fr));gap:.8rem 1.2rem}.grid4 figure{margin:0}
 .grid2{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(480px,100%),1fr));gap:.4rem 1.6rem}
 .grid4 img{width:100%;image-rendering:auto}
-svg{width:100%;height:auto;max-width:820px;display:block}
+svg{width:100%;height:auto;max-width:820px;display:block;overflow:visible}
 svg text{fill:var(--soft);font:11px system-ui,sans-serif}svg .grid{stroke:var(--rule);stroke-width:1}
 svg path,svg line{fill:none;stroke-width:1.8}svg .area{fill:var(--c0);opacity:.75;stroke:none}svg .clip{fill:var(--bad)}
 """
@@ -41,7 +41,7 @@ svg path,svg line{fill:none;stroke-width:1.8}svg .area{fill:var(--c0);opacity:.7
     + """
 details summary{cursor:pointer;color:var(--soft);margin:.8rem 0 .4rem}
 @media(max-width:600px){.lines tr{display:grid;grid-template-columns:auto 1fr;border-bottom:1px solid var(--rule)}
-.lines td,.lines th{border:0}.lines td:last-child{grid-column:1/-1;padding-top:0}}
+.lines td,.lines th{border:0}.lines td:last-child{grid-column:1/-1;padding-top:0}.grid2 svg text{font-size:15px}}
 @media print{main{max-width:none}section{break-inside:avoid}}
 """
 )
