@@ -64,6 +64,23 @@ def test_even_grey_is_exact_to_the_border(cfa: str) -> None:
     assert np.abs(demosaic(np.full((8, 9), 0.4, np.float32), cfa) - 0.4).max() < 1e-6
 
 
+@pytest.mark.parametrize("cfa", PATTERNS)
+@pytest.mark.parametrize("shape", [(3, 3), (3, 9), (7, 4), (150, 5)])
+def test_the_border_is_as_if_the_picture_were_mirrored_about_its_outermost_pixels(
+    cfa: str, shape: tuple[int, int]
+) -> None:
+    image = np.random.default_rng(7).uniform(0, 1, shape).astype(np.float32)
+    wider = demosaic(np.pad(image, 2, mode="reflect"), cfa)[2:-2, 2:-2]
+    assert np.array_equal(demosaic(image, cfa), wider)
+
+
+def test_a_mosaic_of_one_pixel_or_row_is_no_fault() -> None:
+    for shape in ((1, 1), (1, 6), (2, 1)):
+        colour = demosaic(np.full(shape, 0.5, np.float32), "GBRG")
+        assert colour.shape == (*shape, 3)
+        assert np.isfinite(colour).all()
+
+
 @given(seed=st.integers(0, 1000), cfa=st.sampled_from(PATTERNS))
 def test_sums_of_mosaics_demosaic_to_sums(seed: int, cfa: str) -> None:
     """This is why plates may be split in the mosaic."""

@@ -4,23 +4,15 @@ images", ICASSP 2004: each missing colour is its bilinear estimate, corrected by
 It is linear, so plates may be split in the mosaic and demosaiced afterwards; measured samples are kept exactly.
 """
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.threads import over_ranges
 from psvideo.errors import PsvideoError
 
-# Figure 2 of the paper, times 1/8.
-GREEN_AT_COLOUR = np.array(
-    [[0, 0, -1, 0, 0], [0, 0, 2, 0, 0], [-1, 2, 4, 2, -1], [0, 0, 2, 0, 0], [0, 0, -1, 0, 0]], np.float32
-)
-COLOUR_BESIDE_GREEN = np.array(
-    [[0, 0, 0.5, 0, 0], [0, -1, 0, -1, 0], [-1, 4, 5, 4, -1], [0, -1, 0, -1, 0], [0, 0, 0.5, 0, 0]], np.float32
-)
-COLOUR_ACROSS = np.array(
-    [[0, 0, -1.5, 0, 0], [0, 2, 0, 2, 0], [-1.5, 0, 6, 0, -1.5], [0, 2, 0, 2, 0], [0, 0, -1.5, 0, 0]], np.float32
-)
 PATTERNS = ("RGGB", "BGGR", "GRBG", "GBRG")
+EACH_ROWS = 64
+"""Rows that a thread makes at a time."""
 
 
 def demosaic(image: NDArray[np.float32], cfa: str) -> NDArray[np.float32]:
@@ -33,23 +25,10 @@ def demosaic(image: NDArray[np.float32], cfa: str) -> NDArray[np.float32]:
         raise PsvideoError(
             f"colour filter pattern {cfa!r} cannot be demosaiced; expected one of {', '.join(PATTERNS)}."
         )
-    green = _filtered(image, GREEN_AT_COLOUR)
-    beside = _filtered(image, COLOUR_BESIDE_GREEN)
-    above = _filtered(image, COLOUR_BESIDE_GREEN.T)
-    across = _filtered(image, COLOUR_ACROSS)
-    colour = np.empty((*image.shape, 3), np.float32)
-    for place, filters in enumerate(cfa):
-        row, col = divmod(place, 2)
-        here = np.s_[row::2, col::2]
-        in_row, in_col = cfa[2 * row + 1 - col], cfa[2 * (1 - row) + col]
-        source = {filters: image}
-        source |= (
-            {in_row: beside, in_col: above} if filters == "G" else {"G": green, "RB"["RB".index(filters) - 1]: across}
-        )
-        for channel, name in enumerate("RGB"):
-            colour[here][..., channel] = source[name][here]
+    from psvideo.clip.decode.malvar_kernel import demosaic_rows  # loads the compiler, which help does without
+
+    mosaic = np.ascontiguousarray(image, np.float32)
+    colour = np.empty((*mosaic.shape, 3), np.float32)
+    filters = np.array(["RGB".index(name) for name in cfa], np.intp).reshape(2, 2)
+    over_ranges(lambda first, last: demosaic_rows(mosaic, filters, first, last, colour), len(mosaic), each=EACH_ROWS)
     return colour
-
-
-def _filtered(image: NDArray[np.float32], kernel: NDArray[np.float32]) -> NDArray[np.float32]:
-    return np.asarray(cv2.filter2D(image, cv2.CV_32F, kernel / 8, borderType=cv2.BORDER_REFLECT_101), np.float32)
