@@ -66,9 +66,16 @@ def photographs() -> Iterator[Accuracy]:
     yield from by_class(washington_sphere())
 
 
-def bust(lights: tuple[int, ...]) -> tuple[Case, np.ndarray]:
-    """The demo's bust before its wall, with a camera's noise; and what three of the lights reach."""
-    stage = set_stage(read_scene(ROOT / "data_synth" / "bust.toml"), ROOT / "data_synth")
+def bust(lights: tuple[int, ...], width_px: int | None = None) -> tuple[Case, np.ndarray]:
+    """The demo's bust before its wall, with a camera's noise; and what three of the lights reach.
+
+    ``width_px`` makes a picture of another size, whose pixels see means, as a camera's do.
+    """
+    scene = read_scene(ROOT / "data_synth" / "bust.toml")
+    if width_px is not None:
+        size = {"width_px": width_px, "height_px": round(scene.camera.height_px * width_px / scene.camera.width_px)}
+        scene = scene.model_copy(update={"camera": scene.camera.model_copy(update={**size, "rays": 2})})
+    stage = set_stage(scene, ROOT / "data_synth")
     assert stage.still is not None
     hits, chosen = stage.still.hits, [stage.rig.lights[n] for n in lights]
     rng = np.random.default_rng(5)

@@ -98,6 +98,15 @@ def test_a_matte_bust_is_trusted_hair_and_creases_included() -> None:
     assert (errors[surface.valid & reached] > 10).mean() <= 0.001
 
 
+def test_a_small_picture_is_trusted_as_a_large_one_is_beside_the_edges_of_shadows() -> None:
+    case, reached = bust((0, 1, 2, 3, 4), width_px=192)
+    surface = Solving(error=True).solve(case.plates, case.lit)
+    errors = np.degrees(2 * np.arcsin(np.clip(np.linalg.norm(surface.normals - case.truth, axis=-1) / 2, 0, 1)))
+    reached &= np.linalg.norm(case.truth, axis=-1) > 0.5
+    assert surface.valid[reached & (errors < 5)].mean() >= 0.97
+    assert (errors[reached & surface.valid] > 10).mean() <= 0.03
+
+
 def doubted(turned: np.ndarray) -> tuple[Signs, np.ndarray]:
     """Return what speaks against the normals of a plain, turned by slopes (row, col, 2: along columns, along rows)."""
     normals = np.stack([-turned[..., 0], turned[..., 1], np.ones(turned.shape[:2])], axis=-1)

@@ -18,9 +18,11 @@ from psvideo.solve.normals.task import Floats, Samples
 
 GRID_PX = 480
 """The grid has at most so many points along the longer side."""
-TORN, NEAR, AROUND = 5, 9, 27
-"""Slopes are added up along the edges of squares of so many points, averaged over those of the second; the rest is
-averaged over the largest."""
+TORN, NEAR = 5, 9
+"""Slopes are added up along the edges of squares of so many points, averaged over those of the second."""
+AROUND, FAR_AROUND, LEAST_AROUND = 0.1, 0.5, 7
+"""The rest is looked at around a point, over such shares of the subject's size (the root of its points), whatever the
+picture's, and over no less than so many points: their residuals are of noise as well."""
 LEAST_FACING, MOST_TORN = np.float32(0.25), np.float32(0.5)
 """Slopes are those of normals that face the camera at least so much; and around four points they count up to so much,
 since where one thing is before another they say nothing of either."""
@@ -28,6 +30,9 @@ TORN_OF_NOISE = np.float32(0.35)
 """How much of what noise does to a normal shows in slopes added up: 0.27 on nothing but noise, and a margin."""
 MOST_FIT_DEG = np.float32(24)
 """What residuals predict counts as no more around a point: a line of rows that went wrong is not its surroundings."""
+OUTLYING, TURNS, LEAST_LEVEL_DEG = np.float32(1.5), 4, np.float32(0.05)
+"""What is around counts up to so many times its typical size, found in so many turns: edges of shadows and creases are
+their own, and of no more than a few of the points."""
 LEAST_REACH = np.float32(0.2)
 """Where fewer lights reach, residuals of noise predict more: as if no less than this share of them did."""
 MOVING_DEG, OF_MOTION = np.float32(0.5), 5
@@ -42,9 +47,9 @@ LEAST_LIGHTS = 0.02
 class Doubting:
     """How much the signs count.
 
-    misfit_deg, misfit_power, little_deg: the error m that residuals predict beyond noise counts as
-        m^(1 + power) / (m + little) of these degrees: true errors depend less on it than in proportion; where it is
-        little it is noise.
+    misfit_deg, misfit_power, little_deg: the error m that residuals around predict beyond noise counts as
+        m^(1 + power) / (m + little) of these degrees: where it is little it is noise.
+    own: what a pixel's own residuals predict counts from so many times m on, wholly: a shadow's edge or a highlight.
     flat_power: the more so the flatter the lights lie: with this power of by how much they spread light that no matte
         surface gives more than well-spread lights do, for how it spreads does not average out.
     indirect: how much of the angle counts by which light from around would turn the normal.
@@ -52,19 +57,20 @@ class Doubting:
         count up to a share of the other doubt, and little more: along creases and the outline of a thing before another
         there are more, where normals are as good as elsewhere.
 
-    Fitted, with ``Judging.fit_share``, on a ball, a bear and a cat (DiLiGenT), a sphere with a wrong rig (Washington),
+    Fitted on a ball, a bear and a cat (DiLiGenT), a sphere with a wrong rig (Washington),
     another renderer's bunny, and virtual shapes of eight materials and under wrong rigs, under 5 to 96 lights, spread
     or nearly in a plane, and, with less weight, on five photographed objects of which all lights are the truth for some
     of them. Each subject left out and predicted from the others: ``python -m bench predicted``.
     """
 
-    misfit_deg: float = 1.6
-    misfit_power: float = 0.4
-    little_deg: float = 0.1
+    misfit_deg: float = 1.7
+    misfit_power: float = 0.5
+    little_deg: float = 1.0
+    own: float = 2.0
     flat_power: float = 0.5
     indirect: float = 1.0
-    torn: float = 1.85
-    torn_beside: float = 0.6
+    torn: float = 2.35
+    torn_beside: float = 0.47
     torn_alone_deg: float = 0.2
 
 
@@ -109,17 +115,20 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
     misfit of rig or surface. Raises ValueError where nobody looked for light from around."""
     if one.indirect is None:
         raise ValueError("`indirect` expected in the evidence: see indirect.py")
-    around = _mean(points.known.astype(np.float32), AROUND)
     fit = np.minimum(points.fit_deg, MOST_FIT_DEG)
     sums, counts = one.indirect
     reach = np.clip(1 - counts / np.float32(len(one.plates)), LEAST_REACH, 1)
-    squares = np.where(points.known, fit**2 - (points.fit_of_noise_deg / reach) ** 2, np.float32(0))
+    noise = (points.fit_of_noise_deg / reach) ** 2
+    squares = np.where(points.known, fit**2 - noise, np.float32(0))
     if turned_deg is not None:
         squares *= cv2.blur(turned_deg, (OF_MOTION, OF_MOTION)) < MOVING_DEG
-    indirect = np.maximum(_mean(sums, AROUND) / np.maximum(_mean(counts, AROUND), LEAST_LIGHTS), 0)
+    around, far_around = (_width(points.known, share) for share in (AROUND, FAR_AROUND))
+    far = _mean(sums, far_around) / np.maximum(_mean(counts, far_around), LEAST_LIGHTS)
+    near = _mean(sums, around) + np.float32(LEAST_LIGHTS) * far  # where all lights reach what is around, farther off
+    indirect = np.maximum(near / (_mean(counts, around) + np.float32(LEAST_LIGHTS)), 0)
     own = np.maximum(sums / np.maximum(counts, 1) - 2 * np.radians(points.noise_deg), 0)
     return Signs(
-        misfit_deg=np.sqrt(np.maximum(_mean(squares, AROUND) / around, 0)),
+        misfit_deg=np.maximum(*(_typical(squares, noise, points.known, width) for width in (around, far_around))),
         indirect_deg=np.degrees(indirect + own) * _turned(points.surface, one),
         torn_deg=np.sqrt(np.maximum(_torn_squared(points) - (TORN_OF_NOISE * points.noise_deg) ** 2, 0)),
         lost_deg=points.noise_deg * np.sqrt(1 / reach - 1),
@@ -135,6 +144,22 @@ def doubt_deg(signs: Signs, *, how: Doubting = Doubting()) -> Floats:
     most_torn = np.float32(how.torn_beside) * both + np.float32(how.torn_alone_deg)
     torn = np.float32(how.torn) * np.minimum(signs.torn_deg, most_torn)
     return np.asarray(np.hypot(both + torn, signs.lost_deg), np.float32)
+
+
+def _width(known: NDArray[np.bool_], share: float) -> int:
+    """Return an odd number of points, a share of the subject's size."""
+    return max(int(share * np.sqrt(np.count_nonzero(known))) // 2 * 2 + 1, LEAST_AROUND)
+
+
+def _typical(squares: Floats, noise: Floats, known: NDArray[np.bool_], width: int) -> Floats:
+    """Return the root of what is typical of squares around every point; what stands out counts as OUTLYING times that,
+    and as what noise makes of a few (``noise`` is its mean)."""
+    there = _mean(known.astype(np.float32), width)
+    level = np.sqrt(np.maximum(_mean(squares, width) / there, 0))
+    for _ in range(TURNS):
+        most = (OUTLYING * np.maximum(level, LEAST_LEVEL_DEG)) ** 2 + 2 * noise
+        level = np.sqrt(np.maximum(_mean(np.minimum(squares, most), width) / there, 0))
+    return np.asarray(level, np.float32)
 
 
 def _flatter(surface: Surface, one: Evidence) -> Floats:

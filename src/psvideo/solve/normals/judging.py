@@ -29,16 +29,14 @@ class Judging:
 
     most_error_deg: a normal is trusted where its predicted error is at most this: of such normals hardly any is off by
         twice as much.
-    fit_share: how much of what residuals predict counts in the pixel itself, beyond ``fit_noise`` times what noise
-        makes: so much do residuals predict of nothing but noise. (Robust solving corrects them for few lights, where
-        what is not matte does not average out.)
+    fit_noise: so many times what noise makes do residuals predict of nothing but noise. (Robust solving corrects them
+        for few lights, where what is not matte does not average out.)
     held: so many standard deviations hold 68 % of two-dimensional Gaussian errors (1.07, and some doubt).
     least_share: of the light, the least that any camera, lens and lamp is off by.
     doubting, moving: what may turn normals beyond that, and where things move.
     """
 
     most_error_deg: float = 5.0
-    fit_share: float = 0.2
     fit_noise: float = 1.95
     held: float = 1.15
     least_share: float = 0.001
@@ -46,7 +44,7 @@ class Judging:
     moving: MovingDoubt = field(default_factory=MovingDoubt)
 
 
-NOTHING = np.zeros((0, 0), np.float32)
+NOTHING, NO_DOUBT = np.zeros((0, 0), np.float32), np.zeros((2, 0, 0), np.float32)
 MANY_LIGHTS = 8
 """Beyond so many lights residuals are not taken to average out."""
 MOST_USUAL_DEG = 30.0
@@ -68,7 +66,8 @@ def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging =
     if turned_deg is not None:
         known = points.known.astype(np.float32)
         moving = moving_doubt_deg(turned_deg, signs.torn_deg, known, one.moves, how=how.moving)
-    at_points = spread.judged(points.surface, doubt, 1, how, limit_deg=0.0)[0][points.known].astype(np.float32)
+    usual = np.float32(how.doubting.own) * signs.misfit_deg
+    at_points = spread.judged(points.surface, np.stack([doubt, usual]), 1, limit_deg=0.0)[0][points.known]
     misfit = surface.misfit
     if at_points.size:
         albedo = _brightness(points.surface.albedo)[points.known]  # what is bright shows more of the subject
@@ -78,7 +77,8 @@ def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging =
         misfit = None if misfit is None else replace(misfit, error_deg=beyond_deg, noise_deg=by_noise)
     for more in (moving, near.doubt_deg if near.doubt_deg.size else None):
         doubt = doubt if more is None else np.hypot(doubt, more)
-    error, trusted = spread.judged(surface, doubt, points.step, how, limit_deg=how.most_error_deg, spare=one.spare)
+    doubt = np.stack([doubt, usual])
+    error, trusted = spread.judged(surface, doubt, points.step, limit_deg=how.most_error_deg, spare=one.spare)
     return replace(surface, valid=trusted, error_deg=error, misfit=misfit)
 
 
@@ -184,7 +184,6 @@ class _Spread:
         surface: Surface,
         doubt: Floats,
         step: int,
-        how: Judging,
         *,
         limit_deg: float,
         spare: Path | None = None,
@@ -192,13 +191,13 @@ class _Spread:
         """Return all errors in degrees, and whether they are within the limit."""
         trusted = np.empty(surface.valid.shape, np.bool_)
         error = planes_for(trusted.shape, surface.normals.dtype, pixels=trusted.size, folder=spare)
-        factors = (SURE * self.of_noise, how.fit_share, limit_deg)
+        factors = (SURE * self.of_noise, 1.0, limit_deg)
         self.fill(surface, self.fit(surface), self.noise, factors, error, doubt=doubt, step=step, trusted=trusted)
         return error, trusted
 
     def fill(
         self, surface: Surface, fit: Samples, noise: Spread, factors: tuple[float, ...], error: NDArray[np.floating], *,
-        doubt: Floats = NOTHING, step: int = 1, trusted: Mask | None = None,
+        doubt: Floats = NO_DOUBT, step: int = 1, trusted: Mask | None = None,
     ) -> None:  # fmt: skip
         """Fill ``error``, and ``trusted`` where it is asked for, as ``judge_rows`` does."""
         from psvideo.solve.normals.judging_kernel import judge_rows

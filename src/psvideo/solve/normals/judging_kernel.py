@@ -27,7 +27,8 @@ def judge_rows(
     fit: (row, col), the error in degrees that residuals predict, or residuals, or empty.
     factors: of the error that noise makes, what of ``fit`` is noise; how much of the rest counts; by what residuals
     become degrees where noise does, 0 where they are that already; and the error up to which a normal is trusted.
-    doubt: of every ``step``-th row and column, as of ``spread.dim`` and ``wider``, degrees to be added; or empty.
+    doubt: (2, row, col) of every ``step``-th row and column, as of ``spread.dim`` and ``wider``: degrees to be added,
+    and what of ``fit`` is usual around and does not count; or empty.
     """
     n, a, f, d, out, kept = lent(normals), lent(albedo), lent(fit), lent(doubt), lent(error), lent(trusted)
     dim, wider = lent(spread.dim), lent(spread.wider)
@@ -38,12 +39,13 @@ def judge_rows(
     xx, yy, zz, xy, xz, yz = inverse[0, 0], inverse[1, 1], inverse[2, 2], inverse[0, 1], inverse[0, 2], inverse[1, 2]
     of_noise, counts, degrees_of, limit = factors[0] * factors[0], factors[1], factors[2], factors[3]
     trace, holds_fit = xx + yy + zz, f.size > 0
-    beyond, sizes = np.zeros(cols, np.float32), np.zeros(cols, np.float32)
+    beyond, usual, sizes = np.zeros(cols, np.float32), np.zeros(cols, np.float32), np.zeros(cols, np.float32)
     near = dim.size > 0
     reaching, turning = np.ones(cols, np.float32), np.ones(cols, np.float32)
     for row in range(first, last):
         if d.size:
-            _fill_between(d, row, step, beyond)
+            _fill_between(d[0], row, step, beyond)
+            _fill_between(d[1], row, step, usual)
         if near:
             _fill_between(dim, row, step, reaching)
             _fill_between(wider, row, step, turning)
@@ -61,7 +63,8 @@ def judge_rows(
             if holds_fit:
                 one = decoded(f[row, col])
                 one = min(one * degrees_of * np.sqrt(wide) / size if degrees_of > ZERO else one, MOST_FIT_DEG)
-                more += counts * np.sqrt(max(one * one - of_noise * wide * (noise + of_fit), ZERO))
+                one = np.sqrt(max(one * one - of_noise * wide * (noise + of_fit), ZERO))
+                more += counts * max(one - usual[col], ZERO)
             degrees = min(np.sqrt(wide * (noise + own) + more * more), LARGEST_DEG)
             solved = sizes[col] > ZERO
             out[row, col] = encoded(degrees if solved else ZERO, out)
