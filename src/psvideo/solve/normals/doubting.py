@@ -33,6 +33,8 @@ MOST_FIT_DEG = np.float32(24)
 OUTLYING, TURNS, LEAST_LEVEL_DEG = np.float32(1.5), 4, np.float32(0.05)
 """What is around counts up to so many times its typical size, found in so many turns: edges of shadows and creases are
 their own, and of no more than a few of the points."""
+CERTAIN = np.float32(1)
+"""... beyond so many standard errors of the mean square that noise makes of so few."""
 LEAST_REACH = np.float32(0.2)
 """Where fewer lights reach, residuals of noise predict more: as if no less than this share of them did."""
 MOVING_DEG, OF_MOTION = np.float32(0.5), 5
@@ -152,14 +154,15 @@ def _width(known: NDArray[np.bool_], share: float) -> int:
 
 
 def _typical(squares: Floats, noise: Floats, known: NDArray[np.bool_], width: int) -> Floats:
-    """Return the root of what is typical of squares around every point; what stands out counts as OUTLYING times that,
-    and as what noise makes of a few (``noise`` is its mean)."""
+    """Return the root of what is typical of squares around every point, of which noise makes ``noise`` in the mean and
+    that is taken off; what stands out counts as OUTLYING times that, and as what noise makes of a few."""
     there = _mean(known.astype(np.float32), width)
-    level = np.sqrt(np.maximum(_mean(squares, width) / there, 0))
+    typical = _mean(squares, width) / there
     for _ in range(TURNS):
-        most = (OUTLYING * np.maximum(level, LEAST_LEVEL_DEG)) ** 2 + 2 * noise
-        level = np.sqrt(np.maximum(_mean(np.minimum(squares, most), width) / there, 0))
-    return np.asarray(level, np.float32)
+        most = OUTLYING**2 * np.maximum(typical, LEAST_LEVEL_DEG**2) + 2 * noise
+        typical = _mean(np.minimum(squares, most), width) / there
+    by_chance = CERTAIN * np.sqrt(2 / np.maximum(there * np.float32(width**2), 1)) * _mean(noise * known, width) / there
+    return np.asarray(np.sqrt(np.maximum(typical - by_chance, 0)), np.float32)
 
 
 def _flatter(surface: Surface, one: Evidence) -> Floats:

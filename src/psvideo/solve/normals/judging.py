@@ -48,7 +48,7 @@ NOTHING, NO_DOUBT = np.zeros((0, 0), np.float32), np.zeros((2, 0, 0), np.float32
 MANY_LIGHTS = 8
 """Beyond so many lights residuals are not taken to average out."""
 MOST_USUAL_DEG = 30.0
-SURE = 1.5
+SURE = 2.0
 """In a single pixel residuals count from so many times what noise makes of them."""
 
 
