@@ -30,6 +30,7 @@ TABLES = (
     "accuracy",
     "predicted",
     "verdicts",
+    "verdict_rigs",
 )
 
 for name in sys.argv[1:] or TABLES:

@@ -114,7 +114,7 @@ def subjects() -> Iterator[tuple[str, Case]]:
     for width_px in (96, 192, 384, 768):
         case, reached = bust((0, 1, 2, 3, 4), width_px=width_px)
         yield f"virtual bust, {width_px} px", case._replace(mask=reached)
-    for name, normals, inside in (_ball(), _waves(), _bumps()):
+    for name, normals, inside in shapes():
         for slant_deg in (30, 50):
             ways = np.concatenate([ring(8, slant_deg), ring(4, slant_deg / 2)])
             yield f"virtual {name}", shot(normals, inside, ways)
@@ -122,6 +122,11 @@ def subjects() -> Iterator[tuple[str, Case]]:
             yield f"virtual {name}", shot(normals, inside, ways, around=0.05)
             yield f"virtual {name}", shot(normals, inside, ways, gloss=0.15)
             yield f"virtual {name}", turned(shot(normals, inside, ways), 2)
+
+
+def shapes() -> tuple[tuple[str, np.ndarray, np.ndarray], ...]:
+    """Return virtual shapes: their names, normals (row, col, 3) and where they are, (row, col)."""
+    return _ball(), _waves(), _bumps()
 
 
 def _ball() -> tuple[str, np.ndarray, np.ndarray]:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from psvideo.model.light_field import Points, light_vectors, points_on_plane
+from psvideo.model.marker import turned_slot
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Light, Rig
 from psvideo.model.timing import Flash, Timing
@@ -224,3 +225,19 @@ def test_turning_renames_the_flashes_and_nothing_else(make_plan: PlanMaker) -> N
     )
     assert turned(plan, timing, 1).flashes == (replace(flash, slot=0, lights=plan.flashes[0].lights),)
     assert turned(plan, timing, 0) == timing
+
+
+@pytest.mark.parametrize("dead", range(6))
+def test_a_dead_light_that_looks_like_the_marker_is_told_from_it_by_the_rig(dead: int, make_plan: PlanMaker) -> None:
+    plan = make_plan(lights=NAMES[:6], dark=True)
+    rig = ring([0, 50, 130, 200, 260, 300], [0.8, 0.6, 0.9, 0.7, 0.95, 0.75])
+    measured = replace(rig, lights=tuple(replace(light, error_deg=0.5) for light in rig.lights))
+    (marker,) = (slot for slot in plan.cycle_slots if plan.flashes[slot].is_dark)
+    turn = next(turn for turn in range(7) if turned_slot(plan, marker, turn) == plan.lit_slots[dead])
+    lit = pictures(make_plan(lights=NAMES[:6], dark=False), measured, 0)
+    lit = {slot: lit[n] for n, slot in enumerate(plan.lit_slots)}
+    lit[plan.lit_slots[dead]] = lit[marker] = np.zeros_like(lit[plan.lit_slots[0]])
+    shown = {slot: lit[turned_slot(plan, slot, turn)] for slot in plan.lit_slots}
+    assert order_by_rig(plan, measured, shown).turn == turn
+    shown = {slot: lit[slot] for slot in plan.lit_slots}
+    assert order_by_rig(plan, measured, shown).turn == 0

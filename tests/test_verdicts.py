@@ -348,7 +348,6 @@ SOLVED = [
     _by("tilted", rig_of, "rig", {"claimed_tilt_deg": 5}, {"claimed_tilt_deg": 9}, lights=3),
     _by("tilted much", rig_of, "rig", {"claimed_tilt_deg": 14}, {"claimed_tilt_deg": 19}, "doubtful bad", lights=8),
     _by("rolled", rig_of, "rig", {"turned_deg": 8}, {"turned_deg": 10}, lights=4),
-    _by("each its own way", rig_of, "rig", {"claimed_deg": 3}, {"claimed_deg": 12}, lights=3),
     _by("away", rig_but_leaning, "rig", {"claimed_tilt_deg": 40}, {"claimed_tilt_deg": 50}, "good bad"),
     _by("sRGB as light", rig_of, "rig", {"recorded": "linear"}, {"recorded": "srgb"}, noise=0.0005),
     _by("light as sRGB", rig_of, "rig", {"recorded": "linear"}, {"recorded": "undone"}),

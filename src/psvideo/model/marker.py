@@ -5,7 +5,7 @@ skip their dark slots mark the cycle. Where turning the cycle by some flashes gi
 lights' names are not in the timing: their powers, a rig's directions or a person must say it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass
 
 from psvideo.model.plan import Plan
@@ -29,6 +29,20 @@ def alike_turns(plan: Plan) -> tuple[int, ...]:
     """Return by how many flashes the cycle can be turned without a change in when light comes, 0 first."""
     kinds = slot_kinds(plan)
     return tuple(turn for turn in range(len(kinds)) if kinds[turn:] + kinds[:turn] == kinds)
+
+
+def turns_in_the_dark(plan: Plan, dead: Set[int]) -> tuple[int, ...]:
+    """Return by how many flashes the cycle can be turned where the lights of some slots are ``dead``, which look like
+    dark slots: every slot that is then named dark must be. 0 is among them; without a dead slot, ``alike_turns``."""
+    kinds, slots = slot_kinds(plan), plan.cycle_slots
+    dark = [kind.is_dark or slot in dead for kind, slot in zip(kinds, slots, strict=True)]
+
+    def fits(turn: int) -> bool:
+        later = kinds[turn:] + kinds[:turn]
+        same = all(kind.duration_s == named.duration_s for kind, named in zip(kinds, later, strict=True))
+        return same and all(is_dark or not named.is_dark for is_dark, named in zip(dark, later, strict=True))
+
+    return tuple(turn for turn in range(len(kinds)) if fits(turn))
 
 
 def has_marker(plan: Plan) -> bool:

@@ -1,4 +1,4 @@
-"""Name the lights of a clip whose plan has no marker: by the light that the user names, or by the rig's directions.
+"""Name the lights of a clip that shows no marker: by the light that the user names, or by the rig's directions.
 
 For the rig, small plates of one cycle are rebuilt at up to three places of the clip, and only their frames are decoded.
 All places that give an order must give the same; else the order stays a guess, and the timing says why.
@@ -89,7 +89,8 @@ def _verdicts(take: Take, timing: Timing, rig: Rig) -> Iterator[RigTurn]:
             last_end = start + cycle
             pictures = _small_plates(take, timing, range(start, last_end))
             if all(slot in pictures for slot in take.plan.lit_slots):
-                yield order_by_rig(take.clip.shown_plan, rig, pictures)
+                lit = {slot: pictures[slot] for slot in take.plan.lit_slots}
+                yield order_by_rig(take.clip.shown_plan, rig, lit)
 
 
 def _whole(timing: Timing, start: int, count: int) -> bool:

@@ -1,4 +1,5 @@
-"""Which light is which, from the rig's known directions: for plans whose cycle has no marker.
+"""Which light is which, from the rig's known directions: for plans whose cycle has no marker, or one that a dead light
+looks like.
 
 Turning the names by one flash changes nothing in when light comes, but it does in where it comes from. Under the right
 names a matte surface explains every pixel; under others it would only if the rig were wrong by so and so many degrees.
@@ -7,7 +8,7 @@ for all others. It is not where the rig looks the same after the turn (a regular
 lights every picture fits. Then nothing is claimed.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from psvideo.model.camera import FloatArray
 from psvideo.model.clipping import SATURATED, SMALL_PLATE_MARGIN
 from psvideo.model.light_field import Points, light_vectors
-from psvideo.model.marker import alike_turns, has_marker, turned_slot
+from psvideo.model.marker import turned_slot, turns_in_the_dark
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Light, Rig
 from psvideo.model.timing import Timing
@@ -37,6 +38,10 @@ KEPT = 0.8
 """The share of pixels, those that fit best, by which a turn is judged: the others may lie in shadow or be glossy."""
 AWAY_DEG = 90.0
 """The error of a turn under which the surface would face away from the camera."""
+LEAST_FIRING = 4
+NOT_FIRING = 0.01
+"""Of the brightest flash's light, what a light that fires gives at least."""
+UNCLEAR = "the plan's cycle has a marker, and the picture does not show it clearly enough"
 FAINT = 0.004
 """How little normals may vary (as their squared length in one direction) until they say nothing of the lights."""
 
@@ -84,9 +89,9 @@ def why_undecided(plan: Plan, rig: Rig) -> str | None:
     Raises PsvideoError where the rig lacks a light of the plan.
     """
     lights = rig.select(plan.lights)
-    if len(plan.cycle_slots) != len(plan.flashes) or has_marker(plan):
-        return "the plan's cycle has a marker, and the picture does not show it clearly enough"
-    if len(plan.lit_slots) < 4:
+    if len(plan.cycle_slots) != len(plan.flashes):
+        return UNCLEAR
+    if len(plan.lit_slots) < LEAST_FIRING:
         return (
             f"any picture fits any order of {len(plan.lit_slots)} flashes; a fourth light, or a dark slot, would decide"
         )
@@ -106,7 +111,13 @@ def order_by_rig(plan: Plan, rig: Rig, pictures: Mapping[int, Image]) -> RigTurn
     refusal = why_undecided(plan, rig)
     if refusal is not None:
         return RigTurn(turn=None, why=refusal)
-    samples = _samples([pictures[slot] for slot in plan.lit_slots])
+    dead = dead_slots(pictures)
+    turns, firing = turns_in_the_dark(plan, dead), [slot for slot in plan.lit_slots if slot not in dead]
+    if len(turns) == 1:
+        return RigTurn(turn=None, why=UNCLEAR)
+    if len(firing) < LEAST_FIRING:
+        return RigTurn(turn=None, why=f"only {len(firing)} lights fire, and any picture fits any order of these")
+    samples = _samples([pictures[slot] for slot in firing])
     if len(samples.light) < LEAST_PIXELS:
         return RigTurn(
             turn=None,
@@ -114,8 +125,7 @@ def order_by_rig(plan: Plan, rig: Rig, pictures: Mapping[int, Image]) -> RigTurn
             f"(at least {LEAST_PIXELS} are needed)",
         )
     vectors = light_vectors(plan, rig, samples.points)
-    turns = alike_turns(plan)
-    fits = [_fit(turn, vectors[:, _named_after(plan, turn)], samples.light) for turn in turns]
+    fits = [_fit(turn, vectors[:, _named_after(plan, firing, turn)], samples.light) for turn in turns]
     return _verdict(sorted(fits, key=lambda fit: fit.rig_error_deg), _own_error_deg(rig.select(plan.lights)))
 
 
@@ -152,10 +162,16 @@ def _own_error_deg(lights: tuple[Light, ...]) -> float:
     return max(errors_deg)
 
 
-def _named_after(plan: Plan, turn: int) -> list[int]:
-    """Return for every lit slot which lit slot's light it shows after a turn."""
-    lit = plan.lit_slots
-    return [lit.index(turned_slot(plan, slot, turn)) for slot in lit]
+def dead_slots(pictures: Mapping[int, Image]) -> frozenset[int]:
+    """Return the lit slots whose light did not fire: their pictures hold hardly any of the brightest one's light."""
+    levels = {slot: float(picture.mean()) for slot, picture in pictures.items()}
+    most = max(levels.values(), default=0.0)
+    return frozenset(slot for slot, level in levels.items() if level < NOT_FIRING * most)
+
+
+def _named_after(plan: Plan, slots: Sequence[int], turn: int) -> list[int]:
+    """Return for every one of some lit slots which lit slot's light it shows after a turn."""
+    return [plan.lit_slots.index(turned_slot(plan, slot, turn)) for slot in slots]
 
 
 def _samples(pictures: list[Image]) -> _Samples:

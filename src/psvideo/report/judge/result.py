@@ -63,8 +63,8 @@ def validity(observed: Observed) -> Iterator[Judgement]:
         return
     reached = [one.measured_share for one in known if one.measured_share is not None]
     enough = bool(reached) and float(np.median(reached)) >= LEAST_VALID
-    off_deg = _off_deg(observed) or 0.0
-    by_surface = enough and max(COMMON_DEG, by_noise_deg(observed.facts)) < off_deg <= LOST_DEG
+    beyond_deg = off_deg(observed) or 0.0
+    by_surface = enough and max(COMMON_DEG, by_noise_deg(observed.facts)) < beyond_deg <= LOST_DEG
     grade: Grade = "bad" if max(shares) < HARDLY_VALID and not by_surface else "doubtful"
     if enough:
         none = usual < NONE_VALID
@@ -96,7 +96,7 @@ def _trusting(observed: Observed) -> str:
 
 def accuracy(observed: Observed) -> Iterator[Judgement]:
     """Judge how far off a typical normal is by more than noise, and what makes it so."""
-    error_deg = _off_deg(observed)
+    error_deg = off_deg(observed)
     if error_deg is None or error_deg < by_noise_deg(observed.facts):  # what noise hides cannot be told from it
         return
     amount = f"about {error_deg:.0f} degrees" if error_deg > 1.5 else "no more than about a degree"
@@ -121,7 +121,7 @@ def accuracy(observed: Observed) -> Iterator[Judgement]:
     )
 
 
-def _off_deg(observed: Observed) -> float | None:
+def off_deg(observed: Observed) -> float | None:
     """Return how far off a typical normal is by more than noise, in the mean; None where nothing says so."""
     known = [one.misfit.error_deg for one in observed.facts if one.misfit is not None]
     return MEAN_OF_HELD * float(np.median(known)) if known else None

@@ -35,10 +35,9 @@ CLEAR = 32.0
 OUTLIER = 2.0
 """Residuals are taken for Cauchy's, so many times their median wide."""
 ROUNDS, ENOUGH = 30, 1e-4
-RIDGE = 1e-3
-"""Of the mean square: what the points do not tell stays as it is."""
 LEAST_TOLD = 0.02
-"""A cylinder, the edges of a few faces and two waves tell less of some changes. (Balls: 0.04; most things: 0.4.)"""
+"""Changes that points tell so little of (eigenvalues, each unknown's size apart) are taken for none: a cylinder, waves
+or the edges of a few faces tell of some changes and not of others."""
 WIDEST, A_LITTLE = 1.5, 0.01
 """A picture's width over the focal length is no more than a lens of 24 mm gives on film. Of a lens that is not known it
 may be anything up to this: what is seen beside the axis looks turned."""
@@ -78,8 +77,7 @@ class Lens:
 
 
 def lean(surface: Surface, *, lens: Lens | None = None) -> Lean | None:
-    """Return the change that makes measured normals a surface's; None where too few of them bend,
-    or all along the same few ways.
+    """Return the change that makes measured normals a surface's; None where too few of them bend.
 
     lens: how the picture was seen; None where that is not known: by any lens, its axis in the middle of the picture.
     """
@@ -91,7 +89,7 @@ def lean(surface: Surface, *, lens: Lens | None = None) -> Lean | None:
         by_lens = (_crossed(*_in_view(n, ways, x, y, A_LITTLE)) - far) / A_LITTLE
         lens = Lens(width=float(np.clip(_fitted(far, by_lens).more, 0, WIDEST)))
     found = _fitted(_crossed(*_in_view(n, ways, x - lens.right, y - lens.up, lens.width)), None)
-    return _described(found.rows, found.gain, n) if found.told > LEAST_TOLD else None
+    return _described(found.rows, found.gain, n)
 
 
 def _bending(surface: Surface) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -132,13 +130,12 @@ def _crossed(n: FloatArray, ways: FloatArray) -> FloatArray:
 
 
 class _Fitted(NamedTuple):
-    """``rows``, c1 and c2 (2, 3); how much of one ``more`` unknown; how much less that leaves over, as a share; and how
-    well these are ``told`` from each other, 1 at best."""
+    """``rows``, c1 and c2 (2, 3); how much of one ``more`` unknown; and how much less that leaves over, as a
+    share."""
 
     rows: FloatArray
     more: float
     gain: float
-    told: float
 
 
 def _fitted(crossed: FloatArray, more: FloatArray | None) -> _Fitted:
@@ -155,15 +152,21 @@ def _fitted(crossed: FloatArray, more: FloatArray | None) -> _Fitted:
         weights = 1 / (1 + (left / width) ** 2)
         squares = np.einsum("p,pi,pj->ij", weights, slopes, slopes)
         pull = np.einsum("p,pi,p->i", weights, slopes, still)
-        before, found = found, -np.linalg.solve(squares + RIDGE * np.diag(np.diag(squares) + 1e-12), pull)
+        before, found = found, -_solved(squares, pull)
         if np.abs(found - before).max() < ENOUGH:
             break
-    sizes = np.sqrt(np.diag(squares)) + 1e-12
-    told = float(np.linalg.eigvalsh(squares / sizes / sizes[:, None])[0])
     cost, none = (float(np.mean(np.log1p((one / width) ** 2))) for one in (left, still))
     a, b, c, d, e = found[:5]
     rows = np.array([[1 + a, b, c], [d, 1 - a, e]])
-    return _Fitted(rows=rows, more=float(found[-1]), gain=none / max(cost, 1e-12) - 1, told=told)
+    return _Fitted(rows=rows, more=float(found[-1]), gain=none / max(cost, 1e-12) - 1)
+
+
+def _solved(squares: FloatArray, pull: FloatArray) -> FloatArray:
+    """Solve normal equations for what they tell of; the rest is 0."""
+    sizes = np.sqrt(np.diag(squares)) + 1e-12
+    told, ways = np.linalg.eigh(squares / sizes / sizes[:, None])
+    kept = ways[:, told > LEAST_TOLD] / np.sqrt(told[told > LEAST_TOLD])
+    return np.asarray(kept @ (kept.T @ (pull / sizes)) / sizes)
 
 
 def _described(rows: FloatArray, gain: float, normals: FloatArray) -> Lean:
