@@ -14,6 +14,7 @@ import pytest
 from psvideo.model.surface import Surface
 from psvideo.plates.align import between, flow, held, moving
 from psvideo.plates.align.comb import Comb, Schedule
+from psvideo.plates.align.moving_kernel import AT_REST, BOTH
 from psvideo.plates.align.opened import opened
 from psvideo.plates.align.packed import packed
 from psvideo.plates.align.rounds import Aligning, aligned
@@ -548,3 +549,30 @@ def test_an_open_shutter_shows_what_a_true_one_does_and_better_than_the_mean_of_
     frames = psnr_db(np.mean(each, axis=0), truth, inner)
     assert blurred > 35
     assert blurred > max(sharp, frames) + 3
+
+
+@pytest.mark.parametrize("step", [1, 2])
+@pytest.mark.parametrize("gone", [False, True], ids=["both plates", "one plate gone"])
+def test_what_moves_over_many_rows_is_whole_and_what_rests_beside_it_stays(step: int, gone: bool) -> None:
+    rows, cols, moving_cols, px = 200, 96, slice(31, 78), 70
+    y, x = np.mgrid[0:rows, 0:cols]
+    still = (0.4 + 0.2 * np.sin(2 * np.pi * 3 * y / rows) * np.cos(x / 9)).astype(np.float32)
+    frames = [still.copy(), still.copy(), still.copy()]
+    for image, shift in zip(frames, (0, px // 2, px), strict=True):
+        image[:, moving_cols] = np.roll(still[:, moving_cols], shift, axis=0)
+    before, after = (
+        LightPlate(light="a", number=n, time_s=float(n), picture=made(frames[2 * n]), seen=np.ones(rows, np.bool_))
+        for n in (0, 1)
+    )
+    moves = np.zeros((rows // step, cols // step), np.bool_)
+    moves[:, moving_cols.start // step : -(-moving_cols.stop // step)] = True
+    velocity = np.stack([np.zeros(moves.shape), px / step * moves]).astype(np.float32)
+    motion = moving.Followed(time_s=0.5, velocity=velocity, moves=moves, step=step)
+    source = np.where(moves, np.uint8(BOTH), np.uint8(AT_REST))
+    ends = between.Ends(before=None if gone else before, after=after, share=0.5)
+    plate = between.plate_at(ends, source, motion, number=0)
+    inner = slice(px // 2 + 4, rows - px // 2 - 4), slice(moving_cols.start + 4, moving_cols.stop - 4)
+    assert np.abs(plate.image - frames[1])[inner].max() < 2e-3
+    assert plate.pixels_seen.all()
+    kept = np.r_[0 : moving_cols.start - 3, moving_cols.stop + 3 : cols]
+    np.testing.assert_allclose(plate.image[:, kept], still[:, kept], rtol=0, atol=1e-5)  # held in 16 bits
