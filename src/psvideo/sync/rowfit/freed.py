@@ -21,8 +21,8 @@ STILL, PLAIN = 0.95, 0.3
 """Where a fit takes away less of the robust loss than the first (a subject that moves), a time that leaves the plan's
 value must take away this share of what is left; else it is as likely that the subject feigns it."""
 SLOWER, SLOWER_SHARE = 10.0, 5e-3
-"""What tails must take away of the robust loss beyond what a blur does, and which share of it; alone they must do better
-than a blur alone. Compressed clips without tails gave 31 and 3e-3 at most where tails were also clear of their errors,
+"""What tails must take away of the robust loss beyond what a blur does, and which share of it; alone they must do more
+than a blur. Compressed clips without tails gave 31 and 3e-3 at most where tails were also clear of their errors,
 tails of two rows through H.264 at least 22 and 0.016. Noise alone feigns 0.7."""
 SOFTER, WORTH = (0.02, 0.06, 0.18), 1.0
 """Tails, as shares of the shortest flash, that are tried where rise and fall are alike: they leave the length of a
