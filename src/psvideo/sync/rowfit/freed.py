@@ -24,6 +24,9 @@ SLOWER, SLOWER_SHARE = 10.0, 5e-3
 """What tails must take away of the robust loss beyond what a blur does, and which share of it; alone they must do more
 than a blur. Compressed clips without tails gave 31 and 3e-3 at most where tails were also clear of their errors,
 tails of two rows through H.264 at least 22 and 0.016. Noise alone feigns 0.7."""
+LONGER = 2.0
+"""Where rows are blurred too, the longer tail must be so many times the blur, whose shape is only nearly that of the
+model: compression feigned 1.0 at most beside one, tails through H.264 were 3.2 and more."""
 SOFTER, WORTH = (0.02, 0.06, 0.18), 1.0
 """Tails, as shares of the shortest flash, that are tried where rise and fall are alike: they leave the length of a
 flash as it is, so that small ones change nothing to the first order. Freeing them must take away so much at least."""
@@ -110,8 +113,9 @@ def _tails(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...], tails: t
     by_blur = max(_gain(rows, fit, blurred), 0.0)
     beyond = _gain(rows, fit, both) - by_blur
     likelier = gain > by_blur and beyond > max(SLOWER, SLOWER_SHARE * _loss(rows, fit))
-    if likelier and _clear(fit, both, tails):
-        taken = both if _gain(rows, slow, both) > WORTH else slow
+    taken = both if _gain(rows, slow, both) > WORTH else slow
+    longer = max(taken.beat.rise_s, taken.beat.fall_s) > LONGER * taken.beat.blur_s
+    if likelier and longer and _clear(fit, both, tails):
         return Freed(fit=taken, unsure_s=float(np.hypot(apart_s, 0.0 if taken is both else _more_s(slow, both))))
     doubt_s = UNTOLD * float(np.hypot(rms_apart_s(rows, fit.beat, both.beat), both.shift_error_s))
     return Freed(fit=fit, unsure_s=doubt_s, soft_s=max(slow.beat.rise_s, slow.beat.fall_s))

@@ -82,13 +82,13 @@ def jitter(plan: Plan, rows: Profiles, fit: Fit) -> Jitter:
         share = spread_s**2 / (spread_s**2 + variance)
         late_s = np.full(len(late_s), mean_s)
         late_s[timed] += share * np.clip(seen_s - mean_s, -OUTLIER * spread_s, OUTLIER * spread_s)
-    lit = (flashes.unknown > 0) & (flashes.start_s > rows.frame_start_s[0]) & (flashes.start_s < rows.frame_start_s[-1])
+    inside = (flashes.start_s > rows.frame_start_s[0]) & (flashes.start_s < rows.frame_start_s[-1])
     left = np.full(len(late_s), spread_s**2)
     left[timed] = share * variance
     return Jitter(
         start_s=flashes.start_s,
         late_s=late_s,
-        error_s=float(np.sqrt(left[lit].mean())),
+        error_s=float(np.sqrt(left[inside].mean())),
         mean_error_s=float(np.sqrt(noise / stiff[timed].sum())),
     )
 

@@ -8,9 +8,9 @@ from psvideo.model.plan import UNKNOWN_CLOCK_PPM, Plan
 from psvideo.model.units import counted
 from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
-from psvideo.sync.rowfit.search import search
+from psvideo.sync.rowfit.search import GridPlace, search
 from psvideo.sync.rowfit.seed import SEARCH_ROWS, first_guess, gain_of
-from psvideo.sync.verdict.rivals import Rival, likeliest, likely_rates, strobe_rivals
+from psvideo.sync.verdict.rivals import CLEARLY, Rival, likeliest, likely_rates, strobe_rivals
 
 STEADY = 0.02
 """Rows that change by less than this share of their light from frame to frame saw no strobe."""
@@ -144,10 +144,12 @@ def _described(plan: Plan, rival: Rival) -> str:
 
 
 def _other_strobe(plan: Plan, rows: Profiles) -> str:
-    period_s, gain = other_period(plan, rows)
+    period_s, gain, planned = other_period(plan, rows)
     flash_s = plan.flashes[plan.lit_slots[0]].duration_s
     planned_s = plan.dark_s + flash_s
     if gain < WRONG_PERIOD_GAIN or abs(period_s / planned_s - 1) < OTHER_PERIOD:
+        return ""
+    if 1 - gain > CLEARLY * (1 - planned):
         return ""
     words = (
         f"The picture looks like a strobe that flashes every {period_s * 1e3:.4g} ms, and not every "
@@ -167,16 +169,20 @@ def _other_strobe(plan: Plan, rows: Profiles) -> str:
     return f"{words}. Put the plan that it played beside the clip, or let it play this one."
 
 
-def other_period(plan: Plan, rows: Profiles) -> tuple[float, float]:
-    """Return the time from flash to flash that explains the picture best, and how much of the loss it takes away."""
+def other_period(plan: Plan, rows: Profiles) -> tuple[float, float, float]:
+    """Return the time from flash to flash that explains the picture best, how much of the loss it takes away, and how
+    much the plan's own takes away of the same few frames."""
     part = rows.take(slice(0, min(PERIOD_FRAMES, len(rows.value)))).binned(PERIOD_ROWS).one_window()
     longest_s = max(flash.duration_s for flash in plan.flashes)
     step_s = longest_s / len(part.value)
-    best = (np.inf, 0.0)
-    for period_s in np.arange(longest_s + 0.25 * rows.period_s, 2.5 * rows.period_s, step_s):
-        tried = replace(plan, dark_s=float(period_s) - longest_s)
-        place = search(tried, part, range_ppm=0.0, start=first_guess(plan), readout_known=True)[0]
-        best = min(best, (place.loss, float(period_s)))
-    tried = replace(plan, dark_s=best[1] - longest_s)
-    place = search(tried, part, range_ppm=0.0, start=first_guess(plan), readout_known=True)[0]
-    return best[1], gain_of(part, unexplained(tried, part, place.beat))
+
+    def best(dark_s: float) -> GridPlace:
+        tried = replace(plan, dark_s=dark_s)
+        return search(tried, part, range_ppm=0.0, start=first_guess(plan), readout_known=True)[0]
+
+    def gain(dark_s: float) -> float:
+        return gain_of(part, unexplained(replace(plan, dark_s=dark_s), part, best(dark_s).beat))
+
+    periods_s = np.arange(longest_s + 0.25 * rows.period_s, 2.5 * rows.period_s, step_s).tolist()
+    period_s = min(periods_s, key=lambda one_s: best(one_s - longest_s).loss)
+    return period_s, gain(period_s - longest_s), gain(plan.dark_s)

@@ -14,7 +14,7 @@ import numpy as np
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.search import search
-from psvideo.sync.rowfit.seed import MISNAMED_PPM, SEARCH_ROWS, first_guess, seeded
+from psvideo.sync.rowfit.seed import MISNAMED_PPM, first_guess, seeded
 
 SHUTTERS_DEG = (360.0, 270.0, 240.0, 216.0, 180.0, 172.8, 144.0, 120.0, 90.0, 72.0, 60.0, 45.0, 22.5, 11.25)
 SHUTTERS_S = tuple(1.0 / n for n in (24, 25, 30, 48, 50, 60, 96, 100, 120, 125, 160, 200, 240, 250, 500, 1000))
@@ -23,8 +23,10 @@ RATES_HZ = (24, 25, 30, 48, 50, 60, 96, 100, 120, 200, 240)
 APART = 0.04
 """Exposures that differ by less than this share are one, and the fit's own business where one is the plan's."""
 LEAST_FRAMES = 24
+ROUGH_ROWS = 18
+"""Rows of the rough search of all rivals, which only decides what is looked at closely;"""
 SCREENED = 4
-"""Rivals that are looked at closely after a rough search of all."""
+"""rivals that are looked at closely after a rough search of all."""
 CLEARLY, BETTER = 0.5, 0.85
 """A rival is believed where it leaves less than this share of the robust loss that the plan leaves; the second, where
 the plan's own fit is out of the question and the rival's will be judged for itself."""
@@ -132,7 +134,7 @@ def _at_rate_of(plan: Plan, rows: Profiles) -> Profiles:
 def _rough_loss(rival: Rival, rows: Profiles) -> float:
     plan = rival.plan
     guess, known = first_guess(plan), plan.camera.readout_s is not None
-    part = _at_rate_of(plan, rows.turned() if guess.upward else rows).binned(SEARCH_ROWS)
+    part = _at_rate_of(plan, rows.turned() if guess.upward else rows).binned(ROUGH_ROWS)
     reach = max(plan.clock_range_ppm, MISNAMED_PPM)
     return search(plan, part, range_ppm=reach, start=guess, readout_known=known)[0].loss
 
