@@ -28,6 +28,8 @@ HANGS_S = 300.0
 CAPABILITIES_V3 = 0x20080522
 OVERRIDES = 0b110
 """CAP_DAC_OVERRIDE and CAP_DAC_READ_SEARCH: what lets root write where nobody may (capabilities(7))."""
+FILE_CALLS = "%file,read,write,pread64,pwrite64,lseek,fsync,close,getdents64"
+"""What a program asks of a disk, by strace's names."""
 SMALLEST_BYTES = 64
 PAGE_BYTES = 4096
 
@@ -196,6 +198,22 @@ def _clock_jumps(rng: np.random.Generator, scene: Scene) -> Fault:
     return Fault(when=f"the clock {jump_s:+g} s", inside=inside)
 
 
+def _slow_disk(rng: np.random.Generator, scene: Scene) -> Fault:
+    later_us = int(rng.uniform(500, 10_000))
+    tracing: list[subprocess.Popen[bytes]] = []
+
+    def outside(child: int) -> None:
+        injected = f"inject={FILE_CALLS}:delay_exit={later_us}"
+        call = ["strace", "-f", "-qq", "-o", os.devnull, "-p", str(child), "-e", f"trace={FILE_CALLS}", "-e", injected]
+        tracing.append(subprocess.Popen(call))
+
+    def mended() -> None:
+        for one in tracing:  # it ends with what it traces
+            one.wait(HANGS_S)
+
+    return Fault(when=f"on a disk slower by {later_us} us a call", after_s=0.0, outside=outside, mended=mended)
+
+
 FAULTS: dict[str, Callable[[np.random.Generator, Scene], Fault]] = {
     "killed": _signalled("killed", signal.SIGKILL),
     "SIGTERM": _signalled("SIGTERM", signal.SIGTERM),
@@ -210,6 +228,7 @@ FAULTS: dict[str, Callable[[np.random.Generator, Scene], Fault]] = {
     "read-only": _read_only,
     "pipe closed": _nobody_reads,
     "clock jumps": _clock_jumps,
+    "slow disk": _slow_disk,
 }
 """By name, what makes one at a random moment or of a random size."""
 
