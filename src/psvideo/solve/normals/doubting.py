@@ -124,7 +124,7 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
     squares = np.where(points.known, fit**2 - noise, np.float32(0))
     if turned_deg is not None:
         squares *= cv2.blur(turned_deg, (OF_MOTION, OF_MOTION)) < MOVING_DEG
-    around, far_around = (_width(points.known, share) for share in (AROUND, FAR_AROUND))
+    around, far_around = (width_of(points.known, share) for share in (AROUND, FAR_AROUND))
     far = _mean(sums, far_around) / np.maximum(_mean(counts, far_around), LEAST_LIGHTS)
     near = _mean(sums, around) + np.float32(LEAST_LIGHTS) * far  # where all lights reach what is around, farther off
     indirect = np.maximum(near / (_mean(counts, around) + np.float32(LEAST_LIGHTS)), 0)
@@ -148,8 +148,8 @@ def doubt_deg(signs: Signs, *, how: Doubting = Doubting()) -> Floats:
     return np.asarray(np.hypot(both + torn, signs.lost_deg), np.float32)
 
 
-def _width(known: NDArray[np.bool_], share: float) -> int:
-    """Return an odd number of points, a share of the subject's size."""
+def width_of(known: NDArray[np.bool_] | Floats, share: float) -> int:
+    """Return how many points, an odd number, are a share of the size of a subject of all ``known`` ones."""
     return max(int(share * np.sqrt(np.count_nonzero(known))) // 2 * 2 + 1, LEAST_AROUND)
 
 

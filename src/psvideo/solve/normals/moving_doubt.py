@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from psvideo.plates.align.own_means import own_mean
-from psvideo.solve.normals.doubting import ThinSurface
+from psvideo.solve.normals.doubting import ThinSurface, width_of
 from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.task import Floats, Mask
 
@@ -16,14 +16,15 @@ class MovingDoubt:
     """How much counts that plates before and after an instant disagree along the motion.
 
     own: how much of the angle that this makes in a pixel itself.
-    around_deg, around_px: where the mean angle over a square of so many points is so large, it counts as well, and the
-        square of it elsewhere: where most of what is around is not explained, what fits does so by chance.
+    around_deg, around: where the mean angle over a square of such a share of the subject's size is so large, it counts
+        as well, and the square of it elsewhere: where most of what is around is not explained, what fits does so by
+        chance.
     torn, least_torn_deg: how much of the angle counts by which normals belong to no surface, beyond what creases and
         outlines of a painted bust at rest make of it.
-    torn_px, least_around_deg, torn_around_deg: and of its mean over a square of so many points, beyond the first, the
+    torn_around, least_around_deg, torn_around_deg: and of its mean over a square of such a share, beyond the first, the
         square over the second: what is wrong throughout (blades, a checker) is hardly torn in the middle of a facet.
-    near_px, stirring_deg, stirring_share: all of that where anything stirs: motion turns at least such a share of so
-        many points by more than such an angle, or is followed there.
+    near, stirring_deg, stirring_share: all of that where anything stirs: motion turns at least such a share of a square
+        so wide by more than such an angle, or is followed there.
 
     Fitted on a mottled ball, a painted bust and a bare box of 3, 5 and 8 lights that slide, spin and tumble by 1 to 16
     px from flash to flash: nine tenths of what is measured is off by no more than twice what is predicted. What is torn
@@ -32,13 +33,13 @@ class MovingDoubt:
 
     own: float = 1.6
     around_deg: float = 3.0
-    around_px: int = 27
+    around: float = 0.1
     torn: float = 1.0
     least_torn_deg: float = 3.0
     least_around_deg: float = 2.0
-    torn_px: int = 41
+    torn_around: float = 0.15
     torn_around_deg: float = 2.0
-    near_px: int = 81
+    near: float = 0.3
     stirring_deg: float = 0.5
     stirring_share: float = 0.02
 
@@ -73,7 +74,7 @@ def moving_doubt_deg(
     the lights show edges beside each other, and normals between them fit nothing around. What moves and what stands
     still, on a grid of its own, ``moves``, do not speak for each other.
     """
-    size, own = (how.around_px, how.around_px), np.zeros(known.shape, np.bool_)
+    size, own = (width_of(known, how.around),) * 2, np.zeros(known.shape, np.bool_)
     if moves is not None:
         grown = cv2.resize(moves.astype(np.uint8), known.shape[::-1], interpolation=cv2.INTER_NEAREST)
         own = grown > 0
@@ -86,7 +87,7 @@ def moving_doubt_deg(
 
 
 def _torn_doubt(turned_deg: Floats, torn_deg: Floats, known: Floats, moves: Mask, how: MovingDoubt) -> Floats:
-    near, size = (how.near_px, how.near_px), (how.torn_px, how.torn_px)
+    near, size = ((width_of(known, share),) * 2 for share in (how.near, how.torn_around))
     stirs = cv2.blur(((turned_deg > how.stirring_deg) | moves).astype(np.float32), near)
     around = cv2.blur(torn_deg * known, size) / np.maximum(cv2.blur(known, size), np.float32(1e-6))
     own = np.maximum(torn_deg - np.float32(how.least_torn_deg), 0)
