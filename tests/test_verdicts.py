@@ -25,6 +25,7 @@ from psvideo.report.observe.motion import glimpse, motion
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rigpoints import rig_points
 from psvideo.report.observe.shadow import shadow_light
+from psvideo.report.observe.yuille1997 import Lean
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.solving import Solving
 
@@ -467,6 +468,20 @@ def test_validity_is_counted_over_the_subject_filled_or_not_before_a_dim_backdro
         (facts,) = replace(one, backdrop=backdrop).observed(0).facts
         assert facts.valid_share is not None
         assert 0.48 < facts.valid_share < 0.58, "of the ball; what is behind it counts neither way"
+
+
+def test_lights_nearly_in_a_plane_are_named_where_normals_lean_and_the_rig_is_not_blamed_alone() -> None:
+    one = Footage(solved=True).observed(0)
+    one.leans[:] = [Lean(lean_deg=20.0, gain=1.0, turn_deg=(20.0, 0.0, 0.0), rest_deg=0.2)]
+    (line,) = rig_of(one)
+    assert (line.grade, "tilted up or down as a whole by about 20 degrees" in line.found) == ("bad", True)
+    assert one.points is not None
+    one.points = replace(one.points, vectors=one.points.vectors * [1, 1, 0.05])
+    one.light_at_points.clear()
+    (line,) = (each for each in rig_of(one) if "lean" in each.found)
+    assert (line.grade, "nearly in a plane" in line.found) == ("doubtful", True)
+    one.facts[:] = [replace(facts, clipped_share=0.2) for facts in one.facts]
+    assert not any("lean" in each.found for each in rig_of(one)), "what clips leans normals, too"
 
 
 def test_a_dead_light_among_enough_others_is_named_and_left_out_and_the_rig_is_still_checked() -> None:

@@ -43,7 +43,7 @@ MOST_FLAT = 6.5
 """Lights of a larger condition number lie nearly in a plane: gloss and light from around lean normals under the right
 rig as well, on photographs by 9 to 15 degrees."""
 FLAT = (
-    "Normals that lean otherwise, by about {:.0f} degrees, would be those of one surface: the lights lie nearly in a "
+    "The normals are not quite those of one surface, and would be if all leaned otherwise: the lights lie nearly in a "
     "plane, so that gloss, light from around or a rig that is a little off turn all of them."
 )
 TURNED = ("tilted up or down", "swung to the left or right", "rolled around the line of sight")
@@ -186,7 +186,7 @@ def _leaning(observed: Observed) -> Judgement | None:
     return Judgement(
         subject="rig",
         grade="bad" if exact and not flat and _lost(usual, shown_deg) else "doubtful",
-        found=FLAT.format(usual.lean_deg) if flat else _leaning_words(usual, whole=whole, exact=exact),
+        found=FLAT if flat else _leaning_words(usual, whole=whole, exact=exact),
         advice="Add lights from other sides, farther from the plane of these."
         if flat
         else "Measure the lights again with the camera where it stands. If the picture is cropped at one side, or the "
