@@ -18,6 +18,8 @@ LOST_DEG = 15.0
 MEAN_OF_HELD = 0.83
 """Predicted errors hold two thirds of the true ones; this is the mean as a share of it, for errors in two directions
 (Rayleigh)."""
+LITTLE_NOISE_DEG = 1.0
+"""Where noise turns normals by less, more light makes none of them trusted."""
 NOT_MATTE = 0.1
 """From this share of the light on that another rig would explain and this one cannot, directions are doubted."""
 MOVING_FACTOR = 2.0
@@ -71,9 +73,8 @@ def validity(observed: Observed) -> Iterator[Judgement]:
         yield Judgement(
             subject="validity",
             grade=grade,
-            found=f"{found}, though three lights reach {100 * np.median(reached):.0f} %: "
-            "elsewhere the predicted error is too large."
-            + (" These normals serve a look, and no measurement." if none else ""),
+            found=f"Three lights reach {100 * np.median(reached):.0f} % of the subject, and {found}: elsewhere its "
+            "predicted error is too large." + (" These normals serve a look, and no measurement." if none else ""),
             advice=_trusting(observed),
             decisive=none,
         )
@@ -89,9 +90,12 @@ def validity(observed: Observed) -> Iterator[Judgement]:
 
 def _trusting(observed: Observed) -> str:
     """Say what would make more normals to be trusted: what accuracy says is to blame, or more light where noise is."""
-    if any(one.grade != "good" for one in accuracy(observed)):
+    said = any(one.grade != "good" for one in accuracy(observed))
+    if said and by_noise_deg(observed.facts) < LITTLE_NOISE_DEG:
         return "Do what is said of accuracy; more light does not help."
-    return 'Give more light, or use more lights; `aov=["error"]` says how far off each pixel may be.'
+    return "Give more light, or use more lights" + (
+        "." if said else '; `aov=["error"]` says how far off each pixel may be.'
+    )
 
 
 def accuracy(observed: Observed) -> Iterator[Judgement]:
