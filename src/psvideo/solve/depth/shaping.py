@@ -112,7 +112,7 @@ def reservations(shaping: Shaping) -> tuple[str, ...]:
         said.append(
             "Depth was integrated for an orthographic view, because the rig has no [camera] focal_px: it is relative, "
             "in widths of the picture about a median of 1, and bends a subject that is near the camera. Give the focal "
-            "length in pixels: there, or to stills as --focal-px."
+            "length."
         )
     if shaping.first is not None and shaping.first.parts > 1:
         said.append(
