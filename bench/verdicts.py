@@ -42,7 +42,7 @@ class Subject:
     word: str = "This take is usable"
     aside: tuple[int, ...] = field(default=())
 
-    def choose(self, lights: tuple[int, ...], *, word: str = "This take is usable") -> "Subject":
+    def choose(self, lights: tuple[int, ...]) -> "Subject":
         """Return the same subject under some of its lights."""
         chosen = list(lights)
         return Subject(
@@ -54,7 +54,7 @@ class Subject:
             dark=self.dark,
             transfer=self.transfer,
             truth=self.truth,
-            word=word,
+            word=self.word,
         )
 
     def solved(self, folder: Path) -> RunReport:
@@ -91,7 +91,7 @@ def subjects() -> Iterator[Subject]:
         whole = _diligent(SHARED_DATA / "diligent_photos" / thing, thing)
         yield whole
         yield whole.choose(TWELVE)
-        yield whole.choose(EIGHT, word="This take is doubtful")
+        yield whole.choose(EIGHT)
     ball = _diligent(SHARED_DATA / "diligent_ball", "ball")
     yield ball
     yield ball.choose((0, 5, 9, 14, 17, 22, 27, 31, 34, 38, 43, 46))
@@ -151,7 +151,6 @@ def _washington(thing: str) -> Subject:
         mask=folder / thing / f"{thing}.mask.png",
         transfer="linear",
         truth=truth,
-        word="This take is usable" if thing == "gray" else "This take is doubtful",
     )
 
 

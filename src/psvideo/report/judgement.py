@@ -12,15 +12,12 @@ DECISIVE = ("strobe", "timing", "order", "rig")
 @dataclass(frozen=True, kw_only=True)
 class Judgement:
     """One line of a judgement. ``subject`` is a word such as ``exposure``; ``found`` a sentence with its figures;
-    ``advice`` what to change on set, empty where there is nothing to change. ``unknown``: it could not be judged.
-    ``decisive``: where this is doubtful, all normals may be wrong, as they may where one of the DECISIVE subjects is.
-    """
+    ``advice`` what to change on set, empty where there is nothing to change. ``unknown``: it could not be judged."""
 
     subject: str
     grade: Grade
     found: str
     advice: str = ""
-    decisive: bool = False
 
     @property
     def sentence(self) -> str:
@@ -43,7 +40,7 @@ def verdict_of(judgements: Sequence[Judgement]) -> str:
     if "bad" in grades:
         subjects = list(dict.fromkeys(one.subject for one in judgements if one.grade == "bad"))
         return f"This take is not usable as it is: {', '.join(subjects)}."
-    if any(one.grade == "doubtful" and (one.decisive or one.subject in DECISIVE) for one in judgements):
+    if any(one.grade == "doubtful" and one.subject in DECISIVE for one in judgements):
         return "This take is doubtful: see below before using it."
     return "This take is usable." if "doubtful" not in grades else "This take is usable, with reservations."
 

@@ -69,14 +69,13 @@ def validity(observed: Observed) -> Iterator[Judgement]:
     by_surface = enough and max(COMMON_DEG, by_noise_deg(observed.facts)) < beyond_deg <= LOST_DEG
     grade: Grade = "bad" if max(shares) < HARDLY_VALID and not by_surface else "doubtful"
     if enough:
-        none = usual < NONE_VALID
         yield Judgement(
             subject="validity",
             grade=grade,
             found=f"Three lights reach {100 * np.median(reached):.0f} % of the subject, and {found}: elsewhere its "
-            "predicted error is too large." + (" These normals serve a look, and no measurement." if none else ""),
+            "predicted error is too large."
+            + (" These normals serve a look, and no measurement." if usual < NONE_VALID else ""),
             advice=_trusting(observed),
-            decisive=none,
         )
         return
     yield Judgement(
