@@ -39,7 +39,7 @@ class Footage:
     """A painted ball in the void, or a wall of waves, under a few lights, filmed for a few rounds.
 
     stops: where its brightest hundredth (0.5 %) lies below saturation under the first light; ``clip`` instead: the
-        share of it that the first light clips, or all of them do. gains: of each light, (light,) or (round, light).
+        share of it that the first ``clipping`` lights clip. gains: of each light, (light,) or (round, light).
     noise: of saturation. dark: a part of the subject where only two lights reach. ambient: by round, as a share of what
         an exposure holds. blur_px, shift_px: of the picture, and how far it moves from round to round.
     claimed_deg, turned_deg, claimed_tilt_deg, claimed_gain: by how much the rig's directions are off, each its own way;
@@ -54,7 +54,7 @@ class Footage:
     rounds: int = 1
     stops: float = -0.5
     clip: float | None = None
-    clip_all: bool = False
+    clipping: int = 1
     gains: Sequence[float] | Sequence[Sequence[float]] = (1.0,)
     noise: float = 0.001
     dark: float = 0.0
@@ -131,8 +131,8 @@ class Footage:
         scale = target / float(np.quantile(lit, 0.995 if self.clip is None else 1 - self.clip))
         gains = np.asarray(self.gains, np.float64)
         gains = np.resize(gains[number] if gains.ndim == 2 else gains, self.lights)
-        if self.clip is not None and not self.clip_all:
-            gains = np.where(np.arange(self.lights) == 0, gains, 0.3 / scale)
+        if self.clip is not None:
+            gains = np.where(np.arange(self.lights) < self.clipping, gains, 0.3 / scale)
         return [shade * scale * gain for shade, gain in zip(shades, gains, strict=True)]
 
     def _dark_level(self, clean: Sequence[np.ndarray], number: int) -> float:
@@ -291,8 +291,9 @@ LIT = [
     _by("dark", exposure, "exposure", {"stops": -5.8}, {"stops": -6.3}, "doubtful bad"),
     _by("clips", exposure, "clipping", {"clip": 0.016}, {"clip": 0.025}, "nothing doubtful", noise=0),
     _by("clips much", exposure, "clipping", {"clip": 0.23}, {"clip": 0.27}, "doubtful bad", noise=0),
+    _by("five are spared", exposure, "clipping", {"lights": 6}, {"lights": 5}, "doubtful bad", noise=0, clip=0.4),
     _by("clips much of three", exposure, "clipping", {"clip": 0.09}, {"clip": 0.11}, "doubtful bad", noise=0, lights=3),
-    _by("all clip", exposure, "clipping", {"clip": 0.16}, {"clip": 0.3}, "doubtful bad", noise=0, clip_all=True),
+    _by("all clip", exposure, "clipping", {"clip": 0.16}, {"clip": 0.3}, "doubtful bad", noise=0, clipping=5),
     _by("weak", lamps, "lights", {"gains": [1, 0.15, 1, 1, 1]}, {"gains": [1, 0.1, 1, 1, 1]}),
     _by("dead", lamps, "lights", {"gains": [1, 0.012, 1]}, {"gains": [1, 0.008, 1]}, "doubtful bad", lights=3),
     _by("missed", lamps, "lights", {"gains": missing(1, 0.55)}, {"gains": missing(1, 0.45)}, rounds=12),

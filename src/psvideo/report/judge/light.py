@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.levels import TARGET_QUANTILE, Levels
 from psvideo.report.observe.observed import NO_LIGHT, InstantFacts, Observed
+from psvideo.solve.normals.solving import ROBUST_FROM_LIGHTS
 
 DIM_STOPS, DARK_STOPS = -3.5, -6.0
 """A take whose brightest lamp's brightest parts stay so far below saturation is noisy, or lost in noise."""
@@ -18,7 +19,7 @@ a white wall differs by a photograph's contrast, some 8 times."""
 MOST_CLIPPED, LOST_CLIPPED = 0.02, 0.1
 """Shares of the subject that one lamp may clip: more costs normals there, and with three lamps all of them."""
 SPARE_CLIPPED = 0.25
-"""With more lamps than three the others still give the normal."""
+"""With more lamps than three the others still give the normal; where enough for robust solving clip less, always."""
 MEASURED, FAINT_AMBIENT = 0.8, 0.02
 """Without a dark slot: the share of the picture that must stand still, unless there is less ambient light than this."""
 MOST_AMBIENT, LOST_AMBIENT = 0.1, 0.5
@@ -81,7 +82,8 @@ MORE_LIGHT = (
 
 def _clipping(levels: dict[str, Levels]) -> Iterator[Judgement]:
     over = {light: one for light, one in levels.items() if one.clipped_share > MOST_CLIPPED}
-    lost = LOST_CLIPPED if len(levels) < 4 else SPARE_CLIPPED
+    lost = SPARE_CLIPPED if len(levels) > LEAST_LIGHTS else LOST_CLIPPED
+    few = sum(one.clipped_share <= lost for one in levels.values()) < ROBUST_FROM_LIGHTS
     if len(over) == len(levels) > 1:
         power = min(one.right_power() for one in over.values())
         shares = [one.clipped_share for one in over.values()]
@@ -95,10 +97,9 @@ def _clipping(levels: dict[str, Levels]) -> Iterator[Judgement]:
         return
     whole = [one for one in levels.values() if one.clipped_share <= 1 - TARGET_QUANTILE]
     if len(over) > NAMED:
-        shares = [one.clipped_share for one in over.values()]
         yield Judgement(
             subject="clipping",
-            grade="bad" if max(shares) > lost else "doubtful",
+            grade="bad" if few and max(one.clipped_share for one in over.values()) > lost else "doubtful",
             found=f"{len(over)} of {len(levels)} lights clip: "
             f"{first_of({light: one.clipped_share for light, one in over.items()})} of the subject.",
             advice="Lower their powers (or durations) to about "
@@ -108,7 +109,7 @@ def _clipping(levels: dict[str, Levels]) -> Iterator[Judgement]:
     for light, one in over.items():
         yield Judgement(
             subject="clipping",
-            grade="bad" if one.clipped_share > lost else "doubtful",
+            grade="bad" if few and one.clipped_share > lost else "doubtful",
             found=f"The flash of {light!r} is clipped in {100 * one.clipped_share:.0f} % of the subject.",
             advice=f"Lower its power (or its duration) to about {_percent(one.right_power(whole))}.",
         )
