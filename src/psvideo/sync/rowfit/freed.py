@@ -121,10 +121,12 @@ def _tails(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...], tails: t
 
 
 def _longer(taken: Fit, joint: Fit) -> bool:
-    """Tell whether tails that may be taken are far longer than the blur that was found beside tails."""
-    none_s = 1.01 * LEAST_BLUR_ROWS * joint.beat.row_time_s
-    beside_s = joint.beat.blur_s if joint.beat.blur_s > none_s else taken.beat.blur_s
-    return max(taken.beat.rise_s, taken.beat.fall_s) > LONGER * beside_s
+    """Tell whether tails that may be taken are far longer than the blur that was found beside tails, and longer than
+    one that is too small to be found."""
+    least_s = LEAST_BLUR_ROWS * joint.beat.row_time_s
+    is_blurred = joint.beat.blur_s > 1.01 * least_s
+    beyond_s = LONGER * joint.beat.blur_s if is_blurred else max(LONGER * taken.beat.blur_s, least_s)
+    return max(taken.beat.rise_s, taken.beat.fall_s) > beyond_s
 
 
 def _more_s(one: Fit, other: Fit) -> float:
