@@ -136,3 +136,11 @@ def test_the_command_line_leaves_huge_pages_alone_unless_the_user_wants_them(sai
     kept = {name: value for name, value in os.environ.items() if name != "NUMPY_MADVISE_HUGEPAGE"}
     done = subprocess.run([sys.executable, "-c", ask], capture_output=True, text=True, check=True, env=kept | said)
     assert done.stdout.split()[-1] == huge
+
+
+@pytest.mark.parametrize(("said", "threads"), [({}, "1"), ({"OPENBLAS_NUM_THREADS": "2"}, "2")])
+def test_linear_algebra_has_no_threads_of_its_own_unless_wanted(said: dict[str, str], threads: str) -> None:
+    ask = "import os; from psvideo.cli.app import main; main(['--version']); print(os.environ['OPENBLAS_NUM_THREADS'])"
+    kept = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
+    done = subprocess.run([sys.executable, "-c", ask], capture_output=True, text=True, check=True, env=kept | said)
+    assert done.stdout.split()[-1] == threads

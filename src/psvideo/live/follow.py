@@ -19,7 +19,7 @@ from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat, FoundClock
 from psvideo.sync.rowfit.profiles import Profiles, brightnesses, unexplained
-from psvideo.sync.rowfit.refine import CAUCHY, explained, projected, sandwich, scaled
+from psvideo.sync.rowfit.refine import CAUCHY, GLOBALS, explained, projected, sandwich, scaled
 from psvideo.sync.rowfit.seed import GOOD_SEED, gain_of
 from psvideo.sync.rowfit.track import MOST, SUSPICIOUS, losses_of
 from psvideo.sync.verdict.believed import MIN_EXPLAINED, MIN_GAIN
@@ -38,8 +38,6 @@ HELD = 0.33
 """A correction moves the clock by no more than this share of a flash."""
 STEP_COST = 0.02
 """What every frame that is taken for missing costs, in mean losses of a frame: cycles may look alike."""
-GLOBALS = 5
-"""Times that the fit could set free and that are held here: exposure, row time, rise and fall."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -219,7 +217,7 @@ def _shift(plan: Plan, rows: Profiles, beat: Beat, rest: FloatArray) -> tuple[fl
     """Return by how much all flashes come later than a beat says, and the standard error: one robust step."""
     scale = scaled(rows, rest, 0.0)
     weight = 1.0 / (1.0 + (rest / (CAUCHY * scale)) ** 2) / scale**2
-    basis = np.zeros((len(rows.window_start) + 1 + GLOBALS, 1))
+    basis = np.zeros((len(rows.window_start) + 1 + len(GLOBALS), 1))  # what a fit may free is held here
     basis[: len(rows.window_start) + 1] = 1.0
     _, hessian, scores = projected(plan, rows, beat, weight, basis, tails=False)
     shortest_s = min(plan.flashes[slot].duration_s for slot in plan.lit_slots)

@@ -10,6 +10,9 @@ from dataclasses import dataclass
 
 from psvideo.model.plan import Plan
 
+NOT_FIRING = 0.01
+"""Of the strongest light's, what a light that fires gives at least: with less it looks like a dark slot."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class SlotKind:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from psvideo.model.camera import FloatArray
 from psvideo.model.clipping import SATURATED, SMALL_PLATE_MARGIN
 from psvideo.model.light_field import Points, light_vectors
-from psvideo.model.marker import turned_slot, turns_in_the_dark
+from psvideo.model.marker import NOT_FIRING, turned_slot, turns_in_the_dark
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Light, Rig
 from psvideo.model.timing import Timing
@@ -39,8 +39,6 @@ KEPT = 0.8
 AWAY_DEG = 90.0
 """The error of a turn under which the surface would face away from the camera."""
 LEAST_FIRING = 4
-NOT_FIRING = 0.01
-"""Of the brightest flash's light, what a light that fires gives at least."""
 UNCLEAR = "the plan's cycle has a marker, and the picture does not show it clearly enough"
 FAINT = 0.004
 """How little normals may vary (as their squared length in one direction) until they say nothing of the lights."""

@@ -5,9 +5,10 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.model.marker import NOT_FIRING
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.levels import TARGET_QUANTILE, Levels
-from psvideo.report.observe.observed import NO_LIGHT, InstantFacts, Observed
+from psvideo.report.observe.observed import InstantFacts, Observed
 from psvideo.solve.normals.solving import ROBUST_FROM_LIGHTS
 
 DIM_STOPS, DARK_STOPS = -3.5, -6.0
@@ -193,7 +194,7 @@ def _weak(
 ) -> Iterator[Judgement]:
     """Say which lamps give little. One that comes from the side gives the subject little, and its parts enough."""
     dim = (relative < WEAK_LIGHT) & (brightest < WEAK_LIGHT)
-    weak = [light for light, share, is_dim in zip(lights, relative, dim, strict=True) if is_dim and share >= NO_LIGHT]
+    weak = [light for light, share, is_dim in zip(lights, relative, dim, strict=True) if is_dim and share >= NOT_FIRING]
     if len(weak) > NAMED:
         yield Judgement(
             subject="lights",
@@ -205,8 +206,8 @@ def _weak(
     if relative.max() <= 0:  # nothing is lit, which is said once
         return
     for light, share, is_dim, says in zip(lights, relative, dim, claimed, strict=True):
-        if share < NO_LIGHT:
-            others = int((relative >= NO_LIGHT).sum())
+        if share < NOT_FIRING:
+            others = int((relative >= NOT_FIRING).sum())
             enough = others >= LEAST_LIGHTS
             yield Judgement(
                 subject="lights",

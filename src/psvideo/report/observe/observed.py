@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.clip import Masks
+from psvideo.model.marker import NOT_FIRING
 from psvideo.model.surface import Misfit, Surface
 from psvideo.plates.ambient_regression import Separated
 from psvideo.plates.light_plate import LightPlate
@@ -34,8 +35,6 @@ LIT = 0.01
 of dark takes, than a sixth of their brightest hundredth."""
 DARKEST = 1 / 6
 FAINT = 2.0**-12
-NO_LIGHT = 0.01
-"""A lamp that gives less than this share of the strongest does not fire."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -279,7 +278,7 @@ class Observed:
         if not known:
             return np.ones(len(self.lights), np.bool_)
         usual = np.median(np.array(known), axis=0)
-        return np.asarray(usual >= NO_LIGHT * usual.max(), np.bool_)
+        return np.asarray(usual >= NOT_FIRING * usual.max(), np.bool_)
 
     @property
     def rig_fit(self) -> RigFit | None:
