@@ -144,3 +144,9 @@ def test_linear_algebra_has_no_threads_of_its_own_unless_wanted(said: dict[str, 
     kept = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
     done = subprocess.run([sys.executable, "-c", ask], capture_output=True, text=True, check=True, env=kept | said)
     assert done.stdout.split()[-1] == threads
+
+
+def test_python_looks_seldom_for_circles_of_objects() -> None:
+    ask = "import gc; from psvideo.cli.app import main; main(['--version']); print(gc.get_threshold()[0])"
+    done = subprocess.run([sys.executable, "-c", ask], capture_output=True, text=True, check=True)
+    assert int(done.stdout.split()[-1]) >= 10_000
