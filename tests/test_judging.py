@@ -77,6 +77,24 @@ def test_light_by_way_of_other_surfaces_is_seen_where_lights_do_not_reach() -> N
     assert np.median(predicted) > 1.5 * np.median(without)
 
 
+def test_black_cloth_behind_a_subject_says_nothing_of_it() -> None:
+    normals, inside = ball()
+    lights = ring(8, 35)
+    shade = np.maximum(np.einsum("rcx,lx->lrc", normals, lights), 0) * 0.5
+    cloth = 0.007 + 0.004 * np.random.default_rng(4).random((len(lights), 1, SIZE))  # a file's codes, and stray light
+    plates = [
+        np.round(255 * np.where(inside, one, back)).astype(np.float32) / 255
+        for one, back in zip(shade, cloth, strict=True)
+    ]
+    lit = Illumination(directions=lights, intensities=np.ones((len(lights), 1)))
+    alone, before_it = (Solving(error=True).solve(plates, lit, mask=mask) for mask in (inside, None))
+    assert alone.error_deg is not None
+    assert before_it.error_deg is not None
+    middle = cv2.erode(inside.astype(np.uint8), np.ones((9, 9))) > 0
+    assert np.median(before_it.error_deg[middle]) < np.median(alone.error_deg[middle]) + 0.5
+    assert before_it.valid[middle].mean() > 0.98
+
+
 def test_a_rig_that_is_wrong_is_predicted_and_makes_few_pixels_invalid() -> None:
     lights = ring(8, 35)
     across = np.random.default_rng(2).normal(size=lights.shape)

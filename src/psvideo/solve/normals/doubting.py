@@ -129,8 +129,9 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
     near = _mean(sums, around) + np.float32(LEAST_LIGHTS) * far  # where all lights reach what is around, farther off
     indirect = np.maximum(near / (_mean(counts, around) + np.float32(LEAST_LIGHTS)), 0)
     own = np.maximum(sums / np.maximum(counts, 1) - 2 * np.radians(points.noise_deg), 0)
+    shown = brightness(points.surface.albedo) * points.known
     return Signs(
-        misfit_deg=np.maximum(*(_typical(squares, noise, points.known, width) for width in (around, far_around))),
+        misfit_deg=np.maximum(*(_typical(squares, noise, shown, width) for width in (around, far_around))),
         indirect_deg=np.degrees(indirect + own) * _turned(points.surface, one),
         torn_deg=np.sqrt(np.maximum(_torn_squared(points) - (TORN_OF_NOISE * points.noise_deg) ** 2, 0)),
         lost_deg=points.noise_deg * np.sqrt(1 / reach - 1),
@@ -153,16 +154,25 @@ def width_of(known: NDArray[np.bool_] | Floats, share: float) -> int:
     return max(int(share * np.sqrt(np.count_nonzero(known))) // 2 * 2 + 1, LEAST_AROUND)
 
 
-def _typical(squares: Floats, noise: Floats, known: NDArray[np.bool_], width: int) -> Floats:
+def _typical(squares: Floats, noise: Floats, shown: Floats, width: int) -> Floats:
     """Return the root of what is typical of squares around every point, of which noise makes ``noise`` in the mean and
-    that is taken off; what stands out counts as OUTLYING times that, and as what noise makes of a few."""
-    there = _mean(known.astype(np.float32), width)
-    typical = _mean(squares, width) / there
+    that is taken off; what stands out counts as OUTLYING times that, and as what noise makes of a few.
+
+    ``shown`` is each point's albedo, by which it counts: whatever little light comes from elsewhere, or is lost in a
+    file's codes, turns black cloth far, and says nothing of the subject before it."""
+    weight = _mean(shown, width)
+    typical = _mean(squares * shown, width) / weight
     for _ in range(TURNS):
         most = OUTLYING**2 * np.maximum(typical, LEAST_LEVEL_DEG**2) + 2 * noise
-        typical = _mean(np.minimum(squares, most), width) / there
-    by_chance = CERTAIN * np.sqrt(2 / np.maximum(there * np.float32(width**2), 1)) * _mean(noise * known, width) / there
+        typical = _mean(np.minimum(squares, most) * shown, width) / weight
+    count = _mean((shown > 0).astype(np.float32), width) * np.float32(width**2)
+    by_chance = CERTAIN * np.sqrt(2 / np.maximum(count, 1)) * _mean(noise * shown, width) / weight
     return np.asarray(np.sqrt(np.maximum(typical - by_chance, 0)), np.float32)
+
+
+def brightness(albedo: NDArray[np.floating]) -> Floats:
+    """Return albedo (row, col), of three channels their mean."""
+    return np.asarray(albedo if albedo.ndim == 2 else albedo.mean(axis=-1, dtype=np.float32), np.float32)
 
 
 def _flatter(surface: Surface, one: Evidence) -> Floats:

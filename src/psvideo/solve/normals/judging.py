@@ -14,7 +14,17 @@ from psvideo.compute.spilled import let_go, planes_for
 from psvideo.compute.threads import over_ranges
 from psvideo.model.surface import MEASURED, Surface
 from psvideo.solve.normals.bands import BAND_PIXELS
-from psvideo.solve.normals.doubting import Doubting, Signs, ThinSurface, bits, doubt_deg, signs_of, step_of, stored
+from psvideo.solve.normals.doubting import (
+    Doubting,
+    Signs,
+    ThinSurface,
+    bits,
+    brightness,
+    doubt_deg,
+    signs_of,
+    step_of,
+    stored,
+)
 from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.moving_doubt import MovingDoubt, moved_deg, moving_doubt_deg
@@ -70,7 +80,7 @@ def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging =
     at_points = spread.judged(points.surface, np.stack([doubt, usual]), 1, limit_deg=0.0)[0][points.known]
     misfit = surface.misfit
     if at_points.size:
-        albedo = _brightness(points.surface.albedo)[points.known]  # what is bright shows more of the subject
+        albedo = brightness(points.surface.albedo)[points.known]  # what is bright shows more of the subject
         noise_deg = np.hypot(points.noise_deg, signs.lost_deg)[points.known]
         typical, by_noise = (_usual(each, albedo) for each in (at_points, noise_deg))
         beyond_deg = float(np.sqrt(max(typical**2 - by_noise**2, 0.0)))
@@ -213,10 +223,6 @@ class _Spread:
             let_go(*(plane[first:last] for plane in (*planes, *albedo, error, *([fit] if fit.size else []))))
 
         over_ranges(judge, rows, each=BAND_PIXELS // cols)
-
-
-def _brightness(albedo: NDArray[np.floating]) -> Floats:
-    return np.asarray(albedo if albedo.ndim == 2 else albedo.mean(axis=-1, dtype=np.float32), np.float32)
 
 
 def _every(planes: NDArray[np.floating], step: int) -> NDArray[np.floating]:
