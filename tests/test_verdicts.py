@@ -12,7 +12,7 @@ import pytest
 from psvideo.model.camera import Camera
 from psvideo.model.plan import Plan, PlannedFlash, assemble_plan
 from psvideo.model.rig import Light, Rig
-from psvideo.model.surface import Misfit
+from psvideo.model.surface import Misfit, Surface
 from psvideo.model.timing import DroppedFrames, Timing
 from psvideo.plates.ambient_regression import Separated
 from psvideo.plates.light_plate import LightPlate
@@ -25,7 +25,7 @@ from psvideo.report.observe.motion import glimpse, motion
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rigpoints import rig_points
 from psvideo.report.observe.shadow import shadow_light
-from psvideo.report.observe.yuille1997 import Lean
+from psvideo.report.observe.yuille1997 import Lean, Lens, lean
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.solving import Solving
 
@@ -483,6 +483,55 @@ def test_lights_nearly_in_a_plane_are_named_where_normals_lean_and_the_rig_is_no
     assert (line.grade, "nearly in a plane" in line.found) == ("doubtful", True)
     one.facts[:] = [replace(facts, clipped_share=0.2) for facts in one.facts]
     assert not any("lean" in each.found for each in rig_of(one)), "what clips leans normals, too"
+
+
+def lenses(*, right: float, tilt_deg: float, width: float = 0.6) -> np.ndarray:
+    """Return normals of a wall of waves seen through a lens, ``width`` the picture's over the focal length, whose axis
+    lies so many widths ``right`` of its middle, turned by an angle around the picture's columns."""
+    rows, cols = np.mgrid[:SIZE, :SIZE] - (SIZE - 1) / 2
+    x, y = width * (cols / SIZE - right), -width * rows / SIZE
+    far = np.ones_like(x)
+    for _ in range(50):  # the wall stands at 1 and swells by height(x, y)
+        height, across, up = _swell(x * far, y * far)
+        far = 1 - height
+    normals = np.stack([-across, -up, np.ones_like(up)], axis=-1)
+    turn = np.radians(tilt_deg)
+    turned = np.array([[np.cos(turn), 0, np.sin(turn)], [0, 1, 0], [-np.sin(turn), 0, np.cos(turn)]])
+    return normals / np.linalg.norm(normals, axis=-1, keepdims=True) @ turned.T
+
+
+def _swell(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return a height and its slopes."""
+    one, other = 20 * x + 14 * y, 24 * y - 8 * x
+    height = 0.02 * (np.sin(one) + np.cos(other))
+    return height, 0.02 * (20 * np.cos(one) + 8 * np.sin(other)), 0.02 * (14 * np.cos(one) - 24 * np.sin(other))
+
+
+@pytest.mark.parametrize(
+    ("right", "tilt_deg", "lens", "subject"),
+    [
+        (0.0, 0, None, "nothing"),
+        (0.3, 0, None, "lens"),  # a shifted lens and a right rig
+        (0.3, 0, Lens(width=0.6, right=0.3), "nothing"),
+        (0.0, 9, Lens(width=0.6), "rig"),
+        (0.0, 9, None, "lens"),  # which of them it is, nobody can tell
+        (0.0, 25, None, "rig"),  # no lens shifts so far
+    ],
+)
+def test_a_rig_is_not_doubted_for_what_a_shifted_lens_that_nobody_named_would_explain(
+    right: float, tilt_deg: float, lens: Lens | None, subject: str
+) -> None:
+    one = Footage(solved=True).observed(0)
+    normals = lenses(right=right, tilt_deg=tilt_deg).astype(np.float32)
+    surface = Surface(
+        normals=normals, albedo=np.ones((SIZE, SIZE, 1), np.float32), valid=np.ones((SIZE, SIZE), np.bool_)
+    )
+    found = lean(surface, lens=lens)
+    assert found is not None
+    one.leans[:] = [found]
+    doubted = [line for line in rig_of(one) if line.grade != "good"]
+    assert [line.subject for line in doubted] == ([] if subject == "nothing" else [subject])
+    assert verdict_of(doubted).startswith("This take is usable") == (subject != "rig")
 
 
 def test_a_dead_light_among_enough_others_is_named_and_left_out_and_the_rig_is_still_checked() -> None:

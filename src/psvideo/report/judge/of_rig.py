@@ -37,7 +37,7 @@ times on virtual subjects, 2 to 4 times on photographs.)"""
 SURELY_LEANING = 0.5
 """Photographs gain less, of what is glossy or in each other's light: there the angle is rough."""
 REST, EXACT_LIGHTS = 1 / 3, 3
-"""A rig is turned as a whole where so little of the change is none; what is wrong of three lights is one change as
+"""A rig is turned as a whole, or a lens beside its axis, where so little of the change is none; what is wrong of three lights is one change as
 well. More lights that are each wrong in a way of their own make normals that no such change mends."""
 MOST_FLAT = 6.5
 """Lights of a larger condition number lie nearly in a plane: gloss and light from around lean normals under the right
@@ -59,9 +59,11 @@ def rig(observed: Observed) -> Iterator[Judgement]:
     wrong = None if fit is None else _misfit(firing, fit)
     found = (wrong, _crossed(observed), _away(observed), fit and (_curve(fit) or _near(fit)))
     leaning = None if any(found) else _leaning(observed)
-    if any(found) or leaning is not None:
-        yield from (one for one in (*found, leaning) if one)
-    elif fit is not None:
+    doubted = [one for one in (*found, leaning) if one]
+    yield from doubted
+    if any(one.subject == "rig" for one in doubted):
+        return
+    if fit is not None:
         yield _explained(fit)
     elif observed.slopes:
         yield Judgement(
@@ -180,6 +182,8 @@ def _leaning(observed: Observed) -> Judgement | None:
     shown_deg = off_deg(observed) or 0.0
     if usual.lean_deg <= max(LEANS_DEG, MORE_THAN_SHOWN * shown_deg) or usual.gain <= BY_LEANING:
         return None
+    if usual.off_axis is not None and (usual.least_deg or 0.0) < REST * usual.lean_deg:
+        return _off_axis(usual, usual.off_axis)
     whole = usual.rest_deg < REST * usual.lean_deg
     flat = _nearly_in_a_plane(observed)
     exact = whole or int(observed.firing.sum()) == EXACT_LIGHTS
@@ -194,8 +198,22 @@ def _leaning(observed: Observed) -> Judgement | None:
     )
 
 
+def _off_axis(usual: Lean, widths: float) -> Judgement:
+    """Say that a lens that is not known may be why: of a right rig as well, so the rig itself is not doubted."""
+    return Judgement(
+        subject="lens",
+        grade="doubtful",
+        found=f"The normals would be those of one surface if the lens's axis met the picture {100 * widths:.0f} % of its "
+        f"width off the middle (cropped, or a shifted lens), or if the rig were tilted by about {usual.lean_deg:.0f} "
+        "degrees: no lens is given that would tell.",
+        advice="Write `focal_px` and `principal_px` into the rig's [camera]; if the axis is in the middle, measure the "
+        "lights again with the camera where it stands.",
+    )
+
+
 def _lost(usual: Lean, shown_deg: float) -> bool:
-    return usual.lean_deg > max(LOST_DEG, SURELY_MORE * shown_deg) and usual.gain > SURELY_LEANING
+    least_deg = usual.lean_deg if usual.least_deg is None else usual.least_deg
+    return least_deg > max(LOST_DEG, SURELY_MORE * shown_deg) and usual.gain > SURELY_LEANING
 
 
 def _clips(observed: Observed) -> bool:

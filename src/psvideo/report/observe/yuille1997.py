@@ -7,7 +7,7 @@ rig (A. Yuille and D. Snow, "Shape and albedo from multiple images using integra
 leave open are slopes that all grow alike, or by one slant: there A is taken for a turn.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import cv2
@@ -34,25 +34,32 @@ CLEAR = 32.0
 """A point tells something where its normals turn by so many times the square that noise makes of them."""
 OUTLIER = 2.0
 """Residuals are taken for Cauchy's, so many times their median wide."""
-ROUNDS, ENOUGH = 30, 1e-4
+ROUNDS, ENOUGH, SHIFTS = 30, 1e-4, 2
 LEAST_TOLD = 0.02
 """Changes that points tell so little of (eigenvalues, each unknown's size apart) are taken for none: a cylinder, waves
 or the edges of a few faces tell of some changes and not of others."""
 WIDEST, A_LITTLE = 1.5, 0.01
 """A picture's width over the focal length is no more than a lens of 24 mm gives on film. Of a lens that is not known it
 may be anything up to this: what is seen beside the axis looks turned."""
+FARTHEST_AXIS = 1 / 3
+"""A lens shifts by 12 mm on a film 36 mm wide (Canon TS-E, Nikon PC), and a picture cropped to three fifths at one side
+has its axis as far from its middle: normals of a right rig then look tilted, just as if the rig were."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Lean:
     """One change of all normals. ``lean_deg`` is how far it turns one in the mean, and ``gain`` by how much less it
     leaves over than the normals as they are, as a share of what it leaves. ``turn_deg`` (x, y, z) is the turn in it,
-    the axis times the angle, and ``rest_deg`` how far what is no turn turns a normal in the mean."""
+    the axis times the angle, and ``rest_deg`` how far what is no turn turns a normal in the mean. ``off_axis`` is how far
+    from the picture's middle its axis would lie, in widths of the picture, if that were to explain what it can, and
+    ``least_deg`` the lean that is left then; both are None where the lens is known."""
 
     lean_deg: float
     gain: float
     turn_deg: tuple[float, float, float]
     rest_deg: float
+    off_axis: float | None = None
+    least_deg: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,20 +88,57 @@ def lean(surface: Surface, *, lens: Lens | None = None) -> Lean | None:
 
     lens: how the picture was seen; None where that is not known: by any lens, its axis in the middle of the picture.
     """
-    n, ways, x, y = _bending(surface)
+    seen = _bending(surface)
+    n, ways, x, y = seen
     if len(n) < LEAST_PIXELS:
         return None
+    if lens is not None:
+        found = _through(seen, lens)
+        return _described(found.rows, found.gain, n)
     far = _crossed(n, ways)
-    if lens is None:
-        by_lens = (_crossed(*_in_view(n, ways, x, y, A_LITTLE)) - far) / A_LITTLE
-        lens = Lens(width=float(np.clip(_fitted(far, by_lens).more, 0, WIDEST)))
-    found = _fitted(_crossed(*_in_view(n, ways, x - lens.right, y - lens.up, lens.width)), None)
-    return _described(found.rows, found.gain, n)
+    by_lens = (_crossed(*_in_view(n, ways, x, y, A_LITTLE)) - far) / A_LITTLE
+    lens = Lens(width=float(np.clip(_fitted(far, by_lens).more, 0, WIDEST)))
+    found = _through(seen, lens)
+    shifted = _shifted(seen, lens, found)
+    left = _through(seen, shifted)
+    return replace(
+        _described(found.rows, found.gain, n),
+        off_axis=float(np.hypot(shifted.right, shifted.up)),
+        least_deg=_described(left.rows, left.gain, n).lean_deg,
+    )
 
 
-def _bending(surface: Surface) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return normals (point, 3) that bend by more than noise and in one piece, how they change over a picture's width
-    to the right and upwards, (2, point, 3), and where they lie, x and y in such widths from the picture's middle."""
+def _through(seen: "_Bending", lens: Lens) -> "_Fitted":
+    """Find the change that makes normals a surface's that was seen through a lens."""
+    return _fitted(
+        _crossed(*_in_view(seen.normals, seen.ways, seen.x - lens.right, seen.y - lens.up, lens.width)), None
+    )
+
+
+def _shifted(seen: "_Bending", lens: Lens, found: "_Fitted") -> Lens:
+    """Return a lens of the same width whose axis lies where that explains most: there the rows' last columns are
+    -width times ``right`` and ``up``, which the same of a turned rig cannot be told from."""
+    for _ in range(SHIFTS):
+        by = found.rows[:, 2] / -max(lens.width, A_LITTLE)
+        at = np.array([lens.right, lens.up]) + by
+        at *= min(1.0, FARTHEST_AXIS / max(float(np.hypot(*at)), 1e-12))
+        lens = replace(lens, right=float(at[0]), up=float(at[1]))
+        found = _through(seen, lens)
+    return lens
+
+
+class _Bending(NamedTuple):
+    """Normals (point, 3), how they change over a picture's width to the right and upwards, (2, point, 3), and where
+    they lie, x and y in such widths from the picture's middle."""
+
+    normals: FloatArray
+    ways: FloatArray
+    x: FloatArray
+    y: FloatArray
+
+
+def _bending(surface: Surface) -> _Bending:
+    """Return normals that bend by more than noise and in one piece."""
     valid, small = thinned_normals(surface, width_step(surface))
     noise = noise_of_slopes(valid, small)
     blurred = np.asarray(cv2.GaussianBlur(small * valid[..., None], (0, 0), BLUR_PX), np.float64)
@@ -109,7 +153,7 @@ def _bending(surface: Surface) -> tuple[FloatArray, FloatArray, FloatArray, Floa
     down, across = down[::each], across[::each]
     rows, cols = valid.shape
     ways = cols * np.stack([right[down, across], up[down, across]])
-    return normals[down, across], ways, (across - (cols - 1) / 2) / cols, ((rows - 1) / 2 - down) / cols
+    return _Bending(normals[down, across], ways, (across - (cols - 1) / 2) / cols, ((rows - 1) / 2 - down) / cols)
 
 
 def _in_view(
