@@ -497,7 +497,7 @@ def lenses(*, right: float, tilt_deg: float, width: float = 0.6) -> np.ndarray:
     normals = np.stack([-across, -up, np.ones_like(up)], axis=-1)
     turn = np.radians(tilt_deg)
     turned = np.array([[np.cos(turn), 0, np.sin(turn)], [0, 1, 0], [-np.sin(turn), 0, np.cos(turn)]])
-    return normals / np.linalg.norm(normals, axis=-1, keepdims=True) @ turned.T
+    return np.asarray(normals / np.linalg.norm(normals, axis=-1, keepdims=True) @ turned.T)
 
 
 def _swell(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -37,8 +37,8 @@ times on virtual subjects, 2 to 4 times on photographs.)"""
 SURELY_LEANING = 0.5
 """Photographs gain less, of what is glossy or in each other's light: there the angle is rough."""
 REST, EXACT_LIGHTS = 1 / 3, 3
-"""A rig is turned as a whole, or a lens beside its axis, where so little of the change is none; what is wrong of three lights is one change as
-well. More lights that are each wrong in a way of their own make normals that no such change mends."""
+"""A rig is turned as a whole, or a lens is shifted, where so little of the change is none; what is wrong of three
+lights is one change as well. More lights that are each wrong in a way of their own make normals that no such change mends."""
 MOST_FLAT = 6.5
 """Lights of a larger condition number lie nearly in a plane: gloss and light from around lean normals under the right
 rig as well, on photographs by 9 to 15 degrees."""
@@ -203,9 +203,9 @@ def _off_axis(usual: Lean, widths: float) -> Judgement:
     return Judgement(
         subject="lens",
         grade="doubtful",
-        found=f"The normals would be those of one surface if the lens's axis met the picture {100 * widths:.0f} % of its "
-        f"width off the middle (cropped, or a shifted lens), or if the rig were tilted by about {usual.lean_deg:.0f} "
-        "degrees: no lens is given that would tell.",
+        found="The normals would be those of one surface if the lens's axis met the picture "
+        f"{100 * widths:.0f} % of its width off the middle (cropped, or a shifted lens), or if the rig were tilted by "
+        f"about {usual.lean_deg:.0f} degrees: no lens is given that would tell.",
         advice="Write `focal_px` and `principal_px` into the rig's [camera]; if the axis is in the middle, measure the "
         "lights again with the camera where it stands.",
     )

@@ -50,8 +50,8 @@ has its axis as far from its middle: normals of a right rig then look tilted, ju
 class Lean:
     """One change of all normals. ``lean_deg`` is how far it turns one in the mean, and ``gain`` by how much less it
     leaves over than the normals as they are, as a share of what it leaves. ``turn_deg`` (x, y, z) is the turn in it,
-    the axis times the angle, and ``rest_deg`` how far what is no turn turns a normal in the mean. ``off_axis`` is how far
-    from the picture's middle its axis would lie, in widths of the picture, if that were to explain what it can, and
+    the axis times the angle, and ``rest_deg`` how far what is no turn turns a normal in the mean. ``off_axis`` is how
+    far from the picture's middle its axis would lie, in widths of the picture, if that were to explain what it can, and
     ``least_deg`` the lean that is left then; both are None where the lens is known."""
 
     lean_deg: float
