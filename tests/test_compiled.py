@@ -15,7 +15,9 @@ import pytest
 
 from psvideo.cli.console import compiling_said
 from psvideo.compute.compiled import EXACT, FUSED, REORDERED, sources_digest
+from psvideo.plates import ambient_kernel
 from psvideo.runs.compiling import USUAL, SmallTake, run_small
+from psvideo.solve.filling import looking
 from psvideo.solve.normals import kernel, near_kernel, robust_kernel
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.woodham1980 import solve
@@ -280,6 +282,23 @@ def test_two_processes_compile_into_one_folder_at_a_time(tmp_path: Path) -> None
     assert [process.returncode for process in at_once] == [0, 0], said
     assert list(tmp_path.rglob("*.nbc")), "kept"
     subprocess.run(command, env=environment, check=True)
+
+
+COSTLY = (b"numba.np.arraymath", b"numba.np.linalg", b"numba.cpython.unicode")
+"""What numba's own functions on arrays load with a kept loop that calls them: SciPy's linear algebra, a text library."""
+
+
+@pytest.mark.parametrize(
+    "loop",
+    [kernel.solve_rows, robust_kernel.solve_rows, looking.look_rows, looking.count_rows, ambient_kernel.blend_rows],
+    ids=lambda loop: f"{loop.__module__}.{loop.__name__}",
+)
+def test_a_kept_loop_loads_none_of_numbas_mathematics_of_arrays(loop: Any) -> None:
+    kept = loop._cache
+    files = list(Path(kept.cache_path).glob(f"{kept._impl.filename_base}.*.nbc"))
+    if not files:
+        pytest.skip("this loop was not kept yet: psvideo doctor --compile keeps all")
+    assert [(file.name, name) for file in files for name in COSTLY if name in file.read_bytes()] == []
 
 
 def test_a_full_disk_under_the_cache_does_not_stop_a_solution(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -63,7 +63,8 @@ def blend_rows(
             upper, part = _between(row, block, levels.shape[0])
             if upper != held:
                 if upper == held + 1:
-                    above[:] = below
+                    for sample in range(samples):  # numba's copies of slices load texts, to say what does not fit
+                        above[sample] = below[sample]
                 else:
                     _across(levels[upper], block, above)
                 _across(levels[min(upper + 1, levels.shape[0] - 1)], block, below)
@@ -76,7 +77,8 @@ def blend_rows(
                 there = then[sample] * level[sample]
                 then[sample] = there + (line[sample] * own - there) * shares[sample]
         else:
-            slots[row] = old_slots[row]
+            for place in range(len(share)):
+                slots[row, place] = old_slots[row, place]
         pack_row(then, codes[row], least, step, narrow[row], row, channels)
         _into_blocks(then, total, row, block, len(seen), found)
 
@@ -122,7 +124,10 @@ def _into_blocks(line: Floats, total: Floats, row: int, block: int, rows: int, c
 @FUSED.inlined
 def _over_pixels(each: Floats, block: int, cols: int, channels: int, line: Floats) -> None:
     """Repeat what is known of blocks for every sample of their row."""
-    if each.min() == each.max():  # as usual
+    other = np.int32(0)
+    for place in range(each.shape[0]):
+        other = np.int32(other | (each[place] != each[0]))
+    if not other:  # as usual
         line[:] = each[0]
         return
     for place in range(each.shape[0]):
@@ -143,8 +148,8 @@ def _across(gain: Floats, block: int, line: Floats) -> None:
     """Fill a row with what is known of a row of blocks, which changes steadily between their middles."""
     across, channels = gain.shape
     begin, cols = block // 2, line.shape[0] // channels
-    for col in range(begin):
-        line[col * channels : (col + 1) * channels] = gain[0]
+    for sample in range(begin * channels):
+        line[sample] = gain[0, sample % channels]
     scale = ONE / np.float32(block)
     for step in range(block):
         part = (np.float32(step) + HALF) * scale if block > 1 else np.float32(0)
@@ -152,5 +157,5 @@ def _across(gain: Floats, block: int, line: Floats) -> None:
             at = (begin + left * block + step) * channels
             for channel in range(channels):
                 line[at + channel] = gain[left, channel] + part * (gain[left + 1, channel] - gain[left, channel])
-    for col in range(begin + (across - 1) * block, cols):
-        line[col * channels : (col + 1) * channels] = gain[across - 1]
+    for sample in range((begin + (across - 1) * block) * channels, cols * channels):
+        line[sample] = gain[across - 1, sample % channels]

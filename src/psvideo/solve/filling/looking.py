@@ -9,7 +9,7 @@ from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import lent
 from psvideo.solve.normals.blocks import ABSENT, BLOCK, ONE, ZERO
 from psvideo.solve.normals.kernel import lent_task
-from psvideo.solve.normals.measuring import read_block
+from psvideo.solve.normals.measuring import any_asked, read_block
 from psvideo.solve.normals.near_kernel import at, of_light
 from psvideo.solve.normals.task import Bytes, Floats, Task, Work
 
@@ -50,7 +50,7 @@ def count_rows(task: Task, work: Work, wanted: Bytes, counts: Bytes, first: int,
     for row in range(first, last):
         for col in range(0, t.cols, BLOCK):
             n = min(BLOCK, t.cols - col)
-            if not asked[row, col : col + n].any():
+            if not any_asked(asked, row, col, n):
                 continue
             read_block(t, values, row, col, n)
             for light in range(t.lights):
@@ -74,7 +74,7 @@ def look_rows(task: Task, work: Work, index: NDArray[np.int32], said: Said, firs
     for row in range(first, last):
         for col in range(0, t.cols, BLOCK):
             n = min(BLOCK, t.cols - col)
-            if not (places[row, col : col + n] >= 0).any():
+            if not _any_place(places, row, col, n):
                 continue
             read_block(t, values, row, col, n)
             for light in range(t.lights):
@@ -101,6 +101,15 @@ def look_rows(task: Task, work: Work, index: NDArray[np.int32], said: Said, firs
                         _note(bright, towards, place, 0, level, x * one, y * one, z * one)
                     elif level > bright[place, 1]:
                         _note(bright, towards, place, 1, level, x * one, y * one, z * one)
+
+
+@FUSED.inlined
+def _any_place(places: NDArray[np.int32], row: int, col: int, n: int) -> bool:
+    """Whether any of n pixels has a place."""
+    highest = np.int32(-1)
+    for place in range(col, col + n):
+        highest = max(highest, places[row, place])
+    return bool(highest >= 0)
 
 
 @FUSED.inlined

@@ -39,7 +39,7 @@ from psvideo.solve.normals.blocks import (
 )
 from psvideo.solve.normals.colour_kernel import albedo_from_sums, gather_all, residuals_of_all, solve_all
 from psvideo.solve.normals.grey_kernel import solve_grey
-from psvideo.solve.normals.measuring import all_seen, combine, gather_one, gather_three, hide_unseen
+from psvideo.solve.normals.measuring import all_seen, any_asked, combine, gather_one, gather_three, hide_unseen
 from psvideo.solve.normals.near_kernel import at, of_light, place_lights
 from psvideo.solve.normals.task import Bytes, Floats, Near, Result, Samples, Task, Work
 
@@ -72,7 +72,7 @@ def solve_rows(task: Task, result: Result, work: Work, first: int, last: int) ->
         for col in range(0, t.cols, step):
             n = min(step, t.cols - col)
             summed = False
-            if t.mask.size and not t.mask[row, col : col + n].any():
+            if t.mask.size and not any_asked(t.mask, row, col, n):
                 w[X : X + n], w[Y : Y + n], w[Z : Z + n] = ZERO, ZERO, ZERO
             else:
                 summed = _solve_block(t, w, values, m, row, col, n, out.residual.size > 0)

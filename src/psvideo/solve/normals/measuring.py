@@ -79,8 +79,24 @@ def combine(task: Task, w: Floats, values: Floats, m: Floats, n: int) -> None:
 @FUSED.inlined
 def all_seen(seen: Bytes, row: int, col: int, n: int) -> bool:
     """Whether every light was seen in n pixels; one entry may stand for the whole row."""
+    if not seen.size:
+        return True
     first, last = (0, 1) if seen.shape[2] == 1 else (col, col + n)
-    return not seen.size or bool(seen[:, row, first:last].all())
+    every = np.uint8(1)
+    for light in range(seen.shape[0]):
+        for place in range(first, last):
+            every = np.uint8(every & seen[light, row, place])
+    return bool(every)
+
+
+@FUSED.inlined
+def any_asked(asked: Bytes, row: int, col: int, n: int) -> bool:
+    """Whether anything is asked of n pixels. (Numba's own ``any`` would load its mathematics of arrays, and SciPy, with
+    every kept loop that calls it.)"""
+    found = np.uint8(0)
+    for place in range(col, col + n):
+        found = np.uint8(found | asked[row, place])
+    return bool(found)
 
 
 @FUSED.inlined

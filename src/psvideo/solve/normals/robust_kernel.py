@@ -15,7 +15,7 @@ from psvideo.solve.normals.apart import Room, fill_up, put_side_by_side, room_fo
 from psvideo.solve.normals.blocks import BLOCK, COUNT, LIMIT, ONE, ZERO, X, Y, Z
 from psvideo.solve.normals.equations import DOUBT
 from psvideo.solve.normals.explained import list_unexplained, solve_plainly
-from psvideo.solve.normals.measuring import all_seen, read_usable
+from psvideo.solve.normals.measuring import all_seen, any_asked, read_usable
 from psvideo.solve.normals.near_kernel import place_lights
 from psvideo.solve.normals.predicted_error import NO_ERROR, UNEXPLAINED, predict_error
 from psvideo.solve.normals.reflecting import find_ways
@@ -91,7 +91,7 @@ def solve_rows(
         for col in range(0, t.cols, STEP):
             n = min(STEP, t.cols - col)
             start, summed, odd = row * t.cols + col, False, 0
-            if t.mask.size and not t.mask[row, col : col + n].any():
+            if t.mask.size and not any_asked(t.mask, row, col, n):
                 w[X : X + n], w[Y : Y + n], w[Z : Z + n] = ZERO, ZERO, ZERO
                 v[DOUBT : DOUBT + n], v[UNEXPLAINED : UNEXPLAINED + n] = NO_ERROR, ZERO
             else:
