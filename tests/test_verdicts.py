@@ -545,6 +545,33 @@ def test_a_dead_light_among_enough_others_is_named_and_left_out_and_the_rig_is_s
     assert graded(rig_but_leaning(wrong), "rig") in ("doubtful", "bad")
 
 
+@pytest.mark.parametrize("passing", [False, True])
+def test_motion_and_sharpness_are_looked_for_in_plates_that_are_lit_where_the_first_light_is_dead(
+    passing: bool,
+) -> None:
+    dark = Footage(shape="tiles", lights=4, gains=[0, 1, 1, 1], noise=0.001)
+    rounds = [dark._round([f"light{n}" for n in range(4)], plates, plates, number)
+              for number, plates in enumerate(_tiles_that_move(dark, 3))]  # fmt: skip
+    one = Observed(lights=rounds[0].lights)
+    for each in rounds:
+        for plate in each.plates if passing else ():
+            one.look(plate)
+        one.add(each)
+    assert one.watched == "light1"
+    assert one.blurs_px
+    assert one.blurs_px[0] < result.SOFT_PX
+    assert [facts.moving_share is not None and facts.moving_share > 0.05 for facts in one.facts[1:]] == [True, True]
+
+
+def _tiles_that_move(footage: Footage, rounds: int) -> list[list[np.ndarray]]:
+    rng = np.random.default_rng(0)
+    each = []
+    for number in range(rounds):
+        clean = [np.roll(one, 4 * number, axis=1) for one in footage._plates(ring(footage.lights), 0)]
+        each.append([(one + rng.normal(0, footage.noise, one.shape)).astype(np.float32) for one in clean])
+    return each
+
+
 def test_a_light_of_which_no_frame_showed_the_subject_is_not_called_dead() -> None:
     one = Footage(rounds=2).observed(0)
     one.counts[one.lights[0]] = np.zeros_like(one.counts[one.lights[0]])

@@ -115,12 +115,13 @@ class Job:
 class Beginning:
     """What a clip's first instant leaves to all others.
 
-    number: its own. whites: by light, what sketches of plates take for white. white: what motion in the report takes
-    for it. shaping: begun with its depth, None where none is asked for.
+    number: its own. whites: by light, what sketches of plates take for white. watched, white: whose plates the report
+    looks for motion in, and what it takes for white. shaping: begun with its depth, None where none is asked for.
     """
 
     number: int
     whites: dict[str, float]
+    watched: str
     white: float | None
     shaping: Shaping | None
 
@@ -171,7 +172,7 @@ def write_instants(
     if piece is not None:
         observed.only = piece.numbers
     if beginning is not None:
-        observed.first, observed.white = beginning.number, beginning.white
+        observed.first, observed.watched, observed.white = beginning.number, beginning.watched, beginning.white
     shaping = job.shaping if beginning is None else beginning.shaping
     found = Found(observed=observed)
     ambient = first_ambient(job.take, job.timing) if job.mixes_ambient else None
@@ -257,5 +258,12 @@ def beginning_of(job: Job) -> Beginning | None:
     observed = observing(take, job.lighting.rig, job.lighting.masks)
     for instant in instants_of(replace(job, take=take), observed, part=part):
         shaping, _ = shape_of(job.shaping, job.lighting, instant)
-        return Beginning(number=instant.round.number, whites=dict(part.whites), white=observed.white, shaping=shaping)
+        observed.watch_brightest()
+        return Beginning(
+            number=instant.round.number,
+            whites=dict(part.whites),
+            watched=observed.watched,
+            white=observed.white,
+            shaping=shaping,
+        )
     return None

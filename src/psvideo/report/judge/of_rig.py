@@ -38,7 +38,8 @@ SURELY_LEANING = 0.5
 """Photographs gain less, of what is glossy or in each other's light: there the angle is rough."""
 REST, EXACT_LIGHTS = 1 / 3, 3
 """A rig is turned as a whole, or a lens is shifted, where so little of the change is none; what is wrong of three
-lights is one change as well. More lights that are each wrong in a way of their own make normals that no such change mends."""
+lights is one change as well. More lights that are each wrong in a way of their own make normals that no such change
+mends."""
 MOST_FLAT = 6.5
 """Lights of a larger condition number lie nearly in a plane: gloss and light from around lean normals under the right
 rig as well, on photographs by 9 to 15 degrees."""

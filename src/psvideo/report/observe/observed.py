@@ -35,6 +35,8 @@ LIT = 0.01
 of dark takes, than a sixth of their brightest hundredth."""
 DARKEST = 1 / 6
 FAINT = 2.0**-12
+WEAK_BESIDE = 1 / 8
+"""Motion and sharpness are looked for under the first light, unless it gives less than this of the brightest."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -183,7 +185,8 @@ class Observed:
     without a dark slot; ``in_shadow`` which share of a lamp's light is left where it cannot reach.
     ``first`` is the number of the clip's first round, and ``white`` what motion takes for white, found with its first
     plate.
-    ``watched`` is whose plates motion is looked for in, as they pass; left out, the first light's.
+    ``watched`` is whose plates motion is looked for in, as they pass; left out, the first light's, or the brightest's
+    where the first gives hardly any light in the first round (``watch_brightest``).
     """
 
     lights: tuple[str, ...]
@@ -205,6 +208,7 @@ class Observed:
     ambient_measured: dict[int, float] = field(default_factory=dict)
     beyond_mask: list[float] = field(default_factory=list)
     worst: Worst = field(default_factory=Worst)
+    _first: dict[str, Glimpse] = field(default_factory=dict)
     _glimpse: Glimpse | None = None
     _sample: Sample | None = None
     _dark: NDArray[np.float32] | None = None
@@ -215,10 +219,22 @@ class Observed:
         """Look at a plate before it is moved to one instant: motion is seen in those of one light, and ambient
         light in the dark slots."""
         self._passed = True
-        if plate.light == (self.watched or self.lights[0]):
-            self._look_for_motion(plate)
+        self._glance(plate)
         if plate.light == AMBIENT:
             self._look_at_dark(plate)
+
+    def watch_brightest(self) -> None:
+        """Choose whose plates motion is looked for in from now on, by those that were seen so far: the first light's
+        unless it is weak beside the brightest."""
+        if self.watched or not self._first:
+            return
+        light = max(self._first, key=lambda one: self._first[one].white)
+        first = self.lights[0]
+        if first in self._first and self._first[first].white >= WEAK_BESIDE * self._first[light].white:
+            light = first
+        self.watched, self._glimpse = light, self._first[light]
+        self.white = self._glimpse.white
+        self._first.clear()
 
     def look_at_window(self, found: Separated) -> None:
         """Look at the ambient light that a window of frames told without a dark slot."""
@@ -239,8 +255,10 @@ class Observed:
         mask = None if self.masks is None else self.masks.at(one.number)
         seen = seen_of(one, mask)
         self.beyond_mask.append(seen.beyond)
-        if not self._passed and one.plates[0].light == self.lights[0]:
-            self._look_for_motion(one.plates[0])
+        if not self._passed:
+            for plate in one.plates:
+                self._glance(plate)
+        self.watch_brightest()
         moving, changed = self._moving, self._change(surface)
         facts = instant_facts(one, surface, mask, changed, seen=seen, moving=moving, dark=self._dark)
         self.facts.append(facts)
@@ -291,7 +309,8 @@ class Observed:
         return self.worst.thumbnails
 
     def _look_closely(self, one: Round, surface: Surface | None, seen: Seen) -> None:
-        blur_px = sharpest_blur_px(middle_of(one.plates[0].picture))
+        watched = next((plate for plate in one.plates if plate.light == self.watched), one.plates[0])
+        blur_px = sharpest_blur_px(middle_of(watched.picture))
         if blur_px is not None:
             self.blurs_px.append(blur_px)
         if surface is not None:
@@ -313,6 +332,15 @@ class Observed:
         found = shadow_light(seen.bright, seen.shown, surface, ways, step=step)
         if found is not None:
             self.in_shadow.append(found)
+
+    def _glance(self, plate: LightPlate) -> None:
+        """Look for motion in a plate; of the first round, keep what it is told from."""
+        if not self.watched and plate.light in self._first:
+            self.watch_brightest()
+        if not self.watched and plate.light in self.lights:
+            self._first[plate.light] = glimpse(plate)
+        elif plate.light == self.watched:
+            self._look_for_motion(plate)
 
     def _look_for_motion(self, plate: LightPlate) -> None:
         before = self._glimpse
