@@ -10,6 +10,8 @@ from live_clip import live_clip
 
 import psvideo as ps
 from psvideo.cli.app import main
+from psvideo.errors import PsvideoError
+from psvideo.formats.rig_toml import format_rig
 from psvideo.live.chain import NewestRound
 from psvideo.live.smaller import Smaller, smaller_plan, smaller_timing
 from psvideo.model.coded import Coded, Tone
@@ -84,6 +86,20 @@ def test_a_clip_without_the_plans_strobe_ends_in_one_paragraph(clip: Path, capsy
     assert "too few" in said
     assert main(["live", str(clip.parent / "none"), "--no-page"]) == 1
     assert "there is no such clip" in capsys.readouterr().err
+
+
+def test_a_rig_that_gives_no_normals_is_refused_before_anything_is_shown(clip: Path, tmp_path: Path) -> None:
+    rig = ps.read_rig(clip / "rig.toml")
+    turned = [(float(np.sin(at)), 0.0, float(np.cos(at))) for at in np.linspace(-0.6, 0.6, len(rig.lights))]
+    flat = [replace(light, direction=direction) for light, direction in zip(rig.lights, turned, strict=True)]
+    (tmp_path / "flat.toml").write_text(format_rig(replace(rig, lights=tuple(flat))), encoding="utf-8")
+    opened: list[str] = []
+    with pytest.raises(PsvideoError, match="nearly in one plane"):
+        live(
+            clip, rig=tmp_path / "flat.toml", record=tmp_path / "kept", page=True, pace="fastest", opened=opened.append
+        )
+    assert not opened
+    assert [path.name for path in tmp_path.iterdir()] == ["flat.toml"]
 
 
 @pytest.mark.parametrize("upward", [False, True])

@@ -27,13 +27,14 @@ from psvideo.live.status import LiveStatus, LiveSummary
 from psvideo.live.watching import Watching, told
 from psvideo.model.choices import Pace
 from psvideo.model.intensity import lights_as_planned
-from psvideo.model.plan import Plan
 from psvideo.model.rig import Rig
 from psvideo.model.timing import DroppedFrames, Timing, timed_camera
 from psvideo.page.serving import ADDRESS
 from psvideo.plates.sequence import check_separable
 from psvideo.runs.caller import PYTHON, Caller
 from psvideo.runs.live_strobe import held_strobe
+from psvideo.solve.near_surface import near_surface_of
+from psvideo.solve.normals.illumination import illumination
 from psvideo.strobe.link.ports import AUTO
 from psvideo.strobe.runlog import RunLog, format_log
 
@@ -88,7 +89,8 @@ def live(
     UsageError
         Where a file to write exists, or the plan's strobe cannot be followed.
     PsvideoError
-        Where the source cannot be read or does not fit the plan, or no strobe was found in it.
+        Where the source cannot be read or does not fit the plan, the rig's lights give no normals, or no strobe was
+        found in it.
     """
     played = opened_source(str(source), plan=path_if_given("plan", plan), pace=pace, growing=growing, raw=raw)
     for warning in played.warnings:
@@ -99,6 +101,8 @@ def live(
     timing_path = path_if_given("timing_out", timing_out)
     if timing_path is not None:
         refuse_existing(timing_path, force=force)
+    if known is not None:
+        _check_rig(known, played)
     running = _running(played, known, first_light, seconds, said, shown)
     kept = _keeper(path_if_given("rig_out", rig_out), force=force)
     record_path = path_if_given("record", record)
@@ -112,7 +116,7 @@ def live(
         held_strobe, running.chain, port=strobe, yes=yes, noted=running.notes.append, caller=caller, logged=logged
     )
     with (
-        _page(running, played.plan, known, caller, opened, kept, host, port, token) if page else nullcontext(),
+        _page(running, played, known, caller, opened, kept, host, port, token) if page else nullcontext(),
         nullcontext() if record_path is None else recording(record_path, played, force=force) as recorded,
         nullcontext() if lock is None else held(plan_path, lock=lock) as holding,
     ):
@@ -127,6 +131,13 @@ def live(
     if timing_path is not None:
         write_text(timing_path, format_timing(_timing(running.chain, played)))
     return summary
+
+
+def _check_rig(rig: Rig, source: LiveSource) -> None:
+    """Raise PsvideoError where a rig gives no normals: before a board flashes, not when the first round is solved."""
+    lights, camera = lights_as_planned(rig, source.plan), source.plan.camera
+    near = near_surface_of(rig, lights, height_px=camera.height_px, width_px=camera.width_px)
+    illumination(lights, channels=1 if source.cfa is None else 3, ground=None if near is None else near.ground)
 
 
 def _keeper(path: Path | None, *, force: bool) -> Callable[[Rig], str]:
@@ -145,7 +156,7 @@ def _keeper(path: Path | None, *, force: bool) -> Callable[[Rig], str]:
 @contextmanager
 def _page(
     running: Running,
-    plan: Plan,
+    source: LiveSource,
     rig: Rig | None,
     caller: Caller,
     opened: Callable[[str], None],
@@ -155,10 +166,12 @@ def _page(
     token: str | None,
 ) -> Iterator[None]:
     """Serve the live page while the block runs: every result is put there, and some are judged."""
+    plan = source.plan
     watching, pictures = Watching(plan=plan, rig=rig, spell=caller.spell), NewestPictures()
     shown = running.shown
 
     def use(found: Rig) -> str:
+        _check_rig(found, source)
         running.chain.rig = watching.rig = found
         return kept(found)
 
@@ -192,8 +205,6 @@ def _running(
     said: Callable[[LiveStatus], None],
     shown: Callable[[NewestRound], None],
 ) -> Running:
-    if rig is not None:
-        lights_as_planned(rig, source.plan)
     camera = source.plan.camera
     quality = first_quality(camera.width_px, camera.height_px, mosaic=source.cfa is not None)
     chain = Chain(plan=source.plan, cfa=source.cfa, rig=rig, first_light=first_light, step=quality.step)
