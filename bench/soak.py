@@ -40,6 +40,8 @@ light = [
 ]
 """
 FRAMES, PAGE_MINUTES = 10_000, 1.0
+LOOK_S = 1.0
+"""The page is looked at so often, and more often where it is open for less than a minute."""
 MIDDLE = 0.25
 """Growth is counted from here on: before, libraries are loaded and pools filled."""
 
@@ -114,8 +116,8 @@ def through_the_chain(folder: Path, frames: int) -> Flatness:
     return longest.flatness("a take through normals", f"{frames} frames, {len(report.instants)} results")
 
 
-def with_the_page_open(folder: Path, minutes: float) -> Flatness:
-    """Ask the page for pictures until so much time is over."""
+def with_the_page_open(folder: Path, minutes: float, *, pause_s: float = 0.0) -> Flatness:
+    """Ask the page for pictures until so much time is over, and wait for ``pause_s`` after each as people do."""
     gauge, asked = Gauge(), 0
     with view(folder / "out") as server:
         serving_it = threading.Thread(target=server.serve_forever)
@@ -124,8 +126,9 @@ def with_the_page_open(folder: Path, minutes: float) -> Flatness:
             with urllib.request.urlopen(server.url + name) as answer:
                 answer.read()
             asked += 1
-            if asked % 20 == 1:
+            if time.monotonic() - gauge.began_s > len(gauge.handles) * min(LOOK_S, LOOK_S * minutes):
                 gauge.look()
+            time.sleep(pause_s)
             if time.monotonic() - gauge.began_s > 60 * minutes:
                 break
         server.shutdown()
@@ -152,10 +155,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--frames", type=int, default=FRAMES)
     parser.add_argument("--page-minutes", type=float, default=PAGE_MINUTES)
+    parser.add_argument("--page-pause-s", type=float, default=0.0)
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as place:
         print(*through_the_chain(Path(place), asked.frames), flush=True)
-        print(*with_the_page_open(Path(place), asked.page_minutes), flush=True)
+        print(*with_the_page_open(Path(place), asked.page_minutes, pause_s=asked.page_pause_s), flush=True)
     return 0
 
 

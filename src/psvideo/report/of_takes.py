@@ -9,6 +9,7 @@ from typing import Any
 from urllib.parse import quote
 
 from psvideo import __version__
+from psvideo.model.units import counted
 from psvideo.report.html import MARKS, PAGE
 from psvideo.report.style import STYLE
 
@@ -97,11 +98,22 @@ def takes_page(results: Sequence[TakeResult]) -> str:
 
 def _take(one: TakeResult) -> str:
     kind = "bad" if not one.usable else "good" if not one.findings else "doubtful"
-    words = "failed." if one.fault else one.verdict
-    items = "".join(f"<li>{html.escape(sentence)}</li>" for sentence in (one.findings or (one.fault,)) if sentence)
     valid = "" if one.valid_share is None else f", {100 * one.valid_share:.0f} % valid"
-    link = f'<p class="soft"><a href="{quote(one.out.name)}/report.html">{one.instants} results{valid}</a></p>'
+    links = [] if one.fault else [(f"{counted(one.instants, 'result')}{valid}", f"{quote(one.out.name)}/report.html")]
+    words = (one.fault,) if one.fault else one.findings
+    return take_section(one.clip.name, kind, "failed." if one.fault else one.verdict, words, links=links)
+
+
+def take_section(
+    name: str, kind: str, verdict: str, findings: Sequence[str], *, links: Sequence[tuple[str, str]]
+) -> str:
+    """Return a take's part of a page: one of the grades, what sums it up, what was found, and (words, address) to go
+    on to."""
+    items = "".join(f"<li>{html.escape(sentence)}</li>" for sentence in findings)
+    found = f"<ol>{items}</ol>" if items else ""
+    there = ", ".join(f'<a href="{address}">{html.escape(words)}</a>' for words, address in links)
+    on = f'<p class="soft">{there}</p>' if there else ""
     return (
-        f'<section><div class="verdict {kind}"><p class="word"><i>{MARKS[kind]}</i> {html.escape(one.clip.name)}: '
-        f"{html.escape(words)}</p><ol>{items}</ol></div>{'' if one.fault else link}</section>"
+        f'<section><div class="verdict {kind}"><p class="word"><i>{MARKS[kind]}</i> {html.escape(name)}: '
+        f"{html.escape(verdict)}</p>{found}</div>{on}</section>"
     )

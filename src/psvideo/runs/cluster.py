@@ -211,11 +211,17 @@ def _hanging_replaced(client: "Client", ours: Container[str]) -> Iterator[None]:
 
 
 def called_apart(
-    client: "Client", call: Callable[[Value], Result], values: Sequence[Value], *, watch: Watch = unwatched
+    client: "Client",
+    call: Callable[[Value], Result],
+    values: Sequence[Value],
+    *,
+    watch: Watch = unwatched,
+    what: str = "checking",
 ) -> Iterator[tuple[Value, Result | str]]:
     """Have a function called with each value by a worker, and give the value with the result, or with what is wrong.
 
-    Values and results are small, and no result is a str. Raises PsvideoError where the scheduler is gone.
+    Values and results are small, and no result is a str; ``what`` is done to takes, in a word. Raises PsvideoError
+    where the scheduler is gone.
     """
     from distributed import as_completed
 
@@ -223,7 +229,7 @@ def called_apart(
     value_of = {future.key: value for future, value in zip(futures, values, strict=True)}
     done = as_completed(futures, loop=client.loop, raise_errors=False)
     with _hanging_replaced(client, value_of):
-        for future in watch(done, total=len(futures), what="checking", unit="takes"):
+        for future in watch(done, total=len(futures), what=what, unit="takes"):
             yield value_of[future.key], future.result() if future.status == "finished" else _fault(future)
 
 

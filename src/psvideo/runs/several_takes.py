@@ -39,17 +39,24 @@ def several_takes(clips: Sequence[Path | str], *, out: Path | str, force: bool, 
     replaced (``force``) nor gone on with (``resume``).
     """
     paths, folder = [path_of("clips", clip) for clip in clips], path_of("out", out)
-    if not paths:
-        raise UsageError("`clips`: names no clip. Expected one or several folders of frames, or movie files.")
-    names = [clip.stem if clip.is_file() else clip.resolve().name for clip in paths]
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise UsageError(f"`clips`: several are named {twice[0]!r}, and their results would lie in one folder.")
+    names = names_of("clips", paths)
     places = [folder] if len(paths) == 1 else [folder / name for name in names]
     if not resume:
         for place in places:
             refuse_folder(place, mark=MARK, force=force)
     return Takes(of=tuple(zip(paths, places, strict=True)), folder=folder)
+
+
+def names_of(parameter: str, clips: Sequence[Path]) -> list[str]:
+    """Return what results of each clip are called. Raises UsageError, which names the parameter, where there is no
+    clip, or two are named alike."""
+    if not clips:
+        raise UsageError(f"`{parameter}`: names no clip. Expected one or several folders of frames, or movie files.")
+    names = [clip.stem if clip.is_file() else clip.resolve().name for clip in clips]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise UsageError(f"`{parameter}`: several are named {twice[0]!r}, and their results would lie in one place.")
+    return names
 
 
 def one_by_one(takes: Takes, do: Callable[[Path, Path], object], *, caller: Caller) -> Iterator[TakeResult]:

@@ -6,6 +6,10 @@ from typing import Annotated
 import typer
 
 Pictures = Annotated[Path, typer.Argument(help="A folder of stills (one per light), of plates, or a clip.")]
+PicturesOfTakes = Annotated[
+    list[Path],
+    typer.Argument(help="A folder of stills (one per light), of plates, or a clip. Or several, with a folder as -o."),
+]
 RigOut = Annotated[Path, typer.Option("-o", "--out", help="The rig file to write.")]
 RigIn = Annotated[Path, typer.Option("--rig", help="The rig whose directions or positions are known.")]
 FocalPx = Annotated[float | None, typer.Option(help="Focal length in pixels.", min=1)]

@@ -3,13 +3,24 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from psvideo.cli.commands.calibrate.of_takes import calibrate_all
 from psvideo.cli.console import Voice
-from psvideo.cli.options.calibrate import FocalPx, Pictures, RigIn, RigOut, Transfer
-from psvideo.cli.options.clip_and_run import FirstLight, Force, Frames, Json, PlanPath, Quiet, Verbose
+from psvideo.cli.options.calibrate import FocalPx, Pictures, PicturesOfTakes, RigIn, RigOut, Transfer
+from psvideo.cli.options.clip_and_run import (
+    FirstLight,
+    Force,
+    Frames,
+    Json,
+    PlanPath,
+    Quiet,
+    Scheduler,
+    Verbose,
+    Workers,
+)
 from psvideo.cli.options.typed import parse_box, parse_circle
 from psvideo.model.choices import Prior
 from psvideo.model.units import counted
@@ -20,7 +31,7 @@ if TYPE_CHECKING:
 
 
 def matte_sphere(
-    pictures: Pictures,
+    pictures: PicturesOfTakes,
     out: RigOut,
     circle: Annotated[
         str | None, typer.Option(help="The sphere's outline found by hand: x,y,radius in pixels from the top left.")
@@ -35,6 +46,8 @@ def matte_sphere(
     frames: Frames = None,
     first_light: FirstLight = None,
     force: Force = False,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     json: Json = False,
     verbose: Verbose = False,
     quiet: Quiet = False,
@@ -43,9 +56,7 @@ def matte_sphere(
     from psvideo.runs.calibrate.matte_sphere import matte_sphere as measure
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
-    found = measure(
-        pictures,
-        out=out,
+    options: dict[str, Any] = dict(  # noqa: C408, as they are called below
         circle=None if circle is None else parse_circle(circle),
         albedo=albedo,
         focal_px=focal_px,
@@ -53,10 +64,12 @@ def matte_sphere(
         plan=plan,
         frames=frames,
         first_light=first_light,
-        force=force,
-        watch=voice.track,
-        caller=voice.caller(),
     )
+    told: dict[str, Any] = {"force": force, "watch": voice.track, "caller": voice.caller()}
+    if len(pictures) > 1 or workers is not None or scheduler is not None:
+        calibrate_all(voice, "matte-sphere", pictures, out=out, workers=workers, scheduler=scheduler, **told, **options)
+        return
+    found = measure(pictures[0], out=out, **told, **options)
     x, y, radius = found.outline.place[:3]
     voice.say(f"sphere at {x:.1f}, {y:.1f} with radius {radius:.1f} px (+- {found.outline.error_px:.2f})")
     for light in found.lights:
@@ -68,7 +81,7 @@ def matte_sphere(
 
 
 def flat_field(
-    pictures: Pictures,
+    pictures: PicturesOfTakes,
     rig: RigIn,
     out: RigOut,
     albedo: Annotated[float, typer.Option(help="The target's albedo: white paper 0.85, a white card 0.9.")] = 0.9,
@@ -83,6 +96,8 @@ def flat_field(
     frames: Frames = None,
     first_light: FirstLight = None,
     force: Force = False,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     json: Json = False,
     verbose: Verbose = False,
     quiet: Quiet = False,
@@ -92,10 +107,8 @@ def flat_field(
     from psvideo.runs.calibrate.flat_field import flat_field as measure
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
-    found = measure(
-        pictures,
+    options: dict[str, Any] = dict(  # noqa: C408, as they are called below
         rig=rig,
-        out=out,
         albedo=albedo,
         box=None if box is None else parse_box(box),
         flat=flat,
@@ -103,10 +116,12 @@ def flat_field(
         plan=plan,
         frames=frames,
         first_light=first_light,
-        force=force,
-        watch=voice.track,
-        caller=voice.caller(),
     )
+    told: dict[str, Any] = {"force": force, "watch": voice.track, "caller": voice.caller()}
+    if len(pictures) > 1 or workers is not None or scheduler is not None:
+        calibrate_all(voice, "flat-field", pictures, out=out, workers=workers, scheduler=scheduler, **told, **options)
+        return
+    found = measure(pictures[0], out=out, **told, **options)
     for light in found.lights:
         strengths = ", ".join(f"{value:.4g}" for value in light.intensity)
         voice.say(
@@ -121,7 +136,7 @@ def flat_field(
 
 
 def colours(
-    pictures: Pictures,
+    pictures: PicturesOfTakes,
     rig: RigIn,
     out: RigOut,
     albedo: Annotated[float, typer.Option(help="The card's albedo: white paper 0.85, a white card 0.9.")] = 0.9,
@@ -133,6 +148,8 @@ def colours(
     frames: Frames = None,
     first_light: FirstLight = None,
     force: Force = False,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     json: Json = False,
     verbose: Verbose = False,
     quiet: Quiet = False,
@@ -142,20 +159,20 @@ def colours(
     from psvideo.runs.calibrate.colours import colours as measure
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
-    done = measure(
-        pictures,
+    options: dict[str, Any] = dict(  # noqa: C408, as they are called below
         rig=rig,
-        out=out,
         albedo=albedo,
         box=None if box is None else parse_box(box),
         transfer=transfer,
         plan=plan,
         frames=frames,
         first_light=first_light,
-        force=force,
-        watch=voice.track,
-        caller=voice.caller(),
     )
+    told: dict[str, Any] = {"force": force, "watch": voice.track, "caller": voice.caller()}
+    if len(pictures) > 1 or workers is not None or scheduler is not None:
+        calibrate_all(voice, "colours", pictures, out=out, workers=workers, scheduler=scheduler, **told, **options)
+        return
+    done = measure(pictures[0], out=out, **told, **options)
     found = done.found
     for name, seen, error in zip(found.names, found.seen, found.error, strict=True):
         shares = ", ".join(f"{value / seen.max():.4f}" for value in seen)
@@ -175,7 +192,7 @@ def colours(
 
 
 def intensities(
-    pictures: Pictures,
+    pictures: PicturesOfTakes,
     rig: RigIn,
     out: RigOut,
     transfer: Transfer = None,
@@ -183,6 +200,8 @@ def intensities(
     frames: Frames = None,
     first_light: FirstLight = None,
     force: Force = False,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     json: Json = False,
     verbose: Verbose = False,
     quiet: Quiet = False,
@@ -191,18 +210,18 @@ def intensities(
     from psvideo.runs.calibrate.intensities import intensities as measure
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
-    found = measure(
-        pictures,
+    options: dict[str, Any] = dict(  # noqa: C408, as they are called below
         rig=rig,
-        out=out,
         transfer=transfer,
         plan=plan,
         frames=frames,
         first_light=first_light,
-        force=force,
-        watch=voice.track,
-        caller=voice.caller(),
     )
+    told: dict[str, Any] = {"force": force, "watch": voice.track, "caller": voice.caller()}
+    if len(pictures) > 1 or workers is not None or scheduler is not None:
+        calibrate_all(voice, "intensities", pictures, out=out, workers=workers, scheduler=scheduler, **told, **options)
+        return
+    found = measure(pictures[0], out=out, **told, **options)
     lights = found.rig.lights
     for light, error in zip(lights, found.error, strict=True):
         voice.say(f"  {light.name:12} intensity {', '.join(f'{x:.4g}' for x in light.intensity)}  +- {error:.1%}")

@@ -3,14 +3,26 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from psvideo.cli.commands.calibrate.of_takes import calibrate_all
 from psvideo.cli.console import Voice
 from psvideo.cli.options.calibrate import Circles, FocalMm, FocalPx, RadiusMm, SensorMm, Spheres, Transfer
-from psvideo.cli.options.clip_and_run import FirstLight, Force, Frames, Json, PlanPath, Quiet, Verbose
+from psvideo.cli.options.clip_and_run import (
+    FirstLight,
+    Force,
+    Frames,
+    Json,
+    PlanPath,
+    Quiet,
+    Scheduler,
+    Verbose,
+    Workers,
+)
 from psvideo.cli.options.typed import parse_circle, parse_point, parse_radius_mm
+from psvideo.errors import UsageError
 from psvideo.model.units import counted
 
 if TYPE_CHECKING:
@@ -39,7 +51,15 @@ def mirror_sphere(
     plan: PlanPath = None,
     frames: Frames = None,
     first_light: FirstLight = None,
+    each: Annotated[
+        bool,
+        typer.Option(
+            "--each", help="Every folder or clip is a take of its own: a rig for each goes into the folder -o."
+        ),
+    ] = False,
     force: Force = False,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     json: Json = False,
     verbose: Verbose = False,
     quiet: Quiet = False,
@@ -48,9 +68,7 @@ def mirror_sphere(
     from psvideo.runs.calibrate.mirror_sphere import mirror_sphere as measure
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
-    found = measure(
-        pictures,
-        out=out,
+    options: dict[str, Any] = dict(  # noqa: C408, as they are called below
         circle=[parse_circle(text) for text in circle or ()],
         spheres=spheres,
         focal_px=focal_px,
@@ -63,10 +81,18 @@ def mirror_sphere(
         plan=plan,
         frames=frames,
         first_light=first_light,
-        force=force,
-        watch=voice.track,
-        caller=voice.caller(),
     )
+    told: dict[str, Any] = {"force": force, "watch": voice.track, "caller": voice.caller()}
+    if each:
+        calibrate_all(
+            voice, "mirror-sphere", pictures, out=out, workers=workers, scheduler=scheduler, **told, **options
+        )
+        return
+    if workers is not None or scheduler is not None:
+        raise UsageError(
+            "--workers and --scheduler measure several takes at a time: say with --each that they are such."
+        )
+    found = measure(pictures, out=out, **told, **options)
     voice.say(describe(found))
     voice.say(f"{out}: {len(found.rig.lights)} of {len(found.lights)} lights written; see {out.with_suffix('.png')}.")
     voice.result(record(found))
