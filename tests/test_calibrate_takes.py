@@ -54,7 +54,7 @@ def test_every_take_gets_its_rig_and_the_report_begins_with_what_is_wrong(
     assert float(said[1]) == pytest.approx(angle_deg(DIRECTIONS["key"], MOVED), abs=0.3)
     assert {light.name for light in read_rig(tmp_path / "rigs" / "take2.toml").lights} == set(DIRECTIONS)
     page = (tmp_path / "rigs" / "report.html").read_text(encoding="utf-8")
-    assert page.index("take4") < page.index("take3") < page.index("take1")
+    assert re.findall(r"<th><a [^>]*>(\w+)</a></th>", page)[:2] == ["take4", "take3"]
     assert 'href="take3.png"' in page
     assert main([*words, "-o", str(tmp_path / "rigs")]) == 2, "rigs are not replaced without --force"
     assert main([*words, "-o", str(tmp_path / "rig.toml")]) == 2, "every take gets a rig of its own"

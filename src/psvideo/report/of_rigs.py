@@ -8,9 +8,7 @@ from urllib.parse import quote
 from psvideo import __version__
 from psvideo.model.rig import Vector
 from psvideo.model.units import counted
-from psvideo.report.html import PAGE
-from psvideo.report.of_takes import take_section
-from psvideo.report.style import STYLE
+from psvideo.report.overview import TakeLine, overview_page, take_section
 
 SCHEMA = "psvideo-rigs/1"
 
@@ -86,18 +84,23 @@ def rigs_page(results: Sequence[RigResult]) -> str:
     """Return the report as one self-contained HTML page, with links to every take's rig and picture."""
     failed, lacking = sum(bool(one.fault) for one in results), sum(bool(one.missing) for one in results)
     whole = len(results) - failed - lacking
-    body = (
-        f"<p>{counted(len(results), 'take')}, {whole} with all lights, {lacking} without some, {failed} failed. "
-        "A light is held against where it stood, and how it shone, in the takes before.</p>"
+    said = (
+        f"{counted(len(results), 'take')}: {whole} with all lights, {lacking} without some, {failed} failed. A light "
+        "is held against where it stood, and how it shone, in the takes before."
     )
-    body += "".join(map(_section, results))
-    return PAGE.format(title="Lights, take by take", style=STYLE, head="", body=body, version=__version__)
+    return overview_page("Lights, take by take", said, [*map(_line, results)])
 
 
-def _section(one: RigResult) -> str:
-    kind = "bad" if not one.usable else "good" if not one.findings else "doubtful"
+def _line(one: RigResult) -> TakeLine:
+    grade = "bad" if not one.usable else "good" if not one.findings else "doubtful"
     picture = one.rig.with_suffix(".png")
-    links = [(one.rig.name, quote(one.rig.name))] if not one.fault else []
-    links += [("picture", quote(picture.name))] if picture.exists() else []
+    links = [] if one.fault else [(one.rig.name, quote(one.rig.name))]
+    links += [("what was found on the sphere", quote(picture.name))] if picture.exists() else []
     words = (one.fault,) if one.fault else one.findings
-    return take_section(one.take.name, kind, one.verdict, words, links=links)
+    return TakeLine(
+        name=one.take.name,
+        grade=grade,
+        verdict=one.verdict,
+        address=links[-1][1] if links else "",
+        section=take_section(one.take.name, grade, one.verdict, words, links=links) if words else "",
+    )

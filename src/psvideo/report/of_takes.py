@@ -1,6 +1,5 @@
 """One report over several takes, the worst first: report.json for machines, report.html for people."""
 
-import html
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,8 +9,8 @@ from urllib.parse import quote
 
 from psvideo import __version__
 from psvideo.model.units import counted
-from psvideo.report.html import MARKS, PAGE
-from psvideo.report.style import STYLE
+from psvideo.report.judgement import DECISIVE
+from psvideo.report.overview import TakeLine, overview_page, take_section
 
 SCHEMA = "psvideo-takes/1"
 
@@ -32,6 +31,8 @@ class TakeResult:
         How many results it has.
     valid_share
         The share of the subject that is valid in a typical one; None where it is not known.
+    bad, doubtful
+        What speaks against it: subjects of its report's lines.
     """
 
     clip: Path
@@ -42,6 +43,8 @@ class TakeResult:
     findings: tuple[str, ...] = ()
     instants: int = 0
     valid_share: float | None = None
+    bad: tuple[str, ...] = ()
+    doubtful: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, clip: Path, out: Path, record: Mapping[str, Any]) -> "TakeResult":
@@ -55,18 +58,25 @@ class TakeResult:
             findings=tuple(record["findings"]),
             instants=len(record["instants"]),
             valid_share=median(shares) if shares else None,
+            bad=_subjects(record, "bad"),
+            doubtful=_subjects(record, "doubtful"),
         )
 
 
+def _subjects(record: Mapping[str, Any], grade: str) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(one["subject"] for one in record["judgements"] if one["grade"] == grade))
+
+
 def worst_first(results: Iterable[TakeResult]) -> tuple[TakeResult, ...]:
-    """Return takes in the order in which to look at them: those that failed, that are not usable, and then by what
-    speaks against them."""
+    """Return takes in the order in which to look at them: those that failed, that are not usable, that are doubtful as
+    a whole, and then by how much speaks against them."""
     return tuple(sorted(results, key=_badness))
 
 
-def _badness(one: TakeResult) -> tuple[bool, bool, int, float, str]:
+def _badness(one: TakeResult) -> tuple[bool, bool, int, bool, int, float, str]:
     valid = 1.0 if one.valid_share is None else one.valid_share
-    return not one.fault, one.usable, -len(one.findings), valid, one.clip.name
+    as_a_whole = any(subject in DECISIVE for subject in one.doubtful)
+    return not one.fault, one.usable, -len(one.bad), not as_a_whole, -len(one.findings), valid, one.clip.name
 
 
 def takes_record(results: Sequence[TakeResult]) -> dict[str, object]:
@@ -83,6 +93,8 @@ def take_row(one: TakeResult) -> dict[str, object]:
         "verdict": one.verdict,
         "usable": one.usable,
         "findings": list(one.findings),
+        "bad": list(one.bad),
+        "doubtful": list(one.doubtful),
         "instants": one.instants,
         "valid_share": one.valid_share,
     }
@@ -91,29 +103,29 @@ def take_row(one: TakeResult) -> dict[str, object]:
 def takes_page(results: Sequence[TakeResult]) -> str:
     """Return the report as one self-contained HTML page, with links to every take's own."""
     usable, failed = sum(one.usable for one in results), sum(bool(one.fault) for one in results)
-    said = f"{len(results)} takes: {usable} usable, {len(results) - usable - failed} not, {failed} failed."
-    body = f"<p>{said}</p>" + "".join(map(_take, results))
-    return PAGE.format(title="Takes", style=STYLE, head="", body=body, version=__version__)
+    doubted = sum(one.usable and bool(one.findings) for one in results)
+    but = f" ({doubted} of them with reservations or doubts)" if doubted else ""
+    said = (
+        f"{counted(len(results), 'take')}: {usable} usable{but}, {len(results) - usable - failed} not, {failed} failed."
+    )
+    return overview_page("Takes", said, [*map(_line, results)])
 
 
-def _take(one: TakeResult) -> str:
-    kind = "bad" if not one.usable else "good" if not one.findings else "doubtful"
+def _line(one: TakeResult) -> TakeLine:
+    grade = "bad" if not one.usable else "good" if not one.findings else "doubtful"
+    verdict = "failed." if one.fault else one.verdict
     valid = "" if one.valid_share is None else f", {100 * one.valid_share:.0f} % valid"
-    links = [] if one.fault else [(f"{counted(one.instants, 'result')}{valid}", f"{quote(one.out.name)}/report.html")]
+    figures = "" if one.fault else f"{counted(one.instants, 'result')}{valid}"
+    address = "" if one.fault else f"{quote(one.out.name)}/report.html"
     words = (one.fault,) if one.fault else one.findings
-    return take_section(one.clip.name, kind, "failed." if one.fault else one.verdict, words, links=links)
-
-
-def take_section(
-    name: str, kind: str, verdict: str, findings: Sequence[str], *, links: Sequence[tuple[str, str]]
-) -> str:
-    """Return a take's part of a page: one of the grades, what sums it up, what was found, and (words, address) to go
-    on to."""
-    items = "".join(f"<li>{html.escape(sentence)}</li>" for sentence in findings)
-    found = f"<ol>{items}</ol>" if items else ""
-    there = ", ".join(f'<a href="{address}">{html.escape(words)}</a>' for words, address in links)
-    on = f'<p class="soft">{there}</p>' if there else ""
-    return (
-        f'<section><div class="verdict {kind}"><p class="word"><i>{MARKS[kind]}</i> {html.escape(name)}: '
-        f"{html.escape(verdict)}</p>{found}</div>{on}</section>"
+    links = [(f"Its report: {figures}", address)] if address else []
+    return TakeLine(
+        name=one.clip.name,
+        grade=grade,
+        verdict=verdict,
+        figures=figures,
+        address=address,
+        bad=one.bad,
+        doubtful=one.doubtful,
+        section=take_section(one.clip.name, grade, verdict, words, links=links) if words else "",
     )

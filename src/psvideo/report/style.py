@@ -22,7 +22,7 @@ i{font-style:normal;display:inline-block;width:1.2em;text-align:center}
 .good{--tone:var(--good)}.doubtful{--tone:var(--doubt)}.bad{--tone:var(--bad)}.unknown{--tone:var(--soft)}
 table{border-collapse:collapse}th{text-align:left;font-weight:600}
 td,th{padding:.28rem 1rem .28rem 0;border-bottom:1px solid var(--rule);vertical-align:top}
-.lines{width:100%}.lines th{white-space:nowrap}
+.lines{width:100%}.takes{margin:1rem 0 2rem}.takes td:last-child{width:100%}.lines th{white-space:nowrap}
 .grade{color:var(--tone);white-space:nowrap;font-weight:600}
 .facts th{white-space:nowrap;color:var(--soft);font-weight:500}.facts td{overflow-wrap:anywhere}
 .figures td,.figures th{font-variant-numeric:tabular-nums}.wide{overflow-x:auto}

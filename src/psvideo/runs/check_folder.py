@@ -57,7 +57,7 @@ def check_takes(
         checks = _shared_out(cluster, paths, partial(one, caller=AS_IT_IS), caller=caller, watch=watch)
     found: dict[Path, Check | Unread] = {}
     for path, found[path] in checks:
-        _keep(page, found)
+        _keep(page, found, worst_first=True)
         yield found[path]
 
 
@@ -134,8 +134,9 @@ def _one(path: Path, plan: Path | None, rig: Path | None, first_light: str | Non
         return Unread(path=path, fault=caller.spell(str(fault)) if path.exists() else gone)
 
 
-def _keep(page: Path | None, found: Mapping[Path, Check | Unread]) -> None:
+def _keep(page: Path | None, found: Mapping[Path, Check | Unread], *, worst_first: bool = False) -> None:
     """Write the page of all checks so far, if there is one."""
     if page is not None:
         checks = [one for one in found.values() if isinstance(one, Check)]
-        write_page(page, checks, {one.path: one.fault for one in found.values() if isinstance(one, Unread)})
+        unread = {one.path: one.fault for one in found.values() if isinstance(one, Unread)}
+        write_page(page, checks, unread, worst_first=worst_first)

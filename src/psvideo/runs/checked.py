@@ -5,11 +5,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from psvideo import __version__
 from psvideo.formats.whole_files import write_text
-from psvideo.report.html import MARKS, PAGE, judgement_lines
-from psvideo.report.judgement import Judgement, usable, verdict_of
-from psvideo.report.style import STYLE
+from psvideo.model.units import counted
+from psvideo.report.html import MARKS, judgement_lines
+from psvideo.report.judgement import DECISIVE, Judgement, usable, verdict_of
+from psvideo.report.overview import TakeLine, overview_page
 
 SCHEMA = "psvideo-check/1"
 
@@ -57,23 +57,54 @@ def check_record(check: Check) -> dict[str, object]:
     }
 
 
-def write_page(path: Path, checks: Sequence[Check], failed: Mapping[Path, str]) -> None:
+def write_page(path: Path, checks: Sequence[Check], failed: Mapping[Path, str], *, worst_first: bool = False) -> None:
     """Write the page of checks; ``failed`` says of other takes why they could not be checked."""
-    write_text(path, check_page(checks, failed))
+    write_text(path, check_page(checks, failed, worst_first=worst_first))
 
 
-def check_page(checks: Sequence[Check], failed: Mapping[Path, str]) -> str:
-    """Return a self-contained page; ``failed`` says of other takes why they could not be checked."""
+def check_page(checks: Sequence[Check], failed: Mapping[Path, str], *, worst_first: bool = False) -> str:
+    """Return a self-contained page, the newest check first, or the worst; ``failed`` says of other takes why they could
+    not be checked."""
     usable = sum(one.usable for one in checks)
-    body = (
-        f"<p>{len(checks) + len(failed)} takes: {usable} usable, {len(checks) - usable} not, {len(failed)} unread.</p>"
+    said = (
+        f"{counted(len(checks) + len(failed), 'take')}: {usable} usable, {len(checks) - usable} not, "
+        f"{len(failed)} unread."
     )
-    body += "".join(_fault(path, why) for path, why in failed.items()) + "".join(map(_take, reversed(checks)))
-    return PAGE.format(title="Checked takes", style=STYLE, head="", body=body, version=__version__)
+    shown = sorted(checks, key=_badness) if worst_first else [*reversed(checks)]
+    lines = [_unread_line(path, why) for path, why in failed.items()] + [*map(_line, shown)]
+    return overview_page("Checked takes", said, lines)
+
+
+def _badness(check: Check) -> tuple[int, bool, int, str]:
+    bad, doubtful = _subjects(check, "bad"), _subjects(check, "doubtful")
+    return -len(bad), not any(subject in DECISIVE for subject in doubtful), -len(doubtful), str(check.path)
+
+
+def _subjects(check: Check, grade: str) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(one.subject for one in check.judgements if one.grade == grade))
+
+
+def _line(check: Check) -> TakeLine:
+    return TakeLine(
+        name=check.clip,
+        grade=_grade(check),
+        verdict=check.verdict,
+        bad=_subjects(check, "bad"),
+        doubtful=_subjects(check, "doubtful"),
+        section=_take(check),
+    )
+
+
+def _unread_line(path: Path, why: str) -> TakeLine:
+    return TakeLine(name=path.name, grade="bad", verdict="cannot be checked.", section=_fault(path, why))
+
+
+def _grade(check: Check) -> str:
+    return "bad" if not check.usable else "good" if check.verdict == "This take is usable." else "doubtful"
 
 
 def _take(check: Check) -> str:
-    kind = "bad" if not check.usable else "good" if check.verdict == "This take is usable." else "doubtful"
+    kind = _grade(check)
     notes = "".join(f"<li>{html.escape(note)}</li>" for note in check.notes)
     return (
         f'<section><div class="verdict {kind}"><p class="word"><i>{MARKS[kind]}</i> {html.escape(check.clip)}: '
