@@ -20,7 +20,7 @@ width_px = 96
 height_px = 72
 fps = 100
 shutter_deg = {shutter}
-readout_s = 0.01
+readout_s = {readout}
 width_m = 1.6
 full_well_e = 30000
 read_e = 4
@@ -38,12 +38,17 @@ def picture(path: Path) -> np.ndarray:
     return np.asarray(channel.pixels, np.float32)
 
 
-def film(folder: Path, *, shutter: float = 360.0, marker: bool = True, ambient: float = 0.0, frames: int = 48) -> Path:
-    scene = folder / "scene.toml"
-    scene.write_text(
-        SCENE.format(shutter=shutter, marker=str(marker).lower(), ambient=ambient, frames=frames, lit_ball=LIT_BALL),
-        encoding="utf-8",
-    )
+def film(
+    folder: Path,
+    *,
+    shutter: float = 360.0,
+    readout: float = 0.01,
+    marker: bool = True,
+    ambient: float = 0.0,
+    frames: int = 48,
+) -> Path:
+    scene, words = folder / "scene.toml", {"shutter": shutter, "readout": readout, "marker": str(marker).lower()}
+    scene.write_text(SCENE.format(**words, ambient=ambient, frames=frames, lit_ball=LIT_BALL), encoding="utf-8")
     assert main(["synth", str(scene), "-o", str(folder / "clip"), "-q"]) == 0
     return folder / "clip"
 
@@ -72,11 +77,12 @@ def at_its_best(tmp_path_factory: pytest.TempPathFactory) -> tuple[float, float]
     return solved(film(tmp_path_factory.mktemp("best")))
 
 
-@pytest.mark.parametrize("shutter", [180.0, 90.0])
+@pytest.mark.parametrize(("shutter", "readout"), [(180.0, 0.01), (90.0, 0.01), (90.0, 0.0025)])
 def test_below_360_degrees_a_standing_ball_loses_nothing(
-    shutter: float, tmp_path: Path, at_its_best: tuple[float, float]
+    shutter: float, readout: float, tmp_path: Path, at_its_best: tuple[float, float]
 ) -> None:
-    share, error_deg = solved(film(tmp_path, shutter=shutter), "--aov", "age")
+    """Read out quickly, half of the flashes fall between two exposures of all rows: no frame sees any of them."""
+    share, error_deg = solved(film(tmp_path, shutter=shutter, readout=readout), "--aov", "age")
     assert share > at_its_best[0] - 0.02
     assert error_deg < 1.2 * at_its_best[1]
     ages = [picture(file).max() for file in sorted((tmp_path / "out" / "age").iterdir())]

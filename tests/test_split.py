@@ -160,6 +160,20 @@ def test_below_360_degrees_plates_are_divided_by_what_rows_saw_and_the_rest_is_m
     assert not all(plate.seen.all() for plate in plates)
 
 
+def test_flashes_between_two_exposures_of_all_rows_give_plates_of_no_rows_where_these_are_wanted(
+    make_plan: PlanMaker,
+) -> None:
+    plan = make_plan(shutter=0.25, readout=0.25)
+    shot, timing = shoot(plan, plates_for(plan))
+    seen, wanted = (list(split(frames_of(shot), plan.camera, timing, unseen=unseen)) for unseen in (False, True))
+    complete = [flash.index for flash in timing.flashes if flash.complete]
+    assert [plate.flash.index for plate in wanted] == complete
+    assert len(complete) > 1.3 * len(seen)
+    missed = [plate for plate in wanted if not plate.seen.any()]
+    assert {plate.flash.index for plate in missed} >= set(complete) - {plate.flash.index for plate in seen}
+    assert all(not plate.image.any() and not plate.exposures.any() for plate in missed)
+
+
 def test_a_dropped_frame_leaves_rows_unseen_and_the_rest_whole(make_plan: PlanMaker) -> None:
     plan = make_plan()
     truth = plates_for(plan)

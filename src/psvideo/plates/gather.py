@@ -109,12 +109,12 @@ def gather(
     plan, flashes = take.plan, timing.flashes
     if take.unmixing is None:
         check_separable(plan)
-    made = clip_plates(take, timing, method=method, part=part, watch=watch, each_window=each_window)
+    borrows = aligning is not None and plan.mode != "synced" and has_blind_time(timed_camera(plan, timing))
+    made = clip_plates(take, timing, method=method, part=part, watch=watch, each_window=each_window, unseen=borrows)
     single, turn = _shown(made, each_flash), take.clip.turn
     names, plates = plan.lights, light_plates(single, plan, flashes, start=start_number)
     if take.unmixing is not None:
         names, plates = slot_names(plan), slot_plates(single, flashes, start=start_number)
-    borrows = aligning is not None and plan.mode != "synced" and has_blind_time(timed_camera(plan, timing))
     if borrows and turn.transposed:  # rows are borrowed while they are rows
         plates, borrows = with_nearest_rows(plates), False
     plates = _shown(map(partial(upright, turn=turn), plates), each_plate)
@@ -162,10 +162,12 @@ def clip_plates(
     part: Part | None = None,
     watch: Watch = unwatched,
     each_window: Callable[[Separated], None] | None = None,
+    unseen: bool = False,
 ) -> Iterator[Plate]:
     """Decode a take once and yield the plate of every flash that it holds, ambient light taken off, demosaiced.
 
-    ``part`` decodes and yields no more than that; how ambient light is taken off depends on the whole take.
+    ``part`` decodes and yields no more than that; how ambient light is taken off depends on the whole take. ``unseen``
+    gives flashes between two exposures an empty plate, whose rows others lend.
     """
     clip, camera = take.clip, timed_camera(take.plan, timing)
     places = places_in_time(timing, clip.numbers)
@@ -178,7 +180,9 @@ def clip_plates(
     in_files = take.plan.mode != "synced"  # of flashes few frames are held at a time, of photographs all
     decoded = read_frames(clip, numbers, ahead=ahead, threads=thread_count(), kept=take.kept, in_files=in_files)
     frames = placed(watch(decoded, total=len(numbers), what="rebuilding flashes"), places)
-    single = (split if method == "weights" else hudon2015.split)(frames, camera, here)
+    single = (
+        split(frames, camera, here, unseen=unseen) if method == "weights" else hudon2015.split(frames, camera, here)
+    )
     known = None if part is None else part.ambient
     if come_often:
         known_early = EARLY_DARKS if holds_plain_codes(clip) and part is None else 0

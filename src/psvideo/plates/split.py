@@ -51,9 +51,10 @@ class Plate:
         return total
 
 
-def split(frames: Iterable[CodedFrame], camera: Camera, timing: Timing) -> Iterator[Plate]:
+def split(frames: Iterable[CodedFrame], camera: Camera, timing: Timing, *, unseen: bool = False) -> Iterator[Plate]:
     """Yield one plate for every complete flash that any frame saw, in order, dark slots included.
 
+    ``unseen`` yields a plate of no rows for flashes that fell between two exposures of all rows.
     ``frames`` come in order; a hole in their indices is a dropped frame. Only the few frames that the current flash
     touches are held. The plates still hold ambient light, as ``Plate.shares`` says.
     """
@@ -61,6 +62,8 @@ def split(frames: Iterable[CodedFrame], camera: Camera, timing: Timing) -> Itera
 
     def rebuilt(flash: Flash) -> Plate | None:
         touched = frames_of(camera, timing, flash)
+        if unseen and not touched:  # the frames around give no more than their size
+            touched = range(touched.start - 1, touched.start + 1)
         images = stream.between(touched) if flash.complete and touched else {}
         return _rebuild(camera, timing, flash, images) if images else None
 
@@ -97,8 +100,11 @@ class _Window:
 
 def _rebuild(camera: Camera, timing: Timing, flash: Flash, images: dict[int, Coded]) -> Plate:
     """Combine the frames that saw one flash, each row with its own coefficients."""
-    recipe = flash_recipe(camera, timing, flash, frozenset(images))
-    frames, coefficients = recipe.frames, recipe.coefficients
+    if frames_of(camera, timing, flash):
+        recipe = flash_recipe(camera, timing, flash, frozenset(images))
+        frames, coefficients, seen = recipe.frames, recipe.coefficients, recipe.seen
+    else:
+        frames, seen = (), np.zeros(camera.height_px, np.bool_)
     if not frames:  # none of them saw it: all rows are unseen
         frames, coefficients = (next(iter(images)),), np.zeros((1, camera.height_px))
     return Plate(
@@ -106,7 +112,7 @@ def _rebuild(camera: Camera, timing: Timing, flash: Flash, images: dict[int, Cod
         picture=Mixture(frames=tuple(images[index] for index in frames), coefficients=coefficients),
         shares=coefficients,
         middles_s=_opens_s(camera, frames) + camera.exposure_s / 2,
-        seen=recipe.seen,
+        seen=seen,
     )
 
 
