@@ -34,7 +34,7 @@ COUNTS = (5, 8, 12, 12, 24, 48, 96)
 """So many lights of a subject's, three sets of each."""
 FLAT = 6.5
 """Lights of a larger condition number lie nearly in a plane, up to what solving accepts."""
-FITTED = ("misfit_deg", "misfit_power", "little_deg", "torn", "torn_beside")
+FITTED = ("misfit_deg", "misfit_power", "little_deg", "few_power", "indirect", "torn", "torn_beside")
 MOST_OVER, OF_OVER = 0.02, 3.0
 """Of what is trusted, the share that may be off by more than 10 degrees, and how much more of it counts."""
 POINTS = 400
@@ -81,7 +81,7 @@ class Seen:
             indirect_deg=self.signs.indirect_deg[some],
             torn_deg=self.signs.torn_deg[some],
             lost_deg=self.signs.lost_deg[some],
-            flatter=self.signs.flatter[some],
+            hidden=self.signs.hidden,
         )
         return Seen(
             self.subject, self.lights, self.flat, self.true_deg[some], self.noise_deg[some], self.fit_deg[some], signs
@@ -211,7 +211,7 @@ def _looked(subject: str, case: Case, *, flat: bool) -> Seen:
             indirect_deg=signs.indirect_deg[known],
             torn_deg=signs.torn_deg[known],
             lost_deg=signs.lost_deg[known],
-            flatter=signs.flatter[known],
+            hidden=signs.hidden,
         ),
     )
 

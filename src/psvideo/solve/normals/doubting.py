@@ -35,12 +35,14 @@ OUTLYING, TURNS, LEAST_LEVEL_DEG = np.float32(1.5), 4, np.float32(0.05)
 their own, and of no more than a few of the points."""
 CERTAIN = np.float32(1)
 """... beyond so many standard errors of the mean square that noise makes of so few."""
+UNSURE_OF_NOISE = np.float32(1.2)
+"""Noise is known to a tenth, and its square to a fifth: what is less beyond it is no misfit."""
 LEAST_REACH = np.float32(0.2)
 """Where fewer lights reach, residuals of noise predict more: as if no less than this share of them did."""
 MOVING_DEG, OF_MOTION = np.float32(0.5), 5
 """Where motion turns normals by more, over so many points, residuals are its own, and no misfit of rig or surface."""
-WELL_SPREAD = np.float32(5)
-"""What ``flatter`` is measured by: a ring of any number of lights 30 degrees around the camera spreads 4.9."""
+ENOUGH_LIGHTS = 12
+"""What ``hidden`` is measured by: so many lights hide little of what is not matte."""
 LEAST_LIGHTS = 0.02
 """So many lights that do not reach a point, in the mean, must there be for light from around to be known."""
 
@@ -52,8 +54,8 @@ class Doubting:
     misfit_deg, misfit_power, little_deg: the error m that residuals around predict beyond noise counts as
         m^(1 + power) / (m + little) of these degrees: where it is little it is noise.
     own: what a pixel's own residuals predict counts from so many times m on, wholly: a shadow's edge or a highlight.
-    flat_power: the more so the flatter the lights lie: with this power of by how much they spread light that no matte
-        surface gives more than well-spread lights do, for how it spreads does not average out.
+    few_power: the more so the fewer lights there are: with this power of how much more of what is not matte a normal and
+        an albedo follow, so that residuals do not show it.
     indirect: how much of the angle counts by which light from around would turn the normal.
     torn, torn_beside, torn_alone_deg: how much more it is for each degree by which normals belong to no surface; these
         count up to a share of the other doubt, and little more: along creases and the outline of a thing before another
@@ -65,29 +67,28 @@ class Doubting:
     of them. Each subject left out and predicted from the others: ``python -m bench predicted``.
     """
 
-    misfit_deg: float = 1.7
+    misfit_deg: float = 1.8
     misfit_power: float = 0.5
-    little_deg: float = 1.0
+    little_deg: float = 1.75
     own: float = 2.0
-    flat_power: float = 0.5
-    indirect: float = 1.0
-    torn: float = 2.35
-    torn_beside: float = 0.47
-    torn_alone_deg: float = 0.2
+    few_power: float = 0.5
+    indirect: float = 1.65
+    torn: float = 2.5
+    torn_beside: float = 0.5
+    torn_alone_deg: float = 0.1
 
 
 @dataclass(frozen=True, kw_only=True)
 class Signs:
     """What is looked for, (row, col) of the points, in degrees: what residuals predict beyond noise, by which angle
     light from around would turn the normal, by which normals around belong to no surface, and what noise makes more
-    where some lights are not used. ``flatter`` is by how much more than well-spread lights all of them spread into the
-    normal what no matte surface gives, 1 at least."""
+    where some lights are not used. ``hidden`` is by how much more than ENOUGH_LIGHTS so few hide of what is not matte."""
 
     misfit_deg: Floats
     indirect_deg: Floats
     torn_deg: Floats
     lost_deg: Floats
-    flatter: Floats
+    hidden: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,7 +122,7 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
     sums, counts = one.indirect
     reach = np.clip(1 - counts / np.float32(len(one.plates)), LEAST_REACH, 1)
     noise = (points.fit_of_noise_deg / reach) ** 2
-    squares = np.where(points.known, fit**2 - noise, np.float32(0))
+    squares = np.where(points.known, fit**2 - UNSURE_OF_NOISE * noise, np.float32(0))
     if turned_deg is not None:
         squares *= cv2.blur(turned_deg, (OF_MOTION, OF_MOTION)) < MOVING_DEG
     around, far_around = (width_of(points.known, share) for share in (AROUND, FAR_AROUND))
@@ -129,20 +130,21 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
     near = _mean(sums, around) + np.float32(LEAST_LIGHTS) * far  # where all lights reach what is around, farther off
     indirect = np.maximum(near / (_mean(counts, around) + np.float32(LEAST_LIGHTS)), 0)
     own = np.maximum(sums / np.maximum(counts, 1) - 2 * np.radians(points.noise_deg), 0)
-    shown = brightness(points.surface.albedo) * points.known
+    albedo = brightness(points.surface.albedo) * points.known
+    shown = np.minimum(albedo, albedo.sum() / max(np.count_nonzero(points.known), 1))  # glare is no more than the rest
     return Signs(
         misfit_deg=np.maximum(*(_typical(squares, noise, shown, width) for width in (around, far_around))),
         indirect_deg=np.degrees(indirect + own) * _turned(points.surface, one),
         torn_deg=np.sqrt(np.maximum(_torn_squared(points) - (TORN_OF_NOISE * points.noise_deg) ** 2, 0)),
         lost_deg=points.noise_deg * np.sqrt(1 / reach - 1),
-        flatter=_flatter(points.surface, one),
+        hidden=hidden_by(len(one.plates)) / hidden_by(ENOUGH_LIGHTS),
     )
 
 
 def doubt_deg(signs: Signs, *, how: Doubting = Doubting()) -> Floats:
     """Return by how many degrees normals may be off beyond noise, (row, col) of the points."""
     misfit = np.float32(how.misfit_deg) * signs.misfit_deg ** np.float32(1 + how.misfit_power)
-    misfit *= signs.flatter ** np.float32(how.flat_power) / (signs.misfit_deg + np.float32(how.little_deg))
+    misfit *= np.float32(signs.hidden**how.few_power) / (signs.misfit_deg + np.float32(how.little_deg))
     both = np.hypot(misfit, np.float32(how.indirect) * signs.indirect_deg)
     most_torn = np.float32(how.torn_beside) * both + np.float32(how.torn_alone_deg)
     torn = np.float32(how.torn) * np.minimum(signs.torn_deg, most_torn)
@@ -158,8 +160,8 @@ def _typical(squares: Floats, noise: Floats, shown: Floats, width: int) -> Float
     """Return the root of what is typical of squares around every point, of which noise makes ``noise`` in the mean and
     that is taken off; what stands out counts as OUTLYING times that, and as what noise makes of a few.
 
-    ``shown`` is each point's albedo, by which it counts: whatever little light comes from elsewhere, or is lost in a
-    file's codes, turns black cloth far, and says nothing of the subject before it."""
+    ``shown`` is each point's albedo, up to the mean, by which it counts: whatever little light comes from elsewhere, or
+    is lost in a file's codes, turns black cloth far, and says nothing of the subject before it."""
     weight = _mean(shown, width)
     typical = _mean(squares * shown, width) / weight
     for _ in range(TURNS):
@@ -175,16 +177,13 @@ def brightness(albedo: NDArray[np.floating]) -> Floats:
     return np.asarray(albedo if albedo.ndim == 2 else albedo.mean(axis=-1, dtype=np.float32), np.float32)
 
 
-def _flatter(surface: Surface, one: Evidence) -> Floats:
-    """Return by how much more than well-spread lights these turn a normal for what is wrong of a light's share, however
-    many there are."""
-    strength = one.lit.intensities.mean(axis=1)
-    matrix = one.lit.directions * (strength / strength.mean())[:, None]
-    inverse = np.linalg.inv(matrix.T @ matrix).astype(np.float32)
-    normals = surface.normals.astype(np.float32)
-    along = np.einsum("rcx,xy,rcy->rc", normals, inverse, normals)
-    spread = np.sqrt(np.float32(len(matrix)) * np.maximum(np.trace(inverse) - along, 0))
-    return np.asarray(np.maximum(spread / WELL_SPREAD, np.float32(1)), np.float32)
+def hidden_by(lights: int) -> float:
+    """Return all lights over those that a normal and an albedo leave to be held against them.
+
+    >>> hidden_by(5), hidden_by(12)
+    (2.5, 1.3333333333333333)
+    """
+    return lights / max(lights - 3, 1)
 
 
 def _turned(surface: Surface, one: Evidence) -> Floats:
