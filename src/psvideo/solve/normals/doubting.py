@@ -54,8 +54,8 @@ class Doubting:
     misfit_deg, misfit_power, little_deg: the error m that residuals around predict beyond noise counts as
         m^(1 + power) / (m + little) of these degrees: where it is little it is noise.
     own: what a pixel's own residuals predict counts from so many times m on, wholly: a shadow's edge or a highlight.
-    few_power: the more so the fewer lights there are: with this power of how much more of what is not matte a normal and
-        an albedo follow, so that residuals do not show it.
+    few_power: the more so the fewer lights there are: with this power of how much more of what is not matte they hide,
+        because a normal and an albedo follow it.
     indirect: how much of the angle counts by which light from around would turn the normal.
     torn, torn_beside, torn_alone_deg: how much more it is for each degree by which normals belong to no surface; these
         count up to a share of the other doubt, and little more: along creases and the outline of a thing before another
@@ -67,12 +67,12 @@ class Doubting:
     of them. Each subject left out and predicted from the others: ``python -m bench predicted``.
     """
 
-    misfit_deg: float = 1.8
+    misfit_deg: float = 1.9
     misfit_power: float = 0.5
     little_deg: float = 1.75
     own: float = 2.0
     few_power: float = 0.5
-    indirect: float = 1.65
+    indirect: float = 1.4
     torn: float = 2.5
     torn_beside: float = 0.5
     torn_alone_deg: float = 0.1
@@ -82,7 +82,8 @@ class Doubting:
 class Signs:
     """What is looked for, (row, col) of the points, in degrees: what residuals predict beyond noise, by which angle
     light from around would turn the normal, by which normals around belong to no surface, and what noise makes more
-    where some lights are not used. ``hidden`` is by how much more than ENOUGH_LIGHTS so few hide of what is not matte."""
+    where some lights are not used. ``hidden``: so many times more than ENOUGH_LIGHTS do these hide of what is not
+    matte."""
 
     misfit_deg: Floats
     indirect_deg: Floats

@@ -37,8 +37,8 @@ from psvideo.solve.normals.task import LIGHTS, Floats, Mask, Samples, Spread
 class Judging:
     """How errors are predicted and when a normal is trusted.
 
-    most_error_deg: a normal is trusted where its predicted error is at most this: of such normals one in forty is off by
-        more than 10 degrees, under few lights one in twenty.
+    most_error_deg: a normal is trusted where its predicted error is at most this: of such normals at most one in forty
+        is off by more than 10 degrees, under 5 to 8 lights one in twenty.
     fit_noise: so many times what noise makes do residuals predict of nothing but noise. (Robust solving corrects them
         for few lights, where what is not matte does not average out.)
     held: so many standard deviations hold 68 % of two-dimensional Gaussian errors (1.07, and some doubt).
