@@ -166,6 +166,18 @@ def test_a_hole_beside_the_very_last_or_first_frames_is_found(end: str, gone: in
     assert rms_rows(timing, plan, int(shown.max()) + 1) < 0.05
 
 
+@pytest.mark.parametrize("gone", [2, 3])
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 5])
+@pytest.mark.parametrize("end", ["first", "last"])
+def test_a_hole_after_a_few_frames_of_a_short_clip_is_found(end: str, count: int, gone: int, plan: Plan) -> None:
+    """Frames at wrong places would spoil the brightnesses by which all others are judged."""
+    shown = np.arange(26)
+    shown[-count if end == "last" else count :] += gone
+    timing = retimed(plan, shown)
+    assert_placed(timing, shown)
+    assert rms_rows(timing, plan, int(shown.max()) + 1) < 0.05
+
+
 @pytest.mark.parametrize("end", ["first", "last"])
 def test_an_end_that_fits_no_place_gives_no_whole_flash(end: str, plan: Plan) -> None:
     """The frame there belongs to another take."""

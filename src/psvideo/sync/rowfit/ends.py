@@ -1,7 +1,7 @@
 """The clip's first and last frames, beyond which nothing shows where they are: a hole there gets a search of its own.
 
-Tracking believes in a hole once the frames on either side of it agree. One or two frames at an end are too few for
-that, but they still fit one place in time, or none; where they fit none, the flashes in them are not to be trusted.
+Tracking believes in a hole once the frames on either side of it agree. A few frames at an end are too few for that, but
+they still fit one place in time, or none; where they fit none, the flashes in them are not to be trusted.
 """
 
 from dataclasses import dataclass, replace
@@ -15,12 +15,15 @@ from psvideo.sync.rowfit.profiles import Profiles, brightnesses
 from psvideo.sync.rowfit.row_model import IntArray
 from psvideo.sync.rowfit.track import MEMORY, MOST, SUSPICIOUS, losses_of
 
-AT_END = 2
+AT_END = 6
 """Frames at either end that are looked at."""
 BEFORE = 4
 """Frames before those, by which it is judged how well frames are foretold at all."""
+LEAST_KNOWN = 12
+"""Fewer frames than these foretell nothing; nor do fewer than two for every light."""
 ODD = 2.0
-"""An end is odd where it is foretold so many times worse than the frames before it, and worse by ``SUSPICIOUS``."""
+"""An end is odd where it is foretold so many times worse than the frames before it, and worse by ``SUSPICIOUS``; and a
+place is the right one where all others fit so many times worse than it, and than is usual."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,8 +37,6 @@ class ClipEnds:
 
 def ends(plan: Plan, rows: Profiles, index: IntArray, beat: Beat) -> ClipEnds:
     """Return the places in time (frame,) with holes beside the first and the last frames found."""
-    if len(index) < MEMORY + BEFORE + AT_END:
-        return ClipEnds(index=index, lost_first=0, lost_last=0)
     last, lost_last = _end(plan, rows, index, beat)
     turned = replace(rows, value=np.ascontiguousarray(rows.value[::-1]))
     first, lost_first = _end(plan, turned, last[::-1], beat)
@@ -43,34 +44,37 @@ def ends(plan: Plan, rows: Profiles, index: IntArray, beat: Beat) -> ClipEnds:
 
 
 def _end(plan: Plan, rows: Profiles, index: IntArray, beat: Beat) -> tuple[IntArray, int]:
-    """Return the places with the end of the arrays put where it fits, and how many frames there fit nowhere."""
+    """Return the places with the end of the arrays put where it fits, and how many frames there fit nowhere.
+
+    From the inside outwards, so that nothing is foretold from frames that are odd themselves. A frame in the dark that
+    was taken for a repeat of the one before it may as well be a later one in the dark.
+    """
     onward = int(np.sign(index[-1] - index[0]))
-    odd = 0
-    for count in range(1, AT_END + 1):
-        known = slice(len(index) - count - MEMORY, len(index) - count)
-        bar = _bar(plan, rows, index, beat, known)
-        if (_fits(plan, rows, index, beat, known, index[-count:]) < bar).any():
-            break
-        odd = count
-    if not odd:
-        return index, 0
-    known = slice(len(index) - odd - MEMORY, len(index) - odd)
-    bar = _bar(plan, rows, index, beat, known)
-    tried = np.array(
-        [_fits(plan, rows, index, beat, known, index[-odd:] + onward * extra).max() for extra in range(1, MOST + 1)]
-    )
-    if (tried < bar).sum() != 1:
-        return index, odd
-    moved = index.copy()
-    moved[-odd:] += onward * (1 + int(tried.argmin()))
-    return moved, 0
+    room = len(index) - BEFORE - max(LEAST_KNOWN, 2 * (len(plan.lit_slots) + 1))
+    for count in range(min(AT_END, room), 0, -1):
+        known = slice(max(len(index) - count - MEMORY, 0), len(index) - count)
+        usual = _usual(plan, rows, index, beat, known)
+        bar = max(ODD * usual, usual + SUSPICIOUS)
+        own = _fits(plan, rows, index, beat, known, index[-count:])
+        repeated = bool(index[-count] == index[-count - 1])
+        if own[0] < bar and not repeated:
+            continue
+        places = [index[-count:] + onward * extra for extra in range(1, MOST + 1)]
+        worst = np.array([own.max(), *(_fits(plan, rows, index, beat, known, place).max() for place in places)])
+        best = int(worst.argmin())
+        if worst[best] < bar and (worst > ODD * max(worst[best], usual)).sum() == MOST:
+            moved = index.copy()
+            moved[-count:] += onward * best
+            return moved, 0
+        if repeated or (own >= bar).all():
+            return index, count
+    return index, 0
 
 
-def _bar(plan: Plan, rows: Profiles, index: IntArray, beat: Beat, known: slice) -> float:
-    """Return the loss from which on frames after the known ones are odd, by how the last of those are foretold."""
+def _usual(plan: Plan, rows: Profiles, index: IntArray, beat: Beat, known: slice) -> float:
+    """Return how badly the last of the known frames are foretold by those before them."""
     learnt = slice(known.start, known.stop - BEFORE)
-    usual = float(_fits(plan, rows, index, beat, learnt, index[known.stop - BEFORE : known.stop]).max())
-    return max(ODD * usual, usual + SUSPICIOUS)
+    return float(_fits(plan, rows, index, beat, learnt, index[known.stop - BEFORE : known.stop]).max())
 
 
 def _fits(plan: Plan, rows: Profiles, index: IntArray, beat: Beat, known: slice, places: IntArray) -> FloatArray:

@@ -33,6 +33,8 @@ HOLDS = 1.0
 NATURAL = 0.1
 """A frame that looks like the one before it is repeated only where its own place in time fits worse by so much."""
 LEAST_ANCHOR = 12
+AGREEING = 4
+"""Fits from which frames that stray from the others count less and less."""
 MEMORY, NEAR = 24, 10
 """Frames on either side of a hole that show where it is, and how far from where it was found it may be."""
 
@@ -100,7 +102,7 @@ def from_first_frame(rows: Profiles, tracked: FrameTrack) -> FrameTrack:
 def _anchor(plan: Plan, rows: Profiles, beat: Beat, seed: slice) -> tuple[int, int]:
     """Return the longest run of frames in the seed that fit as well as most."""
     part = rows.take(seed)
-    loss = frame_losses(part, unexplained(plan, part, beat))
+    loss = _losses_of_most(plan, part, beat)
     calm = np.array([np.median(loss[max(n - 1, 0) : n + 2]) for n in range(len(loss))])
     good = calm < np.median(loss) + max(SUSPICIOUS, float(np.median(loss)))
     good &= ~twin_frames(rows)[seed]
@@ -110,6 +112,18 @@ def _anchor(plan: Plan, rows: Profiles, beat: Beat, seed: slice) -> tuple[int, i
     if length < min(LEAST_ANCHOR, len(loss)):
         return seed.start, seed.stop
     return seed.start + first, seed.start + first + length
+
+
+def _losses_of_most(plan: Plan, rows: Profiles, beat: Beat) -> FloatArray:
+    """Return every frame's loss under brightnesses that most frames agree on, shape (frame,).
+
+    Two frames at wrong places in time spoil brightnesses so much that frames at right ones look as odd.
+    """
+    trust = np.ones_like(rows.value)
+    for _ in range(AGREEING):
+        loss = frame_losses(rows, unexplained(plan, rows, beat, trust))
+        trust = np.ascontiguousarray(np.broadcast_to(1.0 / (1.0 + (loss / SUSPICIOUS) ** 2)[:, None], trust.shape))
+    return loss
 
 
 def frame_losses(rows: Profiles, rest: FloatArray) -> FloatArray:

@@ -33,6 +33,6 @@ def remarks_on_frames(plan: Plan, found: ClipFit, numbered: NDArray[np.int64]) -
     for name, place in (("first", found.trusted[0] - index[0]), ("last", index[-1] - found.trusted[1])):
         if place:
             yield (
-                f"The {name} frame (or the {name} two) fit no place in time, or more than one, as when frames are "
+                f"The {name} frame (or the {name} few) fit no place in time, or more than one, as when frames are "
                 f"missing beside them: flashes that they saw are marked as incomplete."
             )
