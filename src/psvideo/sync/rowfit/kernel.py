@@ -9,7 +9,7 @@ import numpy as np
 
 from psvideo.compute.compiled import EXACT
 from psvideo.model.camera import FloatArray
-from psvideo.sync.rowfit.row_model import LEFT, RIGHT, SIGNALS, Flashes, Rows, given_off, see, slopes, width
+from psvideo.sync.rowfit.row_model import LEFT, RIGHT, SIGNALS, Flashes, Rows, given_off, see, see_all, slopes, width
 from psvideo.sync.rowfit.whitening import factors, whiten, whiten_all
 
 RIDGE = 1e-6
@@ -73,9 +73,7 @@ def row_rest(rows: Rows, flashes: Flashes, weight: FloatArray, row: int, design:
     """Fill ``rest`` (frame,) with what one row's own brightnesses, fitted window by window, leave unexplained."""
     frames, size = design.shape
     normal, right = np.empty((size, size)), np.empty(size)
-    k = 0
-    for n in range(frames):
-        k = see(rows, flashes, n, row, k, design[n])
+    see_all(rows, flashes, row, design)
     value = rows.value[:, row].copy()
     if rows.restless[row] > 0.0:
         diagonal, below = np.empty(frames), np.empty(frames)
@@ -230,9 +228,7 @@ def brightnesses(rows: Rows, flashes: Flashes, weight: FloatArray, first: int, l
     design = np.empty((len(rows.value), size))
     normal = np.empty((size, size))
     for row in range(first, last):
-        k = 0
-        for n in range(len(rows.value)):
-            k = see(rows, flashes, n, row, k, design[n])
+        see_all(rows, flashes, row, design)
         _fit_window(rows.value[:, row], weight[:, row], design, 0, len(rows.value), normal, found[row])
 
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
 from psvideo.model.camera import FloatArray
@@ -53,8 +54,8 @@ class Profiles:
             doubt=None if self.doubt is None else self.doubt[frames],
         )
 
-    def only_rows(self, rows: slice) -> "Profiles":
-        """Return some neighbouring rows of all frames."""
+    def only_rows(self, rows: slice | NDArray[np.bool_]) -> "Profiles":
+        """Return some of the rows of all frames."""
         return replace(
             self,
             value=np.ascontiguousarray(self.value[:, rows]),

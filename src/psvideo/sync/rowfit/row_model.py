@@ -124,6 +124,41 @@ def see(rows: Rows, flashes: Flashes, frame: int, row: int, k: int, design: Floa
 
 
 @EXACT.kept
+def see_all(rows: Rows, flashes: Flashes, row: int, design: FloatArray) -> None:
+    """Fill ``design`` (frame, unknown) with what a row saw in every frame, as ``see`` does frame by frame."""
+    if flashes.rise_s == 0.0 and flashes.fall_s == 0.0 and flashes.blur_s == 0.0 and len(rows.beat_hz) == 0:
+        _see_sharp(rows.frame_start_s, rows.row_place[row] * rows.row_time_s, rows.exposure_s, flashes, design)
+        return
+    k = 0
+    for n in range(len(design)):
+        k = see(rows, flashes, n, row, k, design[n])
+
+
+@EXACT.kept
+def _see_sharp(
+    frame_start_s: FloatArray, offset_s: float, exposure_s: float, flashes: Flashes, design: FloatArray
+) -> None:
+    """Fill ``design`` where flashes are square pulses and nothing flickers, which most searches try."""
+    start_s, duration_s, unknown = flashes.start_s, flashes.duration_s, flashes.unknown
+    count, size = len(start_s), design.shape[1]
+    k = 0
+    for n in range(len(design)):
+        design[n, 0] = 1.0
+        for u in range(1, size):
+            design[n, u] = 0.0
+        open_s = frame_start_s[n] + offset_s
+        close_s = open_s + exposure_s
+        while k < count and start_s[k] + duration_s[k] <= open_s:
+            k += 1
+        j = k
+        while j < count and start_s[j] < close_s:
+            if unknown[j] > 0:
+                since_s, until_s = max(open_s, start_s[j]), min(close_s, start_s[j] + duration_s[j])
+                design[n, unknown[j]] += max(until_s - since_s, 0.0) / duration_s[j]
+            j += 1
+
+
+@EXACT.kept
 def slopes(
     rows: Rows, flashes: Flashes, frame: int, row: int, k: int, brightness: FloatArray, tails: bool, signals: FloatArray
 ) -> float:
@@ -181,13 +216,12 @@ def seen_of(rows: Rows, flashes: Flashes, frame: int, row: int, j: int) -> float
 @EXACT.kept
 def predictions(rows: Rows, flashes: Flashes, brightness: FloatArray, first: int, last: int, found: FloatArray) -> None:
     """Fill ``found`` (frame, row) with what known brightnesses (row, unknown) give."""
-    size = flashes.unknowns + 2 * len(rows.beat_hz)
-    design = np.empty(size)
+    frames, size = len(rows.value), width(rows, flashes)
+    design = np.empty((frames, size))
     for row in range(first, last):
-        k = 0
-        for n in range(len(rows.value)):
-            k = see(rows, flashes, n, row, k, design)
+        see_all(rows, flashes, row, design)
+        for n in range(frames):
             total = 0.0
             for i in range(size):
-                total += design[i] * brightness[row, i]
+                total += design[n, i] * brightness[row, i]
             found[n, row] = total

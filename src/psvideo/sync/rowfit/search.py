@@ -8,6 +8,7 @@ search.
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
 from psvideo.model.camera import FloatArray
@@ -18,6 +19,11 @@ from psvideo.sync.rowfit.profiles import Profiles, compiled_rows, rows_of_a_part
 
 ROBUST_STEEPNESS = 20.0
 """Of the coarse loss ``log(1 + 20 r^2)``, r being a residual over its row's own spread (physics.md)."""
+
+FEWER, LEAST_ROWS = 4, 6
+"""Every so manieth row is looked at first, but no fewer rows than these;"""
+LOW = 0.15
+"""the others only for this share of the clocks, the lowest."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,12 +48,35 @@ def search(
         for offset in ppm
         for phase_s in phases_s
     ]
-    loss = losses(plan, rows, clocks, start, place=rows.place if readout_known else np.zeros_like(rows.place))
-    loss = loss.reshape(len(ppm), len(phases_s), -1) / len(rows.value)
     if readout_known:
-        best = _best(loss.mean(axis=2)[None], keep)
+        loss = _least(plan, rows, clocks, start).reshape(len(ppm), len(phases_s)) / len(rows.value)
+        best = _best(loss[None], keep)
         return [GridPlace(beat=_placed(start, clocks[a * len(phases_s) + b]), loss=value) for _, a, b, value in best]
+    loss = losses(plan, rows, clocks, start, place=np.zeros_like(rows.place))
+    loss = loss.reshape(len(ppm), len(phases_s), -1) / len(rows.value)
     return _over_readouts(plan, rows, loss, clocks, phases_s, start, keep)
+
+
+def _least(plan: Plan, rows: Profiles, clocks: list[FoundClock], start: Beat) -> FloatArray:
+    """Return every clock's mean loss over the rows (clock,); infinite where a few of the rows show it to be high."""
+    height = len(rows.place)
+    few = np.zeros(height, np.bool_)
+    few[:: max(min(FEWER, height // LEAST_ROWS), 1)] = True
+    total = _sum_over(plan, rows, few, clocks, start)
+    low = np.argsort(total, kind="stable")[: max(int(LOW * len(clocks)), 1)]
+    loss = np.full(len(clocks), np.inf)
+    loss[low] = (total[low] + _sum_over(plan, rows, ~few, [clocks[n] for n in low.tolist()], start)) / height
+    return loss
+
+
+def _sum_over(
+    plan: Plan, rows: Profiles, among: NDArray[np.bool_], clocks: list[FoundClock], start: Beat
+) -> FloatArray | float:
+    """Return every clock's loss (clock,), summed over some of the rows."""
+    if not among.any():
+        return 0.0
+    part = rows.only_rows(among)
+    return losses(plan, part, clocks, start, place=part.place).sum(axis=1)
 
 
 def _grid(plan: Plan, rows: Profiles, range_ppm: float) -> tuple[FloatArray, FloatArray]:
