@@ -123,7 +123,7 @@ def see(rows: Rows, flashes: Flashes, frame: int, row: int, k: int, design: Floa
     return k
 
 
-@EXACT.kept
+@EXACT.called
 def see_all(rows: Rows, flashes: Flashes, row: int, design: FloatArray) -> None:
     """Fill ``design`` (frame, unknown) with what a row saw in every frame, as ``see`` does frame by frame."""
     if flashes.rise_s == 0.0 and flashes.fall_s == 0.0 and flashes.blur_s == 0.0 and len(rows.beat_hz) == 0:
@@ -134,7 +134,7 @@ def see_all(rows: Rows, flashes: Flashes, row: int, design: FloatArray) -> None:
         k = see(rows, flashes, n, row, k, design[n])
 
 
-@EXACT.kept
+@EXACT.called
 def _see_sharp(
     frame_start_s: FloatArray, offset_s: float, exposure_s: float, flashes: Flashes, design: FloatArray
 ) -> None:
