@@ -21,7 +21,7 @@ ROBUST_STEEPNESS = 20.0
 """Of the coarse loss ``log(1 + 20 r^2)``, r being a residual over its row's own spread (physics.md)."""
 
 FEWER, LEAST_ROWS = 4, 6
-"""Every so manieth row is looked at first, but no fewer rows than these;"""
+"""One of so many rows is looked at first, but no fewer rows than these;"""
 LOW = 0.15
 """the others only for this share of the clocks, the lowest."""
 
@@ -63,6 +63,8 @@ def _least(plan: Plan, rows: Profiles, clocks: list[FoundClock], start: Beat) ->
     few = np.zeros(height, np.bool_)
     few[:: max(min(FEWER, height // LEAST_ROWS), 1)] = True
     total = _sum_over(plan, rows, few, clocks, start)
+    if few.all():
+        return total / height
     low = np.argsort(total, kind="stable")[: max(int(LOW * len(clocks)), 1)]
     loss = np.full(len(clocks), np.inf)
     loss[low] = (total[low] + _sum_over(plan, rows, ~few, [clocks[n] for n in low.tolist()], start)) / height
@@ -71,12 +73,11 @@ def _least(plan: Plan, rows: Profiles, clocks: list[FoundClock], start: Beat) ->
 
 def _sum_over(
     plan: Plan, rows: Profiles, among: NDArray[np.bool_], clocks: list[FoundClock], start: Beat
-) -> FloatArray | float:
+) -> FloatArray:
     """Return every clock's loss (clock,), summed over some of the rows."""
-    if not among.any():
-        return 0.0
     part = rows.only_rows(among)
-    return losses(plan, part, clocks, start, place=part.place).sum(axis=1)
+    total: FloatArray = losses(plan, part, clocks, start, place=part.place).sum(axis=1)
+    return total
 
 
 def _grid(plan: Plan, rows: Profiles, range_ppm: float) -> tuple[FloatArray, FloatArray]:
