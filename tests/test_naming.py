@@ -16,7 +16,7 @@ seed = 3
 width_px = 80
 height_px = 60
 fps = 100
-shutter_deg = 360.0
+shutter_deg = {shutter}
 readout_s = 0.01
 width_m = 1.6
 
@@ -39,11 +39,12 @@ DIRECTIONS = {
 }
 
 
-def shoot(folder: Path, names: str, *, phase_s: float = 0.0, frames: int = 20) -> Path:
+def shoot(folder: Path, names: str, *, phase_s: float = 0.0, frames: int = 20, shutter: float = 360.0) -> Path:
     """A ball under some of the lights, one after the other, without any marker."""
     scene = folder / "scene.toml"
     text = SCENE.format(
         frames=frames,
+        shutter=shutter,
         phase_s=phase_s,
         flashes=", ".join(f"{{lights = {{{name} = 1.0}}, duration_s = 0.001}}" for name in names),
         lights="\n".join(f'[[light]]\nname = "{name}"\ndirection = {list(DIRECTIONS[name])}' for name in names),
@@ -83,6 +84,16 @@ def test_sync_takes_the_order_from_the_rig(five: Path, tmp_path: Path, capsys: p
     assert reported["order"] == "rig"
     assert "in the next best" in reported["order_note"]
     assert names_of(tmp_path / "reported.json") == names_of(five / "truth" / "timing.json")
+
+
+@pytest.mark.parametrize("shutter", [150.0, 90.0])
+def test_below_360_degrees_the_next_cycles_lend_the_rows_by_which_the_rig_gives_the_order(
+    shutter: float, tmp_path: Path
+) -> None:
+    clip = shoot(tmp_path, "abcde", phase_s=0.0242, frames=40, shutter=shutter)
+    assert run("sync", clip, "--rig", clip / "rig.toml", "-o", tmp_path / "timing.json", "-q") == 0
+    assert json.loads((tmp_path / "timing.json").read_text())["order"] == "rig"
+    assert names_of(tmp_path / "timing.json") == names_of(clip / "truth" / "timing.json")
 
 
 def test_split_and_normals_put_right_a_timing_that_was_named_wrongly(five: Path, tmp_path: Path) -> None:

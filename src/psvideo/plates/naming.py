@@ -1,6 +1,7 @@
 """Name the lights of a clip that shows no marker: by the light that the user names, or by the rig's directions.
 
 For the rig, small plates of one cycle are rebuilt at up to three places of the clip, and only their frames are decoded.
+Below 360 degrees, where every flash is missed by some rows, the next cycles lend these.
 All places that give an order must give the same; else the order stays a guess, and the timing says why.
 """
 
@@ -9,6 +10,7 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from psvideo.clip import Take
 from psvideo.errors import PsvideoError, UsageError
@@ -17,6 +19,7 @@ from psvideo.model.rig import Rig
 from psvideo.model.shutter import frames_touched
 from psvideo.model.timing import Timing, places_in_time, timed_camera
 from psvideo.plates.gather import clip_plates
+from psvideo.plates.nearest_rows import MOST_LATER, has_blind_time
 from psvideo.plates.split import Plate
 from psvideo.sync.order_by_rig import Image, RigTurn, order_by_rig, turned, why_undecided
 
@@ -82,12 +85,13 @@ def _agreed(verdicts: list[RigTurn]) -> RigTurn:
 def _verdicts(take: Take, timing: Timing, rig: Rig) -> Iterator[RigTurn]:
     """Judge cycles at the clip's start, middle and end, as far as they do not overlap."""
     cycle = len(take.plan.cycle_slots)
+    lending = MOST_LATER if has_blind_time(timed_camera(take.plan, timing)) else 0
     starts = [n for n in range(len(timing.flashes) - cycle + 1) if _whole(timing, n, cycle)]
     last_end = -1
     for start in (starts[place * (len(starts) - 1) // (PLACES - 1)] for place in range(PLACES if starts else 0)):
         if start >= last_end:
             last_end = start + cycle
-            pictures = _small_plates(take, timing, range(start, last_end))
+            pictures = _small_plates(take, timing, range(start, min(last_end + lending * cycle, len(timing.flashes))))
             if all(slot in pictures for slot in take.plan.lit_slots):
                 lit = {slot: pictures[slot] for slot in take.plan.lit_slots}
                 yield order_by_rig(take.clip.shown_plan, rig, lit)
@@ -98,7 +102,8 @@ def _whole(timing: Timing, start: int, count: int) -> bool:
 
 
 def _small_plates(take: Take, timing: Timing, flashes: range) -> dict[int, Image]:
-    """Rebuild some flashes from the frames that they touch, and return small pictures of them by slot."""
+    """Rebuild some flashes from the frames that they touch, and return small pictures of them by slot: each slot's
+    first, and what that lacks from its next ones."""
     camera = timed_camera(take.plan, timing)
     first, last = frames_touched(camera, timing.start_s, timing.duration_s)
     begin, end = int(first[flashes.start]), int(last[flashes.stop - 1])
@@ -108,11 +113,20 @@ def _small_plates(take: Take, timing: Timing, flashes: range) -> dict[int, Image
         return {}
     plates = clip_plates(replace(take, numbers=near), timing)
     turn = take.clip.turn
-    return {plate.flash.slot: turn.upright(_small(plate)) for plate in plates if plate.flash.index in flashes}
+    pictures: dict[int, Image] = {}
+    unseen: dict[int, NDArray[np.bool_]] = {}
+    for plate in (one for one in plates if one.flash.index in flashes):
+        slot = plate.flash.slot
+        picture, lacks = map(turn.upright, _small(plate))
+        wanted = unseen.get(slot, np.ones_like(lacks)) & ~lacks
+        pictures.setdefault(slot, np.zeros_like(picture))[wanted] = picture[wanted]
+        unseen[slot] = unseen.get(slot, lacks) & lacks
+    return pictures
 
 
-def _small(plate: Plate) -> Image:
-    """Return a small picture of a plate: 0 where any of it was unseen, 1.0 where any of it was saturated."""
+def _small(plate: Plate) -> tuple[Image, NDArray[np.bool_]]:
+    """Return a small picture of a plate: 0 where any of it was unseen, 1.0 where any of it was saturated; and where it
+    was unseen."""
     shown = plate.image
     rows, cols = shown.shape[:2]
     shrink = max(max(rows, cols) / SMALL_PX, 1.0)
@@ -124,5 +138,6 @@ def _small(plate: Plate) -> Image:
     small = smaller(shown)
     small[smaller((shown >= 1.0).astype(np.float32)) > 0] = 1.0
     seen = np.repeat(plate.seen[:, None], cols, axis=1).astype(np.float32)
-    small[smaller(seen) < 1.0 - 1e-4] = 0.0
-    return small
+    unseen = smaller(seen) < 1.0 - 1e-4
+    small[unseen] = 0.0
+    return small, unseen
