@@ -117,10 +117,14 @@ def _small_plates(take: Take, timing: Timing, flashes: range) -> dict[int, Image
     unseen: dict[int, NDArray[np.bool_]] = {}
     for plate in (one for one in plates if one.flash.index in flashes):
         slot = plate.flash.slot
-        picture, lacks = map(turn.upright, _small(plate))
-        wanted = unseen.get(slot, np.ones_like(lacks)) & ~lacks
-        pictures.setdefault(slot, np.zeros_like(picture))[wanted] = picture[wanted]
-        unseen[slot] = unseen.get(slot, lacks) & lacks
+        picture, lacks = _small(plate)
+        picture, lacks = turn.upright(picture), turn.upright(lacks)
+        if slot not in pictures:
+            pictures[slot], unseen[slot] = picture, lacks
+            continue
+        lent = unseen[slot] & ~lacks
+        pictures[slot] = np.where(lent if picture.ndim == 2 else lent[..., None], picture, pictures[slot])
+        unseen[slot] = unseen[slot] & lacks
     return pictures
 
 
