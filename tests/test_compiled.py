@@ -285,7 +285,7 @@ def test_two_processes_compile_into_one_folder_at_a_time(tmp_path: Path) -> None
 
 
 COSTLY = (b"numba.np.arraymath", b"numba.np.linalg", b"numba.cpython.unicode")
-"""What numba's own functions on arrays load with a kept loop that calls them: SciPy's linear algebra, a text library."""
+"""What comes with a kept loop that calls numba's own functions on arrays: SciPy's linear algebra, a text library."""
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from psvideo.clip import Frame, Take, read_frames
+from psvideo.clip import Frame, Take, holds_plain_codes, read_frames
 from psvideo.compute.threads import thread_count
 from psvideo.model.camera import Camera
 from psvideo.model.recipe import frames_of
@@ -33,12 +33,12 @@ def ambient_shown(
 def dark_plates(take: Take, timing: Timing, after: int = -1) -> Iterator[Plate]:
     """Read ahead, from the few frames that they touch, the dark slots, between which ambient light is interpolated."""
     camera, places = timed_camera(take.plan, timing), places_in_time(timing, take.clip.numbers)
-    timing = used_of(take, timing)
+    timing, in_files = used_of(take, timing), holds_plain_codes(take.clip)  # a slot's frames wait for the next slot
     number_at = {places[number]: number for number in take.numbers if number in places}
     for dark in timing.flashes[after + 1 :]:
         if dark.complete and dark.is_dark:
             near = tuple(number_at[place] for place in frames_of(camera, timing, dark) if place in number_at)
-            frames = placed(read_frames(take.clip, near, kept=take.kept), places)
+            frames = placed(read_frames(take.clip, near, kept=take.kept, in_files=in_files), places)
             plate = plate_of(dark, frames, camera, timing) if near else None
             if plate is not None:
                 yield plate
