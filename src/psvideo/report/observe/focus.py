@@ -22,11 +22,14 @@ LARGEST_PX = 1600
 SQUARE_PX, SQUARES = 160, 12
 """Of larger pictures, so many squares are looked at closely: those with the steepest edges, seen every fourth pixel."""
 COARSE = 4
+EACH = 4
+"""Noise is the median over every so many rows and columns: it varies by less than a hundredth."""
 STEEP_SQUARE = 0.98
 STEEPEST = 1e-3
 """A slope counts from a quarter of the one that this share of the picture exceeds."""
 KERNEL = np.array([[-0.5, 0, 0.5]], np.float32)
 
+Plane = NDArray[np.float32]
 Squares = NDArray[np.float32]
 
 
@@ -77,14 +80,15 @@ def _in_squares(picture: NDArray[np.float32], side: int) -> Squares:
 
 def _noise(grey: NDArray[np.float32]) -> float:
     """Return the standard deviation of noise, from what a median over neighbours takes away."""
-    off = (grey - np.asarray(cv2.medianBlur(grey, 3)))[::2, ::2]
+    some = slice(None, None, EACH)
+    off = grey[some, some] - np.asarray(cv2.medianBlur(grey, 3))[some, some]
     return 1.4826 * float(np.median(np.abs(off)))
 
 
 def _blur_between(squares: Squares, first_px: float, again_px: float, *, noise: float, steepest: float) -> float | None:
     """Return the blur of the sharpest edges from their slopes after two blurs; None where too few stand out."""
-    smooth = _blurred(squares, first_px)
-    steep, soft = _each(_slope, smooth), _each(_slope, _blurred(squares, again_px))
+    slopes = [_slopes(one) for one in _blurred(squares, first_px)]
+    steep, soft = np.stack([_size(*one) for one in slopes]), _each(_slope, _blurred(squares, again_px))
     if first_px:
         noise /= 2 * np.sqrt(np.pi) * first_px  # what such a blur leaves of noise that is new in every pixel
     edges = (steep > max(NOISE_FACTOR * noise, 0.25 * float(np.quantile(steep[:, ::2, ::2], 1 - steepest)))) & (
@@ -92,7 +96,7 @@ def _blur_between(squares: Squares, first_px: float, again_px: float, *, noise: 
     )
     rim = 4 + round(2 * again_px)
     edges[:, :rim], edges[:, -rim:], edges[:, :, :rim], edges[:, :, -rim:] = False, False, False, False
-    edges &= np.stack([_ridge(*one) for one in zip(smooth, steep, strict=True)])
+    edges &= np.stack([_ridge(*one, size) for one, size in zip(slopes, steep, strict=True)])
     if edges.sum() < LEAST_EDGES:
         return None
     along = [_each(_summed, np.where(edges, one, np.float32(0))) for one in (steep, soft)]
@@ -116,9 +120,9 @@ def _blurred(squares: Squares, sigma_px: float) -> Squares:
     return _each(lambda one: np.asarray(cv2.GaussianBlur(one, (0, 0), sigma_px)), squares) if sigma_px else squares
 
 
-def _ridge(grey: NDArray[np.float32], steep: NDArray[np.float32]) -> NDArray[np.bool_]:
+def _ridge(right: Plane, down: Plane, steep: Plane) -> NDArray[np.bool_]:
     """Tell where the slope is greatest across its edge."""
-    across = np.abs(cv2.filter2D(grey, cv2.CV_32F, KERNEL)) > np.abs(cv2.filter2D(grey, cv2.CV_32F, KERNEL.T))
+    across = np.abs(right) > np.abs(down)
     row = steep >= cv2.dilate(steep, np.ones((1, 3), np.uint8))
     col = steep >= cv2.dilate(steep, np.ones((3, 1), np.uint8))
     return np.asarray(np.where(across, row, col), np.bool_)
@@ -126,6 +130,14 @@ def _ridge(grey: NDArray[np.float32], steep: NDArray[np.float32]) -> NDArray[np.
 
 def _slope(grey: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the slope's size by central differences."""
-    return np.asarray(
-        cv2.magnitude(cv2.filter2D(grey, cv2.CV_32F, KERNEL), cv2.filter2D(grey, cv2.CV_32F, KERNEL.T)), np.float32
-    )
+    return _size(*_slopes(grey))
+
+
+def _slopes(grey: Plane) -> tuple[Plane, Plane]:
+    """Return central differences to the right and down."""
+    right, down = (cv2.filter2D(grey, cv2.CV_32F, kernel) for kernel in (KERNEL, KERNEL.T))
+    return np.asarray(right, np.float32), np.asarray(down, np.float32)
+
+
+def _size(right: Plane, down: Plane) -> Plane:
+    return np.asarray(cv2.magnitude(right, down), np.float32)

@@ -22,7 +22,7 @@ from psvideo.report.observe.motion import Glimpse, Motion, glimpse, motion
 from psvideo.report.observe.rigfit import RigFit
 from psvideo.report.observe.rigpoints import RigPoints
 from psvideo.report.observe.shadow import shadow_light
-from psvideo.report.observe.slopes import share_away, slope_agreement
+from psvideo.report.observe.slopes import averaged, share_away, slope_agreement
 from psvideo.report.observe.steadiness import Change, Sample, change, sample_of
 from psvideo.report.observe.thinned import step_of, thin_surface, thinned
 from psvideo.report.observe.worst import Thumbnail, Worst
@@ -314,11 +314,12 @@ class Observed:
         if blur_px is not None:
             self.blurs_px.append(blur_px)
         if surface is not None:
-            agreement = slope_agreement(surface)
+            small = averaged(surface)
+            agreement = slope_agreement(small)
             if agreement is not None:
                 self.slopes.append(agreement)
             self.away.append(share_away(surface))
-            found = lean(surface, lens=self.lens)
+            found = lean(small, lens=self.lens)
             if found is not None:
                 self.leans.append(found)
             self._look_into_shadow(one, surface, seen)

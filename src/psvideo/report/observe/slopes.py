@@ -4,7 +4,7 @@ For heights z(x, y) with slopes p and q, dp/dy = dq/dx. Normals found with mirro
 this, even with three lights, which explain any brightness. Both sides are held against each other by correlation.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -39,12 +39,19 @@ LEAST_AVERAGED = 3
 """Of so many rows and columns, evenly, the mean of a larger square is taken."""
 
 
-def slope_agreement(surface: Surface) -> float | None:
+class Averaged(NamedTuple):
+    """Normals averaged over squares, (row, col, 3) of them, and where all of a square is measured."""
+
+    valid: NDArray[np.bool_]
+    normals: NDArray[np.float32]
+
+
+def slope_agreement(small: Averaged) -> float | None:
     """Return the correlation of dp/dy with dq/dx: near 1 for a surface, 0 for noise, below it for wrong lights.
 
     None where too few neighbouring normals are there, or where they show nothing but noise.
     """
-    valid, normals = thinned_normals(surface, width_step(surface))
+    valid, normals = small
     found = _turning(valid, normals, BLUR_PX)
     if found is not None and found.power > TOO_MUCH * noise_of_slopes(valid, normals):
         return found.agreement
@@ -59,11 +66,6 @@ def slope_agreement(surface: Surface) -> float | None:
     else:
         return None
     return None if found is None else found.agreement
-
-
-def width_step(surface: Surface) -> int:
-    """Return how many pixels of a surface its slopes are averaged over."""
-    return max(int(surface.valid.shape[1]) // WIDTH_PX, 1)
 
 
 class _Turning(NamedTuple):
@@ -114,13 +116,16 @@ def share_away(surface: Surface) -> float:
     return float((some.normals[..., 2] < AWAY)[some.measured].sum() / count) if count >= LEAST_AWAY else 0.0
 
 
-def thinned_normals(surface: Surface, step: int) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
-    """Return validity and normals averaged over squares of ``step`` pixels; valid where all of a square is."""
+def averaged(surface: Surface) -> Averaged:
+    """Return a surface's normals as its slopes are looked at: averaged, about WIDTH_PX of them in a row."""
+    step = max(int(surface.valid.shape[1]) // WIDTH_PX, 1)
     rows, cols = (size // step for size in surface.valid.shape)
     fine = max(step // LEAST_AVERAGED, 1)
     inside = (slice(0, rows * step, fine), slice(0, cols * step, fine))
-    area = surface.normals[inside].astype(np.float32)
-    small = np.asarray(cv2.resize(area, (cols, rows), interpolation=cv2.INTER_AREA), np.float32)
-    flags = surface.measured[inside].astype(np.float32)
-    whole = cv2.resize(flags, (cols, rows), interpolation=cv2.INTER_AREA) > 0.999
-    return whole, small
+    planes = [surface.normals[inside][..., axis] for axis in range(3)]  # as they lie in memory
+    small = np.stack([_mean_of_squares(plane, rows, cols) for plane in planes], axis=-1)
+    return Averaged(_mean_of_squares(surface.measured[inside], rows, cols) > 0.999, small)
+
+
+def _mean_of_squares(plane: NDArray[Any], rows: int, cols: int) -> NDArray[np.float32]:
+    return np.asarray(cv2.resize(plane.astype(np.float32), (cols, rows), interpolation=cv2.INTER_AREA), np.float32)

@@ -15,14 +15,12 @@ import numpy as np
 
 from psvideo.model.camera import FloatArray
 from psvideo.model.rig import Rig
-from psvideo.model.surface import Surface
 from psvideo.report.observe.slopes import (
     BLUR_PX,
     LEAST_PIXELS,
     NORMAL_MEDIAN,
+    Averaged,
     noise_of_slopes,
-    thinned_normals,
-    width_step,
 )
 
 MOST_POINTS = 12_000
@@ -83,12 +81,12 @@ class Lens:
         )
 
 
-def lean(surface: Surface, *, lens: Lens | None = None) -> Lean | None:
+def lean(small: Averaged, *, lens: Lens | None = None) -> Lean | None:
     """Return the change that makes measured normals a surface's; None where too few of them bend.
 
     lens: how the picture was seen; None where that is not known: by any lens, its axis in the middle of the picture.
     """
-    seen = _bending(surface)
+    seen = _bending(small)
     n, ways, x, y = seen
     if len(n) < LEAST_PIXELS:
         return None
@@ -137,9 +135,9 @@ class _Bending(NamedTuple):
     y: FloatArray
 
 
-def _bending(surface: Surface) -> _Bending:
+def _bending(seen: Averaged) -> _Bending:
     """Return normals that bend by more than noise and in one piece."""
-    valid, small = thinned_normals(surface, width_step(surface))
+    valid, small = seen
     noise = noise_of_slopes(valid, small)
     blurred = np.asarray(cv2.GaussianBlur(small * valid[..., None], (0, 0), BLUR_PX), np.float64)
     normals = blurred / np.maximum(np.linalg.norm(blurred, axis=-1, keepdims=True), 1e-6)
@@ -194,8 +192,8 @@ def _fitted(crossed: FloatArray, more: FloatArray | None) -> _Fitted:
         left = still + slopes @ found
         width = OUTLIER * float(np.median(np.abs(left))) / NORMAL_MEDIAN + 1e-12
         weights = 1 / (1 + (left / width) ** 2)
-        squares = np.einsum("p,pi,pj->ij", weights, slopes, slopes)
-        pull = np.einsum("p,pi,p->i", weights, slopes, still)
+        weighted = slopes.T * weights
+        squares, pull = weighted @ slopes, weighted @ still
         before, found = found, -_solved(squares, pull)
         if np.abs(found - before).max() < ENOUGH:
             break

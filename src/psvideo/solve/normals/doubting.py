@@ -7,6 +7,7 @@ wrong whatever the lights say of them: along a closed way the slopes of a surfac
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -103,6 +104,11 @@ class ThinSurface:
     fit_deg: Floats
     fit_of_noise_deg: Floats
 
+    @cached_property
+    def planes(self) -> Floats:
+        """The normals, (3, row, col)."""
+        return np.moveaxis(self.surface.normals, -1, 0).astype(np.float32)
+
     @property
     def known(self) -> NDArray[np.bool_]:
         """Where there is a normal."""
@@ -135,7 +141,7 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
     shown = np.minimum(albedo, albedo.sum() / max(np.count_nonzero(points.known), 1))  # glare is no more than the rest
     return Signs(
         misfit_deg=np.maximum(*(_typical(squares, noise, shown, width) for width in (around, far_around))),
-        indirect_deg=np.degrees(indirect + own) * _turned(points.surface, one),
+        indirect_deg=np.degrees(indirect + own) * _turned(points.planes, one),
         torn_deg=np.sqrt(np.maximum(_torn_squared(points) - (TORN_OF_NOISE * points.noise_deg) ** 2, 0)),
         lost_deg=points.noise_deg * np.sqrt(1 / reach - 1),
         hidden=hidden_by(len(one.plates)) / hidden_by(ENOUGH_LIGHTS),
@@ -187,20 +193,19 @@ def hidden_by(lights: int) -> float:
     return lights / max(lights - 3, 1)
 
 
-def _turned(surface: Surface, one: Evidence) -> Floats:
+def _turned(normals: Floats, one: Evidence) -> Floats:
     """Return by how many radians light turns the normal that every lamp adds alike, for each share of the albedo:
     least squares takes it for a vector, of which what lies across the normal turns it."""
     towards = one.lit.directions
     added = (np.linalg.pinv(towards) @ np.ones(len(towards))).astype(np.float32)
-    normals = surface.normals.astype(np.float32)
-    along = normals @ added
-    return np.sqrt(np.maximum(np.float32(added @ added) - along * along, 0))
+    along = np.tensordot(added, normals, 1)
+    return np.asarray(np.sqrt(np.maximum(np.float32(added @ added) - along * along, 0)), np.float32)
 
 
 def _torn_squared(points: ThinSurface) -> Floats:
     """Return the squared angle by which normals around every point belong to no surface: what their slopes add up to
     around four points each, over a square."""
-    across, up, towards = (points.surface.normals[..., axis].astype(np.float32) for axis in range(3))
+    across, up, towards = points.planes
     facing = np.maximum(towards, LEAST_FACING)
     right, down = -across / facing, up / facing
     known = points.known
