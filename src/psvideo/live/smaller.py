@@ -1,9 +1,9 @@
 """Frames made smaller in their codes: what the live picture is made of, at the size that there is time for.
 
-Rows that are averaged opened one after the other; ``smaller_plan`` and ``smaller_timing`` say of the small picture when
-its rows open and flashes come, so that recipes hold for it as for any. A mosaic becomes colour on the way: of each
-colour the mean of its samples in a cell, which lie around the cell's middle where it is an odd number of pixels wide. A
-cell with a clipped sample is clipped.
+Rows that are averaged opened one after the other; ``smaller_plan`` and ``smaller_timing`` say of the small picture
+when its rows open, that each is a mean of several, and when flashes come, so that recipes hold for it as for any. A
+mosaic becomes colour on the way: of each colour the mean of its samples in a cell, which lie around the cell's middle
+where it is an odd number of pixels wide. A cell with a clipped sample is clipped.
 """
 
 from dataclasses import dataclass, replace
@@ -54,7 +54,8 @@ def smaller_plan(plan: Plan, step: int) -> Plan:
     camera = plan.camera
     height_px, width_px = camera.height_px // step, camera.width_px // step
     readout_s = None if camera.readout_s is None else camera.readout_s * height_px * step / camera.height_px
-    return replace(plan, camera=replace(camera, height_px=height_px, width_px=width_px, readout_s=readout_s))
+    small = replace(camera, height_px=height_px, width_px=width_px, readout_s=readout_s, rows_each=step)
+    return replace(plan, camera=small)
 
 
 def smaller_timing(timing: Timing, step: int, height_px: int) -> Timing:

@@ -37,7 +37,11 @@ def exposure_of(fps: Fraction, *, shutter_deg: float | None = None, exposure_s: 
 
 @dataclass(frozen=True, kw_only=True)
 class Camera:
-    """One camera in one mode. ``readout_s`` is None where it is unknown, 0 for a global shutter, negative bottom-up."""
+    """One camera in one mode. ``readout_s`` is None where it is unknown, 0 for a global shutter, negative bottom-up.
+
+    ``rows_each``: a row is the mean of so many rows of the sensor that open one after the other, as in a picture that
+    was made smaller; its own time is their mean's.
+    """
 
     width_px: int
     height_px: int
@@ -46,6 +50,7 @@ class Camera:
     readout_s: float | None
     name: str = "camera"
     encoding: Encoding = field(default_factory=Encoding)
+    rows_each: int = 1
 
     @property
     def frame_period_s(self) -> float:
@@ -74,6 +79,18 @@ class Camera:
                 "needs it: write the measured readout time in seconds into the plan's [camera] table."
             )
         return self.readout_s / self.height_px
+
+    def within_row_s(self) -> FloatArray:
+        """When the sensor's rows open of which a row is the mean, beside that row's own time, shape (rows_each,).
+
+        >>> mean = Camera(width_px=2, height_px=3, fps=Fraction(100), exposure_s=0.01, readout_s=0.006, rows_each=2)
+        >>> mean.within_row_s().round(6).tolist()
+        [-0.0005, 0.0005]
+        """
+        if self.rows_each == 1:
+            return np.zeros(1)
+        each = np.arange(self.rows_each) - 0.5 * (self.rows_each - 1)
+        return each * (self.row_time_s / self.rows_each)
 
     def row_offsets_s(self) -> FloatArray:
         """When each row opens after its frame has begun, shape (row,); 0 for the row that comes first.

@@ -75,11 +75,17 @@ def row_weights(
     )
     on_s = np.asarray(start_s, np.float64)[:, None, None]
     length_s = np.asarray(duration_s, np.float64)[:, None, None]
+    parts = [_seen(opens_s + later_s, on_s, length_s, camera.exposure_s, pulse) for later_s in camera.within_row_s()]
+    return parts[0] if len(parts) == 1 else np.mean(parts, axis=0, dtype=np.float64)
+
+
+def _seen(opens_s: FloatArray, on_s: FloatArray, length_s: FloatArray, exposure_s: float, pulse: Pulse) -> FloatArray:
+    """Return the share of flashes that exposures collect which begin at ``opens_s``; all broadcast."""
     if pulse != SQUARE:
         since_s = opens_s - on_s
-        seen: FloatArray = pulse.given_off(since_s + camera.exposure_s, length_s) - pulse.given_off(since_s, length_s)
+        seen: FloatArray = pulse.given_off(since_s + exposure_s, length_s) - pulse.given_off(since_s, length_s)
         return seen
-    overlap_s = np.minimum(opens_s + camera.exposure_s, on_s + length_s) - np.maximum(opens_s, on_s)
+    overlap_s = np.minimum(opens_s + exposure_s, on_s + length_s) - np.maximum(opens_s, on_s)
     weights: FloatArray = np.clip(overlap_s, 0.0, None) / length_s
     return weights
 
@@ -98,7 +104,7 @@ def frames_touched(
     >>> int(first[0]), int(last[0])
     (-1, 1)
     """
-    offsets_s = camera.row_offsets_s()
+    offsets_s = camera.row_offsets_s()[:, None] + camera.within_row_s()
     period_s = camera.frame_period_s
     first = np.floor((start_s - offsets_s.max() - camera.exposure_s) / period_s) + 1
     last = np.ceil((start_s + duration_s + pulse.tail_s - offsets_s.min()) / period_s) - 1
