@@ -73,6 +73,22 @@ def test_bare_bytes_are_recorded_as_they_came(
     assert all(np.array_equal(one, other) for one, other in zip(kept, sent, strict=True))
 
 
+def test_a_sender_that_is_cut_off_in_the_middle_of_a_frame_loses_that_frame_alone(
+    clip: Path, pictures: Pictures, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sent = b"".join(one.tobytes() for one in grey(pictures))
+    piped(monkeypatch, sent[: -grey(pictures)[0].nbytes // 2])
+    words = ["live", "-", "--raw", "gray16le", "--plan", str(clip / "plan.toml"), "--no-page"]
+    assert main([*words, "--record", str(tmp_path / "rec")]) == 0
+    assert len(ps.open_take(tmp_path / "rec").numbers) == len(pictures) - 1
+    assert "1 frame came damaged or cut short, and was left out" in capsys.readouterr().err
+
+
+def test_a_device_that_is_not_there_is_told_what_to_look_for(clip: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["live", "/dev/video73", "--plan", str(clip / "plan.toml"), "--no-page"]) == 1
+    assert "cable" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("data", "words"),
     [

@@ -6,7 +6,7 @@ that began again, and is put after what came before by the machine's clock.
 
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
@@ -19,6 +19,7 @@ from psvideo.clip.reading import looks
 from psvideo.clip.record import CodedPicture, Frame
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import Camera
+from psvideo.model.units import counted
 
 STANDARD_INPUT = "-"
 OPEN_S = 20.0
@@ -28,6 +29,8 @@ LEAP_S = 5.0
 JUDGED = 24
 """Frames by which a stream's rate is held against the plan's."""
 OFF = 0.02
+MOST_DAMAGED = 24
+"""A stream of which more frames in a row cannot be decoded is no stream of pictures."""
 DEVICES = {"/dev/video": "v4l2"}
 
 
@@ -62,17 +65,20 @@ class StreamPlaces:
         return self._place
 
 
-def read_stream(source: str, camera: Camera, *, raw: str | None = None) -> Iterator[Frame]:
+def read_stream(
+    source: str, camera: Camera, *, raw: str | None = None, noted: Callable[[str], None] = lambda note: None
+) -> Iterator[Frame]:
     """Give a stream's frames at their places in time: of a URL, a device, or standard input (``-``).
 
-    ``raw`` is FFmpeg's name of the pixel format of frames that come as bare bytes, such as gray or gray16le. Raises
+    ``raw`` is FFmpeg's name of the pixel format of frames that come as bare bytes, such as gray or gray16le. A stream
+    that breaks off ends there, and frames that are damaged are left out; ``noted`` gets a sentence of either. Raises
     PsvideoError where nothing comes, or what comes is not the camera's.
     """
     name = "standard input" if source == STANDARD_INPUT else source
     stamps, steps = StreamPlaces(rate_hz=float(camera.fps)), list[int]()
     first: CodedPicture | None = None
     before = 0
-    for stamp_s, picture in _decoded(source, name, camera, raw):
+    for stamp_s, picture in _decoded(source, name, camera, raw, noted):
         _check(name, picture, camera, first)
         place = stamps.place(stamp_s, time.monotonic())
         if first is not None and len(steps) < JUDGED:
@@ -81,10 +87,12 @@ def read_stream(source: str, camera: Camera, *, raw: str | None = None) -> Itera
         first, before = first or picture, place
         yield Frame(index=place, number=place, coded=in_codes(picture, camera.encoding))
     if first is None:
-        raise PsvideoError(f"{name}: ended before its first frame. Start what sends it, then psvideo live again.")
+        raise PsvideoError(f"{name}: ended before its first whole frame. Start what sends it, then psvideo live again.")
 
 
-def _decoded(source: str, name: str, camera: Camera, raw: str | None) -> Iterator[tuple[float | None, CodedPicture]]:
+def _decoded(
+    source: str, name: str, camera: Camera, raw: str | None, noted: Callable[[str], None]
+) -> Iterator[tuple[float | None, CodedPicture]]:
     options = {"flags": "low_delay"}
     kind = next((kind for begin, kind in DEVICES.items() if source.startswith(begin)), None)
     if raw is not None:
@@ -95,20 +103,54 @@ def _decoded(source: str, name: str, camera: Camera, raw: str | None) -> Iterato
             "framerate": str(camera.fps),
         }
     file = sys.stdin.buffer if source == STANDARD_INPUT else source
+    came = False
     try:
         with av.open(file, mode="r", format=kind, options=options, timeout=(OPEN_S, None)) as container:
             if not container.streams.video:
                 raise PsvideoError(f"{name}: holds no video; expected the camera's frames.")
             stream = container.streams.video[0]
-            for frame in container.decode(stream):
+            for frame in _whole_frames(container, stream, name, noted):
+                came = True
                 base_s = frame.time_base or stream.time_base
                 stamp_s = None if frame.pts is None or base_s is None else float(frame.pts * base_s)
                 yield stamp_s, picture_of(Path(name), frame)
     except (av.FFmpegError, OSError, UnicodeDecodeError) as fault:
-        raise PsvideoError(
-            f"{name}: cannot be read ({fault}). Expected y4m or another stream that FFmpeg knows; say with `raw` which "
-            "pixels bare bytes hold, such as gray or gray16le, and check that the sender runs."
-        ) from fault
+        if not came:
+            raise PsvideoError(f"{name}: cannot be read ({fault}). {_advice(source)}") from fault
+        noted(f"{name}: broke off ({fault}). What came until then was used.")
+
+
+def _whole_frames(
+    container: "av.container.InputContainer", stream: "av.VideoStream", name: str, noted: Callable[[str], None]
+) -> Iterator[av.VideoFrame]:
+    """Give the frames that can be decoded; a sender that is killed leaves half of one, networks lose parts."""
+    damaged, in_a_row = 0, 0
+    for packet in container.demux(stream):
+        try:
+            frames = packet.decode()
+        except av.FFmpegError:
+            damaged, in_a_row = damaged + 1, in_a_row + 1
+            if in_a_row > MOST_DAMAGED:
+                raise
+            continue
+        in_a_row = 0 if frames else in_a_row
+        yield from frames
+    if damaged:
+        noted(f"{name}: {counted(damaged, 'frame')} came damaged or cut short, and {_were(damaged)} left out.")
+
+
+def _were(count: int) -> str:
+    return "was" if count == 1 else "were"
+
+
+def _advice(source: str) -> str:
+    """Return what to do where nothing can be read."""
+    if is_device(source):
+        return "Check the camera's cable and the device's name, and that no other program uses it."
+    return (
+        "Expected y4m or another stream that FFmpeg knows; say with `raw` which pixels bare bytes hold, such as gray "
+        "or gray16le, and check that the sender runs."
+    )
 
 
 def _check(name: str, picture: CodedPicture, camera: Camera, first: CodedPicture | None) -> None:

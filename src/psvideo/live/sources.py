@@ -36,7 +36,9 @@ def opened_source(
         explained = found.plan.camera.encoding.white_level is not None
         return replace(found, plan_path=plan if explained else None, notes=notes)
     if source == STANDARD_INPUT or is_device(source) or source.lower().startswith(SCHEMES):
-        return _live(source, plan, lambda camera_plan: read_stream(source, camera_plan.camera, raw=raw), raw)
+        said: list[str] = []
+        found = _live(source, plan, lambda one: read_stream(source, one.camera, raw=raw, noted=said.append), raw)
+        return replace(found, notes=said)
     if raw is not None:
         raise UsageError("`raw` says what bare bytes from standard input or the network hold; a clip's files say it.")
     return played_clip(open_clip(Path(source), plan=plan), pace=pace)
