@@ -89,9 +89,8 @@ class Camera:
         """
         if self.rows_each == 1:
             return np.zeros(1)
-        each = np.arange(self.rows_each) - 0.5 * (self.rows_each - 1)
-        within_s: FloatArray = each * (self.row_time_s / self.rows_each)
-        return within_s
+        each = np.arange(self.rows_each, dtype=np.float64) - 0.5 * (self.rows_each - 1)
+        return each * (self.row_time_s / self.rows_each)
 
     def row_offsets_s(self) -> FloatArray:
         """When each row opens after its frame has begun, shape (row,); 0 for the row that comes first.
