@@ -22,6 +22,9 @@ LITTLE_NOISE_DEG = 1.0
 """Where noise turns normals by less, more light makes none of them trusted."""
 NOT_MATTE = 0.1
 """From this share of the light on that another rig would explain and this one cannot, directions are doubted."""
+HARDLY_OFF = 0.05
+"""Four directions that are 5 degrees off leave 1 to 3 % of the light, 10 degrees 2 to 6 % (normals are 4 to 10 degrees
+off), 20 degrees 6 to 11 %."""
 MOVING_FACTOR = 2.0
 """Where the picture moves, so many times more may be left unexplained: no rig explains what moved between flashes."""
 LEAST_VALID, HARDLY_VALID = 0.6, 0.2
@@ -65,8 +68,12 @@ def validity(observed: Observed) -> Iterator[Judgement]:
         return
     reached = [one.measured_share for one in known if one.measured_share is not None]
     enough = bool(reached) and float(np.median(reached)) >= LEAST_VALID
-    beyond_deg = off_deg(observed) or 0.0
-    by_surface = enough and max(COMMON_DEG, by_noise_deg(observed.facts)) < beyond_deg <= LOST_DEG
+    beyond_deg = off_deg(observed)
+    by_surface = enough and (
+        _steady(observed)
+        if beyond_deg is None
+        else max(COMMON_DEG, by_noise_deg(observed.facts)) < beyond_deg <= LOST_DEG
+    )
     grade: Grade = "bad" if max(shares) < HARDLY_VALID and not by_surface else "doubtful"
     if enough:
         yield Judgement(
@@ -89,6 +96,8 @@ def validity(observed: Observed) -> Iterator[Judgement]:
 
 def _trusting(observed: Observed) -> str:
     """Say what would make more normals to be trusted: what accuracy says is to blame, or more light where noise is."""
+    if off_deg(observed) is None and _steady(observed):
+        return 'Use more lights; more light does not help. `aov=["error"]` says how far off each pixel may be.'
     said = any(one.grade != "good" for one in accuracy(observed))
     if said and by_noise_deg(observed.facts) < LITTLE_NOISE_DEG:
         return "Do what is said of accuracy; more light does not help."
@@ -165,6 +174,15 @@ def steadiness(facts: Sequence[InstantFacts]) -> Iterator[Judgement]:
             found=f"At rest, normals change by {noise_deg:.2f} degrees and light by up to {level:.2f} % from one "
             "result to the next.",
         )
+
+
+def _steady(observed: Observed) -> bool:
+    """Tell whether normals at rest change so little between results that noise is not to blame for what is not trusted,
+    and the rig explains the plates: of few lights nothing else tells gloss, creases or compression from noise."""
+    known = [one.change.normals_deg for one in observed.facts if one.change is not None]
+    fit = observed.rig_fit
+    explained = fit is not None and fit.excess <= HARDLY_OFF
+    return explained and bool(known) and float(np.median(known)) < COMMON_DEG
 
 
 def moves(facts: Sequence[InstantFacts]) -> bool:
