@@ -52,6 +52,9 @@ HALF = np.float32(0.5)
 BAND_ROWS = 64
 MARGIN_ROWS = 5
 """Rows beside those that places lie in which count too: for cubic interpolation, and around what is clipped."""
+BESIDE_CLIPPED, OVERSHOOT, JUST_BELOW = 5, 1.45, 1 - 1e-4
+"""Cubic interpolation mixes samples of so wide a square, and makes up to so many times the brightest of them (the sum
+of its positive weights): those that clip are kept out of it, and it stays below what clips, rounding to 16 bits too."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -259,8 +262,7 @@ class _Side:
         """Return what the plate counts at places of its own, or, (1, 1), at all: 0 where it was not seen."""
         if self.within is None:
             return np.full((1, 1), self.weight)
-        known = zip((y, x), self.within.shape, strict=True)
-        row, col = (np.clip(np.rint(at).astype(np.intp), 0, most - 1) for at, most in known)
+        row, col = _nearest((y, x), self.within.shape)
         return self.within[row, col] * self.weight
 
 
@@ -276,15 +278,29 @@ class _Rows:
         return self.light[band.start - self.first : band.stop - self.first]
 
     def moved(self, x: Vectors, y: Vectors) -> Image:
-        """Return the plate at places of its own; clipped light stays clipped."""
+        """Return the plate at places of its own. What clips is what does at the nearest sample: beside clipped ones
+        that is taken as it is, for it cannot be told how bright they are, and what is between is not clipped for it."""
         light, full, y_shown = self.light, self.side.plate.saturation, y - np.float32(self.first)
         image = np.asarray(cv2.remap(light, x, y_shown, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE), np.float32)
-        if light.max() >= full:
+        brightest = light.max()
+        if brightest > full / OVERSHOOT:
+            np.minimum(image, np.float32(full * JUST_BELOW), out=image)
+        if brightest >= full:
             clipped = (_brightest(light) >= full).astype(np.uint8)
-            wider = cv2.dilate(clipped, np.ones((5, 5), np.uint8))
-            touched = cv2.remap(wider, x, y_shown, cv2.INTER_NEAREST, borderMode=cv2.BORDER_REPLICATE) > 0
-            image[touched] = full
+            wider = cv2.dilate(clipped, np.ones((BESIDE_CLIPPED, BESIDE_CLIPPED), np.uint8))
+            row, col = _nearest((y_shown, x), clipped.shape)
+            beside = wider[row, col] > 0
+            row, col = row[beside], col[beside]
+            samples = light[row, col]
+            samples[clipped[row, col] > 0] = full
+            image[beside] = samples
         return image
+
+
+def _nearest(places: tuple[Vectors, Vectors], shape: tuple[int, ...]) -> list[NDArray[np.intp]]:
+    """Return the row and the column of the nearest pixel within a picture."""
+    each = zip(places, shape, strict=True)
+    return [np.clip(np.rint(at).astype(np.intp), 0, most - 1) for at, most in each]
 
 
 def _brightest(image: Image) -> Image:

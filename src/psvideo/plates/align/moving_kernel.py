@@ -143,8 +143,9 @@ def blend_rows(
 
     ``taken`` (row, col) is AT_REST (image stays), BEFORE, AFTER, BOTH or NOWHERE; ``weights`` (2, row, col), or one
     each for all, what either counts where both are taken, 0 where it is not known; ``full`` the values from which on
-    either is clipped, and what clipped light becomes. ``rows_seen`` (row,) says where anything may be known of what is
-    moved, and ``seen`` (row, col) becomes False where nothing is; there the image stays.
+    either is clipped, and what clipped light becomes: where one of two is clipped, the one that counts more is taken
+    alone. ``rows_seen`` (row,) says where anything may be known of what is moved, and ``seen`` (row, col) becomes False
+    where nothing is; there the image stays.
     """
     code, weight, one, other = lent(taken), lent(weights), lent(before), lent(after)
     made, known = lent(image), lent(seen)
@@ -161,8 +162,13 @@ def blend_rows(
             if what == NOWHERE or not (rows_seen[row] and total > ZERO):
                 known[row, col] = False
                 continue
-            per, clipped = ONE / total, False
-            early, late = early * per, late * per
+            if early > ZERO and late > ZERO:
+                clips = _clips(one[row, place], full[0]), _clips(other[row, place], full[1])
+                if clips[0] != clips[1]:
+                    early, late = (early, ZERO) if early >= late else (ZERO, late)
+                    total = early + late
+            early, late = early / total, late / total
+            clipped = False
             for channel in range(made.shape[2]):
                 first, second = one[row, place, channel], other[row, place, channel]
                 if (early > ZERO and first >= full[0]) or (late > ZERO and second >= full[1]):
@@ -171,3 +177,12 @@ def blend_rows(
             if clipped:
                 for channel in range(made.shape[2]):
                     made[row, col, channel] = full[2]
+
+
+@FUSED.inlined
+def _clips(light: Floats, full: np.float32) -> bool:
+    """Whether any channel of a pixel is clipped."""
+    clipped = False
+    for channel in range(light.shape[0]):
+        clipped = clipped or light[channel] >= full
+    return clipped
