@@ -36,9 +36,12 @@ UNEXPLAINED, MOST = 0.3, 0.1
 STILL_CODES, STILL_LIGHTS, STILL_SHARE = 3.0, 2, 0.7
 """Pixels that change by less, under two lights at least and so many of all, are at rest: what changes under the others
 is a shadow, or something else that passes."""
-FINEST_PX, SHADING_PX, SHADING = 1.0, 13, 0.7
+FINEST_PX, SHADING_PX, SHADING = 1.0, 13, 0.85
 """Sketches are compared smoothed by the first, and without most of what is wider than the second: as surfaces turn,
 their shading changes, their detail does not."""
+CONTRAST = 8.0
+"""Detail of more contrast, in codes, over as wide a window is brought down to it: as surfaces turn, edges between them
+stay where they are, and the light on either side of them does not."""
 PUZZLING, PUZZLED = 0.5, 0.004
 """More of the picture than this share is unlike by so much of every light: what moves is faster than flow follows."""
 FAR = 2
@@ -270,5 +273,9 @@ def _smoothed(codes: Codes) -> Vectors:
 
 def _detail(codes: Codes) -> Codes:
     smooth = _smoothed(codes)
-    detail = smooth - np.float32(SHADING) * _mean(smooth, SHADING_PX)
+    shading = _mean(smooth, SHADING_PX)
+    detail = smooth - shading
+    contrast = np.sqrt(_mean(detail * detail, SHADING_PX))
+    detail *= np.float32(CONTRAST) / np.maximum(contrast, np.float32(CONTRAST))
+    detail += np.float32(1 - SHADING) * shading
     return np.asarray(np.clip(detail + np.float32(64.5), 0, 255), np.uint8)
