@@ -275,7 +275,7 @@ def _detail(codes: Codes) -> Codes:
     smooth = _smoothed(codes)
     shading = _mean(smooth, SHADING_PX)
     detail = smooth - shading
-    contrast = np.sqrt(_mean(detail * detail, SHADING_PX))
+    contrast = np.sqrt(np.maximum(_mean(detail * detail, SHADING_PX), 0))  # sums that run along rows round
     detail *= np.float32(CONTRAST) / np.maximum(contrast, np.float32(CONTRAST))
     detail += np.float32(1 - SHADING) * shading
     return np.asarray(np.clip(detail + np.float32(64.5), 0, 255), np.uint8)
