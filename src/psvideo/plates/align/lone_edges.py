@@ -40,11 +40,13 @@ FOLLOWED = 0.3
 @dataclass(frozen=True, kw_only=True)
 class InstantSketch:
     """What a light shows at an instant: the ``codes`` of a sketch (row, col), ``white``, the light of the brightest,
-    and the ``noise`` of what changes between two of them, in codes."""
+    and the ``noise`` of what changes between two of them, in codes. ``used`` (row, col): where the light's plate is; its
+    edges elsewhere are nobody's; None where it is everywhere."""
 
     codes: Codes
     white: float
     noise: float
+    used: Flags | None = None
 
     @classmethod
     def standing(cls, sketch: Sketch, shape: tuple[int, ...]) -> "InstantSketch":
@@ -60,15 +62,15 @@ def unsure_by_lone_edges(shown: Sequence[InstantSketch], moves: Flags) -> list[V
         return [np.zeros(one.codes.shape, np.float32) for one in shown]
     around = max(round(max(shown[0].codes.shape) * AROUND_SHARE) | 1, 3)
     noise = max(one.noise for one in shown)
-    mean = cv2.blur(_lone([one.codes for one in shown], noise), (around, around))
+    mean = cv2.blur(_lone(shown, noise), (around, around))
     share = np.float32(UNSURE * np.sqrt(len(shown) / FEWEST)) * np.maximum(mean - np.float32(USUAL), 0)
     share *= np.where(moves, np.float32(FOLLOWED), np.float32(1))
     return [share * light_of(one.codes.astype(np.float32)) * np.float32(one.white) for one in shown]
 
 
-def _lone(shown: Sequence[Codes], noise: float) -> Vectors:
+def _lone(shown: Sequence[InstantSketch], noise: float) -> Vectors:
     """Return how much of an edge is alone, (row, col), as a step in the logarithm of light."""
-    edges = [_edges(codes, noise) for codes in shown]
+    edges = [_edges(one, noise) for one in shown]
     lit = np.sum([here for _, _, here in edges], axis=0, dtype=np.int16) >= FEWEST
     wide = [cv2.dilate(step * here, np.ones((BESIDE_PX, BESIDE_PX), np.uint8)) for step, _, here in edges]
     first, second = np.zeros((2, *lit.shape), np.float32)  # the widest two, so that each light is held against others
@@ -82,9 +84,9 @@ def _lone(shown: Sequence[Codes], noise: float) -> Vectors:
     return np.asarray(alone * lit, np.float32)
 
 
-def _edges(codes: Codes, noise: float) -> tuple[Vectors, Vectors, Vectors]:
+def _edges(one: InstantSketch, noise: float) -> tuple[Vectors, Vectors, Vectors]:
     """Return steps in the logarithm of light over three pixels, the least that is one, and 1 where light tells."""
-    light = cv2.GaussianBlur(light_of(codes.astype(np.float32)), (0, 0), SMOOTH_PX)
+    light = cv2.GaussianBlur(light_of(one.codes.astype(np.float32)), (0, 0), SMOOTH_PX)
     level = np.log(light + np.float32(TOE))
     across, down = (cv2.Sobel(level, cv2.CV_32F, *way, scale=3 / 8) for way in ((1, 0), (0, 1)))
     least = np.float32(LEAST_EDGE) + np.float32(OF_NOISE / SCALE * noise) / np.sqrt(light + np.float32(TOE))
@@ -92,4 +94,6 @@ def _edges(codes: Codes, noise: float) -> tuple[Vectors, Vectors, Vectors]:
     dim, bright = cv2.erode(light, window), cv2.dilate(light, window)
     shadow = cv2.dilate((dim <= np.float32(SHADOW) * bright).astype(np.uint8), np.ones((PENUMBRA_PX,) * 2, np.uint8))
     here = (shadow == 0) & (bright > np.float32(LEAST_LIT))
+    if one.used is not None:
+        here &= cv2.erode(one.used.view(np.uint8), window) > 0
     return np.hypot(across, down).astype(np.float32), least, here.astype(np.float32)

@@ -182,7 +182,8 @@ def _unsure(held: Held, instant: DueInstant, taken: dict[str, Taken], sources: S
     the lights do; what is left out is not."""
     moves = np.zeros(sources[0].shape, np.bool_) if instant.motion is None else instant.motion.moves
     shape = moves.shape
-    shown = {light: one.shows for light, one in taken.items()}
+    used = (source != NOWHERE for source in sources)
+    shown = {light: replace(one.shows, used=where) for (light, one), where in zip(taken.items(), used, strict=True)}
     for light in held.lights:
         sketch = held.shots[light][instant.round].sketch
         if light not in shown and sketch is not None:
