@@ -36,10 +36,10 @@ UNEXPLAINED, MOST = 0.3, 0.1
 STILL_CODES, STILL_LIGHTS, STILL_SHARE = 3.0, 2, 0.7
 """Pixels that change by less, under two lights at least and so many of all, are at rest: what changes under the others
 is a shadow, or something else that passes."""
-FINEST_PX, SHADING_PX, SHADING = 1.0, 13, 0.85
+FINEST_PX, SHADING_PX, SHADING = 1.0, 13, 0.7
 """Sketches are compared smoothed by the first, and without most of what is wider than the second: as surfaces turn,
 their shading changes, their detail does not."""
-CONTRAST = 8.0
+CONTRAST = 10.0
 """Detail of more contrast, in codes, over as wide a window is brought down to it: as surfaces turn, edges between them
 stay where they are, and the light on either side of them does not."""
 PUZZLING, PUZZLED = 0.5, 0.004
