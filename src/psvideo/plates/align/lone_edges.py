@@ -40,8 +40,8 @@ FOLLOWED = 0.3
 @dataclass(frozen=True, kw_only=True)
 class InstantSketch:
     """What a light shows at an instant: the ``codes`` of a sketch (row, col), ``white``, the light of the brightest,
-    and the ``noise`` of what changes between two of them, in codes. ``used`` (row, col): where the light's plate is; its
-    edges elsewhere are nobody's; None where it is everywhere."""
+    and the ``noise`` of what changes between two of them, in codes. ``used`` (row, col) is where the light's plate is
+    used, None where it is everywhere: nobody sees its edges elsewhere."""
 
     codes: Codes
     white: float
