@@ -18,6 +18,7 @@ from psvideo.plates.align.moving_kernel import AT_REST, BOTH
 from psvideo.plates.align.opened import opened
 from psvideo.plates.align.packed import packed
 from psvideo.plates.align.rounds import Aligning, aligned
+from psvideo.plates.align.vectors import pixels_per_s
 from psvideo.plates.beauty import beauty_of, mix_of
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import Mixture, made
@@ -46,6 +47,7 @@ def metres_per_s(px_per_flash: float) -> float:
 
 MOTIONS: dict[str, dict[str, Any] | None] = {
     "at rest": None,
+    "0.2 px": {"velocity_m_per_s": [metres_per_s(0.2), metres_per_s(-0.05), 0]},
     "1 px": {"velocity_m_per_s": [metres_per_s(1.1), metres_per_s(0.3), 0]},
     "4 px": {"velocity_m_per_s": [metres_per_s(4.2), metres_per_s(-0.7), 0]},
     "16 px": {"velocity_m_per_s": [metres_per_s(15.8), metres_per_s(2.7), 0]},
@@ -202,6 +204,18 @@ def test_through_noise_motion_costs_hardly_more_than_noise_alone(lights: int) ->
     alone_deg, _ = at_rest.error_deg(at_rest.solved(at_rest.rounds[1]), 0.0)
     one = brought(clip)[1]
     assert clip.error_deg(clip.solved(one), one.time_s)[0] < alone_deg + 0.2
+
+
+def test_vectors_of_what_moves_by_less_than_a_pixel_a_round_are_those_of_the_whole_subject() -> None:
+    clip = filmed(3, "0.2 px", 0.002)
+    one = brought(clip)[1]
+    true = np.array([0.2, 0.05], np.float32) / PITCH_S
+    subject = clip.subject(one.time_s)
+    off = np.hypot(*np.moveaxis(pixels_per_s(one.motion, subject.shape) - true, -1, 0)) / np.hypot(*true)
+    assert np.median(off[subject]) < 0.1
+    assert (off[subject] < 0.5).mean() > 0.9
+    away = np.s_[:, -20:]  # where its shadow does not fall
+    assert not pixels_per_s(one.motion, subject.shape)[away].any()
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.01])
@@ -584,7 +598,7 @@ def test_what_moves_over_many_rows_is_whole_and_what_rests_beside_it_stays(step:
     moves = np.zeros((rows // step, cols // step), np.bool_)
     moves[:, moving_cols.start // step : -(-moving_cols.stop // step)] = True
     velocity = np.stack([np.zeros(moves.shape), px / step * moves]).astype(np.float32)
-    motion = moving.Followed(time_s=0.5, velocity=velocity, moves=moves, step=step)
+    motion = moving.Followed(time_s=0.5, velocity=velocity, moves=moves, rests=~moves, step=step)
     source = np.where(moves, np.uint8(BOTH), np.uint8(AT_REST))
     ends = between.Ends(before=None if gone else before, after=after, share=0.5)
     plate = between.plate_at(ends, source, motion, number=0)

@@ -62,12 +62,14 @@ class Pair:
 
 @dataclass(frozen=True, kw_only=True)
 class Followed:
-    """``velocity`` (2, row, col) is x right, y down, in its own pixels per second, 0 where not ``moves``. Each of these
-    pixels is ``step`` by ``step`` of the sketches'."""
+    """``velocity`` (2, row, col) is x right, y down, in its own pixels per second, 0 where not ``moves``. ``rests``
+    (row, col) is what clearly stands beside that; the rest looks alike either way. Each of these pixels is ``step`` by
+    ``step`` of the sketches'."""
 
     time_s: float
     velocity: Vectors
     moves: Flags
+    rests: Flags
     step: int = 1
 
     @functools.cached_property
@@ -86,17 +88,6 @@ class Followed:
         return np.float32(span_s) * self.velocity
 
 
-def pixels_per_s(motion: Followed | None, shape: tuple[int, ...]) -> Vectors:
-    """Return the velocity of every pixel of a picture (row, col[, channel]), x right and y down, (row, col, 2)."""
-    rows, cols = shape[:2]
-    if motion is None:
-        return np.zeros((rows, cols, 2), np.float32)
-    small_rows, small_cols = motion.moves.shape
-    scale = cols / small_cols, rows / small_rows
-    grown = [cv2.resize(way, (cols, rows), interpolation=cv2.INTER_LINEAR) for way in motion.velocity]
-    return np.stack([np.float32(factor) * way for factor, way in zip(scale, grown, strict=True)], axis=-1)
-
-
 def followed_at(pairs: Sequence[Pair], time_s: float) -> Followed:
     """Return how everything moves at an instant, which may lie before or after some lights' plates too."""
     lights = _Lights.of(pairs, time_s)
@@ -113,10 +104,11 @@ def followed_at(pairs: Sequence[Pair], time_s: float) -> Followed:
     fine = lights.mean(lights.unlike(velocity), FINE_PX)
     stirs = lights.still() < max(STILL_LIGHTS, STILL_SHARE * lights.count)
     moves = _clearly(best, wide_rest, lights.count) & (fine < np.float32(FINE_EXPLAINED) * fine_rest) & stirs
+    rests = np.zeros_like(moves)
     for _ in range(GROWN):
-        moves = _grown(lights, moves, velocity, (wide_rest, fine_rest), stirs)
+        moves, rests = _grown(lights, moves, velocity, (wide_rest, fine_rest), stirs)
     velocity *= moves
-    return Followed(time_s=time_s, velocity=velocity, moves=moves, step=lights.step)
+    return Followed(time_s=time_s, velocity=velocity, moves=moves, rests=rests & ~moves, step=lights.step)
 
 
 def _clearly(unlike: Vectors, other: Vectors, count: int) -> Flags:
@@ -124,9 +116,11 @@ def _clearly(unlike: Vectors, other: Vectors, count: int) -> Flags:
     return np.asarray(unlike < np.maximum(EXPLAINED * other - MARGIN * count, other - GAIN * count))
 
 
-def _grown(lights: "_Lights", moves: Flags, velocity: Vectors, rest: tuple[Vectors, Vectors], stirs: Flags) -> Flags:
-    """Return ``moves`` with those beside it that move along as well as they rest, and put their ``velocity`` in: what
-    is bare shows no motion of its own, and follows the most of what is around it.
+def _grown(
+    lights: "_Lights", moves: Flags, velocity: Vectors, rest: tuple[Vectors, Vectors], stirs: Flags
+) -> tuple[Flags, Flags]:
+    """Return ``moves`` with those beside it that move along as well as they rest, and what beside it clearly rests; put
+    the ``velocity`` of the former in: what is bare shows no motion of its own, and follows the most of what is around.
 
     What neither explains may be hidden by what moves: it joins where there is more of that before and behind it.
     """
@@ -144,7 +138,7 @@ def _grown(lights: "_Lights", moves: Flags, velocity: Vectors, rest: tuple[Vecto
     joins = (most > 0) & (fine < rest[1] + np.float32(MARGIN * lights.count)) & stirs & ~moves & ~rests
     joins &= (wide <= np.float32(UNEXPLAINED * lights.count)) | (ends > MOST)
     np.copyto(velocity, near, where=joins)
-    return moves | joins
+    return moves | joins, rests
 
 
 def _shifted(values: Vectors, way: Vectors) -> Vectors:

@@ -1,0 +1,75 @@
+"""Motion vectors for compositing: the velocity of what moves, plain parts of it included.
+
+Alignment moves what motion explains better than rest does, and that is what it needs: where plates look alike either
+way, nothing is gained. A thing's plain inside shows nothing of its motion, nor does a textured one that goes by less
+than a pixel. Here what is undecided and lies within what moves goes along; what clearly rests stands, and so does what
+is undecided and lies around: a wall, whose border is mostly the picture's.
+"""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.plates.align.flow import Flags, Vectors
+from psvideo.plates.align.moving import Followed, window_of
+
+GAPS_PX = 9
+"""Gaps of so many pixels in what moves are closed: outlines along the motion show nothing of it."""
+MOST_EDGE = 1 / 8
+"""What touches more of the picture's edge than this share is what things move before."""
+SMOOTH_PX = 27
+"""Vectors of plain parts are means over such a window, as where alignment lets them grow."""
+
+
+def pixels_per_s(motion: Followed | None, shape: tuple[int, ...]) -> Vectors:
+    """Return the velocity of every pixel of a picture (row, col[, channel]), x right and y down, (row, col, 2)."""
+    rows, cols = shape[:2]
+    if motion is None:
+        return np.zeros((rows, cols, 2), np.float32)
+    velocity = _of_whole_things(motion)
+    small_rows, small_cols = motion.moves.shape
+    scale = cols / small_cols, rows / small_rows
+    grown = [cv2.resize(way, (cols, rows), interpolation=cv2.INTER_LINEAR) for way in velocity]
+    return np.stack([np.float32(factor) * way for factor, way in zip(scale, grown, strict=True)], axis=-1)
+
+
+def _of_whole_things(motion: Followed) -> Vectors:
+    """Return the velocity, (2, row, col), also of what lies undecided within what moves."""
+    inside = _enclosed(motion)
+    if not inside.any():
+        return motion.velocity
+    nearest = np.where(motion.moves, motion.velocity, motion.nearby)
+    size = (window_of(SMOOTH_PX, motion.step),) * 2
+    known = (inside | motion.moves).astype(np.float32)
+    there = np.maximum(cv2.blur(known, size), np.float32(1e-6))
+    smooth = np.stack([cv2.blur(plane * known, size) / there for plane in nearest])
+    return np.asarray(np.where(inside, smooth, motion.velocity), np.float32)
+
+
+def _enclosed(motion: Followed) -> Flags:
+    """Return what is undecided and borders more on what moves than on what rests and on the picture's edge."""
+    gaps = np.ones((window_of(GAPS_PX, motion.step),) * 2, np.uint8)
+    closed = cv2.morphologyEx(motion.moves.view(np.uint8), cv2.MORPH_CLOSE, gaps) > 0
+    moves = closed & ~motion.rests
+    count, labels = cv2.connectedComponents((~moves & ~motion.rests).astype(np.uint8), connectivity=4)
+    on_edge = _on_edge(labels, count)
+    inside = _beside(labels, moves, count) > _beside(labels, motion.rests, count) + on_edge
+    inside &= on_edge <= MOST_EDGE * 2 * sum(labels.shape)
+    inside[0] = False
+    return np.asarray(inside[labels] | (moves & ~motion.moves))
+
+
+def _beside(labels: NDArray[np.int32], where: Flags, count: int) -> NDArray[np.intp]:
+    """Return of every part how many sides of its pixels border on something."""
+    pairs = (
+        (labels[:, :-1], where[:, 1:]),
+        (labels[:, 1:], where[:, :-1]),
+        (labels[:-1], where[1:]),
+        (labels[1:], where[:-1]),
+    )
+    return np.sum([np.bincount(own[other], minlength=count) for own, other in pairs], axis=0)
+
+
+def _on_edge(labels: NDArray[np.int32], count: int) -> NDArray[np.intp]:
+    edges = np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]])
+    return np.bincount(edges, minlength=count)
