@@ -51,7 +51,8 @@ def _enclosed(motion: Followed) -> Flags:
     gaps = np.ones((window_of(GAPS_PX, motion.step),) * 2, np.uint8)
     closed = cv2.morphologyEx(motion.moves.view(np.uint8), cv2.MORPH_CLOSE, gaps) > 0
     moves = closed & ~motion.rests
-    count, labels = cv2.connectedComponents((~moves & ~motion.rests).astype(np.uint8), connectivity=4)
+    count, parts = cv2.connectedComponents((~moves & ~motion.rests).astype(np.uint8), connectivity=4)
+    labels = np.asarray(parts, np.int32)
     on_edge = _on_edge(labels, count)
     inside = _beside(labels, moves, count) > _beside(labels, motion.rests, count) + on_edge
     inside &= on_edge <= MOST_EDGE * 2 * sum(labels.shape)
@@ -67,7 +68,8 @@ def _beside(labels: NDArray[np.int32], where: Flags, count: int) -> NDArray[np.i
         (labels[:-1], where[1:]),
         (labels[1:], where[:-1]),
     )
-    return np.sum([np.bincount(own[other], minlength=count) for own, other in pairs], axis=0)
+    sides = [np.bincount(own[other], minlength=count) for own, other in pairs]
+    return np.asarray(np.sum(sides, axis=0), np.intp)
 
 
 def _on_edge(labels: NDArray[np.int32], count: int) -> NDArray[np.intp]:
