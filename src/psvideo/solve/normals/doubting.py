@@ -68,7 +68,7 @@ class Doubting:
     of them. Each subject left out and predicted from the others: ``python -m bench predicted``.
     """
 
-    misfit_deg: float = 1.9
+    misfit_deg: float = 2.0
     misfit_power: float = 0.5
     little_deg: float = 1.75
     own: float = 2.0
