@@ -22,8 +22,9 @@ BEFORE = 4
 LEAST_KNOWN = 12
 """Fewer frames than these foretell nothing; nor do fewer than two for every light."""
 ODD = 2.0
-"""An end is odd where it is foretold so many times worse than the frames before it, and worse by ``SUSPICIOUS``; and a
-place is the right one where all others fit so many times worse than it, and than is usual."""
+"""An end is odd where it is foretold so many times worse than the frames before it, and worse by ``SUSPICIOUS``. A place
+is the right one where all others fit so many times worse, and nearer ones so many times worse than is usual, too: short
+holes are likelier than long ones."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,7 +63,8 @@ def _end(plan: Plan, rows: Profiles, index: IntArray, beat: Beat) -> tuple[IntAr
         places = [index[-count:] + onward * extra for extra in range(1, MOST + 1)]
         worst = np.array([own.max(), *(_fits(plan, rows, index, beat, known, place).max() for place in places)])
         best = int(worst.argmin())
-        if worst[best] < bar and (worst > ODD * max(worst[best], usual)).sum() == MOST:
+        nearer, farther = worst[:best], worst[best + 1 :]
+        if worst[best] < bar and (nearer > ODD * max(worst[best], usual)).all() and (farther > ODD * worst[best]).all():
             moved = index.copy()
             moved[-count:] += onward * best
             return moved, 0
