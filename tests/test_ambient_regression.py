@@ -128,3 +128,14 @@ def test_a_window_too_short_to_tell_says_so(film: Callable[..., Take]) -> None:
     design = design_of(take.plan, take.plan.camera, take.timing, range(7))
     assert not design.known.all()
     assert not design.takes[:, ~design.known].any()
+
+
+@pytest.mark.parametrize("frames", [5, 7, 9, 14])
+def test_of_few_frames_a_row_that_saw_whole_flashes_only_is_not_taken_for_known(
+    frames: int, film: Callable[..., Take]
+) -> None:
+    take = film()
+    design = design_of(take.plan, take.plan.camera, take.timing, range(10, 10 + frames))
+    kept = np.einsum("nr,snr->sr", design.takes, design.shares)[:, design.known]
+    assert np.abs(kept).max(initial=0.0) < 0.011
+    np.testing.assert_allclose(design.takes.sum(axis=0)[design.known], 1.0, atol=0.011)

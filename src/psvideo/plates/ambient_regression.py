@@ -34,6 +34,9 @@ MOSAIC = 2
 """A colour filter mosaic repeats after so many pixels."""
 MOST_NOISE = 2.0
 """A row is known where the ambient picture's noise variance is at most so many times a frame's."""
+MOST_KEPT = 0.01
+"""... and where it holds no more than this of any flash: in few frames a row may see whole flashes only, which nothing
+tells the ambient light from."""
 MOVED = 4.0
 """A block moved whose residuals are so many times what noise leaves of blocks as bright."""
 AT_LEAST, AT_LEAST_SHARE = 1e-4, 3e-3
@@ -113,7 +116,9 @@ def _takes(shares: FloatArray) -> tuple[FloatArray, Flags]:
     scale = np.trace(equations, axis1=1, axis2=2)[:, None, None]
     inverse = np.linalg.inv(equations + 1e-9 * scale * np.eye(len(terms)))
     takes: FloatArray = np.einsum("rb,bnr->nr", inverse[:, 0, :], terms) * trust
-    known: Flags = np.asarray((takes**2).sum(axis=0) <= MOST_NOISE)
+    kept = np.einsum("nr,bnr->br", takes, terms)  # 1 of the ambient light and 0 of every flash, where they are told
+    kept[0] -= 1
+    known: Flags = np.asarray(((takes**2).sum(axis=0) <= MOST_NOISE) & (np.abs(kept).max(axis=0) <= MOST_KEPT))
     takes[:, ~known] = 0.0
     return takes, known
 
