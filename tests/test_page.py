@@ -8,8 +8,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+import cv2
 import numpy as np
 import page_folder as small
 import pytest
@@ -279,6 +280,39 @@ def test_what_is_not_measured_is_hatched_and_the_disc_of_lights_is_drawn(server:
     assert disc.get_attribute("data-tip") == "drag the light"
     knob.drag_to(page.locator(".pane").first)
     page.wait_for_selector(".disc[data-tip='']", state="attached")
+
+
+def test_gaps_of_the_subject_are_hatched_and_what_lies_around_it_is_not(browser: Browser, tmp_path: Path) -> None:
+    """With ``--no-fill`` what was not measured holds zeros, like everything around the subject."""
+    made = small.results(tmp_path / "out")
+    normals, inside = small.ball()
+    gap = np.zeros_like(inside)
+    gap[small.ROWS // 2 - 4 : small.ROWS // 2 + 4, small.COLS // 2 - 4 : small.COLS // 2 + 4] = True
+    for folder, planes in (
+        ("normals", small.rgb(normals * ~gap[..., None])),
+        ("valid", {"Y": (inside & ~gap).astype(np.float16)}),
+    ):
+        small.write(made / folder / f"take_{folder}.{small.FIRST}.exr", planes, small.FIRST)
+    with serving(made) as server:
+        page = Watched(browser.new_context(viewport=SMALL).new_page()).open(server.url)
+        page.evaluate("() => psvideo.change({ layout: 'one', contents: ['normals', 'normals', 'normals', 'normals'] })")
+        box = page.locator(".pane").first.bounding_box()
+        assert box is not None
+        marked = _drawn(page, box)
+        page.evaluate("() => psvideo.change({ markInvalid: false })")
+        differs = np.abs(marked.astype(int) - _drawn(page, box)).max(axis=2) > 8
+    rows, cols = differs.shape
+    across, down = min(cols / small.COLS, rows / small.ROWS) * np.array([3, 3])
+    middle = np.s_[int(rows / 2 - down) : int(rows / 2 + down), int(cols / 2 - across) : int(cols / 2 + across)]
+    assert differs[middle].mean() > 0.9
+    assert differs.sum() < 0.1 * rows * cols
+
+
+def _drawn(page: Page, box: Any) -> np.ndarray:
+    page.wait_for_function("() => !psvideo.loader.loading")
+    settled(page)
+    picture = cv2.imdecode(np.frombuffer(page.screenshot(clip=box), np.uint8), cv2.IMREAD_COLOR)
+    return np.asarray(picture)
 
 
 @pytest.mark.parametrize(("width", "height", "stacked"), [(1440, 420, "no"), (390, 844, "yes")])

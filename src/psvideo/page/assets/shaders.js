@@ -39,6 +39,7 @@ vec3 chosen(vec3 light) {
   return ${["light", "light.rrr", "light.ggg", "light.bbb", "vec3(dot(light, vec3(0.2126, 0.7152, 0.0722)))"][way.channels]};
 }
 ${way.kind === "relit" ? relitText(way) : ""}
+${way.valid ? GAP : ""}
 void main() {
   ${way.kind === "relit" ? "" : `vec4 value = texture(uMain, vAt)${way.grey ? ".rrra" : ""};`}
   vec3 shown = ${SHOWN[way.kind](way)};
@@ -57,8 +58,22 @@ const SHOWN = {
   relit: (way) => (way.linear ? "relit(vAt)" : "srgb(chosen(relit(vAt) * uExposure))"),
 };
 
-// Nothing is hatched where nothing is shown.
-const HATCH = `if (texture(uValid, vAt).x < 0.5 && texture(uMain, vAt).rgb != vec3(0.0)) {
+// Where nothing is shown a gap of the subject is hatched: something is shown to all four sides. What is around is not.
+const GAP = `bool isShown(vec2 at) { return texture(uMain, at).rgb != vec3(0.0); }
+bool isBeside(vec2 way) {
+  for (float far = 1.0; far <= 1024.0; far *= 1.5) {
+    vec2 at = vAt + far * way;
+    if (any(lessThan(at, vec2(0.0))) || any(greaterThan(at, vec2(1.0)))) return false;
+    if (isShown(at)) return true;
+  }
+  return false;
+}
+bool inGap() {
+  vec2 step = 1.0 / vec2(textureSize(uMain, 0));
+  return isBeside(vec2(step.x, 0.0)) && isBeside(vec2(-step.x, 0.0))
+    && isBeside(vec2(0.0, step.y)) && isBeside(vec2(0.0, -step.y));
+}`;
+const HATCH = `if (texture(uValid, vAt).x < 0.5 && (isShown(vAt) || inGap())) {
     float stripe = step(0.5, fract((gl_FragCoord.x + gl_FragCoord.y) / 12.0));
     shown = mix(shown, mix(uInvalidInk, uValidInk, stripe), 0.55);
   }`;
