@@ -193,7 +193,7 @@ def _fitted(crossed: FloatArray, more: FloatArray | None) -> _Fitted:
         width = OUTLIER * float(np.median(np.abs(left))) / NORMAL_MEDIAN + 1e-12
         weights = 1 / (1 + (left / width) ** 2)
         weighted = slopes.T * weights
-        squares, pull = weighted @ slopes, weighted @ still
+        squares, pull = weighted @ slopes, np.einsum("ip,p->i", weighted, still)  # BLAS would cut the sum by threads
         before, found = found, -_solved(squares, pull)
         if np.abs(found - before).max() < ENOUGH:
             break
