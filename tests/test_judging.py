@@ -36,16 +36,26 @@ def ball() -> tuple[np.ndarray, np.ndarray]:
 
 
 def judged(
-    lights: np.ndarray, *, claimed: np.ndarray | None = None, noise: float = 0.002, indirect: float = 0.0
+    lights: np.ndarray,
+    *,
+    claimed: np.ndarray | None = None,
+    noise: float = 0.002,
+    indirect: float = 0.0,
+    blotches: float = 0.0,
+    along: np.ndarray = COLOUR,
 ) -> tuple[Surface, np.ndarray, np.ndarray]:
     """Return a ball as solved, true errors in degrees where it was measured, and predicted ones.
 
-    indirect: what of its albedo every light gives all of the ball by way of other surfaces.
+    indirect: what of its albedo every light gives all of the ball by way of other surfaces. blotches: the standard
+    deviation of soft errors, each light's own, whose channels stand to each other as ``along`` says.
     """
     normals, inside = ball()
     rng = np.random.default_rng(3)
     shade = np.maximum(np.einsum("rcx,lx->lrc", normals, lights), 0) + indirect * inside
     plates = [(one[..., None] * COLOUR + rng.normal(0, noise, (*one.shape, 3))).astype(np.float32) for one in shade]
+    for plate in plates:
+        soft = cv2.GaussianBlur(rng.normal(size=inside.shape), (0, 0), 2)
+        plate += ((blotches / soft.std() * soft * inside)[..., None] * along / np.linalg.norm(along)).astype(np.float32)
     directions = lights if claimed is None else claimed
     lit = Illumination(directions=directions, intensities=np.ones((len(lights), 3)))
     surface = Solving(error=True).solve(plates, lit, mask=inside)
@@ -75,6 +85,18 @@ def test_light_by_way_of_other_surfaces_is_seen_where_lights_do_not_reach() -> N
     _, _, without = judged(ring(8, 55))
     assert (errors <= 2 * predicted).mean() >= 0.9
     assert np.median(predicted) > 1.5 * np.median(without)
+
+
+def test_what_channels_do_not_share_turns_no_normal_and_is_not_predicted_to() -> None:
+    """As in movies, whose colour is coarse; where the channels are off together, normals are."""
+    apart = np.cross(COLOUR, [0.0, 0.0, 1.0])
+    clean, errors, predicted = judged(ring(4, 40), blotches=0.02, along=apart)
+    assert np.median(errors) < 0.6
+    assert np.median(predicted) < 3.5
+    assert clean.valid[clean.measured].mean() > 0.8
+    _, errors, predicted = judged(ring(4, 40), blotches=0.02)
+    assert np.median(errors) > 1.5
+    assert (errors <= 2 * predicted).mean() > 0.9
 
 
 def test_black_cloth_behind_a_subject_says_nothing_of_it() -> None:

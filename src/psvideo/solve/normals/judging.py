@@ -14,6 +14,7 @@ from psvideo.compute.spilled import let_go, planes_for
 from psvideo.compute.threads import over_ranges
 from psvideo.model.surface import MEASURED, Surface
 from psvideo.solve.normals.bands import BAND_PIXELS
+from psvideo.solve.normals.between_channels import share_together
 from psvideo.solve.normals.doubting import (
     Doubting,
     Signs,
@@ -26,7 +27,6 @@ from psvideo.solve.normals.doubting import (
     stored,
 )
 from psvideo.solve.normals.evidence import Evidence
-from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.moving_doubt import MovingDoubt, moved_deg, moving_doubt_deg
 from psvideo.solve.normals.near_spread import NearSpread, near_spread
 from psvideo.solve.normals.plate_noise import PlateNoise
@@ -68,7 +68,7 @@ def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging =
     What robust solving predicted is in ``error_deg`` already; of least squares noise and residuals say what is known.
     """
     near = near_spread(one.lit, _thin_shape(surface))
-    spread = _Spread.of(surface, one.lit, noise, how, near)
+    spread = _Spread.of(surface, one, noise, how, near)
     points = spread.points(surface)
     turned_deg = moved_deg(points, one)
     signs = signs_of(points, one, turned_deg)
@@ -110,7 +110,7 @@ def looked_at(
 ) -> tuple[ThinSurface, Signs]:
     """Return the points at which a surface is judged, and what speaks against their normals: what constants are fitted
     to."""
-    points = _Spread.of(surface, one.lit, noise, how, near_spread(one.lit, _thin_shape(surface))).points(surface)
+    points = _Spread.of(surface, one, noise, how, near_spread(one.lit, _thin_shape(surface))).points(surface)
     return points, signs_of(points, one)
 
 
@@ -132,7 +132,8 @@ class _Spread:
     of_residual: float
 
     @classmethod
-    def of(cls, surface: Surface, lit: Illumination, noise: PlateNoise, how: Judging, near: NearSpread) -> "_Spread":
+    def of(cls, surface: Surface, one: Evidence, noise: PlateNoise, how: Judging, near: NearSpread) -> "_Spread":
+        lit = one.lit
         strength, lights = lit.intensities.mean(axis=1), len(lit.intensities)
         matrix = lit.directions * strength[:, None]
         channels = 1 if surface.albedo.ndim == 2 else surface.albedo.shape[-1]
@@ -141,6 +142,7 @@ class _Spread:
         variances = [noise.read / channels, noise.photon * mean / 2 / channels, *floors]
         many, free = max(lights / MANY_LIGHTS, 1), lights - 3
         plain = surface.error_deg is None and free > 0  # every channel's residuals are there, and albedo was free
+        many *= share_together(surface, one, noise) if plain else 1
         of_noise = many * ((channels * lights - channels - 2) / free if plain else 1)
         of_residual = many * lights / free if plain else 0
         return cls(
