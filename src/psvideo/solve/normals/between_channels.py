@@ -11,7 +11,7 @@ from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.plate_noise import PlateNoise, rows_of
 from psvideo.solve.normals.task import Floats
 
-ROWS, PIXELS = 16, 1 << 14
+ROWS, PIXELS = 12, 1 << 12
 """Looked at are so many rows, evenly spread, and so many of their pixels."""
 LEAST_PIXELS = 64
 USUAL = 0.9
@@ -30,7 +30,7 @@ def share_together(surface: Surface, one: Evidence, noise: PlateNoise) -> float:
         return 1.0
     lights, (rows, cols) = len(one.plates), surface.valid.shape
     some = np.arange(0, rows, max(rows // ROWS, 1))
-    step = max(some.size * cols // PIXELS, 1)
+    step = -(-some.size * cols // PIXELS)
     plates = [(rows_of(plate, some)[:, ::step] - one.black_level) * one.scale for plate in one.plates]
     values = np.stack(plates).astype(np.float32)  # (light, row, col, channel)
     lit = (values.min(axis=-1) > one.usable.dark_level) & (values.max(axis=-1) < one.usable.saturation)
