@@ -12,24 +12,23 @@ from psvideo.solve.normals.plate_noise import PlateNoise, rows_of
 from psvideo.solve.normals.task import Floats
 
 ROWS, PIXELS = 12, 1 << 12
-"""Looked at are so many rows, evenly spread, and so many of their pixels."""
+"""Looked at are so many rows, evenly spread, and so many of their pixels; of small pictures all."""
 LEAST_PIXELS = 64
 USUAL = 0.9
 """Highlights and the edges of shadows stand out: pixels of larger residuals than this share of them are left aside."""
-LEAST = 0.05
 
 
 def share_together(surface: Surface, one: Evidence, noise: PlateNoise) -> float:
     """Return the share, 1 at most, of squared residuals beyond ``noise`` that a pixel's channels have together.
 
     Of L lights three channels leave 3 L - 5 numbers over, once two of a normal and three of albedo are known: L - 3
-    together, and 2 (L - 1) of how they stand to each other. 1 where there is one channel, where hardly a pixel is lit
-    by all lights, and where residuals hold less beyond noise than noise.
+    together, and 2 (L - 1) of how they stand to each other. 1 where there is one channel or hardly a pixel is lit by
+    all lights, and towards 1 the less there is beyond noise.
     """
     if surface.residual is None or surface.albedo.ndim == 2:
         return 1.0
     lights, (rows, cols) = len(one.plates), surface.valid.shape
-    some = np.arange(0, rows, max(rows // ROWS, 1))
+    some = np.arange(0, rows, max(min(rows // ROWS, rows * cols // PIXELS), 1))
     step = -(-some.size * cols // PIXELS)
     plates = [(rows_of(plate, some)[:, ::step] - one.black_level) * one.scale for plate in one.plates]
     values = np.stack(plates).astype(np.float32)  # (light, row, col, channel)
@@ -41,11 +40,10 @@ def share_together(surface: Surface, one: Evidence, noise: PlateNoise) -> float:
     usual = every <= np.quantile(every, USUAL)
     shown = values[:, known][:, usual]
     variance = noise.read + noise.photon * float(shown.mean())
-    beyond = float(every[usual].mean()) - (3 * lights - 5) * variance
-    between = float(_between(shown, one).mean()) - 2 * (lights - 1) * variance
-    if beyond < (3 * lights - 5) * variance:
-        return 1.0
-    return float(np.clip(1 - between / beyond, LEAST, 1.0))
+    by_noise = (3 * lights - 5) * variance
+    beyond = max(float(every[usual].mean()) - by_noise, 0.0)
+    between = max(float(_between(shown, one).mean()) - 2 * (lights - 1) * variance, 0.0)
+    return 1 - min(between, beyond) / (beyond + by_noise)
 
 
 def _between(values: Floats, one: Evidence) -> Floats:
