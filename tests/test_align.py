@@ -457,8 +457,10 @@ def test_rows_that_no_frame_saw_stay_unseen_and_do_not_look_like_motion() -> Non
         assert shown.pixels_seen[:60].mean() > 0.8
 
 
-@pytest.mark.parametrize(("motion", "gain"), [("4 px", 1.6), ("4 px", 2.2), ("spin", 1.6)])
-def test_where_light_moves_as_much_is_clipped_as_clips_and_at_the_same_places(motion: str, gain: float) -> None:
+@pytest.mark.parametrize(("motion", "gain", "least"), [("4 px", 1.6, 0.93), ("4 px", 2.2, 0.95), ("spin", 1.6, 0.88)])
+def test_where_light_moves_as_much_is_clipped_as_clips_and_at_the_same_places(
+    motion: str, gain: float, least: float
+) -> None:
     clip = filmed(3, motion)
 
     def brighter(one: Round) -> Round:
@@ -471,7 +473,7 @@ def test_where_light_moves_as_much_is_clipped_as_clips_and_at_the_same_places(mo
         assert plate.image.max() == 1.0
         clips, clipped = true.image >= 1.0, plate.image >= 1.0
         assert clips.sum() > 200
-        assert clipped[clips & plate.pixels_seen].mean() > 0.85
+        assert clipped[clips & plate.pixels_seen].mean() > least
         assert clipped.sum() == pytest.approx(clips.sum(), rel=0.1)
 
 
