@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from psvideo.cli.commands.calibrate.of_takes import calibrate_all
+from psvideo.cli.commands.calibrate.of_takes import one_or_all
 from psvideo.cli.console import Voice
 from psvideo.cli.options.calibrate import FocalPx, Pictures, PicturesOfTakes, RigIn, RigOut, Transfer
 from psvideo.cli.options.clip_and_run import (
@@ -56,7 +56,15 @@ def matte_sphere(
     from psvideo.runs.calibrate.matte_sphere import matte_sphere as measure
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
-    options: dict[str, Any] = dict(  # noqa: C408, as they are called below
+    found = one_or_all(
+        voice,
+        "matte-sphere",
+        measure,
+        pictures,
+        out=out,
+        force=force,
+        workers=workers,
+        scheduler=scheduler,
         circle=None if circle is None else parse_circle(circle),
         albedo=albedo,
         focal_px=focal_px,
@@ -65,11 +73,8 @@ def matte_sphere(
         frames=frames,
         first_light=first_light,
     )
-    told: dict[str, Any] = {"force": force, "watch": voice.track, "caller": voice.caller()}
-    if len(pictures) > 1 or workers is not None or scheduler is not None:
-        calibrate_all(voice, "matte-sphere", pictures, out=out, workers=workers, scheduler=scheduler, **told, **options)
+    if found is None:
         return
-    found = measure(pictures[0], out=out, **told, **options)
     x, y, radius = found.outline.place[:3]
     voice.say(f"sphere at {x:.1f}, {y:.1f} with radius {radius:.1f} px (+- {found.outline.error_px:.2f})")
     for light in found.lights:
@@ -107,7 +112,15 @@ def flat_field(
     from psvideo.runs.calibrate.flat_field import flat_field as measure
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
-    options: dict[str, Any] = dict(  # noqa: C408, as they are called below
+    found = one_or_all(
+        voice,
+        "flat-field",
+        measure,
+        pictures,
+        out=out,
+        force=force,
+        workers=workers,
+        scheduler=scheduler,
         rig=rig,
         albedo=albedo,
         box=None if box is None else parse_box(box),
@@ -117,11 +130,8 @@ def flat_field(
         frames=frames,
         first_light=first_light,
     )
-    told: dict[str, Any] = {"force": force, "watch": voice.track, "caller": voice.caller()}
-    if len(pictures) > 1 or workers is not None or scheduler is not None:
-        calibrate_all(voice, "flat-field", pictures, out=out, workers=workers, scheduler=scheduler, **told, **options)
+    if found is None:
         return
-    found = measure(pictures[0], out=out, **told, **options)
     for light in found.lights:
         strengths = ", ".join(f"{value:.4g}" for value in light.intensity)
         voice.say(
@@ -159,7 +169,15 @@ def colours(
     from psvideo.runs.calibrate.colours import colours as measure
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
-    options: dict[str, Any] = dict(  # noqa: C408, as they are called below
+    done = one_or_all(
+        voice,
+        "colours",
+        measure,
+        pictures,
+        out=out,
+        force=force,
+        workers=workers,
+        scheduler=scheduler,
         rig=rig,
         albedo=albedo,
         box=None if box is None else parse_box(box),
@@ -168,11 +186,8 @@ def colours(
         frames=frames,
         first_light=first_light,
     )
-    told: dict[str, Any] = {"force": force, "watch": voice.track, "caller": voice.caller()}
-    if len(pictures) > 1 or workers is not None or scheduler is not None:
-        calibrate_all(voice, "colours", pictures, out=out, workers=workers, scheduler=scheduler, **told, **options)
+    if done is None:
         return
-    done = measure(pictures[0], out=out, **told, **options)
     found = done.found
     for name, seen, error in zip(found.names, found.seen, found.error, strict=True):
         shares = ", ".join(f"{value / seen.max():.4f}" for value in seen)
@@ -210,18 +225,23 @@ def intensities(
     from psvideo.runs.calibrate.intensities import intensities as measure
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
-    options: dict[str, Any] = dict(  # noqa: C408, as they are called below
+    found = one_or_all(
+        voice,
+        "intensities",
+        measure,
+        pictures,
+        out=out,
+        force=force,
+        workers=workers,
+        scheduler=scheduler,
         rig=rig,
         transfer=transfer,
         plan=plan,
         frames=frames,
         first_light=first_light,
     )
-    told: dict[str, Any] = {"force": force, "watch": voice.track, "caller": voice.caller()}
-    if len(pictures) > 1 or workers is not None or scheduler is not None:
-        calibrate_all(voice, "intensities", pictures, out=out, workers=workers, scheduler=scheduler, **told, **options)
+    if found is None:
         return
-    found = measure(pictures[0], out=out, **told, **options)
     lights = found.rig.lights
     for light, error in zip(lights, found.error, strict=True):
         voice.say(f"  {light.name:12} intensity {', '.join(f'{x:.4g}' for x in light.intensity)}  +- {error:.1%}")

@@ -1,10 +1,10 @@
-"""psvideo calibrate, of several takes: a rig for each, the worst first."""
+"""psvideo calibrate, of one take or of several: a rig for each, the worst first."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import typer
 
@@ -12,6 +12,29 @@ from psvideo.cli.console import Voice
 
 if TYPE_CHECKING:
     from psvideo.runs.calibrate.of_takes import Calibration
+
+
+Found = TypeVar("Found")
+
+
+def one_or_all(
+    voice: Voice,
+    calibration: Calibration,
+    measure: Callable[..., Found],
+    pictures: Sequence[Path],
+    *,
+    out: Path,
+    force: bool,
+    workers: int | None,
+    scheduler: str | None,
+    **options: Any,
+) -> Found | None:
+    """Calibrate on one take and return what was found; on several, or with workers, on each, and return None."""
+    told: dict[str, Any] = {"force": force, "watch": voice.track, "caller": voice.caller()}
+    if len(pictures) == 1 and workers is None and scheduler is None:
+        return measure(pictures[0], out=out, **told, **options)
+    calibrate_all(voice, calibration, pictures, out=out, workers=workers, scheduler=scheduler, **told, **options)
+    return None
 
 
 def calibrate_all(voice: Voice, calibration: Calibration, pictures: Sequence[Path], *, out: Path, **given: Any) -> None:
