@@ -142,9 +142,9 @@ class _Spread:
         variances = [noise.read / channels, noise.photon * mean / 2 / channels, *floors]
         many, free = max(lights / MANY_LIGHTS, 1), lights - 3
         plain = surface.error_deg is None and free > 0  # every channel's residuals are there, and albedo was free
-        many *= share_together(surface, one, noise) if plain else 1
-        of_noise = many * ((channels * lights - channels - 2) / free if plain else 1)
-        of_residual = many * lights / free if plain else 0
+        counted = many * (share_together(surface, one, noise) if plain else 1)
+        of_noise = counted * ((channels * lights - channels - 2) / free if plain else 1)
+        of_residual = counted * lights / free if plain else 0
         return cls(
             noise=Spread(
                 inverse=np.linalg.inv(matrix.T @ matrix).astype(np.float32),
