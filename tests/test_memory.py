@@ -146,7 +146,7 @@ def test_linear_algebra_has_no_threads_of_its_own_unless_wanted(said: dict[str, 
     assert done.stdout.split()[-1] == threads
 
 
-def test_python_looks_seldom_for_circles_of_objects() -> None:
+def test_python_seldom_looks_for_reference_cycles() -> None:
     ask = "import gc; from psvideo.cli.app import main; main(['--version']); print(gc.get_threshold()[0])"
     done = subprocess.run([sys.executable, "-c", ask], capture_output=True, text=True, check=True)
     assert int(done.stdout.split()[-1]) >= 10_000

@@ -11,7 +11,7 @@ MOST_IN_HEAP_BYTES, MOST_SPARE_BYTES = 32 << 20, 1 << 30
 """Pictures up to so many bytes, the most that glibc allows, lie in the heap, and so much of it may be free: a run's
 pictures come and go in the same memory, which the system would clear each time that it is given back."""
 OBJECTS_BETWEEN_LOOKS = 10_000
-"""After so many new objects Python looks for circles of them, and not after 700."""
+"""Python looks for reference cycles once so many objects are new; by default, 700."""
 ELSEWHERE = (OSError, AttributeError, TypeError)
 """Another C library, or none to be called by name."""
 
@@ -47,8 +47,8 @@ def keep_algebra_single() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
-def look_for_circles_seldom() -> None:
-    """Let Python look less often for objects that hold each other, of which runs leave none that hold pictures.
+def collect_cycles_seldom() -> None:
+    """Let Python look for reference cycles less often; none that runs leave behind holds a picture.
 
     Loading and compiling make hundreds of thousands of objects that stay: compiling a run's loops took 36 s instead of
     40 of processor time, and looks that find nothing 0.1 s instead of 0.18 of every later run.

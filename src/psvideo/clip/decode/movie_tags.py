@@ -52,7 +52,7 @@ def side_data_of(frame: av.VideoFrame) -> Mapping[str, Any]:
     """Return what comes with a frame beside its picture.
 
     PyAV's own ``frame.side_data`` ties frame and data into a circle, so that every frame's memory stays (8 MB of 1080p
-    ProRes) until Python happens to look for circles.
+    ProRes) until Python happens to look for reference cycles.
     """
     container: Any = SideDataContainer
     found: Mapping[str, Any] = container(frame)

@@ -59,9 +59,9 @@ def calibrate_takes(
     """
     folder, paths = path_of("out", out), [path_of("pictures", path) for path in pictures]
     if folder.suffix == ".toml" or folder.is_file():
-        raise UsageError(f"{folder}: names a file, and every take gets a rig of its own. Name a folder.")
+        raise UsageError(f"{folder}: is a file, and every take gets its own rig. Give a folder.")
     if options.get("flat") is not None:
-        raise UsageError("`flat` is the falloff of one take: leave it out here, and measure that take by itself.")
+        raise UsageError("`flat` is the falloff of a single take. Leave it out here, and measure that take alone.")
     rigs = {path: folder / f"{name}.toml" for path, name in zip(paths, names_of("pictures", paths), strict=True)}
     for rig in rigs.values():
         refuse_existing(rig, force=force, mark=SCHEMA)

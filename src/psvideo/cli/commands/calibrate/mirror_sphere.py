@@ -90,7 +90,7 @@ def mirror_sphere(
         return
     if workers is not None or scheduler is not None:
         raise UsageError(
-            "--workers and --scheduler measure several takes at a time: say with --each that they are such."
+            "--workers and --scheduler are for several takes. Add --each if every folder is a take of its own."
         )
     found = measure(pictures, out=out, **told, **options)
     voice.say(describe(found))

@@ -45,7 +45,7 @@ def calibrate_all(voice: Voice, calibration: Calibration, pictures: Sequence[Pat
     results = calibrate_takes(calibration, pictures, out=out, **given)
     voice.result(rigs_record(results))
     for one in results:
-        voice.say(f"{one.rig}: {one.fault or one.verdict}")
+        voice.say(one.fault or f"{one.rig}: {one.verdict}")
         for words in one.findings:
             voice.say(f"  {words}")
     voice.say(f"See {out / 'report.html'}.")
