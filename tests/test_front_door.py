@@ -2,7 +2,9 @@
 
 import ast
 import doctest
+import importlib
 import inspect
+import pydoc
 import subprocess
 import sys
 from collections.abc import Callable
@@ -63,6 +65,29 @@ def test_a_room_of_the_same_name_does_not_take_a_functions_place() -> None:
         print(ps.solve is solve, callable(solve), callable(sync))
     """
     assert python(inspect.cleandoc(script)) == "True True True"
+
+
+def test_a_module_in_a_room_of_the_same_name_is_imported_under_a_name_of_ones_own() -> None:
+    script = """
+        import psvideo.solve.images as images, psvideo.solve.normals.woodham1980 as least_squares
+        import psvideo as ps, psvideo.sync.find as find, psvideo.solve.depth.view as imported_later
+        print(images.__name__, least_squares.__name__, find.__name__, ps.solve.depth.view is imported_later)
+    """
+    names = "psvideo.solve.images psvideo.solve.normals.woodham1980 psvideo.sync.find True"
+    assert python(inspect.cleandoc(script)) == names
+
+
+def test_a_function_in_a_room_of_the_same_name_is_replaced_by_its_dotted_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("psvideo.solve.images.solve_images", None)
+    assert importlib.import_module("psvideo.solve.images").solve_images is None
+
+
+@pytest.mark.parametrize("name", ["solve", "sync"])
+def test_a_function_with_a_room_of_its_name_shows_its_own_parameters_and_words(name: str) -> None:
+    function = getattr(ps, name)
+    assert next(iter(inspect.signature(function).parameters)) == {"solve": "take", "sync": "clip"}[name]
+    assert "Raises" in (inspect.getdoc(function) or "")
+    assert f"{name}(" in pydoc.render_doc(function)
 
 
 def test_an_unknown_name_is_an_attribute_error() -> None:

@@ -136,6 +136,18 @@ def _answering(name: str, function: Callable[..., Any]) -> Callable[..., Any]:
             raise UsageError(f"psvideo.{name}: {said}") from None
         return function(*given, **named)
 
+    room = sys.modules.get(f"{__name__}.{name}")
+    return call if room is None else _with_modules_of(room, call)
+
+
+def _with_modules_of(room: ModuleType, call: Callable[..., Any]) -> Callable[..., Any]:
+    """Return the function with the attributes of the room of its name, so that ``psvideo.solve.images`` is a module.
+
+    Functions keep their attributes in a dictionary, as modules do: here both have the same one, so that modules which
+    are imported later are seen as well.
+    """
+    room.__dict__.update(call.__dict__)  # __wrapped__, where inspect looks for the parameters
+    call.__dict__ = room.__dict__
     return call
 
 
@@ -144,7 +156,7 @@ def __dir__() -> list[str]:
 
 
 class _FrontDoor(ModuleType):
-    """Keeps ``solve`` and ``sync`` the functions: importing a room of the same name would put the room there."""
+    """Keeps ``solve`` and ``sync`` functions: importing a room of the same name would put the room there."""
 
     def __setattr__(self, name: str, value: object) -> None:
         if not (name in _HOMES and isinstance(value, ModuleType)):
