@@ -416,3 +416,25 @@ def test_the_colour_of_pixels_that_are_solved_apart_is_their_own() -> None:
             np.broadcast_to(colour / 1.2, albedo[struck].shape),
             atol=0.01,
         )
+
+
+@pytest.mark.parametrize("colour", [(0.6, 0.15, 0.08), (0.4, 0.4, 0.4)])
+def test_a_white_highlight_is_not_in_the_albedo_under_it(colour: tuple[float, float, float]) -> None:
+    normals, inside = ball(64, reach_deg=70)
+    around, slant = np.arange(5) * 2 * np.pi / 5, np.radians(35)
+    directions = np.stack(
+        [np.sin(slant) * np.cos(around), np.sin(slant) * np.sin(around), np.cos(slant) + 0 * around], 1
+    )
+    half = directions + np.array([0, 0, 1])
+    half /= np.linalg.norm(half, axis=1, keepdims=True)
+    shine = np.moveaxis(0.2 * np.maximum(normals @ half.T, 0) ** 200, -1, 0) * inside
+    matte = np.moveaxis(np.maximum(normals @ directions.T, 0), -1, 0)[..., None] * colour
+    noise = np.random.default_rng(2).normal(0, 0.001, matte.shape)
+    off = []
+    for plates in (matte + noise, matte + shine[..., None] + noise):
+        surface = ps.solve_images(plates.astype(np.float32), directions, solver="robust")
+        struck = (shine.max(axis=0) > 0.05) & surface.valid
+        assert np.count_nonzero(struck) > 100
+        off.append(np.abs(np.asarray(surface.albedo, np.float64)[struck] / colour - 1).mean(axis=0))
+    assert off[0].max() < 0.01
+    assert off[1].max() < 0.02

@@ -112,3 +112,16 @@ def add_weighted(
             inside = max(ONE - square, ZERO)
             error[i] = inside * inside if tukey else ONE / (ONE + square)
     add_equations(matrix, w, m, e, n)
+
+
+@FUSED.called
+def fill_weights(matrix: Floats, width: np.float32, w: Floats, v: Floats, m: Floats, e: Floats, n: int) -> None:
+    """Cauchy's weights of all measurements, 0 of what is not there, as SCALE is."""
+    fill_residuals(matrix, w, m, e, n)
+    for i in range(n):
+        v[FROM + i] = ONE / (width * v[SCALE + i])
+    for light in range(len(e)):
+        error = e[light]
+        for i in range(n):
+            square = (error[i] * v[FROM + i]) ** 2  # of what is OUT: infinite
+            error[i] = ONE / (ONE + square)

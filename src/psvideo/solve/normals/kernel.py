@@ -11,14 +11,12 @@ compiled for both.
 import numpy as np
 
 from psvideo.compute.compiled import FUSED
-from psvideo.compute.memory import encoded, lent
+from psvideo.compute.memory import lent
 from psvideo.compute.symmetric import adjugate
 from psvideo.solve.normals.blocks import (
     ABSENT,
-    ALBEDO,
     BLOCK,
     COUNT,
-    LEAST_Z,
     LIMIT,
     MISSING,
     ONE,
@@ -37,11 +35,12 @@ from psvideo.solve.normals.blocks import (
     Y,
     Z,
 )
-from psvideo.solve.normals.colour_kernel import albedo_from_sums, gather_all, residuals_of_all, solve_all
+from psvideo.solve.normals.colour_kernel import gather_all, solve_all
 from psvideo.solve.normals.grey_kernel import solve_grey
 from psvideo.solve.normals.measuring import all_seen, any_asked, combine, gather_one, gather_three, hide_unseen
 from psvideo.solve.normals.near_kernel import at, of_light, place_lights
-from psvideo.solve.normals.task import Bytes, Floats, Near, Result, Samples, Task, Work
+from psvideo.solve.normals.storing import store_block
+from psvideo.solve.normals.task import Floats, Near, Result, Task, Work
 
 COLOUR_STEP = 160  # pixels of three channels that are solved together: few enough to stay in the nearest cache
 
@@ -76,7 +75,7 @@ def solve_rows(task: Task, result: Result, work: Work, first: int, last: int) ->
                 w[X : X + n], w[Y : Y + n], w[Z : Z + n] = ZERO, ZERO, ZERO
             else:
                 summed = _solve_block(t, w, values, m, row, col, n, out.residual.size > 0)
-            store_block(t, out, w, values, m, row * t.cols + col, n, summed)
+            store_block(t, out, w, values, m, m, row * t.cols + col, n, summed, False)
 
 
 @FUSED.inlined
@@ -199,88 +198,3 @@ def _solve_normal_equations(w: Floats, n: int, condition_squared: np.float32) ->
         trusted = sound & (determinant > ZERO) & (w[COUNT + i] >= THREE)  # the latter as roundings may seem sound
         scale = ONE / determinant if trusted else ZERO
         w[X + i], w[Y + i], w[Z + i] = x * scale, y * scale, z * scale
-
-
-@FUSED.called
-def store_block(
-    task: Task, result: Result, w: Floats, values: Floats, m: Floats, start: int, n: int, summed: bool
-) -> None:
-    """From g to what is stored; ``summed``: all measurements count, and three channels' sums are there."""
-    end = start + n
-    x, y, z = result.normals[0, start:end], result.normals[1, start:end], result.normals[2, start:end]
-    _store_normals(w, n, x, y, z, result.albedo[0, start:end], result.valid[start:end], task.albedo_scale)
-    if result.residual.size:
-        w[XX : XX + n], w[XY : XY + n] = ZERO, ZERO
-    for channel in range(task.tone.shape[1]):
-        if summed:
-            break
-        if task.tone.shape[1] > 1:
-            _albedo_given_normal(task, w, values, m, channel, n, result.albedo[channel, start:end])
-        if result.residual.size:
-            _add_residual(task, w, values, m, channel, n)
-    if summed:
-        red, green, blue = result.albedo[0, start:end], result.albedo[1, start:end], result.albedo[2, start:end]
-        albedo_from_sums(task, w, n, red, green, blue)
-    residual = result.residual[start:end]
-    if summed and result.residual.size:
-        residuals_of_all(task, w, values, n)
-    for i in range(len(residual)):
-        error = np.sqrt(w[XX + i] / max(w[XY + i], ONE))
-        residual[i] = encoded(error if abs(w[X + i]) + abs(w[Y + i]) + abs(w[Z + i]) > ZERO else ZERO, residual)
-
-
-@FUSED.inlined
-def _store_normals(
-    w: Floats, n: int, x: Samples, y: Samples, z: Samples, albedo: Samples, valid: Bytes, albedo_scale: np.float32
-) -> None:
-    """From g to the stored normal, albedo and validity, and to the planes X, Y, Z: all 0 where it faces away."""
-    for i in range(n):
-        gx, gy, gz = w[X + i], w[Y + i], w[Z + i]
-        square = gx * gx + gy * gy + gz * gz
-        length = np.sqrt(square)
-        trusted = gz > LEAST_Z * length
-        scale = ONE / length if trusted else ZERO
-        size = square * scale if trusted else ZERO
-        gx, gy, gz = gx * scale, gy * scale, gz * scale
-        w[X + i], w[Y + i], w[Z + i], w[ALBEDO + i] = gx, gy, gz, size
-        x[i] = encoded(gx, x)
-        y[i] = encoded(gy, y)
-        z[i] = encoded(gz, z)
-        albedo[i] = encoded(size * albedo_scale, albedo)
-        valid[i] = trusted
-
-
-@FUSED.inlined
-def _albedo_given_normal(task: Task, w: Floats, values: Floats, m: Floats, channel: int, n: int, out: Samples) -> None:
-    """One channel's least squares albedo over the usable measurements, the normal being known."""
-    w[SUM : SUM + n], w[COUNT : COUNT + n] = ZERO, ZERO
-    for light in range(task.lights):
-        lamp = of_light(task.matrix, light)
-        plane = values[light * task.tone.shape[1] + channel]
-        for i in range(n):
-            x, y, z = at(lamp, i)
-            here = m[light, i] > ABSENT
-            shade = x * w[X + i] + y * w[Y + i] + z * w[Z + i]
-            shade = shade if here else ZERO
-            w[SUM + i] += shade * plane[i] if here else ZERO
-            w[COUNT + i] += shade * shade
-    scale = task.albedo_scale
-    for i in range(n):
-        albedo = w[SUM + i] / w[COUNT + i] if w[COUNT + i] > ZERO else ZERO
-        w[ALBEDO + i] = max(albedo, ZERO)
-        out[i] = encoded(max(albedo, ZERO) * scale, out)
-
-
-@FUSED.inlined
-def _add_residual(task: Task, w: Floats, values: Floats, m: Floats, channel: int, n: int) -> None:
-    """Add one channel's squared residuals in plate units to the plane XX, and their count to XY."""
-    for light in range(task.lights):
-        lamp = of_light(task.matrix, light)
-        plane, to_plate = values[light * task.tone.shape[1] + channel], task.tone[light, channel, 3]
-        for i in range(n):
-            x, y, z = at(lamp, i)
-            here = m[light, i] > ABSENT
-            shade = x * w[X + i] + y * w[Y + i] + z * w[Z + i]
-            error = (plane[i] - w[ALBEDO + i] * shade) * to_plate
-            w[XX + i] += error * error if here else ZERO
-            w[XY + i] += ONE if here else ZERO

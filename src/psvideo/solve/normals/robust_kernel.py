@@ -20,11 +20,11 @@ from psvideo.solve.normals.near_kernel import place_lights
 from psvideo.solve.normals.predicted_error import NO_ERROR, UNEXPLAINED, predict_error
 from psvideo.solve.normals.reflecting import find_ways
 from psvideo.solve.normals.robust_weights import solve_reweighted, weigh
+from psvideo.solve.normals.storing import store_block
 from psvideo.solve.normals.task import FEW, LIGHTS, Bytes, Floats, Indices, Result, Task, Weights, empty_result
 
 STEP = 128  # pixels that are solved together: few enough that all of their planes stay in the nearest cache
 LEAST_CHECKED = 5  # usable measurements from which on residuals show how well the lights explain a pixel
-DROPPED_FROM = 4  # measurements, of which one may be left out
 MOST_APART = 1 / 2  # of a block's pixels; where more are unexplained, it is as quick to solve all of them robustly
 
 
@@ -90,24 +90,26 @@ def solve_rows(
         waiting = 0
         for col in range(0, t.cols, STEP):
             n = min(STEP, t.cols - col)
-            start, summed, odd = row * t.cols + col, False, 0
+            start, summed, weighed, odd = row * t.cols + col, False, False, 0
             if t.mask.size and not any_asked(t.mask, row, col, n):
                 w[X : X + n], w[Y : Y + n], w[Z : Z + n] = ZERO, ZERO, ZERO
                 v[DOUBT : DOUBT + n], v[UNEXPLAINED : UNEXPLAINED + n] = NO_ERROR, ZERO
             else:
-                summed, odd = _solve_block(t, sent, per, weights, whole, listed, row, col, n)
+                summed, weighed, odd = _solve_block(t, sent, per, weights, whole, listed, row, col, n)
             for k in range(odd):
                 places[waiting + k] = start + listed[k]
             put_side_by_side(whole, listed, odd, distant, apart, waiting)
             waiting += odd
-            kernel.store_block(t, block, w, whole.values, whole.measurements, 0, n, summed)
+            values, m, e = whole.values, whole.measurements, whole.errors
+            store_block(t, block, w, values, m, e, 0, n, summed, weighed)
             for i in range(n):
                 listed[i] = start + i
             _hand_out(block, v, out, predicted, unexplained, half, listed, n)
             if waiting and (waiting >= STEP or col + STEP >= t.cols):
                 n = fill_up(apart, waiting, distant, listed)
                 _solve_apart(t_apart, sent, per, weights, apart, n)
-                kernel.store_block(t_apart, block, apart.planes, apart.values, apart.measurements, 0, n, False)
+                values, m, e = apart.values, apart.measurements, apart.errors
+                store_block(t_apart, block, apart.planes, values, m, e, 0, n, False, True)
                 _hand_out(block, apart.more, out, predicted, unexplained, half, places, waiting)
                 waiting = 0
 
@@ -161,11 +163,12 @@ def _write(values: Floats, plane: Bytes, half: bool, places: Indices, n: int) ->
 @FUSED.inlined
 def _solve_block(
     task: Task, sent: Floats, per: Floats, weights: Weights, room: Room, listed: Indices, row: int, col: int, n: int
-) -> tuple[bool, int]:
+) -> tuple[bool, bool, int]:
     """Leave g in the planes X, Y, Z, all 0 where the normal is not to be trusted, and the error in DOUBT.
 
-    Returned is whether three channels' sums are left as well (``colour_kernel.py``), of what counts in every pixel; and
-    how many pixels are listed because they are to be solved apart.
+    Returned is whether three channels' sums are left as well (``colour_kernel.py``), of what counts in every pixel;
+    whether ``errors`` holds weights by which all were solved; and how many pixels are listed because they are to be
+    solved apart.
     """
     w, v, m = room.planes, room.more, room.measurements
     distant, modelled = task.near.depth.size == 0, room.ways.size > 0
@@ -188,7 +191,7 @@ def _solve_block(
             inside = ONE if task.mask[row, col + i] else ZERO
             w[X + i], w[Y + i], w[Z + i] = (w[X + i] * inside, w[Y + i] * inside, w[Z + i] * inside)
         apart = _only_inside(task, listed, apart, row, col)
-    return summed and not (whole and (modelled or task.lights <= DROPPED_FROM)), apart
+    return summed and not whole, whole, apart
 
 
 @FUSED.inlined

@@ -7,7 +7,7 @@ import numpy as np
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import flattened
-from psvideo.solve.normals.any_lights import add_start, add_weighted, choose_start, find_scale
+from psvideo.solve.normals.any_lights import add_start, add_weighted, choose_start, fill_weights, find_scale
 from psvideo.solve.normals.apart import Room
 from psvideo.solve.normals.equations import solve_equations
 from psvideo.solve.normals.few_lights import begin_few, reweigh_few
@@ -41,8 +41,8 @@ def solve_reweighted(task: Task, sent: Floats, per: Floats, weights: Weights, ro
 def weigh(
     task: Task, sent: Floats, weights: Weights, share: np.float32, modelled: bool, room: Room, few: bool, n: int
 ) -> None:
-    """SCALE and the weighted normal equations of solved pixels; before, where they are to be ``modelled``, they are
-    solved again under the subject's model, and their samples left without what that adds.
+    """SCALE, the weighted normal equations of solved pixels, and these weights in ``errors``; before, where they are to
+    be ``modelled``, they are solved again under the subject's model, and their samples left without what that adds.
 
     share: of a pixel's light, what is left over at least.
     """
@@ -52,6 +52,8 @@ def weigh(
         weigh_reflecting(room.ways, task.lights, weights, share, kept, matte, w, v, room.values, m, e, n)
     else:
         _reweigh(task, sent, weights, share, False, TWO, True, few, room, n)
+        if few:
+            fill_weights(task.matrix, TWO, room.planes, room.more, room.measurements, room.errors, n)
 
 
 @FUSED.inlined

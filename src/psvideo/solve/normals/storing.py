@@ -1,0 +1,124 @@
+"""Compiled part of both solvers: from g to the stored normal, every channel's albedo, and what is left over."""
+
+import numpy as np
+
+from psvideo.compute.compiled import FUSED
+from psvideo.compute.memory import encoded
+from psvideo.solve.normals.blocks import ABSENT, ALBEDO, COUNT, LEAST_Z, ONE, SUM, XX, XY, ZERO, X, Y, Z
+from psvideo.solve.normals.colour_kernel import albedo_from_sums, residuals_of_all
+from psvideo.solve.normals.near_kernel import at, of_light
+from psvideo.solve.normals.task import Bytes, Floats, Result, Samples, Task
+
+
+@FUSED.called
+def store_block(
+    task: Task, result: Result, w: Floats, values: Floats, m: Floats, weights: Floats, start: int, n: int,
+    summed: bool, weighed: bool,
+) -> None:  # fmt: skip
+    """From g to what is stored; ``summed``: all measurements count, and three channels' sums are there.
+
+    weights (light, pixel): by which measurements count for albedo where they are ``weighed``.
+    """
+    end = start + n
+    x, y, z = result.normals[0, start:end], result.normals[1, start:end], result.normals[2, start:end]
+    _store_normals(w, n, x, y, z, result.albedo[0, start:end], result.valid[start:end], task.albedo_scale)
+    if result.residual.size:
+        w[XX : XX + n], w[XY : XY + n] = ZERO, ZERO
+    for channel in range(task.tone.shape[1]):
+        if summed:
+            break
+        if task.tone.shape[1] > 1:
+            if weighed:
+                _sum_up_weighed(task, w, values, m, weights, channel, n)
+            else:
+                _sum_up(task, w, values, m, channel, n)
+            _albedo_given_normal(task, w, n, result.albedo[channel, start:end])
+        if result.residual.size:
+            _add_residual(task, w, values, m, channel, n)
+    if summed:
+        red, green, blue = result.albedo[0, start:end], result.albedo[1, start:end], result.albedo[2, start:end]
+        albedo_from_sums(task, w, n, red, green, blue)
+    residual = result.residual[start:end]
+    if summed and result.residual.size:
+        residuals_of_all(task, w, values, n)
+    for i in range(len(residual)):
+        error = np.sqrt(w[XX + i] / max(w[XY + i], ONE))
+        residual[i] = encoded(error if abs(w[X + i]) + abs(w[Y + i]) + abs(w[Z + i]) > ZERO else ZERO, residual)
+
+
+@FUSED.inlined
+def _store_normals(
+    w: Floats, n: int, x: Samples, y: Samples, z: Samples, albedo: Samples, valid: Bytes, albedo_scale: np.float32
+) -> None:
+    """From g to the stored normal, albedo and validity, and to the planes X, Y, Z: all 0 where it faces away."""
+    for i in range(n):
+        gx, gy, gz = w[X + i], w[Y + i], w[Z + i]
+        square = gx * gx + gy * gy + gz * gz
+        length = np.sqrt(square)
+        trusted = gz > LEAST_Z * length
+        scale = ONE / length if trusted else ZERO
+        size = square * scale if trusted else ZERO
+        gx, gy, gz = gx * scale, gy * scale, gz * scale
+        w[X + i], w[Y + i], w[Z + i], w[ALBEDO + i] = gx, gy, gz, size
+        x[i] = encoded(gx, x)
+        y[i] = encoded(gy, y)
+        z[i] = encoded(gz, z)
+        albedo[i] = encoded(size * albedo_scale, albedo)
+        valid[i] = trusted
+
+
+@FUSED.inlined
+def _sum_up(task: Task, w: Floats, values: Floats, m: Floats, channel: int, n: int) -> None:
+    """What one channel's least squares albedo is made of, over the usable measurements, the normal being known."""
+    w[SUM : SUM + n], w[COUNT : COUNT + n] = ZERO, ZERO
+    for light in range(task.lights):
+        lamp = of_light(task.matrix, light)
+        plane = values[light * task.tone.shape[1] + channel]
+        for i in range(n):
+            x, y, z = at(lamp, i)
+            here = m[light, i] > ABSENT
+            shade = x * w[X + i] + y * w[Y + i] + z * w[Z + i]
+            shade = shade if here else ZERO
+            w[SUM + i] += shade * plane[i] if here else ZERO
+            w[COUNT + i] += shade * shade
+
+
+@FUSED.inlined
+def _sum_up_weighed(task: Task, w: Floats, values: Floats, m: Floats, weights: Floats, channel: int, n: int) -> None:
+    """The same of measurements that count by what they counted for the normal: a highlight is not the surface's."""
+    w[SUM : SUM + n], w[COUNT : COUNT + n] = ZERO, ZERO
+    for light in range(task.lights):
+        lamp = of_light(task.matrix, light)
+        plane = values[light * task.tone.shape[1] + channel]
+        for i in range(n):
+            x, y, z = at(lamp, i)
+            here = m[light, i] > ABSENT
+            shade = x * w[X + i] + y * w[Y + i] + z * w[Z + i]
+            counted = shade * weights[light, i] if here else ZERO
+            w[SUM + i] += counted * plane[i] if here else ZERO
+            w[COUNT + i] += counted * shade
+
+
+@FUSED.inlined
+def _albedo_given_normal(task: Task, w: Floats, n: int, out: Samples) -> None:
+    """One channel's albedo of what was summed up."""
+    scale = task.albedo_scale
+    for i in range(n):
+        albedo = w[SUM + i] / w[COUNT + i] if w[COUNT + i] > ZERO else ZERO
+        w[ALBEDO + i] = max(albedo, ZERO)
+        out[i] = encoded(max(albedo, ZERO) * scale, out)
+
+
+@FUSED.inlined
+def _add_residual(task: Task, w: Floats, values: Floats, m: Floats, channel: int, n: int) -> None:
+    """Add one channel's squared residuals in plate units to the plane XX, and their count to XY."""
+    for light in range(task.lights):
+        lamp = of_light(task.matrix, light)
+        plane, to_plate = values[light * task.tone.shape[1] + channel], task.tone[light, channel, 3]
+        for i in range(n):
+            x, y, z = at(lamp, i)
+            here = m[light, i] > ABSENT
+            shade = x * w[X + i] + y * w[Y + i] + z * w[Z + i]
+            error = (plane[i] - w[ALBEDO + i] * shade) * to_plate
+            w[XX + i] += error * error if here else ZERO
+            w[XY + i] += ONE if here else ZERO
