@@ -67,8 +67,9 @@ def plate_errors(
     ``plan`` is the true one and ``claimed`` the camera as plan.toml has it, whose seconds are ``scale`` times as long.
     """
     camera = replace(claimed, exposure_s=timing.exposure_s, readout_s=timing.row_time_s * plan.camera.height_px)
-    ours = _without_ambient(list(split(iter(frames), camera, timing)))
-    published = {plate.flash.index: plate for plate in _without_ambient(list(hudon2015.split(frames, camera, timing)))}
+    ours = _without_ambient(list(split(iter(frames), camera, timing)), timing)
+    by_algorithm_1 = _without_ambient(list(hudon2015.split(frames, camera, timing)), timing)
+    published = {plate.flash.index: plate for plate in by_algorithm_1}
     shares, solved = oracle(plan, flashes, true_frames)
     true_s = np.array([flash.start_s for flash in flashes]) * scale
     sums = np.zeros(5)
@@ -93,10 +94,10 @@ def plate_errors(
     )
 
 
-def _without_ambient(plates: list[Plate]) -> list[Plate]:
+def _without_ambient(plates: list[Plate], timing: Timing) -> list[Plate]:
     """Take the ambient light off between the dark slots before and after, as the pipeline does."""
     darks = [plate for plate in plates if plate.flash.is_dark]
-    return list(subtract(plates, darks=darks))
+    return list(subtract(plates, darks=darks, ripple=timing.mains if darks else None))
 
 
 def oracle(plan: Plan, flashes: Sequence[TrueFlash], frames: Mapping[int, Picture]) -> tuple[np.ndarray, np.ndarray]:

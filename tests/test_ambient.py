@@ -10,10 +10,11 @@ import pytest
 from memory_frame import MemoryFrame
 
 from psvideo.model.plan import Plan
+from psvideo.model.ripple import Exposures, Ripple
 from psvideo.model.shutter import frames_touched
 from psvideo.model.timing import Flash, Timing
 from psvideo.plates import ambient, ambient_off
-from psvideo.plates.mains import Exposures, Mains, Ripple, RowLight, find_ripple
+from psvideo.plates.mains import Mains, RowLight, find_ripple
 from psvideo.plates.mixture import made
 from psvideo.plates.split import Plate, split
 from psvideo.synth import Noise, TrueClock
@@ -38,9 +39,11 @@ class Take:
 
     plates: list[Plate]
     truth: dict[int, np.ndarray]
+    ripple: Ripple | None = None
 
     def without_ambient(self) -> Iterator[Plate]:
-        return ambient_off.subtract(self.plates, darks=[plate for plate in self.plates if not plate.flash.lights])
+        darks = [plate for plate in self.plates if not plate.flash.lights]
+        return ambient_off.subtract(self.plates, darks=darks, ripple=self.ripple)
 
     def errors(self) -> np.ndarray:
         """Return the errors of whole plates between two dark slots once ambient light is off, (plate, row, col)."""
@@ -179,6 +182,28 @@ def test_mains_light_is_separated_row_by_row(hz: float, depth: float, make_plan:
     take = shoot(plan, dimmed, mains=MainsSwing(hz=hz, depth=depth))
     assert rms(shoot(plan, held).errors()) < 1e-5
     assert rms(take.errors()[8:]) < 1e-4 + (2e-3 if hz == 100.2 else 0) * depth
+
+
+def _true_ripple(plan: Plan, hz: float, depth: float) -> Ripple:
+    """The swing of exposures whose light is ``1 + depth sin(2 pi hz t)``."""
+    return Ripple(hz=hz, amplitude=-1j * depth * float(np.sinc(hz * plan.camera.exposure_s)))
+
+
+def test_mains_light_that_the_timing_knows_is_off_from_the_first_plate_on(make_plan: PlanMaker) -> None:
+    plan = make_plan(width_px=160, height_px=120, fps=Fraction(110))
+    take = shoot(plan, held, mains=MainsSwing(hz=100.2, depth=1.0))
+    assert rms(take.errors()[:3]) > 2e-3
+    assert rms(replace(take, ripple=_true_ripple(plan, 100.2, 1.0)).errors()) < 1e-5
+
+
+def test_a_rough_ripple_of_the_clip_gives_way_to_what_dark_slots_agree_on(make_plan: PlanMaker) -> None:
+    plan = make_plan(width_px=160, height_px=120, fps=Fraction(110))
+    take = shoot(plan, held, mains=MainsSwing(hz=100, depth=1.0))
+    true = _true_ripple(plan, 100, 1.0)
+    rough = replace(true, amplitude=0.9 * true.amplitude, error=0.1 * abs(true.amplitude))
+    late = {error: rms(replace(take, ripple=replace(rough, error=error)).errors()[8:]) for error in (0.0, rough.error)}
+    assert late[rough.error] < 2e-4
+    assert late[0.0] > 5 * late[rough.error]
 
 
 def test_exposures_of_whole_pulses_show_none(make_plan: PlanMaker) -> None:

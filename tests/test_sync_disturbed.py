@@ -13,8 +13,9 @@ from memory_frame import MemoryFrame
 from psvideo.errors import PsvideoError
 from psvideo.formats.exr_files import write_exr
 from psvideo.formats.plan_toml import format_plan
-from psvideo.formats.timing_json import format_timing, read_timing
+from psvideo.formats.timing_json import format_timing, parse_timing, read_timing, timing_record
 from psvideo.model.plan import Plan, PlannedFlash
+from psvideo.model.ripple import Exposures
 from psvideo.model.row_profiles import collect_with_doubt
 from psvideo.model.timing import DroppedFrames, Timing, places_in_time
 from psvideo.plates.gather import gather
@@ -149,6 +150,21 @@ def test_flickering_ambient_light_is_separated_from_the_strobe(hz: float, make_p
     shot = shoot(plan, ambient=0.15, mains=MainsSwing(hz=hz, depth=0.8))
     timing = timing_of(plan, shot)
     assert rms_rows(timing, shot, plan) < 0.02
+    times_s = np.linspace(0, 1, 50)
+    true = MainsSwing(hz=hz, depth=0.8).mean(times_s, plan.camera.exposure_s)
+    middles_s = times_s[None] + plan.camera.exposure_s / 2
+    assert timing.mains is not None
+    found = timing.mains.swing(Exposures(shares=np.ones((1, 50)), middles_s=middles_s))
+    assert np.sqrt(np.mean((found - true) ** 2)) < 0.02
+    assert parse_timing(timing_record(timing), source="") == timing
+    assert timing_of(plan, shoot(plan, ambient=0.15)).mains is None
+
+
+def test_mains_that_run_a_little_fast_are_followed_through_the_clip(make_plan: PlanMaker) -> None:
+    plan = make_plan(height_px=ROWS, width_px=COLUMNS, shutter=0.5, readout=0.6, fps=Fraction(90))
+    timing = timing_of(plan, shoot(plan, frames=240, ambient=0.15, mains=MainsSwing(hz=100.15, depth=0.8)))
+    assert timing.mains is not None
+    assert timing.mains.hz == pytest.approx(100.15, abs=0.02)
 
 
 def test_tails_that_the_plan_does_not_give_are_found(plan: Plan) -> None:

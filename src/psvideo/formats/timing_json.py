@@ -8,6 +8,7 @@ from pydantic import Field, ValidationError
 from psvideo.errors import PsvideoError
 from psvideo.formats.contract import Contract, check_schema, read_json
 from psvideo.formats.paths import path_of
+from psvideo.model.ripple import Ripple
 from psvideo.model.timing import DroppedFrames, Flash, Order, Timing
 
 SCHEMA = "psvideo-timing/1"
@@ -28,6 +29,13 @@ class _DroppedFile(Contract):
     count: int = Field(gt=0)
 
 
+class _MainsFile(Contract):
+    hz: float = Field(gt=0)
+    cosine: float = Field(ge=-1, le=1)
+    sine: float = Field(ge=-1, le=1)
+    error: float = Field(ge=0)
+
+
 class _TimingFile(Contract):
     schema_: str = Field(alias="schema")
     clip: str
@@ -37,6 +45,7 @@ class _TimingFile(Contract):
     clock_offset_ppm: float
     rise_s: float = Field(default=0.0, ge=0)
     fall_s: float = Field(default=0.0, ge=0)
+    mains: _MainsFile | None = None
     phase_error_rows: float = Field(ge=0)
     order: Order
     order_note: str = ""
@@ -85,14 +94,24 @@ def parse_timing(data: dict[str, object], *, source: str) -> Timing:
         raise PsvideoError(f"{source}: key '{key}': {first['msg']}. Make it again with psvideo sync.") from None
     flashes = tuple(Flash(**flash.model_dump()) for flash in file.flashes)
     dropped = tuple(DroppedFrames(after=hole.after, count=hole.count) for hole in file.dropped_frames)
-    scalars = file.model_dump(exclude={"schema_", "flashes", "dropped_frames", "repeated_frames"})
+    scalars = file.model_dump(exclude={"schema_", "flashes", "dropped_frames", "repeated_frames", "mains"})
     repeated = tuple(file.repeated_frames)
-    return Timing(flashes=flashes, dropped_frames=dropped, repeated_frames=repeated, **scalars)
+    mains = None if file.mains is None else _ripple(file.mains)
+    return Timing(flashes=flashes, dropped_frames=dropped, repeated_frames=repeated, mains=mains, **scalars)
+
+
+def _ripple(file: _MainsFile) -> Ripple:
+    return Ripple(hz=file.hz, amplitude=complex(file.cosine, -file.sine), error=file.error)
+
+
+def _mains_row(ripple: Ripple) -> dict[str, float]:
+    return {"hz": ripple.hz, "cosine": ripple.amplitude.real, "sine": -ripple.amplitude.imag, "error": ripple.error}
 
 
 def timing_record(timing: Timing) -> dict[str, object]:
     """Return the timing as what timing.json holds."""
     order_note = {"order_note": timing.order_note} if timing.order_note else {}
+    mains = {} if timing.mains is None else {"mains": _mains_row(timing.mains)}
     repeated = {"repeated_frames": list(timing.repeated_frames)} if timing.repeated_frames else {}
     return {
         "schema": SCHEMA,
@@ -103,6 +122,7 @@ def timing_record(timing: Timing) -> dict[str, object]:
         "clock_offset_ppm": timing.clock_offset_ppm,
         "rise_s": timing.rise_s,
         "fall_s": timing.fall_s,
+        **mains,
         "phase_error_rows": timing.phase_error_rows,
         "order": timing.order,
         **order_note,

@@ -8,6 +8,7 @@ import numpy as np
 
 from psvideo.model.camera import Camera, FloatArray
 from psvideo.model.plan import HasLights, Plan
+from psvideo.model.ripple import Ripple
 from psvideo.model.shutter import Pulse
 from psvideo.model.units import show_seconds
 
@@ -60,6 +61,8 @@ class Timing:
         A sentence on how a rig's directions decided the order, or why they did not; empty where none were asked.
     rise_s, fall_s
         The LEDs' 1/e times, given or found.
+    mains
+        How ambient light swings with the mains, None where the clip does not show it clearly.
     notes
         Sentences on what to distrust. Not in the file, like the next two.
     row_time_error_s
@@ -81,6 +84,7 @@ class Timing:
     order_note: str = ""
     rise_s: float = 0.0
     fall_s: float = 0.0
+    mains: Ripple | None = None
     notes: tuple[str, ...] = field(default=(), compare=False)
     row_time_error_s: float | None = field(default=None, compare=False)
     phase_error_s: float | None = field(default=None, compare=False)

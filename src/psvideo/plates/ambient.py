@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from psvideo.model.camera import FloatArray
 from psvideo.model.coded import Image
+from psvideo.model.ripple import Ripple
 from psvideo.plates.ambient_blocks import block_px, block_rows, no_blocks, over_bands, times_rows
 from psvideo.plates.ambient_change import AmbientChange
 from psvideo.plates.ambient_kernel import blend_rows, look_rows
@@ -45,24 +46,25 @@ class Ambient:
     steady: bool = False
 
 
-def update(ambient: Ambient | None, dark: Plate) -> Ambient:
-    """Return the ambient light with one more dark slot in it."""
+def update(ambient: Ambient | None, dark: Plate, *, ripple: Ripple | None = None) -> Ambient:
+    """Return the ambient light with one more dark slot in it; ``ripple`` is what the timing found of the mains."""
     rows, coarse = _looked_at(dark)
     if ambient is None:
+        factor = _freeing(ripple, rows)
         slots = np.broadcast_to(dark.seen[:, None], (len(dark.seen), coarse.shape[1])).astype(np.float32)
         return Ambient(
-            level=AmbientLevel.of(dark.image),
-            coarse=coarse,
+            level=AmbientLevel.of(times_rows(dark.image, factor)),
+            coarse=times_rows(coarse, _over_blocks(factor, len(coarse))),
             slots=slots,
             middle_s=rows.opened.middle_s,
             known=dark.seen,
-            mains=Mains(rows=rows),
+            mains=Mains(rows=rows, timed=ripple),
             index=dark.flash.index,
         )
     mains = ambient.mains.next(rows)
-    factor = np.ones(len(dark.seen)) if mains.ripple is None else 1 / mains.ripple.swing(rows.opened)
+    factor = _freeing(mains.ripple, rows)
     blocks = block_rows(len(dark.seen), len(coarse))
-    coarse = times_rows(coarse, np.bincount(blocks, factor) / np.bincount(blocks))
+    coarse = times_rows(coarse, _over_blocks(factor, len(coarse)))
     whole = np.bincount(blocks, ~(ambient.known & dark.seen)) == 0
     change = AmbientChange.between(ambient.coarse, coarse, whole, block=block_px(dark.picture.shape))
     again = ~ambient.known | first_ripple(ambient.mains, mains)
@@ -78,6 +80,18 @@ def update(ambient: Ambient | None, dark: Plate) -> Ambient:
         index=dark.flash.index,
         steady=bool(whole.all()) and change.is_steady(coarse),
     )
+
+
+def _freeing(ripple: Ripple | None, rows: RowLight) -> FloatArray:
+    """Return by which factor a dark slot's rows are freed of a ripple, shape (row,)."""
+    return np.ones(len(rows.mean)) if ripple is None else 1 / ripple.swing(rows.opened)
+
+
+def _over_blocks(factor: FloatArray, count: int) -> FloatArray:
+    """Return the means of rows' factors over ``count`` blocks of rows."""
+    blocks = block_rows(len(factor), count)
+    means: FloatArray = np.bincount(blocks, factor) / np.bincount(blocks)
+    return means
 
 
 def _looked_at(dark: Plate) -> tuple[RowLight, Image]:

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from psvideo.model.ripple import Exposures, Ripple
 from psvideo.model.timing import Timing
 from psvideo.plates.ambient import Ambient, first_ripple, update
-from psvideo.plates.mains import Exposures
 from psvideo.plates.mixture import shown_level
 from psvideo.plates.split import Plate
 
@@ -51,14 +51,20 @@ def with_darks_ahead(
 
 
 def subtract(
-    plates: Iterable[Plate], *, darks: Iterable[Plate] = (), waits: bool = True, known: Ambient | None = None
+    plates: Iterable[Plate],
+    *,
+    darks: Iterable[Plate] = (),
+    waits: bool = True,
+    known: Ambient | None = None,
+    ripple: Ripple | None = None,
 ) -> Iterator[Plate]:
     """Yield the plates with ambient light taken off the lit ones; dark slots pass as the average at their moment.
 
     ``darks`` are the clip's dark slots, read ahead of the plates: no further than the one after the current plate.
     ``waits`` False: not even that while the light is steady, so that few frames are held; then the next dark slot is
     read when it passes. Before the first and after the last, its light is taken as it is. Without any, plates keep
-    theirs. ``known`` is what dark slots told before the first plate, where ``darks`` begin after these.
+    theirs. ``known`` is what dark slots told before the first plate, where ``darks`` begin after these;
+    ``ripple`` is what the clip's timing found of the mains.
     """
     coming = iter(darks)
     before = after = known
@@ -69,7 +75,7 @@ def subtract(
                 before = after
                 break
             before = None
-            later = update(after, dark)
+            later = update(after, dark, ripple=ripple)
             alone = after is None or later.steady or first_ripple(after.mains, later.mains)
             before = later if alone else after
             after = later

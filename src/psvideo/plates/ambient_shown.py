@@ -9,6 +9,7 @@ from psvideo.clip import Frame, Take, holds_plain_codes, read_frames
 from psvideo.compute.threads import thread_count
 from psvideo.model.camera import Camera
 from psvideo.model.recipe import frames_of
+from psvideo.model.ripple import Ripple
 from psvideo.model.shutter import frames_touched
 from psvideo.model.timing import Flash, Timing, places_in_time, timed_camera
 from psvideo.plates.ambient import Ambient, update
@@ -106,8 +107,13 @@ def ambient_before(take: Take, timing: Timing, index: int) -> Ambient | None:
     for dark in ambient_shown(take, timing, None):
         if dark.flash.index >= index:
             break
-        ambient = update(ambient, dark)
+        ambient = update(ambient, dark, ripple=ripple_of(take, timing))
     return ambient
+
+
+def ripple_of(take: Take, timing: Timing) -> Ripple | None:
+    """Return the ripple that dark slots hold; what windows of frames show in their place is a mean over it."""
+    return None if all(flash.lit for flash in take.plan.flashes) else timing.mains
 
 
 def used_of(take: Take, timing: Timing, numbers: Sequence[int] | None = None) -> Timing:

@@ -23,7 +23,7 @@ from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.ambient import update
 from psvideo.plates.ambient_off import subtract, with_darks_ahead
 from psvideo.plates.ambient_regression import Separated
-from psvideo.plates.ambient_shown import AHEAD, ambient_shown, dark_plates, placed, used_of
+from psvideo.plates.ambient_shown import AHEAD, ambient_shown, dark_plates, placed, ripple_of, used_of
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import made, shown_level
 from psvideo.plates.nearest_rows import has_blind_time, with_nearest_rows
@@ -191,7 +191,8 @@ def clip_plates(
         darks: Iterator[Plate] = chain(islice(dark_plates(take, timing), len(early)), later)
     else:
         darks = ambient_shown(take, timing, each_window, after=-1 if known is None else known.index)
-    return map(_colour_of(clip), subtract(single, darks=darks, waits=not come_often, known=known))
+    ripple = ripple_of(take, timing)
+    return map(_colour_of(clip), subtract(single, darks=darks, waits=not come_often, known=known, ripple=ripple))
 
 
 def first_ambient(take: Take, timing: Timing) -> LightPlate | None:
@@ -202,7 +203,7 @@ def first_ambient(take: Take, timing: Timing) -> LightPlate | None:
     dark = next(dark_plates(take, timing), None)
     if dark is None:
         return None
-    plate = _colour_of(take.clip)(replace(dark, picture=shown_level(update(None, dark).level)))
+    plate = _colour_of(take.clip)(replace(dark, picture=shown_level(update(None, dark, ripple=timing.mains).level)))
     shown = LightPlate(light=AMBIENT, number=0, time_s=plate.time_s, picture=plate.picture, seen=plate.seen)
     return upright(shown, take.clip.turn)
 

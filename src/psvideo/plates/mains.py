@@ -5,14 +5,18 @@ them, each row at another phase: stripes that move from frame to frame. Between 
 are known from the clock, so that one amplitude and phase, the same for all rows, is found from how the rows' means
 changed. Two pairs of dark slots in a row must agree: a shadow that crosses the rows may look like a ripple
 once, but not twice. The lamps' share of the light is taken to be the same all over the picture.
+
+Where the fit of the clip's timing found a ripple, it is known from the first plate on, and from far more rows than two
+dark slots have: what these show takes its place only where it is known better.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.camera import FloatArray
+from psvideo.model.ripple import MOST_SWING, Exposures, Ripple, swing
 from psvideo.plates.split import Plate
 
 PULSES_HZ = (100.0, 120.0)
@@ -21,31 +25,13 @@ EXPLAINED = 0.8
 LEAST_TURN = 0.3
 """Dark slots must differ at least so much in phase (of 2 at most, RMS) to show a ripple."""
 LEAST_ROWS = 16
-LEAST_SWING, MOST_SWING = 1e-3, 0.9
+LEAST_SWING = 1e-3
 AGREES = 0.3
 """Two findings agree that differ by no more than this share of themselves, which is 0.3 in phase as well."""
 LONGEST_UNSEEN = 4
 """Dark slots for which a ripple is taken to go on that is not seen: the mains wander, by up to 0.2 Hz."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Exposures:
-    """Whose exposures went into a plate's rows: ``shares`` and ``middles_s`` (frame, row)."""
-
-    shares: FloatArray
-    middles_s: FloatArray
-
-    @property
-    def middle_s(self) -> FloatArray:
-        """The mean moment of each row's exposures, shape (row,)."""
-        middle: FloatArray = (self.shares * self.middles_s).sum(axis=0) / np.maximum(self.shares.sum(axis=0), 1e-12)
-        return middle
-
-    def phasor(self, hz: float) -> NDArray[np.complex128]:
-        """Return where in a pulse each row's exposures lie on average, shape (row,)."""
-        turns = np.exp(2j * np.pi * hz * self.middles_s)
-        mean: NDArray[np.complex128] = (self.shares * turns).sum(axis=0) / np.maximum(self.shares.sum(axis=0), 1e-12)
-        return mean
+ROUGH = 0.02
+"""A clip's own ripple that is known no better than to this share gives way to what pairs of dark slots agree on."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,37 +51,34 @@ class RowLight:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Ripple:
-    """The swing of the ambient light's exposures: of ``abs(amplitude)`` of their mean, ``hz`` times a second."""
-
-    hz: float
-    amplitude: complex
-
-    def swing(self, opened: Exposures) -> FloatArray:
-        """Return by which factor the rows' exposures were off the mean, shape (row,)."""
-        return _swing(self.amplitude, opened.phasor(self.hz))
-
-
-@dataclass(frozen=True, kw_only=True)
 class Mains:
     """What dark slots showed of mains light up to the one whose ``rows`` these are.
 
-    ``last`` is what the last pair of slots showed, ``ripple`` what two pairs agreed on, ``unseen`` slots ago.
+    ``last`` is what the last pair of slots showed, ``agreed`` what two pairs agreed on, ``unseen`` slots ago;
+    ``timed`` is what the whole clip showed when it was timed.
     """
 
     rows: RowLight
     last: Ripple | None = None
-    ripple: Ripple | None = None
+    agreed: Ripple | None = None
     unseen: int = 0
+    timed: Ripple | None = None
+
+    @property
+    def ripple(self) -> Ripple | None:
+        """What is known best: the whole clip's, unless that is rough and two pairs of slots agreed."""
+        if self.timed is None or (self.agreed is not None and self.timed.error > ROUGH * abs(self.timed.amplitude)):
+            return self.agreed
+        return self.timed
 
     def next(self, rows: RowLight) -> "Mains":
         """Return what is known with one more dark slot."""
         found = find_ripple(self.rows, rows)
         if found is not None and self.last is not None and _agree(found, self.last):
-            return Mains(rows=rows, last=found, ripple=found)
-        if self.ripple is None or self.unseen == LONGEST_UNSEEN:
-            return Mains(rows=rows, last=found)
-        return Mains(rows=rows, last=found, ripple=self.ripple, unseen=self.unseen + 1)
+            return replace(self, rows=rows, last=found, agreed=found, unseen=0)
+        if self.agreed is None or self.unseen == LONGEST_UNSEEN:
+            return replace(self, rows=rows, last=found, agreed=None, unseen=0)
+        return replace(self, rows=rows, last=found, unseen=self.unseen + 1)
 
 
 def _agree(one: Ripple, other: Ripple) -> bool:
@@ -130,7 +113,7 @@ def _fitted(
         return None
     amplitude = 0j
     for _ in range(5):
-        low, high = _swing(amplitude, early), _swing(amplitude, late)
+        low, high = swing(amplitude, early), swing(amplitude, late)
         turn = late / high - early / low
         slopes = np.stack([np.ones(len(turn)), turn.real, -turn.imag], axis=1) * weight[:, None]
         rest = (change - np.log(high / low)) * weight
@@ -138,13 +121,8 @@ def _fitted(
         amplitude += complex(real, imaginary)
         if abs(amplitude) > MOST_SWING:
             return None
-    left = change - np.log(_swing(amplitude, late) / _swing(amplitude, early))
+    left = change - np.log(swing(amplitude, late) / swing(amplitude, early))
     left = left - np.average(left, weights=weight**2)
     flat = change - np.average(change, weights=weight**2)
     explained = 1 - float(((left * weight) ** 2).sum() / max(((flat * weight) ** 2).sum(), 1e-18))
     return explained, Ripple(hz=hz, amplitude=amplitude)
-
-
-def _swing(amplitude: complex, phasor: NDArray[np.complex128]) -> FloatArray:
-    swing: FloatArray = np.maximum(1 + (amplitude * phasor).real, 1 - MOST_SWING)
-    return swing

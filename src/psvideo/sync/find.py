@@ -21,6 +21,7 @@ from psvideo.model.timing import DroppedFrames, Flash, Order, Timing
 from psvideo.sync.rowfit.beat import Beat, train_between, train_until
 from psvideo.sync.rowfit.course import window_frames
 from psvideo.sync.rowfit.fit import ClipFit
+from psvideo.sync.rowfit.mains_swing import mains_swing
 from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.refine import Fit
 from psvideo.sync.turns import turns
@@ -215,6 +216,7 @@ def _assemble(
         phase_error_rows=found.fit.shift_error_s / (abs(row_time_s) or camera.frame_period_s / camera.height_px),
         rise_s=beat.rise_s,
         fall_s=beat.fall_s,
+        mains=mains_swing(plan, found.rows, found.fit),
         order=order,
         dropped_frames=dropped,
         repeated_frames=repeated,
