@@ -19,7 +19,9 @@ from psvideo.model.rig import Light, Rig
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import made
 from psvideo.plates.sequence import Round
-from psvideo.report.judge.light import ambient, exposure, lamps
+from psvideo.report.judge.of_ambient import ambient
+from psvideo.report.judge.of_exposure import exposure
+from psvideo.report.judge.of_lamps import lamps
 from psvideo.report.judge.of_rig import rig
 from psvideo.report.judge.result import accuracy, off_deg, validity
 from psvideo.report.judgement import verdict_of

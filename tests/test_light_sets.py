@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from psvideo.calibrate.light_files import find_plates, find_stills
-from psvideo.calibrate.light_pictures import averaged, light_pictures
+from psvideo.calibrate.light_pictures import LightPictures, averaged, light_pictures
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
-from psvideo.runs.light_sets import Reading, open_light_sets, read_images, read_light_pictures
+from psvideo.runs.light_sets import Reading, open_light_sets, read_images
 
 SCENES = Path(__file__).resolve().parents[1] / "data_synth"
 
@@ -18,6 +18,10 @@ SCENES = Path(__file__).resolve().parents[1] / "data_synth"
 def still(path: Path, value: float, size: tuple[int, int] = (6, 8)) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     cv2.imwrite(str(path), np.full(size, round(value * 65535), np.uint16))
+
+
+def mean_pictures(path: Path, reading: Reading = Reading()) -> LightPictures:
+    return averaged(open_light_sets(path, reading).sets)
 
 
 def test_stills_are_lights_of_their_names_and_ambient_light_is_taken_off(tmp_path: Path) -> None:
@@ -36,10 +40,10 @@ def test_a_folder_per_light_holds_several_frames(tmp_path: Path) -> None:
     for light, values in (("a", (0.1, 0.3)), ("b", (0.5, 0.7))):
         for number, value in enumerate(values, start=1001):
             still(tmp_path / light / f"x_{light}.{number}.png", value)
-    found = read_light_pictures(tmp_path)
+    found = mean_pictures(tmp_path)
     assert found.frames == 2
     assert found.images[:, 0, 0] == pytest.approx([0.2, 0.6], abs=1e-4)
-    second = read_light_pictures(tmp_path, Reading(frames="2"))
+    second = mean_pictures(tmp_path, Reading(frames="2"))
     assert second.images[:, 0, 0] == pytest.approx([0.3, 0.7], abs=1e-4)
 
 
@@ -119,7 +123,7 @@ def test_a_strobed_clip_and_its_plates_show_the_same(tmp_path: Path) -> None:
     clip, plates = tmp_path / "clip", tmp_path / "plates"
     assert main(["synth", str(SCENES / "sphere.toml"), "-o", str(clip), "-q"]) == 0
     assert main(["split", str(clip), "-o", str(plates), "-q"]) == 0
-    from_clip, from_plates = read_light_pictures(clip), read_light_pictures(plates)
+    from_clip, from_plates = mean_pictures(clip), mean_pictures(plates)
     assert from_clip.names == from_plates.names
     assert from_clip.frames == from_plates.frames > 1
     assert np.abs(from_clip.images - from_plates.images).max() < 1e-3
@@ -137,4 +141,4 @@ def test_what_does_not_fit_is_said(tmp_path: Path) -> None:
     still(tmp_path / "sizes" / "a.png", 0.1)
     still(tmp_path / "sizes" / "b.png", 0.1, (6, 9))
     with pytest.raises(PsvideoError, match="one camera"):
-        read_light_pictures(tmp_path / "sizes")
+        mean_pictures(tmp_path / "sizes")

@@ -18,7 +18,10 @@ from psvideo.plates.ambient_regression import Separated
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import made
 from psvideo.plates.sequence import AMBIENT, Round
-from psvideo.report.judge import light, result, time
+from psvideo.report.judge import result, time
+from psvideo.report.judge.of_ambient import ambient
+from psvideo.report.judge.of_exposure import exposure as judge_exposure
+from psvideo.report.judge.of_lamps import lamps as judge_lamps
 from psvideo.report.judge.of_rig import rig as judge_rig
 from psvideo.report.judgement import Judgement, verdict_of
 from psvideo.report.observe.motion import glimpse, motion
@@ -243,11 +246,11 @@ def graded(lines: Judgement | Sequence[Judgement] | None, subject: str) -> str:
 
 
 def exposure(one: Observed) -> list[Judgement]:
-    return list(light.exposure(one))
+    return list(judge_exposure(one))
 
 
 def lamps(one: Observed) -> list[Judgement]:
-    return list(light.lamps(one))
+    return list(judge_lamps(one))
 
 
 def flickering(share: float) -> list[list[float]]:
@@ -301,12 +304,12 @@ LIT = [
     _by("missed often", lamps, "lights", {"gains": missing(1, 0.3)}, {"gains": missing(2, 0.3)}, "doubtful bad",
         rounds=12),
     _by("unsteady", lamps, "lights", {"gains": flickering(0.016)}, {"gains": flickering(0.025)}, rounds=6),
-    _by("ambient", light.ambient, "ambient", {"ambient": [0.09]}, {"ambient": [0.11]}),
-    _by("ambient lost", light.ambient, "ambient", {"ambient": [0.48]}, {"ambient": [0.52]}, "doubtful bad"),
-    _by("ambient swings", light.ambient, "ambient", {"ambient": [0.074, 0.087]}, {"ambient": [0.07, 0.09]}, rounds=6),
-    _by("ambient noticed", light.ambient, "ambient", {"ambient": [0.03, 0.06]}, {"ambient": [0.04, 0.08]}, rounds=6),
-    _by("ambient measured", light.ambient, "ambient", {"measured": 0.82}, {"measured": 0.78}, ambient=[0.03]),
-    _by("ambient faint", light.ambient, "ambient", {"ambient": [0.018]}, {"ambient": [0.023]}, measured=0.7),
+    _by("ambient", ambient, "ambient", {"ambient": [0.09]}, {"ambient": [0.11]}),
+    _by("ambient lost", ambient, "ambient", {"ambient": [0.48]}, {"ambient": [0.52]}, "doubtful bad"),
+    _by("ambient swings", ambient, "ambient", {"ambient": [0.074, 0.087]}, {"ambient": [0.07, 0.09]}, rounds=6),
+    _by("ambient noticed", ambient, "ambient", {"ambient": [0.03, 0.06]}, {"ambient": [0.04, 0.08]}, rounds=6),
+    _by("ambient measured", ambient, "ambient", {"measured": 0.82}, {"measured": 0.78}, ambient=[0.03]),
+    _by("ambient faint", ambient, "ambient", {"ambient": [0.018]}, {"ambient": [0.023]}, measured=0.7),
     _by("focus", result.focus, "focus", {"blur_px": 2.5}, {"blur_px": 3.2}, shape="tiles"),
 ]  # fmt: skip
 
@@ -452,7 +455,7 @@ def test_light_that_is_left_in_attached_shadow_is_said_where_no_dark_slot_shows_
     left = shadow_light(np.array(plates), np.ones((6, SIZE, SIZE), np.bool_), surface, ways, step=1)
     assert left is not None
     one = Observed(lights=("a",), in_shadow=[left])
-    assert light.ambient(one).grade == grade
+    assert ambient(one).grade == grade
 
 
 @pytest.mark.parametrize(("ambient", "said"), [(0.03, False), (0.08, True)])

@@ -1,7 +1,7 @@
 """Rigs written as the light lists of other programs: ``.lp`` (RTI) and DiLiGenT's pair of text files.
 
 Both use psvideo's axes (x right, y up, z towards the camera) and hold distant lights only; ``.lp`` holds no strengths.
-``psvideo.formats.rig_toml`` reads them back to the last digit.
+``list_rows`` reads them back to the last digit.
 """
 
 import re
@@ -10,7 +10,8 @@ from typing import Literal
 
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.contract import read_text
-from psvideo.formats.rig_toml import format_rig, is_number
+from psvideo.formats.list_rows import is_number
+from psvideo.formats.rig_toml import format_rig
 from psvideo.formats.whole_files import write_text
 from psvideo.model.rig import Light, Rig, Vector
 

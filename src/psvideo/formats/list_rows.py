@@ -1,18 +1,87 @@
-"""The rows of a list of lights: held against their count, and against what beginners write in them."""
+"""Light lists of other programs, read: rows of numbers, held against their count and what beginners write in them.
 
+``.lp`` (RTI), DiLiGenT's ``light_directions.txt`` with ``light_intensities.txt`` beside it, and a plain list of unit
+vectors with its count on the first line (University of Washington). Lists without names belong to the plan's lights in
+the order in which the plan first lights them. ``light_lists`` writes the first two.
+"""
+
+import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError
+from psvideo.formats.contract import read_text
+from psvideo.model.rig import Light, Rig
 
 ANGLES_SPAN = 7.0
 """Columns that span more, beside a third one that is the same throughout, are degrees: more than radians do."""
 AXES = "x right, y up, z towards the camera"
+DECIMAL_COMMA = re.compile(r"-?\d+,\d+")
 
 
-def counted(path: Path, rows: list[list[float]]) -> list[list[float]]:
+def read_light_list(path: Path, *, plan_lights: Sequence[str] = ()) -> Rig:
+    """Read directions of lights, and their strengths where the list has them (all 1 where not).
+
+    ``plan_lights`` are names for the lights, in order; left out, they are numbered. Raises PsvideoError, which names
+    the file, what was found and what was expected.
+    """
+    rows = _numbers(path, read_text(path))
+    if path.suffix == ".lp" or len(rows[0]) == 1:
+        rows = _counted(path, rows)
+    if not rows:
+        raise PsvideoError(f"{path}: says that it lists 0 lights; expected a line for every light.")
+    short = next((place for place, row in enumerate(rows, start=1) if len(row) < 3), None)
+    if short:
+        raise PsvideoError(
+            f"{path}: light {short} has only {len(rows[short - 1])} of the three numbers x y z of the direction to the "
+            "light (x right, y up, z towards the camera). Angles are to be made directions first."
+        )
+    vectors = np.array([row[:3] for row in rows], np.float64)
+    lengths = np.linalg.norm(vectors, axis=1)
+    if np.any(lengths < 1e-6):
+        raise PsvideoError(
+            f"{path}: vector {int(np.argmin(lengths)) + 1} has no length; expected directions to lights."
+        )
+    _refuse_angles(path, vectors)
+    beside = _diligent_strengths(path, len(rows))
+    strengths = [tuple(row[3:6]) if len(row) == 6 else strength for row, strength in zip(rows, beside, strict=True)]
+    names = _names(path, len(rows), plan_lights)
+    lights = [
+        Light(name=name, direction=(x, y, z), intensity=strength)
+        for name, (x, y, z), strength in zip(names, (vectors / lengths[:, None]).tolist(), strengths, strict=True)
+    ]
+    return Rig(lights=tuple(lights))
+
+
+def _numbers(path: Path, text: str) -> list[list[float]]:
+    """Return the numbers of each line; words (an .lp file's picture names) are left out."""
+    comma = next((word for word in re.split(r"[\s;]+", text) if DECIMAL_COMMA.fullmatch(word)), None)
+    if comma:
+        raise PsvideoError(
+            f"{path}: writes {comma!r}. Expected numbers with points, such as {comma.replace(',', '.')}."
+        )
+    lines = [re.split(r"[,;]" if re.search("[,;]", line) else r"\s+", line.strip()) for line in text.splitlines()]
+    rows = [[float(word) for word in words if is_number(word)] for words in lines]
+    rows = [row for row in rows if row]
+    if not rows:
+        raise PsvideoError(
+            f"{path}: holds no numbers. Expected rig.toml, an .lp file, or one light direction x y z per line."
+        )
+    return rows
+
+
+def is_number(word: str) -> bool:
+    """Return whether a word of a list is a finite number."""
+    try:
+        return bool(np.isfinite(float(word)))
+    except ValueError:
+        return False
+
+
+def _counted(path: Path, rows: list[list[float]]) -> list[list[float]]:
     """Take the count off the top of a list and hold the list against it. Raises PsvideoError where it does not fit."""
     count, vectors = rows[0][0], rows[1:]
     if len(rows[0]) != 1 or count != len(vectors):
@@ -30,7 +99,7 @@ def counted(path: Path, rows: list[list[float]]) -> list[list[float]]:
     return vectors
 
 
-def refuse_angles(path: Path, vectors: NDArray[np.float64]) -> None:
+def _refuse_angles(path: Path, vectors: NDArray[np.float64]) -> None:
     """Raise PsvideoError where columns are angles and a distance: two turn far, and the third is always the same."""
     span = np.ptp(vectors, axis=0)
     if len(vectors) > 2 and span[:2].max() > ANGLES_SPAN and span[2] == 0 and abs(vectors[0, 2]) <= 1:
@@ -40,3 +109,25 @@ def refuse_angles(path: Path, vectors: NDArray[np.float64]) -> None:
             f"direction to the light ({AXES}). With azimuth a and elevation e: x = cos(e) cos(a), y = cos(e) sin(a), "
             "z = sin(e)."
         )
+
+
+def _diligent_strengths(path: Path, count: int) -> list[tuple[float, ...]]:
+    """Return the intensities of the ``light_intensities.txt`` beside a DiLiGenT list, else 1 for every light."""
+    beside = path.with_name("light_intensities.txt")
+    if path.name != "light_directions.txt" or not beside.is_file():
+        return [(1.0,)] * count
+    rows = _numbers(beside, read_text(beside))
+    if len(rows) != count:
+        raise PsvideoError(f"{beside}: holds {len(rows)} intensities, and {path.name} beside it {count} directions.")
+    return [tuple(row) for row in rows]
+
+
+def _names(path: Path, count: int, plan_lights: Sequence[str]) -> list[str]:
+    if not plan_lights:
+        return [f"L{index}" for index in range(count)]
+    if len(plan_lights) != count:
+        raise PsvideoError(
+            f"{path}: lists {count} lights, and the plan flashes {len(plan_lights)} ({', '.join(plan_lights)}). A list "
+            "without names must hold exactly the plan's lights, in the order in which the plan first lights them."
+        )
+    return list(plan_lights)

@@ -1,11 +1,5 @@
-"""Rig files: rig.toml (schema ``psvideo-rig/1``), and the light lists of other programs.
+"""Rig files: rig.toml (schema ``psvideo-rig/1``). ``read_rig`` reads the light lists of other programs as well."""
 
-Read as well: ``.lp`` (RTI), DiLiGenT's ``light_directions.txt`` with ``light_intensities.txt`` beside it, and a plain
-list of unit vectors with its count on the first line (University of Washington). Lists without names belong to the
-plan's lights in the order in which the plan first lights them.
-"""
-
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Self
@@ -16,7 +10,7 @@ from pydantic import Field, field_validator, model_validator
 
 from psvideo.errors import PsvideoError
 from psvideo.formats.contract import Contract, check_light_name, parse_toml, read_text
-from psvideo.formats.list_rows import counted, refuse_angles
+from psvideo.formats.list_rows import read_light_list
 from psvideo.formats.paths import path_of
 from psvideo.model.rig import Light, Rig, Vector
 
@@ -24,8 +18,6 @@ SCHEMA = "psvideo-rig/1"
 UNIT_LENGTH_TOLERANCE = 0.01
 FARTHEST_LIGHT_M = 50.0
 """No near light is further from the camera; positions in millimetres are, from 5 cm on."""
-
-DECIMAL_COMMA = re.compile(r"-?\d+,\d+")
 
 Triple = Annotated[list[float], Field(min_length=3, max_length=3)]
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
@@ -131,35 +123,9 @@ def read_rig(path: Path | str, *, plan_lights: Sequence[str] = ()) -> Rig:
     [0.488, 0.39, 0.781]
     """
     path = path_of("path", path)
-    text = read_text(path)
     if path.suffix == ".toml":
-        return _in_front(parse_rig(text, source=str(path)), path)
-    rows = _numbers(path, text)
-    if path.suffix == ".lp" or len(rows[0]) == 1:
-        rows = counted(path, rows)
-    if not rows:
-        raise PsvideoError(f"{path}: says that it lists 0 lights; expected a line for every light.")
-    short = next((place for place, row in enumerate(rows, start=1) if len(row) < 3), None)
-    if short:
-        raise PsvideoError(
-            f"{path}: light {short} has only {len(rows[short - 1])} of the three numbers x y z of the direction to the "
-            "light (x right, y up, z towards the camera). Angles are to be made directions first."
-        )
-    vectors = np.array([row[:3] for row in rows], np.float64)
-    lengths = np.linalg.norm(vectors, axis=1)
-    if np.any(lengths < 1e-6):
-        raise PsvideoError(
-            f"{path}: vector {int(np.argmin(lengths)) + 1} has no length; expected directions to lights."
-        )
-    refuse_angles(path, vectors)
-    beside = _diligent_strengths(path, len(rows))
-    strengths = [tuple(row[3:6]) if len(row) == 6 else strength for row, strength in zip(rows, beside, strict=True)]
-    names = _names(path, len(rows), plan_lights)
-    lights = [
-        Light(name=name, direction=_vector(vector), intensity=strength)
-        for name, vector, strength in zip(names, vectors / lengths[:, None], strengths, strict=True)
-    ]
-    return _in_front(Rig(lights=tuple(lights)), path)
+        return _in_front(parse_rig(read_text(path), source=str(path)), path)
+    return _in_front(read_light_list(path, plan_lights=plan_lights), path)
 
 
 def _in_front(rig: Rig, path: Path) -> Rig:
@@ -210,53 +176,6 @@ def _unit(values: Sequence[float]) -> Vector:
     """Return a vector of exactly unit length; one that is so already to 1e-12 keeps its digits."""
     length = float(np.linalg.norm(values))
     return _vector(values) if abs(length - 1.0) < 1e-12 else _vector(np.asarray(values, np.float64) / length)
-
-
-def _numbers(path: Path, text: str) -> list[list[float]]:
-    """Return the numbers of each line; words (an .lp file's picture names) are left out."""
-    comma = next((word for word in re.split(r"[\s;]+", text) if DECIMAL_COMMA.fullmatch(word)), None)
-    if comma:
-        raise PsvideoError(
-            f"{path}: writes {comma!r}. Expected numbers with points, such as {comma.replace(',', '.')}."
-        )
-    lines = [re.split(r"[,;]" if re.search("[,;]", line) else r"\s+", line.strip()) for line in text.splitlines()]
-    rows = [[float(word) for word in words if is_number(word)] for words in lines]
-    rows = [row for row in rows if row]
-    if not rows:
-        raise PsvideoError(
-            f"{path}: holds no numbers. Expected rig.toml, an .lp file, or one light direction x y z per line."
-        )
-    return rows
-
-
-def is_number(word: str) -> bool:
-    """Return whether a word of a list is a finite number."""
-    try:
-        return bool(np.isfinite(float(word)))
-    except ValueError:
-        return False
-
-
-def _diligent_strengths(path: Path, count: int) -> list[tuple[float, ...]]:
-    """Return the intensities of the ``light_intensities.txt`` beside a DiLiGenT list, else 1 for every light."""
-    beside = path.with_name("light_intensities.txt")
-    if path.name != "light_directions.txt" or not beside.is_file():
-        return [(1.0,)] * count
-    rows = _numbers(beside, read_text(beside))
-    if len(rows) != count:
-        raise PsvideoError(f"{beside}: holds {len(rows)} intensities, and {path.name} beside it {count} directions.")
-    return [tuple(row) for row in rows]
-
-
-def _names(path: Path, count: int, plan_lights: Sequence[str]) -> list[str]:
-    if not plan_lights:
-        return [f"L{index}" for index in range(count)]
-    if len(plan_lights) != count:
-        raise PsvideoError(
-            f"{path}: lists {count} lights, and the plan flashes {len(plan_lights)} ({', '.join(plan_lights)}). A list "
-            "without names must hold exactly the plan's lights, in the order in which the plan first lights them."
-        )
-    return list(plan_lights)
 
 
 def format_rig(rig: Rig) -> str:

@@ -26,15 +26,6 @@ class Turn:
         """Whether the picture stands upright already."""
         return not (self.transposed or self.rows_flipped or self.cols_flipped)
 
-    @property
-    def is_mirrored(self) -> bool:
-        """Whether left and right change places, as no turning of the camera makes them.
-
-        >>> Turn(cols_flipped=True).is_mirrored, Turn(rows_flipped=True, cols_flipped=True).is_mirrored
-        (True, False)
-        """
-        return self.transposed ^ self.rows_flipped ^ self.cols_flipped
-
     def upright(self, picture: NDArray[Number]) -> NDArray[Number]:
         """Return a picture (row, col[, channel]) as it is to be seen, in memory of its own where it was turned.
 

@@ -1,6 +1,6 @@
 """Pictures of a scene, one per light, from what a user names: stills, plates, or a synced or strobed clip.
 
-``open_light_sets`` gives one set per round, which shows the scatter between frames; ``read_light_pictures`` their mean.
+``open_light_sets`` gives one set per round, which shows the scatter between frames; ``read_images`` their mean.
 """
 
 from collections.abc import Iterator
@@ -151,11 +151,6 @@ def _compared(sets: Iterator[LightPictures], where: Path, caller: Caller) -> Ite
             "folders are scenes of their own, name one of them; where the subject or the exposure changed, choose "
             "pictures with `frames`, or take them again."
         )
-
-
-def read_light_pictures(path: Path, reading: Reading = Reading(), *, watch: Watch = unwatched) -> LightPictures:
-    """Return the mean picture of the scene under each light. Raises as ``open_light_sets``."""
-    return averaged(open_light_sets(path, reading, watch=watch).sets)
 
 
 def open_light_sets(path: Path, reading: Reading = Reading(), *, watch: Watch = unwatched) -> LightSets:

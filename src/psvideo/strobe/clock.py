@@ -35,7 +35,6 @@ class ClockFit:
     offset_s: float
     offset_ppm: float
     gain_error_ppm: float
-    offset_error_s: float
     readings: int
 
     def host_s(self, ticks: int) -> float:
@@ -63,7 +62,6 @@ def fit_clock(readings: Sequence[ClockQuery], *, tick_ps: int) -> ClockFit | Non
         offset_s=offset_s - gain * kept[0].ticks,
         offset_ppm=(gain / nominal_s - 1) * 1e6,
         gain_error_ppm=max(abs(gain - low), abs(high - gain)) / nominal_s * 1e6,
-        offset_error_s=0.5 * float(width_s.min()),
         readings=len(readings),
     )
 

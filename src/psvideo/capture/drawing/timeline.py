@@ -58,7 +58,6 @@ class Timeline:
     """Everything that the diagram shows, from ``start_s`` to ``end_s``."""
 
     camera: Camera
-    readout_is_known: bool
     start_s: float
     end_s: float
     frames: tuple[FrameSpans, ...]
@@ -73,8 +72,7 @@ def timeline(plan: Plan, *, phase_s: float | None = None, frames: int | None = N
     ``frames`` None shows about one round. An unknown readout is drawn as long as the frame.
     """
     camera = plan.camera
-    known = camera.readout_s is not None
-    if not known:
+    if camera.readout_s is None:
         camera = replace(camera, readout_s=camera.frame_period_s)
     readout_s = abs(camera.readout_s or 0.0)
     count = frames or min(max(_frames_of_a_round(plan) + 1, FEWEST_FRAMES), MOST_FRAMES)
@@ -85,7 +83,6 @@ def timeline(plan: Plan, *, phase_s: float | None = None, frames: int | None = N
     flashes = _flashes(plan, phase_s, end_s)
     return Timeline(
         camera=camera,
-        readout_is_known=known,
         start_s=0.0,
         end_s=end_s,
         frames=tuple(_frame(camera, index, flashes) for index in range(-_frames_before(camera), count)),

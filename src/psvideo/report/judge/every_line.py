@@ -2,7 +2,9 @@
 
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
-from psvideo.report.judge.light import ambient, exposure, lamps
+from psvideo.report.judge.of_ambient import ambient
+from psvideo.report.judge.of_exposure import exposure
+from psvideo.report.judge.of_lamps import lamps
 from psvideo.report.judge.of_rig import rig
 from psvideo.report.judge.result import accuracy, focus, steadiness, validity
 from psvideo.report.judge.time import coverage, motion, timing_and_order

@@ -4,7 +4,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from psvideo.report.judge.light import LOST_CLIPPED, NAMED
+from psvideo.report.judge.of_exposure import LOST_CLIPPED
+from psvideo.report.judge.of_lamps import NAMED
 from psvideo.report.judge.result import AT_REST, COMMON_DEG, LOST_DEG, NOISY_DEG, by_noise_deg, moves, off_deg
 from psvideo.report.judgement import Grade, Judgement
 from psvideo.report.observe.observed import InstantFacts, Observed

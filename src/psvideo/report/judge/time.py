@@ -8,7 +8,7 @@ from psvideo.model.motion_cost import cost_words
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.model.units import counted
-from psvideo.report.judge.light import NOTICED
+from psvideo.report.judge.of_ambient import NOTICED
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.observed import Observed
 

@@ -5,11 +5,10 @@ from pathlib import Path
 
 from psvideo.calibrate.led_colours import LedColours, measure_led_colours, with_colours
 from psvideo.compute.progress import Watch, unwatched
-from psvideo.errors import UsageError
 from psvideo.formats.rig_toml import format_rig, read_rig
 from psvideo.formats.whole_files import write_text
 from psvideo.model.rig import Rig
-from psvideo.runs.calibrate.flat_field import target_of
+from psvideo.runs.calibrate.flat_field import check_albedo, target_of
 from psvideo.runs.calibrate.reading import pictures_of, reading_of, rig_out
 from psvideo.runs.caller import PYTHON, Caller
 
@@ -51,8 +50,7 @@ def colours(
     are grey, or colours cannot be separated.
     """
     rig_path = rig_out(out, force=force)
-    if not 0 < albedo <= 1:
-        raise UsageError(f"`albedo` {albedo:g}: expected a share above 0 and up to 1.")
+    check_albedo(albedo)
     found = pictures_of(Path(pictures), reading_of(plan, frames, first_light, transfer), watch=watch, caller=caller)
     known = read_rig(Path(rig), plan_lights=found.names)
     target, ground = target_of(found, known, albedo=albedo, box=box)

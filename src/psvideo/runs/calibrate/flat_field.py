@@ -61,8 +61,7 @@ def flat_field(
     rig_path, flat_path = rig_out(out, force=force), None if flat is None else Path(flat)
     if flat_path is not None:
         refuse_existing(flat_path, force=force, mark=FLAT_SCHEMA)
-    if not 0 < albedo <= 1:
-        raise UsageError(f"`albedo` {albedo:g}: expected a share above 0 and up to 1.")
+    check_albedo(albedo)
     found = pictures_of(Path(pictures), reading_of(plan, frames, first_light, transfer), watch=watch, caller=caller)
     known = read_rig(Path(rig), plan_lights=found.names)
     target, ground = target_of(found, known, albedo=albedo, box=box)
@@ -77,6 +76,12 @@ def flat_field(
             "intensity per light, not a map. Write the map with `flat` flat.toml, and give it to psvideo normals"
         )
     return FlatFieldCalibration(lights=tuple(lights), rig=measured)
+
+
+def check_albedo(albedo: float) -> None:
+    """Raise UsageError where a target's albedo cannot be meant."""
+    if not 0 < albedo <= 1:
+        raise UsageError(f"`albedo` {albedo:g}: expected a share above 0 and up to 1.")
 
 
 def target_of(

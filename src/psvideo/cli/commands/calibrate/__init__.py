@@ -2,8 +2,12 @@
 
 import typer
 
+from psvideo.cli.commands.calibrate.colours import colours
 from psvideo.cli.commands.calibrate.convert import convert
-from psvideo.cli.commands.calibrate.lights import colours, flat_field, guess, intensities, matte_sphere
+from psvideo.cli.commands.calibrate.flat_field import flat_field
+from psvideo.cli.commands.calibrate.guess import guess
+from psvideo.cli.commands.calibrate.intensities import intensities
+from psvideo.cli.commands.calibrate.matte_sphere import matte_sphere
 from psvideo.cli.commands.calibrate.mirror_sphere import mirror_sphere
 from psvideo.cli.commands.calibrate.readout import readout
 

@@ -1,0 +1,85 @@
+"""psvideo calibrate colours: what the camera sees of coloured lights, from a white card."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from psvideo.cli.commands.calibrate.of_takes import one_or_all
+from psvideo.cli.console import Voice
+from psvideo.cli.options.calibrate import PicturesOfTakes, RigIn, RigOut, Transfer
+from psvideo.cli.options.clip_and_run import (
+    FirstLight,
+    Force,
+    Frames,
+    Json,
+    PlanPath,
+    Quiet,
+    Scheduler,
+    Verbose,
+    Workers,
+)
+from psvideo.cli.options.typed import parse_box
+from psvideo.model.units import counted
+
+
+def colours(
+    pictures: PicturesOfTakes,
+    rig: RigIn,
+    out: RigOut,
+    albedo: Annotated[float, typer.Option(help="The card's albedo: white paper 0.85, a white card 0.9.")] = 0.9,
+    box: Annotated[
+        str | None, typer.Option(help="The card's part of the picture: left,top,right,bottom in pixels.")
+    ] = None,
+    transfer: Transfer = None,
+    plan: PlanPath = None,
+    frames: Frames = None,
+    first_light: FirstLight = None,
+    force: Force = False,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    json: Json = False,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+) -> None:
+    """Measure what red, green and blue see of every coloured light, from a white card that one light at a time lights;
+    writes the rig with colours."""
+    from psvideo.runs.calibrate.colours import colours as measure
+
+    voice = Voice(json=json, verbose=verbose, quiet=quiet)
+    done = one_or_all(
+        voice,
+        "colours",
+        measure,
+        pictures,
+        out=out,
+        force=force,
+        workers=workers,
+        scheduler=scheduler,
+        rig=rig,
+        albedo=albedo,
+        box=None if box is None else parse_box(box),
+        transfer=transfer,
+        plan=plan,
+        frames=frames,
+        first_light=first_light,
+    )
+    if done is None:
+        return
+    found = done.found
+    for name, seen, error in zip(found.names, found.seen, found.error, strict=True):
+        shares = ", ".join(f"{value / seen.max():.4f}" for value in seen)
+        voice.say(f"  {name:12} intensity {seen.max():.4g}  colour {shares}  +- {error.max():.2%}")
+    voice.say(f"Hardest to tell apart: {', '.join(found.together)}, condition number {found.condition:.2f}.")
+    voice.say(f"{out}: {counted(len(found.names), 'light')} with colours.")
+    voice.result(
+        {
+            "lights": [
+                {"name": name, "seen": seen.tolist(), "error": error.tolist()}
+                for name, seen, error in zip(found.names, found.seen, found.error, strict=True)
+            ],
+            "together": found.together,
+            "condition": found.condition,
+        }
+    )

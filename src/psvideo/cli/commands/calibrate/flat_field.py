@@ -1,0 +1,98 @@
+"""psvideo calibrate flat-field: how strong lights are, from a white target."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from psvideo.cli.commands.calibrate.of_takes import one_or_all
+from psvideo.cli.console import Voice
+from psvideo.cli.options.calibrate import PicturesOfTakes, RigIn, RigOut, Transfer
+from psvideo.cli.options.clip_and_run import (
+    FirstLight,
+    Force,
+    Frames,
+    Json,
+    PlanPath,
+    Quiet,
+    Scheduler,
+    Verbose,
+    Workers,
+)
+from psvideo.cli.options.typed import parse_box
+from psvideo.model.units import counted
+
+if TYPE_CHECKING:
+    from psvideo.calibrate.flat_field import FlatLight
+
+
+def flat_field(
+    pictures: PicturesOfTakes,
+    rig: RigIn,
+    out: RigOut,
+    albedo: Annotated[float, typer.Option(help="The target's albedo: white paper 0.85, a white card 0.9.")] = 0.9,
+    box: Annotated[
+        str | None, typer.Option(help="The target's part of the picture: left,top,right,bottom in pixels.")
+    ] = None,
+    flat: Annotated[
+        Path | None, typer.Option(help="A file to write how light falls off over the target, for psvideo normals.")
+    ] = None,
+    transfer: Transfer = None,
+    plan: PlanPath = None,
+    frames: Frames = None,
+    first_light: FirstLight = None,
+    force: Force = False,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    json: Json = False,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+) -> None:
+    """Measure every light's intensity, per channel, from a matte white target that faces the camera (or lies in the
+    plane that the rig gives); writes the rig with intensities."""
+    from psvideo.runs.calibrate.flat_field import flat_field as measure
+
+    voice = Voice(json=json, verbose=verbose, quiet=quiet)
+    found = one_or_all(
+        voice,
+        "flat-field",
+        measure,
+        pictures,
+        out=out,
+        force=force,
+        workers=workers,
+        scheduler=scheduler,
+        rig=rig,
+        albedo=albedo,
+        box=None if box is None else parse_box(box),
+        flat=flat,
+        transfer=transfer,
+        plan=plan,
+        frames=frames,
+        first_light=first_light,
+    )
+    if found is None:
+        return
+    for light in found.lights:
+        strengths = ", ".join(f"{value:.4g}" for value in light.intensity)
+        voice.say(
+            f"  {light.name:12} intensity {strengths}  +- {light.intensity_error:.1%}; the target differs by "
+            f"{light.falloff:.0%} beyond what the rig explains"
+        )
+    if flat is not None:
+        left = max(light.left for light in found.lights)
+        voice.say(f"{flat}: falloff written, which leaves {left:.1%}; give it to psvideo normals with --flat.")
+    voice.say(f"{out}: {counted(len(found.lights), 'light')} written.")
+    voice.result({"lights": [_flat_record(light) for light in found.lights]})
+
+
+def _flat_record(light: FlatLight) -> dict[str, object]:
+    return {
+        "name": light.name,
+        "intensity": light.intensity.tolist(),
+        "intensity_error": light.intensity_error,
+        "falloff": light.falloff,
+        "left": light.left,
+    }

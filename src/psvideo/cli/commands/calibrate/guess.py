@@ -1,0 +1,57 @@
+"""psvideo calibrate guess: directions of lights from pictures of the subject alone."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from psvideo.cli.console import Voice
+from psvideo.cli.options.calibrate import Pictures, RigOut, Transfer
+from psvideo.cli.options.clip_and_run import FirstLight, Force, Frames, Json, PlanPath, Quiet, Verbose
+from psvideo.model.choices import Prior
+from psvideo.model.units import counted
+
+
+def guess(
+    pictures: Pictures,
+    out: RigOut,
+    prior: Annotated[
+        Prior | None,
+        typer.Option(
+            help="equal-lights (six or more of one strength) or equal-albedo; left out: by how many there are."
+        ),
+    ] = None,
+    transfer: Transfer = None,
+    plan: PlanPath = None,
+    frames: Frames = None,
+    first_light: FirstLight = None,
+    force: Force = False,
+    json: Json = False,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+) -> None:
+    """Guess directions of distant lights from pictures of a matte, rounded subject, where nothing was calibrated."""
+    from psvideo.runs.calibrate.guess import guess as guess_lights
+
+    voice = Voice(json=json, verbose=verbose, quiet=quiet)
+    made = guess_lights(
+        pictures,
+        out=out,
+        prior=prior,
+        transfer=transfer,
+        plan=plan,
+        frames=frames,
+        first_light=first_light,
+        force=force,
+        watch=voice.track,
+        caller=voice.caller(),
+    )
+    for light in made.rig.lights:
+        where = ", ".join(f"{value:+.2f}" for value in light.direction or ())
+        voice.say(f"  {light.name:12} direction {where}  intensity {light.intensity[0]:.3f}")
+    voice.say(
+        f"A matte surface explains {made.explained:.1%} of the pictures; {made.prior} holds to {made.spread:.1%}."
+    )
+    voice.say(f"{out}: {counted(len(made.rig.lights), 'light')} written.")
+    voice.result({"guess": True, "prior": made.prior, "explained": made.explained, "spread": made.spread})

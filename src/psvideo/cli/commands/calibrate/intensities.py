@@ -1,0 +1,64 @@
+"""psvideo calibrate intensities: how strong lights of known directions are, from any matte scene."""
+
+from __future__ import annotations
+
+from psvideo.cli.commands.calibrate.of_takes import one_or_all
+from psvideo.cli.console import Voice
+from psvideo.cli.options.calibrate import PicturesOfTakes, RigIn, RigOut, Transfer
+from psvideo.cli.options.clip_and_run import (
+    FirstLight,
+    Force,
+    Frames,
+    Json,
+    PlanPath,
+    Quiet,
+    Scheduler,
+    Verbose,
+    Workers,
+)
+from psvideo.model.units import counted
+
+
+def intensities(
+    pictures: PicturesOfTakes,
+    rig: RigIn,
+    out: RigOut,
+    transfer: Transfer = None,
+    plan: PlanPath = None,
+    frames: Frames = None,
+    first_light: FirstLight = None,
+    force: Force = False,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    json: Json = False,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+) -> None:
+    """Measure the relative intensities of four or more distant lights of known directions from any matte scene."""
+    from psvideo.runs.calibrate.intensities import intensities as measure
+
+    voice = Voice(json=json, verbose=verbose, quiet=quiet)
+    found = one_or_all(
+        voice,
+        "intensities",
+        measure,
+        pictures,
+        out=out,
+        force=force,
+        workers=workers,
+        scheduler=scheduler,
+        rig=rig,
+        transfer=transfer,
+        plan=plan,
+        frames=frames,
+        first_light=first_light,
+    )
+    if found is None:
+        return
+    lights = found.rig.lights
+    for light, error in zip(lights, found.error, strict=True):
+        voice.say(f"  {light.name:12} intensity {', '.join(f'{x:.4g}' for x in light.intensity)}  +- {error:.1%}")
+    voice.say(
+        f"{out}: {counted(len(lights), 'light')} written; intensities are relative, their mean 1 in every channel."
+    )
+    voice.result({"lights": [{"name": light.name, "intensity": light.intensity} for light in lights]})

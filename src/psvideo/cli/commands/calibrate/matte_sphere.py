@@ -1,0 +1,104 @@
+"""psvideo calibrate matte-sphere: where lights are and how strong, from their shading on a matte sphere."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from psvideo.cli.commands.calibrate.of_takes import one_or_all
+from psvideo.cli.console import Voice
+from psvideo.cli.options.calibrate import FocalPx, PicturesOfTakes, RigOut, Transfer
+from psvideo.cli.options.clip_and_run import (
+    FirstLight,
+    Force,
+    Frames,
+    Json,
+    PlanPath,
+    Quiet,
+    Scheduler,
+    Verbose,
+    Workers,
+)
+from psvideo.cli.options.typed import parse_circle
+from psvideo.model.units import counted
+
+if TYPE_CHECKING:
+    from psvideo.calibrate.matte import MatteLight
+
+
+def matte_sphere(
+    pictures: PicturesOfTakes,
+    out: RigOut,
+    circle: Annotated[
+        str | None, typer.Option(help="The sphere's outline found by hand: x,y,radius in pixels from the top left.")
+    ] = None,
+    albedo: Annotated[
+        float | None,
+        typer.Option(help="The sphere's albedo; left out, intensities are relative, mean 1.", min=0.01, max=1),
+    ] = None,
+    focal_px: FocalPx = None,
+    transfer: Transfer = None,
+    plan: PlanPath = None,
+    frames: Frames = None,
+    first_light: FirstLight = None,
+    force: Force = False,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    json: Json = False,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+) -> None:
+    """Measure directions and intensities of lights from a matte sphere; writes rig.toml and a picture beside it."""
+    from psvideo.runs.calibrate.matte_sphere import matte_sphere as measure
+
+    voice = Voice(json=json, verbose=verbose, quiet=quiet)
+    found = one_or_all(
+        voice,
+        "matte-sphere",
+        measure,
+        pictures,
+        out=out,
+        force=force,
+        workers=workers,
+        scheduler=scheduler,
+        circle=None if circle is None else parse_circle(circle),
+        albedo=albedo,
+        focal_px=focal_px,
+        transfer=transfer,
+        plan=plan,
+        frames=frames,
+        first_light=first_light,
+    )
+    if found is None:
+        return
+    x, y, radius = found.outline.place[:3]
+    voice.say(f"sphere at {x:.1f}, {y:.1f} with radius {radius:.1f} px (+- {found.outline.error_px:.2f})")
+    for light in found.lights:
+        voice.say(_matte_line(light))
+    if albedo is None:
+        voice.say("Intensities are relative, their mean 1: give the sphere's --albedo to tie albedo to it.")
+    voice.say(f"{out}: {len(found.rig.lights)} of {counted(len(found.lights), 'light')} written; see {found.picture}.")
+    voice.result({"lights": [_matte_record(light) for light in found.lights]})
+
+
+def _matte_line(light: MatteLight) -> str:
+    if light.fault:
+        return f"  {light.name:12} left out: {light.fault}"
+    where = ", ".join(f"{value:+.4f}" for value in light.direction)
+    strengths = ", ".join(f"{value:.4g}" for value in light.intensity)
+    return (
+        f"  {light.name:12} direction {where}  +- {light.error_deg:.2f} degrees; intensity {strengths}  "
+        f"+- {light.intensity_error:.1%}"
+    )
+
+
+def _matte_record(light: MatteLight) -> dict[str, object]:
+    return {
+        "name": light.name,
+        "direction": light.direction.tolist(),
+        "error_deg": light.error_deg,
+        "intensity": light.intensity.tolist(),
+        "intensity_error": light.intensity_error,
+        "fault": light.fault or None,
+    }

@@ -1,0 +1,115 @@
+"""Judgements on exposure: how bright the subject is, what clips, and a mask that lies beside it."""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from psvideo.report.judge.of_lamps import LEAST_LIGHTS, NAMED
+from psvideo.report.judgement import Judgement
+from psvideo.report.observe.levels import TARGET_QUANTILE, Levels
+from psvideo.report.observe.observed import Observed
+from psvideo.solve.normals.solving import ROBUST_FROM_LIGHTS
+
+DIM_STOPS, DARK_STOPS = -3.5, -6.0
+"""A take whose brightest lamp's brightest parts stay so far below saturation is noisy, or lost in noise."""
+BEST_STOPS = -0.5
+MISPLACED = 16.0
+"""A mask beyond which the picture is so many times brighter than within lies beside the subject: a dark subject before
+a white wall differs by a photograph's contrast, some 8 times."""
+MOST_CLIPPED, LOST_CLIPPED = 0.02, 0.1
+"""Shares of the subject that one lamp may clip: more costs normals there, and with three lamps all of them."""
+SPARE_CLIPPED = 0.25
+"""With more lamps than three the others still give the normal; where enough for robust solving clip less, always."""
+MORE_LIGHT = (
+    "Check that the lights fire, that the lens is open, and that plan.toml's black_level and transfer are right."
+)
+
+
+def exposure(observed: Observed) -> Iterator[Judgement]:
+    """Judge how bright the brightest lamp's plates are, and how much each lamp clips."""
+    levels = {light: observed.levels(light) for light in observed.lights if light in observed.counts}
+    if not any(one.total for one in levels.values()):
+        yield Judgement(subject="exposure", grade="bad", found="Nothing in the picture is lit.", advice=MORE_LIGHT)
+        return
+    if observed.beyond_mask and min(observed.beyond_mask) > MISPLACED:
+        yield Judgement(
+            subject="mask",
+            grade="bad",
+            found=f"The mask leaves out what is lit: beyond it the picture is {min(observed.beyond_mask):.0f} times as "
+            "bright as within.",
+            advice="Paint white where normals are wanted, and black elsewhere; the mask may be inverted.",
+        )
+    clipped = list(_clipping(levels))
+    top = max(one.stops(TARGET_QUANTILE) for one in levels.values())
+    worst = max(one.clipped_share for one in levels.values())
+    if top < DIM_STOPS:
+        yield Judgement(
+            subject="exposure",
+            grade="bad" if top < DARK_STOPS else "doubtful",
+            found=f"The picture is dark: its brightest parts under the brightest light are {-top:.1f} stops below "
+            "saturation, so noise is large.",
+            advice=f"Open the aperture by about {_half(BEST_STOPS - top)}, or flash longer or stronger.",
+        )
+    elif not clipped:
+        yield Judgement(
+            subject="exposure",
+            grade="good",
+            found=f"The brightest parts are {-top:.1f} stops below saturation, and at most {100 * worst:.1f} % of the "
+            "subject is clipped.",
+        )
+    yield from clipped
+
+
+def _clipping(levels: dict[str, Levels]) -> Iterator[Judgement]:
+    over = {light: one for light, one in levels.items() if one.clipped_share > MOST_CLIPPED}
+    lost = SPARE_CLIPPED if len(levels) > LEAST_LIGHTS else LOST_CLIPPED
+    few = sum(one.clipped_share <= lost for one in levels.values()) < ROBUST_FROM_LIGHTS
+    if len(over) == len(levels) > 1:
+        power = min(one.right_power() for one in over.values())
+        shares = [one.clipped_share for one in over.values()]
+        yield Judgement(
+            subject="clipping",
+            grade="bad" if max(shares) > lost else "doubtful",
+            found=f"Every light clips: {100 * min(shares):.0f} to {100 * max(shares):.0f} % of the subject.",
+            advice=f"Close the aperture by about {_half(-np.log2(power))}, or lower all powers to "
+            f"{_percent(power)}, and look again.",
+        )
+        return
+    whole = [one for one in levels.values() if one.clipped_share <= 1 - TARGET_QUANTILE]
+    if len(over) > NAMED:
+        yield Judgement(
+            subject="clipping",
+            grade="bad" if few and max(one.clipped_share for one in over.values()) > lost else "doubtful",
+            found=f"{len(over)} of {len(levels)} lights clip: "
+            f"{first_of({light: one.clipped_share for light, one in over.items()})} of the subject.",
+            advice="Lower their powers (or durations) to about "
+            f"{_percent(min(one.right_power(whole) for one in over.values()))}, or close the aperture.",
+        )
+        return
+    for light, one in over.items():
+        yield Judgement(
+            subject="clipping",
+            grade="bad" if few and one.clipped_share > lost else "doubtful",
+            found=f"The flash of {light!r} is clipped in {100 * one.clipped_share:.0f} % of the subject.",
+            advice=f"Lower its power (or its duration) to about {_percent(one.right_power(whole))}.",
+        )
+
+
+def first_of(shares: Mapping[str, float]) -> str:
+    """Return the lights with the largest shares in per cent, and how many more there are.
+
+    >>> first_of({"a": 0.2, "b": 0.5, "c": 0.1, "d": 0.3, "e": 0.05})
+    "'b' 50 %, 'd' 30 %, 'a' 20 %, 'c' 10 % and 1 more"
+    """
+    largest = sorted(shares.items(), key=lambda named: -named[1])
+    more = f" and {len(largest) - NAMED} more" if len(largest) > NAMED else ""
+    return ", ".join(f"{light!r} {100 * share:.0f} %" for light, share in largest[:NAMED]) + more
+
+
+def _half(stops: float) -> str:
+    halves = max(round(2 * float(stops)), 1)
+    return f"{halves / 2:g} {'stop' if halves <= 2 else 'stops'}"
+
+
+def _percent(power: float) -> str:
+    return f"{max(5 * int(20 * power), 5)} %"

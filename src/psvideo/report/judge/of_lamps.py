@@ -1,0 +1,179 @@
+"""Judgements on lamps: those that give little or nothing, fail in some rounds, or flicker."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.model.marker import NOT_FIRING
+from psvideo.report.judgement import Judgement
+from psvideo.report.observe.levels import TARGET_QUANTILE
+from psvideo.report.observe.observed import InstantFacts, Observed
+
+WEAK_LIGHT = 1 / 8
+"""Of the brightest lamp's light."""
+LEAST_LIGHTS = 3
+"""Where so many others fire, one that does not is missed by what they do not reach; shadow and it look the same."""
+CHECKED_FROM = 5
+"""With fewer lights than these nothing shows that one of them gives less than the rig says, and all normals lean."""
+MISSED = 0.5
+"""A flash that gives less than this share of its lamp's usual light did not fire as it should."""
+UNSTEADY = 0.02
+NAMED = 4
+"""So many lights or rounds are named one by one; of more, only how many."""
+
+
+def lamps(observed: Observed, *, timed: bool = True) -> Iterator[Judgement]:
+    """Judge whether every lamp gives light, always, and steadily; where flash times are not known (``timed``), only
+    whether it does at all."""
+    facts = [one for one in observed.facts if len(one.levels) == len(observed.lights)]
+    if not facts:
+        return
+    level = np.array([one.levels for one in facts])
+    usual = np.median(level, axis=0)
+    relative = usual / max(float(usual.max()), 1e-12)
+    known = _shown(observed)
+    named = [light for light, is_known in zip(observed.lights, known, strict=True) if is_known]
+    said = list(_weak(named, relative[known], _brightest(observed)[known], _claimed(observed)[known]))
+    alive = observed.firing
+    whole = np.array([one.unseen_share == 0 for one in facts])
+    if timed and whole.any():
+        shown = [one for one in facts if one.unseen_share == 0]
+        said += _missed(observed.lights, shown, level[whole], usual, alive)
+        said += _unsteady(observed.lights, shown, level[whole], usual, alive)
+    yield from said
+    if not said:
+        spread = -np.log2(max(relative[known].min(), 1e-9))
+        yield Judgement(
+            subject="lights",
+            grade="good",
+            found=f"All {len(observed.lights)} lights fire{' in every round' if timed else ''}; the weakest gives "
+            f"{spread:.1f} stops less than the strongest.",
+        )
+
+
+def _brightest(observed: Observed) -> NDArray[np.float64]:
+    """Return the light in every lamp's brightest parts, as a share of the strongest lamp's."""
+    tops = np.array([2.0 ** observed.levels(light).stops(TARGET_QUANTILE) for light in observed.lights])
+    return np.asarray(tops / tops.max())
+
+
+def _claimed(observed: Observed) -> NDArray[np.float64]:
+    """Return what the rig says that every lamp gives, as a share of the strongest; zeros where that is not known, or
+    where there are enough others to find out."""
+    if observed.points is None or len(observed.lights) >= CHECKED_FROM:
+        return np.zeros(len(observed.lights))
+    strengths = np.linalg.norm(observed.points.vectors, axis=2).mean(axis=0)
+    return np.asarray(strengths / max(float(strengths.max()), 1e-12))
+
+
+def _shown(observed: Observed) -> NDArray[np.bool_]:
+    """Return of which lights any of the subject was seen, (light,): of others nothing can be said."""
+    counted = np.array([observed.levels(light).total > 0 for light in observed.lights], np.bool_)
+    return counted | (not counted.any())
+
+
+def _weak(
+    lights: Sequence[str],
+    relative: NDArray[np.float64],
+    brightest: NDArray[np.float64],
+    claimed: NDArray[np.float64],
+) -> Iterator[Judgement]:
+    """Say which lamps give little. One that comes from the side gives the subject little, and its parts enough."""
+    dim = (relative < WEAK_LIGHT) & (brightest < WEAK_LIGHT)
+    weak = [light for light, share, is_dim in zip(lights, relative, dim, strict=True) if is_dim and share >= NOT_FIRING]
+    if len(weak) > NAMED:
+        yield Judgement(
+            subject="lights",
+            grade="doubtful",
+            found=f"{len(weak)} of {len(lights)} lights are weak: less than {100 * WEAK_LIGHT:.0f} % of the strongest "
+            f"({', '.join(map(repr, weak[:NAMED]))} and {len(weak) - NAMED} more).",
+            advice="Raise their power or their flash duration, or move them nearer.",
+        )
+    if relative.max() <= 0:  # nothing is lit, which is said once
+        return
+    for light, share, is_dim, says in zip(lights, relative, dim, claimed, strict=True):
+        if share < NOT_FIRING:
+            others = int((relative >= NOT_FIRING).sum())
+            enough = others >= LEAST_LIGHTS
+            yield Judgement(
+                subject="lights",
+                grade="doubtful" if enough else "bad",
+                found=f"The light {light!r} gives no light ({100 * max(share, 0):.1f} % of the strongest)"
+                + (f"; normals come from the other {others}." if enough else "."),
+                advice="Check its cable, driver and line, and that the plan names it as the board does.",
+            )
+        elif is_dim and says >= WEAK_LIGHT:
+            yield Judgement(
+                subject="lights",
+                grade="bad",
+                found=f"The light {light!r} is weak: {100 * share:.0f} % of the strongest, where the rig says "
+                f"{100 * says:.0f} %. With {len(lights)} lights all normals lean away from it.",
+                advice="Raise its power, or measure the lights' strengths again.",
+            )
+        elif is_dim and len(weak) <= NAMED:
+            yield Judgement(
+                subject="lights",
+                grade="doubtful",
+                found=f"The light {light!r} is weak: {100 * share:.0f} % of the strongest.",
+                advice="Raise its power or its flash duration, or move it nearer.",
+            )
+
+
+def _missed(
+    lights: Sequence[str],
+    facts: Sequence[InstantFacts],
+    level: NDArray[np.float64],
+    usual: NDArray[np.float64],
+    alive: NDArray[np.bool_],
+) -> Iterator[Judgement]:
+    """Say which lamps failed in which rounds; where nothing is lit under any of them, no single one is blamed."""
+    missed = level < MISSED * usual
+    empty = missed[:, alive].all(axis=1) & (alive.sum() > 1)
+    if empty.any():
+        named = _numbers([one.number for one, none in zip(facts, empty, strict=True) if none])
+        yield Judgement(
+            subject="lights",
+            grade="doubtful",
+            found=f"Nothing is lit in {int(empty.sum())} of {len(facts)} rounds ({named}): the subject left the "
+            "picture, or no light fired. Their results are empty.",
+            advice="Leave these frames out, or look at the strobe's log.",
+        )
+    for k, light in enumerate(lights):
+        numbers = [one.number for one, gone in zip(facts, missed[:, k] & ~empty, strict=True) if gone]
+        if alive[k] and numbers:
+            yield Judgement(
+                subject="lights",
+                grade="bad" if len(numbers) > 0.1 * len(facts) else "doubtful",
+                found=f"The light {light!r} failed or was covered in {len(numbers)} of {len(facts)} rounds "
+                f"({_numbers(numbers)}).",
+                advice="Check its driver and supply; these rounds' normals are wrong.",
+            )
+
+
+def _numbers(numbers: Sequence[int]) -> str:
+    more = f" and {len(numbers) - NAMED} more" if len(numbers) > NAMED else ""
+    return ", ".join(map(str, numbers[:NAMED])) + more
+
+
+def _unsteady(
+    lights: Sequence[str],
+    facts: Sequence[InstantFacts],
+    level: NDArray[np.float64],
+    usual: NDArray[np.float64],
+    alive: NDArray[np.bool_],
+) -> Iterator[Judgement]:
+    """Say which lamps change from round to round while nothing moves."""
+    still = np.array([not one.moving_share for one in facts[1:]], bool)
+    steps = np.abs(np.diff(level, axis=0))[still]
+    if len(steps) < 4:
+        return
+    swing = np.median(steps, axis=0) / np.maximum(usual, 1e-9)
+    for light, share, lives in zip(lights, swing, alive, strict=True):
+        if lives and share > UNSTEADY:
+            yield Judgement(
+                subject="lights",
+                grade="doubtful",
+                found=f"The light {light!r} flickers: its level changes by {100 * share:.1f} % from round to round.",
+                advice="Check its driver and supply, and that no dimmer (PWM) is in its line.",
+            )
