@@ -15,7 +15,7 @@ import numpy as np
 from bench.table import Row
 from psvideo.compute.compiled import FUSED
 from psvideo.model.coded import Coded, Tone
-from psvideo.plates.ambient_level import AmbientLevel
+from psvideo.plates.ambient.ambient_level import AmbientLevel
 from psvideo.plates.mixture import Mixture
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.kernel import solve_rows, working_memory

@@ -11,7 +11,7 @@ from psvideo.model.coded import Coded
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.plates import hudon2015
-from psvideo.plates.ambient_off import subtract
+from psvideo.plates.ambient.ambient_off import subtract
 from psvideo.plates.split import Plate, split
 from psvideo.synth import TrueFlash
 from psvideo.synth.camera.sensor import seen_share

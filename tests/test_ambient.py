@@ -13,8 +13,8 @@ from psvideo.model.plan import Plan
 from psvideo.model.ripple import Exposures, Ripple
 from psvideo.model.shutter import frames_touched
 from psvideo.model.timing import Flash, Timing
-from psvideo.plates import ambient, ambient_off
-from psvideo.plates.mains import Mains, RowLight, find_ripple
+from psvideo.plates.ambient import ambient_followed, ambient_off
+from psvideo.plates.ambient.mains import Mains, RowLight, find_ripple
 from psvideo.plates.mixture import made
 from psvideo.plates.split import Plate, split
 from psvideo.synth import Noise, TrueClock
@@ -352,6 +352,6 @@ def test_ripples_of_an_average_of_hundreds_of_dark_slots_die_out() -> None:
     averaged = None
     for index in range(200):
         swing = 1 + 0.1 * (index % 2)  # so that there is always a level to follow
-        averaged = ambient.update(averaged, dark(index, LEVEL * swing * (waves if index < 3 else 1)))
+        averaged = ambient_followed.update(averaged, dark(index, LEVEL * swing * (waves if index < 3 else 1)))
     assert averaged is not None
     assert rms(averaged.level.coded.light() - LEVEL * swing) < 1.5e-3

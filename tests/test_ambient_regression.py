@@ -10,7 +10,7 @@ from memory_frame import MemoryFrame
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Flash, Timing
-from psvideo.plates.ambient_regression import Separated, design_of, separated
+from psvideo.plates.ambient.ambient_regression import Separated, design_of, separated
 from psvideo.plates.split import split
 from psvideo.synth import Exposure, Noise, TrueClock, expose
 

@@ -15,7 +15,7 @@ import pytest
 
 from psvideo.cli.console import compiling_said
 from psvideo.compute.compiled import EXACT, FUSED, REORDERED, sources_digest
-from psvideo.plates import ambient_kernel
+from psvideo.plates.ambient import ambient_kernel
 from psvideo.runs.compiling import USUAL, SmallTake, run_small
 from psvideo.solve.filling import looking
 from psvideo.solve.normals import kernel, near_kernel, robust_kernel

@@ -23,7 +23,7 @@ from psvideo.model.row_profiles import row_light
 from psvideo.model.timing import Flash, Timing
 from psvideo.plates import ready_mixture
 from psvideo.plates.align.packed import packed
-from psvideo.plates.ambient_level import AmbientLevel
+from psvideo.plates.ambient.ambient_level import AmbientLevel
 from psvideo.plates.mixture import Mixture, combined, made
 from psvideo.plates.split import split
 

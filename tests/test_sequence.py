@@ -12,7 +12,8 @@ from memory_frame import MemoryFrame
 from psvideo.model.plan import Plan, PlannedFlash, mixing_matrix, reference_duration_s
 from psvideo.model.shutter import frames_touched, row_weights
 from psvideo.model.timing import Flash, Timing
-from psvideo.plates import ambient_off, sequence
+from psvideo.plates import sequence
+from psvideo.plates.ambient import ambient_off
 from psvideo.plates.sequence import Round, coming, light_plates
 from psvideo.plates.split import split
 from psvideo.synth import Exposure, Noise, TrueClock, expose

@@ -17,7 +17,8 @@ from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.model.row_profiles import collect
 from psvideo.model.shutter import frames_touched, row_weights
 from psvideo.model.timing import Flash, Timing
-from psvideo.plates import ambient_off, hudon2015
+from psvideo.plates import hudon2015
+from psvideo.plates.ambient import ambient_off
 from psvideo.plates.sequence import Round, coming, gathered, light_plates
 from psvideo.plates.split import Plate, split
 from psvideo.sync.find import find_timing

@@ -14,7 +14,7 @@ from psvideo.model.plan import Plan, PlannedFlash, assemble_plan
 from psvideo.model.rig import Light, Rig
 from psvideo.model.surface import Misfit, Surface
 from psvideo.model.timing import DroppedFrames, Timing
-from psvideo.plates.ambient_regression import Separated
+from psvideo.plates.ambient.ambient_regression import Separated
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import made
 from psvideo.plates.sequence import AMBIENT, Round

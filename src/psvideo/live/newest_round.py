@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from psvideo.model.coded import Coded
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Flash, Timing, timed_camera
-from psvideo.plates.ambient import Ambient, update
-from psvideo.plates.ambient_off import subtract
+from psvideo.plates.ambient.ambient_followed import Ambient, update
+from psvideo.plates.ambient.ambient_off import subtract
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import shown_level
 from psvideo.plates.sequence import AMBIENT, FIRST_NUMBER, Round, gathered, light_plates

@@ -20,10 +20,10 @@ from psvideo.plates import hudon2015
 from psvideo.plates.align.comb import Comb, Schedule, schedule_of
 from psvideo.plates.align.opened import opened
 from psvideo.plates.align.rounds import Aligning, aligned
-from psvideo.plates.ambient import update
-from psvideo.plates.ambient_off import subtract, with_darks_ahead
-from psvideo.plates.ambient_regression import Separated
-from psvideo.plates.ambient_shown import AHEAD, ambient_shown, dark_plates, placed, ripple_of, used_of
+from psvideo.plates.ambient.ambient_followed import update
+from psvideo.plates.ambient.ambient_off import subtract, with_darks_ahead
+from psvideo.plates.ambient.ambient_regression import Separated
+from psvideo.plates.ambient.ambient_shown import AHEAD, ambient_shown, dark_plates, placed, ripple_of, used_of
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import made, shown_level
 from psvideo.plates.nearest_rows import has_blind_time, with_nearest_rows

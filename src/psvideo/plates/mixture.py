@@ -17,7 +17,7 @@ from psvideo.compute.threads import over_ranges
 from psvideo.model.camera import FloatArray
 from psvideo.model.clipping import SATURATED
 from psvideo.model.coded import IDENTITY, Coded, Image
-from psvideo.plates.ambient_level import AmbientLevel
+from psvideo.plates.ambient.ambient_level import AmbientLevel
 from psvideo.plates.mixing_kernel import COUNTS, MixtureArrays, mix_pictures, mix_rows
 from psvideo.plates.ready_mixture import ReadyMixture
 from psvideo.plates.thinning_kernel import mix_halved, mix_thinned

@@ -6,7 +6,7 @@ tell, and the white by which sketches of a light's plates are coded, which its f
 
 from dataclasses import dataclass, field
 
-from psvideo.plates.ambient import Ambient
+from psvideo.plates.ambient.ambient_followed import Ambient
 
 
 @dataclass(frozen=True, kw_only=True)

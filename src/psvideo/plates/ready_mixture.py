@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.coded import Coded
-from psvideo.plates.ambient_level import AmbientLevel
+from psvideo.plates.ambient.ambient_level import AmbientLevel
 from psvideo.plates.mixing_kernel import InFiles, MixtureArrays
 
 

@@ -2,7 +2,7 @@
 
 Each plate is a picture by its recipe (``model.recipe``), which says what of which frame's rows makes it up; nothing is
 added up before somebody wants to see it. It still holds the ambient light of every exposure in it;
-``ambient.subtract`` takes it off.
+``ambient_off`` takes it off.
 """
 
 from collections import deque

@@ -21,7 +21,7 @@ from psvideo.export.result_files import is_written
 from psvideo.model.shutter import frames_touched
 from psvideo.model.timing import Timing, places_in_time, timed_camera
 from psvideo.plates.align.comb import Schedule
-from psvideo.plates.ambient_shown import ambient_before, used_of
+from psvideo.plates.ambient.ambient_shown import ambient_before, used_of
 from psvideo.plates.gather import scheduled
 from psvideo.plates.nearest_rows import MOST_LATER, has_blind_time
 from psvideo.plates.part import Part

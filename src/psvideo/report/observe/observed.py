@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from psvideo.clip import Masks
 from psvideo.model.marker import NOT_FIRING
 from psvideo.model.surface import Misfit, Surface
-from psvideo.plates.ambient_regression import Separated
+from psvideo.plates.ambient.ambient_regression import Separated
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import AMBIENT, Round
 from psvideo.report.observe.focus import middle_of, sharpest_blur_px

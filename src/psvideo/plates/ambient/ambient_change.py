@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.coded import Image
-from psvideo.plates.ambient_blocks import times_rows
+from psvideo.plates.ambient.ambient_blocks import times_rows
 
 LEVEL_SIGMA_PX = {1: 4.0, 2: 8.0, 4: 8.0}
 """Over how many pixels, by a block's size: about 14 blocks of one or two pixels, 7 of four, so that the factor adds

@@ -12,8 +12,8 @@ from psvideo.model.recipe import frames_of
 from psvideo.model.ripple import Ripple
 from psvideo.model.shutter import frames_touched
 from psvideo.model.timing import Flash, Timing, places_in_time, timed_camera
-from psvideo.plates.ambient import Ambient, update
-from psvideo.plates.ambient_regression import Design, Separated, design_of, separated, windows_of
+from psvideo.plates.ambient.ambient_followed import Ambient, update
+from psvideo.plates.ambient.ambient_regression import Design, Separated, design_of, separated, windows_of
 from psvideo.plates.mixture import made
 from psvideo.plates.split import Plate, plate_of
 

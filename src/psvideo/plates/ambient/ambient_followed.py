@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from psvideo.model.camera import FloatArray
 from psvideo.model.coded import Image
 from psvideo.model.ripple import Ripple
-from psvideo.plates.ambient_blocks import block_px, block_rows, no_blocks, over_bands, times_rows
-from psvideo.plates.ambient_change import AmbientChange
-from psvideo.plates.ambient_kernel import blend_rows, look_rows
-from psvideo.plates.ambient_level import AmbientLevel
-from psvideo.plates.mains import Mains, RowLight
+from psvideo.plates.ambient.ambient_blocks import block_px, block_rows, no_blocks, over_bands, times_rows
+from psvideo.plates.ambient.ambient_change import AmbientChange
+from psvideo.plates.ambient.ambient_kernel import blend_rows, look_rows
+from psvideo.plates.ambient.ambient_level import AmbientLevel
+from psvideo.plates.ambient.mains import Mains, RowLight
 from psvideo.plates.split import Plate
 
 LONGEST_MEMORY = 16
