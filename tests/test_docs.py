@@ -86,6 +86,46 @@ def test_contributing_has_a_line_for_every_room() -> None:
     assert len(lines) == len(rooms)
 
 
+PACKAGE = ROOT / "src" / "psvideo"
+PLAIN = {"cli/commands", "cli/commands/calibrate", "runs/calibrate"}
+"""Rooms whose modules have the names of commands, which say all."""
+
+
+def first_page(room: Path) -> str:
+    return ast.get_docstring(ast.parse((room / "__init__.py").read_text(encoding="utf-8"))) or ""
+
+
+def names_on(page: str) -> set[str]:
+    """Return what a room's first page writes as code, one word each: modules, rooms, functions."""
+    return set(re.findall(r"``([a-z][a-z0-9_.]*)``", page))
+
+
+def modules_in(room: Path) -> set[str]:
+    inner = {path.name for path in room.iterdir() if (path / "__init__.py").is_file()}
+    return {path.stem for path in room.glob("*.py")} - {"__init__"} | inner
+
+
+ROOMS = sorted(path.parent for path in PACKAGE.rglob("__init__.py") if path.parent != PACKAGE)
+
+
+@pytest.mark.parametrize("room", ROOMS, ids=lambda path: path.relative_to(PACKAGE).as_posix())
+def test_the_first_page_of_a_room_of_more_than_four_modules_names_each(room: Path) -> None:
+    modules = modules_in(room)
+    if len(modules) > 4 and room.relative_to(PACKAGE).as_posix() not in PLAIN:
+        pages = f"{first_page(room)} {first_page(room.parent)}"  # a room's page may describe small rooms within
+        assert modules <= {part for name in names_on(pages) for part in name.split(".")}
+
+
+@pytest.mark.parametrize("room", ROOMS, ids=lambda path: path.relative_to(PACKAGE).as_posix())
+def test_what_the_first_page_of_a_room_names_is_there(room: Path) -> None:
+    inner = {name for folder in room.rglob("__init__.py") for name in modules_in(folder.parent)}
+    nodes = ast.parse((room / "__init__.py").read_text(encoding="utf-8")).body
+    offered = {alias.name for node in nodes if isinstance(node, ast.ImportFrom) for alias in node.names}
+    there = inner | offered | modules_in(PACKAGE) | {path.name for path in room.iterdir() if path.is_dir()}
+    unknown = {name for name in names_on(first_page(room)) if name.split(".")[-1] not in there}
+    assert not {name for name in unknown if not (PACKAGE / f"{name.replace('.', '/')}.py").is_file()}
+
+
 def test_contributing_names_the_rooms_in_the_order_of_their_imports() -> None:
     tree = ast.parse((ROOT / "tests" / "test_layers.py").read_text(encoding="utf-8"))
     assigned = next(

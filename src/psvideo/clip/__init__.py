@@ -1,8 +1,14 @@
 """A clip on disk becomes linear float frames, lazily. The only room that knows decoders.
 
-``open_clip`` finds the footage and its plan and checks that they fit; ``read_frames`` decodes, takes the transfer curve
-off and gives one frame after the other; ``keeping_near`` keeps what was decoded for a second look; ``demosaic`` makes
-colour of a mosaic.
+``open_clip`` finds the footage and its plan and checks that they fit; ``read_frames`` decodes, takes the transfer
+curve off and gives one frame after the other; ``keeping_near`` keeps what was decoded for a second look; ``demosaic``
+makes colour of a mosaic.
+
+``decode`` has a module for each kind of file. ``record`` and ``take`` hold the records; ``folder`` and ``opening``
+find files, ``stills`` photographs; ``reading`` reads, with ``transfer`` and ``linear`` from codes to light,
+``in_file`` and ``kept`` for codes that are not in memory; ``stated`` is what photographs say of themselves. What comes
+while it is recorded: ``growing_folder``, ``stream``, ``genicam`` with ``genicam_camera``. Beside the footage: ``mask``
+and ``mask_sequence``, ``depth_map``.
 """
 
 from psvideo.clip.decode.malvar2004 import demosaic

@@ -1,1 +1,5 @@
-"""Pictures for eyes: contact sheets, shading, charts, timing, spheres."""
+"""Pictures for eyes.
+
+``quantity`` (any result), ``relighting`` with ``relit_kernel``, ``contact`` sheets, ``charts``, ``timing_sheet``, and
+what was found on a ``mirror_sphere`` or a ``matte_sphere``.
+"""

@@ -1,1 +1,7 @@
-"""Decoders, one module for each kind of file. Only this room and ``clip.transfer`` know decoding libraries."""
+"""Decoders, one module for each kind of file. Only this room and ``clip.transfer`` know decoding libraries.
+
+``decoders`` chooses one by the kind of file. Pictures: ``png``, ``tiff``, ``jpeg``, ``dpx``, ``exr`` with
+``exr_chunks``, ``dng``, ``raw`` (other cameras); ``signatures`` recognises files with a wrong ending. Movies:
+``movie`` with ``movie_edits``, ``movie_tags``, ``movie_times``, ``ffmpeg_planes``, ``yuv``. Mosaics: ``malvar2004``
+with ``malvar_kernel``.
+"""

@@ -1,4 +1,8 @@
-"""Animated meshes and cameras as USD."""
+"""Animated meshes, cameras and materials as USD.
+
+``usd_stage`` is the stage beside a delivery, written with ``usda`` as text, with its ``usd_material``;
+``usd_animation`` the mesh over time; ``usd_camera`` reads a camera from a file, ``pose`` from a matrix.
+"""
 
 import importlib.util
 

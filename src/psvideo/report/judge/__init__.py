@@ -1,1 +1,5 @@
-"""Measurements in, judgements out: one line for each thing, with advice."""
+"""Measurements in, judgements out: one line for each thing, with advice.
+
+``every_line`` puts them together: ``time`` (strobe, order, frames, motion), ``of_exposure``, ``of_lamps``,
+``of_ambient``, ``of_rig``, ``result`` (accuracy, validity, focus, steadiness). ``powers`` is for the live view alone.
+"""

@@ -1,8 +1,9 @@
 """From normals to shape: depth along the camera's axis, and a mesh cut where depth jumps.
 
-``view`` says how normals and depth hang together, ``kernel`` and ``multigrid`` solve large sparse equations on masked
-grids, ``simchony1990`` is the fast path for whole rectangles, ``cao2022`` finds the height with its jumps, ``depth``
-gives it a scale, ``shaping`` keeps that over a clip, and ``mesh`` makes triangles of it.
+``view`` says how normals and depth belong together. ``cao2022`` finds the height with its jumps: ``integration`` and
+``reweighting`` go round, ``multigrid`` solves each round (``checkerboard`` and ``torn_blocks`` hold its grids).
+``simchony1990`` is the fast path for whole rectangles. ``scale`` gives the height a scale, ``shaping`` keeps that over
+a clip, and ``mesh`` makes triangles of it.
 """
 
 from psvideo.solve.depth.cao2022 import Height, Integration, integrate

@@ -1,1 +1,8 @@
-"""The strobe's times from row profiles: one model of what rows see, searched coarsely, tracked, and sharpened."""
+"""The strobe's times from row profiles: one model of what rows see, searched coarsely, tracked, and sharpened.
+
+``fit`` is the whole. ``beat`` holds the times that are looked for, ``profiles`` the data, ``row_model`` and ``kernel``
+the compiled model and its fit. Searched: ``seed``, ``search``, ``rounds_first`` (coded dark slots), ``retime`` (frames
+left out or repeated). Tracked: ``course``, ``track``, ``ends``. Sharpened: ``refine``, ``freed`` (times that the plan
+has wrong), ``bend`` (clocks that drift), ``jitter``, ``softness``, ``restless`` with ``whitening`` (subjects that
+move), ``plateau`` (times that no row shows).
+"""
