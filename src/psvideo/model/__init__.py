@@ -3,9 +3,9 @@
 The shoot: ``camera``, ``plan``, ``marker`` (how the flashes of a cycle differ in time), ``maximal_length`` (codes of
 dark slots), ``timing`` (when every flash fired), ``camera_clocks`` (several cameras), ``shoot_figures`` and
 ``motion_cost`` (what a plan costs). From frames to plates: ``shutter`` (which rows saw how much of a flash),
-``recipe`` (how rows add up to a plate), ``row_profiles``, ``coded`` (pictures in the codes of their files),
-``clipping``, ``turn`` (which way is up). The lights: ``rig``, ``intensity``, ``falloff``, ``ground`` and
-``near_light`` (lights at a distance), ``light_field`` (what they send to points of the picture), ``colours`` (several
-LEDs at once). The result: ``surface``, ``quantities`` (the table of all that is written and shown). For words:
-``choices``, ``units``.
+``recipe`` (how rows add up to a plate), ``row_profiles``, ``coded`` (pictures in the codes of their files), ``ripple``
+(lamps on the mains), ``clipping``, ``turn`` (which way is up). The lights: ``rig``, ``intensity``, ``falloff``,
+``ground`` and ``near_light`` (lights at a distance), ``light_field`` (what they send to points of the picture),
+``colours`` (several LEDs at once). The result: ``surface``, ``quantities`` (the table of all that is written and
+shown). For words: ``choices``, ``units``.
 """

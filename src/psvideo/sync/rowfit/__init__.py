@@ -3,6 +3,6 @@
 ``fit`` is the whole. ``beat`` holds the times that are looked for, ``profiles`` the data, ``row_model`` and ``kernel``
 the compiled model and its fit. Searched: ``seed``, ``search``, ``rounds_first`` (coded dark slots), ``retime`` (frames
 left out or repeated). Tracked: ``course``, ``track``, ``ends``. Sharpened: ``refine``, ``freed`` (times that the plan
-has wrong), ``bend`` (clocks that drift), ``jitter``, ``softness``, ``restless`` with ``whitening`` (subjects that
-move), ``plateau`` (times that no row shows).
+has wrong), ``bend`` (clocks that drift), ``mains_swing`` (room light on the mains), ``jitter``, ``softness``,
+``restless`` with ``whitening`` (subjects that move), ``plateau`` (times that no row shows).
 """
