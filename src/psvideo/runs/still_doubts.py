@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from psvideo.clip.decode.decoders import decode
+from psvideo.clip.decode.decoders import opened
+from psvideo.clip.in_file import RowsInFile
 from psvideo.clip.stills import Photographs
 from psvideo.clip.transfer import find_curve, to_light
 from psvideo.model.camera import FloatArray
@@ -63,9 +64,11 @@ def glance_at(pictures: Photographs, lights: Sequence[Light]) -> Glance | None:
         return None
     signals = []
     for file in pictures.files:
-        codes = decode(pictures.kind, file).codes
+        codes = opened(pictures.kind, file).codes
         step = max(int(np.sqrt(codes.shape[0] * codes.shape[1] / POINTS)), 1)
-        thin = codes[step // 2 :: step, step // 2 :: step].astype(np.float64) / (2**pictures.header.bits - 1)
+        rows = np.arange(step // 2, codes.shape[0], step)
+        some = codes.some(rows)[rows - rows[0]] if isinstance(codes, RowsInFile) else codes[rows]
+        thin = some[:, step // 2 :: step].astype(np.float64) / (2**pictures.header.bits - 1)
         signals.append((thin if thin.ndim == 2 else thin[..., 1]).ravel())
     green = [light.intensity[min(1, len(light.intensity) - 1)] for light in lights]
     dark = signals.pop() if len(signals) > len(lights) else None

@@ -1,16 +1,16 @@
 """A surface with its holes filled: every pixel of the subject has a normal and an albedo, and says how it got them."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.compute.spilled import let_go, planes_for
+from psvideo.compute.spilled import let_go
 from psvideo.model.surface import MEASURED, NO_LIGHT, ONE_LIGHT, TWO_LIGHTS, Surface
-from psvideo.solve.filling.growing import LEFT_ALONE, SOLVED, THREE_LIGHTS, UNKNOWN, Picture, grow, queue_for
+from psvideo.solve.filling.growing import REACH_PX, grow, queue_for
 from psvideo.solve.filling.looking import Said, count_rows, look_rows, room_for
+from psvideo.solve.filling.tiles import AT_ONCE, THREE_LIGHTS, bring_back, tiles_around
 from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.task import Bytes, Floats, Mask, Samples, Task, Work
 
@@ -26,6 +26,7 @@ root of the distance from it over the longer side of the picture. On the virtual
 four lights, a bear and a cat (DiLiGenT)."""
 THIN = 4
 """What is typical is looked for in every fourth row and column."""
+HOLE, OUTSIDE, SMALL = 0, 2, 3  # what is no part of the subject: not looked at yet, no hole, a small one
 CLASSES = np.array([NO_LIGHT, ONE_LIGHT, TWO_LIGHTS, MEASURED], np.uint8)
 
 
@@ -38,49 +39,44 @@ def filled(surface: Surface, one: Evidence, *, solved: Mask, noise: float, threa
     The subject is what the mask allows; without one, what any light reaches, and small holes in it. What was solved
     stays to the bit. ``source`` says of every pixel how many lights its normal is from.
     """
-    source = np.multiply(solved, MEASURED, dtype=np.uint8)
     wanted = _wanted(solved, one, threads)
-    if not wanted.any():
-        return replace(surface, source=source)
     where = np.ascontiguousarray(np.argwhere(wanted), np.int32)
-    index = _places(solved, wanted, one.spare)
-    said = _said(one, index, len(where), noise, threads)
-    lights = np.full(solved.shape, np.uint8(UNKNOWN + 1))
-    lights[solved], lights[wanted] = THREE_LIGHTS, UNKNOWN
-    planes, channels = np.moveaxis(surface.normals, -1, 0), _channels(surface.albedo)
-    picture = Picture(normals=_bits(planes), albedo=_bits(channels), places=index, lights=lights)
+    if not len(where):
+        return replace(surface, source=_source(solved))
+    said = _said(one, wanted, len(where), noise, threads)
+    normals, albedo = _bits(np.moveaxis(surface.normals, -1, 0)), _bits(_channels(surface.albedo))
+    tiles = tiles_around(wanted, solved, normals, albedo, reach_px=REACH_PX, spare=one.spare)
+    del wanted
     away = np.zeros(len(where), np.float32)
-    grow(picture, said, where, queue_for(len(where)), away)
-    let_go(*planes, *channels, index)
-    source[wanted] = CLASSES[np.minimum(lights[wanted], THREE_LIGHTS)]
-    return replace(surface, source=source, error_deg=_errors(surface, where, lights[wanted], away))
+    grow(tiles, said, where, queue_for(len(where)), away)
+    del said
+    lights = bring_back(tiles, where, normals, albedo)
+    source = _source(solved)
+    source[where[:, 0], where[:, 1]] = CLASSES[np.minimum(lights, THREE_LIGHTS)]
+    return replace(surface, source=source, error_deg=_errors(surface, where, lights, away))
 
 
-def _places(solved: Mask, wanted: Mask, spare: Path | None) -> NDArray[np.int32]:
-    """Return a pixel's place among those that are wanted, and what else ``growing.Picture`` says (row, col)."""
-    index = planes_for(solved.shape, np.int32, pixels=solved.size, folder=spare)
-    before = 0
-    for row, (known, asked) in enumerate(zip(solved, wanted, strict=True)):
-        index[row] = np.where(known, np.int32(SOLVED), np.int32(LEFT_ALONE))
-        count = int(np.count_nonzero(asked))
-        index[row, asked] = np.arange(before, before + count, dtype=np.int32)
-        before += count
-        let_go(index[row])
-    return index
+def _source(solved: Mask) -> Bytes:
+    return np.multiply(solved, MEASURED, dtype=np.uint8)
 
 
 def _errors(surface: Surface, where: NDArray[np.int32], lights: Bytes, away: Floats) -> NDArray[np.floating] | None:
     """Return the predicted errors with those of the filled pixels, which grow with the distance from what is
     solved and with how far that is off."""
-    if surface.error_deg is None:
+    errors = surface.error_deg
+    if errors is None:
         return None
-    rows, cols = where.T
-    around = surface.error_deg[::THIN, ::THIN].astype(np.float32)
+    around = errors[::THIN, ::THIN].astype(np.float32)
+    let_go(errors)
     typical_deg = TIMES_TYPICAL * np.float32(np.median(around[around > 0])) if (around > 0).any() else np.float32(0)
-    share = away / np.float32(max(surface.valid.shape))
-    each_deg = AT_SEAM_DEG[lights] + typical_deg + PER_ROOT_DEG * np.sqrt(share)
-    surface.error_deg[rows, cols] = np.minimum(each_deg, MOST_ERROR_DEG)
-    return surface.error_deg
+    for first in range(0, len(where), AT_ONCE):
+        some = slice(first, first + AT_ONCE)
+        rows, cols = where[some].T
+        share = away[some] / np.float32(max(surface.valid.shape))
+        each_deg = AT_SEAM_DEG[lights[some]] + typical_deg + PER_ROOT_DEG * np.sqrt(share)
+        errors[rows, cols] = np.minimum(each_deg, MOST_ERROR_DEG)
+        let_go(errors[rows[0] : rows[-1] + 1])
+    return errors
 
 
 def _wanted(solved: Mask, one: Evidence, threads: int | None) -> Mask:
@@ -109,23 +105,27 @@ def _lit(solved: Mask, one: Evidence, threads: int | None) -> Bytes:
 
 
 def holes_in(subject: Mask) -> Mask:
-    """Return the small parts of the rest that the subject encloses."""
-    count, labels, facts, _ = cv2.connectedComponentsWithStats((~subject).astype(np.uint8), connectivity=4)
-    rows, cols = subject.shape
-    left, top, wide, high, size = facts.T
-    inside = (left > 0) & (top > 0) & (left + wide < cols) & (top + high < rows)
-    small = inside & (size <= max(LARGEST_HOLE * rows * cols, 1))
-    small[0] = False
-    return np.asarray(small[labels]) if count > 1 else np.zeros_like(subject)
+    """Return the small parts of the rest that the subject encloses, told apart by their sides, not by corners."""
+    largest = max(LARGEST_HOLE * subject.size, 1)
+    parts = np.pad(subject, 1).view(np.uint8)  # what is around the picture is none of the subject
+    cv2.floodFill(parts, None, (0, 0), OUTSIDE)
+    for row, line in enumerate(parts):
+        begins = np.flatnonzero(line == HOLE)
+        for col in begins[np.diff(begins, prepend=-1) > 1].tolist():
+            if line[col] == HOLE and cv2.floodFill(parts, None, (col, row), SMALL)[0] > largest:
+                cv2.floodFill(parts, None, (col, row), OUTSIDE)
+    return np.asarray(parts[1:-1, 1:-1] == SMALL)
 
 
-def _said(one: Evidence, index: NDArray[np.int32], pixels: int, noise: float, threads: int | None) -> Said:
+def _said(one: Evidence, wanted: Mask, pixels: int, noise: float, threads: int | None) -> Said:
     said = room_for(pixels, noise)
+    asked, counts = wanted.view(np.uint8), np.count_nonzero(wanted, axis=1)
+    begins = np.cumsum(counts) - counts
 
     def look(given: Task, work: Work, first: int, last: int) -> None:
-        look_rows(given, work, index, said, first, last)
+        look_rows(given, work, asked, begins, said, first, last)
 
-    one.in_bands(look, threads, needed=np.asarray((index >= 0).any(axis=1)))
+    one.in_bands(look, threads, needed=counts > 0)
     return said
 
 

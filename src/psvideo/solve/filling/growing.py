@@ -14,8 +14,9 @@ from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import decoded, encoded, lent
 from psvideo.solve.filling.hernandez2011 import from_one, from_two
 from psvideo.solve.filling.looking import Said
+from psvideo.solve.filling.tiles import SHIFT, THREE_LIGHTS, UNKNOWN, WITHIN, Tiles
 from psvideo.solve.normals.blocks import ONE, THREE, ZERO
-from psvideo.solve.normals.task import Bytes, Floats, Samples
+from psvideo.solve.normals.task import Floats
 
 REACH_PX = 4  # neighbours are looked at so far in every direction,
 SPREAD_PX = 2.0  # with weights that fall off so,
@@ -28,38 +29,25 @@ MOST_STEPS = np.float32(50)
 UNCOLOURED = np.float32(0.01)  # the square of what is not known of the colour of a pixel without light
 ONWARD = np.float32(0.7)  # how far neighbours' bend is taken on: all of it would burst from noise
 FOREVER = 1 << 30
-SOLVED, LEFT_ALONE = -1, -2  # of Picture.places
-THREE_LIGHTS, UNKNOWN = 3, 9  # of Picture.lights
-
-
-class Picture(NamedTuple):
-    """The surface that is filled, planes of float32 or of half floats as the bits of uint16, and what is beside it.
-
-    places: (row, col), the place of a pixel to be filled in the lists, -1 of solved ones, -2 of what is left alone.
-    lights: (row, col), how many lights a pixel's normal is from, 3 where it is solved.
-    """
-
-    normals: Samples  # (3, row, col)
-    albedo: Samples  # (channel, row, col)
-    places: NDArray[np.int32]
-    lights: Bytes
+NONE = -1  # of a queue's lists
 
 
 class Queue(NamedTuple):
-    """Pixels by distance: a ring of buckets, of lists that are linked."""
+    """Pixels by distance: a ring of buckets, ``heads``, of lists that are linked both ways, so that a pixel that is
+    nearer by another way leaves its place. ``distance`` (pixel,) is FOREVER of those that nothing has reached yet."""
 
     heads: NDArray[np.int32]
     following: NDArray[np.int32]
-    pixels: NDArray[np.int32]
+    preceding: NDArray[np.int32]
     distance: NDArray[np.int32]
 
 
 def queue_for(pixels: int) -> Queue:
-    """Return a queue that holds so many pixels, each pushed by at most four neighbours and once as a start."""
+    """Return a queue that holds so many pixels."""
     return Queue(
-        heads=np.full(BUCKETS, -1, np.int32),
-        following=np.full(5 * pixels + 1, -1, np.int32),
-        pixels=np.zeros(5 * pixels + 1, np.int32),
+        heads=np.full(BUCKETS, NONE, np.int32),
+        following=np.full(pixels, NONE, np.int32),
+        preceding=np.full(pixels, NONE, np.int32),
         distance=np.full(pixels, FOREVER, np.int32),
     )
 
@@ -71,79 +59,112 @@ WINDOW = np.exp(
 
 
 @FUSED.kept
-def grow(picture: Picture, said: Said, where: NDArray[np.int32], queue: Queue, away: Floats) -> None:
-    """Fill the pixels ``where`` (pixel, 2: row and column) of the picture, nearest first; for one thread.
+def grow(tiles: Tiles, said: Said, where: NDArray[np.int32], queue: Queue, away: Floats) -> None:
+    """Fill the pixels ``where`` (pixel, 2: row and column) of a picture's tiles, nearest first; for one thread.
 
     ``away`` (pixel,) takes a pixel's distance from what is solved, in pixels of its own colour.
     """
-    p = Picture(lent(picture.normals), lent(picture.albedo), lent(picture.places), lent(picture.lights))
+    p = Tiles(
+        tiles.rows, tiles.cols, lent(tiles.table),
+        lent(tiles.normals), lent(tiles.albedo), lent(tiles.lights), lent(tiles.places),
+    )  # fmt: skip
     s = Said(lent(said.reached), lent(said.bright), lent(said.towards), lent(said.colour), said.noise)
-    q = Queue(lent(queue.heads), lent(queue.following), lent(queue.pixels), lent(queue.distance))
+    q = Queue(lent(queue.heads), lent(queue.following), lent(queue.preceding), lent(queue.distance))
     places, out = lent(where), lent(away)
-    pushed = 0
+    waiting = now = begun = farthest = 0
     for pixel in range(len(places)):
-        pushed = _push_start(p, s, places, q, pixel, pushed)
-    begun, now, waiting = 0, 0, pushed
+        distance = _start(p, s, places, pixel)
+        if distance < FOREVER:
+            _push(q, pixel, distance)
+            waiting, farthest = waiting + 1, max(farthest, distance)
     while True:
         while waiting > 0:
-            entry = q.heads[now % BUCKETS]
-            if entry < 0:
+            pixel = q.heads[now % BUCKETS]
+            if pixel == NONE:
                 now += 1
                 continue
-            q.heads[now % BUCKETS] = q.following[entry]
-            waiting -= 1
-            pixel = q.pixels[entry]
+            _take_out(q, pixel)
             row, col = places[pixel, 0], places[pixel, 1]
-            if p.lights[row, col] != UNKNOWN:
-                continue
             _estimate(p, s, row, col, pixel)
             out[pixel] = np.float32(now) / np.float32(STEP)
-            before = pushed
-            pushed = _push_around(p, s, places, q, pixel, now, pushed)
-            waiting += pushed - before
-        while begun < len(places) and p.lights[places[begun, 0], places[begun, 1]] != UNKNOWN:
+            more, farthest = _push_around(p, s, q, row, col, now, farthest)
+            waiting += more - 1
+        while begun < len(places) and _lights(p, places[begun, 0], places[begun, 1]) != UNKNOWN:
             begun += 1
         if begun == len(places):
             return
-        q.distance[begun] = now
-        pushed = _push(q, begun, now, pushed)
+        now = farthest  # what nothing reaches comes after all that something does
+        _push(q, begun, now)
         waiting = 1
 
 
 @FUSED.inlined
-def _push(q: Queue, pixel: int, distance: int, pushed: int) -> int:
+def _tile(p: Tiles, row: int, col: int) -> int:
+    """The tile that a pixel lies in."""
+    return int(p.table[row >> SHIFT, col >> SHIFT])
+
+
+@FUSED.inlined
+def _lights(p: Tiles, row: int, col: int) -> int:
+    """How many lights a pixel's normal is from."""
+    return int(p.lights[_tile(p, row, col), row & WITHIN, col & WITHIN])
+
+
+@FUSED.inlined
+def _push(q: Queue, pixel: int, distance: int) -> None:
+    """Put a pixel that waits nowhere at the head of its distance's list."""
     bucket = distance % BUCKETS
-    q.pixels[pushed], q.following[pushed], q.heads[bucket] = pixel, q.heads[bucket], pushed
-    return pushed + 1
+    head = q.heads[bucket]
+    if head != NONE:
+        q.preceding[head] = pixel
+    q.distance[pixel], q.following[pixel], q.preceding[pixel], q.heads[bucket] = distance, head, NONE, pixel
+
+
+@FUSED.inlined
+def _take_out(q: Queue, pixel: int) -> None:
+    """Take a pixel that waits out of its list."""
+    before, after = q.preceding[pixel], q.following[pixel]
+    if before == NONE:
+        q.heads[q.distance[pixel] % BUCKETS] = after
+    else:
+        q.following[before] = after
+    if after != NONE:
+        q.preceding[after] = before
 
 
 @FUSED.called
-def _push_start(p: Picture, s: Said, places: NDArray[np.int32], q: Queue, pixel: int, pushed: int) -> int:
-    """Push a pixel that has solved neighbours with the shortest step from one of them."""
+def _start(p: Tiles, s: Said, places: NDArray[np.int32], pixel: int) -> int:
+    """Return the shortest step to a pixel from a solved neighbour, FOREVER where it has none."""
     row, col = places[pixel, 0], places[pixel, 1]
+    nearest = FOREVER
     for side in range(4):
         y, x = row + (side == 1) - (side == 0), col + (side == 3) - (side == 2)
-        if 0 <= y < p.places.shape[0] and 0 <= x < p.places.shape[1] and p.places[y, x] == SOLVED:
-            q.distance[pixel] = min(q.distance[pixel], _step(p, s, row, col, y, x))
-    return _push(q, pixel, q.distance[pixel], pushed) if q.distance[pixel] < FOREVER else pushed
+        if 0 <= y < p.rows and 0 <= x < p.cols and _lights(p, y, x) == THREE_LIGHTS:
+            nearest = min(nearest, _step(p, s, row, col, y, x))
+    return nearest
 
 
 @FUSED.called
-def _push_around(p: Picture, s: Said, places: NDArray[np.int32], q: Queue, pixel: int, now: int, pushed: int) -> int:
-    """Push a pixel's neighbours that are to be filled and are nearer by this way."""
-    row, col = places[pixel, 0], places[pixel, 1]
+def _push_around(p: Tiles, s: Said, q: Queue, row: int, col: int, now: int, farthest: int) -> tuple[int, int]:
+    """Push a pixel's neighbours that are to be filled and are nearer by this way; return how many more wait, and the
+    longest distance that was ever pushed."""
+    more = 0
     for side in range(4):
         y, x = row + (side == 1) - (side == 0), col + (side == 3) - (side == 2)
-        if 0 <= y < p.places.shape[0] and 0 <= x < p.places.shape[1] and p.lights[y, x] == UNKNOWN:
-            other, distance = p.places[y, x], now + _step(p, s, row, col, y, x)
+        if 0 <= y < p.rows and 0 <= x < p.cols and _lights(p, y, x) == UNKNOWN:
+            other, distance = p.places[_tile(p, y, x), y & WITHIN, x & WITHIN], now + _step(p, s, row, col, y, x)
             if distance < q.distance[other]:
-                q.distance[other] = distance
-                pushed = _push(q, other, distance, pushed)
-    return pushed
+                if q.distance[other] < FOREVER:
+                    _take_out(q, other)
+                else:
+                    more += 1
+                _push(q, other, distance)
+                farthest = max(farthest, distance)
+    return more, farthest
 
 
 @FUSED.called
-def _step(p: Picture, s: Said, row: int, col: int, y: int, x: int) -> int:
+def _step(p: Tiles, s: Said, row: int, col: int, y: int, x: int) -> int:
     """The distance between neighbours, the longer the more their colours differ."""
     red, blue, noise = _colour_of(p, s, row, col)
     red_there, blue_there, noise_there = _colour_of(p, s, y, x)
@@ -153,14 +174,15 @@ def _step(p: Picture, s: Said, row: int, col: int, y: int, x: int) -> int:
 
 
 @FUSED.inlined
-def _colour_of(p: Picture, s: Said, row: int, col: int) -> tuple[np.float32, np.float32, np.float32]:
+def _colour_of(p: Tiles, s: Said, row: int, col: int) -> tuple[np.float32, np.float32, np.float32]:
     """The shares of red and blue, and the square of what noise makes of them."""
-    pixel, last = p.places[row, col], len(p.albedo) - 1
+    tile, y, x = _tile(p, row, col), row & WITHIN, col & WITHIN
+    pixel, last = p.places[tile, y, x], p.albedo.shape[1] - 1
     if pixel >= 0:
         red, green, blue = s.colour[pixel, 0], s.colour[pixel, 1], s.colour[pixel, 2]
     else:
-        red = decoded(p.albedo[0, row, col])
-        green, blue = decoded(p.albedo[min(1, last), row, col]), decoded(p.albedo[last, row, col])
+        red = decoded(p.albedo[tile, 0, y, x])
+        green, blue = decoded(p.albedo[tile, min(1, last), y, x]), decoded(p.albedo[tile, last, y, x])
     total = red + green + blue
     if not total > ZERO:
         return THIRD, THIRD, UNCOLOURED
@@ -169,7 +191,7 @@ def _colour_of(p: Picture, s: Said, row: int, col: int) -> tuple[np.float32, np.
 
 
 @FUSED.called
-def _estimate(p: Picture, s: Said, row: int, col: int, pixel: int) -> None:
+def _estimate(p: Tiles, s: Said, row: int, col: int, pixel: int) -> None:
     """Give a pixel its normal and albedo from its neighbours and from what the lights say."""
     nx, ny, nz, albedo, reds, blues = _said_around(p, s, row, col)
     count = min(s.reached[pixel], 2)
@@ -182,38 +204,40 @@ def _estimate(p: Picture, s: Said, row: int, col: int, pixel: int) -> None:
     nx, ny, nz = nx * one, ny * one, nz * one
     if count > 0:
         reds, blues, _ = _colour_of(p, s, row, col)
-    p.lights[row, col] = count
-    p.normals[0, row, col] = encoded(nx, p.normals)
-    p.normals[1, row, col] = encoded(ny, p.normals)
-    p.normals[2, row, col] = encoded(nz, p.normals)
-    if len(p.albedo) == 1:
-        p.albedo[0, row, col] = encoded(albedo, p.albedo)
+    tile, y, x = _tile(p, row, col), row & WITHIN, col & WITHIN
+    p.lights[tile, y, x] = count
+    p.normals[tile, 0, y, x] = encoded(nx, p.normals)
+    p.normals[tile, 1, y, x] = encoded(ny, p.normals)
+    p.normals[tile, 2, y, x] = encoded(nz, p.normals)
+    if p.albedo.shape[1] == 1:
+        p.albedo[tile, 0, y, x] = encoded(albedo, p.albedo)
     else:
-        p.albedo[0, row, col] = encoded(THREE * albedo * reds, p.albedo)
-        p.albedo[1, row, col] = encoded(THREE * albedo * max(ONE - reds - blues, ZERO), p.albedo)
-        p.albedo[2, row, col] = encoded(THREE * albedo * blues, p.albedo)
+        p.albedo[tile, 0, y, x] = encoded(THREE * albedo * reds, p.albedo)
+        p.albedo[tile, 1, y, x] = encoded(THREE * albedo * max(ONE - reds - blues, ZERO), p.albedo)
+        p.albedo[tile, 2, y, x] = encoded(THREE * albedo * blues, p.albedo)
 
 
 @FUSED.inlined
 def _said_around(
-    p: Picture, s: Said, row: int, col: int
+    p: Tiles, s: Said, row: int, col: int
 ) -> tuple[np.float32, np.float32, np.float32, np.float32, np.float32, np.float32]:
     """The normal (x, y, z), albedo, and shares of red and blue that a pixel's neighbours give it, those of its own
     colour most; their bend is taken on, so that a round surface stays round."""
-    rows, cols = p.places.shape
-    channels = len(p.albedo)
+    channels = p.albedo.shape[1]
     red, blue, noise = _colour_of(p, s, row, col)
     weight = albedo = nx = ny = nz = reds = blues = ZERO
     down = right = downs = rights = both = ZERO
     nx_down = ny_down = nz_down = nx_right = ny_right = nz_right = ZERO
-    for y in range(max(row - REACH_PX, 0), min(row + REACH_PX + 1, rows)):
-        for x in range(max(col - REACH_PX, 0), min(col + REACH_PX + 1, cols)):
-            state = p.lights[y, x]
+    for y in range(max(row - REACH_PX, 0), min(row + REACH_PX + 1, p.rows)):
+        v = y & WITHIN
+        for x in range(max(col - REACH_PX, 0), min(col + REACH_PX + 1, p.cols)):
+            tile, u = _tile(p, y, x), x & WITHIN
+            state = p.lights[tile, v, u]
             if state > THREE_LIGHTS:
                 continue
-            there_red = decoded(p.albedo[0, y, x])
-            there_blue = decoded(p.albedo[channels - 1, y, x])
-            there = there_red + there_blue + (decoded(p.albedo[1, y, x]) if channels > 1 else there_red)
+            there_red = decoded(p.albedo[tile, 0, v, u])
+            there_blue = decoded(p.albedo[tile, channels - 1, v, u])
+            there = there_red + there_blue + (decoded(p.albedo[tile, 1, v, u]) if channels > 1 else there_red)
             if not there > ZERO:
                 continue
             one = ONE / there
@@ -222,7 +246,11 @@ def _said_around(
             alike = ONE / (ONE + apart / (SAME_COLOUR**2 + noise + (s.noise * one) ** 2))
             alike *= alike
             w = WEIGHTS[state] * WINDOW[y - row + REACH_PX, x - col + REACH_PX] * (alike * alike + TINY)
-            a, b, c = decoded(p.normals[0, y, x]), decoded(p.normals[1, y, x]), decoded(p.normals[2, y, x])
+            a, b, c = (
+                decoded(p.normals[tile, 0, v, u]),
+                decoded(p.normals[tile, 1, v, u]),
+                decoded(p.normals[tile, 2, v, u]),
+            )
             dy, dx = np.float32(y - row), np.float32(x - col)
             weight += w
             albedo += w * there * THIRD

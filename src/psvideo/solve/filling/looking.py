@@ -64,24 +64,32 @@ def count_rows(task: Task, work: Work, wanted: Bytes, counts: Bytes, first: int,
 
 
 @FUSED.kept
-def look_rows(task: Task, work: Work, index: NDArray[np.int32], said: Said, first: int, last: int) -> None:
-    """Read the rows' pixels whose ``index`` (row, col) is not negative; it is their place in ``said``."""
+def look_rows(
+    task: Task, work: Work, wanted: Bytes, begins: NDArray[np.int64], said: Said, first: int, last: int
+) -> None:
+    """Read the rows' pixels that are ``wanted`` (row, col); those of a row lie in ``said`` one after another from its
+    place in ``begins`` (row,) on."""
     t = lent_task(task, work.matrix, work.per_strength)
-    places, values = lent(index), lent(work.values)
+    asked, values, places = lent(wanted), lent(work.values), lent(begins)
     count, bright, towards, colour = lent(said.reached), lent(said.bright), lent(said.towards), lent(said.colour)
     channels = t.tone.shape[1]
     scale, share = t.albedo_scale, ONE / np.float32(channels)
     for row in range(first, last):
+        begin = places[row]
         for col in range(0, t.cols, BLOCK):
             n = min(BLOCK, t.cols - col)
-            if not _any_place(places, row, col, n):
+            if not any_asked(asked, row, col, n):
                 continue
             read_block(t, values, row, col, n)
+            place = begin
             for light in range(t.lights):
                 lamp, per = of_light(t.matrix, light), t.per_strength[light]
+                place = begin - 1
                 for i in range(n):
-                    place = places[row, col + i]
-                    if place < 0 or not values[light * channels, i] > ABSENT:
+                    if not asked[row, col + i]:
+                        continue
+                    place += 1
+                    if not values[light * channels, i] > ABSENT:
                         continue
                     level = ZERO
                     for channel in range(channels):
@@ -101,15 +109,7 @@ def look_rows(task: Task, work: Work, index: NDArray[np.int32], said: Said, firs
                         _note(bright, towards, place, 0, level, x * one, y * one, z * one)
                     elif level > bright[place, 1]:
                         _note(bright, towards, place, 1, level, x * one, y * one, z * one)
-
-
-@FUSED.inlined
-def _any_place(places: NDArray[np.int32], row: int, col: int, n: int) -> bool:
-    """Whether any of n pixels has a place."""
-    highest = np.int32(-1)
-    for place in range(col, col + n):
-        highest = max(highest, places[row, place])
-    return bool(highest >= 0)
+            begin = place + 1
 
 
 @FUSED.inlined
