@@ -12,6 +12,14 @@ from numpy.typing import NDArray
 from psvideo.compute import spilled
 from psvideo.errors import PsvideoError
 from psvideo.model.rig import Light
+from psvideo.solve.filling.tiles import (
+    LEFT_ALONE,
+    SIDE_PX,
+    THREE_LIGHTS,
+    UNKNOWN,
+    bring_back,
+    tiles_around,
+)
 from psvideo.solve.normals.bands import ShownPlates
 from psvideo.solve.normals.illumination import illumination
 from psvideo.solve.normals.solving import Solving
@@ -65,6 +73,42 @@ def test_a_disk_without_room_is_said_before_anything_is_solved(tmp_path: Path, m
     monkeypatch.setattr(spilled, "LARGE_PIXELS", 100)
     with pytest.raises(PsvideoError, match=r"one of 0 MB has no room \(No space left on device\)"):
         spilled.planes_for((3, 200), np.float16, pixels=200, folder=tmp_path)
+
+
+def test_a_thinned_picture_is_the_same_wherever_it_lies(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(spilled, "LARGE_PIXELS", 100)
+    planes = spilled.planes_for((3, 50, 70), np.float32, pixels=50 * 70, folder=tmp_path)
+    planes[:] = np.random.default_rng(0).random(planes.shape)
+    picture = np.moveaxis(planes, 0, -1)
+    assert (spilled.thin(picture, 7) == picture.copy()[::7, ::7]).all()
+    assert (spilled.thin(picture[..., 1], 4) == picture.copy()[::4, ::4, 1]).all()
+
+
+def test_holes_are_filled_in_what_lies_around_them_alone() -> None:
+    """A hole of one pixel at a corner of four tiles holds these, one inside a tile that tile alone, and what comes back
+    are those pixels."""
+    rng = np.random.default_rng(1)
+    normals = rng.random((3, 200, 330)).astype(np.float32)
+    albedo, wanted = rng.random((1, 200, 330)).astype(np.float32), np.zeros((200, 330), np.bool_)
+    wanted[[64, 100, 199], [96, 208, 329]] = True
+    solved = ~wanted
+    solved[:, 300:] = False
+    where = np.ascontiguousarray(np.argwhere(wanted), np.int32)
+    tiles = tiles_around(wanted, solved, normals, albedo, reach_px=4, spare=None)
+    assert np.argwhere(tiles.table >= 0).tolist() == [[1, 2], [1, 3], [2, 2], [2, 3], [3, 6], [6, 10]]
+    for row, col in [(63, 95), (64, 96), (99, 207), (199, 329), (195, 325)]:
+        tile, y, x = tiles.table[row // SIDE_PX, col // SIDE_PX], row % SIDE_PX, col % SIDE_PX
+        assert (tiles.normals[tile, :, y, x] == normals[:, row, col]).all()
+        expected = UNKNOWN if wanted[row, col] else THREE_LIGHTS if solved[row, col] else LEFT_ALONE
+        assert tiles.lights[tile, y, x] == expected, (row, col)
+        place = np.flatnonzero((where == (row, col)).all(axis=1))
+        assert tiles.places[tile, y, x] == (place[0] if len(place) else -1)
+
+    before = normals.copy()
+    tiles.normals[:], tiles.lights[:] = 7.0, 2
+    assert bring_back(tiles, where, normals, albedo).tolist() == [2, 2, 2]
+    assert (normals[:, wanted] == 7.0).all()
+    assert (normals[:, ~wanted] == before[:, ~wanted]).all()
 
 
 def test_where_few_rows_are_wanted_there_is_room_for_few() -> None:

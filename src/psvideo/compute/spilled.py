@@ -44,6 +44,16 @@ def planes_for(shape: tuple[int, ...], kind: DTypeLike, *, pixels: int, folder: 
     return np.frombuffer(held, kind).reshape(shape)
 
 
+def thin(picture: NDArray[Any], step: int) -> NDArray[Any]:
+    """Return every ``step``-th row and column of a picture (row, col[, channel]) in new memory; planes in files are let
+    go one after the other, since all of each comes into memory for it."""
+    if picture.ndim == 3:
+        return np.stack([thin(picture[..., channel], step) for channel in range(picture.shape[-1])], axis=-1)
+    some = picture[::step, ::step].copy()
+    let_go(picture)
+    return some
+
+
 def let_go(*parts: NDArray[Any]) -> None:
     """Hand parts of such planes, whole rows, back to the system's cache; other arrays stay as they are.
 

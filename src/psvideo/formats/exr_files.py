@@ -4,10 +4,11 @@ OpenEXR encodes into a file that Python has opened, so that a full disk is an or
 goes wrong while it closes a file, and leaves a truncated one.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 import OpenEXR
@@ -19,6 +20,9 @@ from psvideo.formats.whole_files import whole_file
 from psvideo.model.choices import Compression
 
 _INT32_MAX = 2**31 - 1
+AT_ONCE_ROWS = 2048
+LET_GO_EACH_BYTES = 1 << 23
+"""What lies in files is let go after so many rows that were looked at, and each time that so much was written."""
 
 _COMPRESSIONS: dict[Compression, object] = {
     "zip": OpenEXR.ZIP_COMPRESSION,
@@ -74,8 +78,7 @@ def write_exr(
         raise ValueError(f"{path}: the channels' planes differ in shape or there are none: {sorted(shapes)}")
     header = dict(attributes or {}) | _header(shapes.pop(), fps, time_code, crop, compression)
     with whole_file(path) as beside:
-        _write(path, beside, lambda: OpenEXR.File(header, planes))
-    let_go(*planes.values())
+        _write(path, beside, lambda: OpenEXR.File(header, planes), tuple(planes.values()))
 
 
 def _plane(name: str, values: NDArray[np.floating], half: bool) -> NDArray[np.floating]:
@@ -84,8 +87,7 @@ def _plane(name: str, values: NDArray[np.floating], half: bool) -> NDArray[np.fl
         raise ValueError(f"channel {name!r} has shape {values.shape}; expected (row, col)")
     if values.dtype == np.float16:
         stored = np.ascontiguousarray(values)
-        # the bits of positive infinity and, as unsigned ones, of negative infinity; NaN's are above
-        finite = int(stored.view(np.int16).max()) < 0x7C00 and int(stored.view(np.uint16).max()) < 0xFC00
+        finite = all(_finite(stored[first : first + AT_ONCE_ROWS]) for first in range(0, len(stored), AT_ONCE_ROWS))
     elif half:
         from psvideo.compute.halves import halves_of  # loads the compiler, which reading and help do without
 
@@ -96,6 +98,13 @@ def _plane(name: str, values: NDArray[np.floating], half: bool) -> NDArray[np.fl
     if not finite:
         raise ValueError(f"channel {name!r} holds NaN or infinity; missing pixels are 0 and marked in 'valid'")
     return np.asarray(stored if half else np.ascontiguousarray(stored, np.float32))
+
+
+def _finite(halves: NDArray[np.floating]) -> bool:
+    # the bits of positive infinity and, as unsigned ones, of negative infinity; NaN's are above
+    finite = int(halves.view(np.int16).max()) < 0x7C00 and int(halves.view(np.uint16).max()) < 0xFC00
+    let_go(halves)
+    return finite
 
 
 def _header(
@@ -174,10 +183,28 @@ def write_exr_parts(
         _write(path, beside, lambda: OpenEXR.File(built))
 
 
-def _write(path: Path, beside: Path, build: Callable[[], "OpenEXR.File"]) -> None:
-    """Write what is built to the file ``beside``, which stands for ``path`` until it is whole."""
+class _Stream:
+    """A file that OpenEXR writes into; large planes that it reads go back to the system's cache meanwhile."""
+
+    def __init__(self, file: BinaryIO, planes: Sequence[NDArray[np.floating]]) -> None:
+        self._file, self._planes, self._written = file, planes, 0
+        self.seek, self.tell = file.seek, file.tell
+
+    def write(self, data: bytes) -> int:
+        self._written += len(data)
+        if self._written > LET_GO_EACH_BYTES:
+            let_go(*self._planes)
+            self._written = 0
+        return self._file.write(data)
+
+
+def _write(
+    path: Path, beside: Path, build: Callable[[], "OpenEXR.File"], planes: Sequence[NDArray[np.floating]] = ()
+) -> None:
+    """Write what is built of ``planes`` to the file ``beside``, which stands for ``path`` until it is whole."""
     try:
-        with beside.open("wb") as stream:
-            build().write(stream)
+        with beside.open("wb") as file:
+            build().write(_Stream(file, planes))
+            let_go(*planes)
     except RuntimeError as fault:  # what OpenEXR raises for all its faults
         raise PsvideoError(f"{path}: OpenEXR cannot encode this picture: {fault}") from fault

@@ -6,6 +6,7 @@ Ambient light that nothing took off, and light by way of other surfaces, stay th
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.spilled import thin
 from psvideo.model.camera import FloatArray
 from psvideo.model.surface import Surface
 
@@ -27,8 +28,8 @@ def shadow_light(
     bright, shown: (light, row, col), plates by their brightest channel and what is known of them, every ``step``-th
     pixel. ways: (light, 3), the rig's directions times strengths; distant lamps.
     """
-    normals = surface.normals[::step, ::step].astype(np.float64)
-    albedo = surface.albedo[::step, ::step].astype(np.float64)
+    normals = thin(surface.normals, step).astype(np.float64)
+    albedo = thin(surface.albedo, step).astype(np.float64)
     albedo = albedo if albedo.ndim == 2 else albedo.max(axis=-1)
     measured = surface.measured[::step, ::step]
     if not measured.any():

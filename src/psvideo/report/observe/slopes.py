@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.spilled import let_go
 from psvideo.model.surface import Surface
 from psvideo.report.observe.thinned import thin_surface
 
@@ -122,8 +123,10 @@ def averaged(surface: Surface) -> Averaged:
     rows, cols = (size // step for size in surface.valid.shape)
     fine = max(step // LEAST_AVERAGED, 1)
     inside = (slice(0, rows * step, fine), slice(0, cols * step, fine))
-    planes = [surface.normals[inside][..., axis] for axis in range(3)]  # as they lie in memory
-    small = np.stack([_mean_of_squares(plane, rows, cols) for plane in planes], axis=-1)
+    small = np.empty((rows, cols, 3), np.float32)
+    for axis in range(3):  # as they lie in memory
+        small[..., axis] = _mean_of_squares(surface.normals[inside][..., axis], rows, cols)
+        let_go(surface.normals)
     return Averaged(_mean_of_squares(surface.measured[inside], rows, cols) > 0.999, small)
 
 

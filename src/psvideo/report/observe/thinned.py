@@ -3,9 +3,9 @@
 import math
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.spilled import thin
 from psvideo.model.surface import Surface
 
 LEAST_STEP = 4
@@ -24,8 +24,7 @@ def step_of(rows: int, cols: int) -> int:
 
 def thinned(picture: NDArray[Any]) -> NDArray[Any]:
     """Return the rows and columns of a picture (row, col[, channel]) that are looked at, as a picture of its own."""
-    step = step_of(*picture.shape[:2])
-    return np.ascontiguousarray(picture[::step, ::step])
+    return thin(picture, step_of(*picture.shape[:2]))
 
 
 def thin_surface(surface: Surface) -> Surface:

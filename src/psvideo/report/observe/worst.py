@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.spilled import thin
 from psvideo.model.surface import Surface
 from psvideo.report.observe.steadiness import Change
 
@@ -76,7 +77,7 @@ class Worst:
             number=facts.number,
             badness=bad,
             why=why,
-            normals=surface.normals[::step, ::step].astype(np.float16),
+            normals=thin(surface.normals, step).astype(np.float16),
             valid=surface.valid[::step, ::step].copy(),
         )
         self._kept = sorted([*self._kept, small], key=lambda one: -one.badness)[:KEPT]

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.compute.spilled import let_go, planes_for
+from psvideo.compute.spilled import let_go, planes_for, thin
 from psvideo.compute.threads import over_ranges
 from psvideo.model.surface import MEASURED, Surface
 from psvideo.solve.normals.bands import BAND_PIXELS
@@ -167,25 +167,24 @@ class _Spread:
     def points(self, surface: Surface) -> ThinSurface:
         """Return every so many rows and columns of a surface, and what noise and residuals make of them."""
         step = step_of(surface.valid.shape)
-        thin = replace(
+        some = replace(
             surface,
-            normals=_every(surface.normals, step),
-            albedo=_every(surface.albedo, step),
+            normals=_thinned(surface.normals, step),
+            albedo=_thinned(surface.albedo, step),
             valid=surface.valid[::step, ::step],
-            residual=None if surface.residual is None else _every(surface.residual, step),
-            error_deg=None if surface.error_deg is None else _every(surface.error_deg, step),
+            residual=None if surface.residual is None else _thinned(surface.residual, step),
+            error_deg=None if surface.error_deg is None else _thinned(surface.error_deg, step),
             source=None,
         )
-        let_go(surface.normals, surface.albedo)
-        fit, v = self.fit(thin), self.noise.variances
-        noise_deg, fit_deg, of_noise_deg = np.zeros((3, *thin.valid.shape), np.float32)
-        self.fill(thin, NOTHING, self.noise, (0.0, 0.0), noise_deg)
+        fit, v = self.fit(some), self.noise.variances
+        noise_deg, fit_deg, of_noise_deg = np.zeros((3, *some.valid.shape), np.float32)
+        self.fill(some, NOTHING, self.noise, (0.0, 0.0), noise_deg)
         if fit.size:
-            self.fill(thin, fit, self.noise._replace(variances=np.zeros_like(v)), (0.0, 1.0), fit_deg)
-            self.fill(thin, NOTHING, self.noise._replace(variances=v[[0, 1, 3, 3]]), (0.0, 0.0), of_noise_deg)
+            self.fill(some, fit, self.noise._replace(variances=np.zeros_like(v)), (0.0, 1.0), fit_deg)
+            self.fill(some, NOTHING, self.noise._replace(variances=v[[0, 1, 3, 3]]), (0.0, 0.0), of_noise_deg)
         return ThinSurface(
             step=step,
-            surface=thin,
+            surface=some,
             noise_deg=noise_deg,
             fit_deg=fit_deg,
             fit_of_noise_deg=np.float32(self.of_noise) * of_noise_deg,
@@ -227,9 +226,8 @@ class _Spread:
         over_ranges(judge, rows, each=BAND_PIXELS // cols)
 
 
-def _every(planes: NDArray[np.floating], step: int) -> NDArray[np.floating]:
+def _thinned(planes: NDArray[np.floating], step: int) -> NDArray[np.floating]:
     """Return every so many rows and columns, channels in planes of their own as in a surface."""
-    thin = planes[::step, ::step]
-    if thin.ndim == 2:
-        return np.ascontiguousarray(thin)
-    return np.moveaxis(np.ascontiguousarray(np.moveaxis(thin, -1, 0)), 0, -1)
+    if planes.ndim == 2:
+        return thin(planes, step)
+    return np.moveaxis(np.stack([thin(plane, step) for plane in np.moveaxis(planes, -1, 0)]), 0, -1)
