@@ -8,7 +8,7 @@ import shlex
 import sys
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:
@@ -28,11 +28,13 @@ COMPILING = logging.getLogger("psvideo.compiling")
 
 @dataclass(frozen=True, kw_only=True)
 class Voice:
-    """How much a command says, and to whom; parameters in sentences are spelled as options."""
+    """How much a command says, and to whom; parameters in sentences are spelled as options. ``warned`` is what it
+    warned of so far."""
 
     json: bool = False
     verbose: bool = False
     quiet: bool = False
+    warned: set[str] = field(default_factory=set)
 
     def say(self, text: str) -> None:
         """Print a line for people: on stdout, or nowhere where machines read stdout."""
@@ -46,8 +48,10 @@ class Voice:
 
     def warn(self, text: str) -> None:
         """Print a warning on stderr, for people and machines alike."""
+        sentence = spelled(text)
+        self.warned.add(sentence)
         if not self.quiet:
-            print(f"psvideo: warning: {spelled(text)}", file=sys.stderr)
+            print(f"psvideo: warning: {sentence}", file=sys.stderr)
 
     def result(self, data: Mapping[str, object]) -> None:
         """Print the machine-readable result, where --json asked for it: one object, all that stdout gets."""
@@ -106,10 +110,11 @@ def command_line(context: "typer.Context") -> str:
 
 
 def print_report(voice: Voice, report: "RunReport") -> None:
-    """Say whether the take is usable, and warn of all that speaks against it."""
+    """Say whether the take is usable, and warn of all that speaks against it and was not said while it was read."""
     voice.say(report.verdict)
     for sentence in report.findings:
-        voice.warn(sentence)
+        if spelled(sentence) not in voice.warned:
+            voice.warn(sentence)
 
 
 def print_takes(voice: Voice, results: "Sequence[TakeResult]") -> None:

@@ -28,6 +28,8 @@ GLOBALS = {"exposure_s": EXPOSURE, "row_time_s": ROW_TIME, "rise_s": RISE, "fall
 """The times, beside the clock's, that can be set free, and the signal of each."""
 EDGES = {"rise_s", "fall_s", "blur_s"}
 """Those that make edges soft: what they change is worked out only where one is free."""
+DAMPING = 1e-10
+"""Of every unknown's own precision, what is added where rows tell two unknowns together and neither alone."""
 LEAST_BLUR_ROWS = 0.3
 """A blur that is free stays this large, which is next to none: it changes what lies so near an edge, and no row may."""
 
@@ -68,7 +70,7 @@ def refine(
         trust = 1.0 / (1.0 + (rest / (CAUCHY * scale)) ** 2)
         weight = trust / scale**2
         rest, hessian, scores = projected(plan, rows, beat, weight, basis, tails=bool(EDGES & set(free)))
-        move = np.linalg.solve(hessian + prior(plan, rows, unit_s, free), scores.sum(axis=0))
+        move = solved(hessian + prior(plan, rows, unit_s, free), scores.sum(axis=0))
         beat, rest, gained = _step(plan, rows, beat, free, _held(plan, move, free), weight, rest)
         if step > 6 and (not gained or (np.abs(move) < 1e-5 * unit_s).all()):
             break
@@ -114,7 +116,7 @@ def _gains(
         kept = [*range(2 + len(free)), 2 + every.index(name)]
         part, pulls = hessian[np.ix_(kept, kept)], scores[:, kept]
         known = prior(plan, rows, _units(plan, rows, fit.beat, (*free, name)), (*free, name))
-        move = np.linalg.solve(part + known, pulls.sum(axis=0))
+        move = solved(part + known, pulls.sum(axis=0))
         gain = float(move @ part @ move)
         if gain > at_least and _may_move(rows, fit.beat, name, float(move[-1])):
             gains[name] = gain
@@ -184,6 +186,17 @@ def projected(
     return rest, hessian, scores
 
 
+def solved(matrix: FloatArray, right: FloatArray) -> FloatArray:
+    """Return what a normal matrix times the result is; it is damped (Marquardt 1963) only where it has no inverse.
+
+    A strobe in step with the frames shows one edge again and again: shift and slope are then one unknown.
+    """
+    try:
+        return np.asarray(np.linalg.solve(matrix, right))
+    except np.linalg.LinAlgError:
+        return np.asarray(np.linalg.solve(matrix + DAMPING * np.diag(np.diag(matrix)), right))
+
+
 def freedom(plan: Plan, rows: Profiles, beat: Beat) -> float:
     """Return which share of the residuals' squares brightnesses that are fitted to them leave (MacKinnon, White 1985).
 
@@ -212,7 +225,7 @@ def sandwich(hessian: FloatArray, scores: FloatArray, known: FloatArray) -> Floa
 
     Of several estimates, each right under other correlations, the one that claims least certainty is taken.
     """
-    bread = np.linalg.inv(hessian + known)
+    bread = solved(hessian + known, np.eye(len(known)))
     filling = scores.T @ scores
     for lag in range(1, min(LAG, len(scores) - 1) + 1):
         cross = scores[lag:].T @ scores[:-lag]
