@@ -274,6 +274,18 @@ def test_rows_that_other_rounds_show_are_not_called_holes() -> None:
     assert "come from the rounds before and after" in text_of(planned(shutter=180.0), "blind")
 
 
+def test_a_strobe_in_step_with_the_frames_is_warned_of_with_a_dark_time_that_is_not() -> None:
+    """Three flashes of 2.5 ms and a dark slot, 5 ms apart, last three frames of 10 ms."""
+    in_step = {"shutter": 180.0, "flash": "2.5ms", "dark": "5ms", "dark_every": 1}
+    shoot = planned(**in_step)
+    assert "every 3 frames" in text_of(shoot, "in-step")
+    assert "come from the rounds before" not in text_of(shoot, "blind")
+    better = re.search(r"`dark_s` to ([\d.]+ms)", text_of(shoot, "in-step").replace(" ms", "ms"))
+    assert better is not None
+    assert "in-step" not in kinds(planned(**{**in_step, "dark": better[1]}))
+    assert "in-step" not in kinds(planned(**{**in_step, "shutter": 360.0, "dark": "12.5ms"}))
+
+
 def test_two_lights_are_warned_of_before_anything_is_filmed() -> None:
     assert "Normals need three lights" in text_of(planned(lights="key,left"), "lights")
     assert "lights" not in kinds(planned())

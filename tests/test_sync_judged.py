@@ -11,6 +11,7 @@ from psvideo.errors import PsvideoError
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.sync.find import find_timing
+from psvideo.sync.rowfit.refine import solved
 from psvideo.synth import Noise, TrueClock, expose
 
 PlanMaker = Callable[..., Plan]
@@ -90,6 +91,30 @@ def test_durations_halved_or_doubled_are_named(factor: float, plan: Plan) -> Non
     kept_s = plan.dark_s - (factor - 1) * plan.flashes[0].duration_s
     with pytest.raises(PsvideoError, match=r"fits flashes of 0\.8 ms"):
         timing_of(replace(plan, flashes=flashes, dark_s=kept_s), filmed(plan))
+
+
+def test_a_strobe_that_played_more_lights_is_named(make_plan: PlanMaker) -> None:
+    film, planned = (make_plan(height_px=ROWS, width_px=COLUMNS, lights=tuple(names)) for names in ("abcd", "abc"))
+    words = "fits 4 lights and a dark slot in turn, and the plan has 3 lights and a dark slot"
+    with pytest.raises(PsvideoError, match=words):
+        timing_of(planned, filmed(film, frames=30))
+
+
+@pytest.mark.campaign
+def test_flashes_twice_as_long_are_no_slower_readout_with_missing_frames(make_plan: PlanMaker) -> None:
+    """Half the readout makes long flashes short, and frames that nobody missed make up for the other rate."""
+    film = make_plan(height_px=ROWS, width_px=COLUMNS, lights=tuple("abcde"), fps=Fraction(100), readout=0.8)
+    short = tuple(replace(flash, duration_s=0.5 * flash.duration_s) for flash in film.flashes)
+    with pytest.raises(PsvideoError, match=r"fits flashes of 0\.8 ms \(plan: 0\.4 ms\)"):
+        timing_of(replace(film, flashes=short), filmed(film, frames=36))
+
+
+def test_two_times_that_rows_tell_together_only_are_moved_together() -> None:
+    """A strobe in step with the frames shows one edge again and again, by which shift and rate are one unknown."""
+    alike = 1.8e28 * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    move = solved(alike, np.array([-1.4e10, 1.4e10]))
+    assert alike @ move == pytest.approx([-1.4e10, 1.4e10])
+    assert np.abs(move).max() < 1e-17
 
 
 @pytest.mark.parametrize(("true", "planned"), [pytest.param(24, 25, marks=pytest.mark.campaign), (60, 120)])

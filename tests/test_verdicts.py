@@ -440,6 +440,24 @@ def test_times_rows_and_motion_on_both_sides_of_a_threshold_are_told_apart() -> 
     assert moved(5, aligned=True) == "doubtful"
 
 
+def test_rows_that_the_rest_of_the_take_shows_are_not_lost_unless_the_strobe_keeps_step() -> None:
+    """Below 360 degrees a part of a take shows fewer rows than all of it."""
+
+    def said(dark_s: float, take_s: float | None) -> tuple[str, str]:
+        plan = plan_of(["a"], mode="rolling", dark_s=dark_s)
+        found = list(time.coverage(plan, timing_of(exposure_s=0.005), Footage(unseen=0.5).observed(0), take_s=take_s))
+        return graded(found, "rows"), " ".join(f"{one.found} {one.advice}" for one in found)
+
+    flash_s = plan_of(["a"], mode="rolling", dark_s=0.01).flashes[0].duration_s
+    assert said(0.0105, 5.0)[0] == "doubtful"
+    assert said(0.0105, None)[0] == "bad"
+    for take_s in (None, 5.0):
+        grade, words = said(0.01 - flash_s, take_s)
+        assert grade == "bad"
+        assert "keeps step" in words
+        assert "dark_s" in words
+
+
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize(("around", "grade"), [(0.0, "unknown"), (0.025, "unknown"), (0.06, "doubtful")])
 def test_light_that_is_left_in_attached_shadow_is_said_where_no_dark_slot_shows_it(

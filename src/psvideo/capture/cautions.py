@@ -7,6 +7,7 @@ from fractions import Fraction
 from typing import Literal
 
 from psvideo.capture.request import Limits, ShootRequest
+from psvideo.model.in_step import IN_STEP, dark_s_out_of_step, frames_in_step, never_shown
 from psvideo.model.marker import has_marker
 from psvideo.model.motion_cost import LEAST_PX, cost_words, motion_cost
 from psvideo.model.plan import Plan
@@ -178,13 +179,27 @@ def _about_the_margin(plan: Plan, figures: ShootFigures) -> Iterator[Caution]:
 
 
 def _about_blind_time(plan: Plan, figures: ShootFigures) -> Iterator[Caution]:
-    if figures.missing_row_share > 0:
+    never = never_shown(plan)
+    if never > IN_STEP:
+        yield _warning("in-step", in_step_words(plan, never))
+    elif figures.missing_row_share > 0:
         yield _warning(
             "blind",
             f"At a shutter of {plan.camera.shutter_deg:.4g} degrees {figures.missing_row_share:.0%} of the rows of "
             "each plate never see its flash. Where the subject stands still they come from the rounds before and "
             "after; what moves in them is lost. Set the shutter to 360 degrees.",
         )
+
+
+def in_step_words(plan: Plan, never: float) -> str:
+    """Say that rows never see a light since the strobe keeps step with the frames, and which dark time mends it."""
+    other_s = dark_s_out_of_step(plan)
+    longer = "" if other_s is None else f", or `dark_s` to {show_seconds(other_s)}"
+    return (
+        f"The strobe keeps step with the frames: every {frames_in_step(plan)} frames its flashes meet the same rows, and "
+        f"at a shutter of {plan.camera.shutter_deg:.4g} degrees {never:.0%} of the rows never see a light, however long "
+        f"the take. Set the shutter to 360 degrees{longer}."
+    )
 
 
 def _about_three_frames(plan: Plan, figures: ShootFigures) -> Iterator[Caution]:

@@ -159,7 +159,9 @@ def _lines_of(take: Take, timing: Timing, known: Rig | None, *, watch: Watch) ->
             "longer: a round needs as many frames as it has flashes, and one or two more."
         )
     seen = Judgement(subject="strobe", grade="good", found=_strobe_words(plan, timing))
-    return (seen, *judgements(apart.plan, timing, observed))
+    numbers = take.clip.numbers
+    take_s = (numbers[-1] - numbers[0] + 1) * plan.camera.frame_period_s
+    return (seen, *judgements(apart.plan, timing, observed, take_s=take_s))
 
 
 def _store(clip: Clip, window: Sequence[int]) -> AbstractContextManager[Kept | None]:

@@ -7,23 +7,30 @@ from psvideo.report.judge.of_exposure import exposure
 from psvideo.report.judge.of_lamps import lamps
 from psvideo.report.judge.of_rig import rig
 from psvideo.report.judge.result import accuracy, focus, steadiness, validity
-from psvideo.report.judge.time import coverage, motion, timing_and_order
+from psvideo.report.judge.time import coverage, in_step, motion, timing_and_order
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.observed import Observed
 
 
 def judgements(
-    plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = False, opened: bool = False
+    plan: Plan,
+    timing: Timing,
+    observed: Observed,
+    *,
+    aligned: bool = False,
+    opened: bool = False,
+    take_s: float | None = None,
 ) -> tuple[Judgement, ...]:
-    """Return one line per thing that decides whether a take can be used."""
+    """Return one line per thing that decides whether a take can be used; ``take_s`` is how long a take lasts of which
+    only a part was looked at."""
     on_time = tuple(timing_and_order(timing, plan.mode))
     if not observed.facts:
         return on_time
     return (
         *on_time,
-        *coverage(plan, timing, observed),
+        *coverage(plan, timing, observed, take_s=take_s),
         *exposure(observed),
-        *lamps(observed, timed=all(one.grade == "good" for one in on_time)),
+        *lamps(observed, timed=all(one.grade == "good" for one in on_time), missed=in_step(plan, timing)),
         ambient(observed),
         motion(plan, timing, observed, aligned=aligned, opened=opened),
         focus(observed),

@@ -23,9 +23,9 @@ NAMED = 4
 """So many lights or rounds are named one by one; of more, only how many."""
 
 
-def lamps(observed: Observed, *, timed: bool = True) -> Iterator[Judgement]:
+def lamps(observed: Observed, *, timed: bool = True, missed: bool = False) -> Iterator[Judgement]:
     """Judge whether every lamp gives light, always, and steadily; where flash times are not known (``timed``), only
-    whether it does at all."""
+    whether it does at all. ``missed``: the camera may be blind whenever one lamp flashes."""
     facts = [one for one in observed.facts if len(one.levels) == len(observed.lights)]
     if not facts:
         return
@@ -34,7 +34,7 @@ def lamps(observed: Observed, *, timed: bool = True) -> Iterator[Judgement]:
     relative = usual / max(float(usual.max()), 1e-12)
     known = _shown(observed)
     named = [light for light, is_known in zip(observed.lights, known, strict=True) if is_known]
-    said = list(_weak(named, relative[known], _brightest(observed)[known], _claimed(observed)[known]))
+    said = list(_weak(named, relative[known], _brightest(observed)[known], _claimed(observed)[known], missed=missed))
     alive = observed.firing
     whole = np.array([one.unseen_share == 0 for one in facts])
     if timed and whole.any():
@@ -78,6 +78,8 @@ def _weak(
     relative: NDArray[np.float64],
     brightest: NDArray[np.float64],
     claimed: NDArray[np.float64],
+    *,
+    missed: bool = False,
 ) -> Iterator[Judgement]:
     """Say which lamps give little. One that comes from the side gives the subject little, and its parts enough."""
     dim = (relative < WEAK_LIGHT) & (brightest < WEAK_LIGHT)
@@ -101,7 +103,9 @@ def _weak(
                 grade="doubtful" if enough else "bad",
                 found=f"The light {light!r} gives no light ({100 * max(share, 0):.1f} % of the strongest)"
                 + (f"; normals come from the other {others}." if enough else "."),
-                advice="Check its cable, driver and line, and that the plan names it as the board does.",
+                advice="Take the strobe out of step, as said of the rows: it may flash while the shutter is closed."
+                if missed
+                else "Check its cable, driver and line, and that the plan names it as the board does.",
             )
         elif is_dim and says >= WEAK_LIGHT:
             yield Judgement(

@@ -1,9 +1,11 @@
 """Judgements on time: the flashes' moments, the lights' order, rows that nobody saw, and motion."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
+from psvideo.model.in_step import IN_STEP, dark_s_out_of_step, frames_in_step, never_shown
 from psvideo.model.motion_cost import cost_words
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
@@ -64,11 +66,15 @@ ORDER = {
 }
 
 
-def coverage(plan: Plan, timing: Timing, observed: Observed) -> Iterator[Judgement]:
-    """Judge which rows were seen by nobody, or under two flashes, and why."""
+def coverage(plan: Plan, timing: Timing, observed: Observed, *, take_s: float | None = None) -> Iterator[Judgement]:
+    """Judge which rows were seen by nobody, or under two flashes, and why. ``take_s`` is how long the take lasts of
+    which only a part was looked at: below 360 degrees the rest shows rows that this part does not."""
     unseen = max((one.unseen_share for one in observed.facts), default=0.0)
     borrowed = max((one.borrowed_share for one in observed.facts), default=0.0)
-    said = [] if plan.mode == "synced" else [*_mixed(plan, timing), *_blind(timing, unseen, borrowed)]
+    if take_s is not None and unseen > MOST_UNSEEN and _is_blind(timing) and not in_step(plan, timing):
+        never = never_shown(_as_found(plan, timing), lasts_s=take_s, clock_offset_ppm=timing.clock_offset_ppm)
+        unseen, borrowed = min(unseen, never), min(borrowed + unseen, 1.0)
+    said = [] if plan.mode == "synced" else [*_mixed(plan, timing), *_blind(plan, timing, unseen, borrowed)]
     said += _dropped(timing, observed)
     if unseen > MOST_UNSEEN and not said:
         said.append(
@@ -99,22 +105,47 @@ def _mixed(plan: Plan, timing: Timing) -> Iterator[Judgement]:
         )
 
 
-def _blind(timing: Timing, unseen: float, borrowed: float) -> Iterator[Judgement]:
-    share = timing.exposure_s / timing.frame_period_s
-    if share < BLIND and borrowed > MOST_UNSEEN and unseen <= LOST_UNSEEN:
-        yield Judgement(
-            subject="rows",
-            grade="doubtful",
-            found=f"The shutter is open for {360 * share:.0f} degrees only: up to {100 * borrowed:.0f} % of a round's "
-            "rows come from other rounds. What stands still loses nothing by it, what moves in them is left out.",
-            advice="Shoot at 360 degrees.",
-        )
-    elif share < BLIND and unseen > MOST_UNSEEN:
+def _is_blind(timing: Timing) -> bool:
+    return timing.exposure_s / timing.frame_period_s < BLIND
+
+
+def _as_found(plan: Plan, timing: Timing) -> Plan:
+    return replace(plan, camera=replace(plan.camera, exposure_s=timing.exposure_s))
+
+
+def in_step(plan: Plan, timing: Timing) -> bool:
+    """Tell whether flashes meet the same rows again and again, so that some rows never see some lights."""
+    found = _as_found(plan, timing)
+    return _is_blind(timing) and never_shown(found, clock_offset_ppm=timing.clock_offset_ppm) > IN_STEP
+
+
+def _blind(plan: Plan, timing: Timing, unseen: float, borrowed: float) -> Iterator[Judgement]:
+    if not _is_blind(timing):
+        return
+    opened = f"the shutter is open for {360 * timing.exposure_s / timing.frame_period_s:.0f} degrees only"
+    if unseen > MOST_UNSEEN and in_step(plan, timing):
+        other_s = dark_s_out_of_step(_as_found(plan, timing))
         yield Judgement(
             subject="rows",
             grade="bad" if unseen > LOST_UNSEEN else "doubtful",
-            found=f"Up to {100 * unseen:.0f} % of a round's rows were seen by no frame: the shutter is open for "
-            f"{360 * share:.0f} degrees only.",
+            found=f"Up to {100 * unseen:.0f} % of a round's rows see a light in no round: {opened}, and the strobe keeps "
+            f"step with the frames, so that every {frames_in_step(plan)} frames its flashes meet the same rows.",
+            advice="Shoot at 360 degrees"
+            + ("." if other_s is None else f", or with a dark time (dark_s) of {other_s * 1e3:.4g} ms."),
+        )
+    elif borrowed > MOST_UNSEEN and unseen <= LOST_UNSEEN:
+        yield Judgement(
+            subject="rows",
+            grade="doubtful",
+            found=f"{opened.capitalize()}: up to {100 * borrowed:.0f} % of a round's rows come from other rounds. What "
+            "stands still loses nothing by it, what moves in them is left out.",
+            advice="Shoot at 360 degrees.",
+        )
+    elif unseen > MOST_UNSEEN:
+        yield Judgement(
+            subject="rows",
+            grade="bad" if unseen > LOST_UNSEEN else "doubtful",
+            found=f"Up to {100 * unseen:.0f} % of a round's rows were seen by no frame: {opened}.",
             advice="Shoot at 360 degrees.",
         )
 

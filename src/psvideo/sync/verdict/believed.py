@@ -7,7 +7,7 @@ from psvideo.sync.rowfit.course import too_many
 from psvideo.sync.rowfit.fit import ClipFit, find
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import freedom, refine, robust_loss
-from psvideo.sync.rowfit.seed import gain_of
+from psvideo.sync.rowfit.seed import MISNAMED_PPM, gain_of
 from psvideo.sync.verdict.refusal import MOST_PPM
 from psvideo.sync.verdict.rivals import BETTER, CLEARLY, FAIR, camera_rivals, double_rivals, likeliest, strobe_rivals
 
@@ -29,6 +29,8 @@ STILL = 0.9
 subject moves."""
 GAPPED = 0.8
 """A fit that needs frames to be missing and explains less than this share of the changes is worth one, too."""
+EXCUSES = 2
+"""A fit with so many excuses (missing frames, a clock beyond the plan's tolerance) must explain more."""
 OTHER_LENGTHS = (0.5, 0.7, 1.4, 2.0)
 LENGTH_FRAMES = 200
 FLASHES_DIFFER = 0.7
@@ -55,7 +57,9 @@ def judged(plan: Plan, rows: Profiles) -> Verdict:
         return Verdict(plan=plan, found=found, believed=True)
     meant, found = _as_meant(plan, rows, found)
     believed = convincing(meant, found) and not _feigned(plan, found)
-    if believed and (_unsure(meant, found) or _gaps_feigned(found) or flashes_differ(meant, found)):
+    if believed and (
+        _unsure(meant, found) or _gaps_feigned(found) or _excuses(plan, found) or flashes_differ(meant, found)
+    ):
         believed = likeliest(meant, rows, list(strobe_rivals(plan))) is None
     return Verdict(plan=meant, found=found, believed=believed)
 
@@ -88,6 +92,7 @@ def convincing(plan: Plan, found: ClipFit) -> bool:
     return (
         (strobed or found.across > ACROSS)
         and (not often or min(share, explained) > 0.9)
+        and (_excuses(plan, found) < EXCUSES or share > UNSURE_GAIN)
         and abs(fit.beat.clock.mean_offset_ppm()) < MOST_PPM
         and (found.slack_s > 0 or fit.shift_error_s < LOST * _shortest_s(plan))
     )
@@ -101,8 +106,17 @@ def doubtful(plan: Plan, found: ClipFit) -> bool:
         or _unsure(plan, found)
         or _gaps_feigned(found)
         or not convincing(plan, found)
+        or _excuses(plan, found) > 0
         or flashes_differ(plan, found)
     )
+
+
+def _excuses(plan: Plan, found: ClipFit) -> int:
+    """Return how many things a fit takes for given that nobody said: frames missing behind whole numbers, and a clock
+    farther off than the plan says, and than a misnamed rate makes it. One is a fault of the take; with both, most
+    plans can be made to fit."""
+    ppm = abs(found.fit.beat.clock.mean_offset_ppm())
+    return (found.steps > 0) + (ppm > max(plan.clock_range_ppm, MISNAMED_PPM))
 
 
 def _moved(plan: Plan, found: ClipFit) -> bool:

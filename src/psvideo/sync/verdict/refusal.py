@@ -10,7 +10,7 @@ from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.search import GridPlace, search
 from psvideo.sync.rowfit.seed import SEARCH_ROWS, first_guess, gain_of
-from psvideo.sync.verdict.rivals import CLEARLY, Rival, likeliest, likely_rates, strobe_rivals
+from psvideo.sync.verdict.rivals import CLEARLY, Rival, count_rivals, likeliest, likely_rates, strobe_rivals
 
 STEADY = 0.02
 """Rows that change by less than this share of their light from frame to frame saw no strobe."""
@@ -25,6 +25,8 @@ OTHER_PERIOD = 0.02
 """Share by which the time from flash to flash must be off to be called another one."""
 MOST_PPM = 1.5 * UNKNOWN_CLOCK_PPM
 """No two clocks are further apart than this, errors of short clips included."""
+LITTLE_MORE = 2.0
+"""Times the robust loss that more lights leave, which fewer may."""
 PERIOD_FRAMES, PERIOD_ROWS = 14, 8
 
 
@@ -86,6 +88,12 @@ def why_not(plan: Plan, rows: Profiles) -> str:
     meant = likeliest(plan, rows, list(strobe_rivals(plan)))
     if meant is not None:
         return _described(plan, meant)
+    played = _other_count(plan, rows)
+    if played is not None:
+        return (
+            f"The picture fits {_round_words(played)} in turn, and the plan has {_round_words(plan)}: the strobe played "
+            "another plan. Put the plan that it played beside the clip."
+        )
     whole = rows.value.mean(axis=1)
     alone = float(((rows.value - whole[:, None]) - (rows.value - whole[:, None]).mean(axis=0)).std())
     if alone < ALONE * float((whole - whole.mean()).std()) and plan.camera.readout_s != 0:
@@ -119,6 +127,25 @@ def _repeats(plan: Plan, rows: Profiles) -> bool:
     change = rows.value - rows.value.mean(axis=0)
     left = sum(float(((part - part.mean(axis=0)) ** 2).sum()) for part in (change[place == n] for n in range(cycle)))
     return left * frames / (frames - cycle) < REPEATS * float((change**2).sum())
+
+
+def _other_count(plan: Plan, rows: Profiles) -> Plan | None:
+    """Return the plan with the number of lights that the picture fits. Two rounds fit as one, and a dark slot as one
+    more light: of those that leave little more, it is one with fewer lights."""
+    rivals = list(count_rivals(plan))
+    meant = likeliest(plan, rows, rivals)
+    if meant is None:
+        return None
+    length, lights = len(meant.plan.flashes), len(meant.plan.lights)
+    simpler = [one for one in rivals if length % len(one.plan.flashes) == 0 and len(one.plan.lights) < lights]
+    simplest = likeliest(meant.plan, rows, simpler, leaves=LITTLE_MORE) if simpler else None
+    return (simplest or meant).plan
+
+
+def _round_words(plan: Plan) -> str:
+    dark = "a dark slot" if any(flash.is_dark for flash in plan.flashes) else "no dark slot"
+    rare = f" in one round of {plan.dark_every}" if plan.dark_every > 1 else ""
+    return f"{counted(len(plan.lit_slots), 'light')} and {dark}{rare}"
 
 
 def _described(plan: Plan, rival: Rival) -> str:

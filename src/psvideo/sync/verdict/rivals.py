@@ -22,6 +22,8 @@ FACTORS = (0.125, 0.25, 0.5, 2.0, 4.0, 8.0)
 RATES_HZ = (24, 25, 30, 48, 50, 60, 96, 100, 120, 200, 240)
 APART = 0.04
 """Exposures that differ by less than this share are one, and the fit's own business where one is the plan's."""
+OTHER_COUNTS = 3
+"""So many lights more or fewer are tried."""
 LEAST_FRAMES = 24
 ROUGH_ROWS = 18
 """Rows of the rough search of all rivals, which only decides what is looked at closely;"""
@@ -33,7 +35,7 @@ the plan's own fit is out of the question and the rival's will be judged for its
 FAIR, GOOD = 0.4, 0.7
 """And where it takes away such a share of all of it itself; the second, where no fit will judge it."""
 
-Fault = Literal["shutter", "readout", "flashes", "rate"]
+Fault = Literal["shutter", "readout", "flashes", "rate", "count"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,6 +77,17 @@ def strobe_rivals(plan: Plan) -> Iterator[Rival]:
         for exposure_s in {by_angle_s, min(plan.camera.exposure_s, period_s)}:
             camera = replace(plan.camera, fps=rate, exposure_s=exposure_s, readout_s=None)
             yield Rival(plan=replace(plan, camera=camera), fault="rate")
+
+
+def count_rivals(plan: Plan) -> Iterator[Rival]:
+    """Yield the plan with fewer or more lights, with a dark slot in every round and without, the shortest first."""
+    lit = plan.flashes[plan.lit_slots[0]]
+    dark = replace(lit, lights={})
+    for count in range(max(len(plan.lit_slots) - OTHER_COUNTS, 1), len(plan.lit_slots) + OTHER_COUNTS + 1):
+        flashes = tuple(replace(lit, lights={f"light {n + 1}": 1.0}) for n in range(count))
+        for played in (flashes, (*flashes, dark)):
+            if [flash.is_dark for flash in played] != [flash.is_dark for flash in plan.flashes] or plan.dark_every > 1:
+                yield Rival(plan=replace(plan, flashes=played, dark_every=1, dark_code=0), fault="count")
 
 
 def _exposures(plan: Plan) -> list[float]:
