@@ -196,9 +196,9 @@ def in_step_words(plan: Plan, never: float) -> str:
     other_s = dark_s_out_of_step(plan)
     longer = "" if other_s is None else f", or `dark_s` to {show_seconds(other_s)}"
     return (
-        f"The strobe keeps step with the frames: every {frames_in_step(plan)} frames its flashes meet the same rows, and "
-        f"at a shutter of {plan.camera.shutter_deg:.4g} degrees {never:.0%} of the rows never see a light, however long "
-        f"the take. Set the shutter to 360 degrees{longer}."
+        f"The strobe keeps step with the frames: every {frames_in_step(plan)} frames its flashes meet the same rows, "
+        f"and at a shutter of {plan.camera.shutter_deg:.4g} degrees {never:.0%} of the rows never see a light, however "
+        f"long the take. Set the shutter to 360 degrees{longer}."
     )
 
 

@@ -128,8 +128,8 @@ def _blind(plan: Plan, timing: Timing, unseen: float, borrowed: float) -> Iterat
         yield Judgement(
             subject="rows",
             grade="bad" if unseen > LOST_UNSEEN else "doubtful",
-            found=f"Up to {100 * unseen:.0f} % of a round's rows see a light in no round: {opened}, and the strobe keeps "
-            f"step with the frames, so that every {frames_in_step(plan)} frames its flashes meet the same rows.",
+            found=f"Up to {100 * unseen:.0f} % of a round's rows see a light in no round: {opened}, and the strobe "
+            f"keeps step with the frames, so that every {frames_in_step(plan)} frames its flashes meet the same rows.",
             advice="Shoot at 360 degrees"
             + ("." if other_s is None else f", or with a dark time (dark_s) of {other_s * 1e3:.4g} ms."),
         )

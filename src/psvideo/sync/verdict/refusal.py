@@ -91,8 +91,8 @@ def why_not(plan: Plan, rows: Profiles) -> str:
     played = _other_count(plan, rows)
     if played is not None:
         return (
-            f"The picture fits {_round_words(played)} in turn, and the plan has {_round_words(plan)}: the strobe played "
-            "another plan. Put the plan that it played beside the clip."
+            f"The picture fits {_round_words(played)} in turn, and the plan has {_round_words(plan)}: the strobe "
+            "played another plan. Put the plan that it played beside the clip."
         )
     whole = rows.value.mean(axis=1)
     alone = float(((rows.value - whole[:, None]) - (rows.value - whole[:, None]).mean(axis=0)).std())
