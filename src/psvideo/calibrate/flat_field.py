@@ -98,8 +98,8 @@ def on_target(
     shade = field_of(light, ground, part) @ target.normal
     if np.min(shade) <= LEAST_COSINE * np.max(np.abs(shade)):
         raise PsvideoError(
-            f"Light {light.name!r} does not reach the white target by the rig's direction: expected it before the "
-            "target's face. Check the rig, or give the target's normal with the rig's [surface] plane."
+            f"Light {light.name!r}: by the rig it stands behind the white target, or just at its edge. Check "
+            "the light's direction in the rig, or say with the rig's [surface] plane which way the target faces."
         )
     return values / np.broadcast_to(shade, usable.shape)[..., None] / target.albedo, usable
 

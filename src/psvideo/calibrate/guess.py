@@ -145,8 +145,8 @@ def _metric(vectors: FloatArray) -> FloatArray:
         kept = rest <= np.quantile(rest, KEPT) if len(vectors) > 100 else kept
     if sizes[-1] < LEAST_SINGULAR * sizes[0]:
         raise PsvideoError(
-            "These pictures leave the lights' directions open under this prior: lights in a regular ring are alike, "
-            "and so is a surface that faces few ways. Try the other `prior`, or calibrate on a sphere."
+            "These pictures fit several directions of the lights equally well, as where lights stand in a regular "
+            "ring, or the subject faces few ways. Try the other `prior`, or calibrate on a sphere."
         )
     return np.array([[a, d, e], [d, b, f], [e, f, c]])
 

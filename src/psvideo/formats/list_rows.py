@@ -86,7 +86,8 @@ def _counted(path: Path, rows: list[list[float]]) -> list[list[float]]:
     count, vectors = rows[0][0], rows[1:]
     if len(rows[0]) != 1 or count != len(vectors):
         raise PsvideoError(
-            f"{path}: the first line says {rows[0]}, and {len(vectors)} lines follow; expected their count."
+            f"{path}: its first line is {' '.join(f'{one:g}' for one in rows[0])}, and {len(vectors)} lines follow. "
+            "Expected the first line to say how many follow."
         )
     vectors = [row[-3:] for row in vectors]
     short = next((row for row in vectors if len(row) != 3), None)
@@ -118,7 +119,10 @@ def _diligent_strengths(path: Path, count: int) -> list[tuple[float, ...]]:
         return [(1.0,)] * count
     rows = _numbers(beside, read_text(beside))
     if len(rows) != count:
-        raise PsvideoError(f"{beside}: holds {len(rows)} intensities, and {path.name} beside it {count} directions.")
+        raise PsvideoError(
+            f"{beside}: holds {len(rows)} intensities, and {path.name} beside it {count} directions. Expected a line "
+            "for every light in both."
+        )
     return [tuple(row) for row in rows]
 
 

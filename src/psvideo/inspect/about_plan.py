@@ -21,7 +21,7 @@ def plan_findings(plan: Plan) -> Iterator[Finding]:
         f"{camera.name}: {camera.width_px} x {camera.height_px} at {float(camera.fps):.6g} fps, {_shutter(plan)}, "
         f"transfer {find_curve(camera.encoding.transfer).name}"
     )
-    yield ok(f"{plan.mode}, {len(plan.flashes)} flash(es) a round, lights {', '.join(plan.lights)}")
+    yield ok(f"{plan.mode}, {counted(len(plan.flashes), 'flash')} a round, lights {', '.join(plan.lights)}")
     if plan.mode == "synced":
         return
     if plan.mode == "rolling" and plan.dark_s < camera.exposure_s * (1 - ROUNDING):

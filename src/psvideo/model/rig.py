@@ -11,6 +11,7 @@ import numpy as np
 
 from psvideo.errors import PsvideoError, UsageError, check_kind, nearest
 from psvideo.model.camera import FloatArray
+from psvideo.model.units import counted
 
 Vector = tuple[float, float, float]
 
@@ -172,7 +173,7 @@ def intensities(lights: Sequence[Light], channels: int) -> FloatArray:
         if len(light.by_channel) not in (1, channels):
             what = "intensities" if light.colour is None else "channels in its colour"
             raise PsvideoError(
-                f"Light {light.name!r} has {len(light.by_channel)} {what} and the pictures have {channels} "
-                "channel(s); expected one number, or one per channel."
+                f"Light {light.name!r} has {len(light.by_channel)} {what} and the pictures have "
+                f"{counted(channels, 'channel')}; expected one number, or one per channel."
             )
     return np.array([np.broadcast_to(light.by_channel, channels) for light in lights], np.float64)

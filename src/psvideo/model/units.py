@@ -9,10 +9,12 @@ NTSC = Fraction(1000, 1001)
 def counted(count: int, thing: str) -> str:
     """Return a number with its noun.
 
-    >>> counted(1, "plate"), counted(0, "plate")
-    ('1 plate', '0 plates')
+    >>> counted(1, "plate"), counted(0, "plate"), counted(3, "flash")
+    ('1 plate', '0 plates', '3 flashes')
     """
-    return f"{count} {thing}" if count == 1 else f"{count} {thing}s"
+    if count == 1:
+        return f"{count} {thing}"
+    return f"{count} {thing}{'es' if thing.endswith(('s', 'sh', 'ch', 'x')) else 's'}"
 
 
 def show_seconds(seconds: float, *, figures: int = 4) -> str:

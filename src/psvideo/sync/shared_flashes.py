@@ -15,6 +15,7 @@ from psvideo.model.camera_clocks import CameraClock, CameraClocks, Numbering
 from psvideo.model.marker import cycle_places
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
+from psvideo.model.units import counted
 from psvideo.strobe.runlog import CAMERA_CLOCK_PPM
 
 LEAST_SHARED = 8
@@ -126,8 +127,8 @@ def _chosen(first: CameraTake, take: CameraTake, possible: Sequence[int], wanted
     )
     if shared < LEAST_SHARED:
         raise PsvideoError(
-            f"{names} share {shared} flash(es); expected {LEAST_SHARED} at least. Clips must run at the same time, and "
-            "with the first one named."
+            f"{names} share {counted(shared, 'flash')}; expected {LEAST_SHARED} at least. Name clips that were "
+            "recorded at the same time as the first one."
         )
     return possible[0]
 

@@ -1,4 +1,4 @@
-"""From a scene to the nouns: the plan that the strobe plays, the plan that the clip comes with, the rig, the clock."""
+"""From a scene to its records: the plan that the strobe plays, the one that the clip comes with, the rig, the clock."""
 
 import dataclasses
 

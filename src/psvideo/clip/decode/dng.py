@@ -155,7 +155,8 @@ def _black(path: Path, page: tifffile.TiffPage, cut: Cut) -> Levels:
         levels = np.broadcast_to(levels, (rows, cols, 1))
     if levels.ndim != 3 or np.ptp(levels, axis=2).any():
         raise PsvideoError(
-            f"{path}: has black levels {levels.tolist()} that do not fit its pattern of {rows} x {cols}."
+            f"{path}: has black levels {levels.tolist()} that do not fit its pattern of {rows} x {cols}: expected one "
+            "for each place of the pattern. Convert the file again."
         )
     shifted = np.roll(levels[..., 0], (-cut.row_in_area, -cut.col_in_area), axis=(0, 1))
     return tuple(tuple(map(float, row)) for row in shifted)

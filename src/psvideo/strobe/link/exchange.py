@@ -106,7 +106,10 @@ class Link:
             answered_s = time.monotonic()
             if reading.nonce == nonce and answered_s - asked_s <= REPLY_WITHIN_S:
                 return reading, asked_s, answered_s
-        raise NoReplyError(f"{self.port.name}: the controller answers clock queries with those of others.")
+        raise NoReplyError(
+            f"{self.port.name}: the controller's answers to clock queries came late, or were to another program. Close "
+            "other programs that use this port, then run the command again."
+        )
 
     def resynchronise(self, *, within_s: float = 2.0) -> bool:
         """Throw away what is under way, until a clock query is answered with its own nonce; False where none is."""

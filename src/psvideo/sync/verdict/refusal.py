@@ -35,8 +35,8 @@ def nothing_to_find(plan: Plan, rows: Profiles) -> str:
     least = least_frames(plan)
     if len(rows.value) < least:
         return (
-            f"holds {counted(len(rows.value), 'frame')}; finding the timing of a strobe with {len(plan.lit_slots)} lit "
-            f"flash(es) a round needs at least {least}, and 50 or more make it certain."
+            f"holds {counted(len(rows.value), 'frame')}; finding the timing of a strobe with "
+            f"{counted(len(plan.lit_slots), 'lit flash')} a round needs at least {least}, and 50 or more make it sure."
         )
     changes = _changes(rows)
     if float(np.abs(changes).max()) < 1e-9:
