@@ -109,8 +109,8 @@ def _natural(name: str) -> list[tuple[int, str]]:
 
 
 def bears(file: Path, light: str) -> bool:
-    """True where a file's name is the light's, or ends with it after a mark: ``take3_key.png``, ``key.png``; words in
-    small letters also mean large ones (``DARK``)."""
+    """Return whether a file's name is the light's, or ends with it after a mark: ``take3_key.png``, ``key.png``; words
+    in small letters also mean large ones (``DARK``)."""
     wanted = re.escape(light)
     return re.search(rf"(^|[^A-Za-z0-9])({wanted}|{wanted.upper()}|{wanted.capitalize()})$", file.stem) is not None
 

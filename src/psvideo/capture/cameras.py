@@ -146,7 +146,7 @@ def find_mode(wanted: str, *, fps: Fraction | None, size_px: tuple[int, int] | N
 
 
 def fits(mode: CameraMode, *, fps: Fraction | None, size_px: tuple[int, int] | None) -> bool:
-    """Tell whether a mode has this frame rate (or the one that it is a rounding of) and this size."""
+    """Return whether a mode has this frame rate (or the one that it is a rounding of) and this size."""
     return (fps is None or abs(fps / mode.fps - 1) < RATE_TOLERANCE) and (
         size_px is None or size_px == (mode.width_px, mode.height_px)
     )

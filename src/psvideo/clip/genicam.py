@@ -37,7 +37,7 @@ LONGEST_NUMBER = 65_535
 
 
 def is_genicam(source: str) -> bool:
-    """Tell whether a name is that of a GenICam camera."""
+    """Return whether a name is that of a GenICam camera."""
     return source == SCHEME or source.startswith((SCHEME + ":", SCHEME + "?"))
 
 

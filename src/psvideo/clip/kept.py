@@ -56,7 +56,7 @@ class Kept:
         self.missed = 0
 
     def __contains__(self, number: int) -> bool:
-        """True where the picture of this frame is kept."""
+        """Return whether the picture of this frame is kept."""
         return number in self._places
 
     def __len__(self) -> int:

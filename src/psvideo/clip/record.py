@@ -186,7 +186,7 @@ class Clip:
 
     @property
     def is_movie(self) -> bool:
-        """True where one file holds all frames."""
+        """Whether one file holds all frames."""
         return self.kind == "movie"
 
     def index_of(self, number: int) -> int:

@@ -35,7 +35,7 @@ DEVICES = {"/dev/video": "v4l2"}
 
 
 def is_device(source: str) -> bool:
-    """Tell whether a name is that of a video device, such as /dev/video0."""
+    """Return whether a name is that of a video device, such as /dev/video0."""
     return source.startswith(tuple(DEVICES))
 
 

@@ -85,7 +85,7 @@ def sha256_of(path: Path) -> str:
 
 
 def _has_time_code(fps: Fraction) -> bool:
-    """Tell whether a time code counts this rate's frames; a camera that is faster counts those of the project."""
+    """Return whether a time code counts this rate's frames; a camera that is faster counts those of the project."""
     return round(fps) <= MOST_FRAMES and fps.denominator in (1, 1001)
 
 

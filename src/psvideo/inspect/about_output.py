@@ -14,12 +14,12 @@ from psvideo.model.units import counted
 
 
 def is_plates(folder: Path) -> bool:
-    """True where ``split`` wrote this folder: a timing beside one folder of plates per light."""
+    """Return whether ``split`` wrote this folder: a timing beside one folder of plates per light."""
     return (folder / "timing.json").is_file() and bool(_sequences(folder)) and not is_results(folder)
 
 
 def is_results(folder: Path) -> bool:
-    """True where ``normals`` wrote this folder."""
+    """Return whether ``normals`` wrote this folder."""
     return any((folder / "normals").glob("*.exr"))
 
 

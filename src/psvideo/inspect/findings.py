@@ -33,7 +33,7 @@ class Finding:
 
 
 def is_well(findings: Iterable[Finding]) -> bool:
-    """True where nothing was found that would stop work."""
+    """Whether nothing was found that would stop work."""
     return all(finding.level not in STOPS for finding in findings)
 
 
@@ -48,7 +48,7 @@ class Description:
 
     @property
     def fits(self) -> bool:
-        """True where nothing was found that would stop a command."""
+        """Whether nothing was found that would stop a command."""
         return is_well(self.findings)
 
 

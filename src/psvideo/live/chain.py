@@ -269,5 +269,5 @@ def _ended(one: Round, camera: Camera, timing: Timing) -> int:
 
 
 def _fits(frame: RingFrame, plan: Plan, step: int) -> bool:
-    """Tell whether a frame has the size that is made now, and not the one before."""
+    """Return whether a frame has the size that is made now, and not the one before."""
     return frame.coded.shape[0] == plan.camera.height_px // step

@@ -158,7 +158,7 @@ class Follower:
         self._learn(rows)
 
     def _judge(self, rows: Profiles, rest: FloatArray) -> None:
-        """Say whether the latest frames show the strobe where the clock has it, and as well as those before did.
+        """Return whether the latest frames show the strobe where the clock has it, and as well as those before did.
 
         Right after a change of light nobody knows: new brightnesses explain a few frames wherever flashes are.
         """

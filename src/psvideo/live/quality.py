@@ -72,7 +72,7 @@ class LiveSecond:
         return replace(self, age_s=self.made_age_s)
 
     def spares(self, made_s: float) -> bool:
-        """Tell whether there would be time to spare if making a result took so long, and drawing it as much longer."""
+        """Return whether time would be left if making a result took so long, and drawing it as much longer."""
         drawing_s = max(self.age_s - self.made_age_s, 0.0) * made_s / max(self.made_s, 1e-9)
         age_s = self.made_age_s + made_s - self.made_s + drawing_s
         busy = made_s * min(MOST_RATE, self.rounds_per_s)

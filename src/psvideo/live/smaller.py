@@ -81,7 +81,7 @@ def smaller_rig(rig: Rig, step: int) -> Rig:
 
 
 def _is_even(tone: Tone) -> bool:
-    """Tell whether all positions of a mosaic have the same levels."""
+    """Return whether all positions of a mosaic have the same levels."""
     return bool((tone.zero == tone.zero[0, 0]).all() and (tone.gain == tone.gain[0, 0]).all())
 
 

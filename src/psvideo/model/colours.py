@@ -32,7 +32,7 @@ WHITE: Vector = (1.0, 1.0, 1.0)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class OneFlash:
-    """What one flash tells by itself: ``lights`` are the shown lights that shine in it, ``inverse`` (light, channel)
+    """What one flash shows by itself: ``lights`` are the shown lights that shine in it, ``inverse`` (light, channel)
     gives each from the channels, once these are divided by the surface's colour."""
 
     lights: tuple[int, ...]
@@ -53,7 +53,7 @@ class Unmixing:
         (light, lit slot, channel): of a round's flashes, what gives a lamp's plate in every channel. None where colours
         are not exchanged.
     alone
-        What every lit slot tells by itself; empty where one flash is not enough.
+        What every lit slot shows by itself; empty where one flash is not enough.
     surface_colour
         The subject's colour, where it is given.
     condition
@@ -184,7 +184,7 @@ def _one_by_one(plan: Plan, rig: Rig, seen: FloatArray, condition: float) -> Unm
 
 
 def _one_flash(seen: FloatArray) -> OneFlash | None:
-    """Return what a flash of these lights (light, channel) tells by itself, None where that is too little."""
+    """Return what a flash of these lights (light, channel) shows by itself, None where that is too little."""
     lit = np.flatnonzero(seen.any(axis=1))
     if len(lit) > CHANNELS or colour_condition(seen[lit]) > MAX_CONDITION:
         return None

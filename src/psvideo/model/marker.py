@@ -49,7 +49,7 @@ def turns_in_the_dark(plan: Plan, dead: Set[int]) -> tuple[int, ...]:
 
 
 def has_marker(plan: Plan) -> bool:
-    """True where no turn of the cycle looks like the cycle itself, so that timing alone distinguishes the flashes."""
+    """Return whether every turn of the cycle looks unlike it, so that timing alone distinguishes the flashes."""
     return len(alike_turns(plan)) == 1
 
 

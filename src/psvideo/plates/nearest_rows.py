@@ -91,7 +91,7 @@ def _later(waiting: deque[_Waiting]) -> list[_Waiting]:
 
 
 def _can_go(waiting: deque[_Waiting], known: dict[str, LightPlate]) -> bool:
-    """Tell whether nothing nearer can come for the first plate, or it has waited enough."""
+    """Return whether nothing nearer can come for the first plate, or it has waited enough."""
     if not waiting:
         return False
     seen, later = waiting[0].plate.rows_seen.copy(), _later(waiting)

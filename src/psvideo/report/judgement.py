@@ -30,7 +30,7 @@ class Judgement:
 
 
 def usable(judgements: Sequence[Judgement]) -> bool:
-    """Tell whether nothing is bad."""
+    """Return whether nothing is bad."""
     return all(one.grade != "bad" for one in judgements)
 
 

@@ -183,7 +183,7 @@ def window_of(plan: Plan, numbers: Sequence[int]) -> tuple[int, ...]:
 
 
 def too_short(plan: Plan, numbers: Sequence[int]) -> bool:
-    """Tell whether so few frames cannot be expected to show the strobe."""
+    """Return whether so few frames cannot be expected to show the strobe."""
     return len(numbers) < 2 * len(plan.cycle_slots) / len(plan.dark_rounds) + 3
 
 

@@ -28,7 +28,7 @@ class Check:
 
     @property
     def usable(self) -> bool:
-        """True where nothing is bad."""
+        """Whether nothing is bad."""
         return usable(self.judgements)
 
     @property

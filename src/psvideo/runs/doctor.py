@@ -19,7 +19,7 @@ class Checkup:
 
     @property
     def well(self) -> bool:
-        """True where nothing lacks that psvideo needs."""
+        """Whether everything is there that psvideo needs."""
         return is_well(self.findings)
 
 

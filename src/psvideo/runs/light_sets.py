@@ -173,7 +173,7 @@ def open_light_sets(path: Path, reading: Reading = Reading(), *, watch: Watch = 
 
 
 def _is_clip(path: Path, plan_path: Path) -> bool:
-    """True where a folder holds a clip's frames, not stills that bear the lights' names nor a folder per light."""
+    """Return whether a folder holds a clip's frames, not stills that bear the lights' names nor a folder per light."""
     if find_plates(path) is not None:
         return False
     lights = set(read_plan(plan_path).lights)

@@ -71,7 +71,7 @@ def write_piece(job: Job, folder: Path, piece: str, *, watch: Watch = unwatched)
 
 
 def pieces_begun(folder: Path) -> bool:
-    """Tell whether pieces of a run were solved into a folder."""
+    """Return whether pieces of a run were solved into a folder."""
     return (folder / FOLDER).is_dir()
 
 

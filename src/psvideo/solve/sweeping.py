@@ -112,13 +112,13 @@ def _unsure(costs: NDArray[np.float64], lights: int) -> NDArray[np.float32]:
 
 
 def _jumps(depth_m: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """Tell between which neighbours no surface runs."""
+    """Return between which neighbours no surface runs."""
     logs, beside = np.log(depth_m), np.ones((3, 3), np.uint8)
     return np.asarray(cv2.dilate(logs, beside) - cv2.erode(logs, beside)) > JUMP
 
 
 def _on_plane(ratio: NDArray[np.float64], reached: NDArray[np.bool_], jumps: NDArray[np.bool_]) -> bool:
-    """Tell whether every part has its median distance on the plane, within the sweep's own error."""
+    """Return whether every part has its median distance on the plane, within the sweep's own error."""
     count, parts = cv2.connectedComponents((~jumps).astype(np.uint8), connectivity=4)
     known = [ratio[reached & (parts == number)] for number in range(1, count)]
     return all(abs(float(np.log(np.median(part)))) < PLANE_HOLDS for part in known if len(part) >= LEAST_POINTS)

@@ -56,7 +56,7 @@ def _most_bursts(duration: int, caps: Capabilities) -> int:
 
 
 def _playable(on: int, period: int, count: int, duration: int, caps: Capabilities) -> bool:
-    """True where a board plays these bursts and the last one is whole; a line at full power has no bursts."""
+    """Return whether a board plays these bursts and the last one is whole; a line at full power has no bursts."""
     if period > caps.max_period:
         return False
     last = duration - (count - 1) * period

@@ -20,7 +20,7 @@ def state_folder() -> Path:
 
 
 def is_confirmed(sha256: str, *, folder: Path) -> bool:
-    """True where the warning for this plan was confirmed before."""
+    """Return whether the warning for this plan was confirmed before."""
     return sha256 in _read(folder)
 
 

@@ -92,7 +92,7 @@ def _aligned(plan: Plan, rows: Profiles, beat: Beat) -> Beat:
 
 
 def _beaten(gain: FloatArray) -> bool:
-    """Tell whether a rival's losses exceed the best's (frame,) clearly."""
+    """Return whether a rival's losses exceed the best's (frame,) clearly."""
     total = float(gain.sum())
     error = float(np.sqrt((gain**2).sum())) + 1e-12
     against = float(-np.minimum(gain, 0.0).sum())

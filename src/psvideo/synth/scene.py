@@ -223,7 +223,7 @@ class Scene(Contract):
 
     @property
     def moves(self) -> bool:
-        """True where any object moves."""
+        """Whether any object moves."""
         return any(thing.motion is not None for thing in self.object)
 
     @property

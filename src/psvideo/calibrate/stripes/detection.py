@@ -154,7 +154,7 @@ def _refuse_wide(found: Sequence[FoundStripes], readings: Sequence[FoundStripes]
 
 
 def _is_echo(reading: FoundStripes, readings: Sequence[FoundStripes]) -> bool:
-    """Tell whether a reading only repeats a shorter period several times.
+    """Return whether a reading only repeats a shorter period several times.
 
     Many periods in one are no light's doing, and thin stripes with sharp edges repeat exactly after several periods
     only, because their edges fall between rows.

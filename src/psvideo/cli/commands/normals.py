@@ -156,12 +156,14 @@ def normals(
         start_number=start_number,
     )
     many = len(clips) > 1 or workers is not None or scheduler is not None
-    told: dict[str, Any] = {"force": force, "resume": resume, "watch": voice.track, "caller": voice.caller(context)}
+    common: dict[str, Any] = {"force": force, "resume": resume, "watch": voice.track, "caller": voice.caller(context)}
     if many:
-        results = normals_of_takes(clips, out=out, workers=workers, scheduler=scheduler, piece=piece, **told, **options)
+        results = normals_of_takes(
+            clips, out=out, workers=workers, scheduler=scheduler, piece=piece, **common, **options
+        )
         print_takes(voice, results)
         return
-    report = solve(clips[0], out=out, piece=piece, **told, **options)
+    report = solve(clips[0], out=out, piece=piece, **common, **options)
     voice.result(report_record(report))
     if piece is not None:
         voice.say(f"{out}: piece {piece} is solved, {counted(len(report.instants), 'instant')}; --resume ends the run.")

@@ -86,11 +86,11 @@ def split(
         compression=compression,
         start_number=start_number,
     )
-    told: dict[str, Any] = {"force": force, "resume": resume, "watch": voice.track, "caller": voice.caller(context)}
+    common: dict[str, Any] = {"force": force, "resume": resume, "watch": voice.track, "caller": voice.caller(context)}
     if len(clips) > 1 or workers is not None or scheduler is not None:
-        print_takes(voice, split_of_takes(clips, out=out, workers=workers, scheduler=scheduler, **told, **options))
+        print_takes(voice, split_of_takes(clips, out=out, workers=workers, scheduler=scheduler, **common, **options))
         return
-    report = rebuild(clips[0], out=out, **told, **options)
+    report = rebuild(clips[0], out=out, **common, **options)
     voice.result(timing_record(report.timing))
     voice.say(describe_timing(report.timing))
     print_report(voice, report)

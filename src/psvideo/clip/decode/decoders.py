@@ -80,7 +80,7 @@ def guarded(read: Callable[[Path], Read], file: Path) -> Read:
 
 
 def movie_decoders() -> dict[str, bool]:
-    """Tell of each kind of movie whether it can be decoded. Raises ImportError where PyAV cannot be loaded."""
+    """Return of each kind of movie whether it can be decoded. Raises ImportError where PyAV cannot be loaded."""
     codec = import_module("av.codec")
     return {name: decoder in codec.codecs_available for name, decoder in MOVIE_CODECS.items()}
 

@@ -145,8 +145,8 @@ class Held:
         return around
 
     def moved_since(self, light: str, round_number: int) -> bool | None:
-        """Tell whether a light's plate shows motion since that of the round before; None where one of them is not there
-        or no flow is asked for."""
+        """Return whether a light's plate shows motion since that of the round before; None where one of them is not
+        there or no flow is asked for."""
         key, shots = (light, round_number), self.shots.get(light, {})
         if key not in self.motion:
             before, own = shots.get(round_number - 1), shots.get(round_number)
@@ -167,8 +167,8 @@ class Held:
         return ~moved if moved.any() else np.ones((1, 1), np.bool_)
 
     def _stood(self, instant: DueInstant) -> bool:
-        """Tell whether nothing moved in an instant's round: no light shows motion since the round before, and all those
-        after the instant, one at least, were compared. So nothing began to move before the last of them.
+        """Return whether nothing moved in an instant's round: no light shows motion since the round before, and all
+        those after the instant, one at least, were compared. So nothing began to move before the last of them.
 
         The lights before the instant need not wait for the next round then.
         """
@@ -179,14 +179,14 @@ class Held:
         return bool(late) and not any(since.values()) and all(since[light] is False for light in late)
 
     def _stands_on(self) -> bool:
-        """Tell whether the lights in the first half of a round all show that nothing moved since the one before, which
-        was the last whole one: of that, nothing is needed any more."""
+        """Return whether the lights in the first half of a round all show that nothing moved since the round before,
+        which was the last whole one: of that, nothing is needed any more."""
         early = [light for light in self.lights if self.shots[light][self.whole].time_s <= self.middle_s]
         since = [self.moved_since(light, self.whole + 1) for light in early]
         return self.trusts_rest and bool(since) and all(one is False for one in since)
 
     def _rests(self, instant: DueInstant) -> bool:
-        """Tell whether all lights before an instant, one at least, were compared with the next round, and none moves.
+        """Return whether all lights before an instant, one at least, were compared with the next round, and none moves.
 
         The lights after it, of which the round before lacks plates, need not wait for the next round then.
         """
@@ -195,7 +195,7 @@ class Held:
         return self.trusts_rest and bool(early) and seen and not instant.moving
 
     def lacks_ambient(self, instant: DueInstant) -> bool:
-        """Tell whether a round's dark slot is wanted and may still come."""
+        """Return whether a round's dark slot is wanted and may still come."""
         return self.with_ambient and not (self.ended or self.newest > instant.round or instant.round in self.ambient)
 
     def let_go(self) -> None:
@@ -229,7 +229,7 @@ class Held:
                 shots[shot.round] = replace(shot, plate=smaller)
 
     def _is_for_later(self, shot: Shot) -> bool:
-        """Tell whether a plate may serve an instant of a round that is not complete yet."""
+        """Return whether a plate may serve an instant of a round that is not complete yet."""
         coming = self.newest if self.newest > self.whole else self.newest + 1
         if shot.round < coming - 1:
             return False

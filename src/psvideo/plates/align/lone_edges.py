@@ -85,7 +85,7 @@ def _lone(shown: Sequence[InstantSketch], noise: float) -> Vectors:
 
 
 def _edges(one: InstantSketch, noise: float) -> tuple[Vectors, Vectors, Vectors]:
-    """Return steps in the logarithm of light over three pixels, the least that is one, and 1 where light tells."""
+    """Return steps in the logarithm of light over three pixels, the least that is one, and 1 where light is enough."""
     light = cv2.GaussianBlur(light_of(one.codes.astype(np.float32)), (0, 0), SMOOTH_PX)
     level = np.log(light + np.float32(TOE))
     across, down = (cv2.Sobel(level, cv2.CV_32F, *way, scale=3 / 8) for way in ((1, 0), (0, 1)))

@@ -102,7 +102,7 @@ def _instants(
 
 
 def _is_beside(how: Aligning, k: int, time_s: float) -> bool:
-    """Tell whether an instant is looked at for an open shutter only, beside the one whose surface is solved."""
+    """Return whether an instant is looked at for an open shutter only, beside the one whose surface is solved."""
     return isinstance(how.rate, Comb) and time_s != how.rate.time_s(k)
 
 
@@ -148,7 +148,7 @@ def _pass_rest(held: Held, instant: DueInstant, how: Aligning) -> None:
 
 
 def _moves(held: Held, light: str, around: Around, how: Aligning) -> bool:
-    """Tell whether anything moves between two shots of a light, where that is asked for."""
+    """Return whether anything moves between two shots of a light, where that is asked for."""
     if around.before is around.after or around.before.sketch is None:
         return False
     return how.align == "flow" or bool(held.moved_since(light, around.after.round))

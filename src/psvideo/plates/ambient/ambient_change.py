@@ -54,7 +54,7 @@ class AmbientChange:
         return cls(gain=gain, restarts=restarts | limited.any(axis=2) if limited.any() else restarts)
 
     def is_steady(self, level: Image) -> bool:
-        """Tell whether hardly anything of this light, (row, col[, channel]) of blocks, changed by more than noise."""
+        """Return whether hardly anything of this light, (row, col[, channel]) of blocks, changed by more than noise."""
         change = np.abs(self.gain[::SPARSE] - 1) * np.maximum(level[::SPARSE], 0)
         return bool(np.quantile(change, 0.999) < STEADY and self.restarts.mean() < 1e-3)
 

@@ -128,5 +128,5 @@ def _blended(
 
 
 def first_ripple(before: Mains, after: Mains) -> bool:
-    """Tell whether a ripple is known that is still in the earlier picture."""
+    """Return whether a ripple is known that is still in the earlier picture."""
     return before.ripple is None and after.ripple is not None

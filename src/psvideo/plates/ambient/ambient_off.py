@@ -63,7 +63,7 @@ def subtract(
     ``darks`` are the clip's dark slots, read ahead of the plates: no further than the one after the current plate.
     ``waits`` False: not even that while the light is steady, so that few frames are held; then the next dark slot is
     read when it passes. Before the first and after the last, its light is taken as it is. Without any, plates keep
-    theirs. ``known`` is what dark slots told before the first plate, where ``darks`` begin after these;
+    theirs. ``known`` is what dark slots showed before the first plate, where ``darks`` begin after these;
     ``ripple`` is what the clip's timing found of the mains.
     """
     coming = iter(darks)
@@ -89,7 +89,7 @@ def subtract(
 
 
 def _is_stale(after: Ambient, plate: Plate, *, waits: bool) -> bool:
-    """Tell whether a plate asks for a later dark slot: for the next one, or, where none waits, for itself."""
+    """Return whether a plate asks for a later dark slot: for the next one, or, where none waits, for itself."""
     return after.index < plate.flash.index and (plate.flash.is_dark or waits)
 
 

@@ -1,4 +1,4 @@
-"""Ambient light where the plan has no dark slot: told from rows that saw a part of a flash only.
+"""Ambient light where the plan has no dark slot: found from rows that saw a part of a flash only.
 
 Every row of every frame sees some flash, but a share of about d / (Te + d) of them sees only a part of one. Where the
 scene stands, ``frame = A + sum_s w[s] * L[s]``, with the shares w that timing gives and one unknown L for every slot of
@@ -35,8 +35,8 @@ MOSAIC = 2
 MOST_NOISE = 2.0
 """A row is known where the ambient picture's noise variance is at most so many times a frame's."""
 MOST_KEPT = 0.01
-"""... and where it holds no more than this of any flash: in few frames a row may see whole flashes only, which nothing
-tells the ambient light from."""
+"""... and where it holds no more than this of any flash: in few frames a row may see whole flashes only, from which
+nothing separates the ambient light."""
 MOVED = 4.0
 """A block moved whose residuals are so many times what noise leaves of blocks as bright."""
 AT_LEAST, AT_LEAST_SHARE = 1e-4, 3e-3
@@ -51,11 +51,11 @@ AROUND_BLOCKS = 3.0
 
 @dataclass(frozen=True, kw_only=True)
 class Design:
-    """How a window's frames tell the ambient light.
+    """How a window's frames give the ambient light.
 
     frames: their indices, ascending. shares: (slot, frame, row), what each row saw of each lit slot's flashes. takes:
     (frame, row), the weights with which frames sum to the ambient light of one exposure. known: (row,), False where the
-    window does not tell it.
+    window does not show it.
     """
 
     frames: tuple[int, ...]
@@ -66,7 +66,7 @@ class Design:
 
 @dataclass(frozen=True, kw_only=True)
 class Separated:
-    """What a window of frames tells of the ambient light of one exposure.
+    """What a window of frames shows of the ambient light of one exposure.
 
     begins: its first frame. image: as a frame. stood: (block row, block col), True where it was measured, False where
     it was guessed from around. known: (row,).
@@ -90,7 +90,7 @@ def windows_of(numbers: Sequence[int]) -> list[tuple[int, ...]]:
 
 
 def design_of(plan: Plan, camera: Camera, timing: Timing, frames: Iterable[int]) -> Design:
-    """Return how frames (indices) tell the ambient light under a plan that has no dark slot."""
+    """Return how frames (indices) give the ambient light under a plan that has no dark slot."""
     numbers = tuple(frames)
     slots = plan.lit_slots
     shares = np.zeros((len(slots), len(numbers), camera.height_px))
@@ -109,14 +109,14 @@ def design_of(plan: Plan, camera: Camera, timing: Timing, frames: Iterable[int])
 
 
 def _takes(shares: FloatArray) -> tuple[FloatArray, Flags]:
-    """Return the weights (frame, row) of the regression's constant, and the rows where it is told."""
+    """Return the weights (frame, row) of the regression's constant, and the rows where they give it."""
     trust = 1.0 / (TRUSTS_DIM + shares.sum(axis=0))
     terms = np.concatenate([np.ones((1, *shares.shape[1:])), shares])
     equations = np.einsum("anr,nr,bnr->rab", terms, trust, terms)
     scale = np.trace(equations, axis1=1, axis2=2)[:, None, None]
     inverse = np.linalg.inv(equations + 1e-9 * scale * np.eye(len(terms)))
     takes: FloatArray = np.einsum("rb,bnr->nr", inverse[:, 0, :], terms) * trust
-    kept = np.einsum("nr,bnr->br", takes, terms)  # 1 of the ambient light and 0 of every flash, where they are told
+    kept = np.einsum("nr,bnr->br", takes, terms)  # 1 of the ambient light and 0 of every flash, where they are known
     kept[0] -= 1
     known: Flags = np.asarray(((takes**2).sum(axis=0) <= MOST_NOISE) & (np.abs(kept).max(axis=0) <= MOST_KEPT))
     takes[:, ~known] = 0.0
@@ -126,7 +126,7 @@ def _takes(shares: FloatArray) -> tuple[FloatArray, Flags]:
 def separated(
     design: Design, images: Iterable[Image], *, before: Separated | None = None, mosaic: bool = False
 ) -> Separated:
-    """Return the ambient light that a window's frames tell; ``images`` are in linear light, in the design's order.
+    """Return the ambient light that a window's frames show; ``images`` are in linear light, in the design's order.
 
     ``before`` is an earlier window's, for what moves in this one. ``mosaic``: the frames are colour filter mosaics, of
     two by two pixels, and only samples behind the same filter are compared.

@@ -51,7 +51,7 @@ def _separated_plates(
 ) -> Iterator[Plate]:
     """Read windows of frames ahead, and give the ambient light of each as if a dark slot in its middle had shown it.
 
-    A triggered clip has no rows that saw a part of a flash, and nothing is told.
+    A triggered clip has no rows that saw a part of a flash, and shows no ambient light.
     """
     if take.plan.mode == "synced":
         return
@@ -102,7 +102,7 @@ def _as_dark_slot(found: Separated, design: Design, camera: Camera, last: int) -
 
 
 def ambient_before(take: Take, timing: Timing, index: int) -> Ambient | None:
-    """Return what the dark slots before a flash tell of the ambient light, None where there is none; decodes them."""
+    """Return what the dark slots before a flash show of the ambient light, None where there is none; decodes them."""
     ambient: Ambient | None = None
     for dark in ambient_shown(take, timing, None):
         if dark.flash.index >= index:

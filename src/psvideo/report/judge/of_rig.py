@@ -219,7 +219,7 @@ def _lost(usual: Lean, shown_deg: float) -> bool:
 
 
 def _clips(observed: Observed) -> bool:
-    """Tell whether so much is clipped that normals of few lights are left, which lean for that."""
+    """Return whether so much is clipped that normals of few lights are left, which lean for that."""
     return float(np.median([one.clipped_share for one in observed.facts])) > LOST_CLIPPED
 
 
@@ -243,6 +243,6 @@ def _leaning_words(usual: Lean, *, whole: bool, exact: bool) -> str:
 
 
 def quiet(facts: Sequence[InstantFacts]) -> bool:
-    """Tell whether normals are steady enough to be held against each other."""
+    """Return whether normals are steady enough to be held against each other."""
     known = [one.change.normals_deg for one in facts if one.change is not None and (one.moving_share or 0.0) < AT_REST]
     return by_noise_deg(facts) < NOISY_DEG and (not known or float(np.median(known)) < NOISY_DEG)

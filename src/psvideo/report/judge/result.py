@@ -177,8 +177,8 @@ def steadiness(facts: Sequence[InstantFacts]) -> Iterator[Judgement]:
 
 
 def _steady(observed: Observed) -> bool:
-    """Tell whether normals at rest change so little between results that noise is not to blame for what is not trusted,
-    and the rig explains the plates: of few lights nothing else tells gloss, creases or compression from noise."""
+    """Return whether normals at rest change so little between results that noise is not to blame for what is not
+    trusted, and the rig explains the plates: of few lights nothing else separates gloss or compression from noise."""
     known = [one.change.normals_deg for one in observed.facts if one.change is not None]
     fit = observed.rig_fit
     explained = fit is not None and fit.excess <= HARDLY_OFF
@@ -186,7 +186,7 @@ def _steady(observed: Observed) -> bool:
 
 
 def moves(facts: Sequence[InstantFacts]) -> bool:
-    """Tell whether a usual round shows motion."""
+    """Return whether a usual round shows motion."""
     shares = [one.moving_share for one in facts if one.moving_share is not None]
     return bool(shares) and float(np.median(shares)) > AT_REST
 

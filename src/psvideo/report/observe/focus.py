@@ -121,7 +121,7 @@ def _blurred(squares: Squares, sigma_px: float) -> Squares:
 
 
 def _ridge(right: Plane, down: Plane, steep: Plane) -> NDArray[np.bool_]:
-    """Tell where the slope is greatest across its edge."""
+    """Return where the slope is greatest across its edge."""
     across = np.abs(right) > np.abs(down)
     row = steep >= cv2.dilate(steep, np.ones((1, 3), np.uint8))
     col = steep >= cv2.dilate(steep, np.ones((3, 1), np.uint8))

@@ -92,7 +92,7 @@ def motion(before: Glimpse, after: Glimpse) -> Motion | None:
 
 
 def _changed(one: NDArray[np.float32], other: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """Tell where two pictures differ by more than noise, (row, col). A change of all light by one factor is none."""
+    """Return where two pictures differ by more than noise, (row, col). A change of all light by one factor is none."""
     early, late = one[::2, ::2], other[::2, ::2]  # medians of a quarter are as good
     bright = early > 30
     level = float(np.median(late[bright] / early[bright])) if bright.any() else 1.0
@@ -105,7 +105,7 @@ def _changed(one: NDArray[np.float32], other: NDArray[np.float32]) -> NDArray[np
 
 
 def _explained(one: NDArray[np.float32], other: NDArray[np.float32], way: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """Tell where flow explains most of what two pictures differ by, or leaves no more than shading, (row, col)."""
+    """Return where flow explains most of what two pictures differ by, or leaves no more than shading, (row, col)."""
     x, y = _places(way)
     moved = cv2.remap(other, x + way[..., 0], y + way[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     left, change = (cv2.blur((picture - one) ** 2, (DETAIL_PX, DETAIL_PX)) for picture in (moved, other))

@@ -237,7 +237,7 @@ class Observed:
         self._first.clear()
 
     def look_at_window(self, found: Separated) -> None:
-        """Look at the ambient light that a window of frames told without a dark slot."""
+        """Look at the ambient light that a window of frames showed without a dark slot."""
         self._dark = np.array(_brightest(thinned(found.image)))
         self.ambient_measured[found.begins] = float(found.stood.mean())
 

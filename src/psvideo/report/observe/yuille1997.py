@@ -29,13 +29,13 @@ CREASE = 0.25
 """Normals that turn by more radians from pixel to pixel show a crease, or one thing before another."""
 BESIDE_PX = 7
 CLEAR = 32.0
-"""A point tells something where its normals turn by so many times the square that noise makes of them."""
+"""A point counts where its normals turn by so many times the square that noise makes of them."""
 OUTLIER = 2.0
 """Residuals are taken for Cauchy's, so many times their median wide."""
 ROUNDS, ENOUGH, SHIFTS = 30, 1e-4, 2
 LEAST_TOLD = 0.02
-"""Changes that points tell so little of (eigenvalues, each unknown's size apart) are taken for none: a cylinder, waves
-or the edges of a few faces tell of some changes and not of others."""
+"""Changes of which points show so little (eigenvalues, each unknown's size apart) are taken for none: a cylinder, waves
+or the edges of a few faces show some changes and not others."""
 WIDEST, A_LITTLE = 1.5, 0.01
 """A picture's width over the focal length is no more than a lens of 24 mm gives on film. Of a lens that is not known it
 may be anything up to this: what is seen beside the axis looks turned."""
@@ -204,7 +204,7 @@ def _fitted(crossed: FloatArray, more: FloatArray | None) -> _Fitted:
 
 
 def _solved(squares: FloatArray, pull: FloatArray) -> FloatArray:
-    """Solve normal equations for what they tell of; the rest is 0."""
+    """Solve normal equations for what they determine; the rest is 0."""
     sizes = np.sqrt(np.diag(squares)) + 1e-12
     told, ways = np.linalg.eigh(squares / sizes / sizes[:, None])
     kept = ways[:, told > LEAST_TOLD] / np.sqrt(told[told > LEAST_TOLD])

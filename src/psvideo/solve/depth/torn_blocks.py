@@ -154,7 +154,7 @@ def _move_out(ties: Any, inverse: Any, belongs: Any, colour: int, row: int, k: i
 
 @REORDERED.called
 def _follow(ties: Any, inverse: Any, belongs: Any, colour: int, row: int, k: int) -> None:
-    """Move a pixel that is still loose where the one of its block goes that it hangs together with."""
+    """Move a pixel that is still loose along with a pixel of its block that it hangs together with."""
     if belongs[colour, row, k] != LOOSE:
         return
     west, east, north, south = ties_about(ties, colour, row, k)

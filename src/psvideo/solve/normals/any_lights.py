@@ -55,7 +55,7 @@ def add_start(task: Task, w: Floats, v: Floats, m: Floats, e: Floats, n: int) ->
 
 @FUSED.called
 def fill_residuals(matrix: Floats, w: Floats, m: Floats, e: Floats, n: int) -> None:
-    """Residuals without their sign, OUT of what is not there."""
+    """Absolute residuals; OUT where a measurement is MISSING."""
     for light in range(len(e)):
         lamp, there, errors = of_light(matrix, light), m[light], e[light]
         for i in range(n):
@@ -68,7 +68,7 @@ def fill_residuals(matrix: Floats, w: Floats, m: Floats, e: Floats, n: int) -> N
 def find_scale(
     matrix: Floats, noise: np.float32, share: np.float32, w: Floats, v: Floats, m: Floats, e: Floats, n: int
 ) -> None:
-    """Residuals without their sign, and in SCALE their median as a standard deviation, at least a camera's noise.
+    """Absolute residuals, and in SCALE their median as a standard deviation, at least a camera's noise.
 
     Three of the residuals may be 0 because three unknowns were fitted: the median is that of the others.
     """

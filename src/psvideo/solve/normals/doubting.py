@@ -164,11 +164,13 @@ def width_of(known: NDArray[np.bool_] | Floats, share: float) -> int:
 
 
 def _typical(squares: Floats, noise: Floats, shown: Floats, width: int) -> Floats:
-    """Return the root of what is typical of squares around every point, of which noise makes ``noise`` in the mean and
-    that is taken off; what stands out counts as OUTLYING times that, and as what noise makes of a few.
+    """Return the root of the typical ``squares`` around every point.
 
-    ``shown`` is each point's albedo, up to the mean, by which it counts: whatever little light comes from elsewhere, or
-    is lost in a file's codes, turns black cloth far, and says nothing of the subject before it."""
+    ``noise`` is what noise alone would make of them, whose mean the caller has taken off. Outliers count as OUTLYING
+    times what is typical, and what chance could leave of ``noise`` over as many points is taken off as well.
+    ``shown``, each point's albedo up to the mean, is its weight: a little stray light, or what is lost in a file's
+    codes, turns the normals of black cloth far, and says nothing of the subject before it.
+    """
     weight = _mean(shown, width)
     typical = _mean(squares * shown, width) / weight
     for _ in range(TURNS):
@@ -203,8 +205,8 @@ def _turned(normals: Floats, one: Evidence) -> Floats:
 
 
 def _torn_squared(points: ThinSurface) -> Floats:
-    """Return the squared angle by which normals around every point belong to no surface: what their slopes add up to
-    around four points each, over a square."""
+    """Return the squared angle by which the normals around every point cannot be one surface's: around any four points
+    the slopes of a surface add up to 0, and what these add up to is averaged over a square."""
     across, up, towards = points.planes
     facing = np.maximum(towards, LEAST_FACING)
     right, down = -across / facing, up / facing

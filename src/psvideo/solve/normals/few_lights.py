@@ -88,7 +88,7 @@ def _added(sums: Any, lamp: Any, weight: np.float32, m: np.float32) -> Any:
 
 @FUSED.inlined
 def _error(m: np.float32, lamp: Any, x: np.float32, y: np.float32, z: np.float32) -> np.float32:
-    """The residual without its sign; of what is MISSING OUT."""
+    """The absolute residual; OUT where the measurement is MISSING."""
     error: np.float32 = abs(m - (lamp[0] * x + lamp[1] * y + lamp[2] * z))
     return error if m > ABSENT else OUT
 

@@ -50,7 +50,7 @@ class IndirectLook:
 
 
 def indirect_of(one: Evidence, surface: Surface) -> Indirect:
-    """Return the same of a surface that was solved before; its plates are read for it."""
+    """Return what ``IndirectLook`` finds for a surface that is solved already; its plates are read again for it."""
     looks = IndirectLook.of(one)
     planes, albedo = stored(surface)
 

@@ -13,7 +13,7 @@ from psvideo.solve.normals.task import Floats, Mask
 
 @dataclass(frozen=True, kw_only=True)
 class MovingDoubt:
-    """How much counts that plates before and after an instant disagree along the motion.
+    """How plates before and after an instant that disagree along the motion become degrees of doubt.
 
     own: how much of the angle that this makes in a pixel itself.
     around_deg, around: where the mean angle over a square of such a share of the subject's size is so large, it counts

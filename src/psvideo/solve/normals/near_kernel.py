@@ -77,7 +77,7 @@ def _place_lights(matrix: Any, per_strength: Any, near: Any, row: Any, col: Any,
 
 
 def at(numbers: Any, pixel: int) -> Any:
-    """What ``of_light`` or one light's 1 / strength, for all pixels or as planes, is in a pixel. Compiled only."""
+    """One pixel's value of what ``of_light`` returned, or of one light's 1 / strength. Compiled only."""
     raise NotImplementedError
 
 

@@ -85,7 +85,7 @@ def _sum_up(task: Task, w: Floats, values: Floats, m: Floats, channel: int, n: i
 
 @FUSED.inlined
 def _sum_up_weighed(task: Task, w: Floats, values: Floats, m: Floats, weights: Floats, channel: int, n: int) -> None:
-    """The same of measurements that count by what they counted for the normal: a highlight is not the surface's."""
+    """As ``_sum_up``, each measurement weighted as it was for the normal: a highlight is not the surface's colour."""
     w[SUM : SUM + n], w[COUNT : COUNT + n] = ZERO, ZERO
     for light in range(task.lights):
         lamp = of_light(task.matrix, light)

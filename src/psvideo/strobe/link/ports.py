@@ -46,7 +46,7 @@ class SerialPort:
 
     @property
     def is_candidate(self) -> bool:
-        """True where a strobe controller may be."""
+        """Whether a strobe controller may be."""
         return self.board is not None or self.bridge is not None
 
     @property

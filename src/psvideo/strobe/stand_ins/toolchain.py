@@ -53,7 +53,7 @@ def _has(program: str) -> bool:
 
 
 def _finds(compiler: str, header: str) -> bool:
-    """True where a compiler finds a header."""
+    """Return whether a compiler finds a header."""
     search = [
         compiler,
         *(["-mmcu=atmega328p"] if compiler == "avr-gcc" else []),

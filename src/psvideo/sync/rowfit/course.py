@@ -48,7 +48,7 @@ def followed(plan: Plan, rows: Profiles, seed: Seed) -> Course:
 
 
 def too_many(steps: int, strayed: int, frames: int) -> bool:
-    """Tell whether frames seem to be missing at so many places, or so many, that it takes an excellent fit."""
+    """Return whether frames seem to be missing at so many places, or so many, that it takes an excellent fit."""
     return steps > max(MOST_STEPS, MOST_STEPS_SHARE * frames) or strayed > MOST_STRAYED_SHARE * frames
 
 

@@ -87,7 +87,7 @@ def freed(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> Freed:
 
 
 def _may_be_feigned(rows: Profiles, before: Fit, after: Fit) -> bool:
-    """Tell whether the subject moves so much that it may feign what the times that were freed explain."""
+    """Return whether the subject moves so much that it may feign what the times that were freed explain."""
     moving = rows.restless is None and gain_of(rows, after.rest) < STILL
     return moving and _gain(rows, before, after) < PLAIN * _loss(rows, before)
 
@@ -121,7 +121,7 @@ def _tails(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...], tails: t
 
 
 def _longer(taken: Fit, joint: Fit) -> bool:
-    """Tell whether tails that may be taken are far longer than the blur that was found beside tails, and longer than
+    """Return whether tails that may be taken are far longer than the blur that was found beside tails, and longer than
     one that is too small to be found."""
     least_s = LEAST_BLUR_ROWS * joint.beat.row_time_s
     is_blurred = joint.beat.blur_s > 1.01 * least_s
@@ -148,7 +148,7 @@ def _off_s(before: Fit, after: Fit, name: str) -> float:
 
 
 def _clear(before: Fit, after: Fit, names: tuple[str, ...]) -> bool:
-    """Tell whether one of some times has moved by far more than its error."""
+    """Return whether one of some times has moved by far more than its error."""
     return any(_off_s(before, after, name) > CLEAR * after.errors_s[name] for name in names)
 
 
@@ -162,7 +162,7 @@ def _next(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...], names: tu
 
 
 def _softer(plan: Plan, rows: Profiles, fit: Fit) -> bool:
-    """Tell whether flashes that rise and fall as slowly, and start earlier by that, fit better."""
+    """Return whether flashes that rise and fall as slowly, and start earlier by that, fit better."""
     limit = _loss(rows, fit) - WORTH
     for share in SOFTER:
         tail_s = share * _shortest_s(plan)
@@ -174,7 +174,7 @@ def _softer(plan: Plan, rows: Profiles, fit: Fit) -> bool:
 
 
 def _plausible(plan: Plan, beat: Beat) -> bool:
-    """Tell whether a beat's tails are tails: no longer than the shortest flash, unless the plan says so."""
+    """Return whether a beat's tails are tails: no longer than the shortest flash, unless the plan says so."""
     longest_s = max(_shortest_s(plan), plan.rise_s, plan.fall_s)
     return max(beat.rise_s, beat.fall_s) <= longest_s
 

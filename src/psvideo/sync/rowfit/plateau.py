@@ -62,7 +62,7 @@ def _share(rows: Profiles, name: str) -> float:
 
 
 def _flat(plan: Plan, rows: Profiles, fit: Fit, middle_s: float, reach_s: float) -> bool:
-    """Tell whether moves about the middle make no difference; a valley's sides would rise by a quarter of its rim."""
+    """Return whether moves about the middle make no difference; a valley's sides would rise by a quarter of its rim."""
     squares = [_left(plan, rows, fit, _shifted(rows, fit.beat, middle_s + s, 0.0)) for s in (-reach_s, 0.0, reach_s)]
     return max(squares) - min(squares) < FLAT * WORSE
 

@@ -124,7 +124,7 @@ def _gains(
 
 
 def _may_move(rows: Profiles, beat: Beat, name: str, move: float) -> bool:
-    """Tell whether a time has room to move: tails are not negative, exposures not longer than the frame."""
+    """Return whether a time has room to move: tails are not negative, exposures not longer than the frame."""
     if move < 0:
         return bool(getattr(beat, name) > 0)
     return name != "exposure_s" or beat.exposure_s < rows.period_s * (1 - 1e-9)

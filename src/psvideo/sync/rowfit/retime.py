@@ -147,7 +147,7 @@ def likeliest(
 
 
 def _alike(change: FloatArray, repeated: Mask) -> bool:
-    """Tell whether frames that a pattern takes for repeated look it."""
+    """Return whether frames that a pattern takes for repeated look it."""
     if not repeated.any() or repeated[1:].all():
         return False
     return float(np.median(change[repeated])) < ALIKE * float(np.median(change[~repeated]))

@@ -80,7 +80,7 @@ def _as_meant(plan: Plan, rows: Profiles, found: ClipFit) -> tuple[Plan, ClipFit
 
 
 def convincing(plan: Plan, found: ClipFit) -> bool:
-    """Tell whether a fit has found a strobe, and not merely the least bad place for one.
+    """Return whether a fit has found a strobe, and not merely the least bad place for one.
 
     Brightnesses alone explain some of mere noise, which counts in short clips.
     """
@@ -99,7 +99,7 @@ def convincing(plan: Plan, found: ClipFit) -> bool:
 
 
 def doubtful(plan: Plan, found: ClipFit) -> bool:
-    """Tell whether a fit leaves so much, or had to stray so far from the plan, that the plan may be wrong by far."""
+    """Return whether a fit leaves so much, or had to stray so far from the plan, that the plan may be wrong by far."""
     return (
         _moved(plan, found)
         or gain_of(found.rows, found.fit.rest) < UNSURE_GAIN
@@ -120,7 +120,7 @@ def _excuses(plan: Plan, found: ClipFit) -> int:
 
 
 def _moved(plan: Plan, found: ClipFit) -> bool:
-    """Tell whether a fit needs another exposure or readout than the plan's."""
+    """Return whether a fit needs another exposure or readout than the plan's."""
     beat, camera = found.fit.beat, plan.camera
     moved = abs(beat.exposure_s / camera.exposure_s - 1) > MOVED
     if camera.readout_s:
@@ -129,7 +129,7 @@ def _moved(plan: Plan, found: ClipFit) -> bool:
 
 
 def _feigned(plan: Plan, found: ClipFit) -> bool:
-    """Tell whether a subject that moves in step with the shutter may feign another exposure or readout.
+    """Return whether a subject that moves in step with the shutter may feign another exposure or readout.
 
     Where nothing moves, the true shutter explains nearly everything.
     """
@@ -141,12 +141,12 @@ def _unsure(plan: Plan, found: ClipFit) -> bool:
 
 
 def _gaps_feigned(found: ClipFit) -> bool:
-    """Tell whether holes may only stand for a strobe that drifts away from the plan's: true ones leave little."""
+    """Return whether holes may only stand for a strobe that drifts away from the plan's: true ones leave little."""
     return found.steps > 0 and found.fit.explained < GAPPED
 
 
 def flashes_differ(plan: Plan, found: ClipFit) -> bool:
-    """Tell whether flashes much longer or shorter than the plan's, in the same places and without tails, fit better."""
+    """Return whether flashes much longer or shorter than the plan's, in the same places without tails, fit better."""
     rows, beat = found.rows.take(slice(0, LENGTH_FRAMES)).binned(48), found.fit.beat
     rest = unexplained(plan, rows, beat)
     limit = FLASHES_DIFFER * robust_loss(rows, rest, rest)

@@ -119,7 +119,7 @@ def clock_too_far(plan: Plan, found: ClipFit) -> str:
 
 
 def _repeats(plan: Plan, rows: Profiles) -> bool:
-    """Tell whether the picture is the same in every cycle's frames, as where the camera triggers the strobe."""
+    """Return whether the picture is the same in every cycle's frames, as where the camera triggers the strobe."""
     cycle, frames = len(plan.cycle_slots), len(rows.value)
     if frames < 2 * cycle + 1 or cycle < 2:
         return False

@@ -138,7 +138,7 @@ def _synced(plan: Plan, frames: int) -> tuple[FlashTrain, FloatArray, FloatArray
 def is_complete(
     camera: Camera, emission: Emission, start_s: float, duration_s: float, recorded: NDArray[np.intp]
 ) -> bool:
-    """Tell whether no light of the flash fell into frames that were not recorded."""
+    """Return whether no light of the flash fell into frames that were not recorded."""
     opens_s = row_opens_s(camera)
     reach = int(np.ceil((opens_s.max() + camera.exposure_s) / camera.frame_period_s)) + 1
     now = int(np.floor(start_s / camera.frame_period_s))

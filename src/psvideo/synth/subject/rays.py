@@ -28,7 +28,7 @@ class Caster:
         return np.asarray(hit, np.intp)
 
     def blocked(self, origins: FloatArray, directions: FloatArray, distance_m: FloatArray) -> NDArray[np.bool_]:
-        """Tell whether anything lies on each ray before ``distance_m``. Directions are unit vectors."""
+        """Return whether anything lies on each ray before ``distance_m``. Directions are unit vectors."""
         reach = np.minimum(distance_m * self._scale, 1e30).astype(np.float32)
         unit = np.ascontiguousarray(directions, np.float32)
         return np.asarray(self._scene.run(self._boxed(origins), unit, reach, query="OCCLUDED") >= 0)

@@ -62,7 +62,7 @@ def irradiance(light: Light, points_m: FloatArray) -> tuple[FloatArray, FloatArr
 def _shadowed(
     view: SeenScene, direction: FloatArray, distance_m: FloatArray, lit: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Tell for each hit whether something stands between it and the light; asked only where the light could reach."""
+    """Return for each hit whether something stands between it and the light; only asked where the light could reach."""
     shadowed = np.zeros(len(lit), bool)
     if view.shadows is not None and lit.any():
         origins = lifted(view)[lit]

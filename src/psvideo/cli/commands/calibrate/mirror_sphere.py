@@ -82,17 +82,17 @@ def mirror_sphere(
         frames=frames,
         first_light=first_light,
     )
-    told: dict[str, Any] = {"force": force, "watch": voice.track, "caller": voice.caller()}
+    common: dict[str, Any] = {"force": force, "watch": voice.track, "caller": voice.caller()}
     if each:
         calibrate_all(
-            voice, "mirror-sphere", pictures, out=out, workers=workers, scheduler=scheduler, **told, **options
+            voice, "mirror-sphere", pictures, out=out, workers=workers, scheduler=scheduler, **common, **options
         )
         return
     if workers is not None or scheduler is not None:
         raise UsageError(
             "--workers and --scheduler are for several takes. Add --each if every folder is a take of its own."
         )
-    found = measure(pictures, out=out, **told, **options)
+    found = measure(pictures, out=out, **common, **options)
     voice.say(describe(found))
     voice.say(f"{out}: {len(found.rig.lights)} of {len(found.lights)} lights written; see {out.with_suffix('.png')}.")
     voice.result(record(found))

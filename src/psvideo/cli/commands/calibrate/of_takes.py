@@ -30,10 +30,10 @@ def one_or_all(
     **options: Any,
 ) -> Found | None:
     """Calibrate on one take and return what was found; on several, or with workers, on each, and return None."""
-    told: dict[str, Any] = {"force": force, "watch": voice.track, "caller": voice.caller()}
+    common: dict[str, Any] = {"force": force, "watch": voice.track, "caller": voice.caller()}
     if len(pictures) == 1 and workers is None and scheduler is None:
-        return measure(pictures[0], out=out, **told, **options)
-    calibrate_all(voice, calibration, pictures, out=out, workers=workers, scheduler=scheduler, **told, **options)
+        return measure(pictures[0], out=out, **common, **options)
+    calibrate_all(voice, calibration, pictures, out=out, workers=workers, scheduler=scheduler, **common, **options)
     return None
 
 
