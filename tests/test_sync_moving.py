@@ -13,7 +13,9 @@ from psvideo.model.row_profiles import collect_with_doubt
 from psvideo.model.timing import Timing
 from psvideo.sync.find import find_timing
 from psvideo.sync.rowfit.beat import FoundClock
-from psvideo.sync.rowfit.profiles import Profiles, compiled_flashes, compiled_rows
+from psvideo.sync.rowfit.freed import taken_away
+from psvideo.sync.rowfit.profiles import Profiles, compiled_flashes, compiled_rows, unexplained
+from psvideo.sync.rowfit.refine import Fit, robust_loss
 from psvideo.sync.rowfit.row_model import seen_of
 from psvideo.sync.rowfit.seed import first_guess
 from psvideo.sync.rowfit.whitening import factors, whiten
@@ -75,3 +77,34 @@ def test_residuals_are_whitened_by_what_flashes_of_one_light_differ_by() -> None
     whiten(column, diagonal, below)
     factor = np.linalg.cholesky(np.eye(20) + 40.0 * shares @ shares.T)
     assert np.allclose(column, np.linalg.solve(factor, rows.value[:, row]), atol=1e-12)
+
+
+def test_the_same_times_gain_nothing_whichever_samples_were_trusted() -> None:
+    filmed = replace(EVERYTHING, plan=plan_of(height_px=48), claimed=None, frames=40, mains=None, dropped=()).film(0)
+    index, profiles, _ = collect_with_doubt(filmed.frames)
+    plan = plan_of(height_px=48)
+    rows = Profiles(
+        value=np.asarray(profiles, np.float64),
+        index=index,
+        period_s=plan.camera.frame_period_s,
+        place=np.arange(48.0),
+        window_start=np.zeros(1, np.int64),
+        restless=np.full(48, 40.0),
+    )
+    beat = replace(first_guess(plan), clock=FoundClock(phase_s=filmed.exposure.flashes[0].start_s, offset_ppm=3000.0))
+    even, some = np.ones_like(rows.value), np.random.default_rng(3).random(rows.value.shape) ** 4
+    one, other = (
+        Fit(
+            beat=beat,
+            rest=unexplained(plan, rows, beat, weight),
+            weight=weight,
+            shift_error_s=0.0,
+            errors_s={},
+            explained=0.0,
+        )
+        for weight in (even, some)
+    )
+    assert robust_loss(rows, one.rest, one.rest) != robust_loss(rows, other.rest, one.rest)
+    assert taken_away(plan, rows, one, other) == taken_away(plan, rows, other, one) == 0.0
+    still = replace(rows, restless=None)
+    assert taken_away(plan, still, one, other) != 0.0

@@ -71,11 +71,13 @@ def freed(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> Freed:
             taken = tried is not fit
         else:
             tried = fitted(plan, rows, fit.beat, (*free, *more))
-            taken = _gain(rows, fit, tried) > max(BETTER * _loss(rows, fit), LEAST_GAIN) and _clear(fit, tried, more)
+            taken = taken_away(plan, rows, fit, tried) > max(BETTER * _loss(rows, fit), LEAST_GAIN) and _clear(
+                fit, tried, more
+            )
         if not taken:
             refused |= set(more)
             continue
-        if not set(more) <= set(TAILS) and _may_be_feigned(rows, fit, tried):
+        if not set(more) <= set(TAILS) and _may_be_feigned(plan, rows, fit, tried):
             unsure_s = float(np.hypot(unsure_s, rms_apart_s(rows, fit.beat, tried.beat) / np.sqrt(2)))
             wider_s |= {name: _off_s(fit, tried, name) / np.sqrt(2) for name in more}
         fit, free = tried, tuple(dict.fromkeys((*free, *tried.errors_s)))
@@ -86,10 +88,10 @@ def freed(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> Freed:
     return Freed(fit=replace(fit, errors_s=errors_s) if wider_s else fit, unsure_s=unsure_s, soft_s=soft_s)
 
 
-def _may_be_feigned(rows: Profiles, before: Fit, after: Fit) -> bool:
+def _may_be_feigned(plan: Plan, rows: Profiles, before: Fit, after: Fit) -> bool:
     """Return whether the subject moves so much that it may feign what the times that were freed explain."""
     moving = rows.restless is None and gain_of(rows, after.rest) < STILL
-    return moving and _gain(rows, before, after) < PLAIN * _loss(rows, before)
+    return moving and taken_away(plan, rows, before, after) < PLAIN * _loss(rows, before)
 
 
 def _tails(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...], tails: tuple[str, ...]) -> Freed:
@@ -99,7 +101,7 @@ def _tails(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...], tails: t
     worse.
     """
     slow = fitted(plan, rows, fit.beat, (*free, *tails))
-    gain = _gain(rows, fit, slow)
+    gain = taken_away(plan, rows, fit, slow)
     if gain < SOFT or not _plausible(plan, slow.beat):
         return Freed(fit=fit)
     row_time_s = fit.beat.row_time_s
@@ -108,12 +110,12 @@ def _tails(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...], tails: t
     blurred = fitted(plan, rows, replace(fit.beat, blur_s=row_time_s), (*free, BLUR))
     start = replace(slow.beat, blur_s=blurred.beat.blur_s)
     joint = fitted(plan, rows, start, (*free, *tails, BLUR))
-    both = joint if _plausible(plan, joint.beat) and _gain(rows, slow, joint) >= -WORTH else slow
+    both = joint if _plausible(plan, joint.beat) and taken_away(plan, rows, slow, joint) >= -WORTH else slow
     apart_s = rms_apart_s(rows, slow.beat, both.beat)
-    by_blur = max(_gain(rows, fit, blurred), 0.0)
-    beyond = _gain(rows, fit, both) - by_blur
+    by_blur = max(taken_away(plan, rows, fit, blurred), 0.0)
+    beyond = taken_away(plan, rows, fit, both) - by_blur
     likelier = gain > by_blur and beyond > max(SLOWER, SLOWER_SHARE * _loss(rows, fit))
-    taken = both if _gain(rows, slow, both) > WORTH else slow
+    taken = both if taken_away(plan, rows, slow, both) > WORTH else slow
     if likelier and _longer(taken, joint) and _clear(fit, both, tails):
         return Freed(fit=taken, unsure_s=float(np.hypot(apart_s, 0.0 if taken is both else _more_s(slow, both))))
     doubt_s = UNTOLD * float(np.hypot(rms_apart_s(rows, fit.beat, both.beat), both.shift_error_s))
@@ -138,9 +140,20 @@ def _loss(rows: Profiles, fit: Fit) -> float:
     return robust_loss(rows, fit.rest, fit.rest)
 
 
-def _gain(rows: Profiles, before: Fit, after: Fit) -> float:
-    """Return what a fit takes away of the robust loss of the one before."""
-    return _loss(rows, before) - robust_loss(rows, after.rest, before.rest)
+def taken_away(plan: Plan, rows: Profiles, before: Fit, after: Fit) -> float:
+    """Return what a fit takes away of the robust loss of the one before.
+
+    Where flashes differ, which of them count as outliers has more than one answer, and brightnesses depend on it more
+    than on the times: both fits get the better of their own trust in the samples and the other's.
+    """
+    if rows.restless is None:
+        return _loss(rows, before) - robust_loss(rows, after.rest, before.rest)
+
+    def least(one: Fit, other: Fit) -> float:
+        as_other = unexplained(plan, rows, one.beat, other.weight)
+        return min(robust_loss(rows, rest, before.rest) for rest in (one.rest, as_other))
+
+    return least(before, after) - least(after, before)
 
 
 def _off_s(before: Fit, after: Fit, name: str) -> float:
