@@ -16,6 +16,10 @@ LEAST = 0.0003
 ROWS, SAMPLES = 24, 1 << 16
 """Noise is looked for in about so many rows of every plate, evenly spread, and so many samples of all."""
 LEVELS, LEAST_PIXELS = 12, 512
+CODE_SAMPLES, LEAST_CODES, ALIKE, COARSEST = 1 << 12, 5, 1.25, 0.025
+"""So many samples of a plate show whether it holds a file's codes: it has few values then, from so many on, which most
+samples share, and half of the gaps between neighbouring ones are alike up to this factor. Codes of eight bits are no
+farther apart, whatever their curve (HLG: 0.021 at the top)."""
 LOW_SHARE, LOW_OF_VARIANCE = 0.25, 0.1015
 """Noise comes from the lowest quarter of squared differences, for up to three quarters of a picture may be detail: the
 quarter's border as a share of the mean, for one Gaussian number (chi squared)."""
@@ -44,16 +48,19 @@ def noise_of(
     """Return the noise of one channel of plates as ``solve`` takes them.
 
     Second differences along columns and rows (J. Immerkaer, "Fast noise variance estimation", CVIU 1996) leave hardly
-    anything of smooth surfaces; the lowest quarter of them at each level leaves edges and texture out.
+    anything of smooth surfaces; the lowest quarter of them at each level leaves edges and texture out. Plates that hold
+    a file's codes are never less noisy than rounding makes them: a twelfth of the codes' squared distance at the level.
     """
     pixels = SAMPLES // len(plates)
-    details, levels = zip(*(_fine(plate, black_level, scale, pixels) for plate in plates), strict=True)
-    detail, level = np.concatenate(details), np.concatenate(levels)
+    details, levels, squares = zip(*(_fine(plate, black_level, scale, pixels) for plate in plates), strict=True)
+    detail, level, rounding = np.concatenate(details), np.concatenate(levels), np.concatenate(squares) / 12
     if len(detail) < LEAST_PIXELS:
         return PlateNoise(read=LEAST**2, photon=0.0)
     parts = np.array_split(np.argsort(level), LEVELS)
     at = np.array([float(np.median(level[part])) for part in parts])
+    rounded = np.array([float(np.median(rounding[part])) for part in parts])
     found = np.array([float(np.quantile(detail[part], LOW_SHARE)) / LOW_OF_VARIANCE for part in parts])
+    found = np.maximum(found - rounded, rounded)  # of the samples a twelfth is what blurred the codes
     bright, darkest = at > 0.25 * at.max(), int(np.argmin(at))
     if at.max() <= 0:  # no light anywhere
         return PlateNoise(read=max(float(found[darkest]), LEAST**2), photon=0.0)
@@ -63,22 +70,48 @@ def noise_of(
     return PlateNoise(read=read, photon=photon)
 
 
-def _fine(plate: Samples | Mixture, black_level: float, scale: float, pixels: int) -> tuple[Values, Values]:
-    """Return squared second differences that white noise makes as large as its variance, and the level there."""
-    rows = plate.shape[0]
-    if rows < 3 or plate.shape[1] < 3:
-        return np.zeros(0), np.zeros(0)
+def _fine(plate: Samples | Mixture, black_level: float, scale: float, pixels: int) -> tuple[Values, Values, Values]:
+    """Return squared second differences that white noise makes as large as its variance, the level there, and the
+    squared distance of the plate's codes, 0 where it holds none.
+
+    Differences of codes are few and far between: codes are blurred by their distance first, evenly.
+    """
+    rows, cols = plate.shape[:2]
+    if rows < 3 or cols < 3:
+        return np.zeros(0), np.zeros(0), np.zeros(0)
     step = max((rows - 2) // ROWS, 1)
     firsts = np.arange(0, rows - 2, step)
     part = rows_of(plate, (firsts + np.arange(3)[:, None]).ravel())
     part = part[..., min(1, plate.shape[2] - 1)] if len(plate.shape) == 3 else part
-    top, middle, bottom = np.split((part.astype(np.float64) - black_level) * scale, 3)
+    count = len(firsts) * (cols - 2)
+    row, col = np.divmod(np.arange(0, count, max(count // pixels, 1)), cols - 2)
+    lines = part.reshape(3, len(firsts), cols)
+    around = (lines[:, row[:, None], col[:, None] + np.arange(3)].astype(np.float64) - black_level) * scale
+    gaps = _gaps_of_codes(around)
+    if gaps is not None:
+        around += gaps * (np.random.default_rng(0).random(around.shape) - 0.5)
+    top, middle, bottom = around
     down = top - 2 * middle + bottom
-    fine = down[:, :-2] - 2 * down[:, 1:-1] + down[:, 2:]
-    every = max(fine.size // pixels, 1)
+    fine = down[:, 0] - 2 * down[:, 1] + down[:, 2]
     three = top + middle + bottom
-    level = (three[:, :-2] + three[:, 1:-1] + three[:, 2:]) / 9  # the same noise is in both, and not correlated
-    return (fine**2 / 36).ravel()[::every], level.ravel()[::every]
+    level = (three[:, 0] + three[:, 1] + three[:, 2]) / 9  # the same noise is in both, and not correlated
+    return fine**2 / 36, level, np.zeros_like(level) if gaps is None else gaps[1, :, 1] ** 2
+
+
+def _gaps_of_codes(values: Values) -> Values | None:
+    """Return how far from each other codes are at every value, or None where values are none that a file rounded."""
+    some = values.ravel()[:: max(values.size // CODE_SAMPLES, 1)]
+    codes = np.unique(some)
+    if not LEAST_CODES <= len(codes) <= len(some) / 2:
+        return None
+    gaps = np.diff(codes)
+    ratios = gaps[1:] / gaps[:-1]
+    fine_or_none = gaps.max() < LEAST or np.median(gaps) > COARSEST
+    if fine_or_none or np.mean((ratios < ALIKE) & (ratios > 1 / ALIKE)) < 0.5:
+        return None
+    beside = np.pad(gaps, 1, mode="edge")
+    gaps = np.minimum(gaps, np.minimum(beside[:-2], beside[2:]))  # some codes may not occur
+    return np.asarray(np.interp(values, codes[:-1] + gaps / 2, gaps))
 
 
 def rows_of(plate: Samples | Mixture, rows: NDArray[np.intp]) -> Samples:

@@ -1,0 +1,66 @@
+"""How noisy plates are said to be, beside what they were made with: sensor noise, and a file's rounding."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from psvideo.solve.normals.plate_noise import noise_of
+
+Array = NDArray[np.float64]
+
+
+def encoded_srgb(light: Array) -> Array:
+    return np.where(light < 0.0031308, 12.92 * light, 1.055 * np.maximum(light, 0.0031308) ** (1 / 2.4) - 0.055)
+
+
+def light_of_srgb(code: Array) -> Array:
+    return np.where(code < 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)
+
+
+def linear(light: Array) -> Array:
+    return light
+
+
+CURVES: dict[str, tuple[Callable[[Array], Array], Callable[[Array], Array]]] = {
+    "linear": (linear, linear),
+    "srgb": (encoded_srgb, light_of_srgb),
+}
+
+
+def waves(brightest: float) -> Array:
+    """Return a surface's shading under four lights, (light, row, col)."""
+    row, col = np.mgrid[:128, :128] / 128
+    slopes = np.stack([0.6 * np.cos(5 * row + 3 * col), 0.6 * np.sin(4 * col - 2 * row), np.ones_like(row)], axis=-1)
+    slopes /= np.linalg.norm(slopes, axis=-1, keepdims=True)
+    lights = np.array([[0.5, 0, 0.8], [-0.5, 0.1, 0.8], [0, 0.55, 0.8], [0.1, -0.5, 0.8]])
+    shade = np.moveaxis(np.maximum(slopes @ lights.T, 0), -1, 0)
+    return np.asarray(brightest * shade / shade.max())
+
+
+@pytest.mark.parametrize("curve", CURVES)
+@pytest.mark.parametrize("sensor", [0.0, 0.0005, 0.002])
+@pytest.mark.parametrize("brightest", [0.8, 0.1])
+def test_rounding_to_eight_bits_is_noise_too(curve: str, sensor: float, brightest: float) -> None:
+    encode, decode = CURVES[curve]
+    true = waves(brightest)
+    noisy = np.clip(true + np.random.default_rng(3).normal(0, sensor, true.shape), 0, 1)
+    plates = decode(np.round(255 * encode(noisy)) / 255).astype(np.float32)
+    noise = noise_of(list(plates))
+    level = true > 0.5 * brightest
+    off = float(np.sqrt(np.mean((plates - true)[level] ** 2)))
+    assert 0.7 < noise.at(float(true[level].mean())) / off < 1.55
+
+
+@pytest.mark.parametrize("sensor", [0.0, 0.002])
+def test_what_no_file_rounded_is_as_noisy_as_it_is(sensor: float) -> None:
+    true = waves(0.8)
+    plates = (true + np.random.default_rng(3).normal(0, sensor, true.shape)).astype(np.float32)
+    assert noise_of(list(plates)).at(0.4) == pytest.approx(max(sensor, 0.0003), rel=0.2)
+
+
+def test_the_few_values_of_flat_faces_are_no_codes() -> None:
+    faces = np.array([0.02, 0.031, 0.05, 0.0525, 0.07, 0.1, 0.11, 0.16, 0.3])
+    plate = np.repeat(np.repeat(faces.reshape(3, 3), 40, axis=0), 40, axis=1).astype(np.float32)
+    assert noise_of([plate] * 3).at(0.1) < 0.001
