@@ -275,7 +275,7 @@ def _reference(samples: Array, lit: Illumination, seen: NDArray[np.bool_]) -> tu
         return nothing
     shade = matrix[used] @ normal
     albedo = np.maximum(shade @ values[used] / (shade @ shade), 0)
-    errors = (values[used] - shade[:, None] * albedo) * lit.intensities[used] / strength[used, None]
+    errors = together[used] - matrix[used] @ scaled
     return normal, albedo / strength.mean(), float(np.sqrt(np.mean(errors**2)))
 
 

@@ -20,7 +20,6 @@ from psvideo.solve.normals.blocks import (
     SUMS,
     TINY,
     XX,
-    XY,
     YY,
     ZERO,
     ZZ,
@@ -169,10 +168,7 @@ def _squares(task: Task) -> tuple[np.float32, np.float32, np.float32, np.float32
 
 @FUSED.inlined
 def albedo_from_sums(task: Task, w: Floats, n: int, red: Samples, green: Samples, blue: Samples) -> None:
-    """Every channel's least squares albedo, the normal being known, of what ``gather_all`` added up.
-
-    It is left in the planes RX, GX and BX too.
-    """
+    """Every channel's least squares albedo, the normal being known, of what ``gather_all`` added up."""
     xx, xy, xz, yy, yz, zz = _squares(task)
     scale = task.albedo_scale
     for i in range(n):
@@ -186,21 +182,3 @@ def albedo_from_sums(task: Task, w: Floats, n: int, red: Samples, green: Samples
         red[i] = encoded(w[RX + i] * scale, red)
         green[i] = encoded(w[GX + i] * scale, green)
         blue[i] = encoded(w[BX + i] * scale, blue)
-
-
-@FUSED.inlined
-def residuals_of_all(task: Task, w: Floats, values: Floats, n: int) -> None:
-    """The squared residuals of all channels in plate units into the plane XX, and their count into XY."""
-    line = flattened(values)
-    w[XX : XX + n] = ZERO
-    w[XY : XY + n] = np.float32(3 * task.lights)
-    for light in range(task.lights):
-        x, y, z = _sent(task, light)
-        to_r, to_g, to_b = task.tone[light, 0, 3], task.tone[light, 1, 3], task.tone[light, 2, 3]
-        v = line[3 * BLOCK * light :]
-        for i in range(n):
-            shade = x * w[X + i] + y * w[Y + i] + z * w[Z + i]
-            r = (v[i] - w[RX + i] * shade) * to_r
-            g = (v[BLOCK + i] - w[GX + i] * shade) * to_g
-            b = (v[2 * BLOCK + i] - w[BX + i] * shade) * to_b
-            w[XX + i] += r * r + g * g + b * b

@@ -14,7 +14,6 @@ from psvideo.compute.spilled import let_go, planes_for, thin
 from psvideo.compute.threads import over_ranges
 from psvideo.model.surface import MEASURED, Surface
 from psvideo.solve.normals.bands import BAND_PIXELS
-from psvideo.solve.normals.between_channels import share_together
 from psvideo.solve.normals.doubting import (
     Doubting,
     Signs,
@@ -141,10 +140,7 @@ class _Spread:
         floors = [(share * mean) ** 2 for share in (how.least_share, float(LIGHTS))]
         variances = [noise.read / channels, noise.photon * mean / 2 / channels, *floors]
         many, free = max(lights / MANY_LIGHTS, 1), lights - 3
-        plain = surface.error_deg is None and free > 0  # every channel's residuals are there, and albedo was free
-        counted = many * (share_together(surface, one, noise) if plain else 1)
-        of_noise = counted * ((channels * lights - channels - 2) / free if plain else 1)
-        of_residual = counted * lights / free if plain else 0
+        plain = surface.error_deg is None and free > 0  # residuals are there, which three numbers were fitted to
         return cls(
             noise=Spread(
                 inverse=np.linalg.inv(matrix.T @ matrix).astype(np.float32),
@@ -153,8 +149,8 @@ class _Spread:
                 dim=near.dim,
                 wider=near.wider,
             ),
-            of_noise=how.fit_noise * float(np.sqrt(of_noise)),
-            of_residual=how.fit_noise / how.held * float(np.sqrt(of_residual)),
+            of_noise=how.fit_noise * float(np.sqrt(many)),
+            of_residual=how.fit_noise / how.held * float(np.sqrt(many * lights / free)) if plain else 0.0,
         )
 
     def fit(self, surface: Surface) -> Samples:

@@ -5,7 +5,7 @@ import numpy as np
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import encoded
 from psvideo.solve.normals.blocks import ABSENT, ALBEDO, COUNT, LEAST_Z, ONE, SUM, XX, XY, ZERO, X, Y, Z
-from psvideo.solve.normals.colour_kernel import albedo_from_sums, residuals_of_all
+from psvideo.solve.normals.colour_kernel import albedo_from_sums
 from psvideo.solve.normals.near_kernel import at, of_light
 from psvideo.solve.normals.task import Bytes, Floats, Result, Samples, Task
 
@@ -23,7 +23,7 @@ def store_block(
     x, y, z = result.normals[0, start:end], result.normals[1, start:end], result.normals[2, start:end]
     _store_normals(w, n, x, y, z, result.albedo[0, start:end], result.valid[start:end], task.albedo_scale)
     if result.residual.size:
-        w[XX : XX + n], w[XY : XY + n] = ZERO, ZERO
+        _store_residual(task, w, m, n, result.residual[start:end])
     for channel in range(task.tone.shape[1]):
         if summed:
             break
@@ -33,17 +33,9 @@ def store_block(
             else:
                 _sum_up(task, w, values, m, channel, n)
             _albedo_given_normal(task, w, n, result.albedo[channel, start:end])
-        if result.residual.size:
-            _add_residual(task, w, values, m, channel, n)
     if summed:
         red, green, blue = result.albedo[0, start:end], result.albedo[1, start:end], result.albedo[2, start:end]
         albedo_from_sums(task, w, n, red, green, blue)
-    residual = result.residual[start:end]
-    if summed and result.residual.size:
-        residuals_of_all(task, w, values, n)
-    for i in range(len(residual)):
-        error = np.sqrt(w[XX + i] / max(w[XY + i], ONE))
-        residual[i] = encoded(error if abs(w[X + i]) + abs(w[Y + i]) + abs(w[Z + i]) > ZERO else ZERO, residual)
 
 
 @FUSED.inlined
@@ -105,20 +97,25 @@ def _albedo_given_normal(task: Task, w: Floats, n: int, out: Samples) -> None:
     scale = task.albedo_scale
     for i in range(n):
         albedo = w[SUM + i] / w[COUNT + i] if w[COUNT + i] > ZERO else ZERO
-        w[ALBEDO + i] = max(albedo, ZERO)
         out[i] = encoded(max(albedo, ZERO) * scale, out)
 
 
 @FUSED.inlined
-def _add_residual(task: Task, w: Floats, values: Floats, m: Floats, channel: int, n: int) -> None:
-    """Add one channel's squared residuals in plate units to the plane XX, and their count to XY."""
+def _store_residual(task: Task, w: Floats, m: Floats, n: int, out: Samples) -> None:
+    """What g leaves of the measurements, channels combined: the root of the mean square over those that count."""
+    channels = task.tone.shape[1]
+    w[XX : XX + n], w[XY : XY + n] = ZERO, ZERO
     for light in range(task.lights):
-        lamp = of_light(task.matrix, light)
-        plane, to_plate = values[light * task.tone.shape[1] + channel], task.tone[light, channel, 3]
+        lamp, to_plate = of_light(task.matrix, light), ZERO
+        for channel in range(channels):
+            to_plate += task.tone[light, channel, 3] / np.float32(channels)
         for i in range(n):
             x, y, z = at(lamp, i)
             here = m[light, i] > ABSENT
             shade = x * w[X + i] + y * w[Y + i] + z * w[Z + i]
-            error = (plane[i] - w[ALBEDO + i] * shade) * to_plate
+            error = (m[light, i] - w[ALBEDO + i] * shade) * to_plate
             w[XX + i] += error * error if here else ZERO
             w[XY + i] += ONE if here else ZERO
+    for i in range(n):
+        error = np.sqrt(w[XX + i] / max(w[XY + i], ONE))
+        out[i] = encoded(error if w[ALBEDO + i] > ZERO else ZERO, out)
