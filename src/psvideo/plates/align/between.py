@@ -15,39 +15,13 @@ from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
 from psvideo.model.coded import Image
-from psvideo.plates.align.brightness import light_of
-from psvideo.plates.align.flow import Codes, Flags, Vectors, comparable, noise_between, places
-from psvideo.plates.align.lone_edges import InstantSketch
-from psvideo.plates.align.moving import SHADING_PX, Followed, Pair, window_of
-from psvideo.plates.align.moving_kernel import AFTER, AT_REST, BEFORE, BOTH, NOWHERE, blend_rows, ways_rows
+from psvideo.plates.align.flow import Codes, Flags, Vectors
+from psvideo.plates.align.moving import Followed
+from psvideo.plates.align.moving_kernel import AT_REST, NOWHERE, blend_rows, ways_rows
 from psvideo.plates.align.packed import packed
-from psvideo.plates.align.unsure import unsure_of
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import Reader, made
 
-UNLIKE = 10.0
-"""Plates whose detail differs by more codes along the motion do not show the same thing."""
-ALIKE_PX = 5
-EVENLY, BARE = 24.0, 3.0
-"""Where they differ by more than the first as a whole, only what is bare does: its detail differs by no more than the
-second. It turns, and its shading with it; detail and shading that both change are two things."""
-DARK = 0.003
-"""Light that is no shadow's edge, as a share of a sketch's white: noise makes as much."""
-SHADED = 0.25
-"""... nor do those of which one is darker, as a whole, than this share of the other: a shadow passed."""
-TURNED = 40.0
-"""What turns is shaded in its detail too, which differs by no more codes: both plates show it all the same."""
-BLENDED, BLENDED_UNLIKE = np.float32(0.25), np.float32(0.8)
-"""Shading turns evenly: by what it differs between two plates, their blend is off so much less than the nearer one
-would be; by what their detail differs, by a shadow, or by more than is even, only a little less."""
-REST = 3.0
-"""What stands still while its shading changes by more codes is blended by time."""
-ENOUGH = 4
-"""Where so many lights are sure, what others show is left out unless it is sure as well."""
-MANY = 4
-"""Of so many lights one must be sure, of more half."""
-APART_PX = 1.0
-"""What moves by so much more or less from plate to plate moves by itself, and may hide other things."""
 HALF = np.float32(0.5)
 BAND_ROWS = 64
 MARGIN_ROWS = 5
@@ -55,126 +29,6 @@ MARGIN_ROWS = 5
 BESIDE_CLIPPED, OVERSHOOT, JUST_BELOW = 5, 1.45, 1 - 1e-4
 """Cubic interpolation mixes samples of so wide a square, and makes up to so many times the brightest of them (the sum
 of its positive weights): those that clip are kept out of it, and it stays below what clips, rounding to 16 bits too."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Taken:
-    """Of one light (row, col): where its plates ``alike`` show the same along the motion, ``source``, what a pixel is
-    to be taken from, and where that is ``sure``; by how much it may be off, in units of the plates' light,
-    ``unsure``; and what it ``shows`` at the instant."""
-
-    alike: Flags
-    sure: Flags
-    source: Codes
-    unsure: Vectors
-    shows: InstantSketch
-
-
-def taken_of(pair: Pair, motion: Followed) -> Taken:
-    """Return what every pixel of a light's plate is taken from, on the velocities' grid."""
-    one, other = comparable(pair.before, pair.after)
-    spans_s = motion.time_s - pair.before.time_s, pair.after.time_s - motion.time_s
-    ways = motion.way(spans_s[0]), motion.way(-spans_s[1])
-    before, after = (_along(codes, way) for codes, way in zip((one, other), ways, strict=True))
-    apart = np.asarray(cv2.subtract(after, before, dtype=cv2.CV_32F), np.float32)
-    wide, narrow = ((window_of(size_px, motion.step),) * 2 for size_px in (SHADING_PX, ALIKE_PX))
-    shading = np.asarray(cv2.blur(apart, wide), np.float32)
-    unlike = np.asarray(cv2.blur((apart - shading) ** 2, narrow), np.float32)
-    alike = unlike < np.where(np.abs(shading) < EVENLY, np.float32(UNLIKE**2), np.float32(BARE**2))
-    shaded = _shaded(before, after, wide)
-    alike &= ~shaded
-    nearer = BEFORE if spans_s[0] <= spans_s[1] else AFTER
-    turns = alike | (unlike < np.float32(TURNED**2))
-    source = np.where(motion.moves, np.where(turns, BOTH, nearer), AT_REST).astype(np.uint8)
-    source[~motion.moves & alike & (np.abs(shading) > REST)] = BOTH
-    gone = [_outside(way) for way in ways]
-    for hidden, span_s in zip(gone, (spans_s[0], -spans_s[1]), strict=True):
-        _add_hidden(hidden, motion, alike, span_s, sum(spans_s))
-    source[gone[0] & ~gone[1]] = AFTER
-    source[gone[1] & ~gone[0]] = BEFORE
-    hidden = gone[0] != gone[1]
-    noise = noise_between(pair.before, pair.after)
-    unsure = unsure_of(pair, before, after, motion, noise) * ~hidden
-    unsure *= np.where(source == BOTH, _off_of_blend(alike, shading, unlike, shaded), 1)
-    return Taken(
-        alike=alike,
-        sure=alike | hidden,
-        source=source,
-        unsure=unsure,
-        shows=InstantSketch(codes=_shown(before, after, source, spans_s), white=pair.before.white, noise=noise),
-    )
-
-
-def _shown(before: Codes, after: Codes, source: Codes, spans_s: tuple[float, float]) -> Codes:
-    """Return the sketch of what is taken of two plates, moved to the instant."""
-    share = float(np.clip(spans_s[0] / (spans_s[0] + spans_s[1]), 0, 1))
-    nearer = before if spans_s[0] <= spans_s[1] else after
-    shown = np.where(source == BOTH, cv2.addWeighted(before, 1 - share, after, share, 0), nearer)
-    shown = np.where(source == BEFORE, before, shown)
-    return np.asarray(np.where(source == AFTER, after, shown), np.uint8)
-
-
-def _off_of_blend(alike: Flags, shading: Vectors, unlike: Vectors, shaded: Flags) -> Vectors:
-    """Return by which share of what two plates differ their blend may be off. ``shading`` is by how much they differ as
-    a whole, and ``unlike`` the square of what their detail does."""
-    level, unlike = shading * shading, np.maximum(unlike, np.float32(0))  # sums that run along rows round
-    squares = (BLENDED**2 * level + BLENDED_UNLIKE**2 * unlike) / np.maximum(level + unlike, np.float32(1e-6))
-    share = np.where(shaded | (np.abs(shading) > EVENLY), BLENDED_UNLIKE, np.sqrt(squares))
-    return np.asarray(np.where(alike, BLENDED, share), np.float32)
-
-
-def without_doubtful(shown: Sequence[Taken], motion: Followed, others: int) -> list[Codes]:
-    """Return the sources of all lights under which something moves, without what is doubtful where enough is sure.
-
-    Nor is anything known where more than half of many lights show that something moved, and no motion explains it.
-    ``others`` is the number of lights under which nothing moves.
-    """
-    sure = np.sum([one.sure for one in shown], axis=0, dtype=np.int16)
-    left_out = sure + others >= ENOUGH
-    if len(shown) >= MANY:
-        left_out |= ~motion.moves & (sure < min(len(shown) // 2, len(shown) - MANY + 1))
-    return [np.where(left_out & ~one.sure, np.uint8(NOWHERE), one.source) for one in shown]
-
-
-def _shaded(before: Codes, after: Codes, window: tuple[int, int]) -> Flags:
-    """Return where one of two plates is in shadow as a whole."""
-    one, other = (light_of(cv2.blur(codes, window).astype(np.float32)) for codes in (before, after))
-    return np.asarray(np.minimum(one, other) < np.float32(SHADED) * np.maximum(one, other) - np.float32(DARK))
-
-
-def _along(codes: Codes, way: Vectors) -> Codes:
-    x, y = places(*way.shape[1:])
-    high, wide = (np.float32(many / few) for many, few in zip(codes.shape, way.shape[1:], strict=True))
-    x, y = (x - way[0] + HALF) * wide - HALF, (y - way[1] + HALF) * high - HALF
-    return np.asarray(cv2.remap(codes, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))
-
-
-def _outside(way: Vectors) -> Flags:
-    rows, cols = way.shape[1:]
-    x, y = places(rows, cols)
-    x, y = x - way[0], y - way[1]
-    return np.asarray((x < -0.5) | (x > cols - 0.5) | (y < -0.5) | (y > rows - 0.5))
-
-
-def _add_hidden(hidden: Flags, motion: Followed, alike: Flags, span_s: float, round_s: float) -> None:
-    """Add to ``hidden`` what something else covers in a plate, a time before the instant: what its place there is
-    better explained by, which moves otherwise."""
-    rows, cols = np.nonzero(~alike)
-    own = motion.velocity[:, rows, cols]
-    there = _places_from(rows, cols, -np.float32(span_s) * own, hidden.shape)
-    others = np.where(motion.moves[rows, cols], motion.velocity[:, there[0], there[1]], motion.nearby[:, rows, cols])
-    back = _places_from(*there, np.float32(span_s) * others, hidden.shape)
-    again = motion.velocity[:, back[0], back[1]]
-    per = round_s * motion.step
-    apart_px, missed_px = (np.hypot(*(pair[0] - pair[1])) * per for pair in ((others, own), (again, others)))
-    hidden[rows, cols] |= (apart_px > APART_PX) & (missed_px <= APART_PX) & alike[back]
-
-
-def _places_from(
-    rows: NDArray[np.intp], cols: NDArray[np.intp], way: Vectors, shape: tuple[int, ...]
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    row, col = np.rint(rows + way[1]).astype(np.intp), np.rint(cols + way[0]).astype(np.intp)
-    return np.clip(row, 0, shape[0] - 1), np.clip(col, 0, shape[1] - 1)
 
 
 @dataclass(frozen=True, kw_only=True)

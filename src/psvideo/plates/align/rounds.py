@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from psvideo.model.choices import Align, Rate
-from psvideo.plates.align.between import Ends, Taken, plate_at, taken_of, without_doubtful
+from psvideo.plates.align.between import Ends, plate_at
 from psvideo.plates.align.brightness import evened
 from psvideo.plates.align.comb import Comb, Schedule
 from psvideo.plates.align.flow import Codes, Vectors
@@ -18,6 +18,8 @@ from psvideo.plates.align.held import Around, DueInstant, Held
 from psvideo.plates.align.lone_edges import InstantSketch, unsure_by_lone_edges
 from psvideo.plates.align.moving import Followed, Pair, followed_at
 from psvideo.plates.align.moving_kernel import NOWHERE
+from psvideo.plates.align.taken import Taken, taken_of, without_doubtful
+from psvideo.plates.align.unsure import UNKNOWN
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import AMBIENT, Round, gathered, handed_over
 
@@ -168,9 +170,11 @@ def _make_moving(held: Held, instant: DueInstant) -> None:
     instant.motion = motion = followed_at(pairs, instant.time_s)
     shown = [taken_of(pair, motion) for pair in pairs]
     guesses = sources = [one.source for one in shown]
+    unknown = np.zeros_like(motion.moves)
     if not instant.guessed:
-        sources = without_doubtful(shown, motion, len(held.lights) - len(lights))
+        sources, unknown = without_doubtful(shown, motion, len(held.lights) - len(lights))
     instant.unsure = _unsure(held, instant, dict(zip(lights, shown, strict=True)), sources)
+    instant.unsure[:, unknown] = UNKNOWN
     for light, source, guess in zip(lights, sources, guesses, strict=True):
         _hand_on(instant, _moved_to(held.sure_around(light, instant), source, guess, motion))
         instant.moving.remove(light)

@@ -13,6 +13,8 @@ from psvideo.plates.align.own_means import own_mean
 
 WINDOW_PX = 5
 """Plates are compared over so many pixels of their sketches."""
+UNKNOWN = np.float32(1e4)
+"""What nobody knows of a plate may be off by so much light: it turns a normal by more than any angle."""
 NOISE_FACTOR = 1.6
 """Squares of a change below so many times those that noise makes of it are noise."""
 

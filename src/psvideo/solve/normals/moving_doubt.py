@@ -10,6 +10,9 @@ from psvideo.solve.normals.doubting import ThinSurface, width_of
 from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.task import Floats, Mask
 
+MOST_DEG = np.float32(180)
+"""What turns a normal by more is no angle: nothing is known of its plates."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class MovingDoubt:
@@ -78,9 +81,10 @@ def moving_doubt_deg(
     if moves is not None:
         grown = cv2.resize(moves.astype(np.uint8), known.shape[::-1], interpolation=cv2.INTER_NEAREST)
         own = grown > 0
-    turned = own_mean(np.minimum(turned_deg, np.float32(60)), size, own)
-    around = turned / np.maximum(own_mean(known, size, own), np.float32(1e-6))
-    apart = _torn_doubt(turned_deg, torn_deg, known, own, how)
+    tells = known * (turned_deg <= MOST_DEG)  # beyond that nothing is known, and nothing is said of what is around
+    turned = own_mean(np.minimum(turned_deg, np.float32(60)) * tells, size, own)
+    around = turned / np.maximum(own_mean(tells, size, own), np.float32(1e-6))
+    apart = _torn_doubt(turned_deg, torn_deg, tells, own, how)
     return np.asarray(
         np.float32(how.own) * turned_deg + around * around / np.float32(how.around_deg) + apart, np.float32
     )
