@@ -10,8 +10,8 @@ WIDE = (13, 13)
 
 
 def told(apart: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    whole = cv2.blur(apart, WIDE)
-    left = cv2.blur((apart - whole) ** 2, (5, 5))
+    whole = np.asarray(cv2.blur(apart, WIDE), np.float32)
+    left = np.asarray(cv2.blur((apart - whole) ** 2, (5, 5)), np.float32)
     return evenly_changed(apart, (whole, left), (EACH_PX, EACH_PX), BARE)
 
 
