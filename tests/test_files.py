@@ -110,6 +110,7 @@ BROKEN_PLANS = {
     "no number": ('fps = "abc"', "camera.fps"),
     "both exposures": ("exposure_s = 0.004", "one of the two"),
     "readout too long": ("readout_s = 0.02", "longer than the frame period"),
+    "readout in milliseconds": ("readout_s = 8", "times are in seconds, and 8 ms is 0.008"),
     "not finite": ("readout_s = nan", "readout_s"),
     "black above white": ("black_level = 9.0\nwhite_level = 3.0", "below white_level"),
 }

@@ -96,6 +96,17 @@ def test_folders_lack_a_light_of_the_plan_by_name(tmp_path: Path) -> None:
         find_plates(tmp_path, lights=("key", "left"))
 
 
+def test_noise_of_dark_pictures_is_no_other_exposure(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """A chrome ball is dark but for its highlights."""
+    rng = np.random.default_rng(3)
+    for number in range(3):
+        path = tmp_path / "key" / f"photo.{number}.png"
+        still(path, 0.0)
+        cv2.imwrite(str(path), rng.normal(1310, 655, (64, 64)).clip(0).astype(np.uint16))
+    read_images(tmp_path)
+    assert "differ" not in caplog.text
+
+
 def test_folders_that_are_scenes_and_not_lights_are_said(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     """A folder of scenes, each with one picture per light, looks like a folder of lights with several pictures each."""
     for folder, values in (("cat", (0.5, 0.5, 0.5)), ("horse", (0.5, 0.505, 0.35))):

@@ -150,6 +150,12 @@ def test_clips_that_show_nothing_are_refused_at_once(kind: str, plan: Plan) -> N
         timing_of(plan, profiles)
 
 
+def test_flashes_in_milliseconds_are_said_to_be_in_seconds(plan: Plan) -> None:
+    long = tuple(replace(flash, duration_s=1e3 * flash.duration_s) for flash in plan.flashes)
+    with pytest.raises(PsvideoError, match=r"duration_s = 0\.0008 is 0\.8 ms"):
+        timing_of(replace(plan, flashes=long), RNG.random((20, ROWS)))
+
+
 def test_a_good_clip_draws_no_remarks(plan: Plan) -> None:
     assert timing_of(plan, filmed(plan)).notes == ()
     assert timing_of(plan, filmed(plan, frames=10)).notes == ()

@@ -407,6 +407,25 @@ def test_what_is_left_beyond_noise_makes_a_take_doubtful_and_then_bad_whatever_i
     ]  # fmt: skip
 
 
+def test_a_guessed_order_is_blamed_before_the_rig_where_normals_are_no_surface_s() -> None:
+    one = Footage().observed(0)
+    one.slopes[:] = [-0.2]
+    guessed, known = (" ".join(f"{line.found} {line.advice}" for line in judge_rig(one, guessed=g)) for g in (1, 0))
+    assert "the order of the lights is a guess" in guessed
+    assert "first_light" in guessed
+    assert "camera axes" not in guessed
+    assert "camera axes" in known
+
+
+def test_ambient_light_that_is_the_same_everywhere_is_called_a_black_level() -> None:
+    one = Footage().observed(0)
+    one.facts[:] = [replace(facts, ambient=0.3) for facts in one.facts]
+    for even, named in ((0.95, True), (0.5, False)):
+        one.dark_evenness[:] = [even]
+        assert ("black_level" in ambient(one).advice) == named
+        assert ambient(one).grade == "doubtful"
+
+
 def timed(**changed: Any) -> str:
     return graded(list(time.timing_and_order(timing_of(**changed), "rolling")), "timing")
 

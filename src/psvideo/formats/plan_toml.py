@@ -46,13 +46,20 @@ class _Camera(Contract):
             raise ValueError("shutter_deg and exposure_s are both given; expected one of the two")
         period_s = float(1 / parse_fps(self.fps))
         if self.exposure_s is not None and self.exposure_s > period_s * (1 + 1e-6):
-            raise ValueError(f"exposure_s is {self.exposure_s:g}, longer than the frame period of {period_s:.6g} s")
+            raise ValueError(_too_long("exposure_s", self.exposure_s, period_s))
         if isinstance(self.readout_s, float) and abs(self.readout_s) > period_s * (1 + 1e-3):
-            raise ValueError(f"readout_s is {self.readout_s:g}, longer than the frame period of {period_s:.6g} s")
+            raise ValueError(_too_long("readout_s", self.readout_s, period_s))
         levels = (self.black_level, self.white_level)
         if levels[0] is not None and levels[1] is not None and levels[0] >= levels[1]:
             raise ValueError(f"black_level is {levels[0]:g}; expected below white_level, which is {levels[1]:g}")
         return self
+
+
+def _too_long(name: str, value_s: float, period_s: float) -> str:
+    said = f"{name} is {value_s:g}, longer than the frame period of {period_s:.6g} s"
+    if abs(value_s) * 1e-3 > period_s:
+        return said
+    return f"{said}; times are in seconds, and {abs(value_s):g} ms is {value_s * 1e-3:g}"
 
 
 class _Flash(Contract):

@@ -34,7 +34,7 @@ def judgements(
         ambient(observed),
         motion(plan, timing, observed, aligned=aligned, opened=opened),
         focus(observed),
-        *rig(observed),
+        *rig(observed, guessed=timing.order == "guess"),
         *accuracy(observed),
         *validity(observed),
         *steadiness(observed.facts),

@@ -11,6 +11,9 @@ MOST_AMBIENT, LOST_AMBIENT = 0.1, 0.5
 IN_SHADOW = 0.03
 """Of a lamp's light, what may be left in attached shadow: up to 0.016 on photographs in a dark room; ambient light of
 5 % leaves 0.02 to 0.06, and 10 % 0.03 to 0.1."""
+EVEN = 0.85
+"""Of the dark slot's light where it is brightest, what is there where it is dimmest: ambient light falls on things that
+are brighter and darker, a black level that was not taken off is everywhere."""
 NOTICED, MOST_SWING = 0.05, 0.1
 """Ambient light of more than the first share that changes from dark slot to dark slot by more than the second."""
 
@@ -39,6 +42,14 @@ def ambient(observed: Observed) -> Judgement:
         found = f"{found[:-1]} and flickers or changes by {100 * swing:.0f} % (mains light, a screen, the sun)."
     elif share <= MOST_AMBIENT:
         return Judgement(subject="ambient", grade="good", found=found)
+    elif observed.dark_evenness and float(np.median(observed.dark_evenness)) > EVEN:
+        return Judgement(
+            subject="ambient",
+            grade="bad" if share > LOST_AMBIENT else "doubtful",
+            found=f"{found[:-1]}, and as strong all over the picture: black_level in the plan is likely to be too low. "
+            "It is taken off, but the levels above are not what they seem.",
+            advice="Film a frame with the cap on, and write its code as black_level into the plan's [camera].",
+        )
     return Judgement(
         subject="ambient",
         grade="bad" if share > LOST_AMBIENT else "doubtful",

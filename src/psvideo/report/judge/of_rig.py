@@ -25,6 +25,9 @@ NEARER = 0.7
 """Lamps stand near where that leaves less than this share of what is left over. (Photographs: 0.88 and more; lamps ten
 widths away that a rig takes for distant: 0.2 to 0.5.)"""
 LOST_LEAN_DEG = 12.0
+IN_PICTURE = 0.5
+"""Lamps that are less than so many of the picture's widths away would be seen in it. (Linear codes read as S-Log3 look
+like that.)"""
 UNDONE, REDONE = 0.7, 0.25
 """Plates were read by another curve where that leaves less than these shares of what is left over. (sRGB read as light:
 0.3 to 0.8; photographs in light: 1.7 and more. Light read as sRGB: 0.05 to 0.15; photographs in sRGB: 0.6 and more.)"""
@@ -54,12 +57,13 @@ TOO_FAR_DEG, AGREE_FAR = 8.0, 0.15
 bear's under eight lights in one plane: 0.21; five lights of which each is taken for the next: 0.11.)"""
 
 
-def rig(observed: Observed) -> Iterator[Judgement]:
-    """Judge whether the rig's directions and strengths can have made these plates."""
+def rig(observed: Observed, *, guessed: bool = False) -> Iterator[Judgement]:
+    """Judge whether the rig's directions and strengths can have made these plates. ``guessed``: which light is which
+    is a guess."""
     fit = observed.rig_fit
     firing = [light for light, fires in zip(observed.lights, observed.firing, strict=True) if fires]
     wrong = None if fit is None else _misfit(firing, fit)
-    found = (wrong, _crossed(observed), _away(observed), fit and (_curve(fit) or _near(fit)))
+    found = (wrong, _crossed(observed, guessed=guessed), _away(observed), fit and (_curve(fit) or _near(fit)))
     leaning = None if any(found) else _leaning(observed)
     doubted = [one for one in (*found, leaning) if one]
     yield from doubted
@@ -119,6 +123,14 @@ def _near(fit: RigFit) -> Judgement | None:
     near = fit.near
     if near is None or near.misfit > NEARER * fit.misfit or near.lean_deg <= COMMON_DEG:
         return None
+    if near.widths < IN_PICTURE:
+        return Judgement(
+            subject="rig",
+            grade="bad",
+            found="The plates fit no rig: bright and dim parts differ as if the lights stood within the picture. The "
+            "plan's transfer curve or black level is likely to be another than the footage's.",
+            advice="Check transfer, black_level and white_level in the plan's [camera].",
+        )
     return Judgement(
         subject="rig",
         grade="bad" if near.lean_deg > LOST_LEAN_DEG else "doubtful",
@@ -146,18 +158,26 @@ def _curve(fit: RigFit) -> Judgement | None:
     )
 
 
-def _crossed(observed: Observed) -> Judgement | None:
+def _crossed(observed: Observed, *, guessed: bool) -> Judgement | None:
     agreement = float(np.median(observed.slopes)) if observed.slopes else 1.0
     far = max((one.misfit.error_deg for one in observed.facts if one.misfit is not None), default=0.0) > TOO_FAR_DEG
     if agreement > (AGREE_FAR if far else AGREE) or not quiet(observed.facts):
         return None
     if agreement > DISAGREE and moves(observed.facts):
         return None
+    cannot = f"The normals cannot be those of one surface (agreement of slopes {agreement:.2f}, 1 at best)"
+    grade: Grade = "bad" if agreement < DISAGREE else "doubtful"
+    if guessed:
+        return Judgement(
+            subject="rig",
+            grade=grade,
+            found=f"{cannot}: the order of the lights is a guess, and hardly the true one.",
+            advice="Try the other lights as `first_light`, one after the other: with the right one this line is gone.",
+        )
     return Judgement(
         subject="rig",
-        grade="bad" if agreement < DISAGREE else "doubtful",
-        found=f"The normals cannot be those of one surface (agreement of slopes {agreement:.2f}, 1 at best): "
-        "directions are mirrored or turned, or lights exchanged.",
+        grade=grade,
+        found=f"{cannot}: directions are mirrored or turned, or lights exchanged.",
         advice="Check that the rig file is in camera axes (x right, y up), belongs to this set-up, and names the "
         "lights as the plan does; calibrate again if anything was moved.",
     )

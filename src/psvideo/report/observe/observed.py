@@ -183,6 +183,7 @@ class Observed:
     ``only`` are the numbers of rounds that are noted, None for all; the others serve to hold these against.
     ``ambient_measured`` (by window's first frame) is in which share of the picture ambient light could be measured
     without a dark slot; ``in_shadow`` which share of a lamp's light is left where it cannot reach.
+    ``dark_evenness`` is each dark slot's light where it is dim, beside that where it is bright.
     ``first`` is the number of the clip's first round, and ``white`` what motion takes for white, found with its first
     plate.
     ``watched`` is whose plates motion is looked for in, as they pass; left out, the first light's, or the brightest's
@@ -207,6 +208,7 @@ class Observed:
     light_at_points: list[NDArray[np.float64]] = field(default_factory=list)
     ambient_measured: dict[int, float] = field(default_factory=dict)
     beyond_mask: list[float] = field(default_factory=list)
+    dark_evenness: list[float] = field(default_factory=list)
     worst: Worst = field(default_factory=Worst)
     _first: dict[str, Glimpse] = field(default_factory=dict)
     _glimpse: Glimpse | None = None
@@ -243,6 +245,8 @@ class Observed:
 
     def _look_at_dark(self, plate: LightPlate) -> None:
         self._dark = np.array(_brightest(plate.picture.thinned(step_of(*plate.shape[:2]))))
+        low, high = np.percentile(self._dark, [5, 95])
+        self.dark_evenness.append(float(low / max(high, FAINT)))
 
     def add(self, one: Round, surface: Surface | None = None) -> None:
         """Take in one round, and the surface that was solved from it, if any."""
@@ -283,6 +287,7 @@ class Observed:
         self.light_at_points += other.light_at_points
         self.ambient_measured |= other.ambient_measured
         self.beyond_mask += other.beyond_mask
+        self.dark_evenness += other.dark_evenness
         self.worst.join(other.worst)
 
     def levels(self, light: str) -> Levels:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from psvideo.model.plan import UNKNOWN_CLOCK_PPM, Plan
-from psvideo.model.units import counted
+from psvideo.model.units import counted, show_seconds
 from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.search import GridPlace, search
@@ -37,6 +37,13 @@ def nothing_to_find(plan: Plan, rows: Profiles) -> str:
         return (
             f"holds {counted(len(rows.value), 'frame')}; finding the timing of a strobe with "
             f"{counted(len(plan.lit_slots), 'lit flash')} a round needs at least {least}, and 50 or more make it sure."
+        )
+    shortest_s = min(plan.flashes[slot].duration_s for slot in plan.lit_slots)
+    if shortest_s > plan.camera.frame_period_s:
+        return (
+            f"the plan's flashes last {show_seconds(shortest_s)} and more, longer than a frame of "
+            f"{show_seconds(plan.camera.frame_period_s)}: no row sees one whole. Times in plan.toml are in seconds: "
+            f"duration_s = {shortest_s * 1e-3:g} is {show_seconds(shortest_s * 1e-3)}."
         )
     changes = _changes(rows)
     if float(np.abs(changes).max()) < 1e-9:
