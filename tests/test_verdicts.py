@@ -410,7 +410,9 @@ def test_what_is_left_beyond_noise_makes_a_take_doubtful_and_then_bad_whatever_i
 def test_a_guessed_order_is_blamed_before_the_rig_where_normals_are_no_surface_s() -> None:
     one = Footage().observed(0)
     one.slopes[:] = [-0.2]
-    guessed, known = (" ".join(f"{line.found} {line.advice}" for line in judge_rig(one, guessed=g)) for g in (1, 0))
+    guessed, known = (
+        " ".join(f"{line.found} {line.advice}" for line in judge_rig(one, guessed=g)) for g in (True, False)
+    )
     assert "the order of the lights is a guess" in guessed
     assert "first_light" in guessed
     assert "camera axes" not in guessed
