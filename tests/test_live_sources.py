@@ -187,3 +187,17 @@ def test_a_folder_is_read_while_it_is_written(clip: Path, tmp_path: Path) -> Non
     assert all(np.array_equal(frame.image, known[frame.index]) for frame in found)
     with pytest.raises(ps.PsvideoError, match="no frame appeared"):
         list(read_growing(clip / "truth", take.plan.camera, quiet_s=0.02))
+
+
+@pytest.mark.parametrize(
+    ("raw", "said"),
+    [("grey", "Did you mean gray?"), ("bayer_rggb8", "A mosaic is gray or gray16le"), ("grayf32le", "no pixels")],
+)
+def test_bare_bytes_of_an_unknown_kind_are_refused_with_the_kinds_that_are_read(
+    clip: Path, raw: str, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["live", "-", "--raw", raw, "--plan", str(clip / "plan.toml"), "--no-page"]) == 2
+    error = capsys.readouterr().err
+    assert f"--raw {raw}" in error
+    assert "gray, gray10le, gray12le, gray16le, rgb24" in error
+    assert said in error

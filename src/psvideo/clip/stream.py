@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 from statistics import median
 
@@ -17,7 +18,7 @@ from psvideo.clip.decode.movie import picture_of
 from psvideo.clip.linear import in_codes
 from psvideo.clip.reading import looks
 from psvideo.clip.record import CodedPicture, Frame
-from psvideo.errors import PsvideoError
+from psvideo.errors import PsvideoError, UsageError
 from psvideo.model.camera import Camera
 from psvideo.model.units import counted
 
@@ -31,12 +32,37 @@ JUDGED = 24
 OFF = 0.02
 MOST_DAMAGED = 24
 """A stream of which more frames in a row cannot be decoded is no stream of pictures."""
+FEW_PX = 16
 DEVICES = {"/dev/video": "v4l2"}
+
+
+RAW = ("gray", "gray10le", "gray12le", "gray16le", "rgb24", "bgr24", "rgb48le", "gbrp", "yuv420p", "uyvy422", "nv12")
+"""What cameras and recorders send as bare bytes, as FFmpeg calls it; other names of FFmpeg's are tried too."""
+LIKELY = "yuv420p"
+"""What streams usually hold that say it themselves."""
 
 
 def is_device(source: str) -> bool:
     """Return whether a name is that of a video device, such as /dev/video0."""
     return source.startswith(tuple(DEVICES))
+
+
+def stream_kind(raw: str | None) -> CodedPicture:
+    """Return a few pixels as a stream codes them, black where that is 0: for bare bytes those that ``raw`` names, for
+    others what is usual.
+
+    Raises UsageError where FFmpeg has no such pixels, or they are not read here.
+    """
+    try:
+        return picture_of(Path(raw or LIKELY), av.VideoFrame(FEW_PX, FEW_PX, raw or LIKELY))
+    except (ValueError, av.FFmpegError, PsvideoError):
+        bayer = " A mosaic is gray or gray16le, and the plan's cfa says its filters." if "bayer" in str(raw) else ""
+        alike = get_close_matches(str(raw), RAW, 1)
+        meant = f" Did you mean {alike[0]}?" if alike and not bayer else ""
+        raise UsageError(
+            f"`raw` {raw}: these are no pixels that are read; expected {', '.join(RAW[:-1])} or {RAW[-1]}, or another "
+            f"of FFmpeg's names for grey, RGB or YUV.{bayer}{meant}"
+        ) from None
 
 
 @dataclass(kw_only=True)

@@ -98,6 +98,7 @@ class Chain:
     _rounds: LiveRounds | None = None
     _pending: deque[tuple[int, FloatArray, FloatArray | None]] = field(default_factory=deque)
     _idle: threading.Event = field(default_factory=_set)
+    _first: int | None = None
     _last: int | None = None
     _wanted: int = 0
     _guard: threading.RLock = field(default_factory=threading.RLock)
@@ -182,6 +183,7 @@ class Chain:
 
     def _count(self, index: int) -> None:
         self.seen += 1
+        self._first = index if self._first is None else self._first
         if self._last is not None and index > self._last + 1:
             self.lost_frames += index - self._last - 1
             self.gaps[self._last] = index - self._last - 1
@@ -216,10 +218,11 @@ class Chain:
             index = np.array([one[0] for one in fresh], np.int64)
             values = np.stack([one[1] for one in fresh])
             doubts = _stacked([one[2] for one in fresh], values)
+            first_light = self.first_light if index[0] == self._first else None  # it speaks of the first frames alone
 
         def run() -> None:
             try:
-                found: Lock | str = lock(self.plan, index, values, doubt=doubts, first_light=self.first_light)
+                found: Lock | str = lock(self.plan, index, values, doubt=doubts, first_light=first_light)
             except NoStrobeError as fault:
                 found = str(fault)
             except Exception as fault:  # handed to whoever waits for the run

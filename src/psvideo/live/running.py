@@ -7,14 +7,17 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from psvideo.compute.compile_count import CompileCount, compiles_counted
 from psvideo.live.behind import Behind
 from psvideo.live.chain import Chain, LiveFrame, NewestRound, search_here
 from psvideo.live.holding import Holding
+from psvideo.live.preparing import compiling_words, prepared
 from psvideo.live.quality import MOST_RATE, LiveSecond, Quality
 from psvideo.live.recording import Recording
 from psvideo.live.smaller import smaller_plan
 from psvideo.live.source import LiveSource
-from psvideo.live.status import LiveStatus, LiveSummary
+from psvideo.live.status import LiveState, LiveStatus, LiveSummary
+from psvideo.live.waiting import Waiting
 
 IDLE_S = 0.1
 """Whoever waits for a frame looks so often whether the run is over."""
@@ -25,6 +28,9 @@ SETTLES_S = 3.0
 """After the first results, which wait for what is loaded once, until it is judged whether there is time for more."""
 SEARCH_S = 60.0
 """A search that is under way when the source ends is waited for no longer than this."""
+LEAVES_S = 5.0
+"""Whoever reads a source that is silent hears only with its next frame that the run is over, and is waited for so long.
+"""
 Shown = Callable[[NewestRound], None]
 Said = Callable[[LiveStatus], None]
 
@@ -38,6 +44,7 @@ def search_beside(run: Callable[[], None]) -> None:
 class Running:
     """One live run. ``shown`` gets every new result, ``said`` a status each second, ``recording`` every frame.
 
+    ``prepare`` is done before the source is opened, where frames do not wait for it.
     ``drawn_age_s`` says how old results were when pages had drawn them since a time, None where none did; ``status`` is
     the last one that was said."""
 
@@ -46,6 +53,7 @@ class Running:
     quality: Quality
     shown: Shown
     said: Said
+    prepare: Callable[[], None] = lambda: None
     drawn_age_s: Callable[[float], float | None] = lambda since_s: None
     recording: Recording | None = None
     holding: Holding | None = None
@@ -58,11 +66,18 @@ class Running:
     _made_s: list[float] = field(default_factory=list)
     _making_since_s: float | None = None
     _behind: Behind | None = None
+    _waiting: Waiting = field(init=False)
+    _compiles: CompileCount = field(default_factory=CompileCount)
+    _preparing: bool = False
     _slow: bool = False
     _settled_s: float | None = None
     _stop: threading.Event = field(default_factory=threading.Event)
     _came: threading.Event = field(default_factory=threading.Event)
     _fault: BaseException | None = None
+
+    def __post_init__(self) -> None:
+        """See who is waited for."""
+        self._waiting = Waiting(name=self.source.name)
 
     def stop(self) -> None:
         """End the run soon, from any thread."""
@@ -71,10 +86,12 @@ class Running:
     def run(self) -> LiveSummary:
         """Take the source's frames to their end, or until stopped, and return what it came to."""
         began_s = time.monotonic()
-        if self.source.paced:
-            self._beside(began_s)
-        else:
-            self._one_by_one(began_s)
+        with compiles_counted() as self._compiles:
+            if self.source.paced:
+                self._get_ready(began_s)
+                self._beside(began_s)
+            else:
+                self._one_by_one(began_s)
         fault = self._fault or self.chain.fault
         if fault is not None:
             raise fault
@@ -89,6 +106,17 @@ class Running:
             if self._stop.is_set() or self._over(frame.index):
                 break
         self.said(self._status(time.monotonic() - began_s, 1.0, (0, 0)))
+
+    def _get_ready(self, began_s: float) -> None:
+        """Rehearse, and say how far that is."""
+
+        def said() -> None:
+            self.said(self._status(time.monotonic() - began_s, STATUS_S, (0, 0)))
+
+        self._preparing = True
+        wrong = prepared(self.prepare, said=said, every_s=STATUS_S)
+        self._preparing = False
+        self.notes.extend([wrong] if wrong else [])
 
     def _beside(self, began_s: float) -> None:
         self.chain.search = search_beside
@@ -106,7 +134,7 @@ class Running:
             before, said_s = (status.frames, status.results), now_s
             self.said(status)
         for thread in threads:
-            thread.join()
+            thread.join(LEAVES_S)
         self.chain.wait(SEARCH_S)  # a short clip may end before the strobe is found in it
         self._solve()
 
@@ -217,9 +245,11 @@ class Running:
         latest = self._ages_s[len(self._ages_s) - max(self.results - before[1], 0) :]
         made_s = float(np.median(latest)) if latest else None
         drawn_s = self.drawn_age_s(time.monotonic() - last_s)
+        state: LiveState = "preparing" if self._preparing else chain.state
+        waits_for = self._waiting.look(at_s, state=state, frames=chain.seen, why=chain.why)
         self.status = LiveStatus(
             at_s=round(at_s, 3),
-            state=chain.state,
+            state=state,
             fps=(chain.seen - before[0]) / last_s,
             frames=chain.seen,
             lost=chain.lost_frames,
@@ -231,6 +261,8 @@ class Running:
             width_px=camera.width_px,
             height_px=camera.height_px,
             why=chain.why,
+            compiling=compiling_words(self._compiles, time.monotonic(), preparing=self._preparing),
+            waits_for=waits_for,
             recorded=None if self.recording is None else self.recording.written,
             off_rows=None if self.holding is None else self.holding.short_rows,
             trim_ppm=None if self.holding is None or self.holding.ended else self.holding.ppm,

@@ -5,10 +5,16 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from psvideo.clip import Clip, read_frames
+from psvideo.clip.linear import in_codes
+from psvideo.clip.record import CodedPicture, Header
 from psvideo.errors import PsvideoError
 from psvideo.live.chain import LiveFrame
+from psvideo.model.camera import Encoding
 from psvideo.model.choices import Pace
+from psvideo.model.coded import Coded
 from psvideo.model.plan import Plan
 
 PLAIN = ("png", "tiff")
@@ -19,6 +25,7 @@ PLAIN = ("png", "tiff")
 class LiveSource:
     """A source of frames. ``frames`` gives them, each with its place in time by the source's own count or time stamps.
 
+    ``kind`` is a few pixels as its frames are likely to be coded.
     ``first_number`` is what the first frame's file is called by, where there is one. ``cfa`` is the filter pattern of a
     mosaic. ``plan_path`` is the plan's file where the frames are plain codes that it explains. ``paced``: frames come
     when they are due, and not as soon as somebody wants them. ``warnings`` say what is odd about it, ``notes``
@@ -28,12 +35,31 @@ class LiveSource:
     name: str
     plan: Plan
     frames: Callable[[], Iterator[LiveFrame]]
+    kind: Coded
     cfa: str | None = None
     first_number: int = 0
     plan_path: Path | None = None
     paced: bool = True
     warnings: tuple[str, ...] = ()
     notes: list[str] = field(default_factory=list)
+
+
+FEW_PX = 2
+BYTE = 255
+
+
+def plain_kind(encoding: Encoding) -> Coded:
+    """Return a few pixels as a camera is likely to code them: grey, of 8 bits where the plan says that 255 is white."""
+    bits = 8 if encoding.white_level is not None and encoding.white_level <= BYTE else 16
+    header = Header(width_px=FEW_PX, height_px=FEW_PX, channels=1, bits=bits, cfa=encoding.cfa)
+    codes = np.zeros((FEW_PX, FEW_PX), f"u{bits // 8}")
+    return in_codes(CodedPicture(header=header, codes=codes), encoding)
+
+
+def _kind(clip: Clip) -> Coded:
+    """Return a few pixels of a clip's first frame."""
+    coded = next(iter(read_frames(clip, clip.numbers[:1]))).coded
+    return Coded(codes=np.asarray(coded.codes[:FEW_PX])[:, :FEW_PX], tone=coded.tone)
 
 
 def played_clip(clip: Clip, *, pace: Pace = "own") -> LiveSource:
@@ -59,6 +85,7 @@ def played_clip(clip: Clip, *, pace: Pace = "own") -> LiveSource:
     return LiveSource(
         name=clip.name,
         plan=clip.plan,
+        kind=_kind(clip),
         frames=frames,
         cfa=clip.cfa,
         first_number=clip.numbers[0],

@@ -8,11 +8,12 @@ from pathlib import Path
 from psvideo.clip import Frame, open_clip
 from psvideo.clip.genicam import is_genicam, read_genicam
 from psvideo.clip.growing_folder import read_growing
-from psvideo.clip.stream import STANDARD_INPUT, is_device, read_stream
+from psvideo.clip.linear import in_codes
+from psvideo.clip.stream import STANDARD_INPUT, is_device, read_stream, stream_kind
 from psvideo.errors import UsageError
 from psvideo.formats.plan_toml import read_plan
 from psvideo.live.chain import LiveFrame
-from psvideo.live.source import LiveSource, played_clip
+from psvideo.live.source import LiveSource, plain_kind, played_clip
 from psvideo.model.choices import Pace
 from psvideo.model.plan import Plan
 
@@ -37,16 +38,16 @@ def opened_source(
         return replace(found, plan_path=plan if explained else None, notes=notes)
     if source == STANDARD_INPUT or is_device(source) or source.lower().startswith(SCHEMES):
         said: list[str] = []
-        found = _live(source, plan, lambda one: read_stream(source, one.camera, raw=raw, noted=said.append), raw)
-        return replace(found, notes=said)
+        found = _live(source, plan, lambda one: read_stream(source, one.camera, raw=raw, noted=said.append))
+        explained = raw is not None and raw.startswith(PLAIN)
+        kind = in_codes(stream_kind(raw), found.plan.camera.encoding)
+        return replace(found, notes=said, plan_path=plan if explained else None, kind=kind)
     if raw is not None:
         raise UsageError("`raw` says what bare bytes from standard input or the network hold; a clip's files say it.")
     return played_clip(open_clip(Path(source), plan=plan), pace=pace)
 
 
-def _live(
-    source: str, plan: Path | None, read: Callable[[Plan], Iterable[Frame]], raw: str | None = None
-) -> LiveSource:
+def _live(source: str, plan: Path | None, read: Callable[[Plan], Iterable[Frame]]) -> LiveSource:
     if plan is None:
         raise UsageError(
             f"{source}: nothing lies beside frames that come as they are taken, so the plan must be named: `plan`."
@@ -58,6 +59,12 @@ def _live(
             yield LiveFrame(index=frame.index, coded=frame.coded, came_s=time.monotonic())
 
     name = "standard input" if source == STANDARD_INPUT else source
-    encoding = planned.camera.encoding
-    explained = plan if raw is not None and raw.startswith(PLAIN) else None
-    return LiveSource(name=name, plan=planned, frames=frames, cfa=encoding.cfa, first_number=1, plan_path=explained)
+    camera = planned.camera
+    return LiveSource(
+        name=name,
+        plan=planned,
+        frames=frames,
+        cfa=camera.encoding.cfa,
+        first_number=1,
+        kind=plain_kind(camera.encoding),
+    )

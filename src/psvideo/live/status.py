@@ -1,10 +1,14 @@
 """How things stand: one record a second for machines, one line for people, and what it came to at the end."""
 
 from dataclasses import asdict, dataclass
+from typing import Literal
 
 from psvideo.live.follow import State
 
-SAID: dict[State, str] = {
+LiveState = Literal["preparing"] | State
+"""Before the source is opened, live is preparing: it loads, and compiles where nothing is kept yet."""
+SAID: dict[LiveState, str] = {
+    "preparing": "getting ready",
     "seeking": "looking for the strobe",
     "locked": "locked",
     "unsure": "not sure of the strobe",
@@ -18,12 +22,14 @@ class LiveStatus:
     open, until it was made), None where there was none.
 
     ``phase_error_rows`` and ``clock_offset_ppm`` are None while nothing is followed; ``why`` says then why not.
+    ``compiling`` says how far that is, "" where nothing is compiled. ``waits_for`` says what is missing and what to do
+    where nothing can be shown for long.
     ``width_px`` and ``height_px`` are the live picture's; ``off_rows`` is how far the dark row
     is from where the strobe is to hold it, and ``trim_ppm`` by how much the board's steps are longer; None without.
     """
 
     at_s: float
-    state: State
+    state: LiveState
     fps: float
     frames: int
     lost: int
@@ -35,16 +41,25 @@ class LiveStatus:
     width_px: int
     height_px: int
     why: str = ""
+    compiling: str = ""
+    waits_for: str = ""
     recorded: int | None = None
     off_rows: float | None = None
     trim_ppm: int | None = None
     notes: tuple[str, ...] = ()
 
     @property
+    def all_words(self) -> tuple[str, ...]:
+        """What is missing, and what else there is to say of the run."""
+        return (*filter(None, [self.waits_for]), *self.notes)
+
+    @property
     def line(self) -> str:
         """One line for a terminal."""
+        if self.state == "preparing":
+            return self.compiling or SAID[self.state]
         comes = f"{self.fps:.1f} fps" if self.fps or not self.frames else "NO FRAMES COME"
-        parts = [SAID[self.state], comes]
+        parts = [SAID[self.state], *([self.compiling] if self.compiling else []), comes]
         if self.phase_error_rows is not None and self.clock_offset_ppm is not None:
             parts.append(f"+-{self.phase_error_rows:.2g} row, {self.clock_offset_ppm:+.1f} ppm")
         parts.append(f"{self.frames} frames, {self.lost} lost")

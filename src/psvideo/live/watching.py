@@ -76,8 +76,10 @@ def told(status: LiveStatus | None, watching: Watching) -> dict[str, object]:
     """Return what a page says beside its pictures: how things stand, the gravest lines first, histograms by light."""
     lines = (*gravest_first(watching.lines), *(one for one in watching.lines if one.grade in ("good", "unknown")))
     return {
-        "state": "seeking" if status is None else status.state,
+        "state": "preparing" if status is None else status.state,
         "line": "" if status is None else status.line,
+        "compiling": "" if status is None else status.compiling,
+        "notes": [] if status is None else [watching.spell(words) for words in status.all_words],
         "verdict": verdict_of(watching.lines) if watching.lines else "",
         "lines": [{"subject": one.subject, "grade": one.grade, "sentence": one.sentence} for one in lines],
         "histograms": watching.histograms,

@@ -32,11 +32,13 @@ from psvideo.model.timing import DroppedFrames, Timing, timed_camera
 from psvideo.page.serving import ADDRESS
 from psvideo.plates.sequence import check_separable
 from psvideo.runs.caller import PYTHON, Caller
+from psvideo.runs.live_rehearsal import rehearse
 from psvideo.runs.live_strobe import held_strobe
 from psvideo.solve.near_surface import near_surface_of
 from psvideo.solve.normals.illumination import illumination
 from psvideo.strobe.link.ports import AUTO
 from psvideo.strobe.runlog import RunLog, format_log
+from psvideo.sync.find import check_first_light
 
 
 def live(
@@ -97,6 +99,7 @@ def live(
         caller.warn(warning)
     check_followed(played.plan)
     check_separable(played.plan)
+    check_first_light(played.plan, first_light)
     known = None if rig is None else read_rig(path_of("rig", rig), plan_lights=played.plan.lights)
     timing_path = path_if_given("timing_out", timing_out)
     if timing_path is not None:
@@ -104,6 +107,7 @@ def live(
     if known is not None:
         _check_rig(known, played)
     running = _running(played, known, first_light, seconds, said, shown)
+    running.prepare = lambda: rehearse(played, known, step=running.chain.step, page=page)
     kept = _keeper(path_if_given("rig_out", rig_out), force=force)
     record_path = path_if_given("record", record)
     plan_path = path_if_given("plan", plan) or played.plan_path

@@ -56,10 +56,7 @@ def find_timing(
     ``numbers`` (frame,) are the frames' own numbers, by which dropped and repeated ones are reported (left out: the
     indices). Raises PsvideoError where the profiles do not look like the plan's strobe.
     """
-    if first_light is not None and first_light not in plan.lights:
-        raise UsageError(
-            f"`first_light` {first_light}: no such light in the plan; its lights are {', '.join(plan.lights)}."
-        )
+    check_first_light(plan, first_light)
     if plan.mode == "synced":
         return _synced_timing(plan, indices, clip=clip, dropped=dropped)
     strobe = find_strobe(plan, indices, profiles, clip=clip, first_light=first_light, doubt=doubt)
@@ -78,6 +75,14 @@ def find_timing(
             *remarks_on_frames(plan, found, np.asarray(indices)),
         ),
     )
+
+
+def check_first_light(plan: Plan, first_light: str | None) -> None:
+    """Raise UsageError where the light of the first flash is none of the plan's."""
+    if first_light is not None and first_light not in plan.lights:
+        raise UsageError(
+            f"`first_light` {first_light}: no such light in the plan; its lights are {', '.join(plan.lights)}."
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,7 +3,8 @@
 import json as texts
 import sys
 import webbrowser
-from dataclasses import asdict
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -89,6 +90,7 @@ def live(
         return
     if not source:
         raise UsageError("Name what to watch: a clip, a URL, a device; psvideo live --list shows what there is.")
+    telling = _Telling(voice=voice)
     summary = watch(
         source,
         plan=plan,
@@ -110,13 +112,12 @@ def live(
         port=port,
         token=token,
         opened=lambda url: _open(voice, url, browser=not no_browser),
-        said=lambda status: _say(voice, status),
+        said=telling.say,
         caller=voice.caller(),
     )
     if sys.stderr.isatty() and not (json or quiet):
         print(file=sys.stderr)
-    for note in summary.notes:
-        voice.warn(note)
+    telling.warn(summary.notes)
     voice.say(summary.words)
     if json:
         print(texts.dumps(summary.record), flush=True)
@@ -143,10 +144,33 @@ def _open(voice: Voice, url: str, *, browser: bool) -> None:
         webbrowser.open(url)
 
 
-def _say(voice: Voice, status: "LiveStatus") -> None:
-    """Say how things stand: a line that is written over on a terminal, one line of JSON a second for machines."""
-    if voice.json:
-        print(texts.dumps(status.record), flush=True)
-    elif not voice.quiet:
-        over = "\r\x1b[K" if sys.stderr.isatty() else ""
-        print(f"{over}{status.line}", end="" if over else "\n", file=sys.stderr, flush=True)
+@dataclass(kw_only=True)
+class _Telling:
+    """Says how things stand: a line that is written over on a terminal, one line of JSON a second for machines; and
+    what there is to say of the run when it comes up, each sentence once."""
+
+    voice: Voice
+    warned: set[str] = field(default_factory=set)
+    waited: str = ""
+
+    def say(self, status: "LiveStatus") -> None:
+        """Say what the last second was."""
+        over = "\r\x1b[K" if sys.stderr.isatty() and not self.voice.json else ""
+        words = status.all_words
+        if over and not self.warned.issuperset(words):
+            print(over, end="", file=sys.stderr)
+        self.warn(words)
+        if not status.waits_for:
+            self.warned.discard(self.waited)
+        self.waited = status.waits_for
+        if self.voice.json:
+            print(texts.dumps(status.record), flush=True)
+        elif not self.voice.quiet:
+            print(f"{over}{status.line}", end="" if over else "\n", file=sys.stderr, flush=True)
+
+    def warn(self, words: Sequence[str]) -> None:
+        """Warn of what was not yet said."""
+        for sentence in words:
+            if sentence not in self.warned:
+                self.voice.warn(sentence)
+                self.warned.add(sentence)

@@ -1,5 +1,6 @@
 """The planes of a frame that FFmpeg decoded, at full depth, with no conversion of colours on the way."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +38,8 @@ REPACKED = {
 """Interleaved layouts, and the planar one of the same depth, subsampling and colours."""
 
 PLANAR = ("gray", "yuv", "gbr")
+UNREAD = re.compile(r"f16|f32|32[bl]e|41[01]p")
+"""Floats, which are no codes; codes of more than 16 bits; and colour for every fourth pixel alone."""
 
 
 def planes(path: Path, frame: av.VideoFrame) -> list[NDArray[Any]]:
@@ -49,7 +52,8 @@ def planes(path: Path, frame: av.VideoFrame) -> list[NDArray[Any]]:
     if name in REPACKED:
         frame = frame.reformat(format=REPACKED[name])
     parts = frame.format.components
-    if (not name.startswith(PLANAR) and name not in REPACKED) or len({part.plane for part in parts}) != len(parts):
+    known = (name.startswith(PLANAR) and not UNREAD.search(name)) or name in REPACKED
+    if not known or len({part.plane for part in parts}) != len(parts):
         raise PsvideoError(
             f"{path}: its pixel format, {name}, is not read; expected YUV, RGB or grey. Export it as such."
         )

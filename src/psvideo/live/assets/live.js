@@ -8,7 +8,7 @@ const at = (id) => document.getElementById(id);
 const stage = openStage(at("picture"));
 const held = {};
 const light = { name: "Light", direction: directionAt(0.45, 0.5), colour: "#ffffff", intensity: 1, near: false, distance: 1 };
-const SENTENCES = { seeking: "Looking for the strobe", locked: "Locked", unsure: "Not sure of the strobe", lost: "Strobe lost" };
+const SENTENCES = { preparing: "Getting ready", seeking: "Looking for the strobe", locked: "Locked", unsure: "Not sure of the strobe", lost: "Strobe lost" };
 let socket = null;
 let seen = 0;
 let drawn = 0;
@@ -109,8 +109,8 @@ function write(node, text) {
 
 function showStatus(told) {
   at("state").dataset.state = told.state;
-  write(at("state"), told.state === "locked" ? told.verdict || "Locked" : SENTENCES[told.state]);
-  write(at("facts"), told.line);
+  write(at("state"), told.compiling || (told.state === "locked" ? told.verdict || "Locked" : SENTENCES[told.state]));
+  write(at("facts"), told.line === told.compiling ? "" : told.line);
   if (isNew("lines", told.lines)) at("lines").replaceChildren(...told.lines.map(({ subject, grade, sentence }) => {
     const line = document.createElement("li");
     const word = document.createElement("b");
@@ -120,7 +120,8 @@ function showStatus(told) {
     return line;
   }));
   if (isNew("histograms", [told.histograms, told.powers])) showHistograms(told.histograms, told.powers || {});
-  if (isNew("ball", told.ball || [])) showBall(told.ball || []);
+  if (isNew("ball", told.ball || [])) showWords(at("ball-words"), told.ball || []);
+  if (isNew("notes", told.notes || [])) showWords(at("notes"), told.notes || []);
   const names = told.lights.join();
   if (names !== at("plate").dataset.names) {
     at("plate").dataset.names = names;
@@ -128,9 +129,9 @@ function showStatus(told) {
   }
 }
 
-function showBall(words) {
-  at("ball-words").hidden = words.length === 0;
-  at("ball-words").replaceChildren(...words.map((sentence) => {
+function showWords(list, words) {
+  list.hidden = words.length === 0;
+  list.replaceChildren(...words.map((sentence) => {
     const line = document.createElement("li");
     line.textContent = sentence;
     return line;

@@ -100,7 +100,8 @@ def from_first_frame(rows: Profiles, tracked: FrameTrack) -> FrameTrack:
 
 
 def _anchor(plan: Plan, rows: Profiles, beat: Beat, seed: slice) -> tuple[int, int]:
-    """Return the longest run of frames in the seed that fit as well as most."""
+    """Return the longest run of frames in the seed that fit as well as most; all of it where there is none, as among
+    dark frames, which are twins of each other."""
     part = rows.take(seed)
     loss = _losses_of_most(plan, part, beat)
     calm = np.array([np.median(loss[max(n - 1, 0) : n + 2]) for n in range(len(loss))])
@@ -108,7 +109,7 @@ def _anchor(plan: Plan, rows: Profiles, beat: Beat, seed: slice) -> tuple[int, i
     good &= ~twin_frames(rows)[seed]
     edges = np.flatnonzero(np.diff(np.concatenate([[0], good.astype(np.int64), [0]])))
     runs = [(int(b - a), int(a)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
-    length, first = max(runs)
+    length, first = max(runs, default=(0, 0))
     if length < min(LEAST_ANCHOR, len(loss)):
         return seed.start, seed.stop
     return seed.start + first, seed.start + first + length

@@ -1,0 +1,141 @@
+"""What live does before its first frame, and what it says while there is nothing to show."""
+
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from live_clip import live_clip
+from memory_frame import MemoryFrame
+
+import psvideo as ps
+from psvideo.cli.app import main
+from psvideo.compute.compile_count import COMPILING, CompileCount, compiles_counted
+from psvideo.live.chain import Chain, LiveFrame
+from psvideo.live.preparing import compiling_words, prepared
+from psvideo.live.sources import opened_source
+from psvideo.live.waiting import AGAIN_S, SILENT_S, Waiting
+from psvideo.model.plan import Plan
+from psvideo.runs.live import live
+from psvideo.runs.live_rehearsal import rehearse
+from psvideo.synth import TrueClock, expose
+
+PlanMaker = Callable[..., Plan]
+ENDS_S = 5.0
+"""A busy machine may take so long to end a process."""
+
+
+@pytest.fixture(scope="module")
+def clip(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return live_clip(tmp_path_factory.mktemp("live"))
+
+
+def test_after_the_rehearsal_nothing_is_compiled_while_frames_come(clip: Path) -> None:
+    source, rig = opened_source(str(clip), plan=None), ps.read_rig(clip / "rig.toml")
+    rehearse(source, rig, step=1, page=True)
+    with compiles_counted() as compiles:
+        live(clip, rig=clip / "rig.toml", pace="fastest", page=True)
+    assert compiles.count == 0
+
+
+def test_the_source_is_opened_once_everything_is_ready(clip: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    order: list[str] = []
+    monkeypatch.setattr("psvideo.runs.live.rehearse", lambda *_, **__: order.append("rehearsed"))
+    monkeypatch.setattr("psvideo.live.source.read_frames", lambda *_, **__: order.append("read") or iter(()))
+    monkeypatch.setattr("psvideo.live.source._kind", lambda clip: None)
+    with pytest.raises(ps.PsvideoError, match="0 frames are too few"):
+        live(clip)
+    assert order == ["rehearsed", "read"]
+
+
+def test_what_is_compiled_is_counted_and_said_until_it_is_done() -> None:
+    with compiles_counted() as compiles:
+        said: list[str] = []
+
+        def prepare() -> None:
+            for name in "abc":
+                COMPILING.info("compiling %s", name)
+            time.sleep(0.1)
+
+        def say() -> None:
+            said.append(compiling_words(compiles, compiles.since_s + 21, preparing=True))
+
+        assert not prepared(prepare, said=say, every_s=0.02)
+    assert said[0].startswith("Compiling, once: 3 loops in 21 s so far")
+    assert compiling_words(compiles, compiles.last_s + 1, preparing=False)
+    assert not compiling_words(compiles, compiles.last_s + 60, preparing=False)
+    assert not compiling_words(CompileCount(), 0.0, preparing=True)
+
+
+def test_a_rehearsal_that_goes_wrong_is_a_sentence_and_the_run_goes_on() -> None:
+    def fails() -> None:
+        raise ValueError("no such thing")
+
+    assert "no such thing" in prepared(fails, said=lambda: None, every_s=0.01)
+
+
+def test_a_silent_source_is_said_to_be_and_a_reason_stays_for_a_while() -> None:
+    waiting = Waiting(name="udp://127.0.0.1:5000")
+    assert not waiting.look(1.0, state="preparing", frames=0, why="")
+    assert not waiting.look(2.0, state="seeking", frames=0, why="")
+    words = waiting.look(1.0 + SILENT_S, state="seeking", frames=0, why="")
+    assert words.startswith("udp://127.0.0.1:5000: no frames come yet. Check")
+    assert waiting.look(10.0, state="seeking", frames=9, why="51 %") == "51 %"
+    assert waiting.look(11.0, state="seeking", frames=19, why="52 %") == "51 %"
+    assert waiting.look(10.0 + AGAIN_S, state="lost", frames=99, why="53 %") == "53 %"
+    assert not waiting.look(21.0, state="locked", frames=109, why="")
+    assert "no frames come after 109 of them" in waiting.look(30.0, state="locked", frames=109, why="")
+
+
+def test_darkness_is_said_to_be_dark_while_the_run_goes_on(make_plan: PlanMaker) -> None:
+    plan = make_plan()
+    chain, waiting = Chain(plan=plan), Waiting(name="pipe")
+    said = ""
+    for place in range(80):
+        dark = np.zeros((plan.camera.height_px, plan.camera.width_px), np.float32)
+        chain.take(LiveFrame(index=place, coded=MemoryFrame(place, dark).coded, came_s=0.0))
+        said = said or waiting.look(0.01 * place, state=chain.state, frames=chain.seen, why=chain.why)
+    assert "its rows do not change at all from frame to frame. Check that the lights flashed" in said
+
+
+def test_a_first_light_that_the_plan_does_not_have_is_refused_at_once(
+    clip: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["live", str(clip), "--first-light", "nobody", "--no-page"]) == 2
+    assert "no such light in the plan; its lights are" in capsys.readouterr().err
+
+
+def test_the_first_light_names_the_first_frames_flashes_and_not_those_after_a_pause(make_plan: PlanMaker) -> None:
+    plan = make_plan()
+    rng = np.random.default_rng(3)
+    shape = plan.camera.height_px, plan.camera.width_px
+    plates = {slot: (0.05 + 0.3 * rng.random(shape)).astype(np.float32) for slot in plan.lit_slots}
+    before = expose(plates, plan, frames=80, clock=TrueClock(phase_s=0.0))
+    first = next("+".join(one.lights) for one in before.flashes if one.lights and one.start_s > 0.01)
+    wrong = next(light for light in plan.lights if light != first)
+    chain = Chain(plan=plan, first_light=wrong)
+    dark = np.zeros(shape, np.float32)
+    for place, image in enumerate([*[dark] * 300, *before.frames]):  # dark at first: then nobody knows which is first
+        chain.take(LiveFrame(index=place, coded=MemoryFrame(place, image).coded, came_s=0.0))
+    assert chain.fault is None
+    assert chain.state == "locked"
+
+
+def test_a_network_stream_that_is_silent_is_said_to_be_and_ctrl_c_ends_it_at_once(clip: Path) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    words = ["live", f"udp://127.0.0.1:{port}", "--plan", str(clip / "plan.toml"), "--no-page"]
+    with subprocess.Popen([sys.executable, "-m", "psvideo", *words], stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        said = next(line for line in process.stderr if "no frames come yet" in line)
+        began_s = time.monotonic()
+        process.send_signal(signal.SIGINT)
+        process.wait(timeout=30)
+    assert time.monotonic() - began_s < ENDS_S
+    assert "address and port" in said
