@@ -73,12 +73,20 @@ def _plan(plan: Plan, small: SmallPictures, step: int) -> Plan:
 def _frames(kind: Coded, plan: Plan, small: SmallPictures, step: int) -> Iterator[LiveFrame]:
     """Yield frames of the small pictures under the plan's flashes, coded as the few pixels ``kind`` are."""
     count = frames_to_lock(plan) + (ENOUGH + 1) * len(plan.flashes)
-    plates = [np.repeat(np.repeat(one, step, 0), step, 1) for one in small.images]
+    plates = [np.repeat(np.repeat(one, step, 0), step, 1) for one in _with_shadows(small.images)]
     shot = expose(plates, plan, frames=count, ambient=0.02, noise=Noise(full_well_e=10_000, read_e=5))
     light = _light_of_codes(kind)
     for index, image in enumerate(shot.frames):
         codes = image if light is None else np.searchsorted(light[:-1], image).astype(kind.codes.dtype)
         yield LiveFrame(index=index, coded=replace(kind, codes=codes), came_s=0.0)
+
+
+def _with_shadows(images: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return plates of which a corner is dark, and beside it a part that two lights alone reach: it is to be filled."""
+    shadowed, quarter = images.copy(), images.shape[1] // 4
+    shadowed[:, :quarter, :quarter] = 0
+    shadowed[2:, :quarter, quarter : 2 * quarter] = 0
+    return shadowed
 
 
 def _light_of_codes(kind: Coded) -> NDArray[np.float32] | None:
