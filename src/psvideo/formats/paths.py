@@ -43,6 +43,15 @@ def check_file(path: Path) -> None:
         raise PsvideoError(f"{path}: is {OTHER_THAN_FILES.get(kind, 'no file')}, and a file is expected. Name a file.")
 
 
+def take_name(clip: Path) -> str:
+    """Return what a clip's results, and its rig, are called: its folder's name, or its movie's without the ending.
+
+    >>> take_name(Path("takes/shot3"))
+    'shot3'
+    """
+    return clip.stem if clip.is_file() else clip.resolve().name
+
+
 def path_if_given(name: str, given: Path | str | None) -> Path | None:
     """Return a parameter that may be left out as a path; raises as ``path_of``."""
     return None if given is None else path_of(name, given)

@@ -14,6 +14,7 @@ from psvideo.clip import Clip, Kept, Take, keeping_near, read_frames
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import NoStrobeError, PsvideoError, UsageError
 from psvideo.formats.paths import path_if_given, path_of
+from psvideo.formats.rig_folder import rig_of_take
 from psvideo.formats.rig_toml import read_rig
 from psvideo.model.clipping import SATURATED
 from psvideo.model.colours import unmixing_of
@@ -116,7 +117,7 @@ def judged(
     began = time.monotonic()
     whole = open_take(path, plan=plan)
     clip = whole.clip
-    known = None if rig is None else read_rig(rig, plan_lights=clip.plan.lights)
+    known = None if rig is None else read_rig(rig_of_take(rig, path), plan_lights=clip.plan.lights)
     window = window_of(clip.plan, clip.numbers)
     later = _later(clip, window)
     with _store(clip, window) as kept:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import PsvideoError, UsageError
+from psvideo.formats.rig_folder import check_rigs
 from psvideo.runs.caller import PYTHON, Caller
 from psvideo.runs.check import judged, refuse_inside
 from psvideo.runs.checked import Check, write_page
@@ -46,6 +47,7 @@ def check_takes(
     lie in a take, and where the cluster cannot be used; PsvideoError where no scheduler answers, or it is gone.
     """
     paths, page = [Path(clip) for clip in clips], None if report is None else Path(report)
+    check_rigs(rig, paths)
     for path in paths:
         refuse_inside(page, path)
     plan_path, rig_path = (None if path is None else Path(path) for path in (plan, rig))

@@ -16,6 +16,7 @@ from psvideo.export.farm_job import (
     job_values,
 )
 from psvideo.formats.paths import path_if_given, path_of
+from psvideo.formats.rig_folder import rig_of_take
 from psvideo.formats.rig_toml import read_rig
 from psvideo.formats.whole_files import write_text
 from psvideo.formats.whole_folders import refuse_folder, whole_folder
@@ -54,7 +55,7 @@ def farm(
         refuse_folder(folder, mark=TEMPLATE_FILE, force=force)
     refuse_folder(target, mark=MARK, force=False)
     take = open_take(path_of("clip", clip), plan=path_if_given("plan", plan))
-    rig_path = path_of("rig", rig)
+    rig_path = rig_of_take(rig, take.clip.path)
     read_rig(rig_path, plan_lights=take.plan.lights)
     job = FarmJob(
         clip=take.clip.path.resolve(),

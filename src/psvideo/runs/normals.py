@@ -11,6 +11,7 @@ from psvideo.errors import UsageError
 from psvideo.export.asked import Asked, delivery_of
 from psvideo.export.usd import require_usd
 from psvideo.formats.paths import path_if_given, path_of
+from psvideo.formats.rig_folder import rig_of_take
 from psvideo.formats.whole_folders import begun
 from psvideo.model.choices import (
     MOST_ITERATIONS,
@@ -95,7 +96,8 @@ def normals(
 
     - ``clip``: a folder of numbered frames with plan.toml, or a movie file. ``plan`` names the plan where it does not
       lie beside the footage.
-    - ``rig``: where the lights are: rig.toml, an .lp file, a DiLiGenT or UW list.
+    - ``rig``: where the lights are: rig.toml, an .lp file, a DiLiGenT or UW list; or a folder of rigs, of which that
+      one is taken that is named after the clip.
     - ``timing``: timing.json of this clip; left out, the flashes are found from the picture. ``first_light`` names the
       light of the clip's first complete flash, for plans without a marker.
     - ``frames``: file numbers to use, such as ``"1-100"`` or ``"1-100x2"``; left out, all.
@@ -157,7 +159,8 @@ def normals(
     >>> len(report.instants)
     2
     """
-    clip_path, rig_path = path_of("clip", clip), path_of("rig", rig)
+    clip_path = path_of("clip", clip)
+    rig_path = rig_of_take(rig, clip_path)
     going_on = resume or piece is not None
     output = Output(folder=path_of("out", out), force=force, resume=going_on, start_number=start_number, caller=caller)
     output.check()

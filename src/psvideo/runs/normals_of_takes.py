@@ -8,6 +8,7 @@ from typing import Any
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import UsageError
 from psvideo.formats.paths import path_if_given
+from psvideo.formats.rig_folder import check_rigs
 from psvideo.report.of_takes import TakeResult
 from psvideo.runs.caller import PYTHON, Caller
 from psvideo.runs.cluster import Cluster
@@ -42,6 +43,7 @@ def normals_of_takes(
       such as ``"tcp://HOST:8786"``, which see the same files under the same paths. Both need the extra
       ``psvideo[dask]``. With neither, one take is solved after the other here. ``pieces``: into how many a take is cut
       (left out: by its length). ``piece`` is refused: it belongs to ``normals``.
+    - ``rig`` among the ``options``: one for all takes, or a folder of rigs, one for each and named after it.
     - ``force``, ``resume`` and all other ``options`` are those of ``normals``. Takes that are done already are left as
       they are with ``resume``.
 
@@ -69,6 +71,7 @@ def normals_of_takes(
     """
     if piece is not None:
         raise UsageError("`piece` is solved by one process, of one clip. Leave it out here.")
+    check_rigs(options.get("rig"), clips)
     takes = several_takes(clips, out=out, force=force, resume=resume)
     whole = {name: value.resolve() if isinstance(value, Path) else value for name, value in options.items()}
     given: dict[str, Any] = {**whole, "force": force}

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import AllDoneError, PsvideoError, UsageError
-from psvideo.formats.paths import path_of
+from psvideo.formats.paths import path_of, take_name
 from psvideo.formats.whole_files import write_text
 from psvideo.formats.whole_folders import forget_begun, refuse_folder
 from psvideo.report.of_takes import TakeResult, takes_page, takes_record, worst_first
@@ -52,7 +52,7 @@ def names_of(parameter: str, clips: Sequence[Path]) -> list[str]:
     clip, or two are named alike."""
     if not clips:
         raise UsageError(f"`{parameter}`: names no clip. Expected one or several folders of frames, or movie files.")
-    names = [clip.stem if clip.is_file() else clip.resolve().name for clip in clips]
+    names = [take_name(clip) for clip in clips]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise UsageError(f"`{parameter}`: several are named {twice[0]!r}, and their results would lie in one place.")

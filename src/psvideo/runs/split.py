@@ -8,6 +8,7 @@ from psvideo.clip import decoded_once
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import UsageError
 from psvideo.formats.paths import path_if_given, path_of
+from psvideo.formats.rig_folder import rig_of_take
 from psvideo.formats.rig_toml import read_rig
 from psvideo.model.choices import Compression, MovieCodec, PlatesPreview, SplitMethod
 from psvideo.model.colours import unmixing_of
@@ -103,7 +104,7 @@ def split(
     say_of_clip(take.clip, caller)
     rate = take_rate(fps, take, shutter=shutter, resync=path_if_given("resync", resync))
     over_time = OverTime(aligning=Aligning(rate=rate))
-    known = None if rig is None else read_rig(path_of("rig", rig), plan_lights=take.plan.lights)
+    known = None if rig is None else read_rig(rig_of_take(rig, take.clip.path), plan_lights=take.plan.lights)
     unmixing = None if known is None else unmixing_of(take.plan, known, channels=take.clip.channels)
     extras.check(take.unmixed(unmixing).plan)
     over_time.check(take.plan, unmixed=unmixing is not None)

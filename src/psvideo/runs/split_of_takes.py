@@ -7,6 +7,7 @@ from typing import Any
 
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import AllDoneError
+from psvideo.formats.rig_folder import check_rigs
 from psvideo.report.of_takes import TakeResult
 from psvideo.runs.caller import PYTHON, Caller
 from psvideo.runs.cluster import Cluster
@@ -58,6 +59,7 @@ def split_of_takes(
     >>> [(one.clip.name, one.fault, one.instants) for one in results]
     [('take3', '', 3)]
     """
+    check_rigs(options.get("rig"), clips)
     takes = several_takes(clips, out=out, force=force, resume=resume)
     whole = {name: value.resolve() if isinstance(value, Path) else value for name, value in options.items()}
     given: dict[str, Any] = {**whole, "force": force}

@@ -8,6 +8,7 @@ from psvideo.clip import Take
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import UsageError
 from psvideo.formats.paths import path_if_given, path_of
+from psvideo.formats.rig_folder import rig_of_take
 from psvideo.formats.rig_toml import read_rig
 from psvideo.formats.timing_json import format_timing
 from psvideo.formats.whole_files import PICTURE_MARK, refuse_existing, write_text
@@ -75,7 +76,7 @@ def sync(
         refuse_existing(picture_path, force=force, mark=PICTURE_MARK)
     take = open_take(path_of("clip", clip), plan=path_if_given("plan", plan), frames=frames)
     say_of_clip(take.clip, caller)
-    known = None if rig is None else read_rig(path_of("rig", rig), plan_lights=take.plan.lights)
+    known = None if rig is None else read_rig(rig_of_take(rig, take.clip.path), plan_lights=take.plan.lights)
     profiles = take_profiles(take, watch=watch)
     timing = timing_of_profiles(take, profiles, first_light=first_light)
     if picture_path is not None and take.plan.mode != "synced":

@@ -6,13 +6,13 @@ from typing import Annotated
 import typer
 
 from psvideo.cli.console import Voice
-from psvideo.cli.options.clip_and_run import ClipPath, Force, Json, PlanPath, Quiet
+from psvideo.cli.options.clip_and_run import ClipPath, Force, Json, PlanPath, Quiet, RigPath
 from psvideo.model.units import counted
 
 
 def farm(
     clip: ClipPath,
-    rig: Annotated[Path, typer.Option("--rig", help="Where the lights are: rig.toml, .lp, DiLiGenT or UW list.")],
+    rig: RigPath,
     options: Annotated[
         list[str] | None, typer.Argument(metavar="-- OPTIONS", help="After --: other options of psvideo normals.")
     ] = None,

@@ -17,6 +17,7 @@ from psvideo.cli.options.clip_and_run import (
     PlanPath,
     Quiet,
     Resume,
+    RigPath,
     Scheduler,
     StartNumber,
     TimingPath,
@@ -65,7 +66,7 @@ from psvideo.model.units import counted
 def normals(
     context: typer.Context,
     clips: ClipPaths,
-    rig: Annotated[Path, typer.Option("--rig", help="Where the lights are: rig.toml, .lp, DiLiGenT or UW list.")],
+    rig: RigPath,
     out: Annotated[Path, typer.Option("-o", "--out", help="The folder to write.")],
     plan: PlanPath = None,
     timing: TimingPath = None,

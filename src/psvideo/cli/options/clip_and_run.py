@@ -22,6 +22,13 @@ FirstLight = Annotated[
         autocompletion=offer_lights,
     ),
 ]
+RigPath = Annotated[
+    Path,
+    typer.Option(
+        "--rig",
+        help="Where the lights are: rig.toml, .lp, DiLiGenT or UW list; or a folder of rigs, named after the takes.",
+    ),
+]
 OrderRig = Annotated[
     Path | None,
     typer.Option("--rig", help="Where the lights are, to find their order where there is no marker."),
