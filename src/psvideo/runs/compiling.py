@@ -9,14 +9,11 @@ from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.compute.threads import thread_count
 from psvideo.model.quantities import Aov
-from psvideo.model.rig import Light, Rig
 from psvideo.runs.caller import Caller
+from psvideo.runs.small_pictures import RING, SmallPictures
 
 SCENE = """
 schema = "psvideo-scene/1"
@@ -28,9 +25,6 @@ ambient = {{ level = 0.02 }}
 object = [{{ mesh = "sphere", albedo = {{ pattern = "noise" }}{motion}{gloss} }}]
 light = [{lights}]
 """
-RING = [(0.5, 0.0), (-0.5, 0.1), (0.1, 0.5), (-0.1, -0.5), (0.4, 0.4), (-0.4, 0.4), (-0.4, -0.4), (0.4, -0.4)]
-"""The lights' x and y; z is 0.8."""
-
 GLOSS = ", specular = { strength = 0.3, roughness = 0.35 }"
 
 
@@ -73,44 +67,6 @@ USUAL = (
     SmallTake(lights=3, kind="exr", float32=True),
 )
 """What usual footage runs through: 16 and 8 bits, mosaics, floats; few lights and many; at rest and moving."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class SmallPictures:
-    """Pictures of a dome, solved from Python: float32 in, float32 out, which takes never are."""
-
-    lights: int
-    colour: bool = False
-    near: bool = False
-
-    @property
-    def rig(self) -> Rig:
-        """Lights, 1 m away where they are near."""
-        size = self.size_px
-        ways = [(float(x), float(y), float(z)) for x, y, z in self.directions]
-        if not self.near:
-            return Rig(lights=tuple(Light(name=f"l{n}", direction=way) for n, way in enumerate(ways)))
-        lights = tuple(Light(name=f"l{n}", position_m=(x, y, z - 1.0)) for n, (x, y, z) in enumerate(ways))
-        return Rig(lights=lights, focal_px=(10 * size,) * 2, principal_px=(size / 2,) * 2, plane=(0.0, 0.0, 1.0, 1.0))
-
-    @property
-    def directions(self) -> NDArray[np.float64]:
-        """Unit vectors (light, 3)."""
-        ways = np.array([(x, y, 0.8) for x, y in RING[: self.lights]])
-        return np.asarray(ways / np.linalg.norm(ways, axis=1, keepdims=True))
-
-    @property
-    def images(self) -> NDArray[np.float32]:
-        """Plates (light, row, col[, channel])."""
-        y, x = np.mgrid[-0.6 : 0.6 : self.size_px * 1j, -0.6 : 0.6 : self.size_px * 1j]
-        normals = np.stack([x, -y, np.sqrt(1 - x * x - y * y)], axis=-1)
-        shade = 0.5 * np.maximum(np.einsum("rcx,lx->lrc", normals, self.directions), 0)
-        return np.asarray(np.stack([shade] * 3, axis=-1) if self.colour else shade, np.float32)
-
-    @property
-    def size_px(self) -> int:
-        """Rows and columns."""
-        return 64
 
 
 PICTURES = (

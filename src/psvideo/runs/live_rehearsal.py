@@ -19,7 +19,7 @@ from psvideo.model.coded import Coded
 from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.model.rig import Rig
 from psvideo.model.timing import timed_camera
-from psvideo.runs.compiling import RING, SmallPictures
+from psvideo.runs.small_pictures import RING, SmallPictures
 from psvideo.synth.camera.exposure import expose
 from psvideo.synth.camera.noise import Noise
 
