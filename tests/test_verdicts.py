@@ -461,6 +461,17 @@ def test_times_rows_and_motion_on_both_sides_of_a_threshold_are_told_apart() -> 
     assert moved(5, aligned=True) == "doubtful"
 
 
+def test_rows_whose_ambient_light_no_part_of_a_flash_tells_are_not_laid_to_the_shutter() -> None:
+    plan, one = plan_of(["a"], mode="rolling", dark_s=0.01), Footage(unseen=0.1).observed(0)
+    (said,) = time.coverage(plan, timing_of(), one)
+    assert said.grade == "doubtful"
+    assert "dark slot" in said.advice
+    assert "360" not in said.advice
+    assert graded(list(time.coverage(plan, timing_of(), one, take_s=5.0)), "rows") == "good"
+    dark = replace(plan, flashes=(*plan.flashes, replace(plan.flashes[0], lights={})))
+    assert "360" in next(time.coverage(dark, timing_of(), one)).advice
+
+
 def test_rows_that_the_rest_of_the_take_shows_are_not_lost_unless_the_strobe_keeps_step() -> None:
     """Below 360 degrees a part of a take shows fewer rows than all of it."""
 

@@ -161,7 +161,8 @@ def _lines_of(take: Take, timing: Timing, known: Rig | None, *, watch: Watch) ->
         )
     seen = Judgement(subject="strobe", grade="good", found=_strobe_words(plan, timing))
     numbers = take.clip.numbers
-    take_s = (numbers[-1] - numbers[0] + 1) * plan.camera.frame_period_s
+    partly = len(take.numbers) < len(numbers)
+    take_s = (numbers[-1] - numbers[0] + 1) * plan.camera.frame_period_s if partly else None
     return (seen, *judgements(apart.plan, timing, observed, take_s=take_s))
 
 

@@ -68,15 +68,29 @@ ORDER = {
 
 def coverage(plan: Plan, timing: Timing, observed: Observed, *, take_s: float | None = None) -> Iterator[Judgement]:
     """Judge which rows were seen by nobody, or under two flashes, and why. ``take_s`` is how long the take lasts of
-    which only a part was looked at: below 360 degrees the rest shows rows that this part does not."""
+    which only a part was looked at: the rest shows more rows below 360 degrees, and tells the ambient light of more where
+    there is no dark slot."""
     unseen = max((one.unseen_share for one in observed.facts), default=0.0)
     borrowed = max((one.borrowed_share for one in observed.facts), default=0.0)
     if take_s is not None and unseen > MOST_UNSEEN and _is_blind(timing) and not in_step(plan, timing):
         never = never_shown(_as_found(plan, timing), lasts_s=take_s, clock_offset_ppm=timing.clock_offset_ppm)
         unseen, borrowed = min(unseen, never), min(borrowed + unseen, 1.0)
+    without_dark = not (plan.mode == "synced" or _is_blind(timing) or any(flash.is_dark for flash in plan.flashes))
+    if take_s is not None and without_dark:
+        unseen = 0.0  # more frames tell the ambient light of more rows
     said = [] if plan.mode == "synced" else [*_mixed(plan, timing), *_blind(plan, timing, unseen, borrowed)]
     said += _dropped(timing, observed)
-    if unseen > MOST_UNSEEN and not said:
+    if unseen > MOST_UNSEEN and not said and without_dark:
+        said.append(
+            Judgement(
+                subject="rows",
+                grade="bad" if unseen > LOST_UNSEEN else "doubtful",
+                found=f"In up to {100 * unseen:.0f} % of a round's rows ambient light is not known: without a dark "
+                "slot the rows tell it that see a part of a flash, and these saw whole ones only.",
+                advice="Film longer, or add a dark slot to the plan.",
+            )
+        )
+    elif unseen > MOST_UNSEEN and not said:
         said.append(
             Judgement(
                 subject="rows",

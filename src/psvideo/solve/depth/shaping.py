@@ -102,7 +102,14 @@ def scale_note(shaping: Shaping) -> str:
     """Return in a sentence what a clip's depth is measured in: from normals alone nothing knows its scale."""
     if shaping.metric:
         return "Depth is in metres: its scale is the rig's [surface] plane's, or that of the depth given."
-    return "Depth is relative, its median 1, because the rig has no [surface] plane: give one (in metres) for scale."
+    if shaping.view.perspective:
+        return (
+            "Depth is relative, its median 1, because the rig has no [surface] plane: give one (in metres) for scale."
+        )
+    return (
+        "Depth is relative, in widths of the picture about a median of 1: metres need focal_px in the rig's [camera] "
+        "and a [surface] plane."
+    )
 
 
 def reservations(shaping: Shaping) -> tuple[str, ...]:
@@ -110,9 +117,8 @@ def reservations(shaping: Shaping) -> tuple[str, ...]:
     said = []
     if not shaping.view.perspective:
         said.append(
-            "Depth was integrated for an orthographic view, because the rig has no [camera] focal_px: it is relative, "
-            "in widths of the picture about a median of 1, and bends a subject that is near the camera. Give the focal "
-            "length."
+            "Depth was integrated for an orthographic view, because the rig has no [camera] focal_px: a subject near "
+            "the camera is bent. Give the focal length."
         )
     if shaping.first is not None and shaping.first.parts > 1:
         said.append(
