@@ -68,8 +68,8 @@ ORDER = {
 
 def coverage(plan: Plan, timing: Timing, observed: Observed, *, take_s: float | None = None) -> Iterator[Judgement]:
     """Judge which rows were seen by nobody, or under two flashes, and why. ``take_s`` is how long the take lasts of
-    which only a part was looked at: the rest shows more rows below 360 degrees, and tells the ambient light of rows where
-    there is no dark slot."""
+    which only a part was looked at: the rest shows more rows below 360 degrees, and tells the ambient light of rows
+    where there is no dark slot."""
     unseen = max((one.unseen_share for one in observed.facts), default=0.0)
     borrowed = max((one.borrowed_share for one in observed.facts), default=0.0)
     if take_s is not None and unseen > MOST_UNSEEN and _is_blind(timing) and not in_step(plan, timing):
