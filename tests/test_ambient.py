@@ -8,10 +8,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from memory_frame import MemoryFrame
+from true_timing import true_timing
 
 from psvideo.model.plan import Plan
 from psvideo.model.ripple import Exposures, Ripple
-from psvideo.model.shutter import frames_touched
 from psvideo.model.timing import Flash, Timing
 from psvideo.plates.ambient import ambient_followed, ambient_off
 from psvideo.plates.ambient.mains import Mains, RowLight, find_ripple
@@ -84,29 +84,7 @@ def shoot(
         for n, image in zip(kept, images, strict=True):
             yield MemoryFrame(n, np.minimum(noise.add(image, frame_rng(1, n)), 1.0).astype(np.float32))
 
-    starts_s = np.array([flash.start_s for flash in flashes])
-    durations_s = np.array([flash.duration_s for flash in flashes])
-    first, last = frames_touched(plan.camera, starts_s, durations_s)
-    timing = Timing(
-        clip="clip",
-        frame_period_s=plan.camera.frame_period_s,
-        exposure_s=plan.camera.exposure_s,
-        row_time_s=plan.camera.row_time_s,
-        clock_offset_ppm=30.0,
-        phase_error_rows=0.0,
-        order="marker",
-        flashes=tuple(
-            Flash(
-                index=n,
-                slot=flash.slot,
-                lights=plan.flashes[flash.slot].lights,
-                start_s=flash.start_s,
-                duration_s=flash.duration_s,
-                complete=bool(first[n] >= 0 and last[n] < frames),
-            )
-            for n, flash in enumerate(flashes)
-        ),
-    )
+    timing = true_timing(plan, flashes, frames=frames)
     return Take(plates=list(split(read(), plan.camera, timing)), truth=truth)
 
 

@@ -15,6 +15,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from filmed import filmed
 from picture_file import read_picture
 
 from psvideo.cli.app import main
@@ -37,16 +38,8 @@ def run(*arguments: object) -> int:
 
 @pytest.fixture(scope="module")
 def shot(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
-    folder = tmp_path_factory.mktemp("shoots")
-
-    def film(name: str) -> Path:
-        clip = folder / name
-        if not clip.is_dir():
-            (folder / f"{name}.toml").write_text(SCENES[name])
-            assert run("synth", folder / f"{name}.toml", "-o", clip, "-q") == 0
-        return clip
-
-    return film
+    """Film one of the scenes, once."""
+    return filmed(tmp_path_factory.mktemp("shoots"), SCENES)
 
 
 def listing(folder: Path) -> list[tuple[str, int, int]]:

@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 from bench.accuracy_whole import bust
+from ring_and_ball import ring
 
 from psvideo.model.surface import Surface
 from psvideo.report.observe.slopes import averaged, slope_agreement
@@ -18,12 +19,6 @@ from psvideo.solve.normals.task import Usable
 
 SIZE = 96
 COLOUR = np.array([0.5, 0.4, 0.3])
-
-
-def ring(lights: int, slant_deg: float) -> np.ndarray:
-    around, slant = 0.3 + np.arange(lights) * 2 * np.pi / lights, np.radians(slant_deg)
-    up = np.full(lights, np.cos(slant))
-    return np.stack([np.sin(slant) * np.cos(around), np.sin(slant) * np.sin(around), up], axis=-1)
 
 
 def ball() -> tuple[np.ndarray, np.ndarray]:

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from ring_and_ball import ball, ring
 
 from psvideo.errors import PsvideoError
 from psvideo.model.rig import Light
@@ -15,23 +16,6 @@ from psvideo.solve.normals.woodham1980 import EVERYTHING, Usable, solve
 
 Array = NDArray[np.float64]
 DEFAULT = Usable()
-
-
-def ring(lights: int, slant_deg: float) -> Array:
-    """Unit directions evenly around the camera's axis."""
-    around, slant = 0.3 + np.arange(lights) * 2 * np.pi / lights, np.radians(slant_deg)
-    up = np.full(lights, np.cos(slant))
-    return np.stack([np.sin(slant) * np.cos(around), np.sin(slant) * np.sin(around), up], axis=-1)
-
-
-def ball(size: int = 96, *, reach_deg: float = 90.0) -> tuple[Array, NDArray[np.bool_]]:
-    """Normals of a ball's front, as far as ``reach_deg`` from its middle, and where they are."""
-    radius = (size - 1) / 2 / np.sin(np.radians(reach_deg))
-    rows, cols = np.mgrid[:size, :size] - (size - 1) / 2
-    x, y = cols / radius, -rows / radius
-    inside = x * x + y * y < np.sin(np.radians(reach_deg)) ** 2
-    z = np.sqrt(np.where(inside, 1 - x * x - y * y, 0))
-    return np.where(inside[..., None], np.stack([x, y, z], axis=-1), 0), inside
 
 
 def lit_by(directions: Array, intensities: Array | None = None, *, channels: int = 1) -> Illumination:
@@ -62,7 +46,7 @@ def error_deg(surface: Surface, truth: Array, where: NDArray[np.bool_] | None = 
 @pytest.mark.parametrize("channels", [1, 3])
 @pytest.mark.parametrize("lights", [3, 4, 5, 8])
 def test_a_matte_ball_comes_out_exactly(lights: int, channels: int) -> None:
-    normals, inside = ball()
+    normals, inside = ball(reach_deg=90)
     strengths = np.random.default_rng(lights).uniform(0.4, 1.2, (lights, channels))
     lit = lit_by(ring(lights, 40), strengths)
     albedo = np.array([0.7, 0.3, 0.05])[:channels]
@@ -76,7 +60,7 @@ def test_a_matte_ball_comes_out_exactly(lights: int, channels: int) -> None:
 
 
 def test_with_three_lights_a_normal_is_valid_exactly_where_no_light_is_in_shadow() -> None:
-    normals, inside = ball()
+    normals, inside = ball(reach_deg=90)
     lit = lit_by(ring(3, 40))
     surface = solve(list(shoot(normals, lit, 0.8)), lit)
     shade = np.einsum("rcx,lx->lrc", normals, lit.directions)
@@ -88,7 +72,7 @@ def test_with_three_lights_a_normal_is_valid_exactly_where_no_light_is_in_shadow
 
 
 def test_with_eight_lights_shadows_cost_neither_coverage_nor_accuracy() -> None:
-    normals, inside = ball()
+    normals, inside = ball(reach_deg=90)
     lit = lit_by(ring(8, 40))
     plates = list(shoot(normals, lit, 0.8))
     surface = solve(plates, lit)
@@ -161,7 +145,7 @@ def test_a_channel_in_which_the_surface_is_black_adds_no_noise() -> None:
 
 
 def test_albedo_keeps_one_scale_for_any_picture() -> None:
-    normals, _ = ball(48)
+    normals, _ = ball(48, reach_deg=90)
     lit = lit_by(ring(4, 40), np.full((4, 1), 0.5))
     dim = solve(list(shoot(normals, lit, 0.1)), lit)
     bright = solve(list(shoot(normals, lit, 0.9)), lit)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from ring_and_ball import ring
 
 from psvideo.model.ground import Ground
 from psvideo.model.rig import Light
@@ -15,13 +16,6 @@ from psvideo.solve.normals.task import Usable
 
 Array = NDArray[np.float64]
 SIZE = 64
-
-
-def ring(lights: int, slant_deg: float) -> Array:
-    """Unit directions evenly around the camera's axis."""
-    around, slant = 0.3 + np.arange(lights) * 2 * np.pi / lights, np.radians(slant_deg)
-    up = np.full(lights, np.cos(slant))
-    return np.stack([np.sin(slant) * np.cos(around), np.sin(slant) * np.sin(around), up], axis=-1)
 
 
 WAYS = np.concatenate([ring(8, 45), ring(4, 20)])

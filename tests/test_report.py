@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from filmed import filmed
 
 from psvideo.cli.app import main
 
@@ -69,16 +70,7 @@ def run(*arguments: object) -> int:
 @pytest.fixture(scope="module")
 def shot(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
     """Film one of the scenes, once."""
-    folder = tmp_path_factory.mktemp("shoots")
-
-    def film(name: str) -> Path:
-        clip = folder / name
-        if not clip.is_dir():
-            (folder / f"{name}.toml").write_text(SCENES[name])
-            assert run("synth", folder / f"{name}.toml", "-o", clip, "-q") == 0
-        return clip
-
-    return film
+    return filmed(tmp_path_factory.mktemp("shoots"), SCENES)
 
 
 @pytest.fixture(scope="module")

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from ring_and_ball import ball, ring
 from scipy.optimize import linprog  # type: ignore[attr-defined]
 
 import psvideo as ps
@@ -28,23 +29,6 @@ Array = NDArray[np.float64]
 Plates = list[NDArray[np.float32]]
 SCENES = Path(__file__).resolve().parents[1] / "data_synth"
 TRUST_ALL = Reweighting(most_error_deg=179.0)
-
-
-def ring(lights: int, slant_deg: float) -> Array:
-    """Unit directions evenly around the camera's axis."""
-    around, slant = 0.3 + np.arange(lights) * 2 * np.pi / lights, np.radians(slant_deg)
-    up = np.full(lights, np.cos(slant))
-    return np.stack([np.sin(slant) * np.cos(around), np.sin(slant) * np.sin(around), up], axis=-1)
-
-
-def ball(size: int = 96, *, reach_deg: float = 89.0) -> tuple[Array, NDArray[np.bool_]]:
-    """Normals of a ball's front, as far as ``reach_deg`` from its middle, and where they are."""
-    radius = (size - 1) / 2 / np.sin(np.radians(reach_deg))
-    rows, cols = np.mgrid[:size, :size] - (size - 1) / 2
-    x, y = cols / radius, -rows / radius
-    inside = x * x + y * y < np.sin(np.radians(reach_deg)) ** 2
-    z = np.sqrt(np.where(inside, 1 - x * x - y * y, 0))
-    return np.where(inside[..., None], np.stack([x, y, z], axis=-1), 0), inside
 
 
 def lit_by(directions: Array, *, channels: int = 1) -> Illumination:
@@ -87,7 +71,7 @@ def gloss() -> tuple[Plates, Illumination, Array]:
 @pytest.mark.parametrize("channels", [1, 3])
 @pytest.mark.parametrize("lights", [3, 4, 5, 8, 17])
 def test_a_matte_ball_comes_out_exactly(lights: int, channels: int, loss: str) -> None:
-    normals, inside = ball()
+    normals, inside = ball(reach_deg=89)
     lit = lit_by(ring(lights, 40), channels=channels)
     albedo = np.array([0.7, 0.3, 0.05])[:channels]
     plates = shoot(normals, lit, albedo if channels == 3 else 0.7)
@@ -337,7 +321,7 @@ def test_the_result_depends_neither_on_threads_nor_on_where_a_pixel_lies() -> No
 
 
 def test_codes_and_half_floats_give_the_same_surface() -> None:
-    normals, _ = ball(64)
+    normals, _ = ball(64, reach_deg=89)
     lit = Illumination(directions=ring(6, 35), intensities=np.ones((6, 1)))
     codes = [np.round(plate * 60_000 + 512).astype(np.uint16) for plate in shoot(normals, lit)]
     exact = solve(codes, lit, black_level=512, scale=1 / 60_000)
@@ -365,7 +349,7 @@ def test_auto_is_robust_from_five_lights_on() -> None:
     assert ROBUST_FROM_LIGHTS == 5
     assert Solving(solver="robust").method(4) == "robust"
     assert Solving(solver="least-squares").method(48) == "least-squares"
-    normals, _ = ball(32)
+    normals, _ = ball(32, reach_deg=89)
     lit = lit_by(ring(5, 35))
     plates = shoot(normals, lit)
     for solver in ("auto", "least-squares"):

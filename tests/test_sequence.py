@@ -8,10 +8,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from memory_frame import MemoryFrame
+from true_timing import true_timing
 
 from psvideo.model.plan import Plan, PlannedFlash, mixing_matrix, reference_duration_s
-from psvideo.model.shutter import frames_touched, row_weights
-from psvideo.model.timing import Flash, Timing
+from psvideo.model.shutter import row_weights
+from psvideo.model.timing import Timing
 from psvideo.plates import sequence
 from psvideo.plates.ambient import ambient_off
 from psvideo.plates.sequence import Round, coming, light_plates
@@ -54,31 +55,7 @@ def shoot(
 ) -> tuple[Exposure, Timing]:
     clock = TrueClock(phase_s=0.0123, offset_ppm=30.0)
     shot = expose(plates_under(plan, lights), plan, frames=frames, clock=clock, ambient=AMBIENT, noise=noise)
-    start_s = np.array([flash.start_s for flash in shot.flashes])
-    duration_s = np.array([flash.duration_s for flash in shot.flashes])
-    first, last = frames_touched(plan.camera, start_s, duration_s)
-    flashes = tuple(
-        Flash(
-            index=n,
-            slot=flash.slot,
-            lights=plan.flashes[flash.slot].lights,
-            start_s=flash.start_s,
-            duration_s=flash.duration_s,
-            complete=bool(first[n] >= 0 and last[n] < frames),
-        )
-        for n, flash in enumerate(shot.flashes)
-    )
-    timing = Timing(
-        clip="clip",
-        frame_period_s=plan.camera.frame_period_s,
-        exposure_s=plan.camera.exposure_s,
-        row_time_s=plan.camera.row_time_s,
-        clock_offset_ppm=30.0,
-        phase_error_rows=0.0,
-        order="marker",
-        flashes=flashes,
-    )
-    return shot, timing
+    return shot, true_timing(plan, shot.flashes, frames=frames)
 
 
 def gathered(plan: Plan, shot: Exposure, timing: Timing) -> list[Round]:

@@ -11,12 +11,13 @@ import OpenEXR
 import pytest
 from memory_frame import MemoryFrame
 from picture_file import read_picture
+from true_timing import true_timing
 
 from psvideo.formats.plan_toml import read_plan
 from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.model.row_profiles import collect
 from psvideo.model.shutter import frames_touched, row_weights
-from psvideo.model.timing import Flash, Timing
+from psvideo.model.timing import Timing
 from psvideo.plates import hudon2015
 from psvideo.plates.ambient import ambient_off
 from psvideo.plates.sequence import Round, coming, gathered, light_plates
@@ -48,38 +49,9 @@ def plates_for(plan: Plan, *, colour: bool = False, seed: int = 3) -> dict[int, 
     return {slot: (0.05 + 0.6 * rng.random(shape)).astype(np.float32) for slot in plan.lit_slots}
 
 
-def true_timing(plan: Plan, shot: Exposure, frames: int) -> Timing:
-    """The timing as the virtual shoot knows it."""
-    start_s = np.array([flash.start_s for flash in shot.flashes])
-    duration_s = np.array([flash.duration_s for flash in shot.flashes])
-    first, last = frames_touched(plan.camera, start_s, duration_s)
-    flashes = tuple(
-        Flash(
-            index=n,
-            slot=flash.slot,
-            lights=plan.flashes[flash.slot].lights,
-            start_s=flash.start_s,
-            duration_s=flash.duration_s,
-            complete=bool(first[n] >= 0 and last[n] < frames),
-        )
-        for n, flash in enumerate(shot.flashes)
-    )
-    camera = plan.camera
-    return Timing(
-        clip="clip",
-        frame_period_s=camera.frame_period_s,
-        exposure_s=camera.exposure_s,
-        row_time_s=camera.row_time_s,
-        clock_offset_ppm=30.0,
-        phase_error_rows=0.0,
-        order="marker",
-        flashes=flashes,
-    )
-
-
 def shoot(plan: Plan, plates: dict[int, np.ndarray], *, frames: int = 40, **options: object) -> tuple[Exposure, Timing]:
     shot = expose(plates, plan, frames=frames, clock=TrueClock(phase_s=0.0123, offset_ppm=30.0), **options)  # type: ignore[arg-type]
-    return shot, true_timing(plan, shot, frames)
+    return shot, true_timing(plan, shot.flashes, frames=frames)
 
 
 def relative_rms(plates: list[Plate], truth: dict[int, np.ndarray]) -> float:
