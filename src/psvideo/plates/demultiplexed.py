@@ -34,6 +34,7 @@ class Making:
 
 
 def makings_of(plan: Plan) -> list[Making]:
+    """Return how every light of a plan is had from the flashes of a round, in the order of the plan's lights."""
     matrix = mixing_matrix(plan)
     inverse = np.linalg.pinv(matrix)
     inverse[np.abs(inverse) < 1e-12] = 0.0
@@ -52,6 +53,7 @@ def makings_of(plan: Plan) -> list[Making]:
 
 
 def of_light(making: Making, lit: dict[int, Plate], number: int) -> LightPlate:
+    """Return the plate of a light at its full flash, from the plates of a round's ``lit`` flashes by slot."""
     parts = [lit[slot] for slot in making.shares]
     if making.alone:
         return _merged(parts, np.array(list(making.exposures.values())), making.light, number)

@@ -41,6 +41,7 @@ def over_bands(run: Callable[[int, int], None], shape: tuple[int, ...]) -> None:
 
 
 def times_rows(image: Image, factor: NDArray[np.floating]) -> Image:
+    """Return a picture (row, col[, channel]), each row times its factor (row,); the same one where all are 1."""
     if (factor == 1).all():
         return image
     scaled: Image = image * factor.astype(np.float32).reshape(-1, *[1] * (image.ndim - 1))

@@ -18,18 +18,27 @@ LEAST_BADNESS = 0.02
 
 
 class Facts(Protocol):
-    """What makes one instant worse than another."""
+    """What makes one instant worse than another; ``InstantFacts`` says what each means."""
 
     @property
-    def number(self) -> int: ...
+    def number(self) -> int:
+        """The instant's number."""
+
     @property
-    def valid_share(self) -> float | None: ...
+    def valid_share(self) -> float | None:
+        """Of the subject, what has a normal to be trusted."""
+
     @property
-    def clipped_share(self) -> float: ...
+    def clipped_share(self) -> float:
+        """Of the subject, what is saturated, in the mean over the lights."""
+
     @property
-    def unseen_share(self) -> float: ...
+    def unseen_share(self) -> float:
+        """Of the rows, those that no frame saw."""
+
     @property
-    def change(self) -> Change | None: ...
+    def change(self) -> Change | None:
+        """What differs from the result before, at rest."""
 
 
 @dataclass(frozen=True, kw_only=True)
