@@ -15,7 +15,7 @@ from psvideo.model.surface import Surface
 from psvideo.plates.align import between, flow, held, moving
 from psvideo.plates.align.comb import Comb, Schedule
 from psvideo.plates.align.moving_kernel import AT_REST, BOTH
-from psvideo.plates.align.opened import opened
+from psvideo.plates.align.opened import with_open_shutter
 from psvideo.plates.align.packed import packed
 from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.align.vectors import pixels_per_s
@@ -588,7 +588,7 @@ def test_an_open_shutter_shows_what_a_true_one_does_and_better_than_the_mean_of_
     due = Schedule(by_round={1002: tuple((1001, time_s) for time_s in comb.samples_s(0))}, left_out=(0, 0, 0))
     plates = (plate for one in clip.rounds for plate in one.plates)
     how = Aligning(rate=comb)
-    (one,) = opened(aligned(plates, clip.lights, how, first=1001, schedule=due))
+    (one,) = with_open_shutter(aligned(plates, clip.lights, how, first=1001, schedule=due))
     truth = np.zeros(one.plates[0].shape, np.float32)
     many = 45
     for j in range(many):

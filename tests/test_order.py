@@ -11,7 +11,7 @@ from psvideo.model.marker import turned_slot
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Light, Rig
 from psvideo.model.timing import Flash, Timing
-from psvideo.sync.order_by_rig import order_by_rig, turned
+from psvideo.sync.order_by_rig import named_by_turn, order_by_rig
 
 PlanMaker = Callable[..., Plan]
 NAMES = tuple("abcdefgh")
@@ -223,8 +223,8 @@ def test_turning_renames_the_flashes_and_nothing_else(make_plan: PlanMaker) -> N
         order="guess",
         flashes=(flash,),
     )
-    assert turned(plan, timing, 1).flashes == (replace(flash, slot=0, lights=plan.flashes[0].lights),)
-    assert turned(plan, timing, 0) == timing
+    assert named_by_turn(plan, timing, 1).flashes == (replace(flash, slot=0, lights=plan.flashes[0].lights),)
+    assert named_by_turn(plan, timing, 0) == timing
 
 
 @pytest.mark.parametrize("dead", range(6))

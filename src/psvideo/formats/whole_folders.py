@@ -78,7 +78,7 @@ def forget_begun(path: Path) -> None:
             shutil.rmtree(beside)
 
 
-def begun(path: Path) -> Path:
+def unfinished_folder_of(path: Path) -> Path:
     """Return the hidden folder in which an output is written until it is whole; it need not be there."""
     return _beside(path.resolve())
 

@@ -18,12 +18,12 @@ from psvideo.model.choices import SplitMethod
 from psvideo.model.timing import Timing, places_in_time, timed_camera
 from psvideo.plates import hudon2015
 from psvideo.plates.align.comb import Comb, Schedule, schedule_of
-from psvideo.plates.align.opened import opened
+from psvideo.plates.align.opened import with_open_shutter
 from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.ambient.ambient_followed import update
 from psvideo.plates.ambient.ambient_off import subtract, with_darks_ahead
 from psvideo.plates.ambient.ambient_regression import Separated
-from psvideo.plates.ambient.ambient_shown import AHEAD, ambient_shown, dark_plates, placed, ripple_of, used_of
+from psvideo.plates.ambient.ambient_shown import AHEAD, ambient_shown, at_true_places, dark_plates, ripple_of, used_of
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import made, shown_level
 from psvideo.plates.nearest_rows import has_blind_time, with_nearest_rows
@@ -133,7 +133,7 @@ def gather(
             whites=None if part is None else part.whites,
         )
         rounds = _apart(rounds, take)
-        return opened(rounds) if isinstance(aligning.rate, Comb) and aligning.rate.open_s else rounds
+        return with_open_shutter(rounds) if isinstance(aligning.rate, Comb) and aligning.rate.open_s else rounds
     if take.unmixing is not None:
         return _apart(gathered(plates, names, expected=lambda _: {*names, AMBIENT}, whole=True), take)
     expected = coming(plan, flashes, start=start_number)
@@ -179,7 +179,7 @@ def clip_plates(
     ahead = 1 if holds_plain_codes(clip) else AHEAD
     in_files = take.plan.mode != "synced"  # of flashes few frames are held at a time, of photographs all
     decoded = read_frames(clip, numbers, ahead=ahead, threads=thread_count(), kept=take.kept, in_files=in_files)
-    frames = placed(watch(decoded, total=len(numbers), what="rebuilding flashes"), places)
+    frames = at_true_places(watch(decoded, total=len(numbers), what="rebuilding flashes"), places)
     single = (
         split(frames, camera, here, unseen=unseen) if method == "weights" else hudon2015.split(frames, camera, here)
     )

@@ -21,7 +21,7 @@ from psvideo.model.timing import Timing, places_in_time, timed_camera
 from psvideo.plates.gather import clip_plates
 from psvideo.plates.nearest_rows import MOST_LATER, has_blind_time
 from psvideo.plates.split import Plate
-from psvideo.sync.order_by_rig import Image, RigTurn, order_by_rig, turned, why_undecided
+from psvideo.sync.order_by_rig import Image, RigTurn, named_by_turn, order_by_rig, why_undecided
 
 PLACES = 3
 """Cycles that are looked at, spread over the clip."""
@@ -39,7 +39,7 @@ def named_first(take: Take, timing: Timing, first_light: str) -> Timing:
             f"`first_light` {first_light}: no such light in the plan; its lights are {', '.join(take.plan.lights)}."
         )
     for turn in alike_turns(take.plan):
-        named = turned(take.plan, timing, turn)
+        named = named_by_turn(take.plan, timing, turn)
         if first_light == _first_lights(named):
             return replace(named, order="given", order_note="")
     raise PsvideoError(
@@ -69,7 +69,7 @@ def named_by_rig(take: Take, timing: Timing, rig: Rig) -> Timing:
     if verdict.turn is None:
         return replace(timing, order_note=f"The rig does not show the order of the lights: {verdict.why}.")
     note = f"The rig shows the order of the lights: {verdict.why}."
-    return replace(turned(take.plan, timing, verdict.turn), order="rig", order_note=note)
+    return replace(named_by_turn(take.plan, timing, verdict.turn), order="rig", order_note=note)
 
 
 def _agreed(verdicts: list[RigTurn]) -> RigTurn:

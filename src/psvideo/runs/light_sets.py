@@ -125,7 +125,7 @@ def sets_of(path: Path, reading: Reading, *, watch: Watch, caller: Caller) -> Li
     return replace(opened, sets=_compared(opened.sets, path, caller))
 
 
-def pictures_of(place: Place, reading: Reading) -> LightSets:
+def open_photographs(place: Place, reading: Reading) -> LightSets:
     """Open single photographs, one per light. Raises PsvideoError where two are of one light."""
     files = find_stills(place.files)
     renamed = {place.names.get(found[0], light): found for light, found in files.by_light.items()}

@@ -12,7 +12,7 @@ from psvideo.export.asked import Asked, delivery_of
 from psvideo.export.usd import require_usd
 from psvideo.formats.paths import path_if_given, path_of
 from psvideo.formats.rig_folder import rig_of_take
-from psvideo.formats.whole_folders import begun
+from psvideo.formats.whole_folders import unfinished_folder_of
 from psvideo.model.choices import (
     MOST_ITERATIONS,
     PREVIEWS,
@@ -207,7 +207,7 @@ def normals(
     delivery = metric_delivery(delivery, asked.aov, lighting, caller)
     timing_path = path_if_given("timing", timing)
     output = output.given(take, timing_path, first_light, solver, fill, over_time, delivery, *lighting.identity)
-    noted = noted_timing(begun(output.folder)) if going_on and timing_path is None else None
+    noted = noted_timing(unfinished_folder_of(output.folder)) if going_on and timing_path is None else None
     with decoded_once(take, output=output.folder) as kept:
         found = noted or timing_of(kept, timing_path, first_light=first_light, rig=lighting.flashed, watch=watch)
         found = found.spelled(caller.spell)

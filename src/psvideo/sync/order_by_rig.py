@@ -71,7 +71,7 @@ class _Fit:
     left: float
 
 
-def turned(plan: Plan, timing: Timing, turn: int) -> Timing:
+def named_by_turn(plan: Plan, timing: Timing, turn: int) -> Timing:
     """Return the timing with every flash named as the one ``turn`` places further on in the cycle."""
     slots = {slot: turned_slot(plan, slot, turn) for slot in plan.cycle_slots}
     flashes = tuple(

@@ -22,7 +22,7 @@ GUESSED = 1 / 1024
 """What a plate shows where motion hid what it should counts so little beside what others know of that pixel."""
 
 
-def opened(rounds: Iterable[Round]) -> Iterator[Round]:
+def with_open_shutter(rounds: Iterable[Round]) -> Iterator[Round]:
     """Yield of every ``SAMPLES`` rounds of one number the middle one, with the mean of all as ``open_plates``."""
     for _, several in groupby(rounds, key=lambda one: one.number):
         middle: Round | None = None

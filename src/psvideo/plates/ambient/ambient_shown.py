@@ -39,7 +39,7 @@ def dark_plates(take: Take, timing: Timing, after: int = -1) -> Iterator[Plate]:
     for dark in timing.flashes[after + 1 :]:
         if dark.complete and dark.is_dark:
             near = tuple(number_at[place] for place in frames_of(camera, timing, dark) if place in number_at)
-            frames = placed(read_frames(take.clip, near, kept=take.kept, in_files=in_files), places)
+            frames = at_true_places(read_frames(take.clip, near, kept=take.kept, in_files=in_files), places)
             plate = plate_of(dark, frames, camera, timing) if near else None
             if plate is not None:
                 yield plate
@@ -63,7 +63,9 @@ def _separated_plates(
         design = design_of(take.plan, camera, timing, [places[number] for number in window])
         if not design.known.any():
             continue
-        frames = placed(read_frames(take.clip, window, ahead=AHEAD, threads=thread_count(), kept=take.kept), places)
+        frames = at_true_places(
+            read_frames(take.clip, window, ahead=AHEAD, threads=thread_count(), kept=take.kept), places
+        )
         images = (frame.image for frame in frames)
         before = separated(design, images, before=before, mosaic=take.clip.cfa is not None)
         last = _last_flash(places[window[-1]], camera, timing)
@@ -130,7 +132,7 @@ def used_of(take: Take, timing: Timing, numbers: Sequence[int] | None = None) ->
     return replace(timing, flashes=flashes)
 
 
-def placed(frames: Iterable[Frame], places: Mapping[int, int]) -> Iterator[Frame]:
+def at_true_places(frames: Iterable[Frame], places: Mapping[int, int]) -> Iterator[Frame]:
     """Put frames where they truly are in time; repeated ones, which are nowhere, are left out."""
     for frame in frames:
         if frame.number in places:
