@@ -6,12 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from psvideo.cli.options.per_light import parse_lights, parse_per_light, parse_powers
 from psvideo.cli.options.typed import (
     parse_fraction,
-    parse_lights,
     parse_metres,
-    parse_per_light,
-    parse_powers,
     parse_rate,
     parse_seconds,
     parse_size_px,

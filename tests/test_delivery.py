@@ -12,7 +12,7 @@ import OpenEXR
 import pytest
 
 from psvideo.cli.app import main
-from psvideo.cli.options.typed import parse_weights
+from psvideo.cli.options.per_light import parse_weights
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.asked import Asked, delivery_of
 from psvideo.export.otio import Footage, Images, timeline_text

@@ -9,7 +9,7 @@ nothing accumulates; ``Program.played`` is the plan with exactly the times and p
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from psvideo.errors import PsvideoError, UsageError, nearest
+from psvideo.errors import PsvideoError
 from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.model.shoot_figures import slot_label
 from psvideo.strobe.bursts import find_bursts, nearest_powers
@@ -25,6 +25,7 @@ from psvideo.strobe.limits import (
 )
 from psvideo.strobe.link.replies import Capabilities
 from psvideo.strobe.link.requests import Arm, Lit, New, Request, Slot, Steps
+from psvideo.strobe.wiring import wire
 
 PS_PER_S = 10**12
 STEPS_A_LINE = 20
@@ -121,52 +122,6 @@ def to_ticks(time_s: float, tick_ps: int) -> int:
 def show_ticks(ticks: int, caps: Capabilities) -> str:
     """Return ticks as people read times, with the ticks behind."""
     return f"{ticks * caps.tick_ps * 1e-9:.6g} ms ({ticks} ticks)"
-
-
-def wire(plan: Plan, caps: Capabilities, given: Mapping[str, int]) -> dict[str, int]:
-    """Return the line of every light of the plan. Raises UsageError where the wiring given cannot be."""
-    for name, line in given.items():
-        if name not in plan.lights:
-            raise UsageError(f"`line` {name}={line}: the plan has no such light: {nearest(name, plan.lights)}")
-        if not 0 <= line < caps.lines:
-            raise UsageError(
-                f"`line` {name}={line}: this board has {caps.lines} lines with {caps.wiring} wiring, numbered 0 to "
-                f"{caps.lines - 1}."
-            )
-        twin = next((other for other, taken in given.items() if taken == line and other != name), None)
-        if twin is not None and _powers(plan, twin) != _powers(plan, name):
-            raise UsageError(
-                f"`line` {name}={line}: {twin} has line {line} already, and the two do not flash together at one power "
-                "in every flash. Give each its own line."
-            )
-    free = [line for line in range(caps.lines) if line not in given.values()]
-    others = [name for name in plan.lights if name not in given]
-    if len(others) > len(free):
-        raise PsvideoError(
-            f"The plan has {len(plan.lights)} lights and this board has {caps.lines} lines with {caps.wiring} wiring. "
-            f"{_how_with_fewer(plan, caps)}Take another wiring or board, or plan fewer lights."
-        )
-    rest = dict(zip(others, free, strict=False))
-    return {name: given[name] if name in given else rest[name] for name in plan.lights}
-
-
-def _powers(plan: Plan, light: str) -> tuple[float, ...]:
-    """Return a light's power in every flash of the list."""
-    return tuple(flash.lights.get(light, 0.0) for flash in plan.flashes)
-
-
-def _how_with_fewer(plan: Plan, caps: Capabilities) -> str:
-    """Return how lights that always flash together share lines, where that is enough; else nothing."""
-    together: dict[tuple[float, ...], list[str]] = {}
-    for name in plan.lights:
-        together.setdefault(_powers(plan, name), []).append(name)
-    if not len(together) <= caps.lines < len(plan.lights):
-        return ""
-    words = ", ".join(f"`line` {','.join(names)}={line}" for line, names in enumerate(together.values()))
-    return (
-        f"Lights that always flash together, at one power, can hang on one line, each with a driver of its own: wire "
-        f"{len(together)} lines, and say {words}. "
-    )
 
 
 def _lack_of_room(plan: Plan, caps: Capabilities) -> Iterator[str]:

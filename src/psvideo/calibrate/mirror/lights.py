@@ -2,7 +2,7 @@
 
 The highlight of a light is where the sphere mirrors the viewing ray into the light's direction. What is known of the
 view decides how rays are taken (``sphere_view``); one or more sightings (frames, spheres, places) are joined: distant
-lights as a mean direction, near ones as the point where the mirrored rays meet (``mirror_law``). Lights that are not
+lights as a mean direction, near ones as the point where the mirrored rays meet (``law``). Lights that are not
 found are named with the reason, and left out of the rig. Highlights clip, so they show no intensity: all lights get 1.
 """
 

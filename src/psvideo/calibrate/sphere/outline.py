@@ -1,6 +1,6 @@
 """A sphere's outline to a fraction of a pixel: found by its roundness, placed by how the picture changes at its rim.
 
-Round things are looked for in pictures that show outlines (``sphere_search``); the rim of each is fitted in all
+Round things are looked for in pictures that show outlines (``round_things``); the rim of each is fitted in all
 pictures together (``rim_fit``): under every light, under the room light, with the lights off.
 """
 

@@ -2,7 +2,7 @@
 
     profile[i] = B[i] + E[i] * sum over h of (a_h cos(2 pi h f x) + b_h sin(2 pi h f x)),   x = i - (rows - 1) / 2
 
-B and E are smooth; B, E, a and b are each profile's own, and f is what all share: see ``stripe_fit``.
+B and E are smooth; B, E, a and b are each profile's own, and f is what all share: see ``waveform``.
 """
 
 from typing import Any, NamedTuple

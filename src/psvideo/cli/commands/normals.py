@@ -45,6 +45,7 @@ from psvideo.cli.options.delivery import (
     WithAmbient,
     YOption,
 )
+from psvideo.cli.options.per_light import parse_weights
 from psvideo.cli.options.solving import (
     AlignOption,
     Denoise,
@@ -59,7 +60,7 @@ from psvideo.cli.options.solving import (
     ShutterOption,
     SolverOption,
 )
-from psvideo.cli.options.typed import chosen_previews, parse_instants, parse_weights
+from psvideo.cli.options.typed import chosen_previews, parse_instants
 from psvideo.model.units import counted
 
 

@@ -24,8 +24,9 @@ from psvideo.cli.options.clip_and_run import (
     Workers,
 )
 from psvideo.cli.options.delivery import CodecOption, CompressionOption, PlatesPreviewOption, Weights, WithAmbient
+from psvideo.cli.options.per_light import parse_weights
 from psvideo.cli.options.solving import FpsOption, ResyncOption, ShutterOption
-from psvideo.cli.options.typed import parse_instants, parse_weights
+from psvideo.cli.options.typed import parse_instants
 from psvideo.model.choices import SplitMethod
 from psvideo.model.units import counted
 

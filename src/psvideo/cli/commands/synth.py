@@ -8,7 +8,7 @@ import typer
 
 from psvideo.cli.console import Voice
 from psvideo.cli.options.clip_and_run import Force, Json, Quiet, Verbose
-from psvideo.cli.options.typed import parse_lines
+from psvideo.cli.options.per_light import parse_lines
 from psvideo.errors import UsageError
 
 if TYPE_CHECKING:

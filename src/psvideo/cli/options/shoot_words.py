@@ -5,13 +5,11 @@ from dataclasses import dataclass
 from typing import TypeVar, get_args
 
 from psvideo.capture.request import CameraWish, Limits, Marker, ShootRequest, choose_camera
+from psvideo.cli.options.per_light import parse_lights, parse_per_light, parse_powers
 from psvideo.cli.options.typed import (
     parse_fraction,
-    parse_lights,
     parse_metres,
-    parse_per_light,
     parse_positive_seconds,
-    parse_powers,
     parse_rate,
     parse_seconds,
     parse_size_px,

@@ -15,7 +15,7 @@ from psvideo.cli.commands.strobe.emulate import emulate
 from psvideo.cli.commands.strobe.progress import watching
 from psvideo.cli.console import Voice
 from psvideo.cli.options.clip_and_run import Force, Json, Quiet, Verbose
-from psvideo.cli.options.typed import parse_lines
+from psvideo.cli.options.per_light import parse_lines
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.model.units import counted
 from psvideo.strobe.link.ports import AUTO
