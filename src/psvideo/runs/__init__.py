@@ -8,6 +8,6 @@ A module has the name of its command: ``normals``, ``split``, ``sync``, ``stills
 - in pieces and on many machines: ``pieces``, ``piece_notes``, ``cluster``
 - several takes or cameras: ``several_takes``, ``normals_of_takes``, ``split_of_takes``, ``sync_cameras``
 - photographs: ``light_sets``, ``still_rig``, ``still_doubts``, ``rti``
-- on the set: ``checked``, ``check_folder``, ``takes``, ``live_sources``, ``live_strobe``
-- after installation: ``compiling``
+- on the set: ``checked``, ``check_folder``, ``takes``, ``live_sources``, ``live_strobe``, ``live_rehearsal``
+- loops compiled ahead: ``compiling``, ``small_pictures``
 """

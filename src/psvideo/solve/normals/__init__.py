@@ -6,6 +6,6 @@
 ``woodham1980``, in the loops of ``kernel``, ``grey_kernel`` and ``colour_kernel``. Robust: ``robust`` with the loops
 of ``robust_kernel``; a block goes through ``explained``, ``few_lights`` or ``any_lights``, ``robust_weights``,
 ``odd_of_four``, ``equations``, ``apart`` and ``predicted_error``; then ``reflectance`` and ``reflecting`` for what is
-not matte. Judged afterwards: ``evidence``, ``judging`` with ``judging_kernel``, ``doubting``, ``between_channels``,
-``indirect``, ``near_spread``, ``moving_doubt``.
+not matte. Judged afterwards: ``evidence``, ``judging`` with ``judging_kernel``, ``doubting``, ``indirect``,
+``near_spread``, ``moving_doubt``.
 """
