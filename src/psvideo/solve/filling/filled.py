@@ -26,7 +26,6 @@ root of the distance from it over the longer side of the picture. On the virtual
 four lights, a bear and a cat (DiLiGenT)."""
 THIN = 4
 """What is typical is looked for in every fourth row and column."""
-HOLE, OUTSIDE, SMALL = 0, 2, 3  # what is no part of the subject: not looked at yet, no hole, a small one
 CLASSES = np.array([NO_LIGHT, ONE_LIGHT, TWO_LIGHTS, MEASURED], np.uint8)
 
 
@@ -105,16 +104,14 @@ def _lit(solved: Mask, one: Evidence, threads: int | None) -> Bytes:
 
 
 def holes_in(subject: Mask) -> Mask:
-    """Return the small parts of the rest that the subject encloses, told apart by their sides, not by corners."""
-    largest = max(LARGEST_HOLE * subject.size, 1)
-    parts = np.pad(subject, 1).view(np.uint8)  # what is around the picture is none of the subject
-    cv2.floodFill(parts, None, (0, 0), OUTSIDE)
-    for row, line in enumerate(parts):
-        begins = np.flatnonzero(line == HOLE)
-        for col in begins[np.diff(begins, prepend=-1) > 1].tolist():
-            if line[col] == HOLE and cv2.floodFill(parts, None, (col, row), SMALL)[0] > largest:
-                cv2.floodFill(parts, None, (col, row), OUTSIDE)
-    return np.asarray(parts[1:-1, 1:-1] == SMALL)
+    """Return the small parts of the rest that the subject encloses."""
+    count, labels, facts, _ = cv2.connectedComponentsWithStats((~subject).view(np.uint8), connectivity=4)
+    rows, cols = subject.shape
+    left, top, wide, high, size = facts.T
+    inside = (left > 0) & (top > 0) & (left + wide < cols) & (top + high < rows)
+    small = inside & (size <= max(LARGEST_HOLE * rows * cols, 1))
+    small[0] = False
+    return np.asarray(small[labels]) if count > 1 else np.zeros_like(subject)
 
 
 def _said(one: Evidence, wanted: Mask, pixels: int, noise: float, threads: int | None) -> Said:
