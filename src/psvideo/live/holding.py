@@ -57,11 +57,6 @@ class Holding:
                 step_s = self.chain.plan.cycle_s / len(self.chain.plan.cycle_slots)
                 follower.trimmed(self.chain.camera_s(host_s) + STEPS_UNTIL * step_s, float(wanted))
 
-    def release(self) -> None:
-        """Take the trim off."""
-        if self.ppm:
-            self._trimmed(0)
-
     def _trimmed(self, ppm: int) -> bool:
         try:
             self.ask(trim_by(ppm))

@@ -1,4 +1,4 @@
-"""The controller's real firmware in emulation, as a serial port: started, steered and stopped.
+"""The controller's real firmware in emulation, as a serial port: started and stopped.
 
 The emulator (lights/emulator) is a process of its own that plays an ATmega328P or ATmega2560 and its pins. Its clock
 keeps pace with the wall's, or runs as fast as it goes; its trace counts virtual time only.
@@ -9,7 +9,6 @@ import subprocess
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 from psvideo.errors import PsvideoError
 from psvideo.formats.whole_files import whole_file
@@ -17,9 +16,6 @@ from psvideo.strobe.link.words import WiringName
 from psvideo.strobe.stand_ins.toolchain import AvrBoard, Built, build
 
 STOPS_WITHIN_S = 10.0
-
-Outside = Literal["open", "close", "hang", "reset"]
-"""What can happen to a board from outside: its interlock opens or closes, its program hangs, its reset is pressed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,13 +34,6 @@ class EmulatedBoard:
     def __init__(self, process: subprocess.Popen[str], port: str) -> None:
         self._process = process
         self.port = port
-
-    def let(self, what: Outside) -> None:
-        """Let something happen to the board."""
-        if self._process.stdin is None or self._process.poll() is not None:
-            raise PsvideoError("The emulated board has stopped; start it again.")
-        self._process.stdin.write(what + "\n")
-        self._process.stdin.flush()
 
     @property
     def is_running(self) -> bool:
