@@ -8,12 +8,17 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, cast
 
 import pytest
 
 from psvideo.cli import console
 from psvideo.cli.console import Voice
+
+if TYPE_CHECKING:
+    from psvideo.report.run_report import RunReport
 
 ENTRY = "import sys; from psvideo.cli.app import main; sys.exit(main())"
 COLOUR = re.compile(r"\x1b\[(?:[0-9;]*;)?(?:3[0-7]|9[0-7]|38;[25])[0-9;]*m")
@@ -102,3 +107,17 @@ def test_quiet_says_nothing_and_machines_get_no_text_on_standard_output(capsys: 
     machines.say("a")
     machines.result({"a": 1})
     assert capsys.readouterr().out == '{\n "a": 1\n}\n'
+
+
+def test_what_was_warned_of_is_not_said_again_at_the_end(capsys: pytest.CaptureFixture[str]) -> None:
+    @dataclass(frozen=True)
+    class Judged:
+        verdict: str = "This take is usable, with reservations."
+        findings: tuple[str, ...] = ("8 bits cost accuracy", "Give more light, or `first_light`.")
+
+    voice = Voice()
+    voice.warn("8 bits cost accuracy")
+    console.print_report(voice, cast("RunReport", Judged()))
+    said = capsys.readouterr().err
+    assert said.count("8 bits cost accuracy") == 1
+    assert said.count("Give more light, or --first-light.") == 1
