@@ -38,6 +38,7 @@ def judged(
     indirect: float = 0.0,
     blotches: float = 0.0,
     along: np.ndarray = COLOUR,
+    colour: np.ndarray = COLOUR,
 ) -> tuple[Surface, np.ndarray, np.ndarray]:
     """Return a ball as solved, true errors in degrees where it was measured, and predicted ones.
 
@@ -47,7 +48,7 @@ def judged(
     normals, inside = ball()
     rng = np.random.default_rng(3)
     shade = np.maximum(np.einsum("rcx,lx->lrc", normals, lights), 0) + indirect * inside
-    plates = [(one[..., None] * COLOUR + rng.normal(0, noise, (*one.shape, 3))).astype(np.float32) for one in shade]
+    plates = [(one[..., None] * colour + rng.normal(0, noise, (*one.shape, 3))).astype(np.float32) for one in shade]
     for plate in plates:
         soft = cv2.GaussianBlur(rng.normal(size=inside.shape), (0, 0), 2)
         plate += ((blotches / soft.std() * soft * inside)[..., None] * along / np.linalg.norm(along)).astype(np.float32)
@@ -65,6 +66,13 @@ def test_of_noise_alone_two_thirds_are_within_the_predicted_error(lights: int) -
     _, errors, predicted = judged(ring(lights, 30))
     assert 0.6 <= (errors <= predicted).mean() <= 0.92, "some doubt is left"
     assert np.median(predicted) < 2.2 * np.median(errors)
+
+
+@pytest.mark.parametrize("lights", [3, 4])
+def test_noise_is_as_well_predicted_on_a_red_surface_whose_other_channels_hardly_count(lights: int) -> None:
+    _, errors, predicted = judged(ring(lights, 30), noise=0.006, colour=np.array([0.6, 0.06, 0.04]))
+    assert 0.6 <= (errors <= predicted).mean() <= 0.85
+    assert 0.8 < np.median(predicted) / np.median(errors) < 1.7
 
 
 @pytest.mark.parametrize("lights", [5, 12])

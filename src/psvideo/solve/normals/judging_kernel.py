@@ -52,7 +52,10 @@ def judge_rows(
         sizes[:] = ZERO
         for channel in range(channels):
             for col in range(cols):
-                sizes[col] += decoded(a[channel, row, col]) * share
+                one = decoded(a[channel, row, col])
+                sizes[col] += one * one * share
+        for col in range(cols):
+            sizes[col] = np.sqrt(sizes[col])  # channels count by their brightness: noise over it goes with the squares
         for col in range(cols):
             x, y, z = decoded(n[0, row, col]), decoded(n[1, row, col]), decoded(n[2, row, col])
             size = max(sizes[col] * reaching[col], TINY)
