@@ -428,6 +428,12 @@ def test_ambient_light_that_is_the_same_everywhere_is_called_a_black_level() -> 
         assert ambient(one).grade == "doubtful"
 
 
+@pytest.mark.parametrize(("shape", "named"), [("ball", True), ("waves", False)])
+def test_even_ambient_light_over_an_even_wall_is_no_black_level(shape: str, named: bool) -> None:
+    one = Footage(shape=shape, ambient=(0.3,)).observed(0)
+    assert ("black_level" in ambient(one).advice) == named
+
+
 def timed(**changed: Any) -> str:
     return graded(list(time.timing_and_order(timing_of(**changed), "rolling")), "timing")
 

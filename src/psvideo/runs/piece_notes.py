@@ -44,6 +44,7 @@ def write_notes(folder: Path, numbers: range, found: Found) -> None:
         "in_shadow": seen.in_shadow,
         "ambient_measured": list(seen.ambient_measured.items()),
         "beyond_mask": seen.beyond_mask,
+        "dark_evenness": seen.dark_evenness,
         "worst": [{"number": one.number, "badness": one.badness, "why": one.why} for one in seen.thumbnails],
         "reserved": found.reserved,
     }
@@ -107,6 +108,7 @@ def _read(path: Path) -> tuple[range, Found]:
             in_shadow=record["in_shadow"],
             ambient_measured={int(begins): share for begins, share in record["ambient_measured"]},
             beyond_mask=record["beyond_mask"],
+            dark_evenness=record["dark_evenness"],
             worst=Worst(
                 Thumbnail(**one, normals=arrays[f"normals{n}"], valid=arrays[f"valid{n}"])
                 for n, one in enumerate(record["worst"])

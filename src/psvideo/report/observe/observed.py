@@ -35,6 +35,9 @@ LIT = 0.01
 of dark takes, than a sixth of their brightest hundredth."""
 DARKEST = 1 / 6
 FAINT = 2.0**-12
+UNEVEN = 0.5
+"""A picture of things that are brighter and darker, or turned from the light, holds less than this where it is dim, of
+what it holds where it is bright."""
 WEAK_BESIDE = 1 / 8
 """Motion and sharpness are looked for under the first light, unless it gives less than this of the brightest."""
 
@@ -169,6 +172,11 @@ def _ambient_share(dark: NDArray[np.float32] | None, subject: NDArray[np.bool_],
     return level / max(level + float(np.mean(levels)), 1e-9)
 
 
+def _evenness(image: NDArray[np.float32]) -> float:
+    low, high = np.percentile(image, [5, 95])
+    return float(low / max(high, FAINT))
+
+
 def _brightest(image: NDArray[np.float32]) -> NDArray[np.float32]:
     # channel by channel: numpy is slow along a short last axis
     return image if image.ndim == 2 else functools.reduce(np.maximum, np.moveaxis(image, -1, 0))
@@ -183,7 +191,8 @@ class Observed:
     ``only`` are the numbers of rounds that are noted, None for all; the others serve to hold these against.
     ``ambient_measured`` (by window's first frame) is in which share of the picture ambient light could be measured
     without a dark slot; ``in_shadow`` which share of a lamp's light is left where it cannot reach.
-    ``dark_evenness`` is each dark slot's light where it is dim, beside that where it is bright.
+    ``dark_evenness`` is, round by round, ambient light where it is dim beside that where it is bright; 0 where the
+    lights' own pictures are even, for then nothing shows what it falls on.
     ``first`` is the number of the clip's first round, and ``white`` what motion takes for white, found with its first
     plate.
     ``watched`` is whose plates motion is looked for in, as they pass; left out, the first light's, or the brightest's
@@ -245,8 +254,6 @@ class Observed:
 
     def _look_at_dark(self, plate: LightPlate) -> None:
         self._dark = np.array(_brightest(plate.picture.thinned(step_of(*plate.shape[:2]))))
-        low, high = np.percentile(self._dark, [5, 95])
-        self.dark_evenness.append(float(low / max(high, FAINT)))
 
     def add(self, one: Round, surface: Surface | None = None) -> None:
         """Take in one round, and the surface that was solved from it, if any."""
@@ -259,6 +266,8 @@ class Observed:
         mask = None if self.masks is None else self.masks.at(one.number)
         seen = seen_of(one, mask)
         self.beyond_mask.append(seen.beyond)
+        if self._dark is not None:
+            self.dark_evenness.append(_evenness(self._dark) if _evenness(seen.bright.max(axis=0)) < UNEVEN else 0.0)
         if not self._passed:
             for plate in one.plates:
                 self._glance(plate)

@@ -9,7 +9,16 @@ from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import freedom, refine, robust_loss
 from psvideo.sync.rowfit.seed import MISNAMED_PPM, gain_of
 from psvideo.sync.verdict.refusal import MOST_PPM
-from psvideo.sync.verdict.rivals import BETTER, CLEARLY, FAIR, camera_rivals, double_rivals, likeliest, strobe_rivals
+from psvideo.sync.verdict.rivals import (
+    BETTER,
+    CLEARLY,
+    FAIR,
+    Rival,
+    camera_rivals,
+    double_rivals,
+    likeliest,
+    strobe_rivals,
+)
 
 MIN_EXPLAINED, MIN_GAIN = 0.5, 0.3
 """A fit that explains less of the rows' changes, or takes less of the robust loss away, has not found a strobe."""
@@ -57,10 +66,9 @@ def judged(plan: Plan, rows: Profiles) -> Verdict:
         return Verdict(plan=plan, found=found, believed=True)
     meant, found = _as_meant(plan, rows, found)
     believed = convincing(meant, found) and not _feigned(plan, found)
-    if believed and (
-        _unsure(meant, found) or _gaps_feigned(found) or _excuses(plan, found) or flashes_differ(meant, found)
-    ):
-        believed = likeliest(meant, rows, list(strobe_rivals(plan))) is None
+    if believed:
+        rivals = _worth_trying(plan, meant, found)
+        believed = not rivals or likeliest(meant, rows, rivals) is None
     return Verdict(plan=meant, found=found, believed=believed)
 
 
@@ -117,6 +125,17 @@ def _excuses(plan: Plan, found: ClipFit) -> int:
     plans can be made to fit."""
     ppm = abs(found.fit.beat.clock.mean_offset_ppm())
     return (found.steps > 0) + (ppm > max(plan.clock_range_ppm, MISNAMED_PPM))
+
+
+def _worth_trying(plan: Plan, meant: Plan, found: ClipFit) -> list[Rival]:
+    """Return the rivals of a fit that is not beyond doubt. Frames that are missing in a pattern make another rate,
+    which is no rival of theirs where the fit explains all."""
+    if _unsure(meant, found) or _gaps_feigned(found) or flashes_differ(meant, found):
+        return list(strobe_rivals(plan))
+    excuses = _excuses(plan, found)
+    if excuses == 1 and found.steps:
+        return [one for one in strobe_rivals(plan) if one.fault != "rate"]
+    return list(strobe_rivals(plan)) if excuses else []
 
 
 def _moved(plan: Plan, found: ClipFit) -> bool:
