@@ -220,7 +220,7 @@ def paint(shift_px: float) -> np.ndarray:
     return np.asarray(np.clip(soft[:, start : start + SIZE] / soft.std(), -2, 2))
 
 
-def card(shift_px: float) -> tuple[np.ndarray, np.ndarray]:  # noqa: ARG001 - it looks the same wherever it is
+def card(shift_px: float) -> tuple[np.ndarray, np.ndarray]:
     return np.broadcast_to([0.0, 0.0, 1.0], (SIZE, SIZE, 3)), np.full((SIZE, SIZE), 0.8)
 
 
