@@ -16,7 +16,8 @@ there() {
 }
 
 if { [ ! -e "$three" ] || [ ! -e "$micropython" ]; } && command -v npm >/dev/null; then
-    npm install --prefix clients --silent --no-audit --no-fund --no-package-lock >/dev/null 2>&1 ||
+    npm install --prefix clients --silent --no-audit --no-fund --no-package-lock --fetch-retries 1 \
+        --fetch-retry-mintimeout 2000 --fetch-retry-maxtimeout 5000 >/dev/null 2>&1 ||
         echo "npm cannot install three.js and MicroPython: the tests that use them are skipped." >&2
 fi
 
