@@ -1,5 +1,6 @@
 """How commands end before their time: signals, readers that are gone, machines that have no more to give."""
 
+import ctypes
 import errno
 import os
 import re
@@ -21,6 +22,19 @@ def test_what_asks_a_program_to_end_stops_it_as_ctrl_c_does(number: int) -> None
     with pytest.raises(KeyboardInterrupt), stoppable():
         os.kill(os.getpid(), number)
     assert signal.getsignal(number) == before
+
+
+def test_a_stop_that_falls_into_a_call_back_from_c_is_a_stop_and_no_fault() -> None:
+    called_back = ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal(signal.SIGTERM))
+
+    def compile_and_keep() -> None:
+        called_back()
+        raise RuntimeError("no compiled object yet")
+
+    with pytest.raises(KeyboardInterrupt), stoppable():
+        compile_and_keep()
+    with pytest.raises(RuntimeError), stoppable():
+        raise RuntimeError("a fault of its own")
 
 
 def test_signals_that_are_ignored_stay_so() -> None:

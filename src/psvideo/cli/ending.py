@@ -39,7 +39,8 @@ def stoppable() -> Iterator[None]:
     """In this block, what asks a program to end stops it as Ctrl-C does: what it writes is closed, lights become dark.
     A second such signal ends it at once, which costs no more than a kill. Signals that are ignored stay so (nohup).
 
-    Python drops what is raised while it clears something away; a stop that fell there is asked for again.
+    Python drops what is raised while it clears something away, or is called back by C (a compiler that keeps what it
+    made); a stop that fell there is asked for again, and what goes wrong for its sake until then is the stop.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -78,6 +79,10 @@ def stoppable() -> Iterator[None]:
         signal.signal(number, stop)
     try:
         yield
+    except Exception as fault:
+        if later and not asked:
+            raise KeyboardInterrupt from fault
+        raise
     finally:
         for timer in later:
             timer.cancel()
