@@ -57,11 +57,10 @@ class NewestPictures:
             if number in self._came_s:
                 self._drawn.append((at_s, at_s - self._came_s[number]))
 
-    def drawn_age_s(self, since_s: float) -> float | None:
-        """Return how old results were when pages had drawn them since a time, the median; None where none was drawn."""
+    def drawn_ages_s(self, since_s: float) -> list[float]:
+        """Return how old results were when pages had drawn them, of all that were drawn since a time."""
         with self._changed:
-            ages_s = [age_s for at_s, age_s in self._drawn if at_s > since_s]
-        return float(np.median(ages_s)) if ages_s else None
+            return [age_s for at_s, age_s in self._drawn if at_s > since_s]
 
     def packed(self, plate: str) -> tuple[int, list[bytes]]:
         """Return the newest number and its pictures as blocks: normals and albedo, one light's plate, the frame."""

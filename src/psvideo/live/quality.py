@@ -43,8 +43,9 @@ STEPS = (1, 2, 3, 4, 6, 8)
 class LiveSecond:
     """What was measured in a second in which there were results.
 
-    ``age_s``: from the coming of a result's last frame until it was drawn; ``made_age_s``: until it was made;
-    ``made_s``: what making one took (medians). ``rate``: results a second; ``rounds_per_s``: what the strobe gives.
+    ``age_s``: from the coming of a result's last frame until it was drawn; ``made_age_s``: until it was made, both of
+    the second's oldest, since every picture is to be in time. ``made_s``: what making one took, the median.
+    ``rate``: results a second; ``rounds_per_s``: what the strobe gives.
     ``behind_s``: by how much later frames were fetched than in the seconds before.
     """
 

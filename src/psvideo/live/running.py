@@ -45,8 +45,8 @@ class Running:
     """One live run. ``shown`` gets every new result, ``said`` a status each second, ``recording`` every frame.
 
     ``prepare`` is done before the source is opened, where frames do not wait for it.
-    ``drawn_age_s`` says how old results were when pages had drawn them since a time, None where none did; ``status`` is
-    the last one that was said."""
+    ``drawn_ages_s`` says how old results were when pages had drawn them since a time; ``status`` is the last one that
+    was said."""
 
     chain: Chain
     source: LiveSource
@@ -54,7 +54,7 @@ class Running:
     shown: Shown
     said: Said
     prepare: Callable[[], None] = lambda: None
-    drawn_age_s: Callable[[float], float | None] = lambda since_s: None
+    drawn_ages_s: Callable[[float], list[float]] = lambda since_s: []
     recording: Recording | None = None
     holding: Holding | None = None
     seconds: float | None = None
@@ -224,10 +224,9 @@ class Running:
             made_s = [time.monotonic() - since_s]
         if not made_s:
             return None
-        ages_s = self._ages_s[-len(made_s) :] if status.age_s is not None else made_s
-        made_age_s = float(np.median(ages_s))
+        made_age_s = max(self._ages_s[-len(made_s) :] if status.oldest_s is not None else made_s)
         return LiveSecond(
-            age_s=made_age_s if status.age_s is None else status.age_s,
+            age_s=made_age_s if status.oldest_s is None else status.oldest_s,
             made_age_s=made_age_s,
             made_s=float(np.median(made_s)),
             rate=status.results_per_s,
@@ -242,9 +241,8 @@ class Running:
     def _status(self, at_s: float, last_s: float, before: tuple[int, int]) -> LiveStatus:
         chain, follower = self.chain, self.chain.follower
         camera = smaller_plan(chain.plan, chain.step).camera
-        latest = self._ages_s[len(self._ages_s) - max(self.results - before[1], 0) :]
-        made_s = float(np.median(latest)) if latest else None
-        drawn_s = self.drawn_age_s(time.monotonic() - last_s)
+        made_s = self._ages_s[len(self._ages_s) - max(self.results - before[1], 0) :]
+        ages_s = self.drawn_ages_s(time.monotonic() - last_s) or made_s
         state: LiveState = "preparing" if self._preparing else chain.state
         waits_for = self._waiting.look(at_s, state=state, frames=chain.seen, why=chain.why)
         self.status = LiveStatus(
@@ -255,7 +253,8 @@ class Running:
             lost=chain.lost_frames,
             results=self.results,
             results_per_s=(self.results - before[1]) / last_s,
-            age_s=made_s if drawn_s is None else drawn_s,
+            age_s=float(np.median(ages_s)) if ages_s else None,
+            oldest_s=max(ages_s, default=None),
             phase_error_rows=None if follower is None else follower.error_rows,
             clock_offset_ppm=None if follower is None else follower.clock.offset_ppm,
             width_px=camera.width_px,

@@ -19,7 +19,7 @@ SAID: dict[LiveState, str] = {
 @dataclass(frozen=True, kw_only=True)
 class LiveStatus:
     """The last second. ``age_s`` is from the coming of a result's last frame until pages had drawn it (where none is
-    open, until it was made), None where there was none.
+    open, until it was made), the median, ``oldest_s`` the largest, None where there was none.
 
     ``phase_error_rows`` and ``clock_offset_ppm`` are None while nothing is followed; ``why`` says then why not.
     ``compiling`` says how far that is, "" where nothing is compiled. ``waits_for`` says what is missing and what to do
@@ -36,6 +36,7 @@ class LiveStatus:
     results: int
     results_per_s: float
     age_s: float | None
+    oldest_s: float | None
     phase_error_rows: float | None
     clock_offset_ppm: float | None
     width_px: int

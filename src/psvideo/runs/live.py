@@ -191,7 +191,7 @@ def _page(
         looks(newest)
         shown(newest)
 
-    running.shown, running.drawn_age_s = show, pictures.drawn_age_s
+    running.shown, running.drawn_ages_s = show, pictures.drawn_ages_s
 
     def say() -> dict[str, object]:
         return told(running.status, watching) | {"ball": [caller.spell(words) for words in ball.words]}
