@@ -13,7 +13,7 @@ from bench.table import Row
 from psvideo.calibrate.light_pictures import light_pictures
 from psvideo.calibrate.mirror.lights import MirrorCalibration, calibrate_lights
 from psvideo.calibrate.sphere.sighting import Looking, sight_spheres
-from psvideo.runs.light_sets import open_light_sets
+from psvideo.runs.photographs.light_sets import open_light_sets
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 LIGHTS = ((0.3, 0.4, 0.87), (-0.5, 0.2, 0.84), (0.1, -0.4, 0.9), (0.7, 0.3, 0.4), (-0.2, 0.7, 0.6))

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from psvideo.compute.threads import THREADS
-from psvideo.runs.cluster import done_apart
-from psvideo.runs.normals_of_takes import normals_of_takes
+from psvideo.runs.many_takes.cluster import done_apart
+from psvideo.runs.many_takes.normals_of_takes import normals_of_takes
 from psvideo.synth.shoot import shoot
 
 TAKES, PIECES, WORKERS = 1000, 5, (20, 200)

@@ -59,7 +59,12 @@ MATRIX = "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"
 MOST_MB = int(LIMIT_MB)
 PLENTY_MB = 6000
 """Address space of a command: far more than it may use, so that what asks for all of it is seen and harms nobody."""
-LOADED = ("psvideo.runs.normals_of_takes", "psvideo.runs.stills", "psvideo.inspect.describe", "psvideo.export.usd")
+LOADED = (
+    "psvideo.runs.many_takes.normals_of_takes",
+    "psvideo.runs.stills",
+    "psvideo.inspect.describe",
+    "psvideo.export.usd",
+)
 """What most commands load is loaded before they are forked."""
 TRIED = 300
 """Commands that the table tries."""

@@ -20,7 +20,7 @@ from picture_file import read_picture
 
 from psvideo.cli.app import main
 from psvideo.report.observe.focus import sharpest_blur_px
-from psvideo.runs.takes import takes_in, whole_takes
+from psvideo.runs.many_takes.arriving import takes_in, whole_takes
 
 SPHERE = (Path(__file__).resolve().parents[1] / "data_synth" / "sphere.toml").read_text()
 SCENE = SPHERE.replace("frames = 12", "frames = 26").replace("readout_s = 0.01\n", "readout_s = 0.01\nread_e = 5.0\n")

@@ -241,7 +241,7 @@ def test_a_stopped_run_goes_on_to_the_same_delivery(clip: Path, whole: Path, mon
         raise PsvideoError("stopped")
 
     with monkeypatch.context() as patched:
-        patched.setattr("psvideo.runs.handover.write_preview", stop)
+        patched.setattr("psvideo.runs.delivery.handover.write_preview", stop)
         assert normals(clip, out, *EVERYTHING) == 1
     assert not out.exists()
     partial = clip.parent / ".again.partial"

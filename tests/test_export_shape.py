@@ -178,7 +178,7 @@ def test_a_stopped_run_with_meshes_resumes_to_the_same_files(
         raise PsvideoError("stopped")
 
     with monkeypatch.context() as patched:
-        patched.setattr("psvideo.runs.results.write_report", stop)
+        patched.setattr("psvideo.runs.instants.results.write_report", stop)
         assert run(clip, out, *more) == 1
     assert not out.exists()
     shutil.rmtree(tmp_path / ".out.partial" / "depth")

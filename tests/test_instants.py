@@ -26,8 +26,8 @@ from psvideo.plates.align.comb import comb_of, schedule_of
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import made
 from psvideo.plates.sequence import Round
+from psvideo.runs.delivery.relit import TILT, TURN_S, blur_of
 from psvideo.runs.output import rate_of, sequence_fps
-from psvideo.runs.relit import TILT, TURN_S, blur_of
 
 PlanMaker = Callable[..., Plan]
 

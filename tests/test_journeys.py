@@ -119,7 +119,7 @@ def test_a_stopped_run_goes_on_where_it_stopped_and_only_as_it_began(
         raise PsvideoError("the power went off")
 
     with monkeypatch.context() as patched:
-        patched.setattr("psvideo.runs.results.write_text", stop)
+        patched.setattr("psvideo.runs.instants.results.write_text", stop)
         assert run(*command, out) == 1
     assert not out.exists()
     kept = sorted((tmp_path / ".out.partial" / "albedo").iterdir())

@@ -10,7 +10,7 @@ from psvideo.calibrate.light_files import find_plates, find_stills
 from psvideo.calibrate.light_pictures import LightPictures, averaged, light_pictures
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
-from psvideo.runs.light_sets import Reading, open_light_sets, read_images
+from psvideo.runs.photographs.light_sets import Reading, open_light_sets, read_images
 
 SCENES = Path(__file__).resolve().parents[1] / "data_synth"
 

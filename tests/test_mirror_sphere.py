@@ -21,7 +21,7 @@ from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
 from psvideo.formats.rig_toml import parse_rig, read_rig
 from psvideo.runs.calibrate.mirror_sphere import mirror_sphere
-from psvideo.runs.light_sets import open_light_sets
+from psvideo.runs.photographs.light_sets import open_light_sets
 
 DIRECTIONS = {"key": (0.3, 0.4, 0.87), "left": (-0.5, 0.2, 0.84), "low": (0.1, -0.4, 0.9), "rim": (0.7, 0.3, 0.4)}
 DISTANT = {name: Lamp(direction=vector) for name, vector in DIRECTIONS.items()}

@@ -30,9 +30,9 @@ from psvideo.report.observe.observed import InstantFacts, Observed
 from psvideo.report.observe.worst import Thumbnail, Worst
 from psvideo.report.observe.yuille1997 import Lean
 from psvideo.runs import cluster, pieces
-from psvideo.runs.piece_notes import noted, write_notes
-from psvideo.runs.pieces import cut, piece_named
-from psvideo.runs.solving import Found
+from psvideo.runs.instants.piece_notes import noted, write_notes
+from psvideo.runs.instants.pieces import cut, piece_named
+from psvideo.runs.instants.solving import Found
 from psvideo.solve import steady
 
 CLIPS: dict[str, dict[str, Any]] = {

@@ -24,11 +24,11 @@ if TYPE_CHECKING:  # what editors and type checkers see; _HOMES is the same for 
     from psvideo.pictures.relighting import relight as relight
     from psvideo.plates.gather import gather as gather
     from psvideo.runs.check import check as check
-    from psvideo.runs.light_sets import read_images as read_images
+    from psvideo.runs.many_takes.normals_of_takes import normals_of_takes as normals_of_takes
+    from psvideo.runs.many_takes.split_of_takes import split_of_takes as split_of_takes
     from psvideo.runs.normals import normals as normals
-    from psvideo.runs.normals_of_takes import normals_of_takes as normals_of_takes
+    from psvideo.runs.photographs.light_sets import read_images as read_images
     from psvideo.runs.split import split as split
-    from psvideo.runs.split_of_takes import split_of_takes as split_of_takes
     from psvideo.runs.stills import stills as stills
     from psvideo.runs.sync import sync as sync
     from psvideo.runs.sync_cameras import sync_cameras as sync_cameras
@@ -51,10 +51,10 @@ _HOMES = {
     "find_timing": "psvideo.sync.take_timing:find_take_timing",
     "gather": "psvideo.plates.gather",
     "normals": "psvideo.runs.normals",
-    "normals_of_takes": "psvideo.runs.normals_of_takes",
+    "normals_of_takes": "psvideo.runs.many_takes.normals_of_takes",
     "open_take": "psvideo.sync.open_take",
     "picture_of": "psvideo.pictures.quantity",
-    "read_images": "psvideo.runs.light_sets",
+    "read_images": "psvideo.runs.photographs.light_sets",
     "read_mask": "psvideo.clip.mask",
     "read_plan": "psvideo.formats.plan_toml",
     "read_rig": "psvideo.formats.rig_toml",
@@ -64,7 +64,7 @@ _HOMES = {
     "solve": "psvideo.solve.of_take",
     "solve_images": "psvideo.solve.images",
     "split": "psvideo.runs.split",
-    "split_of_takes": "psvideo.runs.split_of_takes",
+    "split_of_takes": "psvideo.runs.many_takes.split_of_takes",
     "stills": "psvideo.runs.stills",
     "sync": "psvideo.runs.sync",
     "sync_cameras": "psvideo.runs.sync_cameras",

@@ -1,7 +1,8 @@
 """Pictures of one scene, one per light, in linear light: what every calibration of lights starts from.
 
 Read here: still photographs, one per light, in a folder; and plates, a folder per light (``psvideo split`` writes such
-a folder). Clips need their flashes found first: ``psvideo.runs.light_sets`` takes all three, and gives the same record.
+a folder). Clips need their flashes found first: ``psvideo.runs.photographs.light_sets`` takes all three, and gives the
+same record.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence

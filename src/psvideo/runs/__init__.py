@@ -1,13 +1,16 @@
 """Whole commands as functions: a clip in, a folder of files out, with the same checks as on the command line.
 
-A module has the name of its command: ``normals``, ``split``, ``sync``, ``stills``, ``check``, ``view``, ``live``,
-``demo``, ``doctor``, ``farm``, ``capture_plan``; ``calibrate`` and ``strobe`` are rooms. What they are made of:
+Commands are modules here with their own names: ``normals``, ``split``, ``sync``, ``stills``, ``check``, ``view``,
+``live``, ``demo``, ``doctor``, ``farm``, ``capture_plan``. Those that are several are rooms: ``calibrate``, ``strobe``.
 
-- a run: ``caller`` (who hears of it), ``output``, ``lighting``, ``solving``, ``results``, ``plates``, ``delivering``,
-  ``depths``, ``relit``, ``reporting``, ``handover``, ``previews``, ``look``
-- in pieces and on many machines: ``pieces``, ``piece_notes``, ``cluster``
-- several takes or cameras: ``several_takes``, ``normals_of_takes``, ``split_of_takes``, ``sync_cameras``
-- photographs: ``light_sets``, ``still_rig``, ``still_doubts``, ``rti``
-- on the set: ``checked``, ``check_folder``, ``takes``, ``live_sources``, ``live_strobe``, ``live_rehearsal``
-- loops compiled ahead: ``compiling``, ``small_pictures``
+What all of them use: ``caller`` (who hears of a run), ``output`` (where it writes), ``lighting`` (what it solves with).
+What single ones use: ``sync_cameras`` (sync of several cameras), ``checked`` (what a check found), ``live_sources``,
+``live_strobe``, ``live_rehearsal``, and ``compiling`` with its ``small_pictures`` (loops compiled ahead of first use).
+
+Rooms, from the bottom up:
+
+- ``delivery``: what a result needs besides normals, and what lies beside it: cameras, movies, timelines
+- ``instants``: solves the instants of a clip one after the other and writes them; in one go or in pieces
+- ``photographs``: lights and doubts of still pictures
+- ``many_takes``: commands over several takes, in this process or on many machines
 """

@@ -27,7 +27,7 @@ from psvideo.report.judge.every_line import judgements
 from psvideo.report.judgement import Judgement
 from psvideo.runs.caller import PYTHON, Caller
 from psvideo.runs.checked import Check, write_page
-from psvideo.runs.reporting import observing
+from psvideo.runs.instants.reporting import observing
 from psvideo.sync.open_take import open_take
 from psvideo.sync.take_timing import find_take_timing
 

@@ -18,10 +18,10 @@ from psvideo.pictures.contact import Strip, Tile, sheet
 from psvideo.pictures.quantity import picture_of
 from psvideo.pictures.relighting import exposure_for, relight, srgb
 from psvideo.plates.timed import timing_of
+from psvideo.runs.instants.results import normals_run
+from psvideo.runs.instants.solving import Job
 from psvideo.runs.lighting import read_lighting
 from psvideo.runs.output import Output
-from psvideo.runs.results import normals_run
-from psvideo.runs.solving import Job
 from psvideo.solve.instants import Instant
 from psvideo.sync.open_take import open_take
 from psvideo.synth.scenes import builtin_scene

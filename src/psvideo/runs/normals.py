@@ -34,12 +34,12 @@ from psvideo.plates.sequence import FIRST_NUMBER
 from psvideo.plates.timed import timing_of
 from psvideo.report.run_report import RunReport
 from psvideo.runs.caller import PYTHON, Caller, say_kept, say_of_clip
-from psvideo.runs.delivering import metric_delivery
+from psvideo.runs.delivery.delivering import metric_delivery
+from psvideo.runs.instants.piece_notes import noted_timing
+from psvideo.runs.instants.results import normals_run, piece_run
+from psvideo.runs.instants.solving import Job, OverTime
 from psvideo.runs.lighting import read_lighting
 from psvideo.runs.output import Output, take_rate
-from psvideo.runs.piece_notes import noted_timing
-from psvideo.runs.results import normals_run, piece_run
-from psvideo.runs.solving import Job, OverTime
 from psvideo.sync.open_take import open_take
 
 MOST_AVERAGED = 64

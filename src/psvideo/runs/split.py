@@ -18,9 +18,9 @@ from psvideo.plates.sequence import FIRST_NUMBER
 from psvideo.plates.timed import timing_of
 from psvideo.report.run_report import RunReport
 from psvideo.runs.caller import PYTHON, Caller, say_kept, say_of_clip
+from psvideo.runs.instants.plates import Extras, split_run
+from psvideo.runs.instants.solving import OverTime
 from psvideo.runs.output import Output, take_rate
-from psvideo.runs.plates import Extras, split_run
-from psvideo.runs.solving import OverTime
 from psvideo.sync.open_take import open_take
 
 

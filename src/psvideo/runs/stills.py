@@ -31,14 +31,14 @@ from psvideo.plates.timed import timing_of
 from psvideo.report.run_report import RunReport
 from psvideo.runs.calibrate.mirror_sphere import focal_widths, radius_in_m
 from psvideo.runs.caller import PYTHON, Caller
-from psvideo.runs.delivering import metric_delivery
+from psvideo.runs.delivery.delivering import metric_delivery
+from psvideo.runs.instants.results import normals_run
+from psvideo.runs.instants.solving import Job, OverTime
 from psvideo.runs.lighting import read_lighting
 from psvideo.runs.output import Output
-from psvideo.runs.results import normals_run
-from psvideo.runs.rti import write_rti
-from psvideo.runs.solving import Job, OverTime
-from psvideo.runs.still_doubts import curve_doubt, exposures_of, glance_at
-from psvideo.runs.still_rig import KnownLights, lens_stated, listed_lights, sphere_lights
+from psvideo.runs.photographs.rti import write_rti
+from psvideo.runs.photographs.still_doubts import curve_doubt, exposures_of, glance_at
+from psvideo.runs.photographs.still_rig import KnownLights, lens_stated, listed_lights, sphere_lights
 from psvideo.solve.instants import Instant
 
 PLAN, RIG, LP = "plan.toml", "rig.toml", "lights.lp"

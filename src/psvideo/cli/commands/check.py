@@ -19,8 +19,8 @@ from psvideo.model.units import counted
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from psvideo.runs.check_folder import Unread
     from psvideo.runs.checked import Check
+    from psvideo.runs.many_takes.check_folder import Unread
 
 INTERVAL_S = 2.0
 COLOURS = {"good": "32", "doubtful": "33", "bad": "31", "unknown": "2"}
@@ -61,7 +61,7 @@ def check(
     if watch is not None and apart:
         raise UsageError("--watch checks takes as they come, in this process: leave out --workers and --scheduler.")
     if clips and (len(clips) > 1 or apart):
-        from psvideo.runs.check_folder import check_takes
+        from psvideo.runs.many_takes.check_folder import check_takes
 
         several = check_takes(
             clips,
@@ -92,7 +92,7 @@ def check(
         if not found.usable:
             raise typer.Exit(1)
     elif watch is not None:
-        from psvideo.runs.check_folder import check_folder
+        from psvideo.runs.many_takes.check_folder import check_folder
 
         checks = check_folder(
             watch,

@@ -116,8 +116,8 @@ def normals(
 ) -> None:
     """Write normals, albedo and validity for every round of flashes; does sync and split by itself."""
     from psvideo.report.run_report import report_record
+    from psvideo.runs.many_takes.normals_of_takes import normals_of_takes
     from psvideo.runs.normals import normals as solve
-    from psvideo.runs.normals_of_takes import normals_of_takes
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     options: dict[str, Any] = dict(  # noqa: C408, as they are called below

@@ -64,8 +64,8 @@ def split(
 ) -> None:
     """Rebuild one plate per flash and write one EXR sequence per light, ambient light taken off."""
     from psvideo.formats.timing_json import timing_record
+    from psvideo.runs.many_takes.split_of_takes import split_of_takes
     from psvideo.runs.split import split as rebuild
-    from psvideo.runs.split_of_takes import split_of_takes
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     options: dict[str, Any] = dict(  # noqa: C408, as they are called below

@@ -7,7 +7,7 @@ from psvideo.compute.progress import Watch
 from psvideo.formats.rig_toml import SCHEMA
 from psvideo.formats.whole_files import PICTURE_MARK, refuse_existing
 from psvideo.runs.caller import Caller
-from psvideo.runs.light_sets import Reading, sets_of
+from psvideo.runs.photographs.light_sets import Reading, sets_of
 
 
 def rig_out(out: Path | str, *, force: bool) -> Path:

@@ -22,7 +22,7 @@ from psvideo.model.choices import Codec, Preview
 from psvideo.model.quantities import QUANTITIES
 from psvideo.pictures.quantity import picture_of
 from psvideo.pictures.relighting import exposure_for, smaller, srgb
-from psvideo.runs.relit import TURN_S, WIDTH_PX, read_relit
+from psvideo.runs.delivery.relit import TURN_S, WIDTH_PX, read_relit
 
 Pixels = NDArray[np.uint8]
 Image = NDArray[np.float32]

@@ -23,11 +23,11 @@ from psvideo.plates.beauty import BEAUTY, Mix, beauty_of
 from psvideo.plates.gather import first_ambient, gather
 from psvideo.plates.sequence import AMBIENT, round_numbers
 from psvideo.report.run_report import RunReport
-from psvideo.runs.delivering import plates_of, say_instants
-from psvideo.runs.handover import Finished, write_previews, write_timeline
-from psvideo.runs.look import look_at_plates
+from psvideo.runs.delivery.delivering import plates_of, say_instants
+from psvideo.runs.delivery.handover import Finished, write_previews, write_timeline
+from psvideo.runs.delivery.look import look_at_plates
+from psvideo.runs.instants.reporting import observing, run_report, write_report
 from psvideo.runs.output import Output, folder_of, tags_of
-from psvideo.runs.reporting import observing, run_report, write_report
 
 SAMPLE_ROUND = 3
 """The round that the report shows, counted from 1; the first where there are fewer."""

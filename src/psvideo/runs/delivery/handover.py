@@ -30,8 +30,8 @@ from psvideo.model.intensity import lights_as_planned
 from psvideo.model.near_light import is_near
 from psvideo.model.rig import Rig
 from psvideo.runs.caller import Caller
-from psvideo.runs.previews import Shown, preview_name, write_preview
-from psvideo.runs.relit import KEPT, relit_file
+from psvideo.runs.delivery.previews import Shown, preview_name, write_preview
+from psvideo.runs.delivery.relit import KEPT, relit_file
 from psvideo.solve.normals.illumination import illumination
 
 OTHER_RATES = ("flashes",)

@@ -23,13 +23,13 @@ from psvideo.plates.gather import first_ambient, gather
 from psvideo.plates.part import Part
 from psvideo.plates.sequence import AMBIENT, FIRST_NUMBER
 from psvideo.report.observe.observed import Observed
-from psvideo.runs.delivering import passes_asked, surface_job, write_plates, write_specular
-from psvideo.runs.depths import shape_of
+from psvideo.runs.delivery.delivering import passes_asked, surface_job, write_plates, write_specular
+from psvideo.runs.delivery.look import look
+from psvideo.runs.delivery.relit import blur_of
+from psvideo.runs.instants.depths import shape_of
+from psvideo.runs.instants.reporting import observing
 from psvideo.runs.lighting import Lighting
-from psvideo.runs.look import look
 from psvideo.runs.output import tags_of
-from psvideo.runs.relit import blur_of
-from psvideo.runs.reporting import observing
 from psvideo.solve.depth import Shaping, reservations
 from psvideo.solve.instants import Instant, denoised, surfaces
 from psvideo.solve.normals.solving import Solving

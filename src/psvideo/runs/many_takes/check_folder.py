@@ -11,8 +11,8 @@ from psvideo.formats.rig_folder import check_rigs
 from psvideo.runs.caller import PYTHON, Caller
 from psvideo.runs.check import judged, refuse_inside
 from psvideo.runs.checked import Check, write_page
-from psvideo.runs.cluster import Cluster, called_apart, connected
-from psvideo.runs.takes import whole_takes
+from psvideo.runs.many_takes.arriving import whole_takes
+from psvideo.runs.many_takes.cluster import Cluster, called_apart, connected
 
 AS_IT_IS = Caller(spell=str)
 """In a worker, sentences keep their parameters' own names: the caller's words for them are put in here."""

@@ -12,7 +12,7 @@ from psvideo.formats.whole_files import write_text
 from psvideo.formats.whole_folders import forget_begun, refuse_folder
 from psvideo.report.of_takes import TakeResult, takes_page, takes_record, worst_first
 from psvideo.runs.caller import Caller
-from psvideo.runs.cluster import Cluster, Shared, connected, done_apart
+from psvideo.runs.many_takes.cluster import Cluster, Shared, connected, done_apart
 from psvideo.runs.output import MARK
 
 

@@ -10,8 +10,8 @@ from psvideo.errors import AllDoneError
 from psvideo.formats.rig_folder import check_rigs
 from psvideo.report.of_takes import TakeResult
 from psvideo.runs.caller import PYTHON, Caller
-from psvideo.runs.cluster import Cluster
-from psvideo.runs.several_takes import apart, one_by_one, result_of, several_takes
+from psvideo.runs.many_takes.cluster import Cluster
+from psvideo.runs.many_takes.several_takes import apart, one_by_one, result_of, several_takes
 from psvideo.runs.split import split
 
 

@@ -1,0 +1,6 @@
+"""What a delivery holds besides normals and albedo.
+
+``delivering`` adds to every instant what was asked for: its camera, its plates, their sum. ``relit`` makes the pictures
+of the relit movie while surfaces are in memory. Once all instants are written, ``handover`` writes the timeline and the
+note for a program, and ``previews`` the movies for eyes. ``look`` is one picture of one instant.
+"""
