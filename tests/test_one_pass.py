@@ -18,7 +18,7 @@ from psvideo.clip.decode import tiff
 from psvideo.clip.decode.decoders import decode
 from psvideo.clip.record import CodedPicture
 from psvideo.report.observe.observed import Observed
-from psvideo.runs import solving as runs
+from psvideo.runs.instants import solving as runs
 from psvideo.solve.instants import surfaces
 
 SCENES = Path(__file__).resolve().parents[1] / "data_synth"

@@ -29,10 +29,11 @@ from psvideo.plates.align import held
 from psvideo.report.observe.observed import InstantFacts, Observed
 from psvideo.report.observe.worst import Thumbnail, Worst
 from psvideo.report.observe.yuille1997 import Lean
-from psvideo.runs import cluster, pieces
+from psvideo.runs.instants import pieces
 from psvideo.runs.instants.piece_notes import noted, write_notes
 from psvideo.runs.instants.pieces import cut, piece_named
 from psvideo.runs.instants.solving import Found
+from psvideo.runs.many_takes import cluster
 from psvideo.solve import steady
 
 CLIPS: dict[str, dict[str, Any]] = {
