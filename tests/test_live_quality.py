@@ -186,3 +186,9 @@ def test_a_cell_of_a_mosaic_is_the_mean_of_each_colours_samples_wherever_it_begi
         cell = np.s_[row * step : (row + 1) * step, col * step : (col + 1) * step]
         means = [codes[cell][colour[cell] == name].mean() for name in "RGB"]
         assert np.abs(small[row, col] - means).max() < (0.07 if kind is np.uint8 else 1.0), "cut to what codes hold"
+
+
+def test_a_colour_picture_stays_colour_whatever_filters_the_plan_names() -> None:
+    codes = np.arange(8 * 8 * 3, dtype=np.uint16).reshape(8, 8, 3)
+    plain, named = (Smaller(step=2, cfa=cfa).of(Coded(codes=codes, tone=Tone())).codes for cfa in (None, "RGGB"))
+    assert np.array_equal(named, plain)

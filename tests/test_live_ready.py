@@ -99,11 +99,11 @@ def test_a_rehearsal_that_goes_wrong_is_a_sentence_and_the_run_goes_on() -> None
 
 
 def test_a_silent_source_is_said_to_be_and_a_reason_stays_for_a_while() -> None:
-    waiting = Waiting(name="udp://127.0.0.1:5000")
+    waiting = Waiting(name="udp://127.0.0.1:5000", check="the sender")
     assert not waiting.look(1.0, state="preparing", frames=0, why="")
     assert not waiting.look(2.0, state="seeking", frames=0, why="")
     words = waiting.look(1.0 + SILENT_S, state="seeking", frames=0, why="")
-    assert words.startswith("udp://127.0.0.1:5000: no frames come yet. Check")
+    assert words.startswith("udp://127.0.0.1:5000: no frames come yet. Check the sender.")
     assert waiting.look(10.0, state="seeking", frames=9, why="51 %") == "51 %"
     assert waiting.look(11.0, state="seeking", frames=19, why="52 %") == "51 %"
     assert waiting.look(10.0 + AGAIN_S, state="lost", frames=99, why="53 %") == "53 %"
@@ -113,7 +113,7 @@ def test_a_silent_source_is_said_to_be_and_a_reason_stays_for_a_while() -> None:
 
 def test_darkness_is_said_to_be_dark_while_the_run_goes_on(make_plan: PlanMaker) -> None:
     plan = make_plan()
-    chain, waiting = Chain(plan=plan), Waiting(name="pipe")
+    chain, waiting = Chain(plan=plan), Waiting(name="pipe", check="the sender")
     said = ""
     for place in range(80):
         dark = np.zeros((plan.camera.height_px, plan.camera.width_px), np.float32)

@@ -18,7 +18,9 @@ from live_clip import live_clip
 import psvideo as ps
 from psvideo.cli.app import main
 from psvideo.clip import read_frames
+from psvideo.clip.filters import check_live_filters
 from psvideo.clip.growing_folder import read_growing
+from psvideo.clip.record import Header
 from psvideo.clip.stream import StreamPlaces, read_stream
 
 Pictures = list[np.ndarray]
@@ -115,6 +117,26 @@ def test_what_is_wrong_with_a_pipe_is_one_paragraph(
     said = capsys.readouterr().err
     assert words in said
     assert "Traceback" not in said
+
+
+def test_colour_that_comes_where_the_plan_says_a_mosaic_is_refused_and_read_nowhere_as_one(
+    clip: Path, pictures: Pictures, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    plan = (clip / "plan.toml").read_text(encoding="utf-8").replace("[camera]", '[camera]\ncfa = "RGGB"', 1)
+    (tmp_path / "mosaic.toml").write_text(plan, encoding="utf-8")
+    words = ["live", "-", "--raw", "rgb24", "--plan", str(tmp_path / "mosaic.toml"), "--no-page"]
+    piped(monkeypatch, bytes(3 * pictures[0].shape[0] * pictures[0].shape[1] * 4))
+    assert main(words) == 1
+    assert "is a colour picture, and the plan says cfa = 'RGGB'" in capsys.readouterr().err
+
+
+def test_a_mosaic_whose_filters_the_plan_does_not_name_is_refused_while_it_comes() -> None:
+    mosaic = Header(width_px=4, height_px=4, channels=1, bits=8, cfa="GBRG")
+    with pytest.raises(ps.PsvideoError, match="write cfa = 'GBRG'"):
+        check_live_filters("genicam", mosaic, None)
+    with pytest.raises(ps.PsvideoError, match="says that its colour filters are GBRG"):
+        check_live_filters("genicam", mosaic, "RGGB")
+    check_live_filters("genicam", mosaic, "GBRG")
 
 
 def test_frames_as_they_are_taken_need_a_plan_by_name(capsys: pytest.CaptureFixture[str]) -> None:

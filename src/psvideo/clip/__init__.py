@@ -6,7 +6,8 @@ makes colour of a mosaic.
 
 ``decode`` has a module for each kind of file. ``record`` and ``take`` hold the records; ``folder`` and ``opening``
 find files, ``stills`` photographs; ``reading`` reads, with ``transfer`` and ``linear`` from codes to light,
-``in_file`` and ``kept`` for codes that are not in memory; ``stated`` is what photographs say of themselves. What comes
+``in_file`` and ``kept`` for codes that are not in memory; ``stated`` is what photographs say of themselves,
+``filters`` whether they are a mosaic. What comes
 while it is recorded: ``growing_folder``, ``stream``, ``genicam`` with ``genicam_camera``. Beside the footage: ``mask``
 and ``mask_sequence``, ``depth_map``.
 """

@@ -20,6 +20,7 @@ from urllib.parse import parse_qsl
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.clip.filters import check_live_filters
 from psvideo.clip.genicam_camera import HEAD
 from psvideo.clip.linear import in_codes
 from psvideo.clip.record import CodedPicture, Frame, Header
@@ -172,11 +173,10 @@ def _header(source: str, mode: "_Mode", camera: Camera) -> Header:
         )
     filters = {"RG": "RGGB", "GR": "GRBG", "GB": "GBRG", "BG": "BGGR"}
     cfa = filters[form[5:7]] if form.startswith("Bayer") else None
-    if cfa is not None and camera.encoding.cfa not in (None, cfa):
-        raise PsvideoError(
-            f"{source}: its filters are {cfa}, and the plan says {camera.encoding.cfa}. Correct cfa in the plan."
-        )
-    return Header(width_px=width_px, height_px=height_px, channels=rest[0] if rest else 1, bits=int(bits[1]), cfa=cfa)
+    channels = rest[0] if rest else 1
+    header = Header(width_px=width_px, height_px=height_px, channels=channels, bits=int(bits[1]), cfa=cfa)
+    check_live_filters(source, header, camera.encoding.cfa)
+    return header
 
 
 def _command(*words: str) -> list[str]:

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from psvideo.clip.decode.decoders import opened
+from psvideo.clip.filters import check_live_filters
 from psvideo.clip.folder import KINDS, number_of
 from psvideo.clip.linear import in_codes
 from psvideo.clip.reading import looks
@@ -42,6 +43,7 @@ def read_growing(folder: Path, camera: Camera, *, quiet_s: float = QUIET_S) -> I
                     f"{file}: is {looks(head)}; expected {expected}, as the plan and the frames before say. Use the "
                     "plan of this mode, and an empty folder for each take."
                 )
+            check_live_filters(file, head, camera.encoding.cfa)
             first, look, done = number if first is None else first, looks(head), number
             yield Frame(index=number - first, number=number, coded=in_codes(picture, camera.encoding))
         if new:

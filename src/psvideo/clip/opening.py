@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from psvideo.clip.decode.decoders import read_header
 from psvideo.clip.decode.yuv import signal_range
+from psvideo.clip.filters import check_filters
 from psvideo.clip.folder import MOVIES, RAWS, find_sequence, unread
 from psvideo.clip.linear import depth_held
 from psvideo.clip.record import Clip, Header
@@ -210,14 +211,4 @@ def check_fit(file: Path, header: Header, plan: Plan, plan_path: Path) -> None:
             f"{file}: is {header.width_px} x {header.height_px} pixels, and {plan_path} says {camera.width_px} x "
             f"{camera.height_px}. Use the plan of this footage, or correct width_px and height_px in it."
         )
-    cfa = camera.encoding.cfa
-    if cfa is not None and header.channels == 3:
-        raise PsvideoError(
-            f"{file}: is a colour picture, and {plan_path} says cfa = {cfa!r}, which is for mosaiced frames of one "
-            "channel. Leave cfa out of the plan."
-        )
-    if cfa is not None and header.cfa is not None and header.cfa != cfa:
-        raise PsvideoError(
-            f"{file}: says that its colour filters are {header.cfa} from the top left pixel on, and {plan_path} says "
-            f"cfa = {cfa!r}. Leave cfa out of the plan: DNG files carry it themselves."
-        )
+    check_filters(file, header, camera.encoding.cfa, plan=plan_path)

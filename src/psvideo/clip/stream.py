@@ -15,6 +15,7 @@ from statistics import median
 import av
 
 from psvideo.clip.decode.movie import picture_of
+from psvideo.clip.filters import check_live_filters
 from psvideo.clip.linear import in_codes
 from psvideo.clip.reading import looks
 from psvideo.clip.record import CodedPicture, Frame
@@ -187,6 +188,7 @@ def _check(name: str, picture: CodedPicture, camera: Camera, first: CodedPicture
             f"{name}: sends {head.width_px} x {head.height_px} pixels, and the plan says {camera.width_px} x "
             f"{camera.height_px}. Set the camera to the plan's size, or use the plan of this mode."
         )
+    check_live_filters(name, head, camera.encoding.cfa)
     if first is not None and looks(head) != looks(first.header):
         raise PsvideoError(
             f"{name}: sends {looks(head)} all of a sudden, and began with {looks(first.header)}. Somebody changed the "

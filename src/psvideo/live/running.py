@@ -77,7 +77,7 @@ class Running:
 
     def __post_init__(self) -> None:
         """See who is waited for."""
-        self._waiting = Waiting(name=self.source.name)
+        self._waiting = Waiting(name=self.source.name, check=self.source.check)
 
     def stop(self) -> None:
         """End the run soon, from any thread."""

@@ -86,8 +86,12 @@ def _is_even(tone: Tone) -> bool:
 
 
 def _channels(cfa: str | None, channels: int) -> tuple[NDArray[np.int64], int]:
-    """Return which channel a sample goes to, by (row % 2, col % 2, channel), and how many there are."""
-    if cfa is None:
+    """Return which channel a sample goes to, by (row % 2, col % 2, channel), and how many there are.
+
+    A picture of several channels is no mosaic, whatever the plan says: readers refuse it, and a rehearsal is before
+    them.
+    """
+    if cfa is None or channels > 1:
         return np.broadcast_to(np.arange(channels), (2, 2, channels)).astype(np.int64), channels
     return np.array([CHANNELS[name] for name in cfa], np.int64).reshape(2, 2, 1), 3
 

@@ -29,7 +29,7 @@ class LiveSource:
     ``first_number`` is what the first frame's file is called by, where there is one. ``cfa`` is the filter pattern of a
     mosaic. ``plan_path`` is the plan's file where the frames are plain codes that it explains. ``paced``: frames come
     when they are due, and not as soon as somebody wants them. ``warnings`` say what is odd about it, ``notes``
-    what happened to it on the way.
+    what happened to it on the way; ``check`` what to look at where no frames come.
     """
 
     name: str
@@ -42,6 +42,7 @@ class LiveSource:
     paced: bool = True
     warnings: tuple[str, ...] = ()
     notes: list[str] = field(default_factory=list)
+    check: str = "that the camera or the sender runs, its cable, and the address and port that it sends to"
 
 
 FEW_PX = 2

@@ -30,7 +30,8 @@ def opened_source(
     Raises UsageError where what is needed for it was not given.
     """
     if growing:
-        return _live(source, plan, lambda camera_plan: read_growing(Path(source), camera_plan.camera))
+        found = _live(source, plan, lambda camera_plan: read_growing(Path(source), camera_plan.camera))
+        return replace(found, check="that the recorder still writes its frames into this folder")
     if is_genicam(source):
         notes: list[str] = []
         found = _live(source, plan, lambda camera_plan: read_genicam(source, camera_plan.camera, noted=notes.append))

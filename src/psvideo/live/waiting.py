@@ -12,9 +12,10 @@ AGAIN_S = 10.0
 
 @dataclass(kw_only=True)
 class Waiting:
-    """Holds what is said of the source called ``name``."""
+    """Holds what is said of the source called ``name``; ``check`` is what to look at where it is silent."""
 
     name: str
+    check: str
     words: str = ""
     _frames: int = 0
     _came_s: float = 0.0
@@ -35,6 +36,6 @@ class Waiting:
     def _silent(self) -> str:
         so_far = f" after {self._frames} of them" if self._frames else " yet"
         return (
-            f"{self.name}: no frames come{so_far}. Check that the camera or the sender runs, its cable, and the "
-            "address and port that it sends to. The live view goes on once they come; Ctrl-C ends it."
+            f"{self.name}: no frames come{so_far}. Check {self.check}. The live view goes on once they come; Ctrl-C "
+            "ends it."
         )
