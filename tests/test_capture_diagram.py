@@ -13,7 +13,7 @@ import pytest
 from psvideo.capture.drawing.diagram import check_diagram_name, diagram_text, write_diagram
 from psvideo.capture.drawing.draw_png import png
 from psvideo.capture.drawing.draw_svg import svg
-from psvideo.capture.drawing.shapes import HEIGHT, LIGHT_COLOURS, WIDTH, Label, Polygon, timing_picture
+from psvideo.capture.drawing.shapes import HEIGHT, LIGHT_COLOURS, WIDTH, Label, Polygon, timing_diagram
 from psvideo.capture.drawing.timeline import timeline
 from psvideo.errors import UsageError
 from psvideo.model.plan import Plan
@@ -84,7 +84,7 @@ def test_dark_rows_lie_where_the_light_of_two_flashes_fades(make_plan: MakePlan)
 
 
 def test_the_svg_is_xml_with_a_band_for_each_light_and_named_axes(plan: Plan) -> None:
-    root = ElementTree.fromstring(svg(timing_picture(plan)))
+    root = ElementTree.fromstring(svg(timing_diagram(plan)))
     texts = [element.text for element in root.iter("{http://www.w3.org/2000/svg}text")]
     assert "row" in texts
     assert "time on the camera's clock (ms)" in texts
@@ -95,12 +95,12 @@ def test_the_svg_is_xml_with_a_band_for_each_light_and_named_axes(plan: Plan) ->
 
 def test_names_with_signs_of_xml_do_not_break_the_svg(make_plan: MakePlan) -> None:
     plan = make_plan(lights=("a<b&c", '"q"'))
-    texts = {element.text for element in ElementTree.fromstring(svg(timing_picture(plan))).iter()}
+    texts = {element.text for element in ElementTree.fromstring(svg(timing_diagram(plan))).iter()}
     assert any("a<b&c" in text for text in texts if text), texts
 
 
 def test_nothing_is_drawn_outside_the_picture(plan: Plan) -> None:
-    picture = timing_picture(plan)
+    picture = timing_diagram(plan)
     for shape in picture.shapes:
         points = shape.points if isinstance(shape, Polygon) else (shape.at,)
         assert all(-0.5 <= x <= WIDTH + 0.5 and -0.5 <= y <= HEIGHT + 0.5 for x, y in points), shape
@@ -109,7 +109,7 @@ def test_nothing_is_drawn_outside_the_picture(plan: Plan) -> None:
 
 
 def test_the_png_is_a_picture_in_the_lights_colours(plan: Plan) -> None:
-    image = cv2.imdecode(np.frombuffer(png(timing_picture(plan)), np.uint8), cv2.IMREAD_COLOR)
+    image = cv2.imdecode(np.frombuffer(png(timing_diagram(plan)), np.uint8), cv2.IMREAD_COLOR)
     assert image is not None
     assert image.shape == (2 * HEIGHT, 2 * WIDTH, 3)
     key = np.array([int(LIGHT_COLOURS[0][at : at + 2], 16) for at in (5, 3, 1)])

@@ -169,7 +169,7 @@ def test_a_movie_is_not_decoded_to_its_end(
     write_movie(tmp_path / "take.mkv", frames * 8)
     shutil.copy(clip / "plan.toml", tmp_path / "plan.toml")
     decoded: list[int] = []
-    picture = movie.picture_of
+    picture = movie.rgb_codes
     monkeypatch.setattr(movie, "picture_of", lambda *given: decoded.append(1) or picture(*given))  # type: ignore[func-returns-value]
     run("check", tmp_path / "take.mkv", "-q")
     assert 20 < len(decoded) < 60

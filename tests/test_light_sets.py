@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from psvideo.calibrate.light_files import find_plates, find_stills
-from psvideo.calibrate.light_pictures import LightPictures, averaged, light_pictures
+from psvideo.calibrate.light_pictures import LightPictures, light_pictures, mean_of_sets
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
 from psvideo.runs.photographs.light_sets import Reading, open_light_sets, read_images
@@ -21,14 +21,14 @@ def still(path: Path, value: float, size: tuple[int, int] = (6, 8)) -> None:
 
 
 def mean_pictures(path: Path, reading: Reading = Reading()) -> LightPictures:
-    return averaged(open_light_sets(path, reading).sets)
+    return mean_of_sets(open_light_sets(path, reading).sets)
 
 
 def test_stills_are_lights_of_their_names_and_ambient_light_is_taken_off(tmp_path: Path) -> None:
     for name, value in (("L2", 0.3), ("L10", 0.5), ("key", 1.0), ("ambient", 0.1), ("room", 0.7)):
         still(tmp_path / f"{name}.png", value)
     opened = open_light_sets(tmp_path)
-    found = averaged(opened.sets)
+    found = mean_of_sets(opened.sets)
     assert found.names == ("L2", "L10", "key")
     assert found.images[:, 0, 0] == pytest.approx([0.2, 0.4, 0.9], abs=1e-4)
     assert found.saturated.all(axis=(1, 2)).tolist() == [False, False, True]
@@ -125,7 +125,7 @@ def test_rows_that_no_frame_saw_do_not_count_in_the_mean() -> None:
     seen[0, 1] = False
     half = light_pictures("a", [np.where(seen[0, :, None], 0.4, 0.0).astype(np.float32)], seen=seen)
     whole = light_pictures("a", [np.full((4, 1), 0.6, np.float32)])
-    found = averaged([half, whole])
+    found = mean_of_sets([half, whole])
     assert found.images[0, :, 0] == pytest.approx([0.5, 0.6, 0.5, 0.5])
     assert found.seen.all()
 

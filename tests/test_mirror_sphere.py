@@ -12,7 +12,7 @@ import pytest
 from bench.mirror_scene import Ball, Lamp, Lens, photograph, unit
 from picture_file import read_picture
 
-from psvideo.calibrate.light_pictures import LightPictures, averaged, light_pictures
+from psvideo.calibrate.light_pictures import LightPictures, light_pictures, mean_of_sets
 from psvideo.calibrate.mirror.lights import MirrorCalibration, calibrate_lights
 from psvideo.calibrate.sphere.outline import find_outlines, given_outline
 from psvideo.calibrate.sphere.sighting import Looking, SphereNotFoundError, sight_spheres
@@ -190,7 +190,7 @@ def test_the_psbox_outline_is_the_same_under_room_light_and_leds_and_its_errors_
     assert errors.mean() < 0.5
     assert (errors < 2.5 * own).all()
     opened = open_light_sets(psbox)
-    pictures = averaged(opened.sets)
+    pictures = mean_of_sets(opened.sets)
     view = SphereView(focal_px=None, principal_px=(549.5, 499.5))
     assert opened.room is not None
     under_leds = find_outlines(pictures, view)[0]

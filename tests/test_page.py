@@ -16,7 +16,7 @@ import page_folder as small
 import pytest
 
 from psvideo.errors import UsageError
-from psvideo.page import page_server, show_of, side_by_side, write_page
+from psvideo.page import page_server, show_of, side_by_side, write_single_page
 from psvideo.page.serving import PageServer
 
 if TYPE_CHECKING:
@@ -467,7 +467,7 @@ CONTRAST_BELOW = """least => {
 
 def test_one_file_opens_by_itself_and_relights_alike(folder: Path, tmp_path: Path, watched: Watched) -> None:
     page_file = tmp_path / "page.html"
-    held = write_page(show_of(folder), page_file, width_px=640, count=3)
+    held = write_single_page(show_of(folder), page_file, width_px=640, count=3)
     assert (held.pictures, held.missing, held.width_px) == (12, 0, small.COLS)
     assert held.total_bytes == page_file.stat().st_size
     text = page_file.read_text()
@@ -495,7 +495,7 @@ def test_results_side_by_side_are_each_relit_as_they_are_under_the_same_light(
     with page_server(show, port=0) as server:
         thread = threading.Thread(target=server.serve_forever)
         thread.start()
-        write_page(show, tmp_path / "page.html", width_px=640, count=3)
+        write_single_page(show, tmp_path / "page.html", width_px=640, count=3)
         page = watched.open((tmp_path / "page.html").as_uri() if in_one_file else server.url)
         assert page.evaluate("() => psvideo.panes()") == ["relit", "r2.relit"]
         assert np.abs(relit_in(page, lights=[light(KEY)]) - albedo() * lambert(KEY)).max() <= 1e-3

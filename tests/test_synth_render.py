@@ -17,9 +17,9 @@ from psvideo.synth.scene import AlbedoTable, AmbientTable, CameraTable, ObjectTa
 from psvideo.synth.subject.body import make_body
 from psvideo.synth.subject.material import layered_noise, pattern_albedo
 from psvideo.synth.subject.meshes import builtin_names, builtin_shape
-from psvideo.synth.subject.meshes.fields import ball, common, cut, ellipsoid, join
-from psvideo.synth.subject.meshes.surface_nets import surface_of
-from psvideo.synth.subject.render import SeenScene, look
+from psvideo.synth.subject.meshes.fields import ball, common, difference, ellipsoid, union
+from psvideo.synth.subject.meshes.surface_nets import extract_surface
+from psvideo.synth.subject.render import SeenScene, cast_rays
 from psvideo.synth.subject.shading import ambient_plate, flash_plate, irradiance, light_collected
 from psvideo.synth.subject.shape import load_shape
 from psvideo.synth.truth import true_albedo, true_mask, true_normals
@@ -34,7 +34,7 @@ def camera(**keys: object) -> CameraTable:
 
 def see(*objects: Mapping[str, object], time_s: float = 0.0, **keys: object) -> SeenScene:
     bodies = [make_body(ObjectTable.model_validate(table), HERE) for table in objects]
-    return look(bodies, camera(**keys), time_s)
+    return cast_rays(bodies, camera(**keys), time_s)
 
 
 def plate(view: SeenScene, light: Light) -> np.ndarray:
@@ -222,9 +222,9 @@ def test_noise_is_smooth_and_the_same_everywhere_and_always() -> None:
 
 def test_surface_nets_find_spheres_and_cuts_with_their_volume_and_outward_faces() -> None:
     def field(p: np.ndarray) -> np.ndarray:
-        return cut(ball(p, (0, 0, 0), 0.5), ellipsoid(p, (0, 0, 0.5), (0.2, 0.2, 0.2)), 0.0)
+        return difference(ball(p, (0, 0, 0), 0.5), ellipsoid(p, (0, 0, 0.5), (0.2, 0.2, 0.2)), 0.0)
 
-    vertices, faces = surface_of(field, np.full(3, -0.6), np.full(3, 0.6), 0.02)
+    vertices, faces = extract_surface(field, np.full(3, -0.6), np.full(3, 0.6), 0.02)
     mesh = trimesh.Trimesh(vertices, faces, process=False)
     assert mesh.is_watertight
     lens = np.pi * 0.2**2 * (0.2 * 2 / 3 - 0.2**2 / (4 * 0.5))  # of two balls, the smaller's centre on the larger
@@ -235,8 +235,8 @@ def test_surface_nets_find_spheres_and_cuts_with_their_volume_and_outward_faces(
 
 def test_soft_unions_and_cuts_change_the_field_only_near_the_seam() -> None:
     a, b = np.array([-1.0, 0.02, 3.0]), np.array([2.0, 0.03, -1.0])
-    np.testing.assert_array_equal(join(a, b, 0.1)[[0, 2]], [-1.0, -1.0])
-    assert join(a, b, 0.1)[1] < 0.02
+    np.testing.assert_array_equal(union(a, b, 0.1)[[0, 2]], [-1.0, -1.0])
+    assert union(a, b, 0.1)[1] < 0.02
     np.testing.assert_array_equal(common(a, b, 0.1)[[0, 2]], [2.0, 3.0])
 
 
@@ -296,7 +296,7 @@ def test_a_texture_lies_upright_and_its_codes_are_taken_for_srgb(tmp_path: Path)
     picture[:32, :, 2], picture[32:, :32, 0] = 188, 255  # red above, blue below on the left (OpenCV's order)
     cv2.imwrite(str(tmp_path / "flag.png"), picture)
     body = make_body(ObjectTable.model_validate({"mesh": "square.obj", "albedo": {"texture": "flag.png"}}), tmp_path)
-    albedo = true_albedo(look([body], camera(), 0.0).hits, 3)
+    albedo = true_albedo(cast_rays([body], camera(), 0.0).hits, 3)
     np.testing.assert_allclose(albedo[14, 22], [0.503, 0, 0], atol=1e-3)
     np.testing.assert_allclose([albedo[34, 22], albedo[34, 42]], [[0, 0, 1], [0, 0, 0]], atol=1e-6)
 

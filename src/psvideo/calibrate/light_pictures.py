@@ -113,7 +113,7 @@ def pictures_of_round(one: Round) -> LightPictures:
     )
 
 
-def averaged(sets: Iterable[LightPictures]) -> LightPictures:
+def mean_of_sets(sets: Iterable[LightPictures]) -> LightPictures:
     """Return the mean over sets of the same lights, row by row over the frames that saw it; at least one set."""
     total: LightPictures | None = None
     count = np.zeros(())

@@ -21,7 +21,7 @@ class Place:
     names: Mapping[Path, str] = field(default_factory=dict)
 
 
-def places_of(paths: Sequence[Path]) -> list[Path | Place]:
+def grouped_pictures(paths: Sequence[Path]) -> list[Path | Place]:
     """Return folders as they are, a pattern (``ball/left_*.jpg``) as the pictures that it fits, whose lights are called
     by what the ``*`` stands for, and pictures of one folder together.
 

@@ -89,7 +89,7 @@ def _stated(kind: str, file: Path) -> Stated:
         return said
     from psvideo.clip.decode import raw  # loads LibRaw
 
-    return replace(said, exposure=raw.exposure_of(file))
+    return replace(said, exposure=raw.relative_exposure(file))
 
 
 def _refuse_odd(files: Sequence[Path], facts: Sequence[str], verb: str) -> None:

@@ -14,7 +14,7 @@ from statistics import median
 
 import av
 
-from psvideo.clip.decode.movie import picture_of
+from psvideo.clip.decode.movie import rgb_codes
 from psvideo.clip.filters import check_live_filters
 from psvideo.clip.linear import in_codes
 from psvideo.clip.reading import looks
@@ -55,7 +55,7 @@ def stream_kind(raw: str | None) -> CodedPicture:
     Raises UsageError where FFmpeg has no such pixels, or they are not read here.
     """
     try:
-        return picture_of(Path(raw or LIKELY), av.VideoFrame(FEW_PX, FEW_PX, raw or LIKELY))
+        return rgb_codes(Path(raw or LIKELY), av.VideoFrame(FEW_PX, FEW_PX, raw or LIKELY))
     except (ValueError, av.FFmpegError, PsvideoError):
         bayer = " A mosaic is gray or gray16le, and the plan's cfa says its filters." if "bayer" in str(raw) else ""
         alike = get_close_matches(str(raw), RAW, 1)
@@ -140,7 +140,7 @@ def _decoded(
                 came = True
                 base_s = frame.time_base or stream.time_base
                 stamp_s = None if frame.pts is None or base_s is None else float(frame.pts * base_s)
-                yield stamp_s, picture_of(Path(name), frame)
+                yield stamp_s, rgb_codes(Path(name), frame)
     except (av.FFmpegError, OSError, UnicodeDecodeError) as fault:
         if not came:
             raise PsvideoError(f"{name}: cannot be read ({fault}). {_advice(source)}") from fault

@@ -8,7 +8,7 @@ from importlib.metadata import PackageNotFoundError, version
 
 from psvideo.clip.decode import decoders
 from psvideo.inspect.findings import Finding
-from psvideo.strobe.stand_ins.toolchain import why_not
+from psvideo.strobe.stand_ins.toolchain import missing_tools
 
 REINSTALL = "Install psvideo again in a fresh environment: pip install ."
 LIBRARIES = (
@@ -34,7 +34,7 @@ def software() -> Iterator[Finding]:
     )
     yield from _movies()
     yield from (_extra(name, *words) for name, words in EXTRAS.items())
-    reason = why_not()
+    reason = missing_tools()
     yield Finding(
         name="emulated board",
         level="ok" if reason is None else "note",

@@ -13,7 +13,7 @@ from psvideo.live.chain import NewestRound
 from psvideo.model.camera import Camera
 from psvideo.model.coded import Coded
 from psvideo.model.shutter import row_weights
-from psvideo.page.picture import Look, PagePicture, block, halves, picked, shown
+from psvideo.page.picture import Look, PagePicture, halves, picked, picture_block, shown
 
 LARGE, SMALL = Look(width_px=640), Look(width_px=320, quick=True)
 BRIGHT = 0.8
@@ -70,7 +70,7 @@ class NewestPictures:
             return number, []
         names = ["normals", "albedo"] if newest.surface is not None else []
         return number, [
-            kept[name] if name in kept else kept.setdefault(name, block(_picture(name, newest, camera)))
+            kept[name] if name in kept else kept.setdefault(name, picture_block(_picture(name, newest, camera)))
             for name in (*names, f"plate {plate}", "frame")
         ]
 

@@ -10,6 +10,6 @@ from psvideo.page.folders import show_of
 from psvideo.page.serving import page_server
 from psvideo.page.show import Show
 from psvideo.page.side_by_side import side_by_side
-from psvideo.page.single_file import write_page
+from psvideo.page.single_file import write_single_page
 
-__all__ = ["Show", "page_server", "show_of", "side_by_side", "write_page"]
+__all__ = ["Show", "page_server", "show_of", "side_by_side", "write_single_page"]

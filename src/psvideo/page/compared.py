@@ -79,13 +79,13 @@ class ComparedPlates:
         return plates[light]
 
     def _timed(self) -> tuple["Take", Timing]:
-        from psvideo.plates.timed import timing_of
+        from psvideo.plates.timed import read_or_find_timing
         from psvideo.sync.open_take import open_take
 
         if self._take is None:
             self._take = open_take(self._clip, plan=self._plan)
         if self._timing is None:
-            self._timing = timing_of(self._take, self._given, first_light=None)
+            self._timing = read_or_find_timing(self._take, self._given, first_light=None)
         return self._take, self._timing
 
 

@@ -6,7 +6,7 @@ from fractions import Fraction
 from functools import partial
 from pathlib import Path
 
-from psvideo.clip.decode.exr import contents, stored
+from psvideo.clip.decode.exr import contents, read_halves
 from psvideo.clip.folder import number_of
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.contract import read_json
@@ -128,7 +128,7 @@ def _sequence(folder: Path, quantity: Quantity) -> ShownSequence:
 
 
 def _read(files: Mapping[int, Path], quantity: Quantity, number: int, look: Look) -> PagePicture:
-    found = stored(files[number])
+    found = read_halves(files[number])
     pixels = shown(found.planes, look, directions=quantity.shown == "normals", full=quantity.digits == "float")
     facts: dict[str, object] = {"time_s": found.attributes.get("psvideo:time_s")}
     if (matrix := found.attributes.get("psvideo:camera_to_world")) is not None:

@@ -73,10 +73,10 @@ def _frame(clip: Clip, number: int, look: Look) -> PagePicture:
     image = next(iter(read_frames(clip, [number], ahead=1, threads=1))).image
     if clip.cfa is not None:
         image = demosaic(image, clip.cfa)
-    return picture_of(image, look)
+    return page_picture(image, look)
 
 
-def picture_of(image: np.ndarray, look: Look, **facts: object) -> PagePicture:
+def page_picture(image: np.ndarray, look: Look, **facts: object) -> PagePicture:
     """Return linear light (row, col[, channel]) as the page shows it."""
     planes = [image] if image.ndim == 2 else [image[..., channel] for channel in range(image.shape[2])]
     return PagePicture(pixels=shown(planes, look), facts=facts)
@@ -106,4 +106,4 @@ def _plate(
     plates: ComparedPlates, method: SplitMethod, light: str, times_s: dict[int, float], number: int, look: Look
 ) -> PagePicture:
     found = plates.plate(method, light, times_s[number])
-    return picture_of(found.image, look, time_s=found.time_s, round=found.number)
+    return page_picture(found.image, look, time_s=found.time_s, round=found.number)

@@ -84,7 +84,7 @@ def _smaller(plane: Plane, width_px: int) -> NDArray[np.float32]:
     return smaller(plane, width_px) if plane.shape[1] > width_px else plane.astype(np.float32)
 
 
-def block(picture: PagePicture) -> bytes:
+def picture_block(picture: PagePicture) -> bytes:
     """Return a picture as a block of bytes."""
     pixels = picture.pixels
     facts = {

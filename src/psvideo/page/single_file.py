@@ -19,7 +19,7 @@ import numpy as np
 from psvideo.errors import PsvideoError
 from psvideo.formats.whole_files import refuse_existing, whole_file
 from psvideo.page.assembled import assets
-from psvideo.page.picture import Look, block, missing_block
+from psvideo.page.picture import Look, missing_block, picture_block
 from psvideo.page.show import Show, ShownSequence, index_of
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ class PageContents:
         return f"{self.pictures} pictures {self.width_px} pixels wide{missing}, {size}. It opens in any browser."
 
 
-def write_page(
+def write_single_page(
     show: Show, path: Path, *, width_px: int, count: int, force: bool = False, watch: "Watch | None" = None
 ) -> PageContents:
     """Write a page that holds up to ``count`` pictures of each sequence, spread over it, at most ``width_px`` wide.
@@ -128,7 +128,7 @@ def _packed(sequence: ShownSequence, number: int, width_px: int) -> tuple[str, b
         picture = sequence.read(number, Look(width_px=width_px))
     except PsvideoError:  # its words name folders of this machine, and the page goes to others
         return _text(missing_block(f"{sequence.label} {number} could not be read when this page was written.")), True
-    whole = block(picture)
+    whole = picture_block(picture)
     (length,) = struct.unpack("<I", whole[4:8])
     pixels = np.frombuffer(whole, np.uint8, offset=8 + length).reshape(-1, picture.pixels.dtype.itemsize)
     return _text(whole[: 8 + length] + pixels.T.tobytes()), False

@@ -7,7 +7,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 
 from psvideo.errors import PsvideoError
-from psvideo.page.picture import Look, block, missing_block
+from psvideo.page.picture import Look, missing_block, picture_block
 from psvideo.page.show import ShownSequence
 
 MOST_BYTES = 384_000_000
@@ -61,6 +61,6 @@ class BlockStore:
 def _made(sequence: ShownSequence, number: int, look: Look) -> bytes:
     """Read a picture; what cannot be read becomes a block that says so."""
     try:
-        return block(sequence.read(number, look))
+        return picture_block(sequence.read(number, look))
     except PsvideoError as fault:
         return missing_block(str(fault))

@@ -52,7 +52,7 @@ def makings_of(plan: Plan) -> list[Making]:
     return makings
 
 
-def of_light(making: Making, lit: dict[int, Plate], number: int) -> LightPlate:
+def plate_of_light(making: Making, lit: dict[int, Plate], number: int) -> LightPlate:
     """Return the plate of a light at its full flash, from the plates of a round's ``lit`` flashes by slot."""
     parts = [lit[slot] for slot in making.shares]
     if making.alone:

@@ -12,7 +12,7 @@ from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan, mixing_matrix
 from psvideo.model.timing import Flash
 from psvideo.plates.align.moving import Followed
-from psvideo.plates.demultiplexed import Making, makings_of, of_light
+from psvideo.plates.demultiplexed import Making, makings_of, plate_of_light
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.split import Plate
 
@@ -130,7 +130,7 @@ def light_plates(
         del plate
         for making in waiting:
             if making.slots <= lit.keys():
-                yield of_light(making, lit, now)
+                yield plate_of_light(making, lit, now)
         waiting = [making for making in waiting if not making.slots <= lit.keys()]
         needed = {slot for making in waiting for slot in making.slots}
         lit = {slot: held for slot, held in lit.items() if slot in needed}

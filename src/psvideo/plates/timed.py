@@ -12,7 +12,7 @@ from psvideo.plates.naming import named_by_rig, named_first
 from psvideo.sync.take_timing import find_take_timing
 
 
-def timing_of(
+def read_or_find_timing(
     take: Take, given: Path | None, *, first_light: str | None, rig: Rig | None = None, watch: Watch = unwatched
 ) -> Timing:
     """Return a take's timing: the file that is given, else found from the picture.

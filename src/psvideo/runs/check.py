@@ -26,7 +26,7 @@ from psvideo.plates.naming import named_by_rig
 from psvideo.report.judge.every_line import judgements
 from psvideo.report.judgement import Judgement
 from psvideo.runs.caller import PYTHON, Caller
-from psvideo.runs.checked import Check, write_page
+from psvideo.runs.checked import Check, write_checks_page
 from psvideo.runs.instants.reporting import observing
 from psvideo.sync.open_take import open_take
 from psvideo.sync.take_timing import find_take_timing
@@ -84,7 +84,7 @@ def check(
     """
     page, path = path_if_given("report", report), path_of("clip", clip)
     refuse_inside(page, path)
-    found = judged(
+    found = judged_take(
         path,
         plan=path_if_given("plan", plan),
         rig=path_if_given("rig", rig),
@@ -93,7 +93,7 @@ def check(
         caller=caller,
     )
     if page is not None:
-        write_page(page, [found], {})
+        write_checks_page(page, [found], {})
     return found
 
 
@@ -104,7 +104,7 @@ def refuse_inside(report: Path | None, footage: Path) -> None:
         raise UsageError(f"`report` {report}: lies among the footage of {folder}. Name a file somewhere else.")
 
 
-def judged(
+def judged_take(
     path: Path,
     *,
     plan: Path | None,
@@ -118,7 +118,7 @@ def judged(
     whole = open_take(path, plan=plan)
     clip = whole.clip
     known = None if rig is None else read_rig(rig_of_take(rig, path), plan_lights=clip.plan.lights)
-    window = window_of(clip.plan, clip.numbers)
+    window = frames_to_check(clip.plan, clip.numbers)
     later = _later(clip, window)
     with _store(clip, window) as kept:
         take = replace(whole, numbers=window, kept=kept)
@@ -174,7 +174,7 @@ def _store(clip: Clip, window: Sequence[int]) -> AbstractContextManager[Kept | N
     return keeping_near(Path(tempfile.gettempdir()) / "psvideo-check")
 
 
-def window_of(plan: Plan, numbers: Sequence[int]) -> tuple[int, ...]:
+def frames_to_check(plan: Plan, numbers: Sequence[int]) -> tuple[int, ...]:
     """Return the frames from a clip's start that show a few rounds, and a whole cycle with its marker."""
     if plan.mode == "synced":
         return tuple(numbers[: ROUNDS * len(plan.flashes)])

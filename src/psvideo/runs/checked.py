@@ -57,7 +57,9 @@ def check_record(check: Check) -> dict[str, object]:
     }
 
 
-def write_page(path: Path, checks: Sequence[Check], failed: Mapping[Path, str], *, worst_first: bool = False) -> None:
+def write_checks_page(
+    path: Path, checks: Sequence[Check], failed: Mapping[Path, str], *, worst_first: bool = False
+) -> None:
     """Write the page of checks; ``failed`` says of other takes why they could not be checked."""
     write_text(path, check_page(checks, failed, worst_first=worst_first))
 

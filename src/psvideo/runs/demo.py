@@ -17,7 +17,7 @@ from psvideo.model.surface import Surface
 from psvideo.pictures.contact import Strip, Tile, sheet
 from psvideo.pictures.quantity import picture_of
 from psvideo.pictures.relighting import exposure_for, relight, srgb
-from psvideo.plates.timed import timing_of
+from psvideo.plates.timed import read_or_find_timing
 from psvideo.runs.instants.results import normals_run
 from psvideo.runs.instants.solving import Job
 from psvideo.runs.lighting import read_lighting
@@ -46,7 +46,7 @@ def run_demo(folder: Path, *, force: bool = False, watch: Watch = unwatched) -> 
     delivery = Delivery(space=Space())
     output = Output(folder=out, force=force)
     with decoded_once(open_take(clip_path), output=out) as take:
-        timing = timing_of(take, None, first_light=None, watch=watch)
+        timing = read_or_find_timing(take, None, first_light=None, watch=watch)
         lighting = read_lighting(take, clip_path / "rig.toml")
         sheet_of = partial(demo_sheet, take.clip)
         job = Job(take=take, timing=timing, lighting=lighting, delivery=delivery)

@@ -31,7 +31,7 @@ from psvideo.model.choices import (
 from psvideo.model.quantities import Aov
 from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.sequence import FIRST_NUMBER
-from psvideo.plates.timed import timing_of
+from psvideo.plates.timed import read_or_find_timing
 from psvideo.report.run_report import RunReport
 from psvideo.runs.caller import PYTHON, Caller, say_kept, say_of_clip
 from psvideo.runs.delivery.delivering import metric_delivery
@@ -209,7 +209,9 @@ def normals(
     output = output.given(take, timing_path, first_light, solver, fill, over_time, delivery, *lighting.identity)
     noted = noted_timing(unfinished_folder_of(output.folder)) if going_on and timing_path is None else None
     with decoded_once(take, output=output.folder) as kept:
-        found = noted or timing_of(kept, timing_path, first_light=first_light, rig=lighting.flashed, watch=watch)
+        found = noted or read_or_find_timing(
+            kept, timing_path, first_light=first_light, rig=lighting.flashed, watch=watch
+        )
         found = found.spelled(caller.spell)
         for note in found.notes:
             caller.warn(note)

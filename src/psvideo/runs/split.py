@@ -15,7 +15,7 @@ from psvideo.model.colours import unmixing_of
 from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.beauty import mix_of
 from psvideo.plates.sequence import FIRST_NUMBER
-from psvideo.plates.timed import timing_of
+from psvideo.plates.timed import read_or_find_timing
 from psvideo.report.run_report import RunReport
 from psvideo.runs.caller import PYTHON, Caller, say_kept, say_of_clip
 from psvideo.runs.instants.plates import Extras, split_run
@@ -111,7 +111,7 @@ def split(
     given = path_if_given("timing", timing)
     output = output.given(take, given, first_light, known, method, extras, over_time)
     with decoded_once(take, output=output.folder) as kept:
-        found = timing_of(kept, given, first_light=first_light, rig=known, watch=watch).spelled(caller.spell)
+        found = read_or_find_timing(kept, given, first_light=first_light, rig=known, watch=watch).spelled(caller.spell)
         for note in found.notes:
             caller.warn(note)
         shown = known if unmixing is None else unmixing.rig

@@ -27,7 +27,7 @@ from psvideo.model.plan import PlannedFlash, assemble_plan
 from psvideo.model.quantities import Aov
 from psvideo.model.rig import Rig
 from psvideo.plates.align.rounds import Aligning
-from psvideo.plates.timed import timing_of
+from psvideo.plates.timed import read_or_find_timing
 from psvideo.report.run_report import RunReport
 from psvideo.runs.calibrate.mirror_sphere import focal_widths, radius_in_m
 from psvideo.runs.caller import PYTHON, Caller
@@ -159,7 +159,7 @@ def stills(
         with decoded_once(take, output=output.folder) as kept:
             job = Job(
                 take=kept,
-                timing=timing_of(kept, None, first_light=None, watch=watch),
+                timing=read_or_find_timing(kept, None, first_light=None, watch=watch),
                 lighting=lighting,
                 delivery=delivery,
                 solver=solver,

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from psvideo.compute.progress import Watch, unwatched
-from psvideo.page import Show, page_server, show_of, side_by_side, write_page
+from psvideo.page import Show, page_server, show_of, side_by_side, write_single_page
 from psvideo.page.serving import PageServer
 from psvideo.page.single_file import PageContents
 from psvideo.runs.caller import PYTHON, Caller
@@ -48,7 +48,7 @@ def export_view(
     where ``out`` exists, and PsvideoError where there is nothing to show.
     """
     show = _show(path, clip, plan, caller)
-    return write_page(show, Path(out), width_px=width_px, count=count, force=force, watch=watch)
+    return write_single_page(show, Path(out), width_px=width_px, count=count, force=force, watch=watch)
 
 
 def _show(

@@ -15,7 +15,7 @@ from psvideo.formats.plan_toml import format_plan
 from psvideo.formats.rig_toml import format_rig
 from psvideo.formats.whole_files import refuse_existing
 from psvideo.formats.whole_folders import whole_folder
-from psvideo.synth.camera.encode import codes_of, mosaic, noise_of
+from psvideo.synth.camera.encode import codes_of, mosaic, sensor_noise
 from psvideo.synth.camera.frames import SUFFIX, write_frame
 from psvideo.synth.camera.noise import frame_rng
 from psvideo.synth.camera.sensor import Image, MainsSwing, expose_frames
@@ -26,7 +26,7 @@ from psvideo.synth.scenes import scene_file
 from psvideo.synth.shotplan import claimed_plan, true_clock
 from psvideo.synth.stage import Stage, set_stage
 from psvideo.synth.subject.render import SeenScene
-from psvideo.synth.truth import write_picture, write_scene_truth, write_surface, write_timing
+from psvideo.synth.truth import write_picture, write_scene_truth, write_timing, write_true_surface
 
 CLIPPED_WARNING = 0.005
 """A frame in which a larger share of the samples saturates is worth a word."""
@@ -161,7 +161,7 @@ def _record(stage: Stage, folder: Path, n: int, image: Image) -> float:
     scene = stage.scene
     scale = codes_of(scene.camera, scene.output.kind)
     sampled = image if scene.camera.cfa is None else mosaic(image, scene.camera.cfa)
-    codes = scale.from_light(noise_of(scene.camera).add(sampled, frame_rng(scene.seed, n)))
+    codes = scale.from_light(sensor_noise(scene.camera).add(sampled, frame_rng(scene.seed, n)))
     name = f"{scene.name}.{scene.output.first_number + n:04d}{SUFFIX[scene.output.kind]}"
     write_frame(folder / "frames" / name, codes, kind=scene.output.kind, camera=scene.camera, scale=scale)
     return float(np.mean(sampled >= 1.0))
@@ -191,7 +191,7 @@ class _Truth:
         self.plates: dict[int, str] = {}
         folder.mkdir()
         if stage.still is not None:
-            write_surface(folder, stage.still.hits, stage.scene.camera.channels)
+            write_true_surface(folder, stage.still.hits, stage.scene.camera.channels)
 
     def plate(self, flash: TrueFlash) -> Image | None:
         """Return the plate of a flash or a part of one, None for a dark slot; called once for each, in order."""
@@ -220,7 +220,7 @@ class _Truth:
             write_picture(self._folder / "plates" / f"{name}.exr", plate)
             self.plates[flash.index] = f"plates/{name}.exr"
             if self._stage.still is None:
-                write_surface(self._folder, view.hits, self._stage.scene.camera.channels, name)
+                write_true_surface(self._folder, view.hits, self._stage.scene.camera.channels, name)
                 return
             self._names[looks] = self.plates[flash.index]
         self.plates[flash.index] = self._names[looks]

@@ -18,7 +18,7 @@ from psvideo.synth.lamps.true_flashes import TrueFlash, row_opens_s
 from psvideo.synth.scene import Scene
 from psvideo.synth.shotplan import true_plan, true_rig
 from psvideo.synth.subject.body import Body, make_body
-from psvideo.synth.subject.render import SeenScene, look
+from psvideo.synth.subject.render import SeenScene, cast_rays
 from psvideo.synth.subject.shading import ambient_plate, flash_plate
 from psvideo.synth.truth import as_seen
 
@@ -35,7 +35,7 @@ class Stage:
 
     def view(self, time_s: float) -> SeenScene:
         """Return what the camera sees at a time on its clock."""
-        return self.still or look(self.bodies, self.scene.camera, time_s)
+        return self.still or cast_rays(self.bodies, self.scene.camera, time_s)
 
     def plate(self, flash: TrueFlash, view: SeenScene) -> Image:
         """Return the scene as one whole flash lights it; averaged over the flash where the scene asks for that."""
@@ -67,5 +67,5 @@ class Stage:
 def set_stage(scene: Scene, folder: Path) -> Stage:
     """Load and place everything. ``folder`` is where the scene's relative paths start."""
     bodies = tuple(make_body(table, folder) for table in scene.object)
-    still = None if scene.moves else look(bodies, scene.camera, 0.0)
+    still = None if scene.moves else cast_rays(bodies, scene.camera, 0.0)
     return Stage(scene=scene, plan=true_plan(scene), rig=true_rig(scene), bodies=bodies, still=still)

@@ -23,7 +23,7 @@ def write_picture(path: Path, image: Plane) -> None:
     write_exr(path, planes, half=False)
 
 
-def write_surface(folder: Path, hits: Hits, channels: int, name: str = "") -> None:
+def write_true_surface(folder: Path, hits: Hits, channels: int, name: str = "") -> None:
     """Write normals, albedo and mask: ``normals.exr``, or ``normals/<name>.exr`` where the scene moves."""
     surface = {"normals": true_normals(hits), "albedo": true_albedo(hits, channels), "mask": true_mask(hits)}
     for key, image in surface.items():

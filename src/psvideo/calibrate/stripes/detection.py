@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from psvideo.calibrate.stripes.spectrum import find_peaks, flattened, without
+from psvideo.calibrate.stripes.spectrum import detrended, find_peaks, without
 from psvideo.calibrate.stripes.stripe_model import spline_basis
 from psvideo.calibrate.stripes.waveform import StripeFit, fit_stripes
 from psvideo.errors import PsvideoError
@@ -70,7 +70,7 @@ def find_stripes(profiles: FloatArray, *, expected: float | None = None) -> Foun
     """
     whole = profiles[:MOST_SEARCHED_FRAMES].mean(axis=2)
     rows = whole.shape[2]
-    if flattened(whole).std() <= LEAST_CHANGE * np.abs(whole).max():
+    if detrended(whole).std() <= LEAST_CHANGE * np.abs(whole).max():
         raise PsvideoError(NO_STRIPES)
     found = [_read(whole, frequency) for frequency in _candidates(whole, expected)]
     readings = [reading for reading in found if reading.frequency * rows >= FEWEST_PERIODS]
@@ -127,11 +127,11 @@ def _read(whole: FloatArray, frequency: float) -> FoundStripes:
     """Fit one candidate in the channel where it is strongest."""
     rows = whole.shape[2]
     wave = np.exp(-2j * np.pi * frequency * np.arange(rows)) * np.hanning(rows)
-    channel = int(np.argmax(np.abs(flattened(whole) @ wave).sum(axis=0)))
+    channel = int(np.argmax(np.abs(detrended(whole) @ wave).sum(axis=0)))
     profiles = whole[:, [channel]]
     fit = fit_stripes(profiles, frequency, most_harmonics=HARMONICS)
     uneven = float((without(profiles, spline_basis(rows, frequency)) ** 2).sum())
-    change = float((flattened(profiles) ** 2).sum())
+    change = float((detrended(profiles) ** 2).sum())
     return FoundStripes(
         frequency=fit.frequency,
         explained=1 - fit.unexplained / max(uneven, 1e-12),

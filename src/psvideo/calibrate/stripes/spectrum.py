@@ -42,7 +42,7 @@ def find_fainter(whole: FloatArray, frequency: float) -> float | None:
 def _power(whole: FloatArray) -> FloatArray:
     """Return the spectrum's power, summed over frames and channels, at multiples of 1 / (8 rows) periods per row."""
     rows = whole.shape[2]
-    spectrum = np.fft.rfft(flattened(whole) * np.hanning(rows), OVERSAMPLING * rows, axis=2)
+    spectrum = np.fft.rfft(detrended(whole) * np.hanning(rows), OVERSAMPLING * rows, axis=2)
     power: FloatArray = (np.abs(spectrum) ** 2).sum(axis=(0, 1))
     return power
 
@@ -54,7 +54,7 @@ def _tops(curve: FloatArray, lowest: int) -> list[int]:
     return [int(top) for top in tops[np.argsort(-curve[tops])][:PEAKS]]
 
 
-def flattened(profiles: FloatArray) -> FloatArray:
+def detrended(profiles: FloatArray) -> FloatArray:
     """Take a cubic off every profile: the scene's own fall of light."""
     return without(profiles, np.vander(np.linspace(-1, 1, profiles.shape[-1]), 4))
 

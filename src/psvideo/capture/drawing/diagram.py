@@ -7,7 +7,7 @@ from rich.text import Text
 from psvideo.capture.drawing.draw_png import png
 from psvideo.capture.drawing.draw_svg import svg
 from psvideo.capture.drawing.draw_text import timing_text
-from psvideo.capture.drawing.shapes import timing_picture
+from psvideo.capture.drawing.shapes import timing_diagram
 from psvideo.errors import UsageError
 from psvideo.formats.whole_files import PICTURE_MARK, marked_png, whole_file
 from psvideo.model.plan import Plan
@@ -28,7 +28,7 @@ def check_diagram_name(name: str | None, *, option: str = "`diagram`") -> Path |
 
 def write_diagram(plan: Plan, path: Path) -> None:
     """Write the diagram of a plan as SVG or PNG, whole or not at all."""
-    picture = timing_picture(plan)
+    picture = timing_diagram(plan)
     if path.suffix.lower() == ".png":
         data = marked_png(png(picture))
     else:

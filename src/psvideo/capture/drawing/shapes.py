@@ -50,7 +50,7 @@ class Drawing:
     shapes: tuple[Polygon | Label, ...]
 
 
-def timing_picture(plan: Plan, *, phase_s: float | None = None, frames: int | None = None) -> Drawing:
+def timing_diagram(plan: Plan, *, phase_s: float | None = None, frames: int | None = None) -> Drawing:
     """Return the timing diagram of a plan, like the paper's figure 4: rows downwards, time to the right."""
     line = timeline(plan, phase_s=phase_s, frames=frames)
     shapes: list[Polygon | Label] = [Polygon(points=_box(0, 0, WIDTH, HEIGHT), fill="#ffffff")]

@@ -27,7 +27,7 @@ from psvideo.clip.decode.movie_tags import (
     transfer_of,
     turn_of,
 )
-from psvideo.clip.decode.movie_times import UNEVEN, Places, places_of, promised_frames, stamps_of
+from psvideo.clip.decode.movie_times import UNEVEN, Places, frame_places, promised_frames, stamps_of
 from psvideo.clip.decode.yuv import CODES, HIGHEST, LOWEST, LUMA_WEIGHTS, signal_range, to_rgb
 from psvideo.clip.record import CodedPicture, Header
 from psvideo.errors import PsvideoError
@@ -72,7 +72,7 @@ def index_movie(path: Path) -> Movie:
     with _opened(path) as (container, stream):
         stamps = stamps_of(container, stream)
         shown = _shown(path, container, stream, stamps.timestamps)
-        found = places_of(path, shown)
+        found = frame_places(path, shown)
         promised = promised_frames(container, stream, found.period * found.per_frame)
         time_base_s = float(stream.time_base or 1)
         code = container.metadata.get("timecode") or stream.metadata.get("timecode")
@@ -164,7 +164,7 @@ def read_movie(path: Path, timestamps: Sequence[int]) -> Iterator[CodedPicture]:
                 continue
             if frame.pts > wanted[0] or frame.is_corrupt:  # a damaged frame is painted over, and flagged
                 break
-            yield picture_of(path, frame)
+            yield rgb_codes(path, frame)
             wanted.popleft()
             if not wanted:
                 return
@@ -228,7 +228,7 @@ def _sealed(path: Path) -> str:
     return ""
 
 
-def picture_of(path: Path, frame: av.VideoFrame) -> CodedPicture:
+def rgb_codes(path: Path, frame: av.VideoFrame) -> CodedPicture:
     """Take a decoded frame's planes and make R'G'B' codes of them."""
     if frame.interlaced_frame:
         raise PsvideoError(f"{path}: is interlaced; expected whole frames. Record progressive footage.")

@@ -90,7 +90,7 @@ def _length_s(container: InputContainer, stream: VideoStream) -> float:
         return (container.duration or 0) / av.time_base if len(container.streams) == 1 else 0.0
 
 
-def places_of(path: Path, timestamps: Sequence[int]) -> Places:
+def frame_places(path: Path, timestamps: Sequence[int]) -> Places:
     """Return each frame's place in time, of the longest even run where the rate changes on the way.
 
     Raises PsvideoError where no run is long enough for that.

@@ -39,7 +39,7 @@ def decode(path: Path) -> CodedPicture:
     return CodedPicture(header=head, codes=codes)
 
 
-def exposure_of(path: Path) -> float | None:
+def relative_exposure(path: Path) -> float | None:
     """Return the light gathered, seconds times ISO over the f-number squared, where LibRaw reads them."""
     with _opened(path) as raw:
         said = raw.other

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from psvideo.export.programs import Delivered
 from psvideo.export.result_files import result_name
-from psvideo.export.usd.usda import block
+from psvideo.export.usd.usda import prim
 
 MATERIAL = "/delivery/surface"
 
@@ -22,7 +22,7 @@ def material(made: Delivered, numbers: Sequence[int], *, with_normals: bool) -> 
     in_world, down = made.delivery.space.name == "world", made.delivery.space.y == "down"
     preview_normals = with_normals and not in_world
     parts = [
-        block(
+        prim(
             'def Shader "preview"',
             'uniform token info:id = "UsdPreviewSurface"',
             f"color3f inputs:diffuseColor.connect = <{here}/albedo.outputs:rgb>",
@@ -32,7 +32,7 @@ def material(made: Delivered, numbers: Sequence[int], *, with_normals: bool) -> 
             "color3f inputs:specularColor = (0, 0, 0)",
             "token outputs:surface",
         ),
-        block(
+        prim(
             'def Shader "st"',
             'uniform token info:id = "UsdPrimvarReader_float2"',
             'string inputs:varname = "st"',
@@ -42,7 +42,7 @@ def material(made: Delivered, numbers: Sequence[int], *, with_normals: bool) -> 
         *([_texture("normals", made, numbers, here)] if preview_normals else []),
         *_materialx(made, numbers, here, with_normals=with_normals, in_world=in_world, down=down),
     ]
-    return block(
+    return prim(
         'def Material "surface"',
         f"token outputs:surface.connect = <{here}/preview.outputs:surface>",
         f"token outputs:mtlx:surface.connect = <{here}/mtlx_surface.outputs:out>",
@@ -66,7 +66,7 @@ def _texture(quantity: str, made: Delivered, numbers: Sequence[int], here: str) 
     png = is_normals and made.delivery.png16 and not down
     decoded = ["float4 inputs:scale = (2, 2, 2, 1)", "float4 inputs:bias = (-1, -1, -1, 0)"] if png else []
     flipped = ["float4 inputs:scale = (1, -1, 1, 1)"] if is_normals and down else []
-    return block(
+    return prim(
         f'def Shader "{quantity}"',
         'uniform token info:id = "UsdUVTexture"',
         _files(made, quantity, numbers, "png" if png else "exr"),
@@ -86,7 +86,7 @@ def _materialx(
     """Return standard_surface as a Lambert surface; its ``normal`` is in world space, into which the card's turn."""
     turned = "mtlx_normals" if in_world and not down else "mtlx_flip" if in_world else "mtlx_turn"
     parts = [
-        block(
+        prim(
             'def Shader "mtlx_surface"',
             'uniform token info:id = "ND_standard_surface_surfaceshader"',
             "float inputs:base = 1",
@@ -97,7 +97,7 @@ def _materialx(
             "token outputs:out",
         ),
         _image("albedo", "color3", made, numbers, here),
-        block(
+        prim(
             'def Shader "mtlx_st"',
             'uniform token info:id = "ND_geompropvalue_vector2"',
             'string inputs:geomprop = "st"',
@@ -109,7 +109,7 @@ def _materialx(
     parts.append(_image("normals", "vector3", made, numbers, here))
     if down:
         parts.append(
-            block(
+            prim(
                 'def Shader "mtlx_flip"',
                 'uniform token info:id = "ND_multiply_vector3"',
                 f"float3 inputs:in1.connect = <{here}/mtlx_normals.outputs:out>",
@@ -119,7 +119,7 @@ def _materialx(
         )
     if not in_world:
         parts.append(
-            block(
+            prim(
                 'def Shader "mtlx_turn"',
                 'uniform token info:id = "ND_transformnormal_vector3"',
                 f"float3 inputs:in.connect = <{here}/{'mtlx_flip' if down else 'mtlx_normals'}.outputs:out>",
@@ -133,7 +133,7 @@ def _materialx(
 
 def _image(quantity: str, kind: str, made: Delivered, numbers: Sequence[int], here: str) -> list[str]:
     usd_kind = "color3f" if kind == "color3" else "float3"
-    return block(
+    return prim(
         f'def Shader "mtlx_{quantity}"',
         f'uniform token info:id = "ND_image_{kind}"',
         _files(made, quantity, numbers),

@@ -16,7 +16,7 @@ import numpy as np
 from psvideo.export.mesh_files import animation_name
 from psvideo.export.programs import Delivered, SeenLight
 from psvideo.export.usd.usd_material import MATERIAL, material
-from psvideo.export.usd.usda import block, identifier, indented, matrix_of, numbers_of
+from psvideo.export.usd.usda import identifier, indented, matrix_of, numbers_of, prim
 from psvideo.model.camera import FloatArray
 from psvideo.model.rig import Light
 
@@ -92,8 +92,8 @@ def _shot(made: Delivered, view: StageView, lights: Sequence[Sequence[str]], *, 
     elif view.poses:
         place = [f"matrix4d xformOp:transform = {matrix_of(next(iter(view.poses.values())))}"]
     order = ['uniform token[] xformOpOrder = ["xformOp:transform"]'] if place else []
-    inner = [_camera(made, view), block('def Scope "lights"', *lights), *([_card(made, view)] if card else [])]
-    return block('def Xform "shot"', place, order, *inner)
+    inner = [_camera(made, view), prim('def Scope "lights"', *lights), *([_card(made, view)] if card else [])]
+    return prim('def Xform "shot"', place, order, *inner)
 
 
 def _camera(made: Delivered, view: StageView) -> list[str]:
@@ -101,7 +101,7 @@ def _camera(made: Delivered, view: StageView) -> list[str]:
     # without a lens the picture is as wide as one unit of its relative depth, in metres as far as anybody knows
     wide = TENTHS * (APERTURE_M if view.focal is not None else 1.0) / unit
     lens = [f"float focalLength = {view.focal * wide:.9g}"] if view.focal is not None else []
-    return block(
+    return prim(
         'def Camera "camera"',
         f'token projection = "{"orthographic" if view.focal is None else "perspective"}"',
         lens,
@@ -122,7 +122,7 @@ def _card(made: Delivered, view: StageView) -> list[str]:
     upward = (up - high / 2, up + high / 2)
     corners = [(x, y, deep) for x, y in zip((0, 1, 1, 0), (0, 0, 1, 1), strict=True)]
     points = [(across[int(x)], upward[int(y)], z) for x, y, z in corners]
-    return block(
+    return prim(
         'def Mesh "card" (\n        prepend apiSchemas = ["MaterialBindingAPI"]\n    )',
         f"rel material:binding = <{MATERIAL}>",
         "uniform bool doubleSided = 1",
@@ -139,7 +139,7 @@ def _card(made: Delivered, view: StageView) -> list[str]:
 
 
 def _mesh(made: Delivered) -> list[str]:
-    return block(
+    return prim(
         f'def Mesh "mesh" (\n        prepend apiSchemas = ["MaterialBindingAPI"]\n        prepend references = '
         f"@./{animation_name(made.clip)}@\n    )",
         f"rel material:binding = <{MATERIAL}>",
@@ -153,7 +153,7 @@ def _sun(light: SeenLight) -> list[str]:
     x /= np.linalg.norm(x)
     turn = np.eye(4)
     turn[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
-    return block(
+    return prim(
         f'def DistantLight "{identifier(light.name)}"',
         "float inputs:angle = 0",
         "bool inputs:normalize = 1",
@@ -166,7 +166,7 @@ def _sun(light: SeenLight) -> list[str]:
 def _lamp(light: Light, unit_m: float) -> list[str]:
     """A near light: a point whose irradiance at one metre is the rig's; a normalized sphere gives strength / (4 d²)."""
     at = np.array(light.position_m, np.float64) / unit_m
-    return block(
+    return prim(
         f'def SphereLight "{identifier(light.name)}"',
         f"float inputs:radius = {0.01 / unit_m:.9g}",
         "bool inputs:normalize = 1",

@@ -13,7 +13,7 @@ def indented(lines: Sequence[str]) -> list[str]:
     return [f"    {line}" if line else line for line in lines]
 
 
-def block(head: str, *parts: Sequence[str] | str) -> list[str]:
+def prim(head: str, *parts: Sequence[str] | str) -> list[str]:
     """Return a prim: its head, and what stands in it, lines or lists of them."""
     inner = [line for part in parts for line in ([part] if isinstance(part, str) else part)]
     return [head, "{", *indented(inner), "}"]

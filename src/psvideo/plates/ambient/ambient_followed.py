@@ -17,7 +17,7 @@ from psvideo.model.coded import Image
 from psvideo.model.ripple import Ripple
 from psvideo.plates.ambient.ambient_blocks import block_px, block_rows, no_blocks, over_bands, times_rows
 from psvideo.plates.ambient.ambient_change import AmbientChange
-from psvideo.plates.ambient.ambient_kernel import blend_rows, look_rows
+from psvideo.plates.ambient.ambient_kernel import average_rows, measure_rows
 from psvideo.plates.ambient.ambient_level import AmbientLevel
 from psvideo.plates.ambient.mains import Mains, RowLight
 from psvideo.plates.split import Plate
@@ -101,7 +101,7 @@ def _looked_at(dark: Plate) -> tuple[RowLight, Image]:
     block = block_px(shape)
 
     def look(first: int, last: int) -> None:
-        bound.run(look_rows, range(first, last), block, first, last, means, clipped, coarse)
+        bound.run(measure_rows, range(first, last), block, first, last, means, clipped, coarse)
 
     over_bands(look, shape)
     return RowLight.of(dark, means, clipped), coarse
@@ -119,7 +119,7 @@ def _blended(
 
     def blend(first: int, last: int) -> None:
         bound.run(
-            blend_rows, range(first, last), block, LONGEST_MEMORY, factors, seen, restarts, gain, old, ambient.slots,
+            average_rows, range(first, last), block, LONGEST_MEMORY, factors, seen, restarts, gain, old, ambient.slots,
             first, last, new, slots, coarse,
         )  # fmt: skip
 

@@ -19,7 +19,7 @@ ONE, HALF = np.float32(1), np.float32(0.5)
 
 
 @FUSED.kept
-def look_rows(
+def measure_rows(
     mix: MixtureArrays, block: int, first: int, last: int, means: FloatArray, clipped: Flags, coarse: Floats
 ) -> None:
     """Fill of some rows of a picture, whole rows of blocks, the ``means`` (row,) and whether any sample is ``clipped``
@@ -34,7 +34,7 @@ def look_rows(
 
 
 @FUSED.kept
-def blend_rows(
+def average_rows(
     mix: MixtureArrays, block: int, longest: float, factor: Floats, seen: Flags, restarts: Flags, gain: Floats,
     old: Planes, old_slots: Floats, first: int, last: int, new: Planes, slots: Floats, coarse: Floats,
 ) -> None:  # fmt: skip

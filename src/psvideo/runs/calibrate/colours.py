@@ -8,7 +8,7 @@ from psvideo.compute.progress import Watch, unwatched
 from psvideo.formats.rig_toml import format_rig, read_rig
 from psvideo.formats.whole_files import write_text
 from psvideo.model.rig import Rig
-from psvideo.runs.calibrate.flat_field import check_albedo, target_of
+from psvideo.runs.calibrate.flat_field import check_albedo, white_target
 from psvideo.runs.calibrate.reading import pictures_of, reading_of, rig_out
 from psvideo.runs.caller import PYTHON, Caller
 
@@ -53,7 +53,7 @@ def colours(
     check_albedo(albedo)
     found = pictures_of(Path(pictures), reading_of(plan, frames, first_light, transfer), watch=watch, caller=caller)
     known = read_rig(Path(rig), plan_lights=found.names)
-    target, ground = target_of(found, known, albedo=albedo, box=box)
+    target, ground = white_target(found, known, albedo=albedo, box=box)
     measured = measure_led_colours(found, known, target, ground=ground)
     made = with_colours(known, measured)
     write_text(rig_path, format_rig(made))

@@ -64,7 +64,7 @@ def flat_field(
     check_albedo(albedo)
     found = pictures_of(Path(pictures), reading_of(plan, frames, first_light, transfer), watch=watch, caller=caller)
     known = read_rig(Path(rig), plan_lights=found.names)
-    target, ground = target_of(found, known, albedo=albedo, box=box)
+    target, ground = white_target(found, known, albedo=albedo, box=box)
     lights = measure_flat_field(found, known, target, ground=ground)
     measured = with_intensities(known, lights)
     write_text(rig_path, format_rig(measured))
@@ -84,7 +84,7 @@ def check_albedo(albedo: float) -> None:
         raise UsageError(f"`albedo` {albedo:g}: expected a share above 0 and up to 1.")
 
 
-def target_of(
+def white_target(
     found: LightPictures, known: Rig, *, albedo: float, box: tuple[int, int, int, int] | None
 ) -> tuple[Target, Ground | None]:
     """Return the white target of some pictures: it faces the camera, or lies in the rig's plane; and where it stands,

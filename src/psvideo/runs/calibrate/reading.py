@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from psvideo.calibrate.light_pictures import LightPictures, averaged
+from psvideo.calibrate.light_pictures import LightPictures, mean_of_sets
 from psvideo.compute.progress import Watch
 from psvideo.formats.rig_toml import SCHEMA
 from psvideo.formats.whole_files import PICTURE_MARK, refuse_existing
@@ -31,4 +31,4 @@ def reading_of(plan: Path | str | None, frames: str | None, first_light: str | N
 
 def pictures_of(path: Path, reading: Reading, *, watch: Watch, caller: Caller) -> LightPictures:
     """Return the mean picture of a scene under each light, and hand on what is odd about the pictures."""
-    return averaged(sets_of(path, reading, watch=watch, caller=caller).sets)
+    return mean_of_sets(sets_of(path, reading, watch=watch, caller=caller).sets)

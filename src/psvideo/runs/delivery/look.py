@@ -13,7 +13,7 @@ Pixels = NDArray[np.uint8]
 SHOWN_WIDTH_PX, WIDE_PX = 600, 1200
 
 
-def look(instant: Instant) -> Pixels:
+def instant_sheet(instant: Instant) -> Pixels:
     """Return a picture of one instant for eyes: its plates, its normals and its albedo."""
     albedo = smaller(instant.surface.albedo, SHOWN_WIDTH_PX)
     normals = smaller(instant.surface.normals, SHOWN_WIDTH_PX)
@@ -21,7 +21,7 @@ def look(instant: Instant) -> Pixels:
     return sheet([_plates(instant.round), Strip("Surface", surface)], width_px=WIDE_PX)
 
 
-def look_at_plates(one: Round) -> Pixels:
+def plates_sheet(one: Round) -> Pixels:
     """Return a picture of one round's plates for eyes."""
     return sheet([_plates(one)], width_px=WIDE_PX)
 

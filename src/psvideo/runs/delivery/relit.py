@@ -51,7 +51,7 @@ def keep_relit(
 
 def read_relit(normals: Path, albedo: Path, number: int, fps: Fraction) -> Halves:
     """Return an instant's picture from its files."""
-    of_normals, of_albedo = exr.stored(normals), exr.stored(albedo)
+    of_normals, of_albedo = exr.read_halves(normals), exr.read_halves(albedo)
     return _relit(of_normals.planes, of_albedo.planes, _light(number, fps, of_normals.attributes))
 
 

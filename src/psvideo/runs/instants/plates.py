@@ -25,7 +25,7 @@ from psvideo.plates.sequence import AMBIENT, round_numbers
 from psvideo.report.run_report import RunReport
 from psvideo.runs.delivery.delivering import plates_of, say_instants
 from psvideo.runs.delivery.handover import Finished, write_previews, write_timeline
-from psvideo.runs.delivery.look import look_at_plates
+from psvideo.runs.delivery.look import plates_sheet
 from psvideo.runs.instants.reporting import observing, run_report, write_report
 from psvideo.runs.output import Output, folder_of, tags_of
 
@@ -116,7 +116,7 @@ def split_run(
                     write(partial(write_plate, folder, clip.name, plate, tags, compression=extras.compression))
             observed.add(one)
             if len(observed.facts) in (1, SAMPLE_ROUND):
-                picture = look_at_plates(one)
+                picture = plates_sheet(one)
             del one, plate, sums  # they would be held while the next round gathers
         if picture is None:
             raise PsvideoError(nothing_complete(clip, timing))

@@ -24,7 +24,7 @@ from psvideo.plates.part import Part
 from psvideo.plates.sequence import AMBIENT, FIRST_NUMBER
 from psvideo.report.observe.observed import Observed
 from psvideo.runs.delivery.delivering import passes_asked, surface_job, write_plates, write_specular
-from psvideo.runs.delivery.look import look
+from psvideo.runs.delivery.look import instant_sheet
 from psvideo.runs.delivery.relit import blur_of
 from psvideo.runs.instants.depths import shape_of
 from psvideo.runs.instants.reporting import observing
@@ -195,7 +195,7 @@ def write_instants(
                     beside(folder, instant)
             observed.add(instant.round, instant.surface)
             if observed.first is not None and number - observed.first in (0, SAMPLE_ROUND - 1) and observed.facts:
-                found.picture = (picture_of or look)(instant)
+                found.picture = (picture_of or instant_sheet)(instant)
             del instant  # its plates would be held while the next round gathers
     found.reserved = () if shaping is None else reservations(shaping)
     return found

@@ -9,8 +9,8 @@ from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.rig_folder import check_rigs
 from psvideo.runs.caller import PYTHON, Caller
-from psvideo.runs.check import judged, refuse_inside
-from psvideo.runs.checked import Check, write_page
+from psvideo.runs.check import judged_take, refuse_inside
+from psvideo.runs.checked import Check, write_checks_page
 from psvideo.runs.many_takes.arriving import whole_takes
 from psvideo.runs.many_takes.cluster import Cluster, called_apart, connected
 
@@ -130,7 +130,7 @@ def _checks(
 
 def _one(path: Path, plan: Path | None, rig: Path | None, first_light: str | None, caller: Caller) -> Check | Unread:
     try:
-        return judged(path, plan=plan, rig=rig, first_light=first_light, caller=caller)
+        return judged_take(path, plan=plan, rig=rig, first_light=first_light, caller=caller)
     except (PsvideoError, OSError) as fault:
         gone = f"{path}: was removed before it could be checked."
         return Unread(path=path, fault=caller.spell(str(fault)) if path.exists() else gone)
@@ -141,4 +141,4 @@ def _keep(page: Path | None, found: Mapping[Path, Check | Unread], *, worst_firs
     if page is not None:
         checks = [one for one in found.values() if isinstance(one, Check)]
         unread = {one.path: one.fault for one in found.values() if isinstance(one, Unread)}
-        write_page(page, checks, unread, worst_first=worst_first)
+        write_checks_page(page, checks, unread, worst_first=worst_first)

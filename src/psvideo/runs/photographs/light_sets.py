@@ -15,7 +15,7 @@ from psvideo.calibrate.light_files import find_plates, find_stills
 from psvideo.calibrate.light_pictures import (
     LightFiles,
     LightPictures,
-    averaged,
+    mean_of_sets,
     pictures_of_round,
     read_picture,
     read_sets,
@@ -112,7 +112,7 @@ def read_images(path: Path | str, *, transfer: str | None = None, plan: Path | s
     (('key', 'left', 'top'), (3, 120, 160, 3))
     """
     reading = Reading(transfer=transfer, plan=path_if_given("plan", plan))
-    return averaged(sets_of(path_of("path", path), reading, watch=unwatched, caller=PYTHON).sets)
+    return mean_of_sets(sets_of(path_of("path", path), reading, watch=unwatched, caller=PYTHON).sets)
 
 
 def sets_of(path: Path, reading: Reading, *, watch: Watch, caller: Caller) -> LightSets:

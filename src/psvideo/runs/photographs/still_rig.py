@@ -9,7 +9,7 @@ import numpy as np
 from psvideo.calibrate.light_files import pictures_in
 from psvideo.calibrate.mirror.lights import calibrate_lights
 from psvideo.calibrate.sphere.sighting import Looking, Sighting, sight_spheres
-from psvideo.calibrate.still_places import Place, places_of
+from psvideo.calibrate.still_places import Place, grouped_pictures
 from psvideo.clip.stated import Stated, stated_by
 from psvideo.compute.progress import Watch
 from psvideo.errors import PsvideoError
@@ -74,7 +74,7 @@ def sphere_lights(
     With near lights the surface is taken to be as far away as the spheres. Raises PsvideoError where no sphere is
     found, one is cut off, or no light is measured.
     """
-    places = places_of(spheres)
+    places = grouped_pictures(spheres)
     looking, notes = _through_its_lens(looking, places)
     sightings = _sighted(places, looking, transfer=transfer, watch=watch, caller=caller)
     cut = _cut_differently(sightings)

@@ -15,7 +15,7 @@ from psvideo.strobe.link.words import WiringName
 from psvideo.strobe.stand_ins.emulated import Emulation, emulated_board
 from psvideo.strobe.stand_ins.python_board import PythonBoard
 from psvideo.strobe.stand_ins.python_board_server import TRACE_HZ, open_port, serve
-from psvideo.strobe.stand_ins.toolchain import AvrBoard, StandIn, why_not
+from psvideo.strobe.stand_ins.toolchain import AvrBoard, StandIn, missing_tools
 
 LOOK_EVERY_S = 0.2
 PYTHON_LIMITS: AvrBoard = "atmega328p"
@@ -54,7 +54,7 @@ def emulate(
     path = None if trace is None else Path(trace)
     if path is not None:
         refuse_existing(path, force=force, mark=SCHEMA)
-    reason = None if board is not None else why_not()
+    reason = None if board is not None else missing_tools()
     if reason is not None:
         caller.warn(f"{reason}; the Python board answers instead.")
     chosen: StandIn = board or (PYTHON_LIMITS if reason is None else "python")

@@ -67,7 +67,7 @@ def _finds(compiler: str, header: str) -> bool:
     return subprocess.run(search, input=b"", capture_output=True, check=False).returncode == 0
 
 
-def why_not() -> str | None:
+def missing_tools() -> str | None:
     """Return in one sentence why the real firmware cannot be run here, or None where it can."""
     if lights_folder() is None:
         return (
@@ -84,7 +84,7 @@ def build(board: AvrBoard) -> Built:
     Raises PsvideoError where the checkout or packages are missing (named, with the other way: the Python board), or
     where make fails.
     """
-    reason, lights = why_not(), lights_folder()
+    reason, lights = missing_tools(), lights_folder()
     if reason is not None or lights is None:
         advice = "Install them (lights/emulator/install.sh)" if lights else "Run it from a checkout"
         raise PsvideoError(f'`board={board!r}`: {reason}. {advice}, or take `board="python"`, which needs neither.')

@@ -73,6 +73,6 @@ def mosaic(image: Image, cfa: str) -> Image:
     return kept
 
 
-def noise_of(camera: CameraTable) -> Noise:
+def sensor_noise(camera: CameraTable) -> Noise:
     """Return the noise that the scene gives its camera."""
     return Noise(full_well_e=camera.full_well_e, read_e=camera.read_e)

@@ -63,7 +63,7 @@ def camera_rays(camera: CameraTable, far_m: float) -> tuple[FloatArray, FloatArr
     return np.zeros_like(directions), directions / np.linalg.norm(directions, axis=1, keepdims=True)
 
 
-def look(bodies: Sequence[Body], camera: CameraTable, time_s: float) -> SeenScene:
+def cast_rays(bodies: Sequence[Body], camera: CameraTable, time_s: float) -> SeenScene:
     """Pose the bodies at a time on the camera's clock and cast the camera's rays at them."""
     poses = [body.pose(time_s) for body in bodies]
     vertices = np.concatenate([vertices for vertices, _ in poses])

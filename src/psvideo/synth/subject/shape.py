@@ -45,7 +45,7 @@ def make_shape(vertices: FloatArray, faces: NDArray[np.integer], colours: FloatA
     )
 
 
-def join(*shapes: Shape) -> Shape:
+def merged(*shapes: Shape) -> Shape:
     """Return several shapes as one; colours stay where all of them have colours."""
     firsts = np.cumsum([0] + [len(shape.vertices) for shape in shapes[:-1]])
     colours = [shape.colours for shape in shapes if shape.colours is not None]

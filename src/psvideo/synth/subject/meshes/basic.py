@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from psvideo.model.camera import FloatArray
-from psvideo.synth.subject.shape import Shape, join, make_shape
+from psvideo.synth.subject.shape import Shape, make_shape, merged
 
 Paint = tuple[float, float, float]
 
@@ -54,7 +54,7 @@ def box() -> Shape:
             turn = np.stack([right, np.roll([0.0, 1.0, 0.0], axis + 1), normal], axis=1)
             vertices = (face.vertices + np.array([0.0, 0.0, 0.5])) @ turn.T
             sides.append(make_shape(vertices, face.faces))
-    return join(*sides)
+    return merged(*sides)
 
 
 def cylinder() -> Shape:
@@ -75,8 +75,8 @@ def lathe(outline: Sequence[tuple[float, float] | None], *, columns: int = 160, 
             pieces[-1].append(point)
     turned = [_turned(np.array(piece), columns) for piece in pieces]
     if not paints:
-        return join(*turned)
-    return join(*(painted(piece, paint) for piece, paint in zip(turned, paints, strict=True)))
+        return merged(*turned)
+    return merged(*(painted(piece, paint) for piece, paint in zip(turned, paints, strict=True)))
 
 
 def _turned(points: FloatArray, columns: int) -> Shape:

@@ -4,7 +4,7 @@ import numpy as np
 
 from psvideo.model.camera import FloatArray
 from psvideo.synth.subject.meshes.basic import Paint, grid_faces, lathe, painted, tube
-from psvideo.synth.subject.shape import Shape, join, make_shape
+from psvideo.synth.subject.shape import Shape, make_shape, merged
 
 BLADES = 5
 REACH_M = 0.150
@@ -34,7 +34,7 @@ def fan_blades() -> Shape:
     ]
     hub = lathe([*dome[:5], None, *dome[4:6], None, *dome[5:]], columns=96)
     forward = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
-    return join(painted(make_shape(hub.vertices @ forward.T, hub.faces), (0.10, 0.10, 0.11)), *blades)
+    return merged(painted(make_shape(hub.vertices @ forward.T, hub.faces), (0.10, 0.10, 0.11)), *blades)
 
 
 def _blade(angle: float) -> Shape:
@@ -52,7 +52,7 @@ def _blade(angle: float) -> Shape:
     middle = np.stack([radius * np.cos(bow), radius * np.sin(bow), z], axis=-1).reshape(-1, 3)
     face = make_shape(middle, grid_faces(rows, cols))
     back = make_shape(middle - 0.0012 * face.normals, face.faces[:, ::-1])
-    return join(face, back)
+    return merged(face, back)
 
 
 def fan_cage() -> Shape:
@@ -81,7 +81,7 @@ def fan_cage() -> Shape:
         columns=128,
     )
     foot = painted(make_shape(stand.vertices + np.array([0, 0, -0.075]), stand.faces), (0.11, 0.12, 0.13))
-    return join(*(painted(wire, STEEL) for wire in [*wires, *rim]), *dark, foot)
+    return merged(*(painted(wire, STEEL) for wire in [*wires, *rim]), *dark, foot)
 
 
 def _ring(radius: float, z: float) -> FloatArray:

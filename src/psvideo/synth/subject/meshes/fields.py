@@ -37,11 +37,11 @@ def strand(p: FloatArray, points: Sequence[ArrayLike], radii: Sequence[float], b
     limbs = [limb(p, points[i], points[i + 1], radii[i], radii[i + 1]) for i in range(len(points) - 1)]
     total = limbs[0]
     for piece in limbs[1:]:
-        total = join(total, piece, blend)
+        total = union(total, piece, blend)
     return total
 
 
-def turned(p: FloatArray, centre: ArrayLike, axis: int, degrees: float) -> FloatArray:
+def rotated(p: FloatArray, centre: ArrayLike, axis: int, degrees: float) -> FloatArray:
     """Return points turned back about a line parallel to an axis, so that what is drawn there appears turned."""
     angle = np.deg2rad(-degrees)
     i, j = (axis + 1) % 3, (axis + 2) % 3
@@ -52,7 +52,7 @@ def turned(p: FloatArray, centre: ArrayLike, axis: int, degrees: float) -> Float
     return np.asarray(turned_q + np.asarray(centre))
 
 
-def join(a: FloatArray, b: FloatArray, blend: float = 0.0) -> FloatArray:
+def union(a: FloatArray, b: FloatArray, blend: float = 0.0) -> FloatArray:
     """Return the union, with a fillet about as wide as ``blend``."""
     if blend <= 0:
         return np.minimum(a, b)
@@ -60,14 +60,14 @@ def join(a: FloatArray, b: FloatArray, blend: float = 0.0) -> FloatArray:
     return np.asarray(np.minimum(a, b) - near**3 * blend / 6.0)
 
 
-def cut(a: FloatArray, b: FloatArray, blend: float = 0.0) -> FloatArray:
+def difference(a: FloatArray, b: FloatArray, blend: float = 0.0) -> FloatArray:
     """Return ``a`` without ``b``, with a rounded edge."""
-    return -join(-a, b, blend)
+    return -union(-a, b, blend)
 
 
 def common(a: FloatArray, b: FloatArray, blend: float = 0.0) -> FloatArray:
     """Return what ``a`` and ``b`` share, with a rounded edge."""
-    return -join(-a, -b, blend)
+    return -union(-a, -b, blend)
 
 
 def mirrored(p: FloatArray) -> FloatArray:

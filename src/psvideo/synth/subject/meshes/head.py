@@ -10,8 +10,18 @@ import numpy as np
 
 from psvideo.model.camera import FloatArray
 from psvideo.synth.subject.material import layered_noise
-from psvideo.synth.subject.meshes.fields import ball, common, cut, ellipsoid, join, limb, mirrored, strand, turned
-from psvideo.synth.subject.meshes.surface_nets import surface_of
+from psvideo.synth.subject.meshes.fields import (
+    ball,
+    common,
+    difference,
+    ellipsoid,
+    limb,
+    mirrored,
+    rotated,
+    strand,
+    union,
+)
+from psvideo.synth.subject.meshes.surface_nets import extract_surface
 from psvideo.synth.subject.shape import Shape, make_shape
 
 CELL_M = 0.0019
@@ -23,7 +33,7 @@ Detail = Callable[[FloatArray, FloatArray], FloatArray]
 
 def bust() -> Shape:
     """A head with neck and shoulders on a round base, about 0.53 m high."""
-    vertices, faces = surface_of(bust_field, np.array([-0.2, -0.43, -0.16]), np.array([0.2, 0.15, 0.14]), CELL_M)
+    vertices, faces = extract_surface(bust_field, np.array([-0.2, -0.43, -0.16]), np.array([0.2, 0.15, 0.14]), CELL_M)
     return make_shape(vertices, faces, _paint(mirrored(vertices)))
 
 
@@ -52,12 +62,12 @@ def bust_field(p: FloatArray) -> FloatArray:
     """Return the signed distance to the bust."""
     m = mirrored(p)
     body = _neck(p, m)
-    body = _within(body, m, (0.25, -0.45, -0.20), (0.0, -0.09, 0.20), lambda b, q: join(_shoulders(q), b, 0.035))
-    body = _within(body, m, (0.25, -0.45, -0.20), (0.0, -0.30, 0.20), lambda b, q: join(b, _base(q), 0.008))
-    body = _within(body, m, (0.12, -0.17, -0.20), (0.0, 0.20, 0.20), lambda b, q: join(b, _skull(q), 0.016))
+    body = _within(body, m, (0.25, -0.45, -0.20), (0.0, -0.09, 0.20), lambda b, q: union(_shoulders(q), b, 0.035))
+    body = _within(body, m, (0.25, -0.45, -0.20), (0.0, -0.30, 0.20), lambda b, q: union(b, _base(q), 0.008))
+    body = _within(body, m, (0.12, -0.17, -0.20), (0.0, 0.20, 0.20), lambda b, q: union(b, _skull(q), 0.016))
     body = _within(body, m, (0.09, -0.13, 0.02), (0.0, 0.06, 0.20), _face)
-    body = _within(body, m, (0.12, -0.09, -0.20), (0.0, 0.20, 0.20), lambda b, q: join(b, _hair(q), 0.004))
-    return _within(body, m, (0.12, -0.06, -0.06), (0.04, 0.05, 0.05), lambda b, q: join(b, _ear(q), 0.006))
+    body = _within(body, m, (0.12, -0.09, -0.20), (0.0, 0.20, 0.20), lambda b, q: union(b, _hair(q), 0.004))
+    return _within(body, m, (0.12, -0.06, -0.06), (0.04, 0.05, 0.05), lambda b, q: union(b, _ear(q), 0.006))
 
 
 def _within(
@@ -76,27 +86,27 @@ def _skull(m: FloatArray) -> FloatArray:
     cranium = ellipsoid(m, (0, 0.032, -0.014), (0.0715, 0.083, 0.092))
     forehead = ellipsoid(m, (0, 0.040, 0.022), (0.060, 0.058, 0.063))
     midface = ellipsoid(m, (0, -0.028, 0.026), (0.056, 0.076, 0.058))
-    head = join(join(cranium, forehead, 0.03), midface, 0.03)
+    head = union(union(cranium, forehead, 0.03), midface, 0.03)
     cheekbone = ellipsoid(m, (0.042, -0.019, 0.050), (0.021, 0.013, 0.022))
-    head = join(head, cheekbone, 0.026)
+    head = union(head, cheekbone, 0.026)
     cheek = ellipsoid(m, (0.029, -0.053, 0.050), (0.026, 0.034, 0.028))
-    head = join(head, cheek, 0.030)
+    head = union(head, cheek, 0.030)
     jaw = strand(
         m, [(0.052, -0.048, -0.004), (0.046, -0.077, 0.014), (0.013, -0.104, 0.062)], [0.012, 0.011, 0.012], 0.01
     )
-    head = join(head, jaw, 0.034)
+    head = union(head, jaw, 0.034)
     underside = ellipsoid(m, (0, -0.086, 0.026), (0.042, 0.022, 0.044))
-    head = join(head, underside, 0.024)
+    head = union(head, underside, 0.024)
     chin = ellipsoid(m, (0, -0.103, 0.069), (0.017, 0.013, 0.014))
-    return join(head, chin, 0.020)
+    return union(head, chin, 0.020)
 
 
 def _face(head: FloatArray, m: FloatArray) -> FloatArray:
     """Brows, eyes, nose and mouth on the head."""
-    head = join(head, _brow(m), 0.020)
+    head = union(head, _brow(m), 0.020)
     socket = ellipsoid(m, (0.0315, 0.0035, 0.0935), (0.0225, 0.0135, 0.0200))
-    head = cut(head, socket, 0.016)
-    head = join(head, _eye(m), 0.004)
+    head = difference(head, socket, 0.016)
+    head = union(head, _eye(m), 0.004)
     return _mouth(_nose(head, m), m)
 
 
@@ -112,35 +122,35 @@ def _eye(m: FloatArray) -> FloatArray:
     x, y = (m[:, 0] - EYE[0]) / 0.0158, m[:, 1] - EYE[1]
     arch = 1.0 - x**2
     gap = np.maximum(y - 0.0058 * arch, -0.0042 * arch - y)
-    eye = join(globe, common(lids, -gap, 0.0010), 0.0)
+    eye = union(globe, common(lids, -gap, 0.0010), 0.0)
     crease = strand(
         m, [(0.0180, 0.0065, 0.0780), (0.0315, 0.0128, 0.0790), (0.0460, 0.0065, 0.0690)], [0.001, 0.0016, 0.001]
     )
-    return cut(eye, crease, 0.003)
+    return difference(eye, crease, 0.003)
 
 
 def _nose(head: FloatArray, m: FloatArray) -> FloatArray:
     """Bridge, tip, wings and nostrils."""
     points = [(0, 0.018, 0.0805), (0, 0.001, 0.0860), (0, -0.022, 0.0955), (0, -0.032, 0.1005)]
-    head = join(head, strand(m, points, [0.0070, 0.0062, 0.0074, 0.0084], 0.01), 0.016)
-    head = join(head, ball(m, (0, -0.0350, 0.1018), 0.0092), 0.008)
-    head = join(head, limb(m, (0, -0.0455, 0.084), (0, -0.0410, 0.1005), 0.0045, 0.0045), 0.006)
+    head = union(head, strand(m, points, [0.0070, 0.0062, 0.0074, 0.0084], 0.01), 0.016)
+    head = union(head, ball(m, (0, -0.0350, 0.1018), 0.0092), 0.008)
+    head = union(head, limb(m, (0, -0.0455, 0.084), (0, -0.0410, 0.1005), 0.0045, 0.0045), 0.006)
     wing = ellipsoid(m, (0.0122, -0.0405, 0.0890), (0.0066, 0.0070, 0.0100))
-    head = join(head, wing, 0.007)
+    head = union(head, wing, 0.007)
     nostril = ellipsoid(m, (0.0070, -0.0472, 0.0945), (0.0032, 0.0036, 0.0060))
-    return cut(head, nostril, 0.003)
+    return difference(head, nostril, 0.003)
 
 
 def _mouth(head: FloatArray, m: FloatArray) -> FloatArray:
     """Muzzle, lips, the line between them, philtrum and the fold above the chin."""
-    head = join(head, ellipsoid(m, (0, -0.067, 0.066), (0.030, 0.022, 0.0235)), 0.020)
-    head = join(head, _lips(m), 0.005)
+    head = union(head, ellipsoid(m, (0, -0.067, 0.066), (0.030, 0.022, 0.0235)), 0.020)
+    head = union(head, _lips(m), 0.005)
     line = strand(
         m, [(0.0, -0.0703, 0.0940), (0.0090, -0.0696, 0.0918), (0.0260, -0.0722, 0.0780)], [0.0016, 0.0016, 0.0014]
     )
-    head = cut(head, line, 0.0045)
-    head = cut(head, limb(m, (0, -0.0515, 0.0935), (0, -0.0605, 0.0950), 0.0020, 0.0028), 0.005)
-    return cut(head, ellipsoid(m, (0, -0.0885, 0.0930), (0.018, 0.0045, 0.0095)), 0.012)
+    head = difference(head, line, 0.0045)
+    head = difference(head, limb(m, (0, -0.0515, 0.0935), (0, -0.0605, 0.0950), 0.0020, 0.0028), 0.005)
+    return difference(head, ellipsoid(m, (0, -0.0885, 0.0930), (0.018, 0.0045, 0.0095)), 0.012)
 
 
 def _lips(m: FloatArray) -> FloatArray:
@@ -157,13 +167,13 @@ def _lips(m: FloatArray) -> FloatArray:
         [0.0048, 0.0042, 0.0014],
         0.003,
     )
-    return join(upper, lower)
+    return union(upper, lower)
 
 
 def _ear(m: FloatArray) -> FloatArray:
     """Shell, rim and lobe."""
-    q = turned(m, (0.064, -0.010, 0.005), 1, 24.0)
-    q = turned(q, (0.064, -0.010, -0.010), 0, -10.0)
+    q = rotated(m, (0.064, -0.010, 0.005), 1, 24.0)
+    q = rotated(q, (0.064, -0.010, -0.010), 0, -10.0)
     shell = ellipsoid(q, (0.0665, -0.008, -0.012), (0.0070, 0.0290, 0.0170))
     bowl = ellipsoid(q, (0.0745, -0.0085, -0.0075), (0.0075, 0.0170, 0.0095))
     rim = strand(
@@ -179,14 +189,14 @@ def _ear(m: FloatArray) -> FloatArray:
         [0.0022, 0.0030, 0.0034, 0.0034, 0.0032, 0.0052],
         0.003,
     )
-    return join(cut(shell, bowl, 0.004), rim, 0.004)
+    return union(difference(shell, bowl, 0.004), rim, 0.004)
 
 
 def _hair(m: FloatArray) -> FloatArray:
     """A cap of waved locks, combed back from a hairline."""
     cap = ellipsoid(m, (0, 0.034, -0.021), (0.0785, 0.0895, 0.0955))
     nape = ellipsoid(m, (0, -0.022, -0.058), (0.056, 0.045, 0.048))
-    front = join(cap, ellipsoid(m, (0, 0.058, 0.018), (0.062, 0.049, 0.061)), 0.03)
+    front = union(cap, ellipsoid(m, (0, 0.058, 0.018), (0.062, 0.049, 0.061)), 0.03)
     angle = np.arctan2(m[:, 0], m[:, 1] - 0.02)
     run = m[:, 2] + 0.35 * m[:, 1]
     waves = 0.0022 * np.sin(20.0 * angle + 2.0 * np.sin(95.0 * run)) + 0.0008 * np.sin(46.0 * angle + 60.0 * run)
@@ -194,7 +204,7 @@ def _hair(m: FloatArray) -> FloatArray:
         m[:, 2], [-0.12, -0.05, -0.038, -0.028, 0.0, 0.030, 0.075], [-0.062, -0.055, -0.03, 0.022, 0.022, 0.036, 0.066]
     )
     line = line + 0.003 * np.sin(150.0 * m[:, 0] + 60.0 * m[:, 2]) - 0.20 * m[:, 0] * (m[:, 2] > 0.03)
-    return common(join(front, nape, 0.03) + waves, line - m[:, 1], 0.010)
+    return common(union(front, nape, 0.03) + waves, line - m[:, 1], 0.010)
 
 
 def _neck(p: FloatArray, m: FloatArray) -> FloatArray:
@@ -204,7 +214,7 @@ def _neck(p: FloatArray, m: FloatArray) -> FloatArray:
         m, [(0.054, -0.055, -0.026), (0.037, -0.125, 0.002), (0.011, -0.192, 0.030)], [0.010, 0.010, 0.008], 0.01
     )
     throat = ball(p, (0, -0.135, 0.025), 0.005)
-    return join(join(column, muscle, 0.022), throat, 0.020)
+    return union(union(column, muscle, 0.022), throat, 0.020)
 
 
 def _shoulders(m: FloatArray) -> FloatArray:
@@ -212,13 +222,13 @@ def _shoulders(m: FloatArray) -> FloatArray:
     chest = ellipsoid(m, (0, -0.275, -0.030), (0.150, 0.110, 0.080))
     shoulder = ellipsoid(m, (0.135, -0.235, -0.040), (0.058, 0.060, 0.055))
     slope = limb(m, (0.040, -0.155, -0.045), (0.135, -0.210, -0.042), 0.032, 0.032)
-    body = join(join(chest, shoulder, 0.03), slope, 0.040)
+    body = union(union(chest, shoulder, 0.03), slope, 0.040)
     breast = ellipsoid(m, (0.060, -0.262, 0.022), (0.062, 0.045, 0.030))
-    body = join(body, breast, 0.030)
+    body = union(body, breast, 0.030)
     collar = strand(
         m, [(0.012, -0.199, 0.032), (0.070, -0.196, 0.020), (0.130, -0.196, -0.018)], [0.0055, 0.0050, 0.0070], 0.01
     )
-    body = join(body, collar, 0.020)
+    body = union(body, collar, 0.020)
     rounded = ellipsoid(m, (0, -0.195, -0.020), (0.185, 0.150, 0.150))
     body = common(body, rounded, 0.012)
     return common(body, m[:, 0] - 0.172, 0.014)
@@ -231,4 +241,4 @@ def _base(m: FloatArray) -> FloatArray:
     waist = 0.032 + 0.020 * ((y + 0.365) / 0.03) ** 2
     column = np.maximum(radius - np.minimum(waist, 0.070), np.abs(y + 0.355) - 0.040)
     plinth = np.maximum(radius - 0.074, np.abs(y + 0.402) - 0.010) - 0.002
-    return join(column, plinth, 0.003)
+    return union(column, plinth, 0.003)

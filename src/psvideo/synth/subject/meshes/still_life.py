@@ -5,7 +5,7 @@ import numpy as np
 from psvideo.model.camera import FloatArray
 from psvideo.synth.subject.material import layered_noise
 from psvideo.synth.subject.meshes.basic import Paint, box, grid_faces, lathe, painted, tube
-from psvideo.synth.subject.shape import Shape, join, make_shape
+from psvideo.synth.subject.shape import Shape, make_shape, merged
 
 
 def _smooth_outline(points: list[tuple[float, float]], count: int) -> list[tuple[float, float]]:
@@ -76,7 +76,7 @@ def apple() -> Shape:
     albedo = red[:, None] * [0.52, 0.05, 0.04] + (1 - red[:, None]) * [0.52, 0.50, 0.10]
     flesh = make_shape(v, grid_faces(rows, columns, wrap=True)[:, ::-1], albedo)
     stem = tube([(0, 0.012, 0), (0.001, 0.026, 0), (0.004, 0.038, 0.002)], 0.0014)
-    return join(flesh, painted(stem, (0.16, 0.09, 0.04)))
+    return merged(flesh, painted(stem, (0.16, 0.09, 0.04)))
 
 
 def pear() -> Shape:
@@ -98,7 +98,7 @@ def pear() -> Shape:
     speckle = 1 - 0.25 * (layered_noise(v / 0.0028) > 0.55)[:, None]
     albedo = (blush * [0.55, 0.28, 0.08] + (1 - blush) * [0.48, 0.47, 0.11]) * speckle
     stem = tube([(0.003, 0.088, 0), (0.004, 0.102, 0), (0.010, 0.114, 0.002)], 0.0013)
-    return join(make_shape(v, shape.faces, np.clip(albedo, 0, 1)), painted(stem, (0.15, 0.09, 0.05)))
+    return merged(make_shape(v, shape.faces, np.clip(albedo, 0, 1)), painted(stem, (0.15, 0.09, 0.05)))
 
 
 def book() -> Shape:
@@ -117,7 +117,7 @@ def book() -> Shape:
         strip[:, 0] = x + np.repeat([-0.0012, 0.0012], 40)
         strip[:, 1:] = 0.021 * np.array([1, 0]) + (strip[:, 1:] - 0.021 * np.array([1, 0])) * [1.03, 1.004]
         bands.append(painted(make_shape(strip, grid_faces(2, 40)), (0.62, 0.47, 0.14)))
-    return join(*boards, pages, spine, *bands)
+    return merged(*boards, pages, spine, *bands)
 
 
 def _slab(size: tuple[float, float, float], middle: tuple[float, float, float], paint: Paint) -> Shape:

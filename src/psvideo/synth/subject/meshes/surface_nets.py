@@ -18,7 +18,9 @@ COARSE = 4
 """Fine cells along a coarse cell's edge."""
 
 
-def surface_of(field: Field, low: FloatArray, high: FloatArray, cell_m: float) -> tuple[FloatArray, NDArray[np.int32]]:
+def extract_surface(
+    field: Field, low: FloatArray, high: FloatArray, cell_m: float
+) -> tuple[FloatArray, NDArray[np.int32]]:
     """Return vertices (vertex, 3) and triangles (face, 3) of the surface inside a box, at cells of ``cell_m``.
 
     The surface must stay inside the box. Features thinner than a coarse cell are found only where the field's values
