@@ -162,15 +162,15 @@ def test_what_cannot_be_checked_is_one_plain_paragraph(
 def test_a_movie_is_not_decoded_to_its_end(
     shot: Callable[[str], Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from psvideo.clip.decode import movie
+    from psvideo.clip.decode import movie, movie_codes
 
     clip = shot("good")
     frames = [read_picture(file, cv2.IMREAD_UNCHANGED) for file in sorted((clip / "frames").iterdir())]
     write_movie(tmp_path / "take.mkv", frames * 8)
     shutil.copy(clip / "plan.toml", tmp_path / "plan.toml")
     decoded: list[int] = []
-    picture = movie.rgb_codes
-    monkeypatch.setattr(movie, "picture_of", lambda *given: decoded.append(1) or picture(*given))  # type: ignore[func-returns-value]
+    picture = movie_codes.rgb_codes
+    monkeypatch.setattr(movie, "rgb_codes", lambda *given: decoded.append(1) or picture(*given))  # type: ignore[func-returns-value]
     run("check", tmp_path / "take.mkv", "-q")
     assert 20 < len(decoded) < 60
 

@@ -30,9 +30,9 @@ from psvideo.report.observe.observed import InstantFacts, Observed
 from psvideo.report.observe.worst import Thumbnail, Worst
 from psvideo.report.observe.yuille1997 import Lean
 from psvideo.runs.instants import pieces
+from psvideo.runs.instants.job import Found
 from psvideo.runs.instants.piece_notes import noted, write_notes
 from psvideo.runs.instants.pieces import cut, piece_named
-from psvideo.runs.instants.solving import Found
 from psvideo.runs.many_takes import cluster
 from psvideo.solve import steady
 

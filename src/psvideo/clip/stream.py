@@ -14,7 +14,7 @@ from statistics import median
 
 import av
 
-from psvideo.clip.decode.movie import rgb_codes
+from psvideo.clip.decode.movie_codes import rgb_codes
 from psvideo.clip.filters import check_live_filters
 from psvideo.clip.linear import in_codes
 from psvideo.clip.reading import looks

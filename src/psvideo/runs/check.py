@@ -3,7 +3,7 @@
 import math
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +16,6 @@ from psvideo.errors import NoStrobeError, PsvideoError, UsageError
 from psvideo.formats.paths import path_if_given, path_of
 from psvideo.formats.rig_folder import rig_of_take
 from psvideo.formats.rig_toml import read_rig
-from psvideo.model.clipping import SATURATED
 from psvideo.model.colours import unmixing_of
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Rig
@@ -24,6 +23,7 @@ from psvideo.model.timing import DroppedFrames, Timing
 from psvideo.plates.gather import gather
 from psvideo.plates.naming import named_by_rig
 from psvideo.report.judge.every_line import judgements
+from psvideo.report.judge.of_frames import FrameLight, exposure_of_frames, frame_light, later_frames
 from psvideo.report.judgement import Judgement
 from psvideo.runs.caller import PYTHON, Caller
 from psvideo.runs.checked import Check, write_checks_page
@@ -36,8 +36,8 @@ ROUNDS = 4
 """So many rounds are looked at, where the clip is long enough."""
 SPREAD = 6
 """More frames, over the rest of the take: whether light and exposure stay."""
-BRIGHTER, DARKER = 1.25, 0.4
-"""Later frames that reach so many times the light of those looked at."""
+EXPOSED_FRAMES, EARLY_FRAMES = 12, 16
+"""About so many frames show how a clip without a strobe is exposed, and what later frames are held against."""
 MOST_KEPT_BYTES = 1_500_000_000
 """Larger windows are decoded twice: temporary folders may lie in memory."""
 
@@ -127,12 +127,12 @@ def judged_take(
         except NoStrobeError as fault:
             if too_short(clip.plan, window):
                 raise
-            lines: tuple[Judgement, ...] = (_unseen(str(fault)), *_raw_light(take))
+            lines: tuple[Judgement, ...] = (_unseen(str(fault)), exposure_of_frames(_light_of(take, EXPOSED_FRAMES)))
             notes: tuple[str, ...] = ()
         else:
             timing = timing if known is None else named_by_rig(take, timing, known)
             timing = _with_later_holes(timing, clip, window)
-            lines = (*_lines_of(take, timing, known, watch=watch), *_steady_later(take, later))
+            lines = (*_lines_of(take, timing, known, watch=watch), *_later_light(take, later))
             notes = timing.notes
     return Check(
         clip=clip.name,
@@ -215,46 +215,15 @@ def _with_later_holes(timing: Timing, clip: Clip, window: tuple[int, ...]) -> Ti
     return replace(timing, dropped_frames=(*timing.dropped_frames, *more))
 
 
-def _raw_light(take: Take) -> Iterator[Judgement]:
-    """Judge the frames as they are, where no strobe was found in them."""
-    tops, clipped = zip(*_frame_light(take, take.numbers[:: max(len(take.numbers) // 12, 1)]), strict=True)
-    top, share = max(tops), max(clipped)
-    advice = ""
-    if top < 2**-6:
-        advice = "Check that the lights fire and that the lens is open."
-    elif share > 0.1:
-        advice = "Close the aperture or lower the powers."
-    yield Judgement(
-        subject="exposure",
-        grade="bad" if advice else "good",
-        found=f"The brightest parts reach {100 * min(top, 1):.0f} % of saturation; at most {100 * share:.1f} % of a "
-        "frame is clipped.",
-        advice=advice,
-    )
+def _light_of(take: Take, count: int) -> list[FrameLight]:
+    """Measure about so many of a take's frames, spread over them."""
+    numbers = take.numbers[:: max(len(take.numbers) // count, 1)]
+    return [frame_light(frame.image) for frame in read_frames(take.clip, numbers, kept=take.kept)]
 
 
-def _steady_later(take: Take, later: tuple[int, ...]) -> Iterator[Judgement]:
-    """Say whether frames from the rest of the take are as bright as those from its start."""
+def _later_light(take: Take, later: tuple[int, ...]) -> tuple[Judgement, ...]:
+    """Judge frames from the rest of the take against those from its start; nothing where there are none."""
     if not later:
-        return
-    early = [top for top, _ in _frame_light(take, take.numbers[:: max(len(take.numbers) // 16, 1)])]
-    late = [top for top, _ in _frame_light(take, later)]
-    ratio = max(late) / max(max(early), 1e-6)
-    if DARKER < ratio < BRIGHTER:
-        yield Judgement(subject="later", grade="good", found="Light and exposure stay through the take.")
-        return
-    change = abs(np.log2(max(ratio, 1e-6)))
-    word = "brighter" if ratio > 1 else "darker"
-    yield Judgement(
-        subject="later",
-        grade="bad" if ratio < DARKER / 4 else "doubtful",
-        found=f"Later in the take the picture is {change:.1f} stops {word} than at its start.",
-        advice="Check that the strobe ran to the end, and that exposure, gain and aperture are fixed.",
-    )
-
-
-def _frame_light(take: Take, numbers: Sequence[int]) -> Iterator[tuple[float, float]]:
-    """Give every frame's light at its brightest thousandth, and which share of it is clipped."""
-    for frame in read_frames(take.clip, tuple(numbers), kept=take.kept):
-        thin = frame.image[::4, ::4]
-        yield float(np.quantile(thin, 0.999)), float((thin >= SATURATED).mean())
+        return ()
+    late = [frame_light(frame.image) for frame in read_frames(take.clip, later, kept=take.kept)]
+    return (later_frames(_light_of(take, EARLY_FRAMES), late),)

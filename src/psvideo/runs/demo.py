@@ -18,8 +18,8 @@ from psvideo.pictures.contact import Strip, Tile, sheet
 from psvideo.pictures.quantity import picture_of
 from psvideo.pictures.relighting import exposure_for, relight, srgb
 from psvideo.plates.timed import read_or_find_timing
+from psvideo.runs.instants.job import Job
 from psvideo.runs.instants.results import normals_run
-from psvideo.runs.instants.solving import Job
 from psvideo.runs.lighting import read_lighting
 from psvideo.runs.output import Output
 from psvideo.solve.instants import Instant

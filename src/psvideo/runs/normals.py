@@ -35,9 +35,9 @@ from psvideo.plates.timed import read_or_find_timing
 from psvideo.report.run_report import RunReport
 from psvideo.runs.caller import PYTHON, Caller, say_kept, say_of_clip
 from psvideo.runs.delivery.delivering import metric_delivery
+from psvideo.runs.instants.job import Job, OverTime
 from psvideo.runs.instants.piece_notes import noted_timing
 from psvideo.runs.instants.results import normals_run, piece_run
-from psvideo.runs.instants.solving import Job, OverTime
 from psvideo.runs.lighting import read_lighting
 from psvideo.runs.output import Output, take_rate
 from psvideo.sync.open_take import open_take

@@ -18,8 +18,8 @@ from psvideo.plates.sequence import FIRST_NUMBER
 from psvideo.plates.timed import read_or_find_timing
 from psvideo.report.run_report import RunReport
 from psvideo.runs.caller import PYTHON, Caller, say_kept, say_of_clip
+from psvideo.runs.instants.job import OverTime
 from psvideo.runs.instants.plates import Extras, split_run
-from psvideo.runs.instants.solving import OverTime
 from psvideo.runs.output import Output, take_rate
 from psvideo.sync.open_take import open_take
 

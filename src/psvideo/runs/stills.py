@@ -32,8 +32,8 @@ from psvideo.report.run_report import RunReport
 from psvideo.runs.calibrate.mirror_sphere import focal_widths, radius_in_m
 from psvideo.runs.caller import PYTHON, Caller
 from psvideo.runs.delivery.delivering import metric_delivery
+from psvideo.runs.instants.job import Job, OverTime
 from psvideo.runs.instants.results import normals_run
-from psvideo.runs.instants.solving import Job, OverTime
 from psvideo.runs.lighting import read_lighting
 from psvideo.runs.output import Output
 from psvideo.runs.photographs.rti import write_rti

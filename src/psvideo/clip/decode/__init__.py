@@ -2,6 +2,6 @@
 
 ``decoders`` chooses one by the kind of file. Pictures: ``png``, ``tiff``, ``jpeg``, ``dpx``, ``exr`` with
 ``exr_chunks``, ``dng``, ``raw`` (other cameras); ``signatures`` recognises files with a wrong ending. Movies:
-``movie`` with ``movie_edits``, ``movie_tags``, ``movie_times``, ``ffmpeg_planes``, ``yuv``. Mosaics: ``malvar2004``
-with ``malvar_kernel``.
+``movie`` with ``movie_edits``, ``movie_tags`` and ``movie_times``, and ``movie_codes`` with ``ffmpeg_planes`` and
+``yuv``. Mosaics: ``malvar2004`` with ``malvar_kernel``.
 """

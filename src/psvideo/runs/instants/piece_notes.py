@@ -18,7 +18,7 @@ from psvideo.model.timing import Timing
 from psvideo.report.observe.observed import InstantFacts, Observed
 from psvideo.report.observe.worst import Thumbnail, Worst
 from psvideo.report.observe.yuille1997 import Lean
-from psvideo.runs.instants.solving import Found
+from psvideo.runs.instants.job import Found
 
 FOLDER = ".pieces"
 """In the folder that a run writes, until it is whole."""

@@ -27,9 +27,10 @@ from psvideo.plates.nearest_rows import MOST_LATER, has_blind_time
 from psvideo.plates.part import Part
 from psvideo.plates.sequence import POOLED_ROUNDS, round_numbers
 from psvideo.plates.unmixed import slot_names
+from psvideo.runs.instants.job import Beginning, Found, Job, Piece
 from psvideo.runs.instants.piece_notes import FOLDER, note_timing, noted, write_notes
 from psvideo.runs.instants.reporting import observing
-from psvideo.runs.instants.solving import Beginning, Found, Job, Piece, beginning_of, write_instants
+from psvideo.runs.instants.solving import beginning_of, write_instants
 
 BESIDE = 3
 """Rounds on either side that aligning looks at: two, and one that the cut leaves incomplete."""

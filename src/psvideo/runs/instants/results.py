@@ -22,10 +22,11 @@ from psvideo.report.observe.observed import InstantFacts
 from psvideo.report.run_report import RunReport
 from psvideo.runs.delivery.delivering import check_delivery, pass_doubts, say_instants, world_doubts
 from psvideo.runs.delivery.handover import Finished, write_note, write_previews, write_stage, write_timeline
+from psvideo.runs.instants.job import Found, Job
 from psvideo.runs.instants.pieces import forget_pieces, pieced_together, pieces_begun, write_piece
 from psvideo.runs.instants.plates import nothing_complete
 from psvideo.runs.instants.reporting import Solved, run_report, write_report
-from psvideo.runs.instants.solving import Found, Job, write_instants
+from psvideo.runs.instants.solving import write_instants
 from psvideo.runs.output import Output, begun_by, folder_of
 from psvideo.solve.depth import scale_note
 from psvideo.solve.instants import Instant

@@ -8,8 +8,10 @@ from numpy.typing import NDArray
 
 from psvideo.compute.spilled import let_go
 from psvideo.model.surface import MEASURED, NO_LIGHT, ONE_LIGHT, TWO_LIGHTS, Surface
-from psvideo.solve.filling.growing import REACH_PX, grow, queue_for
+from psvideo.solve.filling.bucket_queue import queue_for
+from psvideo.solve.filling.growing import grow
 from psvideo.solve.filling.looking import Said, count_rows, look_rows, room_for
+from psvideo.solve.filling.neighbours import REACH_PX
 from psvideo.solve.filling.tiles import AT_ONCE, THREE_LIGHTS, bring_back, tiles_around
 from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.task import Bytes, Floats, Mask, Samples, Task, Work

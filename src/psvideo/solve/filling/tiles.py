@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.compiled import FUSED
 from psvideo.compute.spilled import let_go, planes_for
 from psvideo.solve.normals.task import Bytes, Mask, Samples
 
@@ -111,3 +112,15 @@ def _near(wanted: Mask, reach_px: int) -> Mask:
         around = cv2.dilate(columns[None], np.ones((1, 2 * reach_px + 1), np.uint8))
         near[down] = around.reshape(-1, SIDE_PX).any(axis=1)
     return near
+
+
+@FUSED.inlined
+def tile_at(tiles: Tiles, row: int, col: int) -> int:
+    """The tile that a pixel lies in."""
+    return int(tiles.table[row >> SHIFT, col >> SHIFT])
+
+
+@FUSED.inlined
+def lights_at(tiles: Tiles, row: int, col: int) -> int:
+    """How many lights a pixel's normal is from."""
+    return int(tiles.lights[tile_at(tiles, row, col), row & WITHIN, col & WITHIN])

@@ -1,0 +1,101 @@
+"""The normal, albedo and colour that a pixel's neighbours suggest, those of its own colour most; compiled."""
+
+import numpy as np
+
+from psvideo.compute.compiled import FUSED
+from psvideo.compute.memory import decoded
+from psvideo.solve.filling.looking import Said
+from psvideo.solve.filling.tiles import THREE_LIGHTS, WITHIN, Tiles, tile_at
+from psvideo.solve.normals.blocks import ONE, ZERO
+
+REACH_PX = 4  # neighbours are looked at so far in every direction,
+SPREAD_PX = 2.0  # with weights that fall off so,
+SAME_COLOUR = np.float32(0.015)  # and with the colour: shares of red and blue that differ so much weigh a half;
+WEIGHTS = np.array([0.1, 0.25, 0.5, 1.0], np.float32)  # of neighbours that no, one, two or three lights reach
+UNCOLOURED = np.float32(0.01)  # the square of what is not known of the colour of a pixel without light
+ONWARD = np.float32(0.7)  # how far neighbours' bend is taken on: all of it would burst from noise
+HALF, THIRD, TINY = np.float32(0.5), np.float32(1 / 3), np.float32(1e-6)
+WINDOW = np.exp(
+    -(np.arange(-REACH_PX, REACH_PX + 1)[:, None] ** 2 + np.arange(-REACH_PX, REACH_PX + 1)[None] ** 2)
+    / (2 * SPREAD_PX**2)
+).astype(np.float32)
+
+
+@FUSED.inlined
+def colour_of(p: Tiles, s: Said, row: int, col: int) -> tuple[np.float32, np.float32, np.float32]:
+    """The shares of red and blue, and the square of what noise makes of them."""
+    tile, y, x = tile_at(p, row, col), row & WITHIN, col & WITHIN
+    pixel, last = p.places[tile, y, x], p.albedo.shape[1] - 1
+    if pixel >= 0:
+        red, green, blue = s.colour[pixel, 0], s.colour[pixel, 1], s.colour[pixel, 2]
+    else:
+        red = decoded(p.albedo[tile, 0, y, x])
+        green, blue = decoded(p.albedo[tile, min(1, last), y, x]), decoded(p.albedo[tile, last, y, x])
+    total = red + green + blue
+    if not total > ZERO:
+        return THIRD, THIRD, UNCOLOURED
+    one = ONE / total
+    return red * one, blue * one, (s.noise * one) ** 2
+
+
+@FUSED.inlined
+def from_neighbours(
+    p: Tiles, s: Said, row: int, col: int
+) -> tuple[np.float32, np.float32, np.float32, np.float32, np.float32, np.float32]:
+    """The normal (x, y, z), albedo, and shares of red and blue that a pixel's neighbours give it, those of its own
+    colour most; their bend is taken on, so that a round surface stays round."""
+    channels = p.albedo.shape[1]
+    red, blue, noise = colour_of(p, s, row, col)
+    weight = albedo = nx = ny = nz = reds = blues = ZERO
+    down = right = downs = rights = both = ZERO
+    nx_down = ny_down = nz_down = nx_right = ny_right = nz_right = ZERO
+    for y in range(max(row - REACH_PX, 0), min(row + REACH_PX + 1, p.rows)):
+        v = y & WITHIN
+        for x in range(max(col - REACH_PX, 0), min(col + REACH_PX + 1, p.cols)):
+            tile, u = tile_at(p, y, x), x & WITHIN
+            state = p.lights[tile, v, u]
+            if state > THREE_LIGHTS:
+                continue
+            there_red = decoded(p.albedo[tile, 0, v, u])
+            there_blue = decoded(p.albedo[tile, channels - 1, v, u])
+            there = there_red + there_blue + (decoded(p.albedo[tile, 1, v, u]) if channels > 1 else there_red)
+            if not there > ZERO:
+                continue
+            one = ONE / there
+            share_red, share_blue = there_red * one, there_blue * one
+            apart = (share_red - red) ** 2 + (share_blue - blue) ** 2
+            alike = ONE / (ONE + apart / (SAME_COLOUR**2 + noise + (s.noise * one) ** 2))
+            alike *= alike
+            w = WEIGHTS[state] * WINDOW[y - row + REACH_PX, x - col + REACH_PX] * (alike * alike + TINY)
+            a, b, c = (
+                decoded(p.normals[tile, 0, v, u]),
+                decoded(p.normals[tile, 1, v, u]),
+                decoded(p.normals[tile, 2, v, u]),
+            )
+            dy, dx = np.float32(y - row), np.float32(x - col)
+            weight += w
+            albedo += w * there * THIRD
+            reds += w * share_red
+            blues += w * share_blue
+            nx, ny, nz = nx + w * a, ny + w * b, nz + w * c
+            wy, wx = w * dy, w * dx
+            down, right = down + wy, right + wx
+            downs, rights, both = downs + wy * dy, rights + wx * dx, both + wy * dx
+            nx_down, ny_down, nz_down = nx_down + wy * a, ny_down + wy * b, nz_down + wy * c
+            nx_right, ny_right, nz_right = nx_right + wx * a, ny_right + wx * b, nz_right + wx * c
+    if not weight > ZERO:
+        return ZERO, ZERO, ONE, ZERO, THIRD, THIRD
+    one = ONE / weight
+    albedo, reds, blues = albedo * one, reds * one, blues * one
+    nx, ny, nz, down, right = nx * one, ny * one, nz * one, down * one, right * one
+    vy, vx, vxy = downs * one - down * down + HALF, rights * one - right * right + HALF, both * one - down * right
+    determinant = ONE / (vy * vx - vxy * vxy)
+    # how far a straight course over the neighbours, taken on to this pixel, leads from their mean
+    per_y = -(down * vx - right * vxy) * determinant * ONWARD
+    per_x = -(right * vy - down * vxy) * determinant * ONWARD
+    nx += per_y * (nx_down * one - down * nx) + per_x * (nx_right * one - right * nx)
+    ny += per_y * (ny_down * one - down * ny) + per_x * (ny_right * one - right * ny)
+    nz += per_y * (nz_down * one - down * nz) + per_x * (nz_right * one - right * nz)
+    length = np.sqrt(nx * nx + ny * ny + nz * nz)
+    one = ONE / max(length, TINY)
+    return nx * one, ny * one, nz * one, albedo, reds, blues
