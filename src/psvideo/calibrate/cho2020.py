@@ -18,7 +18,7 @@ from psvideo.errors import PsvideoError
 from psvideo.model.camera import FloatArray
 
 LIT, KEPT = 0.08, 0.8
-"""A pixel counts that every light lights at least so much of its brightest one; of these the share that fits best."""
+"""A pixel counts that every light lights at least this much of its brightest one; of these the share that fits best."""
 LEAST_PIXELS, MOST_PIXELS = 300, 20_000
 BLOCKS = 4
 ROUNDS = 4

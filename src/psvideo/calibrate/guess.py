@@ -1,10 +1,10 @@
-"""A rig guessed from pictures alone (uncalibrated): better than nothing, and to be taken for no more.
+"""A rig guessed from pictures alone (uncalibrated photometric stereo): for a first look, not for measuring.
 
 The pictures of a matte surface under distant lights have rank three (H. Hayakawa, "Photometric stereo under a light
-source with arbitrary motion", JOSA A 11(11), 1994): lights and surface come out up to a 3 x 3 matrix. Stated priors
-find it. Lights of equal strength (six or more) or a surface of equal albedo fix it up to a rotation; that the normals
-belong to a surface (integrability; A. Yuille and D. Snow, "Shape and albedo from multiple images using integrability",
-CVPR 1997) fixes the rotation up to convex or concave; the subject is taken to bulge towards the camera.
+source with arbitrary motion", JOSA A 11(11), 1994): lights and surface come out up to a 3 x 3 matrix, which
+assumptions fix. Lights of equal strength (six or more), or a surface of equal albedo, leave a rotation; that the
+normals belong to a surface (integrability; A. Yuille and D. Snow, "Shape and albedo from multiple images using
+integrability", CVPR 1997) leaves convex or concave; the subject is assumed to bulge towards the camera.
 """
 
 from collections.abc import Sequence

@@ -14,7 +14,7 @@ from psvideo.formats.timing_json import read_timing
 
 TIMING = "timing.json"
 FEWEST_TO_ONE = 4
-"""So many numbered files for one of another name make that one no light (a mask); with fewer, all are lights."""
+"""This many numbered files for one of another name make that one no light (a mask); with fewer, all are lights."""
 NOT_LIGHTS = ("flashes", "beauty", "truth")
 """Folders that may lie beside the lights' own: single flashes, the lights' sum, and a virtual shoot's truth."""
 

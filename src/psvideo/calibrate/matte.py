@@ -28,7 +28,7 @@ goes into the error: no paint is quite matte."""
 TUKEY_WIDTH = 4.685
 ROUNDS = 12
 PATCHES = 4
-"""The jackknife leaves out one of so many times so many patches of the outline's square."""
+"""The jackknife leaves out one of this many times this many patches of the outline's square."""
 LEAST_PIXELS = 200
 MOST_PIXELS = 40_000
 MOST_LEFT = 0.1

@@ -14,7 +14,7 @@ from psvideo.formats.paths import check_file
 
 FEWEST = 3
 LISTED = 6
-"""So many names are listed in a message."""
+"""This many names are listed in a message."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,7 +20,7 @@ from psvideo.sync.take_timing import find_take_timing
 MODEL_ERROR_SHARE = 2e-5
 """Share of the frame period by which virtual shoots were off beyond the fit's own error (240 rows and fewer)."""
 SURE_ERRORS = 3.0
-"""A readout that is no more than so many standard errors from zero does not show which end comes first."""
+"""A readout that is no more than this many standard errors from zero does not show which end comes first."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""How commands end before their time: by a signal, a reader that is gone, or a machine that has no more to give."""
+"""How commands end early: by a signal, a closed pipe, or a machine without memory or disk space."""
 
 import contextlib
 import errno

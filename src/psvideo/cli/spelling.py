@@ -1,4 +1,4 @@
-"""Parameters in sentences of the library, spelled as the options that they are on the command line."""
+"""Rewrites parameters in the library's sentences as command-line options: `dark_s` becomes --dark."""
 
 import re
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""Codes that stay in their file, of which rows are read when somebody wants them."""
+"""Codes that stay in their file; rows are read when they are needed."""
 
 import os
 import sys

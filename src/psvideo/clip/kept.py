@@ -26,7 +26,7 @@ from psvideo.errors import PsvideoError
 SHARE_OF_FREE_SPACE = 0.5
 """What kept pictures may take of the disk's free space; the run's own files need room too."""
 STAYS_FROM_BYTES = 1 << 20
-"""Pictures of so many bytes and more may stay in the file while they are worked on."""
+"""Pictures of this many bytes and more may stay in the file while they are worked on."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,7 +1,7 @@
 """Frames of a stream as they come: pipes, network streams and video devices, by FFmpeg, in their own codes.
 
-A stream's time stamps say where its frames are in time. They are judged: a stamp that goes back, or leaps, is a stream
-that began again, and is put after what came before by the machine's clock.
+A stream's time stamps say when its frames were taken. Where a stamp goes back or leaps, the stream has begun again; its
+frames are then placed after the earlier ones by the machine's clock.
 """
 
 import sys

@@ -1,4 +1,4 @@
-"""How many loops a run compiles: what a page and a console say while that takes its time."""
+"""How many loops a run compiles: shown on the page and the console while it takes time."""
 
 import logging
 import time

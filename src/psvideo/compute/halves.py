@@ -1,4 +1,4 @@
-"""Half floats of single ones in one vectorised pass, where numpy converts one value after the other."""
+"""Single-precision floats to half floats in one vectorised pass; numpy converts one value at a time."""
 
 import numpy as np
 from numpy.typing import NDArray

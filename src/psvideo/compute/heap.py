@@ -1,4 +1,4 @@
-"""What memory and libraries do unasked, set before they load: one heap, small pages, no threads of their own."""
+"""Settings of the allocator and of libraries, made before they load: one heap, small pages, no threads of their own."""
 
 import contextlib
 import ctypes
@@ -8,10 +8,10 @@ import os
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8
 """glibc's numbers of the settings (malloc.h)."""
 MOST_IN_HEAP_BYTES, MOST_SPARE_BYTES = 32 << 20, 1 << 30
-"""Pictures up to so many bytes, the most that glibc allows, lie in the heap, and so much of it may be free: a run's
+"""Pictures up to this many bytes, the most that glibc allows, lie in the heap, and this much of it may be free: a run's
 pictures come and go in the same memory, which the system would clear each time that it is given back."""
 OBJECTS_BETWEEN_LOOKS = 10_000
-"""Python looks for reference cycles once so many objects are new; by default, 700."""
+"""Python looks for reference cycles once this many objects are new; by default, 700."""
 ELSEWHERE = (OSError, AttributeError, TypeError)
 """Another C library, or none to be called by name."""
 

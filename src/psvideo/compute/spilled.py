@@ -1,6 +1,6 @@
-"""Planes of large pictures that lie in a file: the system's cache holds them, as far as it likes, the process does not.
+"""Planes of large pictures that lie in a file: the system's page cache holds them while there is room, not the process.
 
-Whoever has worked on a part of them lets it go; it is read back where it is wanted again.
+Code that has worked on a part of them lets it go (``let_go``); a later access reads it back.
 """
 
 import mmap
@@ -17,7 +17,7 @@ from psvideo.errors import PsvideoError
 LARGE_PIXELS = 1 << 25
 """Pictures of more pixels have planes in files: just more than 8K video has, whose results come and go in memory."""
 AROUND_BYTES = 1 << 20
-"""So much before a part goes with it: where a page is read, the system hands over those around it too."""
+"""This much before a part goes with it: where a page is read, the system hands over those around it too."""
 
 
 def planes_for(shape: tuple[int, ...], kind: DTypeLike, *, pixels: int, folder: Path | None) -> NDArray[Any]:

@@ -22,7 +22,7 @@ from psvideo.model.choices import Compression
 _INT32_MAX = 2**31 - 1
 AT_ONCE_ROWS = 2048
 LET_GO_EACH_BYTES = 1 << 23
-"""What lies in files is let go after so many rows that were looked at, and each time that so much was written."""
+"""What lies in files is let go after this many rows that were looked at, and each time that this much was written."""
 
 _COMPRESSIONS: dict[Compression, object] = {
     "zip": OpenEXR.ZIP_COMPRESSION,

@@ -1,4 +1,4 @@
-"""Light lists of other programs, read: rows of numbers, held against their count and what beginners write in them.
+"""Reads light lists of other programs: rows of numbers, checked against their count and for common mistakes.
 
 ``.lp`` (RTI), DiLiGenT's ``light_directions.txt`` with ``light_intensities.txt`` beside it, and a plain list of unit
 vectors with its count on the first line (University of Washington). Lists without names belong to the plan's lights in

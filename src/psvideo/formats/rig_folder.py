@@ -9,7 +9,7 @@ from psvideo.formats.paths import path_of, take_name
 RIGS = (".toml", ".lp", ".txt")
 """What rigs and light lists end with."""
 NAMED = 5
-"""So many takes without a rig are named, and how many more there are is said."""
+"""This many takes without a rig are named, and how many more there are is said."""
 
 
 def rig_of_take(rig: Path | str, clip: Path) -> Path:

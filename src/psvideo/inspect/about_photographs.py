@@ -12,7 +12,7 @@ from psvideo.inspect.findings import Finding, ok, warn
 from psvideo.model.units import counted
 
 FEWEST, MOST = 3, 300
-"""So many photographs of one subject are taken; what has more pictures is a clip."""
+"""This many photographs of one subject are taken; what has more pictures is a clip."""
 SAME_EXPOSURE = 1.02
 
 

@@ -1,4 +1,4 @@
-"""What was found out about a file, a folder or this machine: records without judgement of their own."""
+"""What was found out about a file, a folder or this machine, as records."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field

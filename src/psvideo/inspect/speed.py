@@ -16,7 +16,7 @@ ROWS, COLS, LIGHTS = 1080, 1920, 8
 BYTES = ROWS * COLS * (2 * LIGHTS + 8)
 """Moved by one solution: a 16-bit code per light and pixel in, half-float normals and albedo out."""
 MOST_COPIES = 12.0
-"""A solver that takes longer than so many copies of as many bytes runs uncompiled, or on a machine that is busy."""
+"""A solver that takes longer than this many copies of as many bytes runs uncompiled, or on a machine that is busy."""
 DISK_MB = 64
 SLOW_DISK_MB_S = 60.0
 MEASURED_S = 0.5

@@ -14,9 +14,9 @@ SATURATED = 0.998
 ROUNDING = 1e-5
 """How far below its saturation what is clipped may come out, as a share of it, where plates were scaled."""
 LOSSY_MARGIN = 0.018
-"""Compressed files blur the very end: pictures that may come from such count as clipped so much sooner."""
+"""Compressed files blur the very end: pictures that may come from such count as clipped this much sooner."""
 SMALL_PLATE_MARGIN = 0.048
-"""A small plate's pixel is a mean that may hide brighter ones: what is measured there stays so much further away."""
+"""A small plate's pixel is a mean that may hide brighter ones: what is measured there stays this much further away."""
 
 
 def at_saturation(image: NDArray[np.floating[Any]], saturation: float = 1.0) -> NDArray[np.bool_]:

@@ -1,4 +1,4 @@
-"""Strobes in step with the frames: below 360 degrees some rows never see some lights then, however long the take.
+"""Strobes in step with the frames: with a shutter below 360 degrees some rows then never see some lights, in any take.
 
 A row is blind for a part of each frame. Flashes of a light fall at other places in the frame from round to round, so
 that each row sees the light in some round, unless rounds last a whole number of frames, or nearly.

@@ -1,4 +1,4 @@
-"""Maximal-length sequences (Golomb 1967): bits in which every run of ``order`` bits but zeros stands just once."""
+"""Maximal-length sequences (Golomb 1967): every word of ``order`` bits, except all zeros, occurs exactly once."""
 
 TAPS = {
     3: (3, 2),

@@ -26,7 +26,7 @@ Flags = NDArray[np.bool_]
 WHOLE = 1.0 - 1e-9
 """A row that saw this share of a square flash saw all of it; ..."""
 WHOLE_BUT_TAIL = 1.0 - 1e-3
-"""... with tails, which never quite end, one that saw so much did."""
+"""... with tails, which never quite end, one that saw this much did."""
 LEAST_SHARE = 0.05
 """A row that saw less of a flash than this is unseen: dividing by so little would bring up only noise."""
 NO_FOREIGN = 1e-5
@@ -36,9 +36,9 @@ MOST_FOREIGN = 0.3
 CLEAN = 0.01
 """A dark slot's exposures that saw less of other flashes are enough by themselves where there are any."""
 MOST_LEFT = 0.01
-"""Of another flash that cannot be taken off so much may be left in a row; with more it is unseen."""
+"""Of another flash that cannot be taken off this much may be left in a row; with more it is unseen."""
 MOST_GAIN = 2.5
-"""Taking neighbours off may raise noise (as its square) so many times at most."""
+"""Taking neighbours off may raise noise (as its square) this many times at most."""
 LEAST_DETERMINANT = 1e-3
 """Sums that hold the same mixture of flashes cannot be taken apart."""
 NEIGHBOURS = 2

@@ -1,4 +1,4 @@
-"""Light on the mains: how much more or less of it an exposure collects than the mean, by when it was open."""
+"""Ripple of lamps on the mains: by how much the light of an exposure differs from the mean, by when it was open."""
 
 from dataclasses import dataclass
 

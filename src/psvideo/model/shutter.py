@@ -15,7 +15,7 @@ from psvideo.model.camera import Camera, FloatArray
 
 IntArray = NDArray[np.int64]
 REACH = 9.0
-"""After so many fall times a flash is over: e^-9 of its last light is left, a ten-thousandth."""
+"""After this many fall times a flash is over: e^-9 of its last light is left, a ten-thousandth."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from psvideo.plates.light_plate import LightPlate
 
 RUN_UP: Mapping[SplitMethod, int] = {"weights": 0, "hudon2015": 240}
-"""Frames before a round that a method looks at, where there are so many."""
+"""Frames before a round that a method looks at, where there are this many."""
 
 
 @dataclass(frozen=True, kw_only=True)

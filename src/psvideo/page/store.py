@@ -1,4 +1,4 @@
-"""Blocks that were asked for, each made once by a few threads and kept for a while."""
+"""A cache of picture blocks: each is made once, by a few threads, and kept for a while."""
 
 import threading
 from collections import OrderedDict

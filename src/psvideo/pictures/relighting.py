@@ -15,7 +15,7 @@ from psvideo.model.surface import Surface, check_surface
 Image = NDArray[np.float32]
 Pixels = NDArray[np.uint8]
 BAND_ROWS = 256
-"""About so many rows are averaged at a time."""
+"""About this many rows are averaged at a time."""
 
 
 def relight(

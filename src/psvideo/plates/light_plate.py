@@ -1,4 +1,4 @@
-"""A light's plate: the scene under it alone, at its full flash, at one instant."""
+"""The record of a plate: the scene under one light alone, at its full flash, at one instant."""
 
 from dataclasses import dataclass
 

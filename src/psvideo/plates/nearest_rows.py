@@ -18,8 +18,8 @@ from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import made
 
 LATER, MOST_LATER = 2, 8
-"""A plate waits for so many later ones of its light: for the first number where earlier ones showed what it lacks, and
-for the second, at a clip's start, where none did."""
+"""A plate waits for later ones of its light: for two where earlier ones showed what it lacks, for eight at a clip's
+start, where none did."""
 BLIND = 1e-3
 """Share of the frame period for which rows must be blind to be worth the wait."""
 

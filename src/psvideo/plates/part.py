@@ -1,7 +1,7 @@
-"""A part of a take's frames that is gathered by itself, to the same plates as all of them would give.
+"""A part of a take's frames that is gathered by itself, to the same plates as the whole take would give.
 
-What plates owe to frames elsewhere is little: the ambient light up to the part's first flash, which earlier dark slots
-show, and the white by which sketches of a light's plates are coded, which its first plate sets. Both are handed in.
+Plates depend on frames elsewhere in two ways only: the ambient light before the part's first flash, known from earlier
+dark slots, and the white by which a light's sketches are coded, set by its first plate. Both are handed in.
 """
 
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""A picture bound for compiled loops: where its frames lie, in memory or in open files, of which loops read rows."""
+"""A mixture made ready for compiled loops: where its frames lie, in memory or in open files read row by row."""
 
 import ctypes
 import sys

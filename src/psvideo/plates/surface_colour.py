@@ -1,4 +1,4 @@
-"""What colour a moving surface has, from flashes that show it in different places: needed where one flash must do.
+"""The colour of a moving surface, from flashes that show it in different places; needed where one flash must do.
 
 Where lamps exchange their colours, what three flashes show of a resting surface is ``albedo_c * shading_p``, for
 every lamp p and channel c: a matrix of rank 1. Where something moved, single pixels contradict that; sums over a
@@ -17,11 +17,11 @@ Flags = NDArray[np.bool_]
 
 CONTRADICTION = 0.05
 """Flashes whose products leave a larger share of themselves unexplained show different surfaces: normals that are some
-8 degrees apart leave so much, and noise of 5 % of the light."""
+8 degrees apart leave this much, and noise of 5 % of the light."""
 MOVED = 0.1
-"""So much leaves no doubt that something moved between them, and that flow did not bring it together."""
+"""This much leaves no doubt that something moved between them, and that flow did not bring it together."""
 WINDOW_PX = 5
-"""Contradictions are looked for in means over so many pixels: noise makes less of them."""
+"""Contradictions are looked for in means over this many pixels: noise makes less of them."""
 NEIGHBOURHOODS = (1 / 24, 1 / 8, 1 / 3, 2.0)
 """Widths, in shares of the picture's longer side, in which the flashes are asked to agree, the smallest first."""
 LEAST_PX = 11

@@ -1,4 +1,4 @@
-"""The compiled loops that make small pictures of plates: every so many rows and columns, or means over pixels."""
+"""The compiled loops that make small pictures of plates: every n-th row and column, or means over blocks of pixels."""
 
 import numpy as np
 from numba.np.numpy_support import carray

@@ -1,6 +1,6 @@
-"""Plates turned upright: sensors are read row by row whichever way the camera was held, people look at what is upright.
+"""Plates turned upright, for cameras that were held on their side or upside down.
 
-Frames and their recipes lie as the sensor does. A plate that is turned is made, and held in half its memory.
+Frames and recipes stay as the sensor read them. A turned plate is computed at once, and held in 16-bit codes.
 """
 
 from dataclasses import replace

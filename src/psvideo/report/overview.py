@@ -1,4 +1,4 @@
-"""A page over many takes: what recurs, a line for each, and below what was found of those that want a look."""
+"""A page over many takes: what recurs, one line per take, and details of those that need attention."""
 
 import html
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Whether lights stayed as they were from one calibration to the next, by what both know of them."""
+"""Whether lights moved or changed between one calibration and the next, given the errors of both."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -9,7 +9,7 @@ from psvideo.report.of_rigs import LightOfTake, RigResult
 
 SURE = 3.0
 """Standard errors of the difference beyond which a light is said to have changed. An error of a direction is the root
-mean square angle: chance alone exceeds so many once in 8,000 (Rayleigh), and an intensity's once in 370."""
+mean square angle: chance alone exceeds this many once in 8,000 (Rayleigh), and an intensity's once in 370."""
 
 
 def changes(results: Sequence[RigResult]) -> tuple[RigResult, ...]:

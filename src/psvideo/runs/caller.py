@@ -1,4 +1,4 @@
-"""Who calls a run: where its sentences go while it lasts, and how parameters are spelled there."""
+"""Who calls a run, Python or the command line: where its messages go, and how parameters are spelled in them."""
 
 import logging
 from collections.abc import Callable

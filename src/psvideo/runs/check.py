@@ -33,11 +33,11 @@ from psvideo.sync.take_timing import find_take_timing
 
 LEAST_FRAMES, MOST_FRAMES = 30, 160
 ROUNDS = 4
-"""So many rounds are looked at, where the clip is long enough."""
+"""This many rounds are looked at, where the clip is long enough."""
 SPREAD = 6
 """More frames, over the rest of the take: whether light and exposure stay."""
 EXPOSED_FRAMES, EARLY_FRAMES = 12, 16
-"""About so many frames show how a clip without a strobe is exposed, and what later frames are held against."""
+"""About this many frames show how a clip without a strobe is exposed, and what later frames are held against."""
 MOST_KEPT_BYTES = 1_500_000_000
 """Larger windows are decoded twice: temporary folders may lie in memory."""
 

@@ -1,6 +1,6 @@
 """Compiling ahead what usual runs need: a few small virtual takes are run once, each in a process of its own.
 
-Nobody lists loops and types: whatever a run of them compiles is kept for all later runs (docs/decisions/first-run.md).
+There is no list of loops and types: what these runs compile is kept for all later ones (docs/decisions/first-run.md).
 """
 
 import tempfile

@@ -1,4 +1,4 @@
-"""Where a run writes, at what rate its sequences play, and under which settings a stopped one may go on."""
+"""Where a run writes, at what rate its sequences play, and with which settings a stopped run may be resumed."""
 
 import hashlib
 from contextlib import AbstractContextManager

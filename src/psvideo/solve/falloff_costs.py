@@ -1,4 +1,4 @@
-"""How badly distances explain what near lights show in points of the picture."""
+"""The cost of each assumed distance: how badly it explains what near lights show at points of the picture."""
 
 from collections.abc import Sequence
 

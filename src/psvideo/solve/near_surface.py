@@ -23,7 +23,7 @@ from psvideo.solve.depth import Shaping, View, depth_of, view_of
 from psvideo.solve.normals.illumination import Illumination
 
 ROUGH_PX = 480
-"""Depth for the lights' sake is integrated on a picture of at most so many pixels along its longer side."""
+"""Depth for the lights' sake is integrated on a picture of at most this many pixels along its longer side."""
 MOST_OFF = 0.12
 """Integrated depth that is off by more than this share of what the lights' falloff says is not believed."""
 LEAST_COVERED = 0.5

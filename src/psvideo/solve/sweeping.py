@@ -29,16 +29,17 @@ POINTS = 72
 RATIOS = np.geomspace(0.5, 2.5, 25)
 """Of the plane's distance, 7 % apart; between them a parabola is laid."""
 AROUND = 5
-"""Costs are averaged over squares of so many points."""
+"""Costs are averaged over squares of this many points."""
 STAY = 0.05
 """The cost of standing off the plane by a factor e, squared; little beside what tells one distance from another."""
 LEAST_GAIN = 0.005
-"""A distance is taken where its cost is less than the plane's by so much: about a tenth of a standard error squared."""
+"""A distance is taken where its cost is this much below the plane's: about a tenth of a standard error squared."""
 PLANE_HOLDS, LEAST_POINTS = 0.06, 25
-"""A part of so many points that is found no farther than this share from the plane is on it: somebody measured it, and
-normals say more of the relief than distances do."""
+"""A part of at least this many points is on the plane where it is found no farther from it than this share: the plane
+was measured, and normals say more of the relief than distances do."""
 ON_PLANE, RELIEF = 0.8, 0.1
-"""What is thought of distances beforehand: so much of what is seen stands off the plane by so much, as a share."""
+"""The prior on distances: this share of the picture lies within about this share of the plane's distance, the rest
+anywhere."""
 SURE = 0.01
 """Better than to this share no distance is known."""
 JUMP = 0.08

@@ -17,11 +17,11 @@ from psvideo.solve.falloff_costs import falloff_costs
 FINE_POINTS = 960
 """Points along the picture's longer side."""
 REACH = 5
-"""Distances are averages over squares of so many coarse points: on both sides of these they are another's."""
+"""Distances are averages over squares of this many coarse points: on both sides of these they are another's."""
 APART = 1.04
 """Sides that differ by less are one."""
 AROUND = 5
-"""What single pixels say is averaged over a disc of so many, less at its rim."""
+"""What single pixels say is averaged over a disc of this many, less at its rim."""
 
 Plane = NDArray[np.float32]
 

@@ -1,4 +1,4 @@
-"""Which plans a user has been warned of: their checksums in the user's state folder, one a line."""
+"""Plans whose warnings the user has confirmed: their checksums in the user's state folder, one per line."""
 
 import os
 import sys

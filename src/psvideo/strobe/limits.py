@@ -1,6 +1,6 @@
 """What a controller refuses to play: the same rules for the host, before anything is sent, and for the Python board.
 
-They stand in lights/protocol.md; the firmware has them once more by itself.
+They are specified in lights/protocol.md; the firmware enforces them too.
 """
 
 import struct

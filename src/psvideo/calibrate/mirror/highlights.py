@@ -36,7 +36,7 @@ FLOODED = 0.3
 SKIRT_PX = 2
 """How far beyond the candidate's edge its light is counted: a small spot's flanks show where it is."""
 FEW_CLIPPED = 40
-"""So many clipped pixels do not yet hide where a spot's middle is: its flanks show it."""
+"""This many clipped pixels do not yet hide where a spot's middle is: its flanks show it."""
 ALIKE = 0.5
 """A second spot with more than this share of the first one's score makes the choice doubtful."""
 STATIC = 0.6

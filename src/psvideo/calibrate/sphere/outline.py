@@ -23,13 +23,13 @@ LEAST_COVERAGE, LEAST_EVIDENCE = 0.6, 8.0
 """Share of the spokes that must agree on an outline, and how much likelier than chance they must make it (natural
 logarithm); noise and boxes reach 0.58."""
 MOST_PICTURES = 4
-"""Lights are averaged to so many pictures: what misleads a rim is alike under all of them, so more do not help."""
+"""Lights are averaged to this many pictures: what misleads a rim is alike under all of them, so more do not help."""
 SAME = 0.02
 """Round things nearer to an outline that was tried than this share of its radius are the same one."""
 SURE_COVERAGE, RESTART_SHARE = 0.95, 0.04
 """An outline that fewer spokes agree on is looked for again from beside it, by this share of its radius."""
 CANDIDATES = 4
-"""So many round things of each picture are tried."""
+"""This many round things of each picture are tried."""
 
 
 @dataclass(frozen=True, kw_only=True)

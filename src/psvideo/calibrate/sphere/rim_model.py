@@ -2,13 +2,13 @@
 
 At its very rim a smooth sphere mirrors fully (Fresnel: at grazing angles everything does) what is just behind it. So a
 mirror's picture is continuous there: it only begins to change, and it does so with the cosine of incidence, which
-grows as the root of the distance from the rim. Inside, brightness is taken for a cubic in that root; outside for a
-straight line; all blurred by the lens. A matte thing may jump at its rim; its inside is a square in the root. What the
-steepest place of a mirror's edge shows lies inside of that: on a dark ball before a bright wall by several pixels.
+grows as the root of the distance from the rim. Inside, the model is a cubic in that root; outside, a straight
+line; all of it blurred by the lens. A matte sphere may jump at its rim, and inside it is a square in the root. The
+steepest place of a mirror's edge lies inside its rim: on a dark ball before a bright wall by several pixels.
 
 Everything but the rim's place and the blur is linear, and eliminated by least squares (variable projection). The
-unexplained rest, as a likelihood with unknown noise, says how good a place is: pictures and radii in which nothing
-stands out say nothing, and need no weights.
+residuals, as a likelihood with unknown noise, say how good a place is. Pictures and radii in which nothing stands out
+favour no place, so they need no weights.
 """
 
 from collections.abc import Sequence

@@ -1,8 +1,8 @@
-"""How certain a fitted frequency is: from what the residuals did, not from an assumption that they are independent.
+"""How certain a fitted frequency is, from the residuals as they are: they are not independent.
 
-Texture, lines of the sensor and a model that is not quite right make residuals alike from row to row, from frame to
+Texture, lines of the sensor and a model that is not quite right correlate residuals from row to row, from frame to
 frame or along a block of columns. The error of the estimate is the spread of the sum of all rows' pulls on it, and that
-is measured in several ways, each of which sees another likeness; the largest is believed.
+is measured in several ways, each for another kind of correlation; the largest is taken.
 """
 
 from dataclasses import dataclass

@@ -23,7 +23,7 @@ from psvideo.errors import PsvideoError, UsageError
 from psvideo.model.camera import FloatArray
 
 MOST_FRAMES = 24
-"""So many frames are read where the user names none: more would hardly make the result better."""
+"""This many frames are read where the user names none: more would hardly make the result better."""
 MOST_BLOCKS = 8
 FEWEST_COLUMNS = 16
 

@@ -11,7 +11,7 @@ OUTSTANDING = 20.0
 FOLDED = 40
 WINDOW_CYCLES = 3.0
 """Fainter stripes are heard where their peak has this share of the main one's power and stands out this many times of
-its neighbourhood, more than the window's width from the harmonics (so many) of the main ones."""
+its neighbourhood, more than the window's width from the harmonics (this many) of the main ones."""
 
 
 def find_peaks(whole: FloatArray) -> list[float]:

@@ -1,4 +1,4 @@
-"""In which panel of the help an option stands, where its command has many."""
+"""The panels that group options in the help of commands with many of them."""
 
 STILLS = ("lights", "sphere", "spheres", "dark", "transfer", "focal_px", "focal_mm", "sensor_mm", "radius_mm", "circle")
 """What photographs are read with."""

@@ -1,4 +1,4 @@
-"""What was typed at the command line, as text, and the request that it means."""
+"""From the words typed for ``capture-plan`` to the request that they mean."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

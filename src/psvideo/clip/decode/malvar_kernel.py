@@ -1,4 +1,4 @@
-"""The compiled loop of demosaicing: a row at a time, of which every filter shares its sums with the others."""
+"""The compiled loop of demosaicing, row by row; all filters share the sums of a row."""
 
 import numpy as np
 from numpy.typing import NDArray

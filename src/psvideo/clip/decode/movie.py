@@ -208,7 +208,7 @@ IN_THE_CLEAR = "Expected a movie as the camera recorded it: ProRes, DNxHR, H.264
 ENCRYPTED = b"encv"
 """The sample entry of encrypted video (ISO/IEC 14496-12, 8.12)."""
 LOOKED_AT = 1 << 22
-"""So many bytes at both ends of a file: there lies its description."""
+"""This many bytes at both ends of a file: there lies its description."""
 
 
 def _sealed(path: Path) -> str:

@@ -21,12 +21,12 @@ UNEVEN = 0.25
 LEAST_EVEN_SHARE = 0.5
 """The longest even run is used where it is at least this share of the movie."""
 MOST_STEPS = 8
-"""The usual step between frames is divided into at most so many: 24, 25, 30 and 60 a second are whole multiples of 1/8
-of one another or less."""
+"""The usual step between frames is divided into at most this many parts: 24, 25, 30 and 60 a second are whole multiples
+of 1/8 of one another or less."""
 EXACT = 0.02
 """A step is a whole multiple within this share of the usual one, or the timestamps' own unit."""
 LEAST_HELD_SHARE = 0.8
-"""A rate is held for a while: so many of the steps that are no whole frames are as long as the one before or after.
+"""A rate is held for a while: this many of the steps that are no whole frames are as long as the one before or after.
 Timestamps that jitter, or stumble once, are not."""
 
 

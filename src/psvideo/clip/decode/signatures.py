@@ -1,4 +1,4 @@
-"""How files of other kinds begin: what a picture with the wrong ending is."""
+"""The first bytes of each kind of file: recognises a picture with the wrong ending."""
 
 KINDS = {
     b"\xff\xd8\xff": ("JPEG", ".jpg"),

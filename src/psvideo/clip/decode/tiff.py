@@ -18,7 +18,7 @@ from psvideo.errors import PsvideoError
 logging.getLogger("tifffile").addHandler(logging.NullHandler())
 
 STAYS_FROM_BYTES = 1 << 27
-"""Samples of so many bytes and more (22 megapixels in colour) stay in their file where they lie there as they are."""
+"""Samples of this many bytes and more (22 megapixels in colour) stay in their file where they lie there as they are."""
 OF_CLIP_STAYS_FROM_BYTES = 1 << 20
 """The same of a clip's frames, of which a round and a half would be held: smaller ones cost less than reading them
 piece by piece."""

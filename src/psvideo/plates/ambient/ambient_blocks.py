@@ -1,4 +1,4 @@
-"""Blocks of pixels, over which levels of ambient light are compared; pictures are worked on in bands of whole ones."""
+"""Blocks of pixels over which levels of ambient light are compared; pictures are processed in bands of whole blocks."""
 
 from collections.abc import Callable
 from itertools import pairwise
@@ -10,7 +10,7 @@ from psvideo.compute.threads import over_ranges
 from psvideo.model.coded import Image
 
 BLOCKS_PX = ((100, 2), (600, 4))
-"""Levels are compared over blocks of so many pixels a side from pictures of so many rows and columns on; those of
+"""Levels are compared over blocks of this many pixels a side from pictures of this many rows and columns on; those of
 smaller pictures as they are. The last block takes what rows and columns are left."""
 BAND_ROWS = 64
 """Rows that are worked on at a time: a whole number of blocks."""

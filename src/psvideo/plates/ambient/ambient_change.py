@@ -1,4 +1,4 @@
-"""What changed from one dark slot to the next: a neighbourhood's level, by noise, or the scene itself."""
+"""What changed from one dark slot to the next beyond noise: the level of the light, or the scene."""
 
 from dataclasses import dataclass
 
@@ -20,7 +20,7 @@ average start again for it: where a file cuts noise off at black, what is left o
 LEAST_GAIN, MOST_GAIN = 0.5, 2.0
 """Where light changed by more than these factors between dark slots, the average starts again."""
 SPARSE, MOST_JUDGED = 5, 20_000
-"""Noise is judged from every fifth pixel of every fifth row, or so many pixels, which is plenty."""
+"""Noise is judged from every fifth pixel of every fifth row, or this many pixels, which is plenty."""
 NEIGHBOURHOOD_PX = 9
 """What the level does not explain is judged over a square of this width, which averages noise away."""
 CHANGED = 4.0

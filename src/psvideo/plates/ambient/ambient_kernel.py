@@ -1,6 +1,6 @@
-"""The compiled loops of ambient light: a dark slot looked at, and averaged with those before it, row by row.
+"""The compiled loops of ambient light: a dark slot is measured, and averaged with those before it, row by row.
 
-A row lies in a core's first cache while all is done to it; of whole pictures there is only what is kept.
+A row stays in a core's first cache meanwhile; no picture is held except the average.
 """
 
 import numpy as np

@@ -27,18 +27,18 @@ Flags = NDArray[np.bool_]
 WINDOW_FRAMES = 128
 """Frames that one regression takes together: enough for plates within a few per cent of the best."""
 EVERY_ROW, BLOCK_PX = 8, 16
-"""Whether the scene stood is judged in every eighth row, whose shares are exact, over the means of so many columns."""
+"""Whether the scene stood still is judged in every eighth row, whose shares are exact, by means over 16 columns."""
 TRUSTS_DIM = 0.25
 """Rows count by 1 / (this + the share of a flash that they saw): what is dim has less photon noise."""
 MOSAIC = 2
-"""A colour filter mosaic repeats after so many pixels."""
+"""A colour filter mosaic repeats after this many pixels."""
 MOST_NOISE = 2.0
-"""A row is known where the ambient picture's noise variance is at most so many times a frame's."""
+"""A row is known where the ambient picture's noise variance is at most this many times a frame's."""
 MOST_KEPT = 0.01
 """... and where it holds no more than this of any flash: in few frames a row may see whole flashes only, from which
 nothing separates the ambient light."""
 MOVED = 4.0
-"""A block moved whose residuals are so many times what noise leaves of blocks as bright."""
+"""A block moved whose residuals are this many times what noise leaves of blocks as bright."""
 AT_LEAST, AT_LEAST_SHARE = 1e-4, 3e-3
 """Residuals of less than this, and this share of the block's light, are no motion, however little noise there is."""
 SATURATED = 0.98

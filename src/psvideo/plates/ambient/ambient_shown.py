@@ -1,4 +1,4 @@
-"""What shows a take's ambient light, read ahead of its plates: dark slots, or windows of frames for want of them."""
+"""A take's ambient light, read ahead of its plates: from dark slots or, without any, from windows of frames."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace

@@ -23,7 +23,7 @@ PULSES_HZ = (100.0, 120.0)
 EXPLAINED = 0.8
 """A ripple is believed where it explains this share of the rows' changes, beyond one change of level."""
 LEAST_TURN = 0.3
-"""Dark slots must differ at least so much in phase (of 2 at most, RMS) to show a ripple."""
+"""Dark slots must differ at least this much in phase (of 2 at most, RMS) to show a ripple."""
 LEAST_ROWS = 16
 LEAST_SWING = 1e-3
 AGREES = 0.3

@@ -14,8 +14,8 @@ DIM_STOPS, DARK_STOPS = -3.5, -6.0
 """A take whose brightest lamp's brightest parts stay so far below saturation is noisy, or lost in noise."""
 BEST_STOPS = -0.5
 MISPLACED = 16.0
-"""A mask beyond which the picture is so many times brighter than within lies beside the subject: a dark subject before
-a white wall differs by a photograph's contrast, some 8 times."""
+"""A mask lies beside the subject where the picture is this many times brighter outside of it than within: a dark
+subject before a white wall differs by a photograph's contrast, some 8 times."""
 MOST_CLIPPED, LOST_CLIPPED = 0.02, 0.1
 """Shares of the subject that one lamp may clip: more costs normals there, and with three lamps all of them."""
 SPARE_CLIPPED = 0.25

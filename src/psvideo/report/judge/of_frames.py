@@ -10,7 +10,7 @@ from psvideo.model.clipping import SATURATED
 from psvideo.report.judgement import Judgement
 
 BRIGHTER, DARKER = 1.25, 0.4
-"""Later frames that reach so many times the light of the first ones are of another exposure, or of a strobe that
+"""Later frames that reach this many times the light of the first ones are of another exposure, or of a strobe that
 stopped."""
 DARK = 2**-6
 """A picture whose brightest parts stay six stops below saturation holds little but noise."""

@@ -13,14 +13,14 @@ from psvideo.report.observe.observed import InstantFacts, Observed
 WEAK_LIGHT = 1 / 8
 """Of the brightest lamp's light."""
 LEAST_LIGHTS = 3
-"""Where so many others fire, one that does not is missed by what they do not reach; shadow and it look the same."""
+"""Where this many others fire, one that does not is missed by what they do not reach; shadow and it look the same."""
 CHECKED_FROM = 5
 """With fewer lights than these nothing shows that one of them gives less than the rig says, and all normals lean."""
 MISSED = 0.5
 """A flash that gives less than this share of its lamp's usual light did not fire as it should."""
 UNSTEADY = 0.02
 NAMED = 4
-"""So many lights or rounds are named one by one; of more, only how many."""
+"""This many lights or rounds are named one by one; of more, only how many."""
 
 
 def lamps(observed: Observed, *, timed: bool = True, missed: bool = False) -> Iterator[Judgement]:

@@ -26,8 +26,7 @@ NEARER = 0.7
 widths away that a rig takes for distant: 0.2 to 0.5.)"""
 LOST_LEAN_DEG = 12.0
 IN_PICTURE = 0.5
-"""Lamps that are less than so many of the picture's widths away would be seen in it. (Linear codes read as S-Log3 look
-like that.)"""
+"""Lamps nearer than this, in widths of the picture, would be seen in it. (Linear codes read as S-Log3 do.)"""
 UNDONE, REDONE = 0.7, 0.25
 """Plates were read by another curve where that leaves less than these shares of what is left over. (sRGB read as light:
 0.3 to 0.8; photographs in light: 1.7 and more. Light read as sRGB: 0.05 to 0.15; photographs in sRGB: 0.6 and more.)"""
@@ -35,7 +34,7 @@ LEANS_DEG, BY_LEANING = 6.0, 0.1
 """Normals would be one surface's if all were changed by more than the first; that says something of the rig where it
 leaves less over by the second, a share of what it leaves."""
 MORE_THAN_SHOWN, SURELY_MORE = 2.0, 4.0
-"""... and where it is more than so many times what residuals show: where lights are each wrong in a way of
+"""... and where it is more than this many times what residuals show: where lights are each wrong in a way of
 their own, which accuracy says, normals lean by up to 3.5 times that. (Under a rig that is turned as a whole: 25
 times on virtual subjects, 2 to 4 times on photographs.)"""
 SURELY_LEANING = 0.5

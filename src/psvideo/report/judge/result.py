@@ -26,7 +26,7 @@ HARDLY_OFF = 0.05
 """Four directions that are 5 degrees off leave 1 to 3 % of the light, 10 degrees 2 to 6 % (normals are 4 to 10 degrees
 off), 20 degrees 6 to 11 %."""
 MOVING_FACTOR = 2.0
-"""Where the picture moves, so many times more may be left unexplained: no rig explains what moved between flashes."""
+"""Where the picture moves, this many times more may be left unexplained: no rig explains what moved between flashes."""
 LEAST_VALID, HARDLY_VALID = 0.6, 0.2
 """Shares of the subject: three lights that stand well reach more of most subjects than the first."""
 NONE_VALID = 0.02

@@ -1,4 +1,4 @@
-"""What a delivery asks of a run: a camera that is known at every instant, the plates and their sum written as well."""
+"""What a delivery needs besides the surface: the camera at every instant, the plates, their sum, and passes."""
 
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence

@@ -27,7 +27,7 @@ from psvideo.pictures.relit_kernel import Halves, relit
 from psvideo.plates.sequence import Round
 
 TURN_S = 4.0
-"""The light goes round once in so many seconds of playing,"""
+"""The light goes round once in this many seconds of playing,"""
 TILT = 0.6
 """so far from the camera's axis (sine of the angle)."""
 WIDTH_PX = 1280

@@ -1,9 +1,9 @@
-"""A run cut into ranges of instants that are solved apart, in any order and place, to the same bytes as at one go.
+"""A run cut into ranges of instants that are solved apart, in any order and on any machine, to the same bytes.
 
-An instant owes something to those around it, and that reaches a known way: results at rest are held steady over blocks
-of rounds, averages over blocks of their own, plates are aligned with those of the rounds beside, lack rows that other
-rounds show, and wait for a dark slot. So a piece reads and solves some instants before its own, and reads some frames
-after. The rest is known from the clip's first instant and from earlier dark slots.
+An instant depends on those around it, but no further than is known: results at rest are pooled over blocks of rounds,
+averages over blocks of their own, plates are aligned with those of the neighbouring rounds, borrow rows that their
+flash missed, and wait for the next dark slot. So a piece solves some instants before its own, and reads some frames
+after. All else comes from the clip's first instant and from earlier dark slots.
 """
 
 import shutil

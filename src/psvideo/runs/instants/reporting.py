@@ -1,4 +1,4 @@
-"""What a run says of itself: the report of a take that was observed, written beside its results."""
+"""Writes the report of a run beside its results, from what was observed while it went on."""
 
 import json
 import platform

@@ -1,4 +1,4 @@
-"""The instants of a run, or of a piece of it, written as they are solved; what was seen of them is returned."""
+"""Solves the instants of a run, or of a piece of it, and writes each at once; returns what the report needs of them."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace

@@ -12,7 +12,7 @@ from psvideo.clip.folder import BRACKETED, KINDS, MOVIES, NUMBERED
 DEEPEST = 4
 """Folders in folders that are looked into: cards put takes a few levels down."""
 UNCHANGED_LOOKS = 2
-"""A take is whole once so many looks in turn found it the same."""
+"""A take is whole once this many looks in turn found it the same."""
 
 
 @dataclass(frozen=True)

@@ -31,12 +31,12 @@ SILENT_S = 60
 SETTINGS = {"distributed.nanny.pre-spawn-environ": {}, "distributed.scheduler.worker-ttl": f"{SILENT_S}s"}
 """dask's own environment for workers sets MALLOC_TRIM_THRESHOLD_, which halves the speed of numpy."""
 RETRIES = 2
-"""A piece is tried so many times more where a worker fails at it for other reasons than its footage."""
+"""A piece is tried this many times more where a worker fails at it for other reasons than its footage."""
 ANSWERS_S = 10
 """Within this a scheduler answers."""
 HANGS_S, HANGS_TIMES = 600.0, 10.0
-"""A piece hangs that takes longer than this, and than so many times the longest that was done (the first ones may find
-a take's timing); a disk that is gone holds a process so without end."""
+"""A piece that takes longer than this, and than this many times the longest done so far, hangs: a disk that is gone
+holds a process for ever. (The first pieces may have to find a take's timing.)"""
 LOOKS_EVERY_S = 10.0
 LOGGERS = ("distributed", "tornado", "tornado.application", "asyncio")
 

@@ -40,7 +40,7 @@ MOST_DIFFERENT = 0.2
 """Share of its light by which a light's pictures may differ. Noise and motion at the edges of a subject stay below, an
 exposure wrong by a quarter of a stop reaches it, and so do, of twelve photographs under other lights, some two."""
 RUN_PX = 16
-"""Noise of a sum over so many pixels is a quarter of the pixels' own, beside their light."""
+"""Noise of a sum over this many pixels is a quarter of the pixels' own, beside their light."""
 PLAN = "plan.toml"
 
 

@@ -28,7 +28,7 @@ Pixels = NDArray[np.uint8]
 FOLDER = "rti"
 PTM = "relight.ptm"
 LARGEST_PX = 4096
-"""The longer side of the planes: graphics cards hold textures of so many pixels everywhere."""
+"""The longer side of the planes: graphics cards hold textures of this many pixels everywhere."""
 QUALITY = 95
 RIDGE = 1e-3
 """What keeps few lights from making polynomials that burst between them, as a share of the equations' trace."""

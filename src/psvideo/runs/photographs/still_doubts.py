@@ -1,6 +1,6 @@
-"""What photographs say against what was assumed of them: their curve, and the exposures that their files name.
+"""Whether photographs contradict what was assumed of them: their transfer curve and the exposures in their files.
 
-A matte surface under known lights leaves the less of its light over, the more of what was assumed is true.
+A matte surface under known lights leaves small residuals; a wrong assumption makes them larger.
 """
 
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ from psvideo.model.camera import FloatArray
 from psvideo.model.rig import Light
 
 POINTS = 6000
-"""So many pixels of every picture are looked at, evenly spread."""
+"""This many pixels of every picture are looked at, evenly spread."""
 LEAST, MOST = 0.1, 0.97
 """Of a pixel's brightest light, and of saturation: between them a sample counts."""
 LEAST_LIGHTS = 4

@@ -34,7 +34,7 @@ surface is smooth, and with the paper's sharpness never less than 0.12 where ste
 SAME_COSINE = 0.996
 """Normals less than 5 degrees apart look the same as in the instant before."""
 AROUND_PX, SAME_SHARE = 7, 0.7
-"""A pixel is the same where so many of those around it look the same: along outlines normals are noisy."""
+"""A pixel is the same where this many of those around it look the same: along outlines normals are noisy."""
 
 
 @dataclass(frozen=True, kw_only=True)

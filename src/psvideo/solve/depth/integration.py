@@ -1,4 +1,4 @@
-"""Rounds of reweighting: a height for the shares, shares for the height, until the energy settles."""
+"""Reweighting, round by round: solve for the height, compute new weights from it, until the energy settles."""
 
 from dataclasses import dataclass
 from math import inf

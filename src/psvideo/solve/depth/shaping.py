@@ -1,4 +1,4 @@
-"""Depth over a clip: the same view, plane and scale for every instant, each of which can be done by itself."""
+"""Depth over a clip: one view, plane and scale for all instants, so that each can be integrated by itself."""
 
 from dataclasses import dataclass, replace
 

@@ -17,15 +17,15 @@ from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.task import Bytes, Floats, Mask, Samples, Task, Work
 
 MOST_LIGHTS_AROUND = 5
-"""A pixel that light reaches is of the subject where so many of the nine around it are lit or solved: noise is not."""
+"""A lit pixel belongs to the subject where this many of the nine around it are lit or solved; noise does not."""
 LARGEST_HOLE = 0.005
 """What no light reaches belongs to the subject where that encloses it and it is no larger share of the picture."""
 AT_SEAM_DEG = np.array([28, 19, 2], np.float32)
 TIMES_TYPICAL, PER_ROOT_DEG, MOST_ERROR_DEG = np.float32(2.5), np.float32(55), np.float32(60)
-"""Two thirds of the pixels that no, one and two lights reach are off by no more than the first beside what is solved,
-and so many times what is typical there, since what spoils three lights spoils fewer more; and by the next times the
-root of the distance from it over the longer side of the picture. On the virtual bust and others under sets of three and
-four lights, a bear and a cat (DiLiGenT)."""
+"""How far two thirds of the filled pixels are off at most: the sum of AT_SEAM_DEG (for no, one and two lights), of
+TIMES_TYPICAL times the error typical around, since what spoils three lights spoils fewer more, and of PER_ROOT_DEG
+times the root of the distance from solved pixels over the longer side of the picture. Measured on the virtual bust and
+others under sets of three and four lights, a bear and a cat (DiLiGenT)."""
 THIN = 4
 """What is typical is looked for in every fourth row and column."""
 CLASSES = np.array([NO_LIGHT, ONE_LIGHT, TWO_LIGHTS, MEASURED], np.uint8)

@@ -1,8 +1,8 @@
 """The compiled loop that grows normals and albedo from solved pixels into the others, the likeliest neighbours first.
 
-Neighbours of the same colour give a normal and an albedo, and what one or two lights say of the pixel mends them
-(``hernandez2011``). Pixels are taken in the order of their distance from what is solved, where a step to another colour
-is a long one: so they follow their own surface, and what is behind an outline comes last.
+Neighbours of the same colour suggest a normal and an albedo (``neighbours``), which the one or two lights that reach
+the pixel correct (``hernandez2011``). Pixels are filled in the order of their distance from solved ones. A step to
+another colour counts as a long one, so that a surface is filled from itself, and not across an outline.
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
-"""The surroundings of holes, copied out of a picture in square tiles: what growing works in.
+"""The surroundings of holes, copied out of a picture in square tiles, in which ``growing`` works.
 
-Growing goes from pixel to pixel all over the picture, nearest to what is solved first. Of a large one, whose planes lie
-in files, every row came into memory by that; most of it lies far from any hole.
+Growing jumps all over the picture, to whatever pixel is nearest to solved ones. In a large picture, whose planes lie in
+files, that would bring every row into memory, though most pixels lie far from any hole.
 """
 
 from pathlib import Path
@@ -19,7 +19,7 @@ SHIFT = 5
 SIDE_PX = 1 << SHIFT
 WITHIN = SIDE_PX - 1
 AT_ONCE = 1 << 18
-"""So many pixels are brought back before the planes that they lie in are let go."""
+"""This many pixels are brought back before the planes that they lie in are let go."""
 
 
 THREE_LIGHTS, UNKNOWN, LEFT_ALONE = 3, 9, 10  # of Tiles.lights

@@ -22,7 +22,7 @@ from psvideo.solve.passes.plate_rows import PlateRows
 
 Floats = NDArray[np.float32]
 SEPARATE, TIMES_BRIGHTER = 0.7, 6.0
-"""Two heaps are separate from this share of the variance between them on, where their middles differ so much. (A
+"""Two heaps are separate from this share of the variance between them on, where their middles differ this much. (A
 subject before a black curtain: 0.94 and 12 to 34; before a lit wall: 0.5 to 0.8, but 1.5 to 3.8.)"""
 AT_BORDER = 0.25
 """The dark heap is a backdrop where it has this share of the picture's border; else it is dark hair or cloth."""

@@ -1,4 +1,4 @@
-"""Every plate held against what the diffuse model makes of its light: which lights reach a pixel, and what exceeds it.
+"""Every plate compared with the diffuse model: which lights reach a pixel, and what exceeds the model.
 
 The model is ``plate = albedo * intensity * max(0, n . direction)``.
 """

@@ -1,4 +1,4 @@
-"""A strobed clip in memory, from plates that are already there: the short way to frames with known truth."""
+"""A strobed clip in memory, made from given plates: frames with known truth, without rendering."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

@@ -9,7 +9,7 @@ from psvideo.model.camera import FloatArray
 Bursts = tuple[tuple[float, float], ...]
 
 TAILS = 16.0
-"""After so many fall times a tail has given off all but 1e-7 of its light."""
+"""After this many fall times a tail has given off all but 1e-7 of its light."""
 
 
 @dataclass(frozen=True, kw_only=True)
