@@ -2,5 +2,5 @@
 
 ``every_line`` puts them together: ``time`` (strobe, order, frames, motion), ``of_exposure``, ``of_lamps``,
 ``of_ambient``, ``of_rig``, ``result`` (accuracy, validity, focus, steadiness). ``powers`` is for the live
-view alone, ``of_frames`` for ``check`` alone: frames before they are plates.
+view alone, ``of_frames`` for ``psvideo check`` alone: frames before they are plates.
 """
