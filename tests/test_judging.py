@@ -10,12 +10,12 @@ from ring_and_ball import ring
 
 from psvideo.model.surface import Surface
 from psvideo.report.observe.slopes import averaged, slope_agreement
-from psvideo.solve.normals.doubting import Signs, ThinSurface, doubt_deg, signs_of
-from psvideo.solve.normals.evidence import Evidence
+from psvideo.solve.normals.doubting import Signs, ThinSurface, doubt_deg, signs_of, stored
+from psvideo.solve.normals.evidence import Evidence, Indirect
 from psvideo.solve.normals.illumination import Illumination
-from psvideo.solve.normals.indirect import indirect_of
+from psvideo.solve.normals.indirect import IndirectLook
 from psvideo.solve.normals.solving import Solving
-from psvideo.solve.normals.task import Usable
+from psvideo.solve.normals.task import Task, Usable, Work, empty_result
 
 SIZE = 96
 COLOUR = np.array([0.5, 0.4, 0.3])
@@ -156,6 +156,18 @@ def test_a_small_picture_is_trusted_as_a_large_one_is_beside_the_edges_of_shadow
     reached &= np.linalg.norm(case.truth, axis=-1) > 0.5
     assert surface.valid[reached & (errors < 5)].mean() >= 0.97
     assert (errors[reached & surface.valid] > 10).mean() <= 0.03
+
+
+def indirect_of(one: Evidence, surface: Surface) -> Indirect:
+    """Return what ``IndirectLook`` finds for a surface that is given, not solved."""
+    looks, (normals, albedo) = IndirectLook.of(one), stored(surface)
+    given = empty_result(surface.valid.size, 1, half=False, residual=False)._replace(normals=normals, albedo=albedo)
+
+    def look(shown: Task, work: Work, first: int, last: int) -> None:
+        looks.look(shown, given, work, first, last)
+
+    one.in_bands(look, step=looks.step)
+    return looks.found
 
 
 def doubted(turned: np.ndarray) -> tuple[Signs, np.ndarray]:

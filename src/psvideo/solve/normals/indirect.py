@@ -4,11 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from psvideo.model.surface import Surface
 from psvideo.solve.normals.bands import ShownPlates
-from psvideo.solve.normals.doubting import step_of, stored
+from psvideo.solve.normals.doubting import step_of
 from psvideo.solve.normals.evidence import Evidence, Indirect
-from psvideo.solve.normals.task import Result, Samples, Task, Work, task
+from psvideo.solve.normals.task import Result, Task, Work, task
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,24 +37,9 @@ class IndirectLook:
 
     def look(self, shown: Task, result: Result, work: Work, first: int, last: int) -> None:
         """Look at solved rows, whose samples lie where the solver's task says."""
-        shape = (-1, self.rows, self.given.cols)
-        planes, albedo = result.normals.reshape(shape), result.albedo.reshape(shape)
-        self._look(shown, planes, albedo, work, first, last)
-
-    def _look(self, shown: Task, planes: Samples, albedo: Samples, work: Work, first: int, last: int) -> None:
         from psvideo.solve.normals.judging_kernel import indirect_rows
 
+        shape = (-1, self.rows, self.given.cols)
+        planes, albedo = result.normals.reshape(shape), result.albedo.reshape(shape)
         given = self.given._replace(plates=shown.plates[: len(self.given.plates)], like=shown.like)
         indirect_rows(given, work, planes, albedo, *self.found, first, last, self.step)
-
-
-def indirect_of(one: Evidence, surface: Surface) -> Indirect:
-    """Return what ``IndirectLook`` finds for a surface that is solved already; its plates are read again for it."""
-    looks = IndirectLook.of(one)
-    planes, albedo = stored(surface)
-
-    def look(given: Task, work: Work, first: int, last: int) -> None:
-        looks._look(given, planes, albedo, work, first, last)
-
-    one.in_bands(look, step=looks.step)
-    return looks.found
