@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.formats.light_lists import write_rig
+from psvideo.formats.light_list_writer import write_rig
 from psvideo.formats.rig_toml import read_rig
 from psvideo.model.rig import Light, Rig, Vector
 

@@ -16,7 +16,7 @@ from psvideo.clip.stills import Photographs, look_at
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.asked import Asked, delivery_of
-from psvideo.formats.light_lists import write_rig
+from psvideo.formats.light_list_writer import write_rig
 from psvideo.formats.paths import path_if_given, path_of
 from psvideo.formats.plan_toml import format_plan
 from psvideo.formats.rig_toml import format_rig

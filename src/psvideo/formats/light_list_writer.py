@@ -1,23 +1,19 @@
 """Rigs written as the light lists of other programs: ``.lp`` (RTI) and DiLiGenT's pair of text files.
 
 Both use psvideo's axes (x right, y up, z towards the camera) and hold distant lights only; ``.lp`` holds no strengths.
-``list_rows`` reads them back to the last digit.
+``light_list_reader`` reads them back to the last digit.
 """
 
-import re
 from pathlib import Path
 from typing import Literal
 
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.formats.contract import read_text
-from psvideo.formats.list_rows import is_number
+from psvideo.formats.light_list_reader import DIRECTIONS, INTENSITIES
 from psvideo.formats.rig_toml import format_rig
 from psvideo.formats.whole_files import write_text
 from psvideo.model.rig import Light, Rig, Vector
 
 ListKind = Literal["toml", "lp", "diligent"]
-FILENAMES = "filenames.txt"
-DIRECTIONS, INTENSITIES = "light_directions.txt", "light_intensities.txt"
 
 
 def kind_of(path: Path) -> ListKind:
@@ -34,26 +30,6 @@ def kind_of(path: Path) -> ListKind:
 def files_of(path: Path) -> tuple[Path, ...]:
     """Return the files that writing a rig makes: two for DiLiGenT."""
     return (path, path.with_name(INTENSITIES)) if kind_of(path) == "diligent" else (path,)
-
-
-def pictures_named_by(path: Path) -> tuple[str, ...]:
-    """Return the pictures that a list names, in order: the words before the numbers of every line (``.lp``, tables), or
-    the ``filenames.txt`` beside DiLiGenT's lists; empty where it names none, or not one in every line."""
-    beside = path.with_name(FILENAMES)
-    if path.name == DIRECTIONS and beside.is_file():
-        return tuple(line.strip() for line in read_text(beside).splitlines() if line.strip())
-    if path.suffix == ".toml":
-        return ()
-    named = [_name_in(line) for line in read_text(path).splitlines()]
-    return tuple(name for name in named if name)
-
-
-def _name_in(line: str) -> str:
-    """Return what stands before a line's three numbers, or before six: direction and strengths."""
-    words = [word for word in re.split(r"[\s,;]+", line.strip()) if word]
-    numbers = len(words) - next((place for place in range(len(words), 0, -1) if not is_number(words[place - 1])), 0)
-    before = words[: -6 if numbers >= 6 else -3] if numbers >= 3 else []
-    return " ".join(before) if len(before) == 1 or not all(is_number(word) for word in before) else ""
 
 
 def write_rig(path: Path, rig: Rig) -> tuple[str, ...]:

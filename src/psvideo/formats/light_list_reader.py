@@ -2,7 +2,7 @@
 
 ``.lp`` (RTI), DiLiGenT's ``light_directions.txt`` with ``light_intensities.txt`` beside it, and a plain list of unit
 vectors with its count on the first line (University of Washington). Lists without names belong to the plan's lights in
-the order in which the plan first lights them. ``light_lists`` writes the first two.
+the order in which the plan first lights them. ``light_list_writer`` writes the first two.
 """
 
 import re
@@ -16,6 +16,8 @@ from psvideo.errors import PsvideoError
 from psvideo.formats.contract import read_text
 from psvideo.model.rig import Light, Rig
 
+DIRECTIONS, INTENSITIES, FILENAMES = "light_directions.txt", "light_intensities.txt", "filenames.txt"
+"""The files of DiLiGenT."""
 ANGLES_SPAN = 7.0
 """Columns that span more, beside a third one that is the same throughout, are degrees: more than radians do."""
 AXES = "x right, y up, z towards the camera"
@@ -56,6 +58,26 @@ def read_light_list(path: Path, *, plan_lights: Sequence[str] = ()) -> Rig:
     return Rig(lights=tuple(lights))
 
 
+def pictures_named_by(path: Path) -> tuple[str, ...]:
+    """Return the pictures that a list names, in order: the words before the numbers of every line (``.lp``, tables), or
+    the ``filenames.txt`` beside DiLiGenT's lists; empty where it names none, or not one in every line."""
+    beside = path.with_name(FILENAMES)
+    if path.name == DIRECTIONS and beside.is_file():
+        return tuple(line.strip() for line in read_text(beside).splitlines() if line.strip())
+    if path.suffix == ".toml":
+        return ()
+    named = [_name_in(line) for line in read_text(path).splitlines()]
+    return tuple(name for name in named if name)
+
+
+def _name_in(line: str) -> str:
+    """Return what stands before a line's three numbers, or before six: direction and strengths."""
+    words = [word for word in re.split(r"[\s,;]+", line.strip()) if word]
+    numbers = len(words) - next((place for place in range(len(words), 0, -1) if not _is_number(words[place - 1])), 0)
+    before = words[: -6 if numbers >= 6 else -3] if numbers >= 3 else []
+    return " ".join(before) if len(before) == 1 or not all(_is_number(word) for word in before) else ""
+
+
 def _numbers(path: Path, text: str) -> list[list[float]]:
     """Return the numbers of each line; words (an .lp file's picture names) are left out."""
     comma = next((word for word in re.split(r"[\s;]+", text) if DECIMAL_COMMA.fullmatch(word)), None)
@@ -64,7 +86,7 @@ def _numbers(path: Path, text: str) -> list[list[float]]:
             f"{path}: writes {comma!r}. Expected numbers with points, such as {comma.replace(',', '.')}."
         )
     lines = [re.split(r"[,;]" if re.search("[,;]", line) else r"\s+", line.strip()) for line in text.splitlines()]
-    rows = [[float(word) for word in words if is_number(word)] for words in lines]
+    rows = [[float(word) for word in words if _is_number(word)] for words in lines]
     rows = [row for row in rows if row]
     if not rows:
         raise PsvideoError(
@@ -73,7 +95,7 @@ def _numbers(path: Path, text: str) -> list[list[float]]:
     return rows
 
 
-def is_number(word: str) -> bool:
+def _is_number(word: str) -> bool:
     """Return whether a word of a list is a finite number."""
     try:
         return bool(np.isfinite(float(word)))
@@ -114,8 +136,8 @@ def _refuse_angles(path: Path, vectors: NDArray[np.float64]) -> None:
 
 def _diligent_strengths(path: Path, count: int) -> list[tuple[float, ...]]:
     """Return the intensities of the ``light_intensities.txt`` beside a DiLiGenT list, else 1 for every light."""
-    beside = path.with_name("light_intensities.txt")
-    if path.name != "light_directions.txt" or not beside.is_file():
+    beside = path.with_name(INTENSITIES)
+    if path.name != DIRECTIONS or not beside.is_file():
         return [(1.0,)] * count
     rows = _numbers(beside, read_text(beside))
     if len(rows) != count:
