@@ -19,12 +19,21 @@ class Indirect(NamedTuple):
     counts: Floats
 
 
+class Left(NamedTuple):
+    """What normals leave of the plates, at every point at which a surface is judged: of all lights the squares of what
+    their plates show beyond a matte surface, in units of albedo, summed, and how many lights show there."""
+
+    squares: Floats
+    lights: Floats
+
+
 @dataclass(frozen=True, kw_only=True)
 class Evidence:
     """Plates, lights, and which samples to look at; ``spare``, a folder in whose files large pictures are worked on.
 
     ``unsure`` (light, row, col), on a grid of its own over the picture, is by how much plates may be off for motion;
-    ``moves`` (row, col), on that grid, where something was followed. ``indirect`` is what the solver saw on its way.
+    ``moves`` (row, col), on that grid, where something was followed. ``indirect`` is what the solver saw on its way,
+    and ``left``, where plates are unsure.
     """
 
     plates: Sequence[Samples] | Sequence[Mixture]
@@ -35,6 +44,7 @@ class Evidence:
     unsure: Floats | None = None
     moves: Mask | None = None
     indirect: Indirect | None = None
+    left: Left | None = None
     black_level: float = 0.0
     scale: float = 1.0
     spare: Path | None = None

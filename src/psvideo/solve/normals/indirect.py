@@ -1,4 +1,5 @@
-"""Light where lamps do not reach, looked for while a solver has the rows: reading plates again would cost as much."""
+"""Light where lamps do not reach, and what normals leave of plates that are unsure, looked for while a solver has the
+rows: reading plates again would cost as much."""
 
 from dataclasses import dataclass
 
@@ -6,7 +7,7 @@ import numpy as np
 
 from psvideo.solve.normals.bands import ShownPlates
 from psvideo.solve.normals.doubting import step_of
-from psvideo.solve.normals.evidence import Evidence, Indirect
+from psvideo.solve.normals.evidence import Evidence, Indirect, Left
 from psvideo.solve.normals.task import Result, Task, Work, task
 
 
@@ -18,6 +19,7 @@ class IndirectLook:
     rows: int
     step: int
     found: Indirect
+    left: Left
 
     @classmethod
     def of(cls, one: Evidence) -> "IndirectLook":
@@ -25,9 +27,11 @@ class IndirectLook:
         samples = ShownPlates.of(one.plates).as_floats().samples
         rows, cols = samples[0].shape[:2]
         step = step_of((rows, cols))
-        sums, counts = np.zeros((2, -(-rows // step), -(-cols // step)), np.float32)
+        shape = -(-rows // step), -(-cols // step)
+        found = Indirect(*np.zeros((2, *shape), np.float32))
+        left = Left(*np.zeros((2, *((0, 0) if one.unsure is None else shape)), np.float32))
         given = task(samples, one.lit, one.seen, one.mask, one.usable, one.black_level, one.scale)
-        return cls(given=given, rows=rows, step=step, found=Indirect(sums, counts))
+        return cls(given=given, rows=rows, step=step, found=found, left=left)
 
     def memory(self) -> Work:
         """Return room for one thread."""
@@ -42,4 +46,4 @@ class IndirectLook:
         shape = (-1, self.rows, self.given.cols)
         planes, albedo = result.normals.reshape(shape), result.albedo.reshape(shape)
         given = self.given._replace(plates=shown.plates[: len(self.given.plates)], like=shown.like)
-        indirect_rows(given, work, planes, albedo, *self.found, first, last, self.step)
+        indirect_rows(given, work, planes, albedo, *self.found, *self.left, first, last, self.step)

@@ -69,7 +69,7 @@ def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging =
     near = near_spread(one.lit, _thin_shape(surface))
     spread = _Spread.of(surface, one, noise, how, near)
     points = spread.points(surface)
-    turned_deg = moved_deg(points, one)
+    turned_deg = moved_deg(points, one, noise)
     signs = signs_of(points, one, turned_deg)
     doubt, moving = doubt_deg(signs, how=how.doubting), None
     if turned_deg is not None:

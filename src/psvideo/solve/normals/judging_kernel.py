@@ -90,14 +90,16 @@ def _fill_between(coarse: Floats, row: int, step: int, line: Floats) -> None:
 @FUSED.kept
 def indirect_rows(
     task: Task, work: Work, normals: Samples, albedo: Samples, sums: Floats, counts: Floats,
-    first: int, last: int, step: int,
+    squares: Floats, lights: Floats, first: int, last: int, step: int,
 ) -> None:  # fmt: skip
-    """Add up what reaches every ``step``-th row and column from lights that do not, as a share of the albedo.
+    """Add up what reaches every ``step``-th row and column from lights that do not, as a share of the albedo, and the
+    ``squares`` of what normals leave of all ``lights`` that show there, where these planes are not empty.
 
-    normals, albedo: as ``judge_rows`` takes them, zeros where there is none. sums, counts: (row // step, col // step).
+    normals, albedo: as ``judge_rows`` takes them, zeros where there is none. The others: (row // step, col // step).
     """
     t = lent_task(task, work.matrix, work.per_strength)
     n, a, values, total, count = lent(normals), lent(albedo), lent(work.values), lent(sums), lent(counts)
+    over, lit, looks = lent(squares), lent(lights), squares.size > 0
     channels, facing = t.tone.shape[1], FACING if t.ratio > ZERO else ZERO
     each = ONE / np.float32(channels)
     for row in range(-(-first // step) * step, last, step):
@@ -111,7 +113,7 @@ def indirect_rows(
                 if not size > ZERO:
                     continue
                 nx, ny, nz = decoded(n[0, row, col + i]), decoded(n[1, row, col + i]), decoded(n[2, row, col + i])
-                sum_of, number = ZERO, ZERO
+                sum_of, number, left, showing = ZERO, ZERO, ZERO, ZERO
                 for light in range(t.lights):
                     if not values[light * channels, i] > ABSENT:
                         continue
@@ -123,6 +125,9 @@ def indirect_rows(
                     lx, ly, lz = at(lamp, i)
                     cosine = (lx * nx + ly * ny + lz * nz) * one
                     level *= one * t.albedo_scale
+                    beyond = level / size - max(cosine, ZERO)
+                    left += beyond * beyond
+                    showing += ONE if max(level, size * cosine) > t.dark * t.albedo_scale else ZERO
                     shadowed = (cosine > facing) & (level < SHADOWED * size * cosine)
                     if shadowed | (cosine <= facing) | (level < t.dark * t.albedo_scale):  # or lost in noise
                         grazing = ZERO if shadowed else max(cosine, ZERO)
@@ -131,3 +136,6 @@ def indirect_rows(
                         number += ONE
                 total[row // step, (col + i) // step] = sum_of
                 count[row // step, (col + i) // step] = number
+                if looks:
+                    over[row // step, (col + i) // step] = left
+                    lit[row // step, (col + i) // step] = showing

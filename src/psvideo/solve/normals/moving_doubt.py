@@ -6,12 +6,24 @@ import cv2
 import numpy as np
 
 from psvideo.plates.align.own_means import own_mean
-from psvideo.solve.normals.doubting import ThinSurface, width_of
-from psvideo.solve.normals.evidence import Evidence
+from psvideo.solve.normals.doubting import ThinSurface, brightness, width_of
+from psvideo.solve.normals.evidence import Evidence, Left
+from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.task import Floats, Mask
 
 MOST_DEG = np.float32(180)
 """What turns a normal by more is no angle: nothing is known of its plates."""
+SOLVED = 3
+"""So many lights are explained by a normal and an albedo, whatever they show."""
+MATTE = 0.03
+"""Surfaces that stand still leave so much of a light that is not noise, as a share of albedo: they are not quite matte,
+and rigs are a little off."""
+BESIDE = (3, 3)
+"""What normals leave is averaged over so many points, for noise leaves next to nothing here and there."""
+EXPLAINED = np.float32(0.05)
+"""What nobody knows of plates is known after all where it is less likely than this that they are off."""
+MOST_ODDS, LEAST = np.float32(30), np.float32(1e-6)
+NOISELESS = PlateNoise(read=0.0, photon=0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,25 +59,50 @@ class MovingDoubt:
     stirring_share: float = 0.02
 
 
-def moved_deg(points: ThinSurface, one: Evidence) -> Floats | None:
+def moved_deg(points: ThinSurface, one: Evidence, noise: PlateNoise = NOISELESS) -> Floats | None:
     """Return by which angle what is unsure of the plates turns the points' normals, in degrees; None where nothing
-    moved.
+    moved. More than MOST_DEG is no angle: nothing is known there.
 
-    The errors of lights are taken as independent, and spread as least squares spreads them across the normal.
+    The errors of lights are taken as independent, and spread as least squares spreads them across the normal. Where one
+    normal explains the plates of more than three lights as it explains what stands still, they are hardly off.
     """
     if one.unsure is None or not one.unsure.any():
         return None
-    rows, cols = points.surface.valid.shape
     normals = points.surface.normals.astype(np.float32)
-    matrix = one.lit.directions * one.lit.intensities.mean(axis=1)[:, None]
-    turned = np.zeros((rows, cols), np.float32)
-    for pull, plane in zip(np.linalg.pinv(matrix).T.astype(np.float32), one.unsure, strict=True):
-        across = np.float32(pull @ pull) - (normals @ pull) ** 2
-        off = cv2.resize(plane, (cols, rows), interpolation=cv2.INTER_LINEAR)
-        turned += np.maximum(across, 0) * off * off
-    albedo = points.surface.albedo
-    size = albedo if albedo.ndim == 2 else albedo.mean(axis=-1)
-    return np.asarray(np.degrees(np.sqrt(turned) / np.maximum(size, np.float32(1e-6))) * points.known, np.float32)
+    strength = one.lit.intensities.mean(axis=1)
+    matrix = one.lit.directions * strength[:, None]
+    pulls = np.linalg.pinv(matrix).T.astype(np.float32)
+    size = np.maximum(brightness(points.surface.albedo), np.float32(1e-6))
+    turned, likely, shown = np.zeros((3, *points.known.shape), np.float32)
+    for pull, plane, row, lamp in zip(pulls, one.unsure, matrix, strength, strict=True):
+        across = np.maximum(np.float32(pull @ pull) - (normals @ pull) ** 2, 0)
+        off = cv2.resize(plane, points.known.shape[::-1], interpolation=cv2.INTER_LINEAR)
+        most = np.minimum(off, size * np.float32(lamp))  # a plate is off by no more light than a lamp gives
+        turned += across * off * off
+        likely += across * most * most
+        shown += np.float32((1 - row @ pull) / lamp**2) * most * most
+    scale = np.float32(np.rad2deg(1)) * points.known / size
+    turned, likely = np.sqrt(turned) * scale, np.sqrt(likely) * scale
+    if one.left is None or len(one.plates) <= SOLVED:
+        return np.asarray(turned, np.float32)
+    dark = np.asarray(np.float32(noise.dark / strength.mean()) / size, np.float32)
+    share = _off_share(one.left, points.known, shown / (size * size), dark)
+    known = (turned <= MOST_DEG) | (share < EXPLAINED)
+    return np.asarray(np.where(known, likely * share, turned), np.float32)
+
+
+def _off_share(left: Left, known: Mask, off: Floats, noise: Floats) -> Floats:
+    """Return how likely plates are off by as much as is unsure of them: what a normal leaves of them is Gaussian and so
+    large then, and else as large as of what stands still; before anything is seen, either is as likely.
+
+    ``off`` is the sum of squares that would be left, ``noise`` what is left of noise, both in units of albedo.
+    """
+    free = np.maximum(left.lights - np.float32(SOLVED), 0)
+    usual = np.float32(MATTE**2) + noise * noise
+    square = off / np.maximum(free, 1) + usual
+    seen = cv2.blur(left.squares * known, BESIDE) / np.maximum(cv2.blur(known.astype(np.float32), BESIDE), LEAST)
+    odds = free * np.log(square / usual) - seen * (1 / usual - 1 / square)
+    return np.asarray(np.where(free > 0, 1 / (1 + np.exp(np.clip(odds / 2, -MOST_ODDS, MOST_ODDS))), 1), np.float32)
 
 
 def moving_doubt_deg(

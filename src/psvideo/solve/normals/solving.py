@@ -93,7 +93,7 @@ class Solving:
         )
         looks = IndirectLook.of(one)
         solved = self._solved(plates, lit, usable, noise, seen, mask, looks)
-        return solved, replace(one, indirect=looks.found), noise
+        return solved, replace(one, indirect=looks.found, left=looks.left if looks.left.lights.size else None), noise
 
     def _solved(
         self,
