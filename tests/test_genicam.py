@@ -76,7 +76,10 @@ def test_a_camera_that_crashes_is_a_sentence_and_is_found_again(served: Callable
         ("sys.exit('there is no such camera; there are: 0815')", "there are: 0815"),
         ("mode(shape=(48, 32))\nframe(1)", "sends 32 x 48 pixels, and the plan says 64 x 48"),
         ("mode('BGR8Packed')\nframe(1)", "expected Mono, Bayer or RGB"),
-        ("mode('BayerGB8')\nframe(1)", "its filters are GBRG, and the plan says RGGB"),
+        (
+            "mode('BayerGB8')\nframe(1)",
+            "its colour filters are GBRG from the top left pixel on, and the plan says cfa = 'RGGB'",
+        ),
     ],
 )
 def test_what_cannot_be_filmed_ends_in_one_paragraph(served: Callable[[str], None], does: str, said: str) -> None:
