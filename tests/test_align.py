@@ -16,7 +16,7 @@ from psvideo.plates.align import between, flow, held, moving
 from psvideo.plates.align.comb import Comb, Schedule
 from psvideo.plates.align.moving_kernel import AT_REST, BOTH
 from psvideo.plates.align.opened import with_open_shutter
-from psvideo.plates.align.packed import packed
+from psvideo.plates.align.packed import PutBy, packed
 from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.align.unsure import UNKNOWN
 from psvideo.plates.align.vectors import pixels_per_s
@@ -289,8 +289,8 @@ def test_no_more_plates_are_held_than_instants_need(
                 yield own
                 del own
 
-    def watched(picture: Mixture, saturation: float) -> Mixture:
-        small = packed(picture, saturation)
+    def watched(picture: Mixture, saturation: float, put_by: PutBy | None = None) -> Mixture:
+        small = packed(picture, saturation, put_by)
         count(np.asarray(small.frames[0].codes))
         return small
 

@@ -1,5 +1,6 @@
 """Results at any instant: which instants a rate asks for, on paper, and what is delivered at them."""
 
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
@@ -13,6 +14,8 @@ import pytest
 
 import psvideo as ps
 from psvideo.cli.options.typed import parse_instants
+from psvideo.clip import decoded_once, kept
+from psvideo.clip.in_file import RowsInFile
 from psvideo.errors import UsageError
 from psvideo.export.planes import Made, planes_of
 from psvideo.export.space import Space
@@ -23,6 +26,8 @@ from psvideo.model.rig import Light, Rig
 from psvideo.model.surface import Surface
 from psvideo.model.timing import Flash
 from psvideo.plates.align.comb import comb_of, schedule_of
+from psvideo.plates.align.rounds import Aligning
+from psvideo.plates.gather import gather
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import made
 from psvideo.plates.sequence import Round
@@ -146,6 +151,26 @@ def passing(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("passing")
     (folder / "scene.toml").write_text(SCENE)
     return Path(ps.shoot(folder / "scene.toml", folder / "clip").path)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="all threads share one place in an open file there")
+def test_moved_plates_take_no_memory_where_a_run_has_a_file_for_them_and_show_the_same(
+    passing: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(kept, "STAYS_FROM_BYTES", 1)
+    take = ps.open_take(passing)
+    timing = ps.find_timing(take)
+    in_memory = [plate for one in gather(take, timing, aligning=Aligning()) for plate in one.plates]
+    with decoded_once(take, output=tmp_path / "out") as stored:
+        count = 0
+        for one in gather(stored, timing, aligning=Aligning()):
+            for plate in one.plates:
+                assert isinstance(plate.picture.frames[0].codes, RowsInFile), plate.light
+                assert np.array_equal(plate.image, in_memory[count].image)
+                assert np.array_equal(plate.picture.thinned(3), in_memory[count].picture.thinned(3))
+                count += 1
+    assert count == len(in_memory) >= 9
+    assert all(isinstance(plate.picture.frames[0].codes, np.ndarray) for plate in in_memory)
 
 
 def exr(path: Path, channel: str) -> np.ndarray:

@@ -16,8 +16,10 @@ from dataclasses import dataclass
 from io import FileIO
 from math import prod
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from psvideo.clip.in_file import RowsInFile, read_whole
 from psvideo.clip.record import CodedPicture, Header, PictureInFile
@@ -92,27 +94,30 @@ class Kept:
             self.bytes_held += codes.nbytes
 
     def passing(self, picture: CodedPicture) -> CodedPicture | PictureInFile:
-        """Return a picture that stays in the file for as long as somebody holds it; the next one then takes its place.
+        """Return a picture that stays in the file, as ``passing_codes`` holds its codes."""
+        rows = self.passing_codes(np.ascontiguousarray(picture.codes))
+        return PictureInFile(header=picture.header, codes=rows) if isinstance(rows, RowsInFile) else picture
 
-        A small one is returned as it is, and so is one for which there is no room.
+    def passing_codes(self, codes: NDArray[Any]) -> NDArray[Any] | RowsInFile:
+        """Return C-contiguous codes that stay in the file for as long as somebody holds them; the next ones then take
+        their place. Few are returned as they are, and so are those for which there is no room.
         """
-        codes, shown = np.ascontiguousarray(picture.codes), self._shown
+        shown = self._shown
         if shown is None or codes.nbytes < STAYS_FROM_BYTES:
-            return picture
+            return codes
         free = self._free.setdefault(codes.nbytes, [])
         with self._lock:
             offset = free.pop() if free else self.bytes_held
             if offset + codes.nbytes > self._most_bytes:
-                return picture
+                return codes
             self.bytes_held = max(self.bytes_held, offset + codes.nbytes)
             try:
                 self._file.seek(offset)
                 _write_all(self._file, codes.data.cast("B"))
             except OSError:
                 self._most_bytes = 0
-                return picture
-        rows = RowsInFile(offset=offset, kind=codes.dtype, shape=codes.shape, file=_Passing(shown, offset, free))
-        return PictureInFile(header=picture.header, codes=rows)
+                return codes
+        return RowsInFile(offset=offset, kind=codes.dtype, shape=codes.shape, file=_Passing(shown, offset, free))
 
     def get(self, number: int, *, in_file: bool = False) -> CodedPicture | PictureInFile:
         """Return a kept picture as it was put. Raises PsvideoError where the disk does not give it back.
@@ -182,7 +187,7 @@ def _write_all(file: FileIO, data: memoryview) -> None:
         data = data[file.write(data) :]
 
 
-_UNREADABLE = "The temporary file that holds decoded frames cannot be read back"
+_UNREADABLE = "The temporary file that holds decoded frames, or plates, cannot be read back"
 _ADVICE = "Check the disk that the output is on, then run the command again."
 
 

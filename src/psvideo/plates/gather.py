@@ -131,6 +131,7 @@ def gather(
             with_ambient=with_ambient,
             schedule=due,
             whites=None if part is None else part.whites,
+            put_by=None if take.kept is None else take.kept.passing_codes,
         )
         rounds = _apart(rounds, take)
         return with_open_shutter(rounds) if isinstance(aligning.rate, Comb) and aligning.rate.open_s else rounds

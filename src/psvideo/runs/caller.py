@@ -44,12 +44,12 @@ def say_of_clip(clip: Clip, caller: Caller) -> None:
 
 
 def say_kept(kept: Kept | None, caller: Caller) -> None:
-    """Say how much disk the decoded frames took, and which of them found no room there."""
+    """Say how much disk decoded frames and moved plates took, and which frames found no room there."""
     if kept is None:
         return
     which = f"{len(kept)} decoded frames ({kept.bytes_held / 1e9:.2f} GB) were kept in"
     if kept.bytes_held and not len(kept):
-        which = f"Decoded frames ({kept.bytes_held / 1e9:.2f} GB at a time) passed through"
+        which = f"Decoded frames, or plates that were moved, ({kept.bytes_held / 1e9:.2f} GB at a time) passed through"
     caller.detail(f"{which} a temporary file beside the output; the file is gone.")
     if kept.missed:
         caller.warn(

@@ -18,7 +18,7 @@ from psvideo.model.coded import Image
 from psvideo.plates.align.flow import Codes, Flags, Vectors
 from psvideo.plates.align.moving import Followed
 from psvideo.plates.align.moving_kernel import AT_REST, NOWHERE, blend_rows, ways_rows
-from psvideo.plates.align.packed import packed
+from psvideo.plates.align.packed import PutBy, packed
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import Reader, made
 
@@ -49,10 +49,19 @@ class Ends:
         return nearer
 
 
-def plate_at(ends: Ends, source: Codes, motion: Followed, *, number: int, guess: Codes | None = None) -> LightPlate:
+def plate_at(
+    ends: Ends,
+    source: Codes,
+    motion: Followed,
+    *,
+    number: int,
+    guess: Codes | None = None,
+    put_by: PutBy | None = None,
+) -> LightPlate:
     """Return a light's plate at an instant; ``seen`` (row, col) is False where what it showed is not known.
 
     ``guess`` says what to show where the ``source`` is NOWHERE, for eyes; left out, the plate that is nearer in time.
+    ``put_by`` takes its codes.
     """
     own = ends.nearer
     rows, cols = own.shape[:2]
@@ -72,7 +81,7 @@ def plate_at(ends: Ends, source: Codes, motion: Followed, *, number: int, guess:
         light=own.light,
         number=number,
         time_s=motion.time_s,
-        picture=packed(made(image), own.saturation),
+        picture=packed(made(image), own.saturation, put_by),
         seen=seen,
         saturation=own.saturation,
         shown_s=own.flashed_s,

@@ -12,7 +12,7 @@ import numpy as np
 from psvideo.plates.align.brightness import evened
 from psvideo.plates.align.flow import Flags, Sketch, Vectors, changed, sketch_of, white_of
 from psvideo.plates.align.moving import Followed
-from psvideo.plates.align.packed import packed
+from psvideo.plates.align.packed import PutBy, packed
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import POOLED_ROUNDS
 
@@ -69,7 +69,7 @@ class Held:
     whether lights that show nothing move speak for the others, and ``with_ambient`` whether dark slots come. ``newest``
     is the round that plates come of, ``whole`` the last one that was complete, and ``middle_s`` its middle. ``motion``
     says by light and round what was compared with the round before, and where it had moved; ``drift`` where it had
-    since the ``first`` sketch of a light in a block of rounds that are pooled.
+    since the ``first`` sketch of a light in a block of rounds that are pooled. ``put_by`` takes codes of packed plates.
     """
 
     lights: tuple[str, ...]
@@ -78,6 +78,7 @@ class Held:
     trusts_rest: bool
     with_ambient: bool
     whites: dict[str, float] = field(default_factory=dict)
+    put_by: PutBy | None = None
     shots: dict[str, dict[int, Shot]] = field(default_factory=dict)
     waiting: deque[DueInstant] = field(default_factory=deque)
     ambient: dict[int, LightPlate] = field(default_factory=dict)
@@ -225,7 +226,7 @@ class Held:
         shots = self.shots[light]
         for shot in (around.before, around.after):
             if (plate := shot.plate) is not None:
-                smaller = replace(plate, picture=packed(plate.picture, plate.saturation))
+                smaller = replace(plate, picture=packed(plate.picture, plate.saturation, self.put_by))
                 shots[shot.round] = replace(shot, plate=smaller)
 
     def _is_for_later(self, shot: Shot) -> bool:

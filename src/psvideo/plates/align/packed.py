@@ -1,19 +1,24 @@
 """Pictures that wait for the next round, held in half the memory: 16-bit codes over the range of what they show."""
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
-from psvideo.model.coded import Coded, Tone
+from psvideo.model.coded import Coded, StoredCodes, Tone
 from psvideo.plates.mixture import Mixture
 
 MOST_CODE = 65535
 BAND_ROWS = 64
+PutBy = Callable[[NDArray[Any]], NDArray[Any] | StoredCodes]
+"""Puts codes by where they take no memory, if there is such a place; else returns them."""
 
 
-def packed(picture: Mixture, saturation: float) -> Mixture:
-    """Return a picture in half its memory, good to half a step of its codes; black and what is saturated stay so.
-
-    One that is not made yet is held by its frames, and comes back as it is.
+def packed(picture: Mixture, saturation: float, put_by: PutBy | None = None) -> Mixture:
+    """Return a picture in half its memory, or none, good to half a step of its codes; black and what is saturated stay
+    so. One that is not made yet is held by its frames, and comes back as it is.
     """
     if not picture.is_made:
         return picture
@@ -31,7 +36,7 @@ def packed(picture: Mixture, saturation: float) -> Mixture:
     over_ranges(pack, len(image), each=BAND_ROWS)
     tone = Tone(zero=np.full((1, 1), zero), gain=np.full((1, 1), step))
     return Mixture(
-        frames=(Coded(codes=codes, tone=tone),),
+        frames=(Coded(codes=codes if put_by is None else put_by(codes), tone=tone),),
         coefficients=np.ones((1, len(image))),
         ceiling=saturation,
         clips_from=saturation - step if most >= saturation else np.inf,

@@ -18,6 +18,7 @@ from psvideo.plates.align.held import Around, DueInstant, Held
 from psvideo.plates.align.lone_edges import InstantSketch, unsure_by_lone_edges
 from psvideo.plates.align.moving import Followed, Pair, followed_at
 from psvideo.plates.align.moving_kernel import NOWHERE
+from psvideo.plates.align.packed import PutBy
 from psvideo.plates.align.taken import Taken, taken_of, without_doubtful
 from psvideo.plates.align.unsure import UNKNOWN
 from psvideo.plates.light_plate import LightPlate
@@ -48,6 +49,7 @@ def aligned(
     with_ambient: bool = False,
     schedule: Schedule | None = None,
     whites: dict[str, float] | None = None,
+    put_by: PutBy | None = None,
 ) -> Iterator[Round]:
     """Yield rounds whose plates all show one instant: one for every complete round, or for every flash of it.
 
@@ -57,7 +59,8 @@ def aligned(
     without alignment, one where nothing moves (one and a half at the clip's start), one and a half and as many in 16
     bits where all does, and two at other rates than the rounds'. ``with_ambient`` says that dark slots come as well:
     every round waits for its own, and takes it along as it is. ``whites`` (by light) are those of the clip's first
-    plates, where ``plates`` begin later; what it lacks is put in.
+    plates, where ``plates`` begin later; what it lacks is put in. ``put_by`` takes the codes of plates that were moved;
+    without it they lie in memory.
     """
     if how == UNMOVED:
         return gathered(
@@ -70,6 +73,7 @@ def aligned(
         trusts_rest=how.align == "auto" and how.rate == "round",
         with_ambient=with_ambient,
         whites={} if whites is None else whites,
+        put_by=put_by,
     )
     return _slid(plates, held, how, first, schedule)
 
@@ -176,7 +180,7 @@ def _make_moving(held: Held, instant: DueInstant) -> None:
     instant.unsure = _unsure(held, instant, dict(zip(lights, shown, strict=True)), sources)
     instant.unsure[:, unknown] = UNKNOWN
     for light, source, guess in zip(lights, sources, guesses, strict=True):
-        _hand_on(instant, _moved_to(held.sure_around(light, instant), source, guess, motion))
+        _hand_on(instant, _moved_to(held.sure_around(light, instant), source, guess, motion, held.put_by))
         instant.moving.remove(light)
         held.let_go()
 
@@ -201,11 +205,11 @@ def _unsure(held: Held, instant: DueInstant, taken: dict[str, Taken], sources: S
     return unsure
 
 
-def _moved_to(around: Around, source: Codes, guess: Codes, motion: Followed) -> LightPlate:
+def _moved_to(around: Around, source: Codes, guess: Codes, motion: Followed, put_by: PutBy | None) -> LightPlate:
     before, after = around.before, around.after
     share = (motion.time_s - before.time_s) / (after.time_s - before.time_s)
     ends = Ends(before=before.plate, after=after.plate, share=share)
-    return plate_at(ends, source, motion, number=after.round, guess=guess)
+    return plate_at(ends, source, motion, number=after.round, guess=guess, put_by=put_by)
 
 
 def _hand_on(instant: DueInstant, plate: LightPlate) -> None:
