@@ -5,16 +5,19 @@ import itertools
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
+from psvideo.compute.spilled import in_file
 from psvideo.model.surface import MEASURED, NO_LIGHT, ONE_LIGHT, TWO_LIGHTS, Surface
 from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import made
 from psvideo.plates.sequence import POOLED_ROUNDS
+from psvideo.solve import steady
 from psvideo.solve.instants import surfaces
 from psvideo.solve.steady import Steady, steadied
 from psvideo.synth import read_scene
@@ -49,10 +52,10 @@ def noisy(rng: np.random.Generator, *, half: bool = False) -> Surface:
     )
 
 
-def run(surfaces: list[Surface], first: int, stood: Flags = RESTS) -> Iterator[Surface]:
+def run(surfaces: list[Surface], first: int, stood: Flags = RESTS, *, spare: Path | None = None) -> Iterator[Surface]:
     held: Steady | None = None
     for number, surface in enumerate(surfaces, first):
-        held = steadied(held, surface, number, stood)
+        held = steadied(held, surface, number, stood, spare=spare)
         yield surface
 
 
@@ -105,6 +108,23 @@ def test_a_result_depends_on_its_block_of_rounds_and_the_one_before() -> None:
     for one, other in zip(whole[late:], part[POOLED_ROUNDS:], strict=True):
         for name in ("normals", "albedo", "error_deg", "valid", "source"):
             assert np.asarray(getattr(one, name)).tobytes() == np.asarray(getattr(other, name)).tobytes(), name
+
+
+def test_what_is_held_in_files_gives_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    in_memory, shapes = list(run(some(3 * POOLED_ROUNDS), 0)), []
+
+    def watched(shape: tuple[int, ...], kind: DTypeLike, folder: Path) -> NDArray[Any]:
+        shapes.append(shape)
+        return in_file(shape, kind, folder)
+
+    monkeypatch.setattr(steady, "in_file", watched)
+    monkeypatch.setattr(steady, "EACH_SLOT", 5)
+    monkeypatch.setattr(steady, "IN_FILES_FROM", 1)
+    for one, other in zip(run(some(3 * POOLED_ROUNDS), 0, spare=tmp_path), in_memory, strict=True):
+        for name in ("normals", "albedo", "error_deg", "valid", "source"):
+            assert np.asarray(getattr(one, name)).tobytes() == np.asarray(getattr(other, name)).tobytes(), name
+    assert len(shapes) > 4, "the pool grew, and turned from block to block"
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_what_changed_begins_again_and_the_rest_goes_on() -> None:

@@ -26,8 +26,15 @@ def planes_for(shape: tuple[int, ...], kind: DTypeLike, *, pixels: int, folder: 
 
     Raises PsvideoError where the folder's disk has no room.
     """
+    if folder is None or pixels <= LARGE_PIXELS:
+        return np.empty(shape, kind)
+    return in_file(shape, kind, folder)
+
+
+def in_file(shape: tuple[int, ...], kind: DTypeLike, folder: Path) -> NDArray[Any]:
+    """Return room, all 0, in a nameless file in a folder, as ``planes_for``."""
     size = int(np.prod(shape)) * np.dtype(kind).itemsize
-    if folder is None or pixels <= LARGE_PIXELS or not size:
+    if not size:
         return np.empty(shape, kind)
     try:
         with tempfile.TemporaryFile(dir=folder) as file:
@@ -38,8 +45,8 @@ def planes_for(shape: tuple[int, ...], kind: DTypeLike, *, pixels: int, folder: 
             held = mmap.mmap(file.fileno(), size)
     except OSError as fault:
         raise PsvideoError(
-            f"{folder}: a picture of {pixels / 1e6:.0f} megapixels is worked on in files there, and one of "
-            f"{size / 1e6:.0f} MB has no room ({fault.strerror or fault}). Free some, or write to another disk."
+            f"{folder}: large pictures are worked on in files there, and one of {size / 1e6:.0f} MB has no room "
+            f"({fault.strerror or fault}). Free some, or write to another disk."
         ) from fault
     return np.frombuffer(held, kind).reshape(shape)
 

@@ -101,7 +101,7 @@ def surfaces(
         if one.doubtful is not None:
             surface = _without(surface, one.doubtful)
         nonlocal steady
-        steady = steadied(steady, surface, one.number, one.stood, _shown(seen))
+        steady = steadied(steady, surface, one.number, one.stood, _shown(seen), spare=solving.spare)
         steady = None if one_by_one else steady
         made = passes_of(asked, plates, surface, lit, seen=shown, mask=mask) if asked.any else None
         return Instant(round=one, surface=surface, passes=made)

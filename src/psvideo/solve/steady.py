@@ -6,12 +6,15 @@ block before, one after the other, so that nothing jumps. Where the picture chan
 smeared. So a result depends on its block and the one before, and on no other round.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
-from psvideo.compute.spilled import let_go
+from psvideo.compute.spilled import in_file, let_go
 from psvideo.compute.threads import over_ranges
 from psvideo.model.surface import Surface
 from psvideo.plates.sequence import POOLED_ROUNDS
@@ -24,6 +27,8 @@ Flags = NDArray[np.bool_]
 SHOWN = np.ones((1, 1), np.bool_)
 MOST_SINCE = 255
 EACH_SLOT = 256
+IN_FILES_FROM = 1 << 22
+"""So many votes or values and more lie in files: every pixel of a clip that noise lets nobody trust would be held."""
 
 
 @dataclass(kw_only=True)
@@ -32,7 +37,8 @@ class Steady:
 
     ``slots`` (row, segment) says where in ``pool`` a segment is, -1 where it is not; ``used`` of its slots are.
     ``since`` counts rounds at rest on a coarse grid, ``trusted`` (row, col) is the last round's, and ``shown`` where
-    all lights showed the picture in it, on a grid.
+    all lights showed the picture in it, on a grid. ``spare`` is a folder in whose files large pools lie, None where
+    they lie in memory.
     """
 
     number: int
@@ -42,24 +48,34 @@ class Steady:
     since: Bytes
     trusted: Bytes
     shown: Flags
+    spare: Path | None = None
 
     @classmethod
-    def beginning(cls, surface: Surface, number: int) -> "Steady":
+    def beginning(cls, surface: Surface, number: int, spare: Path | None) -> "Steady":
         """Return what is held before the first round: nothing."""
         rows, cols = surface.valid.shape
         planes = 3 + len(stored(surface)[1]) + (surface.error_deg is not None)
         return cls(
             number=number - 1,
             slots=np.full((rows, -(-cols // SEGMENT)), -1, np.int32),
-            pool=_room(0, planes),
+            pool=_room(0, planes, None),
             used=0,
             since=np.zeros((1, 1), np.uint8),
             trusted=np.zeros((rows, cols), np.uint8),
             shown=SHOWN,
+            spare=spare,
         )
 
 
-def steadied(held: Steady | None, surface: Surface, number: int, stood: Flags | None, shown: Flags = SHOWN) -> Steady:
+def steadied(
+    held: Steady | None,
+    surface: Surface,
+    number: int,
+    stood: Flags | None,
+    shown: Flags = SHOWN,
+    *,
+    spare: Path | None = None,
+) -> Steady:
     """Hold a round's surface steady, in its own memory, and return what is held for the next one.
 
     held: what was returned of the round before, None at first; it is taken over.
@@ -68,9 +84,10 @@ def steadied(held: Steady | None, surface: Surface, number: int, stood: Flags | 
         where that is not known, and all begins again.
     shown: on a grid, False where frames were missing that some light showed the picture in: what is not there has no
         vote, and where it was not the round before, a pixel begins again.
+    spare: a folder in whose files much of what is held lies; left out, in memory.
     """
     if held is None or stood is None or number != held.number + 1:
-        held, stood = Steady.beginning(surface, number), np.zeros((1, 1), np.bool_)
+        held, stood = Steady.beginning(surface, number, spare), np.zeros((1, 1), np.bool_)
     held.number = number
     held.since = _counted(_counted(held.since, stood), held.shown & shown, more=0)
     held.shown = shown
@@ -89,6 +106,7 @@ def steadied(held: Steady | None, surface: Surface, number: int, stood: Flags | 
     def hold(first: int, last: int) -> None:
         steady_rows(result, held.pool, held.slots, fresh, still, first, last)
         let_go(*(plane[first:last] for plane in (*planes, *albedo)))
+        _let_slots_go(held, held.slots[first:last])
 
     over_ranges(hold, rows, each=max(BAND_PIXELS // cols, 1))
     return held
@@ -109,10 +127,14 @@ def _turn(held: Steady) -> None:
     place = np.full(held.used + 1, -1, np.int32)
     place[kept] = np.arange(len(kept), dtype=np.int32)
     held.slots, held.used = place[held.slots], len(kept)
-    old = held.pool
-    pool = Pool(old.votes[kept], old.values[kept], old.before[kept], np.zeros(len(kept), np.uint8))
-    over_ranges(lambda first, last: turn_block(pool, first, last, POOLED_ROUNDS), len(kept), each=EACH_SLOT)
-    held.pool = pool
+    held.pool = pool = _moved(held.pool, kept, len(kept), held.spare)
+    pool.touched[:] = 0
+
+    def turn(first: int, last: int) -> None:
+        turn_block(pool, first, last, POOLED_ROUNDS)
+        let_go(*(part[first:last] for part in pool))
+
+    over_ranges(turn, len(kept), each=EACH_SLOT)
 
 
 def _touch(held: Steady, result: SurfacePlanes, still: Still) -> Bytes:
@@ -126,25 +148,41 @@ def _touch(held: Steady, result: SurfacePlanes, still: Still) -> Bytes:
     before, held.used = held.used, held.used + int(new.sum())
     held.slots[new] = np.arange(before, held.used, dtype=np.int32)
     if held.used > len(held.pool.touched):
-        held.pool = _wider(held.pool, max(held.used, 2 * before))
+        held.pool = _moved(held.pool, np.arange(before), max(held.used, 2 * before), held.spare)
     held.pool.touched[held.slots[touched > 0]] = 1
     fresh = np.zeros(len(held.pool.touched), np.uint8)
     fresh[before : held.used] = 1
     return fresh
 
 
-def _wider(pool: Pool, slots: int) -> Pool:
-    """Return the pool with room for so many slots."""
-    wider, used = _room(slots, pool.values.shape[1]), len(pool.touched)
-    wider.votes[:used], wider.values[:used], wider.before[:used] = pool.votes, pool.values, pool.before
-    wider.touched[:used] = pool.touched
-    return wider
+def _let_slots_go(held: Steady, slots: NDArray[np.int32]) -> None:
+    """Let go of what is held in slots, where it lies in files."""
+    if (used := slots[slots >= 0]).size:
+        let_go(*(part[used.min() : used.max() + 1] for part in held.pool))
 
 
-def _room(slots: int, planes: int) -> Pool:
+def _moved(pool: Pool, kept: NDArray[np.intp], slots: int, spare: Path | None) -> Pool:
+    """Return a pool with room for so many slots, the first of which are another's ``kept`` ones, in rising order."""
+    room = _room(slots, pool.values.shape[1], spare)
+    for first in range(0, len(kept), EACH_SLOT):
+        some, into = kept[first : first + EACH_SLOT], slice(first, min(first + EACH_SLOT, len(kept)))
+        parts: Iterator[tuple[NDArray[Any], NDArray[Any]]] = zip(pool, room, strict=True)
+        for old, new in parts:
+            new[into] = old[some]
+            let_go(new[into], old[some[0] : some[-1] + 1])
+    return room
+
+
+def _room(slots: int, planes: int, spare: Path | None) -> Pool:
+    def part(planes: int, kind: DTypeLike) -> NDArray[Any]:
+        shape = (slots, planes, SEGMENT)
+        if spare is None or slots * planes * SEGMENT < IN_FILES_FROM:
+            return np.zeros(shape, kind)
+        return in_file(shape, kind, spare)
+
     return Pool(
-        votes=np.zeros((slots, VOTES, SEGMENT), np.uint8),
-        values=np.zeros((slots, planes, SEGMENT), np.uint16),
-        before=np.zeros((slots, planes, SEGMENT), np.uint16),
+        votes=part(VOTES, np.uint8),
+        values=part(planes, np.uint16),
+        before=part(planes, np.uint16),
         touched=np.zeros(slots, np.uint8),
     )
