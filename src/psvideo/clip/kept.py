@@ -187,7 +187,7 @@ def _write_all(file: FileIO, data: memoryview) -> None:
         data = data[file.write(data) :]
 
 
-_UNREADABLE = "The temporary file that holds decoded frames, or plates, cannot be read back"
+_UNREADABLE = "The temporary file that holds decoded frames and plates cannot be read back"
 _ADVICE = "Check the disk that the output is on, then run the command again."
 
 
