@@ -88,7 +88,7 @@ def test_a_picture_that_the_disk_does_not_give_back_is_said(tmp_path: Path) -> N
         kept = Kept(file, most_bytes=10**6)
         kept.put(3, picture(np.ones((10, 10), np.uint16)))
         file.truncate(50)
-        with pytest.raises(PsvideoError, match="temporary file that holds decoded frames and plates cannot be read back"):
+        with pytest.raises(PsvideoError, match="file that holds decoded frames and plates cannot be read back"):
             kept.get(3)
 
 
@@ -112,7 +112,7 @@ def test_a_picture_may_stay_in_the_file_while_rows_of_it_are_read(
         kept.put(3, picture(codes))
         found = kept.get(3, in_file=True)
         file.truncate(50)
-        with pytest.raises(PsvideoError, match="temporary file that holds decoded frames and plates cannot be read back"):
+        with pytest.raises(PsvideoError, match="file that holds decoded frames and plates cannot be read back"):
             np.asarray(found.codes)
 
 
