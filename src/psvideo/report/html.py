@@ -103,7 +103,7 @@ def _lights(report: RunReport) -> str:
     if report.condition is not None:
         condition = (
             f"<p>Condition of the lights' directions: {report.condition:.2f} (1 is best; noise in the plates becomes "
-            "about so many times larger in the normals).</p>"
+            "about this many times larger in the normals).</p>"
         )
     return (
         '<div class="wide"><table class="figures"><tr><th>light</th><th>stands at</th><th>direction known to</th>'

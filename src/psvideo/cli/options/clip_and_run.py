@@ -44,7 +44,7 @@ PieceOption = Annotated[
     typer.Option("--piece", help="Solve a piece alone: 3/10, or 0/10 for what all share; --resume ends the run."),
 ]
 Workers = Annotated[
-    int | None, typer.Option("--workers", min=1, help="Work with so many processes (a dask cluster on this computer).")
+    int | None, typer.Option("--workers", min=1, help="Work with this many processes (a dask cluster on this machine).")
 ]
 Scheduler = Annotated[
     str | None, typer.Option("--scheduler", help="Work with the workers of a dask scheduler: tcp://HOST:8786.")

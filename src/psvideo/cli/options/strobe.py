@@ -42,8 +42,10 @@ WiringWord = Annotated[
     str | None,
     typer.Option("--wiring", help="gated (one exact output, eight selected lines) or direct (each line exact)."),
 ]
-Seconds = Annotated[float | None, typer.Option("--seconds", help="Stop after so many seconds.")]
-Rounds = Annotated[int | None, typer.Option("--rounds", help="Stop after so many rounds, rounded up to whole cycles.")]
+Seconds = Annotated[float | None, typer.Option("--seconds", help="Stop after this many seconds.")]
+Rounds = Annotated[
+    int | None, typer.Option("--rounds", help="Stop after this many rounds (rounded up to whole cycles).")
+]
 LogPath = Annotated[
     Path | None, typer.Option("--log", help="Where to write what was played: strobe.json, for the clip's folder.")
 ]

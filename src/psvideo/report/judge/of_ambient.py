@@ -66,7 +66,7 @@ def _without_dark(observed: Observed) -> Judgement:
             subject="ambient",
             grade="doubtful",
             found=f"Where a light cannot reach, {100 * left:.0f} % of what it gives elsewhere is left: ambient light "
-            "that nothing took off, or light by way of other surfaces. Normals lean towards the camera for it.",
+            "that nothing took off, or light by way of other surfaces. This tilts normals towards the camera.",
             advice="Add a dark slot to the plan, or a picture with all lights off; darken the room, and keep bright "
             "things away from the subject.",
         )

@@ -103,7 +103,8 @@ def _weak(
                 grade="doubtful" if enough else "bad",
                 found=f"The light {light!r} gives no light ({100 * max(share, 0):.1f} % of the strongest)"
                 + (f"; normals come from the other {others}." if enough else "."),
-                advice="Take the strobe out of step, as said of the rows: it may flash while the shutter is closed."
+                advice="Take the strobe out of step with the frames (see the line on rows): it may flash while the "
+                "shutter is closed."
                 if missed
                 else "Check its cable, driver and line, and that the plan names it as the board does.",
             )

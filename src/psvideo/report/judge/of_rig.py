@@ -134,7 +134,7 @@ def _near(fit: RigFit) -> Judgement | None:
         subject="rig",
         grade="bad" if near.lean_deg > LOST_LEAN_DEG else "doubtful",
         found=f"The lights stand near: they fall off over the picture as if {near.widths:.0f} of its widths away, and "
-        f"the rig takes them for distant. Normals lean by about {near.lean_deg:.0f} degrees for it.",
+        f"the rig takes them for distant. This tilts normals by about {near.lean_deg:.0f} degrees.",
         advice="Write where the lights stand into the rig (`position_m`), or move them farther away.",
     )
 
@@ -151,7 +151,7 @@ def _curve(fit: RigFit) -> Judgement | None:
         subject="rig",
         grade="doubtful",
         found=f"The plates were read as {read}, but fit the lights better if they were recorded as {recorded}: "
-        f"{100 * left:.1f} % of their light is left over instead of {100 * fit.misfit:.1f} %. All normals lean for it.",
+        f"{100 * left:.1f} % of their light is left over instead of {100 * fit.misfit:.1f} %. This tilts all normals.",
         advice=f'Say how the footage was recorded (`transfer = "{"srgb" if undone else "linear"}"` in the plan\'s '
         "[camera]).",
     )
@@ -226,7 +226,7 @@ def _off_axis(usual: Lean, widths: float) -> Judgement:
         grade="doubtful",
         found="The normals would be those of one surface if the lens's axis met the picture "
         f"{100 * widths:.0f} % of its width off the middle (cropped, or a shifted lens), or if the rig were tilted by "
-        f"about {usual.lean_deg:.0f} degrees: no lens is given that would tell.",
+        f"about {usual.lean_deg:.0f} degrees: without a lens in the rig nothing tells which.",
         advice="Write `focal_px` and `principal_px` into the rig's [camera]; if the axis is in the middle, measure the "
         "lights again with the camera where it stands.",
     )
@@ -250,15 +250,15 @@ def _nearly_in_a_plane(observed: Observed) -> bool:
 
 
 def _leaning_words(usual: Lean, *, whole: bool, exact: bool) -> str:
-    not_so = "would be those of one surface, and as they are they are not"
+    as_they_are = "as they are, normals are not those of one surface;"
     if whole:
         axis, angle_deg = int(np.abs(usual.turn_deg).argmax()), float(np.linalg.norm(usual.turn_deg))
         return (
-            f"The rig seems {TURNED[axis]} as a whole by about {angle_deg:.0f} degrees: normals turned back by as much "
-            f"{not_so}."
+            f"The rig seems {TURNED[axis]} as a whole by about {angle_deg:.0f} degrees: {as_they_are} turned back by "
+            "that angle they would be."
         )
     by = f" by about {usual.lean_deg:.0f} degrees" if exact else ""
-    return f"The rig's directions are off: normals that lean otherwise{by} {not_so}."
+    return f"The rig's directions are off: {as_they_are} tilted otherwise{by} they would be."
 
 
 def quiet(facts: Sequence[InstantFacts]) -> bool:

@@ -100,7 +100,7 @@ def _trusting(observed: Observed) -> str:
         return 'Use more lights; more light does not help. `aov=["error"]` says how far off each pixel may be.'
     said = any(one.grade != "good" for one in accuracy(observed))
     if said and by_noise_deg(observed.facts) < LITTLE_NOISE_DEG:
-        return "What helps is said with the typical error; more light does not."
+        return "More light does not help; the line on the typical error says what does."
     return "Give more light, or use more lights" + (
         "." if said else '; `aov=["error"]` says how far off each pixel may be.'
     )

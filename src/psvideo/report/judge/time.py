@@ -86,7 +86,7 @@ def coverage(plan: Plan, timing: Timing, observed: Observed, *, take_s: float | 
                 subject="rows",
                 grade="bad" if unseen > LOST_UNSEEN else "doubtful",
                 found=f"In up to {100 * unseen:.0f} % of a round's rows ambient light is not known: without a dark "
-                "slot the rows tell it that see a part of a flash, and these saw whole ones only.",
+                "slot it is found from rows that saw a part of a flash, and these saw whole flashes only.",
                 advice="Film longer, or add a dark slot to the plan.",
             )
         )
