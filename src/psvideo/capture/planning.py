@@ -4,7 +4,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from psvideo.capture.cautions import Caution, request_cautions, shoot_cautions
+from psvideo.capture.caution import Caution
+from psvideo.capture.cautions import request_cautions, shoot_cautions
 from psvideo.capture.request import ShootRequest
 from psvideo.capture.wish import LONG_MARKER, longest_flash
 from psvideo.errors import UsageError

@@ -3,7 +3,8 @@
 from dataclasses import replace
 from pathlib import Path
 
-from psvideo.capture.cautions import LEAST_LIGHTS, Caution
+from psvideo.capture.caution import Caution
+from psvideo.capture.cautions_on_lamps import LEAST_LIGHTS
 from psvideo.capture.drawing.diagram import check_diagram_name, write_diagram
 from psvideo.capture.planning import Shoot, plan_shoot
 from psvideo.capture.request import ShootRequest

@@ -1,0 +1,103 @@
+"""Cautions on lamps: how many and how bright they are, what they bear, and whom their flashes harm."""
+
+from collections.abc import Iterator, Sequence
+
+from psvideo.capture.caution import Caution, warning
+from psvideo.capture.request import Limits
+from psvideo.model.plan import Plan
+from psvideo.model.shoot_figures import SEIZURE_HZ, LightFigures, ShootFigures
+from psvideo.model.units import show_seconds
+
+LEAST_LIGHTS = 3
+MOST_STOPS = 6.0
+"""A flash of a 64th of the exposure needs 64 times the light of a lamp that would do if it were left on."""
+
+
+def about_the_lights(plan: Plan) -> Iterator[Caution]:
+    """Warn of fewer lights than normals need."""
+    names = plan.lights
+    if len(names) < LEAST_LIGHTS:
+        yield warning(
+            "lights",
+            f"Normals need three lights that do not lie in one plane with the subject, and the plan has {len(names)} "
+            f"({', '.join(names) or 'none'}): plates and relit views come, normals do not. Add lights.",
+        )
+
+
+def about_the_light_of_a_flash(figures: ShootFigures) -> Iterator[Caution]:
+    """Warn of flashes so short that they give little light."""
+    dim = [slot for slot in figures.slots if not slot.is_dark and (slot.stops or 0.0) > MOST_STOPS]
+    if dim:
+        worst = max(dim, key=lambda slot: slot.stops or 0.0)
+        enough_s = worst.duration_s * 2 ** ((worst.stops or 0.0) - MOST_STOPS)
+        yield warning(
+            "dim",
+            f"A flash of {show_seconds(worst.duration_s)} gives {worst.light_share:.2%} of the light of the same lamp "
+            f"left on, {worst.stops:.1f} stops less: noise will show in the normals unless the lamps are "
+            f"made for it. Flash for {show_seconds(enough_s)} and more, bring the lamps closer, or film slower.",
+        )
+
+
+def about_seizures(figures: ShootFigures) -> Iterator[Caution]:
+    """Warn of rates at which flashing light can harm photosensitive people."""
+    low, high = SEIZURE_HZ
+    care = "Warn everybody on the set, let no photosensitive person stay, and keep eyes off the lights."
+    if low <= figures.flash_rate_hz <= high:
+        yield warning(
+            "flicker",
+            f"The whole scene flickers at {figures.flash_rate_hz:.1f} Hz, between {low:g} and {high:g} Hz. {care} A "
+            "frame "
+            f"rate of over {high:g} fps helps.",
+        )
+    slow = [light for light in figures.lights if low <= light.rate_hz <= high]
+    if slow:
+        names = "Each light" if len(slow) == len(figures.lights) else ", ".join(light.name for light in slow)
+        rates = sorted({f"{light.rate_hz:.1f}" for light in slow})
+        yield warning(
+            "flicker",
+            f"{names} by itself flashes at {' to '.join(rates[:: max(len(rates) - 1, 1)])} Hz, between {low:g} and "
+            f"{high:g} Hz: "
+            f"a person who sees one light more than the others sees that, though the scene as a whole is lit "
+            f"{figures.flash_rate_hz:.1f} times a second. {care}",
+        )
+    if low <= figures.dark_slot_rate_hz <= high:
+        yield warning(
+            "flicker",
+            f"Dark slots come {figures.dark_slot_rate_hz:.1f} times a second, a flicker of the whole scene between "
+            f"{low:g} and "
+            f"{high:g} Hz. {care} A larger `dark_every` makes them rarer; two a second are enough.",
+        )
+
+
+def about_the_leds(figures: ShootFigures, limits: Limits) -> Iterator[Caution]:
+    """Warn of pulses that are longer, or come more often, than the LEDs bear."""
+    too_long: dict[float, list[str]] = {}
+    too_often: dict[float, list[LightFigures]] = {}
+    for light in figures.lights:
+        if limits.max_pulse_s is not None and light.longest_pulse_s > limits.max_pulse_s * (1 + 1e-9):
+            too_long.setdefault(light.longest_pulse_s, []).append(light.name)
+        if limits.max_duty is not None and light.duty > limits.max_duty * (1 + 1e-9):
+            too_often.setdefault(light.duty, []).append(light)
+    for pulse_s, names in too_long.items():
+        limit = show_seconds(limits.max_pulse_s or 0.0)
+        text = f"{_and(names)}: flashes of {show_seconds(pulse_s)}, over the limit of {limit}. Give at most that."
+        yield warning("pulse", text)
+    for duty, lights in too_often.items():
+        limit_share = limits.max_duty or 1.0
+        fits_s = _flash_for_duty_s(figures, lights[0], limit_share)
+        yield warning(
+            "duty",
+            f"{_and([light.name for light in lights])}: on for {duty:.2%} of the time, over the limit of "
+            f"{limit_share:.2%}. "
+            f"Flashes of {show_seconds(fits_s)} for every light would fit; more lights in the round help too.",
+        )
+
+
+def _flash_for_duty_s(figures: ShootFigures, light: LightFigures, duty: float) -> float:
+    """Return the flash at which the light's duty is met if all lights take it and the dark times stay."""
+    dark_s = (1 - sum(other.duty for other in figures.lights)) / light.rate_hz
+    return duty * dark_s / (1 - duty * figures.flash_rate_hz / light.rate_hz)
+
+
+def _and(names: Sequence[str]) -> str:
+    return " and ".join((", ".join(names[:-1]), names[-1])) if len(names) > 1 else names[0]
