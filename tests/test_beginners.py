@@ -223,7 +223,7 @@ def test_a_table_with_semicolons_is_read_as_it_is_meant(tmp_path: Path) -> None:
 def test_a_dark_picture_beside_the_others_is_none_of_a_light_and_a_forgotten_one_is_mentioned(tmp_path: Path) -> None:
     folder, lights = photographs(tmp_path / "photos", lit()), listed(tmp_path / "lights.lp")
     without = ps.stills(folder, lights=lights, out=tmp_path / "out")
-    assert "No picture is named dark or ambient, so the room is taken for dark" in str(without.shot["Remarks"])
+    assert "No picture is named dark or ambient, so the room is assumed dark" in str(without.shot["Remarks"])
     save(folder / "shot 30.png", np.full_like(lit()[0], 0.001))
     report = ps.stills(folder, lights=lights, dark=folder / "shot 30.png", out=tmp_path / "out", force=True)
     assert "shot 30.png shows the ambient light, which was taken off" in str(report.shot["Remarks"])

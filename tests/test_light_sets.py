@@ -52,7 +52,7 @@ def test_a_mask_beside_the_pictures_is_no_light(mask: str, tmp_path: Path, caplo
     for name, value in (("L1", 0.3), ("L2", 0.5), (mask, 1.0), ("unmask", 0.4)):
         still(tmp_path / f"{name}.png", value)
     assert read_images(tmp_path).names == ("L1", "L2", "unmask")
-    assert f"{mask}.png: is taken for no light's picture" in caplog.text
+    assert f"{mask}.png: is assumed to be no light's picture" in caplog.text
 
 
 @pytest.mark.parametrize(

@@ -348,7 +348,7 @@ def test_the_lens_that_exif_names_gives_depth_its_view(tmp_path: Path) -> None:
         exif.get_ifd(0x8769)[0xA405] = 72
         save8(folder / f"{name}.jpg", as_srgb(picture), exif=exif, quality=98)
     report = ps.stills(folder, lights=listed(tmp_path / "lights.lp"), out=tmp_path / "out")
-    assert "The lens is taken for 128 pixels long, as EXIF says" in remarks(report)
+    assert "The lens is assumed to be 128 pixels long, as EXIF says" in remarks(report)
     assert ps.read_rig(tmp_path / "out" / "setup" / "rig.toml").focal_px == (128.0, 128.0)
     given = ps.stills(folder, lights=tmp_path / "lights.lp", out=tmp_path / "out", focal_px=200.0, force=True)
     assert "as EXIF says" not in remarks(given)

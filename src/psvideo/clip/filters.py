@@ -1,4 +1,4 @@
-"""Colour filters on the sensor: what a picture says of them, held against what the plan says."""
+"""Colour filters on the sensor: what a picture says of them, compared with what the plan says."""
 
 from pathlib import Path
 

@@ -158,7 +158,7 @@ def _filled(pipe: IO[bytes], codes: NDArray[Any]) -> bool:
 
 
 def _header(source: str, mode: "_Mode", camera: Camera) -> Header:
-    """Return what the camera's mode says of its frames, held against the plan."""
+    """Return what the camera's mode says of its frames, compared with the plan."""
     form, (height_px, width_px, *rest) = mode.form, mode.shape
     bits = BITS.match(form)
     if bits is None or form.startswith("BGR"):

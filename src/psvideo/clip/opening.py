@@ -1,4 +1,4 @@
-"""Opening a clip: its files found, its plan read, and the first frame's header held against the plan."""
+"""Opening a clip: its files found, its plan read, and the first frame's header compared with the plan."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -17,8 +17,8 @@ from psvideo.model.plan import Plan
 from psvideo.model.turn import UPRIGHT, Turn
 
 MOST_PIXELS = 1 << 29
-"""Pictures of more pixels are taken for damaged headers, which would ask for all memory before anything is decoded:
-the largest cameras' composites have 400 megapixels."""
+"""Headers that claim more pixels count as damaged, before memory is asked for: the largest cameras' composites have 400
+megapixels."""
 Levels = tuple[tuple[float, ...], ...]
 """Black levels by position, a pattern that repeats over rows and columns from the picture's top left on."""
 

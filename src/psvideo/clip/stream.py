@@ -29,7 +29,7 @@ OPEN_S = 20.0
 LEAP_S = 5.0
 """Stamps that leap by more are another stream's."""
 JUDGED = 24
-"""Frames by which a stream's rate is held against the plan's."""
+"""Frames by which a stream's rate is compared with the plan's."""
 OFF = 0.02
 MOST_DAMAGED = 24
 """A stream of which more frames in a row cannot be decoded is no stream of pictures."""

@@ -13,7 +13,7 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
 TRIED = ((0, 68),)
-"""Versions of numba of which all that is compiled here was held against what it is in pure Python."""
+"""Versions of numba of which all that is compiled here was compared with what it is in pure Python."""
 _Library: Any = JITCodeLibrary
 _Compiler: Any = Compiler
 

@@ -15,7 +15,7 @@ from psvideo.model.camera import FloatArray
 from psvideo.model.rig import Rig
 
 FARTHEST_M = 50.0
-"""No light or surface is farther: beyond it numbers are taken for millimetres (and a light there is a distant one)."""
+"""No light or surface is farther: beyond it numbers are read as millimetres (and a light there is a distant one)."""
 FARTHEST_SHARE = 1e-3
 """A plane that runs past the horizon is followed to a thousand times its nearest depth."""
 

@@ -86,7 +86,7 @@ def rigs_page(results: Sequence[RigResult]) -> str:
     whole = len(results) - failed - lacking
     said = (
         f"{counted(len(results), 'take')}: {whole} with all lights, {lacking} without some, {failed} failed. A light "
-        "is held against where it stood, and how it shone, in the takes before."
+        "is compared with where it stood, and how it shone, in the takes before."
     )
     return overview_page("Lights, take by take", said, [*map(_line, results)])
 

@@ -15,7 +15,7 @@ mean square angle: chance alone exceeds this many once in 8,000 (Rayleigh), and 
 def changes(results: Sequence[RigResult]) -> tuple[RigResult, ...]:
     """Return takes, in the order in which they were shot, with what changed in each among its findings.
 
-    A light is held against the first take since it changed last, so that slow drift adds up until it shows.
+    A light is compared with the first take since it changed last, so that slow drift adds up until it shows.
     """
     stood: dict[str, tuple[RigResult, LightOfTake]] = {}
     shone: dict[str, tuple[RigResult, LightOfTake]] = {}
@@ -27,7 +27,7 @@ def _changes(
     stood: dict[str, tuple[RigResult, LightOfTake]],
     shone: dict[str, tuple[RigResult, LightOfTake]],
 ) -> Iterator[str]:
-    """Give what changed in a take, and note it as what later ones are held against."""
+    """Give what changed in a take, and note it as what later ones are compared with."""
     for light in one.lights:
         if light.direction is not None and light.error_deg is not None:
             before, then = stood.setdefault(light.name, (one, light))

@@ -32,7 +32,7 @@ def capture_plan(
 ) -> Shoot:
     """Plan a shoot, and write its plan and its timing diagram where they are asked for.
 
-    ``out`` is the plan.toml to write; ``rig`` says where the lights will stand, which is held against what normals
+    ``out`` is the plan.toml to write; ``rig`` says where the lights will stand, which is compared with what normals
     need; ``diagram`` is a picture of the timing (.svg or .png; "-" means text, and draws none); ``force`` replaces
     either where it exists. Returns the shoot with its figures and ``cautions``: what may spoil it. Raises UsageError
     where an output exists, or where wishes exclude each other, and PsvideoError where the rig lacks a light.

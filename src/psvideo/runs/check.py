@@ -37,7 +37,7 @@ ROUNDS = 4
 SPREAD = 6
 """More frames, over the rest of the take: whether light and exposure stay."""
 EXPOSED_FRAMES, EARLY_FRAMES = 12, 16
-"""About this many frames show how a clip without a strobe is exposed, and what later frames are held against."""
+"""About this many frames show how a clip without a strobe is exposed, and what later frames are compared with."""
 MOST_KEPT_BYTES = 1_500_000_000
 """Larger windows are decoded twice: temporary folders may lie in memory."""
 
@@ -56,7 +56,7 @@ def check(
 
     - ``clip``: a folder of numbered frames with plan.toml, or a movie file. ``plan`` names the plan where it does not
       lie beside the footage.
-    - ``rig``: where the lights are, to find their order where there is no marker; the plates are held against it.
+    - ``rig``: where the lights are, to find their order where there is no marker; the plates are compared with it.
       ``first_light`` names the light of the clip's first complete flash, for plans without a marker.
     - ``report``: a page (HTML) to write of the check, outside of the footage. Nothing else is written.
 

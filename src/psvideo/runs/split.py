@@ -56,7 +56,7 @@ def split(
       lie beside the footage. ``frames``: file numbers to use, such as ``"1-100"`` or ``"1-100x2"``; left out, all.
     - ``timing``: timing.json of this clip; left out, the flashes are found from the picture. ``first_light`` names the
       light of the clip's first complete flash, for plans without a marker; ``rig``, where the lights are, gives their
-      order too, and is held against the plates in the report.
+      order too, and is compared with the plates in the report.
     - ``method``: by the rows' "weights", or Algorithm 1 of Hudon et al. ("hudon2015"), to compare with.
     - ``flashes``: every flash by itself too. ``beauty``: the sum of all lights too, each as strong as
       ``weight`` says (by name; 1 where not named), with ambient light where ``with_ambient``. ``preview``: movies for

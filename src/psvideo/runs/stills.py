@@ -45,7 +45,7 @@ PLAN, RIG, LP = "plan.toml", "rig.toml", "lights.lp"
 SETUP = "setup"
 """The folder in a result that holds how the photographs were taken to be: plan, rig, and the lights as a list."""
 NO_DARK = (
-    "No picture is named dark or ambient, so the room is taken for dark. If it was not, photograph the subject with "
+    "No picture is named dark or ambient, so the room is assumed dark. If it was not, photograph the subject with "
     "every light off as well."
 )
 
@@ -256,7 +256,11 @@ def _through_lens(rig: Rig, pictures: Photographs, looking: Looking) -> tuple[Ri
     lens_px = given_px or lens_stated(pictures.stated)
     if lens_px is None:
         return rig, ()
-    said = () if given_px else (f"The lens is taken for {lens_px:.6g} pixels long, as EXIF says; shapes depend on it.",)
+    said = (
+        ()
+        if given_px
+        else (f"The lens is assumed to be {lens_px:.6g} pixels long, as EXIF says; shapes depend on it.",)
+    )
     return replace(rig, focal_px=(lens_px, lens_px)), said
 
 

@@ -1,4 +1,4 @@
-"""A plan as what a board plays: whole ticks, slots and steps, held against the board's limits before anything is sent.
+"""A plan as what a board plays: whole ticks, slots and steps, checked against the board's limits before it is sent.
 
     Plan + Capabilities + wiring -> Program -> requests
 

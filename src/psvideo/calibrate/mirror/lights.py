@@ -21,7 +21,7 @@ from psvideo.solve.normals.illumination import MAX_CONDITION
 DISAGREE_DEG = 10.0
 """Directions from two spheres that differ by more, and do not meet in a point, cannot both be right."""
 SURE_ERRORS = 4.0
-"""Excess of the rays' scatter over their errors from which on a light is taken for near."""
+"""Excess of the rays' scatter over their errors from which on a light counts as near."""
 MOST_POSITION_ERROR = 0.15
 """Share of its distance by which a near light's position may be uncertain; beyond, it gets a direction only."""
 SMALL_RADIUS_PX = 60.0
@@ -196,7 +196,7 @@ def _about_view(sightings: Sequence[Sighting]) -> list[str]:
         else ""
     )
     return [
-        "the focal length is not known, so the view is taken for orthographic, and all directions are wrong by about "
+        "the focal length is not known, so the view is assumed orthographic, and all directions are wrong by about "
         f"the angle by which the sphere stands off the lens's axis: {long_deg:.1f} degrees with a lens of "
         f"{USUAL_FIELDS_DEG[0]:.0f} degrees field of view, {normal_deg:.1f} with {USUAL_FIELDS_DEG[1]:.0f}.{seen} Give "
         "`focal_px`, or `focal_mm` and `sensor_mm`. The standard errors leave this out."

@@ -262,6 +262,6 @@ def _leaning_words(usual: Lean, *, whole: bool, exact: bool) -> str:
 
 
 def quiet(facts: Sequence[InstantFacts]) -> bool:
-    """Return whether normals are steady enough to be held against each other."""
+    """Return whether normals are steady enough to be compared with each other."""
     known = [one.change.normals_deg for one in facts if one.change is not None and (one.moving_share or 0.0) < AT_REST]
     return by_noise_deg(facts) < NOISY_DEG and (not known or float(np.median(known)) < NOISY_DEG)

@@ -52,7 +52,7 @@ def matte_sphere(
     - ``out``: the rig file to write; ``force`` replaces it where it exists.
     - ``circle``: the sphere's outline found by hand: x, y and radius in pixels, from the centre of the top left one.
     - ``albedo``: the sphere's, above 0 and up to 1; left out, intensities are relative, their mean 1.
-    - ``focal_px``: the focal length in pixels; left out, the view is taken for orthographic.
+    - ``focal_px``: the focal length in pixels; left out, the view is assumed orthographic.
 
     Raises UsageError where an output exists, and PsvideoError where no sphere is found or no light can be measured.
     """
@@ -74,7 +74,7 @@ def matte_sphere(
             caller.warn(f"light {light.name!r} is left out of the rig: {light.fault}")
     if focal_px is None:
         caller.warn(
-            "the focal length is not known, so the view is taken for orthographic, and all directions are wrong by "
+            "the focal length is not known, so the view is assumed orthographic, and all directions are wrong by "
             "about the angle by which the sphere stands off the lens's axis: give `focal_px`"
         )
     return MatteCalibration(outline=outline, lights=tuple(lights), rig=rig, picture=picture)

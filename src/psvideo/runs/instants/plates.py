@@ -76,7 +76,7 @@ def split_run(
     """Write one sequence per light, ambient where there are dark slots, timing.json and the report.
 
     ``aligning`` brings plates to instants of a rate; left out, every plate shows its own flash. ``known`` is the rig,
-    if there is one, to be held against the plates.
+    if there is one, to be compared with the plates.
     """
     clip = take.clip
     observed, picture = observing(take, known), None

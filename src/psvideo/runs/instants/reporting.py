@@ -47,7 +47,7 @@ class Solved:
 
 
 def observing(take: Take, rig: Rig | None = None, masks: Masks | None = None) -> Observed:
-    """Return what gathers the facts of a take's rounds; with a rig, it is held against the plates.
+    """Return what gathers the facts of a take's rounds; with a rig, it is compared with the plates.
 
     Near lights are so only on the rig's plane: where depth is known instead, there may be none.
     """

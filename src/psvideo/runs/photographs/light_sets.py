@@ -192,7 +192,7 @@ def _is_clip(path: Path, plan_path: Path) -> bool:
 def _of_files(files: LightFiles, encoding: Encoding, reading: Reading) -> LightSets:
     transfer = reading.transfer or encoding.transfer
     notes = []
-    aside = tuple(f"{file}: is taken for no light's picture and left aside" for file in files.left_aside)
+    aside = tuple(f"{file}: is assumed to be no light's picture and left aside" for file in files.left_aside)
     if reading.transfer is None and files.usual_transfer != "linear":
         notes.append(f"the pictures are read by the curve {transfer!r}; `transfer` names another")
     read = Encoding(transfer=transfer, black_level=encoding.black_level, white_level=encoding.white_level)
