@@ -8,6 +8,7 @@ from typing import TypeVar
 
 import cv2
 import numpy as np
+import OpenEXR
 import pytest
 import tifffile
 from numpy.typing import NDArray
@@ -177,11 +178,60 @@ def test_pictures_that_speak_against_what_was_assumed_of_them_are_named(tmp_path
     folder = photographs(tmp_path / "photos", lit(), save=save8)
     lights = listed(tmp_path / "lights.lp")
     report = ps.stills(folder, lights=lights, out=tmp_path / "out")
-    doubt = next(warning for warning in report.warnings if "fit the lights better" in warning)
+    doubt = report.findings[0]  # before what follows from it
     assert "read as 'srgb', the usual curve of 8-bit pictures" in doubt
     assert "say `transfer='linear'`" in doubt
-    assert not ps.stills(folder, lights=lights, out=tmp_path / "other", transfer="linear").warnings
+    assert report.verdict == "This take is doubtful: see below before using it."
+    assert not any("rig does not fit" in one or "fit the lights better" in one for one in report.findings[1:])
+    assert not ps.stills(folder, lights=lights, out=tmp_path / "other", transfer="linear").findings
     assert error_deg(tmp_path / "other") < 1.5 < error_deg(tmp_path / "out")
+
+
+def dome(lights: int) -> NDArray[np.float64]:
+    """Return directions on a spiral, 20 to 75 degrees above the table."""
+    turns = np.arange(lights) * np.pi * (np.sqrt(5) - 1)
+    height = np.radians(20 + 55 * (np.arange(lights) + 0.5) / lights)
+    return np.stack([np.cos(height) * np.cos(turns), np.cos(height) * np.sin(turns), np.sin(height)], axis=1)
+
+
+def metal(lights: NDArray[np.float64]) -> list[Picture]:
+    """Return photographs of a small shield of metal, nearly flat."""
+    y, x = np.mgrid[:SIZE, :SIZE] * (3 * np.pi / SIZE)
+    slopes = 0.12 * np.cos(x), 0.12 * np.cos(y + x / 2)  # of sin + sin
+    normals = np.stack([-slopes[0] - slopes[1] / 2, slopes[1], np.ones_like(x)], axis=-1)
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    halves = lights + np.array([0, 0, 1])
+    halves /= np.linalg.norm(halves, axis=1, keepdims=True)
+    pairs = zip(lights, halves, strict=True)
+    return [0.3 * normals @ light + 0.65 * np.maximum(normals @ half, 0) ** 40 for light, half in pairs]
+
+
+def test_of_metal_the_surface_is_blamed_and_neither_the_rig_nor_the_curve(tmp_path: Path) -> None:
+    lights = dome(12)
+    names = [f"shot {n}" for n in range(12)]
+    folder = photographs(tmp_path / "photos", [as_srgb(one) for one in metal(lights)], names, save8)
+    report = ps.stills(folder, lights=listed(tmp_path / "right.lp", names, lights), out=tmp_path / "out")
+    assert report.verdict == "This take is usable, with reservations."
+    assert any(one.startswith("The surface shines") for one in report.findings)
+    assert not any(word in one for one in report.findings for word in ("fit the lights better", "rig does not fit"))
+    wrong = listed(tmp_path / "wrong.lp", names, np.roll(lights, 1, axis=0))
+    doubted = ps.stills(folder, lights=wrong, out=tmp_path / "wrong")
+    assert "rig does not fit" in doubted.findings[0]
+
+
+def save_exr(path: Path, light: Picture) -> None:
+    OpenEXR.File({"type": OpenEXR.scanlineimage}, {"Y": light.astype(np.float32)}).write(str(path))
+
+
+def test_developed_pictures_that_go_beyond_one_are_clipped_nowhere_below_their_brightest(tmp_path: Path) -> None:
+    folder = tmp_path / "photos"
+    folder.mkdir()
+    for name, light in zip(NAMES, lit(), strict=True):
+        save_exr(folder / f"{name}.exr", 3.6 * light)
+    report = ps.stills(folder, lights=listed(tmp_path / "lights.lp"), out=tmp_path / "out")
+    assert error_deg(tmp_path / "out") < 1.0
+    assert "They hold light up to 2.5" in remarks(report)
+    assert not any("clip" in one for one in report.findings)
 
 
 def with_exposures(folder: Path, pictures: Sequence[Picture], seconds: Sequence[float]) -> Path:

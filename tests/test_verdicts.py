@@ -49,8 +49,8 @@ class Footage:
     claimed_deg, turned_deg, claimed_tilt_deg, claimed_gain: by how much the rig's directions are off, each its own way;
         by how much all are turned around the axis, and around the picture's rows; what it says of the first light's
         strength. near: how many picture widths away the lights stand, which the rig takes for distant. recorded: by
-        which curve: "srgb" where sRGB was read as light, "undone" where light was read as sRGB. solved: whether normals
-        are needed.
+        which curve: "srgb" where sRGB was read as light, "undone" where light was read as sRGB. sheen: what is mirrored
+        head on beside the albedo, and how narrowly (the cosine's power). solved: whether normals are needed.
     """
 
     shape: str = "ball"
@@ -74,6 +74,7 @@ class Footage:
     claimed_gain: float = 1.0
     unseen: float = 0.0
     borrowed: float = 0.0
+    sheen: tuple[float, float] = (0.0, 1.0)
     solved: bool = False
     fill: bool = True
     backdrop: float = 0.0
@@ -119,6 +120,8 @@ class Footage:
         normals, albedo = SHAPES[self.shape](self.shift_px * number)
         shades = [albedo * (_fallen(normals, way * self.near) if self.near else normals @ way) for way in ways]
         shades = [np.maximum(shade, 0) for shade in shades]
+        if self.sheen[0]:
+            shades = [shade + self._mirrored(normals, way) for shade, way in zip(shades, ways, strict=True)]
         if self.backdrop:
             shades = [np.where(albedo > 0, one, self.backdrop * way[2]) for one, way in zip(shades, ways, strict=True)]
         if self.dark:
@@ -138,6 +141,12 @@ class Footage:
         if self.clip is not None:
             gains = np.where(np.arange(self.lights) < self.clipping, gains, 0.3 / scale)
         return [shade * scale * gain for shade, gain in zip(shades, gains, strict=True)]
+
+    def _mirrored(self, normals: np.ndarray, way: np.ndarray) -> np.ndarray:
+        strength, narrow = self.sheen
+        half = way + np.array([0, 0, 1])
+        half /= np.linalg.norm(half)
+        return strength * np.maximum(normals @ half, 0) ** narrow * (normals @ way > 0)
 
     def _dark_level(self, clean: Sequence[np.ndarray], number: int) -> float:
         subject = np.max(clean, axis=0) > 0.01
@@ -605,6 +614,17 @@ def test_a_rig_is_not_doubted_for_what_a_shifted_lens_that_nobody_named_would_ex
     doubted = [line for line in rig_of(one) if line.grade != "good"]
     assert [line.subject for line in doubted] == ([] if subject == "nothing" else [subject])
     assert verdict_of(doubted).startswith("This take is usable") == (subject != "rig")
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_skin_that_bulges_is_not_taken_for_light_that_stands_near(seed: int) -> None:
+    satin = Footage(shape="ball", lights=6, sheen=(0.8, 6), solved=True).observed(seed)
+    fit = satin.rig_fit
+    assert fit is not None
+    assert fit.near is not None
+    assert fit.near.misfit < 0.8 * fit.misfit  # lamps would explain it, too
+    assert fit.near.by_surface < fit.near.misfit
+    assert not any("stand near" in line.found for line in rig_of(satin))
 
 
 def test_a_dead_light_among_enough_others_is_named_and_left_out_and_the_rig_is_still_checked() -> None:

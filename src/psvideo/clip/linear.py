@@ -65,7 +65,8 @@ def _tone(scale: "Scale", transfer: str, black: Levels | None, white: float | No
 def _half_tone(transfer: str, black: Levels | None, white: float | None) -> Tone:
     values = np.arange(65536, dtype=np.uint16).view(np.float16).astype(np.float32)
     as_they_are = black is None and white is None and not find_curve(transfer).source
-    return Tone(table=_float_light(values, transfer, black, white), halves=as_they_are)
+    with np.errstate(invalid="ignore"):  # among all halves there are those that are no number
+        return Tone(table=_float_light(values, transfer, black, white), halves=as_they_are)
 
 
 @dataclass(frozen=True, kw_only=True)

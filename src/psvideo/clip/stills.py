@@ -5,7 +5,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from psvideo.clip.decode.decoders import read_header
+import numpy as np
+
+from psvideo.clip.decode.decoders import decode, read_header
 from psvideo.clip.folder import KINDS, RAWS
 from psvideo.clip.reading import looks
 from psvideo.clip.record import Clip, Header, shot_of
@@ -21,7 +23,8 @@ from psvideo.model.turn import UPRIGHT
 class Photographs:
     """Pictures of one scene by one camera: their files, what kind they are, and what they say of themselves.
 
-    transfer: the name of the curve by which they are read; because: why.
+    transfer: the name of the curve by which they are read; because: why. white: the brightest of floating-point
+    pictures that go beyond 1: developed or merged ones clip nowhere below.
     """
 
     files: tuple[Path, ...]
@@ -30,11 +33,12 @@ class Photographs:
     stated: tuple[Stated, ...]
     transfer: str
     because: str
+    white: float | None = None
 
     @property
     def encoding(self) -> Encoding:
         """How their codes are read."""
-        return Encoding(transfer=self.transfer)
+        return Encoding(transfer=self.transfer, white_level=self.white)
 
     def clip(self, folder: Path, plan: Plan, plan_path: Path, *, notes: tuple[str, ...] = ()) -> Clip:
         """Return them as a clip of a synced plan."""
@@ -58,7 +62,8 @@ class Photographs:
 
 
 def look_at(files: Sequence[Path], *, transfer: str | None = None) -> Photographs:
-    """Look at photographs without decoding them. ``transfer`` is the curve where somebody says it.
+    """Look at photographs without decoding them, but for floating-point ones. ``transfer`` is the curve where somebody
+    says it.
 
     Raises PsvideoError where one cannot be read, or where they are not of one kind, size, position and curve.
     """
@@ -79,7 +84,27 @@ def look_at(files: Sequence[Path], *, transfer: str | None = None) -> Photograph
     name, because = (transfer, "as you say") if transfer else _transfer(files, kind, headers[0], stated)
     find_curve(name)
     header = headers[0] if headers[0].turn != UPRIGHT else replace(headers[0], turn=stated[0].turn)
-    return Photographs(files=tuple(files), kind=kind, header=header, stated=stated, transfer=name, because=because)
+    return Photographs(
+        files=tuple(files),
+        kind=kind,
+        header=header,
+        stated=stated,
+        transfer=name,
+        because=because,
+        white=_white_beyond(kind, files) if header.bits is None else None,
+    )
+
+
+def _white_beyond(kind: str, files: Sequence[Path]) -> float | None:
+    """Return the brightest sample of floating-point pictures where it is beyond 1, to three figures, upwards."""
+    brightest = 0.0
+    for file in files:
+        codes = np.asarray(decode(kind, file).codes)
+        brightest = max(brightest, float(codes[np.isfinite(codes)].max(initial=0)))
+    if brightest <= 1:
+        return None
+    step = 10.0 ** (np.floor(np.log10(brightest)) - 2)
+    return float(np.ceil(brightest / step) * step)
 
 
 def _stated(kind: str, file: Path) -> Stated:

@@ -46,5 +46,7 @@ def verdict_of(judgements: Sequence[Judgement]) -> str:
 
 
 def gravest_first(judgements: Sequence[Judgement]) -> tuple[Judgement, ...]:
-    """Return what is bad, then what is doubtful, each in the given order; what is good or unknown is left out."""
-    return tuple(one for grade in ("bad", "doubtful") for one in judgements if one.grade == grade)
+    """Return what is bad, then what is doubtful, of both first what may spoil all normals, else in the given order;
+    what is good or unknown is left out."""
+    graver = sorted(judgements, key=lambda one: one.subject not in DECISIVE)
+    return tuple(one for grade in ("bad", "doubtful") for one in graver if one.grade == grade)

@@ -230,8 +230,8 @@ def _opened(
     write_text(place / PLAN, format_plan(plan))
     notes = (_assumed(pictures), pairs.how, *known.notes, *([note] if note else []), *lens, *_aside(pairs))
     clip = pictures.clip(folder, plan, place / PLAN, notes=notes)
-    warned = (*clip.warnings, *known.warnings, *(said for said in (doubt, warning) if said))
-    return _Opened(clip=replace(clip, warnings=warned), rig=rig, rig_path=place / RIG)
+    warned = (*clip.warnings, *known.warnings, *([warning] if warning else []))
+    return _Opened(clip=replace(clip, curve_doubt=doubt or "", warnings=warned), rig=rig, rig_path=place / RIG)
 
 
 def _check_size(folder: Path, pictures: Photographs, known: KnownLights) -> None:
@@ -278,7 +278,10 @@ def _scaled(rig: Rig, factors: np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 
 
 def _assumed(pictures: Photographs) -> str:
-    return f"The pictures were read as {pictures.transfer!r}, {pictures.because}."
+    beyond = (
+        f" They hold light up to {pictures.white:.3g}: nothing below it is taken for clipped." if pictures.white else ""
+    )
+    return f"The pictures were read as {pictures.transfer!r}, {pictures.because}.{beyond}"
 
 
 def _aside(pairs: Pairs) -> tuple[str, ...]:

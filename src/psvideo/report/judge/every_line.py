@@ -20,9 +20,10 @@ def judgements(
     aligned: bool = False,
     opened: bool = False,
     take_s: float | None = None,
+    curve_doubt: str = "",
 ) -> tuple[Judgement, ...]:
     """Return one line per thing that decides whether a take can be used; ``take_s`` is how long a take lasts of which
-    only a part was looked at."""
+    only a part was looked at, ``curve_doubt`` what pictures say against the curve by which they were read."""
     on_time = tuple(timing_and_order(timing, plan.mode))
     if not observed.facts:
         return on_time
@@ -34,7 +35,7 @@ def judgements(
         ambient(observed),
         motion(plan, timing, observed, aligned=aligned, opened=opened),
         focus(observed),
-        *rig(observed, guessed=timing.order == "guess"),
+        *rig(observed, guessed=timing.order == "guess", curve_doubt=curve_doubt),
         *accuracy(observed),
         *validity(observed),
         *steadiness(observed.facts),

@@ -15,6 +15,10 @@ from psvideo.report.observe.yuille1997 import Lean
 MISFIT, LOST_MISFIT = 0.135, 0.25
 """Shares of the light that another rig would explain and this one cannot. A rig that was off by 1 to 5 degrees left
 0.11 to 0.13 on photographs, two lights exchanged among five 0.18, a list in another order 0.19."""
+ONE_SURFACE, BY_SHINING = 0.8, 0.2
+"""Slopes that agree by the first, and that no lean mends by more than the second, are one surface's. So the rig's
+directions are right, and what shines explains the rest (a coin of metal under 6 to 24 lights: 0.83 to 0.97 and 0.01 to
+0.05; the same lights off by 10 degrees each: 0.91 and 0.24, by 20 degrees: 0.77 and 0.31)."""
 LEFT_OVER = 0.1
 STRENGTH_MISFIT, BY_STRENGTH, OTHER_STRENGTH = 0.05, 0.5, 1.25
 """Less is enough where other strengths of some lights, half of them at most, take half of it away."""
@@ -23,13 +27,16 @@ MOST_AWAY = 0.05
 """Of measured normals, the share that may face away from the camera: what a camera sees faces it."""
 NEARER = 0.7
 """Lamps stand near where that leaves less than this share of what is left over. (Photographs: 0.88 and more; lamps ten
-widths away that a rig takes for distant: 0.2 to 0.5.)"""
+widths away that a rig takes for distant: 0.2 to 0.5.) A surface that is not matte, as skin, explains a face's light
+better than lamps at 1.4 widths would, which were none."""
 LOST_LEAN_DEG = 12.0
 IN_PICTURE = 0.5
 """Lamps nearer than this, in widths of the picture, would be seen in it. (Linear codes read as S-Log3 do.)"""
-UNDONE, REDONE = 0.7, 0.25
+UNDONE, REDONE, MOST_BENT = 0.7, 0.18, 0.25
 """Plates were read by another curve where that leaves less than these shares of what is left over. (sRGB read as light:
-0.3 to 0.8; photographs in light: 1.7 and more. Light read as sRGB: 0.05 to 0.15; photographs in sRGB: 0.6 and more.)"""
+0.3 to 0.8; photographs in light: 1.7 and more. Light read as sRGB: 0.05 to 0.15; photographs in sRGB: 0.6 and more.)
+A wrong curve leaves the third at most, and the right one explains the light: metal leaves 0.25 to 0.45 under the right
+one, and is no matte surface under any."""
 LEANS_DEG, BY_LEANING = 6.0, 0.1
 """Normals would be one surface's if all were changed by more than the first; that says something of the rig where it
 leaves less over by the second, a share of what it leaves."""
@@ -56,15 +63,22 @@ TOO_FAR_DEG, AGREE_FAR = 8.0, 0.15
 bear's under eight lights in one plane: 0.21; five lights of which each is taken for the next: 0.11.)"""
 
 
-def rig(observed: Observed, *, guessed: bool = False) -> Iterator[Judgement]:
+def rig(observed: Observed, *, guessed: bool = False, curve_doubt: str = "") -> Iterator[Judgement]:
     """Judge whether the rig's directions and strengths can have made these plates. ``guessed``: which light is which
-    is a guess."""
+    is a guess; ``curve_doubt``: why pictures were likely coded by another curve, where that is known."""
     fit = observed.rig_fit
     firing = [light for light, fires in zip(observed.lights, observed.firing, strict=True) if fires]
-    wrong = None if fit is None else _misfit(firing, fit)
-    found = (wrong, _crossed(observed, guessed=guessed), _away(observed), fit and (_curve(fit) or _near(fit)))
-    leaning = None if any(found) else _leaning(observed)
-    doubted = [one for one in (*found, leaning) if one]
+    said = Judgement(subject="rig", grade="doubtful", found=curve_doubt) if curve_doubt else None
+    curve = said or (None if fit is None else _curve(fit))
+    wrong = None if fit is None or curve else _misfit(firing, fit)
+    crossed, away = _crossed(observed, guessed=guessed), _away(observed)
+    leaning = None if curve or wrong or crossed or away else _leaning(observed)
+    shines = wrong is not None and not crossed and not away and _shines(observed)
+    near = None if fit is None or curve or shines else _near(fit)
+    if fit is not None and shines:
+        yield _shining(fit)
+        return
+    doubted = [one for one in (curve, wrong, crossed, away, near, None if near else leaning) if one]
     yield from doubted
     if any(one.subject == "rig" for one in doubted):
         return
@@ -118,9 +132,27 @@ def _misfit(lights: Sequence[str], fit: RigFit) -> Judgement | None:
     )
 
 
+def _shines(observed: Observed) -> bool:
+    """Return whether normals are those of one surface as they are: then it is the surface that is not matte."""
+    agreement = float(np.median(observed.slopes)) if observed.slopes else 0.0
+    leans = [one for one in observed.leans if one.lean_deg > LEANS_DEG and one.gain > BY_SHINING]
+    return agreement >= ONE_SURFACE and len(leans) <= len(observed.leans) / 2
+
+
+def _shining(fit: RigFit) -> Judgement:
+    return Judgement(
+        subject="surface",
+        grade="doubtful",
+        found=f"The surface shines: {100 * fit.misfit:.0f} % of the light is no matte surface's under these lights, "
+        "and yet the normals are those of one surface, so the rig is hardly to blame.",
+        advice="Metal, glaze and lacquer need many lights, well spread, or polarising filters. If the subject is "
+        "matte, check the strengths of the lights.",
+    )
+
+
 def _near(fit: RigFit) -> Judgement | None:
     near = fit.near
-    if near is None or near.misfit > NEARER * fit.misfit or near.lean_deg <= COMMON_DEG:
+    if near is None or near.misfit > min(NEARER * fit.misfit, near.by_surface) or near.lean_deg <= COMMON_DEG:
         return None
     if near.widths < IN_PICTURE:
         return Judgement(
@@ -135,25 +167,26 @@ def _near(fit: RigFit) -> Judgement | None:
         grade="bad" if near.lean_deg > LOST_LEAN_DEG else "doubtful",
         found=f"The lights stand near: they fall off over the picture as if {near.widths:.0f} of its widths away, and "
         f"the rig takes them for distant. This tilts normals by about {near.lean_deg:.0f} degrees.",
-        advice="Write where the lights stand into the rig (`position_m`), or move them farther away.",
+        advice="Write where the lights stand into the rig (position_m), or move them farther away.",
     )
 
 
 def _curve(fit: RigFit) -> Judgement | None:
     curves, by_distance = fit.curves, fit.misfit if fit.near is None else fit.near.misfit
-    if curves is None or min(curves.undone, curves.redone) > by_distance:
+    if curves is None or fit.misfit > MOST_BENT or min(curves.undone, curves.redone) > min(by_distance, MISFIT):
         return None
-    undone = curves.undone <= UNDONE * fit.misfit
+    undone = curves.undone <= min(UNDONE * fit.misfit, MISFIT)
     if not undone and curves.redone > REDONE * fit.misfit:
         return None
     read, recorded, left = ("light", "sRGB", curves.undone) if undone else ("sRGB", "light", curves.redone)
+    recorded_as = "srgb" if undone else "linear"
     return Judgement(
         subject="rig",
         grade="doubtful",
         found=f"The plates were read as {read}, but fit the lights better if they were recorded as {recorded}: "
         f"{100 * left:.1f} % of their light is left over instead of {100 * fit.misfit:.1f} %. This tilts all normals.",
-        advice=f'Say how the footage was recorded (`transfer = "{"srgb" if undone else "linear"}"` in the plan\'s '
-        "[camera]).",
+        advice=f'Say how they were recorded: transfer = "{recorded_as}" in the plan\'s [camera], or of photographs '
+        f"without a plan `transfer='{recorded_as}'`.",
     )
 
 
@@ -215,7 +248,7 @@ def _leaning(observed: Observed) -> Judgement | None:
         advice="Add lights from other sides, farther from the plane of these."
         if flat
         else "Measure the lights again with the camera where it stands. If the picture is cropped at one side, or the "
-        "lens is shifted, write `focal_px` and `principal_px` into the rig.",
+        "lens is shifted, write focal_px and principal_px into the rig.",
     )
 
 
@@ -227,7 +260,7 @@ def _off_axis(usual: Lean, widths: float) -> Judgement:
         found="The normals would be those of one surface if the lens's axis met the picture "
         f"{100 * widths:.0f} % of its width off the middle (cropped, or a shifted lens), or if the rig were tilted by "
         f"about {usual.lean_deg:.0f} degrees: without a lens in the rig nothing tells which.",
-        advice="Write `focal_px` and `principal_px` into the rig's [camera]; if the axis is in the middle, measure the "
+        advice="Write focal_px and principal_px into the rig's [camera]; if the axis is in the middle, measure the "
         "lights again with the camera where it stands.",
     )
 

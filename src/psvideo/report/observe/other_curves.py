@@ -11,6 +11,9 @@ from psvideo.model.camera import FloatArray
 from psvideo.pictures.relighting import srgb_share
 
 STEPS = 1025
+SHADOW = 0.08
+"""A pixel is reached by all lights where each gives at least this share of the brightest."""
+LEAST_POINTS = 60
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,8 +30,12 @@ def other_curves(light: FloatArray, beyond: FloatArray) -> OtherCurves:
     no normal explains, (light, light)."""
     steps = np.linspace(0, 1, STEPS) ** 2.4  # as finely where sRGB is steep
     signals = srgb_share(steps.astype(np.float32))
+    undone = np.interp(light, signals, steps)
+    reached = undone.min(axis=1) > SHADOW * undone.max(axis=1)  # shadow that sRGB makes brighter is shadow after all
+    if reached.sum() < LEAST_POINTS:
+        reached[:] = True
     return OtherCurves(
-        undone=_left_over(np.interp(light, signals, steps), beyond),
+        undone=_left_over(undone[reached], beyond),
         redone=_left_over(np.interp(light, steps, signals), beyond),
     )
 

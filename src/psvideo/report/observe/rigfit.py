@@ -13,13 +13,10 @@ from numpy.typing import NDArray
 
 from psvideo.model.camera import FloatArray
 from psvideo.report.observe.nearness import Nearness, nearness
-from psvideo.report.observe.other_curves import OtherCurves, other_curves
+from psvideo.report.observe.other_curves import LEAST_POINTS, SHADOW, OtherCurves, other_curves
 
-SHADOW = 0.08
-"""A pixel is reached by all lights where each gives at least this share of the brightest."""
 LEAST_LIGHT = 4.0
-"""... and at least so many times the light of 0.001."""
-LEAST_POINTS = 60
+"""A pixel is lit where its brightest light gives at least so many times the light of 0.001."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -78,7 +78,7 @@ def run_report(
         for name in clip.plan.lights
     )
     how = {} if solved is None else {"aligned": solved.aligned, "opened": solved.opened}
-    judged = judgements(clip.plan, timing, observed, **how)
+    judged = judgements(clip.plan, timing, observed, curve_doubt=clip.curve_doubt, **how)
     warnings = (*clip.warnings, *(() if solved is None else solved.warnings))
     spell = output.caller.spell
     return RunReport(
@@ -138,7 +138,8 @@ def _shot(clip: Clip, numbers: Sequence[int]) -> dict[str, str]:
         "Rounds a second": f"{len(plan.dark_rounds) / plan.cycle_s:.4g}"
         if plan.mode != "synced"
         else f"{float(camera.fps) / len(plan.flashes):.4g}",
-        "Remarks": "; ".join((*clip.warnings, *clip.notes)) or "none",
+        "Remarks": "; ".join((*([clip.curve_doubt] if clip.curve_doubt else []), *clip.warnings, *clip.notes))
+        or "none",
     }
 
 
