@@ -146,7 +146,7 @@ class Footage:
         strength, narrow = self.sheen
         half = way + np.array([0, 0, 1])
         half /= np.linalg.norm(half)
-        return strength * np.maximum(normals @ half, 0) ** narrow * (normals @ way > 0)
+        return np.asarray(strength * np.maximum(normals @ half, 0) ** narrow * (normals @ way > 0))
 
     def _dark_level(self, clean: Sequence[np.ndarray], number: int) -> float:
         subject = np.max(clean, axis=0) > 0.01
