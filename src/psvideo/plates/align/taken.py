@@ -32,9 +32,10 @@ SHADED = 0.25
 """... nor do those of which one is darker, as a whole, than this share of the other: a shadow passed."""
 TURNED = 40.0
 """What turns is shaded in its detail too, which differs by no more codes: both plates show it all the same."""
-BLENDED, BLENDED_UNLIKE = np.float32(0.25), np.float32(0.8)
+BLENDED, BLENDED_UNLIKE, BLENDED_ALIKE = np.float32(0.25), np.float32(0.8), np.float32(0.5)
 """Shading turns evenly: by what it differs between two plates, their blend is off so much less than the nearer one
-would be; by what their detail differs, by a shadow, or by more than is even, only a little less."""
+would be; by what their detail differs, by a shadow, or by more than is even, only a little less, and half where plates
+are alike: edges lie a part of a pixel beside each other there."""
 REST = 3.0
 """What stands still while its shading changes by more codes is blended by time."""
 ENOUGH = 4
@@ -116,9 +117,10 @@ def _off_of_blend(alike: Flags, shading: Vectors, unlike: Vectors, shaded: Flags
     """Return by which share of what two plates differ their blend may be off. ``shading`` is by how much they differ as
     a whole, and ``unlike`` the square of what their detail does."""
     level, unlike = shading * shading, np.maximum(unlike, np.float32(0))  # sums that run along rows round
-    squares = (BLENDED**2 * level + BLENDED_UNLIKE**2 * unlike) / np.maximum(level + unlike, np.float32(1e-6))
-    share = np.where(shaded | (np.abs(shading) > EVENLY), BLENDED_UNLIKE, np.sqrt(squares))
-    return np.asarray(np.where(alike, BLENDED, share), np.float32)
+    detail = np.where(alike, BLENDED_ALIKE, BLENDED_UNLIKE)
+    squares = (BLENDED**2 * level + detail**2 * unlike) / np.maximum(level + unlike, np.float32(1e-6))
+    plain = shaded | (np.abs(shading) > EVENLY)
+    return np.asarray(np.where(plain & ~alike, BLENDED_UNLIKE, np.sqrt(squares)), np.float32)
 
 
 def without_doubtful(shown: Sequence[Taken], motion: Followed, others: int) -> tuple[list[Codes], Flags]:
