@@ -13,7 +13,7 @@ from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import made
 from psvideo.plates.sequence import Round
 from psvideo.report.judge.result import steadiness
-from psvideo.report.observe.observed import InstantFacts, instant_facts
+from psvideo.report.observe.facts import InstantFacts, instant_facts
 from psvideo.report.observe.steadiness import Change, Sample, change, sample_of
 from psvideo.report.run_report import RunReport, report_record, steadiness_of
 

@@ -26,7 +26,8 @@ from psvideo.model.plan import Plan
 from psvideo.model.rig import Rig
 from psvideo.model.shutter import row_weights
 from psvideo.plates.align import held
-from psvideo.report.observe.observed import InstantFacts, Observed
+from psvideo.report.observe.facts import InstantFacts
+from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.worst import Thumbnail, Worst
 from psvideo.report.observe.yuille1997 import Lean
 from psvideo.runs.instants import pieces

@@ -15,7 +15,8 @@ from psvideo.cli.app import main
 from psvideo.model.surface import Misfit, Surface
 from psvideo.report.judge.result import accuracy
 from psvideo.report.judgement import Judgement
-from psvideo.report.observe.observed import InstantFacts, Observed
+from psvideo.report.observe.facts import InstantFacts
+from psvideo.report.observe.observed import Observed
 from psvideo.solve.normals import robust, woodham1980
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.robust import Reweighting, solve

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from psvideo.pictures.charts import stops_chart
 from psvideo.pictures.relighting import normal_colours
 from psvideo.report.judgement import Judgement, gravest_first, usable
+from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.levels import STOPS, TARGET_QUANTILE
-from psvideo.report.observe.observed import InstantFacts
 from psvideo.report.observe.worst import Thumbnail, badness
 from psvideo.report.over_time import over_time
 from psvideo.report.run_report import RunReport

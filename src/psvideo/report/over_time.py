@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.pictures.charts import Axes, ChartLine, line_chart
-from psvideo.report.observe.observed import InstantFacts
+from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.run_report import steadiness_of
 
 LEAST_SPAN, LEAST_CHANGE, LEAST_TURN = 5.0, 0.5, 0.1

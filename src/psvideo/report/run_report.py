@@ -11,8 +11,8 @@ import numpy as np
 from psvideo.model.timing import Timing
 from psvideo.report.judge.result import by_level, change_of
 from psvideo.report.judgement import Judgement, gravest_first, usable, verdict_of
+from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.levels import STOPS, TARGET_QUANTILE, Levels
-from psvideo.report.observe.observed import InstantFacts
 from psvideo.report.observe.worst import Thumbnail
 
 SCHEMA = "psvideo-report/1"

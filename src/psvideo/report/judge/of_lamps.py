@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from psvideo.model.marker import NOT_FIRING
 from psvideo.report.judgement import Judgement
+from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.levels import TARGET_QUANTILE
-from psvideo.report.observe.observed import InstantFacts, Observed
+from psvideo.report.observe.observed import Observed
 
 WEAK_LIGHT = 1 / 8
 """Of the brightest lamp's light."""

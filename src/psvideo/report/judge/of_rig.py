@@ -8,7 +8,8 @@ from psvideo.report.judge.of_exposure import LOST_CLIPPED
 from psvideo.report.judge.of_lamps import NAMED
 from psvideo.report.judge.result import AT_REST, COMMON_DEG, LOST_DEG, NOISY_DEG, by_noise_deg, moves, off_deg
 from psvideo.report.judgement import Grade, Judgement
-from psvideo.report.observe.observed import InstantFacts, Observed
+from psvideo.report.observe.facts import InstantFacts
+from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rigfit import RigFit
 from psvideo.report.observe.yuille1997 import Lean
 

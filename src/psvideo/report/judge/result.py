@@ -5,7 +5,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from psvideo.report.judgement import Grade, Judgement
-from psvideo.report.observe.observed import InstantFacts, Observed
+from psvideo.report.observe.facts import InstantFacts
+from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.steadiness import Change
 
 SOFT_PX = 1.5

@@ -4,7 +4,6 @@ Shares are counted on thinned pictures. What takes longer (sharpness, the rig's 
 rounds 1, 2, 4, 8 and so on, so that ten thousand rounds cost hardly more than a hundred.
 """
 
-import functools
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,10 +11,11 @@ from numpy.typing import NDArray
 
 from psvideo.clip import Masks
 from psvideo.model.marker import NOT_FIRING
-from psvideo.model.surface import Misfit, Surface
+from psvideo.model.surface import Surface
 from psvideo.plates.ambient.ambient_regression import Separated
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import AMBIENT, Round
+from psvideo.report.observe.facts import FAINT, InstantFacts, Seen, brightest_channel, instant_facts, thinned_round
 from psvideo.report.observe.focus import middle_of, sharpest_blur_px
 from psvideo.report.observe.levels import BINS, Counts, Levels, count_levels
 from psvideo.report.observe.motion import Glimpse, Motion, glimpse, motion
@@ -24,17 +24,10 @@ from psvideo.report.observe.rigpoints import RigPoints
 from psvideo.report.observe.shadow import shadow_light
 from psvideo.report.observe.slopes import averaged, share_away, slope_agreement
 from psvideo.report.observe.steadiness import Change, Sample, change, sample_of
-from psvideo.report.observe.thinned import step_of, thin_surface, thinned
+from psvideo.report.observe.thinned import step_of, thinned
 from psvideo.report.observe.worst import Thumbnail, Worst
 from psvideo.report.observe.yuille1997 import Lean, Lens, lean
-from psvideo.solve.filling.filled import holes_in
-from psvideo.solve.passes.alpha_matte import lit_from
 
-LIT = 0.01
-"""A pixel brighter than this share of saturation under any light is part of the scene, unless it is a dim backdrop's;
-of dark takes, than a sixth of their brightest hundredth."""
-DARKEST = 1 / 6
-FAINT = 2.0**-12
 UNEVEN = 0.5
 """A picture of things that are brighter and darker, or turned from the light, holds less than this where it is dim, of
 what it holds where it is bright."""
@@ -42,144 +35,9 @@ WEAK_BESIDE = 1 / 8
 """Motion and sharpness are looked for under the first light, unless it gives less than this of the brightest."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class InstantFacts:
-    """What one round gave: which shares of what is lit (or masked) are valid or saturated, and which share of rows no
-    frame saw; ``borrowed_share`` is that of rows that other rounds showed. A void background counts as neither.
-    ``change`` is what differs from the result before, at rest.
-
-    ``valid_share`` and ``measured_share``, what three lights reach, are None where no normals were solved, the latter
-    where nothing was filled as well. ``levels`` (light) is each light's mean on the subject, 1.0 = saturation;
-    ``clipped`` (light) the share of it that is saturated. ``ambient`` is the ambient light's share of what an exposure
-    holds. ``speed_px_s`` is how fast the fastest parts move, and ``moving_share`` how much of the picture does; None
-    where it is not known. What changes too fast to be followed has a share and no speed.
-    ``misfit`` is what the robust solver found common to the whole picture.
-    """
-
-    number: int
-    time_s: float
-    valid_share: float | None
-    clipped_share: float
-    unseen_share: float
-    borrowed_share: float = 0.0
-    change: Change | None = None
-    levels: tuple[float, ...] = ()
-    clipped: tuple[float, ...] = ()
-    ambient: float | None = None
-    speed_px_s: float | None = None
-    moving_share: float | None = None
-    misfit: Misfit | None = None
-    measured_share: float | None = None
-
-
-@dataclass(frozen=True, kw_only=True)
-class Seen:
-    """One round, thinned: the lights' ``bright`` (light, row, col) by their brightest channel, which of these pixels
-    are known, ``shown`` (light, row, col), and the subject, (row, col); ``beyond`` is by how much brighter than the
-    subject's brightest hundredth that of what a mask leaves out is, 0 without a mask."""
-
-    bright: NDArray[np.float32]
-    shown: NDArray[np.bool_]
-    subject: NDArray[np.bool_]
-    beyond: float = 0.0
-
-
-def seen_of(one: Round, mask: NDArray[np.bool_] | None) -> Seen:
-    """Return a round thinned out, and where its subject is."""
-    step = step_of(*one.plates[0].shape[:2])
-    bright = np.stack([_brightest(plate.picture.thinned(step)) for plate in one.plates])
-    shown = np.stack([plate.pixels_seen[::step, ::step] for plate in one.plates])
-    most = bright.max(axis=0)
-    if mask is not None:
-        subject = thinned(mask)
-        return Seen(bright=bright, shown=shown, subject=subject, beyond=_beyond(most, subject))
-    lit = most > lit_from(most, min(LIT, DARKEST * float(np.percentile(most[::2, ::2], 99))))
-    return Seen(bright=bright, shown=shown, subject=lit | holes_in(lit))
-
-
-def _beyond(most: NDArray[np.float32], subject: NDArray[np.bool_]) -> float:
-    if not subject.any() or subject.all():
-        return 0.0
-    inside, outside = (float(np.percentile(most[where], 99)) for where in (subject, ~subject))
-    return outside / max(inside, FAINT)
-
-
-def instant_facts(
-    one: Round,
-    surface: Surface | None,
-    mask: NDArray[np.bool_] | None,
-    change: Change | None = None,
-    *,
-    seen: Seen | None = None,
-    moving: Motion | None = None,
-    dark: NDArray[np.float32] | None = None,
-) -> InstantFacts:
-    """Return what to remember of one round; ``change`` is how its surface differs from the one before, ``dark`` the
-    ambient light of one exposure, thinned out as ``seen`` is."""
-    seen = seen or seen_of(one, mask)
-    subject, bright = seen.subject, seen.bright
-    count = max(int(subject.sum()), 1)
-    valid, measured = _shares(surface, subject)
-    shares, levels = [], []
-    for picture, shown, plate in zip(bright, seen.shown, one.plates, strict=True):
-        shares.append(float(((picture >= plate.saturation) & subject).sum() / count))
-        light = picture[subject & shown]
-        levels.append(float(light.mean()) if light.size else 0.0)
-    return InstantFacts(
-        number=one.number,
-        time_s=one.time_s,
-        valid_share=valid,
-        measured_share=measured,
-        clipped_share=float(np.mean(shares)),
-        unseen_share=float(np.mean([1 - plate.rows_seen.mean() for plate in one.plates])),
-        borrowed_share=float(np.mean([_borrowed(plate) for plate in one.plates])),
-        change=change,
-        levels=tuple(level / plate.saturation for level, plate in zip(levels, one.plates, strict=True)),
-        clipped=tuple(shares),
-        ambient=_ambient_share(dark, subject, levels),
-        speed_px_s=None if moving is None else moving.speed_px_s,
-        moving_share=None if moving is None else moving.share,
-        misfit=None if surface is None else surface.misfit,
-    )
-
-
-def _shares(surface: Surface | None, subject: NDArray[np.bool_]) -> tuple[float | None, float | None]:
-    """Return which shares of the subject are valid and measured. Of a surface that was filled, noise is none of it; of
-    one that was emptied, what was measured is not known."""
-    if surface is None:
-        return None, None
-    some = thin_surface(surface)
-    filled = surface.source is not None and bool((surface.source > surface.valid.view(np.uint8)).any())
-    whole = subject & some.shown if filled else subject
-    count = max(int(whole.sum()), 1)
-    valid, measured = (float((part & whole).sum() / count) for part in (some.valid, some.measured))
-    return valid, measured if filled or valid == 1 else None
-
-
-def _borrowed(plate: LightPlate) -> float:
-    """Return the share of a plate's rows that come from another round: half a round away and more."""
-    if plate.shown_s is None:
-        return 0.0
-    times_s, counts = np.unique(plate.shown_s[plate.rows_seen], return_counts=True)
-    return float(1 - counts[np.abs(times_s - plate.time_s).argmin()] / plate.shown_s.size) if len(times_s) > 1 else 0.0
-
-
-def _ambient_share(dark: NDArray[np.float32] | None, subject: NDArray[np.bool_], levels: list[float]) -> float | None:
-    """Return which share of what a row under one light holds is ambient light, in the mean over subject and lights."""
-    if dark is None or not subject.any():
-        return None
-    level = max(float(dark.mean(where=subject)), 0.0)
-    return level / max(level + float(np.mean(levels)), 1e-9)
-
-
 def _evenness(image: NDArray[np.float32]) -> float:
     low, high = np.percentile(image, [5, 95])
     return float(low / max(high, FAINT))
-
-
-def _brightest(image: NDArray[np.float32]) -> NDArray[np.float32]:
-    # channel by channel: numpy is slow along a short last axis
-    return image if image.ndim == 2 else functools.reduce(np.maximum, np.moveaxis(image, -1, 0))
 
 
 @dataclass(kw_only=True)
@@ -249,11 +107,11 @@ class Observed:
 
     def look_at_window(self, found: Separated) -> None:
         """Look at the ambient light that a window of frames showed without a dark slot."""
-        self._dark = np.array(_brightest(thinned(found.image)))
+        self._dark = np.array(brightest_channel(thinned(found.image)))
         self.ambient_measured[found.begins] = float(found.stood.mean())
 
     def _look_at_dark(self, plate: LightPlate) -> None:
-        self._dark = np.array(_brightest(plate.picture.thinned(step_of(*plate.shape[:2]))))
+        self._dark = np.array(brightest_channel(plate.picture.thinned(step_of(*plate.shape[:2]))))
 
     def add(self, one: Round, surface: Surface | None = None) -> None:
         """Take in one round, and the surface that was solved from it, if any."""
@@ -264,7 +122,7 @@ class Observed:
             return
         self.first = one.number if self.first is None else self.first
         mask = None if self.masks is None else self.masks.at(one.number)
-        seen = seen_of(one, mask)
+        seen = thinned_round(one, mask)
         self.beyond_mask.append(seen.beyond)
         if self._dark is not None:
             self.dark_evenness.append(_evenness(self._dark) if _evenness(seen.bright.max(axis=0)) < UNEVEN else 0.0)

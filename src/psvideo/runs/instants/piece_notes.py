@@ -15,7 +15,8 @@ from psvideo.errors import PsvideoError
 from psvideo.formats.timing_json import format_timing, parse_timing
 from psvideo.formats.whole_files import whole_file, write_text
 from psvideo.model.timing import Timing
-from psvideo.report.observe.observed import InstantFacts, Observed
+from psvideo.report.observe.facts import InstantFacts
+from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.worst import Thumbnail, Worst
 from psvideo.report.observe.yuille1997 import Lean
 from psvideo.runs.instants.job import Found

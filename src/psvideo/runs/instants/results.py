@@ -18,7 +18,7 @@ from psvideo.formats.whole_files import write_text
 from psvideo.plates.align.comb import Comb
 from psvideo.plates.sequence import coming
 from psvideo.plates.unmixed import unmixing_note
-from psvideo.report.observe.observed import InstantFacts
+from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.run_report import RunReport
 from psvideo.runs.delivery.delivering import check_delivery, pass_doubts, say_instants, world_doubts
 from psvideo.runs.delivery.handover import Finished, write_note, write_previews, write_stage, write_timeline
