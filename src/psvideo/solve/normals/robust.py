@@ -25,6 +25,7 @@ from psvideo.solve.normals.task import (
     Floats,
     Looks,
     Mask,
+    Result,
     Samples,
     Task,
     Usable,
@@ -115,39 +116,19 @@ def solve(
     shown = ShownPlates.of(plates)
     check_arrays(shown.samples, lit, seen, mask)
     shown = shown.as_floats()  # one kind of samples, and so one loop to compile
-    from psvideo.solve.normals import robust_kernel as kernel
-
     (rows, cols), channels = shown.shape[:2], lit.intensities.shape[1]  # which are combined
-    result = empty_result(rows * cols, channels, half=half, residual=residual, spare=spare)
-    predicted = planes_for((rows * cols,), np.uint16 if half else np.float32, pixels=rows * cols, folder=spare)
-    given = _balanced(task(shown.samples, lit, seen, mask, usable, black_level, scale))
-
-    def run(
-        into: Samples, unexplained: Floats, how: Weights, step: int, reflecting: bool, looks: Looks | None = None
-    ) -> None:
-        def memory(one: Task) -> tuple[kernel.Memory, Work | None]:
-            own = kernel.working_memory(one, reflecting=reflecting, residual=residual)
-            return own, None if looks is None else looks.memory()
-
-        def band(one: Task, room: tuple[kernel.Memory, Work | None], first: int, last: int) -> None:
-            own, beside = room
-            kernel.solve_rows(
-                one, kernel.as_bytes(result), half, into.view(np.uint8), unexplained, own, how, first, last, step
-            )
-            if looks is not None and beside is not None:
-                looks.look(one, result, beside, first, last)
-            let_rows_go(result, cols, first, last)
-            let_go(predicted[first * cols : last * cols])
-
-        shown.in_bands(band, given, memory, threads=threads, step=step)
-
+    solution = _Solution(
+        shown=shown,
+        given=_balanced(task(shown.samples, lit, seen, mask, usable, black_level, scale)),
+        result=empty_result(rows * cols, channels, half=half, residual=residual, spare=spare),
+        predicted=planes_for((rows * cols,), np.uint16 if half else np.float32, pixels=rows * cols, folder=spare),
+        half=half,
+        residual=residual,
+        threads=threads,
+    )
     noise = (0.0, 0.0) if plate_noise is None else (plate_noise.read / channels, plate_noise.photon / channels)
     if misfit is None:
-        step, unexplained = max(rows * cols // SAMPLE_PIXELS, 1), np.zeros(rows * cols, np.float32)
-        how = _weights(reweighting, noise, limit_deg=EVERYTHING_DEG, common=0.0)
-        run(predicted, unexplained, how, step, False)
-        found = surface_of(result, predicted, shown.shape, half=half)
-        misfit = _typical(found, unexplained.reshape(rows, cols), step)
+        found, misfit, step = _first_look(solution, reweighting, noise)
         if misfit is not None:
             model = reflectance_of(
                 plates, lit, found, usable, step=step, seen=seen, black_level=black_level, scale=scale
@@ -155,11 +136,72 @@ def solve(
             misfit = replace(misfit, reflectance=model)
     model = None if misfit is None else misfit.reflectance
     limit_deg = max(reweighting.most_error_deg, 0.0 if misfit is None else _limit_deg(reweighting, misfit))
-    common, unit = 0.0 if misfit is None else misfit.share, 1 / float(given.albedo_scale)
+    common, unit = 0.0 if misfit is None else misfit.share, 1 / float(solution.given.albedo_scale)
     how = _weights(reweighting, noise, limit_deg=limit_deg, common=common, model=model, unit=unit)
-    run(predicted if error else predicted[:0], np.zeros(0, np.float32), how, 1, model is not None, looks)
-    surface = surface_of(result, predicted if error else None, shown.shape, half=half)
-    return replace(surface, misfit=misfit)
+    solution.run(how, error=error, reflecting=model is not None, looks=looks)
+    return replace(solution.surface(error=error), misfit=misfit)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Solution:
+    """A picture's task, and where its solution and ``predicted`` errors (pixel,) go as the loops run over its rows."""
+
+    shown: ShownPlates
+    given: Task
+    result: Result
+    predicted: Samples
+    half: bool
+    residual: bool
+    threads: int | None
+
+    def run(
+        self,
+        how: Weights,
+        *,
+        error: bool = True,
+        unexplained: Floats | None = None,
+        step: int = 1,
+        reflecting: bool = False,
+        looks: Looks | None = None,
+    ) -> None:
+        """Solve every ``step``-th row. ``error`` asks for predicted errors; ``unexplained`` (pixel,) takes the share of
+        its light that each pixel's lights leave unexplained. ``looks`` looks at each band while it is in memory."""
+        from psvideo.solve.normals import robust_kernel as kernel
+
+        cols, result, predicted = self.shown.shape[1], self.result, self.predicted
+        into = (predicted if error else predicted[:0]).view(np.uint8)
+        left = np.zeros(0, np.float32) if unexplained is None else unexplained
+
+        def memory(one: Task) -> tuple[kernel.Memory, Work | None]:
+            own = kernel.working_memory(one, reflecting=reflecting, residual=self.residual)
+            return own, None if looks is None else looks.memory()
+
+        def band(one: Task, room: tuple[kernel.Memory, Work | None], first: int, last: int) -> None:
+            own, beside = room
+            kernel.solve_rows(one, kernel.as_bytes(result), self.half, into, left, own, how, first, last, step)
+            if looks is not None and beside is not None:
+                looks.look(one, result, beside, first, last)
+            let_rows_go(result, cols, first, last)
+            let_go(predicted[first * cols : last * cols])
+
+        self.shown.in_bands(band, self.given, memory, threads=self.threads, step=step)
+
+    def surface(self, *, error: bool = True) -> Surface:
+        """Return what was solved as a surface, in the same memory."""
+        return surface_of(self.result, self.predicted if error else None, self.shown.shape, half=self.half)
+
+
+def _first_look(
+    solution: _Solution, reweighting: Reweighting, noise: tuple[float, float]
+) -> tuple[Surface, Misfit | None, int]:
+    """Solve a sample of the rows: return their surface, what is typical of the picture, and how many rows apart they
+    are."""
+    rows, cols = solution.shown.shape[:2]
+    step, unexplained = max(rows * cols // SAMPLE_PIXELS, 1), np.zeros(rows * cols, np.float32)
+    how = _weights(reweighting, noise, limit_deg=EVERYTHING_DEG, common=0.0)
+    solution.run(how, unexplained=unexplained, step=step)
+    found = solution.surface()
+    return found, _typical(found, unexplained.reshape(rows, cols), step), step
 
 
 def _limit_deg(reweighting: Reweighting, misfit: Misfit) -> float:
