@@ -9,7 +9,7 @@ from bench.accuracy_whole import bust
 from ring_and_ball import ring
 
 from psvideo.model.surface import Surface
-from psvideo.report.observe.slopes import averaged, slope_agreement
+from psvideo.report.observe.slopes import coarse_normals, slope_agreement
 from psvideo.solve.normals.doubting import Signs, ThinSurface, doubt_deg, signs_of, stored
 from psvideo.solve.normals.evidence import Evidence, Indirect
 from psvideo.solve.normals.illumination import Illumination
@@ -216,16 +216,16 @@ def gentle(noise_deg: float, *, curved: float = 0.25, mirrored: bool = False) ->
 
 
 def test_noise_does_not_make_a_gently_curved_surface_none() -> None:
-    noisy = slope_agreement(averaged(gentle(4.0)))
+    noisy = slope_agreement(coarse_normals(gentle(4.0)))
     assert noisy is not None
     assert noisy > 0.3
-    turned = slope_agreement(averaged(gentle(4.0, mirrored=True)))
+    turned = slope_agreement(coarse_normals(gentle(4.0, mirrored=True)))
     assert turned is not None
     assert turned < -0.1
 
 
 def test_a_wall_whose_normals_differ_by_noise_alone_says_nothing_of_the_rig() -> None:
-    assert slope_agreement(averaged(gentle(1.5, curved=0.0))) is None
+    assert slope_agreement(coarse_normals(gentle(1.5, curved=0.0))) is None
 
 
 def test_paint_that_shows_through_a_dome_is_not_taken_for_noise() -> None:
@@ -233,6 +233,6 @@ def test_paint_that_shows_through_a_dome_is_not_taken_for_noise() -> None:
     paint = np.random.default_rng(6).normal(size=(120, 160, 2)).astype(np.float32)
     dome.normals[..., :2] += 0.2 * cv2.GaussianBlur(paint, (0, 0), 1.0)
     dome.normals[...] /= np.linalg.norm(dome.normals, axis=-1, keepdims=True)
-    agreement = slope_agreement(averaged(dome))
+    agreement = slope_agreement(coarse_normals(dome))
     assert agreement is not None
     assert agreement < 0.2

@@ -28,7 +28,7 @@ from psvideo.report.observe.motion import glimpse, motion
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rigpoints import rig_points
 from psvideo.report.observe.shadow import shadow_light
-from psvideo.report.observe.slopes import averaged
+from psvideo.report.observe.slopes import coarse_normals
 from psvideo.report.observe.yuille1997 import Lean, Lens, lean
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.solving import Solving
@@ -608,7 +608,7 @@ def test_a_rig_is_not_doubted_for_what_a_shifted_lens_that_nobody_named_would_ex
     surface = Surface(
         normals=normals, albedo=np.ones((SIZE, SIZE, 1), np.float32), valid=np.ones((SIZE, SIZE), np.bool_)
     )
-    found = lean(averaged(surface), lens=lens)
+    found = lean(coarse_normals(surface), lens=lens)
     assert found is not None
     one.leans[:] = [found]
     doubted = [line for line in rig_of(one) if line.grade != "good"]

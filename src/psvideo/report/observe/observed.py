@@ -22,7 +22,7 @@ from psvideo.report.observe.motion import Glimpse, Motion, glimpse, motion
 from psvideo.report.observe.rigfit import RigFit
 from psvideo.report.observe.rigpoints import RigPoints
 from psvideo.report.observe.shadow import shadow_light
-from psvideo.report.observe.slopes import averaged, share_away, slope_agreement
+from psvideo.report.observe.slopes import coarse_normals, share_away, slope_agreement
 from psvideo.report.observe.steadiness import Change, Sample, change, sample_of
 from psvideo.report.observe.thinned import step_of, thinned
 from psvideo.report.observe.worst import Thumbnail, Worst
@@ -186,7 +186,7 @@ class Observed:
         if blur_px is not None:
             self.blurs_px.append(blur_px)
         if surface is not None:
-            small = averaged(surface)
+            small = coarse_normals(surface)
             agreement = slope_agreement(small)
             if agreement is not None:
                 self.slopes.append(agreement)

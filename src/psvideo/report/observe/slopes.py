@@ -117,8 +117,8 @@ def share_away(surface: Surface) -> float:
     return float((some.normals[..., 2] < AWAY)[some.measured].sum() / count) if count >= LEAST_AWAY else 0.0
 
 
-def averaged(surface: Surface) -> Averaged:
-    """Return a surface's normals as its slopes are looked at: averaged, about WIDTH_PX of them in a row."""
+def coarse_normals(surface: Surface) -> Averaged:
+    """Return a surface's normals averaged over squares, about WIDTH_PX of them in a row: what slopes are taken of."""
     step = max(int(surface.valid.shape[1]) // WIDTH_PX, 1)
     rows, cols = (size // step for size in surface.valid.shape)
     fine = max(step // LEAST_AVERAGED, 1)

@@ -10,7 +10,7 @@ from psvideo.compute.spilled import let_go
 from psvideo.model.surface import MEASURED, NO_LIGHT, ONE_LIGHT, TWO_LIGHTS, Surface
 from psvideo.solve.filling.bucket_queue import queue_for
 from psvideo.solve.filling.growing import grow
-from psvideo.solve.filling.looking import Said, count_rows, look_rows, room_for
+from psvideo.solve.filling.looking import Said, count_rows, look_rows, said_for
 from psvideo.solve.filling.neighbours import REACH_PX
 from psvideo.solve.filling.tiles import AT_ONCE, THREE_LIGHTS, bring_back, tiles_around
 from psvideo.solve.normals.evidence import Evidence
@@ -117,7 +117,7 @@ def holes_in(subject: Mask) -> Mask:
 
 
 def _said(one: Evidence, wanted: Mask, pixels: int, noise: float, threads: int | None) -> Said:
-    said = room_for(pixels, noise)
+    said = said_for(pixels, noise)
     asked, counts = wanted.view(np.uint8), np.count_nonzero(wanted, axis=1)
     begins = np.cumsum(counts) - counts
 

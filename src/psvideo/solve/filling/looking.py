@@ -29,8 +29,8 @@ class Said(NamedTuple):
     noise: np.float32
 
 
-def room_for(pixels: int, noise: float) -> Said:
-    """Return room for what is said of so many pixels."""
+def said_for(pixels: int, noise: float) -> Said:
+    """Return memory for what lights say of this many pixels."""
     return Said(
         reached=np.zeros(pixels, np.uint8),
         bright=np.zeros((pixels, 2), np.float32),

@@ -115,7 +115,7 @@ class ThinSurface:
         return self.surface.valid
 
 
-def step_of(shape: tuple[int, ...]) -> int:
+def coarse_step(shape: tuple[int, ...]) -> int:
     """Return how many rows and columns of a picture lie between two points."""
     return max(-(-max(shape[:2]) // GRID_PX), 1)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from psvideo.solve.normals.bands import ShownPlates
-from psvideo.solve.normals.doubting import step_of
+from psvideo.solve.normals.doubting import coarse_step
 from psvideo.solve.normals.evidence import Evidence, Indirect, Left
 from psvideo.solve.normals.task import Result, Task, Work, task
 
@@ -26,7 +26,7 @@ class IndirectLook:
         """Begin with a round."""
         samples = ShownPlates.of(one.plates).as_floats().samples
         rows, cols = samples[0].shape[:2]
-        step = step_of((rows, cols))
+        step = coarse_step((rows, cols))
         shape = -(-rows // step), -(-cols // step)
         found = Indirect(*np.zeros((2, *shape), np.float32))
         left = Left(*np.zeros((2, *((0, 0) if one.unsure is None else shape)), np.float32))

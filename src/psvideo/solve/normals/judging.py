@@ -20,9 +20,9 @@ from psvideo.solve.normals.doubting import (
     ThinSurface,
     bits,
     brightness,
+    coarse_step,
     doubt_deg,
     signs_of,
-    step_of,
     stored,
 )
 from psvideo.solve.normals.evidence import Evidence
@@ -99,7 +99,7 @@ def _usual(errors_deg: Floats, weights: Floats) -> float:
 
 def _thin_shape(surface: Surface) -> tuple[int, int]:
     """Return the shape of the points at which a surface is judged."""
-    step = step_of(surface.valid.shape)
+    step = coarse_step(surface.valid.shape)
     rows, cols = surface.valid.shape
     return -(-rows // step), -(-cols // step)
 
@@ -162,7 +162,7 @@ class _Spread:
 
     def points(self, surface: Surface) -> ThinSurface:
         """Return every so many rows and columns of a surface, and what noise and residuals make of them."""
-        step = step_of(surface.valid.shape)
+        step = coarse_step(surface.valid.shape)
         some = replace(
             surface,
             normals=_thinned(surface.normals, step),
