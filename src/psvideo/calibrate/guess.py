@@ -80,7 +80,7 @@ def guess_rig(pictures: LightPictures, *, prior: Prior | None = None) -> Guess:
 
 
 def _prior(lights: int, wished: Prior | None) -> Prior:
-    """Return what is taken for equal. Raises PsvideoError where so many lights do not show their directions."""
+    """Return what is taken for equal. Raises PsvideoError where this many lights do not show their directions."""
     chosen: Prior = wished or ("equal-lights" if lights >= LEAST_FOR_EQUAL_LIGHTS else "equal-albedo")
     if lights < (LEAST_FOR_EQUAL_LIGHTS if chosen == "equal-lights" else 3):
         raise PsvideoError(

@@ -184,7 +184,7 @@ def read_sets(
 ) -> Iterator[LightPictures]:
     """Read one set of pictures after the other; ``encoding`` says how the files code light.
 
-    ``frames`` chooses sets by number, counted from 1; ``most`` reads the first so many. Raises PsvideoError where a
+    ``frames`` chooses sets by number, counted from 1; ``most`` reads the first this many. Raises PsvideoError where a
     picture cannot be read, or is not of the first one's size.
     """
     chosen = parse_range(frames, range(1, files.sets + 1)) if frames else tuple(range(1, files.sets + 1))

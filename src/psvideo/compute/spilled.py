@@ -21,8 +21,8 @@ AROUND_BYTES = 1 << 20
 
 
 def planes_for(shape: tuple[int, ...], kind: DTypeLike, *, pixels: int, folder: Path | None) -> NDArray[Any]:
-    """Return room for planes of a picture of so many pixels: in memory, or, where that is large and there is a folder,
-    in a nameless file there, which is gone with the array.
+    """Return room for planes of a picture of this many pixels: in memory, or, where that is large and there is a
+    folder, in a nameless file there, which is gone with the array.
 
     Raises PsvideoError where the folder's disk has no room.
     """

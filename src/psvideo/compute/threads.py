@@ -139,7 +139,7 @@ def in_order(
 
 @contextlib.contextmanager
 def writing(*, threads: int = WRITING_THREADS, most_waiting: int = MOST_WAITING) -> Iterator[Submit]:
-    """Give a function that takes jobs (functions without arguments) and runs them in up to so many threads.
+    """Give a function that takes jobs (functions without arguments) and runs them in up to this many threads.
 
     It blocks while ``most_waiting`` jobs are under way, and raises what a job before raised; so does the end of the
     block, which waits for all jobs. A block that fails waits for them too: what was computed is kept for resuming.

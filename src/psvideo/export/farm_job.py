@@ -20,8 +20,8 @@ THREADS = "PSVIDEO_THREADS"
 
 @dataclass(frozen=True, kw_only=True)
 class FarmJob:
-    """A clip to be solved in so many pieces: where it lies, with which rig, and where its results go. ``words`` are the
-    other options of the command ``normals``, as one types them."""
+    """A clip to be solved in this many pieces: where it lies, with which rig, and where its results go. ``words`` are
+    the other options of the command ``normals``, as one types them."""
 
     clip: Path
     rig: Path

@@ -39,7 +39,7 @@ def exposure_of(fps: Fraction, *, shutter_deg: float | None = None, exposure_s: 
 class Camera:
     """One camera in one mode. ``readout_s`` is None where it is unknown, 0 for a global shutter, negative bottom-up.
 
-    ``rows_each``: a row is the mean of so many rows of the sensor that open one after the other, as in a picture that
+    ``rows_each``: a row is the mean of this many rows of the sensor that open one after the other, as in a picture that
     was made smaller; its own time is their mean's.
     """
 

@@ -31,7 +31,7 @@ class MotionCost:
 
 
 def motion_cost(step_px: float) -> MotionCost:
-    """Return what motion by so many pixels from flash to flash costs; beyond the table, as at its end."""
+    """Return what motion by this many pixels from flash to flash costs; beyond the table, as at its end."""
 
     def at(values: tuple[float, ...]) -> float:
         return float(np.interp(np.log2(1 + step_px), np.log2(1 + np.array(STEPS_PX)), values))
@@ -46,7 +46,7 @@ def motion_cost(step_px: float) -> MotionCost:
 
 
 def cost_words(step_px: float) -> str:
-    """Return the cost of so many pixels from flash to flash in words, with alignment and without."""
+    """Return the cost of this many pixels from flash to flash in words, with alignment and without."""
     cost = motion_cost(step_px)
     return (
         f"about {100 * cost.lost:.0f} % of the normals there are lost (at worst {100 * cost.worst_lost:.0f} %), and "

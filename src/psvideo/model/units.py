@@ -18,7 +18,7 @@ def counted(count: int, thing: str) -> str:
 
 
 def show_seconds(seconds: float, *, figures: int = 4) -> str:
-    """Return a time as people write it, with so many figures.
+    """Return a time as people write it, with this many figures.
 
     >>> show_seconds(0.0008), show_seconds(0.000_05), show_seconds(1.5), show_seconds(0.000_157, figures=2)
     ('0.8 ms', '50 us', '1.5 s', '0.16 ms')

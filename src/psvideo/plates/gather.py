@@ -220,7 +220,7 @@ def _decode_ahead(take: Take, numbers: tuple[int, ...], watch: Watch) -> None:
 
 
 def _dark_slots_come_often(take: Take, timing: Timing) -> bool:
-    """Return whether there are dark slots, and no more than so many flashes between the complete ones that plates can
+    """Return whether there are dark slots, and no more than this many flashes between the complete ones that plates can
     wait for the next."""
     dark = [flash.index for flash in used_of(take, timing).flashes if flash.is_dark and flash.complete]
     planned = not all(flash.lit for flash in take.plan.flashes)

@@ -216,7 +216,7 @@ def _with_later_holes(timing: Timing, clip: Clip, window: tuple[int, ...]) -> Ti
 
 
 def _light_of(take: Take, count: int) -> list[FrameLight]:
-    """Measure about so many of a take's frames, spread over them."""
+    """Measure about this many of a take's frames, spread over them."""
     numbers = take.numbers[:: max(len(take.numbers) // count, 1)]
     return [frame_light(frame.image) for frame in read_frames(take.clip, numbers, kept=take.kept)]
 

@@ -118,7 +118,7 @@ def normals(
       second, exactly (a Fraction; whole or decimal numbers are taken as they are written), at most as many as the
       camera took. ``shutter``: the angle, up to 360 degrees of such a rate, for which a shutter is open in beauty and
       plates; surfaces are those of its middle. ``resync``: a clocks.json of several cameras (``sync_cameras``), which
-      then show the same instants of such a rate under the same numbers. ``denoise``: average up to so many results, 1
+      then show the same instants of such a rate under the same numbers. ``denoise``: average up to this many results, 1
       to 64, where nothing moves.
 
     What is written, into the folder ``out`` (float16 EXR sequences, numbered from ``start_number``):

@@ -30,8 +30,8 @@ def light_at(plates: Plates, step: int, seen: NDArray[np.bool_] | None) -> NDArr
 
 
 def around(light: NDArray[np.float64], count: int) -> NDArray[np.float64]:
-    """Return means over squares of so many rows and columns around every ``count``-th, (row, col, light): the light of
-    one distance adds up whatever the surface; -1 where less than half of it is known."""
+    """Return means over squares of this many rows and columns around every ``count``-th, (row, col, light): the light
+    of one distance adds up whatever the surface; -1 where less than half of it is known."""
     half, known = count // 2, light >= 0
     high, wide = (-(-size // count) for size in light.shape[:2])
     fill = [(half, high * count - light.shape[0]), (half, wide * count - light.shape[1]), (0, 0)]

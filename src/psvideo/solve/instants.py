@@ -158,7 +158,7 @@ def _unsure(one: Round, shares: Sequence[NDArray[np.float32]] | None) -> NDArray
 
 
 def denoised(instants: Iterable[Instant], results: int) -> Iterator[Instant]:
-    """Average every surface with those before it, up to so many ``results``, where nothing moves.
+    """Average every surface with those before it, up to this many ``results``, where nothing moves.
 
     An average begins with the block of ``results`` numbers before an instant's own, so that it depends on no others.
     """

@@ -28,7 +28,7 @@ SHOWN = np.ones((1, 1), np.bool_)
 MOST_SINCE = 255
 EACH_SLOT = 256
 IN_FILES_FROM = 1 << 22
-"""So many votes or values and more lie in files: every pixel of a clip that noise lets nobody trust would be held."""
+"""This many votes or values and more lie in files: every pixel of a clip that noise lets nobody trust would be held."""
 
 
 @dataclass(kw_only=True)
@@ -162,7 +162,7 @@ def _let_slots_go(held: Steady, slots: NDArray[np.int32]) -> None:
 
 
 def _moved(pool: Pool, kept: NDArray[np.intp], slots: int, spare: Path | None) -> Pool:
-    """Return a pool with room for so many slots, the first of which are another's ``kept`` ones, in rising order."""
+    """Return a pool with room for this many slots, the first of which are another's ``kept`` ones, in rising order."""
     room = _room(slots, pool.values.shape[1], spare)
     for first in range(0, len(kept), EACH_SLOT):
         some, into = kept[first : first + EACH_SLOT], slice(first, min(first + EACH_SLOT, len(kept)))

@@ -122,7 +122,7 @@ def trim_share(steps: Sequence[Slot], ppm: int) -> tuple[int, int]:
 
 
 def trim_refusal(steps: Sequence[Slot], caps: Capabilities, ppm: int) -> Refusal | None:
-    """Return why a controller does not make a cycle's steps longer (or shorter, below 0) by so many ppm."""
+    """Return why a controller does not make a cycle's steps longer (or shorter, below 0) by this many ppm."""
     if min(slot.dark for slot in steps) + trim_share(steps, ppm)[0] < 2 * caps.min_dark:
         return _refuse(Error.LIMIT, f"dark < 2 min_dark {2 * caps.min_dark}")
     ticks = cycle_ticks(steps) * abs(ppm) // PPM + 1

@@ -92,7 +92,7 @@ def _clear(link: Link) -> list[str]:
 
 
 def cycles_for(plan: Plan, *, seconds: float | None, rounds: int | None) -> int | None:
-    """Return how many whole cycles hold so many seconds, or rounds; None for a run until it is stopped."""
+    """Return how many whole cycles hold this many seconds, or rounds; None for a run until it is stopped."""
     if rounds is not None:
         return math.ceil(rounds / len(plan.dark_rounds))
     if seconds is not None:

@@ -80,7 +80,7 @@ def fit_stripes(profiles: FloatArray, frequency: float, *, most_harmonics: int =
 
 
 def _settle(profiles: FloatArray, frequency: float, harmonics: int, smooth: FloatArray) -> _Solution:
-    """Solve for so many harmonics."""
+    """Solve for this many harmonics."""
     rows = profiles.shape[2]
     lowest, highest = max(frequency - 1 / rows, 1 / rows), frequency + 1 / rows
     state = [start(frame, waves_of(rows, frequency, harmonics), smooth) for frame in profiles]

@@ -147,7 +147,7 @@ def parse_columns(text: str) -> tuple[int, int]:
 
 
 def parse_numbers(text: str, count: int, *, option: str, form: str) -> tuple[float, ...]:
-    """Return so many numbers in pixels from ``10,20,5``; the third of three is a length above 0.
+    """Return this many numbers in pixels from ``10,20,5``; the third of three is a length above 0.
 
     >>> parse_numbers("10,20,5", 3, option="--circle", form="x,y,radius")
     (10.0, 20.0, 5.0)

@@ -37,7 +37,7 @@ class AmbientChange:
 
     @classmethod
     def between(cls, old: Image, new: Image, both: NDArray[np.bool_], *, block: int) -> "AmbientChange":
-        """Compare two pictures in the rows that both show; they are means over blocks of so many pixels a side."""
+        """Compare two pictures in the rows that both show; they are means over blocks of this many pixels a side."""
         gain = _gain(old, new, both, block=block)
         width = max(NEIGHBOURHOOD_PX // block | 1, 3) if block > 1 else NEIGHBOURHOOD_PX
         before, now, factor = (picture.reshape(*old.shape[:2], -1) for picture in (old, new, gain))

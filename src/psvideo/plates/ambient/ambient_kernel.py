@@ -23,7 +23,7 @@ def measure_rows(
     mix: MixtureArrays, block: int, first: int, last: int, means: FloatArray, clipped: Flags, coarse: Floats
 ) -> None:
     """Fill of some rows of a picture, whole rows of blocks, the ``means`` (row,) and whether any sample is ``clipped``
-    (row,), and the means over blocks of so many pixels a side, ``coarse`` (row, col, channel) of blocks."""
+    (row,), and the means over blocks of this many pixels a side, ``coarse`` (row, col, channel) of blocks."""
     given, found = lent_mix(mix), lent(coarse)
     line, total = np.empty(given.samples, np.float32), np.zeros(given.samples, np.float32)
     for row in range(first, last):

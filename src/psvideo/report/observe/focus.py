@@ -13,14 +13,15 @@ SCALES_PX = ((0.0, 1.5, 1.0), (1.5, 4.0, 2.5), (4.0, 9.0, np.inf))
 """Blur before and after (standard deviations), and up to which result these two measure it: noise makes soft edges look
 sharper, so that they are compared once both pictures are smooth."""
 TILE = (15, 15)
-"""Edges are judged by what they are over so many pixels: single ones are at the mercy of noise."""
+"""Edges are judged by what they are over this many pixels: single ones are at the mercy of noise."""
 LEAST_EDGES = 40
 SHARPEST = 0.1
 NOISE_FACTOR = 8.0
 LARGEST_PX = 1600
 """Wider pictures are judged by their middle: defocus must not be averaged away."""
 SQUARE_PX, SQUARES = 160, 12
-"""Of larger pictures, so many squares are looked at closely: those with the steepest edges, seen every fourth pixel."""
+"""Of larger pictures, this many squares are looked at closely: those with the steepest edges, seen every fourth
+pixel."""
 COARSE = 4
 EACH = 4
 """Noise is the median over every so many rows and columns: it varies by less than a hundredth."""

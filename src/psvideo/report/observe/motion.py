@@ -23,7 +23,7 @@ FASTEST = 0.95
 RETURN_PX = 0.7
 EXPLAINED, DETAIL_PX, SHADING_CODES = 0.7, 9, 12.0
 """... and what changed is explained where plates differ along the flow by less than this share of what they do at rest,
-over so many pixels: flow that fits by chance leads there and back as well. Less than the last may be shading that
+over this many pixels: flow that fits by chance leads there and back as well. Less than the last may be shading that
 turns."""
 FOLLOWED = 0.3
 """Where there and back meet for less than this share of what changed, or explain less of it, flow gives no speed."""

@@ -22,22 +22,24 @@ BLUR_PX = 1.5
 BY_CHANCE = 3.0
 """Standard errors by which noise may disagree."""
 WIDER, CLEAR = (2, 4, 8), 0.3
-"""Slopes that agree less than the second are smoothed so much wider as long as noise explains it."""
+"""Slopes that agree less than the second are smoothed this much wider as long as noise explains it."""
 NOISE_LEFT, MORE = 1 / 16, 1.5
-"""Noise keeps so much of its square each time. Where a surface's own slopes agree (or, under mirrored lights, disagree)
-and noise hides it, that is the surface's share, and what is left is at most that and so much of the rest: what leaves
-1.5 times more is a shape that wrong lights made. What is noise to the end (a wall, a box's faces) says nothing."""
+"""Noise keeps this much of its square each time. Where a surface's own slopes agree (or, under mirrored lights,
+disagree) and noise hides it, that is the surface's share, and what is left is at most that and this much of the rest:
+what leaves 1.5 times more is a shape that wrong lights made. What is noise to the end (a wall, a box's faces) says
+nothing."""
 FINEST = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32)
 """What is left of a picture beyond its slopes and bends: noise, of six times the standard error (Immerkaer 1996)."""
 TOO_MUCH = 30.0
-"""Where slopes turn by more than so many times the square that this noise makes of them, something else does: 430 times
-where paint shows through coloured lamps that are taken for white, 1 to 10 times on noisy walls, of mosaics too."""
+"""Where slopes turn by more than this many times the square that this noise makes of them, something
+else does: 430 times where paint shows through coloured lamps that are taken for white, 1 to 10 times on noisy walls, of
+mosaics too."""
 NORMAL_MEDIAN = 0.6745
 """The median distance from the mean of what is distributed normally, in standard deviations."""
 AWAY = -0.1
 """Normals whose z is below this face away from the camera: noise at an outline does less."""
 LEAST_AVERAGED = 3
-"""Of so many rows and columns, evenly, the mean of a larger square is taken."""
+"""Of this many rows and columns, evenly, the mean of a larger square is taken."""
 
 
 class Averaged(NamedTuple):

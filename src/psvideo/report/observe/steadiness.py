@@ -14,7 +14,7 @@ MOST_TURNED_DEG = 5.0
 """Where the mean normal of a neighbourhood turns by more than this from one result to the next, something moved."""
 WINDOW = 5
 ENOUGH = 8192
-"""Medians are taken over so many pixels, spread evenly: more would not change them."""
+"""Medians are taken over this many pixels, spread evenly: more would not change them."""
 
 Values = NDArray[np.float32]
 

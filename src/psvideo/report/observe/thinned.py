@@ -10,7 +10,7 @@ from psvideo.model.surface import Surface
 
 LEAST_STEP = 4
 ENOUGH = 16_384
-"""So many pixels of a picture: a share is then known to 0.4 % and better, and a take costs the same at any size."""
+"""This many pixels of a picture: a share is then known to 0.4 % and better, and a take costs the same at any size."""
 
 
 def step_of(rows: int, cols: int) -> int:

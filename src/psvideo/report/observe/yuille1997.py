@@ -29,9 +29,9 @@ CREASE = 0.25
 """Normals that turn by more radians from pixel to pixel show a crease, or one thing before another."""
 BESIDE_PX = 7
 CLEAR = 32.0
-"""A point counts where its normals turn by so many times the square that noise makes of them."""
+"""A point counts where its normals turn by this many times the square that noise makes of them."""
 OUTLIER = 2.0
-"""Residuals are taken for Cauchy's, so many times their median wide."""
+"""Residuals are taken for Cauchy's, this many times their median wide."""
 ROUNDS, ENOUGH, SHIFTS = 30, 1e-4, 2
 LEAST_TOLD = 0.02
 """Changes of which points show so little (eigenvalues, each unknown's size apart) are taken for none: a cylinder, waves

@@ -47,7 +47,7 @@ def calibrate_takes(
     - ``calibration``: which. ``pictures``: in the order in which they were shot, each a folder of stills or of plates,
       or a clip, with one place of the sphere. ``options`` are those of the calibration.
     - ``out``: the folder; rigs (and pictures) are named after the takes. ``force`` replaces those that exist.
-    - ``workers``: so many processes on this computer; ``scheduler``: the workers of a dask cluster, by its address;
+    - ``workers``: this many processes on this computer; ``scheduler``: the workers of a dask cluster, by its address;
       both need the extra ``psvideo[dask]``. With neither, one take is measured after the other here.
 
     Returns what became of every take, the worst first: one that cannot be measured does not keep the others. A light

@@ -40,7 +40,7 @@ a part of every frame."""
 
 
 def cut(numbers: range, count: int) -> tuple[range, ...]:
-    """Return a range in so many pieces, as equal as they come; fewer where there are not so many numbers.
+    """Return a range in this many pieces, as equal as they come; fewer where there are not this many numbers.
 
     >>> cut(range(1001, 1008), 3)
     (range(1001, 1003), range(1003, 1005), range(1005, 1008))
@@ -51,7 +51,8 @@ def cut(numbers: range, count: int) -> tuple[range, ...]:
 
 
 def piece_named(text: str, numbers: range) -> range:
-    """Return the range that a word such as ``3/10`` names, the third of ten; empty where there are not so many numbers.
+    """Return the range that a word such as ``3/10`` names, the third of ten; empty where there are not this many
+    numbers.
 
     ``0/10`` names none of them. Raises UsageError for other words.
     """

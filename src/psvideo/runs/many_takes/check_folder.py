@@ -40,7 +40,7 @@ def check_takes(
 ) -> Iterator[Check | Unread]:
     """Check takes one after the other, or several at a time; one that cannot be read does not keep the others.
 
-    ``report`` is a page (HTML) of all checks, outside of the takes. ``workers`` checks with so many processes on this
+    ``report`` is a page (HTML) of all checks, outside of the takes. ``workers`` checks with this many processes on this
     computer, ``scheduler`` with the workers of a dask cluster, by its address, which see the same files under the same
     paths: takes come as they are done, and both need the extra ``psvideo[dask]``. ``watch`` is handed the loop over
     takes that are shared out; the other parameters are those of ``check``. Raises UsageError where the report would

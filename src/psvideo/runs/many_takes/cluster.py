@@ -43,7 +43,7 @@ LOGGERS = ("distributed", "tornado", "tornado.application", "asyncio")
 
 @dataclass(frozen=True, kw_only=True)
 class Cluster:
-    """Where work goes: to so many processes here, or to the workers of the scheduler at an address."""
+    """Where work goes: to this many processes here, or to the workers of the scheduler at an address."""
 
     workers: int | None = None
     scheduler: str | None = None

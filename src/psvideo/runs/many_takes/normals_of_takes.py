@@ -39,7 +39,7 @@ def normals_of_takes(
 
     - ``clips``: one, whose results go into ``out``; or several, whose results go into folders of ``out`` that are
       named after them, with one report over all, ``report.html``.
-    - ``workers``: so many processes on this computer; ``scheduler``: the workers of a dask cluster, by its address,
+    - ``workers``: this many processes on this computer; ``scheduler``: the workers of a dask cluster, by its address,
       such as ``"tcp://HOST:8786"``, which see the same files under the same paths. Both need the extra
       ``psvideo[dask]``. With neither, one take is solved after the other here. ``pieces``: into how many a take is cut
       (left out: by its length). ``piece`` is refused: it belongs to ``normals``.
@@ -105,7 +105,7 @@ def normals_of_takes(
 
 @dataclass(frozen=True, kw_only=True)
 class TakeInPieces:
-    """A take to be solved in so many pieces, into ``out``, with the other ``options`` of ``normals``."""
+    """A take to be solved in this many pieces, into ``out``, with the other ``options`` of ``normals``."""
 
     clip: Path
     out: Path

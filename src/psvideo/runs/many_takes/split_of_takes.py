@@ -31,7 +31,7 @@ def split_of_takes(
 
     - ``clips``: one, whose plates go into ``out``; or several, whose plates go into folders of ``out`` that are named
       after them, with one report over all, ``report.html``.
-    - ``workers``: so many processes on this computer; ``scheduler``: the workers of a dask cluster, by its address,
+    - ``workers``: this many processes on this computer; ``scheduler``: the workers of a dask cluster, by its address,
       such as ``"tcp://HOST:8786"``, which see the same files under the same paths. Both need the extra
       ``psvideo[dask]``. With neither, one take is split after the other here.
     - ``force``, ``resume`` and all other ``options`` are those of ``split``. Takes that are done already are left as

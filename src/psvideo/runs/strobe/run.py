@@ -58,7 +58,7 @@ def run(
     """Play a plan until it is stopped (Ctrl-C), or for a time; in every case the lights are dark afterwards.
 
     ``plan`` is a plan.toml. ``port`` is "auto" (by USB identity), a serial port, a pseudo-terminal,
-    ``socket://host:port``, or "emulated", then of the kind ``board``. The run stops after so many ``seconds``, or
+    ``socket://host:port``, or "emulated", then of the kind ``board``. The run stops after this many ``seconds``, or
     ``rounds``, rounded up to whole cycles. ``line`` wires lights to lines by name; lights that it leaves out take the
     free lines in the plan's order. ``wiring`` is "gated" or "direct", left out: the board's own. ``log`` is the
     strobe.json to write; ``force`` replaces one.

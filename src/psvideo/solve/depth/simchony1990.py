@@ -50,6 +50,6 @@ def _divergence(slopes: Slopes) -> FloatArray:
 
 
 def _eigenvalues(count: int) -> FloatArray:
-    """The second difference's eigenvalues with free ends, for a row of so many pixels."""
+    """The second difference's eigenvalues with free ends, for a row of this many pixels."""
     values: FloatArray = 2.0 * np.cos(np.pi * np.arange(count) / count) - 2.0
     return values

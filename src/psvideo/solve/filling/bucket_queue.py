@@ -25,7 +25,7 @@ class Queue(NamedTuple):
 
 
 def queue_for(pixels: int) -> Queue:
-    """Return a queue that holds so many pixels."""
+    """Return a queue that holds this many pixels."""
     return Queue(
         heads=np.full(BUCKETS, NONE, np.int32),
         following=np.full(pixels, NONE, np.int32),

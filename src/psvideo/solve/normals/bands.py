@@ -20,9 +20,9 @@ BAND_PIXELS = 1 << 16
 """Pixels of one band; fewer are solved before a thread has started."""
 MADE_SAMPLES, LEAST_MADE_ROWS = 1 << 18, 8
 """Samples of the plates that are made at a time, of all lights: they stay in a core's second cache beside what is read
-and written; but so many rows, since every call costs something."""
+and written; but this many rows, since every call costs something."""
 BANDS_ROWS = 128
-"""A thread makes and solves about so many rows one after another, in the same memory."""
+"""A thread makes and solves about this many rows one after another, in the same memory."""
 
 
 def check_arrays(plates: Sequence[Samples], lit: Illumination, seen: Mask | None, mask: Mask | None) -> None:

@@ -18,34 +18,34 @@ from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.task import Floats, Samples
 
 GRID_PX = 480
-"""The grid has at most so many points along the longer side."""
+"""The grid has at most this many points along the longer side."""
 TORN, NEAR = 5, 9
-"""Slopes are added up along the edges of squares of so many points, averaged over those of the second."""
+"""Slopes are added up along the edges of squares of this many points, averaged over those of the second."""
 AROUND, FAR_AROUND, LEAST_AROUND = 0.1, 0.5, 7
 """The rest is looked at around a point, over such shares of the subject's size (the root of its points), whatever the
-picture's, and over no less than so many points: their residuals are of noise as well."""
+picture's, and over no less than this many points: their residuals are of noise as well."""
 LEAST_FACING, MOST_TORN = np.float32(0.25), np.float32(0.5)
-"""Slopes are those of normals that face the camera at least so much; and around four points they count up to so much,
-since where one thing is before another they say nothing of either."""
+"""Slopes are those of normals that face the camera at least this much; and around four points they count up to this
+much, since where one thing is before another they say nothing of either."""
 TORN_OF_NOISE = np.float32(0.35)
 """How much of what noise does to a normal shows in slopes added up: 0.27 on nothing but noise, and a margin."""
 MOST_FIT_DEG = np.float32(24)
 """What residuals predict counts as no more around a point: a line of rows that went wrong is not its surroundings."""
 OUTLYING, TURNS, LEAST_LEVEL_DEG = np.float32(1.5), 4, np.float32(0.05)
-"""What is around counts up to so many times its typical size, found in so many turns: edges of shadows and creases are
-their own, and of no more than a few of the points."""
+"""What is around counts up to this many times its typical size, found in this many turns: edges of shadows and creases
+are their own, and of no more than a few of the points."""
 CERTAIN = np.float32(1)
-"""... beyond so many standard errors of the mean square that noise makes of so few."""
+"""... beyond this many standard errors of the mean square that noise makes of so few."""
 UNSURE_OF_NOISE = np.float32(1.2)
 """Noise is known to a tenth, and its square to a fifth: what is less beyond it is no misfit."""
 LEAST_REACH = np.float32(0.2)
 """Where fewer lights reach, residuals of noise predict more: as if no less than this share of them did."""
 MOVING_DEG, OF_MOTION = np.float32(0.5), 5
-"""Where motion turns normals by more, over so many points, residuals are its own, and no misfit of rig or surface."""
+"""Where motion turns normals by more, over this many points, residuals are its own, and no misfit of rig or surface."""
 ENOUGH_LIGHTS = 12
-"""What ``hidden`` is measured by: so many lights hide little of what is not matte."""
+"""What ``hidden`` is measured by: this many lights hide little of what is not matte."""
 LEAST_LIGHTS = 0.02
-"""So many lights that do not reach a point, in the mean, must there be for light from around to be known."""
+"""Light from around is known where at least this many lights, in the mean, do not reach a point."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,7 +54,7 @@ class Doubting:
 
     misfit_deg, misfit_power, little_deg: the error m that residuals around predict beyond noise counts as
         m^(1 + power) / (m + little) of these degrees: where it is little it is noise.
-    own: what a pixel's own residuals predict counts from so many times m on, wholly: a shadow's edge or a highlight.
+    own: what a pixel's own residuals predict counts from this many times m on, wholly: a shadow's edge or a highlight.
     few_power: the more so the fewer lights there are: with this power of how much more of what is not matte they hide,
         because a normal and an albedo follow it.
     indirect: how much of the angle counts by which light from around would turn the normal.
@@ -83,7 +83,7 @@ class Doubting:
 class Signs:
     """What is looked for, (row, col) of the points, in degrees: what residuals predict beyond noise, by which angle
     light from around would turn the normal, by which normals around belong to no surface, and what noise makes more
-    where some lights are not used. ``hidden``: so many times more than ENOUGH_LIGHTS do these hide of what is not
+    where some lights are not used. ``hidden``: how many times more than ENOUGH_LIGHTS these hide of what is not
     matte."""
 
     misfit_deg: Floats

@@ -24,7 +24,7 @@ SIGMA_OF_MEDIAN = np.float32(1.4826)  # of Gaussian noise
 
 
 def exchanges(count: int) -> Iterator[tuple[int, int]]:
-    """Yield the places to compare and exchange that bring so many numbers into rising order.
+    """Yield the places to compare and exchange that bring this many numbers into rising order.
 
     K. E. Batcher's merge exchange (D. E. Knuth, TAOCP 3, 5.2.2, algorithm M): 26 of nine, one more than the best known.
 

@@ -38,9 +38,9 @@ class Judging:
 
     most_error_deg: a normal is trusted where its predicted error is at most this: of such normals at most one in forty
         is off by more than 10 degrees, under 5 to 8 lights one in twenty.
-    fit_noise: so many times what noise makes do residuals predict of nothing but noise. (Robust solving corrects them
+    fit_noise: this many times what noise makes do residuals predict of nothing but noise. (Robust solving corrects them
         for few lights, where what is not matte does not average out.)
-    held: so many standard deviations hold 68 % of two-dimensional Gaussian errors (1.07, and some doubt).
+    held: this many standard deviations hold 68 % of two-dimensional Gaussian errors (1.07, and some doubt).
     least_share: of the light, the least that any camera, lens and lamp is off by.
     doubting, moving: what may turn normals beyond that, and where things move.
     """
@@ -55,10 +55,10 @@ class Judging:
 
 NOTHING, NO_DOUBT = np.zeros((0, 0), np.float32), np.zeros((2, 0, 0), np.float32)
 MANY_LIGHTS = 8
-"""Beyond so many lights residuals are not taken to average out."""
+"""Beyond this many lights residuals are not taken to average out."""
 MOST_USUAL_DEG = 30.0
 SURE = 2.0
-"""In a single pixel residuals count from so many times what noise makes of them."""
+"""In a single pixel residuals count from this many times what noise makes of them."""
 
 
 def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging = Judging()) -> Surface:

@@ -14,12 +14,12 @@ from psvideo.solve.normals.task import Floats, Mask
 MOST_DEG = np.float32(180)
 """What turns a normal by more is no angle: nothing is known of its plates."""
 SOLVED = 3
-"""So many lights are explained by a normal and an albedo, whatever they show."""
+"""This many lights are explained by a normal and an albedo, whatever they show."""
 MATTE = 0.03
-"""Surfaces that stand still leave so much of a light that is not noise, as a share of albedo: they are not quite matte,
-and rigs are a little off."""
+"""Surfaces that stand still leave this much of a light that is not noise, as a share of albedo: they are not quite
+matte, and rigs are a little off."""
 BESIDE = (3, 3)
-"""What normals leave is averaged over so many points, for noise leaves next to nothing here and there."""
+"""What normals leave is averaged over this many points, for noise leaves next to nothing here and there."""
 EXPLAINED = np.float32(0.05)
 """What nobody knows of plates is known after all where it is less likely than this that they are off."""
 MOST_ODDS, LEAST = np.float32(30), np.float32(1e-6)

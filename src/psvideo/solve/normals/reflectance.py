@@ -25,20 +25,20 @@ Values = NDArray[np.float64]
 LEAST_LIGHTS = 6
 """Five measurements leave two residuals: too few to tell a highlight from a normal (a photographed ball got worse)."""
 ROWS, POINTS, FEWEST, MEASUREMENTS = 24, 400, 200, 4800
-"""The model is fitted to so many points of so many rows, to fewer under many lights."""
+"""The model is fitted to this many points of this many rows, to fewer under many lights."""
 LEAST_POINTS = 50
 LEAST_EXPLAINED = 0.1
-"""The model is used where it explains so much of the squares of what is left over. Of a matte subject it explains 0.01,
-of one under lights whose directions are wrong up to 0.07."""
+"""The model is used where it explains this much of the squares of what is left over. Of a matte subject it explains
+0.01, of one under lights whose directions are wrong up to 0.07."""
 ALTERNATIONS, SOLVED_AGAIN, REWEIGHTED = 4, 3, 4
 """How often model and normals follow each other, steps of the normals each time, and of the model's weights."""
 HOPELESS = 0.02
 """What explains no more at the second time is not looked at again."""
 PRIOR, COUNTED = (0.07, 0.3, 0.3, 0.3), 300.0
-"""The model's numbers are near 0 to so much, beside the typical albedo, which counts as one of so many independent
+"""The model's numbers are near 0 to this much, beside the typical albedo, which counts as one of this many independent
 points."""
 POWERS, MOST_BRIGHT = np.array([BROAD, MIDDLE, NARROW], np.float64)[:, None, None], 5.0
-"""Of the darkest points highlights are taken for so many times the albedo at most, while the model is fitted."""
+"""Of the darkest points highlights are taken for this many times the albedo at most, while the model is fitted."""
 MOST_CURVE, MOST_LOBE = 0.6, 5.0
 MODEL_WIDTH, WIDTH = 2.0, 0.6
 """Cauchy's width in standard deviations: of all residuals for the model, of a pixel's own for its normal."""

@@ -24,7 +24,7 @@ LEAST_BRIGHT = np.float32(0.55)  # of what is less, high powers are nothing, and
 _MATTE_X, _MATTE_Y, _MATTE_Z, _BEFORE, _AFTER, _SPREAD, HOLDS, _OLD_X, _OLD_Y, _OLD_Z = (BLOCK * k for k in range(10))
 _UNIT_X, _UNIT_Y, _UNIT_Z, _PER_SIZE, _GAIN, _SHINE = (BLOCK * k for k in range(10, 16))
 KEPT, OF_LIGHT = 16, 4
-"""Planes that ``reflecting`` keeps of a block: so many, then so many per light, its gradient and its shine."""
+"""Planes that ``reflecting`` keeps of a block: this many, then this many per light, its gradient and its shine."""
 _SOUND_SQUARED = np.float32(1e4)
 
 

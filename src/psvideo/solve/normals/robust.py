@@ -52,9 +52,9 @@ class Reweighting:
     noise: in units of sensor saturation.
     signal_noise: as a share of the pixel's albedo under one light, as lights and lenses are never known better.
     darkest, brightest: the shares of the measurements that the start leaves out.
-    contradiction: four measurements contradict each other beyond so many times the noise.
+    contradiction: four measurements contradict each other beyond this many times the noise.
     most_error_deg, beside_typical: a normal whose predicted standard error is larger than this is not valid, unless
-        that error is less than so many times what is typical of the picture.
+        that error is less than this many times what is typical of the picture.
     """
 
     rounds: int = 3
@@ -72,7 +72,7 @@ class Reweighting:
 MOST_TYPICAL_DEG = 30.0
 """However bad a picture is as a whole, beyond this no normal is valid."""
 SAMPLE_PIXELS = 1 << 16
-"""What is typical of a picture is looked for in about so many pixels: whole rows, evenly spread."""
+"""What is typical of a picture is looked for in about this many pixels: whole rows, evenly spread."""
 EVERYTHING_DEG = 179.0
 TUKEY_WIDTH = 4.685  # beside Cauchy's, as far as weights go: so wide, Tukey's keeps 95 % of what Gaussian noise holds
 

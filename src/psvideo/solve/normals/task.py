@@ -23,7 +23,7 @@ Indices = NDArray[np.uint32]
 PIXEL_CONDITION = 12.0  # beyond it, with the lights that shadow leaves, albedo begins to burst in real creases
 
 FEW = 9
-"""Up to so many distant lights a pixel's measurements stay in registers (``few_lights.py``)."""
+"""Up to this many distant lights a pixel's measurements stay in registers (``few_lights.py``)."""
 
 BROAD, MIDDLE, NARROW = 8, 32, 128
 """The powers of the cosine that are a subject's highlights (``reflectance.py``)."""
@@ -223,7 +223,7 @@ def _near(lit: Illumination, unit: float, copies: int) -> Near:
 
 
 def empty_result(pixels: int, channels: int, *, half: bool, residual: bool, spare: Path | None = None) -> Result:
-    """Return memory for the solution of so many pixels; of large pictures files in the folder ``spare``."""
+    """Return memory for the solution of this many pixels; of large pictures files in the folder ``spare``."""
     stored = np.uint16 if half else np.float32
     room = partial(planes_for, kind=stored, pixels=pixels, folder=spare)
     return Result(

@@ -95,7 +95,7 @@ def specular_of(
     """Return what plates hold beyond the diffuse model, summed with the lights' weights (row, col[, 3]), and with
     ``each`` that of every light by itself.
 
-    What noise may make is 0, and so is what was not measured. A clipped sample holds at least so much.
+    What noise may make is 0, and so is what was not measured. A clipped sample holds at least this much.
     """
     total = np.zeros(one.rows.shape, np.float32)
     parts = tuple(np.zeros(one.rows.shape, np.float16) for _ in weights) if each else ()

@@ -103,7 +103,7 @@ class Started(Reply):
 
 @dataclass(frozen=True, kw_only=True)
 class Trimmed(Reply):
-    """The steps behind the one that is played are longer (flashes come later) or shorter by so many ppm."""
+    """The steps behind the one that is played are longer (flashes come later) or shorter by this many ppm."""
 
     way: Way
     ppm: int

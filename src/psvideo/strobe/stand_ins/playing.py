@@ -41,7 +41,7 @@ class Trimming:
     _carried: int = 0
 
     def trim(self, ppm: int, *, step: int) -> None:
-        """Make the steps behind the next one longer by so many ppm, while ``step`` is played."""
+        """Make the steps behind the next one longer by this many ppm, while ``step`` is played."""
         self.before, self.ppm, self.since = self.ppm, ppm, step + 2
 
     def extra(self, step: int) -> int:
