@@ -13,12 +13,16 @@ LENS = Lens(width=190, height=190, focal=800.0)
 BALL = Ball(centre=(0.01, -0.006, -0.6), radius_m=0.045)
 LAMPS = [Lamp(direction=way) for way in ((0.3, 0.4, 0.87), (-0.5, 0.2, 0.84), (0.1, -0.4, 0.9))]
 WASHES = ((1.0, 0.5, 0.0), (0.5, -0.6, 0.3), (0.8, 0.0, -0.5))
+FLOOR = Panel(towards=(0.0, -1.0, -0.02), half_deg=(80.0, 80.0), brightness=0.03)
 WINDOW = Panel(towards=(1.0, 0.3, -0.6), half_deg=(6.0, 20.0), brightness=0.3)
 ROOMS = {
     "chrome before a bright wall": Room(wall=0.4, washes=WASHES, blur_px=1.2),
     "black glass before a bright wall, its rim fading": Room(wall=0.3, washes=WASHES, facing=0.05, blur_px=1.8),
     "a window along the rim, a stand that hides the foot": Room(
         wall=0.15, washes=WASHES, panels=(WINDOW,), stand=0.3, blur_px=1.0
+    ),
+    "a floor, whose horizon is mirrored just inside the rim": Room(
+        wall=0.15, washes=WASHES, panels=(FLOOR,), blur_px=0.8
     ),
     "an edge in the wall": Room(wall=0.1, washes=WASHES, step=(30.0, 1.0, 4.0), blur_px=0.8, noise=0.004),
 }
