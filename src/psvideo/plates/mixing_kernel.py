@@ -137,7 +137,7 @@ def mix_row(mix: MixtureArrays, row: int, out: Floats) -> int:
         factor = mix.coefficients[frame, row]
         if factor == np.float32(0):
             continue
-        codes, zero, gain = _row_of(mix, frame, row), mix.zero[frame, place, 0], mix.gain[frame, place, 0]
+        codes, zero, gain = row_of(mix, frame, row), mix.zero[frame, place, 0], mix.gain[frame, place, 0]
         limit, scale = mix.clips_from / gain + zero, factor * gain
         if mix.zero.shape[2] > 1:
             clipped = _add_pattern(mix, frame, place, codes, factor, out, begun)
@@ -154,7 +154,7 @@ def mix_row(mix: MixtureArrays, row: int, out: Floats) -> int:
                     mix.taken[level, row] * mix.step[level, row],
                     mix.taken[level, row] * mix.least[level, row],
                 )
-                _begin_with_level(codes, zero, scale, mix.most, _level_row(mix, level, row), share, least, out)
+                _begin_with_level(codes, zero, scale, mix.most, level_row(mix, level, row), share, least, out)
                 level = _next_level(mix, level + 1, row)
             else:
                 _begin_linear(codes, zero, scale, mix.most, out)
@@ -165,7 +165,7 @@ def mix_row(mix: MixtureArrays, row: int, out: Floats) -> int:
         return NOTHING
     while level < mix.levels.shape[0]:
         share, least = _share_of(mix, level, row)
-        _take_off(_level_row(mix, level, row), share, least, out)
+        _take_off(level_row(mix, level, row), share, least, out)
         level = _next_level(mix, level + 1, row)
     if holds_clipped:
         _mark_clipped(mix, row, out)
@@ -173,7 +173,8 @@ def mix_row(mix: MixtureArrays, row: int, out: Floats) -> int:
 
 
 @FUSED.inlined
-def _row_of(mix: MixtureArrays, frame: int, row: int) -> Any:
+def row_of(mix: MixtureArrays, frame: int, row: int) -> Any:
+    """A frame's row in its codes, read if it lies in a file."""
     end = (row + 1) * mix.samples
     if mix.files.opened.shape[0]:
         size = mix.samples * mix.like.itemsize
@@ -195,7 +196,8 @@ def _read(files: InFiles, opened: int, begin: int, size: int) -> None:
 
 
 @FUSED.inlined
-def _level_row(mix: MixtureArrays, level: int, row: int) -> Codes:
+def level_row(mix: MixtureArrays, level: int, row: int) -> Codes:
+    """A row of a level in its codes."""
     end = (row + 1) * mix.samples
     codes: Codes = carray(pointer(mix.levels[level], EMPTY), end)
     return codes[row * mix.samples : end]
@@ -314,7 +316,7 @@ def _mark_clipped(mix: MixtureArrays, row: int, out: Floats) -> None:
     rows, cols = mix.zero.shape[1:]
     for frame in range(mix.frames.shape[0]):
         if abs(mix.coefficients[frame, row]) > COUNTS:
-            codes = _row_of(mix, frame, row)
+            codes = row_of(mix, frame, row)
             for sample in range(mix.samples):
                 col = sample % cols
                 zero, gain = mix.zero[frame, row % rows, col], mix.gain[frame, row % rows, col]

@@ -1,11 +1,23 @@
 """The compiled loops that make small pictures of plates: every n-th row and column, or means over blocks of pixels."""
 
+from typing import Any
+
 import numpy as np
 from numba.np.numpy_support import carray
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import lent, pointer
-from psvideo.plates.mixing_kernel import CLIPPED, WHOLE, Floats, MixtureArrays, lent_mix, mix_row
+from psvideo.plates.mixing_kernel import (
+    CLIPPED,
+    WHOLE,
+    Floats,
+    InFiles,
+    MixtureArrays,
+    lent_mix,
+    level_row,
+    mix_row,
+    row_of,
+)
 
 HALF = np.float32(0.5)
 
@@ -17,11 +29,39 @@ def mix_thinned(mix: MixtureArrays, first: int, last: int, step: int, channels: 
     ``first`` and ``last`` count rows of ``out``.
     """
     given, made = lent_mix(mix), lent(out)
-    whole = np.empty(given.samples, np.float32)
+    if given.zero.shape[2] > 1:  # what a sample means depends on its column
+        whole = np.empty(given.samples, np.float32)
+        for row in range(first, last):
+            mix_row(given, step * row, whole)
+            _every(whole, made[row], step, channels)
+        return
+    count = made.shape[1]
+    codes = np.empty((given.frames.shape[0], count), given.like.dtype)
+    levels = np.empty((given.levels.shape[0], count), np.uint16)
+    thin = MixtureArrays(
+        np.empty_like(given.frames), given.like, count, given.coefficients, given.table, given.halves, given.zero,
+        given.gain, given.most, np.empty_like(given.levels), given.least, given.step, given.narrow, given.taken,
+        given.ceiling, given.clips_from, InFiles(given.files.opened[:0], 0, 0, given.files.missed),
+    )  # fmt: skip
     for row in range(first, last):
-        mix_row(given, step * row, whole)
-        for sample in range(made.shape[1]):
-            made[row, sample] = whole[sample // channels * step * channels + sample % channels]
+        at = step * row
+        for frame in range(given.frames.shape[0]):
+            if given.coefficients[frame, at] != np.float32(0):
+                _every(row_of(given, frame, at), codes[frame], step, channels)
+            thin.frames[frame] = codes.ctypes.data + (frame - at) * count * codes.itemsize
+        for level in range(given.levels.shape[0]):
+            if given.taken[level, at] != np.float32(0):
+                _every(level_row(given, level, at), levels[level], step, channels)
+            thin.levels[level] = levels.ctypes.data + (level - at) * count * levels.itemsize
+        mix_row(thin, at, made[row])
+
+
+@FUSED.inlined
+def _every(row: Any, out: Any, step: int, channels: int) -> None:
+    """Copy all channels of every ``step``-th pixel."""
+    for pixel in range(out.shape[0] // channels):
+        for channel in range(channels):
+            out[pixel * channels + channel] = row[pixel * step * channels + channel]
 
 
 @FUSED.kept

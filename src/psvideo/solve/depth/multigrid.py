@@ -42,7 +42,10 @@ class Level:
 
 @dataclass(frozen=True, kw_only=True)
 class Grids:
-    """A hierarchy, the finest first, with what conjugate gradients remember and two lines for the sweeps."""
+    """A hierarchy, the finest first, with what conjugate gradients remember and two lines for the sweeps.
+
+    ``spread`` lies where the finest grid's height does: of every row the step has taken that when it is spread.
+    """
 
     levels: list[Level]
     step: Board
@@ -74,8 +77,8 @@ def empty_grids(shape: tuple[int, int]) -> Grids:
             break
         shape = ((shape[0] + 1) // 2, (shape[1] + 1) // 2)
     line, sums = (np.zeros(levels[0].right.shape[2] + 2, np.float32) for _ in range(2))
-    step, spread, total = (empty_board(*finest) for _ in range(3))
-    return Grids(levels=levels, step=step, spread=spread, sum=total, line=line, sums=sums)
+    step, total = (empty_board(*finest) for _ in range(2))
+    return Grids(levels=levels, step=step, spread=levels[0].height, sum=total, line=line, sums=sums)
 
 
 def prepare(grids: Grids, pins: Board | None = None) -> bool:
