@@ -84,9 +84,12 @@ def _fine(plate: Samples | Mixture, black_level: float, scale: float, pixels: in
     part = rows_of(plate, (firsts + np.arange(3)[:, None]).ravel())
     part = part[..., min(1, plate.shape[2] - 1)] if len(plate.shape) == 3 else part
     count = len(firsts) * (cols - 2)
-    row, col = np.divmod(np.arange(0, count, max(count // pixels, 1)), cols - 2)
-    lines = part.reshape(3, len(firsts), cols)
-    around = (lines[:, row[:, None], col[:, None] + np.arange(3)].astype(np.float64) - black_level) * scale
+    each, lines = max(count // pixels, 1), part.reshape(3, len(firsts), cols)
+    around = np.empty((3, -(-count // each), 3))
+    for place in range(3):
+        around[..., place] = lines[:, :, place : cols - 2 + place].reshape(3, count)[:, ::each]
+    around -= black_level
+    around *= scale
     gaps = _gaps_of_codes(around)
     if gaps is not None:
         around += gaps * (np.random.default_rng(0).random(around.shape) - 0.5)
