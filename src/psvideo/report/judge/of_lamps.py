@@ -95,20 +95,10 @@ def _weak(
         )
     if relative.max() <= 0:  # nothing is lit, which is said once
         return
+    others = int((relative >= NOT_FIRING).sum())
     for light, share, is_dim, says in zip(lights, relative, dim, claimed, strict=True):
         if share < NOT_FIRING:
-            others = int((relative >= NOT_FIRING).sum())
-            enough = others >= LEAST_LIGHTS
-            yield Judgement(
-                subject="lights",
-                grade="doubtful" if enough else "bad",
-                found=f"The light {light!r} gives no light ({100 * max(share, 0):.1f} % of the strongest)"
-                + (f"; normals come from the other {others}." if enough else "."),
-                advice="Take the strobe out of step with the frames (see the line on rows): it may flash while the "
-                "shutter is closed."
-                if missed
-                else "Check its cable, driver and line, and that the plan names it as the board does.",
-            )
+            yield _no_light(light, share, others=others, missed=missed)
         elif is_dim and says >= WEAK_LIGHT:
             yield Judgement(
                 subject="lights",
@@ -124,6 +114,21 @@ def _weak(
                 found=f"The light {light!r} is weak: {100 * share:.0f} % of the strongest.",
                 advice="Raise its power or its flash duration, or move it nearer.",
             )
+
+
+def _no_light(light: str, share: float, *, others: int, missed: bool) -> Judgement:
+    """Say that a lamp does not fire, which is bad where too few others do; ``missed``: rows see it in no round."""
+    enough = others >= LEAST_LIGHTS
+    return Judgement(
+        subject="lights",
+        grade="doubtful" if enough else "bad",
+        found=f"The light {light!r} gives no light ({100 * max(share, 0):.1f} % of the strongest)"
+        + (f"; normals come from the other {others}." if enough else "."),
+        advice="Take the strobe out of step with the frames (see the line on rows): it may flash while the shutter is "
+        "closed."
+        if missed
+        else "Check its cable, driver and line, and that the plan names it as the board does.",
+    )
 
 
 def _missed(
