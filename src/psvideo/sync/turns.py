@@ -15,7 +15,7 @@ from psvideo.model.marker import alike_turns, turned_slot
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.profiles import Profiles, brightnesses, unexplained
-from psvideo.sync.rowfit.refine import CAUCHY, refine, row_noise
+from psvideo.sync.rowfit.refine import CAUCHY, refined_beat, row_noise
 
 TURN_ROWS = 48
 TURN_FRAMES = 400
@@ -88,7 +88,7 @@ def _aligned(plan: Plan, rows: Profiles, beat: Beat) -> Beat:
     """Let a turned clock fall into place: where flashes differ in length, they do not lie quite on one another."""
     if len({flash.duration_s for flash in plan.flashes}) == 1:
         return beat
-    return refine(plan, rows, beat, steps=4).beat
+    return refined_beat(plan, rows, beat, steps=4)
 
 
 def _beaten(gain: FloatArray) -> bool:

@@ -56,7 +56,9 @@ class Jitter:
         """Return by how much the flashes that start at these times come late, same shape; 0 for others."""
         if not len(self.start_s):
             return np.zeros_like(start_s)
-        nearest = np.abs(self.start_s[None, :] - start_s[:, None]).argmin(axis=1)
+        after = np.minimum(np.searchsorted(self.start_s, start_s), len(self.start_s) - 1)
+        before = np.maximum(after - 1, 0)
+        nearest = np.where(start_s - self.start_s[before] < self.start_s[after] - start_s, before, after)
         same = np.abs(self.start_s[nearest] - start_s) < 1e-7
         late_s: FloatArray = np.where(same, self.late_s[nearest], 0.0)
         return late_s

@@ -9,7 +9,20 @@ import numpy as np
 
 from psvideo.compute.compiled import EXACT
 from psvideo.model.camera import FloatArray
-from psvideo.sync.rowfit.row_model import LEFT, RIGHT, SIGNALS, Flashes, Rows, given_off, see, see_all, slopes, width
+from psvideo.sync.rowfit.row_model import (
+    BLUR,
+    LEFT,
+    RIGHT,
+    RISE,
+    SIGNALS,
+    Flashes,
+    Rows,
+    given_off,
+    see,
+    see_all,
+    slopes,
+    width,
+)
 from psvideo.sync.rowfit.whitening import factors, whiten, whiten_all
 
 RIDGE = 1e-6
@@ -138,6 +151,7 @@ def equations(
     cross = np.empty((SIGNALS, size))
     solved = np.empty(size)
     diagonal, below = np.empty(frames), np.empty(frames)
+    used = SIGNALS if tails and flashes.blur_s > 0.0 else BLUR if tails else RISE  # the others are 0 everywhere
     for row in range(first, last):
         k = 0
         for n in range(frames):
@@ -163,22 +177,22 @@ def equations(
             for n in range(begin, end):
                 for i in range(size):
                     if design[n, i] != 0.0:
-                        for p in range(SIGNALS):
+                        for p in range(used):
                             cross[p, i] += weight[n, row] * design[n, i] * signals[n, p]
-            for p in range(SIGNALS):
+            for p in range(used):
                 solve_factored(normal, cross[p], size)
             for n in range(begin, end):
                 explained = 0.0
                 for i in range(size):
                     if design[n, i] != 0.0:
                         explained += design[n, i] * right[i]
-                        for p in range(SIGNALS):
+                        for p in range(used):
                             signals[n, p] -= design[n, i] * cross[p, i]
                 rest[n, row] = value[n] - explained
                 error = rest[n, row]
                 if honest:
                     error /= np.sqrt(1.0 - leverage(normal, design[n], weight[n, row], size, solved))
-                for p in range(SIGNALS):
+                for p in range(used):
                     pull = weight[n, row] * signals[n, p]
                     score[n, p] += pull * error
                     for q in range(p + 1):

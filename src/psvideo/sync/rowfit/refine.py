@@ -1,7 +1,7 @@
 """Sharpening: robust Gauss-Newton steps on a clock that runs straight, the shutter's times with it where asked for."""
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -51,6 +51,15 @@ class Fit:
         return float((self.weight * self.rest**2).sum())
 
 
+class _Stepped(NamedTuple):
+    """Where robust steps end: the beat, what it leaves, and each sample's weight and the trust in it (frame, row)."""
+
+    beat: Beat
+    rest: FloatArray
+    weight: FloatArray
+    trust: FloatArray
+
+
 def refine(
     plan: Plan,
     rows: Profiles,
@@ -61,8 +70,36 @@ def refine(
     first_scale: float = FIRST_SCALE,
 ) -> Fit:
     """Fit shift and clock ratio, and the times named in ``free``, by steps that are taken only as far as they help."""
-    basis = _straight(rows, free)
-    unit_s = _units(plan, rows, beat, free)
+    beat, rest, weight, trust = _stepped(plan, rows, beat, free=free, steps=steps, first_scale=first_scale)
+    basis, unit_s = _straight(rows, free), _units(plan, rows, beat, free)
+    covariance = believable(plan, rows, beat, weight, trust, basis, prior(plan, rows, unit_s, free))
+    return Fit(
+        beat=beat,
+        rest=rest,
+        weight=weight,
+        shift_error_s=mean_error(basis[: len(rows.window_start) + 1], covariance),
+        errors_s={name: float(np.sqrt(covariance[2 + n, 2 + n])) for n, name in enumerate(free)},
+        explained=explained(rows, rest),
+    )
+
+
+def refined_beat(
+    plan: Plan,
+    rows: Profiles,
+    beat: Beat,
+    *,
+    free: tuple[str, ...] = (),
+    steps: int = 10,
+    first_scale: float = FIRST_SCALE,
+) -> Beat:
+    """Return the beat of ``refine``; errors, which cost as much as some of its steps, are not worked out."""
+    return _stepped(plan, rows, beat, free=free, steps=steps, first_scale=first_scale).beat
+
+
+def _stepped(
+    plan: Plan, rows: Profiles, beat: Beat, *, free: tuple[str, ...], steps: int, first_scale: float
+) -> _Stepped:
+    basis, unit_s = _straight(rows, free), _units(plan, rows, beat, free)
     rest = unexplained(plan, rows, beat)
     weight = trust = np.ones_like(rest)
     for step in range(steps):
@@ -74,15 +111,7 @@ def refine(
         beat, rest, gained = _step(plan, rows, beat, free, _held(plan, move, free), weight, rest)
         if step > 6 and (not gained or (np.abs(move) < 1e-5 * unit_s).all()):
             break
-    covariance = believable(plan, rows, beat, weight, trust, basis, prior(plan, rows, unit_s, free))
-    return Fit(
-        beat=beat,
-        rest=rest,
-        weight=weight,
-        shift_error_s=mean_error(basis[: len(rows.window_start) + 1], covariance),
-        errors_s={name: float(np.sqrt(covariance[2 + n, 2 + n])) for n, name in enumerate(free)},
-        explained=explained(rows, rest),
-    )
+    return _Stepped(beat, rest, weight, trust)
 
 
 def clearest(

@@ -9,7 +9,7 @@ from psvideo.model.camera import FloatArray
 from psvideo.model.plan import UNKNOWN_CLOCK_PPM, Plan
 from psvideo.sync.rowfit.beat import Beat, FoundClock
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
-from psvideo.sync.rowfit.refine import refine
+from psvideo.sync.rowfit.refine import refined_beat
 from psvideo.sync.rowfit.retime import Mask, Numbering, as_numbered, fold_frames, inserted, likeliest, stood_in, twins
 from psvideo.sync.rowfit.rounds_first import search_coded
 from psvideo.sync.rowfit.search import search
@@ -185,9 +185,9 @@ def seeded(plan: Plan, rows: Profiles, guess: Beat, range_ppm: float) -> tuple[B
         if place.loss > 1.5 * places[0].loss:
             continue
         part = (rows.turned() if place.beat.upward else rows).binned(SEED_ROWS)
-        fit = refine(plan, part, place.beat, free=free, steps=6)
-        slipped = abs(fit.beat.clock.offset_ppm) > SLIPPED * range_ppm
-        tried.append((0.0 if slipped else gain_of(part, unexplained(plan, part, fit.beat)), fit.beat))
+        beat = refined_beat(plan, part, place.beat, free=free, steps=6)
+        slipped = abs(beat.clock.offset_ppm) > SLIPPED * range_ppm
+        tried.append((0.0 if slipped else gain_of(part, unexplained(plan, part, beat)), beat))
     share, beat = max(tried, key=lambda pair: pair[0])
     return beat, share
 

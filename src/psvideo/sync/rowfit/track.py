@@ -13,7 +13,7 @@ from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.profiles import Profiles, brightnesses, predictions, unexplained
-from psvideo.sync.rowfit.refine import refine
+from psvideo.sync.rowfit.refine import refined_beat
 from psvideo.sync.rowfit.retime import Mask
 from psvideo.sync.rowfit.retime import twins as twin_frames
 from psvideo.sync.rowfit.row_model import IntArray
@@ -64,7 +64,7 @@ def track(plan: Plan, rows: Profiles, beat: Beat, seed: slice, *, memory: int) -
     """
     for _ in range(2):
         low, high = _anchor(plan, rows, beat, seed)
-        beat = refine(plan, rows.take(slice(low, high)), beat, steps=6, first_scale=0.1).beat
+        beat = refined_beat(plan, rows.take(slice(low, high)), beat, steps=6, first_scale=0.1)
     index = rows.index.copy()
     twins = twin_frames(rows)
     late = [_lateness(beat, beat, float(rows.frame_start_s[low:high].mean()))]
@@ -217,7 +217,7 @@ def _cheapest(table: FloatArray, twin: Mask) -> IntArray:
 def _sharpened(plan: Plan, rows: Profiles, now: Beat, base: Beat, frames: slice) -> tuple[Beat, tuple[float, float]]:
     """Fit the clock again to the latest frames, and return how late it is there against the base's clock."""
     part = rows.take(frames).one_window()
-    now = refine(plan, part, now, steps=2, first_scale=0.03).beat
+    now = refined_beat(plan, part, now, steps=2, first_scale=0.03)
     return now, _lateness(base, now, float(part.frame_start_s.mean()))
 
 

@@ -6,7 +6,7 @@ from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.course import too_many
 from psvideo.sync.rowfit.fit import ClipFit, find
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
-from psvideo.sync.rowfit.refine import freedom, refine, robust_loss
+from psvideo.sync.rowfit.refine import freedom, refined_beat, robust_loss
 from psvideo.sync.rowfit.seed import MISNAMED_PPM, gain_of
 from psvideo.sync.verdict.refusal import MOST_PPM
 from psvideo.sync.verdict.rivals import (
@@ -180,7 +180,7 @@ def flashes_differ(plan: Plan, found: ClipFit) -> bool:
         if other.dark_s <= 0:
             continue
         if tails_s > 0:  # which stood for some of the other length, and moved the flashes with them
-            moved = refine(other, rows, moved, steps=4, first_scale=0.1).beat
+            moved = refined_beat(other, rows, moved, steps=4, first_scale=0.1)
         if robust_loss(rows, unexplained(other, rows, moved), rest) < limit:
             return True
     return False
