@@ -91,7 +91,9 @@ def test_every_camera_is_found_by_its_own_name() -> None:
         assert find_model(mode.name) == find_model(mode.name.upper())
 
 
-@pytest.mark.parametrize("typed", ["Sony", "iPhone 99", "", "!!"])
+@pytest.mark.parametrize(
+    "typed", ["Sony", "iPhone 99", "", "!!", "Phone X", "iPhone X", "iPhone 7", "C300", "Huawei P30"]
+)
 def test_what_names_no_single_camera_is_not_guessed(typed: str) -> None:
     assert find_model(typed) == ()
 

@@ -138,7 +138,7 @@ def test_raw_picture_is_found_behind_a_thumbnail(tmp_path: Path) -> None:
 def test_cinema_dng_shows_its_time_code(tmp_path: Path) -> None:
     code = (0x23 | 0x40, 0x59, 0x34, 0x12, 0, 0, 0, 0)  # frames first, drop-frame flag set
     write_dng(tmp_path / "x.dng", mosaic(), [(51043, "B", 8, code, True)])
-    assert read_header("dng", tmp_path / "x.dng").time_code == "12:34:59:23"
+    assert read_header("dng", tmp_path / "x.dng").time_code == "12:34:59;23"
 
 
 @pytest.mark.parametrize("layout", [{}, {"tile": (32, 32)}, LOSSLESS_JPEG | {"rowsperstrip": 16}])

@@ -23,6 +23,7 @@ from psvideo.clip.decode.decoders import decode, opened, read_header
 from psvideo.clip.decode.exr_chunks import is_cut_short
 from psvideo.clip.record import PictureInFile
 from psvideo.errors import PsvideoError
+from psvideo.formats import exr_files
 
 Write = Callable[[Path, NDArray[Any]], None]
 RNG = np.random.default_rng(7)
@@ -260,6 +261,12 @@ def test_dpx_grey_of_ten_bits_is_filled_from_the_low_end(tmp_path: Path) -> None
 def test_dpx_shows_its_time_code(tmp_path: Path) -> None:
     write_dpx(16)(tmp_path / "x.dpx", random(16, 3))
     assert read_header("dpx", tmp_path / "x.dpx").time_code == "01:02:03:04"
+
+
+@pytest.mark.parametrize("code", ["01:00:59:23", "01:00:59;23"])
+def test_exr_shows_its_time_code_and_whether_it_drops_frames(tmp_path: Path, code: str) -> None:
+    exr_files.write_exr(tmp_path / "x.exr", {"Y": np.zeros((4, 5), np.float32)}, time_code=code)
+    assert read_header("exr", tmp_path / "x.exr").time_code == code
 
 
 @pytest.mark.parametrize("channels", [1, 3])

@@ -25,7 +25,7 @@ from psvideo.export.plate_files import write_flash, write_plate
 from psvideo.export.png_maps import decode_normals, encode_normals
 from psvideo.export.result_files import Delivery, is_written, write_surface
 from psvideo.export.space import Space, choose_space, placed
-from psvideo.export.tags import Tags
+from psvideo.export.tags import Tags, advanced
 from psvideo.export.usd.pose import read_pose
 from psvideo.formats.exr_files import Crop, write_exr
 from psvideo.formats.whole_folders import whole_folder
@@ -165,6 +165,22 @@ def test_a_time_code_is_counted_on_to_the_instant_where_it_can_be(tmp_path: Path
     assert (code.hours, code.minutes, code.seconds, code.frame) == (11, 0, 0, 1)  # type: ignore[attr-defined]
     assert replace(coded, first_time_code="10:59:59;22").time_code(1.0) is None
     assert TAGS.time_code(1.0) is None
+
+
+@pytest.mark.parametrize(
+    ("first", "frames", "then"),
+    [
+        ("01:00:59;29", 1, "01:01:00;02"),  # numbers 0 and 1 are left out at a minute's start
+        ("01:09:59;29", 1, "01:10:00;00"),  # but not at every tenth
+        ("00:00:00;00", 17982, "00:10:00;00"),  # ten minutes of 29.97 frames a second
+        ("00:00:00;00", 30 * 3600 - 108, "01:00:00;00"),
+        ("23:59:59;29", 1, "00:00:00;00"),
+        ("10:00:00.00", 1800, "10:01:00;02"),
+    ],
+)
+def test_drop_frame_codes_keep_to_the_clock(first: str, frames: int, then: str) -> None:
+    rate = Fraction(30000, 1001)
+    assert advanced(first, (frames + 0.5) / float(rate), rate) == then
 
 
 def test_a_crop_keeps_the_display_window(tmp_path: Path) -> None:

@@ -83,7 +83,8 @@ def _mode(row: dict[str, str]) -> CameraMode:
 def find_model(wanted: str) -> tuple[CameraMode, ...]:
     """Return all modes of the camera that is meant, or nothing where no single model is.
 
-    Case, spaces, hyphens, the make, ``Mark`` and Roman or Arabic numbers make no difference.
+    Case, spaces, hyphens, the make, ``Mark`` and Roman or Arabic numbers make no difference. Words in the middle may be
+    left out, and the last one not: an iPhone 7 is no iPhone 7 Plus, and has another readout.
 
     >>> {mode.name for mode in find_model("a7siii")}, find_model("sony")
     ({'Sony A7S III'}, ())
@@ -92,11 +93,18 @@ def find_model(wanted: str) -> tuple[CameraMode, ...]:
     by_name = _by_name()
     for names in (
         [name for name, modes in by_name.items() if key in _keys(modes[0])],
-        [name for name in by_name if words and all(word in _key(name) for word in words)],
+        [name for name in by_name if words and _says(words, name)],
     ):
         if len(names) == 1:
             return by_name[names[0]]
     return ()
+
+
+def _says(words: Sequence[str], name: str) -> bool:
+    """Return whether all words are words of a camera's name, its last among them; what stands in [] may be left out."""
+    whole, plain = _words(name), _words(name.partition("[")[0])
+    known = {"".join(whole[first:last]) for last in range(len(whole) + 1) for first in range(last)}
+    return all(word in known for word in words) and words[-1].endswith(plain[-1])
 
 
 def nearest_names(wanted: str, *, count: int = 4) -> tuple[str, ...]:

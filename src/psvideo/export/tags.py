@@ -12,9 +12,12 @@ from psvideo.errors import PsvideoError
 from psvideo.formats.exr_files import Attribute
 from psvideo.formats.paths import check_file
 
-CODE = re.compile(r"(\d\d):(\d\d):(\d\d):(\d\d)")
+CODE = re.compile(r"(\d\d):(\d\d):(\d\d)([:;.])(\d\d)")
 MOST_FRAMES = 30
 """EXR's time code counts at most 30 frames a second."""
+DROP_RATE, DROPPED = Fraction(30000, 1001), 2
+"""The rate at which drop-frame codes keep to the clock, and how many numbers they leave out at the start of each minute
+but every tenth (SMPTE ST 12-1)."""
 
 
 D65 = (0.3127, 0.3290)
@@ -90,12 +93,15 @@ def _has_time_code(fps: Fraction) -> bool:
 
 
 def advanced(code: str, time_s: float, fps: Fraction) -> str | None:
-    """Return the code of the frame that is exposed at ``time_s``; ``code`` is frame 0's, ``HH:MM:SS:FF``.
+    """Return the code of the frame that is exposed at ``time_s``; ``code`` is frame 0's, ``HH:MM:SS:FF``, drop-frame
+    with ``;`` or ``.`` before the frame.
 
-    None where that cannot be said: above 30 frames a second, and for drop-frame codes.
+    None where that cannot be said: above 30 frames a second, and for drop-frame codes at other rates than 29.97.
 
     >>> advanced("01:00:59:23", 2 / 24, Fraction(24))
     '01:01:00:01'
+    >>> advanced("01:00:59;29", 1.5 * 1001 / 30000, Fraction(30000, 1001))
+    '01:01:00;02'
     >>> advanced("01:00:59:23", 0.1, Fraction(120)) is None
     True
     """
@@ -103,7 +109,30 @@ def advanced(code: str, time_s: float, fps: Fraction) -> str | None:
     base = round(fps)
     if found is None or base > MOST_FRAMES:
         return None
-    hours, minutes, seconds, frame = map(int, found.groups())
-    total = ((hours * 60 + minutes) * 60 + seconds) * base + frame + int(time_s * fps + Fraction(1, 10**6))
-    seconds, frame = divmod(total, base)
-    return f"{seconds // 3600 % 24:02d}:{seconds // 60 % 60:02d}:{seconds % 60:02d}:{frame:02d}"
+    hours, minutes, seconds, frame = (int(found[part]) for part in (1, 2, 3, 5))
+    drop = found[4] != ":"
+    if drop and fps != DROP_RATE:
+        return None
+    frames = ((hours * 60 + minutes) * 60 + seconds) * base + frame
+    if drop:
+        frames -= _dropped_before(hours * 60 + minutes)
+    frames += int(time_s * fps + Fraction(1, 10**6))
+    if drop:
+        frames = _numbered(frames)
+    seconds, frame = divmod(frames, base)
+    mark = ";" if drop else ":"
+    return f"{seconds // 3600 % 24:02d}:{seconds // 60 % 60:02d}:{seconds % 60:02d}{mark}{frame:02d}"
+
+
+def _dropped_before(minutes: int) -> int:
+    """Return how many numbers of drop-frame codes are left out up to the start of a minute, its own among them."""
+    return DROPPED * (minutes - minutes // 10)
+
+
+def _numbered(frames: int) -> int:
+    """Return the number, at 30 a second, that a drop-frame code shows for the frame with this index from midnight."""
+    base = round(DROP_RATE)
+    minute, tens = 60 * base - DROPPED, 600 * base - _dropped_before(10)
+    whole, rest = divmod(frames, tens)
+    within = max(rest - DROPPED, 0) // minute  # the first minute of ten is longer: nothing is left out in it
+    return frames + DROPPED * (9 * whole + within)

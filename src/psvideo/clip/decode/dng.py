@@ -26,6 +26,7 @@ LINEARIZATION, BLACK_REPEAT, BLACK, BLACK_BY_COL, BLACK_BY_ROW, WHITE = range(50
 CROP_ORIGIN, CROP_SIZE, ACTIVE_AREA = 50719, 50720, 50829
 CFA_SIZE, CFA_PATTERN = 33421, 33422
 TIME_CODES = 51043
+DROP_FRAME = 0x40  # the flag in the byte that counts frames
 DECODED_BY_TIFFFILE = {1, 7, 8, 34892, 52546}  # not compressed; JPEG, lossless too; Deflate; lossy JPEG; JPEG XL
 
 
@@ -191,9 +192,13 @@ def _numbers(page: tifffile.TiffPage, code: int) -> list[float] | None:
 
 
 def _time_code(page: tifffile.TiffPage) -> str | None:
-    """Return the first of CinemaDNG's TimeCodes: SMPTE 12M decimal digits, frames first, flags in the high bits."""
+    """Return the first of CinemaDNG's TimeCodes: SMPTE 12M decimal digits, frames first, flags in the high bits.
+
+    ``;`` stands before the frame of a drop-frame code.
+    """
     packed = bytes(_tag(page, TIME_CODES) or b"")
     if len(packed) < 4:
         return None
     digits = [byte & mask for byte, mask in zip(packed, (0x3F, 0x7F, 0x7F, 0x3F), strict=False)]
-    return ":".join(f"{byte >> 4}{byte & 15}" for byte in reversed(digits))
+    frame, *rest = (f"{byte >> 4}{byte & 15}" for byte in digits)
+    return ":".join(reversed(rest)) + (";" if packed[0] & DROP_FRAME else ":") + frame

@@ -195,7 +195,8 @@ def _size(window: tuple[NDArray[np.int32], NDArray[np.int32]]) -> tuple[int, int
 def _time_code(code: Any) -> str | None:
     if code is None:
         return None
-    return f"{code.hours:02d}:{code.minutes:02d}:{code.seconds:02d}:{code.frame:02d}"
+    mark = ";" if code.dropFrame else ":"
+    return f"{code.hours:02d}:{code.minutes:02d}:{code.seconds:02d}{mark}{code.frame:02d}"
 
 
 def _in_display_window(codes: NDArray[Any], attributes: Any, head: Header) -> NDArray[Any]:
