@@ -219,8 +219,8 @@ def test_of_metal_the_surface_is_blamed_and_neither_the_rig_nor_the_curve(tmp_pa
     assert "rig does not fit" in doubted.findings[0]
 
 
-def save_exr(path: Path, light: Picture) -> None:
-    OpenEXR.File({"type": OpenEXR.scanlineimage}, {"Y": light.astype(np.float32)}).write(str(path))
+def save_exr(path: Path, light: Picture, depth: type = np.float32) -> None:
+    OpenEXR.File({"type": OpenEXR.scanlineimage}, {"Y": light.astype(depth)}).write(str(path))
 
 
 def test_developed_pictures_that_go_beyond_one_are_clipped_nowhere_below_their_brightest(tmp_path: Path) -> None:
@@ -232,6 +232,22 @@ def test_developed_pictures_that_go_beyond_one_are_clipped_nowhere_below_their_b
     assert error_deg(tmp_path / "out") < 1.0
     assert "They hold light up to 2.5" in remarks(report)
     assert not any("clip" in one for one in report.findings)
+
+
+@pytest.mark.parametrize(("times", "depth"), [(3.6, np.float16), (0.3, np.float32)])
+def test_a_mirrored_lamp_in_a_merged_picture_makes_the_rest_neither_dark_nor_clipped(
+    tmp_path: Path, times: float, depth: type
+) -> None:
+    folder = tmp_path / "photos"
+    folder.mkdir()
+    for name, light in zip(NAMES, lit(), strict=True):
+        picture = times * light
+        picture.flat[light.argmax()] = 30_000.0
+        save_exr(folder / f"{name}.exr", picture, depth)
+    report = ps.stills(folder, lights=listed(tmp_path / "lights.lp"), out=tmp_path / "out")
+    assert error_deg(tmp_path / "out") < 1.0
+    assert ("highlights beyond 10" in remarks(report)) == (times > 1)
+    assert not any("clip" in one or "dark" in one for one in report.findings)
 
 
 def with_exposures(folder: Path, pictures: Sequence[Picture], seconds: Sequence[float]) -> Path:

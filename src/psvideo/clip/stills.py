@@ -1,11 +1,14 @@
 """Still photographs, one per light, as a clip: no plan needed, in the order of the lights, whatever their names."""
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from psvideo.clip.decode.decoders import decode, read_header
 from psvideo.clip.folder import KINDS, RAWS
@@ -18,13 +21,19 @@ from psvideo.model.camera import Encoding
 from psvideo.model.plan import Plan
 from psvideo.model.turn import UPRIGHT
 
+HIGHLIGHTS_PERCENT, HIGHLIGHT = 0.1, 4.0
+"""Of a picture's samples the brightest share, and how much brighter than all others they may be and still count: light
+of a surface that shines broadly; a mirrored lamp is a thousand times as bright, and says nothing of a normal here."""
+BAND_ROWS, SAMPLED_PX = 256, 1 << 20
+"""Rows that are looked at together, and pixels that are enough to know a picture's brightest thousandth."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Photographs:
     """Pictures of one scene by one camera: their files, what kind they are, and what they say of themselves.
 
-    transfer: the name of the curve by which they are read; because: why. white: the brightest of floating-point
-    pictures that go beyond 1: developed or merged ones clip nowhere below.
+    transfer: the name of the curve by which they are read; because: why. white: where floating-point pictures that go
+    beyond 1 are taken to clip: developed or merged ones do not at 1; brightest: their brightest sample.
     """
 
     files: tuple[Path, ...]
@@ -34,6 +43,7 @@ class Photographs:
     transfer: str
     because: str
     white: float | None = None
+    brightest: float = 0.0
 
     @property
     def encoding(self) -> Encoding:
@@ -84,6 +94,7 @@ def look_at(files: Sequence[Path], *, transfer: str | None = None) -> Photograph
     name, because = (transfer, "as you say") if transfer else _transfer(files, kind, headers[0], stated)
     find_curve(name)
     header = headers[0] if headers[0].turn != UPRIGHT else replace(headers[0], turn=stated[0].turn)
+    white, brightest = _white_beyond(kind, files) if header.bits is None else (None, 0.0)
     return Photographs(
         files=tuple(files),
         kind=kind,
@@ -91,20 +102,35 @@ def look_at(files: Sequence[Path], *, transfer: str | None = None) -> Photograph
         stated=stated,
         transfer=name,
         because=because,
-        white=_white_beyond(kind, files) if header.bits is None else None,
+        white=white,
+        brightest=brightest,
     )
 
 
-def _white_beyond(kind: str, files: Sequence[Path]) -> float | None:
-    """Return the brightest sample of floating-point pictures where it is beyond 1, to three figures, upwards."""
-    brightest = 0.0
+def _white_beyond(kind: str, files: Sequence[Path]) -> tuple[float | None, float]:
+    """Return where floating-point pictures are taken to clip, None where that is 1, and their brightest sample.
+
+    That is their brightest, to three figures, upwards; what is much brighter than nearly all of the picture, as a
+    lamp's mirror image is, counts as clipped.
+    """
+    brightest = usual = 0.0
     for file in files:
         codes = np.asarray(decode(kind, file).codes)
-        brightest = max(brightest, float(codes[np.isfinite(codes)].max(initial=0)))
-    if brightest <= 1:
-        return None
-    step = 10.0 ** (np.floor(np.log10(brightest)) - 2)
-    return float(np.ceil(brightest / step) * step)
+        for first in range(0, len(codes), BAND_ROWS):
+            brightest = max(brightest, _highest(codes[first : first + BAND_ROWS], 100.0))
+        apart = max(math.isqrt(codes.shape[0] * codes.shape[1] // SAMPLED_PX), 1)
+        usual = max(usual, _highest(codes[::apart, ::apart], 100 - HIGHLIGHTS_PERCENT))
+    white = min(brightest, HIGHLIGHT * usual)
+    if white <= 1:
+        return None, brightest
+    step = 10.0 ** (np.floor(np.log10(white)) - 2)
+    return float(np.ceil(white / step) * step), brightest
+
+
+def _highest(codes: NDArray[Any], percent: float) -> float:
+    """Return a percentile of the samples that are numbers, 0 where none is."""
+    numbers = codes[np.isfinite(codes)].astype(np.float32)  # between halves a percentile overflows
+    return float(np.percentile(numbers, percent)) if numbers.size else 0.0
 
 
 def _stated(kind: str, file: Path) -> Stated:

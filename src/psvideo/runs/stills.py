@@ -278,10 +278,13 @@ def _scaled(rig: Rig, factors: np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 
 
 def _assumed(pictures: Photographs) -> str:
-    beyond = (
-        f" They hold light up to {pictures.white:.3g}: nothing below it is taken for clipped." if pictures.white else ""
-    )
-    return f"The pictures were read as {pictures.transfer!r}, {pictures.because}.{beyond}"
+    said = f"The pictures were read as {pictures.transfer!r}, {pictures.because}."
+    if pictures.white is None:
+        return said
+    if pictures.brightest <= pictures.white:
+        return f"{said} They hold light up to {pictures.white:.3g}: nothing below it counts as clipped."
+    most, white = pictures.brightest, pictures.white
+    return f"{said} They hold light up to {most:.3g}: highlights beyond {white:.3g} count as clipped."
 
 
 def _aside(pairs: Pairs) -> tuple[str, ...]:
