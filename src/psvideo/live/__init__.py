@@ -6,5 +6,5 @@
 ``genlock`` and ``holding`` trim the strobe to the camera. The picture: ``newest_round`` makes plates of the latest
 frames, ``smaller`` (``smaller_kernel``) and ``quality`` keep up with the camera, ``newest_pictures`` and
 ``page_server`` show it. While there is nothing to show: ``preparing``, ``waiting``. Beside it: ``watching``
-(verdicts) and ``ball_lights`` (a chrome ball), in a thread of their own (``beside``), ``status``.
+(verdicts) and ``ball_lights`` (a chrome ball), ``status``.
 """

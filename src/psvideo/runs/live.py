@@ -12,7 +12,6 @@ from psvideo.formats.rig_toml import format_rig, read_rig
 from psvideo.formats.timing_json import format_timing
 from psvideo.formats.whole_files import refuse_existing, write_text
 from psvideo.live.ball_lights import BallLights
-from psvideo.live.beside import beside
 from psvideo.live.chain import Chain, NewestRound
 from psvideo.live.history import timing_of
 from psvideo.live.lock import check_followed
@@ -182,13 +181,11 @@ def _page(
 
     ball = BallLights(rig=rig, found=use)
 
-    def look(newest: NewestRound) -> None:
-        watching.look(newest, smaller_plan(plan, newest.step))
-        ball.look(newest)
-
     def show(newest: NewestRound) -> None:
-        pictures.put(newest, timed_camera(smaller_plan(plan, newest.step), newest.timing))
-        looks(newest)
+        small = smaller_plan(plan, newest.step)
+        pictures.put(newest, timed_camera(small, newest.timing))
+        watching.look(newest, small)
+        ball.look(newest)
         shown(newest)
 
     running.shown, running.drawn_ages_s = show, pictures.drawn_ages_s
@@ -198,9 +195,8 @@ def _page(
 
     server = live_page(pictures, say, host=host, port=port, token=token, ball=ball.ask)
     try:
-        with beside(look) if source.paced else nullcontext(look) as looks:
-            opened(server.url)
-            yield
+        opened(server.url)
+        yield
     finally:
         server.close()
 
