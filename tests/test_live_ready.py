@@ -18,7 +18,12 @@ from psvideo.cli.app import main
 from psvideo.compute.compile_count import COMPILING, CompileCount, compiles_counted
 from psvideo.live.chain import Chain, LiveFrame
 from psvideo.live.preparing import compiling_words, prepared
+from psvideo.live.quality import first_quality
+from psvideo.live.running import Running
+from psvideo.live.source import LiveSource
+from psvideo.live.status import LiveStatus
 from psvideo.live.waiting import AGAIN_S, SILENT_S, Waiting
+from psvideo.model.coded import Coded, Tone
 from psvideo.model.plan import Plan
 from psvideo.runs.live import live
 from psvideo.synth import TrueClock, expose
@@ -157,3 +162,28 @@ def test_a_network_stream_that_is_silent_is_said_to_be_and_ctrl_c_ends_it_at_onc
         process.wait(timeout=30)
     assert time.monotonic() - began_s < ENDS_S
     assert "address and port" in said
+
+
+def test_one_late_result_of_a_second_is_late_though_most_are_not(make_plan: PlanMaker) -> None:
+    plan = make_plan()
+    kind = Coded(codes=np.zeros((2, 2), np.uint8), tone=Tone())
+    source = LiveSource(name="camera", plan=plan, frames=lambda: iter(()), kind=kind)
+    said: list[LiveStatus] = []
+    running = Running(
+        chain=Chain(plan=plan),
+        source=source,
+        quality=first_quality(64, 48, mosaic=False),
+        shown=lambda newest: None,
+        said=said.append,
+        drawn_ages_s=lambda since_s: [0.05, 0.06, 0.05, 0.31],
+    )
+    running.results = 4
+    running._made_s = [0.02] * 4
+    running._ages_s = [0.03, 0.04, 0.03, 0.28]
+    status = running._status(1.0, 1.0, (0, 0))
+    measured = running._measured(status)
+    assert status.age_s == pytest.approx(0.055)
+    assert status.oldest_s == 0.31
+    assert measured is not None
+    assert (measured.age_s, measured.made_age_s) == (0.31, 0.28)
+    assert measured.is_late

@@ -19,7 +19,7 @@ def check_filters(name: str | Path, header: Header, cfa: str | None, *, plan: st
     if cfa is not None and header.cfa is not None and header.cfa != cfa:
         raise PsvideoError(
             f"{name}: says that its colour filters are {header.cfa} from the top left pixel on, and {plan} says "
-            f"cfa = {cfa!r}. Leave cfa out of the plan, or write cfa = {header.cfa!r}."
+            f"cfa = {cfa!r}. Write cfa = {header.cfa!r} in the plan."
         )
 
 

@@ -12,7 +12,7 @@ from psvideo.plates.align.moving import Followed, Pair, window_of
 from psvideo.plates.align.own_means import own_mean
 
 WINDOW_PX = 3
-"""Plates are compared over so many pixels of their sketches: edges that come to lie beside each other are narrow."""
+"""Plates are compared over this many pixels of their sketches: edges that come to lie beside each other are narrow."""
 UNKNOWN = np.float32(1e4)
 """What nobody knows of a plate may be off by so much light: it turns a normal by more than any angle."""
 NOISE_FACTOR = 1.6
