@@ -227,3 +227,21 @@ def test_a_standing_bust_does_not_flicker(lights: int, level: float) -> None:
         turns[align] = max(float(turned_deg(a, b)[(source_of(a) > 1) & (source_of(b) > 1)].mean()) for a, b in pairs)
     assert flips["auto"] <= 0.1 < flips["none"]
     assert turns["auto"] <= 0.5 < turns["none"]
+
+
+def test_what_was_trusted_throughout_a_block_is_let_go_with_the_next() -> None:
+    doubted = some(POOLED_ROUNDS)
+    sure = replace(doubted[0], valid=np.ones(SHAPE, np.bool_), source=np.full(SHAPE, MEASURED, np.uint8))
+    held: Steady | None = None
+    for number, surface in enumerate([*doubted, *(3 * POOLED_ROUNDS) * [sure]]):
+        held = steadied(held, replace(surface, **copied(surface)), number, RESTS)
+        if number == POOLED_ROUNDS - 1:
+            assert held.used > 0
+    assert held is not None
+    assert held.used == 0
+
+
+def copied(one: Surface) -> dict[str, Any]:
+    """What a surface holds, in memory of its own: holding it steady writes into it."""
+    arrays = {name: getattr(one, name) for name in ("normals", "albedo", "valid", "error_deg", "source")}
+    return {name: None if array is None else array.copy() for name, array in arrays.items()}

@@ -22,6 +22,7 @@ from psvideo.report.judge import result, time
 from psvideo.report.judge.of_ambient import ambient
 from psvideo.report.judge.of_exposure import exposure as judge_exposure
 from psvideo.report.judge.of_lamps import lamps as judge_lamps
+from psvideo.report.judge.of_rig import _near as near_of
 from psvideo.report.judge.of_rig import rig as judge_rig
 from psvideo.report.judgement import Judgement, verdict_of
 from psvideo.report.observe.motion import glimpse, motion
@@ -625,6 +626,18 @@ def test_skin_that_bulges_is_not_taken_for_light_that_stands_near(seed: int) -> 
     assert fit.near.misfit < 0.8 * fit.misfit  # lamps would explain it, too
     assert fit.near.by_surface < fit.near.misfit
     assert not any("stand near" in line.found for line in rig_of(satin))
+
+
+@pytest.mark.parametrize(("by_surface", "named"), [(0.9, True), (0.5, False)])
+def test_lamps_are_said_to_stand_near_where_that_explains_more_than_the_surface_would(
+    by_surface: float, named: bool
+) -> None:
+    fit = Footage(shape="ball", lights=6, sheen=(0.8, 6), solved=True).observed(0).rig_fit
+    assert fit is not None
+    assert fit.near is not None
+    near = replace(fit.near, rise=0.5, misfit=0.6 * fit.misfit, by_surface=by_surface * fit.misfit)
+    found = near_of(replace(fit, near=near))
+    assert (found is not None) == named
 
 
 def test_a_dead_light_among_enough_others_is_named_and_left_out_and_the_rig_is_still_checked() -> None:
