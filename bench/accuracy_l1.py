@@ -3,7 +3,7 @@
 import numpy as np
 
 from bench.accuracy_measure import Case
-from psvideo.solve.normals.robust import USABLE
+from psvideo.solve.normals.robust.huber1981 import USABLE
 
 ROUNDS = 200
 

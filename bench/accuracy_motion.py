@@ -20,7 +20,7 @@ from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import made
 from psvideo.plates.sequence import Round
 from psvideo.solve.normals.illumination import Illumination
-from psvideo.solve.normals.woodham1980 import solve
+from psvideo.solve.normals.least_squares.woodham1980 import solve
 from psvideo.synth.lamps.true_flashes import TrueFlash
 from psvideo.synth.scene import Scene
 from psvideo.synth.stage import Stage, set_stage

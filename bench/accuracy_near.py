@@ -16,8 +16,8 @@ from psvideo.model.ground import ground_of
 from psvideo.model.rig import Light, Rig
 from psvideo.solve.depth import Shaping, View
 from psvideo.solve.near_surface import NearSurface, solve_near
-from psvideo.solve.normals import woodham1980
 from psvideo.solve.normals.illumination import Illumination, illumination
+from psvideo.solve.normals.least_squares import woodham1980
 
 SIZE, WIDTH_M, FAR_M = 128, 0.4, 1.6
 FOCAL_PX, MIDDLE = SIZE * FAR_M / WIDTH_M, (SIZE - 1) / 2

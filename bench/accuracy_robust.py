@@ -9,7 +9,8 @@ import numpy as np
 
 from bench.accuracy_l1 import l1_normals
 from bench.accuracy_measure import Accuracy, Case, angles_deg, described, errors_deg, gloss
-from psvideo.solve.normals import robust, woodham1980
+from psvideo.solve.normals.least_squares import woodham1980
+from psvideo.solve.normals.robust import huber1981
 
 CASES: tuple[tuple[str, tuple[int, ...], float, float], ...] = (
     ("8 lights", tuple(range(8)), 1.0, 0.0),
@@ -26,7 +27,7 @@ def rows() -> Iterator[Accuracy]:
     """Give every case, and the calibration of what is predicted."""
     cases = [(name, gloss(lights, scale=scale, noise=noise)) for name, lights, scale, noise in CASES]
     for name, case in cases:
-        plain, careful = woodham1980.solve(case.plates, case.lit), robust.solve(case.plates, case.lit)
+        plain, careful = woodham1980.solve(case.plates, case.lit), huber1981.solve(case.plates, case.lit)
         both = plain.valid & careful.valid
         before, after = errors_deg(plain, case, both), errors_deg(careful, case, both)
         yield Accuracy(
@@ -39,7 +40,7 @@ def rows() -> Iterator[Accuracy]:
 
 def _beside_l1(case: Case) -> Accuracy:
     """Robust solving beside the exact minimum of absolute residuals over the same usable measurements."""
-    careful = robust.solve(case.plates, case.lit)
+    careful = huber1981.solve(case.plates, case.lit)
     chosen = np.flatnonzero((careful.valid & case.mask).ravel())
     chosen = np.random.default_rng(2).choice(chosen, L1_PIXELS, replace=False)
     truth = case.truth.reshape(-1, 3)[chosen]
@@ -57,7 +58,7 @@ def _beside_l1(case: Case) -> Accuracy:
 
 def calibration(name: str, case: Case) -> Accuracy:
     """Predicted standard error against the true error of the valid pixels."""
-    surface = robust.solve(case.plates, case.lit)
+    surface = huber1981.solve(case.plates, case.lit)
     where = surface.valid & case.mask
     assert surface.error_deg is not None
     predicted, true = surface.error_deg[where], errors_deg(surface, case)

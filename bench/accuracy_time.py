@@ -11,8 +11,9 @@ import numpy as np
 
 from bench.accuracy_l1 import l1_normals
 from bench.accuracy_measure import Accuracy, Case, gloss
-from psvideo.solve.normals import robust, woodham1980
 from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.least_squares import woodham1980
+from psvideo.solve.normals.robust import huber1981
 
 ROWS, COLS, REPEATS, L1_PIXELS, CORES = 1080, 1920, 7, 2000, 2
 
@@ -23,7 +24,7 @@ def rows() -> Iterator[Accuracy]:
     codes = [(plate * 65535).astype(np.uint16) for plate in case.plates]
     plain_s, careful_s, numpy_s = _best_of(
         lambda: woodham1980.solve(codes, case.lit, scale=1 / 65535, half=True, residual=False),
-        lambda: robust.solve(codes, case.lit, scale=1 / 65535, half=True, residual=False),
+        lambda: huber1981.solve(codes, case.lit, scale=1 / 65535, half=True, residual=False),
         lambda: _numpy(codes, case.lit.directions),
     )
     pixels = np.random.default_rng(0).choice(ROWS * COLS, L1_PIXELS, replace=False)
@@ -34,7 +35,7 @@ def rows() -> Iterator[Accuracy]:
         "<= 80 ms", careful_s <= 0.08,
     )  # fmt: skip
     began = time.process_time()
-    robust.solve(codes, case.lit, scale=1 / 65535, half=True, residual=False, threads=1)
+    huber1981.solve(codes, case.lit, scale=1 / 65535, half=True, residual=False, threads=1)
     share_s = (time.process_time() - began) / CORES
     done = share_s <= 0.08
     yield Accuracy(f"robust, processor time / {CORES} cores", "", "", f"{1e3 * share_s:.0f} ms", "<= 80 ms", done)

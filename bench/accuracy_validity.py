@@ -21,10 +21,10 @@ from bench.accuracy_measure import (
     turned,
     washington,
 )
-from psvideo.solve.normals import robust
+from psvideo.solve.normals.robust import huber1981
 
 OWN_LIGHTS = {3: (0, 1, 2), 4: (0, 1, 2, 3), 5: (0, 2, 4, 5, 7), 8: tuple(range(8))}
-EVERYTHING = robust.Reweighting(most_error_deg=robust.EVERYTHING_DEG)
+EVERYTHING = huber1981.Reweighting(most_error_deg=huber1981.EVERYTHING_DEG)
 FAR_DEG = 10.0
 
 
@@ -52,9 +52,9 @@ def rows() -> Iterator[Accuracy]:
 
 def row(what: str, case: Case, *, met: float | None = 0.95, most_invalid: float | None = None) -> Accuracy:
     """Count the normals within 10°; ``met`` is the least share of the valid ones."""
-    usable = replace(robust.USABLE, dark_level=0.0005) if case.name.startswith("DiLiGenT") else robust.USABLE
-    careful = robust.solve(case.plates, case.lit, usable=usable)
-    solved = robust.solve(case.plates, case.lit, usable=usable, reweighting=EVERYTHING, misfit=careful.misfit)
+    usable = replace(huber1981.USABLE, dark_level=0.0005) if case.name.startswith("DiLiGenT") else huber1981.USABLE
+    careful = huber1981.solve(case.plates, case.lit, usable=usable)
+    solved = huber1981.solve(case.plates, case.lit, usable=usable, reweighting=EVERYTHING, misfit=careful.misfit)
     where = solved.valid & case.mask
     valid = careful.valid[where]
     typical = careful.misfit

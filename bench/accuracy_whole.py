@@ -23,8 +23,8 @@ from bench.accuracy_measure import (
     washington_sphere,
 )
 from psvideo.model.surface import MEASURED, NO_LIGHT, ONE_LIGHT, TWO_LIGHTS, Surface
-from psvideo.solve.normals import woodham1980
 from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.least_squares import woodham1980
 from psvideo.solve.normals.solving import Solving
 from psvideo.synth import read_scene
 from psvideo.synth.stage import set_stage

@@ -18,9 +18,10 @@ from psvideo.model.coded import Coded, Tone
 from psvideo.plates.ambient.ambient_level import AmbientLevel
 from psvideo.plates.mixture import Mixture
 from psvideo.solve.normals.illumination import Illumination
-from psvideo.solve.normals.kernel import solve_rows, working_memory
+from psvideo.solve.normals.least_squares.kernel import solve_rows
+from psvideo.solve.normals.least_squares.woodham1980 import solve
+from psvideo.solve.normals.loops.blocks import working_memory
 from psvideo.solve.normals.task import Usable, empty_result, task
-from psvideo.solve.normals.woodham1980 import solve
 
 ROWS, COLS = 1080, 1920
 PIXELS = ROWS * COLS

@@ -11,7 +11,8 @@ from bench.accuracy_measure import ROOT, SHARED_DATA, Case, angles_deg, diligent
 from psvideo.model.surface import Surface
 from psvideo.pictures.contact import Strip, Tile, sheet
 from psvideo.pictures.relighting import normal_colours, srgb
-from psvideo.solve.normals import robust, woodham1980
+from psvideo.solve.normals.least_squares import woodham1980
+from psvideo.solve.normals.robust import huber1981
 
 FULL_DEG = 10.0
 GREY = 110
@@ -20,7 +21,7 @@ GREY = 110
 def main() -> None:
     """Write the pictures; the ball's only where the real captures are."""
     case = gloss(noise=0.002)
-    plain, careful = woodham1980.solve(case.plates, case.lit), robust.solve(case.plates, case.lit)
+    plain, careful = woodham1980.solve(case.plates, case.lit), huber1981.solve(case.plates, case.lit)
     above = [
         Tile("one of eight plates", srgb(case.plates[4], exposure=1.5)),
         Tile("least squares", normal_colours(plain.normals)),
@@ -38,7 +39,7 @@ def main() -> None:
 def _ball(case: Case, name: str) -> Strip:
     plain = woodham1980.solve(case.plates, case.lit, usable=woodham1980.EVERYTHING)
     return _errors(
-        case, plain, robust.solve(case.plates, case.lit), f"Ball of DiLiGenT, {name}: errors, 0 to 10 degrees"
+        case, plain, huber1981.solve(case.plates, case.lit), f"Ball of DiLiGenT, {name}: errors, 0 to 10 degrees"
     )
 
 

@@ -18,9 +18,11 @@ from psvideo.compute.compiled import EXACT, FUSED, REORDERED, sources_digest
 from psvideo.plates.ambient import ambient_kernel
 from psvideo.runs.compiling import USUAL, SmallTake, run_small
 from psvideo.solve.filling import looking
-from psvideo.solve.normals import kernel, near_kernel, robust_kernel
 from psvideo.solve.normals.illumination import Illumination
-from psvideo.solve.normals.woodham1980 import solve
+from psvideo.solve.normals.least_squares import kernel
+from psvideo.solve.normals.least_squares.woodham1980 import solve
+from psvideo.solve.normals.loops import near_kernel
+from psvideo.solve.normals.robust import robust_kernel
 from psvideo.synth import read_scene
 
 SOURCE = Path(kernel.__file__).parents[2]
@@ -67,7 +69,7 @@ def test_the_arithmetic_is_as_it_says() -> None:
 def test_kept_code_depends_on_every_module_that_is_compiled_into_it() -> None:
     digests = {sources_digest(module) for module in (kernel, near_kernel, robust_kernel)}
     assert len(digests) == 3
-    for name in ("kernel", "near_kernel", "equations", "odd_of_four"):
+    for name in ("least_squares.kernel", "loops.near_kernel", "robust.equations", "robust.odd_of_four"):
         assert hasattr(importlib.import_module(f"psvideo.solve.normals.{name}"), "FUSED")
 
 

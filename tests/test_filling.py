@@ -8,9 +8,9 @@ from psvideo.model.coded import Coded, Tone
 from psvideo.model.surface import MEASURED, NO_LIGHT, ONE_LIGHT, TWO_LIGHTS, Surface
 from psvideo.plates.mixture import Mixture
 from psvideo.solve.filling.filled import filled
-from psvideo.solve.normals import woodham1980
 from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.least_squares import woodham1980
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.task import Usable
 

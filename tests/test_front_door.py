@@ -69,11 +69,11 @@ def test_a_room_of_the_same_name_does_not_take_a_functions_place() -> None:
 
 def test_a_module_in_a_room_of_the_same_name_is_imported_under_a_name_of_ones_own() -> None:
     script = """
-        import psvideo.solve.images as images, psvideo.solve.normals.woodham1980 as least_squares
+        import psvideo.solve.images as images, psvideo.solve.normals.least_squares.woodham1980 as least_squares
         import psvideo as ps, psvideo.sync.find as find, psvideo.solve.depth.view as imported_later
         print(images.__name__, least_squares.__name__, find.__name__, ps.solve.depth.view is imported_later)
     """
-    names = "psvideo.solve.images psvideo.solve.normals.woodham1980 psvideo.sync.find True"
+    names = "psvideo.solve.images psvideo.solve.normals.least_squares.woodham1980 psvideo.sync.find True"
     assert python(inspect.cleandoc(script)) == names
 
 

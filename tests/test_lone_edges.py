@@ -10,8 +10,8 @@ from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import made
 from psvideo.solve.normals.illumination import Illumination
-from psvideo.solve.normals.moving_doubt import moving_doubt_deg
 from psvideo.solve.normals.solving import Solving
+from psvideo.solve.normals.trust.moving_doubt import moving_doubt_deg
 
 ROWS, COLS, SIDE = 96, 128, 20
 LIGHTS = ("key", "left", "right")

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from psvideo.model.surface import Surface
-from psvideo.solve.normals.doubting import ThinSurface
 from psvideo.solve.normals.evidence import Evidence, Left
 from psvideo.solve.normals.illumination import Illumination
-from psvideo.solve.normals.moving_doubt import MOST_DEG, MovingDoubt, moved_deg, moving_doubt_deg
+from psvideo.solve.normals.trust.doubting import ThinSurface
+from psvideo.solve.normals.trust.moving_doubt import MOST_DEG, MovingDoubt, moved_deg, moving_doubt_deg
 
 SIDE = 96
 HOW = MovingDoubt()

@@ -23,11 +23,12 @@ from psvideo.model.surface import Surface
 from psvideo.solve import near_surface
 from psvideo.solve.depth import Shaping, View
 from psvideo.solve.near_surface import NearSurface, solve_near
-from psvideo.solve.normals import robust, woodham1980
 from psvideo.solve.normals.illumination import Illumination, illumination
-from psvideo.solve.normals.near_kernel import place_lights
-from psvideo.solve.normals.near_spread import near_spread
+from psvideo.solve.normals.least_squares import woodham1980
+from psvideo.solve.normals.loops.near_kernel import place_lights
+from psvideo.solve.normals.robust import huber1981
 from psvideo.solve.normals.task import Floats, Near
+from psvideo.solve.normals.trust.near_spread import near_spread
 from psvideo.solve.sweeping import swept
 
 Array = NDArray[np.float64]
@@ -112,7 +113,7 @@ def mean_error_deg(found: Surface, normals: Array, where: NDArray[np.bool_] | No
     return float(np.degrees(2 * np.arcsin(apart / 2)).mean())
 
 
-@pytest.mark.parametrize("solver", [woodham1980, robust], ids=["least squares", "robust"])
+@pytest.mark.parametrize("solver", [woodham1980, huber1981], ids=["least squares", "robust"])
 @pytest.mark.parametrize("lights", [3, 4, 8])
 def test_where_the_plane_is_the_surface_normals_and_albedo_are_exact(lights: int, solver: ModuleType) -> None:
     rig = ring_rig(lights, 1.5)
@@ -304,7 +305,7 @@ def test_a_real_rig_of_leds_with_axes_and_unequal_strengths(shared_data: Path) -
     assert max(plate.max() for plate in plates) < 1
     distant = Illumination(directions=near.directions, intensities=near.intensities)
     before = mean_error_deg(woodham1980.solve(plates, distant), normals)
-    for solver in (woodham1980, robust):
+    for solver in (woodham1980, huber1981):
         assert mean_error_deg(solver.solve(plates, near), normals) < min(0.6, 0.1 * before)
 
 

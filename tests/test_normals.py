@@ -11,8 +11,8 @@ from psvideo.errors import PsvideoError
 from psvideo.model.rig import Light
 from psvideo.model.surface import Surface
 from psvideo.solve.normals.illumination import MAX_CONDITION, Illumination, illumination
+from psvideo.solve.normals.least_squares.woodham1980 import EVERYTHING, Usable, solve
 from psvideo.solve.normals.task import PIXEL_CONDITION
-from psvideo.solve.normals.woodham1980 import EVERYTHING, Usable, solve
 
 Array = NDArray[np.float64]
 DEFAULT = Usable()

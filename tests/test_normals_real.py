@@ -14,7 +14,7 @@ from picture_file import read_picture
 from psvideo.formats.rig_toml import read_rig
 from psvideo.model.surface import Surface
 from psvideo.solve.normals.illumination import Illumination
-from psvideo.solve.normals.woodham1980 import EVERYTHING, Usable, solve
+from psvideo.solve.normals.least_squares.woodham1980 import EVERYTHING, Usable, solve
 
 
 def error_deg(surface: Surface, truth: NDArray[np.floating], mask: NDArray[np.bool_]) -> NDArray[np.float64]:

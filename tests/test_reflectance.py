@@ -8,9 +8,9 @@ from ring_and_ball import ring
 from psvideo.model.ground import Ground
 from psvideo.model.rig import Light
 from psvideo.model.surface import Reflectance, Surface
-from psvideo.solve.normals import robust
 from psvideo.solve.normals.illumination import Illumination, illumination
-from psvideo.solve.normals.reflectance import reflectance_of
+from psvideo.solve.normals.robust import huber1981
+from psvideo.solve.normals.robust.reflectance import reflectance_of
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.task import Usable
 
@@ -51,7 +51,7 @@ def off_deg(found: NDArray[np.floating], truth: Array) -> Array:
 
 
 def without_model(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(robust, "reflectance_of", lambda *_, **__: None)
+    monkeypatch.setattr(huber1981, "reflectance_of", lambda *_, **__: None)
 
 
 def test_a_sheen_that_the_whole_subject_has_turns_no_normal(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -17,9 +17,10 @@ from psvideo.report.judge.result import accuracy
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.observed import Observed
-from psvideo.solve.normals import robust, woodham1980
 from psvideo.solve.normals.illumination import Illumination
-from psvideo.solve.normals.robust import Reweighting, solve
+from psvideo.solve.normals.least_squares import woodham1980
+from psvideo.solve.normals.robust import huber1981
+from psvideo.solve.normals.robust.huber1981 import Reweighting, solve
 from psvideo.solve.normals.solving import ROBUST_FROM_LIGHTS, Solving, trust_note
 from psvideo.synth import read_scene
 from psvideo.synth.stage import set_stage
@@ -356,7 +357,7 @@ def test_auto_is_robust_from_five_lights_on() -> None:
     for solver in ("auto", "least-squares"):
         assert Solving(solver=solver, error=True).solve(plates, lit).error_deg is not None
         assert Solving(solver=solver).solve(plates, lit).error_deg is None
-    assert robust.solve(plates, lit).valid.dtype == np.bool_
+    assert huber1981.solve(plates, lit).valid.dtype == np.bool_
 
 
 def test_the_note_says_what_three_lights_cannot_show() -> None:

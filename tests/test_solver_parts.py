@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.symmetric import adjugate
-from psvideo.solve.normals import equations, few_lights
-from psvideo.solve.normals.blocks import BLOCK, COUNT, PLANES
+from psvideo.solve.normals.loops.blocks import BLOCK, COUNT, PLANES
+from psvideo.solve.normals.robust import equations, few_lights
 from psvideo.solve.normals.task import FEW
 
 

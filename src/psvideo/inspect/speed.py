@@ -10,7 +10,7 @@ import numpy as np
 
 from psvideo.inspect.findings import Finding, Level
 from psvideo.solve.normals.illumination import Illumination
-from psvideo.solve.normals.woodham1980 import solve
+from psvideo.solve.normals.least_squares.woodham1980 import solve
 
 ROWS, COLS, LIGHTS = 1080, 1920, 8
 BYTES = ROWS * COLS * (2 * LIGHTS + 8)

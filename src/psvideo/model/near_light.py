@@ -2,9 +2,8 @@
 
 A near light's direction and strength differ from pixel to pixel: it sends ``intensity * max(0, cos)^mu / r^2`` to a
 point at the distance r, cos being taken from the light's axis (Y. Queau et al., "LED-based photometric stereo:
-modeling, calibration and numerical solution", JMIV 60, 2018, section 2). The compiled solvers
-work out what holds for a pixel, block by block (``psvideo.solve.normals.near_kernel``), so that no field of vectors is
-ever held.
+modeling, calibration and numerical solution", JMIV 60, 2018, section 2). The compiled solvers compute each pixel's
+light block by block (``psvideo.solve.normals.loops.near_kernel``), so that no field of vectors is ever held.
 """
 
 from collections.abc import Sequence

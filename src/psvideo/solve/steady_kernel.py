@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import decoded, encoded, lent
 from psvideo.model.surface import MEASURED
-from psvideo.solve.normals.blocks import ONE, ZERO
+from psvideo.solve.normals.loops.blocks import ONE, ZERO
 from psvideo.solve.normals.task import Bytes, Floats, Samples
 
 SEGMENT = 64

@@ -15,7 +15,7 @@ from psvideo.solve.filling.hernandez2011 import from_one, from_two
 from psvideo.solve.filling.looking import Said
 from psvideo.solve.filling.neighbours import SAME_COLOUR, TINY, colour_of, from_neighbours
 from psvideo.solve.filling.tiles import THREE_LIGHTS, UNKNOWN, WITHIN, Tiles, lights_at, tile_at
-from psvideo.solve.normals.blocks import ONE, THREE, ZERO
+from psvideo.solve.normals.loops.blocks import ONE, THREE, ZERO
 from psvideo.solve.normals.task import Floats
 
 STEP = 4  # distance of neighbours of one colour, in the whole numbers in which distances are counted

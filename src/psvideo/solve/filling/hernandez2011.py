@@ -9,7 +9,7 @@ import numpy as np
 
 from psvideo.compute.compiled import FUSED
 from psvideo.solve.filling.looking import Said
-from psvideo.solve.normals.blocks import ONE, ZERO
+from psvideo.solve.normals.loops.blocks import ONE, ZERO
 
 ALBEDO_SHARE = np.float32(0.05)  # how well the neighbours' albedo is that of a pixel
 BENT = np.float32(np.radians(15.0))  # how well the neighbours' normal is

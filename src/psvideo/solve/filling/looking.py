@@ -7,10 +7,9 @@ from numpy.typing import NDArray
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import lent
-from psvideo.solve.normals.blocks import ABSENT, BLOCK, ONE, ZERO
-from psvideo.solve.normals.kernel import lent_task
-from psvideo.solve.normals.measuring import any_asked, read_block
-from psvideo.solve.normals.near_kernel import at, of_light
+from psvideo.solve.normals.loops.blocks import ABSENT, BLOCK, ONE, ZERO
+from psvideo.solve.normals.loops.measuring import any_asked, read_block
+from psvideo.solve.normals.loops.near_kernel import at, lent_task, of_light
 from psvideo.solve.normals.task import Bytes, Floats, Task, Work
 
 

@@ -6,7 +6,7 @@ from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import decoded
 from psvideo.solve.filling.looking import Said
 from psvideo.solve.filling.tiles import THREE_LIGHTS, WITHIN, Tiles, tile_at
-from psvideo.solve.normals.blocks import ONE, ZERO
+from psvideo.solve.normals.loops.blocks import ONE, ZERO
 
 REACH_PX = 4  # neighbours are looked at so far in every direction,
 SPREAD_PX = 2.0  # with weights that fall off so,

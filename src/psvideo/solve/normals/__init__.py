@@ -1,11 +1,13 @@
-"""From one plate per light to the surface. Every method is one module named by its paper: ``solve(...) -> Surface``.
+"""From one plate per light to normals and albedo, and how far to trust them.
 
-``solving`` chooses the solver and calls it. Given to all: ``illumination`` (the lights), ``plate_noise``, ``task``
-(arrays for compiled loops), ``bands`` (rows shared between threads), ``blocks`` (pixels side by side), ``measuring``
-(samples to measurements), ``storing`` (results from blocks), ``near_kernel`` (near lights). Least squares:
-``woodham1980``, in the loops of ``kernel``, ``grey_kernel`` and ``colour_kernel``. Robust: ``robust`` with the loops
-of ``robust_kernel``; a block goes through ``explained``, ``few_lights`` or ``any_lights``, ``robust_weights``,
-``odd_of_four``, ``equations``, ``apart`` and ``predicted_error``; then ``reflectance`` and ``reflecting`` for what is
-not matte. Judged afterwards: ``evidence``, ``judging`` with ``judging_kernel``, ``doubting``, ``indirect``,
-``near_spread``, ``moving_doubt``.
+``solving`` chooses the solver and calls it: begin there. All solvers take the same values: the lights
+(``illumination``), plates and lights as plain arrays (``task``), shared between threads in bands of rows (``bands``),
+and how noisy plates are (``plate_noise``). ``evidence`` keeps one round together for what looks at it again.
+
+Rooms, from the bottom up:
+
+- ``loops``: compiled loops that all solvers use, from samples to measurements and from a solution to what is stored
+- ``least_squares``: the classic solver, for matte surfaces without cast shadows
+- ``robust``: the default, which leaves out shadows and highlights
+- ``trust``: how far normals may be off, and which are valid
 """

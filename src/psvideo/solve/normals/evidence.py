@@ -8,6 +8,7 @@ from typing import NamedTuple
 from psvideo.plates.mixture import Mixture
 from psvideo.solve.normals.bands import ShownPlates
 from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.loops.blocks import working_memory
 from psvideo.solve.normals.task import Floats, Mask, Samples, Task, Usable, Work, task
 
 
@@ -59,8 +60,6 @@ class Evidence:
     ) -> None:
         """Call ``run(task, work, first, last)`` for bands of rows, of which it needs every ``step``-th, and of these
         those ``needed`` (row,); pictures that are not made are made band by band."""
-        from psvideo.solve.normals.kernel import working_memory  # loads the compiler
-
         shown = ShownPlates.of(self.plates)
         given = task(shown.samples, self.lit, self.seen, self.mask, self.usable, self.black_level, self.scale)
         shown.in_bands(run, given, working_memory, threads=threads, step=step, needed=needed)

@@ -10,13 +10,14 @@ import numpy as np
 from psvideo.model.choices import Solver
 from psvideo.model.surface import Surface
 from psvideo.plates.mixture import Mixture
-from psvideo.solve.normals import robust, woodham1980
 from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.illumination import Illumination
-from psvideo.solve.normals.indirect import IndirectLook
-from psvideo.solve.normals.judging import Judging, emptied, judged
+from psvideo.solve.normals.least_squares import woodham1980
 from psvideo.solve.normals.plate_noise import LEAST, PlateNoise, noise_of
+from psvideo.solve.normals.robust import huber1981
 from psvideo.solve.normals.task import Floats, Looks, Mask, Samples, Usable
+from psvideo.solve.normals.trust.indirect import IndirectLook
+from psvideo.solve.normals.trust.judging import Judging, emptied, judged
 
 Plates = Sequence[Samples] | Sequence[Mixture]
 Method = Literal["least-squares", "robust"]
@@ -28,7 +29,7 @@ and a picture has as many."""
 INDIRECT = 0.2
 """Below this share of the pixel's mean, light in shadow may come from neighbouring surfaces: where many measurements
 are brighter it is left out. (Of a surface of albedo 0.5 a wide crease sends back as much.)"""
-EVERYTHING = robust.Reweighting(most_error_deg=robust.EVERYTHING_DEG)
+EVERYTHING = huber1981.Reweighting(most_error_deg=huber1981.EVERYTHING_DEG)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,7 +108,7 @@ class Solving:
     ) -> Surface:
         """Return what the solver makes of the plates."""
         if self.method(len(plates)) == "robust":
-            return robust.solve(
+            return huber1981.solve(
                 plates,
                 lit,
                 seen=seen,

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from psvideo.solve.normals.bands import ShownPlates
-from psvideo.solve.normals.doubting import coarse_step
 from psvideo.solve.normals.evidence import Evidence, Indirect, Left
+from psvideo.solve.normals.loops.blocks import working_memory
 from psvideo.solve.normals.task import Result, Task, Work, task
+from psvideo.solve.normals.trust.doubting import coarse_step
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,13 +36,11 @@ class IndirectLook:
 
     def memory(self) -> Work:
         """Return room for one thread."""
-        from psvideo.solve.normals.kernel import working_memory  # loads the compiler
-
         return working_memory(self.given)
 
     def look(self, shown: Task, result: Result, work: Work, first: int, last: int) -> None:
         """Look at solved rows, whose samples lie where the solver's task says."""
-        from psvideo.solve.normals.judging_kernel import indirect_rows
+        from psvideo.solve.normals.trust.judging_kernel import indirect_rows
 
         shape = (-1, self.rows, self.given.cols)
         planes, albedo = result.normals.reshape(shape), result.albedo.reshape(shape)

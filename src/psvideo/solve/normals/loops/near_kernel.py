@@ -13,9 +13,10 @@ from numba import types
 from numba.extending import overload
 
 from psvideo.compute.compiled import FUSED
+from psvideo.compute.memory import lent
 from psvideo.compute.parts import INLINED
 from psvideo.model import near_light
-from psvideo.solve.normals.task import Floats, Near
+from psvideo.solve.normals.task import Floats, Near, Task
 
 LEAST_COSINE = np.float32(near_light.LEAST_COSINE)
 ONE = np.float32(1)
@@ -59,6 +60,21 @@ def _place_all(matrix: Floats, per_strength: Floats, near: Near, row: int, col: 
             for axis in range(3):
                 matrix[light, axis, :n] = near.positions[light, axis] * strength
             per_strength[light, :n] = ONE / strength if strength > np.float32(0) else ONE
+
+
+@FUSED.inlined
+def lent_task(task: Task, matrix: Floats, per_strength: Floats) -> Task:
+    """The task without reference counts, with the memory that takes every pixel's lights where they are near."""
+    near = task.near
+    return Task(
+        lent(task.plates), lent(task.like), task.lights, task.cols, lent(task.tone), lent(matrix), lent(per_strength),
+        Near(
+            lent(near.positions), lent(near.is_near), lent(near.axes), lent(near.anisotropy), lent(near.strengths),
+            lent(near.depth), lent(near.pinhole),
+        ),
+        lent(task.inverse), lent(task.origin), task.least, task.most, task.dark,
+        task.ratio, task.condition_squared, task.albedo_scale, lent(task.seen), lent(task.mask),
+    )  # fmt: skip
 
 
 def place_lights(matrix: Floats, per_strength: Floats, near: Near, row: int, col: int, n: int) -> None:

@@ -9,9 +9,9 @@ import numpy as np
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.symmetric import adjugate
-from psvideo.solve.normals.blocks import ABSENT, COUNT, MISSING, ONE, XX, XY, XZ, YY, YZ, ZERO, ZZ, X, Y, Z
-from psvideo.solve.normals.equations import DOUBT, LOWER, ODD, RANK, add_equations, solve_equations
-from psvideo.solve.normals.near_kernel import at, of_light
+from psvideo.solve.normals.loops.blocks import ABSENT, COUNT, MISSING, ONE, XX, XY, XZ, YY, YZ, ZERO, ZZ, X, Y, Z
+from psvideo.solve.normals.loops.near_kernel import at, of_light
+from psvideo.solve.normals.robust.equations import DOUBT, LOWER, ODD, RANK, add_equations, solve_equations
 from psvideo.solve.normals.task import Floats, Task
 
 TWO, FOUR = np.float32(2), np.float32(4)

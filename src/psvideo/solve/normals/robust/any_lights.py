@@ -3,10 +3,10 @@
 import numpy as np
 
 from psvideo.compute.compiled import FUSED
-from psvideo.solve.normals.blocks import ABSENT, COUNT, LIMIT, ONE, THREE, ZERO, X, Y, Z
-from psvideo.solve.normals.equations import FROM, HALF, LOWER, OUT, RANK, SCALE, TO, UPPER, add_equations, halve
-from psvideo.solve.normals.few_lights import FOUR, LITTLE, SIGMA_OF_MEDIAN, median_few
-from psvideo.solve.normals.near_kernel import at, of_light
+from psvideo.solve.normals.loops.blocks import ABSENT, COUNT, LIMIT, ONE, THREE, ZERO, X, Y, Z
+from psvideo.solve.normals.loops.near_kernel import at, of_light
+from psvideo.solve.normals.robust.equations import FROM, HALF, LOWER, OUT, RANK, SCALE, TO, UPPER, add_equations, halve
+from psvideo.solve.normals.robust.few_lights import FOUR, LITTLE, SIGMA_OF_MEDIAN, median_few
 from psvideo.solve.normals.task import FEW, Floats, Task, Weights
 
 MANY = np.float32(FEW)  # usable measurements beyond which the weight narrows

@@ -14,7 +14,10 @@ from psvideo.compute.spilled import let_go, planes_for, thin
 from psvideo.compute.threads import over_ranges
 from psvideo.model.surface import MEASURED, Surface
 from psvideo.solve.normals.bands import BAND_PIXELS
-from psvideo.solve.normals.doubting import (
+from psvideo.solve.normals.evidence import Evidence
+from psvideo.solve.normals.plate_noise import PlateNoise
+from psvideo.solve.normals.task import LIGHTS, Floats, Mask, Samples, Spread
+from psvideo.solve.normals.trust.doubting import (
     Doubting,
     Signs,
     ThinSurface,
@@ -25,11 +28,8 @@ from psvideo.solve.normals.doubting import (
     signs_of,
     stored,
 )
-from psvideo.solve.normals.evidence import Evidence
-from psvideo.solve.normals.moving_doubt import MovingDoubt, moved_deg, moving_doubt_deg
-from psvideo.solve.normals.near_spread import NearSpread, near_spread
-from psvideo.solve.normals.plate_noise import PlateNoise
-from psvideo.solve.normals.task import LIGHTS, Floats, Mask, Samples, Spread
+from psvideo.solve.normals.trust.moving_doubt import MovingDoubt, moved_deg, moving_doubt_deg
+from psvideo.solve.normals.trust.near_spread import NearSpread, near_spread
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -207,7 +207,7 @@ class _Spread:
         doubt: Floats = NO_DOUBT, step: int = 1, trusted: Mask | None = None,
     ) -> None:  # fmt: skip
         """Fill ``error``, and ``trusted`` where it is asked for, as ``judge_rows`` does."""
-        from psvideo.solve.normals.judging_kernel import judge_rows
+        from psvideo.solve.normals.trust.judging_kernel import judge_rows
 
         planes, albedo = stored(surface)
         limit_deg = factors[2] if len(factors) > 2 else 0.0

@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from psvideo.compute.compiled import FUSED
-from psvideo.solve.normals.blocks import BLOCK, COUNT, LIMIT, MISSING, PLANES, X, Y, Z
-from psvideo.solve.normals.equations import OUT
-from psvideo.solve.normals.reflecting import KEPT, OF_LIGHT
+from psvideo.solve.normals.loops.blocks import BLOCK, COUNT, LIMIT, MISSING, PLANES, X, Y, Z
+from psvideo.solve.normals.robust.equations import OUT
+from psvideo.solve.normals.robust.reflecting import KEPT, OF_LIGHT
 from psvideo.solve.normals.task import Floats, Indices, Task
 
 WHOLE = 16  # pixels are filled up to whole vectors of so many: what is left over would be solved one by one

@@ -13,14 +13,14 @@ import numpy as np
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import lent
 from psvideo.compute.symmetric import adjugate
-from psvideo.solve.normals.blocks import (
+from psvideo.solve.normals.least_squares.grey_kernel import solve_grey
+from psvideo.solve.normals.loops.blocks import (
     ABSENT,
     BLOCK,
     COUNT,
     LIMIT,
     MISSING,
     ONE,
-    PLANES,
     SUM,
     THREE,
     TINY,
@@ -35,29 +35,13 @@ from psvideo.solve.normals.blocks import (
     Y,
     Z,
 )
-from psvideo.solve.normals.colour_kernel import gather_all, solve_all
-from psvideo.solve.normals.grey_kernel import solve_grey
-from psvideo.solve.normals.measuring import all_seen, any_asked, combine, gather_one, gather_three, hide_unseen
-from psvideo.solve.normals.near_kernel import at, of_light, place_lights
-from psvideo.solve.normals.storing import store_block
-from psvideo.solve.normals.task import Floats, Near, Result, Task, Work
+from psvideo.solve.normals.loops.colour_kernel import solve_colours
+from psvideo.solve.normals.loops.measuring import all_seen, any_asked, combine, gather_one, gather_three, hide_unseen
+from psvideo.solve.normals.loops.near_kernel import at, lent_task, of_light, place_lights
+from psvideo.solve.normals.loops.storing import store_block
+from psvideo.solve.normals.task import Floats, Result, Task, Work
 
 COLOUR_STEP = 160  # pixels of three channels that are solved together: few enough to stay in the nearest cache
-
-
-def working_memory(task: Task) -> Work:
-    """What one call of ``solve_rows`` works in; no two calls at a time may share it."""
-    lights, channels = task.tone.shape[:2]
-    values = np.full((lights * channels, BLOCK), MISSING, np.float32)
-    combined = values if channels == 1 else np.full((lights, BLOCK), MISSING, np.float32)
-    is_near = task.near.depth.size > 0
-    return Work(
-        planes=np.empty(PLANES * BLOCK, np.float32),
-        values=values,
-        measurements=combined,
-        matrix=np.zeros((lights, 3, BLOCK), np.float32) if is_near else task.matrix,
-        per_strength=np.zeros((lights, BLOCK), np.float32) if is_near else task.per_strength,
-    )
 
 
 @FUSED.kept
@@ -76,21 +60,6 @@ def solve_rows(task: Task, result: Result, work: Work, first: int, last: int) ->
             else:
                 summed = _solve_block(t, w, values, m, row, col, n, out.residual.size > 0)
             store_block(t, out, w, values, m, m, row * t.cols + col, n, summed, False)
-
-
-@FUSED.inlined
-def lent_task(task: Task, matrix: Floats, per_strength: Floats) -> Task:
-    """The task without reference counts, with the memory that takes every pixel's lights where they are near."""
-    near = task.near
-    return Task(
-        lent(task.plates), lent(task.like), task.lights, task.cols, lent(task.tone), lent(matrix), lent(per_strength),
-        Near(
-            lent(near.positions), lent(near.is_near), lent(near.axes), lent(near.anisotropy), lent(near.strengths),
-            lent(near.depth), lent(near.pinhole),
-        ),
-        lent(task.inverse), lent(task.origin), task.least, task.most, task.dark,
-        task.ratio, task.condition_squared, task.albedo_scale, lent(task.seen), lent(task.mask),
-    )  # fmt: skip
 
 
 @FUSED.inlined
@@ -121,12 +90,6 @@ def _solve_block(
             kept = ONE if task.mask[row, col + i] else ZERO
             w[X + i], w[Y + i], w[Z + i] = w[X + i] * kept, w[Y + i] * kept, w[Z + i] * kept
     return summed
-
-
-@FUSED.called
-def solve_colours(task: Task, w: Floats, values: Floats, m: Floats, start: int, n: int) -> bool:
-    """Solve a block of three channels as if all measurements were usable; False where one is not."""
-    return gather_all(task, w, values, start, n) and solve_all(task, w, values, m, n)
 
 
 @FUSED.inlined

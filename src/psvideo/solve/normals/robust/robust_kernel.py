@@ -1,7 +1,7 @@
 """The compiled loops of the robust solver, block by block: plain least squares, what that does not explain, the error.
 
-Blocks, planes and symbols are those of ``kernel.py``, whose parts are used here: m = L g per pixel. What these loops
-add lies in a second working array ``v`` and in ``e`` (light, pixel): brightnesses first, then residuals.
+Blocks and planes are those of ``blocks.py``; symbols: m = L g per pixel, as in ``kernel.py``. What these loops add lies
+in a second working array ``v`` and in ``e`` (light, pixel): brightnesses first, then residuals.
 """
 
 from typing import NamedTuple
@@ -10,17 +10,17 @@ import numpy as np
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import encoded, lent
-from psvideo.solve.normals import kernel
-from psvideo.solve.normals.apart import Room, fill_up, put_side_by_side, room_for
-from psvideo.solve.normals.blocks import BLOCK, COUNT, LIMIT, ONE, ZERO, X, Y, Z
-from psvideo.solve.normals.equations import DOUBT
-from psvideo.solve.normals.explained import list_unexplained, solve_plainly
-from psvideo.solve.normals.measuring import all_seen, any_asked, read_usable
-from psvideo.solve.normals.near_kernel import place_lights
-from psvideo.solve.normals.predicted_error import NO_ERROR, UNEXPLAINED, predict_error
-from psvideo.solve.normals.reflecting import find_ways
-from psvideo.solve.normals.robust_weights import solve_reweighted, weigh
-from psvideo.solve.normals.storing import store_block
+from psvideo.solve.normals.loops.blocks import BLOCK, COUNT, LIMIT, ONE, ZERO, X, Y, Z
+from psvideo.solve.normals.loops.colour_kernel import solve_colours
+from psvideo.solve.normals.loops.measuring import all_seen, any_asked, read_usable
+from psvideo.solve.normals.loops.near_kernel import lent_task, place_lights
+from psvideo.solve.normals.loops.storing import store_block
+from psvideo.solve.normals.robust.apart import Room, fill_up, put_side_by_side, room_for
+from psvideo.solve.normals.robust.equations import DOUBT
+from psvideo.solve.normals.robust.explained import list_unexplained, solve_plainly
+from psvideo.solve.normals.robust.predicted_error import NO_ERROR, UNEXPLAINED, predict_error
+from psvideo.solve.normals.robust.reflecting import find_ways
+from psvideo.solve.normals.robust.robust_weights import solve_reweighted, weigh
 from psvideo.solve.normals.task import FEW, LIGHTS, Bytes, Floats, Indices, Result, Task, Weights, empty_result
 
 STEP = 128  # pixels that are solved together: few enough that all of their planes stay in the nearest cache
@@ -73,8 +73,8 @@ def solve_rows(
     compiled once, writes both.
     """
     whole, apart, listed = (_lent_room(memory.whole), _lent_room(memory.apart), lent(memory.listed))
-    t = kernel.lent_task(task, memory.whole.matrix, memory.whole.per_strength)
-    t_apart = kernel.lent_task(task, memory.apart.matrix, memory.apart.per_strength)
+    t = lent_task(task, memory.whole.matrix, memory.whole.per_strength)
+    t_apart = lent_task(task, memory.apart.matrix, memory.apart.per_strength)
     out = Result(lent(result.normals), lent(result.albedo), lent(result.valid), lent(result.residual))
     predicted, unexplained = lent(error), lent(misfit)
     w, v = whole.planes, whole.more
@@ -221,7 +221,7 @@ def _measure(task: Task, room: Room, distant: bool, row: int, col: int, n: int) 
         place_lights(task.matrix, task.per_strength, task.near, row, col, n)
         find_ways(task.matrix, task.per_strength, room.ways, n)
     plain = distant and task.tone.shape[1] == 3 and all_seen(task.seen, row, col, n)
-    summed = plain and kernel.solve_colours(task, w, values, m, row * task.cols + col, n)
+    summed = plain and solve_colours(task, w, values, m, row * task.cols + col, n)
     if summed:
         w[COUNT : COUNT + n], w[LIMIT : LIMIT + n] = np.float32(task.lights), task.dark
     else:

@@ -7,12 +7,12 @@ import numpy as np
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import flattened
-from psvideo.solve.normals.any_lights import add_start, add_weighted, choose_start, fill_weights, find_scale
-from psvideo.solve.normals.apart import Room
-from psvideo.solve.normals.equations import solve_equations
-from psvideo.solve.normals.few_lights import begin_few, reweigh_few
-from psvideo.solve.normals.odd_of_four import TWO, drop_odd_of_four
-from psvideo.solve.normals.reflecting import reflect, weigh_reflecting
+from psvideo.solve.normals.robust.any_lights import add_start, add_weighted, choose_start, fill_weights, find_scale
+from psvideo.solve.normals.robust.apart import Room
+from psvideo.solve.normals.robust.equations import solve_equations
+from psvideo.solve.normals.robust.few_lights import begin_few, reweigh_few
+from psvideo.solve.normals.robust.odd_of_four import TWO, drop_odd_of_four
+from psvideo.solve.normals.robust.reflecting import reflect, weigh_reflecting
 from psvideo.solve.normals.task import Floats, Task, Weights
 
 SOUND_SQUARED = np.float32(1e4)  # while weights change, the last solution is kept where they leave a worse condition

@@ -11,7 +11,7 @@ import numpy as np
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import encoded, flattened
 from psvideo.compute.symmetric import adjugate
-from psvideo.solve.normals.blocks import (
+from psvideo.solve.normals.loops.blocks import (
     BLOCK,
     LOW,
     MISSING,
@@ -27,12 +27,18 @@ from psvideo.solve.normals.blocks import (
     Y,
     Z,
 )
-from psvideo.solve.normals.measuring import samples_of
-from psvideo.solve.normals.near_kernel import at, of_light
+from psvideo.solve.normals.loops.measuring import samples_of
+from psvideo.solve.normals.loops.near_kernel import at, of_light
 from psvideo.solve.normals.task import Floats, Samples, Task
 
 TWO = np.float32(2)
 RX, RY, RZ, GX, GY, GZ, BX, BY, BZ = (SUMS + BLOCK * plane for plane in range(9))
+
+
+@FUSED.called
+def solve_colours(task: Task, w: Floats, values: Floats, m: Floats, start: int, n: int) -> bool:
+    """Solve a block of three channels as if all measurements were usable; False where one is not."""
+    return _gather_all(task, w, values, start, n) and _solve_all(task, w, values, m, n)
 
 
 @FUSED.inlined
@@ -43,7 +49,7 @@ def _sent(task: Task, light: int) -> tuple[np.float32, np.float32, np.float32]:
 
 
 @FUSED.inlined
-def gather_all(task: Task, w: Floats, values: Floats, start: int, n: int) -> bool:
+def _gather_all(task: Task, w: Floats, values: Floats, start: int, n: int) -> bool:
     """Read a block's samples, (light * channel, pixel), and add them up; False where one cannot be used.
 
     The planes XX, YY, ZZ become the channels' light, and RX to BZ their L^T m. ``values`` holds no mark of what is
@@ -122,7 +128,7 @@ def _add_one(task: Task, w: Floats, values: Floats, start: int, n: int, light: i
 
 
 @FUSED.inlined
-def solve_all(task: Task, w: Floats, values: Floats, measurements: Floats, n: int) -> bool:
+def _solve_all(task: Task, w: Floats, values: Floats, measurements: Floats, n: int) -> bool:
     """Leave g in the planes X, Y, Z and the combined measurements in ``measurements``; False where one is in shadow.
 
     The channels are weighted as ``measuring.combine`` does.
@@ -168,7 +174,7 @@ def _squares(task: Task) -> tuple[np.float32, np.float32, np.float32, np.float32
 
 @FUSED.inlined
 def albedo_from_sums(task: Task, w: Floats, n: int, red: Samples, green: Samples, blue: Samples) -> None:
-    """Every channel's least squares albedo, the normal being known, of what ``gather_all`` added up."""
+    """Every channel's least squares albedo, the normal being known, of what ``_gather_all`` added up."""
     xx, xy, xz, yy, yz, zz = _squares(task)
     scale = task.albedo_scale
     for i in range(n):

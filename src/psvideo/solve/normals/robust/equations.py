@@ -1,14 +1,32 @@
 """Compiled parts of the robust solver: weighted normal equations of every pixel of a block, and medians over lights.
 
-Planes lie in two flat working arrays, ``w`` (those of ``kernel.py``) and ``v`` (those below), BLOCK apart.
+Planes lie in two flat working arrays, ``w`` (those of ``blocks.py``) and ``v`` (those below), BLOCK apart.
 """
 
 import numpy as np
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.symmetric import adjugate
-from psvideo.solve.normals.blocks import BLOCK, COUNT, HIGH, LOW, ONE, SUM, THREE, XX, XY, XZ, YY, YZ, ZERO, ZZ, X, Y, Z
-from psvideo.solve.normals.near_kernel import at, of_light
+from psvideo.solve.normals.loops.blocks import (
+    BLOCK,
+    COUNT,
+    HIGH,
+    LOW,
+    ONE,
+    SUM,
+    THREE,
+    XX,
+    XY,
+    XZ,
+    YY,
+    YZ,
+    ZERO,
+    ZZ,
+    X,
+    Y,
+    Z,
+)
+from psvideo.solve.normals.loops.near_kernel import at, of_light
 from psvideo.solve.normals.task import Floats
 
 HALF = np.float32(0.5)

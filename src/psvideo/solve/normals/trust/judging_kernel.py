@@ -4,10 +4,9 @@ import numpy as np
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import decoded, encoded, lent
-from psvideo.solve.normals.blocks import ABSENT, BLOCK, ONE, TINY, ZERO
-from psvideo.solve.normals.kernel import lent_task
-from psvideo.solve.normals.measuring import read_block
-from psvideo.solve.normals.near_kernel import at, of_light
+from psvideo.solve.normals.loops.blocks import ABSENT, BLOCK, ONE, TINY, ZERO
+from psvideo.solve.normals.loops.measuring import read_block
+from psvideo.solve.normals.loops.near_kernel import at, lent_task, of_light
 from psvideo.solve.normals.task import Bytes, Floats, Samples, Spread, Task, Work
 
 TWO, MOST_FIT_DEG, LARGEST_DEG = np.float32(2), np.float32(60), np.float32(180)

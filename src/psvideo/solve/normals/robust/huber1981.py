@@ -19,7 +19,7 @@ from psvideo.plates.mixture import Mixture
 from psvideo.solve.normals.bands import ShownPlates, check_arrays, surface_of
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.plate_noise import PlateNoise
-from psvideo.solve.normals.reflectance import reflectance_of
+from psvideo.solve.normals.robust.reflectance import reflectance_of
 from psvideo.solve.normals.task import (
     FEW,
     Floats,
@@ -166,7 +166,7 @@ class _Solution:
     ) -> None:
         """Solve every ``step``-th row. ``error`` asks for predicted errors; ``unexplained`` (pixel,) takes the share of
         its light that each pixel's lights leave unexplained. ``looks`` looks at each band while it is in memory."""
-        from psvideo.solve.normals import robust_kernel as kernel
+        from psvideo.solve.normals.robust import robust_kernel as kernel
 
         cols, result, predicted = self.shown.shape[1], self.result, self.predicted
         into = (predicted if error else predicted[:0]).view(np.uint8)

@@ -6,8 +6,8 @@ One pseudo-inverse holds for all of them, and is applied to the samples as they 
 import numpy as np
 
 from psvideo.compute.compiled import FUSED
-from psvideo.solve.normals.blocks import HIGH, LOW, MISSING, SLIGHTLY_MORE, X, Y, Z
-from psvideo.solve.normals.measuring import samples_of
+from psvideo.solve.normals.loops.blocks import HIGH, LOW, MISSING, SLIGHTLY_MORE, X, Y, Z
+from psvideo.solve.normals.loops.measuring import samples_of
 from psvideo.solve.normals.task import Floats, Samples, Task
 
 

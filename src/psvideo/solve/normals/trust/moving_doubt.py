@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 
 from psvideo.plates.align.own_means import own_mean
-from psvideo.solve.normals.doubting import ThinSurface, brightness, width_of
 from psvideo.solve.normals.evidence import Evidence, Left
 from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.task import Floats, Mask
+from psvideo.solve.normals.trust.doubting import ThinSurface, brightness, width_of
 
 MOST_DEG = np.float32(180)
 """What turns a normal by more is no angle: nothing is known of its plates."""

@@ -12,6 +12,7 @@ from psvideo.model.surface import Surface
 from psvideo.plates.mixture import Mixture
 from psvideo.solve.normals.bands import ShownPlates, check_arrays, surface_of
 from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.loops.blocks import working_memory
 from psvideo.solve.normals.task import (
     EVERYTHING,
     Looks,
@@ -63,7 +64,7 @@ def solve(
 
     The result does not depend on ``threads``. Raises ValueError where the arrays do not belong together.
     """
-    from psvideo.solve.normals.kernel import solve_rows, working_memory
+    from psvideo.solve.normals.least_squares.kernel import solve_rows
 
     shown = ShownPlates.of(plates)
     check_arrays(shown.samples, lit, seen, mask)

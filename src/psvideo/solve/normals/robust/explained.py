@@ -6,9 +6,9 @@ There nothing is to be weighed down, least squares is the best estimate (Gauss a
 import numpy as np
 
 from psvideo.compute.compiled import FUSED
-from psvideo.solve.normals.blocks import ABSENT, COUNT, HIGH, LOW, ONE, THREE, ZERO, X, Y, Z
-from psvideo.solve.normals.equations import add_equations, solve_equations
-from psvideo.solve.normals.near_kernel import at, of_light
+from psvideo.solve.normals.loops.blocks import ABSENT, COUNT, HIGH, LOW, ONE, THREE, ZERO, X, Y, Z
+from psvideo.solve.normals.loops.near_kernel import at, of_light
+from psvideo.solve.normals.robust.equations import add_equations, solve_equations
 from psvideo.solve.normals.task import LIGHTS, Floats, Indices, Task
 
 EXPLAINED_SQUARED = np.float32(4.5**2)  # of eight measurements, noise spoils none in 9999 of 10,000 pixels

@@ -71,7 +71,7 @@ def reflectance_of(
     *, step: int, seen: Mask | None, black_level: float, scale: float,
 ) -> Reflectance | None:  # fmt: skip
     """Return what a subject solved in every ``step``-th row reflects beyond n . l; None where that explains little of
-    what is left over, or the lights are too few. Arguments are those of ``robust.solve``."""
+    what is left over, or the lights are too few. Arguments are those of ``huber1981.solve``."""
     if len(plates) < LEAST_LIGHTS:
         return None
     solved = np.arange(0, found.valid.shape[0], step)

@@ -1,0 +1,13 @@
+"""The robust solver: least squares in which shadows and highlights weigh little. ``huber1981`` is the method.
+
+A block of pixels goes through ``robust_kernel``:
+
+1. ``explained``: plain least squares; pixels that it explains to their noise are done
+2. ``apart``: the other pixels of a row are collected and solved together
+3. ``robust_weights``: reweighting, by ``few_lights`` (up to nine) or ``any_lights``, with sums from ``equations``
+4. ``odd_of_four``: which of four measurements that contradict each other is left out
+5. ``predicted_error``: each normal's standard error
+
+Where a subject is not matte, ``reflectance`` finds from all its pixels how it reflects light, and ``reflecting`` solves
+its pixels again with that.
+"""
