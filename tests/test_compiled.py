@@ -25,7 +25,7 @@ from psvideo.solve.normals.loops import near_kernel
 from psvideo.solve.normals.robust import robust_kernel
 from psvideo.synth import read_scene
 
-SOURCE = Path(kernel.__file__).parents[2]
+SOURCE = Path(ps.__file__).parent
 SCENE = Path(__file__).resolve().parents[1] / "data_synth" / "sphere.toml"
 
 
