@@ -13,6 +13,7 @@ import numba.core.caching
 import numpy as np
 import pytest
 
+import psvideo
 from psvideo.cli.console import compiling_said
 from psvideo.compute.compiled import EXACT, FUSED, REORDERED, sources_digest
 from psvideo.plates.ambient import ambient_kernel
@@ -25,7 +26,7 @@ from psvideo.solve.normals.loops import near_kernel
 from psvideo.solve.normals.robust import robust_kernel
 from psvideo.synth import read_scene
 
-SOURCE = Path(ps.__file__).parent
+SOURCE = Path(psvideo.__file__).parent
 SCENE = Path(__file__).resolve().parents[1] / "data_synth" / "sphere.toml"
 
 
