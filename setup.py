@@ -42,7 +42,7 @@ class BuildWithScenes(build_py):
         addons = Path("integrations/blender")
         copies = {scene: package / "synth" / "scenes" / scene.name for scene in Path("data_synth").glob("*.toml")}
         for file in (*addons.glob("*/*.py"), *addons.glob("*/*.toml")):
-            copies[file] = package / "export" / "blender" / file.relative_to(addons)
+            copies[file] = package / "export" / "programs" / "blender" / file.relative_to(addons)
         return {str(file): str(copy) for file, copy in sorted(copies.items())}
 
 

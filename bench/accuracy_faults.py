@@ -9,7 +9,7 @@ import numpy as np
 
 from bench.accuracy_measure import Accuracy, Case, errors_deg, matte_ball
 from psvideo.clip.transfer import find_curve, to_light
-from psvideo.export.png_maps import decode_normals, encode_normals
+from psvideo.export.sequences.png_maps import decode_normals, encode_normals
 from psvideo.model.surface import Surface
 from psvideo.solve.normals.solving import Solving
 

@@ -12,7 +12,7 @@ import numpy as np
 import OpenEXR
 
 from bench.observing import noisy_surface
-from psvideo.export.planes import Made, planes_of
+from psvideo.export.sequences.planes import Made, planes_of
 from psvideo.export.space import Space
 from psvideo.formats.exr_files import write_exr
 from psvideo.model.choices import Compression

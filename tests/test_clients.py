@@ -17,8 +17,8 @@ import pytest
 from ball_delivery import NUMBERS, SIZE, ball, deliver
 from picture_file import read_picture
 
-from psvideo.export.png_maps import PNG_MAX, encode_normals
 from psvideo.export.preview_movie import write_movie
+from psvideo.export.sequences.png_maps import PNG_MAX, encode_normals
 from psvideo.export.space import Space
 
 CLIENTS = Path(__file__).parent / "clients"

@@ -20,7 +20,7 @@ import pytest
 from numpy.typing import NDArray
 
 from psvideo.cli.app import main
-from psvideo.export.blender_addon import ADDON_FILE, addon_folder, addon_zip
+from psvideo.export.programs.blender_addon import ADDON_FILE, addon_folder, addon_zip
 from psvideo.formats.rig_toml import read_rig
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -15,9 +15,10 @@ from psvideo.cli.app import main
 from psvideo.cli.options.per_light import parse_weights
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.asked import Asked, delivery_of
-from psvideo.export.otio import Footage, Images, timeline_text
 from psvideo.export.preview_movie import even, write_movie
-from psvideo.export.programs import Delivered, note
+from psvideo.export.programs.delivered import Delivered
+from psvideo.export.programs.loading_notes import note
+from psvideo.export.programs.otio import Footage, Images, timeline_text
 from psvideo.model.choices import Program
 from psvideo.plates.beauty import Mix, beauty_of, mix_of
 from psvideo.plates.light_plate import LightPlate

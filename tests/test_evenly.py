@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-from psvideo.plates.align.evenly import EACH_PX, evenly_changed
+from psvideo.plates.align.doubt.evenly import EACH_PX, evenly_changed
 
 BARE = 3.0
 WIDE = (13, 13)

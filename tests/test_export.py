@@ -20,12 +20,12 @@ from psvideo import __version__
 from psvideo.compute.halves import halves_of
 from psvideo.compute.threads import writing
 from psvideo.errors import AllDoneError, PsvideoError, UsageError
-from psvideo.export.planes import ones_of
-from psvideo.export.plate_files import write_flash, write_plate
-from psvideo.export.png_maps import decode_normals, encode_normals
-from psvideo.export.result_files import Delivery, is_written, write_surface
+from psvideo.export.sequences.planes import ones_of
+from psvideo.export.sequences.plate_files import write_flash, write_plate
+from psvideo.export.sequences.png_maps import decode_normals, encode_normals
+from psvideo.export.sequences.result_files import Delivery, is_written, write_surface
+from psvideo.export.sequences.tags import Tags, advanced
 from psvideo.export.space import Space, choose_space, placed
-from psvideo.export.tags import Tags, advanced
 from psvideo.export.usd.pose import read_pose
 from psvideo.formats.exr_files import Crop, write_exr
 from psvideo.formats.whole_folders import whole_folder

@@ -9,7 +9,7 @@ import pytest
 
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.mesh_files import read_part, write_part
-from psvideo.export.result_files import Delivery
+from psvideo.export.sequences.result_files import Delivery
 from psvideo.export.space import Space, choose_space, placed, placed_points
 from psvideo.export.usd.pose import read_pose
 from psvideo.model.rig import Rig

@@ -20,7 +20,7 @@ from psvideo.clip.decode import exr
 from psvideo.clip.decode.decoders import decode, read_header
 from psvideo.clip.stated import Stated, stated_by
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.export.tags import sha256_of
+from psvideo.export.sequences.tags import sha256_of
 from psvideo.formats.exr_files import write_exr
 from psvideo.formats.paths import path_of
 from psvideo.formats.plan_toml import read_plan

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from psvideo.cli.commands.info import info
 from psvideo.errors import PsvideoError
-from psvideo.export.tags import Tags
+from psvideo.export.sequences.tags import Tags
 from psvideo.formats.exr_files import write_exr
 from psvideo.formats.plan_toml import format_plan
 from psvideo.formats.rig_toml import format_rig

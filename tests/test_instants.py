@@ -17,9 +17,9 @@ from psvideo.cli.options.typed import parse_instants
 from psvideo.clip import decoded_once, kept
 from psvideo.clip.in_file import RowsInFile
 from psvideo.errors import UsageError
-from psvideo.export.planes import Made, planes_of
+from psvideo.export.sequences.planes import Made, planes_of
+from psvideo.export.sequences.tags import Tags
 from psvideo.export.space import Space
-from psvideo.export.tags import Tags
 from psvideo.model.plan import Plan
 from psvideo.model.quantities import QUANTITIES
 from psvideo.model.rig import Light, Rig

@@ -11,7 +11,7 @@ from live_clip import live_clip
 import psvideo as ps
 from psvideo.cli.app import main
 from psvideo.clip import open_clip, read_frames
-from psvideo.export import code_files
+from psvideo.export.sequences import code_files
 from psvideo.live import recording
 from psvideo.live.chain import LiveFrame
 from psvideo.live.recording import Recording

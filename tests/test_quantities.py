@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from ball_delivery import deliver
 
-from psvideo.export.planes import PICTURES, Made, planes_of
-from psvideo.export.result_files import Delivery
+from psvideo.export.sequences.planes import PICTURES, Made, planes_of
+from psvideo.export.sequences.result_files import Delivery
 from psvideo.export.space import Space
 from psvideo.model.quantities import ALWAYS, AOVS, QUANTITIES, SOURCES
 from psvideo.model.surface import Surface

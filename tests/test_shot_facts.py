@@ -10,7 +10,7 @@ import tomlkit
 
 from psvideo.cli.app import main
 from psvideo.clip.decode.movie_tags import shot_by
-from psvideo.export.tags import PRIMARIES, Tags
+from psvideo.export.sequences.tags import PRIMARIES, Tags
 from psvideo.formats.exr_files import write_exr
 
 NAMES = ("key", "left", "top")

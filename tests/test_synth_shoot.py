@@ -19,8 +19,8 @@ import tomlkit
 from psvideo.cli.app import main
 from psvideo.clip import open_clip, read_frames
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.export.blender_addon import NAME as ADDON
-from psvideo.export.blender_addon import addon_folder
+from psvideo.export.programs.blender_addon import NAME as ADDON
+from psvideo.export.programs.blender_addon import addon_folder
 from psvideo.formats.contract import Contract
 from psvideo.formats.plan_toml import read_plan
 from psvideo.formats.rig_toml import read_rig

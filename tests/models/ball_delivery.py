@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from psvideo.export.result_files import Delivery, write_surface
+from psvideo.export.sequences.result_files import Delivery, write_surface
+from psvideo.export.sequences.tags import Tags
 from psvideo.export.space import Space
-from psvideo.export.tags import Tags
 from psvideo.model.quantities import Aov
 from psvideo.model.surface import Surface
 from psvideo.solve.depth import Depth, View

@@ -1,7 +1,12 @@
-"""The only room that knows writers: EXR sequences, PNG, movies, meshes, USD, and what other programs want beside them.
+"""The only room that writes files in formats of other programs.
 
-``asked`` makes one delivery of what was asked for, ``programs`` holds the presets, ``space`` the frames of normals.
-Sequences: ``planes``, ``result_files``, ``plate_files``, ``png_maps``, ``code_files``, ``tags`` (headers). Shape:
-``mesh_files``, ``usd``. Beside them: ``preview_movie``, ``delivery_json``, ``nuke_script``, ``otio``,
-``blender_addon``, ``ptm_file`` (relightable pictures), ``farm_job``.
+``asked`` makes one delivery of all options, with a program's preset; ``space`` turns normals and positions into the
+frame that was asked for (camera, world, tangent).
+
+- ``sequences``: pictures, one file per instant: EXR, 16-bit PNG, TIFF
+- ``usd``: a USD stage with camera, card, material and lights
+- ``programs``: what Nuke, Blender, Unreal and Houdini need: presets, notes on loading, scripts, timelines
+
+Single files: ``mesh_files`` (PLY), ``preview_movie``, ``ptm_file`` (a relightable picture), ``farm_job`` (a job for
+render farms).
 """

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from psvideo.errors import UsageError
-from psvideo.export.programs import NO_PRESET, PRESETS, Preset
-from psvideo.export.result_files import Delivery
+from psvideo.export.programs.presets import NO_PRESET, PRESETS, Preset
+from psvideo.export.sequences.result_files import Delivery
 from psvideo.export.space import choose_space
 from psvideo.model.choices import (
     CameraTime,

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.export.code_files import write_codes
+from psvideo.export.sequences.code_files import write_codes
 from psvideo.formats.plan_toml import FRAMES
 from psvideo.formats.whole_folders import whole_folder
 from psvideo.live.chain import LiveFrame

@@ -1,6 +1,7 @@
 """Everything that is written, shown or asked for by name: one row each, read by export, command line, page and report.
 
-A new quantity is one row here and the function that computes it (for what belongs to an instant: in export/planes.py).
+A new quantity is one row here and the function that computes it (for what belongs to an instant, in
+export/sequences/planes.py).
 """
 
 from collections.abc import Mapping

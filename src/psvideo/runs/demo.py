@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from psvideo.clip import Clip, decoded_once, read_frames
 from psvideo.compute.progress import Watch, unwatched
-from psvideo.export.result_files import Delivery
+from psvideo.export.sequences.result_files import Delivery
 from psvideo.export.space import Space
 from psvideo.formats.whole_files import refuse_existing, whole_file
 from psvideo.model.rig import Vector

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from psvideo.clip import DepthMaps, Masks, Take, open_depth, open_masks
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.export.result_files import Delivery
-from psvideo.export.tags import sha256_of
+from psvideo.export.sequences.result_files import Delivery
+from psvideo.export.sequences.tags import sha256_of
 from psvideo.formats.flat_toml import read_falloff
 from psvideo.formats.rig_toml import read_rig
 from psvideo.model.choices import NEAR_ITERATIONS

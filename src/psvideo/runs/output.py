@@ -9,8 +9,8 @@ from pathlib import Path
 from psvideo import __version__
 from psvideo.clip import Clip, Take
 from psvideo.errors import UsageError
+from psvideo.export.sequences.tags import Tags, sha256_of
 from psvideo.export.space import CAMERA_SPACE, Space
-from psvideo.export.tags import Tags, sha256_of
 from psvideo.formats.clocks_json import read_clocks
 from psvideo.formats.plan_toml import parse_fps
 from psvideo.formats.whole_folders import begun_folder, refuse_folder, whole_folder

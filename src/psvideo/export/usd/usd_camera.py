@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from psvideo.errors import PsvideoError
-from psvideo.export.tags import sha256_of
+from psvideo.export.sequences.tags import sha256_of
 from psvideo.export.usd import require_usd
 from psvideo.export.usd.pose import Pose, pose_of
 

@@ -6,8 +6,8 @@ camera's frame; standard_surface of MaterialX takes it in the world's, into whic
 
 from collections.abc import Sequence
 
-from psvideo.export.programs import Delivered
-from psvideo.export.result_files import result_name
+from psvideo.export.programs.delivered import Delivered
+from psvideo.export.sequences.result_files import result_name
 from psvideo.export.usd.usda import prim
 
 MATERIAL = "/delivery/surface"

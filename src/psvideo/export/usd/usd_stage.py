@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from psvideo.export.mesh_files import animation_name
-from psvideo.export.programs import Delivered, SeenLight
+from psvideo.export.programs.delivered import Delivered, SeenLight
 from psvideo.export.usd.usd_material import MATERIAL, material
 from psvideo.export.usd.usda import identifier, indented, matrix_of, numbers_of, prim
 from psvideo.model.camera import FloatArray

@@ -1,9 +1,13 @@
-"""Plates of one round, which show different instants, brought to one instant; and what moves left out or averaged.
+"""Plates of one round show different instants; here they are brought to one.
 
-``rounds`` is the whole: ``comb`` says which instants, ``held`` keeps the plates around them (``packed``), ``moving``
-finds one velocity for every pixel (proposed by ``flow``, made on sketches by ``sketch_kernel``, and by
-``correlation``; loops in ``moving_kernel``), ``taken`` says which of two plates a pixel comes from, ``between`` makes
-the plates of the instant, ``brightness`` evens light that changes as a whole. What is doubtful: ``evenly`` with
-``evenly_kernel`` (how two plates differ on either side of an edge), ``unsure``, ``lone_edges``, ``own_means``. What is
-made of it: ``opened`` (motion blur), ``denoise``, ``vectors``.
+``rounds`` does it, plate by plate while a clip is read: begin there. ``comb`` lists the instants that are wanted.
+``held`` keeps sketches and plates (``packed`` into 16 bits) for as long as an instant may need them. ``between`` makes
+a light's plate at an instant from the two plates around it; ``taken`` decides which of the two each pixel comes from.
+
+Rooms, from the bottom up:
+
+- ``motion``: where things move, found from all lights together
+- ``doubt``: by how much a plate may be off because the two that it comes from do not match
+
+What aligned plates are used for: ``opened`` (motion blur), ``denoise`` (means over time).
 """

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from psvideo.plates.align.brightness import evened
-from psvideo.plates.align.flow import Flags, Sketch, Vectors, changed, sketch_of, white_of
-from psvideo.plates.align.moving import Followed
+from psvideo.plates.align.motion.brightness import evened
+from psvideo.plates.align.motion.flow import Flags, Sketch, Vectors, changed, sketch_of, white_of
+from psvideo.plates.align.motion.moving import Followed
 from psvideo.plates.align.packed import PutBy, packed
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import POOLED_ROUNDS

@@ -11,16 +11,16 @@ import numpy as np
 
 from psvideo.model.choices import Align, Rate
 from psvideo.plates.align.between import Ends, plate_at
-from psvideo.plates.align.brightness import evened
 from psvideo.plates.align.comb import Comb, Schedule
-from psvideo.plates.align.flow import Codes, Vectors
+from psvideo.plates.align.doubt.lone_edges import InstantSketch, unsure_by_lone_edges
+from psvideo.plates.align.doubt.unsure import UNKNOWN
 from psvideo.plates.align.held import Around, DueInstant, Held
-from psvideo.plates.align.lone_edges import InstantSketch, unsure_by_lone_edges
-from psvideo.plates.align.moving import Followed, Pair, followed_at
-from psvideo.plates.align.moving_kernel import NOWHERE
+from psvideo.plates.align.motion.brightness import evened
+from psvideo.plates.align.motion.flow import Codes, Vectors
+from psvideo.plates.align.motion.moving import Followed, Pair, followed_at
+from psvideo.plates.align.motion.moving_kernel import NOWHERE
 from psvideo.plates.align.packed import PutBy
 from psvideo.plates.align.taken import Taken, taken_of, without_doubtful
-from psvideo.plates.align.unsure import UNKNOWN
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import AMBIENT, Round, gathered, handed_over
 

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from psvideo.clip import Clip, Take
 from psvideo.compute.halves import halves_of
 from psvideo.errors import UsageError
-from psvideo.export.plate_files import plate_name, write_light, write_plate
-from psvideo.export.result_files import Delivery, write_surface
+from psvideo.export.sequences.plate_files import plate_name, write_light, write_plate
+from psvideo.export.sequences.result_files import Delivery, write_surface
+from psvideo.export.sequences.tags import Tags
 from psvideo.export.space import Space
-from psvideo.export.tags import Tags
 from psvideo.model.choices import Compression
 from psvideo.model.plan import Plan
 from psvideo.model.quantities import QUANTITIES, Aov
@@ -24,8 +24,8 @@ from psvideo.model.rig import Rig
 from psvideo.model.timing import Timing
 from psvideo.model.units import show_rate
 from psvideo.plates.align.comb import Comb, Schedule
+from psvideo.plates.align.motion.vectors import pixels_per_s
 from psvideo.plates.align.rounds import Aligning
-from psvideo.plates.align.vectors import pixels_per_s
 from psvideo.plates.beauty import beauty_of
 from psvideo.plates.gather import scheduled
 from psvideo.plates.light_plate import LightPlate

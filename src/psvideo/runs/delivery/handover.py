@@ -15,12 +15,13 @@ import numpy as np
 from psvideo.clip import Clip
 from psvideo.clip.folder import number_of
 from psvideo.compute.progress import Watch
-from psvideo.export.blender_addon import ADDON_FILE, addon_zip
-from psvideo.export.delivery_json import DELIVERY_FILE, delivery_text
-from psvideo.export.nuke_script import nuke_script, script_name
-from psvideo.export.otio import Footage, Images, timeline_text
-from psvideo.export.programs import Delivered, SeenLight, note, note_name
-from psvideo.export.result_files import MOVIE_SUFFIXES, Delivery
+from psvideo.export.programs.blender_addon import ADDON_FILE, addon_zip
+from psvideo.export.programs.delivered import Delivered, SeenLight
+from psvideo.export.programs.delivery_json import DELIVERY_FILE, delivery_text
+from psvideo.export.programs.loading_notes import note, note_name
+from psvideo.export.programs.nuke_script import nuke_script, script_name
+from psvideo.export.programs.otio import Footage, Images, timeline_text
+from psvideo.export.sequences.result_files import MOVIE_SUFFIXES, Delivery
 from psvideo.export.space import CAMERA_SPACE, Space, placed
 from psvideo.export.usd.usd_stage import StageView, stage_name, stage_text
 from psvideo.formats.whole_files import whole_file, write_text

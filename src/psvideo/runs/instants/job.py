@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from psvideo.clip import Take
 from psvideo.errors import UsageError
-from psvideo.export.result_files import Delivery
-from psvideo.export.tags import Tags
+from psvideo.export.sequences.result_files import Delivery
+from psvideo.export.sequences.tags import Tags
 from psvideo.model.choices import Solver
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing

@@ -17,7 +17,7 @@ import numpy as np
 
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import UsageError
-from psvideo.export.result_files import is_written
+from psvideo.export.sequences.result_files import is_written
 from psvideo.model.shutter import frames_touched
 from psvideo.model.timing import Timing, places_in_time, timed_camera
 from psvideo.plates.align.comb import Schedule

@@ -10,8 +10,8 @@ from psvideo.clip import Clip, Take
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.compute.threads import writing
 from psvideo.errors import PsvideoError
-from psvideo.export.plate_files import plate_name, write_flash, write_plate
-from psvideo.export.tags import Tags
+from psvideo.export.sequences.plate_files import plate_name, write_flash, write_plate
+from psvideo.export.sequences.tags import Tags
 from psvideo.formats.timing_json import format_timing
 from psvideo.formats.whole_files import write_text
 from psvideo.model.choices import Compression, MovieCodec, Preview, SplitMethod

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from psvideo import __version__
 from psvideo.clip import Clip, Masks, Take
-from psvideo.export.tags import sha256_of
+from psvideo.export.sequences.tags import sha256_of
 from psvideo.formats.whole_files import write_text
 from psvideo.model.rig import Light, Rig
 from psvideo.model.timing import Timing

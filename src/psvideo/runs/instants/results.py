@@ -11,7 +11,7 @@ from psvideo.compute.heap import give_back
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.mesh_files import animation_name
-from psvideo.export.result_files import mesh_file
+from psvideo.export.sequences.result_files import mesh_file
 from psvideo.export.usd.usd_animation import write_animation
 from psvideo.formats.timing_json import format_timing
 from psvideo.formats.whole_files import write_text

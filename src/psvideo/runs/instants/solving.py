@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.compute.threads import writing
-from psvideo.export.result_files import is_written
+from psvideo.export.sequences.result_files import is_written
 from psvideo.plates.gather import first_ambient, gather
 from psvideo.plates.part import Part
 from psvideo.report.observe.observed import Observed

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from psvideo.plates.align.own_means import own_mean
+from psvideo.plates.align.doubt.own_means import own_mean
 from psvideo.solve.normals.evidence import Evidence, Left
 from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.task import Floats, Mask

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.export.mesh_files import mesh_name, write_part, write_ply
-from psvideo.export.planes import Made, bundled, planes_of
-from psvideo.export.png_maps import PNG_MAX, encode_normals, write_png16
+from psvideo.export.sequences.planes import Made, bundled, planes_of
+from psvideo.export.sequences.png_maps import PNG_MAX, encode_normals, write_png16
+from psvideo.export.sequences.tags import Tags
 from psvideo.export.space import Space
-from psvideo.export.tags import Tags
 from psvideo.formats.exr_files import write_exr, write_exr_parts
 from psvideo.model.choices import Codec, Compression, MovieCodec, Preview, Program
 from psvideo.model.quantities import ALWAYS, AOVS, QUANTITIES, SOURCES, Aov, is_half

@@ -8,8 +8,8 @@ pixel's own side (Kuwahara, Hachimura, Eiho and Kinoshita, "Processing of RI-ang
 import cv2
 import numpy as np
 
-from psvideo.plates.align.evenly_kernel import evenest_rows
-from psvideo.plates.align.flow import Vectors
+from psvideo.plates.align.doubt.evenly_kernel import evenest_rows
+from psvideo.plates.align.motion.flow import Vectors
 
 EACH_PX = 7
 """Of such windows nine hold a pixel: in their middle, at their corners, or at their sides."""

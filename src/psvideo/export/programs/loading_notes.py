@@ -1,84 +1,15 @@
-"""What each program wants of a delivery, and the note that lies beside it on how to load it.
+"""A note beside each delivery that says how to load it into a program.
 
-What a note says of Blender was seen in Blender itself (tests/test_clients_blender.py); of Nuke, Unreal and Houdini it
-follows their manuals; the script for Nuke is checked by its arithmetic (tests/test_nuke.py).
+What a note says of Blender was tried in Blender itself (tests/test_clients_blender.py); the notes for Nuke, Unreal and
+Houdini follow their manuals.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from fractions import Fraction
 
-from psvideo.export.blender_addon import ADDON_FILE
-from psvideo.export.result_files import Delivery, result_name
-from psvideo.model.choices import Program, SpaceName, YDirection
-from psvideo.model.quantities import Aov
-
-
-@dataclass(frozen=True, kw_only=True)
-class Preset:
-    """What a program's preset sets where the options say nothing, and ``reasons`` for each by the option's name."""
-
-    space: SpaceName
-    y: YDirection
-    reasons: dict[str, str]
-    png16: bool = False
-    multipart: bool = False
-    aovs: tuple[Aov, ...] = ()
-
-
-NO_PRESET = Preset(space="camera", y="up", reasons={})
-PRESETS: dict[Program, Preset] = {
-    "nuke": Preset(
-        space="camera",
-        y="up",
-        multipart=True,
-        aovs=("beauty", "position"),
-        reasons={"y": "Nuke's axes have y up", "space": "ReLight needs normals in the frame of its positions"},
-    ),
-    "blender": Preset(
-        space="camera",
-        y="up",
-        png16=True,
-        reasons={"y": "Blender takes y as up", "space": "the note's nodes turn camera space"},
-    ),
-    "unreal": Preset(
-        space="tangent",
-        y="down",
-        png16=True,
-        reasons={"y": "Unreal takes green as down (DirectX)", "space": "Unreal's normal maps are in tangent space"},
-    ),
-    "houdini": Preset(
-        space="camera",
-        y="up",
-        multipart=True,
-        aovs=("depth", "position"),
-        reasons={"y": "Houdini's axes have y up", "space": "positions and normals share the camera's frame"},
-    ),
-}
-
-
-@dataclass(frozen=True, kw_only=True)
-class SeenLight:
-    """A lamp as the middle of the surface sees it: the way to it in the frame of the normals, and its colour."""
-
-    name: str
-    direction: Sequence[float]
-    colour: Sequence[float] = (1.0, 1.0, 1.0)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Delivered:
-    """What other programs have to know of one delivery. ``lights`` are empty where they have no one direction."""
-
-    clip: str
-    first: int
-    last: int
-    fps: Fraction
-    width_px: int
-    height_px: int
-    metric: bool
-    delivery: Delivery
-    lights: tuple[SeenLight, ...] = ()
+from psvideo.export.programs.blender_addon import ADDON_FILE
+from psvideo.export.programs.delivered import Delivered
+from psvideo.export.sequences.result_files import result_name
+from psvideo.model.choices import Program
 
 
 def note_name(program: Program) -> str:

@@ -7,8 +7,8 @@ as many inputs from it as it says, the first from the top, and puts itself there
 
 import re
 
-from psvideo.export.programs import Delivered, SeenLight
-from psvideo.export.result_files import result_name
+from psvideo.export.programs.delivered import Delivered, SeenLight
+from psvideo.export.sequences.result_files import result_name
 
 FOLDER = "[file dirname [value root.name]]"
 """Where the script lies, in Nuke's own words: the delivery may be moved as a whole."""

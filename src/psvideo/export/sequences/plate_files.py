@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.export.tags import Tags
+from psvideo.export.sequences.tags import Tags
 from psvideo.formats.exr_files import write_exr
 from psvideo.model.choices import Compression
 from psvideo.model.quantities import QUANTITIES

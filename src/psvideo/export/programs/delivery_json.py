@@ -3,7 +3,7 @@
 import json
 from typing import Any
 
-from psvideo.export.programs import Delivered
+from psvideo.export.programs.delivered import Delivered
 from psvideo.model.rig import Rig
 
 SCHEMA = "psvideo-delivery/1"

@@ -11,7 +11,7 @@ from pathlib import Path
 NAME = "psvideo_import"
 ADDON_FILE = f"{NAME}.zip"
 INSTALLED = Path(__file__).parent / "blender"
-CHECKOUT = Path(__file__).resolve().parents[3] / "integrations" / "blender"
+CHECKOUT = Path(__file__).resolve().parents[4] / "integrations" / "blender"
 EPOCH = (1980, 1, 1, 0, 0, 0)
 """The time that every file of the archive bears, so that the same add-on gives the same bytes."""
 
