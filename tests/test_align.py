@@ -15,12 +15,12 @@ from psvideo.model.surface import Surface
 from psvideo.plates.align import between, held
 from psvideo.plates.align.comb import Comb, Schedule
 from psvideo.plates.align.doubt.unsure import UNKNOWN
-from psvideo.plates.align.motion import flow, moving
-from psvideo.plates.align.motion.moving_kernel import AT_REST, BOTH
-from psvideo.plates.align.motion.vectors import pixels_per_s
 from psvideo.plates.align.opened import with_open_shutter
 from psvideo.plates.align.packed import PutBy, packed
 from psvideo.plates.align.rounds import Aligning, aligned
+from psvideo.plates.align.velocity import flow, moving
+from psvideo.plates.align.velocity.moving_kernel import AT_REST, BOTH
+from psvideo.plates.align.velocity.vectors import pixels_per_s
 from psvideo.plates.beauty import beauty_of, mix_of
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import Mixture, made

@@ -86,6 +86,16 @@ def test_contributing_has_a_line_for_every_room() -> None:
     assert len(lines) == len(rooms)
 
 
+STEP = re.compile(r"^\d\. `(src/\S+\.py)`(.*)$", flags=re.MULTILINE)
+
+
+def test_a_step_of_contributing_names_what_is_in_its_file() -> None:
+    steps = STEP.findall((ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8"))
+    named = [(file, name) for file, rest in steps for name in re.findall(r"(?:in|its|a) `([A-Z]\w+)", rest)]
+    assert not [(file, name) for file, name in named if name not in (ROOT / file).read_text(encoding="utf-8")]
+    assert len(named) >= 5
+
+
 PACKAGE = ROOT / "src" / "psvideo"
 PLAIN = {"cli/commands", "cli/commands/calibrate", "runs/calibrate"}
 """Rooms whose modules have the names of commands, which say all."""

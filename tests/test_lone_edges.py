@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from psvideo.plates.align.doubt.lone_edges import FOLLOWED, InstantSketch, unsure_by_lone_edges
-from psvideo.plates.align.motion.flow import Sketch
 from psvideo.plates.align.rounds import Aligning, aligned
+from psvideo.plates.align.velocity.flow import Sketch
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import made
 from psvideo.solve.normals.illumination import Illumination

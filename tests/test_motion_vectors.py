@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from psvideo.plates.align.motion.moving import Followed
-from psvideo.plates.align.motion.vectors import pixels_per_s
+from psvideo.plates.align.velocity.moving import Followed
+from psvideo.plates.align.velocity.vectors import pixels_per_s
 
 ROWS, COLS = 120, 160
 GOES = np.array([30.0, -12.0], np.float32)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from psvideo.plates.align.doubt.own_means import own_mean
-from psvideo.plates.align.motion import moving
-from psvideo.plates.align.motion.flow import Sketch, sketch_of
-from psvideo.plates.align.motion.moving import Pair, followed_at
+from psvideo.plates.align.velocity import moving
+from psvideo.plates.align.velocity.flow import Sketch, sketch_of
+from psvideo.plates.align.velocity.moving import Pair, followed_at
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import made
 

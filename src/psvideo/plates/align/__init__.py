@@ -6,7 +6,7 @@ a light's plate at an instant from the two plates around it; ``taken`` decides w
 
 Rooms, from the bottom up:
 
-- ``motion``: where things move, found from all lights together
+- ``velocity``: where things move, found from all lights together
 - ``doubt``: by how much a plate may be off because the two that it comes from do not match
 
 What aligned plates are used for: ``opened`` (motion blur), ``denoise`` (means over time).

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
 from psvideo.model.coded import Image
-from psvideo.plates.align.motion.flow import Codes, Flags, Vectors
-from psvideo.plates.align.motion.moving import Followed
-from psvideo.plates.align.motion.moving_kernel import AT_REST, NOWHERE, blend_rows, ways_rows
 from psvideo.plates.align.packed import PutBy, packed
+from psvideo.plates.align.velocity.flow import Codes, Flags, Vectors
+from psvideo.plates.align.velocity.moving import Followed
+from psvideo.plates.align.velocity.moving_kernel import AT_REST, NOWHERE, blend_rows, ways_rows
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.mixture import Reader, made
 

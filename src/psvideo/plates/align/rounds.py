@@ -15,12 +15,12 @@ from psvideo.plates.align.comb import Comb, Schedule
 from psvideo.plates.align.doubt.lone_edges import InstantSketch, unsure_by_lone_edges
 from psvideo.plates.align.doubt.unsure import UNKNOWN
 from psvideo.plates.align.held import Around, DueInstant, Held
-from psvideo.plates.align.motion.brightness import evened
-from psvideo.plates.align.motion.flow import Codes, Vectors
-from psvideo.plates.align.motion.moving import Followed, Pair, followed_at
-from psvideo.plates.align.motion.moving_kernel import NOWHERE
 from psvideo.plates.align.packed import PutBy
 from psvideo.plates.align.taken import Taken, taken_of, without_doubtful
+from psvideo.plates.align.velocity.brightness import evened
+from psvideo.plates.align.velocity.flow import Codes, Vectors
+from psvideo.plates.align.velocity.moving import Followed, Pair, followed_at
+from psvideo.plates.align.velocity.moving_kernel import NOWHERE
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import AMBIENT, Round, gathered, handed_over
 

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from psvideo.plates.align.doubt.evenly import EACH_PX, evenly_changed
 from psvideo.plates.align.doubt.lone_edges import InstantSketch
 from psvideo.plates.align.doubt.unsure import unsure_of
-from psvideo.plates.align.motion.brightness import light_of
-from psvideo.plates.align.motion.flow import Codes, Flags, Vectors, comparable, noise_between, places
-from psvideo.plates.align.motion.moving import SHADING_PX, Followed, Pair, window_of
-from psvideo.plates.align.motion.moving_kernel import AFTER, AT_REST, BEFORE, BOTH, NOWHERE
+from psvideo.plates.align.velocity.brightness import light_of
+from psvideo.plates.align.velocity.flow import Codes, Flags, Vectors, comparable, noise_between, places
+from psvideo.plates.align.velocity.moving import SHADING_PX, Followed, Pair, window_of
+from psvideo.plates.align.velocity.moving_kernel import AFTER, AT_REST, BEFORE, BOTH, NOWHERE
 
 UNLIKE = 10.0
 """Plates whose detail differs by more codes along the motion do not show the same thing."""

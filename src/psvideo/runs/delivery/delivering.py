@@ -24,8 +24,8 @@ from psvideo.model.rig import Rig
 from psvideo.model.timing import Timing
 from psvideo.model.units import show_rate
 from psvideo.plates.align.comb import Comb, Schedule
-from psvideo.plates.align.motion.vectors import pixels_per_s
 from psvideo.plates.align.rounds import Aligning
+from psvideo.plates.align.velocity.vectors import pixels_per_s
 from psvideo.plates.beauty import beauty_of
 from psvideo.plates.gather import scheduled
 from psvideo.plates.light_plate import LightPlate

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from psvideo.plates.align.doubt.evenly_kernel import evenest_rows
-from psvideo.plates.align.motion.flow import Vectors
+from psvideo.plates.align.velocity.flow import Vectors
 
 EACH_PX = 7
 """Of such windows nine hold a pixel: in their middle, at their corners, or at their sides."""

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from psvideo.plates.align.motion.brightness import SCALE, light_of
-from psvideo.plates.align.motion.flow import TOE, Codes, Flags, Sketch, Vectors
+from psvideo.plates.align.velocity.brightness import SCALE, light_of
+from psvideo.plates.align.velocity.flow import TOE, Codes, Flags, Sketch, Vectors
 
 SMOOTH_PX, BESIDE_PX = 1.0, 3
 """Edges are looked for in sketches smoothed by the first, and found again over a window of the second."""

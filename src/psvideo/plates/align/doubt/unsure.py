@@ -7,9 +7,9 @@ is not the true one; the plate at the instant then lies somewhere between them, 
 import numpy as np
 
 from psvideo.plates.align.doubt.own_means import own_mean
-from psvideo.plates.align.motion.brightness import ROOT_TOE, SCALE
-from psvideo.plates.align.motion.flow import Codes, Vectors
-from psvideo.plates.align.motion.moving import Followed, Pair, window_of
+from psvideo.plates.align.velocity.brightness import ROOT_TOE, SCALE
+from psvideo.plates.align.velocity.flow import Codes, Vectors
+from psvideo.plates.align.velocity.moving import Followed, Pair, window_of
 
 WINDOW_PX = 3
 """Plates are compared over this many pixels of their sketches: edges that come to lie beside each other are narrow."""

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.plates.align.motion.flow import TOE, Sketch, Vectors
+from psvideo.plates.align.velocity.flow import TOE, Sketch, Vectors
 
 LIT, NEAR_WHITE = 32, 250
 """Codes between which brightness is compared: below is mostly black, above may be cut off at a sketch's white."""

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from psvideo.plates.align.motion.flow import Vectors
+from psvideo.plates.align.velocity.flow import Vectors
 
 LARGEST_PX = 240
 """Pictures are made smaller until neither side is longer: a pixel more or less is left to flow."""

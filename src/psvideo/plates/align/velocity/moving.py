@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
-from psvideo.plates.align.motion.correlation import displacements
-from psvideo.plates.align.motion.flow import FINE_PIXELS, Codes, Flags, Sketch, Vectors, comparable, flow_from, places
-from psvideo.plates.align.motion.moving_kernel import arriving_rows, unlike_rows
+from psvideo.plates.align.velocity.correlation import displacements
+from psvideo.plates.align.velocity.flow import FINE_PIXELS, Codes, Flags, Sketch, Vectors, comparable, flow_from, places
+from psvideo.plates.align.velocity.moving_kernel import arriving_rows, unlike_rows
 
 MOST_FLOWS = 4
 """Flow is looked for between the plates of so many lights, evenly spread: more propose the same again."""

@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.plates.align.motion.flow import Flags, Vectors
-from psvideo.plates.align.motion.moving import Followed, window_of
+from psvideo.plates.align.velocity.flow import Flags, Vectors
+from psvideo.plates.align.velocity.moving import Followed, window_of
 
 GAPS_PX = 9
 """Gaps of so many pixels in what moves are closed: outlines along the motion show nothing of it."""

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.coded import Image
-from psvideo.plates.align.motion.sketch_kernel import root_rows
+from psvideo.plates.align.velocity.sketch_kernel import root_rows
 from psvideo.plates.light_plate import LightPlate
 
 Codes = NDArray[np.uint8]
