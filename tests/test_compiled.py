@@ -190,25 +190,39 @@ for module in pkgutil.walk_packages(psvideo.__path__, "psvideo."):
     if module.name not in ("psvideo.cli.app", "psvideo.__main__"):
         importlib.import_module(module.name)
 from psvideo.cli.app import main
-from psvideo.sync.rowfit import row_model
+from psvideo.sync.rowfit import kernel, row_model
 assert row_model.width._cache.cache_path is None, "nothing is kept"
-scene, clip, command, *options = sys.argv[1:]
-assert main(["synth", scene, "-o", clip, "-q"]) == 0
-assert main([command, clip, *options, "-q"]) == 0
+matrix = np.array([[4.0, 2.0], [2.0, 5.0]])
+kernel.factor(matrix, 2)
+assert np.allclose(np.tril(matrix), [[2.0, 0.0], [1.0, 2.0]]), matrix
+if sys.argv[1:]:
+    scene, clip, command, *options = sys.argv[1:]
+    assert main(["synth", scene, "-o", clip, "-q"]) == 0
+    assert main([command, clip, *options, "-q"]) == 0
 """
 
 
-@pytest.mark.parametrize("command", ["sync", pytest.param("normals", marks=pytest.mark.campaign)])
-def test_all_of_it_works_where_no_folder_can_be_written_for_compiled_code(
-    command: str, copy: Path, tmp_path: Path
-) -> None:
+def where_nothing_can_be_kept(copy: Path, *arguments: object) -> None:
+    """Import every module and run a loop in a process that can write compiled code nowhere; then a command."""
     nowhere = dict.fromkeys(("HOME", "NUMBA_CACHE_DIR", "XDG_CACHE_HOME", "LOCALAPPDATA"), "/dev/null/nowhere")
     environment = os.environ | nowhere | {"PYTHONPATH": str(copy.parent), "PYTHONDONTWRITEBYTECODE": "1"}
-    clip, out = tmp_path / "clip", tmp_path / "out"
-    options = ["--rig", str(clip / "rig.toml")] if command == "normals" else []
-    said = [sys.executable, "-c", NO_FOLDER, str(SCENE), str(clip), command, "-o", str(out), *options]
-    done = subprocess.run(said, env=environment, capture_output=True, text=True, check=False)
+    command = [sys.executable, "-c", NO_FOLDER, *map(str, arguments)]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def test_every_module_loads_and_loops_run_where_no_folder_can_be_written_for_compiled_code(copy: Path) -> None:
+    where_nothing_can_be_kept(copy)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("command", ["sync", "normals"])
+def test_whole_commands_run_where_no_folder_can_be_written_for_compiled_code(
+    command: str, copy: Path, tmp_path: Path
+) -> None:
+    clip, out = tmp_path / "clip", tmp_path / "out"
+    options = ["--rig", clip / "rig.toml"] if command == "normals" else []
+    where_nothing_can_be_kept(copy, SCENE, clip, command, "-o", out, *options)
     assert out.is_file() if command == "sync" else list((out / "normals").iterdir())
 
 
