@@ -1,8 +1,8 @@
 """Where lights are and how strong, from a matte sphere whose outline is known.
 
 Every pixel of the sphere has a known normal n, and a matte surface shows ``intensity * albedo * n . l``: linear in the
-light's strength times direction, so many pixels give it by least squares. Only the part that a light reaches well is
-used, and it is weighed robustly (Tukey; P. J. Huber, "Robust Statistics", 1981): near the terminator paint is not
+light's strength times direction, thousands of pixels give it by least squares. Only the part that a light reaches well
+is used, and it is weighed robustly (Tukey; P. J. Huber, "Robust Statistics", 1981): near the terminator paint is not
 matte, light comes back from the surroundings, and gloss adds a spot. Errors come from leaving out one patch of the
 sphere after the other (jackknife), because what a real paint does otherwise is alike over whole patches, and from how
 well the outline is known. The sphere's albedo is the same for all lights: without it intensities are relative.

@@ -1,15 +1,16 @@
-"""A clip on disk becomes linear float frames, lazily. The only room that knows decoders.
+"""A clip on disk becomes frames in linear light, read when they are needed. The only room that knows decoders.
 
-``open_clip`` finds the footage and its plan and checks that they fit; ``read_frames`` decodes, takes the transfer
-curve off and gives one frame after the other; ``keeping_near`` keeps what was decoded for a second look; ``demosaic``
-makes colour of a mosaic.
+``open_clip`` finds the footage and its plan and checks that they fit. ``read_frames`` decodes, removes the transfer
+curve and gives one frame after the other. ``keeping_near`` keeps decoded frames for a second look; ``demosaic`` makes
+colour of a mosaic.
 
-``decode`` has a module for each kind of file. ``record`` and ``take`` hold the records; ``folder`` and ``opening``
-find files, ``stills`` photographs; ``reading`` reads, with ``transfer`` and ``linear`` from codes to light,
-``in_file`` and ``kept`` for codes that are not in memory; ``stated`` is what photographs say of themselves,
-``filters`` whether they are a mosaic. What comes
-while it is recorded: ``growing_folder``, ``stream``, ``genicam`` with ``genicam_camera``. Beside the footage: ``mask``
-and ``mask_sequence``, ``depth_map``.
+- records: ``record`` (a clip), ``take`` (a clip and the frames that are used)
+- finding: ``opening``, ``folder``, ``stills`` (photographs), with ``stated`` (what photographs say of themselves) and
+  ``filters`` (whether they are a mosaic)
+- reading: ``reading``, by ``decode`` (one module for each kind of file), ``transfer`` and ``linear`` (from codes to
+  light), ``in_file`` and ``kept`` (codes that are not in memory)
+- what comes while it is recorded: ``growing_folder``, ``stream``, ``genicam`` with ``genicam_camera``
+- beside the footage: ``mask`` and ``mask_sequence``, ``depth_map``
 """
 
 from psvideo.clip.decode.malvar2004 import demosaic

@@ -32,7 +32,7 @@ LOOKED = 3
 LATEST = 24
 """Frames by which it is judged whether the strobe is still seen."""
 LEFT, LEFT_AFTER_CHANGE, SLOWLY = 0.6, 0.85, 8
-"""Where the strobe explains less than this share of what it usually does (a mean over so many corrections), it is as
+"""Where the strobe explains less than this share of what it usually does (a mean over this many corrections), it is as
 likely to be another one; the more so after a change, as a strobe that was started again is one."""
 HELD = 0.33
 """A correction moves the clock by no more than this share of a flash."""
@@ -88,7 +88,7 @@ class Follower:
         return self.phase.error_at_s(at_s) / row_time_s
 
     def trimmed(self, at_s: float, ppm: float) -> None:
-        """Foresee that the strobe, from a time on, comes later by so many ppm of the time that passes."""
+        """Foresee that the strobe, from a time on, comes later by this many ppm of the time that passes."""
         since_s = self.window.frames[0].index * self.window.period_s if self.window.frames else at_s
         self.phase = trimmed(self.phase, self.trims, at_s, ppm, since_s=since_s)
 

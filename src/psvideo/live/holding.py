@@ -10,11 +10,11 @@ from psvideo.strobe.link.lines import Error
 from psvideo.strobe.link.requests import Trim
 
 STEPS_UNTIL = 1.5
-"""A trim counts from the step behind the next one on: so many steps later, in the mean."""
+"""A trim takes effect from the step after the next one: this many steps later, on average."""
 
 
 def trim_by(ppm: int) -> Trim:
-    """Return the request that makes steps longer (or shorter, below 0) by so many ppm."""
+    """Return the request that makes steps longer (or shorter, below 0) by this many ppm."""
     return Trim(way="sooner" if ppm < 0 else "later", ppm=abs(ppm))
 
 

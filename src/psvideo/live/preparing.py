@@ -14,7 +14,7 @@ RECENT_S = 3.0
 
 
 def prepared(prepare: Callable[[], None], *, said: Callable[[], None], every_s: float) -> str:
-    """Run ``prepare`` and call ``said`` every so many seconds meanwhile; return what went wrong, "" where nothing did.
+    """Run ``prepare``, calling ``said`` every ``every_s`` seconds meanwhile; return what went wrong, or "".
 
     Nothing that goes wrong in a rehearsal keeps the run from beginning: it would only begin more slowly.
     """

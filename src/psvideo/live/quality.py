@@ -82,9 +82,9 @@ class LiveSecond:
 
 @dataclass(frozen=True, kw_only=True)
 class Quality:
-    """The live picture's ``step``: a pixel of it is so many of the camera's wide; ``steps`` are those that there are.
+    """The live picture's ``step``: a pixel of it is this many of the camera's wide; ``steps`` are those that there are.
 
-    ``late``, ``calm``: seconds in a row without time, and with time to spare; ``wait``: so many of the latter let it
+    ``late``, ``calm``: seconds in a row without time, and with time to spare; ``wait``: this many of the latter let it
     grow. ``since``: seconds at this step; ``grew``: whether it was a growth that led here, and is not yet known to
     hold; ``before_s``: what a result cost just before it. ``dearer``: how much dearer results got when the picture grew
     to a step, of those that it grew to. ``drawn_s``: how old pictures were when they were made smaller for that alone;

@@ -9,7 +9,7 @@ from psvideo.model.coded import Coded
 from psvideo.model.plan import Plan
 
 ROUNDS = 2.5
-"""So many rounds are held: the newest whole one lies in them wherever it begins, while it is solved."""
+"""This many rounds are held: the newest whole one lies in them wherever it begins, while it is solved."""
 SPARE = 6
 
 

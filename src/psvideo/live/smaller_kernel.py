@@ -67,7 +67,7 @@ def _finish(
     top: np.float32,
     small: NDArray[Any],
 ) -> None:
-    """Write every so many cells from the first on."""
+    """Write every nth cell from the first on."""
     if stride == 1:
         for col in range(total.shape[0]):
             small[col] = top if most[col] >= clips else total[col] * factor
@@ -123,7 +123,7 @@ def _pile(line: NDArray[Any], sums: Floats, highest: Floats) -> None:
 
 @EXACT.inlined
 def _gather(sums: NDArray[Any], highest: NDArray[Any], first: int, stride: int, total: Floats, most: Floats) -> None:
-    """Add every so many samples from the first on, one for each cell; strides that are known are much faster."""
+    """Add every nth sample from the first on, one for each cell; strides that are known are much faster."""
     if stride == 2:
         _gathered(sums[first:], highest[first:], np.uint64(2), total, most)
     elif stride == 4:

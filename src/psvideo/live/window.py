@@ -51,7 +51,7 @@ class Window:
         self.changes = [at for at in self.changes if at > self.frames[0].index]
 
     def moved(self, first: int, extra: int) -> None:
-        """Put the frames from the place ``first`` on by so many frames later."""
+        """Put the frames from the place ``first`` on by this many frames later."""
         for place, frame in enumerate(self.frames):
             if frame.index >= first:
                 self.frames[place] = replace(frame, index=frame.index + extra)
@@ -64,7 +64,7 @@ class Window:
         return sum(frame.index >= self.changes[-1] for frame in self.frames)
 
     def profiles(self, latest: int | None = None) -> Profiles:
-        """Return the frames, or the ``latest`` so many, each stretch of equal light a window of its own."""
+        """Return the frames, or the last ``latest`` of them, each stretch of equal light a window of its own."""
         frames = list(self.frames)[-(latest or len(self.frames)) :]
         index = np.array([frame.index for frame in frames], np.int64)
         starts = np.searchsorted(index, [at for at in self.changes if at > index[0]])

@@ -33,7 +33,7 @@ class PagePicture:
 
 @dataclass(frozen=True, kw_only=True)
 class Look:
-    """How a picture is to be looked at: at most so wide; ``quick`` leaves pixels out instead of averaging them."""
+    """How a picture is to be looked at: at most this wide; ``quick`` leaves pixels out instead of averaging them."""
 
     width_px: int
     quick: bool = False

@@ -9,7 +9,7 @@ from psvideo.errors import UsageError
 from psvideo.page.show import Show, ShownSequence
 
 SAME_SHAPE = 0.01
-"""By so large a share two pictures' aspects may differ: results are made at other sizes, and sizes are whole."""
+"""Two pictures' aspects may differ by this share: results are made at other sizes, and sizes are whole numbers."""
 
 
 def side_by_side(shows: Sequence[Show], paths: Sequence[Path]) -> Show:

@@ -1,9 +1,16 @@
-"""Frames and their timing in, one clean picture per light and round out.
+"""Frames and their timing in, one clean picture per light and round (a plate) out.
 
-``gather`` is the whole: ``timed`` and ``naming`` give times and names of lights, ``split`` makes the plates of
-flashes, ``ambient`` takes the room's light off, ``demultiplexed`` and ``unmixed`` (with ``surface_colour``) give
-single lights where several flash together, ``light_plate`` and ``sequence`` collect rounds, ``nearest_rows`` lends
-rows that a flash missed, ``upright`` turns, ``align`` brings a round to one instant. A plate is a ``mixture`` of
-frames, made by ``ready_mixture``, ``mixing_kernel`` and ``thinning_kernel`` where somebody looks at it. ``part``: a
-range of frames by itself. ``beauty``: all lights at once. ``hudon2015``: the published method, to compare with.
+``gather`` does it for a whole clip: begin there. On its way:
+
+- times and names: ``timed`` (when flashes fired), ``naming`` (which light is which)
+- plates of flashes: ``split``; ``nearest_rows`` fills rows that a flash missed from the nearest round that saw them
+- ambient light: ``ambient`` takes it off
+- several lights in one flash: ``demultiplexed``, ``unmixed`` (LEDs of different colours) with ``surface_colour``
+- rounds: ``light_plate`` and ``sequence`` collect them, ``align`` brings a round to one instant, ``upright`` turns it
+
+A plate is a ``mixture``: a weighted sum of rows of frames. Its pixels are computed only where they are read, by
+``ready_mixture``, ``mixing_kernel`` and ``thinning_kernel``.
+
+Besides: ``part`` (a range of frames alone), ``beauty`` (all lights at once), ``hudon2015`` (the published method, to
+compare with).
 """

@@ -185,7 +185,7 @@ def row_of(mix: MixtureArrays, frame: int, row: int) -> Any:
 
 @FUSED.called
 def _read(files: InFiles, opened: int, begin: int, size: int) -> None:
-    """Read so many bytes of a file; a part may come at a time."""
+    """Read this many bytes of a file; a part may come at a time."""
     done = 0
     while done < size:
         came = read_at(files.reader, opened, files.room + done, size - done, begin + done)

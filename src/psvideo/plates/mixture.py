@@ -94,7 +94,7 @@ class Mixture:
         return image
 
     def thinned(self, stride: int) -> Image:
-        """Return every so many rows and columns of the picture."""
+        """Return every nth row and column of the picture."""
         if self.is_made:
             return self.image()[::stride, ::stride]
         rows, cols = (-(-size // stride) for size in self.shape[:2])

@@ -21,7 +21,7 @@ from psvideo.solve.near_surface import NearSurface, near_surface_of, near_trust
 from psvideo.solve.normals.illumination import illumination
 
 UNSURE_DEG = 5.0
-"""A rig whose own standard error is so large is named in the report; a guessed one says 20."""
+"""A rig whose own standard error is this large is named in the report; a guessed one says 20."""
 
 
 @dataclass(frozen=True, kw_only=True)

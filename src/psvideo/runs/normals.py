@@ -114,7 +114,7 @@ def normals(
       often near lights' distances are taken again from the depth of the normals found, 0 to 10 (left out: 1, and 0
       with ``depth``).
     - ``align``: "auto" brings the plates of a round to one instant where something moves, "flow" looks for motion
-      everywhere, "none" leaves them. ``fps``: one result per "round", per "flash", per camera "frame", or so many a
+      everywhere, "none" leaves them. ``fps``: one result per "round", per "flash", per camera "frame", or a number a
       second, exactly (a Fraction; whole or decimal numbers are taken as they are written), at most as many as the
       camera took. ``shutter``: the angle, up to 360 degrees of such a rate, for which a shutter is open in beauty and
       plates; surfaces are those of its middle. ``resync``: a clocks.json of several cameras (``sync_cameras``), which

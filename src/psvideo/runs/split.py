@@ -62,7 +62,7 @@ def split(
       ``weight`` says (by name; 1 where not named), with ambient light where ``with_ambient``. ``preview``: movies for
       eyes, coded as ``preview_codec``. ``compression``: how EXR files are packed,
       always without loss: "zip", "zips", "piz", "rle" or "none".
-    - ``fps``: plates of one instant per "flash", per camera "frame", or so many a second, exactly, brought there by
+    - ``fps``: plates of one instant per "flash", per camera "frame", or a number a second, exactly, brought there by
       the alignment; left out, every plate shows its own flash. ``shutter``: the angle, up to 360 degrees of such a
       rate, for which a shutter is open in them. ``resync``: a clocks.json of several cameras (``sync_cameras``), which
       then show the same instants of such a rate under the same numbers.

@@ -1,8 +1,13 @@
 """Plates and a rig in, the surface out: normals, albedo, depth.
 
-``of_take`` solves a take, ``images`` arrays (``given`` checks them), ``instants`` rounds of plates. ``normals`` holds
-the solvers and what is thought of their results, ``filling`` what fewer than three lights reach, ``depth`` the shape,
-``passes`` what else plates say. Near lights: ``near_surface`` solves in turns with the depth, ``sweeping`` finds the
-distance by falloff (``falloff_costs``, ``sweeping_kernel``, ``swept_outlines``). Over time: ``steady`` with
-``steady_kernel``.
+``of_take`` solves a take, ``images`` arrays (checked by ``given``), ``instants`` rounds of plates: begin there.
+
+- ``normals``: the solvers, and how far their results can be trusted
+- ``filling``: estimates where fewer than three lights reach
+- ``depth``: from normals to shape
+- ``passes``: what else plates show (which lights reach a pixel, highlights, a matte)
+
+Near lights: ``near_surface`` solves normals and depth in turns; ``sweeping`` finds the distance by the lights' falloff
+(with ``falloff_costs``, ``sweeping_kernel`` and ``swept_outlines``). Over time: ``steady``, with ``steady_kernel``,
+keeps the trust in a pixel from flickering.
 """

@@ -71,7 +71,7 @@ def falloff_costs(
 
 
 def _thin(plate: Samples | Mixture, step: int) -> NDArray[np.float32]:
-    """Return every so many rows and columns of a plate, (row, col), its channels' mean."""
+    """Return every nth row and column of a plate, (row, col), its channels' mean."""
     some = plate.thinned(step) if isinstance(plate, Mixture) else plate[::step, ::step]
     some = np.asarray(some, np.float32)
     return some if some.ndim == 2 else some.mean(axis=-1)

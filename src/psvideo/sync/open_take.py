@@ -10,7 +10,7 @@ from psvideo.formats.paths import path_if_given, path_of
 from psvideo.strobe.runlog import as_played
 
 MOST_MISSING, MOST_MISSING_SHARE = 10_000, 100
-"""Where more frames are missing in a row than the first, and than so many times those that are there, it is not one
+"""Where more frames are missing in a row than the first, and than this many times those that are there, it is not one
 take: every flash in between would be counted."""
 
 

@@ -1,9 +1,10 @@
-"""The virtual shoot: scenes, a renderer and a sensor, made to give footage whose truth is known.
+"""The virtual shoot: scenes, a renderer and a sensor, which give footage whose truth is known.
 
-It never uses the code that it is there to test: how a row integrates light is computed here by another method.
+It never uses the code that it tests: how a row integrates light is computed here by another method.
 
-``shoot`` is the whole: ``scene`` is read (``scenes`` finds those that come with psvideo), ``shotplan`` makes plan, rig
-and clock of it, ``stage`` sets it up from ``subject`` and ``lamps``, ``camera`` films it, ``truth`` is written beside.
+``shoot`` does it: begin there. It reads a ``scene`` (``scenes`` finds those that come with psvideo), makes plan, rig
+and clock of it (``shotplan``), sets it up from ``subject`` and ``lamps`` (``stage``), films it with ``camera``, and
+writes the ``truth`` beside the clip.
 """
 
 from psvideo.synth.camera.exposure import Exposure, expose

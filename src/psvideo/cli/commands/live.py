@@ -65,7 +65,7 @@ def live(
         typer.Option("--pace", help="A clip's own pace, or fastest: every round is solved, nothing is left out."),
     ] = "own",
     seconds: Annotated[
-        float | None, typer.Option("--seconds", min=0.0, help="End after so many seconds of footage.")
+        float | None, typer.Option("--seconds", min=0.0, help="End after this many seconds of footage.")
     ] = None,
     no_page: Annotated[bool, typer.Option("--no-page", help="Serve no page.")] = False,
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Do not open the page in a browser.")] = False,

@@ -27,8 +27,9 @@ BAND_ROWS = 64
 MARGIN_ROWS = 5
 """Rows beside those that places lie in which count too: for cubic interpolation, and around what is clipped."""
 BESIDE_CLIPPED, OVERSHOOT, JUST_BELOW = 5, 1.45, 1 - 1e-4
-"""Cubic interpolation mixes samples of so wide a square, and makes up to so many times the brightest of them (the sum
-of its positive weights): those that clip are kept out of it, and it stays below what clips, rounding to 16 bits too."""
+"""Cubic interpolation mixes samples of a square this wide; its result may reach this many times the brightest of them
+(the sum of its positive weights). Clipped samples are kept out of it, and its result is kept below the level that
+counts as clipped, also after rounding to 16 bits."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -19,7 +19,7 @@ from psvideo.model.timing import Flash
 from psvideo.plates.sequence import coming, round_numbers
 
 SAMPLES = 15
-"""Instants of one opening, the middle one among them: what moves by so many pixels in it is blurred without steps."""
+"""Instants of one opening, the middle one among them: what moves by this many pixels in it is blurred without steps."""
 MOST_DEG = 360.0
 REACH = 0.75
 """Of a round's length: what is farther from the middle of any whole round is shown by none, beside a hole."""

@@ -39,11 +39,11 @@ are alike: edges lie a part of a pixel beside each other there."""
 REST = 3.0
 """What stands still while its shading changes by more codes is blended by time."""
 ENOUGH = 4
-"""Where so many lights are sure, what others show is left out unless it is sure as well."""
+"""Where this many lights are sure, other lights are left out unless they are sure as well."""
 MANY = 4
-"""Of so many lights one must be sure, of more half."""
+"""With this many lights one must be sure; with more, half of them."""
 FEWEST = 3
-"""So many sure ones make a normal without the others. Fewer leave a hole, and what is filled in there was off by 36
+"""This many sure ones make a normal without the others. Fewer leave a hole, and what is filled in there was off by 36
 degrees where the plates as they are were off by 19 (a bust that tumbles by 8 px from flash to flash)."""
 APART_PX = 1.0
 """What moves by so much more or less from plate to plate moves by itself, and may hide other things."""

@@ -16,7 +16,7 @@ from psvideo.report.observe.nearness import Nearness, nearness
 from psvideo.report.observe.other_curves import LEAST_POINTS, SHADOW, OtherCurves, other_curves
 
 LEAST_LIGHT = 4.0
-"""A pixel is lit where its brightest light gives at least so many times the light of 0.001."""
+"""A pixel is lit where its brightest light gives at least this many times the light of 0.001."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -31,7 +31,7 @@ TURN_S = 4.0
 TILT = 0.6
 """so far from the camera's axis (sine of the angle)."""
 WIDTH_PX = 1280
-"""Pictures of movies are at most so wide."""
+"""Pictures of movies are at most this wide."""
 KEPT = "preview/.relit"
 """The folder of pictures that wait for their movie."""
 

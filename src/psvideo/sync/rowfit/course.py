@@ -24,7 +24,8 @@ class Course:
     """Where a clip's frames are in time, as followed from a seed.
 
     ``trusted`` are the first and the last place in time at which frames fit; ``share`` of the robust loss goes with it.
-    Frames follow otherwise than their numbering says at so many ``steps``, by so many frames together (``strayed``).
+    ``steps``: at how many places frames do not follow one another as their numbers say; ``strayed``: by how many frames
+    in all.
     """
 
     track: FrameTrack
@@ -48,7 +49,7 @@ def followed(plan: Plan, rows: Profiles, seed: Seed) -> Course:
 
 
 def too_many(steps: int, strayed: int, frames: int) -> bool:
-    """Return whether frames seem to be missing at so many places, or so many, that it takes an excellent fit."""
+    """Return whether so many frames seem to be missing, or at so many places, that it takes an excellent fit."""
     return steps > max(MOST_STEPS, MOST_STEPS_SHARE * frames) or strayed > MOST_STRAYED_SHARE * frames
 
 

@@ -20,11 +20,11 @@ AT_END = 6
 BEFORE = 4
 """Frames before those, by which it is judged how well frames are foretold at all."""
 LEAST_KNOWN = 12
-"""Fewer frames than these foretell nothing; nor do fewer than two for every light."""
+"""Fewer frames than this predict nothing; nor do fewer than two for every light."""
 ODD = 2.0
-"""An end is odd where it is foretold so many times worse than the frames before it, and worse by ``SUSPICIOUS``. A
-place is the right one where all others fit so many times worse, and nearer ones so many times worse than is usual, too:
-short holes are likelier than long ones."""
+"""An end is odd where its frames are predicted this many times worse than those before it, and worse by ``SUSPICIOUS``.
+A place is the right one where all others fit this many times worse, and nearer ones also this many times worse than
+usual: short holes are likelier than long ones."""
 
 
 @dataclass(frozen=True, kw_only=True)

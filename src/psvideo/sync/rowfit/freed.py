@@ -13,7 +13,7 @@ from psvideo.sync.rowfit.seed import gain_of
 from psvideo.sync.rowfit.softness import BELIEVED, BLURRED, cleared, within_blur
 
 CLEAR = 5.0
-"""A time leaves the plan's value only when it is off by so many standard errors."""
+"""A time leaves the plan's value only when it is off by this many standard errors."""
 BETTER, LEAST_GAIN = 1e-3, 30.0
 """And only where that takes away such a share of the robust loss, and so much of it: a subject that moves in step with
 the dark row bends errors and estimates alike."""
@@ -25,7 +25,7 @@ SLOWER, SLOWER_SHARE = 10.0, 5e-3
 than a blur. Compressed clips without tails gave 31 and 3e-3 at most where tails were also clear of their errors,
 tails of two rows through H.264 at least 22 and 0.016. Noise alone feigns 0.7."""
 LONGER = 2.0
-"""The longer tail must be so many times the blur that is found beside both, also where tails without that blur fit
+"""The longer tail must be this many times the blur that is found beside both, also where tails without that blur fit
 better: its shape is only nearly that of the model. Compression feigned 2.5 at most in 239 of 240 clips (and 3.4 in the
 last), mostly below 1.8; tails through H.264 were 3.2 and more."""
 SOFTER, WORTH = (0.02, 0.06, 0.18), 1.0

@@ -23,7 +23,7 @@ LEAST_STEEP = -0.1
 LAG = 3
 """Residuals of frames so far apart may still err together (a subject that moves): Newey and West 1987."""
 CLUSTER, LEAST_CLUSTERS = 12, 8
-"""Or whole stretches of frames err together; that needs so many of them to be seen."""
+"""Or whole stretches of frames err together; that needs this many of them to be seen."""
 GLOBALS = {"exposure_s": EXPOSURE, "row_time_s": ROW_TIME, "rise_s": RISE, "fall_s": FALL, "blur_s": BLUR}
 """The times, beside the clock's, that can be set free, and the signal of each."""
 EDGES = {"rise_s", "fall_s", "blur_s"}

@@ -27,9 +27,9 @@ NEAR_ROWS = 8
 LEAST = 24
 """Fewer samples say nothing."""
 CLEARLY = 8.0
-"""Flashes differ where whole ones stray by so many times the variance of split ones: shot noise alone makes it 4."""
+"""Flashes differ where whole ones stray by this many times the variance of split ones: shot noise alone makes it 4."""
 ELSEWHERE = 8
-"""Into so many parts the time from flash to flash is cut; the fit is held against all other places in it."""
+"""Into this many parts the time from flash to flash is cut; the fit is held against all other places in it."""
 
 
 def restless(plan: Plan, rows: Profiles, beat: Beat) -> Profiles:

@@ -26,22 +26,22 @@ TWIN, TWIN_RECODED, TWIN_SHARE = 0.02, 0.08, 0.15
 """Frames of the same moment differ by at most this share of the rows' spreads; in a movie that was encoded again by the
 second one, if that is at most the third one of what frames that follow one another usually differ by."""
 TWIN_GAP = 2.0
-"""And only if none differs by more than that but less than so many times as much."""
+"""And only if no others differ by more than that but by less than this many times as much."""
 USUAL = 90
 """The percentile that is usual: in a movie that shows every moment four times, three frames of four are repeated."""
 NEAR_FRAMES = 0.15
 """Frames so far apart within the cycle count half as much."""
 LONGEST_EVERY, MOST_OF = 24, 12
-"""One frame missing of so many is still searched for as a pattern; several missing of so many."""
+"""One frame missing of this many is still searched for as a pattern; several missing of this many."""
 LARGEST_STEP, LARGEST_OF = 4, 5
 """Frames per frame of the clip that are searched for, and of how many frames a pattern may consist beyond two."""
 
 REPEATED_MOST, REPEATED_OF = 5, 6
-"""How often a moment may be shown, and of how many frames such a pattern may consist beyond one repeated of so many."""
+"""How often one moment may be shown, and the longest such pattern, in frames, other than one repeated frame in many."""
 ALIKE = 0.3
 """Frames that a pattern takes for repeated differ by at most this share of what others differ by."""
 WORTH = 1.5
-"""Numberings that fold so many times worse than the best are not worth a fit."""
+"""Numberings that fold this many times worse than the best are not worth a fit."""
 LEAST_REGULAR = 3
 """Odd steps between frames from which on they may be called regular."""
 BESIDE = 3

@@ -18,7 +18,9 @@ from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.search import GridPlace, clock_ratios_ppm, losses, search
 
 SHORT_ROUNDS = 3
-"""Rounds of the short stretch: the shortest code has every run of so many but one, and that one is of undark rounds."""
+"""Rounds of the short stretch: the shortest code holds every pattern of this many rounds but the one without a dark
+slot.
+"""
 ROUGH = 6
 """Places of either short search that are held against the code."""
 

@@ -21,7 +21,7 @@ ROBUST_STEEPNESS = 20.0
 """Of the coarse loss ``log(1 + 20 r^2)``, r being a residual over its row's own spread (physics.md)."""
 
 FEWER, LEAST_ROWS = 4, 6
-"""One of so many rows is looked at first, but no fewer rows than these;"""
+"""One of this many rows is looked at first, but no fewer rows than these;"""
 LOW = 0.15
 """the others only for this share of the clocks, the lowest."""
 

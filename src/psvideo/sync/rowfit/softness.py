@@ -17,7 +17,7 @@ from psvideo.sync.rowfit.profiles import Profiles, brightnesses, predictions
 from psvideo.sync.rowfit.refine import CAUCHY, Fit, scaled
 
 NEAR_ROWS = 1.0
-"""Samples that tails of so many rows would change lie at an edge,"""
+"""Samples that tails of this many rows would change lie at an edge,"""
 CHANGED = 0.02
 """where they would change by more than this share of what the row sees at most."""
 BELIEVED = 0.4
@@ -26,7 +26,7 @@ tails and exposures gave 0.98 to 1.02 uncompressed, and through H.264 0.3 to 0.8
 BLURRED = 0.05
 """Edges that are blurred put the times in doubt by this share of how soft they are."""
 REACHES_ROWS = 3.0
-"""A blur reaches so many rows: what differs by more is no blur."""
+"""A blur reaches this many rows: what differs by more is no blur."""
 OUTLIER = 6.0
 """Residuals count as no more standard deviations than this."""
 CHANCE = 2.0

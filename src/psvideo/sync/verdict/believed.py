@@ -39,7 +39,7 @@ subject moves."""
 GAPPED = 0.8
 """A fit that needs frames to be missing and explains less than this share of the changes is worth one, too."""
 EXCUSES = 2
-"""A fit with so many excuses (missing frames, a clock beyond the plan's tolerance) must explain more."""
+"""A fit with this many excuses (missing frames, a clock beyond the plan's tolerance) must explain more."""
 OTHER_LENGTHS = (0.5, 0.7, 1.4, 2.0)
 LENGTH_FRAMES = 200
 FLASHES_DIFFER = 0.7

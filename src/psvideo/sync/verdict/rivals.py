@@ -23,7 +23,7 @@ RATES_HZ = (24, 25, 30, 48, 50, 60, 96, 100, 120, 200, 240)
 APART = 0.04
 """Exposures that differ by less than this share are one, and the fit's own business where one is the plan's."""
 OTHER_COUNTS = 3
-"""So many lights more or fewer are tried."""
+"""This many lights more or fewer are tried."""
 LEAST_FRAMES = 24
 ROUGH_ROWS = 18
 """Rows of the rough search of all rivals, which only decides what is looked at closely;"""

@@ -12,7 +12,7 @@ Floats = NDArray[np.float32]
 @FUSED.kept
 def evenest_rows(mean: Floats, spread: Floats, down: int, across: int, shading: Floats, left: Floats) -> None:
     """Put into ``shading`` and ``left`` (row, col) the ``mean`` and the ``spread`` of the window, of those around nine
-    places so many rows and columns away, whose spread is least, where that is less than what is ``left`` there."""
+    places this many rows and columns away, whose spread is least, where that is less than what is ``left`` there."""
     means, spreads, level, best = lent(mean), lent(spread), lent(shading), lent(left)
     rows, cols = means.shape[0], means.shape[1]
     for row in range(rows):

@@ -17,24 +17,24 @@ from psvideo.plates.align.velocity.flow import TOE, Codes, Flags, Sketch, Vector
 SMOOTH_PX, BESIDE_PX = 1.0, 3
 """Edges are looked for in sketches smoothed by the first, and found again over a window of the second."""
 ALONE = 2.5
-"""An edge is alone where it is so many times what any other light shows of it: shading makes edges differ by less."""
+"""An edge is alone where it is this many times what any other light shows of it: shading makes edges differ by less."""
 LEAST_EDGE, OF_NOISE = 0.04, 2.7
-"""Edges of a smaller step in the logarithm of light are none, nor those of less than so much of the noise."""
+"""Steps below the first (of the logarithm of light), or below this many times the noise, are no edges."""
 SHADOW, SHADOW_PX, PENUMBRA_PX = 0.12, 5, 5
 """Where light falls below this share of what it is within such a window it is the edge of a shadow, which is alone; so
 is what lies around it within a second window, where the smoothing leaves steps of it."""
 LEAST_LIT = 0.04
 """What shows less light, as a share of white, says nothing of edges."""
 FEWEST = 3
-"""So many lights must show something of a pixel."""
+"""This many lights must show something of a pixel."""
 AROUND_SHARE = 1 / 8
 """Edges speak for what lies within such a share of the picture's longer side ..."""
 USUAL, UNSURE = 0.01, 5.0
-"""... from so many on, in the mean step of all pixels there (painted and bare subjects that are followed rightly: 0.009
-in the mean), and by so many times the rest light may be off by its share."""
+"""... where their mean step over all its pixels exceeds the first (subjects that are followed correctly, painted or
+bare: 0.009 on average); what is beyond it, times the second, is the share by which light may be off."""
 
 FOLLOWED = 0.3
-"""Where all lights agree with a motion, so much of that counts: what is followed has its edges a little off."""
+"""Where all lights agree with a motion, this share of that counts: what is followed has its edges slightly off."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,7 +16,7 @@ WINDOW_PX = 3
 UNKNOWN = np.float32(1e4)
 """What nobody knows of a plate may be off by so much light: it turns a normal by more than any angle."""
 NOISE_FACTOR = 1.6
-"""Squares of a change below so many times those that noise makes of it are noise."""
+"""Squares of a change below this many times those that noise makes of it are noise."""
 
 
 def unsure_of(pair: Pair, before: Codes, after: Codes, motion: Followed, noise: float) -> Vectors:

@@ -57,6 +57,6 @@ def light_of(codes: NDArray[np.float32]) -> Vectors:
 
 
 def _brightened(codes: NDArray[np.float32], gain: float) -> Vectors:
-    """Return the codes of so many times the light."""
+    """Return the codes of this many times the light."""
     light = np.clip(np.float32(gain) * light_of(codes), 0, 1)
     return np.asarray((np.sqrt(light + np.float32(TOE)) - np.float32(ROOT_TOE)) * np.float32(SCALE), np.float32)

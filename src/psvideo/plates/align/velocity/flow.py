@@ -27,22 +27,22 @@ TOE = 0.02
 LEAST_WHITE = 1 / 16
 """A clip that begins in the dark is not brightened by more than this."""
 FINEST_SCALE, FINE_PIXELS = 1, 250_000
-"""Flow is found on half the sketch and enlarged where sketches have so many pixels: good to a twentieth of one."""
+"""Flow is found on half the sketch and enlarged where sketches have this many pixels: good to a twentieth of one."""
 REFINED, DESCENTS = 1, 12
 """Rounds of refinement and steps of a patch there: 5 and 16 take half as long again, and gain a 150th of a pixel."""
 BLOCK_PX, AROUND = 4, 4
-"""Change is looked for in the means of blocks, over so many of them together."""
+"""Change is measured on means of blocks this wide, over this many blocks together."""
 LEAST_CHANGE = 1.5
 """Blocks that change by fewer codes did not move ..."""
 NOISE_FACTOR = 5.0
-"""... nor those that change by less than so many times what noise makes of them, if it is every pixel's own ..."""
+"""... nor those that change by less than this many times what independent noise of their pixels explains ..."""
 CODED_BLOCKS = 2
-"""Compression works on squares of 8 pixels and more: so many blocks."""
+"""Compression works on squares of 8 pixels and more, which is this many blocks."""
 BLOCK_NOISE_FACTOR, MOST_BLOCK_NOISE = 3.0, 2.0
-"""... or by less than so many times what blocks themselves show of it, no more than so many codes: compression makes
-noise that whole blocks share. More is motion that fills the picture."""
+"""... or by less than the first times the noise that blocks themselves show (compression makes noise that a whole block
+shares), of which at most the second, in codes, counts: more is motion that fills the picture."""
 SOME, LEAST_LIT = 8, 8
-"""Noise is estimated from every so many rows, where codes are not less than this: below, it is cut off at zero."""
+"""Noise is estimated from every eighth row, where codes are at least this: below, noise is cut off at zero."""
 QUARTER_OF_NORMAL = 0.3186
 """A quarter of normal values of variance one is smaller than this."""
 

@@ -20,34 +20,36 @@ from psvideo.plates.align.velocity.flow import FINE_PIXELS, Codes, Flags, Sketch
 from psvideo.plates.align.velocity.moving_kernel import arriving_rows, unlike_rows
 
 MOST_FLOWS = 4
-"""Flow is looked for between the plates of so many lights, evenly spread: more propose the same again."""
+"""Flow is computed between the plates of at most this many lights, evenly spread: more give the same proposals."""
 WINDOW_PX, FINE_PX = 9, 3
-"""Plates are alike over the first window, and rest is no better over the second."""
+"""A velocity is tested over the first window; over the second, a smaller one, rest must not explain the plates
+better."""
 EXPLAINED, MARGIN, GAIN = 0.65, 0.05, 0.25
-"""What moves leaves less than this share of what rest leaves unexplained, less this much of every light; or less than
-that by so much of every light."""
+"""A velocity is accepted where what it leaves unexplained is below the first (a share of what rest leaves) less the
+second, or below what rest leaves by the third; the second and third count once for every light."""
 FINE_EXPLAINED = 0.7
-"""... and over the finer window less than this share: else outlines carry what is beside them along."""
+"""... and, over the smaller window, below this share: otherwise outlines carry along what lies beside them."""
 GROWN, GROWN_PX = 2, 27
-"""So often what is beside moving parts joins them, where it moves along as well as it rests, over such a window."""
+"""This often, pixels beside moving parts join them where both motion and rest explain them, within this window."""
 UNEXPLAINED, MOST = 0.3, 0.1
-"""What is unlike by more of every light is explained by neither; so much more of the window must move than rest there.
-"""
+"""Where plates differ by more than the first per light, neither motion nor rest explains them: a pixel then joins only
+if the moving share of its window exceeds the resting share by the second."""
 STILL_CODES, STILL_LIGHTS, STILL_SHARE = 3.0, 2, 0.7
-"""Pixels that change by less, under two lights at least and so many of all, are at rest: what changes under the others
-is a shadow, or something else that passes."""
+"""Pixels that change by fewer codes than the first, under at least two lights and this share of all, are at rest: what
+changes under the other lights is a shadow, or something that passes."""
 FINEST_PX, SHADING_PX, SHADING = 1.0, 13, 0.7
-"""Sketches are compared smoothed by the first, and without most of what is wider than the second: as surfaces turn,
-their shading changes, their detail does not."""
+"""Before they are compared, sketches are smoothed by the first, and most of what is wider than the second is removed:
+as surfaces turn, their shading changes, their detail does not."""
 CONTRAST = 10.0
-"""Detail of more contrast, in codes, over as wide a window is brought down to it: as surfaces turn, edges between them
-stay where they are, and the light on either side of them does not."""
+"""The most contrast of detail, in codes, over such a window; more is scaled down to it: as surfaces turn, the edges
+between them stay in place, but the light on either side changes."""
 PUZZLING, PUZZLED = 0.5, 0.004
-"""More of the picture than this share is unlike by so much of every light: what moves is faster than flow follows."""
+"""Where more of the picture than the second differs by more than the first per light, things move faster than flow can
+follow."""
 FAR = 2
-"""So many displacements of the picture's changing parts are tried then."""
+"""Then this many displacements of all changing parts together are tried."""
 COARSE = 2
-"""Of sketches of FINE_PIXELS every so many rows and columns get a velocity: flow is found as coarsely there."""
+"""Sketches of FINE_PIXELS and more get a velocity in every second row and column: flow is no finer there."""
 BAND_PIXELS = 1 << 16
 LEAST = np.float32(1e-6)
 
@@ -201,7 +203,7 @@ class _Lights:
         return rows // self.step, cols // self.step
 
     def mean(self, values: Vectors, window_px: int) -> Vectors:
-        """Return means over windows of so many pixels of the sketches."""
+        """Return means over windows of this many pixels of the sketches."""
         return _mean(values, window_of(window_px, self.step))
 
     def unlike(self, velocity: Vectors) -> Vectors:

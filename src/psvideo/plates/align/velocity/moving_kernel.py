@@ -94,7 +94,7 @@ def ways_rows(
 ) -> None:  # fmt: skip
     """Fill ``given`` and ``taken``, a part of a picture of a ``shape`` (row, col) from its row ``first`` and its column
     ``left`` on, with what coarse ``source`` and ``guess`` say; and ``ways`` (2, 2, row, col), the column and row in the
-    plates before and after that pixels came from and will go to, so many seconds ``spans_s`` (2,) since or, below 0,
+    plates before and after that pixels came from and will go to, this many seconds ``spans_s`` (2,) since or, below 0,
     until then. ``velocity`` (2, row, col) is of the coarse pixels, per second.
     """
     own, other, flow, out = lent(source), lent(guess), lent(velocity), lent(ways)

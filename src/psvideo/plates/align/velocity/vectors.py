@@ -14,7 +14,7 @@ from psvideo.plates.align.velocity.flow import Flags, Vectors
 from psvideo.plates.align.velocity.moving import Followed, window_of
 
 GAPS_PX = 9
-"""Gaps of so many pixels in what moves are closed: outlines along the motion show nothing of it."""
+"""Gaps of this many pixels in what moves are closed: outlines along the motion show nothing of it."""
 MOST_EDGE = 1 / 8
 """What touches more of the picture's edge than this share is what things move before."""
 SMOOTH_PX = 27

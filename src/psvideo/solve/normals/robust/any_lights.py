@@ -86,7 +86,7 @@ def find_scale(
     else:
         for i in range(n):
             v[RANK + i] = np.floor(HALF * (w[COUNT + i] + THREE))
-            v[TO + i] = v[TO + i] / max(w[COUNT + i] - v[RANK + i] + ONE, ONE)  # so many are as large or larger
+            v[TO + i] = v[TO + i] / max(w[COUNT + i] - v[RANK + i] + ONE, ONE)  # this many are as large or larger
         halve(v, e, n)
     for i in range(n):
         length = np.sqrt(w[X + i] ** 2 + w[Y + i] ** 2 + w[Z + i] ** 2)

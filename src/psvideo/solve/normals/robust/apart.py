@@ -11,7 +11,7 @@ from psvideo.solve.normals.robust.equations import OUT
 from psvideo.solve.normals.robust.reflecting import KEPT, OF_LIGHT
 from psvideo.solve.normals.task import Floats, Indices, Task
 
-WHOLE = 16  # pixels are filled up to whole vectors of so many: what is left over would be solved one by one
+WHOLE = 16  # pixels are filled up to whole vectors of this many: what is left over would be solved one by one
 
 
 class Room(NamedTuple):

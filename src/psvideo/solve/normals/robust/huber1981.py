@@ -74,7 +74,7 @@ MOST_TYPICAL_DEG = 30.0
 SAMPLE_PIXELS = 1 << 16
 """What is typical of a picture is looked for in about this many pixels: whole rows, evenly spread."""
 EVERYTHING_DEG = 179.0
-TUKEY_WIDTH = 4.685  # beside Cauchy's, as far as weights go: so wide, Tukey's keeps 95 % of what Gaussian noise holds
+TUKEY_WIDTH = 4.685  # beside Cauchy's, as far as weights go: this wide, Tukey's keeps 95 % of what Gaussian noise holds
 
 
 def solve(
