@@ -1,5 +1,7 @@
 """Integration: depth from normals is the surface that they came from, whatever the mask, the view and the steps."""
 
+import mmap
+import pickle
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -25,6 +27,8 @@ from psvideo.solve.depth import (
     begun,
     depth_of,
     integrate,
+    integration,
+    kept_beside,
     mesh_of,
     reservations,
     scale_note,
@@ -423,6 +427,40 @@ def test_in_a_clip_that_stands_still_nothing_wanders_and_no_instant_depends_on_a
     alone = [depth_of(Shaping(view=View()), bust(seed)) for seed in (1, 2, 3)]
     assert max(map(wandered_px, alone)) > 2.0  # which is what the first instant is for
     assert np.array_equal(depth_of(shaping, bust(2)).depth, later[1].depth)
+
+
+@pytest.mark.parametrize("view", [View(), PINHOLE])
+def test_in_files_depth_is_the_same_to_the_byte_and_the_first_instant_too(
+    view: View, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one, other = ball(30.2, 0), ball(33.1, 1)
+
+    def found(shaping: Shaping) -> tuple[Shaping, list[bytes]]:
+        shaping = begun(shaping, one)
+        depths = (shaping.first, depth_of(shaping, other), depth_of(shaping, one))
+        return shaping, [each.tobytes() for d in depths if d is not None for each in (d.depth, d.cut_east, d.cut_south)]
+
+    _, expected = found(Shaping(view=view))
+    monkeypatch.setattr(integration, "IN_FILES_PIXELS", ROWS * COLS)
+    shaping, shown = found(Shaping(view=view, spare=tmp_path))
+    assert shown == expected
+    assert shaping.before is not None
+    held = shaping.before
+    for plane in (held.normals, held.height.height, held.height.rightward, held.height.downward):
+        assert lies_in_file(plane), "the other instants read the first one from files"
+    assert not any(tmp_path.iterdir()), "the files have no names and are gone with the arrays"
+    passed_on = kept_beside(pickle.loads(pickle.dumps(shaping)), tmp_path)
+    assert passed_on is not None
+    assert passed_on.before is not None
+    assert lies_in_file(passed_on.before.normals), "as they do for a piece that is handed the first instant"
+    assert depth_of(passed_on, other).depth.tobytes() == expected[3]
+
+
+def lies_in_file(plane: NDArray[Any]) -> bool:
+    base: Any = plane
+    while isinstance(base, np.ndarray):
+        base = base.base
+    return isinstance(base, memoryview) and isinstance(base.obj, mmap.mmap)
 
 
 def ball(col: float, seed: int) -> Surface:

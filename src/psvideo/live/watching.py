@@ -1,6 +1,7 @@
 """The verdict lines of check while the camera runs: of the last second or two, by the same judgements."""
 
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -21,38 +22,57 @@ LOOK_S = 0.4
 """So far apart are rounds that are looked at, in the footage's time: to look costs as much as to solve."""
 ENOUGH = 4
 """Rounds by which the lines are made."""
+MOST_S = 0.006
+"""After each result it is looked for this long, and a step beyond: what is left waits for the one after, and no picture
+for it."""
 HISTOGRAM = 64
 
 
 @dataclass(kw_only=True)
 class Watching:
     """Looks at some of the rounds; ``lines`` are the judgements of the last few, ``histograms`` each light's counts,
-    ``powers`` what to set each light's power to."""
+    ``powers`` what to set each light's power to. ``most_s``: for how long at a time, of this machine's."""
 
     plan: Plan
     rig: Rig | None = None
     spell: Callable[[str], str] = str
+    most_s: float = float("inf")
     lines: tuple[Judgement, ...] = ()
     histograms: dict[str, list[int]] = field(default_factory=dict)
     powers: dict[str, str] = field(default_factory=dict)
     _observed: Observed | None = None
     _step: int = 0
     _looked_s: float = float("-inf")
+    _looking: Iterator[None] | None = None
 
     def look(self, newest: NewestRound, plan: Plan) -> None:
-        """Look at a round of a picture of the plan's size, and judge once there are enough."""
-        if abs(newest.round.time_s - self._looked_s) < LOOK_S:
-            return
-        self._looked_s = newest.round.time_s
+        """Go on with the round that is being looked at; or begin with this one, of a picture of the plan's size."""
+        until_s = time.monotonic() + self.most_s
+        if self._looking is None:
+            if abs(newest.round.time_s - self._looked_s) < LOOK_S:
+                return
+            self._looked_s = newest.round.time_s
+            self._looking = self._steps(newest, plan)
+        for _ in self._looking:
+            if time.monotonic() > until_s:
+                return
+        self._looking = None
+
+    def _steps(self, newest: NewestRound, plan: Plan) -> Iterator[None]:
+        """Look at a round, and judge once there are enough."""
         if self._observed is None or self._step != newest.step:
             self._step, self._observed = newest.step, self._fresh(plan, newest)
-        self._observed.add(newest.round, newest.surface)
+        observed = self._observed
+        yield
+        yield from observed.adding(newest.round, newest.surface)
+        yield
         self.histograms = {plate.light: _counts(plate.image, plate.saturation) for plate in newest.round.plates}
-        if len(self._observed.facts) >= ENOUGH:
+        yield
+        if len(observed.facts) >= ENOUGH:
             whole = replace(newest.timing, flashes=tuple(one for one in newest.timing.flashes if one.complete))
-            found = judgements(plan, whole, self._observed)
+            found = judgements(plan, whole, observed)
             self.lines = tuple(one.spelled(self.spell) for one in found)
-            self.powers = power_words(plan, self._observed)
+            self.powers = power_words(plan, observed)
             self._observed = None
 
     def _fresh(self, plan: Plan, newest: NewestRound) -> Observed:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from functools import partial
+from math import inf
 from pathlib import Path
 
 from psvideo.errors import NoStrobeError
@@ -24,7 +25,7 @@ from psvideo.live.smaller import smaller_plan
 from psvideo.live.source import LiveSource
 from psvideo.live.sources import opened_source
 from psvideo.live.status import LiveStatus, LiveSummary
-from psvideo.live.watching import Watching, told
+from psvideo.live.watching import MOST_S, Watching, told
 from psvideo.model.choices import Pace
 from psvideo.model.intensity import lights_as_planned
 from psvideo.model.rig import Rig
@@ -171,7 +172,8 @@ def _page(
 ) -> Iterator[None]:
     """Serve the live page while the block runs: every result is put there, and some are judged."""
     plan = source.plan
-    watching, pictures = Watching(plan=plan, rig=rig, spell=caller.spell), NewestPictures()
+    most_s = MOST_S if source.paced else inf  # where frames wait for results, how quick a machine is tells nothing
+    watching, pictures = Watching(plan=plan, rig=rig, spell=caller.spell, most_s=most_s), NewestPictures()
     shown = running.shown
 
     def use(found: Rig) -> str:

@@ -2,6 +2,7 @@
 Recognition 44, 2011, section 3. An edge blurred once more loses the more of its slope the sharper it was."""
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
@@ -50,9 +51,9 @@ def sharpest_blur_px(grey: NDArray[np.float32]) -> float | None:
     """
     squares = _steepest_squares(grey)
     noise, whole = _noise(grey), grey.size / squares.size
-    blur_px, least_px = None, 0.0
+    slopes, blur_px, least_px = _Slopes(squares=squares), None, 0.0
     for first_px, again_px, most_px in SCALES_PX:
-        found = _blur_between(squares, first_px, again_px, noise=noise, steepest=STEEPEST * whole)
+        found = _blur_between(slopes, first_px, again_px, noise=noise, steepest=STEEPEST * whole)
         blur_px = blur_px if found is None else max(found, least_px)
         least_px = most_px
         if found is not None and found <= most_px:
@@ -86,18 +87,37 @@ def _noise(grey: NDArray[np.float32]) -> float:
     return 1.4826 * float(np.median(np.abs(off)))
 
 
-def _blur_between(squares: Squares, first_px: float, again_px: float, *, noise: float, steepest: float) -> float | None:
+@dataclass(frozen=True, kw_only=True)
+class _Slopes:
+    """Slopes of squares after a blur, (square, row, col): to the right, down, their size; each blur is made once."""
+
+    squares: Squares
+    _made: dict[float, tuple[Squares, Squares, Squares]] = field(default_factory=dict)
+
+    def after(self, sigma_px: float) -> tuple[Squares, Squares, Squares]:
+        """Return the slopes after a blur."""
+        if sigma_px not in self._made:
+            pairs = [_slopes(_blurred(one, sigma_px)) for one in self.squares]
+            right, down = (np.stack(planes) for planes in zip(*pairs, strict=True))
+            self._made[sigma_px] = right, down, np.stack([_size(*pair) for pair in pairs])
+        return self._made[sigma_px]
+
+
+def _blur_between(slopes: _Slopes, first_px: float, again_px: float, *, noise: float, steepest: float) -> float | None:
     """Return the blur of the sharpest edges from their slopes after two blurs; None where too few stand out."""
-    slopes = [_slopes(one) for one in _blurred(squares, first_px)]
-    steep, soft = np.stack([_size(*one) for one in slopes]), _each(_slope, _blurred(squares, again_px))
+    right, down, steep = slopes.after(first_px)
     if first_px:
         noise /= 2 * np.sqrt(np.pi) * first_px  # what such a blur leaves of noise that is new in every pixel
-    edges = (steep > max(NOISE_FACTOR * noise, 0.25 * float(np.quantile(steep[:, ::2, ::2], 1 - steepest)))) & (
-        soft > 0
-    )
+    edges = steep > max(NOISE_FACTOR * noise, 0.25 * float(np.quantile(steep[:, ::2, ::2], 1 - steepest)))
     rim = 4 + round(2 * again_px)
     edges[:, :rim], edges[:, -rim:], edges[:, :, :rim], edges[:, :, -rim:] = False, False, False, False
-    edges &= np.stack([_ridge(*one, size) for one, size in zip(slopes, steep, strict=True)])
+    if edges.sum() < LEAST_EDGES:
+        return None
+    edges &= np.stack([_ridge(*one) for one in zip(right, down, steep, strict=True)])
+    if edges.sum() < LEAST_EDGES:  # a wide blur takes most of the time
+        return None
+    soft = slopes.after(again_px)[2]
+    edges &= soft > 0
     if edges.sum() < LEAST_EDGES:
         return None
     along = [_each(_summed, np.where(edges, one, np.float32(0))) for one in (steep, soft)]
@@ -117,8 +137,8 @@ def _summed(square: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.asarray(cv2.boxFilter(square, -1, TILE, normalize=False), np.float32)
 
 
-def _blurred(squares: Squares, sigma_px: float) -> Squares:
-    return _each(lambda one: np.asarray(cv2.GaussianBlur(one, (0, 0), sigma_px)), squares) if sigma_px else squares
+def _blurred(square: Plane, sigma_px: float) -> Plane:
+    return np.asarray(cv2.GaussianBlur(square, (0, 0), sigma_px), np.float32) if sigma_px else square
 
 
 def _ridge(right: Plane, down: Plane, steep: Plane) -> NDArray[np.bool_]:

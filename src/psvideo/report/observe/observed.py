@@ -4,6 +4,8 @@ Shares are counted on thinned pictures. What takes longer (sharpness, the rig's 
 rounds 1, 2, 4, 8 and so on, so that ten thousand rounds cost hardly more than a hundred.
 """
 
+from collections import deque
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -115,6 +117,13 @@ class Observed:
 
     def add(self, one: Round, surface: Surface | None = None) -> None:
         """Take in one round, and the surface that was solved from it, if any."""
+        deque(self.adding(one, surface), maxlen=0)
+
+    def adding(self, one: Round, surface: Surface | None = None) -> Iterator[None]:
+        """Take in one round as ``add`` does, a little before every step: for whoever has more to do meanwhile.
+
+        The next round is begun after the last step.
+        """
         if one.ambient is not None:
             self._look_at_dark(one.ambient)
         if self.only is not None and one.number not in self.only:
@@ -123,6 +132,7 @@ class Observed:
         self.first = one.number if self.first is None else self.first
         mask = None if self.masks is None else self.masks.at(one.number)
         seen = thinned_round(one, mask)
+        yield
         self.beyond_mask.append(seen.beyond)
         if self._dark is not None:
             self.dark_evenness.append(_evenness(self._dark) if _evenness(seen.bright.max(axis=0)) < UNEVEN else 0.0)
@@ -130,14 +140,16 @@ class Observed:
             for plate in one.plates:
                 self._glance(plate)
         self.watch_brightest()
+        yield
         moving, changed = self._moving, self._change(surface)
         facts = instant_facts(one, surface, mask, changed, seen=seen, moving=moving, dark=self._dark)
         self.facts.append(facts)
+        yield
         for plate, bright, shown in zip(one.plates, seen.bright, seen.shown, strict=True):
             counted = count_levels(bright[seen.subject & shown], plate.saturation)
             self.counts[plate.light] = self.counts.get(plate.light, np.zeros(BINS + 2, np.int64)) + counted
         if (one.number - self.first + 1).bit_count() == 1:
-            self._look_closely(one, surface, seen)
+            yield from self._looking_closely(one, surface, seen)
         if surface is not None:
             self.worst.offer(facts, surface)
 
@@ -180,20 +192,24 @@ class Observed:
         """Small pictures of the worst instants, the worst first."""
         return self.worst.thumbnails
 
-    def _look_closely(self, one: Round, surface: Surface | None, seen: Seen) -> None:
+    def _looking_closely(self, one: Round, surface: Surface | None, seen: Seen) -> Iterator[None]:
+        yield
         watched = next((plate for plate in one.plates if plate.light == self.watched), one.plates[0])
         blur_px = sharpest_blur_px(middle_of(watched.picture))
         if blur_px is not None:
             self.blurs_px.append(blur_px)
+        yield
         if surface is not None:
             small = coarse_normals(surface)
             agreement = slope_agreement(small)
             if agreement is not None:
                 self.slopes.append(agreement)
             self.away.append(share_away(surface))
+            yield
             found = lean(small, lens=self.lens)
             if found is not None:
                 self.leans.append(found)
+            yield
             self._look_into_shadow(one, surface, seen)
         if self.points is not None and one.lights == self.lights:
             self.light_at_points.append(self.points.light(one))

@@ -33,6 +33,8 @@ CLEAR = 32.0
 OUTLIER = 2.0
 """Residuals are taken for Cauchy's, this many times their median wide."""
 ROUNDS, ENOUGH, SHIFTS = 30, 1e-4, 2
+FEWER = 4
+"""Each round begins near its end where every fourth point was asked before."""
 LEAST_TOLD = 0.02
 """Changes of which points show so little (eigenvalues, each unknown's size apart) are taken for none: a cylinder, waves
 or the edges of a few faces show some changes and not others."""
@@ -95,10 +97,11 @@ def lean(small: Averaged, *, lens: Lens | None = None) -> Lean | None:
         return _described(found.rows, found.gain, n)
     far = _crossed(n, ways)
     by_lens = (_crossed(*_in_view(n, ways, x, y, A_LITTLE)) - far) / A_LITTLE
-    lens = Lens(width=float(np.clip(_fitted(far, by_lens).more, 0, WIDEST)))
-    found = _through(seen, lens)
-    shifted = _shifted(seen, lens, found)
-    left = _through(seen, shifted)
+    free = _fitted(far, by_lens)
+    lens = Lens(width=float(np.clip(free.more, 0, WIDEST)))
+    found = _through(seen, lens, near=free)
+    shifted, nearly = _shifted(seen, lens, found)
+    left = _through(seen, shifted, near=nearly)
     return replace(
         _described(found.rows, found.gain, n),
         off_axis=float(np.hypot(shifted.right, shifted.up)),
@@ -106,23 +109,24 @@ def lean(small: Averaged, *, lens: Lens | None = None) -> Lean | None:
     )
 
 
-def _through(seen: "_Bending", lens: Lens) -> "_Fitted":
-    """Find the change that makes normals a surface's that was seen through a lens."""
-    return _fitted(
-        _crossed(*_in_view(seen.normals, seen.ways, seen.x - lens.right, seen.y - lens.up, lens.width)), None
-    )
+def _through(seen: "_Bending", lens: Lens, *, near: "_Fitted | None" = None) -> "_Fitted":
+    """Find the change that makes normals a surface's that was seen through a lens; ``near`` is one not far from it."""
+    crossed = _crossed(*_in_view(seen.normals, seen.ways, seen.x - lens.right, seen.y - lens.up, lens.width))
+    return _fitted(crossed, None, near=near)
 
 
-def _shifted(seen: "_Bending", lens: Lens, found: "_Fitted") -> Lens:
-    """Return a lens of the same width whose axis lies where that explains most: there the rows' last columns are
-    -width times ``right`` and ``up``, which the same of a turned rig cannot be told from."""
-    for _ in range(SHIFTS):
+def _shifted(seen: "_Bending", lens: Lens, found: "_Fitted") -> "tuple[Lens, _Fitted]":
+    """Return a lens of the same width whose axis lies where that explains most, and a change not far from what is left
+    then: there the rows' last columns are -width times ``right`` and ``up``, which the same of a turned rig cannot be
+    told from."""
+    for turn in range(SHIFTS):
         by = found.rows[:, 2] / -max(lens.width, A_LITTLE)
         at = np.array([lens.right, lens.up]) + by
         at *= min(1.0, FARTHEST_AXIS / max(float(np.hypot(*at)), 1e-12))
         lens = replace(lens, right=float(at[0]), up=float(at[1]))
-        found = _through(seen, lens)
-    return lens
+        if turn + 1 < SHIFTS:
+            found = _through(seen, lens, near=found)
+    return lens, found
 
 
 class _Bending(NamedTuple):
@@ -139,19 +143,23 @@ def _bending(seen: Averaged) -> _Bending:
     """Return normals that bend by more than noise and in one piece."""
     valid, small = seen
     noise = noise_of_slopes(valid, small)
-    blurred = np.asarray(cv2.GaussianBlur(small * valid[..., None], (0, 0), BLUR_PX), np.float64)
-    normals = blurred / np.maximum(np.linalg.norm(blurred, axis=-1, keepdims=True), 1e-6)
-    right, up = np.gradient(normals, axis=1), -np.gradient(normals, axis=0)
-    bend = (right**2).sum(axis=-1) + (up**2).sum(axis=-1)
+    blurred = np.asarray(cv2.GaussianBlur(small * valid[..., None], (0, 0), BLUR_PX), np.float32)
+    planes = np.moveaxis(blurred, -1, 0).copy()  # numpy is slow along a short last axis
+    planes /= np.maximum(np.sqrt((planes * planes).sum(axis=0)), np.float32(1e-6))
+    right, up = np.zeros_like(planes), np.zeros_like(planes)  # at the rim nothing is whole
+    right[:, :, 1:-1] = (planes[:, :, 2:] - planes[:, :, :-2]) / 2
+    up[:, 1:-1] = (planes[:, :-2] - planes[:, 2:]) / 2
+    bend = (right * right).sum(axis=0) + (up * up).sum(axis=0)
     around = np.ones((BESIDE_PX, BESIDE_PX), np.uint8)
-    whole = cv2.erode((valid & (normals[..., 2] > FACING)).astype(np.uint8), around, borderValue=0) > 0
+    whole = cv2.erode((valid & (planes[2] > FACING)).astype(np.uint8), around, borderValue=0) > 0
     torn = cv2.dilate((whole & (bend > CREASE**2)).astype(np.uint8), around) > 0
     down, across = np.nonzero(whole & ~torn & (bend > CLEAR * noise))
     each = -(-max(len(down), 1) // MOST_POINTS)
     down, across = down[::each], across[::each]
     rows, cols = valid.shape
-    ways = cols * np.stack([right[down, across], up[down, across]])
-    return _Bending(normals[down, across], ways, (across - (cols - 1) / 2) / cols, ((rows - 1) / 2 - down) / cols)
+    normals, *ways = (plane[:, down, across].T.astype(np.float64) for plane in (planes, right, up))
+    place = (across - (cols - 1) / 2) / cols, ((rows - 1) / 2 - down) / cols
+    return _Bending(normals, cols * np.stack(ways), *place)
 
 
 def _in_view(
@@ -180,27 +188,38 @@ class _Fitted(NamedTuple):
     gain: float
 
 
-def _fitted(crossed: FloatArray, more: FloatArray | None) -> _Fitted:
+def _fitted(crossed: FloatArray, more: FloatArray | None, *, near: _Fitted | None = None) -> _Fitted:
     """Find c1 = (1 + a, b, c) and c2 = (d, 1 - a, e): their size is left open. ``more`` (point, 6): what one unknown
-    adds to ``crossed``."""
+    adds to ``crossed``; ``near`` is where to begin."""
     still = crossed[:, 0] + crossed[:, 4]
     terms = [crossed[:, 0] - crossed[:, 4], *crossed[:, [1, 2, 3, 5]].T]
     terms += [] if more is None else [more[:, 0] + more[:, 4]]
-    slopes = np.stack(terms, axis=1)
+    slopes = np.stack(terms)
     found = np.zeros(len(terms))
-    for _ in range(ROUNDS):
-        left = still + slopes @ found
-        width = OUTLIER * float(np.median(np.abs(left))) / NORMAL_MEDIAN + 1e-12
-        weights = 1 / (1 + (left / width) ** 2)
-        weighted = slopes.T * weights
-        squares, pull = weighted @ slopes, np.einsum("ip,p->i", weighted, still)  # BLAS would cut the sum by threads
-        before, found = found, -_solved(squares, pull)
-        if np.abs(found - before).max() < ENOUGH:
-            break
+    if near is not None:
+        (_, b, c), (d, one_less, e) = near.rows
+        found[:5] = 1 - one_less, b, c, d, e
+    elif len(still) >= FEWER * LEAST_PIXELS:
+        found, _, _ = _reweighted(slopes[:, ::FEWER].copy(), still[::FEWER].copy(), found)
+    found, left, width = _reweighted(slopes, still, found)
     cost, none = (float(np.mean(np.log1p((one / width) ** 2))) for one in (left, still))
     a, b, c, d, e = found[:5]
     rows = np.array([[1 + a, b, c], [d, 1 - a, e]])
     return _Fitted(rows=rows, more=float(found[-1]), gain=none / max(cost, 1e-12) - 1)
+
+
+def _reweighted(slopes: FloatArray, still: FloatArray, found: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+    """Return the unknowns that leave least over of ``still`` (point,), round by round from those ``found``; what they
+    leave, and how wide that is. ``slopes`` (unknown, point) is what each adds."""
+    for _ in range(ROUNDS):
+        left = still + np.einsum("ip,i->p", slopes, found)
+        width = OUTLIER * float(np.median(np.abs(left))) / NORMAL_MEDIAN + 1e-12
+        weighted = slopes / (1 + (left / width) ** 2)
+        squares, pull = weighted @ slopes.T, np.einsum("ip,p->i", weighted, still)  # BLAS would cut sums by threads
+        before, found = found, -_solved(squares, pull)
+        if np.abs(found - before).max() < ENOUGH:
+            break
+    return found, left, width
 
 
 def _solved(squares: FloatArray, pull: FloatArray) -> FloatArray:

@@ -19,7 +19,7 @@ from psvideo.runs.delivery.relit import blur_of
 from psvideo.runs.instants.depths import shape_of
 from psvideo.runs.instants.job import Beginning, Found, Job, Piece, Pixels
 from psvideo.runs.instants.reporting import observing
-from psvideo.solve.depth import reservations
+from psvideo.solve.depth import kept_beside, reservations
 from psvideo.solve.instants import Instant, denoised, surfaces
 
 SPECULAR_OF_LIGHTS = "specular_of_lights"
@@ -49,7 +49,7 @@ def write_instants(
         observed.only = piece.numbers
     if beginning is not None:
         observed.first, observed.watched, observed.white = beginning.number, beginning.watched, beginning.white
-    shaping = job.shaping if beginning is None else beginning.shaping
+    shaping = kept_beside(job.shaping if beginning is None else beginning.shaping, folder)
     found = Found(observed=observed)
     ambient = first_ambient(job.take, job.timing) if job.mixes_ambient else None
     with writing() as write:

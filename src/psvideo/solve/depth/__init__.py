@@ -9,7 +9,7 @@ a clip, and ``mesh`` makes triangles of it.
 from psvideo.solve.depth.cao2022 import Height, Integration, integrate
 from psvideo.solve.depth.mesh import Mesh, mesh_of
 from psvideo.solve.depth.scale import Depth, scaled
-from psvideo.solve.depth.shaping import Shaping, begun, depth_of, reservations, scale_note
+from psvideo.solve.depth.shaping import Shaping, begun, depth_of, kept_beside, reservations, scale_note
 from psvideo.solve.depth.view import View, view_of
 
 __all__ = [
@@ -22,6 +22,7 @@ __all__ = [
     "begun",
     "depth_of",
     "integrate",
+    "kept_beside",
     "mesh_of",
     "reservations",
     "scale_note",

@@ -10,15 +10,17 @@ rounds, and is held there to the first one's height by so weak a force that only
 how far away a piece is around which the surface is cut.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from psvideo.compute.spilled import let_go
 from psvideo.model.camera import FloatArray
-from psvideo.solve.depth.integration import BILATERAL, SMOOTH, Integration, TakenOver, find_height
+from psvideo.solve.depth.integration import BILATERAL, SMOOTH, Integration, TakenOver, find_height, kept_in
 from psvideo.solve.depth.view import Box, Slopes, View, slopes_of
 
 Mask = NDArray[np.bool_]
@@ -63,6 +65,15 @@ class Before:
     height: Height
     normals: NDArray[np.floating]
 
+    def kept_in(self, spare: Path | None) -> "Before":
+        """Return the same, of which what is large lies in files in a folder, if there is one."""
+        planes = {name: kept_in(getattr(self.height, name), spare) for name in ("height", "rightward", "downward")}
+        return Before(height=replace(self.height, **planes), normals=kept_in(self.normals, spare))
+
+    def let_go(self) -> None:
+        """Let go what lies in files until it is looked at again."""
+        let_go(self.height.height, self.height.rightward, self.height.downward, self.normals)
+
 
 def integrate(
     normals: NDArray[np.floating],
@@ -71,16 +82,27 @@ def integrate(
     *,
     how: Integration = BILATERAL,
     before: Before | None = None,
+    spare: Path | None = None,
 ) -> Height:
     """Return the height of a surface from its normals (row, col, 3), camera frame, over a mask of any shape.
 
-    What looks the same as ``before`` keeps its jumps, where they still hold, and its place.
+    What looks the same as ``before`` keeps its jumps, where they still hold, and its place. ``spare`` is a folder in
+    whose files large pictures lie in part.
     """
     box = _box(valid)
+    held = None if before is None else _held(before, normals, valid, box)
     slopes = slopes_of(normals, valid, view, box)
-    height, rightward, downward = find_height(
-        slopes, how, held=None if before is None else _held(before, normals, valid, box)
+    slopes = Slopes(
+        facing=kept_in(slopes.facing, spare),
+        across=kept_in(slopes.across, spare),
+        down=kept_in(slopes.down, spare),
+        aspect=slopes.aspect,
     )
+    if before is not None:
+        before.let_go()
+    height, rightward, downward = find_height(slopes, how, held=held, spare=spare)
+    if before is not None:
+        before.let_go()
     planes = (height, *_cuts(slopes, rightward, downward), rightward, downward)
     height, cut_east, cut_south, rightward, downward = (_whole(plane, valid.shape, box) for plane in planes)
     return Height(
@@ -107,10 +129,10 @@ def _box(valid: Mask) -> Box:
 
 def _held(before: Before, normals: NDArray[np.floating], valid: Mask, box: Box) -> TakenOver:
     both = valid[box] & before.height.valid[box]
-    cosine = sum(
-        normals[box][..., axis].astype(np.float32) * before.normals[box][..., axis].astype(np.float32)
-        for axis in range(3)
-    )
+    cosine = np.zeros(both.shape, np.float32)
+    for axis in range(3):
+        along = normals[box][..., axis].astype(np.float32)
+        cosine += np.multiply(along, before.normals[box][..., axis], out=along, dtype=np.float32)
     alike = cv2.blur((both & (cosine > SAME_COSINE)).astype(np.float32), (AROUND_PX, AROUND_PX))
     there = cv2.blur(both.astype(np.float32), (AROUND_PX, AROUND_PX))
     return TakenOver(

@@ -2,10 +2,13 @@
 
 from dataclasses import dataclass
 from math import inf
+from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
+from psvideo.compute.spilled import in_file, let_go
 from psvideo.model.camera import FloatArray
 from psvideo.solve.depth.checkerboard import Board, empty_board
 from psvideo.solve.depth.multigrid import CARRIED, Grids, empty_grids, prepare, solve, weighed
@@ -14,6 +17,7 @@ from psvideo.solve.depth.simchony1990 import poisson_height
 from psvideo.solve.depth.view import Slopes
 
 Floats = NDArray[np.float32]
+Kind = TypeVar("Kind", bound=np.generic)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,6 +44,8 @@ LAST_TOLERANCE = 0.05
 FINEST = 1e-6
 """The finest tolerance: what equations lack is held in 32 bits."""
 MOST_REFINEMENTS = 6
+IN_FILES_PIXELS = 1 << 20
+"""From this many pixels on, what one step of a round needs and the next does not lies in files meanwhile."""
 HOLD = 3e-4
 """What holds a pixel that looks the same to its height before, in ties between neighbours of a surface that faces the
 camera: 3000 such pixels weigh as much as one tie, and the shape within some 40 pixels is hardly touched."""
@@ -66,13 +72,19 @@ class _Work:
     lines: Floats
     grids: Grids
 
+    def put_aside(self) -> None:
+        """Let go what lies in files while the equations are solved, which need the grids alone."""
+        let_go(*self.given[:3], self.height, self.rightward, self.downward)
+
 
 def find_height(
-    slopes: Slopes, how: Integration, *, held: TakenOver | None = None
+    slopes: Slopes, how: Integration, *, held: TakenOver | None = None, spare: Path | None = None
 ) -> tuple[FloatArray, Floats, Floats]:
-    """Return the height, and the shares of the steps to the right and down, all (row, col)."""
+    """Return the height, and the shares of the steps to the right and down, all (row, col).
+
+    spare: a folder in whose files these and the ``slopes`` may lie, where they are large."""
     whole = bool((slopes.facing > 0).all())
-    work = _begun(slopes, poisson_height(slopes) if whole else np.zeros(slopes.facing.shape))
+    work = _begun(slopes, poisson_height(slopes) if whole else None, spare)
     if whole and how.sharpness == 0.0:
         return work.height, work.rightward, work.downward
     before = _weigh(work, 0.0)
@@ -93,19 +105,39 @@ def find_height(
     return work.height, work.rightward, work.downward
 
 
-def _begun(slopes: Slopes, height: FloatArray) -> _Work:
-    """Begin at a height, with equal shares."""
-    rows, cols = height.shape
-    given = (slopes.facing, slopes.across, slopes.down)
-    facing, across, down = (plane.astype(np.float32, copy=False) for plane in given)
+def _begun(slopes: Slopes, height: FloatArray | None, spare: Path | None) -> _Work:
+    """Begin at a height, else at 0, with equal shares."""
+    rows, cols = slopes.facing.shape
+    facing, across, down = (
+        plane.astype(np.float32, copy=False) for plane in (slopes.facing, slopes.across, slopes.down)
+    )
+    rightward, downward = (room_for((rows, cols), np.float32, spare) for _ in range(2))
+    rightward[:] = downward[:] = 0.5
     return _Work(
         given=(facing, across, down, np.float32(slopes.aspect)),
-        height=height,
-        rightward=np.full((rows, cols), 0.5, np.float32),
-        downward=np.full((rows, cols), 0.5, np.float32),
+        height=room_for((rows, cols), np.float64, spare) if height is None else kept_in(height, spare),
+        rightward=rightward,
+        downward=downward,
         lines=np.zeros((2, cols), np.float32),
         grids=empty_grids((rows, cols)),
     )
+
+
+def room_for(shape: tuple[int, ...], kind: DTypeLike, spare: Path | None) -> NDArray[Any]:
+    """Return a plane of 0: where it is large and there is a folder, in a file there (see ``let_go``)."""
+    if spare is None or np.prod(shape[:2]) < IN_FILES_PIXELS:
+        return np.zeros(shape, kind)
+    return in_file(shape, kind, spare)
+
+
+def kept_in(plane: NDArray[Kind], spare: Path | None) -> NDArray[Kind]:
+    """Return a plane, or, where it is large and there is a folder, a copy that lies in a file there."""
+    if spare is None or plane.shape[0] * plane.shape[1] < IN_FILES_PIXELS:
+        return plane
+    room: NDArray[Kind] = in_file(plane.shape, plane.dtype, spare)
+    room[:] = plane
+    let_go(room)
+    return room
 
 
 def _weigh(work: _Work, sharpness: float) -> float:
@@ -123,7 +155,8 @@ def _lacking(work: _Work, height: FloatArray) -> None:
 
 def _wanted(work: _Work) -> float:
     """Return the energy of what the equations want of a flat surface, which tolerances are relative to."""
-    _lacking(work, np.zeros_like(work.height))
+    _lacking(work, np.zeros(work.height.shape))
+    work.put_aside()
     prepare(work.grids)
     return weighed(work.grids)
 
@@ -139,6 +172,7 @@ def _settle(work: _Work, stop: float, *, most: int, held: TakenOver | None = Non
         _lacking(work, work.height)
         if held is not None and pins is not None:
             pull_to_pins(pins, work.height, held.height, work.grids.levels[0].right)
+        work.put_aside()
         pinned = prepare(work.grids, pins)
         first, _ = solve(work.grids, stop=stop, most=MOST_CYCLES, pinned=pinned)
         if first <= stop or first > 0.1 * lacked:

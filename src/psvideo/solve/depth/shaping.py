@@ -1,6 +1,7 @@
 """Depth over a clip: one view, plane and scale for all instants, so that each can be integrated by itself."""
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ class Shaping:
     ``before`` what its integration leaves to theirs.
 
     known_m: depth (row, col) in metres that is known from elsewhere, 0 where it is not; comes before plane and first.
+    spare: a folder in whose files large pictures lie in part.
     """
 
     view: View
@@ -26,6 +28,7 @@ class Shaping:
     first: Depth | None = None
     before: Before | None = None
     known_m: NDArray[np.float32] | None = None
+    spare: Path | None = None
 
     @property
     def metric(self) -> bool:
@@ -35,8 +38,9 @@ class Shaping:
 
 def depth_of(shaping: Shaping, surface: Surface) -> Depth:
     """Return the depth of one instant; safe to call from several threads."""
+    how, before, spare = shaping.how, shaping.before, shaping.spare
     return _scaled(
-        shaping, integrate(surface.normals, surface.shown, shaping.view, how=shaping.how, before=shaping.before)
+        shaping, integrate(surface.normals, surface.shown, shaping.view, how=how, before=before, spare=spare)
     )
 
 
@@ -93,9 +97,18 @@ def begun(shaping: Shaping, surface: Surface) -> Shaping:
 
     All later instants begin from the first one, and never from each other: each can be done by itself.
     """
-    height = integrate(surface.normals, surface.shown, shaping.view, how=shaping.how)
+    height = integrate(surface.normals, surface.shown, shaping.view, how=shaping.how, spare=shaping.spare)
     first = _scaled(replace(shaping, first=None), height)
-    return replace(shaping, first=first, before=Before(height=height, normals=surface.normals))
+    before = Before(height=height, normals=surface.normals)
+    return replace(shaping, first=first, before=before.kept_in(shaping.spare))
+
+
+def kept_beside(shaping: Shaping | None, spare: Path) -> Shaping | None:
+    """Return a clip's shaping, of which large pictures lie in a folder's files from now on; None stays None."""
+    if shaping is None:
+        return None
+    before = None if shaping.before is None else shaping.before.kept_in(spare)
+    return replace(shaping, before=before, spare=spare)
 
 
 def scale_note(shaping: Shaping) -> str:
