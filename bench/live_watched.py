@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from unittest.mock import patch
 
-from psvideo.clip import genicam
-from psvideo.runs.live import live
+from psvideo.compute.heap import set_as_commands_do
 
 TICK_S = 0.01
 """The clock ticks of /proc, on Linux."""
@@ -44,6 +43,10 @@ class Threads:
 
 def main() -> None:
     """Watch the camera whose command is given, after a plan, a rig and how many seconds of footage."""
+    set_as_commands_do()
+    from psvideo.clip import genicam  # numpy comes with it
+    from psvideo.runs.live import live
+
     plan, rig, seconds, camera = sys.argv[1], sys.argv[2], float(sys.argv[3]), sys.argv[4:]
     threads = Threads()
 

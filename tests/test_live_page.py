@@ -6,6 +6,7 @@ import urllib.error
 import urllib.request
 from collections.abc import Iterator
 from itertools import pairwise
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from psvideo.live.chain import NewestRound
 from psvideo.live.newest_pictures import NewestPictures, lit_rows
 from psvideo.live.page_server import LivePage, live_page
 from psvideo.live.smaller import smaller_plan
-from psvideo.live.watching import Watching, told
+from psvideo.live.watching import ENOUGH, Watching, told
 from psvideo.model.camera import Camera
 from psvideo.model.timing import timed_camera
 from psvideo.runs.live import live
@@ -26,7 +27,7 @@ from psvideo.runs.live import live
 if TYPE_CHECKING:
     from playwright.sync_api import Playwright
 
-Served = tuple[LivePage, NewestPictures, list[NewestRound], Camera]
+Served = tuple[LivePage, NewestPictures, list[NewestRound], Camera, Path]
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +43,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
         watching.look(newest, plan)
     pictures.put(results[0], camera)
     page = live_page(pictures, lambda: told(None, watching), port=0)
-    yield page, pictures, results, camera
+    yield page, pictures, results, camera, clip
     page.close()
 
 
@@ -79,7 +80,7 @@ def fetched(url: str, **headers: str) -> tuple[int, bytes]:
 
 
 def test_a_viewer_gets_the_newest_and_not_what_came_between(served: Served) -> None:
-    page, pictures, results, camera = served
+    page, pictures, results, camera, _ = served
     with connected(page.url) as viewer:
         first, shown = asked(viewer, 0)
         assert results[0].surface is not None
@@ -96,8 +97,25 @@ def test_a_viewer_gets_the_newest_and_not_what_came_between(served: Served) -> N
         assert asked(viewer, later["number"])[1] == {}, "what was seen is not sent again"
 
 
+def test_what_a_round_shows_is_looked_at_little_by_little_and_comes_to_the_same(served: Served) -> None:
+    results, plan = served[2], ps.open_take(served[4]).plan
+    at_once, by_steps = Watching(plan=plan), Watching(plan=plan, most_s=0.0)
+    for newest in (*results, *results):
+        at_once.look(newest, plan)
+    steps = 0
+    for newest in (*results, *results):
+        by_steps.look(newest, plan)
+        while by_steps.busy:
+            steps += 1
+            by_steps.look(results[-1], plan)  # which is newer, and not looked at before the other is done
+    assert steps > 3 * ENOUGH
+    assert by_steps.lines == at_once.lines
+    assert by_steps.histograms == at_once.histograms
+    assert by_steps.powers == at_once.powers
+
+
 def test_two_viewers_and_one_that_comes_and_goes(served: Served) -> None:
-    page, pictures, results, camera = served
+    page, pictures, results, camera, _ = served
     with connected(page.url) as one, connected(page.url) as two:
         number = asked(one, 0)[0]["number"]
         assert asked(two, 0, "top")[1]["plate"][0]["light"] == "top"
@@ -139,7 +157,7 @@ def test_a_port_that_is_taken_is_named(served: Served) -> None:
 
 
 def test_the_frame_is_marked_where_lights_and_the_dark_row_are(served: Served) -> None:
-    _, _, results, camera = served
+    _, _, results, camera, _ = served
     for newest in results[2:6]:
         rows = lit_rows(newest, camera)
         assert (rows[0][0], rows[-1][1]) == (0, camera.height_px)
@@ -154,7 +172,7 @@ def test_the_frame_is_marked_where_lights_and_the_dark_row_are(served: Served) -
 def test_the_browser_relights_the_surface_that_was_solved(
     served: Served, playwright: "Playwright", chromium: str
 ) -> None:
-    page, pictures, results, camera = served
+    page, pictures, results, camera, _ = served
     newest = results[-1]
     pictures.put(newest, camera)
     software = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]

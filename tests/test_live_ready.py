@@ -1,5 +1,6 @@
 """What live does before its first frame, and what it says while there is nothing to show."""
 
+import gc
 import signal
 import socket
 import subprocess
@@ -64,10 +65,12 @@ def test_after_the_rehearsal_nothing_is_loaded_or_compiled_while_frames_come(cli
 
 def test_the_source_is_opened_once_everything_is_ready(clip: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     order: list[str] = []
+    left_alone: list[int] = []
     monkeypatch.setattr("psvideo.runs.live.rehearse", lambda *_, **__: order.append("rehearsed"))
 
     def read(*_: object, **__: object) -> Iterator[object]:
         order.append("read")
+        left_alone.append(gc.get_freeze_count())
         return iter(())
 
     monkeypatch.setattr("psvideo.live.source.read_frames", read)
@@ -75,6 +78,8 @@ def test_the_source_is_opened_once_everything_is_ready(clip: Path, monkeypatch: 
     with pytest.raises(ps.PsvideoError, match="0 frames are too few"):
         live(clip)
     assert order == ["rehearsed", "read"]
+    assert left_alone[0] > 10_000, "no search for cycles among what is loaded holds frames up"
+    assert gc.get_freeze_count() == 0
 
 
 def test_what_is_compiled_is_counted_and_said_until_it_is_done() -> None:

@@ -15,7 +15,7 @@ from psvideo.cli.ending import check_addresses, nobody_reads, paragraph_on, say_
 from psvideo.cli.first_screen import COMMANDS, Entry
 from psvideo.cli.spelling import spelled
 from psvideo.cli.teaching import PROGRAM, command_called, teach, words_typed
-from psvideo.compute.heap import collect_cycles_seldom, keep_algebra_single, keep_pages_small, share_one_heap
+from psvideo.compute.heap import set_as_commands_do
 from psvideo.errors import PsvideoError, UsageError, nearest
 
 STOPPED = 130
@@ -83,10 +83,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: Sequence[str] | None) -> int:
-    share_one_heap()
-    keep_pages_small()
-    keep_algebra_single()
-    collect_cycles_seldom()
+    set_as_commands_do()
     words = words_typed(sys.argv[1:] if arguments is None else arguments, os.environ)
     with compiling_said(quiet="-q" in words or "--quiet" in words), starving_said():
         try:

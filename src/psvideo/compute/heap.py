@@ -4,6 +4,7 @@ import contextlib
 import ctypes
 import gc
 import os
+from collections.abc import Iterator
 
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, M_ARENA_MAX = -1, -3, -8
 """glibc's numbers of the settings (malloc.h)."""
@@ -14,6 +15,14 @@ OBJECTS_BETWEEN_LOOKS = 10_000
 """Python looks for reference cycles once this many objects are new; by default, 700."""
 ELSEWHERE = (OSError, AttributeError, TypeError)
 """Another C library, or none to be called by name."""
+
+
+def set_as_commands_do() -> None:
+    """Make all of these settings, for a process that is psvideo's alone; before numpy is imported."""
+    share_one_heap()
+    keep_pages_small()
+    keep_algebra_single()
+    collect_cycles_seldom()
 
 
 def share_one_heap() -> None:
@@ -54,6 +63,19 @@ def collect_cycles_seldom() -> None:
     40 of processor time, and looks that find nothing 0.1 s instead of 0.18 of every later run.
     """
     gc.set_threshold(OBJECTS_BETWEEN_LOOKS)
+
+
+@contextlib.contextmanager
+def no_looks_at_what_is_loaded() -> Iterator[None]:
+    """Let Python, while the block runs, look for reference cycles only among objects that are made in it.
+
+    A look at all that is loaded takes 0.1 s, in which no other thread goes on: half of what a live picture may take.
+    """
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
 
 
 def give_back() -> None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from psvideo.compute.compile_count import CompileCount, compiles_counted
+from psvideo.compute.heap import no_looks_at_what_is_loaded
 from psvideo.live.behind import Behind
 from psvideo.live.chain import Chain, LiveFrame, NewestRound, search_here
 from psvideo.live.holding import Holding
@@ -89,7 +90,8 @@ class Running:
         with compiles_counted() as self._compiles:
             if self.source.paced:
                 self._get_ready(began_s)
-                self._beside(began_s)
+                with no_looks_at_what_is_loaded():
+                    self._beside(began_s)
             else:
                 self._one_by_one(began_s)
         fault = self._fault or self.chain.fault

@@ -45,6 +45,11 @@ class Watching:
     _looked_s: float = float("-inf")
     _looking: Iterator[None] | None = None
 
+    @property
+    def busy(self) -> bool:
+        """Whether a round is being looked at, for which there was no time yet."""
+        return self._looking is not None
+
     def look(self, newest: NewestRound, plan: Plan) -> None:
         """Go on with the round that is being looked at; or begin with this one, of a picture of the plan's size."""
         until_s = time.monotonic() + self.most_s

@@ -11,6 +11,9 @@ from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.loops.blocks import working_memory
 from psvideo.solve.normals.task import Floats, Mask, Samples, Task, Usable, Work, task
 
+GRID_PX = 480
+"""The points at which surfaces are judged are at most this many along the longer side."""
+
 
 class Indirect(NamedTuple):
     """Light that comes by way of other surfaces, as far as it shows: at every point at which a surface is judged, the
@@ -34,7 +37,7 @@ class Evidence:
 
     ``unsure`` (light, row, col), on a grid of its own over the picture, is by how much plates may be off for motion;
     ``moves`` (row, col), on that grid, where something was followed. ``indirect`` is what the solver saw on its way,
-    and ``left``, where plates are unsure.
+    and ``left``, where plates are unsure. ``grid_px`` is how many points there are at most along the longer side.
     """
 
     plates: Sequence[Samples] | Sequence[Mixture]
@@ -49,6 +52,11 @@ class Evidence:
     black_level: float = 0.0
     scale: float = 1.0
     spare: Path | None = None
+    grid_px: int = GRID_PX
+
+    def step_of(self, shape: tuple[int, ...]) -> int:
+        """Return how many rows and columns of a picture lie between two points at which it is judged."""
+        return max(-(-max(shape[:2]) // self.grid_px), 1)
 
     def in_bands(
         self,

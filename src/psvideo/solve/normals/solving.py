@@ -10,7 +10,7 @@ import numpy as np
 from psvideo.model.choices import Solver
 from psvideo.model.surface import Surface
 from psvideo.plates.mixture import Mixture
-from psvideo.solve.normals.evidence import Evidence
+from psvideo.solve.normals.evidence import GRID_PX, Evidence
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.least_squares import woodham1980
 from psvideo.solve.normals.plate_noise import LEAST, PlateNoise, noise_of
@@ -36,7 +36,8 @@ EVERYTHING = huber1981.Reweighting(most_error_deg=huber1981.EVERYTHING_DEG)
 class Solving:
     """``solver`` "auto" is robust from ROBUST_FROM_LIGHTS lights on. ``half`` gives half floats; ``residual`` and
     ``error`` ask for what the surface may hold as well. ``fill`` gives every pixel of the subject a normal. ``spare``
-    is a folder in whose files large pictures are worked on; without one they lie in memory."""
+    is a folder in whose files large pictures are worked on; without one they lie in memory. ``grid_px``: at most this
+    many points along the longer side say how far normals may be off."""
 
     solver: Solver = "auto"
     half: bool = False
@@ -44,6 +45,7 @@ class Solving:
     error: bool = False
     fill: bool = True
     spare: Path | None = None
+    grid_px: int = GRID_PX
 
     def method(self, lights: int) -> Method:
         """Return the solver for so many lights."""
@@ -90,7 +92,15 @@ class Solving:
         noise = noise_of(plates)
         usable = _usable(noise, lit.intensities.shape[1], self.method(len(plates)))
         one = Evidence(
-            plates=plates, lit=lit, usable=usable, seen=seen, mask=mask, unsure=unsure, moves=moves, spare=self.spare
+            plates=plates,
+            lit=lit,
+            usable=usable,
+            seen=seen,
+            mask=mask,
+            unsure=unsure,
+            moves=moves,
+            spare=self.spare,
+            grid_px=self.grid_px,
         )
         looks = IndirectLook.of(one)
         solved = self._solved(plates, lit, usable, noise, seen, mask, looks)

@@ -17,8 +17,6 @@ from psvideo.model.surface import Surface
 from psvideo.solve.normals.evidence import Evidence
 from psvideo.solve.normals.task import Floats, Samples
 
-GRID_PX = 480
-"""The grid has at most this many points along the longer side."""
 TORN, NEAR = 5, 9
 """Slopes are added up along the edges of squares of this many points, averaged over those of the second."""
 AROUND, FAR_AROUND, LEAST_AROUND = 0.1, 0.5, 7
@@ -113,11 +111,6 @@ class ThinSurface:
     def known(self) -> NDArray[np.bool_]:
         """Where there is a normal."""
         return self.surface.valid
-
-
-def coarse_step(shape: tuple[int, ...]) -> int:
-    """Return how many rows and columns of a picture lie between two points."""
-    return max(-(-max(shape[:2]) // GRID_PX), 1)
 
 
 def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = None) -> Signs:

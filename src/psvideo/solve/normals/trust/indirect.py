@@ -27,7 +27,7 @@ class IndirectLook:
         """Begin with a round."""
         samples = ShownPlates.of(one.plates).as_floats().samples
         rows, cols = samples[0].shape[:2]
-        step = coarse_step((rows, cols))
+        step = one.step_of((rows, cols))
         shape = -(-rows // step), -(-cols // step)
         found = Indirect(*np.zeros((2, *shape), np.float32))
         left = Left(*np.zeros((2, *((0, 0) if one.unsure is None else shape)), np.float32))

@@ -23,7 +23,6 @@ from psvideo.solve.normals.trust.doubting import (
     ThinSurface,
     bits,
     brightness,
-    coarse_step,
     doubt_deg,
     signs_of,
     stored,
@@ -66,7 +65,7 @@ def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging =
 
     What robust solving predicted is in ``error_deg`` already; of least squares noise and residuals say what is known.
     """
-    near = near_spread(one.lit, _thin_shape(surface))
+    near = near_spread(one.lit, _thin_shape(surface, one))
     spread = _Spread.of(surface, one, noise, how, near)
     points = spread.points(surface)
     turned_deg = moved_deg(points, one, noise)
@@ -97,9 +96,9 @@ def _usual(errors_deg: Floats, weights: Floats) -> float:
     return float((each * weights).sum() / max(float(weights.sum(dtype=np.float64)), 1e-12))
 
 
-def _thin_shape(surface: Surface) -> tuple[int, int]:
+def _thin_shape(surface: Surface, one: Evidence) -> tuple[int, int]:
     """Return the shape of the points at which a surface is judged."""
-    step = coarse_step(surface.valid.shape)
+    step = one.step_of(surface.valid.shape)
     rows, cols = surface.valid.shape
     return -(-rows // step), -(-cols // step)
 
@@ -109,7 +108,8 @@ def looked_at(
 ) -> tuple[ThinSurface, Signs]:
     """Return the points at which a surface is judged, and what speaks against their normals: what constants are fitted
     to."""
-    points = _Spread.of(surface, one, noise, how, near_spread(one.lit, _thin_shape(surface))).points(surface)
+    near = near_spread(one.lit, _thin_shape(surface, one))
+    points = _Spread.of(surface, one, noise, how, near).points(surface)
     return points, signs_of(points, one)
 
 
@@ -123,9 +123,11 @@ def emptied(surface: Surface) -> Surface:
 
 @dataclass(frozen=True, kw_only=True)
 class _Spread:
-    """How noise spreads into normals under all lights. ``of_noise``: how much of it residuals hold; ``of_residual``: by
-    what they become degrees where they are not that already, 0 where they are."""
+    """How noise spreads into normals under all lights. ``step``: rows and columns between two points; ``of_noise``: how
+    much of noise residuals hold; ``of_residual``: by what they become degrees where they are not that already, 0 where
+    they are."""
 
+    step: int
     noise: Spread
     of_noise: float
     of_residual: float
@@ -142,6 +144,7 @@ class _Spread:
         many, free = max(lights / MANY_LIGHTS, 1), lights - 3
         plain = surface.error_deg is None and free > 0  # residuals are there, which three numbers were fitted to
         return cls(
+            step=one.step_of(surface.valid.shape),
             noise=Spread(
                 inverse=np.linalg.inv(matrix.T @ matrix).astype(np.float32),
                 variances=np.array(variances, np.float32),
@@ -162,7 +165,7 @@ class _Spread:
 
     def points(self, surface: Surface) -> ThinSurface:
         """Return every so many rows and columns of a surface, and what noise and residuals make of them."""
-        step = coarse_step(surface.valid.shape)
+        step = self.step
         some = replace(
             surface,
             normals=_thinned(surface.normals, step),
