@@ -18,6 +18,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import lsqr
 
 from psvideo.cli.app import main
+from psvideo.compute import spilled
 from psvideo.errors import PsvideoError
 from psvideo.model.surface import Surface
 from psvideo.solve.depth import (
@@ -27,7 +28,6 @@ from psvideo.solve.depth import (
     begun,
     depth_of,
     integrate,
-    integration,
     kept_beside,
     mesh_of,
     reservations,
@@ -229,7 +229,7 @@ def test_one_multigrid_cycle_is_worth_many_plain_steps() -> None:
     east[:, -1], south[-1] = 0, 0
     finest = grids.levels[0]
     for plane, board in ((east, finest.ties[0]), (south, finest.ties[1]), (right - right.mean(), finest.right)):
-        write_board(plane.astype(np.float32), board)
+        write_board(plane.astype(np.float32), board, 0)
     prepare(grids)
     wanted = weighed(grids)
     assert solve(grids, stop=1e-8 * wanted, most=100)[1] < 30
@@ -441,7 +441,8 @@ def test_in_files_depth_is_the_same_to_the_byte_and_the_first_instant_too(
         return shaping, [each.tobytes() for d in depths if d is not None for each in (d.depth, d.cut_east, d.cut_south)]
 
     _, expected = found(Shaping(view=view))
-    monkeypatch.setattr(integration, "IN_FILES_PIXELS", ROWS * COLS)
+    monkeypatch.setattr(spilled, "WORKED_ON_PIXELS", ROWS * COLS)
+    monkeypatch.setattr(spilled, "BAND_ROWS", 20)
     shaping, shown = found(Shaping(view=view, spare=tmp_path))
     assert shown == expected
     assert shaping.before is not None

@@ -6,16 +6,22 @@ Code that has worked on a part of them lets it go (``let_go``); a later access r
 import mmap
 import os
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from psvideo.errors import PsvideoError
 
+Kind = TypeVar("Kind", bound=np.generic)
 LARGE_PIXELS = 1 << 25
 """Pictures of more pixels have planes in files: just more than 8K video has, whose results come and go in memory."""
+WORKED_ON_PIXELS = 1 << 20
+"""From this many pixels on, what is worked on in steps lies in files while a step needs it not."""
+BAND_ROWS = 64
+"""Of what is worked on row by row, this many are in memory at a time."""
 AROUND_BYTES = 1 << 20
 """This much before a part goes with it: where a page is read, the system hands over those around it too."""
 
@@ -49,6 +55,38 @@ def in_file(shape: tuple[int, ...], kind: DTypeLike, folder: Path) -> NDArray[An
             f"({fault.strerror or fault}). Free some, or write to another disk."
         ) from fault
     return np.frombuffer(held, kind).reshape(shape)
+
+
+def room_for(shape: tuple[int, ...], kind: DTypeLike, spare: Path | None) -> NDArray[Any]:
+    """Return a plane of 0: where it is large and there is a folder, in a file there (see ``let_go``)."""
+    if spare is None or np.prod(shape[:2]) < WORKED_ON_PIXELS:
+        return np.zeros(shape, kind)
+    return in_file(shape, kind, spare)
+
+
+def kept_in(plane: NDArray[Kind], spare: Path | None) -> NDArray[Kind]:
+    """Return a plane, or, where it is large and there is a folder, a copy that lies in a file there."""
+    if spare is None or plane.shape[0] * plane.shape[1] < WORKED_ON_PIXELS:
+        return plane
+    return _copied(plane, in_file(plane.shape, plane.dtype, spare))
+
+
+def taken_back(plane: NDArray[Kind]) -> NDArray[Kind]:
+    """Return a plane that lies in memory."""
+    return plane if _mapping_of(plane) is None else _copied(plane, np.empty_like(plane))
+
+
+def _copied(plane: NDArray[Kind], into: NDArray[Kind]) -> NDArray[Kind]:
+    for first, last in bands(len(plane)):
+        into[first:last] = plane[first:last]
+        let_go(into[first:last], plane[first:last])
+    return into
+
+
+def bands(rows: int) -> Iterator[tuple[int, int]]:
+    """Yield the first row of every band of BAND_ROWS, and the one after its last."""
+    for first in range(0, rows, BAND_ROWS):
+        yield first, min(first + BAND_ROWS, rows)
 
 
 def thin(picture: NDArray[Any], step: int) -> NDArray[Any]:

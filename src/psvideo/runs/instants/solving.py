@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.progress import Watch, unwatched
-from psvideo.compute.threads import writing
+from psvideo.compute.threads import MOST_WAITING, writing
 from psvideo.export.sequences.result_files import is_written
 from psvideo.plates.gather import first_ambient, gather
 from psvideo.plates.part import Part
@@ -52,7 +52,7 @@ def write_instants(
     shaping = kept_beside(job.shaping if beginning is None else beginning.shaping, folder)
     found = Found(observed=observed)
     ambient = first_ambient(job.take, job.timing) if job.mixes_ambient else None
-    with writing() as write:
+    with writing(most_waiting=_most_waiting(job)) as write:
         part = None if piece is None else piece.part
         for instant in instants_of(job, observed, part=part, spare=folder, watch=watch):
             ambient = (instant.round.ambient or ambient) if job.mixes_ambient else None
@@ -75,6 +75,12 @@ def write_instants(
             del instant  # its plates would be held while the next round gathers
     found.reserved = () if shaping is None else reservations(shaping)
     return found
+
+
+def _most_waiting(job: Job) -> int:
+    """Return how many files may wait to be written. Instants of which depth is found wait for each other, and where
+    nothing else is written each that waits would only hold its surface."""
+    return 1 if job.shaping is not None and not job.delivery.plates else MOST_WAITING
 
 
 def _blur_of(job: Job, instant: Instant) -> NDArray[np.float32] | None:

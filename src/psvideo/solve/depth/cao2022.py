@@ -18,9 +18,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.compute.spilled import let_go
+from psvideo.compute.spilled import kept_in, let_go
 from psvideo.model.camera import FloatArray
-from psvideo.solve.depth.integration import BILATERAL, SMOOTH, Integration, TakenOver, find_height, kept_in
+from psvideo.solve.depth.integration import BILATERAL, SMOOTH, Integration, TakenOver, find_height
 from psvideo.solve.depth.view import Box, Slopes, View, slopes_of
 
 Mask = NDArray[np.bool_]

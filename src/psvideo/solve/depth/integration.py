@@ -1,14 +1,15 @@
 """Reweighting, round by round: solve for the height, compute new weights from it, until the energy settles."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from math import inf
 from pathlib import Path
-from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import NDArray
 
-from psvideo.compute.spilled import in_file, let_go
+from psvideo.compute.spilled import bands, kept_in, let_go, room_for, taken_back
 from psvideo.model.camera import FloatArray
 from psvideo.solve.depth.checkerboard import Board, empty_board
 from psvideo.solve.depth.multigrid import CARRIED, Grids, empty_grids, prepare, solve, weighed
@@ -17,7 +18,6 @@ from psvideo.solve.depth.simchony1990 import poisson_height
 from psvideo.solve.depth.view import Slopes
 
 Floats = NDArray[np.float32]
-Kind = TypeVar("Kind", bound=np.generic)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,8 +44,6 @@ LAST_TOLERANCE = 0.05
 FINEST = 1e-6
 """The finest tolerance: what equations lack is held in 32 bits."""
 MOST_REFINEMENTS = 6
-IN_FILES_PIXELS = 1 << 20
-"""From this many pixels on, what one step of a round needs and the next does not lies in files meanwhile."""
 HOLD = 3e-4
 """What holds a pixel that looks the same to its height before, in ties between neighbours of a surface that faces the
 camera: 3000 such pixels weigh as much as one tie, and the shape within some 40 pixels is hardly touched."""
@@ -72,9 +70,14 @@ class _Work:
     lines: Floats
     grids: Grids
 
-    def put_aside(self) -> None:
-        """Let go what lies in files while the equations are solved, which need the grids alone."""
-        let_go(*self.given[:3], self.height, self.rightward, self.downward)
+    def in_bands(self, run: Callable[[int, int], None], *more: NDArray[np.floating]) -> None:
+        """Call ``run(first, last)`` for bands of rows, after each of which what lies in files is let go, ``more``
+        planes too: the equations are solved on the grids alone."""
+        own = (*self.given[:3], self.height, self.rightward, self.downward)
+        planes = [plane for plane in (*own, *more) if plane.flags.c_contiguous]
+        for first, last in bands(len(self.height)):
+            run(first, last)
+            let_go(*(plane[first:last] for plane in planes))
 
 
 def find_height(
@@ -85,11 +88,19 @@ def find_height(
     spare: a folder in whose files these and the ``slopes`` may lie, where they are large."""
     whole = bool((slopes.facing > 0).all())
     work = _begun(slopes, poisson_height(slopes) if whole else None, spare)
-    if whole and how.sharpness == 0.0:
-        return work.height, work.rightward, work.downward
+    if not (whole and how.sharpness == 0.0):
+        _find(work, how, held)
+    planes = work.height, work.rightward, work.downward
+    del work  # what comes back into memory finds room where the grids were
+    height, rightward, downward = (taken_back(plane) for plane in planes)
+    return height, rightward, downward
+
+
+def _find(work: _Work, how: Integration, held: TakenOver | None) -> None:
+    """Change a height and shares until they settle."""
     before = _weigh(work, 0.0)
     if held is not None and how.sharpness > 0.0:
-        work.rightward[held.same], work.downward[held.same] = held.rightward[held.same], held.downward[held.same]
+        _take_over(work, held)
         before = inf
     wanted = _wanted(work)
     stop, last = (max(share * how.tolerance, FINEST) ** 2 * wanted for share in (1.0, LAST_TOLERANCE))
@@ -101,8 +112,23 @@ def find_height(
             break
         before = energy
     _settle(work, last, most=MOST_REFINEMENTS, held=None if how.sharpness == 0.0 else held)
-    work.height[slopes.facing == 0.0] = 0.0
-    return work.height, work.rightward, work.downward
+    facing = work.given[0]
+
+    def empty(first: int, last: int) -> None:
+        work.height[first:last][facing[first:last] == 0.0] = 0.0
+
+    work.in_bands(empty)
+
+
+def _take_over(work: _Work, held: TakenOver) -> None:
+    """Begin with the shares of another instant where it looks the same."""
+
+    def take(first: int, last: int) -> None:
+        same = held.same[first:last]
+        for own, other in ((work.rightward, held.rightward), (work.downward, held.downward)):
+            own[first:last][same] = other[first:last][same]
+
+    work.in_bands(take, held.rightward, held.downward)
 
 
 def _begun(slopes: Slopes, height: FloatArray | None, spare: Path | None) -> _Work:
@@ -123,40 +149,33 @@ def _begun(slopes: Slopes, height: FloatArray | None, spare: Path | None) -> _Wo
     )
 
 
-def room_for(shape: tuple[int, ...], kind: DTypeLike, spare: Path | None) -> NDArray[Any]:
-    """Return a plane of 0: where it is large and there is a folder, in a file there (see ``let_go``)."""
-    if spare is None or np.prod(shape[:2]) < IN_FILES_PIXELS:
-        return np.zeros(shape, kind)
-    return in_file(shape, kind, spare)
-
-
-def kept_in(plane: NDArray[Kind], spare: Path | None) -> NDArray[Kind]:
-    """Return a plane, or, where it is large and there is a folder, a copy that lies in a file there."""
-    if spare is None or plane.shape[0] * plane.shape[1] < IN_FILES_PIXELS:
-        return plane
-    room: NDArray[Kind] = in_file(plane.shape, plane.dtype, spare)
-    room[:] = plane
-    let_go(room)
-    return room
-
-
 def _weigh(work: _Work, sharpness: float) -> float:
     """Make the shares those of the height; return the energy."""
-    sides = (work.rightward, work.downward, work.lines)
-    return float(weigh_sides(work.height, *work.given, np.float32(sharpness), *sides))
+    energy, sides = 0.0, (work.rightward, work.downward, work.lines)
+
+    def weigh(first: int, last: int) -> None:
+        nonlocal energy
+        energy = float(weigh_sides(work.height, *work.given, np.float32(sharpness), *sides, first, last, energy))
+
+    work.in_bands(weigh)
+    return energy
 
 
-def _lacking(work: _Work, height: FloatArray) -> None:
-    """Put the equations for the shares onto the finest grid, with what they lack at a height."""
+def _lacking(work: _Work, *, share: float = 1.0) -> None:
+    """Put the equations for the shares onto the finest grid, with what they lack at a share of the height."""
     finest = work.grids.levels[0]
     finest.right[:] = 0
-    equations(height, *work.given, work.rightward, work.downward, finest.ties, finest.right)
+    shares = work.rightward, work.downward
+
+    def put(first: int, last: int) -> None:
+        equations(work.height, *work.given, *shares, finest.ties, finest.right, share, first, last)
+
+    work.in_bands(put)
 
 
 def _wanted(work: _Work) -> float:
     """Return the energy of what the equations want of a flat surface, which tolerances are relative to."""
-    _lacking(work, np.zeros(work.height.shape))
-    work.put_aside()
+    _lacking(work, share=0.0)
     prepare(work.grids)
     return weighed(work.grids)
 
@@ -169,21 +188,26 @@ def _settle(work: _Work, stop: float, *, most: int, held: TakenOver | None = Non
     pins = None if held is None else _pins(held, work)
     lacked = inf
     for _ in range(most):
-        _lacking(work, work.height)
+        _lacking(work)
         if held is not None and pins is not None:
-            pull_to_pins(pins, work.height, held.height, work.grids.levels[0].right)
-        work.put_aside()
+            _pull(work, pins, held.height)
         pinned = prepare(work.grids, pins)
         first, _ = solve(work.grids, stop=stop, most=MOST_CYCLES, pinned=pinned)
         if first <= stop or first > 0.1 * lacked:
             return
-        add_board(work.grids.sum, work.height)
+        work.in_bands(partial(add_board, work.grids.sum, work.height))
         if CARRIED**2 * first <= stop:
             return
         lacked = first
 
 
+def _pull(work: _Work, pins: Board, wanted: FloatArray) -> None:
+    lacking = work.grids.levels[0].right
+    work.in_bands(partial(pull_to_pins, pins, work.height, wanted, lacking), wanted)
+
+
 def _pins(held: TakenOver, work: _Work) -> Board:
     pins = empty_board(*work.height.shape)
-    write_board(np.where(held.same, np.float32(HOLD), np.float32(0)), pins)
+    for first, last in bands(len(held.same)):
+        write_board(np.where(held.same[first:last], np.float32(HOLD), np.float32(0)), pins, first)
     return pins

@@ -87,14 +87,17 @@ def weigh_sides(
     rightward: Any,
     downward: Any,
     lines: Any,
+    first: int,
+    last: int,
+    energy: float,
 ) -> float:
-    """Fill every pixel's share of its right (rightward) and lower (downward) step; return the energy at the height.
+    """Fill some rows' shares of their right (rightward) and lower (downward) steps; return the energy at the height,
+    added to that of the rows before.
 
     ``sharpness`` is k, 0 for equal shares; ``lines`` (2, col) is memory.
     """
     ahead, behind = lines[0], lines[1]
-    energy = 0.0
-    for row in range(height.shape[0]):
+    for row in range(first, last):
         _row_steps(height[row], facing[row], across[row], ahead, behind)
         energy += _weigh(ahead, behind, across[row], sharpness, rightward[row])
         _col_steps(height, facing, down, aspect, row, row + 1, ahead)
@@ -123,17 +126,21 @@ def equations(
     downward: Any,
     ties: Any,
     lacking: Any,
+    share: float,
+    first: int,
+    last: int,
 ) -> None:
-    """Fill ties and what every pixel's equation lacks (0 before) at a height, as boards (see ``checkerboard.py``)."""
+    """Fill some rows' ties and add to what every pixel's equation lacks at a share of a height, as boards (see
+    ``checkerboard.py``)."""
     rows, cols = height.shape
-    for r in range(rows):
+    for r in range(first, last):
         for c in range(cols - 1):
             colour, k, to = (r + c) % 2, c // 2 + 1, (c + 1) // 2 + 1
             tie, flow = _tie(
                 rightward[r, c], facing[r, c], across[r, c], rightward[r, c + 1], facing[r, c + 1], across[r, c + 1]
             )
             ties[0, colour, r + 1, k] = tie
-            lack = np.float32(tie * (height[r, c + 1] - height[r, c]) - flow)
+            lack = np.float32(tie * (share * (height[r, c + 1] - height[r, c])) - flow)
             lacking[colour, r + 1, k] += lack
             lacking[1 - colour, r + 1, to] -= lack
         if r + 1 < rows:
@@ -144,31 +151,31 @@ def equations(
                     downward[r + 1, c], facing[r + 1, c] * aspect, down[r + 1, c],
                 )  # fmt: skip
                 ties[1, colour, r + 1, k] = tie
-                lack = np.float32(tie * (height[r + 1, c] - height[r, c]) - flow)
+                lack = np.float32(tie * (share * (height[r + 1, c] - height[r, c])) - flow)
                 lacking[colour, r + 1, k] += lack
                 lacking[1 - colour, r + 2, k] -= lack
 
 
 @REORDERED.kept
-def add_board(board: Any, height: Any) -> None:
-    """Add a board to a height (row, col)."""
-    for r in range(height.shape[0]):
+def add_board(board: Any, height: Any, first: int, last: int) -> None:
+    """Add some rows of a board to a height (row, col)."""
+    for r in range(first, last):
         for c in range(height.shape[1]):
             height[r, c] += board[(r + c) % 2, r + 1, c // 2 + 1]
 
 
 @REORDERED.kept
-def write_board(values: Any, board: Any) -> None:
-    """Put a picture (row, col) onto a board."""
-    for r in range(values.shape[0]):
+def write_board(values: Any, board: Any, first: int) -> None:
+    """Put a picture (row, col) onto a board, from the row ``first`` on."""
+    for r in range(first, first + values.shape[0]):
         for c in range(values.shape[1]):
-            board[(r + c) % 2, r + 1, c // 2 + 1] = values[r, c]
+            board[(r + c) % 2, r + 1, c // 2 + 1] = values[r - first, c]
 
 
 @REORDERED.kept
-def pull_to_pins(pins: Any, height: Any, wanted: Any, lacking: Any) -> None:
-    """Add to what equations lack what pins pull a height (row, col) towards the wanted one."""
-    for r in range(height.shape[0]):
+def pull_to_pins(pins: Any, height: Any, wanted: Any, lacking: Any, first: int, last: int) -> None:
+    """Add to what some rows' equations lack what pins pull a height (row, col) towards the wanted one."""
+    for r in range(first, last):
         for c in range(height.shape[1]):
             colour, k = (r + c) % 2, c // 2 + 1
             lacking[colour, r + 1, k] += pins[colour, r + 1, k] * np.float32(wanted[r, c] - height[r, c])
