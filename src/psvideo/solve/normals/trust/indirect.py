@@ -9,7 +9,6 @@ from psvideo.solve.normals.bands import ShownPlates
 from psvideo.solve.normals.evidence import Evidence, Indirect, Left
 from psvideo.solve.normals.loops.blocks import working_memory
 from psvideo.solve.normals.task import Result, Task, Work, task
-from psvideo.solve.normals.trust.doubting import coarse_step
 
 
 @dataclass(frozen=True, kw_only=True)
