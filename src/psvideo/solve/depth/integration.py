@@ -73,7 +73,7 @@ class _Work:
     def in_bands(self, run: Callable[[int, int], None], *more: NDArray[np.floating]) -> None:
         """Call ``run(first, last)`` for bands of rows, after each of which what lies in files is let go, ``more``
         planes too: the equations are solved on the grids alone."""
-        own = (*self.given[:3], self.height, self.rightward, self.downward)
+        own: list[NDArray[np.floating]] = [*self.given[:3], self.height, self.rightward, self.downward]
         planes = [plane for plane in (*own, *more) if plane.flags.c_contiguous]
         for first, last in bands(len(self.height)):
             run(first, last)
@@ -90,10 +90,9 @@ def find_height(
     work = _begun(slopes, poisson_height(slopes) if whole else None, spare)
     if not (whole and how.sharpness == 0.0):
         _find(work, how, held)
-    planes = work.height, work.rightward, work.downward
+    height, rightward, downward = work.height, work.rightward, work.downward
     del work  # what comes back into memory finds room where the grids were
-    height, rightward, downward = (taken_back(plane) for plane in planes)
-    return height, rightward, downward
+    return taken_back(height), taken_back(rightward), taken_back(downward)
 
 
 def _find(work: _Work, how: Integration, held: TakenOver | None) -> None:
