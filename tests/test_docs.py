@@ -182,7 +182,7 @@ def films(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("films")
 
 
-SLOW = {"how_frames", "how_plates", "how_normals", "gallery_depth", "rolling_fan"}
+SLOW = {"how_frames", "how_plates", "how_normals", "gallery_depth", "depth_bust", "rolling_fan"}
 SLOW |= {"fault_colour_shift", "fault_wrong_curve"}
 """The campaign's: other figures are made in the same way."""
 

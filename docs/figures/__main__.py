@@ -5,13 +5,14 @@ import tempfile
 from pathlib import Path
 
 import cv2
+from docs.figures.depth_views import DEPTH
 from docs.figures.explained import EXPLAINED
 from docs.figures.faults import FAULTS
 from docs.figures.python_page import PYTHON
 from docs.figures.staging import PICTURES
 from docs.figures.turning import TURNING
 
-FIGURES = EXPLAINED | FAULTS | PYTHON | TURNING
+FIGURES = DEPTH | EXPLAINED | FAULTS | PYTHON | TURNING
 
 
 def main(names: list[str]) -> None:

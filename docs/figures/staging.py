@@ -85,7 +85,12 @@ def frames(clip: Path) -> list[Image]:
 
 def exr(folder: Path, place: int = 0) -> Image:
     """Return one picture of a sequence."""
-    channels = OpenEXR.File(str(sorted(folder.glob("*.exr"))[place])).channels()
+    return exr_file(sorted(folder.glob("*.exr"))[place])
+
+
+def exr_file(path: Path) -> Image:
+    """Return an EXR file's picture: its colours, or its first channel."""
+    channels = OpenEXR.File(str(path)).channels()
     picture = channels["RGB"].pixels if "RGB" in channels else next(iter(channels.values())).pixels
     return np.asarray(picture, np.float32)
 
