@@ -11,7 +11,7 @@ from psvideo.errors import PsvideoError
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.sync.find import find_timing
-from psvideo.sync.rowfit.refine import solved
+from psvideo.sync.rowfit.normal_equations import solved
 from psvideo.synth import Noise, TrueClock, expose
 
 PlanMaker = Callable[..., Plan]

@@ -18,9 +18,11 @@ from psvideo.live.window import HeldFrame, Window, window_of
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat, FoundClock
+from psvideo.sync.rowfit.normal_equations import projected
 from psvideo.sync.rowfit.profiles import Profiles, brightnesses, unexplained
-from psvideo.sync.rowfit.refine import CAUCHY, GLOBALS, explained, projected, sandwich, scaled
+from psvideo.sync.rowfit.refine import CAUCHY, GLOBALS, explained, scaled
 from psvideo.sync.rowfit.seed import GOOD_SEED, gain_of
+from psvideo.sync.rowfit.standard_error import sandwich
 from psvideo.sync.rowfit.track import MOST, SUSPICIOUS, losses_of
 from psvideo.sync.verdict.believed import MIN_EXPLAINED, MIN_GAIN
 

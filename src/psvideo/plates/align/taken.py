@@ -17,7 +17,7 @@ from psvideo.plates.align.doubt.lone_edges import InstantSketch
 from psvideo.plates.align.doubt.unsure import unsure_of
 from psvideo.plates.align.velocity.brightness import light_of
 from psvideo.plates.align.velocity.flow import Codes, Flags, Vectors, comparable, noise_between, places
-from psvideo.plates.align.velocity.moving import SHADING_PX, Followed, Pair, window_of
+from psvideo.plates.align.velocity.moving import SHADING_PX, Followed, Pair, odd_width
 from psvideo.plates.align.velocity.moving_kernel import AFTER, AT_REST, BEFORE, BOTH, NOWHERE
 
 UNLIKE = 10.0
@@ -70,7 +70,7 @@ def taken_of(pair: Pair, motion: Followed) -> Taken:
     ways = motion.way(spans_s[0]), motion.way(-spans_s[1])
     before, after = (_along(codes, way) for codes, way in zip((one, other), ways, strict=True))
     apart = np.asarray(cv2.subtract(after, before, dtype=cv2.CV_32F), np.float32)
-    wide, narrow, each = ((window_of(size_px, motion.step),) * 2 for size_px in (SHADING_PX, ALIKE_PX, EACH_PX))
+    wide, narrow, each = ((odd_width(size_px, motion.step),) * 2 for size_px in (SHADING_PX, ALIKE_PX, EACH_PX))
     shading = np.asarray(cv2.blur(apart, wide), np.float32)
     unlike = np.asarray(cv2.blur((apart - shading) ** 2, narrow), np.float32)
     own_shading, own_unlike = evenly_changed(apart, (shading, unlike), each, BARE)

@@ -1,5 +1,7 @@
 """The strobe's times from row profiles: one model of what rows see, searched coarsely, tracked, and sharpened.
 
+Every step of the fit solves ``normal_equations``; ``standard_error`` says how certain its times are.
+
 ``fit`` is the whole. ``beat`` holds the times that are looked for, ``profiles`` the data, ``row_model`` and ``kernel``
 the compiled model and its fit. Searched: ``seed``, ``search``, ``rounds_first`` (coded dark slots), ``retime`` (frames
 left out or repeated). Tracked: ``course``, ``track``, ``ends``. Sharpened: ``refine``, ``freed`` (times that the plan

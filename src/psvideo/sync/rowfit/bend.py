@@ -11,20 +11,10 @@ import numpy as np
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
+from psvideo.sync.rowfit.normal_equations import projected
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
-from psvideo.sync.rowfit.refine import (
-    CAUCHY,
-    EDGES,
-    GLOBALS,
-    Fit,
-    believable,
-    explained,
-    mean_error,
-    projected,
-    refine,
-    scaled,
-    times_moved,
-)
+from psvideo.sync.rowfit.refine import CAUCHY, EDGES, GLOBALS, Fit, explained, refine, scaled, times_moved
+from psvideo.sync.rowfit.standard_error import believable, mean_error
 
 LEAST_WINDOWS = 4
 CLEARLY = 5.0

@@ -8,8 +8,10 @@ import numpy as np
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
-from psvideo.sync.rowfit.profiles import Profiles, equations, unexplained
+from psvideo.sync.rowfit.normal_equations import projected, solved
+from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.row_model import BLUR, EXPOSURE, FALL, RISE, ROW_TIME
+from psvideo.sync.rowfit.standard_error import believable, mean_error
 
 CAUCHY = 2.4
 """Residuals of this many standard deviations are trusted half as much (95 % efficiency for Gaussian noise)."""
@@ -18,18 +20,10 @@ FIRST_SCALE, LAST_SCALE = 0.3, 2e-3
 that the few rows that a flash splits, which show the time, are not taken for outliers before the fit is near."""
 WIDE_SCALE = 0.05
 """The scale at which a time that is off is looked for: rows that it spoils must not count as outliers then."""
-LEAST_STEEP = -0.1
-"""Cauchy's pull falls where residuals are large; of that so much counts, lest a few rule a short clip's errors."""
-LAG = 3
-"""Residuals of frames so far apart may still err together (a subject that moves): Newey and West 1987."""
-CLUSTER, LEAST_CLUSTERS = 12, 8
-"""Or whole stretches of frames err together; that needs this many of them to be seen."""
 GLOBALS = {"exposure_s": EXPOSURE, "row_time_s": ROW_TIME, "rise_s": RISE, "fall_s": FALL, "blur_s": BLUR}
 """The times, beside the clock's, that can be set free, and the signal of each."""
 EDGES = {"rise_s", "fall_s", "blur_s"}
 """Those that make edges soft: what they change is worked out only where one is free."""
-DAMPING = 1e-10
-"""Of every unknown's own precision, what is added where rows tell two unknowns together and neither alone."""
 LEAST_BLUR_ROWS = 0.3
 """A blur that is free stays this large, which is next to none: it changes what lies so near an edge, and no row may."""
 
@@ -188,88 +182,6 @@ def prior(plan: Plan, rows: Profiles, unit_s: FloatArray, free: tuple[str, ...])
     for n in range(len(free)):
         known[2 + n, 2 + n] = (50.0 * unit_s[2 + n]) ** -2.0
     return known + 1e-12 * np.diag(unit_s**-2.0)
-
-
-def projected(
-    plan: Plan,
-    rows: Profiles,
-    beat: Beat,
-    weight: FloatArray,
-    basis: FloatArray,
-    *,
-    tails: bool,
-    steepness: FloatArray | None = None,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return residuals, the normal matrix and every frame's scores (frame, unknown) in the unknowns of a basis."""
-    rest, windows, score = equations(plan, rows, beat, weight, tails=tails, steepness=steepness)
-    knots = len(rows.window_start) + 1
-    size = basis.shape[1]
-    hessian = np.zeros((size, size))
-    common = basis[knots:]
-    for w, matrix in enumerate(windows):
-        local = np.vstack([basis[w], basis[w + 1], common])
-        moved = np.flatnonzero(local.any(axis=0))
-        hessian[np.ix_(moved, moved)] += local[:, moved].T @ matrix @ local[:, moved]
-    window = np.searchsorted(rows.window_start, np.arange(len(rows.value)), side="right") - 1
-    scores = score[:, :1] * basis[window] + score[:, 1:2] * basis[window + 1] + score[:, 2:] @ common
-    return rest, hessian, scores
-
-
-def solved(matrix: FloatArray, right: FloatArray) -> FloatArray:
-    """Return what a normal matrix times the result is; it is damped (Marquardt 1963) only where it has no inverse.
-
-    A strobe in step with the frames shows one edge again and again: shift and slope are then one unknown.
-    """
-    try:
-        return np.asarray(np.linalg.solve(matrix, right))
-    except np.linalg.LinAlgError:
-        return np.asarray(np.linalg.solve(matrix + DAMPING * np.diag(np.diag(matrix)), right))
-
-
-def freedom(plan: Plan, rows: Profiles, beat: Beat) -> float:
-    """Return which share of the residuals' squares brightnesses that are fitted to them leave (MacKinnon, White 1985).
-
-    Not less than one frame's share, which a clip that has as many brightnesses as frames does not even have.
-    """
-    frames = len(rows.value)
-    fitted = len(rows.window_start) * (len(plan.lit_slots) + 1 + 2 * len(beat.beat_hz))
-    return max(frames - fitted, 1) / frames
-
-
-def believable(
-    plan: Plan, rows: Profiles, beat: Beat, weight: FloatArray, trust: FloatArray, basis: FloatArray, known: FloatArray
-) -> FloatArray:
-    """Return the covariance of the unknowns at the end of a robust fit.
-
-    ``weight`` is each sample's, ``trust`` (0 to 1) the part of it that is owed to its residual: a residual whose trust
-    falls as it grows pulls less than its weight says (Huber 1981, section 7.6).
-    """
-    steepness = weight * np.maximum(2.0 * trust - 1.0, LEAST_STEEP)
-    _, hessian, scores = projected(plan, rows, beat, weight, basis, tails=True, steepness=steepness)
-    return sandwich(hessian, scores, known)
-
-
-def sandwich(hessian: FloatArray, scores: FloatArray, known: FloatArray) -> FloatArray:
-    """Return the covariance of the unknowns, true also where frames near one another err together.
-
-    Of several estimates, each right under other correlations, the one that claims least certainty is taken.
-    """
-    bread = solved(hessian + known, np.eye(len(known)))
-    filling = scores.T @ scores
-    for lag in range(1, min(LAG, len(scores) - 1) + 1):
-        cross = scores[lag:].T @ scores[:-lag]
-        filling = filling + (1 - lag / (LAG + 1)) * (cross + cross.T)
-    fillings = [filling, scores.T @ scores]
-    if len(scores) >= LEAST_CLUSTERS * CLUSTER:
-        apart = np.add.reduceat(scores, np.arange(0, len(scores), CLUSTER), axis=0)
-        fillings.append(apart.T @ apart * len(apart) / max(len(apart) - 2, 1))
-    errors = [bread @ one @ bread for one in fillings]
-    return max(errors, key=lambda covariance: float(covariance[0, 0]))
-
-
-def mean_error(knots: FloatArray, covariance: FloatArray) -> float:
-    """Return the root of the mean variance over the knots."""
-    return float(np.sqrt(max(np.mean(np.einsum("ka,ab,kb->k", knots, covariance, knots)), 0.0)))
 
 
 def _held(plan: Plan, move: FloatArray, free: tuple[str, ...]) -> FloatArray:

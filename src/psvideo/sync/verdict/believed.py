@@ -6,17 +6,18 @@ from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.course import too_many
 from psvideo.sync.rowfit.fit import ClipFit, find
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
-from psvideo.sync.rowfit.refine import freedom, refined_beat, robust_loss
+from psvideo.sync.rowfit.refine import refined_beat, robust_loss
 from psvideo.sync.rowfit.seed import MISNAMED_PPM, gain_of
+from psvideo.sync.rowfit.standard_error import freedom
 from psvideo.sync.verdict.refusal import MOST_PPM
 from psvideo.sync.verdict.rivals import (
     BETTER,
     CLEARLY,
     FAIR,
     Rival,
+    best_rival,
     camera_rivals,
     double_rivals,
-    likeliest,
     strobe_rivals,
 )
 
@@ -68,7 +69,7 @@ def judged(plan: Plan, rows: Profiles) -> Verdict:
     believed = convincing(meant, found) and not _feigned(plan, found)
     if believed:
         rivals = _worth_trying(plan, meant, found)
-        believed = not rivals or likeliest(meant, rows, rivals) is None
+        believed = not rivals or best_rival(meant, rows, rivals) is None
     return Verdict(plan=meant, found=found, believed=believed)
 
 
@@ -76,7 +77,7 @@ def _as_meant(plan: Plan, rows: Profiles, found: ClipFit) -> tuple[Plan, ClipFit
     """Return the likeliest plan with another camera and its fit, or the given ones where they are as good."""
     leaves = CLEARLY if convincing(plan, found) else BETTER
     for rivals in (camera_rivals(plan), double_rivals(plan)):
-        meant = likeliest(plan, rows, list(rivals), least=FAIR, leaves=leaves)
+        meant = best_rival(plan, rows, list(rivals), least=FAIR, leaves=leaves)
         if meant is not None:
             again = find(meant.plan, rows, measured=("exposure_s",) if meant.fault == "shutter" else ())
             gains = [gain_of(one.rows, one.fit.rest) for one in (found, again)]

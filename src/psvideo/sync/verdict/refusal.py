@@ -10,7 +10,7 @@ from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.search import GridPlace, search
 from psvideo.sync.rowfit.seed import SEARCH_ROWS, first_guess, gain_of
-from psvideo.sync.verdict.rivals import CLEARLY, Rival, count_rivals, likeliest, likely_rates, strobe_rivals
+from psvideo.sync.verdict.rivals import CLEARLY, Rival, best_rival, count_rivals, likely_rates, strobe_rivals
 
 STEADY = 0.02
 """Rows that change by less than this share of their light from frame to frame saw no strobe."""
@@ -92,7 +92,7 @@ def why_not(plan: Plan, rows: Profiles) -> str:
             f"The picture repeats itself every {len(plan.cycle_slots)} frames, one flash a frame: the strobe seems to "
             'be triggered by the camera. If so, write mode = "synced" under [strobe] in plan.toml.'
         )
-    meant = likeliest(plan, rows, list(strobe_rivals(plan)))
+    meant = best_rival(plan, rows, list(strobe_rivals(plan)))
     if meant is not None:
         return _described(plan, meant)
     played = _other_count(plan, rows)
@@ -140,12 +140,12 @@ def _other_count(plan: Plan, rows: Profiles) -> Plan | None:
     """Return the plan with the number of lights that the picture fits. Two rounds fit as one, and a dark slot as one
     more light: of those that leave little more, it is one with fewer lights."""
     rivals = list(count_rivals(plan))
-    meant = likeliest(plan, rows, rivals)
+    meant = best_rival(plan, rows, rivals)
     if meant is None:
         return None
     length, lights = len(meant.plan.flashes), len(meant.plan.lights)
     simpler = [one for one in rivals if length % len(one.plan.flashes) == 0 and len(one.plan.lights) < lights]
-    simplest = likeliest(meant.plan, rows, simpler, leaves=LITTLE_MORE) if simpler else None
+    simplest = best_rival(meant.plan, rows, simpler, leaves=LITTLE_MORE) if simpler else None
     return (simplest or meant).plan
 
 

@@ -110,7 +110,7 @@ def likely_rates(plan: Plan) -> list[Fraction]:
     return [rate for n, rate in enumerate(near) if all(abs(rate / other - 1) > 0.005 for other in near[:n])]
 
 
-def likeliest(
+def best_rival(
     plan: Plan, rows: Profiles, rivals: Sequence[Rival], *, least: float = GOOD, leaves: float = CLEARLY
 ) -> Rival | None:
     """Return the rival that explains a stretch of the clip best, or None where the plan is as good as any.

@@ -9,7 +9,7 @@ import numpy as np
 from psvideo.plates.align.doubt.own_means import own_mean
 from psvideo.plates.align.velocity.brightness import ROOT_TOE, SCALE
 from psvideo.plates.align.velocity.flow import Codes, Vectors
-from psvideo.plates.align.velocity.moving import Followed, Pair, window_of
+from psvideo.plates.align.velocity.moving import Followed, Pair, odd_width
 
 WINDOW_PX = 3
 """Plates are compared over this many pixels of their sketches: edges that come to lie beside each other are narrow."""
@@ -25,7 +25,7 @@ def unsure_of(pair: Pair, before: Codes, after: Codes, motion: Followed, noise: 
     ``before`` and ``after`` are the codes of its sketches, moved to the instant, and ``noise`` is that of their change.
     """
     one, other = before.astype(np.float32), after.astype(np.float32)
-    windows = (window_of(WINDOW_PX, motion.step),) * 2
+    windows = (odd_width(WINDOW_PX, motion.step),) * 2
     square = own_mean((other - one) ** 2, windows, motion.moves) - np.float32(NOISE_FACTOR * noise**2)
     since_s, until_s = motion.time_s - pair.before.time_s, pair.after.time_s - motion.time_s
     share = min(abs(since_s), abs(until_s)) / (since_s + until_s)

@@ -126,7 +126,7 @@ def _grown(
 
     What neither explains may be hidden by what moves: it joins where there is more of that before and behind it.
     """
-    size = window_of(GROWN_PX, lights.step)
+    size = odd_width(GROWN_PX, lights.step)
     around = _mean(moves.astype(np.float32), size)
     near = np.empty_like(velocity)
     for plane, own in zip(near, velocity, strict=True):
@@ -156,9 +156,9 @@ def _take_better(lights: "_Lights", proposed: Vectors, velocity: Vectors, best: 
     np.copyto(velocity, proposed, where=better)
 
 
-def window_of(window_px: int, step: int) -> int:
-    """Return how many pixels of ``step`` of the sketches' a window is wide, an odd number; 1 stays, others are 3 at
-    least."""
+def odd_width(window_px: int, step: int) -> int:
+    """Return the width of a window of ``window_px`` in pixels of ``step`` of the sketches': an odd number, 3 or more (1
+    stays 1)."""
     return max(window_px // step | 1, min(window_px, 3))
 
 
@@ -204,7 +204,7 @@ class _Lights:
 
     def mean(self, values: Vectors, window_px: int) -> Vectors:
         """Return means over windows of this many pixels of the sketches."""
-        return _mean(values, window_of(window_px, self.step))
+        return _mean(values, odd_width(window_px, self.step))
 
     def unlike(self, velocity: Vectors) -> Vectors:
         """Return how unlike all lights' plates are along velocities, shape (row, col), 0 to the number of lights."""

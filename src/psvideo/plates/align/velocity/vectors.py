@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.plates.align.velocity.flow import Flags, Vectors
-from psvideo.plates.align.velocity.moving import Followed, window_of
+from psvideo.plates.align.velocity.moving import Followed, odd_width
 
 GAPS_PX = 9
 """Gaps of this many pixels in what moves are closed: outlines along the motion show nothing of it."""
@@ -39,7 +39,7 @@ def _of_whole_things(motion: Followed) -> Vectors:
     if not inside.any():
         return motion.velocity
     nearest = np.where(motion.moves, motion.velocity, motion.nearby)
-    size = (window_of(SMOOTH_PX, motion.step),) * 2
+    size = (odd_width(SMOOTH_PX, motion.step),) * 2
     known = (inside | motion.moves).astype(np.float32)
     there = np.maximum(cv2.blur(known, size), np.float32(1e-6))
     smooth = np.stack([cv2.blur(plane * known, size) / there for plane in nearest])
@@ -48,7 +48,7 @@ def _of_whole_things(motion: Followed) -> Vectors:
 
 def _enclosed(motion: Followed) -> Flags:
     """Return what is undecided and borders more on what moves than on what rests and on the picture's edge."""
-    gaps = np.ones((window_of(GAPS_PX, motion.step),) * 2, np.uint8)
+    gaps = np.ones((odd_width(GAPS_PX, motion.step),) * 2, np.uint8)
     closed = cv2.morphologyEx(motion.moves.view(np.uint8), cv2.MORPH_CLOSE, gaps) > 0
     moves = closed & ~motion.rests
     count, parts = cv2.connectedComponents((~moves & ~motion.rests).astype(np.uint8), connectivity=4)

@@ -1,0 +1,47 @@
+"""The fit's normal equations in the unknowns of a basis, and their solution."""
+
+import numpy as np
+
+from psvideo.model.camera import FloatArray
+from psvideo.model.plan import Plan
+from psvideo.sync.rowfit.beat import Beat
+from psvideo.sync.rowfit.profiles import Profiles, equations
+
+DAMPING = 1e-10
+"""Of every unknown's own precision, what is added where rows tell two unknowns together and neither alone."""
+
+
+def projected(
+    plan: Plan,
+    rows: Profiles,
+    beat: Beat,
+    weight: FloatArray,
+    basis: FloatArray,
+    *,
+    tails: bool,
+    steepness: FloatArray | None = None,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return residuals, the normal matrix and every frame's scores (frame, unknown) in the unknowns of a basis."""
+    rest, windows, score = equations(plan, rows, beat, weight, tails=tails, steepness=steepness)
+    knots = len(rows.window_start) + 1
+    size = basis.shape[1]
+    hessian = np.zeros((size, size))
+    common = basis[knots:]
+    for w, matrix in enumerate(windows):
+        local = np.vstack([basis[w], basis[w + 1], common])
+        moved = np.flatnonzero(local.any(axis=0))
+        hessian[np.ix_(moved, moved)] += local[:, moved].T @ matrix @ local[:, moved]
+    window = np.searchsorted(rows.window_start, np.arange(len(rows.value)), side="right") - 1
+    scores = score[:, :1] * basis[window] + score[:, 1:2] * basis[window + 1] + score[:, 2:] @ common
+    return rest, hessian, scores
+
+
+def solved(matrix: FloatArray, right: FloatArray) -> FloatArray:
+    """Return what a normal matrix times the result is; it is damped (Marquardt 1963) only where it has no inverse.
+
+    A strobe in step with the frames shows one edge again and again: shift and slope are then one unknown.
+    """
+    try:
+        return np.asarray(np.linalg.solve(matrix, right))
+    except np.linalg.LinAlgError:
+        return np.asarray(np.linalg.solve(matrix + DAMPING * np.diag(np.diag(matrix)), right))

@@ -1,0 +1,62 @@
+"""How certain the times of a robust fit are: sandwich estimates, which hold where neighbouring frames err together."""
+
+import numpy as np
+
+from psvideo.model.camera import FloatArray
+from psvideo.model.plan import Plan
+from psvideo.sync.rowfit.beat import Beat
+from psvideo.sync.rowfit.normal_equations import projected, solved
+from psvideo.sync.rowfit.profiles import Profiles
+
+LEAST_STEEP = -0.1
+"""Cauchy's pull falls where residuals are large; of that so much counts, lest a few rule a short clip's errors."""
+LAG = 3
+"""Residuals of frames so far apart may still err together (a subject that moves): Newey and West 1987."""
+CLUSTER, LEAST_CLUSTERS = 12, 8
+"""Or whole stretches of frames err together; that needs this many of them to be seen."""
+
+
+def believable(
+    plan: Plan, rows: Profiles, beat: Beat, weight: FloatArray, trust: FloatArray, basis: FloatArray, known: FloatArray
+) -> FloatArray:
+    """Return the covariance of the unknowns at the end of a robust fit.
+
+    ``weight`` is each sample's, ``trust`` (0 to 1) the part of it that is owed to its residual: a residual whose trust
+    falls as it grows pulls less than its weight says (Huber 1981, section 7.6).
+    """
+    steepness = weight * np.maximum(2.0 * trust - 1.0, LEAST_STEEP)
+    _, hessian, scores = projected(plan, rows, beat, weight, basis, tails=True, steepness=steepness)
+    return sandwich(hessian, scores, known)
+
+
+def sandwich(hessian: FloatArray, scores: FloatArray, known: FloatArray) -> FloatArray:
+    """Return the covariance of the unknowns, true also where frames near one another err together.
+
+    Of several estimates, each right under other correlations, the one that claims least certainty is taken.
+    """
+    bread = solved(hessian + known, np.eye(len(known)))
+    filling = scores.T @ scores
+    for lag in range(1, min(LAG, len(scores) - 1) + 1):
+        cross = scores[lag:].T @ scores[:-lag]
+        filling = filling + (1 - lag / (LAG + 1)) * (cross + cross.T)
+    fillings = [filling, scores.T @ scores]
+    if len(scores) >= LEAST_CLUSTERS * CLUSTER:
+        apart = np.add.reduceat(scores, np.arange(0, len(scores), CLUSTER), axis=0)
+        fillings.append(apart.T @ apart * len(apart) / max(len(apart) - 2, 1))
+    errors = [bread @ one @ bread for one in fillings]
+    return max(errors, key=lambda covariance: float(covariance[0, 0]))
+
+
+def mean_error(knots: FloatArray, covariance: FloatArray) -> float:
+    """Return the root of the mean variance over the knots."""
+    return float(np.sqrt(max(np.mean(np.einsum("ka,ab,kb->k", knots, covariance, knots)), 0.0)))
+
+
+def freedom(plan: Plan, rows: Profiles, beat: Beat) -> float:
+    """Return which share of the residuals' squares brightnesses that are fitted to them leave (MacKinnon, White 1985).
+
+    Not less than one frame's share, which a clip that has as many brightnesses as frames does not even have.
+    """
+    frames = len(rows.value)
+    fitted = len(rows.window_start) * (len(plan.lit_slots) + 1 + 2 * len(beat.beat_hz))
+    return max(frames - fitted, 1) / frames
