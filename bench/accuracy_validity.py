@@ -22,9 +22,10 @@ from bench.accuracy_measure import (
     washington,
 )
 from psvideo.solve.normals.robust import huber1981
+from psvideo.solve.normals.robust.weighing import EVERYTHING_DEG, Reweighting
 
 OWN_LIGHTS = {3: (0, 1, 2), 4: (0, 1, 2, 3), 5: (0, 2, 4, 5, 7), 8: tuple(range(8))}
-EVERYTHING = huber1981.Reweighting(most_error_deg=huber1981.EVERYTHING_DEG)
+EVERYTHING = Reweighting(most_error_deg=EVERYTHING_DEG)
 FAR_DEG = 10.0
 
 

@@ -20,7 +20,8 @@ from psvideo.report.observe.observed import Observed
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.least_squares import woodham1980
 from psvideo.solve.normals.robust import huber1981
-from psvideo.solve.normals.robust.huber1981 import Reweighting, solve
+from psvideo.solve.normals.robust.huber1981 import solve
+from psvideo.solve.normals.robust.weighing import Reweighting
 from psvideo.solve.normals.solving import ROBUST_FROM_LIGHTS, Solving, trust_note
 from psvideo.synth import read_scene
 from psvideo.synth.stage import set_stage

@@ -15,6 +15,7 @@ from psvideo.model.surface import Surface
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.least_squares import woodham1980
 from psvideo.solve.normals.robust import huber1981
+from psvideo.solve.normals.robust.weighing import Reweighting
 
 DIM = replace(huber1981.USABLE, dark_level=0.0005)  # the exposures of DiLiGenT are short, and 16 bits deep
 
@@ -115,7 +116,7 @@ def test_the_matte_sphere_of_washington_is_not_worse(shared_data: Path) -> None:
     truth = np.stack([x, y, np.sqrt(np.maximum(1 - x * x - y * y, 0))], axis=-1)
     lit = Illumination(directions=directions, intensities=np.ones((len(directions), 3)))
     sphere = Subject(plates, lit, truth, x * x + y * y < 0.95**2)
-    everywhere = huber1981.solve(plates, lit, reweighting=huber1981.Reweighting(most_error_deg=179.0))
+    everywhere = huber1981.solve(plates, lit, reweighting=Reweighting(most_error_deg=179.0))
     careful = sphere.errors_deg(woodham1980.solve(plates, lit))
     assert sphere.errors_deg(everywhere).mean() <= min(careful.mean(), sphere.plain_deg().mean())
     assert sphere.errors_deg(sphere.robust()).mean() <= careful.mean()

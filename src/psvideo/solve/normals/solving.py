@@ -15,6 +15,7 @@ from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.least_squares import woodham1980
 from psvideo.solve.normals.plate_noise import LEAST, PlateNoise, noise_of
 from psvideo.solve.normals.robust import huber1981
+from psvideo.solve.normals.robust.weighing import EVERYTHING_DEG, Reweighting
 from psvideo.solve.normals.task import Floats, Looks, Mask, Samples, Usable
 from psvideo.solve.normals.trust.indirect import IndirectLook
 from psvideo.solve.normals.trust.judging import Judging, emptied, judged
@@ -29,7 +30,7 @@ and a picture has as many."""
 INDIRECT = 0.2
 """Below this share of the pixel's mean, light in shadow may come from neighbouring surfaces: where many measurements
 are brighter it is left out. (Of a surface of albedo 0.5 a wide crease sends back as much.)"""
-EVERYTHING = huber1981.Reweighting(most_error_deg=huber1981.EVERYTHING_DEG)
+EVERYTHING = Reweighting(most_error_deg=EVERYTHING_DEG)
 
 
 @dataclass(frozen=True, kw_only=True)

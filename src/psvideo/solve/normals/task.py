@@ -101,7 +101,7 @@ class Result(NamedTuple):
 
 
 class Weights(NamedTuple):
-    """How measurements are weighed, and which normals are trusted; the fields are described in huber1981.Reweighting.
+    """How measurements are weighed, and which normals are trusted; ``weighing.Reweighting`` describes the fields.
 
     ``most_error_deg`` is the limit for this picture, and ``common`` the share of a pixel's light that its lights
     usually leave unexplained.

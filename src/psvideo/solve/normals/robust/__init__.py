@@ -1,4 +1,5 @@
-"""The robust solver: least squares in which shadows and highlights weigh little. ``huber1981`` is the method.
+"""The robust solver: least squares in which shadows and highlights weigh little. ``huber1981`` is the method, and
+``weighing`` holds its settings.
 
 A block of pixels goes through ``robust_kernel``:
 

@@ -9,17 +9,17 @@ without the brightest few.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
 from psvideo.compute.spilled import let_go, planes_for
-from psvideo.model.surface import Misfit, Reflectance, Surface
+from psvideo.model.surface import Misfit, Surface
 from psvideo.plates.mixture import Mixture
 from psvideo.solve.normals.bands import ShownPlates, check_arrays, surface_of
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.robust.reflectance import reflectance_of
+from psvideo.solve.normals.robust.weighing import EVERYTHING_DEG, Reweighting, limit_deg, weights
 from psvideo.solve.normals.task import (
     FEW,
     Floats,
@@ -40,41 +40,8 @@ USABLE = Usable(shadow_ratio=0.4)
 """Least squares needs every measurement; here one that is dark beside the others may go sooner."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Reweighting:
-    """How measurements are weighed; ``noise`` and ``signal_noise`` are the least that any camera's residuals have.
-
-    rounds: how often weights are taken again.
-    loss: "cauchy" weighs everything a little, "tukey" leaves what is far off out entirely.
-    width: the residual, over the pixel's own median residual as a standard deviation, where Cauchy's weight is a half
-        and Tukey's becomes 0 at that times ``TUKEY_WIDTH``; narrower with the root of their number where more than nine
-        measurements are usable.
-    noise: in units of sensor saturation.
-    signal_noise: as a share of the pixel's albedo under one light, as lights and lenses are never known better.
-    darkest, brightest: the shares of the measurements that the start leaves out.
-    contradiction: four measurements contradict each other beyond this many times the noise.
-    most_error_deg, beside_typical: a normal whose predicted standard error is larger than this is not valid, unless
-        that error is less than this many times what is typical of the picture.
-    """
-
-    rounds: int = 3
-    loss: Literal["cauchy", "tukey"] = "cauchy"
-    width: float = 0.6
-    noise: float = 0.0005
-    signal_noise: float = 0.01
-    darkest: float = 0.2
-    brightest: float = 0.5
-    contradiction: float = 3.0
-    most_error_deg: float = 6.0
-    beside_typical: float = 2.5
-
-
-MOST_TYPICAL_DEG = 30.0
-"""However bad a picture is as a whole, beyond this no normal is valid."""
 SAMPLE_PIXELS = 1 << 16
 """What is typical of a picture is looked for in about this many pixels: whole rows, evenly spread."""
-EVERYTHING_DEG = 179.0
-TUKEY_WIDTH = 4.685  # beside Cauchy's, as far as weights go: this wide, Tukey's keeps 95 % of what Gaussian noise holds
 
 
 def solve(
@@ -135,9 +102,14 @@ def solve(
             )
             misfit = replace(misfit, reflectance=model)
     model = None if misfit is None else misfit.reflectance
-    limit_deg = max(reweighting.most_error_deg, 0.0 if misfit is None else _limit_deg(reweighting, misfit))
-    common, unit = 0.0 if misfit is None else misfit.share, 1 / float(solution.given.albedo_scale)
-    how = _weights(reweighting, noise, limit_deg=limit_deg, common=common, model=model, unit=unit)
+    how = weights(
+        reweighting,
+        noise,
+        most_error_deg=limit_deg(reweighting, misfit),
+        common=0.0 if misfit is None else misfit.share,
+        model=model,
+        unit=1 / float(solution.given.albedo_scale),
+    )
     solution.run(how, error=error, reflecting=model is not None, looks=looks)
     return replace(solution.surface(error=error), misfit=misfit)
 
@@ -198,40 +170,10 @@ def _first_look(
     are."""
     rows, cols = solution.shown.shape[:2]
     step, unexplained = max(rows * cols // SAMPLE_PIXELS, 1), np.zeros(rows * cols, np.float32)
-    how = _weights(reweighting, noise, limit_deg=EVERYTHING_DEG, common=0.0)
+    how = weights(reweighting, noise, most_error_deg=EVERYTHING_DEG, common=0.0)
     solution.run(how, unexplained=unexplained, step=step)
     found = solution.surface()
     return found, _typical(found, unexplained.reshape(rows, cols), step), step
-
-
-def _limit_deg(reweighting: Reweighting, misfit: Misfit) -> float:
-    return min(reweighting.beside_typical * misfit.error_deg, MOST_TYPICAL_DEG)
-
-
-def _weights(
-    reweighting: Reweighting, noise: tuple[float, float], *,
-    limit_deg: float, common: float, model: Reflectance | None = None, unit: float = 1.0,
-) -> Weights:  # fmt: skip
-    curve, *shine = (0.0,) * 4 if model is None else model
-    tukey = reweighting.loss == "tukey"
-    return Weights(
-        rounds=reweighting.rounds,
-        tukey=tukey,
-        width=np.float32(reweighting.width * (TUKEY_WIDTH if tukey else 1.0)),
-        noise=np.float32(reweighting.noise),
-        signal_noise=np.float32(reweighting.signal_noise),
-        darkest=np.float32(reweighting.darkest),
-        brightest=np.float32(reweighting.brightest),
-        contradiction=np.float32(reweighting.contradiction),
-        most_error_deg=np.float32(limit_deg),
-        common=np.float32(common),
-        read=np.float32(noise[0]),
-        photon=np.float32(noise[1]),
-        curve=np.float32(curve),
-        broad=np.float32(shine[0] * unit),
-        middle=np.float32(shine[1] * unit),
-        narrow=np.float32(shine[2] * unit),
-    )
 
 
 def _typical(found: Surface, unexplained: Floats, step: int) -> Misfit | None:
