@@ -96,6 +96,15 @@ def test_a_step_of_contributing_names_what_is_in_its_file() -> None:
     assert len(named) >= 5
 
 
+def test_contributing_says_to_which_room_every_file_of_tests_belongs() -> None:
+    table = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").partition("| room | tests |")[2].partition("\n\n")[0]
+    names = [name for line in table.splitlines()[2:] for name in re.findall(r"`([\w*]+)`", line.split("|")[2])]
+    files = {name: {file.stem for file in (ROOT / "tests").glob(f"test_{name}.py")} for name in names}
+    assert not [name for name, found in files.items() if not found], "no such tests"
+    known = set().union(*files.values())
+    assert {file.stem for file in (ROOT / "tests").glob("test_*.py")} - known == set(), "add them to the table of rooms"
+
+
 PACKAGE = ROOT / "src" / "psvideo"
 PLAIN = {"cli/commands", "cli/commands/calibrate", "runs/calibrate"}
 """Rooms whose modules have the names of commands, which say all."""
