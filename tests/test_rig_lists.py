@@ -62,6 +62,21 @@ def test_an_lp_file_is_a_count_and_a_line_for_each_light(tmp_path: Path) -> None
     assert "differ in theirs" in lost[0]
 
 
+def test_lights_that_a_list_names_are_the_plans_by_name_whatever_their_order(tmp_path: Path) -> None:
+    (tmp_path / "a.lp").write_text("2\nkey 0 0 1\nleft.jpg 0.6 0 0.8\n")
+    back = read_rig(tmp_path / "a.lp", plan_lights=("left", "key"))
+    assert {one.name: one.direction for one in back.lights} == {"key": (0, 0, 1), "left": (0.6, 0, 0.8)}
+    assert read_rig(tmp_path / "a.lp").names == ("key", "left")
+    by_order = read_rig(tmp_path / "a.lp", plan_lights=("one", "two"))
+    assert [(one.name, one.direction) for one in by_order.lights] == [("one", (0, 0, 1)), ("two", (0.6, 0, 0.8))]
+
+
+@pytest.mark.parametrize("names", [("a", "a"), ("a/", "a?"), ("", "")])
+def test_lights_whose_names_cannot_be_used_are_numbered(names: tuple[str, str], tmp_path: Path) -> None:
+    (tmp_path / "a.lp").write_text(f"2\n{names[0]} 0 0 1\n{names[1]} 0.6 0 0.8\n")
+    assert read_rig(tmp_path / "a.lp").names == ("L0", "L1")
+
+
 def test_a_near_light_is_in_no_list_and_a_name_that_shows_no_kind_is_refused(tmp_path: Path) -> None:
     near = Rig(lights=(Light(name="lamp", position_m=(1.0, 0.0, 0.0)),))
     for name in ("a.lp", "light_directions.txt"):

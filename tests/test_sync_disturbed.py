@@ -439,7 +439,7 @@ def test_a_dark_time_shorter_than_the_exposure_is_said(plan: Plan) -> None:
     ("factor", "words"),
     [
         pytest.param(0.55, "flashes mixed", marks=pytest.mark.campaign),
-        pytest.param(0.9, "taking many frames for missing", marks=pytest.mark.campaign),
+        pytest.param(0.9, "but only if frames are missing or repeated at", marks=pytest.mark.campaign),
         pytest.param(1.4, "and not every", marks=pytest.mark.campaign),
     ],
 )

@@ -1,8 +1,9 @@
 """Reads light lists of other programs: rows of numbers, checked against their count and for common mistakes.
 
 ``.lp`` (RTI), DiLiGenT's ``light_directions.txt`` with ``light_intensities.txt`` beside it, and a plain list of unit
-vectors with its count on the first line (University of Washington). Lists without names belong to the plan's lights in
-the order in which the plan first lights them. ``light_list_writer`` writes the first two.
+vectors with its count on the first line (University of Washington). A list that names the plan's lights belongs to them
+by name; one that names pictures, or nothing, in the order in which the plan first lights them. ``light_list_writer``
+writes the first two.
 """
 
 import re
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError
-from psvideo.formats.contract import read_text
+from psvideo.formats.contract import check_light_name, read_text
 from psvideo.model.rig import Light, Rig
 
 DIRECTIONS, INTENSITIES, FILENAMES = "light_directions.txt", "light_intensities.txt", "filenames.txt"
@@ -21,14 +22,17 @@ DIRECTIONS, INTENSITIES, FILENAMES = "light_directions.txt", "light_intensities.
 ANGLES_SPAN = 7.0
 """Columns that span more, beside a third one that is the same throughout, are degrees: more than radians do."""
 AXES = "x right, y up, z towards the camera"
+ENDING = re.compile(r"\.[A-Za-z][A-Za-z0-9]{1,3}$")
+"""Of a picture's name: from .jpg to .tiff and .cr3."""
 DECIMAL_COMMA = re.compile(r"-?\d+,\d+")
 
 
 def read_light_list(path: Path, *, plan_lights: Sequence[str] = ()) -> Rig:
     """Read directions of lights, and their strengths where the list has them (all 1 where not).
 
-    ``plan_lights`` are names for the lights, in order; left out, they are numbered. Raises PsvideoError, which names
-    the file, what was found and what was expected.
+    ``plan_lights`` are names for the lights, in order, where the list names none of them; left out, lights are called
+    as the list calls them or their pictures, and are numbered where it does not. Raises PsvideoError, which names the
+    file, what was found and what was expected.
     """
     rows = _numbers(path, read_text(path))
     if path.suffix == ".lp" or len(rows[0]) == 1:
@@ -149,11 +153,26 @@ def _diligent_strengths(path: Path, count: int) -> list[tuple[float, ...]]:
 
 
 def _names(path: Path, count: int, plan_lights: Sequence[str]) -> list[str]:
+    written = _written_names(path, count)
+    if set(written) & set(plan_lights):
+        return written
     if not plan_lights:
-        return [f"L{index}" for index in range(count)]
+        return written or [f"L{index}" for index in range(count)]
     if len(plan_lights) != count:
         raise PsvideoError(
             f"{path}: lists {count} lights, and the plan flashes {len(plan_lights)} ({', '.join(plan_lights)}). A list "
-            "without names must hold exactly the plan's lights, in the order in which the plan first lights them."
+            "that names none of the plan's lights must hold exactly these, in the order in which the plan first lights "
+            "them."
         )
     return list(plan_lights)
+
+
+def _written_names(path: Path, count: int) -> list[str]:
+    """Return what a list calls its lights, or their pictures without folders and endings; empty where it does not call
+    every light otherwise."""
+    words = [re.split(r"[\\/]", name)[-1] for name in pictures_named_by(path)]
+    try:
+        names = [check_light_name(ENDING.sub("", word) or word) for word in words]
+    except ValueError:
+        return []
+    return names if len(set(names)) == count == len(names) else []

@@ -100,7 +100,8 @@ def read_rig(path: Path | str, *, plan_lights: Sequence[str] = ()) -> Rig:
         rig.toml, an .lp list (RTI), DiLiGenT's light_directions.txt with light_intensities.txt beside it, or a plain
         list of unit vectors with its count on the first line.
     plan_lights
-        Names for the lights of lists that carry none, in order; left out, they are numbered.
+        Names for the lights of lists that name none of these, in order; left out, lights are called as the list calls
+        them or their pictures, else they are numbered.
 
     Returns
     -------

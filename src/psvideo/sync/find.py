@@ -18,6 +18,7 @@ from psvideo.model.camera import Camera, FloatArray
 from psvideo.model.plan import Plan
 from psvideo.model.shutter import frames_touched
 from psvideo.model.timing import DroppedFrames, Flash, Order, Timing
+from psvideo.model.units import counted
 from psvideo.sync.rowfit.beat import Beat, train_between, train_until
 from psvideo.sync.rowfit.course import window_frames
 from psvideo.sync.rowfit.fit import ClipFit
@@ -123,11 +124,13 @@ def find_strobe(
 
 def _not_found(plan: Plan, rows: Profiles, found: ClipFit, clip: str) -> str:
     reason = why_not(plan, rows) or clock_too_far(plan, found)
-    return (
-        f"{clip}: no strobe like the plan's was found in the picture: the best fit explains "
-        f"{100 * max(found.fit.explained, 0):.0f} % of the rows' changes from frame to frame"
-        f"{' only by taking many frames for missing' if found.steps else ''}. {reason or ADVICE}"
-    )
+    explained = f"explains {100 * max(found.fit.explained, 0):.0f} % of the rows' changes from frame to frame"
+    if found.steps:
+        explained = (
+            f"{explained}, but only if frames are missing or repeated at {counted(found.steps, 'place')} that their "
+            "numbers do not show"
+        )
+    return f"{clip}: no strobe like the plan's was found in the picture: the best fit {explained}. {reason or ADVICE}"
 
 
 def _as_profiles(
