@@ -9,7 +9,7 @@ from bench.accuracy_whole import bust
 from ring_and_ball import ring
 
 from psvideo.model.surface import Surface
-from psvideo.report.observe.slopes import coarse_normals, slope_agreement
+from psvideo.report.observe.slopes import coarse_normals, slope_agreement, surface_agreement
 from psvideo.solve.normals.evidence import Evidence, Indirect
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.solving import Solving
@@ -236,3 +236,23 @@ def test_paint_that_shows_through_a_dome_is_not_taken_for_noise() -> None:
     agreement = slope_agreement(coarse_normals(dome))
     assert agreement is not None
     assert agreement < 0.2
+
+
+@pytest.mark.parametrize(("mirrored", "share", "at_least"), [(False, 0.5, 0.6), (True, 0.5, -1.0), (False, 0.2, -1.0)])
+def test_trusted_normals_of_one_surface_speak_for_the_rig_where_shadows_spoil_the_others(
+    mirrored: bool, share: float, at_least: float
+) -> None:
+    found = gentle(0.5, curved=1.0, mirrored=mirrored)
+    spoilt = np.arange(160) >= 160 * share
+    wrong = np.random.default_rng(3).normal(size=(120, 160, 2)).astype(np.float32)
+    found.normals[:, spoilt, :2] += 1.5 * cv2.GaussianBlur(wrong, (0, 0), 2.0)[:, spoilt] * 4
+    found.normals[...] /= np.linalg.norm(found.normals, axis=-1, keepdims=True)
+    source = np.ones((120, 160), np.uint8)
+    found = replace(found, valid=np.broadcast_to(~spoilt, (120, 160)).copy(), source=source)
+    small = coarse_normals(found)
+    over_all, agreement = slope_agreement(small), surface_agreement(found, small)
+    assert over_all is not None
+    assert agreement is not None
+    assert over_all < 0.3
+    assert agreement >= at_least
+    assert (agreement == over_all) == (at_least < 0)

@@ -70,7 +70,8 @@ def index_movie(path: Path) -> Movie:
         code = container.metadata.get("timecode") or stream.metadata.get("timecode")
         capture_rate = capture_rate_hz(container.metadata | stream.metadata)
         shot = shot_by(container.metadata | stream.metadata)
-        codec = stream.codec_context.codec.canonical_name
+        codec = stream.codec_context.codec
+        odd = _pixels_not_square(stream)
         others = len(_moving(container)) - 1
     held, timestamps = len(stamps.timestamps), found.timestamps
     hidden = held - len(shown)
@@ -81,11 +82,13 @@ def index_movie(path: Path) -> Movie:
             f"{path}: holds {held} frames, and its header promises {promised}: it is truncated. Copy it again."
         )
     header = next(read_movie(path, timestamps[:1])).header
-    coding = compression_warning(codec, header.bits or 0, frames=held, whole_frames=stamps.whole_frames)
+    exact = codec.lossless and not codec.lossy  # changes of other frames cost nothing then
+    whole = held if exact else stamps.whole_frames
+    coding = compression_warning(codec.canonical_name, header.bits or 0, frames=held, whole_frames=whole)
     uneven = _left_out(found) if found.left_out else None
     cut = _cut(hidden, held) if hidden else None
     several = SEVERAL.format(counted(others + 1, "video stream")) if others else None
-    warnings = tuple(warning for warning in (coding, cut, several, uneven, _strays(found)) if warning)
+    warnings = tuple(warning for warning in (coding, cut, several, odd, uneven, _strays(found)) if warning)
     return Movie(
         header=replace(header, time_code=code, shot=shot, warnings=header.warnings + warnings),
         timestamps=timestamps,
@@ -108,6 +111,17 @@ def _shown(path: Path, container: InputContainer, stream: VideoStream, timestamp
             "movie that the camera recorded."
         )
     return shown
+
+
+def _pixels_not_square(stream: VideoStream) -> str | None:
+    """Say where pixels are shown wider than high, or the reverse: as of an anamorphic lens, or a squeezed format."""
+    aspect = stream.sample_aspect_ratio
+    if not aspect or aspect == 1:
+        return None
+    return (
+        f"its pixels are to be shown {float(aspect):.4g} times as wide as high: results have the movie's pixels, and "
+        "are to be shown alike. Normals stay right; depth and meshes take pixels for square, and want such a movie"
+    )
 
 
 def _cut(hidden: int, held: int) -> str:

@@ -30,7 +30,7 @@ def lamps(observed: Observed, *, timed: bool = True, missed: bool = False) -> It
     facts = [one for one in observed.facts if len(one.levels) == len(observed.lights)]
     if not facts:
         return
-    level = np.array([one.levels for one in facts])
+    level = _levels(facts)
     usual = np.median(level, axis=0)
     relative = usual / max(float(usual.max()), 1e-12)
     known = _shown(observed)
@@ -51,6 +51,16 @@ def lamps(observed: Observed, *, timed: bool = True, missed: bool = False) -> It
             found=f"All {len(observed.lights)} lights fire{' in every round' if timed else ''}; the weakest gives "
             f"{spread:.1f} stops less than the strongest.",
         )
+
+
+def _levels(facts: Sequence[InstantFacts]) -> NDArray[np.float64]:
+    """Return the lamps' light in every round, (round, light), as a share of what usually saturates it: where lamps of
+    several colours are taken apart, that differs from round to round, and the light does not."""
+    level = np.array([one.levels for one in facts])
+    if any(len(one.white) != level.shape[1] for one in facts):
+        return level
+    white = np.array([one.white for one in facts])
+    return np.asarray(level * white / np.median(white, axis=0))
 
 
 def _brightest(observed: Observed) -> NDArray[np.float64]:
@@ -96,10 +106,13 @@ def _weak(
     if relative.max() <= 0:  # nothing is lit, which is said once
         return
     others = int((relative >= NOT_FIRING).sum())
+    dead = [(light, share) for light, share in zip(lights, relative, strict=True) if share < NOT_FIRING]
+    if dead:
+        yield _no_light(dead, others=others, missed=missed)
     for light, share, is_dim, says in zip(lights, relative, dim, claimed, strict=True):
         if share < NOT_FIRING:
-            yield _no_light(light, share, others=others, missed=missed)
-        elif is_dim and says >= WEAK_LIGHT:
+            continue
+        if is_dim and says >= WEAK_LIGHT:
             yield Judgement(
                 subject="lights",
                 grade="bad",
@@ -116,18 +129,25 @@ def _weak(
             )
 
 
-def _no_light(light: str, share: float, *, others: int, missed: bool) -> Judgement:
-    """Say that a lamp does not fire, which is bad where too few others do; ``missed``: rows see it in no round."""
+def _no_light(dead: Sequence[tuple[str, float]], *, others: int, missed: bool) -> Judgement:
+    """Say which lamps do not fire, which is bad where too few others do; ``missed``: rows see them in no round."""
     enough = others >= LEAST_LIGHTS
+    named = ", ".join(f"{light!r}" for light, _ in dead[:NAMED])
+    more = f" and {len(dead) - NAMED} more" if len(dead) > NAMED else ""
+    most = f"{100 * max(0.0, *(share for _, share in dead)):.1f} % of the strongest"
+    one = len(dead) == 1
+    what = f"The light {named} gives no light ({most})"
+    if not one:
+        what = f"{len(dead)} lights give no light ({named}{more}; at most {most})"
     return Judgement(
         subject="lights",
         grade="doubtful" if enough else "bad",
-        found=f"The light {light!r} gives no light ({100 * max(share, 0):.1f} % of the strongest)"
-        + (f"; normals come from the other {others}." if enough else "."),
-        advice="Take the strobe out of step with the frames (see the line on rows): it may flash while the shutter is "
-        "closed."
+        found=what + (f"; normals come from the other {others}." if enough else "."),
+        advice="Take the strobe out of step with the frames (see the line on rows): "
+        f"{'it' if one else 'they'} may flash while the shutter is closed."
         if missed
-        else "Check its cable, driver and line, and that the plan names it as the board does.",
+        else f"Check {'its cable, driver and line' if one else 'their cables, drivers and lines'}, and that the plan "
+        f"names {'it' if one else 'them'} as the board does.",
     )
 
 

@@ -207,6 +207,15 @@ def _crossed(observed: Observed, *, guessed: bool) -> Judgement | None:
             found=f"{cannot}: the order of the lights is a guess, and hardly the true one.",
             advice="Try the other lights as `first_light`, one after the other: with the right one this line is gone.",
         )
+    if int(observed.firing.sum()) == EXACT_LIGHTS:
+        return Judgement(
+            subject="rig",
+            grade=grade,
+            found=f"{cannot}: directions are mirrored or turned, lights exchanged, or much of the surface shines or "
+            "lies in shadow, which three lights do not tell apart.",
+            advice="Check that the rig file is in camera axes (x right, y up), belongs to this set-up, and names the "
+            "lights as the plan does. If it does, add lights.",
+        )
     return Judgement(
         subject="rig",
         grade=grade,

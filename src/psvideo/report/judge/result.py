@@ -99,6 +99,11 @@ def _trusting(observed: Observed) -> str:
     """Say what would make more normals to be trusted: what accuracy says is to blame, or more light where noise is."""
     if off_deg(observed) is None and _steady(observed):
         return 'Use more lights; more light does not help. `aov=["error"]` says how far off each pixel may be.'
+    if moves(observed.facts):
+        return (
+            "Move slower, raise the frame rate or flash fewer lights, and give fine detail to follow: plates of what "
+            'moves must be brought together. `aov=["error"]` says how far off each pixel may be.'
+        )
     said = any(one.grade != "good" for one in accuracy(observed))
     if said and by_noise_deg(observed.facts) < LITTLE_NOISE_DEG:
         return "More light does not help; the line on the typical error says what does."
@@ -117,6 +122,15 @@ def accuracy(observed: Observed) -> Iterator[Judgement]:
     if error_deg <= COMMON_DEG * (MOVING_FACTOR if moves(observed.facts) else 1):
         yield Judgement(subject="accuracy", grade="good", found=f"{found}.")
         return
+    grade: Grade = "bad" if error_deg > LOST_DEG else "doubtful"
+    if any(one.shows for one in observed.astray):
+        yield Judgement(
+            subject="accuracy",
+            grade=grade,
+            found=f"{found}: the pictures do not lie one over the other.",
+            advice='Do what is said of motion; `aov=["error"]` says how far off each pixel may be.',
+        )
+        return
     fit = observed.rig_fit
     by_rig = fit is not None and fit.excess > NOT_MATTE
     cause = (
@@ -126,7 +140,7 @@ def accuracy(observed: Observed) -> Iterator[Judgement]:
     )
     yield Judgement(
         subject="accuracy",
-        grade="bad" if error_deg > LOST_DEG else "doubtful",
+        grade=grade,
         found=f"{found}: {cause}.",
         advice='Measure the lights on a sphere beside the subject; `aov=["error"]` says how far off each pixel may be.'
         if by_rig

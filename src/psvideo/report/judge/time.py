@@ -12,6 +12,7 @@ from psvideo.model.timing import Timing
 from psvideo.model.units import counted
 from psvideo.report.judge.of_ambient import NOTICED
 from psvideo.report.judgement import Judgement
+from psvideo.report.observe.astray import LEAST_SHOWN_PX
 from psvideo.report.observe.observed import Observed
 
 SURE_ROWS, LOST_ROWS = 0.3, 2.0
@@ -195,9 +196,7 @@ def motion(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = Fa
     shares = [one.moving_share for one in observed.facts if one.moving_share is not None]
     speeds = [one.speed_px_s for one in observed.facts if one.speed_px_s is not None]
     if not shares:
-        return Judgement(
-            subject="motion", grade="unknown", found="Motion is not known: no two whole plates of one light in turn."
-        )
+        return _places(observed)
     share = float(np.quantile(shares, OFTEN))
     if len(speeds) < LEAST_FOLLOWED * len(shares):
         return Judgement(
@@ -226,6 +225,29 @@ def motion(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = Fa
         f"({blur_px:.1f} px of blur within one): {cost_words(step_px)}." + _unfrozen(plan, timing, observed, speed),
         advice="Move slower, raise the frame rate or flash fewer lights"
         + (", or leave `align` at auto, which brings the plates together." if not aligned else "."),
+    )
+
+
+def _places(observed: Observed) -> Judgement:
+    """Judge whether photographs of a still scene lie one over the other, where that can be told."""
+    found = observed.astray[0] if observed.astray else None
+    if found is None or (not found.shows and found.within_px > LEAST_SHOWN_PX):
+        return Judgement(
+            subject="motion", grade="unknown", found="Motion is not known: no two whole plates of one light in turn."
+        )
+    if not found.shows:
+        return Judgement(
+            subject="motion",
+            grade="good",
+            found=f"The pictures lie one over the other to {max(found.within_px, 0.1):.1f} px.",
+        )
+    more = " or more" if found.typical_px > FAST_PX else ""
+    return Judgement(
+        subject="motion",
+        grade="doubtful",
+        found=f"The camera or the subject moved between the pictures: they lie about {found.typical_px:.1f} px{more} "
+        f"apart, that of {found.light!r} {found.most_px:.1f}. Edges and fine detail of the normals are wrong for that.",
+        advice="Take them again from a tripod without touching the camera, or bring them one over the other first.",
     )
 
 

@@ -30,9 +30,10 @@ class InstantFacts:
 
     ``valid_share`` and ``measured_share``, what three lights reach, are None where no normals were solved, the latter
     where nothing was filled as well. ``levels`` (light) is each light's mean on the subject, 1.0 = saturation;
-    ``clipped`` (light) the share of it that is saturated. ``ambient`` is the ambient light's share of what an exposure
-    holds. ``speed_px_s`` is how fast the fastest parts move, and ``moving_share`` how much of the picture does; None
-    where it is not known. What changes too fast to be followed has a share and no speed.
+    ``clipped`` (light) the share of it that is saturated, ``white`` (light) the light at which its plate is.
+    ``ambient`` is the ambient light's share of what an exposure holds. ``speed_px_s`` is how fast the fastest parts
+    move, and ``moving_share`` how much of the picture does; None where it is not known. What changes too fast to be
+    followed has a share and no speed.
     ``misfit`` is what the robust solver found common to the whole picture.
     """
 
@@ -45,6 +46,7 @@ class InstantFacts:
     change: Change | None = None
     levels: tuple[float, ...] = ()
     clipped: tuple[float, ...] = ()
+    white: tuple[float, ...] = ()
     ambient: float | None = None
     speed_px_s: float | None = None
     moving_share: float | None = None
@@ -116,6 +118,7 @@ def instant_facts(
         change=change,
         levels=tuple(level / plate.saturation for level, plate in zip(levels, one.plates, strict=True)),
         clipped=tuple(shares),
+        white=tuple(plate.saturation for plate in one.plates),
         ambient=_ambient_share(dark, subject, levels),
         speed_px_s=None if moving is None else moving.speed_px_s,
         moving_share=None if moving is None else moving.share,

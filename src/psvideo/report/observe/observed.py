@@ -17,6 +17,7 @@ from psvideo.model.surface import Surface
 from psvideo.plates.ambient.ambient_regression import Separated
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import AMBIENT, Round
+from psvideo.report.observe.astray import Astray, astray
 from psvideo.report.observe.facts import FAINT, InstantFacts, Seen, brightest_channel, instant_facts, thinned_round
 from psvideo.report.observe.focus import middle_of, sharpest_blur_px
 from psvideo.report.observe.levels import BINS, Counts, Levels, count_levels
@@ -24,7 +25,7 @@ from psvideo.report.observe.motion import Glimpse, Motion, glimpse, motion
 from psvideo.report.observe.rigfit import RigFit
 from psvideo.report.observe.rigpoints import RigPoints
 from psvideo.report.observe.shadow import shadow_light
-from psvideo.report.observe.slopes import coarse_normals, share_away, slope_agreement
+from psvideo.report.observe.slopes import coarse_normals, share_away, surface_agreement
 from psvideo.report.observe.steadiness import Change, Sample, change, sample_of
 from psvideo.report.observe.thinned import step_of, thinned
 from psvideo.report.observe.worst import Thumbnail, Worst
@@ -55,6 +56,8 @@ class Observed:
     lights' own pictures are even, for then nothing shows what it falls on.
     ``first`` is the number of the clip's first round, and ``white`` what motion takes for white, found with its first
     plate.
+    ``stills`` says that the pictures of a round are photographs, each under its own light; ``astray`` is by how far
+    they lie apart.
     ``watched`` is whose plates motion is looked for in, as they pass; left out, the first light's, or the brightest's
     where the first gives hardly any light in the first round (``watch_brightest``).
     """
@@ -67,6 +70,7 @@ class Observed:
     only: range | None = None
     first: int | None = None
     white: float | None = None
+    stills: bool = False
     facts: list[InstantFacts] = field(default_factory=list)
     counts: dict[str, Counts] = field(default_factory=dict)
     blurs_px: list[float] = field(default_factory=list)
@@ -74,6 +78,7 @@ class Observed:
     away: list[float] = field(default_factory=list)
     leans: list[Lean] = field(default_factory=list)
     in_shadow: list[float] = field(default_factory=list)
+    astray: list[Astray] = field(default_factory=list)
     light_at_points: list[NDArray[np.float64]] = field(default_factory=list)
     ambient_measured: dict[int, float] = field(default_factory=dict)
     beyond_mask: list[float] = field(default_factory=list)
@@ -163,6 +168,7 @@ class Observed:
         self.away += other.away
         self.leans += other.leans
         self.in_shadow += other.in_shadow
+        self.astray += other.astray
         self.light_at_points += other.light_at_points
         self.ambient_measured |= other.ambient_measured
         self.beyond_mask += other.beyond_mask
@@ -201,7 +207,7 @@ class Observed:
         yield
         if surface is not None:
             small = coarse_normals(surface)
-            agreement = slope_agreement(small)
+            agreement = surface_agreement(surface, small)
             if agreement is not None:
                 self.slopes.append(agreement)
             self.away.append(share_away(surface))
@@ -213,6 +219,19 @@ class Observed:
             self._look_into_shadow(one, surface, seen)
         if self.points is not None and one.lights == self.lights:
             self.light_at_points.append(self.points.light(one))
+            if self.stills and one.number == self.first and seen.subject.any():
+                self._look_at_places(one, seen, self.points)
+
+    def _look_at_places(self, one: Round, seen: Seen, points: RigPoints) -> None:
+        shape = one.plates[0].shape[:2]
+        ends = (np.flatnonzero(seen.subject.any(axis=axis))[[0, -1]] for axis in (1, 0))
+        step = step_of(*shape)
+        down, across = (
+            slice(int(first) * step, min((int(last) + 1) * step, size))
+            for (first, last), size in zip(ends, shape, strict=True)
+        )
+        found = astray(one.plates, points, (down, across))
+        self.astray += [] if found is None else [found]
 
     def _look_into_shadow(self, one: Round, surface: Surface, seen: Seen) -> None:
         if self.points is None or one.lights != self.lights or len(self.points.vectors) > 1:

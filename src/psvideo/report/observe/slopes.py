@@ -38,6 +38,11 @@ NORMAL_MEDIAN = 0.6745
 """The median distance from the mean of what is distributed normally, in standard deviations."""
 AWAY = -0.1
 """Normals whose z is below this face away from the camera: noise at an outline does less."""
+LEAST_TRUSTED, TRUSTED_AGREE = 0.3, 0.6
+"""Slopes of trusted normals count for themselves where they are this share of what three lights gave, and agree so
+well. (Under lights that are exchanged, mirrored, in another order or 15 degrees off: 0.32 at most; under right ones
+0.77 and more.)"""
+WHOLE = 0.999
 LEAST_AVERAGED = 3
 """Of this many rows and columns, evenly, the mean of a larger square is taken."""
 
@@ -69,6 +74,20 @@ def slope_agreement(small: Averaged) -> float | None:
     else:
         return None
     return None if found is None else found.agreement
+
+
+def surface_agreement(surface: Surface, small: Averaged) -> float | None:
+    """Return the agreement of slopes over all that three lights gave (``small``, as ``coarse_normals`` gives it), or
+    over what is trusted where that speaks clearly for the lights: shadows and light by way of other surfaces make
+    normals of no surface too, and what they make is not trusted."""
+    agreement = slope_agreement(small)
+    if agreement is None or agreement >= TRUSTED_AGREE:
+        return agreement
+    own = _mean_of_squares(surface.valid) > WHOLE
+    if own.sum() < LEAST_TRUSTED * small.valid.sum():
+        return agreement
+    trusted = slope_agreement(Averaged(own, small.normals))
+    return trusted if trusted is not None and trusted >= TRUSTED_AGREE else agreement
 
 
 class _Turning(NamedTuple):
@@ -121,16 +140,18 @@ def share_away(surface: Surface) -> float:
 
 def coarse_normals(surface: Surface) -> Averaged:
     """Return a surface's normals averaged over squares, about WIDTH_PX of them in a row: what slopes are taken of."""
-    step = max(int(surface.valid.shape[1]) // WIDTH_PX, 1)
-    rows, cols = (size // step for size in surface.valid.shape)
-    fine = max(step // LEAST_AVERAGED, 1)
-    inside = (slice(0, rows * step, fine), slice(0, cols * step, fine))
-    small = np.empty((rows, cols, 3), np.float32)
+    measured = _mean_of_squares(surface.measured) > WHOLE
+    small = np.empty((*measured.shape, 3), np.float32)
     for axis in range(3):  # as they lie in memory
-        small[..., axis] = _mean_of_squares(surface.normals[inside][..., axis], rows, cols)
+        small[..., axis] = _mean_of_squares(surface.normals[..., axis])
         let_go(surface.normals)
-    return Averaged(_mean_of_squares(surface.measured[inside], rows, cols) > 0.999, small)
+    return Averaged(measured, small)
 
 
-def _mean_of_squares(plane: NDArray[Any], rows: int, cols: int) -> NDArray[np.float32]:
-    return np.asarray(cv2.resize(plane.astype(np.float32), (cols, rows), interpolation=cv2.INTER_AREA), np.float32)
+def _mean_of_squares(plane: NDArray[Any]) -> NDArray[np.float32]:
+    """Return the means of a picture (row, col) over squares, about WIDTH_PX of them in a row."""
+    step = max(plane.shape[1] // WIDTH_PX, 1)
+    rows, cols = (size // step for size in plane.shape)
+    fine = max(step // LEAST_AVERAGED, 1)
+    some = plane[: rows * step : fine, : cols * step : fine]
+    return np.asarray(cv2.resize(some.astype(np.float32), (cols, rows), interpolation=cv2.INTER_AREA), np.float32)

@@ -31,8 +31,9 @@ def convert(
 
     ``rig`` is a rig.toml, an .lp file, or a DiLiGenT or UW list; the name of ``out`` sets the kind: *.toml, *.lp or
     light_directions.txt. ``name``: for a list that names none of them, the lights' names in order; ``force``
-    replaces what exists. ``caller`` is warned of what the kind cannot hold. Raises UsageError where an output exists or its name
-    shows no kind, and PsvideoError where the rig cannot be read, or a light is near and lists hold directions only.
+    replaces what exists. ``caller`` is warned of what the kind cannot hold. Raises UsageError where an output exists
+    or its name shows no kind, and PsvideoError where the rig cannot be read, or a light is near and lists hold
+    directions only.
     """
     path = Path(out)
     files = files_of(path)

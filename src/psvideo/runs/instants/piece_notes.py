@@ -15,6 +15,7 @@ from psvideo.errors import PsvideoError
 from psvideo.formats.timing_json import format_timing, parse_timing
 from psvideo.formats.whole_files import whole_file, write_text
 from psvideo.model.timing import Timing
+from psvideo.report.observe.astray import Astray
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.worst import Thumbnail, Worst
@@ -27,6 +28,7 @@ TIMING = "timing.json"
 BESIDE_TIMING = ("row_time_error_s", "phase_error_s", "notes")
 """What a timing's own file does not hold."""
 FACTS = TypeAdapter(tuple[InstantFacts, ...])
+ASTRAY = TypeAdapter(tuple[Astray, ...])
 LEANS = TypeAdapter(tuple[Lean, ...])
 
 
@@ -43,6 +45,7 @@ def write_notes(folder: Path, numbers: range, found: Found) -> None:
         "away": seen.away,
         "leans": [asdict(one) for one in seen.leans],
         "in_shadow": seen.in_shadow,
+        "astray": [asdict(one) for one in seen.astray],
         "ambient_measured": list(seen.ambient_measured.items()),
         "beyond_mask": seen.beyond_mask,
         "dark_evenness": seen.dark_evenness,
@@ -107,6 +110,7 @@ def _read(path: Path) -> tuple[range, Found]:
             leans=list(LEANS.validate_python(record["leans"])),
             light_at_points=[arrays[f"light{n}"] for n in range(len(lights))],
             in_shadow=record["in_shadow"],
+            astray=list(ASTRAY.validate_python(record["astray"])),
             ambient_measured={int(begins): share for begins, share in record["ambient_measured"]},
             beyond_mask=record["beyond_mask"],
             dark_evenness=record["dark_evenness"],

@@ -58,7 +58,14 @@ def observing(take: Take, rig: Rig | None = None, masks: Masks | None = None) ->
     if rig is not None and not (near and None in (rig.focal_px, rig.principal_px, rig.plane)):
         points = rig_points(clip.shown_plan, rig, channels=clip.channels, **size)
     watched = "" if take.unmixing is None else slot_names(clip.plan)[0]
-    return Observed(lights=clip.plan.lights, watched=watched, masks=masks, points=points, lens=Lens.of(rig, **size))
+    return Observed(
+        lights=clip.plan.lights,
+        watched=watched,
+        masks=masks,
+        points=points,
+        lens=Lens.of(rig, **size),
+        stills=clip.plan.mode == "synced",
+    )
 
 
 def run_report(

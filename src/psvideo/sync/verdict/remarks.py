@@ -208,7 +208,7 @@ def remarks_on_lights(plan: Plan, found: ClipFit, beat: Beat, *, named: bool) ->
         return ()  # no flash takes light away: the names are wrong, and not the lights
     off = [slot for slot, one in zip(lit, level, strict=True) if one < UNFIRED * level.max()]
     if off:
-        dark = " and ".join(dict.fromkeys("+".join(plan.flashes[slot].lit) for slot in off))
+        dark = ", ".join(dict.fromkeys("+".join(plan.flashes[slot].lit) for slot in off))
         unless = "" if named else " If the order guessed here is not the true one, it is another light."
         return (
             f"{dark}: no light is seen from there, less than {100 * UNFIRED:.0f} % of the brightest. Check that it "
