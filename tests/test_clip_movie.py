@@ -69,6 +69,7 @@ def write_movie(
     transfer: int = 2,
     options: dict[str, str] | None = None,
     movflags: str = "",
+    aspect: Fraction = Fraction(1),
 ) -> None:
     frames = list(frames)
     with av.open(str(path), "w", options={"movflags": movflags} if movflags else {}) as container:
@@ -76,6 +77,7 @@ def write_movie(
         stream.width, stream.height, stream.pix_fmt = frames[0].width, frames[0].height, frames[0].format.name
         stream.codec_context.colorspace, stream.codec_context.color_range = matrix, color_range
         stream.codec_context.color_trc = transfer
+        stream.codec_context.sample_aspect_ratio = aspect
         stream.codec_context.time_base = 1 / RATE
         for place, frame in zip(places or range(len(frames)), frames, strict=True):
             frame.pts, frame.time_base = place, 1 / RATE
@@ -496,6 +498,24 @@ def test_the_rate_at_which_a_phone_shot_slow_motion_counts(shared_data: Path, pl
     assert not any("frames per second" in warning for warning in slow.warnings)
     wrong = open_clip(movie, plan=plan_for(rows=240, cols=320, fps=Fraction(120)))
     assert any("was shot at 240 frames per second, and the plan says 120" in warning for warning in wrong.warnings)
+
+
+def test_changes_of_other_frames_cost_nothing_where_no_frame_loses_a_bit(
+    tmp_path: Path, plan_for: Callable[..., Path]
+) -> None:
+    write_movie(tmp_path / "x.mkv", in_10_bits(grey_ramp(24)), options={"g": "12"})
+    assert not any(
+        "costs accuracy" in one for one in open_clip(tmp_path / "x.mkv", plan=plan_for(rows=32, cols=48)).warnings
+    )
+
+
+@pytest.mark.parametrize(("aspect", "said"), [(Fraction(4, 3), True), (Fraction(1), False)])
+def test_pixels_that_are_not_square_are_said(
+    aspect: Fraction, said: bool, tmp_path: Path, plan_for: Callable[..., Path]
+) -> None:
+    write_movie(tmp_path / "x.mov", grey_ramp(4), codec="libx264", aspect=aspect)
+    found = " ".join(open_clip(tmp_path / "x.mov", plan=plan_for(rows=32, cols=48)).warnings)
+    assert ("its pixels are to be shown 1.333 times as wide as high" in found) == said
 
 
 def test_coding_that_costs_accuracy_is_said(tmp_path: Path, plan_for: Callable[..., Path]) -> None:

@@ -25,6 +25,7 @@ from psvideo.report.judge.of_lamps import lamps as judge_lamps
 from psvideo.report.judge.of_rig import _near as near_of
 from psvideo.report.judge.of_rig import rig as judge_rig
 from psvideo.report.judgement import Judgement, verdict_of
+from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.motion import glimpse, motion
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rigpoints import rig_points
@@ -649,6 +650,29 @@ def test_a_dead_light_among_enough_others_is_named_and_left_out_and_the_rig_is_s
     assert verdict_of([line, *rig_of(dead), *validity(dead)]) == "This take is usable, with reservations."
     wrong = Footage(shape="waves", lights=6, gains=[1, 1, 0, 1, 1, 1], claimed_deg=40, solved=True).observed(0)
     assert graded(rig_but_leaning(wrong), "rig") in ("doubtful", "bad")
+
+
+def test_many_dead_lights_are_one_line() -> None:
+    (line,) = lamps(Footage(lights=10, gains=[1, 1, 0, 1, 0, 0, 0, 0, 1, 1], solved=True).observed(0))
+    assert line.found == (
+        "5 lights give no light ('light2', 'light4', 'light5', 'light6' and 1 more; at most 0.0 % of the strongest); "
+        "normals come from the other 5."
+    )
+
+
+@pytest.mark.parametrize(("dimmed", "failed"), [(1.0, False), (0.2, True)])
+def test_a_light_does_not_fail_where_only_the_value_changes_at_which_it_clips(dimmed: float, failed: bool) -> None:
+    """Lamps of several colours that are taken apart clip at another value in every round."""
+    one = Observed(lights=("a", "b", "c"))
+    for number in range(8):
+        white = 5.0 if number == 2 else 1.0
+        levels = tuple(level * (dimmed if number == 2 else 1.0) / white for level in (0.3, 0.2, 0.25))
+        one.facts.append(
+            InstantFacts(number=number, time_s=0.0, valid_share=1.0, clipped_share=0.0, unseen_share=0.0,
+                         levels=levels, clipped=(0.0,) * 3, white=(white,) * 3, moving_share=0.0)
+        )  # fmt: skip
+    assert any("Nothing is lit in 1 of 8 rounds" in line.found for line in lamps(one)) == failed
+    assert not any("flickers" in line.found for line in lamps(one))
 
 
 @pytest.mark.parametrize("passing", [False, True])

@@ -46,7 +46,8 @@ def timing_and_order(timing: Timing, mode: str) -> Iterator[Judgement]:
             subject="timing",
             grade="bad" if rows > LOST_ROWS else "doubtful",
             found=f"Flash times are known to {rows:.2f} row only: plates may be torn near the dark row.",
-            advice="Fix the exposure, switch stabilisation off, and check that plan.toml is what the strobe played.",
+            advice="Check that plan.toml is what the strobe played, and its transfer how the files code light: a wrong "
+            "curve looks like another exposure. Fix the exposure, and switch stabilisation off.",
         )
     if timing.order == "guess":
         yield Judgement(
