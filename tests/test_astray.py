@@ -29,7 +29,7 @@ WHOLE = (slice(0, ROWS), slice(0, COLS))
 def soft(seed: int, width_px: float) -> np.ndarray:
     noise = np.random.default_rng(seed).normal(size=(ROWS, COLS)).astype(np.float32)
     blurred = np.asarray(cv2.GaussianBlur(noise, (0, 0), width_px))
-    return blurred / blurred.std()
+    return np.asarray(blurred / blurred.std())
 
 
 def directions(lights: int) -> np.ndarray:
