@@ -157,12 +157,15 @@ COMMANDS: dict[str, tuple[str, ...]] = {
 
 @pytest.fixture(scope="module")
 def by_one_thread(clip: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Digest]:
-    """Return what gives the checksums of a command that ran whole and by one thread; each runs once."""
+    """Return what gives the checksums of a command that ran whole and by one thread; each runs once.
+
+    All outputs lie as deep as its own: the edit list names the clip from where it lies.
+    """
 
     @cache
     def digest_of(name: str) -> Digest:
         command, *options = (word.format(clip=clip) for word in COMMANDS[name])
-        out = tmp_path_factory.mktemp("one") / "out"
+        out = tmp_path_factory.mktemp("by_one_thread") / "out"
         ended(begun(command, clip, *options, "-o", out, threads=1))
         return digest(out)
 
@@ -178,8 +181,7 @@ def test_any_number_of_threads_gives_the_same_bytes_also_under_load(
 ) -> None:
     command, *options = (word.format(clip=clip) for word in COMMANDS[name])
     for count, around in ((3, load()), (8, nullcontext())):
-        out = tmp_path / str(count) / "out"
-        out.parent.mkdir()
+        out = tmp_path / f"by_{count}_threads"
         with around:
             ended(begun(command, clip, *options, "-o", out, threads=count))
         assert digest(out) == by_one_thread(name), f"{count} threads"
