@@ -16,11 +16,12 @@ import pytest
 import setuptools
 import tomlkit
 
+import psvideo
 from psvideo.cli.app import main
 from psvideo.clip import open_clip, read_frames
 from psvideo.errors import PsvideoError, UsageError
+from psvideo.export.programs.blender_addon import INSTALLED, addon_folder
 from psvideo.export.programs.blender_addon import NAME as ADDON
-from psvideo.export.programs.blender_addon import addon_folder
 from psvideo.formats.contract import Contract
 from psvideo.formats.plan_toml import read_plan
 from psvideo.formats.rig_toml import read_rig
@@ -395,7 +396,8 @@ def test_a_built_package_holds_scenes_and_add_on(tmp_path: Path, monkeypatch: py
     copies = {path.name: path.read_bytes() for path in (tmp_path / "psvideo" / "synth" / "scenes").iterdir()}
     assert copies == {path.name: path.read_bytes() for path in SCENES}
     assert {str(tmp_path / "psvideo" / "synth" / "scenes" / name) for name in copies} <= set(command.get_outputs())
-    addon, source = (one / ADDON for one in (tmp_path / "psvideo" / "export" / "blender", addon_folder().parent))
+    installed = tmp_path / "psvideo" / INSTALLED.relative_to(Path(psvideo.__file__).parent)
+    addon, source = (one / ADDON for one in (installed, addon_folder().parent))
     assert {path.name: path.read_bytes() for path in addon.iterdir()} == {
         path.name: path.read_bytes() for path in source.iterdir() if path.is_file()
     }
