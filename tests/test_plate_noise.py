@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.plate_noise import noise_of
 
 Array = NDArray[np.float64]
@@ -29,13 +30,16 @@ CURVES: dict[str, tuple[Callable[[Array], Array], Callable[[Array], Array]]] = {
 }
 
 
+LIGHTS = np.array([[0.5, 0, 0.8], [-0.5, 0.1, 0.8], [0, 0.55, 0.8], [0.1, -0.5, 0.8]])
+LIT = Illumination(directions=LIGHTS, intensities=np.ones((4, 1)))
+
+
 def waves(brightest: float) -> Array:
     """Return a surface's shading under four lights, (light, row, col)."""
     row, col = np.mgrid[:128, :128] / 128
     slopes = np.stack([0.6 * np.cos(5 * row + 3 * col), 0.6 * np.sin(4 * col - 2 * row), np.ones_like(row)], axis=-1)
     slopes /= np.linalg.norm(slopes, axis=-1, keepdims=True)
-    lights = np.array([[0.5, 0, 0.8], [-0.5, 0.1, 0.8], [0, 0.55, 0.8], [0.1, -0.5, 0.8]])
-    shade = np.moveaxis(np.maximum(slopes @ lights.T, 0), -1, 0)
+    shade = np.moveaxis(np.maximum(slopes @ LIGHTS.T, 0), -1, 0)
     return np.asarray(brightest * shade / shade.max())
 
 
@@ -64,3 +68,46 @@ def test_the_few_values_of_flat_faces_are_no_codes() -> None:
     faces = np.array([0.02, 0.031, 0.05, 0.0525, 0.07, 0.1, 0.11, 0.16, 0.3])
     plate = np.repeat(np.repeat(faces.reshape(3, 3), 40, axis=0), 40, axis=1).astype(np.float32)
     assert noise_of([plate] * 3).at(0.1) < 0.001
+
+
+def grain(seed: int) -> Array:
+    """Return paint whose every pixel has an albedo of its own, (row, col)."""
+    return np.random.default_rng(seed).uniform(0.7, 1, (128, 128))
+
+
+@pytest.mark.parametrize("sensor", [0.001, 0.004])
+def test_grain_of_the_paint_is_no_noise_where_lights_are_known(sensor: float) -> None:
+    true = waves(0.8) * grain(1)
+    plates = list((true + np.random.default_rng(3).normal(0, sensor, true.shape)).astype(np.float32))
+    assert noise_of(plates).at(0.4) > 3 * sensor
+    assert noise_of(plates, LIT).at(0.4) == pytest.approx(sensor, rel=0.25)
+
+
+def test_noise_that_grows_with_light_is_found_under_paint() -> None:
+    true = waves(0.8) * grain(1)
+    sigma = np.sqrt(0.001**2 + 2e-5 * true)
+    plates = list((true + sigma * np.random.default_rng(3).normal(size=true.shape)).astype(np.float32))
+    for level in (0.3, 0.6):
+        assert noise_of(plates, LIT).at(level) == pytest.approx(np.sqrt(0.001**2 + 2e-5 * level), rel=0.25)
+
+
+def test_plates_that_do_not_fit_each_other_are_no_noisier_than_each_is() -> None:
+    moved = np.stack([light * grain(n) for n, light in enumerate(waves(0.8))]).astype(np.float32)
+    assert noise_of(list(moved), LIT).at(0.4) <= 1.001 * noise_of(list(moved)).at(0.4)
+
+
+def test_three_lights_leave_nothing_over_to_know_noise_by() -> None:
+    three = Illumination(directions=LIGHTS[:3], intensities=np.ones((3, 1)))
+    plates = list((waves(0.8) * grain(1)).astype(np.float32)[:3])
+    assert noise_of(plates, three) == noise_of(plates)
+
+
+def test_plates_of_nothing_have_the_least_noise() -> None:
+    dark = [np.full((64, 64), -0.01, np.float32)] * 4
+    assert noise_of(dark, LIT).at(0.4) == pytest.approx(0.0003)
+
+
+def test_rounding_is_found_in_what_lights_leave_over_as_well() -> None:
+    true = waves(0.8) * grain(1)
+    plates = (np.round(255 * true) / 255).astype(np.float32)
+    assert noise_of(list(plates), LIT).at(0.4) == pytest.approx(float(np.sqrt(np.mean((plates - true) ** 2))), rel=0.3)

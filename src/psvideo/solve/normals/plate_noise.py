@@ -1,12 +1,13 @@
 """How noisy plates are, from the plates themselves: what their finest detail says where the picture has least of it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.plates.mixture import Mixture
+from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.task import Samples
 
 Values = NDArray[np.float64]
@@ -15,7 +16,8 @@ LEAST = 0.0003
 """No camera is believed to be less noisy than this, in units of saturation: half a code of ten bits."""
 ROWS, SAMPLES = 24, 1 << 16
 """Noise is looked for in about so many rows of every plate, evenly spread, and so many samples of all."""
-LEVELS, LEAST_PIXELS = 12, 512
+LEVELS, LEAST_PIXELS, BRIGHT = 12, 512, 0.25
+"""What is brighter than such a share of the brightest level shows how noise grows with light."""
 CODE_SAMPLES, LEAST_CODES, ALIKE, COARSEST = 1 << 12, 5, 1.25, 0.025
 """So many samples of a plate show whether it holds a file's codes: it has few values then, from so many on, which most
 samples share, and half of the gaps between neighbouring ones are alike up to this factor. Codes of eight bits are no
@@ -43,25 +45,57 @@ class PlateNoise:
 
 
 def noise_of(
-    plates: Sequence[Samples] | Sequence[Mixture], *, black_level: float = 0.0, scale: float = 1.0
+    plates: Sequence[Samples] | Sequence[Mixture],
+    lit: Illumination | None = None,
+    *,
+    black_level: float = 0.0,
+    scale: float = 1.0,
 ) -> PlateNoise:
-    """Return the noise of one channel of plates as ``solve`` takes them.
+    """Return the noise of one channel of plates as ``solve`` takes them, one per light.
 
     Second differences along columns and rows (J. Immerkaer, "Fast noise variance estimation", CVIU 1996) leave hardly
     anything of smooth surfaces; the lowest quarter of them at each level leaves edges and texture out. Plates that hold
     a file's codes are never less noisy than rounding makes them: a twelfth of the codes' squared distance at the level.
+
+    Where more than three lights are known (``lit``), what no normal and albedo explains of the differences is looked at
+    as well, and the lesser counts: paint, hair and the grain of a surface obey its lights, and noise does not.
     """
     pixels = SAMPLES // len(plates)
-    details, levels, squares = zip(*(_fine(plate, black_level, scale, pixels) for plate in plates), strict=True)
-    detail, level, rounding = np.concatenate(details), np.concatenate(levels), np.concatenate(squares) / 12
-    if len(detail) < LEAST_PIXELS:
+    detail, level, rounding = map(
+        np.stack, zip(*(_fine(plate, n, black_level, scale, pixels) for n, plate in enumerate(plates)), strict=True)
+    )
+    if detail.size < LEAST_PIXELS:
         return PlateNoise(read=LEAST**2, photon=0.0)
+    at, found = _by_level(detail, level, rounding)
+    alone = _line(at, found)
+    if lit is None or len(plates) <= 3:
+        return alone
+    channel = min(1, lit.intensities.shape[1] - 1)
+    left = _left_over(lit.directions * lit.intensities[:, channel, None])
+    sums = (np.einsum("sl,lp->sp", each, of) for each, of in ((left, detail), (left**2, level), (left**2, rounding)))
+    return _lesser(alone, *_by_level(*sums))
+
+
+def _left_over(matrix: Values) -> Values:
+    """Return the sums of the lights' measurements, (sum, light), to which a normal and an albedo add nothing: unit
+    vectors at right angles, so that each holds the noise of one measurement, at the mean level by its squares."""
+    return np.asarray(np.linalg.qr(matrix, mode="complete")[0][:, 3:].T)
+
+
+def _by_level(detail: Values, level: Values, rounding: Values) -> tuple[Values, Values]:
+    """Return LEVELS levels, and the variance there that differences show, each as large as noise at its level makes it;
+    ``rounding`` is the squared distance of codes."""
+    detail, level, rounding = detail.ravel() ** 2, level.ravel(), rounding.ravel() / 12
     parts = np.array_split(np.argsort(level), LEVELS)
     at = np.array([float(np.median(level[part])) for part in parts])
     rounded = np.array([float(np.median(rounding[part])) for part in parts])
     found = np.array([float(np.quantile(detail[part], LOW_SHARE)) / LOW_OF_VARIANCE for part in parts])
-    found = np.maximum(found - rounded, rounded)  # of the samples a twelfth is what blurred the codes
-    bright, darkest = at > 0.25 * at.max(), int(np.argmin(at))
+    return at, np.maximum(found - rounded, rounded)  # of the samples a twelfth is what blurred the codes
+
+
+def _line(at: Values, found: Values) -> PlateNoise:
+    """Return the noise that grows with light as variances at levels do."""
+    bright, darkest = at > BRIGHT * at.max(), int(np.argmin(at))
     if at.max() <= 0:  # no light anywhere
         return PlateNoise(read=max(float(found[darkest]), LEAST**2), photon=0.0)
     rise = (found - found[darkest]) / np.maximum(at - at[darkest], 1e-6)
@@ -70,11 +104,28 @@ def noise_of(
     return PlateNoise(read=read, photon=photon)
 
 
-def _fine(plate: Samples | Mixture, black_level: float, scale: float, pixels: int) -> tuple[Values, Values, Values]:
-    """Return squared second differences that white noise makes as large as its variance, the level there, and the
+def _lesser(alone: PlateNoise, at: Values, found: Values) -> PlateNoise:
+    """Return the lesser noise, of single plates or of what is left over of all: detail only ever adds to it.
+
+    Sums of lights have levels that are much alike, and say little of the dark: there single plates count.
+    """
+    read = min(alone.read, _line(at, found).read)
+    bright = at > BRIGHT * at.max()
+    if at.max() <= 0 or not bright.any():
+        return replace(alone, read=read)
+    level = float(np.median(at[bright]))
+    photon = float(np.median(np.maximum(found[bright] - read, 0) / at[bright]))
+    return PlateNoise(read=read, photon=min(photon, max(alone.at(level) ** 2 - read, 0.0) / level))
+
+
+def _fine(
+    plate: Samples | Mixture, number: int, black_level: float, scale: float, pixels: int
+) -> tuple[Values, Values, Values]:
+    """Return second differences, whose squares white noise makes as large as its variance, the level there, and the
     squared distance of the plate's codes, 0 where it holds none.
 
-    Differences of codes are few and far between: codes are blurred by their distance first, evenly.
+    Differences of codes are few and far between: codes are blurred by their distance first, evenly, every plate's
+    (``number``) in its own way.
     """
     rows, cols = plate.shape[:2]
     if rows < 3 or cols < 3:
@@ -92,13 +143,13 @@ def _fine(plate: Samples | Mixture, black_level: float, scale: float, pixels: in
     around *= scale
     gaps = _gaps_of_codes(around)
     if gaps is not None:
-        around += gaps * (np.random.default_rng(0).random(around.shape) - 0.5)
+        around += gaps * (np.random.default_rng(number).random(around.shape) - 0.5)
     top, middle, bottom = around
     down = top - 2 * middle + bottom
     fine = down[:, 0] - 2 * down[:, 1] + down[:, 2]
     three = top + middle + bottom
     level = (three[:, 0] + three[:, 1] + three[:, 2]) / 9  # the same noise is in both, and not correlated
-    return fine**2 / 36, level, np.zeros_like(level) if gaps is None else gaps[1, :, 1] ** 2
+    return fine / 6, level, np.zeros_like(level) if gaps is None else gaps[1, :, 1] ** 2
 
 
 def _gaps_of_codes(values: Values) -> Values | None:

@@ -90,7 +90,7 @@ class Solving:
         moves: Mask | None = None,
     ) -> tuple[Surface, Evidence, PlateNoise]:
         """Return every pixel that three measurements solve, well or not, and what it is judged by."""
-        noise = noise_of(plates)
+        noise = noise_of(plates, lit)
         usable = _usable(noise, lit.intensities.shape[1], self.method(len(plates)))
         one = Evidence(
             plates=plates,
