@@ -1,7 +1,7 @@
 """How noisy plates are, from the plates themselves: what their finest detail says where the picture has least of it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,8 @@ Values = NDArray[np.float64]
 LEAST = 0.0003
 """No camera is believed to be less noisy than this, in units of saturation: half a code of ten bits."""
 ROWS, SAMPLES = 24, 1 << 16
-"""Noise is looked for in about so many rows of every plate, evenly spread, and so many samples of all."""
+"""Noise is looked for in about so many rows of every plate, evenly spread, and so many samples of all: of small
+pictures in more rows."""
 LEVELS, LEAST_PIXELS, BRIGHT = 12, 512, 0.25
 """What is brighter than such a share of the brightest level shows how noise grows with light."""
 CODE_SAMPLES, LEAST_CODES, ALIKE, COARSEST = 1 << 12, 5, 1.25, 0.025
@@ -73,7 +74,8 @@ def noise_of(
     channel = min(1, lit.intensities.shape[1] - 1)
     left = _left_over(lit.directions * lit.intensities[:, channel, None])
     sums = (np.einsum("sl,lp->sp", each, of) for each, of in ((left, detail), (left**2, level), (left**2, rounding)))
-    return _lesser(alone, *_by_level(*sums))
+    dark_share = float(np.clip(1 - at.min() / max(BRIGHT * at.max(), 1e-9), 0, 1))
+    return _lesser(alone, *_by_level(*sums), dark_share=dark_share)
 
 
 def _left_over(matrix: Values) -> Values:
@@ -104,17 +106,20 @@ def _line(at: Values, found: Values) -> PlateNoise:
     return PlateNoise(read=read, photon=photon)
 
 
-def _lesser(alone: PlateNoise, at: Values, found: Values) -> PlateNoise:
-    """Return the lesser noise, of single plates or of what is left over of all: detail only ever adds to it.
+def _lesser(alone: PlateNoise, at: Values, found: Values, *, dark_share: float) -> PlateNoise:
+    """Return the noise under light of single plates, or of what is left over of all (``found`` at the levels ``at``)
+    where that is less: detail only ever adds to it.
 
-    Sums of lights have levels that are much alike, and say little of the dark: there single plates count.
+    In the dark single plates count, as far as a picture has any (``dark_share``): there is no paint, and noise of an
+    ambient picture that was taken off all plates is alike in all of them, which a normal and an albedo explain.
     """
-    read = min(alone.read, _line(at, found).read)
     bright = at > BRIGHT * at.max()
     if at.max() <= 0 or not bright.any():
-        return replace(alone, read=read)
+        return alone
+    left = min(alone.read, _line(at, found).read)
+    read = left + (alone.read - left) * dark_share
     level = float(np.median(at[bright]))
-    photon = float(np.median(np.maximum(found[bright] - read, 0) / at[bright]))
+    photon = float(np.median(np.maximum(found[bright] - left, 0) / at[bright]))
     return PlateNoise(read=read, photon=min(photon, max(alone.at(level) ** 2 - read, 0.0) / level))
 
 
@@ -130,7 +135,7 @@ def _fine(
     rows, cols = plate.shape[:2]
     if rows < 3 or cols < 3:
         return np.zeros(0), np.zeros(0), np.zeros(0)
-    step = max((rows - 2) // ROWS, 1)
+    step = max((rows - 2) // max(ROWS, pixels // (cols - 2)), 1)
     firsts = np.arange(0, rows - 2, step)
     part = rows_of(plate, (firsts + np.arange(3)[:, None]).ravel())
     part = part[..., min(1, plate.shape[2] - 1)] if len(plate.shape) == 3 else part
