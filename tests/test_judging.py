@@ -11,6 +11,7 @@ from ring_and_ball import ring
 from psvideo.model.surface import Surface
 from psvideo.report.observe.slopes import coarse_normals, slope_agreement, surface_agreement
 from psvideo.solve.normals.evidence import Evidence, Indirect
+from psvideo.solve.normals.trust.fewer_lights import widened
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.task import Task, Usable, Work, empty_result
@@ -81,6 +82,25 @@ def test_what_is_lost_in_heavy_noise_is_not_taken_for_light_by_way_of_other_surf
     assert 0.6 <= (errors <= predicted).mean() <= 0.85
     assert surface.misfit is not None
     assert surface.misfit.error_deg < surface.misfit.noise_deg
+
+
+@pytest.mark.parametrize(("lights", "slant_deg"), [(5, 40), (8, 50), (12, 55)])
+def test_noise_spreads_so_much_farther_where_fewer_lights_reach_a_ball(lights: int, slant_deg: float) -> None:
+    ways, (normals, inside), rng = ring(lights, slant_deg), ball(), np.random.default_rng(7)
+    errors: dict[int, list[float]] = {}
+    for normal in normals[inside][::5]:
+        reach = ways @ normal > 0.1
+        if reach.sum() >= 4:
+            noisy = normal + rng.normal(0, 0.001, (20, int(reach.sum()))) @ np.linalg.pinv(ways[reach]).T
+            whole = normal + rng.normal(0, 0.001, (20, lights)) @ np.linalg.pinv(ways).T
+            ratio = np.mean(np.cross(noisy, normal) ** 2) / np.mean(np.cross(whole, normal) ** 2)
+            errors.setdefault(int(reach.sum()), []).append(float(ratio))
+    by_count = widened(ways, 100.0)
+    assert by_count[lights] == 1
+    assert (np.diff(by_count) <= 0).all()
+    for count, ratios in errors.items():
+        if len(ratios) > 50:
+            assert by_count[count] == pytest.approx(np.median(ratios), rel=0.3), count
 
 
 def test_light_by_way_of_other_surfaces_is_seen_where_lights_do_not_reach() -> None:

@@ -91,6 +91,16 @@ def test_noise_that_grows_with_light_is_found_under_paint() -> None:
         assert noise_of(plates, LIT).at(level) == pytest.approx(np.sqrt(0.001**2 + 2e-5 * level), rel=0.25)
 
 
+@pytest.mark.parametrize("seed", [3, 4, 5])
+def test_noise_that_all_plates_share_is_noise_in_the_dark(seed: int) -> None:
+    """A normal and an albedo explain what an ambient picture took off all plates; what counts as lit may not."""
+    rng = np.random.default_rng(seed)
+    true = np.pad(waves(0.8)[:, 32:96, 32:96], ((0, 0), (32, 32), (32, 32)))
+    plates = true + rng.normal(0, 0.002, true.shape) + rng.normal(0, 0.002, true.shape[1:])
+    alike = list(plates.astype(np.float32))
+    assert noise_of(alike, LIT).dark == pytest.approx(np.hypot(0.002, 0.002), rel=0.08)
+
+
 def test_plates_that_do_not_fit_each_other_are_no_noisier_than_each_is() -> None:
     moved = np.stack([light * grain(n) for n, light in enumerate(waves(0.8))]).astype(np.float32)
     assert noise_of(list(moved), LIT).at(0.4) <= 1.001 * noise_of(list(moved)).at(0.4)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from psvideo.model.surface import Surface
 from psvideo.solve.normals.evidence import Evidence
+from psvideo.solve.normals.trust.fewer_lights import widened
 from psvideo.solve.normals.task import Floats, Samples
 
 TORN, NEAR = 5, 9
@@ -36,8 +37,8 @@ CERTAIN = np.float32(1)
 """... beyond this many standard errors of the mean square that noise makes of so few."""
 UNSURE_OF_NOISE = np.float32(1.2)
 """Noise is known to a tenth, and its square to a fifth: what is less beyond it is no misfit."""
-LEAST_REACH = np.float32(0.2)
-"""Where fewer lights reach, residuals of noise predict more: as if no less than this share of them did."""
+MOST_WIDENED = 5.0
+"""Where fewer lights reach, noise and what residuals predict of it spread farther: up to this many times the square."""
 MOVING_DEG, OF_MOTION = np.float32(0.5), 5
 """Where motion turns normals by more, over this many points, residuals are its own, and no misfit of rig or surface."""
 ENOUGH_LIGHTS = 12
@@ -120,8 +121,12 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
         raise ValueError("`indirect` expected in the evidence: see indirect.py")
     fit = np.minimum(points.fit_deg, MOST_FIT_DEG)
     sums, counts = one.indirect
-    reach = np.clip(1 - counts / np.float32(len(one.plates)), LEAST_REACH, 1)
-    noise = (points.fit_of_noise_deg / reach) ** 2
+    lights = len(one.plates)
+    strengths = one.lit.intensities.mean(axis=1)[:, None]
+    used = (lights - counts).astype(np.intp)
+    wider = widened(one.lit.directions * strengths, MOST_WIDENED)[used]
+    plain = points.surface.error_deg is None
+    noise = points.fit_of_noise_deg**2 * (1 if plain else wider)
     squares = np.where(points.known, fit**2 - UNSURE_OF_NOISE * noise, np.float32(0))
     if turned_deg is not None:
         squares *= cv2.blur(turned_deg, (OF_MOTION, OF_MOTION)) < MOVING_DEG
@@ -136,7 +141,7 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
         misfit_deg=np.maximum(*(_typical(squares, noise, shown, width) for width in (around, far_around))),
         indirect_deg=np.degrees(indirect + own) * _turned(points.planes, one),
         torn_deg=np.sqrt(np.maximum(_torn_squared(points) - (TORN_OF_NOISE * points.noise_deg) ** 2, 0)),
-        lost_deg=points.noise_deg * np.sqrt(1 / reach - 1),
+        lost_deg=points.noise_deg * np.sqrt(wider - 1),
         hidden=hidden_by(len(one.plates)) / hidden_by(ENOUGH_LIGHTS),
     )
 
