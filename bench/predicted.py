@@ -82,6 +82,7 @@ class Seen:
             torn_deg=self.signs.torn_deg[some],
             lost_deg=self.signs.lost_deg[some],
             hidden=self.signs.hidden,
+            uneven=np.broadcast_to(self.signs.uneven, self.true_deg.shape)[some],
         )
         return Seen(
             self.subject, self.lights, self.flat, self.true_deg[some], self.noise_deg[some], self.fit_deg[some], signs
@@ -212,6 +213,7 @@ def _looked(subject: str, case: Case, *, flat: bool) -> Seen:
             torn_deg=signs.torn_deg[known],
             lost_deg=signs.lost_deg[known],
             hidden=signs.hidden,
+            uneven=np.broadcast_to(signs.uneven, known.shape)[known],
         ),
     )
 

@@ -62,13 +62,12 @@ def noise_of(
     as well, and the lesser counts: paint, hair and the grain of a surface obey its lights, and noise does not.
     """
     pixels = SAMPLES // len(plates)
-    detail, level, rounding = map(
-        np.stack, zip(*(_fine(plate, n, black_level, scale, pixels) for n, plate in enumerate(plates)), strict=True)
-    )
+    found = (_fine(plates[n], n, black_level, scale, pixels) for n in range(len(plates)))
+    detail, level, rounding = map(np.stack, zip(*found, strict=True))
     if detail.size < LEAST_PIXELS:
         return PlateNoise(read=LEAST**2, photon=0.0)
-    at, found = _by_level(detail, level, rounding)
-    alone = _line(at, found)
+    at, variances = _by_level(detail, level, rounding)
+    alone = _line(at, variances)
     if lit is None or len(plates) <= 3:
         return alone
     channel = min(1, lit.intensities.shape[1] - 1)

@@ -6,6 +6,7 @@ by way of other surfaces, which light everything alike and leave no residual. An
 wrong whatever the lights say of them: along a closed way the slopes of a surface add up to nothing.
 """
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -41,6 +42,9 @@ MOST_WIDENED = 5.0
 """Where fewer lights reach, noise and what residuals predict of it spread farther: up to this many times the square."""
 MOVING_DEG, OF_MOTION = np.float32(0.5), 5
 """Where motion turns normals by more, over this many points, residuals are its own, and no misfit of rig or surface."""
+UNEVEN_PX, SURFACES_UNEVEN = 4, np.float32(0.7)
+"""Samples so far apart are compared: nearer ones are alike in what codecs leave."""
+
 ENOUGH_LIGHTS = 12
 """What ``hidden`` is measured by: this many lights hide little of what is not matte."""
 LEAST_LIGHTS = 0.02
@@ -83,13 +87,15 @@ class Signs:
     """What is looked for, (row, col) of the points, in degrees: what residuals predict beyond noise, by which angle
     light from around would turn the normal, by which normals around belong to no surface, and what noise makes more
     where some lights are not used. ``hidden``: how many times more than ENOUGH_LIGHTS these hide of what is not
-    matte."""
+    matte. ``uneven``: the share of the misfit that changes from sample to sample, as errors of codecs do and surfaces
+    do not: of that nothing is hidden."""
 
     misfit_deg: Floats
     indirect_deg: Floats
     torn_deg: Floats
     lost_deg: Floats
     hidden: float
+    uneven: Floats | float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -137,10 +143,19 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
     own = np.maximum(sums / np.maximum(counts, 1) - 2 * np.radians(points.noise_deg), 0)
     albedo = brightness(points.surface.albedo) * points.known
     shown = np.minimum(albedo, albedo.sum() / max(np.count_nonzero(points.known), 1))  # glare is no more than the rest
+    misfit_deg = np.maximum(*(_typical(squares, noise, shown, width) for width in (around, far_around)))
+    uneven: Floats | float = 0.0
+    if plain and lights > 3:
+        changes = _changes(fit, points, lights - 3) - UNSURE_OF_NOISE * noise
+        changing_deg = np.maximum(*(_typical(changes, noise, shown, width) for width in (around, far_around)))
+        share = (changing_deg / np.maximum(misfit_deg, np.float32(1e-6))) ** 2
+        uneven = np.clip((share - SURFACES_UNEVEN) / (1 - SURFACES_UNEVEN), 0, 1)
+    tears = points.noise_deg**2 + uneven * misfit_deg**2
     return Signs(
-        misfit_deg=np.maximum(*(_typical(squares, noise, shown, width) for width in (around, far_around))),
+        misfit_deg=misfit_deg,
+        uneven=uneven,
         indirect_deg=np.degrees(indirect + own) * _turned(points.planes, one),
-        torn_deg=np.sqrt(np.maximum(_torn_squared(points) - (TORN_OF_NOISE * points.noise_deg) ** 2, 0)),
+        torn_deg=np.sqrt(np.maximum(_torn_squared(points) - TORN_OF_NOISE**2 * tears, 0)),
         lost_deg=points.noise_deg * np.sqrt(wider - 1),
         hidden=hidden_by(len(one.plates)) / hidden_by(ENOUGH_LIGHTS),
     )
@@ -150,6 +165,7 @@ def doubt_deg(signs: Signs, *, how: Doubting = Doubting()) -> Floats:
     """Return by how many degrees normals may be off beyond noise, (row, col) of the points."""
     misfit = np.float32(how.misfit_deg) * signs.misfit_deg ** np.float32(1 + how.misfit_power)
     misfit *= np.float32(signs.hidden**how.few_power) / (signs.misfit_deg + np.float32(how.little_deg))
+    misfit -= np.asarray(signs.uneven, np.float32) * np.maximum(misfit - signs.misfit_deg, 0)
     both = np.hypot(misfit, np.float32(how.indirect) * signs.indirect_deg)
     most_torn = np.float32(how.torn_beside) * both + np.float32(how.torn_alone_deg)
     torn = np.float32(how.torn) * np.minimum(signs.torn_deg, most_torn)
@@ -177,6 +193,23 @@ def _typical(squares: Floats, noise: Floats, shown: Floats, width: int) -> Float
     count = _mean((shown > 0).astype(np.float32), width) * np.float32(width**2)
     by_chance = CERTAIN * np.sqrt(2 / np.maximum(count, 1)) * _mean(noise * shown, width) / weight
     return np.asarray(np.sqrt(np.maximum(typical - by_chance, 0)), np.float32)
+
+
+def _changes(fit: Floats, points: ThinSurface, free: int) -> Floats:
+    """Return the square of what residuals predict, as far as it changes from sample to sample: a root of ``free``
+    squares of independent numbers varies so much about its mean."""
+    apart = max(UNEVEN_PX // points.step, 1)
+    squares, count = np.zeros_like(fit), np.full_like(fit, 1e-9)
+    for axis in (0, 1):
+        here = [slice(None), slice(None)]
+        there = list(here)
+        here[axis], there[axis] = slice(None, -apart), slice(apart, None)
+        a, b = tuple(here), tuple(there)
+        both = points.known[a] & points.known[b]
+        squares[a] += np.where(both, (fit[a] - fit[b]) ** 2 / 2, 0)
+        count[a] += both
+    mean = np.sqrt(2 / free) * math.gamma((free + 1) / 2) / math.gamma(free / 2)
+    return np.asarray(squares / count / np.float32(1 - mean * mean), np.float32)
 
 
 def brightness(albedo: NDArray[np.floating]) -> Floats:

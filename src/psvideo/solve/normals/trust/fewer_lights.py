@@ -26,8 +26,8 @@ def widened(matrix: NDArray[np.float64], most: float) -> Floats:
     squares = np.einsum("pl,li,lj->pij", some.astype(np.float64), matrix, matrix)
     values = np.linalg.eigvalsh(squares)
     sound = values[:, 2] < PIXEL_CONDITION**2 * values[:, 0]
-    spread = _across(np.linalg.inv(squares[sound]), facing[sound])
-    whole = _across(np.linalg.inv(matrix.T @ matrix)[None], facing[sound])
+    spread = _across(squares[sound], facing[sound])
+    whole = _across((matrix.T @ matrix)[None], facing[sound])
     number, factor = some[sound].sum(axis=1), np.sqrt(spread / whole)
     by_count, least = np.ones(count + 1, np.float32), 1.0
     for lights in range(count - 1, -1, -1):
@@ -44,7 +44,8 @@ def _faced() -> NDArray[np.float64]:
     return np.stack([np.sqrt(1 - z * z) * np.cos(turn), np.sqrt(1 - z * z) * np.sin(turn), z], axis=-1)
 
 
-def _across(inverse: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return what of a covariance (pixel or 1, 3, 3) lies across normals."""
-    along = np.einsum("pi,pij,pj->p", normals, np.broadcast_to(inverse, (len(normals), 3, 3)), normals)
+def _across(squares: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return what of the covariance that normal equations (pixel or 1, 3, 3) leave lies across normals."""
+    inverse = np.broadcast_to(np.linalg.inv(squares), (len(normals), 3, 3))
+    along = np.einsum("pi,pij,pj->p", normals, inverse, normals)
     return np.asarray(np.trace(inverse, axis1=1, axis2=2) - along)
