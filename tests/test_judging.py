@@ -11,11 +11,11 @@ from ring_and_ball import ring
 from psvideo.model.surface import Surface
 from psvideo.report.observe.slopes import coarse_normals, slope_agreement, surface_agreement
 from psvideo.solve.normals.evidence import Evidence, Indirect
-from psvideo.solve.normals.trust.fewer_lights import widened
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.task import Task, Usable, Work, empty_result
 from psvideo.solve.normals.trust.doubting import Signs, ThinSurface, doubt_deg, signs_of, stored
+from psvideo.solve.normals.trust.fewer_lights import widened
 from psvideo.solve.normals.trust.indirect import IndirectLook
 
 SIZE = 96

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from psvideo.model.surface import Surface
 from psvideo.solve.normals.evidence import Evidence
-from psvideo.solve.normals.trust.fewer_lights import widened
 from psvideo.solve.normals.task import Floats, Samples
+from psvideo.solve.normals.trust.fewer_lights import widened
 
 TORN, NEAR = 5, 9
 """Slopes are added up along the edges of squares of this many points, averaged over those of the second."""
