@@ -14,6 +14,7 @@ from psvideo.model.rig import Rig
 from psvideo.report.judge.every_line import judgements
 from psvideo.report.judge.powers import power_words
 from psvideo.report.judgement import Judgement, gravest_first, verdict_of
+from psvideo.report.observe.facts import brightest_channel
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rigpoints import rig_points
 from psvideo.report.observe.yuille1997 import Lens
@@ -26,6 +27,8 @@ MOST_S = 0.006
 """After each result it is looked for this long, and a step beyond: what is left waits for the one after, and no picture
 for it."""
 HISTOGRAM = 64
+THINNED = 2
+"""Histograms count every second row and column."""
 
 
 @dataclass(kw_only=True)
@@ -71,8 +74,11 @@ class Watching:
         yield
         yield from observed.adding(newest.round, newest.surface)
         yield
-        self.histograms = {plate.light: _counts(plate.image, plate.saturation) for plate in newest.round.plates}
-        yield
+        counts = {}
+        for plate in newest.round.plates:
+            counts[plate.light] = _counts(plate.picture.thinned(THINNED), plate.saturation)
+            yield
+        self.histograms = counts
         if len(observed.facts) >= ENOUGH:
             whole = replace(newest.timing, flashes=tuple(one for one in newest.timing.flashes if one.complete))
             found = judgements(plan, whole, observed)
@@ -89,10 +95,9 @@ class Watching:
         return Observed(lights=plan.lights, points=points, lens=Lens.of(self.rig, **size))
 
 
-def _counts(image: NDArray[np.float32], saturation: float) -> list[int]:
+def _counts(thin: NDArray[np.float32], saturation: float) -> list[int]:
     """Return how many pixels of a plate are how bright, by their brightest channel: the last bin holds the clipped."""
-    thin = image[::2, ::2]
-    bright = thin if thin.ndim == 2 else thin.max(axis=2)
+    bright = brightest_channel(thin)
     place = np.clip(np.sqrt(np.clip(bright / saturation, 0, 1)) * (HISTOGRAM - 1), 0, HISTOGRAM - 1).astype(np.intp)
     return [int(count) for count in np.bincount(place.ravel(), minlength=HISTOGRAM)]
 

@@ -114,15 +114,15 @@ def noise_of_slopes(valid: NDArray[np.bool_], normals: NDArray[np.float32]) -> f
 
 def _turning(valid: NDArray[np.bool_], normals: NDArray[np.float32], blur_px: float) -> _Turning | None:
     """Return how slopes turn where normals are smoothed so far; None where too few are there."""
-    blurred = np.asarray(cv2.GaussianBlur(normals * valid[..., None], (0, 0), blur_px))
-    depth = np.maximum(blurred[..., 2], 1e-6)
-    slope_x, slope_y = -blurred[..., 0] / depth, -blurred[..., 1] / depth
-    gentle = valid & (np.hypot(slope_x, slope_y) < STEEPEST) & (blurred[..., 2] > 0)
+    x, y, towards = cv2.split(cv2.GaussianBlur(normals * valid[..., None], (0, 0), blur_px))
+    depth = np.maximum(towards, np.float32(1e-6))
+    slope_x, slope_y = -x / depth, -y / depth
+    gentle = valid & (slope_x * slope_x + slope_y * slope_y < np.float32(STEEPEST**2)) & (towards > 0)
     inside = cv2.erode(gentle.astype(np.uint8), np.ones((7, 7), np.uint8), borderValue=0) > 0
     if inside.sum() < LEAST_PIXELS:
         return None
-    across = -np.gradient(slope_x, axis=0)[inside]  # y points up, rows down
-    along = np.gradient(slope_y, axis=1)[inside]
+    across = ((slope_x[:-2] - slope_x[2:]) / 2)[inside[1:-1]]  # y points up, rows down; nothing at the rim is inside
+    along = ((slope_y[:, 2:] - slope_y[:, :-2]) / 2)[inside[:, 1:-1]]
     total = float((across**2).sum() + (along**2).sum())
     if total <= 1e-12:
         return None
