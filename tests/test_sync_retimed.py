@@ -274,3 +274,17 @@ def test_doubled_durations_are_refused(plan: Plan) -> None:
     profiles = shot_of(plan, FRAMES).frames.mean(axis=2, dtype=np.float64)
     with pytest.raises(PsvideoError, match=r"flashes of 0\.8 ms"):
         find_timing(doubled, np.arange(FRAMES), profiles)
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("dark", [slice(80, 170), slice(100, 160)])
+def test_a_stretch_that_nothing_lights_is_left_out_and_the_rest_timed(dark: slice, make_plan: PlanMaker) -> None:
+    plan = make_plan(height_px=24, width_px=12)
+    profiles = shot_of(plan, 240).frames.mean(axis=2, dtype=np.float64)
+    noise = np.random.default_rng(1).standard_normal(profiles[dark].shape)
+    profiles[dark] = 0.003 + 1e-4 * noise
+    timing = find_timing(plan, np.arange(240), profiles)
+    assert set(timing.repeated_frames) <= set(range(dark.start, dark.stop))
+    assert len(timing.repeated_frames) > 0.9 * (dark.stop - dark.start)
+    assert all(dark.start - 1 <= hole.after < dark.stop for hole in timing.dropped_frames)
+    assert timing.phase_error_rows < 0.2

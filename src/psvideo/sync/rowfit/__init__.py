@@ -6,5 +6,6 @@ Every step of the fit solves ``normal_equations``; ``standard_error`` says how c
 the compiled model and its fit. Searched: ``seed``, ``search``, ``rounds_first`` (coded dark slots), ``retime`` (frames
 left out or repeated). Tracked: ``course``, ``track``, ``ends``. Sharpened: ``refine``, ``freed`` (times that the plan
 has wrong), ``bend`` (clocks that drift), ``mains_swing`` (room light on the mains), ``jitter``, ``softness``,
-``restless`` with ``whitening`` (subjects that move), ``plateau`` (times that no row shows).
+``restless`` with ``whitening`` (subjects that move), ``plateau`` (times that no row shows). ``long_takes`` fits what
+holds throughout to some stretches of a long take, and the clock to all of it.
 """

@@ -163,9 +163,14 @@ def _moved(rows: Profiles, beat: Beat, knots: _Knots, free: tuple[str, ...], mov
     return replace(beat, clock=clock, **times_moved(rows, beat, free, move[size:]))
 
 
+def late_s(one: Beat, other: Beat, at_s: FloatArray) -> FloatArray:
+    """Return by how much flashes of another clock come later than the flashes of one do at some times, same shape."""
+    strobe_s = (at_s - one.clock.phase_s) / one.clock.rate
+    straight_s = other.clock.phase_s + strobe_s * other.clock.rate
+    late: FloatArray = straight_s + other.clock.bend(straight_s) - at_s - one.clock.bend(at_s)
+    return late
+
+
 def rms_apart_s(rows: Profiles, one: Beat, other: Beat) -> float:
     """Return how far two clocks are apart at the windows' ends."""
-    strobe_s = (rows.ends_s - one.clock.phase_s) / one.clock.rate
-    straight_s = other.clock.phase_s + strobe_s * other.clock.rate
-    apart_s = straight_s + other.clock.bend(straight_s) - rows.ends_s - one.clock.bend(rows.ends_s)
-    return float(np.sqrt(np.mean(apart_s**2)))
+    return float(np.sqrt(np.mean(late_s(one, other, rows.ends_s) ** 2)))

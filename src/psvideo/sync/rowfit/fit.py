@@ -10,6 +10,7 @@ from psvideo.sync.rowfit.bend import fitted, rms_apart_s
 from psvideo.sync.rowfit.course import followed, window_frames
 from psvideo.sync.rowfit.freed import freed
 from psvideo.sync.rowfit.jitter import STEADY, Jitter, disagreement_s, jitter, shift_error_s
+from psvideo.sync.rowfit.long_takes import ENOUGH_SAMPLES, stretches, throughout
 from psvideo.sync.rowfit.plateau import centred
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import Fit, explained
@@ -20,10 +21,8 @@ from psvideo.sync.rowfit.track import FrameTrack
 
 TRACK_ROWS = 60
 COARSE_ROWS = 288
-ENOUGH_SAMPLES = 250_000
-"""Row means that the last fit needs; a clip that has more gets its rows averaged, which bounds memory and time."""
 FLASH_ROWS = 8
-"""Rows that a flash must still span after that."""
+"""Rows that a flash must still span where a clip of more row means than are enough gets its rows averaged."""
 SURER = 0.8
 """Share of the standard error that must be left before brightnesses are fitted again in windows half as long."""
 MOST_WINDOWS = 400
@@ -79,24 +78,28 @@ def find(plan: Plan, rows: Profiles, *, measured: tuple[str, ...] = ()) -> ClipF
         doubt=None if rows.doubt is None else np.ascontiguousarray(rows.doubt[keep]),
     ).windowed(window)
     free = measured if plan.camera.readout_s is not None else ("row_time_s", *measured)
-    fit = fitted(plan, fine, tracked.beat, free)
-    fine, fit = _restless(plan, fine, fit, free)
-    fit = _with_mains(plan, fine, fit, free)
-    fine, fit, apart_s = _in_short_windows(plan, fine, fit, free)
-    differing = freed(plan, fine, fit, free)
+    part = stretches(fine)
+    fit = fitted(plan, part, tracked.beat, free)
+    part, fit = _restless(plan, part, fit, free)
+    fit = _with_mains(plan, part, fit, free)
+    part, fit, apart_s = _in_short_windows(plan, part, fit, free)
+    differing = freed(plan, part, fit, free)
     fit = differing.fit
     if fit.errors_s:
-        fit, apart_s = _with_window_errors(plan, fine, fit)
+        fit, apart_s = _with_window_errors(plan, part, fit)
     apart_s = float(np.hypot(differing.unsure_s, apart_s))
-    fit, slack_s = centred(plan, fine, fit)
-    plain, as_seen = _as_seen(plan, fine, fit)
+    fit, slack_s = centred(plan, part, fit)
+    if part.value is fine.value:
+        plain, as_seen = _as_seen(plan, part, fit)
+    else:
+        plain, as_seen = throughout(plan, fine, part, fit, tracked.beat, follow=slack_s == 0.0)
     stray = jitter(plan, plain, as_seen) if slack_s == 0.0 else STEADY
-    known_s = max(fit.shift_error_s, shift_error_s(plan, fine, fit), slack_s)
+    known_s = max(as_seen.shift_error_s, shift_error_s(plan, part, fit), slack_s)
     if stray is not STEADY:
         known_s = min(known_s, stray.mean_error_s)
     else:
-        apart_rows_s = disagreement_s(plan, fine, fit) if fine.restless is None else 0.0
-        known_s = float(np.hypot(known_s * misfit(plan, fine, fit), apart_rows_s))
+        apart_rows_s = disagreement_s(plan, part, fit) if part.restless is None else 0.0
+        known_s = float(np.hypot(known_s * misfit(plan, part, fit), apart_rows_s))
     error_s = float(np.sqrt(known_s**2 + stray.error_s**2 + apart_s**2))
     return ClipFit(
         fit=replace(as_seen, shift_error_s=error_s),
@@ -108,7 +111,7 @@ def find(plan: Plan, rows: Profiles, *, measured: tuple[str, ...] = ()) -> ClipF
         trusted=course.trusted,
         slack_s=slack_s,
         soft_s=differing.soft_s,
-        across=across(plan, fine, fit),
+        across=across(plan, part, fit),
     )
 
 
@@ -184,7 +187,7 @@ def _with_mains(plan: Plan, rows: Profiles, fit: Fit, free: tuple[str, ...]) -> 
     least = left(hz)
     if least > MAINS_EXPLAINS * fit.loss:
         return fit
-    window_s = float(np.median(np.diff(rows.ends_s)))
+    window_s = rows.window_frames * rows.period_s
     if least > MAINS_EXPLAINS * float(np.median([left(hz + swings / window_s) for swings in OTHER_SWINGS])):
         return fit
     return fitted(plan, rows, replace(fit.beat, beat_hz=(hz,)), free)

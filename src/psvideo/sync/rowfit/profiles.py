@@ -69,10 +69,19 @@ class Profiles:
         return replace(self, window_start=np.zeros(1, np.int64))
 
     def windowed(self, frames_each: int) -> "Profiles":
-        """Return the same profiles in windows of about so many frames."""
+        """Return the same profiles in windows of about so many frames.
+
+        Where more are missing, a window ends, and the frame before is one by itself: the clock may bend there.
+        """
         count = max(len(self.value) // max(frames_each, 1), 1)
         starts = np.linspace(0, len(self.value), count, endpoint=False).astype(np.int64)
-        return replace(self, window_start=starts)
+        after = np.flatnonzero(np.diff(self.index) > max(frames_each, 1)) + 1
+        return replace(self, window_start=np.union1d(starts, np.concatenate([after - 1, after])))
+
+    @property
+    def window_frames(self) -> int:
+        """How many frames a window usually has."""
+        return int(np.median(np.diff(self.window_start, append=len(self.value))))
 
     def binned(self, bins: int) -> "Profiles":
         """Average neighbouring rows, so that at most ``bins`` are left."""

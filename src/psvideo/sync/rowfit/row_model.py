@@ -18,6 +18,8 @@ IntArray = NDArray[np.int64]
 
 REACH = 9.0
 """After so many fall times a flash is taken to be over."""
+OVER = 40.0
+"""After so many no number of double precision shows that it is not."""
 LEFT, RIGHT, EXPOSURE, ROW_TIME, RISE, FALL, BLUR = range(7)
 """The signals of a step: the shift at a window's left and right end, exposure, row time, rise and fall time, blur."""
 SIGNALS = 7
@@ -102,6 +104,7 @@ def see(rows: Rows, flashes: Flashes, frame: int, row: int, k: int, design: Floa
     close_s = open_s + rows.exposure_s
     near_s = SPREAD * flashes.blur_s
     tail_s = REACH * flashes.fall_s + near_s
+    over_s = OVER * flashes.fall_s + near_s
     while k < len(flashes.start_s) and flashes.start_s[k] + flashes.duration_s[k] + tail_s <= open_s:
         k += 1
     j = k
@@ -111,6 +114,8 @@ def see(rows: Rows, flashes: Flashes, frame: int, row: int, k: int, design: Floa
             start_s, duration_s = flashes.start_s[j], flashes.duration_s[j]
             if flashes.rise_s == 0.0 and flashes.fall_s == 0.0 and flashes.blur_s == 0.0:
                 design[u] += max(min(close_s, start_s + duration_s) - max(open_s, start_s), 0.0) / duration_s
+            elif open_s <= start_s - near_s and close_s >= start_s + duration_s + over_s:
+                design[u] += 1.0
             else:
                 after, _ = given_off(close_s - start_s, duration_s, flashes.rise_s, flashes.fall_s, flashes.blur_s)
                 before, _ = given_off(open_s - start_s, duration_s, flashes.rise_s, flashes.fall_s, flashes.blur_s)
@@ -169,6 +174,8 @@ def slopes(
     probe_s = 0.01 * flashes.duration_s[0]
     near_s = SPREAD * blur_s
     tail_s = REACH * fall_s + near_s
+    before_s = near_s + (SPREAD * probe_s if tails else 0.0)
+    over_s = OVER * (fall_s + (probe_s if tails else 0.0)) + before_s
     signals[:] = 0.0
     j = k
     while j > 0 and flashes.start_s[j - 1] + flashes.duration_s[j - 1] + tail_s + REACH * probe_s > open_s:
@@ -179,6 +186,9 @@ def slopes(
         if u > 0:
             d = flashes.duration_s[j]
             since_close, since_open = close_s - flashes.start_s[j], open_s - flashes.start_s[j]
+            if since_open <= -before_s and since_close >= d + over_s:  # wholly seen, however it is moved a little
+                j += 1
+                continue
             after, after_rate = given_off(since_close, d, rise_s, fall_s, blur_s)
             before, before_rate = given_off(since_open, d, rise_s, fall_s, blur_s)
             closing += brightness[u] * after_rate

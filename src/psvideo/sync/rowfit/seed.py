@@ -10,7 +10,17 @@ from psvideo.model.plan import UNKNOWN_CLOCK_PPM, Plan
 from psvideo.sync.rowfit.beat import Beat, FoundClock
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import refined_beat
-from psvideo.sync.rowfit.retime import Mask, Numbering, as_numbered, fold_frames, inserted, likeliest, stood_in, twins
+from psvideo.sync.rowfit.retime import (
+    BESIDE,
+    Mask,
+    Numbering,
+    as_numbered,
+    fold_frames,
+    inserted,
+    likeliest,
+    stood_in,
+    twins,
+)
 from psvideo.sync.rowfit.rounds_first import search_coded
 from psvideo.sync.rowfit.search import search
 from psvideo.sync.rowfit.track import frame_losses
@@ -98,7 +108,8 @@ def _retimed(plan: Plan, rows: Profiles, twin: Mask, reach_ppm: float) -> Iterat
     length = min(fold_frames(plan, rows), len(rows.value))
     for start in dict.fromkeys((0, (len(rows.value) - length) // 2)):
         for base in bases:
-            yield from _folded(plan, rows, base, slice(start, start + length), reach_ppm)
+            if base.kept[start : start + length].sum() > 2 * BESIDE:
+                yield from _folded(plan, rows, base, slice(start, start + length), reach_ppm)
 
 
 def _folded(plan: Plan, rows: Profiles, base: Numbering, frames: slice, reach_ppm: float) -> Iterator[Seed]:

@@ -267,7 +267,7 @@ def with_repeats(plan: Plan, rows: Profiles, tracked: FrameTrack, kept: Mask) ->
             there, here = (_fits(plan, rows, tracked, kept, block, places) for places in (own, index))
             natural = open_places & (there < here + NATURAL)
             index[block] = np.where(natural, own[block], index[block])
-    return replace(tracked, index=index)
+    return replace(tracked, index=np.maximum.accumulate(index))
 
 
 def _fits(plan: Plan, rows: Profiles, tracked: FrameTrack, kept: Mask, block: slice, places: IntArray) -> FloatArray:
