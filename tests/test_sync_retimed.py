@@ -277,14 +277,10 @@ def test_doubled_durations_are_refused(plan: Plan) -> None:
 
 
 @pytest.mark.campaign
-@pytest.mark.parametrize("dark", [slice(80, 170), slice(100, 160)])
-def test_a_stretch_that_nothing_lights_is_left_out_and_the_rest_timed(dark: slice, make_plan: PlanMaker) -> None:
+def test_a_picture_that_freezes_for_a_while_is_repeated_and_the_rest_timed(make_plan: PlanMaker) -> None:
     plan = make_plan(height_px=24, width_px=12)
     profiles = shot_of(plan, 240).frames.mean(axis=2, dtype=np.float64)
-    noise = np.random.default_rng(1).standard_normal(profiles[dark].shape)
-    profiles[dark] = 0.003 + 1e-4 * noise
+    profiles[80:170] = profiles[80]
     timing = find_timing(plan, np.arange(240), profiles)
-    assert set(timing.repeated_frames) <= set(range(dark.start, dark.stop))
-    assert len(timing.repeated_frames) > 0.9 * (dark.stop - dark.start)
-    assert all(dark.start - 1 <= hole.after < dark.stop for hole in timing.dropped_frames)
+    assert set(range(81, 170)) <= set(timing.repeated_frames)
     assert timing.phase_error_rows < 0.2

@@ -15,9 +15,11 @@ from psvideo.sync.rowfit.plateau import centred
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import Fit, explained
 from psvideo.sync.rowfit.restless import across, restless
-from psvideo.sync.rowfit.seed import find_seed
+from psvideo.sync.rowfit.retime import Mask, stood_in
+from psvideo.sync.rowfit.seed import find_seed, renumbered
 from psvideo.sync.rowfit.softness import misfit
 from psvideo.sync.rowfit.track import FrameTrack
+from psvideo.sync.rowfit.unlit import unlit, with_unlit
 
 TRACK_ROWS = 60
 COARSE_ROWS = 288
@@ -43,12 +45,14 @@ class ClipFit:
     ``trusted`` are the first and the last place in time at which frames fit. ``slack_s`` is by how much all flashes
     could come earlier or later and the picture be the same, 0 where it shows their times; ``soft_s`` is how soft the
     edges are where that was not taken for LEDs' tails, else 0. ``across`` is how much of what split flashes show is
-    explained (0 to 1) where flashes differ because the subject moves, else 0.
+    explained (0 to 1) where flashes differ because the subject moves, else 0. ``unlit`` (frame,) are frames that were
+    left out because no flash lights them.
     """
 
     fit: Fit
     rows: Profiles
     track: FrameTrack
+    unlit: Mask
     jitter: Jitter
     steps: int
     strayed: int
@@ -63,6 +67,9 @@ def find(plan: Plan, rows: Profiles, *, measured: tuple[str, ...] = ()) -> ClipF
 
     ``measured`` names times that are fitted even where the plan gives them, as the readout is where it is unknown.
     """
+    whole, dark = rows, unlit(plan, rows)
+    if dark.any():
+        rows = renumbered(rows, stood_in(rows, dark))
     seed = find_seed(plan, rows)
     if seed.beat.upward:
         rows = rows.turned()
@@ -104,7 +111,8 @@ def find(plan: Plan, rows: Profiles, *, measured: tuple[str, ...] = ()) -> ClipF
     return ClipFit(
         fit=replace(as_seen, shift_error_s=error_s),
         rows=plain,
-        track=tracked,
+        track=replace(tracked, index=with_unlit(whole, tracked.index, dark)),
+        unlit=dark,
         jitter=stray,
         steps=course.steps,
         strayed=course.strayed,

@@ -30,7 +30,14 @@ def remarks_on_frames(plan: Plan, found: ClipFit, numbered: NDArray[np.int64]) -
             f"Of every {step.denominator} frames the clip repeats {step.denominator - step.numerator}, regularly, as a "
             f"movie that was made {rate:.6g} frames a second from {shown}; repeated ones are left out."
         )
-    for name, place in (("first", found.trusted[0] - index[0]), ("last", index[-1] - found.trusted[1])):
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], found.unlit.astype(np.int64), [0]])))
+    for first, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        yield (
+            f"No flash lights {end - first} frames in a row, {numbered[first]} to {numbered[end - 1]}: the strobe had "
+            "not begun, had stopped, or was covered. They are left out."
+        )
+    lit = index[~found.unlit]
+    for name, place in (("first", found.trusted[0] - lit[0]), ("last", lit[-1] - found.trusted[1])):
         if place:
             yield (
                 f"The {name} frame (or the {name} few) fit no place in time, or more than one, as when frames are "

@@ -1,0 +1,86 @@
+"""A strobe that starts after the camera, stops before it, or is covered for a while."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from psvideo.model.camera import FloatArray
+from psvideo.model.plan import Plan
+from psvideo.sync.find import find_timing
+from psvideo.sync.rowfit.profiles import Profiles
+from psvideo.sync.rowfit.unlit import unlit, with_unlit
+from psvideo.synth import Exposure, Noise, TrueClock, expose
+
+PlanMaker = Callable[..., Plan]
+FRAMES = 110
+
+
+@pytest.fixture
+def plan(make_plan: PlanMaker) -> Plan:
+    return make_plan(height_px=48, width_px=12)
+
+
+def shot_of(plan: Plan) -> Exposure:
+    rng = np.random.default_rng(5)
+    plates = {slot: (0.2 + 0.5 * rng.random((48, 12))).astype(np.float32) for slot in plan.lit_slots}
+    clock = TrueClock(phase_s=0.0123, offset_ppm=80.0)
+    return expose(plates, plan, frames=FRAMES, clock=clock, ambient=0.02, noise=Noise(full_well_e=2e5, read_e=5))
+
+
+def profiles_of(shot: Exposure, dark: slice) -> FloatArray:
+    """Return the shot's row means with some frames that ambient light alone is in."""
+    profiles: FloatArray = shot.frames.mean(axis=2, dtype=np.float64)
+    profiles[dark] = profiles.min(axis=0) + 2e-4 * np.random.default_rng(1).random(profiles[dark].shape)
+    return profiles
+
+
+def laid_out(plan: Plan, profiles: FloatArray) -> Profiles:
+    return Profiles(
+        value=profiles,
+        index=np.arange(len(profiles), dtype=np.int64),
+        period_s=plan.camera.frame_period_s,
+        place=np.arange(float(profiles.shape[1])),
+        window_start=np.zeros(1, np.int64),
+    )
+
+
+@pytest.mark.parametrize("dark", [slice(0, 40), slice(60, 110), slice(40, 75)])
+def test_frames_without_the_strobe_are_left_out_and_said(dark: slice, plan: Plan) -> None:
+    shot = shot_of(plan)
+    timing = find_timing(plan, np.arange(FRAMES), profiles_of(shot, dark))
+    true_s = np.array([flash.start_s for flash in shot.flashes])
+    off_s = np.abs(true_s[:, None] - timing.start_s).min(axis=0)
+    assert off_s.max() < 0.03 * plan.camera.row_time_s
+    assert timing.dropped_frames == ()
+    assert timing.repeated_frames == ()
+    count = dark.stop - dark.start
+    assert any(f"No flash lights {count} frames in a row, {dark.start} to {dark.stop - 1}" in n for n in timing.notes)
+    assert not any("fit no place in time" in note for note in timing.notes)
+    whole = [flash for flash in timing.flashes if flash.complete]
+    period_s = plan.camera.frame_period_s
+    lit_s = np.delete(np.arange(FRAMES), dark) * period_s
+    assert len(whole) > 0.8 * len(lit_s) * period_s / (plan.cycle_s / len(plan.cycle_slots))
+
+
+def test_dark_slots_and_repeated_frames_are_not_left_out(make_plan: PlanMaker) -> None:
+    plan = make_plan(height_px=48, width_px=12, readout=0.2)
+    profiles = shot_of(plan).frames.mean(axis=2, dtype=np.float64)
+    shown_five_times = np.repeat(profiles, 5, axis=0)
+    assert (np.ptp(profiles, axis=1) < 0.01).sum() > 10
+    for value in (profiles, shown_five_times):
+        assert not unlit(plan, laid_out(plan, value)).any()
+
+
+def test_a_subject_that_is_bright_for_a_moment_leaves_no_others_out(plan: Plan) -> None:
+    profiles = shot_of(plan).frames.mean(axis=2, dtype=np.float64)
+    profiles[:102] = 0.02 + 0.01 * (profiles[:102] - 0.02)
+    assert not unlit(plan, laid_out(plan, profiles)).any()
+
+
+def test_frames_left_out_keep_their_places_among_those_that_were_found(plan: Plan) -> None:
+    rows = laid_out(plan, np.zeros((9, 2)))
+    dark = np.array([True, True, False, False, True, True, False, False, True])
+    assert with_unlit(rows, np.array([2, 3, 6, 7]), dark).tolist() == list(range(9))
+    assert with_unlit(rows, np.array([2, 4, 9, 10]), dark).tolist() == [0, 1, 2, 4, 5, 6, 9, 10, 11]
+    assert with_unlit(rows, np.array([2, 3, 5, 6]), dark).tolist() == [0, 1, 2, 3, 4, 5, 5, 6, 7]
