@@ -34,11 +34,11 @@ def little_is_long(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(long_takes, "ENOUGH_SAMPLES", 12_000)
 
 
-def drifting(plan: Plan) -> Exposure:
+def drifting(plan: Plan, noise: Noise) -> Exposure:
     rng = np.random.default_rng(4)
     scene = {slot: (0.2 + 0.5 * rng.random((ROWS, 6))).astype(np.float32) for slot in plan.lit_slots}
     clock = TrueClock(phase_s=0.0123, offset_ppm=60.0, drift_ppm_per_s=30.0, jitter_s=0.0)
-    return expose(scene, plan, frames=FRAMES, clock=clock, noise=Noise(full_well_e=20_000, read_e=8), bits=12)
+    return expose(scene, plan, frames=FRAMES, clock=clock, noise=noise, bits=12)
 
 
 def timed(plan: Plan, shot: Exposure, profiles: FloatArray) -> Timing:
@@ -59,16 +59,16 @@ def means(shot: Exposure) -> FloatArray:
 
 @pytest.mark.usefixtures("little_is_long")
 def test_a_clock_that_drifts_is_followed_through_frames_that_the_first_fit_left_out(plan: Plan) -> None:
-    shot = drifting(plan)
+    shot = drifting(plan, Noise(full_well_e=100, read_e=20))
     timing = timed(plan, shot, means(shot))
     off = errors_in_rows(timing, shot, plan)
-    assert off.max() < 0.1
+    assert off.max() < 0.3
     assert float(np.sqrt(np.mean(off**2))) < 2 * timing.phase_error_rows
 
 
 def test_a_chapter_in_the_dark_is_bridged_from_those_beside_it(plan: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(long_takes, "ENOUGH_SAMPLES", ROWS * 150)
-    value = means(drifting(plan))
+    value = means(drifting(plan, Noise(full_well_e=20_000, read_e=8)))
     value[450:750] = 0.003 + 1e-4 * np.random.default_rng(1).standard_normal((300, ROWS))
     at_s = np.linspace(0.0, 10.5, 12)
     late_s = 15e-6 * at_s**2

@@ -72,9 +72,10 @@ def test_dark_slots_and_repeated_frames_are_not_left_out(make_plan: PlanMaker) -
         assert not unlit(plan, laid_out(plan, value)).any()
 
 
-def test_a_subject_that_is_bright_for_a_moment_leaves_no_others_out(plan: Plan) -> None:
+@pytest.mark.parametrize(("dim", "share"), [(90, 0.02), (102, 0.002)])
+def test_a_subject_that_is_bright_for_a_moment_leaves_no_others_out(dim: int, share: float, plan: Plan) -> None:
     profiles = shot_of(plan).frames.mean(axis=2, dtype=np.float64)
-    profiles[:102] = 0.02 + 0.01 * (profiles[:102] - 0.02)
+    profiles[:dim] = 0.02 + share * (profiles[:dim] - 0.02)
     assert not unlit(plan, laid_out(plan, profiles)).any()
 
 
