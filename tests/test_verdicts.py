@@ -652,6 +652,13 @@ def test_a_dead_light_among_enough_others_is_named_and_left_out_and_the_rig_is_s
     assert graded(rig_but_leaning(wrong), "rig") in ("doubtful", "bad")
 
 
+@pytest.mark.parametrize("lights", [3, 5])
+def test_three_lights_do_not_show_how_far_normals_are_off_and_that_is_said(lights: int) -> None:
+    said = accuracy(Footage(lights=lights, solved=True).observed(0))
+    grades = [line.grade for line in said if "three lights explain any surface" in line.found]
+    assert grades == (["unknown"] if lights == 3 else [])
+
+
 def test_many_dead_lights_are_one_line() -> None:
     (line,) = lamps(Footage(lights=10, gains=[1, 1, 0, 1, 0, 0, 0, 0, 1, 1], solved=True).observed(0))
     assert line.found == (

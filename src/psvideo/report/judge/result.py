@@ -26,6 +26,8 @@ NOT_MATTE = 0.1
 HARDLY_OFF = 0.05
 """Four directions that are 5 degrees off leave 1 to 3 % of the light, 10 degrees 2 to 6 % (normals are 4 to 10 degrees
 off), 20 degrees 6 to 11 %."""
+ALL_EXPLAINED = 3
+"""So many lights leave nothing over that could be held against a normal."""
 MOVING_FACTOR = 2.0
 """Where the picture moves, this many times more may be left unexplained: no rig explains what moved between flashes."""
 LEAST_VALID, HARDLY_VALID = 0.6, 0.2
@@ -104,7 +106,7 @@ def _trusting(observed: Observed) -> str:
             "Move slower, raise the frame rate or flash fewer lights, and give fine detail to follow: plates of what "
             'moves must be brought together. `aov=["error"]` says how far off each pixel may be.'
         )
-    said = any(one.grade != "good" for one in accuracy(observed))
+    said = any(one.grade in ("doubtful", "bad") for one in accuracy(observed))
     if said and by_noise_deg(observed.facts) < LITTLE_NOISE_DEG:
         return "More light does not help; the line on the typical error says what does."
     return "Give more light, or use more lights" + (
@@ -115,6 +117,13 @@ def _trusting(observed: Observed) -> str:
 def accuracy(observed: Observed) -> Iterator[Judgement]:
     """Judge how far off a typical normal is by more than noise, and what makes it so."""
     error_deg = off_deg(observed)
+    if error_deg is None and int(observed.firing.sum()) == ALL_EXPLAINED and _solved(observed.facts):
+        yield Judgement(
+            subject="accuracy",
+            grade="unknown",
+            found="How far normals are off beyond noise is not known: three lights explain any surface, also one that "
+            "shines or lies in other light. Four and more show it.",
+        )
     if error_deg is None or error_deg < by_noise_deg(observed.facts):  # what noise hides cannot be told from it
         return
     amount = f"about {error_deg:.0f} degrees" if error_deg > 1.5 else "no more than about a degree"
@@ -146,6 +155,10 @@ def accuracy(observed: Observed) -> Iterator[Judgement]:
         if by_rig
         else 'More lights, far apart, average it out; `aov=["error"]` says how far off each pixel may be.',
     )
+
+
+def _solved(facts: Sequence[InstantFacts]) -> bool:
+    return any(one.valid_share is not None for one in facts)
 
 
 def off_deg(observed: Observed) -> float | None:
