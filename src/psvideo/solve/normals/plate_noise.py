@@ -88,9 +88,11 @@ def _by_level(detail: Values, level: Values, rounding: Values) -> tuple[Values, 
     ``rounding`` is the squared distance of codes."""
     detail, level, rounding = detail.ravel() ** 2, level.ravel(), rounding.ravel() / 12
     parts = np.array_split(np.argsort(level), LEVELS)
-    at = np.array([float(np.median(level[part])) for part in parts])
-    rounded = np.array([float(np.median(rounding[part])) for part in parts])
+    at = np.array([(level[part[(len(part) - 1) // 2]] + level[part[len(part) // 2]]) / 2 for part in parts])  # medians
     found = np.array([float(np.quantile(detail[part], LOW_SHARE)) / LOW_OF_VARIANCE for part in parts])
+    if not rounding.any():
+        return at, found
+    rounded = np.array([float(np.median(rounding[part])) for part in parts])
     return at, np.maximum(found - rounded, rounded)  # of the samples a twelfth is what blurred the codes
 
 
