@@ -116,8 +116,9 @@ def test_every_round_of_photographs_has_its_result_the_last_one_too(tmp_path: Pa
     assert len(written(tmp_path / "out", "normals")) == rounds
 
 
-def test_a_take_that_is_all_noise_gives_no_normal_and_says_why(tmp_path: Path) -> None:
-    clip = take(tmp_path / "take", [noise(seed) for seed in range(5)])
+@pytest.mark.parametrize("first", [0, 5, 25, 35])
+def test_a_take_that_is_all_noise_gives_no_normal_and_says_why(tmp_path: Path, first: int) -> None:
+    clip = take(tmp_path / "take", [noise(seed) for seed in range(first, first + 5)])
     report = solved(clip, tmp_path / "out", aov=["alpha"])
     assert judged(report, "exposure").startswith("bad: ")
     assert judged(report, "validity").startswith("bad: Only 0 %")

@@ -132,7 +132,7 @@ def test_plates_are_let_go_while_their_surface_waits_to_be_written(
             del instant
 
     @contextlib.contextmanager
-    def never_written() -> Iterator[Callable[[Callable[[], None]], None]]:
+    def never_written(**_: int) -> Iterator[Callable[[Callable[[], None]], None]]:
         yield jobs.append
 
     monkeypatch.setattr(runs, "surfaces", watched)

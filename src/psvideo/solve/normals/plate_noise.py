@@ -112,14 +112,17 @@ def _lesser(alone: PlateNoise, at: Values, found: Values, *, dark_share: float) 
     where that is less: detail only ever adds to it.
 
     In the dark single plates count, as far as a picture has any (``dark_share``): there is no paint, and noise of an
-    ambient picture that was taken off all plates is alike in all of them, which a normal and an albedo explain.
+    ambient picture that was taken off all plates is alike in all of them, which a normal and an albedo explain. Where
+    levels are much alike, no line through them tells the dark: less than the share that is left of the single plates'
+    is not believed.
     """
     bright = at > BRIGHT * at.max()
     if at.max() <= 0 or not bright.any():
         return alone
-    left = min(alone.read, _line(at, found).read)
-    read = left + (alone.read - left) * dark_share
     level = float(np.median(at[bright]))
+    share = float(np.median(found[bright])) / alone.at(level) ** 2
+    left = min(alone.read, max(_line(at, found).read, share * alone.read))
+    read = left + (alone.read - left) * dark_share
     photon = float(np.median(np.maximum(found[bright] - left, 0) / at[bright]))
     return PlateNoise(read=read, photon=min(photon, max(alone.at(level) ** 2 - read, 0.0) / level))
 
