@@ -27,7 +27,7 @@ HARDLY_OFF = 0.05
 """Four directions that are 5 degrees off leave 1 to 3 % of the light, 10 degrees 2 to 6 % (normals are 4 to 10 degrees
 off), 20 degrees 6 to 11 %."""
 ALL_EXPLAINED = 3
-"""So many lights leave nothing over that could be held against a normal."""
+"""This many lights leave no residual: a normal and an albedo explain three brightnesses exactly."""
 MOVING_FACTOR = 2.0
 """Where the picture moves, this many times more may be left unexplained: no rig explains what moved between flashes."""
 LEAST_VALID, HARDLY_VALID = 0.6, 0.2

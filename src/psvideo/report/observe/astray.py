@@ -23,7 +23,7 @@ from psvideo.report.observe.rigpoints import CHANNEL, RigPoints
 LEAST_LIGHTS = 5
 """Of four, one value a pixel is left over, which errors of many kinds explain."""
 MOST_LIGHTS = 24
-"""Of more, so many are asked, evenly over the list: they tell whether the camera stood."""
+"""Of more pictures this many are compared, spread evenly over the list: they tell whether the camera stood."""
 PARTS, LEAST_PARTS, PART_PX = 4, 6, 160
 """Parts down and across the subject, how many must have something to say, and the pixels of each that are looked at."""
 FINE_PX, BROAD_PX = 1.0, 4.0
@@ -37,7 +37,7 @@ LEAST_PIXELS = 150
 SLACK = 1e-3
 """What is common to all pictures is not known: it is taken for none."""
 LEAST_SHOWN_PX, SURELY = 0.5, 2.5
-"""Pictures that lie so far apart, and so many times farther than is unsure, do not belong together. (Where the camera
+"""Pictures that lie this far apart, and this many times their standard error, do not belong together. (Where the camera
 stood: 0.02 to 0.29 px on six photographed objects, 0.01 to 0.5 on rendered ones, 2.2 times the error at most; 0.24 to
 0.40 px on three whose neighbouring pictures show by themselves that the camera was touched.)"""
 OF_MEDIAN = 1.25 * 1.4826

@@ -25,7 +25,7 @@ SQUARE_PX, SQUARES = 160, 12
 pixel."""
 COARSE = 4
 EACH = 4
-"""Noise is the median over every so many rows and columns: it varies by less than a hundredth."""
+"""Noise is the median over every nth row and column: it varies by less than a hundredth."""
 STEEP_SQUARE = 0.98
 STEEPEST = 1e-3
 """A slope counts from a quarter of the one that this share of the picture exceeds."""

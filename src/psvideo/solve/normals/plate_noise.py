@@ -15,14 +15,14 @@ Values = NDArray[np.float64]
 LEAST = 0.0003
 """No camera is believed to be less noisy than this, in units of saturation: half a code of ten bits."""
 ROWS, SAMPLES = 24, 1 << 16
-"""Noise is looked for in about so many rows of every plate, evenly spread, and so many samples of all: of small
+"""Noise is looked for in about this many rows of every plate, evenly spread, and this many samples of all: of small
 pictures in more rows."""
 LEVELS, LEAST_PIXELS, BRIGHT = 12, 512, 0.25
 """What is brighter than such a share of the brightest level shows how noise grows with light."""
 CODE_SAMPLES, LEAST_CODES, ALIKE, COARSEST = 1 << 12, 5, 1.25, 0.025
-"""So many samples of a plate show whether it holds a file's codes: it has few values then, from so many on, which most
-samples share, and half of the gaps between neighbouring ones are alike up to this factor. Codes of eight bits are no
-farther apart, whatever their curve (HLG: 0.021 at the top)."""
+"""This many samples of a plate show whether it holds a file's codes: it then has few values, but at least LEAST_CODES,
+which most samples share, and half of the gaps between neighbouring ones are alike up to this factor. Codes of eight
+bits are no farther apart, whatever their curve (HLG: 0.021 at the top)."""
 LOW_SHARE, LOW_OF_VARIANCE = 0.25, 0.1015
 """Noise comes from the lowest quarter of squared differences, for up to three quarters of a picture may be detail: the
 quarter's border as a share of the mean, for one Gaussian number (chi squared)."""

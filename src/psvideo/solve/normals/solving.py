@@ -25,8 +25,8 @@ Method = Literal["least-squares", "robust"]
 ROBUST_FROM_LIGHTS = 5
 """With five lights a highlight and a shadow can both be seen; with fewer there is nothing to weigh."""
 CERTAIN = 5.0
-"""A measurement counts as lit from so many standard deviations of a dark one on: of three million dark ones, one does,
-and a picture has as many."""
+"""A measurement counts as lit from this many standard deviations of a dark one on: of three million dark ones,
+one does, and a picture has as many."""
 INDIRECT = 0.2
 """Below this share of the pixel's mean, light in shadow may come from neighbouring surfaces: where many measurements
 are brighter it is left out. (Of a surface of albedo 0.5 a wide crease sends back as much.)"""
@@ -49,7 +49,7 @@ class Solving:
     grid_px: int = GRID_PX
 
     def method(self, lights: int) -> Method:
-        """Return the solver for so many lights."""
+        """Return the solver for this many lights."""
         if self.solver == "auto":
             return "robust" if lights >= ROBUST_FROM_LIGHTS else "least-squares"
         return self.solver
@@ -153,7 +153,7 @@ def _usable(noise: PlateNoise, channels: int, method: Method) -> Usable:
 
 
 def trust_note(method: Method, lights: int) -> str:
-    """Return in one sentence what a valid normal of this solver and so many lights can be relied on for."""
+    """Return in one sentence what a valid normal of this solver and this many lights can be relied on for."""
     how = Judging()
     trusted = (
         f"A normal is valid where it was measured and its predicted error is at most {how.most_error_deg:g} degrees. "

@@ -17,10 +17,10 @@ from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import CAUCHY, Fit, explained, scaled
 
 LONG, ENOUGH_SAMPLES = 1_000_000, 250_000
-"""Takes of more row means are long; so many of them are enough for what holds throughout, and for a chapter's clock."""
+"""Takes of more row means are long; the second is enough for what holds throughout, and for the clock of a chapter."""
 STRETCHES, LEAST_WINDOWS = 6, 4
-"""Into so many stretches what is enough is cut, lest all of it be dark, or the subject stand in all of it; each has so
-many windows at least."""
+"""What is enough is cut into this many stretches, lest all of it be dark, or the subject stand in all of it; each has
+this many windows at least."""
 SURE, FAR = 0.05, 0.3
 """Shares of the shortest flash that the error of a chapter's clock, and its way from the one followed roughly, may not
 exceed; else it is bridged from chapter to chapter, as where nothing is lit for a while."""

@@ -69,7 +69,7 @@ class Profiles:
         return replace(self, window_start=np.zeros(1, np.int64))
 
     def windowed(self, frames_each: int) -> "Profiles":
-        """Return the same profiles in windows of about so many frames.
+        """Return the same profiles in windows of about this many frames.
 
         Where more are missing, a window ends, and the frame before is one by itself: the clock may bend there.
         """
@@ -248,5 +248,5 @@ def residuals_of(plan: Plan, timing: Timing, index: IntArray, value: FloatArray)
 
 
 def rows_of_a_part(samples: int) -> int:
-    """Return how many rows or clocks of so many samples each one thread takes at a time."""
+    """Return how many rows or clocks of this many samples each one thread takes at a time."""
     return -(-WORTH_A_THREAD // samples)

@@ -17,9 +17,9 @@ from psvideo.model.camera import FloatArray
 IntArray = NDArray[np.int64]
 
 REACH = 9.0
-"""After so many fall times a flash is taken to be over."""
+"""After this many fall times a flash counts as over."""
 OVER = 40.0
-"""After so many no number of double precision shows that it is not."""
+"""After this many, double precision cannot tell that it is not."""
 LEFT, RIGHT, EXPOSURE, ROW_TIME, RISE, FALL, BLUR = range(7)
 """The signals of a step: the shift at a window's left and right end, exposure, row time, rise and fall time, blur."""
 SIGNALS = 7

@@ -42,7 +42,7 @@ OFTEN = 0.05
 RUN_FRAMES, MOST_RUNS = 16, 24
 """The shortest stretches that are searched, and how many of them."""
 FOLDS, FOLD_ROWS, FITS = 6, 12, 2
-"""Regular numberings that are searched after folding, with so many rows each, and how many of those are fitted."""
+"""Regular numberings that are searched after folding, with this many rows each, and how many of those are fitted."""
 
 
 @dataclass(frozen=True, kw_only=True)

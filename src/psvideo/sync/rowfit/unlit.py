@@ -14,7 +14,7 @@ from psvideo.sync.rowfit.row_model import IntArray
 DARK, FLOOR = 0.02, 2.0
 """A frame is dark whose rows are nearer than this share of their spreads to their darkest, a percentile of each."""
 ROWS = 60
-"""Averaged to so many rows, noise hides less of it."""
+"""Averaged to this many rows, noise hides less of it."""
 LEAST_SHARE = 0.1
 """Where fewer frames than that are lit, it may be the subject that is dark."""
 

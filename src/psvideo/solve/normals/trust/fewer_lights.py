@@ -6,13 +6,13 @@ from numpy.typing import NDArray
 from psvideo.solve.normals.task import PIXEL_CONDITION, Floats
 
 FACED = 400
-"""So many normals of a ball, evenly spread over its picture, say which lights remain."""
+"""This many normals of a ball, evenly spread over its picture, say which lights remain."""
 STEEPEST, GRAZING = 0.1, 0.1
 """The least cosine of these normals to the camera's axis, and of a light that counts."""
 
 
 def widened(matrix: NDArray[np.float64], most: float) -> Floats:
-    """Return by how much the square of a normal's error grows where so many lights reach it, (0 to all of them,).
+    """Return by how much the square of a normal's error grows where this many lights reach it, (0 to all of them,).
 
     Of ``matrix`` (light, 3), intensities times directions. A surface that turns away from some lights leaves those on
     one side, which stand much nearer to a plane than all of them: three of five in a ring leave five times the variance

@@ -164,7 +164,7 @@ class _Spread:
         return bits(surface.residual) if known and surface.residual is not None else NOTHING
 
     def points(self, surface: Surface) -> ThinSurface:
-        """Return every so many rows and columns of a surface, and what noise and residuals make of them."""
+        """Return every nth row and column of a surface, and what noise and residuals make of them."""
         step = self.step
         some = replace(
             surface,
@@ -226,7 +226,7 @@ class _Spread:
 
 
 def _thinned(planes: NDArray[np.floating], step: int) -> NDArray[np.floating]:
-    """Return every so many rows and columns, channels in planes of their own as in a surface."""
+    """Return every nth row and column, channels in planes of their own as in a surface."""
     if planes.ndim == 2:
         return thin(planes, step)
     return np.moveaxis(np.stack([thin(plane, step) for plane in np.moveaxis(planes, -1, 0)]), 0, -1)
