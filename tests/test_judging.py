@@ -287,3 +287,28 @@ def test_trusted_normals_of_one_surface_speak_for_the_rig_where_shadows_spoil_th
     assert over_all < 0.3
     assert agreement >= at_least
     assert (agreement == over_all) == (at_least < 0)
+
+
+def test_errors_that_change_from_block_to_block_as_a_codecs_do_are_not_taken_for_the_surfaces_under_four_lights() -> (
+    None
+):
+    """Blocks of 4 pixels: a surface that is not matte would hide most of its errors from four lights, a codec none."""
+    normals, inside = ball()
+    lights = ring(4, 35.0)
+    rng = np.random.default_rng(3)
+    plates = [
+        (
+            np.where(inside, 0.6 * np.maximum(normals @ light, 0), 0)
+            + inside * np.kron(rng.normal(0, 0.012, (SIZE // 4, SIZE // 4)), np.ones((4, 4)))
+            + rng.normal(0, 0.0008, (SIZE, SIZE))
+        ).astype(np.float32)
+        for light in lights
+    ]
+    lit = Illumination(directions=lights, intensities=np.ones((4, 1)))
+    middle = inside & (normals[..., 2] > 0.6)
+    surface = Solving(error=True).solve(plates, lit, mask=middle)
+    assert surface.error_deg is not None
+    cosine = np.clip((surface.normals.astype(np.float64) * normals).sum(axis=-1), -1, 1)
+    true_deg, claimed_deg = np.degrees(np.arccos(cosine))[middle], surface.error_deg[middle]
+    ratio = float(np.median(claimed_deg) / np.median(true_deg))
+    assert 1 < ratio < 3.1, "2.9 where they are told apart, 3.4 where not"
