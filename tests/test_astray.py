@@ -1,4 +1,4 @@
-"""Photographs that do not lie one over the other: told, with how far, and never where the camera stood."""
+"""Photographs that are not aligned: told, with how far, and never where the camera stood."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -129,12 +129,12 @@ def test_what_moved_is_a_reservation_with_its_size_and_blamed_for_what_normals_a
     moved, (off,) = judged(Astray(typical_px=0.9, error_px=0.1, light="b", most_px=1.6))
     assert moved.grade == "doubtful"
     assert "lie about 0.9 px apart, that of 'b' 1.6" in moved.found
-    assert "the pictures do not lie one over the other" in off.found
+    assert "the pictures are not aligned" in off.found
 
 
 def test_what_stood_is_said_where_it_can_be_told() -> None:
     stood, (off,) = judged(Astray(typical_px=0.04, error_px=0.02, light="b", most_px=0.1))
-    assert (stood.grade, stood.found) == ("good", "The pictures lie one over the other to 0.1 px.")
+    assert (stood.grade, stood.found) == ("good", "The pictures are aligned to within 0.1 px.")
     assert "not quite matte" in off.found
     for unsure in (None, Astray(typical_px=0.9, error_px=0.5, light="b", most_px=1.6)):
         assert judged(unsure)[0].grade == "unknown"

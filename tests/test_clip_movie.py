@@ -515,7 +515,7 @@ def test_pixels_that_are_not_square_are_said(
 ) -> None:
     write_movie(tmp_path / "x.mov", grey_ramp(4), codec="libx264", aspect=aspect)
     found = " ".join(open_clip(tmp_path / "x.mov", plan=plan_for(rows=32, cols=48)).warnings)
-    assert ("its pixels are to be shown 1.333 times as wide as high" in found) == said
+    assert ("its pixels are not square, but 1.333 times as wide as high" in found) == said
 
 
 def test_coding_that_costs_accuracy_is_said(tmp_path: Path, plan_for: Callable[..., Path]) -> None:

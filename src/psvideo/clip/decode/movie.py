@@ -119,8 +119,8 @@ def _pixels_not_square(stream: VideoStream) -> str | None:
     if not aspect or aspect == 1:
         return None
     return (
-        f"its pixels are to be shown {float(aspect):.4g} times as wide as high: results have the movie's pixels, and "
-        "are to be shown alike. Normals stay right; depth and meshes take pixels for square, and want such a movie"
+        f"its pixels are not square, but {float(aspect):.4g} times as wide as high. Results keep the movie's pixels: "
+        "show them as you show the movie. Normals stay right; depth and meshes need square pixels"
     )
 
 

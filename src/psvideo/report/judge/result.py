@@ -136,8 +136,8 @@ def accuracy(observed: Observed) -> Iterator[Judgement]:
         yield Judgement(
             subject="accuracy",
             grade=grade,
-            found=f"{found}: the pictures do not lie one over the other.",
-            advice='Do what is said of motion; `aov=["error"]` says how far off each pixel may be.',
+            found=f"{found}: the pictures are not aligned.",
+            advice='See the line on motion; `aov=["error"]` says how far off each pixel may be.',
         )
         return
     fit = observed.rig_fit

@@ -230,7 +230,7 @@ def motion(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = Fa
 
 
 def _places(observed: Observed) -> Judgement:
-    """Judge whether photographs of a still scene lie one over the other, where that can be told."""
+    """Judge whether photographs of a still scene are aligned, where that can be told."""
     found = observed.astray[0] if observed.astray else None
     if found is None or (not found.shows and found.within_px > LEAST_SHOWN_PX):
         return Judgement(
@@ -240,15 +240,15 @@ def _places(observed: Observed) -> Judgement:
         return Judgement(
             subject="motion",
             grade="good",
-            found=f"The pictures lie one over the other to {max(found.within_px, 0.1):.1f} px.",
+            found=f"The pictures are aligned to within {max(found.within_px, 0.1):.1f} px.",
         )
     more = " or more" if found.typical_px > FAST_PX else ""
     return Judgement(
         subject="motion",
         grade="doubtful",
         found=f"The camera or the subject moved between the pictures: they lie about {found.typical_px:.1f} px{more} "
-        f"apart, that of {found.light!r} {found.most_px:.1f}. Edges and fine detail of the normals are wrong for that.",
-        advice="Take them again from a tripod without touching the camera, or bring them one over the other first.",
+        f"apart, that of {found.light!r} {found.most_px:.1f} px off. Edges and fine detail of the normals suffer.",
+        advice="Take them again from a tripod without touching the camera, or align the pictures first.",
     )
 
 

@@ -1,7 +1,7 @@
 """What is measured on plates and surfaces while a run goes on, for its report.
 
 ``observed`` gathers all of it, round by round; a round's own numbers are its ``facts``. Each has a module: ``levels``
-(exposure), ``motion``, ``astray`` (photographs that do not lie one over the other), ``focus``, ``shadow`` (what is left
+(exposure), ``motion``, ``astray`` (photographs that are not aligned), ``focus``, ``shadow`` (what is left
 where no light reaches), ``steadiness``, ``worst`` (instants to look at), over ``thinned`` pixels. Whether rig and curve
 are right: ``rigpoints``, ``rigfit``, ``nearness``, ``other_curves``, ``slopes``, ``yuille1997``.
 """

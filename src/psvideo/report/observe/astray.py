@@ -56,7 +56,7 @@ class Astray:
 
     @property
     def shows(self) -> bool:
-        """Whether the pictures surely do not lie one over the other."""
+        """Whether the pictures are surely not aligned."""
         return self.typical_px > max(LEAST_SHOWN_PX, SURELY * self.error_px)
 
     @property

@@ -13,6 +13,8 @@ from psvideo.sync.rowfit.row_model import IntArray
 
 DARK, FLOOR = 0.02, 2.0
 """A frame is dark whose rows are nearer than this share of their spreads to their darkest, a percentile of each."""
+VARIES = 0.03
+"""Rows whose spread is below this share of the largest show nothing of the strobe."""
 ROWS = 60
 """Averaged to this many rows, noise hides less of it."""
 LEAST_SHARE = 0.1
@@ -22,7 +24,7 @@ LEAST_SHARE = 0.1
 def unlit(plan: Plan, rows: Profiles) -> Mask:
     """Return the frames that are dark for longer than the plan's own dark times make any, shape (frame,)."""
     few = rows.binned(ROWS)
-    seen = few.spread > 0.03 * few.spread.max()
+    seen = few.spread > VARIES * few.spread.max()
     floor = np.percentile(few.value, FLOOR, axis=0)
     dark = np.abs((few.value - floor) / few.spread)[:, seen].mean(axis=1) < DARK
     edges = np.flatnonzero(np.diff(np.concatenate([[0], dark.astype(np.int64), [0]])))

@@ -43,7 +43,8 @@ MOST_WIDENED = 5.0
 MOVING_DEG, OF_MOTION = np.float32(0.5), 5
 """Where motion turns normals by more, over this many points, residuals are its own, and no misfit of rig or surface."""
 UNEVEN_PX, SURFACES_UNEVEN = 4, np.float32(0.7)
-"""Samples so far apart are compared: nearer ones are alike in what codecs leave."""
+"""Samples this far apart are compared: a codec's errors are alike in nearer ones. The misfit of surfaces changes by
+up to the second share of it, near the noise; only what is beyond that counts as a codec's."""
 
 ENOUGH_LIGHTS = 12
 """What ``hidden`` is measured by: this many lights hide little of what is not matte."""
