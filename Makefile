@@ -63,7 +63,7 @@ $(VENV)/.made:
 $(VENV)/.installed: $(VENV)/.made pyproject.toml constraints.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e .
 	@echo "Compiling, once: up to a minute."
-	@$(BIN)/python -m psvideo.runs.compiling || echo "Going on; the first run will compile." >&2
+	@$(BIN)/python -m psvideo.runs.steps.compiling || echo "Going on; the first run will compile." >&2
 	touch $@
 
 $(VENV)/.installed-test: $(VENV)/.installed

@@ -32,7 +32,7 @@ class BuildWithScenes(build_py):
         before = os.environ.get("PYTHONPATH")  # pip's way to the libraries that it has here for building
         version_in = str(Path("src").resolve())  # the package's own record of itself, which setuptools wrote there
         paths = [str(Path(self.build_lib).resolve()), version_in, *([before] if before else [])]
-        command = [sys.executable, "-B", "-m", "psvideo.runs.compiling"]
+        command = [sys.executable, "-B", "-m", "psvideo.runs.steps.compiling"]
         if subprocess.run(command, env=there | {"PYTHONPATH": os.pathsep.join(paths)}, check=False).returncode:
             self.warn("loops could not be compiled here, and will be by the first run (psvideo doctor --compile)")
 

@@ -17,7 +17,7 @@ from psvideo.model.surface import Surface
 from psvideo.plates.align.denoise import Average, averaged
 from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixture import made
+from psvideo.plates.mixing.mixture import made
 from psvideo.plates.sequence import Round
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.least_squares.woodham1980 import solve

@@ -12,7 +12,7 @@ from psvideo.calibrate.light_pictures import light_pictures
 from psvideo.calibrate.matte import measure_matte_sphere
 from psvideo.calibrate.sphere.outline import given_outline
 from psvideo.calibrate.sphere.sphere_view import SphereView
-from psvideo.model.ground import ground_of
+from psvideo.model.irradiance.ground import ground_of
 from psvideo.model.rig import Light, Rig
 from psvideo.solve.depth import Shaping, View
 from psvideo.solve.near_surface import NearSurface, solve_near

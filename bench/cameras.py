@@ -12,7 +12,7 @@ from bench.timing_scenes import plan_of
 from psvideo.errors import PsvideoError
 from psvideo.model.camera_clocks import CameraClock
 from psvideo.model.plan import Plan
-from psvideo.model.row_profiles import collect
+from psvideo.model.rows.row_profiles import collect
 from psvideo.sync.find import find_timing
 from psvideo.sync.shared_flashes import CameraTake, camera_clocks
 from psvideo.synth import Noise, TrueClock, expose

@@ -20,7 +20,7 @@ from bench.timing_files import read_back, write_h264
 from bench.timing_scenes import plan_of
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import Encoding
-from psvideo.model.row_profiles import collect_with_doubt
+from psvideo.model.rows.row_profiles import collect_with_doubt
 from psvideo.sync.find import find_timing
 from psvideo.synth import Noise, TrueClock, expose
 

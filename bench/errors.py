@@ -11,7 +11,7 @@ from bench.timing import against_truth
 from bench.timing_cases import Case
 from bench.timing_scenes import banded, plan_of, rolling_stripes, tumbling, void
 from psvideo.errors import PsvideoError
-from psvideo.model.row_profiles import collect_with_doubt
+from psvideo.model.rows.row_profiles import collect_with_doubt
 from psvideo.sync.find import find_timing
 from psvideo.synth import TrueClock
 

@@ -20,8 +20,8 @@ sys.path.append(str(Path(__file__).parents[1] / "tests" / "models"))  # the loop
 from firmware_board import firmware_board
 from strobed_loop import StrobedLoop
 
-from psvideo.live.genlock import rows_around, target_of
-from psvideo.live.holding import Holding
+from psvideo.live.following.genlock import rows_around, target_of
+from psvideo.live.following.holding import Holding
 from psvideo.model.camera import Camera
 from psvideo.model.plan import Plan, PlannedFlash
 

@@ -16,7 +16,7 @@ from bench.table import Row
 from psvideo.compute.compiled import FUSED
 from psvideo.model.coded import Coded, Tone
 from psvideo.plates.ambient.ambient_level import AmbientLevel
-from psvideo.plates.mixture import Mixture
+from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.least_squares.kernel import solve_rows
 from psvideo.solve.normals.least_squares.woodham1980 import solve

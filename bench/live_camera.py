@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from psvideo.clip.genicam_camera import HEAD
+from psvideo.clip.streams.genicam_camera import HEAD
 
 BUFFERS = 64
 """Frames that wait to be fetched, as ``genicam_camera`` has its cameras hold."""

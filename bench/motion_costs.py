@@ -1,4 +1,4 @@
-"""What motion costs with alignment as runs have it, by px from flash to flash: the table of `model/motion_cost.py`.
+"""What motion costs with runs' alignment, by px from flash to flash: the table of `model/cost/motion_cost.py`.
 
 python -m bench.motion_costs. Virtual subjects before a mottled wall slide or tumble; a camera's noise is on them. Lost
 is what is trusted at rest and no more; degrees are the mean error of what is trusted, and of every pixel.

@@ -12,7 +12,7 @@ from bench.whole_run_clips import COLS, ROWS, directions
 from psvideo.model.coded import Coded, Tone
 from psvideo.model.surface import Surface
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixture import Mixture
+from psvideo.plates.mixing.mixture import Mixture
 from psvideo.plates.sequence import Round
 from psvideo.report.observe.observed import Observed
 

@@ -10,7 +10,7 @@ from bench.table import Row
 from bench.timing_plates import HeldFrame
 from psvideo.model.camera import Camera
 from psvideo.model.plan import Plan, PlannedFlash
-from psvideo.model.shutter import frames_touched
+from psvideo.model.rows.shutter import frames_touched
 from psvideo.model.timing import Flash, Timing
 from psvideo.plates.split import split
 

@@ -13,7 +13,7 @@ from bench.table import table
 from bench.timing_cases import Case, Filmed, groups
 from bench.timing_plates import HeldFrame, PlateErrors, plate_errors
 from psvideo.errors import PsvideoError
-from psvideo.model.row_profiles import collect_with_doubt
+from psvideo.model.rows.row_profiles import collect_with_doubt
 from psvideo.model.timing import Timing, places_in_time
 from psvideo.sync.find import find_timing
 

@@ -17,7 +17,7 @@ from psvideo.model.camera import Camera
 from psvideo.model.plan import Plan, PlannedFlash, assemble_plan
 from psvideo.model.rig import Light, Rig
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixture import made
+from psvideo.plates.mixing.mixture import made
 from psvideo.plates.sequence import Round
 from psvideo.report.judge.of_ambient import ambient
 from psvideo.report.judge.of_exposure import exposure
@@ -26,7 +26,7 @@ from psvideo.report.judge.of_rig import rig
 from psvideo.report.judge.result import accuracy, off_deg, validity
 from psvideo.report.judgement import verdict_of
 from psvideo.report.observe.observed import Observed
-from psvideo.report.observe.rigpoints import rig_points
+from psvideo.report.observe.rig_and_curve.rigpoints import rig_points
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.solving import Solving
 

@@ -23,7 +23,7 @@ from psvideo.plates.align.velocity.moving_kernel import AT_REST, BOTH
 from psvideo.plates.align.velocity.vectors import pixels_per_s
 from psvideo.plates.beauty import beauty_of, mix_of
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixture import Mixture, made
+from psvideo.plates.mixing.mixture import Mixture, made
 from psvideo.plates.sequence import Round
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.least_squares.woodham1980 import solve

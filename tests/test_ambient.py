@@ -11,11 +11,11 @@ from memory_frame import MemoryFrame
 from true_timing import true_timing
 
 from psvideo.model.plan import Plan
-from psvideo.model.ripple import Exposures, Ripple
+from psvideo.model.rows.ripple import Exposures, Ripple
 from psvideo.model.timing import Flash, Timing
 from psvideo.plates.ambient import ambient_followed, ambient_off
 from psvideo.plates.ambient.mains import Mains, RowLight, find_ripple
-from psvideo.plates.mixture import made
+from psvideo.plates.mixing.mixture import made
 from psvideo.plates.split import Plate, split
 from psvideo.synth import Noise, TrueClock
 from psvideo.synth.camera.noise import NOISELESS, frame_rng

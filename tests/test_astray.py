@@ -13,14 +13,14 @@ from psvideo.model.rig import Light, Rig
 from psvideo.model.surface import Misfit
 from psvideo.model.timing import Timing
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixture import made
+from psvideo.plates.mixing.mixture import made
 from psvideo.report.judge.result import accuracy
 from psvideo.report.judge.time import motion
 from psvideo.report.judgement import Judgement
 from psvideo.report.observe.astray import Astray, astray
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.observed import Observed
-from psvideo.report.observe.rigpoints import rig_points
+from psvideo.report.observe.rig_and_curve.rigpoints import rig_points
 
 ROWS, COLS = 150, 180
 WHOLE = (slice(0, ROWS), slice(0, COLS))

@@ -21,7 +21,7 @@ from psvideo.errors import PsvideoError
 from psvideo.formats.exr_files import write_exr
 from psvideo.formats.rig_toml import format_rig, read_rig
 from psvideo.model.choices import Prior
-from psvideo.model.ground import ground_of
+from psvideo.model.irradiance.ground import ground_of
 from psvideo.model.rig import Light, Rig
 
 Array = NDArray[np.float64]

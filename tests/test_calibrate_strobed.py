@@ -16,7 +16,7 @@ from psvideo.capture import cameras
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
 from psvideo.model.plan import Plan
-from psvideo.model.row_profiles import collect
+from psvideo.model.rows.row_profiles import collect
 from psvideo.sync.find import find_timing
 from psvideo.synth import Noise, TrueClock, expose
 

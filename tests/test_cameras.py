@@ -23,7 +23,7 @@ from psvideo.model.marker import alike_turns, cycle_places
 from psvideo.model.maximal_length import TAPS, maximal_length
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Flash, Timing
-from psvideo.runs.output import rate_of
+from psvideo.runs.steps.output import rate_of
 from psvideo.strobe.link.boards import BOARDS
 from psvideo.sync.shared_flashes import CameraTake, camera_clocks
 from psvideo.synth import shoot

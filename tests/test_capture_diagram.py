@@ -17,7 +17,7 @@ from psvideo.capture.drawing.shapes import HEIGHT, LIGHT_COLOURS, WIDTH, Label, 
 from psvideo.capture.drawing.timeline import timeline
 from psvideo.errors import UsageError
 from psvideo.model.plan import Plan
-from psvideo.model.shutter import row_weights
+from psvideo.model.rows.shutter import row_weights
 
 MakePlan = Callable[..., Plan]
 CASES: dict[str, dict[str, object]] = {

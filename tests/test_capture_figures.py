@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from psvideo.model.camera import Camera
+from psvideo.model.cost.shoot_figures import dark_row_move_px, frames_per_flash, row_shares, shoot_figures
 from psvideo.model.plan import Mode, Plan, PlannedFlash
-from psvideo.model.shoot_figures import dark_row_move_px, frames_per_flash, row_shares, shoot_figures
 
 
 def paper_plan(

@@ -19,10 +19,10 @@ from psvideo.cli.spelling import spelled
 from psvideo.errors import UsageError
 from psvideo.formats.plan_toml import format_plan, parse_plan
 from psvideo.model.camera import Camera
-from psvideo.model.motion_cost import motion_cost
+from psvideo.model.cost.motion_cost import motion_cost
+from psvideo.model.cost.shoot_figures import shoot_figures
 from psvideo.model.plan import Plan
-from psvideo.model.shoot_figures import shoot_figures
-from psvideo.model.shutter import row_weights
+from psvideo.model.rows.shutter import row_weights
 from psvideo.runs.capture_plan import capture_plan
 
 

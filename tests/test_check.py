@@ -162,7 +162,7 @@ def test_what_cannot_be_checked_is_one_plain_paragraph(
 def test_a_movie_is_not_decoded_to_its_end(
     shot: Callable[[str], Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from psvideo.clip.decode import movie, movie_codes
+    from psvideo.clip.decode.movies import movie, movie_codes
 
     clip = shot("good")
     frames = [read_picture(file, cv2.IMREAD_UNCHANGED) for file in sorted((clip / "frames").iterdir())]

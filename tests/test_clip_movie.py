@@ -14,8 +14,8 @@ import pytest
 from numpy.typing import NDArray
 
 from psvideo.clip import Take, keeping_near, open_clip, read_frames
-from psvideo.clip.decode import movie, yuv
-from psvideo.clip.decode.yuv import CODES, HIGHEST, LOWEST, to_rgb
+from psvideo.clip.decode.movies import movie, yuv
+from psvideo.clip.decode.movies.yuv import CODES, HIGHEST, LOWEST, to_rgb
 from psvideo.clip.record import CodedPicture
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.plan_toml import format_plan
@@ -24,7 +24,7 @@ from psvideo.model.camera import Encoding
 from psvideo.model.plan import Plan
 from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.gather import scheduled
-from psvideo.runs.output import take_rate
+from psvideo.runs.steps.output import take_rate
 from psvideo.sync.take_timing import find_take_timing
 from psvideo.synth import TrueClock, expose
 

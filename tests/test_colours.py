@@ -16,13 +16,13 @@ from psvideo.calibrate.light_pictures import LightPictures, light_pictures
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
 from psvideo.formats.rig_toml import format_rig, parse_rig, read_rig
-from psvideo.model.colours import WHITE, Unmixing, lamps_of, unmixing_of
+from psvideo.model.irradiance.colours import WHITE, Unmixing, lamps_of, unmixing_of
 from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.model.rig import Light, Rig, Vector
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixture import made
+from psvideo.plates.mixing.mixture import made
 from psvideo.plates.sequence import Round
-from psvideo.plates.unmixed import slot_names, unmixed, unmixing_note
+from psvideo.plates.several_lights.unmixed import slot_names, unmixed, unmixing_note
 
 PLACES: dict[str, Vector] = {"key": (0.6, 0.0, 0.8), "left": (-0.48, 0.36, 0.8), "top": (0.0, -0.6, 0.8)}
 COLOURS: dict[str, Vector] = {"red": (1.0, 0.1, 0.02), "green": (0.15, 1.0, 0.2), "blue": (0.02, 0.18, 1.0)}

@@ -17,7 +17,7 @@ import psvideo
 from psvideo.cli.console import compiling_said
 from psvideo.compute.compiled import EXACT, FUSED, REORDERED, sources_digest
 from psvideo.plates.ambient import ambient_kernel
-from psvideo.runs.compiling import USUAL, SmallTake, run_small
+from psvideo.runs.steps.compiling import USUAL, SmallTake, run_small
 from psvideo.solve.filling import looking
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.least_squares import kernel
@@ -232,7 +232,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import psvideo as ps
-from psvideo.runs.compiling import GLOSS, SmallTake
+from psvideo.runs.steps.compiling import GLOSS, SmallTake
 folder = Path(sys.argv[1])
 logging.getLogger("psvideo.compiling").setLevel(logging.INFO)
 logging.getLogger("psvideo.compiling").addHandler(logging.StreamHandler(sys.stdout))
@@ -272,7 +272,7 @@ def test_after_installing_no_run_compiles_however_unusual(tmp_path: Path) -> Non
     package = tmp_path / "there" / "psvideo"
     shutil.copytree(SOURCE, package, ignore=shutil.ignore_patterns("__pycache__"))
     environment = os.environ | {"PYTHONPATH": str(package.parent), "NUMBA_CACHE_DIR": str(tmp_path / "kept")}
-    subprocess.run([sys.executable, "-m", "psvideo.runs.compiling"], env=environment, check=True)
+    subprocess.run([sys.executable, "-m", "psvideo.runs.steps.compiling"], env=environment, check=True)
     command = [sys.executable, "-c", UNUSUAL, str(tmp_path)]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

@@ -22,7 +22,7 @@ from psvideo.export.programs.otio import Footage, Images, timeline_text
 from psvideo.model.choices import Program
 from psvideo.plates.beauty import Mix, beauty_of, mix_of
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixture import made
+from psvideo.plates.mixing.mixture import made
 from psvideo.plates.sequence import Round
 
 otio = pytest.importorskip("opentimelineio")

@@ -10,7 +10,7 @@ from psvideo.model.surface import Surface
 from psvideo.model.timing import Timing
 from psvideo.plates.align.denoise import Average, averaged
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixture import made
+from psvideo.plates.mixing.mixture import made
 from psvideo.plates.sequence import Round
 from psvideo.report.judge.result import steadiness
 from psvideo.report.observe.facts import InstantFacts, instant_facts

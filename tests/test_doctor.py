@@ -74,7 +74,7 @@ def test_the_verdict_closes_what_people_read(capsys: pytest.CaptureFixture[str])
 
 def test_compiling_ahead_comes_first_where_it_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[str] = []
-    monkeypatch.setattr("psvideo.runs.compiling.compile_ahead", lambda *, watch: calls.append("compiled"))
+    monkeypatch.setattr("psvideo.runs.steps.compiling.compile_ahead", lambda *, watch: calls.append("compiled"))
     assert main(["doctor", "-q"]) == 0
     assert calls == []
     assert main(["doctor", "--compile", "-q"]) == 0

@@ -33,7 +33,7 @@ from psvideo.model.choices import Compression
 from psvideo.model.surface import Surface
 from psvideo.model.timing import Flash
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixture import made
+from psvideo.plates.mixing.mixture import made
 from psvideo.plates.split import Plate
 
 TAGS = Tags(fps=Fraction(30000, 1001), colour="lin_rec709_scene", plan_sha256="ab" * 32, rig_sha256="cd" * 32)

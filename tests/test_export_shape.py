@@ -18,7 +18,7 @@ from psvideo.export.mesh_files import srgb_codes, write_part, write_ply
 from psvideo.export.space import CAMERA_SPACE, Space
 from psvideo.export.usd import require_usd
 from psvideo.export.usd.usd_animation import write_animation
-from psvideo.runs.output import Output
+from psvideo.runs.steps.output import Output
 from psvideo.solve.depth import Mesh
 
 SCENES = Path(__file__).resolve().parents[1] / "data_synth"

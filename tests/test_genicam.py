@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from psvideo.cli.app import main
-from psvideo.clip import genicam
-from psvideo.clip.genicam import found_cameras, read_genicam
+from psvideo.clip.streams import genicam
+from psvideo.clip.streams.genicam import found_cameras, read_genicam
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import Camera
 

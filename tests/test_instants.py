@@ -29,10 +29,10 @@ from psvideo.plates.align.comb import comb_of, schedule_of
 from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.gather import gather
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixture import made
+from psvideo.plates.mixing.mixture import made
 from psvideo.plates.sequence import Round
 from psvideo.runs.delivery.relit import TILT, TURN_S, blur_of
-from psvideo.runs.output import rate_of, sequence_fps
+from psvideo.runs.steps.output import rate_of, sequence_fps
 
 PlanMaker = Callable[..., Plan]
 

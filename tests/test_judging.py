@@ -9,7 +9,7 @@ from bench.accuracy_whole import bust
 from ring_and_ball import ring
 
 from psvideo.model.surface import Surface
-from psvideo.report.observe.slopes import coarse_normals, slope_agreement, surface_agreement
+from psvideo.report.observe.rig_and_curve.slopes import coarse_normals, slope_agreement, surface_agreement
 from psvideo.solve.normals.evidence import Evidence, Indirect
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.solving import Solving

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from psvideo.cli.app import main
 from psvideo.clip import open_depth
 from psvideo.errors import PsvideoError
-from psvideo.model.ground import ground_of
+from psvideo.model.irradiance.ground import ground_of
 from psvideo.model.rig import Light, Rig
 from psvideo.solve.depth import View, integrate, scaled
 

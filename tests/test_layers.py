@@ -43,7 +43,7 @@ TWO_OF_A_NAME = {
 }
 """Module names that two rooms have, because the room makes the meaning plain."""
 
-SYNTH_NEVER_USES = ("psvideo.model.shutter", "psvideo.model.recipe")
+SYNTH_NEVER_USES = ("psvideo.model.rows.shutter", "psvideo.model.rows.recipe")
 """The rooms under test are above it, or beside; of the model, it has a shutter of its own."""
 
 

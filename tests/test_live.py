@@ -13,10 +13,10 @@ from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
 from psvideo.formats.rig_toml import format_rig
 from psvideo.live.chain import NewestRound
-from psvideo.live.smaller import Smaller, smaller_plan, smaller_timing
+from psvideo.live.showing.smaller import Smaller, smaller_plan, smaller_timing
 from psvideo.model.coded import Coded, Tone
-from psvideo.model.recipe import flash_recipe
-from psvideo.model.shutter import row_weights
+from psvideo.model.rows.recipe import flash_recipe
+from psvideo.model.rows.shutter import row_weights
 from psvideo.model.surface import Surface
 from psvideo.model.timing import timed_camera
 from psvideo.runs.live import live

@@ -13,8 +13,8 @@ from bench.mirror_scene import Ball, Lamp, Lens, photograph, unit
 
 from psvideo.live.ball_lights import BallLights, lights_on_ball
 from psvideo.live.chain import NewestRound
-from psvideo.live.newest_pictures import NewestPictures
-from psvideo.live.page_server import LivePage, live_page
+from psvideo.live.showing.newest_pictures import NewestPictures
+from psvideo.live.showing.page_server import LivePage, live_page
 from psvideo.model.plan import Plan, PlannedFlash
 from psvideo.model.rig import Light, Rig
 from psvideo.report.judge.powers import power_words

@@ -18,8 +18,8 @@ from bench.live_scene import DIRECTIONS, LOOP_FLASHES, LOOP_FRAMES, OFFSET_PPM, 
 from bench.mirror_scene import Ball, Lamp, Lens, photograph, unit
 
 import psvideo as ps
-from psvideo.clip import genicam
-from psvideo.clip.genicam import found_cameras
+from psvideo.clip.streams import genicam
+from psvideo.clip.streams.genicam import found_cameras
 from psvideo.formats.plan_toml import format_plan
 from psvideo.formats.rig_toml import format_rig
 from psvideo.live.status import LiveStatus

@@ -11,8 +11,8 @@ import pytest
 from memory_frame import MemoryFrame
 
 from psvideo.live.chain import Chain, LiveFrame
-from psvideo.live.newest_pictures import NewestPictures
-from psvideo.live.page_server import LivePage, live_page
+from psvideo.live.showing.newest_pictures import NewestPictures
+from psvideo.live.showing.page_server import LivePage, live_page
 from psvideo.model.plan import Plan
 from psvideo.synth import Noise, TrueClock, expose
 

@@ -18,12 +18,20 @@ from strobed_loop import StrobedLoop
 from psvideo.errors import UsageError
 from psvideo.formats.plan_toml import format_plan
 from psvideo.live.chain import Chain
-from psvideo.live.genlock import STEP_PPM, DarkRow, WantedRow, check_holds, next_trim_ppm, rows_around, target_of
-from psvideo.live.holding import Holding
-from psvideo.live.trims import Trims
+from psvideo.live.following.genlock import (
+    STEP_PPM,
+    DarkRow,
+    WantedRow,
+    check_holds,
+    next_trim_ppm,
+    rows_around,
+    target_of,
+)
+from psvideo.live.following.holding import Holding
+from psvideo.live.following.trims import Trims
 from psvideo.model.plan import Plan
-from psvideo.runs.caller import PYTHON
-from psvideo.runs.live_strobe import held_strobe
+from psvideo.runs.steps.caller import PYTHON
+from psvideo.runs.steps.live_strobe import held_strobe
 from psvideo.strobe.link.boards import BOARDS, MAX_TRIM_PPM
 from psvideo.strobe.link.exchange import RefusedError
 from psvideo.strobe.runlog import RunLog, as_played, format_log

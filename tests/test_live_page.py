@@ -16,9 +16,9 @@ from live_clip import live_clip
 import psvideo as ps
 from psvideo.errors import UsageError
 from psvideo.live.chain import NewestRound
-from psvideo.live.newest_pictures import NewestPictures, lit_rows
-from psvideo.live.page_server import LivePage, live_page
-from psvideo.live.smaller import smaller_plan
+from psvideo.live.showing.newest_pictures import NewestPictures, lit_rows
+from psvideo.live.showing.page_server import LivePage, live_page
+from psvideo.live.showing.smaller import smaller_plan
 from psvideo.live.watching import ENOUGH, Watching, told
 from psvideo.model.camera import Camera
 from psvideo.model.timing import timed_camera

@@ -7,8 +7,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from psvideo.live.behind import Behind
-from psvideo.live.quality import (
+from psvideo.live.incoming.behind import Behind
+from psvideo.live.showing.quality import (
     CALM,
     LONGEST_CALM,
     MOST_AGE_S,
@@ -17,7 +17,7 @@ from psvideo.live.quality import (
     Quality,
     first_quality,
 )
-from psvideo.live.smaller import Smaller
+from psvideo.live.showing.smaller import Smaller
 from psvideo.model.coded import Coded, Tone
 
 ROUNDS_PER_S = 22.0

@@ -18,10 +18,10 @@ import psvideo as ps
 from psvideo.cli.app import main
 from psvideo.compute.compile_count import COMPILING, CompileCount, compiles_counted
 from psvideo.live.chain import Chain, LiveFrame
+from psvideo.live.incoming.source import LiveSource
 from psvideo.live.preparing import compiling_words, prepared
-from psvideo.live.quality import first_quality
 from psvideo.live.running import Running
-from psvideo.live.source import LiveSource
+from psvideo.live.showing.quality import first_quality
 from psvideo.live.status import LiveStatus
 from psvideo.live.waiting import AGAIN_S, SILENT_S, Waiting
 from psvideo.model.coded import Coded, Tone
@@ -43,9 +43,9 @@ LOADS_NOTHING = """
 import sys
 from psvideo.compute.compiled import _Kept
 from psvideo.formats.rig_toml import read_rig
-from psvideo.live.sources import opened_source
+from psvideo.live.incoming.sources import opened_source
 from psvideo.runs.live import live
-from psvideo.runs.live_rehearsal import rehearse
+from psvideo.runs.steps.live_rehearsal import rehearse
 
 clip, loaded, load = sys.argv[1], [], _Kept.load_overload
 _Kept.load_overload = lambda self, *given: loaded.append(self._name) or load(self, *given)
@@ -73,8 +73,8 @@ def test_the_source_is_opened_once_everything_is_ready(clip: Path, monkeypatch: 
         left_alone.append(gc.get_freeze_count())
         return iter(())
 
-    monkeypatch.setattr("psvideo.live.source.read_frames", read)
-    monkeypatch.setattr("psvideo.live.source._kind", lambda clip: None)
+    monkeypatch.setattr("psvideo.live.incoming.source.read_frames", read)
+    monkeypatch.setattr("psvideo.live.incoming.source._kind", lambda clip: None)
     with pytest.raises(ps.PsvideoError, match="0 frames are too few"):
         live(clip)
     assert order == ["rehearsed", "read"]

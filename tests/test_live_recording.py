@@ -12,10 +12,10 @@ import psvideo as ps
 from psvideo.cli.app import main
 from psvideo.clip import open_clip, read_frames
 from psvideo.export.sequences import code_files
-from psvideo.live import recording
 from psvideo.live.chain import LiveFrame
-from psvideo.live.recording import Recording
-from psvideo.live.source import played_clip
+from psvideo.live.incoming import recording
+from psvideo.live.incoming.recording import Recording
+from psvideo.live.incoming.source import played_clip
 from psvideo.model.coded import Coded
 from psvideo.runs.live import live
 

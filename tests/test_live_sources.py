@@ -19,9 +19,9 @@ import psvideo as ps
 from psvideo.cli.app import main
 from psvideo.clip import read_frames
 from psvideo.clip.filters import check_live_filters
-from psvideo.clip.growing_folder import read_growing
 from psvideo.clip.record import Header
-from psvideo.clip.stream import StreamPlaces, read_stream
+from psvideo.clip.streams.growing_folder import read_growing
+from psvideo.clip.streams.stream import StreamPlaces, read_stream
 
 Pictures = list[np.ndarray]
 

@@ -9,13 +9,13 @@ from memory_frame import MemoryFrame
 
 from psvideo.errors import UsageError
 from psvideo.live.chain import Chain, LiveFrame
-from psvideo.live.follow import Follower, State, caught_up
-from psvideo.live.history import timing_of
-from psvideo.live.lock import check_followed, frames_to_lock, lock
-from psvideo.live.phase_filter import Measured, smoothed
+from psvideo.live.following.follow import Follower, State, caught_up
+from psvideo.live.following.history import timing_of
+from psvideo.live.following.lock import check_followed, frames_to_lock, lock
+from psvideo.live.following.phase_filter import Measured, smoothed
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
-from psvideo.model.row_profiles import collect
+from psvideo.model.rows.row_profiles import collect
 from psvideo.model.timing import Timing
 from psvideo.sync.find import find_timing
 from psvideo.synth import Exposure, Noise, TrueClock, expose

@@ -8,7 +8,7 @@ from psvideo.plates.align.doubt.lone_edges import FOLLOWED, InstantSketch, unsur
 from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.align.velocity.flow import Sketch
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixture import made
+from psvideo.plates.mixing.mixture import made
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.normals.trust.moving_doubt import moving_doubt_deg

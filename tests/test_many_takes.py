@@ -6,7 +6,7 @@ from typing import Any
 
 from psvideo.report.judgement import Judgement, verdict_of
 from psvideo.report.of_takes import TakeResult, takes_page, worst_first
-from psvideo.runs.checked import Check, check_page
+from psvideo.runs.steps.checked import Check, check_page
 
 GOOD = Judgement(subject="timing", grade="good", found="Flash times are known to 0.01 row.")
 

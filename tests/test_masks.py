@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 import psvideo as ps
 from psvideo.clip.decode.decoders import decode
-from psvideo.clip.mask_sequence import open_masks
+from psvideo.clip.maps.mask_sequence import open_masks
 
 SIZE, NOISE = 64, 0.002
 DIRECTIONS = [[0.0, 0.0, 1.0], [0.6, 0.0, 0.8], [-0.6, 0.0, 0.8], [0.0, 0.6, 0.8], [0.0, -0.6, 0.8]]

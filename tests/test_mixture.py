@@ -16,15 +16,15 @@ from psvideo.clip import in_file
 from psvideo.clip.in_file import RowsInFile
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import Camera
-from psvideo.model.clipping import SATURATED
 from psvideo.model.coded import Coded, Tone
 from psvideo.model.plan import Plan
-from psvideo.model.row_profiles import row_light
+from psvideo.model.rows.clipping import SATURATED
+from psvideo.model.rows.row_profiles import row_light
 from psvideo.model.timing import Flash, Timing
-from psvideo.plates import ready_mixture
 from psvideo.plates.align.packed import packed
 from psvideo.plates.ambient.ambient_level import AmbientLevel
-from psvideo.plates.mixture import Mixture, combined, made
+from psvideo.plates.mixing import ready_mixture
+from psvideo.plates.mixing.mixture import Mixture, combined, made
 from psvideo.plates.split import split
 
 ROWS, COLS = 46, 38

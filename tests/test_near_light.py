@@ -16,8 +16,8 @@ import psvideo as ps
 from psvideo.cli.app import main
 from psvideo.compute.compiled import EXACT
 from psvideo.errors import PsvideoError
-from psvideo.model.ground import ground_of
-from psvideo.model.near_light import near_field, near_vectors
+from psvideo.model.irradiance.ground import ground_of
+from psvideo.model.irradiance.near_light import near_field, near_vectors
 from psvideo.model.rig import Light, Rig
 from psvideo.model.surface import Surface
 from psvideo.solve import near_surface

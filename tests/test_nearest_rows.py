@@ -8,7 +8,7 @@ import pytest
 
 from psvideo.model.camera import Camera
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixture import made
+from psvideo.plates.mixing.mixture import made
 from psvideo.plates.nearest_rows import LATER, MOST_LATER, has_blind_time, with_nearest_rows
 
 ROWS = 8

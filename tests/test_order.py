@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from psvideo.model.light_field import Points, light_vectors, points_on_plane
+from psvideo.model.irradiance.light_field import Points, light_vectors, points_on_plane
 from psvideo.model.marker import turned_slot
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Light, Rig

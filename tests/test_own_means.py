@@ -8,7 +8,7 @@ from psvideo.plates.align.velocity import moving
 from psvideo.plates.align.velocity.flow import Sketch, sketch_of
 from psvideo.plates.align.velocity.moving import Pair, followed_at
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixture import made
+from psvideo.plates.mixing.mixture import made
 
 SHAPE, STEP_PX, SIDE, HEM = (72, 96), 3, 44, 9
 

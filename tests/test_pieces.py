@@ -24,12 +24,12 @@ from psvideo.errors import AllDoneError, PsvideoError, UsageError
 from psvideo.formats.whole_folders import begun_folder, whole_folder
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Rig
-from psvideo.model.shutter import row_weights
+from psvideo.model.rows.shutter import row_weights
 from psvideo.plates.align import held
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.observed import Observed
+from psvideo.report.observe.rig_and_curve.yuille1997 import Lean
 from psvideo.report.observe.worst import Thumbnail, Worst
-from psvideo.report.observe.yuille1997 import Lean
 from psvideo.runs.instants import pieces
 from psvideo.runs.instants.job import Found
 from psvideo.runs.instants.piece_notes import noted, write_notes

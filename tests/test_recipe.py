@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from psvideo.model.camera import Camera, FloatArray
-from psvideo.model.recipe import FlashRecipe, flash_recipe, frames_of
+from psvideo.model.rows.recipe import FlashRecipe, flash_recipe, frames_of
 from psvideo.model.timing import Flash, Timing
 from psvideo.synth.lamps.emission import Emission
 

@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 from ring_and_ball import ring
 
-from psvideo.model.ground import Ground
+from psvideo.model.irradiance.ground import Ground
 from psvideo.model.rig import Light
 from psvideo.model.surface import Reflectance, Surface
 from psvideo.solve.normals.illumination import Illumination, illumination

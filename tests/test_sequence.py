@@ -11,7 +11,7 @@ from memory_frame import MemoryFrame
 from true_timing import true_timing
 
 from psvideo.model.plan import Plan, PlannedFlash, mixing_matrix, reference_duration_s
-from psvideo.model.shutter import row_weights
+from psvideo.model.rows.shutter import row_weights
 from psvideo.model.timing import Timing
 from psvideo.plates import sequence
 from psvideo.plates.ambient import ambient_off

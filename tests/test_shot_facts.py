@@ -9,7 +9,7 @@ import pytest
 import tomlkit
 
 from psvideo.cli.app import main
-from psvideo.clip.decode.movie_tags import shot_by
+from psvideo.clip.decode.movies.movie_tags import shot_by
 from psvideo.export.sequences.tags import PRIMARIES, Tags
 from psvideo.formats.exr_files import write_exr
 

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from psvideo.model.camera import Camera
-from psvideo.model.shutter import frames_touched, row_weights
+from psvideo.model.rows.shutter import frames_touched, row_weights
 
 shares = st.floats(0.0, 1.0)
 PERIOD_S = 0.01

@@ -15,8 +15,8 @@ from true_timing import true_timing
 
 from psvideo.formats.plan_toml import read_plan
 from psvideo.model.plan import Plan, PlannedFlash
-from psvideo.model.row_profiles import collect
-from psvideo.model.shutter import frames_touched, row_weights
+from psvideo.model.rows.row_profiles import collect
+from psvideo.model.rows.shutter import frames_touched, row_weights
 from psvideo.model.timing import Timing
 from psvideo.plates import hudon2015
 from psvideo.plates.ambient import ambient_off

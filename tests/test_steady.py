@@ -15,7 +15,7 @@ from psvideo.compute.spilled import in_file
 from psvideo.model.surface import MEASURED, NO_LIGHT, ONE_LIGHT, TWO_LIGHTS, Surface
 from psvideo.plates.align.rounds import Aligning, aligned
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixture import made
+from psvideo.plates.mixing.mixture import made
 from psvideo.plates.sequence import POOLED_ROUNDS
 from psvideo.solve import steady
 from psvideo.solve.instants import surfaces

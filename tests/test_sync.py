@@ -15,8 +15,8 @@ from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.plan_toml import read_plan
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan, PlannedFlash
-from psvideo.model.row_profiles import collect
-from psvideo.model.shutter import row_weights
+from psvideo.model.rows.row_profiles import collect
+from psvideo.model.rows.shutter import row_weights
 from psvideo.model.timing import Timing
 from psvideo.sync.find import find_timing
 from psvideo.sync.rowfit.beat import Beat, FoundClock, train_until

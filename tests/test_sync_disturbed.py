@@ -15,8 +15,8 @@ from psvideo.formats.exr_files import write_exr
 from psvideo.formats.plan_toml import format_plan
 from psvideo.formats.timing_json import format_timing, parse_timing, read_timing, timing_record
 from psvideo.model.plan import Plan, PlannedFlash
-from psvideo.model.ripple import Exposures
-from psvideo.model.row_profiles import collect_with_doubt
+from psvideo.model.rows.ripple import Exposures
+from psvideo.model.rows.row_profiles import collect_with_doubt
 from psvideo.model.timing import DroppedFrames, Timing, places_in_time
 from psvideo.plates.gather import gather
 from psvideo.sync.find import find_timing

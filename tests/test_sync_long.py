@@ -11,11 +11,12 @@ from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.sync.find import find_timing
-from psvideo.sync.rowfit import bend, long_takes
+from psvideo.sync.rowfit import long_takes
 from psvideo.sync.rowfit.beat import FoundClock
+from psvideo.sync.rowfit.coarse.seed import first_guess
 from psvideo.sync.rowfit.long_takes import LEAST_WINDOWS, STRETCHES, stretches
 from psvideo.sync.rowfit.profiles import Profiles
-from psvideo.sync.rowfit.seed import first_guess
+from psvideo.sync.rowfit.unknowns import bend
 from psvideo.synth import Exposure, Noise, TrueClock, expose
 
 PlanMaker = Callable[..., Plan]

@@ -9,16 +9,16 @@ from bench.timing_cases import Case, groups
 from bench.timing_scenes import plan_of, rolling_stripes
 
 from psvideo.errors import NoStrobeError
-from psvideo.model.row_profiles import collect_with_doubt
+from psvideo.model.rows.row_profiles import collect_with_doubt
 from psvideo.model.timing import Timing
 from psvideo.sync.find import find_timing
 from psvideo.sync.rowfit.beat import FoundClock
-from psvideo.sync.rowfit.freed import taken_away
+from psvideo.sync.rowfit.coarse.seed import first_guess
 from psvideo.sync.rowfit.profiles import Profiles, compiled_flashes, compiled_rows, unexplained
 from psvideo.sync.rowfit.refine import Fit, robust_loss
 from psvideo.sync.rowfit.row_model import seen_of
-from psvideo.sync.rowfit.seed import first_guess
-from psvideo.sync.rowfit.whitening import factors, whiten
+from psvideo.sync.rowfit.unknowns.freed import taken_away
+from psvideo.sync.rowfit.unknowns.whitening import factors, whiten
 
 EVERYTHING = groups()["Several at once"]["everything: void, tumbling, drift, tails, flicker, readout"]
 

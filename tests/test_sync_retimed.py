@@ -14,11 +14,11 @@ from psvideo.errors import PsvideoError
 from psvideo.model.plan import Plan
 from psvideo.model.timing import DroppedFrames, Timing, places_in_time
 from psvideo.sync.find import find_timing
-from psvideo.sync.rowfit import seed as seed_module
+from psvideo.sync.rowfit.coarse import seed as seed_module
+from psvideo.sync.rowfit.coarse.retime import regular_step, twins
+from psvideo.sync.rowfit.coarse.seed import find_seed, other_seeds
 from psvideo.sync.rowfit.fit import find
 from psvideo.sync.rowfit.profiles import Profiles
-from psvideo.sync.rowfit.retime import regular_step, twins
-from psvideo.sync.rowfit.seed import find_seed, other_seeds
 from psvideo.sync.verdict.believed import convincing
 from psvideo.sync.verdict.refusal import clock_too_far
 from psvideo.synth import Exposure, Noise, TrueClock, expose

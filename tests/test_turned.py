@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 import psvideo as ps
 from psvideo.cli.app import main
 from psvideo.clip import open_clip, read_frames
-from psvideo.clip.decode.movie import index_movie
+from psvideo.clip.decode.movies.movie import index_movie
 from psvideo.formats.plan_toml import format_plan
 from psvideo.formats.rig_toml import format_rig, read_rig
 from psvideo.model.camera import Encoding

@@ -16,7 +16,7 @@ from psvideo.model.surface import Misfit, Surface
 from psvideo.model.timing import DroppedFrames, Timing
 from psvideo.plates.ambient.ambient_regression import Separated
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixture import made
+from psvideo.plates.mixing.mixture import made
 from psvideo.plates.sequence import AMBIENT, Round
 from psvideo.report.judge import result, time
 from psvideo.report.judge.of_ambient import ambient
@@ -28,10 +28,10 @@ from psvideo.report.judgement import Judgement, verdict_of
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.motion import glimpse, motion
 from psvideo.report.observe.observed import Observed
-from psvideo.report.observe.rigpoints import rig_points
+from psvideo.report.observe.rig_and_curve.rigpoints import rig_points
+from psvideo.report.observe.rig_and_curve.slopes import coarse_normals
+from psvideo.report.observe.rig_and_curve.yuille1997 import Lean, Lens, lean
 from psvideo.report.observe.shadow import shadow_light
-from psvideo.report.observe.slopes import coarse_normals
-from psvideo.report.observe.yuille1997 import Lean, Lens, lean
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.solving import Solving
 

@@ -9,7 +9,7 @@ from docs.figures.staging import Figure, Image, Pixels, exr, figure, film, frame
 
 from psvideo.formats.plan_toml import read_plan
 from psvideo.formats.timing_json import read_timing
-from psvideo.model.shutter import row_weights
+from psvideo.model.rows.shutter import row_weights
 from psvideo.model.surface import Surface
 from psvideo.pictures.relighting import normal_colours, relight, srgb
 

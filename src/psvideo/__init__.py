@@ -10,7 +10,7 @@ from types import FunctionType, ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # what editors and type checkers see; _HOMES is the same for Python
-    from psvideo.clip.mask import read_mask as read_mask
+    from psvideo.clip.maps.mask import read_mask as read_mask
     from psvideo.errors import PsvideoError as PsvideoError
     from psvideo.formats.plan_toml import read_plan as read_plan
     from psvideo.formats.rig_toml import read_rig as read_rig
@@ -55,7 +55,7 @@ _HOMES = {
     "open_take": "psvideo.sync.open_take",
     "picture_of": "psvideo.pictures.quantity",
     "read_images": "psvideo.runs.photographs.light_sets",
-    "read_mask": "psvideo.clip.mask",
+    "read_mask": "psvideo.clip.maps.mask",
     "read_plan": "psvideo.formats.plan_toml",
     "read_rig": "psvideo.formats.rig_toml",
     "read_timing": "psvideo.formats.timing_json",

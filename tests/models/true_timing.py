@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from psvideo.model.plan import Plan
-from psvideo.model.shutter import frames_touched
+from psvideo.model.rows.shutter import frames_touched
 from psvideo.model.timing import Flash, Timing
 from psvideo.synth import TrueFlash
 

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from psvideo.calibrate.light_pictures import LightPictures
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import FloatArray
-from psvideo.model.falloff import POWERS, Falloff, terms
-from psvideo.model.ground import Ground
-from psvideo.model.near_light import field_of
+from psvideo.model.irradiance.falloff import POWERS, Falloff, terms
+from psvideo.model.irradiance.ground import Ground
+from psvideo.model.irradiance.near_light import field_of
 from psvideo.model.rig import Light, Rig
 
 LEAST_SHARE = 0.5
@@ -30,7 +30,7 @@ ROUNDS = 5
 class FlatLight:
     """One light's intensity per channel and its relative standard error, and the falloff that the rig does not explain:
     the share by which the middle 90 % of the target differ from each other. ``coefficients`` are that falloff's smooth
-    part (``psvideo.model.falloff``), ``left`` what differs beside it in the same way."""
+    part (``psvideo.model.irradiance.falloff``), ``left`` what differs beside it in the same way."""
 
     name: str
     intensity: FloatArray

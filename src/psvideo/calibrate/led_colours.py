@@ -9,8 +9,8 @@ from psvideo.calibrate.flat_field import Target, on_target
 from psvideo.calibrate.light_pictures import LightPictures
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import FloatArray
-from psvideo.model.colours import CHANNELS, MAX_CONDITION, colour_condition, lamps_of, most_alike
-from psvideo.model.ground import Ground
+from psvideo.model.irradiance.colours import CHANNELS, MAX_CONDITION, colour_condition, lamps_of, most_alike
+from psvideo.model.irradiance.ground import Ground
 from psvideo.model.rig import Light, Rig
 
 LEAST_SHARE = 0.98

@@ -20,7 +20,7 @@ from psvideo.clip.reading import looks
 from psvideo.clip.transfer import usual_transfer
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import Encoding
-from psvideo.model.clipping import LOSSY_MARGIN, SATURATED
+from psvideo.model.rows.clipping import LOSSY_MARGIN, SATURATED
 from psvideo.plates.sequence import Round
 
 CLIPPED_FROM = SATURATED - LOSSY_MARGIN

@@ -22,9 +22,9 @@ from psvideo.capture.cautions_on_time import (
     about_three_frames,
 )
 from psvideo.capture.request import Limits, ShootRequest
+from psvideo.model.cost.shoot_figures import ShootFigures
 from psvideo.model.marker import has_marker
 from psvideo.model.plan import Plan
-from psvideo.model.shoot_figures import ShootFigures
 from psvideo.model.units import NTSC, show_rate, show_seconds
 
 

@@ -4,8 +4,8 @@ from collections.abc import Iterator, Sequence
 
 from psvideo.capture.caution import Caution, warning
 from psvideo.capture.request import Limits
+from psvideo.model.cost.shoot_figures import SEIZURE_HZ, LightFigures, ShootFigures
 from psvideo.model.plan import Plan
-from psvideo.model.shoot_figures import SEIZURE_HZ, LightFigures, ShootFigures
 from psvideo.model.units import show_seconds
 
 LEAST_LIGHTS = 3

@@ -4,10 +4,10 @@ import math
 from collections.abc import Iterator
 
 from psvideo.capture.caution import Caution, note, warning
-from psvideo.model.in_step import IN_STEP, dark_s_out_of_step, frames_in_step, never_shown
-from psvideo.model.motion_cost import LEAST_PX, cost_words, motion_cost
+from psvideo.model.cost.in_step import IN_STEP, dark_s_out_of_step, frames_in_step, never_shown
+from psvideo.model.cost.motion_cost import LEAST_PX, cost_words, motion_cost
+from psvideo.model.cost.shoot_figures import ShootFigures, SlotFigures
 from psvideo.model.plan import Plan
-from psvideo.model.shoot_figures import ShootFigures, SlotFigures
 from psvideo.model.units import show_seconds
 
 MOST_LOST = 0.2

@@ -9,9 +9,9 @@ from psvideo.capture.cautions import request_cautions, shoot_cautions
 from psvideo.capture.request import ShootRequest
 from psvideo.capture.wish import LONG_MARKER, longest_flash
 from psvideo.errors import UsageError
+from psvideo.model.cost.shoot_figures import ShootFigures, shoot_figures
 from psvideo.model.maximal_length import TAPS
 from psvideo.model.plan import UNKNOWN_CLOCK_PPM, Plan, PlannedFlash, assemble_plan
-from psvideo.model.shoot_figures import ShootFigures, shoot_figures
 from psvideo.model.units import show_seconds
 
 DARK_SLOT_EVERY_S = 0.5

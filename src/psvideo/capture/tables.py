@@ -8,8 +8,8 @@ from rich.text import Text
 
 from psvideo.capture.cameras import CameraMode
 from psvideo.capture.planning import Shoot
+from psvideo.model.cost.shoot_figures import ShootFigures, SlotFigures
 from psvideo.model.plan import Plan
-from psvideo.model.shoot_figures import ShootFigures, SlotFigures
 from psvideo.model.units import show_rate, show_seconds
 
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from psvideo.report.of_takes import TakeResult
     from psvideo.report.run_report import RunReport
-    from psvideo.runs.caller import Caller
+    from psvideo.runs.steps.caller import Caller
 
 from psvideo.cli.spelling import spelled, spelled_within
 
@@ -69,7 +69,7 @@ class Voice:
 
     def caller(self, context: "typer.Context | None" = None) -> "Caller":
         """Return what a run is called with, so that its sentences come here, and its report holds what was typed."""
-        from psvideo.runs.caller import Caller
+        from psvideo.runs.steps.caller import Caller
 
         command = "" if context is None else command_line(context)
         return Caller(say=self.say, warn=self.warn, detail=self.detail, spell=spelled, command=command)

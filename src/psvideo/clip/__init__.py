@@ -7,17 +7,18 @@ colour of a mosaic.
 - records: ``record`` (a clip), ``take`` (a clip and the frames that are used)
 - finding: ``opening``, ``folder``, ``stills`` (photographs), with ``stated`` (what photographs say of themselves) and
   ``filters`` (whether they are a mosaic)
-- reading: ``reading``, by ``decode`` (one module for each kind of file), ``transfer`` and ``linear`` (from codes to
-  light), ``in_file`` and ``kept`` (codes that are not in memory)
-- what comes while it is recorded: ``growing_folder``, ``stream``, ``genicam`` with ``genicam_camera``
-- beside the footage: ``mask`` and ``mask_sequence``, ``depth_map``
+- reading: ``reading``, ``transfer`` and ``linear`` (from codes to light), ``in_file`` and ``kept`` (codes that are not
+  in memory)
+
+Rooms: ``decode`` (one module for each kind of file), ``streams`` (frames that come while they are recorded), ``maps``
+(masks and depth that others made of the footage).
 """
 
 from psvideo.clip.decode.malvar2004 import demosaic
-from psvideo.clip.depth_map import DepthMaps, open_depth
 from psvideo.clip.kept import Kept, keeping_near
-from psvideo.clip.mask import read_mask
-from psvideo.clip.mask_sequence import Masks, open_masks
+from psvideo.clip.maps.depth_map import DepthMaps, open_depth
+from psvideo.clip.maps.mask import read_mask
+from psvideo.clip.maps.mask_sequence import Masks, open_masks
 from psvideo.clip.opening import open_clip
 from psvideo.clip.reading import holds_plain_codes, parse_range, read_frames
 from psvideo.clip.record import Clip, Frame, holes

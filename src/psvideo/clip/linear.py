@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.clip.decode.yuv import signal_range
+from psvideo.clip.decode.movies.yuv import signal_range
 from psvideo.clip.record import CodedPicture, Header, Levels, PictureInFile
 from psvideo.clip.transfer import find_curve, to_light
 from psvideo.errors import PsvideoError

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from psvideo.clip.decode.decoders import read_header
-from psvideo.clip.decode.yuv import signal_range
+from psvideo.clip.decode.movies.yuv import signal_range
 from psvideo.clip.filters import check_filters
 from psvideo.clip.folder import MOVIES, RAWS, find_sequence, unread
 from psvideo.clip.linear import depth_held
@@ -17,7 +17,7 @@ from psvideo.model.camera import Encoding
 from psvideo.model.plan import Plan
 
 if TYPE_CHECKING:
-    from psvideo.clip.decode.movie import Movie
+    from psvideo.clip.decode.movies.movie import Movie
 
 RATE_TOLERANCE = 5e-4
 """A movie's rate counts as the plan's within this share: tighter than 120 for 119.88."""
@@ -69,7 +69,7 @@ def _open_folder(path: Path, plan_path: Path | None) -> Clip:
 
 
 def _open_movie(path: Path, plan_path: Path | None) -> Clip:
-    from psvideo.clip.decode.movie import index_movie
+    from psvideo.clip.decode.movies.movie import index_movie
 
     plan_path = find_plan(path, given=plan_path)
     plan = read_plan(plan_path)

@@ -8,7 +8,7 @@ from pathlib import Path
 from psvideo.clip.kept import Kept, keeping_near
 from psvideo.clip.record import Clip
 from psvideo.errors import check_kind
-from psvideo.model.colours import Unmixing
+from psvideo.model.irradiance.colours import Unmixing
 from psvideo.model.plan import Plan
 
 

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from psvideo.errors import PsvideoError
 from psvideo.formats.contract import Contract, read_toml
-from psvideo.model.falloff import POWERS, Falloff
+from psvideo.model.irradiance.falloff import POWERS, Falloff
 
 SCHEMA = "psvideo-flat/1"
 

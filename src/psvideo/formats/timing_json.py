@@ -8,7 +8,7 @@ from pydantic import Field, ValidationError
 from psvideo.errors import PsvideoError
 from psvideo.formats.contract import Contract, check_schema, read_json
 from psvideo.formats.paths import path_of
-from psvideo.model.ripple import Ripple
+from psvideo.model.rows.ripple import Ripple
 from psvideo.model.timing import DroppedFrames, Flash, Order, Timing
 
 SCHEMA = "psvideo-timing/1"

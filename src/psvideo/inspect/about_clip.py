@@ -15,7 +15,7 @@ from psvideo.inspect.about_movie import movie_findings
 from psvideo.inspect.about_photographs import photograph_findings
 from psvideo.inspect.about_plan import length_finding, plan_findings, rig_findings
 from psvideo.inspect.findings import Description, Fact, Finding, caught, fault, ok, warn
-from psvideo.model.clipping import SATURATED
+from psvideo.model.rows.clipping import SATURATED
 from psvideo.model.units import counted
 
 MANY = 3

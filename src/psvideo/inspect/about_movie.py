@@ -10,7 +10,7 @@ from psvideo.model.units import counted
 
 def movie_findings(path: Path) -> Iterator[Finding]:
     """Yield what a movie's file says of its pictures and times. Raises PsvideoError where it cannot be read."""
-    from psvideo.clip.decode.movie import index_movie
+    from psvideo.clip.decode.movies.movie import index_movie
 
     movie = index_movie(path)
     head = movie.header

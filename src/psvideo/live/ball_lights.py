@@ -9,7 +9,7 @@ from psvideo.calibrate.mirror.lights import MirrorCalibration, calibrate_lights
 from psvideo.calibrate.sphere.sighting import Looking, sight_spheres
 from psvideo.errors import PsvideoError
 from psvideo.live.chain import NewestRound
-from psvideo.live.smaller import smaller_rig
+from psvideo.live.showing.smaller import smaller_rig
 from psvideo.model.rig import Rig
 
 WHERE = "The live picture"

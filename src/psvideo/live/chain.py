@@ -10,19 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.errors import NoStrobeError
-from psvideo.live.follow import LATEST, Follower, State, caught_up
-from psvideo.live.history import timing_now
-from psvideo.live.lock import LONGEST_S, Lock, frames_to_lock, lock
-from psvideo.live.newest_round import LiveRounds
-from psvideo.live.ring import Ring, RingFrame, ring_of
-from psvideo.live.smaller import Smaller, smaller_plan, smaller_rig, smaller_timing
+from psvideo.live.following.follow import LATEST, Follower, State, caught_up
+from psvideo.live.following.history import timing_now
+from psvideo.live.following.lock import LONGEST_S, Lock, frames_to_lock, lock
+from psvideo.live.incoming.ring import Ring, RingFrame, ring_of
+from psvideo.live.showing.newest_round import LiveRounds
+from psvideo.live.showing.smaller import Smaller, smaller_plan, smaller_rig, smaller_timing
 from psvideo.model.camera import Camera, FloatArray
 from psvideo.model.coded import Coded
-from psvideo.model.intensity import lights_as_planned
+from psvideo.model.irradiance.intensity import lights_as_planned
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Rig
-from psvideo.model.row_profiles import LOST, row_light
-from psvideo.model.shutter import frames_touched
+from psvideo.model.rows.row_profiles import LOST, row_light
+from psvideo.model.rows.shutter import frames_touched
 from psvideo.model.surface import Surface
 from psvideo.model.timing import Timing, timed_camera
 from psvideo.plates.sequence import Round

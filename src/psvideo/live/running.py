@@ -9,14 +9,14 @@ import numpy as np
 
 from psvideo.compute.compile_count import CompileCount, compiles_counted
 from psvideo.compute.heap import no_looks_at_what_is_loaded
-from psvideo.live.behind import Behind
 from psvideo.live.chain import Chain, LiveFrame, NewestRound, search_here
-from psvideo.live.holding import Holding
+from psvideo.live.following.holding import Holding
+from psvideo.live.incoming.behind import Behind
+from psvideo.live.incoming.recording import Recording
+from psvideo.live.incoming.source import LiveSource
 from psvideo.live.preparing import compiling_words, prepared
-from psvideo.live.quality import MOST_RATE, LiveSecond, Quality
-from psvideo.live.recording import Recording
-from psvideo.live.smaller import smaller_plan
-from psvideo.live.source import LiveSource
+from psvideo.live.showing.quality import MOST_RATE, LiveSecond, Quality
+from psvideo.live.showing.smaller import smaller_plan
 from psvideo.live.status import LiveState, LiveStatus, LiveSummary
 from psvideo.live.waiting import Waiting
 

@@ -3,7 +3,7 @@
 from dataclasses import asdict, dataclass
 from typing import Literal
 
-from psvideo.live.follow import State
+from psvideo.live.following.follow import State
 
 LiveState = Literal["preparing"] | State
 """Before the source is opened, live is preparing: it loads, and compiles where nothing is kept yet."""

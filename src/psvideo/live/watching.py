@@ -16,8 +16,8 @@ from psvideo.report.judge.powers import power_words
 from psvideo.report.judgement import Judgement, gravest_first, verdict_of
 from psvideo.report.observe.facts import brightest_channel
 from psvideo.report.observe.observed import Observed
-from psvideo.report.observe.rigpoints import rig_points
-from psvideo.report.observe.yuille1997 import Lens
+from psvideo.report.observe.rig_and_curve.rigpoints import rig_points
+from psvideo.report.observe.rig_and_curve.yuille1997 import Lens
 
 LOOK_S = 0.4
 """So far apart are rounds that are looked at, in the footage's time: to look costs as much as to solve."""

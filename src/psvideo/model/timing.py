@@ -8,8 +8,8 @@ import numpy as np
 
 from psvideo.model.camera import Camera, FloatArray
 from psvideo.model.plan import HasLights, Plan
-from psvideo.model.ripple import Ripple
-from psvideo.model.shutter import Pulse
+from psvideo.model.rows.ripple import Ripple
+from psvideo.model.rows.shutter import Pulse
 from psvideo.model.units import show_seconds
 
 Order = Literal["marker", "rig", "given", "guess"]

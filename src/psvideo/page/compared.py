@@ -105,7 +105,7 @@ def _nearest_round(timing: Timing, light: str, time_s: float) -> int:
 
 def _plates(take: "Take", timing: Timing, method: SplitMethod, number: int) -> Mapping[str, ComparedPlate]:
     """Rebuild one round from the frames that it touches, and those before them that the method follows."""
-    from psvideo.model.shutter import frames_touched
+    from psvideo.model.rows.shutter import frames_touched
     from psvideo.model.timing import timed_camera
     from psvideo.plates.gather import gather
     from psvideo.plates.sequence import round_numbers

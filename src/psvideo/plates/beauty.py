@@ -8,7 +8,7 @@ import numpy as np
 from psvideo.errors import UsageError, nearest
 from psvideo.model.plan import Plan
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixture import made
+from psvideo.plates.mixing.mixture import made
 from psvideo.plates.sequence import AMBIENT, Round
 
 BEAUTY = "beauty"

@@ -25,12 +25,12 @@ from psvideo.plates.ambient.ambient_off import subtract, with_darks_ahead
 from psvideo.plates.ambient.ambient_regression import Separated
 from psvideo.plates.ambient.ambient_shown import AHEAD, ambient_shown, at_true_places, dark_plates, ripple_of, used_of
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixture import made, shown_level
+from psvideo.plates.mixing.mixture import made, shown_level
 from psvideo.plates.nearest_rows import has_blind_time, with_nearest_rows
 from psvideo.plates.part import Part
 from psvideo.plates.sequence import AMBIENT, FIRST_NUMBER, Round, check_separable, coming, gathered, light_plates
+from psvideo.plates.several_lights.unmixed import slot_names, slot_plates, unmixed
 from psvideo.plates.split import Plate, split
-from psvideo.plates.unmixed import slot_names, slot_plates, unmixed
 from psvideo.plates.upright import upright
 
 AnyPlate = TypeVar("AnyPlate", Plate, LightPlate)

@@ -12,7 +12,7 @@ import numpy as np
 from psvideo.model.camera import Camera, FloatArray
 from psvideo.model.coded import Image, LinearFrame
 from psvideo.model.timing import Flash, Timing
-from psvideo.plates.mixture import made
+from psvideo.plates.mixing.mixture import made
 from psvideo.plates.split import Plate
 
 REC709_LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from psvideo.model.camera import FloatArray
 from psvideo.model.coded import Image
-from psvideo.plates.mixture import Mixture
+from psvideo.plates.mixing.mixture import Mixture
 
 
 @dataclass(frozen=True, kw_only=True)

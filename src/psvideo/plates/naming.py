@@ -16,7 +16,7 @@ from psvideo.clip import Take
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.model.marker import alike_turns
 from psvideo.model.rig import Rig
-from psvideo.model.shutter import frames_touched
+from psvideo.model.rows.shutter import frames_touched
 from psvideo.model.timing import Timing, places_in_time, timed_camera
 from psvideo.plates.gather import clip_plates
 from psvideo.plates.nearest_rows import MOST_LATER, has_blind_time

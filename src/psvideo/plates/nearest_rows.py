@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from psvideo.model.camera import Camera, FloatArray
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixture import made
+from psvideo.plates.mixing.mixture import made
 
 LATER, MOST_LATER = 2, 8
 """A plate waits for later ones of its light: for two where earlier ones showed what it lacks, for eight at a clip's

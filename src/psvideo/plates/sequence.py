@@ -12,8 +12,8 @@ from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan, mixing_matrix
 from psvideo.model.timing import Flash
 from psvideo.plates.align.velocity.moving import Followed
-from psvideo.plates.demultiplexed import Making, makings_of, plate_of_light
 from psvideo.plates.light_plate import LightPlate
+from psvideo.plates.several_lights.demultiplexed import Making, makings_of, plate_of_light
 from psvideo.plates.split import Plate
 
 FIRST_NUMBER = 1001

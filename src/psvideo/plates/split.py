@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from psvideo.model.camera import Camera, FloatArray
 from psvideo.model.coded import Coded, CodedFrame, Image
-from psvideo.model.recipe import flash_recipe, frames_of
+from psvideo.model.rows.recipe import flash_recipe, frames_of
 from psvideo.model.timing import Flash, Timing
-from psvideo.plates.mixture import Mixture
+from psvideo.plates.mixing.mixture import Mixture
 
 
 @dataclass(frozen=True, kw_only=True)

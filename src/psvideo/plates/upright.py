@@ -12,7 +12,7 @@ from psvideo.model.camera import FloatArray
 from psvideo.model.turn import Turn
 from psvideo.plates.align.packed import packed
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixture import made
+from psvideo.plates.mixing.mixture import made
 
 
 def upright(plate: LightPlate, turn: Turn) -> LightPlate:

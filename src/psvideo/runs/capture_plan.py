@@ -12,9 +12,9 @@ from psvideo.errors import PsvideoError
 from psvideo.formats.plan_toml import format_plan
 from psvideo.formats.rig_toml import read_rig
 from psvideo.formats.whole_files import PICTURE_MARK, refuse_existing, write_text
-from psvideo.model.ground import ground_of
-from psvideo.model.intensity import lights_as_planned
-from psvideo.model.near_light import is_near
+from psvideo.model.irradiance.ground import ground_of
+from psvideo.model.irradiance.intensity import lights_as_planned
+from psvideo.model.irradiance.near_light import is_near
 from psvideo.model.plan import Plan
 from psvideo.solve.normals.illumination import illumination
 

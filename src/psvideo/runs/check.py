@@ -16,7 +16,7 @@ from psvideo.errors import NoStrobeError, PsvideoError, UsageError
 from psvideo.formats.paths import path_if_given, path_of
 from psvideo.formats.rig_folder import rig_of_take
 from psvideo.formats.rig_toml import read_rig
-from psvideo.model.colours import unmixing_of
+from psvideo.model.irradiance.colours import unmixing_of
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Rig
 from psvideo.model.timing import DroppedFrames, Timing
@@ -25,9 +25,9 @@ from psvideo.plates.naming import named_by_rig
 from psvideo.report.judge.every_line import judgements
 from psvideo.report.judge.of_frames import FrameLight, exposure_of_frames, frame_light, later_frames
 from psvideo.report.judgement import Judgement
-from psvideo.runs.caller import PYTHON, Caller
-from psvideo.runs.checked import Check, write_checks_page
 from psvideo.runs.instants.reporting import observing
+from psvideo.runs.steps.caller import PYTHON, Caller
+from psvideo.runs.steps.checked import Check, write_checks_page
 from psvideo.sync.open_take import open_take
 from psvideo.sync.take_timing import find_take_timing
 

@@ -20,8 +20,8 @@ from psvideo.pictures.relighting import exposure_for, relight, srgb
 from psvideo.plates.timed import read_or_find_timing
 from psvideo.runs.instants.job import Job
 from psvideo.runs.instants.results import normals_run
-from psvideo.runs.lighting import read_lighting
-from psvideo.runs.output import Output
+from psvideo.runs.steps.lighting import read_lighting
+from psvideo.runs.steps.output import Output
 from psvideo.solve.instants import Instant
 from psvideo.sync.open_take import open_take
 from psvideo.synth.scenes import builtin_scene

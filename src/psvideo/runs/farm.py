@@ -20,7 +20,7 @@ from psvideo.formats.rig_folder import rig_of_take
 from psvideo.formats.rig_toml import read_rig
 from psvideo.formats.whole_files import write_text
 from psvideo.formats.whole_folders import refuse_folder, whole_folder
-from psvideo.runs.output import MARK, rounds_of
+from psvideo.runs.steps.output import MARK, rounds_of
 from psvideo.sync.open_take import open_take
 
 PIECE_ROUNDS = 300

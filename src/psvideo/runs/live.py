@@ -14,27 +14,27 @@ from psvideo.formats.timing_json import format_timing
 from psvideo.formats.whole_files import refuse_existing, write_text
 from psvideo.live.ball_lights import BallLights
 from psvideo.live.chain import Chain, NewestRound
-from psvideo.live.history import timing_of
-from psvideo.live.lock import check_followed
-from psvideo.live.newest_pictures import NewestPictures
-from psvideo.live.page_server import live_page
-from psvideo.live.quality import first_quality
-from psvideo.live.recording import recording
+from psvideo.live.following.history import timing_of
+from psvideo.live.following.lock import check_followed
+from psvideo.live.incoming.recording import recording
+from psvideo.live.incoming.source import LiveSource
+from psvideo.live.incoming.sources import opened_source
 from psvideo.live.running import Running
-from psvideo.live.smaller import smaller_plan
-from psvideo.live.source import LiveSource
-from psvideo.live.sources import opened_source
+from psvideo.live.showing.newest_pictures import NewestPictures
+from psvideo.live.showing.page_server import live_page
+from psvideo.live.showing.quality import first_quality
+from psvideo.live.showing.smaller import smaller_plan
 from psvideo.live.status import LiveStatus, LiveSummary
 from psvideo.live.watching import MOST_S, Watching, told
 from psvideo.model.choices import Pace
-from psvideo.model.intensity import lights_as_planned
+from psvideo.model.irradiance.intensity import lights_as_planned
 from psvideo.model.rig import Rig
 from psvideo.model.timing import DroppedFrames, Timing, timed_camera
 from psvideo.page.serving import ADDRESS
 from psvideo.plates.sequence import check_separable
-from psvideo.runs.caller import PYTHON, Caller
-from psvideo.runs.live_rehearsal import rehearse
-from psvideo.runs.live_strobe import held_strobe
+from psvideo.runs.steps.caller import PYTHON, Caller
+from psvideo.runs.steps.live_rehearsal import rehearse
+from psvideo.runs.steps.live_strobe import held_strobe
 from psvideo.solve.near_surface import near_surface_of
 from psvideo.solve.normals.illumination import illumination
 from psvideo.strobe.link.ports import AUTO

@@ -33,13 +33,13 @@ from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.sequence import FIRST_NUMBER
 from psvideo.plates.timed import read_or_find_timing
 from psvideo.report.run_report import RunReport
-from psvideo.runs.caller import PYTHON, Caller, say_kept, say_of_clip
 from psvideo.runs.delivery.delivering import metric_delivery
 from psvideo.runs.instants.job import Job, OverTime
 from psvideo.runs.instants.piece_notes import noted_timing
 from psvideo.runs.instants.results import normals_run, piece_run
-from psvideo.runs.lighting import read_lighting
-from psvideo.runs.output import Output, take_rate
+from psvideo.runs.steps.caller import PYTHON, Caller, say_kept, say_of_clip
+from psvideo.runs.steps.lighting import read_lighting
+from psvideo.runs.steps.output import Output, take_rate
 from psvideo.sync.open_take import open_take
 
 MOST_AVERAGED = 64

@@ -11,16 +11,16 @@ from psvideo.formats.paths import path_if_given, path_of
 from psvideo.formats.rig_folder import rig_of_take
 from psvideo.formats.rig_toml import read_rig
 from psvideo.model.choices import Compression, MovieCodec, PlatesPreview, SplitMethod
-from psvideo.model.colours import unmixing_of
+from psvideo.model.irradiance.colours import unmixing_of
 from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.beauty import mix_of
 from psvideo.plates.sequence import FIRST_NUMBER
 from psvideo.plates.timed import read_or_find_timing
 from psvideo.report.run_report import RunReport
-from psvideo.runs.caller import PYTHON, Caller, say_kept, say_of_clip
 from psvideo.runs.instants.job import OverTime
 from psvideo.runs.instants.plates import Extras, split_run
-from psvideo.runs.output import Output, take_rate
+from psvideo.runs.steps.caller import PYTHON, Caller, say_kept, say_of_clip
+from psvideo.runs.steps.output import Output, take_rate
 from psvideo.sync.open_take import open_take
 
 

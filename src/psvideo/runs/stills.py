@@ -30,15 +30,15 @@ from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.timed import read_or_find_timing
 from psvideo.report.run_report import RunReport
 from psvideo.runs.calibrate.mirror_sphere import focal_widths, radius_in_m
-from psvideo.runs.caller import PYTHON, Caller
 from psvideo.runs.delivery.delivering import metric_delivery
 from psvideo.runs.instants.job import Job, OverTime
 from psvideo.runs.instants.results import normals_run
-from psvideo.runs.lighting import read_lighting
-from psvideo.runs.output import Output
 from psvideo.runs.photographs.rti import write_rti
 from psvideo.runs.photographs.still_doubts import curve_doubt, exposures_of, glance_at
 from psvideo.runs.photographs.still_rig import KnownLights, lens_stated, listed_lights, sphere_lights
+from psvideo.runs.steps.caller import PYTHON, Caller
+from psvideo.runs.steps.lighting import read_lighting
+from psvideo.runs.steps.output import Output
 from psvideo.solve.instants import Instant
 
 PLAN, RIG, LP = "plan.toml", "rig.toml", "lights.lp"

@@ -15,7 +15,7 @@ from psvideo.formats.whole_files import PICTURE_MARK, refuse_existing, write_tex
 from psvideo.model.timing import Timing, places_in_time
 from psvideo.pictures.timing_sheet import timing_picture, write_sheet
 from psvideo.plates.naming import named_by_rig
-from psvideo.runs.caller import PYTHON, Caller, say_of_clip
+from psvideo.runs.steps.caller import PYTHON, Caller, say_of_clip
 from psvideo.sync.open_take import open_take
 from psvideo.sync.take_timing import TakeProfiles, take_profiles, timing_of_profiles
 

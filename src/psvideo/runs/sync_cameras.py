@@ -9,7 +9,7 @@ from psvideo.formats.clocks_json import SCHEMA, format_clocks
 from psvideo.formats.paths import path_if_given, path_of
 from psvideo.formats.whole_files import refuse_existing, write_text
 from psvideo.model.camera_clocks import CameraClocks
-from psvideo.runs.caller import PYTHON, Caller, say_of_clip
+from psvideo.runs.steps.caller import PYTHON, Caller, say_of_clip
 from psvideo.sync.open_take import open_take
 from psvideo.sync.shared_flashes import CameraTake, camera_clocks
 from psvideo.sync.take_timing import find_take_timing

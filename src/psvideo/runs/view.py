@@ -7,7 +7,7 @@ from psvideo.compute.progress import Watch, unwatched
 from psvideo.page import Show, page_server, show_of, side_by_side, write_single_page
 from psvideo.page.serving import PageServer
 from psvideo.page.single_file import PageContents
-from psvideo.runs.caller import PYTHON, Caller
+from psvideo.runs.steps.caller import PYTHON, Caller
 
 
 def view(

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.ground import Ground, every_ray
-from psvideo.model.near_light import near_field
+from psvideo.model.irradiance.ground import Ground, every_ray
+from psvideo.model.irradiance.near_light import near_field
 from psvideo.model.rig import Light
-from psvideo.plates.mixture import Mixture
+from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.plate_noise import LEAST
 from psvideo.solve.normals.task import Samples
 

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from psvideo.errors import UsageError, nearest
 from psvideo.model.choices import NEAR_ITERATIONS, Solver
-from psvideo.model.ground import Ground
+from psvideo.model.irradiance.ground import Ground
 from psvideo.model.rig import Rig
 from psvideo.model.surface import Surface
 from psvideo.solve.given import check_count, checked_images, checked_lights, checked_mask, checked_saturation

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.clip import Masks
-from psvideo.model.falloff import Falloff
-from psvideo.model.intensity import (
+from psvideo.model.irradiance.falloff import Falloff
+from psvideo.model.irradiance.intensity import (
     image_evened,
     image_per_saturation,
     lights_as_planned,
@@ -21,7 +21,7 @@ from psvideo.model.plan import Plan
 from psvideo.model.rig import Rig
 from psvideo.model.surface import Surface
 from psvideo.plates.align.denoise import Average, added, averaged
-from psvideo.plates.mixture import Mixture
+from psvideo.plates.mixing.mixture import Mixture
 from psvideo.plates.sequence import Round
 from psvideo.solve.near_surface import NearSurface, solve_near
 from psvideo.solve.normals.illumination import Illumination, illumination

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.clip import DepthMaps
-from psvideo.model.ground import Ground, ground_of
-from psvideo.model.near_light import is_near
+from psvideo.model.irradiance.ground import Ground, ground_of
+from psvideo.model.irradiance.near_light import is_near
 from psvideo.model.rig import Light, Rig
 from psvideo.model.surface import Surface
 from psvideo.solve.depth import Shaping, View, depth_of, view_of

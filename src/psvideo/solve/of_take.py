@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from psvideo.clip import Masks, Take, check_take
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.model.choices import NEAR_ITERATIONS, Align, Solver
-from psvideo.model.colours import unmixing_of
-from psvideo.model.intensity import lights_as_planned
+from psvideo.model.irradiance.colours import unmixing_of
+from psvideo.model.irradiance.intensity import lights_as_planned
 from psvideo.model.rig import Rig, check_rig
 from psvideo.model.timing import Timing
 from psvideo.plates.align.rounds import Aligning

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.ground import Ground, spread
+from psvideo.model.irradiance.ground import Ground, spread
 from psvideo.model.rig import Light
 from psvideo.solve.falloff_costs import Plates, around, falloff_costs, light_at
 from psvideo.solve.near_surface import NearSurface

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.ground import Ground
+from psvideo.model.irradiance.ground import Ground
 from psvideo.model.rig import Light
 from psvideo.solve.falloff_costs import falloff_costs
 

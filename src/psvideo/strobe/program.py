@@ -10,8 +10,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from psvideo.errors import PsvideoError
+from psvideo.model.cost.shoot_figures import slot_label
 from psvideo.model.plan import Plan, PlannedFlash
-from psvideo.model.shoot_figures import slot_label
 from psvideo.strobe.bursts import find_bursts, nearest_powers
 from psvideo.strobe.limits import (
     LONGEST_CYCLE_S,

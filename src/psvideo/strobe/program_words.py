@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator
 
+from psvideo.model.cost.shoot_figures import shoot_figures, slot_label
 from psvideo.model.plan import Plan
-from psvideo.model.shoot_figures import shoot_figures, slot_label
 from psvideo.strobe.limits import share_ppm
 from psvideo.strobe.link.replies import Capabilities
 from psvideo.strobe.program import PS_PER_S, Program

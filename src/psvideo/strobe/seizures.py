@@ -5,8 +5,8 @@ Light that flashes at 3 to 65 Hz can cause seizures in photosensitive people (IE
 
 from dataclasses import dataclass
 
+from psvideo.model.cost.shoot_figures import SEIZURE_HZ, shoot_figures
 from psvideo.model.plan import Plan
-from psvideo.model.shoot_figures import SEIZURE_HZ, shoot_figures
 
 
 @dataclass(frozen=True, kw_only=True)

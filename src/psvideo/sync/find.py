@@ -16,15 +16,15 @@ from numpy.typing import NDArray
 from psvideo.errors import NoStrobeError, PsvideoError, UsageError
 from psvideo.model.camera import Camera, FloatArray
 from psvideo.model.plan import Plan
-from psvideo.model.shutter import frames_touched
+from psvideo.model.rows.shutter import frames_touched
 from psvideo.model.timing import DroppedFrames, Flash, Order, Timing
 from psvideo.model.units import counted
 from psvideo.sync.rowfit.beat import Beat, train_between, train_until
-from psvideo.sync.rowfit.course import window_frames
 from psvideo.sync.rowfit.fit import ClipFit
-from psvideo.sync.rowfit.mains_swing import mains_swing
 from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.refine import Fit
+from psvideo.sync.rowfit.tracking.course import window_frames
+from psvideo.sync.rowfit.unknowns.mains_swing import mains_swing
 from psvideo.sync.turns import turns
 from psvideo.sync.verdict.believed import judged
 from psvideo.sync.verdict.frame_remarks import remarks_on_frames

@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.camera import FloatArray
-from psvideo.model.clipping import SATURATED, SMALL_PLATE_MARGIN
-from psvideo.model.light_field import Points, light_vectors
+from psvideo.model.irradiance.light_field import Points, light_vectors
 from psvideo.model.marker import NOT_FIRING, turned_slot, turns_in_the_dark
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Light, Rig
+from psvideo.model.rows.clipping import SATURATED, SMALL_PLATE_MARGIN
 from psvideo.model.timing import Timing
 
 Image = NDArray[np.float32]

@@ -9,7 +9,7 @@ from psvideo.clip import Take, check_take, read_frames
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.compute.threads import thread_count
 from psvideo.model.camera import FloatArray
-from psvideo.model.row_profiles import collect_with_doubt
+from psvideo.model.rows.row_profiles import collect_with_doubt
 from psvideo.model.timing import DroppedFrames, Timing
 from psvideo.sync.find import find_timing
 

@@ -9,8 +9,8 @@ from itertools import pairwise
 import numpy as np
 
 from psvideo.model.camera import Camera, FloatArray
+from psvideo.model.cost.shoot_figures import slot_label
 from psvideo.model.plan import Plan
-from psvideo.model.shoot_figures import slot_label
 
 FEWEST_FRAMES, MOST_FRAMES = 4, 7
 DARK_ROW_SHARE = 0.05

@@ -19,8 +19,8 @@ from psvideo.model.units import counted
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from psvideo.runs.checked import Check
     from psvideo.runs.many_takes.check_folder import Unread
+    from psvideo.runs.steps.checked import Check
 
 INTERVAL_S = 2.0
 COLOURS = {"good": "32", "doubtful": "33", "bad": "31", "unknown": "2"}
@@ -111,7 +111,7 @@ def check(
 def _follow(voice: Voice, checks: "Iterator[Check | Unread]") -> bool:
     """Say of take after take what was found, to the last or until Ctrl-C, and end with a line that sums up; return
     whether all can be used."""
-    from psvideo.runs.checked import Check
+    from psvideo.runs.steps.checked import Check
 
     last: dict[Path, bool | None] = {}
     with contextlib.suppress(KeyboardInterrupt):
@@ -141,7 +141,7 @@ def _note(voice: Voice, text: str) -> None:
 
 def _print_check(voice: Voice, check: "Check") -> None:
     if voice.json:
-        from psvideo.runs.checked import check_record
+        from psvideo.runs.steps.checked import check_record
 
         print(json_text.dumps(check_record(check)), flush=True)
         return

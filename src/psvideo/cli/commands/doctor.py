@@ -31,7 +31,7 @@ def doctor(
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
     if ahead:
-        from psvideo.runs.compiling import compile_ahead
+        from psvideo.runs.steps.compiling import compile_ahead
 
         compile_ahead(watch=voice.track)
     found = examine(folder, show=partial(_print_finding, voice))

@@ -6,7 +6,7 @@ from pathlib import Path
 import av
 import numpy as np
 
-from psvideo.clip.decode.ffmpeg_planes import planes
+from psvideo.clip.decode.movies.ffmpeg_planes import planes
 from psvideo.clip.decode.signatures import begins_like
 from psvideo.clip.record import CodedPicture, Header
 from psvideo.errors import PsvideoError

@@ -20,7 +20,7 @@ from psvideo.plates.align.velocity.flow import Codes, Flags, Vectors
 from psvideo.plates.align.velocity.moving import Followed
 from psvideo.plates.align.velocity.moving_kernel import AT_REST, NOWHERE, blend_rows, ways_rows
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixture import Reader, made
+from psvideo.plates.mixing.mixture import Reader, made
 
 HALF = np.float32(0.5)
 BAND_ROWS = 64

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from psvideo.model.coded import Image
 from psvideo.plates.align.comb import SAMPLES
 from psvideo.plates.light_plate import LightPlate
-from psvideo.plates.mixture import made
+from psvideo.plates.mixing.mixture import made
 from psvideo.plates.sequence import Round
 
 GUESSED = 1 / 1024

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
 from psvideo.model.coded import Coded, StoredCodes, Tone
-from psvideo.plates.mixture import Mixture
+from psvideo.plates.mixing.mixture import Mixture
 
 MOST_CODE = 65535
 BAND_ROWS = 64

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from psvideo.model.camera import FloatArray
 from psvideo.model.coded import Image
-from psvideo.model.ripple import Ripple
+from psvideo.model.rows.ripple import Ripple
 from psvideo.plates.ambient.ambient_blocks import block_px, block_rows, no_blocks, over_bands, times_rows
 from psvideo.plates.ambient.ambient_change import AmbientChange
 from psvideo.plates.ambient.ambient_kernel import average_rows, measure_rows

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from psvideo.model.ripple import Exposures, Ripple
+from psvideo.model.rows.ripple import Exposures, Ripple
 from psvideo.model.timing import Timing
 from psvideo.plates.ambient.ambient_followed import Ambient, first_ripple, update
-from psvideo.plates.mixture import shown_level
+from psvideo.plates.mixing.mixture import shown_level
 from psvideo.plates.split import Plate
 
 

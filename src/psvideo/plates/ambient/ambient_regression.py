@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from psvideo.model.camera import Camera, FloatArray
 from psvideo.model.plan import Plan
-from psvideo.model.shutter import row_weights
+from psvideo.model.rows.shutter import row_weights
 from psvideo.model.timing import Timing
 
 Image = NDArray[np.float32]

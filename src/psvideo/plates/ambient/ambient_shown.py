@@ -8,13 +8,13 @@ import numpy as np
 from psvideo.clip import Frame, Take, holds_plain_codes, read_frames
 from psvideo.compute.threads import thread_count
 from psvideo.model.camera import Camera
-from psvideo.model.recipe import frames_of
-from psvideo.model.ripple import Ripple
-from psvideo.model.shutter import frames_touched
+from psvideo.model.rows.recipe import frames_of
+from psvideo.model.rows.ripple import Ripple
+from psvideo.model.rows.shutter import frames_touched
 from psvideo.model.timing import Flash, Timing, places_in_time, timed_camera
 from psvideo.plates.ambient.ambient_followed import Ambient, update
 from psvideo.plates.ambient.ambient_regression import Design, Separated, design_of, separated, windows_of
-from psvideo.plates.mixture import made
+from psvideo.plates.mixing.mixture import made
 from psvideo.plates.split import Plate, plate_of
 
 AHEAD = 2

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.camera import FloatArray
-from psvideo.model.ripple import MOST_SWING, Exposures, Ripple, swing
+from psvideo.model.rows.ripple import MOST_SWING, Exposures, Ripple, swing
 from psvideo.plates.split import Plate
 
 PULSES_HZ = (100.0, 120.0)

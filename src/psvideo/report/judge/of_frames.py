@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.clipping import SATURATED
+from psvideo.model.rows.clipping import SATURATED
 from psvideo.report.judgement import Judgement
 
 BRIGHTER, DARKER = 1.25, 0.4

@@ -10,8 +10,8 @@ from psvideo.report.judge.result import AT_REST, COMMON_DEG, LOST_DEG, NOISY_DEG
 from psvideo.report.judgement import Grade, Judgement
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.observed import Observed
-from psvideo.report.observe.rigfit import RigFit
-from psvideo.report.observe.yuille1997 import Lean
+from psvideo.report.observe.rig_and_curve.rigfit import RigFit
+from psvideo.report.observe.rig_and_curve.yuille1997 import Lean
 
 MISFIT, LOST_MISFIT = 0.135, 0.25
 """Shares of the light that another rig would explain and this one cannot. A rig that was off by 1 to 5 degrees left

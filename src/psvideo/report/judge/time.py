@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from psvideo.model.in_step import IN_STEP, dark_s_out_of_step, frames_in_step, never_shown
-from psvideo.model.motion_cost import cost_words
+from psvideo.model.cost.in_step import IN_STEP, dark_s_out_of_step, frames_in_step, never_shown
+from psvideo.model.cost.motion_cost import cost_words
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.model.units import counted

@@ -3,5 +3,5 @@
 ``observed`` gathers all of it, round by round; a round's own numbers are its ``facts``. Each has a module: ``levels``
 (exposure), ``motion``, ``astray`` (photographs that are not aligned), ``focus``, ``shadow`` (what is left
 where no light reaches), ``steadiness``, ``worst`` (instants to look at), over ``thinned`` pixels. Whether rig and curve
-are right: ``rigpoints``, ``rigfit``, ``nearness``, ``other_curves``, ``slopes``, ``yuille1997``.
+are right is a room of its own, ``rig_and_curve``.
 """

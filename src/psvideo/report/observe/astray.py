@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from psvideo.model.camera import FloatArray
 from psvideo.plates.light_plate import LightPlate
-from psvideo.report.observe.rigpoints import CHANNEL, RigPoints
+from psvideo.report.observe.rig_and_curve.rigpoints import CHANNEL, RigPoints
 
 LEAST_LIGHTS = 5
 """Of four, one value a pixel is left over, which errors of many kinds explain."""

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.plates.mixture import Mixture
+from psvideo.plates.mixing.mixture import Mixture
 
 SCALES_PX = ((0.0, 1.5, 1.0), (1.5, 4.0, 2.5), (4.0, 9.0, np.inf))
 """Blur before and after (standard deviations), and up to which result these two measure it: noise makes soft edges look

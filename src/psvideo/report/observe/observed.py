@@ -22,14 +22,14 @@ from psvideo.report.observe.facts import FAINT, InstantFacts, Seen, brightest_ch
 from psvideo.report.observe.focus import middle_of, sharpest_blur_px
 from psvideo.report.observe.levels import BINS, Counts, Levels, count_levels
 from psvideo.report.observe.motion import Glimpse, Motion, glimpse, motion
-from psvideo.report.observe.rigfit import RigFit
-from psvideo.report.observe.rigpoints import RigPoints
+from psvideo.report.observe.rig_and_curve.rigfit import RigFit
+from psvideo.report.observe.rig_and_curve.rigpoints import RigPoints
+from psvideo.report.observe.rig_and_curve.slopes import coarse_normals, share_away, surface_agreement
+from psvideo.report.observe.rig_and_curve.yuille1997 import Lean, Lens, lean
 from psvideo.report.observe.shadow import shadow_light
-from psvideo.report.observe.slopes import coarse_normals, share_away, surface_agreement
 from psvideo.report.observe.steadiness import Change, Sample, change, sample_of
 from psvideo.report.observe.thinned import step_of, thinned
 from psvideo.report.observe.worst import Thumbnail, Worst
-from psvideo.report.observe.yuille1997 import Lean, Lens, lean
 
 UNEVEN = 0.5
 """A picture of things that are brighter and darker, or turned from the light, holds less than this where it is dim, of

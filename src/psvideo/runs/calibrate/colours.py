@@ -10,7 +10,7 @@ from psvideo.formats.whole_files import write_text
 from psvideo.model.rig import Rig
 from psvideo.runs.calibrate.flat_field import check_albedo, white_target
 from psvideo.runs.calibrate.reading import pictures_of, reading_of, rig_out
-from psvideo.runs.caller import PYTHON, Caller
+from psvideo.runs.steps.caller import PYTHON, Caller
 
 
 @dataclass(frozen=True, kw_only=True)

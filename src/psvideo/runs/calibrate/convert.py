@@ -8,7 +8,7 @@ from psvideo.formats.light_list_writer import files_of, write_rig
 from psvideo.formats.rig_toml import read_rig
 from psvideo.formats.whole_files import refuse_existing
 from psvideo.model.rig import Rig
-from psvideo.runs.caller import PYTHON, Caller
+from psvideo.runs.steps.caller import PYTHON, Caller
 
 
 @dataclass(frozen=True, kw_only=True)

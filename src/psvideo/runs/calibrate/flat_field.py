@@ -13,11 +13,11 @@ from psvideo.formats.flat_toml import SCHEMA as FLAT_SCHEMA
 from psvideo.formats.flat_toml import format_falloff
 from psvideo.formats.rig_toml import format_rig, read_rig
 from psvideo.formats.whole_files import refuse_existing, write_text
-from psvideo.model.ground import Ground, ground_of
-from psvideo.model.near_light import is_near
+from psvideo.model.irradiance.ground import Ground, ground_of
+from psvideo.model.irradiance.near_light import is_near
 from psvideo.model.rig import Rig
 from psvideo.runs.calibrate.reading import pictures_of, reading_of, rig_out
-from psvideo.runs.caller import PYTHON, Caller
+from psvideo.runs.steps.caller import PYTHON, Caller
 
 UNEVEN = 0.1
 """A target that is lit less evenly, beyond what the rig explains, wants a map."""

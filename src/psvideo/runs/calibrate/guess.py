@@ -8,7 +8,7 @@ from psvideo.formats.rig_toml import format_rig
 from psvideo.formats.whole_files import write_text
 from psvideo.model.choices import Prior
 from psvideo.runs.calibrate.reading import pictures_of, reading_of, rig_out
-from psvideo.runs.caller import PYTHON, Caller
+from psvideo.runs.steps.caller import PYTHON, Caller
 
 
 def guess(

@@ -9,7 +9,7 @@ from psvideo.formats.rig_toml import format_rig, read_rig
 from psvideo.formats.whole_files import write_text
 from psvideo.model.rig import Rig, directions
 from psvideo.runs.calibrate.reading import pictures_of, reading_of, rig_out
-from psvideo.runs.caller import PYTHON, Caller
+from psvideo.runs.steps.caller import PYTHON, Caller
 
 
 @dataclass(frozen=True, kw_only=True)

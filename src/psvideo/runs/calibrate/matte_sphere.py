@@ -16,7 +16,7 @@ from psvideo.model.rig import Rig
 from psvideo.pictures.matte_sphere import matte_picture
 from psvideo.pictures.timing_sheet import write_sheet
 from psvideo.runs.calibrate.reading import picture_beside, pictures_of, reading_of, rig_out
-from psvideo.runs.caller import PYTHON, Caller
+from psvideo.runs.steps.caller import PYTHON, Caller
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,8 +13,8 @@ from psvideo.formats.whole_files import write_text
 from psvideo.pictures.mirror_sphere import faulty_picture, sphere_picture
 from psvideo.pictures.timing_sheet import write_sheet
 from psvideo.runs.calibrate.reading import picture_beside, reading_of, rig_out
-from psvideo.runs.caller import PYTHON, Caller
 from psvideo.runs.photographs.light_sets import Reading, sets_of
+from psvideo.runs.steps.caller import PYTHON, Caller
 
 LEAST_RADIUS_MM, LARGEST_RADIUS_MM = 1.0, 1000.0
 

@@ -23,9 +23,9 @@ from psvideo.runs.calibrate.flat_field import flat_field
 from psvideo.runs.calibrate.intensities import intensities
 from psvideo.runs.calibrate.matte_sphere import matte_sphere
 from psvideo.runs.calibrate.mirror_sphere import mirror_sphere
-from psvideo.runs.caller import PYTHON, Caller
 from psvideo.runs.many_takes.cluster import Cluster, called_apart, connected
 from psvideo.runs.many_takes.several_takes import names_of
+from psvideo.runs.steps.caller import PYTHON, Caller
 
 Calibration = Literal["mirror-sphere", "matte-sphere", "flat-field", "colours", "intensities"]
 

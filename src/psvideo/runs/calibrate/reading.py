@@ -6,8 +6,8 @@ from psvideo.calibrate.light_pictures import LightPictures, mean_of_sets
 from psvideo.compute.progress import Watch
 from psvideo.formats.rig_toml import SCHEMA
 from psvideo.formats.whole_files import PICTURE_MARK, refuse_existing
-from psvideo.runs.caller import Caller
 from psvideo.runs.photographs.light_sets import Reading, sets_of
+from psvideo.runs.steps.caller import Caller
 
 
 def rig_out(out: Path | str, *, force: bool) -> Path:

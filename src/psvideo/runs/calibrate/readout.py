@@ -19,7 +19,7 @@ from psvideo.calibrate.stripes.records import (
 from psvideo.calibrate.strobed_readout import StrobedReadout, measure_take_readout
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.runs.caller import PYTHON, Caller
+from psvideo.runs.steps.caller import PYTHON, Caller
 from psvideo.sync.open_take import open_take
 
 CRYSTAL_PPM = 100.0

@@ -30,10 +30,10 @@ from psvideo.plates.beauty import beauty_of
 from psvideo.plates.gather import scheduled
 from psvideo.plates.light_plate import LightPlate
 from psvideo.plates.sequence import AMBIENT, Round, round_numbers
-from psvideo.runs.caller import Caller
 from psvideo.runs.delivery.relit import keep_relit
-from psvideo.runs.lighting import Lighting
-from psvideo.runs.output import Output
+from psvideo.runs.steps.caller import Caller
+from psvideo.runs.steps.lighting import Lighting
+from psvideo.runs.steps.output import Output
 from psvideo.solve.depth import Depth
 from psvideo.solve.instants import Instant
 from psvideo.solve.normals.solving import ROBUST_FROM_LIGHTS

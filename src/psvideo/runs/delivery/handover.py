@@ -26,13 +26,13 @@ from psvideo.export.space import CAMERA_SPACE, Space, placed
 from psvideo.export.usd.usd_stage import StageView, stage_name, stage_text
 from psvideo.formats.whole_files import whole_file, write_text
 from psvideo.model.choices import CODECS, MovieCodec, Preview
-from psvideo.model.ground import ground_of
-from psvideo.model.intensity import lights_as_planned
-from psvideo.model.near_light import is_near
+from psvideo.model.irradiance.ground import ground_of
+from psvideo.model.irradiance.intensity import lights_as_planned
+from psvideo.model.irradiance.near_light import is_near
 from psvideo.model.rig import Rig
-from psvideo.runs.caller import Caller
 from psvideo.runs.delivery.previews import Shown, preview_name, write_preview
 from psvideo.runs.delivery.relit import KEPT, relit_file
+from psvideo.runs.steps.caller import Caller
 from psvideo.solve.normals.illumination import illumination
 
 OTHER_RATES = ("flashes",)

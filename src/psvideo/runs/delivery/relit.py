@@ -19,7 +19,7 @@ from psvideo.compute.halves import halves_of
 from psvideo.export.space import Space, placed
 from psvideo.formats.whole_files import whole_file
 from psvideo.model.camera import FloatArray
-from psvideo.model.light_field import Points, light_vectors
+from psvideo.model.irradiance.light_field import Points, light_vectors
 from psvideo.model.plan import Plan, PlannedFlash, reference_duration_s
 from psvideo.model.rig import Rig
 from psvideo.model.surface import Surface

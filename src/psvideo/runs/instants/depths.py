@@ -5,7 +5,7 @@ from collections.abc import Callable
 from functools import partial
 
 from psvideo.model.surface import Surface
-from psvideo.runs.lighting import Lighting
+from psvideo.runs.steps.lighting import Lighting
 from psvideo.solve.depth import Depth, Shaping, begun, depth_of
 from psvideo.solve.instants import Instant
 

@@ -19,8 +19,8 @@ from psvideo.plates.part import Part
 from psvideo.plates.sequence import AMBIENT, FIRST_NUMBER
 from psvideo.report.observe.observed import Observed
 from psvideo.runs.delivery.delivering import passes_asked
-from psvideo.runs.lighting import Lighting
-from psvideo.runs.output import tags_of
+from psvideo.runs.steps.lighting import Lighting
+from psvideo.runs.steps.output import tags_of
 from psvideo.solve.depth import Shaping
 from psvideo.solve.normals.solving import Solving
 from psvideo.solve.passes.made import AskedPasses

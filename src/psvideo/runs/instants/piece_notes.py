@@ -18,8 +18,8 @@ from psvideo.model.timing import Timing
 from psvideo.report.observe.astray import Astray
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.observed import Observed
+from psvideo.report.observe.rig_and_curve.yuille1997 import Lean
 from psvideo.report.observe.worst import Thumbnail, Worst
-from psvideo.report.observe.yuille1997 import Lean
 from psvideo.runs.instants.job import Found
 
 FOLDER = ".pieces"

@@ -18,7 +18,7 @@ import numpy as np
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import UsageError
 from psvideo.export.sequences.result_files import is_written
-from psvideo.model.shutter import frames_touched
+from psvideo.model.rows.shutter import frames_touched
 from psvideo.model.timing import Timing, places_in_time, timed_camera
 from psvideo.plates.align.comb import Schedule
 from psvideo.plates.ambient.ambient_shown import ambient_before, used_of
@@ -26,7 +26,7 @@ from psvideo.plates.gather import scheduled
 from psvideo.plates.nearest_rows import MOST_LATER, has_blind_time
 from psvideo.plates.part import Part
 from psvideo.plates.sequence import POOLED_ROUNDS, round_numbers
-from psvideo.plates.unmixed import slot_names
+from psvideo.plates.several_lights.unmixed import slot_names
 from psvideo.runs.instants.job import Beginning, Found, Job, Piece
 from psvideo.runs.instants.piece_notes import FOLDER, note_timing, noted, write_notes
 from psvideo.runs.instants.reporting import observing

@@ -16,15 +16,15 @@ from psvideo.export.sequences.tags import sha256_of
 from psvideo.formats.whole_files import write_text
 from psvideo.model.rig import Light, Rig
 from psvideo.model.timing import Timing
-from psvideo.plates.unmixed import slot_names
+from psvideo.plates.several_lights.unmixed import slot_names
 from psvideo.report.html import report_page
 from psvideo.report.judge.every_line import judgements
 from psvideo.report.observe.observed import Observed
-from psvideo.report.observe.rigpoints import rig_points
-from psvideo.report.observe.yuille1997 import Lens
+from psvideo.report.observe.rig_and_curve.rigpoints import rig_points
+from psvideo.report.observe.rig_and_curve.yuille1997 import Lens
 from psvideo.report.run_report import LightFacts, RunReport, report_record
-from psvideo.runs.lighting import Lighting
-from psvideo.runs.output import Output
+from psvideo.runs.steps.lighting import Lighting
+from psvideo.runs.steps.output import Output
 
 Pixels = NDArray[np.uint8]
 LIBRARIES = ("numpy", "opencv-contrib-python-headless", "numba", "OpenEXR")

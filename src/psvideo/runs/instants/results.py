@@ -17,7 +17,7 @@ from psvideo.formats.timing_json import format_timing
 from psvideo.formats.whole_files import write_text
 from psvideo.plates.align.comb import Comb
 from psvideo.plates.sequence import coming
-from psvideo.plates.unmixed import unmixing_note
+from psvideo.plates.several_lights.unmixed import unmixing_note
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.run_report import RunReport
 from psvideo.runs.delivery.delivering import check_delivery, pass_doubts, say_instants, world_doubts
@@ -27,7 +27,7 @@ from psvideo.runs.instants.pieces import forget_pieces, pieced_together, pieces_
 from psvideo.runs.instants.plates import nothing_complete
 from psvideo.runs.instants.reporting import Solved, run_report, write_report
 from psvideo.runs.instants.solving import write_instants
-from psvideo.runs.output import Output, begun_by, folder_of
+from psvideo.runs.steps.output import Output, begun_by, folder_of
 from psvideo.solve.depth import scale_note
 from psvideo.solve.instants import Instant
 from psvideo.solve.normals.solving import trust_note

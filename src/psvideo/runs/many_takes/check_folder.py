@@ -8,11 +8,11 @@ from pathlib import Path
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.rig_folder import check_rigs
-from psvideo.runs.caller import PYTHON, Caller
 from psvideo.runs.check import judged_take, refuse_inside
-from psvideo.runs.checked import Check, write_checks_page
 from psvideo.runs.many_takes.arriving import whole_takes
 from psvideo.runs.many_takes.cluster import Cluster, called_apart, connected
+from psvideo.runs.steps.caller import PYTHON, Caller
+from psvideo.runs.steps.checked import Check, write_checks_page
 
 AS_IT_IS = Caller(spell=str)
 """In a worker, sentences keep their parameters' own names: the caller's words for them are put in here."""

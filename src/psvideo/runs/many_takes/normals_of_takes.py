@@ -10,11 +10,11 @@ from psvideo.errors import UsageError
 from psvideo.formats.paths import path_if_given
 from psvideo.formats.rig_folder import check_rigs
 from psvideo.report.of_takes import TakeResult
-from psvideo.runs.caller import PYTHON, Caller
 from psvideo.runs.many_takes.cluster import Cluster
 from psvideo.runs.many_takes.several_takes import Takes, apart, one_by_one, several_takes
 from psvideo.runs.normals import normals
-from psvideo.runs.output import rounds_of
+from psvideo.runs.steps.caller import PYTHON, Caller
+from psvideo.runs.steps.output import rounds_of
 from psvideo.sync.open_take import open_take
 
 LEAST_ROUNDS = 128

@@ -11,9 +11,9 @@ from psvideo.formats.paths import path_of, take_name
 from psvideo.formats.whole_files import write_text
 from psvideo.formats.whole_folders import forget_begun, refuse_folder
 from psvideo.report.of_takes import TakeResult, takes_page, takes_record, worst_first
-from psvideo.runs.caller import Caller
 from psvideo.runs.many_takes.cluster import Cluster, Shared, connected, done_apart
-from psvideo.runs.output import MARK
+from psvideo.runs.steps.caller import Caller
+from psvideo.runs.steps.output import MARK
 
 
 @dataclass(frozen=True, kw_only=True)

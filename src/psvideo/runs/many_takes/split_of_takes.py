@@ -9,10 +9,10 @@ from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import AllDoneError
 from psvideo.formats.rig_folder import check_rigs
 from psvideo.report.of_takes import TakeResult
-from psvideo.runs.caller import PYTHON, Caller
 from psvideo.runs.many_takes.cluster import Cluster
 from psvideo.runs.many_takes.several_takes import apart, one_by_one, result_of, several_takes
 from psvideo.runs.split import split
+from psvideo.runs.steps.caller import PYTHON, Caller
 
 
 def split_of_takes(

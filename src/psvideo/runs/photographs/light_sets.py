@@ -30,7 +30,7 @@ from psvideo.formats.plan_toml import read_plan
 from psvideo.model.camera import Encoding
 from psvideo.plates.align.rounds import UNMOVED
 from psvideo.plates.gather import gather
-from psvideo.runs.caller import PYTHON, Caller
+from psvideo.runs.steps.caller import PYTHON, Caller
 from psvideo.sync.open_take import open_take
 from psvideo.sync.take_timing import find_take_timing
 

@@ -9,7 +9,7 @@ from threading import Event
 from psvideo.errors import UsageError
 from psvideo.formats.trace_csv import SCHEMA, TraceWriter
 from psvideo.formats.whole_files import refuse_existing, whole_file
-from psvideo.runs.caller import PYTHON, Caller
+from psvideo.runs.steps.caller import PYTHON, Caller
 from psvideo.strobe.link.boards import BOARDS
 from psvideo.strobe.link.words import WiringName
 from psvideo.strobe.stand_ins.emulated import Emulation, emulated_board

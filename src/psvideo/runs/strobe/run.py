@@ -8,7 +8,7 @@ from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.plan_toml import read_plan
 from psvideo.formats.whole_files import refuse_existing, write_text
 from psvideo.model.plan import Plan
-from psvideo.runs.caller import PYTHON, Caller
+from psvideo.runs.steps.caller import PYTHON, Caller
 from psvideo.runs.strobe.port import opened_port
 from psvideo.strobe import confirmed
 from psvideo.strobe.link.boards import board_called

@@ -7,8 +7,8 @@ import numpy as np
 
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import FloatArray
-from psvideo.model.ground import Ground
-from psvideo.model.near_light import NearField, is_near, middle_directions, near_field
+from psvideo.model.irradiance.ground import Ground
+from psvideo.model.irradiance.near_light import NearField, is_near, middle_directions, near_field
 from psvideo.model.rig import Light, directions, intensities
 
 MAX_CONDITION = 20.0  # lights within about 3 degrees of one plane; a normal's error is the noise's times this

@@ -9,7 +9,7 @@ import numpy as np
 
 from psvideo.model.choices import Solver
 from psvideo.model.surface import Surface
-from psvideo.plates.mixture import Mixture
+from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.evidence import GRID_PX, Evidence
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.least_squares import woodham1980

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from psvideo.compute.spilled import let_go, planes_for
 from psvideo.model.camera import FloatArray
-from psvideo.model.clipping import ROUNDING
+from psvideo.model.rows.clipping import ROUNDING
 from psvideo.solve.normals.illumination import Illumination
 
 Floats = NDArray[np.float32]

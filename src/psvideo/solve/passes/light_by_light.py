@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.camera import FloatArray
-from psvideo.model.ground import every_ray
-from psvideo.model.near_light import near_vectors
+from psvideo.model.irradiance.ground import every_ray
+from psvideo.model.irradiance.near_light import near_vectors
 from psvideo.model.surface import Surface
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.plate_noise import LEAST, PlateNoise

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
-from psvideo.plates.mixture import Mixture, Reader, made
+from psvideo.plates.mixing.mixture import Mixture, Reader, made
 from psvideo.solve.normals.task import Mask, Samples
 
 Floats = NDArray[np.float32]

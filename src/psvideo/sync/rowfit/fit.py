@@ -6,19 +6,19 @@ import numpy as np
 
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
-from psvideo.sync.rowfit.bend import fitted, rms_apart_s
-from psvideo.sync.rowfit.course import followed, window_frames
-from psvideo.sync.rowfit.freed import freed
-from psvideo.sync.rowfit.jitter import STEADY, Jitter, disagreement_s, jitter, shift_error_s
+from psvideo.sync.rowfit.coarse.retime import Mask, stood_in
+from psvideo.sync.rowfit.coarse.seed import find_seed, renumbered
 from psvideo.sync.rowfit.long_takes import ENOUGH_SAMPLES, stretches, throughout
-from psvideo.sync.rowfit.plateau import centred
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import Fit, explained
-from psvideo.sync.rowfit.restless import across, restless
-from psvideo.sync.rowfit.retime import Mask, stood_in
-from psvideo.sync.rowfit.seed import find_seed, renumbered
-from psvideo.sync.rowfit.softness import misfit
-from psvideo.sync.rowfit.track import FrameTrack
+from psvideo.sync.rowfit.tracking.course import followed, window_frames
+from psvideo.sync.rowfit.tracking.track import FrameTrack
+from psvideo.sync.rowfit.unknowns.bend import fitted, rms_apart_s
+from psvideo.sync.rowfit.unknowns.freed import freed
+from psvideo.sync.rowfit.unknowns.jitter import STEADY, Jitter, disagreement_s, jitter, shift_error_s
+from psvideo.sync.rowfit.unknowns.plateau import centred
+from psvideo.sync.rowfit.unknowns.restless import across, restless
+from psvideo.sync.rowfit.unknowns.softness import misfit
 from psvideo.sync.rowfit.unlit import unlit, with_unlit
 
 TRACK_ROWS = 60

@@ -23,7 +23,7 @@ from psvideo.sync.rowfit.row_model import (
     slopes,
     width,
 )
-from psvideo.sync.rowfit.whitening import factors, whiten, whiten_all
+from psvideo.sync.rowfit.unknowns.whitening import factors, whiten, whiten_all
 
 RIDGE = 1e-6
 """Share of the normal matrix's diagonal that is added to it, so that a brightness nobody saw stays at zero."""

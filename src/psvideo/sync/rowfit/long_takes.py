@@ -12,9 +12,9 @@ import numpy as np
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat, FoundClock
-from psvideo.sync.rowfit.bend import fitted, late_s
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import CAUCHY, Fit, explained, scaled
+from psvideo.sync.rowfit.unknowns.bend import fitted, late_s
 
 LONG, ENOUGH_SAMPLES = 1_000_000, 250_000
 """Takes of more row means are long; the second is enough for what holds throughout, and for the clock of a chapter."""

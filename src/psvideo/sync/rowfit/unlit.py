@@ -7,8 +7,8 @@ and keep the places in time that their numbering gives them.
 import numpy as np
 
 from psvideo.model.plan import Plan
+from psvideo.sync.rowfit.coarse.retime import REPEATED_MOST, Mask
 from psvideo.sync.rowfit.profiles import Profiles, slot_unknowns
-from psvideo.sync.rowfit.retime import REPEATED_MOST, Mask
 from psvideo.sync.rowfit.row_model import IntArray
 
 DARK, FLOOR = 0.02, 2.0

@@ -3,12 +3,12 @@
 from dataclasses import dataclass, replace
 
 from psvideo.model.plan import Plan
-from psvideo.sync.rowfit.course import too_many
+from psvideo.sync.rowfit.coarse.seed import MISNAMED_PPM, gain_of
 from psvideo.sync.rowfit.fit import ClipFit, find
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import refined_beat, robust_loss
-from psvideo.sync.rowfit.seed import MISNAMED_PPM, gain_of
 from psvideo.sync.rowfit.standard_error import freedom
+from psvideo.sync.rowfit.tracking.course import too_many
 from psvideo.sync.verdict.refusal import MOST_PPM
 from psvideo.sync.verdict.rivals import (
     BETTER,

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.plan import Plan
+from psvideo.sync.rowfit.coarse.retime import regular_step
 from psvideo.sync.rowfit.fit import ClipFit
-from psvideo.sync.rowfit.retime import regular_step
 
 
 def remarks_on_frames(plan: Plan, found: ClipFit, numbered: NDArray[np.int64]) -> Iterator[str]:

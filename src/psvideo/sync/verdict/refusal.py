@@ -6,10 +6,10 @@ import numpy as np
 
 from psvideo.model.plan import UNKNOWN_CLOCK_PPM, Plan
 from psvideo.model.units import counted, show_seconds
+from psvideo.sync.rowfit.coarse.search import GridPlace, search
+from psvideo.sync.rowfit.coarse.seed import SEARCH_ROWS, first_guess, gain_of
 from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
-from psvideo.sync.rowfit.search import GridPlace, search
-from psvideo.sync.rowfit.seed import SEARCH_ROWS, first_guess, gain_of
 from psvideo.sync.verdict.rivals import CLEARLY, Rival, best_rival, count_rivals, likely_rates, strobe_rivals
 
 STEADY = 0.02

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from psvideo.model.surface import Surface
-from psvideo.plates.mixture import Mixture
+from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.bands import ShownPlates, check_arrays, surface_of
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.loops.blocks import working_memory

@@ -14,7 +14,7 @@ import numpy as np
 
 from psvideo.compute.spilled import let_go, planes_for
 from psvideo.model.surface import Misfit, Surface
-from psvideo.plates.mixture import Mixture
+from psvideo.plates.mixing.mixture import Mixture
 from psvideo.solve.normals.bands import ShownPlates, check_arrays, surface_of
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.plate_noise import PlateNoise

@@ -11,8 +11,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.model.ground import every_ray
-from psvideo.model.near_light import NearField, near_vectors
+from psvideo.model.irradiance.ground import every_ray
+from psvideo.model.irradiance.near_light import NearField, near_vectors
 from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.task import Floats
 

@@ -1,0 +1,231 @@
+"""The strobe's clock, followed frame by frame from a lock on: foretold, held against what came, corrected.
+
+The model is the finder's own (``sync.rowfit``): the brightness of every row under every light is fitted to the latest
+frames, and what is left of them moves the clock. A frame that was not foretold is looked at more closely: frames went
+missing before it, or the light changed; where nothing explains it, the lock is lost, and said to be.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+
+from psvideo.live.following.lock import Lock
+from psvideo.live.following.phase_filter import Measured, PhaseFilter, started
+from psvideo.live.following.trims import Trims, trimmed
+from psvideo.live.following.window import HeldFrame, Window, window_of
+from psvideo.model.camera import FloatArray
+from psvideo.model.plan import Plan
+from psvideo.sync.rowfit.beat import Beat, FoundClock
+from psvideo.sync.rowfit.coarse.seed import GOOD_SEED, gain_of
+from psvideo.sync.rowfit.normal_equations import projected
+from psvideo.sync.rowfit.profiles import Profiles, brightnesses, unexplained
+from psvideo.sync.rowfit.refine import CAUCHY, GLOBALS, explained, scaled
+from psvideo.sync.rowfit.standard_error import sandwich
+from psvideo.sync.rowfit.tracking.track import MOST, SUSPICIOUS, losses_of
+from psvideo.sync.verdict.believed import MIN_EXPLAINED, MIN_GAIN
+
+State = Literal["seeking", "locked", "unsure", "lost"]
+EVERY = 8
+"""Frames between two corrections of the clock."""
+LOOKED = 3
+"""Frames that were not foretold until others are taken for missing before them."""
+LATEST = 24
+"""Frames by which it is judged whether the strobe is still seen."""
+LEFT, LEFT_AFTER_CHANGE, SLOWLY = 0.6, 0.85, 8
+"""Where the strobe explains less than this share of what it usually does (a mean over this many corrections), it is as
+likely to be another one; the more so after a change, as a strobe that was started again is one."""
+HELD = 0.33
+"""A correction moves the clock by no more than this share of a flash."""
+STEP_COST = 0.02
+"""What every frame that is taken for missing costs, in mean losses of a frame: cycles may look alike."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hole:
+    """Frames that were found missing: ``count`` of them before the frame at the place ``before``, as numbered."""
+
+    before: int
+    count: int
+
+
+@dataclass(kw_only=True)
+class Follower:
+    """Follows one lock. ``extra`` is by how many frames the picture says that frames come later than numbered.
+
+    ``measured`` is what windows of frames said of the clock, against the lock's own, ``span`` the places in time of the
+    first and the last frame that were followed.
+    """
+
+    plan: Plan
+    lock: Lock
+    beat: Beat
+    phase: PhaseFilter
+    window: Window
+    state: State = "locked"
+    extra: int = 0
+    span: tuple[int, int] | None = None
+    holes: list[Hole] = field(default_factory=list)
+    measured: list[Measured] = field(default_factory=list)
+    trims: Trims = field(default_factory=Trims)
+    share: float = 1.0
+    _light: FloatArray | None = None
+    _learnt: Profiles | None = None
+    _usual: float = 0.0
+    _odd: list[int] = field(default_factory=list)
+    _fresh: int = 0
+    _usual_share: float = GOOD_SEED
+
+    @property
+    def clock(self) -> FoundClock:
+        """The strobe's clock as it is known now."""
+        return self.phase.clock
+
+    @property
+    def error_rows(self) -> float:
+        """The standard error of the flashes' times at the latest frame, in rows."""
+        at_s = self.phase.at_s if self.span is None else self.span[1] * self.window.period_s
+        row_time_s = self.beat.row_time_s or self.window.period_s / self.plan.camera.height_px
+        return self.phase.error_at_s(at_s) / row_time_s
+
+    def trimmed(self, at_s: float, ppm: float) -> None:
+        """Foresee that the strobe, from a time on, comes later by this many ppm of the time that passes."""
+        since_s = self.window.frames[0].index * self.window.period_s if self.window.frames else at_s
+        self.phase = trimmed(self.phase, self.trims, at_s, ppm, since_s=since_s)
+
+    def add(self, index: int, value: FloatArray, doubt: FloatArray | None = None) -> int:
+        """Take in the frame that is numbered ``index`` and return its place in time; ``value`` (row,) is its profile.
+
+        A frame that comes twice is left out.
+        """
+        place = index + self.extra
+        if self.window.frames and place <= self.window.frames[-1].index:
+            return place
+        self.window.add(HeldFrame(index=place, value=value, doubt=doubt))
+        self.span = (place if self.span is None else self.span[0], place)
+        self._fresh += 1
+        if self._light is not None and self.state != "lost":
+            self._hold_against_foretold(index)
+        if self._fresh >= EVERY and len(self.window.frames) >= LATEST:
+            self._correct()
+        return self.window.frames[-1].index
+
+    def _hold_against_foretold(self, index: int) -> None:
+        """Look for missing frames where the latest were not foretold, and else take the light for changed."""
+        latest = self.window.profiles(1)
+        if self._losses(latest)[0] < self._usual + SUSPICIOUS:
+            self._odd = self._odd[-LOOKED:] if self._odd and latest.index[0] - self._odd[-1] < LOOKED else []
+            return
+        self._odd.append(int(latest.index[0]))
+        if len(self._odd) != LOOKED:
+            return
+        first = self._odd[0]
+        frames = self.window.profiles(sum(frame.index >= first for frame in self.window.frames))
+        extra = self._missing(frames)
+        if extra:
+            self.holes.append(Hole(before=first - self.extra, count=extra))
+            self.window.moved(first, extra)
+            self.extra += extra
+            self.span = (self.span or (0, 0))[0], self.window.frames[-1].index
+            self._odd = []
+        elif not self.window.changes or first - self.window.changes[-1] > EVERY:
+            self.window.changes.append(first)
+            self.state = "unsure"
+
+    def _missing(self, frames: Profiles) -> int:
+        """Return how many frames are missing before some that were not foretold, 0 where that explains nothing."""
+        tried = [replace(frames, index=frames.index + extra) for extra in range(MOST + 1)]
+        losses = np.array([self._losses(one).mean() for one in tried])
+        best = int((losses + STEP_COST * np.arange(len(losses))).argmin())
+        return best if losses[best] < min(self._usual, losses[0] - SUSPICIOUS) + SUSPICIOUS else 0
+
+    def _losses(self, rows: Profiles) -> FloatArray:
+        assert self._learnt is not None  # noqa: S101
+        assert self._light is not None  # noqa: S101
+        return losses_of(self.plan, self._learnt, rows, replace(self.beat, clock=self.clock), self._light)
+
+    def _correct(self) -> None:
+        """Move the clock by what the latest frames leave, and judge whether the strobe is still seen in them."""
+        new, self._fresh = self._fresh, 0
+        rows, beat = self.window.profiles(), replace(self.beat, clock=self.clock)
+        rest = unexplained(self.plan, rows, beat)
+        self._judge(rows, rest)
+        if self.state == "locked":
+            at_s = float(rows.frame_start_s.mean())
+            shift_s, error_s = _shift(self.plan, rows, beat, rest)
+            error_s *= float(np.sqrt(len(rows.value) / new))
+            self.measured.append(Measured(at_s=at_s, late_s=self._late_s(at_s) + shift_s, error_s=error_s))
+            self.phase = self.phase.corrected(at_s, shift_s, error_s)
+        self._learn(rows)
+
+    def _judge(self, rows: Profiles, rest: FloatArray) -> None:
+        """Return whether the latest frames show the strobe where the clock has it, and as well as those before did.
+
+        Right after a change of light nobody knows: new brightnesses explain a few frames wherever flashes are.
+        """
+        if self.state == "unsure" and self.window.since_change() < LATEST:
+            return
+        latest = rows.take(slice(len(rows.value) - LATEST, len(rows.value)))
+        self.share = gain_of(latest, rest[-LATEST:])
+        left = LEFT_AFTER_CHANGE if self.state == "unsure" else LEFT
+        least = max(MIN_GAIN, left * self._usual_share)
+        good = self.share > least and explained(latest, rest[-LATEST:]) > MIN_EXPLAINED
+        if good and (self.state != "lost" or self.share > GOOD_SEED):
+            self.state = "locked"
+            self._usual_share += (self.share - self._usual_share) / SLOWLY
+        else:
+            self.state = "unsure" if self.state == "locked" else "lost"
+
+    def _learn(self, rows: Profiles) -> None:
+        """Fit brightnesses to the frames since the light last changed, once these show every light."""
+        known = self.window.since_change()
+        if known < LATEST and self._light is not None:
+            return
+        learnt = rows.take(slice(len(rows.value) - known, len(rows.value))).one_window()
+        beat = replace(self.beat, clock=self.clock)
+        self._light, self._learnt = brightnesses(self.plan, learnt, beat), learnt
+        self._usual = float(np.median(self._losses(learnt)))
+
+    def _late_s(self, at_s: float) -> float:
+        """Return by how much flashes come later at a time than the lock's own clock says, trims left aside."""
+        base, now = self.lock.beat.clock, self.clock
+        strobe_s = (at_s - base.phase_s) / base.rate
+        return now.phase_s + strobe_s * now.rate - at_s
+
+
+def following(plan: Plan, lock: Lock) -> Follower:
+    """Return what follows the strobe from a lock on."""
+    return Follower(
+        plan=plan,
+        lock=lock,
+        beat=lock.beat,
+        phase=started(lock.beat.clock, lock.at_s, lock.error_s, lock.error_ppm),
+        window=window_of(plan, lock.beat),
+    )
+
+
+def caught_up(
+    plan: Plan, lock: Lock, values: Sequence[FloatArray], doubts: Sequence[FloatArray | None] | None = None
+) -> Follower:
+    """Return what follows the strobe after the frames that the lock was found in, whose profiles these are."""
+    follower = following(plan, lock)
+    for place, value, doubt in zip(lock.places.tolist(), values, doubts or [None] * len(values), strict=True):
+        follower.add(place - follower.extra, value, doubt)
+    return follower
+
+
+def _shift(plan: Plan, rows: Profiles, beat: Beat, rest: FloatArray) -> tuple[float, float]:
+    """Return by how much all flashes come later than a beat says, and the standard error: one robust step."""
+    scale = scaled(rows, rest, 0.0)
+    weight = 1.0 / (1.0 + (rest / (CAUCHY * scale)) ** 2) / scale**2
+    basis = np.zeros((len(rows.window_start) + 1 + len(GLOBALS), 1))  # what a fit may free is held here
+    basis[: len(rows.window_start) + 1] = 1.0
+    _, hessian, scores = projected(plan, rows, beat, weight, basis, tails=False)
+    shortest_s = min(plan.flashes[slot].duration_s for slot in plan.lit_slots)
+    known = np.full((1, 1), shortest_s**-2.0)
+    shift_s = float(scores.sum() / (hessian[0, 0] + known[0, 0]))
+    most_s = HELD * shortest_s
+    least_s = (hessian[0, 0] + known[0, 0]) ** -0.5  # where few rows show the phase, none of them may differ
+    error_s = max(float(np.sqrt(sandwich(hessian, scores, known)[0, 0])), float(least_s))
+    return float(np.clip(shift_s, -most_s, most_s)), error_s

@@ -1,0 +1,71 @@
+"""The strobe held to the camera: trims asked of a board, as the followed clock says, and released where it is lost."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from psvideo.live.chain import Chain
+from psvideo.live.following.genlock import EVERY_S, DarkRow, WantedRow, dark_row, next_trim_ppm, rows_around
+from psvideo.strobe.link.exchange import RefusedError
+from psvideo.strobe.link.lines import Error
+from psvideo.strobe.link.requests import Trim
+
+STEPS_UNTIL = 1.5
+"""A trim takes effect from the step after the next one: this many steps later, on average."""
+
+
+def trim_by(ppm: int) -> Trim:
+    """Return the request that makes steps longer (or shorter, below 0) by this many ppm."""
+    return Trim(way="sooner" if ppm < 0 else "later", ppm=abs(ppm))
+
+
+@dataclass(kw_only=True)
+class Holding:
+    """Holds the dark row of a chain's strobe at a target. ``ask`` sends a trim to the board.
+
+    ``ppm`` is the trim that the board has, ``most_ppm`` the largest that it ever had, either way; ``short_rows`` by how
+    much the dark row was off its target when it was last looked at, None while nothing is followed; ``note`` says why
+    the board refused, where it did, ``ended`` that it plays no more.
+    """
+
+    chain: Chain
+    target: WantedRow
+    ask: Callable[[Trim], object]
+    ppm: int = 0
+    most_ppm: int = 0
+    short_rows: float | None = None
+    note: str = ""
+    ended: bool = False
+    _asked_s: float = field(default=-EVERY_S)
+
+    def beat(self, host_s: float) -> None:
+        """Look at the dark row, and trim the strobe where it is due; to be called several times in ``EVERY_S``."""
+        if host_s - self._asked_s < EVERY_S:
+            return
+        self._asked_s = host_s
+        with self.chain.at_rest():
+            follower = self.chain.follower
+            if follower is None or follower.state == "lost":
+                self.short_rows, wanted = None, 0
+            elif follower.state != "locked":
+                return
+            else:
+                camera = follower.lock.camera
+                seen: DarkRow = dark_row(follower, self.chain.camera_s(host_s))
+                self.short_rows = seen.short_of(self.target, rows_around(camera))
+                wanted = next_trim_ppm(self.ppm, seen, self.target, camera)
+            if wanted != self.ppm and self._trimmed(wanted) and follower is not None:
+                step_s = self.chain.plan.cycle_s / len(self.chain.plan.cycle_slots)
+                follower.trimmed(self.chain.camera_s(host_s) + STEPS_UNTIL * step_s, float(wanted))
+
+    def _trimmed(self, ppm: int) -> bool:
+        try:
+            self.ask(trim_by(ppm))
+        except RefusedError as refused:
+            if refused.code == Error.STATE:
+                return False  # the one before does not count yet: the next beat asks again
+            if refused.code != Error.LIMIT:
+                raise
+            self.note = str(refused)
+            return False
+        self.ppm, self.most_ppm = ppm, max(self.most_ppm, abs(ppm))
+        return True

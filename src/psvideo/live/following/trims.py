@@ -1,0 +1,73 @@
+"""What a strobe was told to do to its own period while it was followed: bends of its clock that are foreseen."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from psvideo.live.following.phase_filter import PhaseFilter
+from psvideo.model.camera import FloatArray
+from psvideo.sync.rowfit.beat import FoundClock
+
+LATENCY_S = 0.02
+"""A trim's moment is known no better than this on the camera's clock: frames take their time to come."""
+SETTLED = 4
+"""Looks at a time without trims until it stands still: each leaves a 100th of what the one before did."""
+TAIL_S = 1.0
+"""How far behind the last trim its knot stands, by which the clock's slope is known there."""
+
+
+@dataclass(kw_only=True)
+class Trims:
+    """Trims by time: from ``at_s[k]`` on flashes come later by ``ppm[k]`` of the time that passes, until the next.
+
+    Times are those of the strobe without trims, as a clock's bends have them: after minutes of the same trim they are
+    far from the camera's.
+    """
+
+    at_s: list[float] = field(default_factory=list)
+    ppm: list[float] = field(default_factory=list)
+
+    @property
+    def now_ppm(self) -> float:
+        """The trim that counts last."""
+        return self.ppm[-1] if self.ppm else 0.0
+
+    def add(self, at_s: float, ppm: float) -> None:
+        """Note a trim from a time of the camera on, which is not before the last."""
+        without_s = self.without_s(at_s)
+        self.at_s.append(max(without_s, self.at_s[-1]) if self.at_s else without_s)
+        self.ppm.append(ppm)
+
+    def without_s(self, at_s: float) -> float:
+        """Return at which time a flash that comes at ``at_s`` would have come without any trim."""
+        without_s = at_s
+        for _ in range(SETTLED):
+            without_s = at_s - float(self.late_s(np.array([without_s]))[0])
+        return without_s
+
+    def late_s(self, time_s: FloatArray) -> FloatArray:
+        """Return by how much flashes come later at times, same shape, than without any trim."""
+        late = np.zeros_like(time_s)
+        before = 0.0
+        for at_s, ppm in zip(self.at_s, self.ppm, strict=True):
+            late += 1e-6 * (ppm - before) * np.maximum(time_s - at_s, 0.0)
+            before = ppm
+        return late
+
+    def bent(self, clock: FoundClock, *, since_s: float) -> FoundClock:
+        """Return a clock with the bends of all trims; those of trims that ended before a time of the camera are one
+        slope."""
+        if not self.at_s:
+            return clock
+        first = int(np.searchsorted(self.at_s, self.without_s(since_s)))
+        recent = sorted({*self.at_s[max(first - 2, 0) :]})
+        knots = np.array([recent[0] - TAIL_S, *recent, recent[-1] + TAIL_S])
+        return replace(clock, knot_s=tuple(knots.tolist()), bend_s=tuple(self.late_s(knots).tolist()))
+
+
+def trimmed(phase: PhaseFilter, trims: Trims, at_s: float, ppm: float, *, since_s: float) -> PhaseFilter:
+    """Note a trim and return the filter with it, less sure by what its moment may be wrong."""
+    doubt_s = 1e-6 * (ppm - trims.now_ppm) * LATENCY_S
+    trims.add(at_s, ppm)
+    covariance = phase.covariance + np.diag([doubt_s**2, 0.0])
+    return replace(phase, clock=trims.bent(phase.clock, since_s=since_s), covariance=covariance)

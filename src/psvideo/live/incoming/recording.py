@@ -1,0 +1,134 @@
+"""Recording while the camera runs: every frame in its codes, a clip as any other, whole or not at all.
+
+Frames wait in memory for the disk, up to a limit. Where the disk falls behind so far, or fills, recording ends there
+and says so: what was recorded until then is a clip without a hole.
+"""
+
+import shutil
+import threading
+from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.errors import PsvideoError, UsageError
+from psvideo.export.sequences.code_files import write_codes
+from psvideo.formats.plan_toml import FRAMES
+from psvideo.formats.whole_folders import whole_folder
+from psvideo.live.chain import LiveFrame
+from psvideo.live.incoming.source import LiveSource
+from psvideo.strobe.runlog import LOG_NAME
+
+PLAN = "plan.toml"
+MOST_WAITING_BYTES = 256_000_000
+"""Codes that may wait for the disk: more than a second of most cameras."""
+
+
+@dataclass(kw_only=True)
+class Recording:
+    """Takes frames and writes them beside. ``written`` counts them; ``ended`` says why recording ended early.
+
+    ``log`` is what the strobe's log is to say, where the strobe was played meanwhile; "": what lies beside the plan.
+    ``waits``: a frame waits for room, as of a clip that is played as fast as it goes; else recording ends.
+    """
+
+    folder: Path
+    waits: bool = False
+    written: int = 0
+    ended: str = ""
+    log: str = ""
+    most_bytes: int = MOST_WAITING_BYTES
+    _queue: deque[tuple[int, NDArray[Any]]] = field(default_factory=deque)
+    _bytes: int = 0
+    _over: bool = False
+    _changed: threading.Condition = field(default_factory=threading.Condition)
+
+    def take(self, frame: LiveFrame) -> None:
+        """Take one frame for the disk."""
+        codes = np.asarray(frame.coded.codes)
+        with self._changed:
+            if self.waits:
+                self._changed.wait_for(lambda: self._bytes < self.most_bytes or bool(self.ended))
+            elif self._bytes + codes.nbytes > self.most_bytes and not self.ended:
+                self.ended = (
+                    f"The disk of {self.folder.parent} is too slow for this camera: recording ended after "
+                    f"{self.written + len(self._queue)} frames, which are whole. Record to a faster disk, or film "
+                    "fewer rows or frames a second."
+                )
+            if not self.ended:
+                self._queue.append((frame.index, codes))
+                self._bytes += codes.nbytes
+                self._changed.notify_all()
+
+    def write(self) -> None:
+        """Write frames as they come until the recording is over; what runs in a thread."""
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: bool(self._queue) or self._over)
+                if not self._queue:
+                    return
+                index, codes = self._queue[0]
+            try:
+                write_codes(self.folder / FRAMES / f"live.{index + 1:06d}.tif", codes)
+            except OSError as fault:
+                self._give_up(index, fault)
+                return
+            with self._changed:
+                self._queue.popleft()
+                self._bytes -= codes.nbytes
+                self.written += 1
+                self._changed.notify_all()
+
+    def over(self) -> None:
+        """Say that no more frames come."""
+        with self._changed:
+            self._over = True
+            self._changed.notify_all()
+
+    def _give_up(self, index: int, fault: OSError) -> None:
+        (self.folder / FRAMES / f"live.{index + 1:06d}.tif").unlink(missing_ok=True)
+        with self._changed:
+            self.ended = (
+                f"Recording ended after {self.written} frames, which are whole: the next could not be written "
+                f"({fault.strerror or fault}). Make room on the disk, and record again."
+            )
+            self._queue.clear()
+            self._changed.notify_all()
+
+
+@contextmanager
+def recording(path: Path, source: LiveSource, *, force: bool) -> Iterator[Recording]:
+    """Give what records a source into a clip folder; when the block ends, the folder appears under its name.
+
+    The plan lies in it as it lay before, and the strobe's log: the recording's own, or the one beside the plan. Raises
+    UsageError where the folder exists, or the source's frames are not plain codes, and PsvideoError where not one frame
+    was recorded.
+    """
+    if source.plan_path is None:
+        raise UsageError(
+            f"`record` {path}: {source.name} does not come as codes of 8 or 16 bits that the plan explains. Copy a "
+            "clip as it is, and record from a pipe whose bare bytes `raw` names, such as gray or gray16le."
+        )
+    with whole_folder(path, mark=PLAN, force=force) as folder:
+        (folder / FRAMES).mkdir(exist_ok=True)
+        log = source.plan_path.with_name(LOG_NAME)
+        shutil.copyfile(source.plan_path, folder / PLAN)
+        if log.is_file():
+            shutil.copyfile(log, folder / LOG_NAME)
+        record = Recording(folder=folder, waits=not source.paced)
+        writer = threading.Thread(target=record.write, name="psvideo record", daemon=True)
+        writer.start()
+        try:
+            yield record
+        finally:
+            record.over()
+            writer.join()
+            if record.log:
+                (folder / LOG_NAME).write_text(record.log, encoding="utf-8")
+        if not record.written:
+            raise PsvideoError(f"{path}: not one frame was recorded. {record.ended}".rstrip())

@@ -1,0 +1,168 @@
+"""How rows of frames add up to a flash's plate: coefficients from timing and camera alone, never from pixels.
+
+``plate[i] = sum_n coefficients[n, i] * frame[n, i]`` shows what row i would have recorded of the whole flash, and holds
+the ambient light of ``exposures[i]`` exposures. Flash by flash, never frame by frame: where one frame holds all
+of a flash in a row, that frame is taken alone, because others would add only noise; where a row is split over two
+frames, they are summed (Hudon et al. 2015, eq. 10), which is the best estimate under photon noise, and divided by the
+share that they saw together, which is 1 at 360 degrees.
+
+Rows in which the frames also saw some of a neighbouring flash (an LED's tail, or a dark time that is too short) have it
+taken off: with the weights W (flash, frame) and these first coefficients C (flash, frame) of the flashes around, the
+sums hold ``C W^T`` of the plates, so ``(C W^T)^-1 C`` holds each alone. The coefficients of the neighbours' frames are
+small and negative.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.model.camera import Camera, FloatArray
+from psvideo.model.rows.shutter import Pulse, frames_touched, row_weights
+from psvideo.model.timing import Flash, Timing
+
+Flags = NDArray[np.bool_]
+
+WHOLE = 1.0 - 1e-9
+"""A row that saw this share of a square flash saw all of it; ..."""
+WHOLE_BUT_TAIL = 1.0 - 1e-3
+"""... with tails, which never quite end, one that saw this much did."""
+LEAST_SHARE = 0.05
+"""A row that saw less of a flash than this is unseen: dividing by so little would bring up only noise."""
+NO_FOREIGN = 1e-5
+"""Less of another flash in a row is below the last bit of a code."""
+MOST_FOREIGN = 0.3
+"""A frame's row into which more of other flashes was mixed than this is not used."""
+CLEAN = 0.01
+"""A dark slot's exposures that saw less of other flashes are enough by themselves where there are any."""
+MOST_LEFT = 0.01
+"""Of another flash that cannot be taken off this much may be left in a row; with more it is unseen."""
+MOST_GAIN = 2.5
+"""Taking neighbours off may raise noise (as its square) this many times at most."""
+LEAST_DETERMINANT = 1e-3
+"""Sums that hold the same mixture of flashes cannot be taken apart."""
+NEIGHBOURS = 2
+"""Flashes before and after that may reach into a flash's rows."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlashRecipe:
+    """How one flash's plate is made.
+
+    frames: indices of the frames that take part, ascending. coefficients: (frame, row). seen: (row,), False where the
+    frames that are there saw too little of the flash; its coefficients are 0.
+    """
+
+    frames: tuple[int, ...]
+    coefficients: FloatArray
+    seen: Flags
+
+    @property
+    def exposures(self) -> FloatArray:
+        """How many exposures' worth of ambient light the plate holds, shape (row,)."""
+        total: FloatArray = self.coefficients.sum(axis=0)
+        return total
+
+
+def frames_of(camera: Camera, timing: Timing, flash: Flash) -> range:
+    """Return the frames that a flash's recipe may use: those that saw it, and those that saw what must be taken off."""
+    near = _around(timing, flash) if _may_mix(camera, timing) else (flash,)
+    start_s, duration_s = _times(near)
+    first, last = frames_touched(camera, start_s, duration_s, pulse=timing.pulse)
+    return range(int(first.min()), int(last.max()) + 1)
+
+
+def flash_recipe(camera: Camera, timing: Timing, flash: Flash, there: range | frozenset[int]) -> FlashRecipe:
+    """Return how to make a flash's plate of the frames that are ``there`` (indices); dark slots are averaged.
+
+    A neighbour whose own frames are not there cannot be taken off: where it reaches into a row, only frames that saw
+    hardly any of it are used, and the row is unseen where there are none.
+    """
+    frames = frames_of(camera, timing, flash)
+    present = np.array([index in there for index in frames])
+    near = [one for one in _around(timing, flash) if not one.is_dark and one.index != flash.index]
+    start_s, duration_s = _times((flash, *near))
+    weights = row_weights(camera, start_s, duration_s, frames=frames, pulse=timing.pulse)
+    if flash.is_dark:  # nothing shines in it, so nothing has a tail
+        weights[0] = row_weights(camera, start_s[:1], duration_s[:1], frames=frames)[0]
+    weights[:, ~present] = 0.0
+    coefficients, seen = _separated(weights, whole=_whole(timing.pulse), dark=flash.is_dark)
+    used = np.flatnonzero(coefficients.any(axis=1))
+    return FlashRecipe(frames=tuple(frames[n] for n in used), coefficients=coefficients[used], seen=seen)
+
+
+def _may_mix(camera: Camera, timing: Timing) -> bool:
+    """Whether any row can see light of two flashes: LEDs have tails, or the dark time is shorter than the exposure."""
+    if timing.pulse.fall_s > 0:
+        return True
+    gaps_s = timing.start_s[1:] - (timing.start_s + timing.duration_s)[:-1]
+    return bool(gaps_s.size and gaps_s.min() < camera.exposure_s + np.ptp(camera.within_row_s()))
+
+
+def _around(timing: Timing, flash: Flash) -> tuple[Flash, ...]:
+    return timing.flashes[max(flash.index - NEIGHBOURS, 0) : flash.index + NEIGHBOURS + 1]
+
+
+def _times(flashes: tuple[Flash, ...]) -> tuple[FloatArray, FloatArray]:
+    return np.array([one.start_s for one in flashes]), np.array([one.duration_s for one in flashes])
+
+
+def _whole(pulse: Pulse) -> float:
+    return WHOLE_BUT_TAIL if pulse.fall_s > 0 else WHOLE
+
+
+def _separated(weights: FloatArray, *, whole: float, dark: bool) -> tuple[FloatArray, Flags]:
+    """Return the coefficients (frame, row) of the first of the flashes, and which rows are seen.
+
+    ``weights`` is (flash, frame, row). Where a neighbour cannot be taken off, or only at the price of noise, the frames
+    that saw hardly any of it must do.
+    """
+    first = np.stack([_first(weights, flash, whole=whole, dark=dark and flash == 0) for flash in range(len(weights))])
+    own = first[0].copy()
+    mixed = np.einsum("fr,kfr->kr", own, weights[1:])  # what the first sum holds of the other flashes
+    rows = np.flatnonzero((np.abs(mixed) > NO_FOREIGN).any(axis=0))
+    if rows.size:
+        own[:, rows], kept = _taken_off(first[:, :, rows], weights[:, :, rows], dark=dark)
+        kept &= (own[:, rows] ** 2).sum(axis=0) <= MOST_GAIN * (first[0][:, rows] ** 2).sum(axis=0)
+        clean = _first(weights, 0, whole=whole, dark=dark, most_foreign=CLEAN)
+        own[:, rows[~kept]] = clean[:, rows[~kept]]
+    return own, np.asarray(own.any(axis=0))
+
+
+def _first(
+    weights: FloatArray, flash: int, *, whole: float, dark: bool, most_foreign: float = MOST_FOREIGN
+) -> FloatArray:
+    """Return a flash's coefficients (frame, row) as if there were no other: one whole frame alone, else all that saw
+    any; of a dark slot the mean of the exposures that fell into it."""
+    foreign = weights.sum(axis=0) - weights[flash]
+    seen = weights[flash] * (foreign <= most_foreign)
+    if dark:
+        clean = (seen > 0) & (foreign <= CLEAN)
+        used = np.where(clean.any(axis=0), clean, seen > 0)
+        mean: FloatArray = used / np.maximum(used.sum(axis=0), 1)
+        return mean
+    full = seen >= whole
+    alone = full & (np.cumsum(full, axis=0) == 1)
+    used = np.where(full.any(axis=0), alone, seen > 0)
+    share = (seen * used).sum(axis=0)
+    coefficients: FloatArray = used * np.where(share >= LEAST_SHARE, 1.0 / np.maximum(share, LEAST_SHARE), 0.0)
+    return coefficients
+
+
+def _taken_off(first: FloatArray, weights: FloatArray, *, dark: bool) -> tuple[FloatArray, Flags]:
+    """Return the first flash's coefficients (frame, row) with the others taken off, and the rows where they can be.
+
+    A flash of which no frame there saw enough cannot be taken off where it reaches into the sum.
+    """
+    holds = np.einsum("jfr,kfr->rjk", first, weights)  # what the sum for flash j holds of flash k
+    known: Flags = np.asarray(first.any(axis=1))  # (flash, row)
+    unknown = np.abs(holds[:, 0, 1:]) * ~known.T[:, 1:]
+    kept: Flags = ~(unknown > MOST_LEFT).max(axis=1, initial=False)
+    matrix = np.where(known.T[:, :, None], holds, np.eye(len(weights)))
+    if dark:
+        matrix[:, :, 0], matrix[:, 0, 0] = 0.0, 1.0
+    separable = np.abs(np.linalg.det(matrix)) > LEAST_DETERMINANT
+    matrix[~separable] = np.eye(len(weights))
+    inverse = np.linalg.inv(matrix)
+    own: FloatArray = np.einsum("rj,jfr->fr", inverse[:, 0, :], first)
+    return own, kept & separable

@@ -1,0 +1,281 @@
+"""A picture as a recipe bound to what it is made of: made where and as far as somebody wants it, and held by nobody.
+
+    picture[row] = sum_n coefficients[n, row] * frames[n][row]  -  sum_m taken[m, row] * levels[m][row]
+
+Frames stay in the codes in which they were read, which several pictures share: a picture that is not made costs nothing
+beside them. Levels are what is known of the ambient light.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.compute.threads import over_ranges
+from psvideo.model.camera import FloatArray
+from psvideo.model.coded import IDENTITY, Coded, Image
+from psvideo.model.rows.clipping import SATURATED
+from psvideo.plates.ambient.ambient_level import AmbientLevel
+from psvideo.plates.mixing.mixing_kernel import COUNTS, MixtureArrays, mix_pictures, mix_rows
+from psvideo.plates.mixing.ready_mixture import ReadyMixture
+from psvideo.plates.mixing.thinning_kernel import mix_halved, mix_thinned
+
+BAND_SAMPLES = 1 << 20
+"""Samples of one band of rows, which a thread makes at a time."""
+THINNED_SAMPLES = 1 << 24
+"""The same where few of the rows are made: frames that stay in their files are read so far at a time."""
+
+
+class Reader(Protocol):
+    """Makes rows of a picture, from the first up to the last; see ``Mixture.reader``."""
+
+    def __call__(self, first: int, last: int, into: Image | None = None) -> Image:
+        """Return the rows."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Mixture:
+    """A picture, (row, col) or (row, col, channel), in linear light.
+
+    frames: pictures in codes, all of one shape and type. coefficients: (frame, row). levels: ambient light of the
+    same shape; taken: (level, row). A sample becomes ``ceiling`` where any that counts was
+    ``clips_from`` or more. Rows without coefficients are 0.
+    """
+
+    frames: tuple[Coded, ...]
+    coefficients: FloatArray
+    levels: tuple[AmbientLevel, ...] = ()
+    taken: FloatArray | None = None
+    ceiling: float = 1.0
+    clips_from: float = SATURATED
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The picture's shape."""
+        return self.frames[0].shape
+
+    @property
+    def is_made(self) -> bool:
+        """Whether the picture lies in memory as it is."""
+        first = self.frames[0]
+        plain = not self.levels and len(self.frames) == 1 and first.tone is IDENTITY and first.codes.dtype == np.float32
+        return plain and bool((self.coefficients == 1).all()) and self.clips_from == np.inf
+
+    def image(self) -> Image:
+        """Return the picture."""
+        if self.is_made:
+            return np.asarray(self.frames[0].codes, np.float32)
+        image = np.empty(self.shape, np.float32)
+        self._into(image, range(self.shape[0]))
+        return image
+
+    def reader(self) -> Reader:
+        """Return what makes rows of the picture in the thread that calls it: from the first up to the last, into an
+        array, if one is given, else into a new one."""
+        if self.is_made:
+            return _copying(self.image())
+        bound = self.bound()
+
+        def read(first: int, last: int, into: Image | None = None) -> Image:
+            band = np.empty((last - first, *self.shape[1:]), np.float32) if into is None else into
+            bound.run(mix_rows, range(first, last), np.arange(first, last), band.reshape(last - first, -1))
+            return band
+
+        return read
+
+    def rows(self, rows: range | NDArray[np.intp]) -> Image:
+        """Return some rows of the picture, shape (row, col[, channel])."""
+        if self.is_made:
+            return np.asarray(self.image()[np.array(rows, np.intp)])
+        image = np.empty((len(rows), *self.shape[1:]), np.float32)
+        self._into(image, rows)
+        return image
+
+    def thinned(self, stride: int) -> Image:
+        """Return every nth row and column of the picture."""
+        if self.is_made:
+            return self.image()[::stride, ::stride]
+        rows, cols = (-(-size // stride) for size in self.shape[:2])
+        image = np.empty((rows, cols, *self.shape[2:]), np.float32)
+        channels, bound = int(np.prod(self.shape[2:])), self.bound()
+        each = max(THINNED_SAMPLES // bound.mix.samples // stride, 1)
+        for first in range(0, rows, each):
+            last = min(first + each, rows)
+            some = range(stride * first, stride * (last - 1) + 1, stride)
+            bound.run(mix_thinned, some, first, last, stride, channels, image.reshape(rows, -1))
+        return image
+
+    def halved(self) -> Image:
+        """Return the picture's mean over two by two pixels and over channels, shape (row // 2, col // 2)."""
+        rows, cols = self.shape[0] // 2, self.shape[1] // 2
+        grey = np.empty((rows, cols), np.float32)
+        bound = self.bound()
+        channels = 1 if len(self.shape) == 2 else self.shape[2]
+
+        def band(first: int, last: int) -> None:
+            bound.run(mix_halved, range(2 * first, 2 * last), first, last, channels, grey)
+
+        _in_bands(band, rows, 2 * bound.mix.samples)
+        return grey
+
+    def without(self, levels: tuple[AmbientLevel, ...], taken: FloatArray) -> "Mixture":
+        """Return the picture with levels taken off, each row with its own share; ``taken`` is (level, row)."""
+        return replace(self, levels=(*self.levels, *levels), taken=_joined(self.taken, taken))
+
+    def within(self, rows: NDArray[np.bool_]) -> "Mixture":
+        """Return the picture with 0 in all but some rows."""
+        return self if rows.all() else replace(self, coefficients=self.coefficients * rows)
+
+    def clipped(self) -> NDArray[np.bool_]:
+        """Return where any sample that counts was clipped, of the picture's shape."""
+        clipped = np.zeros(self.shape, np.bool_)
+        for frame, share in zip(self.frames, self.coefficients, strict=True):
+            counts = np.abs(share) > COUNTS
+            clipped[counts] |= frame.light()[counts] >= np.float32(self.clips_from)
+        return clipped
+
+    def bound(self) -> "ReadyMixture":
+        """Return what a compiled loop needs."""
+        frames = self.frames
+        tables = {id(frame.tone.table): frame.tone.table for frame in frames if frame.tone.table.size}
+        if len(tables) > 1 or (tables and any(not frame.tone.table.size for frame in frames)):
+            frames = tuple(Coded(codes=frame.light()) for frame in frames)
+            return replace(self, frames=frames).bound()
+        first = frames[0]
+        taken = np.zeros((0, self.shape[0])) if self.taken is None else self.taken
+        lies = [frame.codes for frame in frames if isinstance(frame.codes, np.ndarray)]
+        mix = MixtureArrays(
+            frames=np.array([codes.ctypes.data for codes in lies], np.intp),
+            like=np.empty(0, first.codes.dtype),
+            samples=int(np.prod(self.shape[1:])),
+            coefficients=np.ascontiguousarray(self.coefficients, np.float32),
+            table=first.tone.table,
+            halves=all(frame.tone.halves for frame in frames),
+            zero=np.stack([frame.tone.zero for frame in frames]).astype(np.float32),
+            gain=np.stack([frame.tone.gain for frame in frames]).astype(np.float32),
+            most=np.float32(min(frame.tone.most for frame in frames)),
+            levels=np.array([level.codes.ctypes.data for level in self.levels], np.intp),
+            least=_rows_of([level.least for level in self.levels], self.shape[0]),
+            step=_rows_of([level.step for level in self.levels], self.shape[0]),
+            narrow=np.array([level.narrow.ctypes.data for level in self.levels], np.intp),
+            taken=np.ascontiguousarray(taken, np.float32),
+            ceiling=np.float32(self.ceiling),
+            clips_from=np.float32(self.clips_from),
+        )
+        return ReadyMixture(mix=mix, frames=frames, levels=self.levels, counts=self.coefficients != 0)
+
+    def _into(self, image: Image, rows: range | NDArray[np.intp]) -> None:
+        if not len(rows):
+            return
+        bound, places = self.bound(), np.array(rows, np.intp)
+        flat = image.reshape(len(rows), -1)
+
+        def band(first: int, last: int) -> None:
+            some = places[first:last]
+            bound.run(mix_rows, np.sort(some), some, flat[first:last])
+
+        _in_bands(band, len(rows), bound.mix.samples)
+
+
+def combined(pictures: Sequence[Mixture], shares: Sequence[float], *, ceiling: float) -> Mixture:
+    """Return the sum of pictures, each times its share; ``ceiling`` where any of them is clipped in a sample that
+    counts. A plate that lies in memory is clipped from 1.0 on."""
+    parts = _Parts.of(pictures)
+    taken = [part.any(axis=0) for part in parts.shares]
+    each = np.array(shares)
+    return Mixture(
+        frames=parts.frames,
+        coefficients=np.tensordot(each, parts.shares, 1),
+        levels=parts.levels,
+        taken=np.tensordot(each, parts.taken * np.array(taken)[:, None], 1),
+        ceiling=ceiling,
+        clips_from=min(1.0, *(one.clips_from for one in pictures)),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Parts:
+    """What several pictures are made of, each once: their frames and levels, and what every one takes of them,
+    ``shares`` (picture, frame, row) and ``taken`` (picture, level, row)."""
+
+    frames: tuple[Coded, ...]
+    levels: tuple[AmbientLevel, ...]
+    shares: FloatArray
+    taken: FloatArray
+
+    @classmethod
+    def of(cls, pictures: Sequence[Mixture]) -> "_Parts":
+        frames = {id(frame): frame for one in pictures for frame in one.frames}
+        levels = {id(level): level for one in pictures for level in one.levels}
+        places = {key: place for parts in (frames, levels) for place, key in enumerate(parts)}
+        rows = pictures[0].shape[0]
+        shares, taken = (np.zeros((len(pictures), len(parts), rows)) for parts in (frames, levels))
+        for number, one in enumerate(pictures):
+            for frame, takes in zip(one.frames, one.coefficients, strict=True):
+                shares[number, places[id(frame)]] += takes
+            for level, takes in zip(one.levels, () if one.taken is None else one.taken, strict=True):
+                taken[number, places[id(level)]] += takes
+        return cls(frames=tuple(frames.values()), levels=tuple(levels.values()), shares=shares, taken=taken)
+
+
+def rows_maker(pictures: Sequence[Mixture]) -> Callable[[NDArray[np.intp], int, Image], None]:
+    """Return what makes rows of several pictures in the thread that calls it: ``make(rows, first, into)`` takes them in
+    rising order, and an array (picture, row, col[, channel]) that begins with the row ``first``."""
+    alike = {(one.ceiling, one.clips_from, one.shape, one.frames[0].codes.dtype, one.is_made) for one in pictures}
+    if len(alike) > 1 or pictures[0].is_made:
+        readers = [one.reader() for one in pictures]
+
+        def make_each(rows: NDArray[np.intp], first: int, into: Image) -> None:
+            whole = rows[-1] - rows[0] + 1 == len(rows)
+            spans = [(rows[0], rows[-1] + 1)] if whole else [(row, row + 1) for row in rows]
+            for read, made in zip(readers, into, strict=True):
+                for begin, end in spans:
+                    read(begin, end, made[begin - first : end - first])
+
+        return make_each
+    parts = _Parts.of(pictures)
+    together = replace(pictures[0], frames=parts.frames, coefficients=parts.shares[0], levels=parts.levels, taken=None)
+    counts: NDArray[np.bool_] = np.logical_or.reduce(parts.shares != 0)
+    bound = replace(together.bound(), counts=counts)
+    shares, taken = (np.ascontiguousarray(part, np.float32) for part in (parts.shares, parts.taken))
+
+    def make(rows: NDArray[np.intp], first: int, into: Image) -> None:
+        flat = into.reshape(*into.shape[:2], -1)
+        bound.run(mix_pictures, rows, shares, taken, rows, first, flat)
+
+    return make
+
+
+def _copying(image: Image) -> Reader:
+    def read(first: int, last: int, into: Image | None = None) -> Image:
+        if into is None:
+            return image[first:last]
+        into[:] = image[first:last]
+        return into
+
+    return read
+
+
+def made(image: Image) -> Mixture:
+    """Return a picture that lies in memory already."""
+    coded = Coded(codes=np.ascontiguousarray(image, np.float32))
+    return Mixture(frames=(coded,), coefficients=np.ones((1, len(image))), clips_from=np.inf)
+
+
+def shown_level(level: AmbientLevel) -> Mixture:
+    """Return ambient light as a picture."""
+    return Mixture(frames=(level.coded,), coefficients=np.ones((1, len(level.codes))), clips_from=np.inf)
+
+
+def _rows_of(levels: Sequence[Image], rows: int) -> Image:
+    return np.stack(levels) if levels else np.zeros((0, rows), np.float32)
+
+
+def _joined(before: FloatArray | None, more: FloatArray) -> FloatArray:
+    return more if before is None else np.concatenate([before, more])
+
+
+def _in_bands(run: Callable[[int, int], None], rows: int, samples: int) -> None:
+    over_ranges(run, rows, each=max(BAND_SAMPLES // samples, 1))

@@ -1,0 +1,125 @@
+"""The compiled loops that make small pictures of plates: every n-th row and column, or means over blocks of pixels."""
+
+from typing import Any
+
+import numpy as np
+from numba.np.numpy_support import carray
+
+from psvideo.compute.compiled import FUSED
+from psvideo.compute.memory import lent, pointer
+from psvideo.plates.mixing.mixing_kernel import (
+    CLIPPED,
+    WHOLE,
+    Floats,
+    InFiles,
+    MixtureArrays,
+    lent_mix,
+    level_row,
+    mix_row,
+    row_of,
+)
+
+HALF = np.float32(0.5)
+
+
+@FUSED.kept
+def mix_thinned(mix: MixtureArrays, first: int, last: int, step: int, channels: int, out: Floats) -> None:
+    """Make every ``step``-th row, and of it every ``step``-th pixel: ``out`` (row, sample).
+
+    ``first`` and ``last`` count rows of ``out``.
+    """
+    given, made = lent_mix(mix), lent(out)
+    if given.zero.shape[2] > 1:  # what a sample means depends on its column
+        whole = np.empty(given.samples, np.float32)
+        for row in range(first, last):
+            mix_row(given, step * row, whole)
+            _every(whole, made[row], step, channels)
+        return
+    count = made.shape[1]
+    codes = np.empty((given.frames.shape[0], count), given.like.dtype)
+    levels = np.empty((given.levels.shape[0], count), np.uint16)
+    thin = MixtureArrays(
+        np.empty_like(given.frames), given.like, count, given.coefficients, given.table, given.halves, given.zero,
+        given.gain, given.most, np.empty_like(given.levels), given.least, given.step, given.narrow, given.taken,
+        given.ceiling, given.clips_from, InFiles(given.files.opened[:0], 0, 0, given.files.missed),
+    )  # fmt: skip
+    for row in range(first, last):
+        at = step * row
+        for frame in range(given.frames.shape[0]):
+            if given.coefficients[frame, at] != np.float32(0):
+                _every(row_of(given, frame, at), codes[frame], step, channels)
+            thin.frames[frame] = codes.ctypes.data + (frame - at) * count * codes.itemsize
+        for level in range(given.levels.shape[0]):
+            if given.taken[level, at] != np.float32(0):
+                _every(level_row(given, level, at), levels[level], step, channels)
+            thin.levels[level] = levels.ctypes.data + (level - at) * count * levels.itemsize
+        mix_row(thin, at, made[row])
+
+
+@FUSED.inlined
+def _every(row: Any, out: Any, step: int, channels: int) -> None:
+    """Copy all channels of every ``step``-th pixel."""
+    for pixel in range(out.shape[0] // channels):
+        for channel in range(channels):
+            out[pixel * channels + channel] = row[pixel * step * channels + channel]
+
+
+@FUSED.kept
+def mix_halved(mix: MixtureArrays, first: int, last: int, channels: int, out: Floats) -> None:
+    """Make pairs of rows, and of them the mean over two by two pixels and all channels: ``out`` (row // 2, col // 2).
+
+    ``first`` and ``last`` count rows of ``out``. Levels are taken off as they are kept for this, and whole where a
+    sample is clipped.
+    """
+    given, made = lent_mix(mix), lent(out)
+    bare = _without_levels(given)
+    upper, lower = np.empty(given.samples, np.float32), np.empty(given.samples, np.float32)
+    share = np.float32(1 / (4 * channels))
+    for row in range(first, last):
+        above, below = mix_row(bare, 2 * row, upper), mix_row(bare, 2 * row + 1, lower)
+        whole = above != CLIPPED and below != CLIPPED
+        if not whole:
+            mix_row(given, 2 * row, upper)
+            mix_row(given, 2 * row + 1, lower)
+        for sample in range(given.samples):
+            upper[sample] += lower[sample]
+        _add_neighbours(upper, made[row], channels, share)
+        for level in range(given.levels.shape[0] if whole else 0):
+            if above == WHOLE:
+                _take_off_narrow(given, level, 2 * row, made[row])
+            if below == WHOLE:
+                _take_off_narrow(given, level, 2 * row + 1, made[row])
+
+
+@FUSED.inlined
+def _without_levels(mix: MixtureArrays) -> MixtureArrays:
+    return MixtureArrays(
+        mix.frames, mix.like, mix.samples, mix.coefficients, mix.table, mix.halves, mix.zero, mix.gain, mix.most,
+        mix.levels[:0], mix.least[:0], mix.step[:0], mix.narrow[:0], mix.taken[:0], mix.ceiling, mix.clips_from,
+        mix.files,
+    )  # fmt: skip
+
+
+@FUSED.inlined
+def _take_off_narrow(mix: MixtureArrays, level: int, row: int, out: Floats) -> None:
+    share = mix.taken[level, row] * HALF
+    if share != np.float32(0):
+        end = (row + 1) * out.shape[0]
+        narrow: Floats = carray(pointer(mix.narrow[level], mix.taken), end)[row * out.shape[0] : end]
+        for col in range(out.shape[0]):
+            out[col] -= share * narrow[col]
+
+
+@FUSED.inlined
+def _add_neighbours(pairs: Floats, out: Floats, channels: int, share: np.float32) -> None:
+    """Two neighbouring pixels' channels added up, times their share."""
+    if channels == 3:
+        for col in range(out.shape[0]):
+            a, b, c = pairs[6 * col], pairs[6 * col + 1], pairs[6 * col + 2]
+            out[col] = (a + b + c + pairs[6 * col + 3] + pairs[6 * col + 4] + pairs[6 * col + 5]) * share
+        return
+    for col in range(out.shape[0]):
+        total = np.float32(0)
+        for sample in range(2 * col * channels, 2 * (col + 1) * channels):
+            total += pairs[sample]
+        out[col] = total * share

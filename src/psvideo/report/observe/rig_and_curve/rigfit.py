@@ -1,0 +1,77 @@
+"""Whether the rig can have lit these plates: what its directions and strengths leave unexplained.
+
+A matte pixel that all lights reach has ``light = L b``, with the rig's directions times strengths L (light, 3). What is
+outside of L's columns cannot come from any normal. Three lights explain anything; from four on a wrong rig shows. How
+strong each light truly was, relative to the rig, is the vector h that makes ``diag(h) light`` fit best: the least
+eigenvector of the sum of ``(light lightT) * (1 - L L+)``.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.model.camera import FloatArray
+from psvideo.report.observe.rig_and_curve.nearness import Nearness, nearness
+from psvideo.report.observe.rig_and_curve.other_curves import LEAST_POINTS, SHADOW, OtherCurves, other_curves
+
+LEAST_LIGHT = 4.0
+"""A pixel is lit where its brightest light gives at least this many times the light of 0.001."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RigFit:
+    """What a few thousand points said of the rig. ``misfit`` is the median share of a point's light that no normal
+    explains, ``own_misfit`` the share that no rig at all would explain (shadows, gloss, motion), ``scaled_misfit`` what
+    is left once every light's strength is free, and ``strengths`` (light,) what they come out as, 1 for the median.
+    ``near`` is how near lamps stand that the rig takes for distant, ``curves`` what is left over under other transfer
+    curves; both None where it says where they stand."""
+
+    misfit: float
+    own_misfit: float
+    scaled_misfit: float
+    strengths: tuple[float, ...]
+    near: Nearness | None = None
+    curves: OtherCurves | None = None
+
+    @property
+    def excess(self) -> float:
+        """The share of the light that another rig could explain, and this one cannot."""
+        return float(np.sqrt(max(self.misfit**2 - self.own_misfit**2, 0.0)))
+
+
+def rig_fit(light: FloatArray, vectors: FloatArray, places: FloatArray | None = None) -> RigFit | None:
+    """Judge a rig by points: ``light`` (point, light) is unclipped, ``vectors`` (point or 1, light, 3) what the rig
+    sends there, and ``places`` (point, 2) where they lie, x right and y up in widths of the picture. None for three
+    lights, or where too few points are reached by all of them."""
+    count = light.shape[1]
+    peak = light.max(axis=1)
+    reached = (light.min(axis=1) > SHADOW * peak) & (peak > LEAST_LIGHT * 1e-3)
+    if count < 4 or reached.sum() < LEAST_POINTS:
+        return None
+    unit = light[reached] / np.linalg.norm(light[reached], axis=1, keepdims=True)
+    beyond = _beyond(vectors if len(vectors) == 1 else vectors[reached])
+    left = np.einsum("...ij,...j->...i", beyond, unit)
+    misfit = float(np.median(np.linalg.norm(left, axis=1)))
+    moments = unit.T @ unit
+    values = np.linalg.eigvalsh(moments)
+    own = float(np.sqrt(max(values[: count - 3].sum(), 0) / values.sum()))
+    gains = np.einsum("pi,pj,pij->ij", unit, unit, np.broadcast_to(beyond, (len(unit), count, count)))
+    unit_free = 1 / np.sqrt(np.diag(moments))  # of gains h = share * diag(moments) h
+    share, h = (found[..., 0] for found in np.linalg.eigh(unit_free[:, None] * gains * unit_free))
+    h = unit_free * h
+    true = 1 / np.maximum(np.abs(h), 1e-3 * np.abs(h).max())
+    strengths = tuple(float(value) for value in true / np.median(true))
+    near = curves = None
+    if places is not None and len(vectors) == 1:
+        near = nearness(unit, beyond[0], vectors[0], places[reached])
+        curves = other_curves(light[reached], beyond[0])
+    scaled = float(np.sqrt(max(share, 0)))
+    return RigFit(misfit=misfit, own_misfit=own, scaled_misfit=scaled, strengths=strengths, near=near, curves=curves)
+
+
+def _beyond(vectors: FloatArray) -> FloatArray:
+    """Return the projectors to what no normal explains, shape (point, light, light)."""
+    explained = vectors @ np.linalg.pinv(vectors)
+    beyond: NDArray[np.float64] = np.eye(vectors.shape[1]) - explained
+    return beyond

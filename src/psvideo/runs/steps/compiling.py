@@ -1,0 +1,121 @@
+"""Compiling ahead what usual runs need: a few small virtual takes are run once, each in a process of its own.
+
+There is no list of loops and types: what these runs compile is kept for all later ones (docs/decisions/first-run.md).
+"""
+
+import tempfile
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+
+from psvideo.compute.progress import Watch, unwatched
+from psvideo.compute.threads import thread_count
+from psvideo.model.quantities import Aov
+from psvideo.runs.steps.caller import Caller
+from psvideo.runs.steps.small_pictures import RING, SmallPictures
+
+SCENE = """
+schema = "psvideo-scene/1"
+name = "small"
+frames = {frames}
+camera = {{ width_px = 96, height_px = 120, fps = 100, shutter_deg = 360, readout_s = 0.0097, width_m = 1.0, {camera} }}
+output = {{ kind = "{kind}" }}
+ambient = {{ level = 0.02 }}
+object = [{{ mesh = "sphere", albedo = {{ pattern = "noise" }}{motion}{gloss} }}]
+light = [{lights}]
+"""
+GLOSS = ", specular = { strength = 0.3, roughness = 0.35 }"
+
+
+@dataclass(frozen=True, kw_only=True)
+class SmallTake:
+    """A take that makes loops compile: its number of lights, its files and camera, what is asked of it, and whether it
+    is watched live too."""
+
+    lights: int
+    kind: str = "png16"
+    camera: str = "full_well_e = 30000"
+    motion: str = ""
+    gloss: str = ""
+    aov: tuple[Aov, ...] = ()
+    live: bool = False
+    float32: bool = False
+
+    @property
+    def scene(self) -> str:
+        """The scene as its file would hold it."""
+        lights = [f'{{ name = "l{n}", direction = [{x}, {y}, 0.8] }}' for n, (x, y) in enumerate(RING[: self.lights])]
+        return SCENE.format(
+            frames=FRAMES_LIVE if self.live else 6 * (self.lights + 1),
+            camera=self.camera,
+            kind=self.kind,
+            motion=self.motion,
+            gloss=self.gloss,
+            lights=", ".join(lights),
+        )
+
+
+FRAMES_LIVE = 72
+"""Enough to find the strobe in, and to follow it."""
+
+USUAL = (
+    SmallTake(lights=8, aov=("residual", "error", "depth", "beauty"), gloss=GLOSS, live=True),
+    SmallTake(lights=4, motion=", motion = { velocity_m_per_s = [0.4, 0.0, 0.0] }", aov=("depth",)),
+    SmallTake(lights=3, kind="png8", camera='bits = 8, transfer = "srgb"'),
+    SmallTake(lights=4, kind="dng", camera='cfa = "RGGB"', live=True),
+    SmallTake(lights=3, kind="exr", float32=True),
+)
+"""What usual footage runs through: 16 and 8 bits, mosaics, floats; few lights and many; at rest and moving."""
+
+
+PICTURES = (
+    SmallPictures(lights=3, near=True),
+    SmallPictures(lights=4),
+    SmallPictures(lights=3, colour=True),
+    SmallPictures(lights=8, colour=True, near=True),
+    SmallPictures(lights=8),
+)
+"""What a caller from Python may hand over: few lights and many, near and far, in colour and grey."""
+
+
+def solve_small() -> None:
+    """Solve the small pictures."""
+    from psvideo.solve.images import solve_images
+
+    for one in PICTURES:
+        solve_images(one.images, one.rig)
+
+
+def compile_ahead(*, watch: Watch = unwatched) -> None:
+    """Compile and keep what usual runs need, takes side by side; what is kept already is only loaded.
+
+    Raises PsvideoError where a small take cannot be run.
+    """
+    with ProcessPoolExecutor(min(thread_count(), len(USUAL)), mp_context=get_context("spawn")) as pool:
+        waiting = [*(pool.submit(run_small, take) for take in USUAL), pool.submit(solve_small)]
+        for one in watch(waiting, total=len(waiting), what="compiling, once", unit="takes"):
+            one.result()
+
+
+def run_small(take: SmallTake) -> None:
+    """Film a small take and run the whole of ``normals`` on it, timing and all, in a folder that is gone afterwards."""
+    from psvideo.runs.live import live
+    from psvideo.runs.normals import normals
+    from psvideo.synth.shoot import shoot
+
+    quiet = Caller(say=_unsaid, warn=_unsaid, detail=_unsaid)
+    with tempfile.TemporaryDirectory(prefix="psvideo-compiling-") as folder:
+        scene, clip = Path(folder) / "small.toml", Path(folder) / "clip"
+        scene.write_text(take.scene, encoding="utf-8")
+        shoot(scene, clip)
+        normals(clip, rig=clip / "rig.toml", out=Path(folder) / "out", aov=take.aov, float32=take.float32, caller=quiet)
+        if take.live:
+            live(clip, rig=clip / "rig.toml", pace="fastest", caller=quiet)
+
+
+def _unsaid(_: str) -> None: ...
+
+
+if __name__ == "__main__":  # what building the package calls
+    compile_ahead()

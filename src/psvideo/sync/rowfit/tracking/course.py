@@ -1,0 +1,94 @@
+"""A clip's whole course, followed from a seed across holes, repeated frames and drift to its very ends."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from psvideo.model.plan import Plan
+from psvideo.sync.rowfit.beat import FoundClock
+from psvideo.sync.rowfit.coarse.seed import CLEARER, Seed, gain_of, other_seeds, renumbered
+from psvideo.sync.rowfit.profiles import Profiles, unexplained
+from psvideo.sync.rowfit.tracking.ends import ends
+from psvideo.sync.rowfit.tracking.track import FrameTrack, from_first_frame, settled, track, with_repeats
+
+GOOD_COURSE = 0.9
+"""A course through the clip that takes away this share of the robust loss is not tried again from elsewhere."""
+MOST_STEPS, MOST_STEPS_SHARE = 3, 0.04
+"""Frames before which others may be missing (or a share of all frames) until only an excellent fit is believed."""
+MOST_STRAYED_SHARE = 0.2
+"""And frames that may be missing altogether: holes that grow and grow follow a subject, not a strobe."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Course:
+    """Where a clip's frames are in time, as followed from a seed.
+
+    ``trusted`` are the first and the last place in time at which frames fit; ``share`` of the robust loss goes with it.
+    ``steps``: at how many places frames do not follow one another as their numbers say; ``strayed``: by how many frames
+    in all.
+    """
+
+    track: FrameTrack
+    trusted: tuple[int, int]
+    steps: int
+    strayed: int
+    share: float
+
+
+def followed(plan: Plan, rows: Profiles, seed: Seed) -> Course:
+    """Follow the strobe from the seed, and from another one where frames seem to be missing all over."""
+    course = _followed(plan, rows, seed)
+    if course.share > GOOD_COURSE or not too_many(course.steps, 0, len(rows.value)):
+        return course
+    for other in other_seeds(plan, rows.turned() if seed.beat.upward else rows):
+        again = _followed(plan, rows, other) if other.beat.upward == seed.beat.upward else course
+        course = again if 1 - again.share < CLEARER * (1 - course.share) else course
+        if course.share > GOOD_COURSE:
+            break
+    return course
+
+
+def too_many(steps: int, strayed: int, frames: int) -> bool:
+    """Return whether so many frames seem to be missing, or at so many places, that it takes an excellent fit."""
+    return steps > max(MOST_STEPS, MOST_STEPS_SHARE * frames) or strayed > MOST_STRAYED_SHARE * frames
+
+
+def _followed(plan: Plan, rows: Profiles, seed: Seed) -> Course:
+    numbering = seed.numbering
+    kept = renumbered(rows, numbering)
+    memory = max(window_frames(plan), int(1.2 * plan.marker_s / rows.period_s))
+    tracked = track(plan, kept, seed.beat, seed.frames, memory=memory)
+    tracked = replace(tracked, beat=replace(tracked.beat, clock=_clock_of(plan, tracked)))
+    index = settled(plan, kept, tracked.index, tracked.beat)
+    placed = ends(plan, kept, index, tracked.beat)
+    tracked = from_first_frame(kept, replace(tracked, index=placed.index))
+    index = tracked.index
+    there = replace(kept, index=index)
+    stray = np.diff(index) - np.diff(numbering.plain)
+    return Course(
+        track=with_repeats(plan, rows, tracked, numbering.kept),
+        trusted=(int(index[placed.lost_first]), int(index[len(index) - 1 - placed.lost_last])),
+        steps=int((stray != 0).sum()),
+        strayed=int(np.abs(stray).sum()),
+        share=gain_of(there, unexplained(plan, there, tracked.beat)),
+    )
+
+
+def window_frames(plan: Plan) -> int:
+    """Return how many frames see every light several times."""
+    return max(24, 6 * (len(plan.lit_slots) + 1))
+
+
+def _clock_of(plan: Plan, tracked: FrameTrack) -> FoundClock:
+    """Return a straight clock through the track's anchors, or a bent one where they stray from it."""
+    clock = tracked.beat.clock
+    if len(tracked.at_s) < 2:
+        return clock
+    line = np.polyfit(tracked.at_s, tracked.late_s, 1)
+    stray_s = tracked.late_s - np.polyval(line, tracked.at_s)
+    pivot_s = float(tracked.at_s.mean())
+    straight = clock.shifted(float(np.polyval(line, pivot_s)), 1e6 * float(line[0]), pivot_s=pivot_s)
+    shortest_s = min(plan.flashes[slot].duration_s for slot in plan.lit_slots)
+    if np.median(np.abs(stray_s)) < 0.02 * shortest_s:
+        return straight
+    return straight.bent(tracked.at_s, stray_s)

@@ -1,0 +1,188 @@
+"""What a smooth clock leaves: flashes that each come a little early or late, and how certain all times are.
+
+Rows that open during a flash and rows that close during it show its time independently of one another. What both say
+alike is jitter, what they say differently is noise; so jitter is believed, and noise shrunk away, without a model of
+either (empirical Bayes).
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.model.camera import FloatArray
+from psvideo.model.plan import Plan
+from psvideo.sync.rowfit import kernel
+from psvideo.sync.rowfit.coarse.seed import gain_of
+from psvideo.sync.rowfit.profiles import Profiles, compiled_flashes, compiled_rows, equations
+from psvideo.sync.rowfit.refine import CAUCHY, WIDE_SCALE, Fit, scaled
+from psvideo.sync.rowfit.row_model import Flashes
+
+LEAST_FLASHES = 8
+SURE = 5.0
+"""Standard deviations of Fisher's z (1921) by which openings and closings must agree before flashes are moved."""
+ALIKE = 1 - 1e-9
+ROUNDS = 4
+"""Flashes are moved, and looked at again where they then are: brightnesses had taken up some of what they strayed."""
+ENOUGH = 0.1
+"""A flash is timed where rows show it by more than this share of what is usual."""
+OUTLIER = 6.0
+"""Flashes stray by no more standard deviations than this, as the others show them."""
+STILL = 0.9
+"""Where the first rows to see a flash are not those that see it last, even and odd rows are held against one another,
+if the subject stands still: a fit takes away this share of the robust loss. Else brightness would pass for jitter."""
+ROWS_OVER = 20.0
+"""What such rows agree on must be that many times what parts them, as variances: compression makes neighbours alike."""
+CHANCE = 2.0
+"""Standard errors by which openings and closings may disagree by chance."""
+ROW_BLOCKS = 8
+"""Blocks of rows whose errors are taken as independent."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Jitter:
+    """By how much each flash comes late, ``late_s`` (flash,), by its start ``start_s``; ``error_s`` is each one's.
+
+    ``mean_error_s`` is the standard error of what all have in common.
+    """
+
+    start_s: FloatArray
+    late_s: FloatArray
+    error_s: float
+    mean_error_s: float = 0.0
+
+    def of(self, start_s: FloatArray) -> FloatArray:
+        """Return by how much the flashes that start at these times come late, same shape; 0 for others."""
+        if not len(self.start_s):
+            return np.zeros_like(start_s)
+        after = np.minimum(np.searchsorted(self.start_s, start_s), len(self.start_s) - 1)
+        before = np.maximum(after - 1, 0)
+        nearest = np.where(start_s - self.start_s[before] < self.start_s[after] - start_s, before, after)
+        same = np.abs(self.start_s[nearest] - start_s) < 1e-7
+        late_s: FloatArray = np.where(same, self.late_s[nearest], 0.0)
+        return late_s
+
+
+STEADY = Jitter(start_s=np.empty(0), late_s=np.empty(0), error_s=0.0)
+
+
+def jitter(plan: Plan, rows: Profiles, fit: Fit) -> Jitter:
+    """Return how single flashes stray from the clock; none at all where what the rows say does not agree on it."""
+    flashes = compiled_flashes(plan, rows, fit.beat)
+    late_s = np.zeros(len(flashes.start_s))
+    straying = _straying(rows, fit, flashes)
+    if straying is None:
+        return STEADY
+    spread_s, noise = straying
+    for _ in range(ROUNDS):
+        pull, stiff = (two.sum(axis=1) for two in _pulls(rows, fit, _moved(flashes, late_s)))
+        timed = stiff > ENOUGH * float(np.median(stiff[stiff > 0]))
+        seen_s = late_s[timed] + pull[timed] / stiff[timed]
+        mean_s = float(np.median(seen_s))
+        variance = noise / stiff[timed]
+        share = spread_s**2 / (spread_s**2 + variance)
+        late_s = np.full(len(late_s), mean_s)
+        late_s[timed] += share * np.clip(seen_s - mean_s, -OUTLIER * spread_s, OUTLIER * spread_s)
+    inside = (flashes.start_s > rows.frame_start_s[0]) & (flashes.start_s < rows.frame_start_s[-1])
+    left = np.full(len(late_s), spread_s**2)
+    left[timed] = share * variance
+    return Jitter(
+        start_s=flashes.start_s,
+        late_s=late_s,
+        error_s=float(np.sqrt(left[inside].mean())),
+        mean_error_s=float(np.sqrt(noise / stiff[timed].sum())),
+    )
+
+
+def _straying(rows: Profiles, fit: Fit, flashes: Flashes) -> tuple[float, float] | None:
+    """Return by how much flashes stray, and a pull's noise: its variance over its stiffness; None where none do."""
+    pull, stiff = _pulls(rows, fit, flashes)
+    if _timed(stiff).sum() >= LEAST_FLASHES:
+        return _agreed(pull, stiff, over=1.0)
+    if gain_of(rows, fit.rest) < STILL:
+        return None
+    halves = [_pulls(rows.only_rows(half), fit, flashes, half) for half in (slice(0, None, 2), slice(1, None, 2))]
+    return _agreed(
+        np.stack([pull.sum(axis=1) for pull, _ in halves], axis=1),
+        np.stack([stiff.sum(axis=1) for _, stiff in halves], axis=1),
+        over=ROWS_OVER,
+    )
+
+
+def _timed(stiff: FloatArray) -> NDArray[np.bool_]:
+    """Return which flashes (flash,) both kinds of rows show, from stiffnesses (flash, 2)."""
+    usual = np.array([np.median(one[one > 0]) if (one > 0).any() else np.inf for one in stiff.T])
+    return np.asarray((stiff > ENOUGH * usual).all(axis=1), np.bool_)
+
+
+def _agreed(pull: FloatArray, stiff: FloatArray, *, over: float) -> tuple[float, float] | None:
+    """Return by how much flashes stray and the noise, as two kinds of rows (flash, 2) show both.
+
+    None where they do not agree, or on no more than ``over`` times what noise makes of their mean, as variances.
+    """
+    timed = _timed(stiff)
+    if timed.sum() < LEAST_FLASHES:
+        return None
+    apart = pull[timed] / stiff[timed]
+    apart -= np.median(apart, axis=0)
+    bound = OUTLIER * 1.4826 * float(np.median(np.abs(apart))) + 1e-15
+    apart = np.clip(apart, -bound, bound)
+    common, own = float((apart[:, 0] * apart[:, 1]).mean()), (apart**2).mean(axis=0)
+    likeness = common / max(float(np.sqrt(own[0] * own[1])), 1e-30)
+    by_noise = float(((apart[:, 0] - apart[:, 1]) ** 2).mean()) / 4
+    if common < over * by_noise or np.arctanh(min(likeness, ALIKE)) * np.sqrt(len(apart) - 3) < SURE:
+        return None
+    noise = float(((apart[:, 0] - apart[:, 1]) ** 2 / (1.0 / stiff[timed]).sum(axis=1)).mean())
+    return float(np.sqrt(common)), noise
+
+
+def _moved(flashes: Flashes, late_s: FloatArray) -> Flashes:
+    """Return the flashes as late as they were found; they stay in order."""
+    return flashes._replace(start_s=np.maximum.accumulate(flashes.start_s + late_s))
+
+
+def _pulls(rows: Profiles, fit: Fit, flashes: Flashes, among: slice = slice(None)) -> tuple[FloatArray, FloatArray]:
+    """Return how strongly rows that open and rows that close shift each flash, shape (flash, 2) twice.
+
+    ``rows`` are those ``among`` the fit's own.
+    """
+    seen = compiled_rows(rows, fit.beat)
+    pull, stiff = np.zeros((len(flashes.start_s), 2)), np.zeros((len(flashes.start_s), 2))
+    rest = np.ascontiguousarray(fit.rest[:, among])
+    scale = scaled(rows, rest, WIDE_SCALE)
+    weight = 1.0 / (1.0 + (rest / (CAUCHY * scale)) ** 2) / scale**2
+    kernel.edges(seen, flashes, weight, 0, rows.value.shape[1], pull, stiff)
+    return pull, stiff
+
+
+def disagreement_s(plan: Plan, rows: Profiles, fit: Fit) -> float:
+    """Return by how much rows that open and rows that close disagree on the flashes' times, beyond chance.
+
+    Half their distance is as large as the standard error where noise is all that parts them; blurred rows part them
+    further, and that much the times are in doubt.
+    """
+    pull, stiff = _pulls(rows, fit, compiled_flashes(plan, rows, fit.beat))
+    if stiff.sum(axis=0).min() <= 0.0:
+        return 0.0
+    opening_s, closing_s = pull.sum(axis=0) / stiff.sum(axis=0)
+    return float(np.sqrt(max((0.5 * (opening_s - closing_s)) ** 2 - (CHANCE * fit.shift_error_s) ** 2, 0.0)))
+
+
+def shift_error_s(plan: Plan, rows: Profiles, fit: Fit) -> float:
+    """Return the standard error of the common shift as blocks of rows give it, which a moving subject upsets."""
+    edges = np.linspace(0, rows.value.shape[1], ROW_BLOCKS + 1).astype(int)
+    if np.diff(edges).min() == 0:
+        return 0.0
+    pulls, stiff = [], []
+    for first, last in pairwise(edges.tolist()):
+        block = rows.only_rows(slice(first, last))
+        weight = np.ascontiguousarray(fit.weight[:, first:last])
+        _, hessian, score = equations(plan, block, fit.beat, weight, tails=False, steepness=weight)
+        pulls.append(score[:, :2].sum())
+        stiff.append(hessian[:, :2, :2].sum())
+    pull, whole = np.array(pulls), float(np.sum(stiff))
+    if whole <= 0.0:
+        return 0.0
+    pull -= np.array(stiff) * pull.sum() / whole
+    return float(np.sqrt(ROW_BLOCKS / (ROW_BLOCKS - 1) * (pull**2).sum()) / whole)
