@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from bench.accuracy_measure import read_image
-from psvideo.solve.depth import Integration, View, integrate, scaled
+from psvideo.solve.depth import Integration, View, depth_of_height, integrate
 from psvideo.solve.depth.cao2022 import BILATERAL, SMOOTH
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data" / "diligent_gt"
@@ -55,7 +55,7 @@ def _object(name: str, how: Integration) -> tuple[float, float]:
     true = np.load(DATA / name / "depth_gt.npz")["depth_gt"]
     view = View(focal_px=(k[0, 0], k[1, 1]), principal_px=(k[0, 2], k[1, 2]))
     began = time.perf_counter()
-    found = scaled(integrate(codes / 32767.5 - 1, mask, view, how=how), view)
+    found = depth_of_height(integrate(codes / 32767.5 - 1, mask, view, how=how), view)
     took_s = time.perf_counter() - began
     seen = found.valid & np.isfinite(true)
     scale = np.median(true[seen] / found.depth[seen])

@@ -44,7 +44,7 @@ class Threads:
 def main() -> None:
     """Watch the camera whose command is given, after a plan, a rig and how many seconds of footage."""
     set_as_commands_do()
-    from psvideo.clip import genicam  # numpy comes with it
+    from psvideo.clip.streams import genicam  # numpy comes with it
     from psvideo.runs.live import live
 
     plan, rig, seconds, camera = sys.argv[1], sys.argv[2], float(sys.argv[3]), sys.argv[4:]

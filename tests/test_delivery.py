@@ -17,7 +17,7 @@ from psvideo.errors import PsvideoError, UsageError
 from psvideo.export.asked import Asked, delivery_of
 from psvideo.export.preview_movie import even, write_movie
 from psvideo.export.programs.delivered import Delivered
-from psvideo.export.programs.loading_notes import note
+from psvideo.export.programs.loading_notes import loading_note
 from psvideo.export.programs.otio import Footage, Images, timeline_text
 from psvideo.model.choices import Program
 from psvideo.plates.beauty import Mix, beauty_of, mix_of
@@ -337,7 +337,7 @@ def test_every_program_has_a_note_with_numbers_rate_colour_and_wrong_ways(name: 
         metric=True,
         delivery=delivery,
     )
-    said = note(name, made)
+    said = loading_note(name, made)
     for words in ("1001", "1100", "23.976", "Known wrong ways", "take7", "sRGB" if delivery.png16 else "Raw"):
         assert words in said
     assert ("position" in delivery.aovs) == ("Positions are" in said)

@@ -27,15 +27,15 @@ from psvideo.solve.depth import (
     View,
     begun,
     depth_of,
+    depth_of_height,
     integrate,
     kept_beside,
     mesh_of,
     reservations,
     scale_note,
-    scaled,
 )
 from psvideo.solve.depth.cao2022 import SMOOTH, Integration
-from psvideo.solve.depth.multigrid import empty_grids, prepare, solve, weighed
+from psvideo.solve.depth.multigrid import empty_grids, set_up_levels, solve, weighed
 from psvideo.solve.depth.reweighting import write_board
 from psvideo.solve.depth.simchony1990 import poisson_height
 from psvideo.solve.depth.view import slopes_of
@@ -102,21 +102,21 @@ def error(found: Depth, true: Floats) -> float:
 def test_a_pinhole_sees_a_tilted_plane_as_a_plane(mask: NDArray[np.bool_], normal: tuple[float, float, float]) -> None:
     normals, depth = plane(PINHOLE, normal)
     # a step between pixels is the mean of two slopes, which for a plane is wrong by (step / f)^3 / 12 only
-    assert error(scaled(integrate(normals, mask, PINHOLE), PINHOLE), depth) < 1e-4
+    assert error(depth_of_height(integrate(normals, mask, PINHOLE), PINHOLE), depth) < 1e-4
 
 
 @pytest.mark.parametrize("mask", [EVERYWHERE, disc(), with_holes()], ids=["rectangle", "disc", "holes"])
 def test_an_orthographic_ramp_is_exact(mask: NDArray[np.bool_]) -> None:
     normals, depth = plane(View(), (-0.7, 0.5, 1.0))
     exact = Integration(tolerance=1e-9)
-    found = scaled(integrate(normals, mask, View(), how=exact), View())
+    found = depth_of_height(integrate(normals, mask, View(), how=exact), View())
     assert np.ptp((found.depth - depth)[mask]) < 1e-6
 
 
 @pytest.mark.parametrize("how", [SMOOTH, Integration()], ids=["smooth", "bilateral"])
 def test_a_ball_comes_out_as_a_ball(how: Integration) -> None:
     normals, depth, mask = sphere(PINHOLE)
-    found = scaled(integrate(normals, mask, PINHOLE, how=how), PINHOLE)
+    found = depth_of_height(integrate(normals, mask, PINHOLE, how=how), PINHOLE)
     ratio = (depth / np.where(mask, found.depth, 1))[mask]
     assert np.abs(ratio / np.median(ratio) - 1).mean() < 4e-3  # the ball is 0.2 deep, at 1.0; a pixel is 0.007
 
@@ -139,7 +139,7 @@ def test_depth_to_normals_to_depth_is_the_identity() -> None:
     bumps: NDArray[Any] = cv2.GaussianBlur(rng.normal(size=(ROWS, COLS)), (0, 0), 7)
     depth: Floats = 1.5 + 0.8 * bumps
     normals = normals_of_points(PINHOLE.points(depth))
-    found = scaled(integrate(normals, EVERYWHERE, PINHOLE), PINHOLE)
+    found = depth_of_height(integrate(normals, EVERYWHERE, PINHOLE), PINHOLE)
     assert error(found, depth) < 2e-3
     assert np.ptp(depth) > 0.1
 
@@ -230,7 +230,7 @@ def test_one_multigrid_cycle_is_worth_many_plain_steps() -> None:
     finest = grids.levels[0]
     for plane, board in ((east, finest.ties[0]), (south, finest.ties[1]), (right - right.mean(), finest.right)):
         write_board(plane.astype(np.float32), board, 0)
-    prepare(grids)
+    set_up_levels(grids)
     wanted = weighed(grids)
     assert solve(grids, stop=1e-8 * wanted, most=100)[1] < 30
     assert weighed(grids) <= 1e-8 * wanted
@@ -269,7 +269,7 @@ def test_what_is_not_valid_touches_nothing() -> None:
     normals, _, mask = sphere(PINHOLE)
     noisy = np.where(mask[..., None], normals, np.random.default_rng(0).normal(size=normals.shape))
     assert np.array_equal(integrate(noisy, mask, PINHOLE).height, integrate(normals, mask, PINHOLE).height)
-    nothing = scaled(integrate(normals, np.zeros_like(mask), PINHOLE), PINHOLE)
+    nothing = depth_of_height(integrate(normals, np.zeros_like(mask), PINHOLE), PINHOLE)
     assert not nothing.depth.any()
     assert nothing.parts == 0
 
@@ -285,21 +285,23 @@ def two_plates() -> NDArray[np.bool_]:
 def test_each_part_is_put_on_the_plane_by_itself_and_speckles_get_no_depth() -> None:
     normals, depth = plane(PINHOLE, (0.3, 0.0, 1.0))
     n = normals[0, 0]
-    found = scaled(
+    found = depth_of_height(
         integrate(normals, two_plates(), PINHOLE), PINHOLE, plane=(n[0] * 2, n[1] * 2, n[2] * 2, n[2] * 2 * 1.7)
     )
     assert found.metric
     assert found.parts == 2
     assert found.depth[2, 2] == 0
     assert np.abs(found.depth / (1.7 * depth) - 1)[found.valid].max() < 1e-4
-    assert np.median(scaled(integrate(normals, two_plates(), PINHOLE), PINHOLE).depth[20:50, 50:85]) == pytest.approx(1)
+    assert np.median(
+        depth_of_height(integrate(normals, two_plates(), PINHOLE), PINHOLE).depth[20:50, 50:85]
+    ) == pytest.approx(1)
 
 
 @pytest.mark.parametrize("wrong", [(0.0, 0.0, 1.0, -1.2), (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 1.0, 0.0)])
 def test_a_plane_behind_the_camera_is_refused(wrong: tuple[float, float, float, float]) -> None:
     normals, _ = plane(PINHOLE, (0, 0, 1))
     with pytest.raises(PsvideoError, match="nowhere before the camera"):
-        scaled(integrate(normals, EVERYWHERE, PINHOLE), PINHOLE, plane=wrong)
+        depth_of_height(integrate(normals, EVERYWHERE, PINHOLE), PINHOLE, plane=wrong)
 
 
 def surface(normals: Floats, valid: NDArray[np.bool_]) -> Surface:
@@ -385,7 +387,7 @@ def test_real_shapes_come_out_as_near_as_published(name: str, shared_data: Path)
     k = np.loadtxt(folder / "K.txt")
     true = np.load(folder / "depth_gt.npz")["depth_gt"]
     view = View(focal_px=(k[0, 0], k[1, 1]), principal_px=(k[0, 2], k[1, 2]))
-    found = scaled(integrate(normals, mask, view), view)
+    found = depth_of_height(integrate(normals, mask, view), view)
     seen = found.valid & np.isfinite(true)
     scale = np.median((true / np.where(seen, found.depth, 1))[seen])
     wrong_mm = np.abs(scale * found.depth - true)[seen].mean()

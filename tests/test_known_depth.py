@@ -14,7 +14,7 @@ from psvideo.clip import open_depth
 from psvideo.errors import PsvideoError
 from psvideo.model.irradiance.ground import ground_of
 from psvideo.model.rig import Light, Rig
-from psvideo.solve.depth import View, integrate, scaled
+from psvideo.solve.depth import View, depth_of_height, integrate
 
 ROWS, COLS, FOCAL_PX = 60, 80, 120.0
 CENTRE, RADIUS_M = np.array([0.02, 0.0, -0.85]), 0.2
@@ -244,6 +244,6 @@ def test_parts_of_unknown_depth_stand_at_the_middle_of_what_is_known() -> None:
     mask[5:30, 5:25] = mask[5:30, 35:55] = True
     known = np.zeros((40, 60), np.float32)
     known[:, :30] = 1.5
-    found = scaled(integrate(normals, mask, view), view, known_m=known)
+    found = depth_of_height(integrate(normals, mask, view), view, known_m=known)
     assert found.metric
     assert np.allclose(found.depth[mask], 1.5)

@@ -78,7 +78,7 @@ def test_a_chapter_in_the_dark_is_bridged_from_those_beside_it(plan: Plan, monke
     index, place = np.arange(FRAMES, dtype=np.int64), np.arange(ROWS, dtype=np.float64)
     start, period_s = np.zeros(1, np.int64), plan.camera.frame_period_s
     rows = Profiles(value=value, index=index, period_s=period_s, place=place, window_start=start).windowed(25)
-    beat, _ = long_takes.followed(plan, rows, rough)
+    beat, _ = long_takes.clocks_of_chapters(plan, rows, rough)
     asked_s = np.linspace(0.2, 9.8, 97)
     off = np.abs(bend.late_s(true, beat, asked_s)) / plan.camera.row_time_s
     dark = (asked_s > 450 * period_s) & (asked_s < 750 * period_s)

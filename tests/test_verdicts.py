@@ -26,7 +26,7 @@ from psvideo.report.judge.of_rig import _near as near_of
 from psvideo.report.judge.of_rig import rig as judge_rig
 from psvideo.report.judgement import Judgement, verdict_of
 from psvideo.report.observe.facts import InstantFacts
-from psvideo.report.observe.motion import glimpse, motion
+from psvideo.report.observe.motion import glimpse, motion_between
 from psvideo.report.observe.observed import Observed
 from psvideo.report.observe.rig_and_curve.rigpoints import rig_points
 from psvideo.report.observe.rig_and_curve.slopes import coarse_normals
@@ -728,6 +728,6 @@ def test_what_is_clipped_does_not_seem_to_move_where_the_rows_that_two_frames_sh
         )
 
     one = glimpse(plate(0))
-    found = motion(one, glimpse(plate(1), one.white))
+    found = motion_between(one, glimpse(plate(1), one.white))
     assert found is not None
     assert (found.speed_px_s, found.share) == (0, 0)

@@ -26,7 +26,7 @@ from psvideo.sync.rowfit.refine import Fit
 from psvideo.sync.rowfit.tracking.course import window_frames
 from psvideo.sync.rowfit.unknowns.mains_swing import mains_swing
 from psvideo.sync.turns import turns
-from psvideo.sync.verdict.believed import judged
+from psvideo.sync.verdict.believed import believed_fit
 from psvideo.sync.verdict.frame_remarks import remarks_on_frames
 from psvideo.sync.verdict.refusal import clock_too_far, nothing_to_find, why_not
 from psvideo.sync.verdict.remarks import remarks, remarks_on_lights
@@ -114,7 +114,7 @@ def find_strobe(
     hopeless = nothing_to_find(plan, rows)
     if hopeless:
         raise NoStrobeError(f"{clip}: {hopeless}")
-    verdict = judged(plan, rows)
+    verdict = believed_fit(plan, rows)
     found = verdict.found
     if not verdict.believed:
         raise NoStrobeError(_not_found(plan, rows, found, clip))

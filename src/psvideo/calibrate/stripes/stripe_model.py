@@ -77,7 +77,7 @@ def start(frame: FloatArray, waves: FloatArray, smooth: FloatArray) -> Nuisance:
     return Nuisance(found[:, :knots], np.ones((len(frame), knots)), found[:, knots:])
 
 
-def equations(frame: FloatArray, own: Nuisance, waves: FloatArray, smooth: FloatArray) -> Equations:
+def stripe_equations(frame: FloatArray, own: Nuisance, waves: FloatArray, smooth: FloatArray) -> Equations:
     """Set up one frame's equations around the present state."""
     shape, slope, change = _changes(own, waves, smooth)
     residual = frame - own.background @ smooth.T - shape

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.calibrate.stripes.error import Pulls, standard_error
-from psvideo.calibrate.stripes.stripe_model import Equations, Nuisance, equations, spline_basis, start, waves_of
+from psvideo.calibrate.stripes.stripe_model import Equations, Nuisance, spline_basis, start, stripe_equations, waves_of
 from psvideo.model.camera import FloatArray
 
 STAGES = (1, 3, 8, 16)
@@ -86,7 +86,7 @@ def _settle(profiles: FloatArray, frequency: float, harmonics: int, smooth: Floa
     state = [start(frame, waves_of(rows, frequency, harmonics), smooth) for frame in profiles]
     for _ in range(MOST_STEPS):
         waves = waves_of(rows, frequency, harmonics)
-        found = [equations(frame, own, waves, smooth) for frame, own in zip(profiles, state, strict=True)]
+        found = [stripe_equations(frame, own, waves, smooth) for frame, own in zip(profiles, state, strict=True)]
         step = sum(part.pull.sum() for part in found) / max(sum(part.information.sum() for part in found), 1e-300)
         step = float(np.clip(step, -LONGEST_STEP_CYCLES / rows, LONGEST_STEP_CYCLES / rows))
         step = float(np.clip(frequency + step, lowest, highest)) - frequency

@@ -17,7 +17,7 @@ def note_name(program: Program) -> str:
     return f"README-{program}.txt"
 
 
-def note(program: Program, made: Delivered) -> str:
+def loading_note(program: Program, made: Delivered) -> str:
     """Return how to load a delivery into a program: steps, colour space, direction of y, numbers, wrong ways."""
     parts = {"nuke": _nuke, "blender": _blender, "unreal": _unreal, "houdini": _houdini}[program](made)
     steps, wrong = parts

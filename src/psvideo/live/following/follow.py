@@ -21,7 +21,7 @@ from psvideo.sync.rowfit.beat import Beat, FoundClock
 from psvideo.sync.rowfit.coarse.seed import GOOD_SEED, gain_of
 from psvideo.sync.rowfit.normal_equations import projected
 from psvideo.sync.rowfit.profiles import Profiles, brightnesses, unexplained
-from psvideo.sync.rowfit.refine import CAUCHY, GLOBALS, explained, scaled
+from psvideo.sync.rowfit.refine import CAUCHY, GLOBALS, errors_of_residuals, explained
 from psvideo.sync.rowfit.standard_error import sandwich
 from psvideo.sync.rowfit.tracking.track import MOST, SUSPICIOUS, losses_of
 from psvideo.sync.verdict.believed import MIN_EXPLAINED, MIN_GAIN
@@ -217,7 +217,7 @@ def caught_up(
 
 def _shift(plan: Plan, rows: Profiles, beat: Beat, rest: FloatArray) -> tuple[float, float]:
     """Return by how much all flashes come later than a beat says, and the standard error: one robust step."""
-    scale = scaled(rows, rest, 0.0)
+    scale = errors_of_residuals(rows, rest, 0.0)
     weight = 1.0 / (1.0 + (rest / (CAUCHY * scale)) ** 2) / scale**2
     basis = np.zeros((len(rows.window_start) + 1 + len(GLOBALS), 1))  # what a fit may free is held here
     basis[: len(rows.window_start) + 1] = 1.0

@@ -16,7 +16,7 @@ from psvideo.plates.align.doubt.evenly import EACH_PX, evenly_changed
 from psvideo.plates.align.doubt.lone_edges import InstantSketch
 from psvideo.plates.align.doubt.unsure import unsure_of
 from psvideo.plates.align.velocity.brightness import light_of
-from psvideo.plates.align.velocity.flow import Codes, Flags, Vectors, comparable, noise_between, places
+from psvideo.plates.align.velocity.flow import Codes, Flags, Vectors, comparable, noise_between, pixel_places
 from psvideo.plates.align.velocity.moving import SHADING_PX, Followed, Pair, odd_width
 from psvideo.plates.align.velocity.moving_kernel import AFTER, AT_REST, BEFORE, BOTH, NOWHERE
 
@@ -146,7 +146,7 @@ def _shaded(before: Codes, after: Codes, window: tuple[int, int]) -> Flags:
 
 
 def _along(codes: Codes, way: Vectors) -> Codes:
-    x, y = places(*way.shape[1:])
+    x, y = pixel_places(*way.shape[1:])
     high, wide = (np.float32(many / few) for many, few in zip(codes.shape, way.shape[1:], strict=True))
     x, y = (x - way[0] + HALF) * wide - HALF, (y - way[1] + HALF) * high - HALF
     return np.asarray(cv2.remap(codes, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))
@@ -154,7 +154,7 @@ def _along(codes: Codes, way: Vectors) -> Codes:
 
 def _outside(way: Vectors) -> Flags:
     rows, cols = way.shape[1:]
-    x, y = places(rows, cols)
+    x, y = pixel_places(rows, cols)
     x, y = x - way[0], y - way[1]
     return np.asarray((x < -0.5) | (x > cols - 0.5) | (y < -0.5) | (y > rows - 0.5))
 

@@ -69,7 +69,7 @@ def glimpse(plate: LightPlate, white: float | None = None) -> Glimpse:
     return Glimpse(codes=codes, scale=plate.shape[1] / grey.shape[1], time_s=plate.time_s, white=white, seen=whole)
 
 
-def motion(before: Glimpse, after: Glimpse) -> Motion | None:
+def motion_between(before: Glimpse, after: Glimpse) -> Motion | None:
     """Return what moved between two plates of one light; None where rows are missing."""
     if not (before.seen and after.seen):
         return None

@@ -21,7 +21,7 @@ from psvideo.report.observe.astray import Astray, astray
 from psvideo.report.observe.facts import FAINT, InstantFacts, Seen, brightest_channel, instant_facts, thinned_round
 from psvideo.report.observe.focus import middle_of, sharpest_blur_px
 from psvideo.report.observe.levels import BINS, Counts, Levels, count_levels
-from psvideo.report.observe.motion import Glimpse, Motion, glimpse, motion
+from psvideo.report.observe.motion import Glimpse, Motion, glimpse, motion_between
 from psvideo.report.observe.rig_and_curve.rigfit import RigFit
 from psvideo.report.observe.rig_and_curve.rigpoints import RigPoints
 from psvideo.report.observe.rig_and_curve.slopes import coarse_normals, share_away, surface_agreement
@@ -254,7 +254,7 @@ class Observed:
         before = self._glimpse
         self._glimpse = glimpse(plate, self.white)
         self.white = self._glimpse.white
-        self._moving = None if before is None else motion(before, self._glimpse)
+        self._moving = None if before is None else motion_between(before, self._glimpse)
 
     def _change(self, surface: Surface | None) -> Change | None:
         before, self._sample = self._sample, None if surface is None else sample_of(surface)

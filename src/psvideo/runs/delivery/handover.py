@@ -18,7 +18,7 @@ from psvideo.compute.progress import Watch
 from psvideo.export.programs.blender_addon import ADDON_FILE, addon_zip
 from psvideo.export.programs.delivered import Delivered, SeenLight
 from psvideo.export.programs.delivery_json import DELIVERY_FILE, delivery_text
-from psvideo.export.programs.loading_notes import note, note_name
+from psvideo.export.programs.loading_notes import loading_note, note_name
 from psvideo.export.programs.nuke_script import nuke_script, script_name
 from psvideo.export.programs.otio import Footage, Images, timeline_text
 from psvideo.export.sequences.result_files import MOVIE_SUFFIXES, Delivery
@@ -102,7 +102,7 @@ def write_note(
     )
     write_text(run.folder / DELIVERY_FILE, delivery_text(made, rig))
     if delivery.program is not None:
-        write_text(run.folder / note_name(delivery.program), caller.spell(note(delivery.program, made)))
+        write_text(run.folder / note_name(delivery.program), caller.spell(loading_note(delivery.program, made)))
     if delivery.program == "nuke":
         write_text(run.folder / script_name(clip.name), nuke_script(made))
     if delivery.program == "blender":

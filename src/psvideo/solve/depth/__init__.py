@@ -8,7 +8,7 @@ a clip, and ``mesh`` makes triangles of it.
 
 from psvideo.solve.depth.cao2022 import Height, Integration, integrate
 from psvideo.solve.depth.mesh import Mesh, mesh_of
-from psvideo.solve.depth.scale import Depth, scaled
+from psvideo.solve.depth.scale import Depth, depth_of_height
 from psvideo.solve.depth.shaping import Shaping, begun, depth_of, kept_beside, reservations, scale_note
 from psvideo.solve.depth.view import View, view_of
 
@@ -21,11 +21,11 @@ __all__ = [
     "View",
     "begun",
     "depth_of",
+    "depth_of_height",
     "integrate",
     "kept_beside",
     "mesh_of",
     "reservations",
     "scale_note",
-    "scaled",
     "view_of",
 ]

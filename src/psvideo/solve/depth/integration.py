@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from psvideo.compute.spilled import bands, kept_in, let_go, room_for, taken_back
 from psvideo.model.camera import FloatArray
 from psvideo.solve.depth.checkerboard import Board, empty_board
-from psvideo.solve.depth.multigrid import CARRIED, Grids, empty_grids, prepare, solve, weighed
-from psvideo.solve.depth.reweighting import add_board, equations, pull_to_pins, weigh_sides, write_board
+from psvideo.solve.depth.multigrid import CARRIED, Grids, empty_grids, set_up_levels, solve, weighed
+from psvideo.solve.depth.reweighting import add_board, fill_equations, pull_to_pins, weigh_sides, write_board
 from psvideo.solve.depth.simchony1990 import poisson_height
 from psvideo.solve.depth.view import Slopes
 
@@ -167,7 +167,7 @@ def _lacking(work: _Work, *, share: float = 1.0) -> None:
     shares = work.rightward, work.downward
 
     def put(first: int, last: int) -> None:
-        equations(work.height, *work.given, *shares, finest.ties, finest.right, share, first, last)
+        fill_equations(work.height, *work.given, *shares, finest.ties, finest.right, share, first, last)
 
     work.in_bands(put)
 
@@ -175,7 +175,7 @@ def _lacking(work: _Work, *, share: float = 1.0) -> None:
 def _wanted(work: _Work) -> float:
     """Return the energy of what the equations want of a flat surface, which tolerances are relative to."""
     _lacking(work, share=0.0)
-    prepare(work.grids)
+    set_up_levels(work.grids)
     return weighed(work.grids)
 
 
@@ -190,7 +190,7 @@ def _settle(work: _Work, stop: float, *, most: int, held: TakenOver | None = Non
         _lacking(work)
         if held is not None and pins is not None:
             _pull(work, pins, held.height)
-        pinned = prepare(work.grids, pins)
+        pinned = set_up_levels(work.grids, pins)
         first, _ = solve(work.grids, stop=stop, most=MOST_CYCLES, pinned=pinned)
         if first <= stop or first > 0.1 * lacked:
             return

@@ -81,7 +81,7 @@ def empty_grids(shape: tuple[int, int]) -> Grids:
     return Grids(levels=levels, step=step, spread=levels[0].height, sum=total, line=line, sums=sums)
 
 
-def prepare(grids: Grids, pins: Board | None = None) -> bool:
+def set_up_levels(grids: Grids, pins: Board | None = None) -> bool:
     """Give the hierarchy the ties of its finest grid, and pins if there are any; return whether there are."""
     pinned = pins is not None
     grids.levels[0].pins = grids.levels[0].pins if pins is None else pins

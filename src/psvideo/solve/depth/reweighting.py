@@ -116,7 +116,7 @@ def _tie(share: Any, facing: Any, slope: Any, next_share: Any, next_facing: Any,
 
 
 @REORDERED.kept
-def equations(
+def fill_equations(
     height: Any,
     facing: Any,
     across: Any,

@@ -61,7 +61,7 @@ class Depth:
         return valid
 
 
-def scaled(
+def depth_of_height(
     height: Height,
     view: View,
     *,

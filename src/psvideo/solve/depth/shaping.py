@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from psvideo.model.rig import Rig, check_rig
 from psvideo.model.surface import Surface, check_surface
 from psvideo.solve.depth.cao2022 import BILATERAL, Before, Height, Integration, integrate
-from psvideo.solve.depth.scale import Depth, Plane, scaled
+from psvideo.solve.depth.scale import Depth, Plane, depth_of_height
 from psvideo.solve.depth.view import View, view_of
 
 
@@ -89,7 +89,7 @@ def find_depth(surface: Surface, rig: Rig | None = None) -> Depth:
 
 
 def _scaled(shaping: Shaping, height: Height) -> Depth:
-    return scaled(height, shaping.view, plane=shaping.plane, reference=shaping.first, known_m=shaping.known_m)
+    return depth_of_height(height, shaping.view, plane=shaping.plane, reference=shaping.first, known_m=shaping.known_m)
 
 
 def begun(shaping: Shaping, surface: Surface) -> Shaping:

@@ -13,7 +13,7 @@ from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat, FoundClock
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
-from psvideo.sync.rowfit.refine import CAUCHY, Fit, explained, scaled
+from psvideo.sync.rowfit.refine import CAUCHY, Fit, errors_of_residuals, explained
 from psvideo.sync.rowfit.unknowns.bend import fitted, late_s
 
 LONG, ENOUGH_SAMPLES = 1_000_000, 250_000
@@ -53,9 +53,9 @@ def throughout(
     """
     rows = rows.windowed(part.window_frames)
     start = replace(fit.beat, clock=_through(rough, fit.beat, part.ends_s))
-    beat, error_s = followed(plan, replace(rows, restless=part.restless), start) if follow else (start, 0.0)
+    beat, error_s = clocks_of_chapters(plan, replace(rows, restless=part.restless), start) if follow else (start, 0.0)
     rest = unexplained(plan, rows, beat)
-    scale = scaled(rows, rest, 0.0)
+    scale = errors_of_residuals(rows, rest, 0.0)
     weight = 1.0 / (1.0 + (rest / (CAUCHY * scale)) ** 2) / scale**2
     rest = unexplained(plan, rows, beat, weight)
     return rows, replace(
@@ -75,7 +75,7 @@ def _through(rough: Beat, beat: Beat, at_s: FloatArray) -> FoundClock:
     return rough.clock.shifted(float(np.polyval(line, pivot_s)), 1e6 * float(line[0]), pivot_s=pivot_s)
 
 
-def followed(plan: Plan, rows: Profiles, start: Beat) -> tuple[Beat, float]:
+def clocks_of_chapters(plan: Plan, rows: Profiles, start: Beat) -> tuple[Beat, float]:
     """Return the beat with every chapter's own clock, from one that is near, and the root mean square of their errors.
 
     A chapter that does not show its clock is bridged from those beside it.

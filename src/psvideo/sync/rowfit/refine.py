@@ -97,7 +97,7 @@ def _stepped(
     rest = unexplained(plan, rows, beat)
     weight = trust = np.ones_like(rest)
     for step in range(steps):
-        scale = scaled(rows, rest, first_scale * 0.4**step)
+        scale = errors_of_residuals(rows, rest, first_scale * 0.4**step)
         trust = 1.0 / (1.0 + (rest / (CAUCHY * scale)) ** 2)
         weight = trust / scale**2
         rest, hessian, scores = projected(plan, rows, beat, weight, basis, tails=bool(EDGES & set(free)))
@@ -131,7 +131,7 @@ def _gains(
 ) -> dict[str, float]:
     """Return what the times would explain that explain enough; residuals count up to a share of their row's spread."""
     every = (*free, *names)
-    scale = scaled(rows, fit.rest, share)
+    scale = errors_of_residuals(rows, fit.rest, share)
     weight = 1.0 / (1.0 + (fit.rest / (CAUCHY * scale)) ** 2) / scale**2
     _, hessian, scores = projected(plan, rows, fit.beat, weight, _straight(rows, every), tails=True)
     gains: dict[str, float] = {}
@@ -230,7 +230,7 @@ def times_moved(rows: Profiles, beat: Beat, free: tuple[str, ...], move: FloatAr
     return times_s
 
 
-def scaled(rows: Profiles, rest: FloatArray, share: float) -> FloatArray:
+def errors_of_residuals(rows: Profiles, rest: FloatArray, share: float) -> FloatArray:
     """Return how far each residual may be off: noise, at first a share of the row's spread, and what is doubtful."""
     scale = np.maximum(row_noise(rest), rows.spread * max(share, LAST_SCALE))
     if rows.doubt is None:
@@ -247,7 +247,7 @@ def row_noise(rest: FloatArray) -> FloatArray:
 
 def robust_loss(rows: Profiles, rest: FloatArray, reference: FloatArray) -> float:
     """Return Cauchy's loss of residuals against the noise of ``reference`` residuals."""
-    return float(np.log1p((rest / (CAUCHY * scaled(rows, reference, 0.0))) ** 2).sum())
+    return float(np.log1p((rest / (CAUCHY * errors_of_residuals(rows, reference, 0.0))) ** 2).sum())
 
 
 def explained(rows: Profiles, rest: FloatArray) -> float:

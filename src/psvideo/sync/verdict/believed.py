@@ -57,7 +57,7 @@ class Verdict:
     believed: bool
 
 
-def judged(plan: Plan, rows: Profiles) -> Verdict:
+def believed_fit(plan: Plan, rows: Profiles) -> Verdict:
     """Return the best fit of a clip under the plan or, where another shutter or readout is far likelier, under that.
 
     ``rows`` are laid out from the picture's top row.

@@ -152,7 +152,7 @@ def flow_from(one: Codes, other: Codes, start_px: tuple[float, float] | None = N
     return np.asarray(search.calc(one, other, start), np.float32)
 
 
-def places(rows: int, cols: int) -> tuple[Vectors, Vectors]:
+def pixel_places(rows: int, cols: int) -> tuple[Vectors, Vectors]:
     """Return the column and the row of every pixel, each (row, col)."""
     x, y = np.meshgrid(np.arange(cols, dtype=np.float32), np.arange(rows, dtype=np.float32))
     return x, y

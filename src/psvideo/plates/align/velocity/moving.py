@@ -16,7 +16,16 @@ from numpy.typing import NDArray
 
 from psvideo.compute.threads import over_ranges
 from psvideo.plates.align.velocity.correlation import displacements
-from psvideo.plates.align.velocity.flow import FINE_PIXELS, Codes, Flags, Sketch, Vectors, comparable, flow_from, places
+from psvideo.plates.align.velocity.flow import (
+    FINE_PIXELS,
+    Codes,
+    Flags,
+    Sketch,
+    Vectors,
+    comparable,
+    flow_from,
+    pixel_places,
+)
 from psvideo.plates.align.velocity.moving_kernel import arriving_rows, unlike_rows
 
 MOST_FLOWS = 4
@@ -144,7 +153,7 @@ def _grown(
 
 
 def _shifted(values: Vectors, way: Vectors) -> Vectors:
-    x, y = places(*values.shape)
+    x, y = pixel_places(*values.shape)
     x, y = x + way[0], y + way[1]
     return np.asarray(cv2.remap(values, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)
 

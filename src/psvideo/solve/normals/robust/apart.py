@@ -29,7 +29,7 @@ class Room(NamedTuple):
     kept: Floats  # what else ``reflecting.py`` keeps
 
 
-def room_for(task: Task, *, reflecting: bool) -> Room:
+def memory_for_block(task: Task, *, reflecting: bool) -> Room:
     """Return memory for one thread; ``reflecting`` where the subject's reflectance is known."""
     lights, channels = task.tone.shape[:2]
     values = np.full((lights * channels, BLOCK), MISSING, np.float32)

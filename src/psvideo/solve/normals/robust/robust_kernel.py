@@ -15,7 +15,7 @@ from psvideo.solve.normals.loops.colour_kernel import solve_colours
 from psvideo.solve.normals.loops.measuring import all_seen, any_asked, read_usable
 from psvideo.solve.normals.loops.near_kernel import lent_task, place_lights
 from psvideo.solve.normals.loops.storing import store_block
-from psvideo.solve.normals.robust.apart import Room, fill_up, put_side_by_side, room_for
+from psvideo.solve.normals.robust.apart import Room, fill_up, memory_for_block, put_side_by_side
 from psvideo.solve.normals.robust.equations import DOUBT
 from psvideo.solve.normals.robust.explained import list_unexplained, solve_plainly
 from psvideo.solve.normals.robust.predicted_error import NO_ERROR, UNEXPLAINED, predict_error
@@ -42,8 +42,8 @@ def working_memory(task: Task, *, reflecting: bool, residual: bool) -> Memory:
     """Return memory for one thread; ``reflecting`` where the subject's reflectance is known, ``residual`` where
     residuals are wanted."""
     return Memory(
-        whole=room_for(task, reflecting=reflecting),
-        apart=room_for(task, reflecting=reflecting),
+        whole=memory_for_block(task, reflecting=reflecting),
+        apart=memory_for_block(task, reflecting=reflecting),
         listed=np.zeros(BLOCK, np.uint32),
         places=np.zeros(BLOCK, np.uint32),
         block=empty_result(BLOCK, task.tone.shape[1], half=False, residual=residual),

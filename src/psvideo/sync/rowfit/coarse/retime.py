@@ -126,7 +126,7 @@ def patterns() -> list[tuple[Fraction, int]]:
     return [(step, lead) for step in every_step for lead in range(step.denominator)]
 
 
-def likeliest(
+def regular_numberings(
     plan: Plan, rows: Profiles, base: Numbering, frames: slice, *, range_ppm: float, keep: int
 ) -> list[Numbering]:
     """Return the regular numberings under which some frames fold to the cycle best, best first.

@@ -15,7 +15,7 @@ from psvideo.sync.rowfit.coarse.retime import (
     as_numbered,
     fold_frames,
     inserted,
-    likeliest,
+    regular_numberings,
     stood_in,
     twins,
 )
@@ -120,7 +120,7 @@ def _folded(plan: Plan, rows: Profiles, base: Numbering, frames: slice, reach_pp
     tried: list[tuple[float, int, slice, Numbering]] = []
     for numbering in (
         as_numbered(rows),
-        *likeliest(plan, distinct, base, among, range_ppm=reach_ppm, keep=FOLDS),
+        *regular_numberings(plan, distinct, base, among, range_ppm=reach_ppm, keep=FOLDS),
     ):
         first = _among(numbering.kept, frames).start
         stretch = slice(first, min(first + _length(plan, rows), len(numbering.index)))

@@ -13,7 +13,7 @@ from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.normal_equations import projected
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
-from psvideo.sync.rowfit.refine import CAUCHY, EDGES, GLOBALS, Fit, explained, refine, scaled, times_moved
+from psvideo.sync.rowfit.refine import CAUCHY, EDGES, GLOBALS, Fit, errors_of_residuals, explained, refine, times_moved
 from psvideo.sync.rowfit.standard_error import believable, mean_error
 
 LEAST_WINDOWS = 4
@@ -38,7 +38,7 @@ def fitted(plan: Plan, rows: Profiles, beat: Beat, free: tuple[str, ...]) -> Fit
         rough = Fit(
             beat=beat,
             rest=rest,
-            weight=scaled(rows, rest, 0.0) ** -2.0,
+            weight=errors_of_residuals(rows, rest, 0.0) ** -2.0,
             shift_error_s=0.0,
             errors_s={},
             explained=explained(rows, rest),
@@ -57,7 +57,7 @@ def bend(plan: Plan, rows: Profiles, fit: Fit, *, free: tuple[str, ...] = (), st
     strength = 0.0
     basis = _basis(len(knots.at_s), free)
     for step in range(steps):
-        scale = scaled(rows, rest, 0.02 if step == 0 and fit.beat.clock.knot_s else 0.0)
+        scale = errors_of_residuals(rows, rest, 0.02 if step == 0 and fit.beat.clock.knot_s else 0.0)
         trust = 1.0 / (1.0 + (rest / (CAUCHY * scale)) ** 2)
         weight = trust / scale**2
         rest, hessian, scores = projected(plan, rows, beat, weight, basis, tails=bool(EDGES & set(free)))

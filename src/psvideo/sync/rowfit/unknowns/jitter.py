@@ -16,7 +16,7 @@ from psvideo.model.plan import Plan
 from psvideo.sync.rowfit import kernel
 from psvideo.sync.rowfit.coarse.seed import gain_of
 from psvideo.sync.rowfit.profiles import Profiles, compiled_flashes, compiled_rows, equations
-from psvideo.sync.rowfit.refine import CAUCHY, WIDE_SCALE, Fit, scaled
+from psvideo.sync.rowfit.refine import CAUCHY, WIDE_SCALE, Fit, errors_of_residuals
 from psvideo.sync.rowfit.row_model import Flashes
 
 LEAST_FLASHES = 8
@@ -150,7 +150,7 @@ def _pulls(rows: Profiles, fit: Fit, flashes: Flashes, among: slice = slice(None
     seen = compiled_rows(rows, fit.beat)
     pull, stiff = np.zeros((len(flashes.start_s), 2)), np.zeros((len(flashes.start_s), 2))
     rest = np.ascontiguousarray(fit.rest[:, among])
-    scale = scaled(rows, rest, WIDE_SCALE)
+    scale = errors_of_residuals(rows, rest, WIDE_SCALE)
     weight = 1.0 / (1.0 + (rest / (CAUCHY * scale)) ** 2) / scale**2
     kernel.edges(seen, flashes, weight, 0, rows.value.shape[1], pull, stiff)
     return pull, stiff

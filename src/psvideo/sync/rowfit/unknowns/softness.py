@@ -14,7 +14,7 @@ from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.profiles import Profiles, brightnesses, predictions
-from psvideo.sync.rowfit.refine import CAUCHY, Fit, scaled
+from psvideo.sync.rowfit.refine import CAUCHY, Fit, errors_of_residuals
 
 NEAR_ROWS = 1.0
 """Samples that tails of this many rows would change lie at an edge,"""
@@ -51,7 +51,7 @@ def cleared(plan: Plan, rows: Profiles, before: Fit, after: Fit) -> float:
     edges = at_edges(plan, rows, before.beat) | at_edges(plan, rows, after.beat)
     if min(edges.sum(), (~edges).sum()) < FEW:
         return 1.0
-    scale = CAUCHY * scaled(rows, before.rest, 0.0)
+    scale = CAUCHY * errors_of_residuals(rows, before.rest, 0.0)
     first, last = (np.log1p((rest / scale) ** 2) for rest in (before.rest, after.rest))
     excess = float(first[edges].mean() - last[~edges].mean())
     gain = float(first[edges].mean() - last[edges].mean())
@@ -71,5 +71,5 @@ def misfit(plan: Plan, rows: Profiles, fit: Fit) -> float:
     edges = at_edges(plan, rows, fit.beat)
     if min(edges.sum(), (~edges).sum()) < FEW:
         return 1.0
-    squares: FloatArray = np.minimum((fit.rest / scaled(rows, fit.rest, 0.0)) ** 2, OUTLIER**2)
+    squares: FloatArray = np.minimum((fit.rest / errors_of_residuals(rows, fit.rest, 0.0)) ** 2, OUTLIER**2)
     return max(float(np.sqrt(squares[edges].mean() / max(squares[~edges].mean(), 1e-30))), 1.0)
