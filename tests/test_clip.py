@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from psvideo.clip import holes, open_clip, parse_range, read_frames, reading
 from psvideo.clip.decode.decoders import decode
+from psvideo.clip.folder import find_sequence
 from psvideo.clip.record import CodedPicture
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.plan_toml import format_plan
@@ -124,6 +125,19 @@ def test_a_folder_that_is_not_clear_is_refused_with_advice(shot: Path, fault: st
         open_clip(shot)
     assert raised.value.exit_status == 1
     assert "\n" not in str(raised.value)
+
+
+def test_the_files_of_a_long_take_are_found_in_time_that_grows_with_their_number(tmp_path: Path) -> None:
+    worked_s = []
+    for count in (500, 8_000):
+        folder = tmp_path / str(count)
+        folder.mkdir()
+        for number in range(count):
+            (folder / f"take.{number:07d}.png").touch()
+        began_s = time.process_time()
+        assert len(find_sequence(folder).files) == count
+        worked_s.append(time.process_time() - began_s)
+    assert worked_s[1] < 3 * 16 * worked_s[0], "two hours are 172,800 files"
 
 
 def test_a_folder_without_frames_says_what_it_holds(tmp_path: Path, write_plan: Callable[..., None]) -> None:

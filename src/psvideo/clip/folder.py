@@ -66,7 +66,8 @@ def find_sequence(folder: Path) -> NumberedImages:
     _refuse_mixture(frames)
     check_text(frames[0])
     numbers = tuple(_number(file) for file in frames)
-    passed_over = tuple(image for image in images if image not in set(frames))
+    taken = set(frames)
+    passed_over = tuple(image for image in images if image not in taken)
     return NumberedImages(
         kind=KINDS[frames[0].suffix.lower()], files=tuple(frames), numbers=numbers, passed_over=passed_over
     )
