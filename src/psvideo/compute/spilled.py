@@ -99,12 +99,17 @@ def thin(picture: NDArray[Any], step: int) -> NDArray[Any]:
     return some
 
 
+def lie_in_files(*planes: NDArray[Any]) -> bool:
+    """Return whether any of these lies in such a file: who lets go band by band asks once, and not for every band."""
+    return any(_mapping_of(plane) is not None for plane in planes)
+
+
 def let_go(*parts: NDArray[Any]) -> None:
     """Hand parts of such planes, whole rows, back to the system's cache; other arrays stay as they are.
 
     A colour picture's channels may lie in planes of their own.
     """
-    if any(_mapping_of(part) is not None for part in parts):
+    if lie_in_files(*parts):
         _let_planes_go(
             [plane for part in parts for plane in ([part] if part.flags.c_contiguous else np.moveaxis(part, -1, 0))]
         )

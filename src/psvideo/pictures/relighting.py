@@ -111,6 +111,9 @@ def smaller_by_rows(read: Callable[[int, int], NDArray[np.floating]], shape: tup
 def _averaged(band: NDArray[np.floating], factor: int) -> Image:
     """Average squares of a whole number of pixels, which OpenCV does several times faster; (channel, row, col)."""
     rows, cols = (size // factor for size in band.shape[:2])
+    if band.flags.c_contiguous and band.dtype == np.float32:
+        small = cv2.resize(band[: rows * factor, : cols * factor], (cols, rows), interpolation=cv2.INTER_AREA)
+        return np.moveaxis(np.asarray(small, np.float32).reshape(rows, cols, -1), -1, 0)
     channels = np.moveaxis(band[: rows * factor, : cols * factor].reshape(rows * factor, cols * factor, -1), -1, 0)
     squares = (np.ascontiguousarray(channel, np.float32) for channel in channels)
     return np.stack([cv2.resize(one, (cols, rows), interpolation=cv2.INTER_AREA) for one in squares])

@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.compute.spilled import let_go, planes_for
+from psvideo.compute.spilled import let_go, lie_in_files, planes_for
 from psvideo.model.camera import FloatArray
 from psvideo.model.rows.clipping import ROUNDING
 from psvideo.solve.normals.illumination import Illumination
@@ -236,6 +236,8 @@ def empty_result(pixels: int, channels: int, *, half: bool, residual: bool, spar
 
 def let_rows_go(result: Result, cols: int, first: int, last: int) -> None:
     """Hand rows of a solution that lies in files back to the system."""
+    if not lie_in_files(result.normals):  # as the other planes, which empty_result made alike
+        return
     part = slice(first * cols, last * cols)
     let_go(*(plane[part] for plane in (*result.normals, *result.albedo, result.residual)))
 

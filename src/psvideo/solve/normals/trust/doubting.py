@@ -6,6 +6,7 @@ by way of other surfaces, which light everything alike and leave no residual. An
 wrong whatever the lights say of them: along a closed way the slopes of a surface add up to nothing.
 """
 
+import functools
 import math
 from dataclasses import dataclass
 from functools import cached_property
@@ -115,6 +116,11 @@ class ThinSurface:
         """The normals, (3, row, col)."""
         return np.moveaxis(self.surface.normals, -1, 0).astype(np.float32)
 
+    @cached_property
+    def brightness(self) -> Floats:
+        """Albedo (row, col), of three channels their mean."""
+        return brightness(self.surface.albedo)
+
     @property
     def known(self) -> NDArray[np.bool_]:
         """Where there is a normal."""
@@ -142,13 +148,14 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
     near = _mean(sums, around) + np.float32(LEAST_LIGHTS) * far  # where all lights reach what is around, farther off
     indirect = np.maximum(near / (_mean(counts, around) + np.float32(LEAST_LIGHTS)), 0)
     own = np.maximum(sums / np.maximum(counts, 1) - 2 * np.radians(points.noise_deg), 0)
-    albedo = brightness(points.surface.albedo) * points.known
+    albedo = points.brightness * points.known
     shown = np.minimum(albedo, albedo.sum() / max(np.count_nonzero(points.known), 1))  # glare is no more than the rest
-    misfit_deg = np.maximum(*(_typical(squares, noise, shown, width) for width in (around, far_around)))
+    surroundings = [_Surroundings.of(noise, shown, width) for width in (around, far_around)]
+    misfit_deg = np.maximum(*(each.typical(squares) for each in surroundings))
     uneven: Floats | float = 0.0
     if plain and lights > 3:
         changes = _changes(fit, points, lights - 3) - UNSURE_OF_NOISE * noise
-        changing_deg = np.maximum(*(_typical(changes, noise, shown, width) for width in (around, far_around)))
+        changing_deg = np.maximum(*(each.typical(changes) for each in surroundings))
         share = (changing_deg / np.maximum(misfit_deg, np.float32(1e-6))) ** 2
         uneven = np.clip((share - SURFACES_UNEVEN) / (1 - SURFACES_UNEVEN), 0, 1)
     tears = points.noise_deg**2 + uneven * misfit_deg**2
@@ -164,7 +171,9 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
 
 def doubt_deg(signs: Signs, *, how: Doubting = Doubting()) -> Floats:
     """Return by how many degrees normals may be off beyond noise, (row, col) of the points."""
-    misfit = np.float32(how.misfit_deg) * signs.misfit_deg ** np.float32(1 + how.misfit_power)
+    shows = np.maximum(signs.misfit_deg, np.float32(1e-9)) ** np.float32(1 + how.misfit_power)
+    shows = np.where(signs.misfit_deg > 0, shows, np.float32(0))  # powers of 0 are usual, and slow
+    misfit = np.float32(how.misfit_deg) * shows
     misfit *= np.float32(signs.hidden**how.few_power) / (signs.misfit_deg + np.float32(how.little_deg))
     misfit -= np.asarray(signs.uneven, np.float32) * np.maximum(misfit - signs.misfit_deg, 0)
     both = np.hypot(misfit, np.float32(how.indirect) * signs.indirect_deg)
@@ -178,22 +187,40 @@ def width_of(known: NDArray[np.bool_] | Floats, share: float) -> int:
     return max(int(share * np.sqrt(np.count_nonzero(known))) // 2 * 2 + 1, LEAST_AROUND)
 
 
-def _typical(squares: Floats, noise: Floats, shown: Floats, width: int) -> Floats:
-    """Return the root of the typical ``squares`` around every point.
+@dataclass(frozen=True, kw_only=True)
+class _Surroundings:
+    """What is typical around every point, over squares ``width`` points wide.
 
-    ``noise`` is what noise alone would make of them, whose mean the caller has taken off. Outliers count as OUTLYING
-    times what is typical, and what chance could leave of ``noise`` over as many points is taken off as well.
-    ``shown``, each point's albedo up to the mean, is its weight: a little stray light, or what is lost in a file's
-    codes, turns the normals of black cloth far, and says nothing of the subject before it.
+    ``shown``, each point's albedo up to the mean, is its weight, and ``weight`` the mean of it around: a little stray
+    light, or what is lost in a file's codes, turns the normals of black cloth far, and says nothing of the subject
+    before it. ``twice_noise`` is twice what noise alone would make of a point's square, and ``by_chance`` what chance
+    could leave of it over as many points.
     """
-    weight = _mean(shown, width)
-    typical = _mean(squares * shown, width) / weight
-    for _ in range(TURNS):
-        most = OUTLYING**2 * np.maximum(typical, LEAST_LEVEL_DEG**2) + 2 * noise
-        typical = _mean(np.minimum(squares, most) * shown, width) / weight
-    count = _mean((shown > 0).astype(np.float32), width) * np.float32(width**2)
-    by_chance = CERTAIN * np.sqrt(2 / np.maximum(count, 1)) * _mean(noise * shown, width) / weight
-    return np.asarray(np.sqrt(np.maximum(typical - by_chance, 0)), np.float32)
+
+    width: int
+    shown: Floats
+    weight: Floats
+    twice_noise: Floats
+    by_chance: Floats
+
+    @classmethod
+    def of(cls, noise: Floats, shown: Floats, width: int) -> "_Surroundings":
+        """Look around; ``noise`` is what noise alone would make of squares."""
+        weight = _mean(shown, width)
+        count = _mean((shown > 0).astype(np.float32), width) * np.float32(width**2)
+        by_chance = CERTAIN * np.sqrt(2 / np.maximum(count, 1)) * _mean(noise * shown, width) / weight
+        return cls(width=width, shown=shown, weight=weight, twice_noise=2 * noise, by_chance=by_chance)
+
+    def typical(self, squares: Floats) -> Floats:
+        """Return the root of the typical ``squares``, of which the caller has taken off the mean that noise makes.
+
+        Outliers count as OUTLYING times what is typical, and what chance could leave is taken off as well.
+        """
+        typical = _mean(squares * self.shown, self.width) / self.weight
+        for _ in range(TURNS):
+            most = OUTLYING**2 * np.maximum(typical, LEAST_LEVEL_DEG**2) + self.twice_noise
+            typical = _mean(np.minimum(squares, most) * self.shown, self.width) / self.weight
+        return np.asarray(np.sqrt(np.maximum(typical - self.by_chance, 0)), np.float32)
 
 
 def _changes(fit: Floats, points: ThinSurface, free: int) -> Floats:
@@ -215,7 +242,10 @@ def _changes(fit: Floats, points: ThinSurface, free: int) -> Floats:
 
 def brightness(albedo: NDArray[np.floating]) -> Floats:
     """Return albedo (row, col), of three channels their mean."""
-    return np.asarray(albedo if albedo.ndim == 2 else albedo.mean(axis=-1, dtype=np.float32), np.float32)
+    if albedo.ndim == 2:
+        return np.asarray(albedo, np.float32)
+    total = functools.reduce(np.add, np.moveaxis(albedo, -1, 0).astype(np.float32))  # numpy is slow along a short axis
+    return np.asarray(total / np.float32(albedo.shape[-1]), np.float32)
 
 
 def hidden_by(lights: int) -> float:

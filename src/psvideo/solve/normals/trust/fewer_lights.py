@@ -1,5 +1,7 @@
 """How much farther noise spreads into a normal that fewer of a rig's lights reach: those on its own side remain."""
 
+import functools
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,6 +11,8 @@ FACED = 400
 """This many normals of a ball, evenly spread over its picture, say which lights remain."""
 STEEPEST, GRAZING = 0.1, 0.1
 """The least cosine of these normals to the camera's axis, and of a light that counts."""
+RIGS_AT_A_TIME = 4
+"""Every round asks again of the same lights, and a program may solve several takes in turn."""
 
 
 def widened(matrix: NDArray[np.float64], most: float) -> Floats:
@@ -18,6 +22,12 @@ def widened(matrix: NDArray[np.float64], most: float) -> Floats:
     one side, which stand much nearer to a plane than all of them: three of five in a ring leave five times the variance
     where their number alone would say 5/3. It is no more than ``most``, and no less than with more lights.
     """
+    return _widened(matrix.astype(np.float64).tobytes(), most)
+
+
+@functools.lru_cache(maxsize=RIGS_AT_A_TIME)
+def _widened(directions: bytes, most: float) -> Floats:
+    matrix = np.frombuffer(directions).reshape(-1, 3)
     count = len(matrix)
     normals = _faced()
     lit = normals @ matrix.T > GRAZING * np.linalg.norm(matrix, axis=1)
@@ -34,6 +44,7 @@ def widened(matrix: NDArray[np.float64], most: float) -> Floats:
         here = factor[number == lights]
         least = max(least, float(here.mean()) ** 2 if here.size else count / max(lights, 1))
         by_count[lights] = min(least, most)
+    by_count.flags.writeable = False  # it is every round's
     return by_count
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.compute.spilled import let_go, planes_for, thin
+from psvideo.compute.spilled import let_go, lie_in_files, planes_for, thin
 from psvideo.compute.threads import over_ranges
 from psvideo.model.surface import MEASURED, Surface
 from psvideo.solve.normals.bands import BAND_PIXELS
@@ -22,7 +22,6 @@ from psvideo.solve.normals.trust.doubting import (
     Signs,
     ThinSurface,
     bits,
-    brightness,
     doubt_deg,
     signs_of,
     stored,
@@ -78,7 +77,7 @@ def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging =
     at_points = spread.judged(points.surface, np.stack([doubt, usual]), 1, limit_deg=0.0)[0][points.known]
     misfit = surface.misfit
     if at_points.size:
-        albedo = brightness(points.surface.albedo)[points.known]  # what is bright shows more of the subject
+        albedo = points.brightness[points.known]  # what is bright shows more of the subject
         noise_deg = np.hypot(points.noise_deg, signs.lost_deg)[points.known]
         typical, by_noise = (_usual(each, albedo) for each in (at_points, noise_deg))
         beyond_deg = float(np.sqrt(max(typical**2 - by_noise**2, 0.0)))
@@ -217,10 +216,13 @@ class _Spread:
         counts = np.array([*factors[:2], self.of_residual, limit_deg], np.float32)
         kept = (np.empty(error.shape, np.bool_) if trusted is None else trusted).view(np.uint8)
         rows, cols = error.shape
+        read = (*planes, *albedo, error, *([fit] if fit.size else []))
+        in_files = lie_in_files(*read)
 
         def judge(first: int, last: int) -> None:
             judge_rows(planes, albedo, fit, noise, counts, doubt, step, bits(error), kept, first, last)
-            let_go(*(plane[first:last] for plane in (*planes, *albedo, error, *([fit] if fit.size else []))))
+            if in_files:
+                let_go(*(plane[first:last] for plane in read))
 
         over_ranges(judge, rows, each=BAND_PIXELS // cols)
 

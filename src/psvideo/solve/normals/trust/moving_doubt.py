@@ -9,7 +9,7 @@ from psvideo.plates.align.doubt.own_means import own_mean
 from psvideo.solve.normals.evidence import Evidence, Left
 from psvideo.solve.normals.plate_noise import PlateNoise
 from psvideo.solve.normals.task import Floats, Mask
-from psvideo.solve.normals.trust.doubting import ThinSurface, brightness, width_of
+from psvideo.solve.normals.trust.doubting import ThinSurface, width_of
 
 MOST_DEG = np.float32(180)
 """What turns a normal by more is no angle: nothing is known of its plates."""
@@ -72,7 +72,7 @@ def moved_deg(points: ThinSurface, one: Evidence, noise: PlateNoise = NOISELESS)
     strength = one.lit.intensities.mean(axis=1)
     matrix = one.lit.directions * strength[:, None]
     pulls = np.linalg.pinv(matrix).T.astype(np.float32)
-    size = np.maximum(brightness(points.surface.albedo), np.float32(1e-6))
+    size = np.maximum(points.brightness, np.float32(1e-6))
     turned, likely, shown = np.zeros((3, *points.known.shape), np.float32)
     for pull, plane, row, lamp in zip(pulls, one.unsure, matrix, strength, strict=True):
         across = np.maximum(np.float32(pull @ pull) - (normals @ pull) ** 2, 0)
