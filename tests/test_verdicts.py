@@ -22,8 +22,8 @@ from psvideo.report.judge import result, time
 from psvideo.report.judge.of_ambient import ambient
 from psvideo.report.judge.of_exposure import exposure as judge_exposure
 from psvideo.report.judge.of_lamps import lamps as judge_lamps
-from psvideo.report.judge.of_rig import _near as near_of
 from psvideo.report.judge.of_rig import rig as judge_rig
+from psvideo.report.judge.rig_by_plates import lights_near
 from psvideo.report.judgement import Judgement, verdict_of
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.observe.motion import glimpse, motion_between
@@ -637,7 +637,7 @@ def test_lamps_are_said_to_stand_near_where_that_explains_more_than_the_surface_
     assert fit is not None
     assert fit.near is not None
     near = replace(fit.near, rise=0.5, misfit=0.6 * fit.misfit, by_surface=by_surface * fit.misfit)
-    found = near_of(replace(fit, near=near))
+    found = lights_near(replace(fit, near=near))
     assert (found is not None) == named
 
 

@@ -1,0 +1,174 @@
+"""The rig judged by normals: whether they can be those of one surface, as they are or all tilted alike."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from psvideo.report.judge.of_exposure import LOST_CLIPPED
+from psvideo.report.judge.result import AT_REST, LOST_DEG, NOISY_DEG, by_noise_deg, moves, off_deg
+from psvideo.report.judgement import Grade, Judgement
+from psvideo.report.observe.facts import InstantFacts
+from psvideo.report.observe.observed import Observed
+from psvideo.report.observe.rig_and_curve.yuille1997 import Lean
+
+ONE_SURFACE, BY_SHINING = 0.8, 0.2
+"""Slopes that agree by the first, and that no lean mends by more than the second, are one surface's. So the rig's
+directions are right, and what shines explains the rest (a coin of metal under 6 to 24 lights: 0.83 to 0.97 and 0.01 to
+0.05; the same lights off by 10 degrees each: 0.91 and 0.24, by 20 degrees: 0.77 and 0.31)."""
+AGREE, DISAGREE = 0.3, -0.1
+"""Slopes that agree by less than the first are hardly those of one surface; by less than the second, surely not."""
+MOST_AWAY = 0.05
+"""Of measured normals, the share that may face away from the camera: what a camera sees faces it."""
+LEANS_DEG, BY_LEANING = 6.0, 0.1
+"""Normals would be one surface's if all were changed by more than the first; that says something of the rig where it
+leaves less over by the second, a share of what it leaves."""
+MORE_THAN_SHOWN, SURELY_MORE = 2.0, 4.0
+"""... and where it is more than this many times what residuals show: where lights are each wrong in a way of
+their own, which accuracy says, normals lean by up to 3.5 times that. (Under a rig that is turned as a whole: 25
+times on virtual subjects, 2 to 4 times on photographs.)"""
+SURELY_LEANING = 0.5
+"""Photographs gain less, of what is glossy or in each other's light: there the angle is rough."""
+REST, EXACT_LIGHTS = 1 / 3, 3
+"""A rig is turned as a whole, or a lens is shifted, where so little of the change is none; what is wrong of three
+lights is one change as well. More lights that are each wrong in a way of their own make normals that no such change
+mends."""
+MOST_FLAT = 6.5
+"""Lights of a larger condition number lie nearly in a plane: gloss and light from around lean normals under the right
+rig as well, on photographs by 9 to 15 degrees."""
+FLAT = (
+    "The normals are not quite those of one surface, and would be if all leaned otherwise: the lights lie nearly in a "
+    "plane, so that gloss, light from around or a rig that is a little off turn all of them."
+)
+TURNED = ("tilted up or down", "swung to the left or right", "rolled around the line of sight")
+TOO_FAR_DEG, AGREE_FAR = 8.0, 0.15
+"""Slopes of normals that are so far off agree badly under the right rig too: then they must agree by the second. (A
+bear's under eight lights in one plane: 0.21; five lights of which each is taken for the next: 0.11.)"""
+
+
+def surface_shines(observed: Observed) -> bool:
+    """Return whether normals are those of one surface as they are: then it is the surface that is not matte."""
+    agreement = float(np.median(observed.slopes)) if observed.slopes else 0.0
+    leans = [one for one in observed.leans if one.lean_deg > LEANS_DEG and one.gain > BY_SHINING]
+    return agreement >= ONE_SURFACE and len(leans) <= len(observed.leans) / 2
+
+
+def lights_crossed(observed: Observed, *, guessed: bool) -> Judgement | None:
+    """Judge whether directions are mirrored or lights exchanged; ``guessed``: which light is which is a guess."""
+    agreement = float(np.median(observed.slopes)) if observed.slopes else 1.0
+    far = max((one.misfit.error_deg for one in observed.facts if one.misfit is not None), default=0.0) > TOO_FAR_DEG
+    if agreement > (AGREE_FAR if far else AGREE) or not quiet(observed.facts):
+        return None
+    if agreement > DISAGREE and moves(observed.facts):
+        return None
+    cannot = f"The normals cannot be those of one surface (agreement of slopes {agreement:.2f}, 1 at best)"
+    grade: Grade = "bad" if agreement < DISAGREE else "doubtful"
+    if guessed:
+        return Judgement(
+            subject="rig",
+            grade=grade,
+            found=f"{cannot}: the order of the lights is a guess, and hardly the true one.",
+            advice="Try the other lights as `first_light`, one after the other: with the right one this line is gone.",
+        )
+    if int(observed.firing.sum()) == EXACT_LIGHTS:
+        return Judgement(
+            subject="rig",
+            grade=grade,
+            found=f"{cannot}: directions are mirrored or turned, lights exchanged, or much of the surface shines or "
+            "lies in shadow, which three lights do not tell apart.",
+            advice="Check that the rig file is in camera axes (x right, y up), belongs to this set-up, and names the "
+            "lights as the plan does. If it does, add lights.",
+        )
+    return Judgement(
+        subject="rig",
+        grade=grade,
+        found=f"{cannot}: directions are mirrored or turned, or lights exchanged.",
+        advice="Check that the rig file is in camera axes (x right, y up), belongs to this set-up, and names the "
+        "lights as the plan does; calibrate again if anything was moved.",
+    )
+
+
+def facing_away(observed: Observed) -> Judgement | None:
+    """Judge whether normals face away from the camera; None where few do."""
+    share = float(np.median(observed.away)) if observed.away else 0.0
+    if share <= MOST_AWAY or not quiet(observed.facts):
+        return None
+    return Judgement(
+        subject="rig",
+        grade="bad",
+        found=f"{100 * share:.0f} % of the normals face away from the camera, which sees none of such a surface: "
+        "directions or strengths of the lights are wrong.",
+        advice="Use the rig file of this set-up; check that lights have the same names in plan and rig, and that each "
+        "gives what the rig says.",
+    )
+
+
+def normals_lean(observed: Observed) -> Judgement | None:
+    """Judge whether the normals would be one surface's if all were tilted alike; None where not."""
+    if not observed.leans or not quiet(observed.facts) or moves(observed.facts) or _clips(observed):
+        return None
+    usual = sorted(observed.leans, key=lambda one: one.lean_deg)[len(observed.leans) // 2]
+    shown_deg = off_deg(observed) or 0.0
+    if usual.lean_deg <= max(LEANS_DEG, MORE_THAN_SHOWN * shown_deg) or usual.gain <= BY_LEANING:
+        return None
+    if usual.off_axis is not None and (usual.least_deg or 0.0) < REST * usual.lean_deg:
+        return _off_axis(usual, usual.off_axis)
+    whole = usual.rest_deg < REST * usual.lean_deg
+    flat = _nearly_in_a_plane(observed)
+    exact = whole or int(observed.firing.sum()) == EXACT_LIGHTS
+    return Judgement(
+        subject="rig",
+        grade="bad" if exact and not flat and _lost(usual, shown_deg) else "doubtful",
+        found=FLAT if flat else _leaning_words(usual, whole=whole, exact=exact),
+        advice="Add lights from other sides, farther from the plane of these."
+        if flat
+        else "Measure the lights again with the camera where it stands. If the picture is cropped at one side, or the "
+        "lens is shifted, write focal_px and principal_px into the rig.",
+    )
+
+
+def _off_axis(usual: Lean, widths: float) -> Judgement:
+    """Say that a lens that is not known may be why: of a right rig as well, so the rig itself is not doubted."""
+    return Judgement(
+        subject="lens",
+        grade="doubtful",
+        found="The normals would be those of one surface if the lens's axis met the picture "
+        f"{100 * widths:.0f} % of its width off the middle (cropped, or a shifted lens), or if the rig were tilted by "
+        f"about {usual.lean_deg:.0f} degrees: without a lens in the rig nothing tells which.",
+        advice="Write focal_px and principal_px into the rig's [camera]; if the axis is in the middle, measure the "
+        "lights again with the camera where it stands.",
+    )
+
+
+def _lost(usual: Lean, shown_deg: float) -> bool:
+    least_deg = usual.lean_deg if usual.least_deg is None else usual.least_deg
+    return least_deg > max(LOST_DEG, SURELY_MORE * shown_deg) and usual.gain > SURELY_LEANING
+
+
+def _clips(observed: Observed) -> bool:
+    """Return whether so much is clipped that normals of few lights are left, which lean for that."""
+    return float(np.median([one.clipped_share for one in observed.facts])) > LOST_CLIPPED
+
+
+def _nearly_in_a_plane(observed: Observed) -> bool:
+    if observed.points is None:
+        return False
+    sizes = np.linalg.svd(observed.points.vectors[:, observed.firing].mean(axis=0), compute_uv=False)
+    return bool(sizes[0] > MOST_FLAT * sizes[-1])
+
+
+def _leaning_words(usual: Lean, *, whole: bool, exact: bool) -> str:
+    as_they_are = "as they are, normals are not those of one surface;"
+    if whole:
+        axis, angle_deg = int(np.abs(usual.turn_deg).argmax()), float(np.linalg.norm(usual.turn_deg))
+        return (
+            f"The rig seems {TURNED[axis]} as a whole by about {angle_deg:.0f} degrees: {as_they_are} turned back by "
+            "that angle they would be."
+        )
+    by = f" by about {usual.lean_deg:.0f} degrees" if exact else ""
+    return f"The rig's directions are off: {as_they_are} tilted otherwise{by} they would be."
+
+
+def quiet(facts: Sequence[InstantFacts]) -> bool:
+    """Return whether normals are steady enough to be compared with each other."""
+    known = [one.change.normals_deg for one in facts if one.change is not None and (one.moving_share or 0.0) < AT_REST]
+    return by_noise_deg(facts) < NOISY_DEG and (not known or float(np.median(known)) < NOISY_DEG)

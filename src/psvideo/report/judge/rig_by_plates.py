@@ -1,0 +1,127 @@
+"""The rig judged by what it leaves unexplained of the plates: wrong strengths, near lights, another curve."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from psvideo.report.judge.of_lamps import NAMED
+from psvideo.report.judge.result import COMMON_DEG
+from psvideo.report.judgement import Grade, Judgement
+from psvideo.report.observe.rig_and_curve.rigfit import RigFit
+
+MISFIT, LOST_MISFIT = 0.135, 0.25
+"""Shares of the light that another rig would explain and this one cannot. A rig that was off by 1 to 5 degrees left
+0.11 to 0.13 on photographs, two lights exchanged among five 0.18, a list in another order 0.19."""
+LEFT_OVER = 0.1
+"""Where more is left over under a rig that is right, the report says what it may come from."""
+STRENGTH_MISFIT, BY_STRENGTH, OTHER_STRENGTH = 0.05, 0.5, 1.25
+"""Less is enough where other strengths of some lights, half of them at most, take half of it away."""
+NEARER = 0.7
+"""Lamps stand near where that leaves less than this share of what is left over. (Photographs: 0.88 and more; lamps ten
+widths away that a rig takes for distant: 0.2 to 0.5.) A surface that is not matte, as skin, explains a face's light
+better than lamps at 1.4 widths would, which were none."""
+LOST_LEAN_DEG = 12.0
+"""Near lights that tilt normals by more than this make the rig bad, not only doubtful."""
+IN_PICTURE = 0.5
+"""Lamps nearer than this, in widths of the picture, would be seen in it. (Linear codes read as S-Log3 do.)"""
+UNDONE, REDONE, MOST_BENT = 0.7, 0.18, 0.25
+"""Plates were read by another curve where that leaves less than these shares of what is left over. (sRGB read as light:
+0.3 to 0.8; photographs in light: 1.7 and more. Light read as sRGB: 0.05 to 0.15; photographs in sRGB: 0.6 and more.)
+A wrong curve leaves the third at most, and the right one explains the light: metal leaves 0.25 to 0.45 under the right
+one, and is no matte surface under any."""
+
+
+def rig_explains(fit: RigFit) -> Judgement:
+    """Say that the rig is right, and how much it leaves over."""
+    found = f"The rig explains the plates: {100 * fit.misfit:.1f} % of the light is left over"
+    if fit.misfit > LEFT_OVER:
+        found += (
+            f" ({100 * fit.own_misfit:.0f} % under any rig), by gloss, soft shadows, or directions a few degrees off"
+        )
+    return Judgement(subject="rig", grade="good", found=f"{found}.")
+
+
+def rig_misfits(lights: Sequence[str], fit: RigFit) -> Judgement | None:
+    """Judge how much of the light cannot come from the rig's lights; None where little."""
+    off = [
+        (light, strength)
+        for light, strength in zip(lights, fit.strengths, strict=True)
+        if not 1 / OTHER_STRENGTH < strength < OTHER_STRENGTH
+    ]
+    some = 0 < len(off) <= len(lights) / 2
+    by_strength = some and fit.excess > STRENGTH_MISFIT and fit.scaled_misfit < BY_STRENGTH * fit.misfit
+    if fit.excess <= MISFIT and not by_strength:
+        return None
+    grade: Grade = "bad" if fit.excess > LOST_MISFIT else "doubtful"
+    found = f"The rig does not fit the plates: {100 * fit.misfit:.0f} % of the light cannot come from its lights"
+    if by_strength:
+        off.sort(key=lambda one: -abs(float(np.log(max(one[1], 1e-6)))))
+        named = ", ".join(f"{light!r} {100 * strength:.0f} %" for light, strength in off[:NAMED])
+        named += f" and {len(off) - NAMED} more," if len(off) > NAMED else ""
+        return Judgement(
+            subject="rig",
+            grade=grade,
+            found=f"{found}; with other strengths it would: {named} of what the rig says.",
+            advice="Check the power and the driver of these lights, or calibrate the rig again.",
+        )
+    return Judgement(
+        subject="rig",
+        grade=grade,
+        found=f"{found}.",
+        advice="Use the rig file of this set-up; calibrate again if a light or the camera was moved; check that lights "
+        "have the same names in plan and rig.",
+    )
+
+
+def shining_surface(fit: RigFit) -> Judgement:
+    """Say that it is the surface that is not matte, and not the rig that is wrong."""
+    return Judgement(
+        subject="surface",
+        grade="doubtful",
+        found=f"The surface shines: {100 * fit.misfit:.0f} % of the light is no matte surface's under these lights, "
+        "and yet the normals are those of one surface, so the rig is hardly to blame.",
+        advice="Metal, glaze and lacquer need many lights, well spread, or polarising filters. If the subject is "
+        "matte, check the strengths of the lights.",
+    )
+
+
+def lights_near(fit: RigFit) -> Judgement | None:
+    """Judge whether lights that the rig takes for distant stand near; None where they do not."""
+    near = fit.near
+    if near is None or near.misfit > min(NEARER * fit.misfit, near.by_surface) or near.lean_deg <= COMMON_DEG:
+        return None
+    if near.widths < IN_PICTURE:
+        return Judgement(
+            subject="rig",
+            grade="bad",
+            found="The plates fit no rig: bright and dim parts differ as if the lights stood within the picture. The "
+            "plan's transfer curve or black level is likely to be another than the footage's.",
+            advice="Check transfer, black_level and white_level in the plan's [camera].",
+        )
+    return Judgement(
+        subject="rig",
+        grade="bad" if near.lean_deg > LOST_LEAN_DEG else "doubtful",
+        found=f"The lights stand near: they fall off over the picture as if {near.widths:.0f} of its widths away, and "
+        f"the rig takes them for distant. This tilts normals by about {near.lean_deg:.0f} degrees.",
+        advice="Write where the lights stand into the rig (position_m), or move them farther away.",
+    )
+
+
+def other_curve(fit: RigFit) -> Judgement | None:
+    """Judge whether plates were read by another transfer curve than recorded; None where not."""
+    curves, by_distance = fit.curves, fit.misfit if fit.near is None else fit.near.misfit
+    if curves is None or fit.misfit > MOST_BENT or min(curves.undone, curves.redone) > min(by_distance, MISFIT):
+        return None
+    undone = curves.undone <= min(UNDONE * fit.misfit, MISFIT)
+    if not undone and curves.redone > REDONE * fit.misfit:
+        return None
+    read, recorded, left = ("light", "sRGB", curves.undone) if undone else ("sRGB", "light", curves.redone)
+    recorded_as = "srgb" if undone else "linear"
+    return Judgement(
+        subject="rig",
+        grade="doubtful",
+        found=f"The plates were read as {read}, but fit the lights better if they were recorded as {recorded}: "
+        f"{100 * left:.1f} % of their light is left over instead of {100 * fit.misfit:.1f} %. This tilts all normals.",
+        advice=f'Say how they were recorded: transfer = "{recorded_as}" in the plan\'s [camera], or of photographs '
+        f"without a plan `transfer='{recorded_as}'`.",
+    )
