@@ -37,7 +37,7 @@ from psvideo.runs.delivery.delivering import metric_delivery
 from psvideo.runs.instants.job import Job, OverTime
 from psvideo.runs.instants.piece_notes import noted_timing
 from psvideo.runs.instants.results import normals_run, piece_run
-from psvideo.runs.steps.caller import PYTHON, Caller, say_kept, say_of_clip
+from psvideo.runs.steps.caller import PYTHON, Caller, said_timing, say_kept, say_of_clip
 from psvideo.runs.steps.lighting import read_lighting
 from psvideo.runs.steps.output import Output, take_rate
 from psvideo.sync.open_take import open_take
@@ -212,12 +212,9 @@ def normals(
         found = noted or read_or_find_timing(
             kept, timing_path, first_light=first_light, rig=lighting.flashed, watch=watch
         )
-        found = found.spelled(caller.spell)
-        for note in found.notes:
-            caller.warn(note)
         job = Job(
             take=kept,
-            timing=found,
+            timing=said_timing(found, caller),
             lighting=lighting,
             delivery=delivery,
             solver=solver,

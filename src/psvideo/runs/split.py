@@ -19,7 +19,7 @@ from psvideo.plates.timed import read_or_find_timing
 from psvideo.report.run_report import RunReport
 from psvideo.runs.instants.job import OverTime
 from psvideo.runs.instants.plates import Extras, split_run
-from psvideo.runs.steps.caller import PYTHON, Caller, say_kept, say_of_clip
+from psvideo.runs.steps.caller import PYTHON, Caller, said_timing, say_kept, say_of_clip
 from psvideo.runs.steps.output import Output, take_rate
 from psvideo.sync.open_take import open_take
 
@@ -111,14 +111,12 @@ def split(
     given = path_if_given("timing", timing)
     output = output.given(take, given, first_light, known, method, extras, over_time)
     with decoded_once(take, output=output.folder) as kept:
-        found = read_or_find_timing(kept, given, first_light=first_light, rig=known, watch=watch).spelled(caller.spell)
-        for note in found.notes:
-            caller.warn(note)
+        found = read_or_find_timing(kept, given, first_light=first_light, rig=known, watch=watch)
         shown = known if unmixing is None else unmixing.rig
         apart = kept.unmixed(unmixing)
         done = split_run(
             apart,
-            found,
+            said_timing(found, caller),
             output,
             method=method,
             extras=extras,

@@ -15,7 +15,7 @@ from psvideo.formats.whole_files import PICTURE_MARK, refuse_existing, write_tex
 from psvideo.model.timing import Timing, places_in_time
 from psvideo.pictures.timing_sheet import timing_picture, write_sheet
 from psvideo.plates.naming import named_by_rig
-from psvideo.runs.steps.caller import PYTHON, Caller, say_of_clip
+from psvideo.runs.steps.caller import PYTHON, Caller, said_timing, say_of_clip
 from psvideo.sync.open_take import open_take
 from psvideo.sync.take_timing import TakeProfiles, take_profiles, timing_of_profiles
 
@@ -81,9 +81,7 @@ def sync(
     timing = timing_of_profiles(take, profiles, first_light=first_light)
     if picture_path is not None and take.plan.mode != "synced":
         _draw(picture_path, take, timing, profiles)
-    timing = (timing if known is None else named_by_rig(take, timing, known)).spelled(caller.spell)
-    for note in timing.notes:
-        caller.warn(note)
+    timing = said_timing(timing if known is None else named_by_rig(take, timing, known), caller)
     if timing_path is not None:
         write_text(timing_path, format_timing(timing))
     return timing

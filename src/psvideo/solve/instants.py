@@ -18,7 +18,7 @@ from psvideo.model.irradiance.intensity import (
     where_least_arrives,
 )
 from psvideo.model.plan import Plan
-from psvideo.model.rig import Rig
+from psvideo.model.rig import Light, Rig
 from psvideo.model.surface import Surface
 from psvideo.plates.align.denoise import Average, added, averaged
 from psvideo.plates.mixing.mixture import Mixture
@@ -75,39 +75,64 @@ def surfaces(
     if shares is not None:
         lights = tuple(where_least_arrives(light, share) for light, share in zip(lights, shares, strict=True))
 
+    solver = _RoundSolver(
+        lights=lights, shares=shares, masks=masks, solving=solving, near=near, asked=asked, one_by_one=one_by_one
+    )
+    # map and filter hold no round while the next one gathers, as a loop's variable would
+    return map(solver.solve, filter(lambda one: one.lights == plan.lights, gathered))
+
+
+@dataclass(kw_only=True)
+class _RoundSolver:
+    """What all rounds are solved with, and ``steady``: what is known of those before, which solving a round renews."""
+
+    lights: Sequence[Light]
+    shares: Sequence[NDArray[np.float32]] | None
+    masks: Masks | None
+    solving: Solving
+    near: NearSurface | None
+    asked: AskedPasses
+    one_by_one: bool
     steady: Steady | None = None
 
-    def solved(one: Round) -> Instant:
-        scaled = [per_saturation(light, plate.saturation) for light, plate in zip(lights, one.plates, strict=True)]
-        light = partial(illumination, scaled, channels=1 if len(one.plates[0].shape) == 2 else 3)
-        mask = None if masks is None else masks.at(one.number)
+    def solve(self, one: Round) -> Instant:
+        """Solve one round; where its subject stood still, trust is that of the rounds before."""
+        mask = None if self.masks is None else self.masks.at(one.number)
         whole = all(plate.seen.ndim == 1 for plate in one.plates)
         seen = np.stack([plate.seen if whole else plate.pixels_seen for plate in one.plates])
-        plates = _pictures(one, shares)
         shown = None if seen.all() else seen
+        plates = _pictures(one, self.shares)
+        surface, lit = self._surface(one, plates, shown, mask)
+        if one.doubtful is not None:
+            surface = _without(surface, one.doubtful)
+        steady = steadied(self.steady, surface, one.number, one.stood, _shown(seen), spare=self.solving.spare)
+        self.steady = None if self.one_by_one else steady
+        made = passes_of(self.asked, plates, surface, lit, seen=shown, mask=mask) if self.asked.any else None
+        return Instant(round=one, surface=surface, passes=made)
 
-        unsure = _unsure(one, shares)
+    def _surface(
+        self,
+        one: Round,
+        plates: Sequence[Samples] | Sequence[Mixture],
+        seen: NDArray[np.bool_] | None,
+        mask: NDArray[np.bool_] | None,
+    ) -> tuple[Surface, Illumination]:
+        """Return a round's surface, and the light that it was solved with in the end: near lights' changes on the way
+        as the surface is found."""
+        scaled = [per_saturation(light, plate.saturation) for light, plate in zip(self.lights, one.plates, strict=True)]
+        light = partial(illumination, scaled, channels=1 if len(one.plates[0].shape) == 2 else 3)
+        unsure = _unsure(one, self.shares)
         moves = None if one.motion is None else one.motion.moves
-
-        here = None if near is None else swept(near.at(one.number), scaled, plates, seen=shown)
+        here = None if self.near is None else swept(self.near.at(one.number), scaled, plates, seen=seen)
         lit = light(ground=None if here is None else here.ground)
 
         def solve(found: Illumination) -> Surface:
             nonlocal lit
             lit = found
-            return solving.solve(plates, found, seen=shown, mask=mask, unsure=unsure, moves=moves)
+            return self.solving.solve(plates, found, seen=seen, mask=mask, unsure=unsure, moves=moves)
 
         surface = solve(lit) if here is None else solve_near(here, lambda ground: light(ground=ground), solve)
-        if one.doubtful is not None:
-            surface = _without(surface, one.doubtful)
-        nonlocal steady
-        steady = steadied(steady, surface, one.number, one.stood, _shown(seen), spare=solving.spare)
-        steady = None if one_by_one else steady
-        made = passes_of(asked, plates, surface, lit, seen=shown, mask=mask) if asked.any else None
-        return Instant(round=one, surface=surface, passes=made)
-
-    # map and filter hold no round while the next one gathers, as a loop's variable would
-    return map(solved, filter(lambda one: one.lights == plan.lights, gathered))
+        return surface, lit
 
 
 def _without(surface: Surface, doubtful: NDArray[np.bool_]) -> Surface:

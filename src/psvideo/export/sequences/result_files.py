@@ -113,11 +113,8 @@ def write_surface(
 
     ``depth``, which integrates the normals, is needed where ``delivery.needs_depth``, ``beauty`` where it is an AOV.
     """
-    shape: Depth | None = None
-    if delivery.needs_depth:
-        if depth is None:
-            raise ValueError("depth is to be written and was not integrated")
-        shape = depth()
+    shape = _integrated(depth) if delivery.needs_depth else None
+    if shape is not None:
         _write_meshes(folder, clip, number, surface, shape, delivery)
     made = Made(
         surface=surface,
@@ -129,6 +126,19 @@ def write_surface(
         motion=motion,
         program=delivery.program,
     )
+    _write_pictures(folder, clip, number, time_s, made, delivery=delivery, tags=tags)
+
+
+def _integrated(depth: Callable[[], Depth] | None) -> Depth:
+    if depth is None:
+        raise ValueError("depth is to be written and was not integrated")
+    return depth()
+
+
+def _write_pictures(
+    folder: Path, clip: str, number: int, time_s: float, made: Made, *, delivery: Delivery, tags: Tags
+) -> None:
+    """Write an instant's picture of each sequence, and the bundle and maps that were asked for beside them."""
     halves = {name: is_half(name, asked=delivery.half) for name in delivery.quantities}
     world = delivery.space.attributes()
     attributes = {name: tags.attributes(time_s=time_s, data=not QUANTITIES[name].colour) | world for name in halves}

@@ -84,18 +84,10 @@ def _materialx(
     made: Delivered, numbers: Sequence[int], here: str, *, with_normals: bool, in_world: bool, down: bool
 ) -> list[list[str]]:
     """Return standard_surface as a Lambert surface; its ``normal`` is in world space, into which the card's turn."""
-    turned = "mtlx_normals" if in_world and not down else "mtlx_flip" if in_world else "mtlx_turn"
+    upright = "mtlx_flip" if down else "mtlx_normals"
+    turned = upright if in_world else "mtlx_turn"
     parts = [
-        prim(
-            'def Shader "mtlx_surface"',
-            'uniform token info:id = "ND_standard_surface_surfaceshader"',
-            "float inputs:base = 1",
-            f"color3f inputs:base_color.connect = <{here}/mtlx_albedo.outputs:out>",
-            "float inputs:diffuse_roughness = 0",
-            "float inputs:specular = 0",
-            f"float3 inputs:normal.connect = <{here}/{turned}.outputs:out>" if with_normals else [],
-            "token outputs:out",
-        ),
+        _lambert(here, turned if with_normals else None),
         _image("albedo", "color3", made, numbers, here),
         prim(
             'def Shader "mtlx_st"',
@@ -108,27 +100,47 @@ def _materialx(
         return parts
     parts.append(_image("normals", "vector3", made, numbers, here))
     if down:
-        parts.append(
-            prim(
-                'def Shader "mtlx_flip"',
-                'uniform token info:id = "ND_multiply_vector3"',
-                f"float3 inputs:in1.connect = <{here}/mtlx_normals.outputs:out>",
-                "float3 inputs:in2 = (1, -1, 1)",
-                "float3 outputs:out",
-            )
-        )
+        parts.append(_flip(here))
     if not in_world:
-        parts.append(
-            prim(
-                'def Shader "mtlx_turn"',
-                'uniform token info:id = "ND_transformnormal_vector3"',
-                f"float3 inputs:in.connect = <{here}/{'mtlx_flip' if down else 'mtlx_normals'}.outputs:out>",
-                'string inputs:fromspace = "object"',
-                'string inputs:tospace = "world"',
-                "float3 outputs:out",
-            )
-        )
+        parts.append(_turn(here, upright))
     return parts
+
+
+def _lambert(here: str, normals: str | None) -> list[str]:
+    """Return a matte surface, lit by the normals that a shader of this name gives, or by the card's own."""
+    return prim(
+        'def Shader "mtlx_surface"',
+        'uniform token info:id = "ND_standard_surface_surfaceshader"',
+        "float inputs:base = 1",
+        f"color3f inputs:base_color.connect = <{here}/mtlx_albedo.outputs:out>",
+        "float inputs:diffuse_roughness = 0",
+        "float inputs:specular = 0",
+        f"float3 inputs:normal.connect = <{here}/{normals}.outputs:out>" if normals is not None else [],
+        "token outputs:out",
+    )
+
+
+def _flip(here: str) -> list[str]:
+    """Return normals whose y points down with y up."""
+    return prim(
+        'def Shader "mtlx_flip"',
+        'uniform token info:id = "ND_multiply_vector3"',
+        f"float3 inputs:in1.connect = <{here}/mtlx_normals.outputs:out>",
+        "float3 inputs:in2 = (1, -1, 1)",
+        "float3 outputs:out",
+    )
+
+
+def _turn(here: str, upright: str) -> list[str]:
+    """Return the camera's normals in world space."""
+    return prim(
+        'def Shader "mtlx_turn"',
+        'uniform token info:id = "ND_transformnormal_vector3"',
+        f"float3 inputs:in.connect = <{here}/{upright}.outputs:out>",
+        'string inputs:fromspace = "object"',
+        'string inputs:tospace = "world"',
+        "float3 outputs:out",
+    )
 
 
 def _image(quantity: str, kind: str, made: Delivered, numbers: Sequence[int], here: str) -> list[str]:

@@ -110,23 +110,26 @@ def _weak(
     if dead:
         yield _no_light(dead, others=others, missed=missed)
     for light, share, is_dim, says in zip(lights, relative, dim, claimed, strict=True):
-        if share < NOT_FIRING:
-            continue
-        if is_dim and says >= WEAK_LIGHT:
-            yield Judgement(
-                subject="lights",
-                grade="bad",
-                found=f"The light {light!r} is weak: {100 * share:.0f} % of the strongest, where the rig says "
-                f"{100 * says:.0f} %. With {len(lights)} lights all normals lean away from it.",
-                advice="Raise its power, or measure the lights' strengths again.",
-            )
-        elif is_dim and len(weak) <= NAMED:
+        if is_dim and share >= NOT_FIRING and says >= WEAK_LIGHT:
+            yield _weaker_than_rig(light, share, says, lights=len(lights))
+        elif is_dim and share >= NOT_FIRING and len(weak) <= NAMED:
             yield Judgement(
                 subject="lights",
                 grade="doubtful",
                 found=f"The light {light!r} is weak: {100 * share:.0f} % of the strongest.",
                 advice="Raise its power or its flash duration, or move it nearer.",
             )
+
+
+def _weaker_than_rig(light: str, share: float, says: float, *, lights: int) -> Judgement:
+    """Say that a light gives little where the rig, which normals are solved with, says that it gives more."""
+    return Judgement(
+        subject="lights",
+        grade="bad",
+        found=f"The light {light!r} is weak: {100 * share:.0f} % of the strongest, where the rig says "
+        f"{100 * says:.0f} %. With {lights} lights all normals lean away from it.",
+        advice="Raise its power, or measure the lights' strengths again.",
+    )
 
 
 def _no_light(dead: Sequence[tuple[str, float]], *, others: int, missed: bool) -> Judgement:

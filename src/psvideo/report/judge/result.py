@@ -131,29 +131,28 @@ def accuracy(observed: Observed) -> Iterator[Judgement]:
     if error_deg <= COMMON_DEG * (MOVING_FACTOR if moves(observed.facts) else 1):
         yield Judgement(subject="accuracy", grade="good", found=f"{found}.")
         return
-    grade: Grade = "bad" if error_deg > LOST_DEG else "doubtful"
-    if any(one.shows for one in observed.astray):
-        yield Judgement(
-            subject="accuracy",
-            grade=grade,
-            found=f"{found}: the pictures are not aligned.",
-            advice='See the line on motion; `aov=["error"]` says how far off each pixel may be.',
-        )
-        return
-    fit = observed.rig_fit
-    by_rig = fit is not None and fit.excess > NOT_MATTE
-    cause = (
-        "other directions of the lights would explain more: they are a few degrees off, or the surface is glossy"
-        if by_rig
-        else "the surface is not quite matte, or light comes by way of others (gloss, creases, soft shadows)"
-    )
+    cause, advice = _why_off(observed)
     yield Judgement(
         subject="accuracy",
-        grade=grade,
+        grade="bad" if error_deg > LOST_DEG else "doubtful",
         found=f"{found}: {cause}.",
-        advice='Measure the lights on a sphere beside the subject; `aov=["error"]` says how far off each pixel may be.'
-        if by_rig
-        else 'More lights, far apart, average it out; `aov=["error"]` says how far off each pixel may be.',
+        advice=f'{advice}; `aov=["error"]` says how far off each pixel may be.',
+    )
+
+
+def _why_off(observed: Observed) -> tuple[str, str]:
+    """Return what makes normals wrong beyond noise, and what to do about it."""
+    if any(one.shows for one in observed.astray):
+        return "the pictures are not aligned", "See the line on motion"
+    fit = observed.rig_fit
+    if fit is not None and fit.excess > NOT_MATTE:
+        return (
+            "other directions of the lights would explain more: they are a few degrees off, or the surface is glossy",
+            "Measure the lights on a sphere beside the subject",
+        )
+    return (
+        "the surface is not quite matte, or light comes by way of others (gloss, creases, soft shadows)",
+        "More lights, far apart, average it out",
     )
 
 

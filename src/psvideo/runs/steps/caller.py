@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from psvideo.clip import Clip, Kept
+from psvideo.model.timing import Timing
 
 _LOG = logging.getLogger("psvideo")
 
@@ -41,6 +42,14 @@ def say_of_clip(clip: Clip, caller: Caller) -> None:
         caller.warn(warning)
     for note in clip.notes:
         caller.detail(note)
+
+
+def said_timing(timing: Timing, caller: Caller) -> Timing:
+    """Hand on what a timing is to be distrusted for; return it in the caller's words, for files."""
+    spelled = timing.spelled(caller.spell)
+    for note in spelled.notes:
+        caller.warn(note)
+    return spelled
 
 
 def say_kept(kept: Kept | None, caller: Caller) -> None:
