@@ -9,7 +9,7 @@ from psvideo.compute.threads import over_ranges
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
-from psvideo.sync.rowfit import kernel, row_model
+from psvideo.sync.rowfit import kernel, projection, row_model
 from psvideo.sync.rowfit.beat import Beat, train_between
 from psvideo.sync.rowfit.row_model import IntArray
 
@@ -195,7 +195,7 @@ def equations(
     def run(first: int, last: int) -> tuple[FloatArray, FloatArray]:
         hessian = np.zeros((len(rows.window_start), row_model.SIGNALS, row_model.SIGNALS))
         score = np.zeros((len(rows.value), row_model.SIGNALS))
-        kernel.equations(seen, flashes, weight, growth, tails, honest, first, last, rest, hessian, score)
+        projection.equations(seen, flashes, weight, growth, tails, honest, first, last, rest, hessian, score)
         return hessian, score
 
     parts = over_ranges(run, rows.value.shape[1], each=rows_of_a_part(len(rows.value)))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
-from psvideo.sync.rowfit import kernel
+from psvideo.sync.rowfit import projection
 from psvideo.sync.rowfit.coarse.seed import gain_of
 from psvideo.sync.rowfit.profiles import Profiles, compiled_flashes, compiled_rows, equations
 from psvideo.sync.rowfit.refine import CAUCHY, WIDE_SCALE, Fit, errors_of_residuals
@@ -152,7 +152,7 @@ def _pulls(rows: Profiles, fit: Fit, flashes: Flashes, among: slice = slice(None
     rest = np.ascontiguousarray(fit.rest[:, among])
     scale = errors_of_residuals(rows, rest, WIDE_SCALE)
     weight = 1.0 / (1.0 + (rest / (CAUCHY * scale)) ** 2) / scale**2
-    kernel.edges(seen, flashes, weight, 0, rows.value.shape[1], pull, stiff)
+    projection.edges(seen, flashes, weight, 0, rows.value.shape[1], pull, stiff)
     return pull, stiff
 
 

@@ -1,0 +1,179 @@
+"""What moving an edge would change, compiled: the normal equations of the times that the row model leaves free.
+
+The derivatives of the model (``row_model``) are projected on what the brightnesses, which ``kernel`` fits, cannot
+explain (Kaufman 1975). That gives the normal equations of a Gauss-Newton step in one pass.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from psvideo.compute.compiled import EXACT
+from psvideo.model.camera import FloatArray
+from psvideo.sync.rowfit.kernel import fit_window, solve_factored
+from psvideo.sync.rowfit.row_model import BLUR, LEFT, RIGHT, RISE, SIGNALS, Flashes, Rows, given_off, see, slopes, width
+from psvideo.sync.rowfit.unknowns.whitening import factors, whiten, whiten_all
+
+MOST_LEVERAGE = 0.9
+"""A sample that its brightness fits all by itself says nothing of errors; its residual is not blown up without end."""
+
+
+@EXACT.called
+def leverage(normal: FloatArray, design: FloatArray, weight: float, size: int, solved: FloatArray) -> float:
+    """Return which share of a sample's own error the brightnesses that are fitted to it take up."""
+    taken = 0.0
+    for i in range(size):
+        left = design[i]
+        for m in range(i):
+            left -= normal[i, m] * solved[m]
+        solved[i] = left / normal[i, i]
+        taken += solved[i] ** 2
+    return min(weight * taken, MOST_LEVERAGE)
+
+
+@EXACT.inlined
+def _fill_signals(
+    rows: Rows,
+    flashes: Flashes,
+    row: int,
+    window: int,
+    first_flash: NDArray[np.int64],
+    right: FloatArray,
+    tails: bool,
+    signals: FloatArray,
+) -> None:
+    """Fill the window's ``signals`` (frame, SIGNALS): how a row's samples change with each time that may be free."""
+    span_s = rows.ends_s[window + 1] - rows.ends_s[window]
+    for n in range(rows.bounds[window], rows.bounds[window + 1]):
+        shift = slopes(rows, flashes, n, row, first_flash[n], right, tails, signals[n])
+        along = (rows.frame_start_s[n] + rows.row_place[row] * rows.row_time_s - rows.ends_s[window]) / span_s
+        signals[n, LEFT] = shift * (1.0 - along)
+        signals[n, RIGHT] = shift * along
+
+
+@EXACT.inlined
+def _project(
+    design: FloatArray,
+    weight: FloatArray,
+    first: int,
+    last: int,
+    normal: FloatArray,
+    used: int,
+    cross: FloatArray,
+    signals: FloatArray,
+) -> None:
+    """Leave of the first ``used`` signals of some frames what other brightnesses could not bring about as well."""
+    size = design.shape[1]
+    cross[:] = 0.0
+    for n in range(first, last):
+        for i in range(size):
+            if design[n, i] != 0.0:
+                for p in range(used):
+                    cross[p, i] += weight[n] * design[n, i] * signals[n, p]
+    for p in range(used):
+        solve_factored(normal, cross[p], size)
+    for n in range(first, last):
+        for i in range(size):
+            if design[n, i] != 0.0:
+                for p in range(used):
+                    signals[n, p] -= design[n, i] * cross[p, i]
+
+
+@EXACT.kept
+def equations(
+    rows: Rows,
+    flashes: Flashes,
+    weight: FloatArray,
+    steepness: FloatArray,
+    tails: bool,
+    honest: bool,
+    first: int,
+    last: int,
+    rest: FloatArray,
+    hessian: FloatArray,
+    score: FloatArray,
+) -> None:
+    """Fill ``rest``; add the rows' normal matrices to ``hessian`` (window, SIGNALS, SIGNALS), their ``weight * signal *
+    rest`` to ``score`` (frame, SIGNALS), which keeps the frames apart. The normal matrices hold ``steepness`` (frame,
+    row): how fast a residual's pull grows with it, which is its weight but in robust fits. Where ``honest``, residuals
+    count in the scores as large as if no brightness had been fitted to them (MacKinnon and White 1985, HC2)."""
+    frames = len(rows.value)
+    size = width(rows, flashes)
+    design = np.empty((frames, size))
+    first_flash = np.empty(frames, np.int64)
+    normal, right = np.empty((size, size)), np.empty(size)
+    signals = np.empty((frames, SIGNALS))
+    cross = np.empty((SIGNALS, size))
+    solved = np.empty(size)
+    diagonal, below = np.empty(frames), np.empty(frames)
+    used = SIGNALS if tails and flashes.blur_s > 0.0 else BLUR if tails else RISE  # the others are 0 everywhere
+    for row in range(first, last):
+        k = 0
+        for n in range(frames):
+            k = see(rows, flashes, n, row, k, design[n])
+            first_flash[n] = k
+        value = rows.value[:, row].copy()
+        if rows.restless[row] > 0.0:
+            factors(rows, flashes, row, diagonal, below)
+            whiten(value, diagonal, below)
+            whiten_all(design, diagonal, below, 0, frames)
+        for window in range(len(rows.bounds) - 1):
+            begin, end = rows.bounds[window], rows.bounds[window + 1]
+            fit_window(value, weight[:, row], design, begin, end, normal, right)
+            _fill_signals(rows, flashes, row, window, first_flash, right, tails, signals)
+            if rows.restless[row] > 0.0:
+                whiten_all(signals, diagonal, below, begin, end)
+            _project(design, weight[:, row], begin, end, normal, used, cross, signals)
+            for n in range(begin, end):
+                explained = 0.0
+                for i in range(size):
+                    if design[n, i] != 0.0:
+                        explained += design[n, i] * right[i]
+                rest[n, row] = value[n] - explained
+                error = rest[n, row]
+                if honest:
+                    error /= np.sqrt(1.0 - leverage(normal, design[n], weight[n, row], size, solved))
+                for p in range(used):
+                    pull = weight[n, row] * signals[n, p]
+                    score[n, p] += pull * error
+                    for q in range(p + 1):
+                        hessian[window, p, q] += steepness[n, row] * signals[n, p] * signals[n, q]
+
+
+@EXACT.kept
+def edges(
+    rows: Rows, flashes: Flashes, weight: FloatArray, first: int, last: int, pull: FloatArray, stiff: FloatArray
+) -> None:
+    """Add to ``pull`` and ``stiff`` (flash, 2) how strongly rows that open (0) or close (1) during a flash shift it."""
+    frames = len(rows.value)
+    design = np.empty((frames, width(rows, flashes)))
+    size = design.shape[1]
+    first_flash = np.empty(frames, np.int64)
+    normal, right = np.empty((size, size)), np.empty(size)
+    for row in range(first, last):
+        k = 0
+        for n in range(frames):
+            k = see(rows, flashes, n, row, k, design[n])
+            first_flash[n] = k
+        for window in range(len(rows.bounds) - 1):
+            begin, end = rows.bounds[window], rows.bounds[window + 1]
+            fit_window(rows.value[:, row], weight[:, row], design, begin, end, normal, right)
+            for n in range(begin, end):
+                rest = rows.value[n, row]
+                for i in range(size):
+                    rest -= design[n, i] * right[i]
+                open_s = rows.frame_start_s[n] + rows.row_place[row] * rows.row_time_s
+                for j in range(first_flash[n], len(flashes.start_s)):
+                    if flashes.start_s[j] >= open_s + rows.exposure_s:
+                        break
+                    u = flashes.unknown[j]
+                    if u > 0:
+                        light = right[u]
+                        since_s, d = open_s - flashes.start_s[j], flashes.duration_s[j]
+                        _, opening = given_off(since_s, d, flashes.rise_s, flashes.fall_s, flashes.blur_s)
+                        _, closing = given_off(
+                            since_s + rows.exposure_s, d, flashes.rise_s, flashes.fall_s, flashes.blur_s
+                        )
+                        pull[j, 0] += weight[n, row] * light * opening * rest
+                        pull[j, 1] -= weight[n, row] * light * closing * rest
+                        stiff[j, 0] += weight[n, row] * (light * opening) ** 2
+                        stiff[j, 1] += weight[n, row] * (light * closing) ** 2
