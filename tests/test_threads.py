@@ -204,3 +204,24 @@ def test_a_run_that_was_killed_goes_on_to_the_same_bytes(
     (partial / ".left.exr.1.partial").write_bytes(b"half a file")
     ended(begun(command, clip, *options, "-o", out, "--resume", threads=8))
     assert digest(out) == by_one_thread(name)
+
+
+LEFT_IN_C = """
+import time
+import numpy as np
+import cv2
+from psvideo.compute.beside import run_beside
+picture = np.zeros((400, 400), np.float32)
+def blur():
+    until = time.monotonic() + 0.6
+    while time.monotonic() < until:
+        cv2.GaussianBlur(picture, (0, 0), 3)
+    print("done")
+run_beside(blur, name="beside")
+time.sleep(0.1)
+"""
+
+
+def test_a_process_whose_thread_is_in_the_midst_of_a_call_of_a_c_library_ends_in_order() -> None:
+    done = subprocess.run([sys.executable, "-c", LEFT_IN_C], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "done\n", "")

@@ -1,6 +1,7 @@
 """How hot loops are compiled, kept on disk and shared between threads; and the memory that they work on.
 
-``compiled`` and ``parts`` compile, ``compile_count`` counts how much; ``heap`` sets up memory and libraries before
-they load, ``memory`` and ``spilled`` hold arrays (in files, where they are large), ``halves`` and ``symmetric`` are
-small loops that many rooms use; ``threads`` shares work, ``progress`` shows how far it is.
+``compiled`` and ``parts`` compile, ``compile_count`` counts how much; ``heap`` sets up memory and libraries before they
+load, ``memory`` and ``spilled`` hold arrays (in files, where they are large), ``halves`` and ``symmetric`` are small
+loops that many rooms use; ``threads`` shares work, ``beside`` starts threads that the end of the process waits for,
+``progress`` shows how far work is.
 """

@@ -9,6 +9,7 @@ from psvideo.export.programs.presets import NO_PRESET, PRESETS, Preset
 from psvideo.export.sequences.result_files import Delivery
 from psvideo.export.space import choose_space
 from psvideo.model.choices import (
+    USUAL_COMPRESSION,
     CameraTime,
     Compression,
     MapFiles,
@@ -37,7 +38,7 @@ class Asked:
     aov: Sequence[Aov] = ()
     mesh: Sequence[MeshKind] = ()
     encode: MapFiles | None = None
-    compression: Compression = "zip"
+    compression: Compression = USUAL_COMPRESSION
     multipart: bool | None = None
     plates: bool = False
     with_ambient: bool = False

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from psvideo.compute.spilled import let_go
 from psvideo.errors import PsvideoError
 from psvideo.formats.whole_files import whole_file
-from psvideo.model.choices import Compression
+from psvideo.model.choices import USUAL_COMPRESSION, Compression
 
 _INT32_MAX = 2**31 - 1
 AT_ONCE_ROWS = 2048
@@ -59,7 +59,7 @@ def write_exr(
     fps: Fraction | None = None,
     time_code: str | None = None,
     crop: Crop | None = None,
-    compression: Compression = "zip",
+    compression: Compression = USUAL_COMPRESSION,
 ) -> None:
     """Write one picture; the file appears under its name when it is whole, and folders are made as needed.
 
@@ -162,7 +162,7 @@ def write_exr_parts(
     attributes: Mapping[str, Mapping[str, Attribute]],
     fps: Fraction | None = None,
     time_code: str | None = None,
-    compression: Compression = "zip",
+    compression: Compression = USUAL_COMPRESSION,
 ) -> None:
     """Write one file with a part per name; each has its own channels and ``attributes``, else as ``write_exr``.
 

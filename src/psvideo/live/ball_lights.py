@@ -3,10 +3,12 @@
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 from psvideo.calibrate.light_pictures import pictures_of_round
 from psvideo.calibrate.mirror.lights import MirrorCalibration, calibrate_lights
 from psvideo.calibrate.sphere.sighting import Looking, sight_spheres
+from psvideo.compute.beside import run_beside
 from psvideo.errors import PsvideoError
 from psvideo.live.chain import NewestRound
 from psvideo.live.showing.smaller import smaller_rig
@@ -46,7 +48,7 @@ class BallLights:
         if not self._asked.is_set():
             return
         self._asked.clear()
-        threading.Thread(target=self.calibrate, args=(newest,), name="psvideo ball", daemon=True).start()
+        run_beside(partial(self.calibrate, newest), name="psvideo ball")
 
     def calibrate(self, newest: NewestRound) -> None:
         """Find the lights that a round shows, and hand them on; what goes wrong is a sentence."""

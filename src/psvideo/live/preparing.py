@@ -1,9 +1,9 @@
 """What happens before the first frame: the rehearsal, in a thread, so that a page and a console can say how far it is
 and Ctrl-C ends it at once."""
 
-import threading
 from collections.abc import Callable
 
+from psvideo.compute.beside import run_beside
 from psvideo.compute.compile_count import CompileCount
 from psvideo.model.units import counted
 
@@ -26,8 +26,7 @@ def prepared(prepare: Callable[[], None], *, said: Callable[[], None], every_s: 
         except Exception as fault:  # said to whoever watches
             wrong.append(f"Getting ready went wrong ({fault}); the first results may come late.")
 
-    thread = threading.Thread(target=run, name="psvideo rehearsal", daemon=True)
-    thread.start()
+    thread = run_beside(run, name="psvideo rehearsal")
     while thread.is_alive():
         thread.join(every_s)
         if thread.is_alive():

@@ -4,9 +4,11 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
+from psvideo.compute.beside import run_beside
 from psvideo.compute.compile_count import CompileCount, compiles_counted
 from psvideo.compute.heap import no_looks_at_what_is_loaded
 from psvideo.live.chain import Chain, LiveFrame, NewestRound, search_here
@@ -38,7 +40,7 @@ Said = Callable[[LiveStatus], None]
 
 def search_beside(run: Callable[[], None]) -> None:
     """Search in a thread of its own, while frames are taken."""
-    threading.Thread(target=run, name="psvideo search", daemon=True).start()
+    run_beside(run, name="psvideo search")
 
 
 @dataclass(kw_only=True)
@@ -122,12 +124,10 @@ class Running:
 
     def _beside(self, began_s: float) -> None:
         self.chain.search = search_beside
-        threads = [
-            threading.Thread(target=self._guarded, args=(run,), name=name, daemon=True)
-            for run, name in ((self._read, "psvideo frames"), (self._make, "psvideo results"))
-        ]
-        for thread in threads:
-            thread.start()
+        # whoever reads a silent source would keep the process from ending
+        reading = threading.Thread(target=self._guarded, args=(self._read,), name="psvideo frames", daemon=True)
+        reading.start()
+        threads = [reading, run_beside(partial(self._guarded, self._make), name="psvideo results")]
         before, said_s = (0, 0), time.monotonic()
         while not self._stop.wait(STATUS_S):
             now_s = time.monotonic()

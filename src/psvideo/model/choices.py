@@ -35,6 +35,8 @@ PREVIEWS: tuple[Preview, ...] = ("relit",)
 Compression = Literal["zip", "zips", "piz", "rle", "none"]
 """How pixels are packed, always without loss. ZIP is read everywhere; ZIPS (single lines) suits Nuke, RLE fast disks.
 DWAA, DWAB and B44 lose data, and which they lose depends on the channels' names: they are not offered."""
+USUAL_COMPRESSION: Compression = "zip"
+"""How pixels are packed where nobody says otherwise: what every program reads."""
 Program = Literal["nuke", "blender", "unreal", "houdini"]
 """The programs that a delivery can be made for."""
 Prior = Literal["equal-lights", "equal-albedo"]

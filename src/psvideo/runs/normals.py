@@ -16,6 +16,7 @@ from psvideo.formats.whole_folders import unfinished_folder_of
 from psvideo.model.choices import (
     MOST_ITERATIONS,
     PREVIEWS,
+    USUAL_COMPRESSION,
     Align,
     CameraTime,
     Compression,
@@ -76,7 +77,7 @@ def normals(
     aov: Sequence[Aov] = (),
     mesh: Sequence[MeshKind] = (),
     encode: MapFiles | None = None,
-    compression: Compression = "zip",
+    compression: Compression = USUAL_COMPRESSION,
     multipart: bool | None = None,
     plates: bool = False,
     with_ambient: bool = False,

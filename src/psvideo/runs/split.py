@@ -10,7 +10,7 @@ from psvideo.errors import UsageError
 from psvideo.formats.paths import path_if_given, path_of
 from psvideo.formats.rig_folder import rig_of_take
 from psvideo.formats.rig_toml import read_rig
-from psvideo.model.choices import Compression, MovieCodec, PlatesPreview, SplitMethod
+from psvideo.model.choices import USUAL_COMPRESSION, Compression, MovieCodec, PlatesPreview, SplitMethod
 from psvideo.model.irradiance.colours import unmixing_of
 from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.beauty import mix_of
@@ -43,7 +43,7 @@ def split(
     resync: Path | str | None = None,
     preview: Sequence[PlatesPreview] = (),
     preview_codec: MovieCodec = "both",
-    compression: Compression = "zip",
+    compression: Compression = USUAL_COMPRESSION,
     start_number: int = FIRST_NUMBER,
     force: bool = False,
     resume: bool = False,

@@ -61,6 +61,7 @@ from psvideo.cli.options.solving import (
     SolverOption,
 )
 from psvideo.cli.options.typed import chosen_previews, parse_instants
+from psvideo.model.choices import USUAL_COMPRESSION
 from psvideo.model.units import counted
 
 
@@ -96,7 +97,7 @@ def normals(
     mesh: MeshOption = None,
     encode: EncodeOption = None,
     separate: Separate = True,
-    compression: CompressionOption = "zip",
+    compression: CompressionOption = USUAL_COMPRESSION,
     multipart: Multipart = None,
     plates: Plates = False,
     with_ambient: WithAmbient = False,

@@ -27,7 +27,7 @@ from psvideo.cli.options.delivery import CodecOption, CompressionOption, PlatesP
 from psvideo.cli.options.per_light import parse_weights
 from psvideo.cli.options.solving import FpsOption, ResyncOption, ShutterOption
 from psvideo.cli.options.typed import parse_instants
-from psvideo.model.choices import SplitMethod
+from psvideo.model.choices import USUAL_COMPRESSION, SplitMethod
 from psvideo.model.units import counted
 
 
@@ -52,7 +52,7 @@ def split(
     resync: ResyncOption = None,
     preview: PlatesPreviewOption = None,
     preview_codec: CodecOption = "both",
-    compression: CompressionOption = "zip",
+    compression: CompressionOption = USUAL_COMPRESSION,
     start_number: StartNumber = 1001,
     force: Force = False,
     resume: Resume = False,

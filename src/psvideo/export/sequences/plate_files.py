@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from psvideo.export.sequences.tags import Tags
 from psvideo.formats.exr_files import write_exr
-from psvideo.model.choices import Compression
+from psvideo.model.choices import USUAL_COMPRESSION, Compression
 from psvideo.model.quantities import QUANTITIES
 from psvideo.model.turn import UPRIGHT, Turn
 from psvideo.plates.light_plate import LightPlate
@@ -25,7 +25,9 @@ def plate_name(clip: str, light: str, number: int) -> str:
     return f"{light}/{clip}_{light}.{number:04d}.exr"
 
 
-def write_plate(folder: Path, clip: str, plate: LightPlate, tags: Tags, *, compression: Compression = "zip") -> None:
+def write_plate(
+    folder: Path, clip: str, plate: LightPlate, tags: Tags, *, compression: Compression = USUAL_COMPRESSION
+) -> None:
     """Write one plate: channels R, G, B or Y, and ``valid`` where rows are missing."""
     write_light(folder, clip, plate, plate.image, tags, compression=compression)
 
@@ -37,7 +39,7 @@ def write_light(
     image: NDArray[np.floating],
     tags: Tags,
     *,
-    compression: Compression = "zip",
+    compression: Compression = USUAL_COMPRESSION,
 ) -> None:
     """Write what an image says of a plate's light, as the plate itself is written."""
     path = folder / plate_name(clip, plate.light, plate.number)
@@ -53,7 +55,13 @@ def write_light(
 
 
 def write_flash(
-    folder: Path, clip: str, plate: Plate, tags: Tags, *, turn: Turn = UPRIGHT, compression: Compression = "zip"
+    folder: Path,
+    clip: str,
+    plate: Plate,
+    tags: Tags,
+    *,
+    turn: Turn = UPRIGHT,
+    compression: Compression = USUAL_COMPRESSION,
 ) -> None:
     """Write what one flash showed by itself, turned upright: ``flashes/<clip>_flash.<index>.exr``."""
     seen = np.array(np.broadcast_to(plate.seen[:, None], plate.picture.shape[:2]))

@@ -13,7 +13,7 @@ from psvideo.export.sequences.png_maps import PNG_MAX, encode_normals, write_png
 from psvideo.export.sequences.tags import Tags
 from psvideo.export.space import Space
 from psvideo.formats.exr_files import write_exr, write_exr_parts
-from psvideo.model.choices import Codec, Compression, MovieCodec, Preview, Program
+from psvideo.model.choices import USUAL_COMPRESSION, Codec, Compression, MovieCodec, Preview, Program
 from psvideo.model.quantities import ALWAYS, AOVS, QUANTITIES, SOURCES, Aov, is_half
 from psvideo.model.surface import Surface
 from psvideo.plates.beauty import Mix
@@ -43,7 +43,7 @@ class Delivery:
     previews: tuple[Preview, ...] = ()
     codec: MovieCodec = "both"
     program: Program | None = None
-    compression: Compression = "zip"
+    compression: Compression = USUAL_COMPRESSION
 
     @property
     def needs_depth(self) -> bool:

@@ -14,7 +14,7 @@ from psvideo.export.sequences.plate_files import plate_name, write_flash, write_
 from psvideo.export.sequences.tags import Tags
 from psvideo.formats.timing_json import format_timing
 from psvideo.formats.whole_files import write_text
-from psvideo.model.choices import Compression, MovieCodec, Preview, SplitMethod
+from psvideo.model.choices import USUAL_COMPRESSION, Compression, MovieCodec, Preview, SplitMethod
 from psvideo.model.plan import Plan
 from psvideo.model.rig import Rig
 from psvideo.model.timing import Timing
@@ -49,7 +49,7 @@ class Extras:
     mix: Mix | None = None
     previews: tuple[Preview, ...] = ()
     codec: MovieCodec = "both"
-    compression: Compression = "zip"
+    compression: Compression = USUAL_COMPRESSION
 
     def check(self, plan: Plan) -> None:
         """Raise UsageError or PsvideoError where the plan does not have what is asked for."""
