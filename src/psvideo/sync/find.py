@@ -19,14 +19,17 @@ from psvideo.model.plan import Plan
 from psvideo.model.rows.shutter import frames_touched
 from psvideo.model.timing import DroppedFrames, Flash, Order, Timing
 from psvideo.model.units import counted
+from psvideo.sync.joined import Chapter, joined, named_alike
+from psvideo.sync.parts import found_in_parts
 from psvideo.sync.rowfit.beat import Beat, train_between, train_until
 from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.refine import Fit
+from psvideo.sync.rowfit.restarts import may_restart
 from psvideo.sync.rowfit.tracking.course import window_frames
 from psvideo.sync.rowfit.unknowns.mains_swing import mains_swing
 from psvideo.sync.turns import turns
-from psvideo.sync.verdict.believed import believed_fit
+from psvideo.sync.verdict.believed import Verdict, believed_fit
 from psvideo.sync.verdict.frame_remarks import remarks_on_frames
 from psvideo.sync.verdict.refusal import clock_too_far, nothing_to_find, why_not
 from psvideo.sync.verdict.remarks import remarks, remarks_on_lights
@@ -60,20 +63,70 @@ def find_timing(
     check_first_light(plan, first_light)
     if plan.mode == "synced":
         return _synced_timing(plan, indices, clip=clip, dropped=dropped)
-    strobe = find_strobe(plan, indices, profiles, clip=clip, first_light=first_light, doubt=doubt)
-    found, beat = strobe.found, strobe.found.fit.beat
-    numbered = np.asarray(indices if numbers is None else numbers, np.int64)
+    rows = _to_fit(plan, indices, profiles, doubt, clip=clip)
+    verdict = believed_fit(plan, rows)
+    take = _Take(
+        plan=plan,
+        clip=clip,
+        indices=np.asarray(indices, np.int64),
+        numbers=np.asarray(indices if numbers is None else numbers, np.int64),
+        dropped=tuple(dropped),
+    )
+    parts = found_in_parts(plan, rows) if not verdict.believed or may_restart(verdict.found) else []
+    if parts:
+        strobes = _named_strobes(plan, parts, first_light)
+        chapters = [_chapter(take.only(cut), one) for (cut, _), one in zip(parts, strobes, strict=True)]
+        return joined(chapters, take.dropped)
+    _refuse_unless_believed(plan, rows, verdict, clip)
+    return _timing(take, _strobe(plan, verdict.found, first_light))
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Take:
+    """The frames (frame,) that were looked at, by their places in time and their numbers, and what is known of them."""
+
+    plan: Plan
+    clip: str
+    indices: NDArray[np.int64]
+    numbers: NDArray[np.int64]
+    dropped: tuple[DroppedFrames, ...]
+
+    def only(self, frames: slice) -> "_Take":
+        """Return some consecutive frames of the take, with the holes that their numbers show."""
+        numbers = self.numbers[frames]
+        dropped = tuple(hole for hole in self.dropped if numbers[0] <= hole.after < numbers[-1])
+        return replace(self, indices=self.indices[frames], numbers=numbers, dropped=dropped)
+
+
+def _named_strobes(plan: Plan, parts: Sequence[tuple[slice, ClipFit]], first_light: str | None) -> list["FoundStrobe"]:
+    """Return the strobes of a clip's parts, the same light under the same name in all of them."""
+    strobes = [_strobe(plan, found, first_light if cut.start == 0 else None) for cut, found in parts]
+    named = named_alike(plan, [(one.found, one.order) for one in strobes])
+    return [FoundStrobe(found=found, order=order) for found, order in named]
+
+
+def _chapter(part: _Take, strobe: "FoundStrobe") -> Chapter:
+    return Chapter(
+        first=int(part.numbers[0]),
+        last=int(part.numbers[-1]),
+        more=int(strobe.found.track.index[-1] - part.indices[-1]),
+        timing=_timing(part, strobe),
+    )
+
+
+def _timing(take: _Take, strobe: "FoundStrobe") -> Timing:
+    plan, found, beat = take.plan, strobe.found, strobe.found.fit.beat
     return _assemble(
         plan,
         found,
         order=strobe.order,
-        clip=clip,
-        dropped=_all_dropped(dropped, numbered, np.asarray(indices), found.track.index),
-        repeated=tuple(int(number) for number in numbered[found.track.repeated]),
+        clip=take.clip,
+        dropped=_all_dropped(take.dropped, take.numbers, take.indices, found.track.index),
+        repeated=tuple(int(number) for number in take.numbers[found.track.repeated]),
         notes=(
             *remarks(plan, found),
             *remarks_on_lights(plan, found, beat, named=strobe.order != "guess"),
-            *remarks_on_frames(plan, found, np.asarray(indices)),
+            *remarks_on_frames(plan, found, take.indices),
         ),
     )
 
@@ -109,15 +162,34 @@ def find_strobe(
     Neighbouring rows are averaged to ``most_rows`` where there are more: less time, and a little less sure. Raises
     NoStrobeError where the profiles do not look like the plan's strobe.
     """
-    rows = _as_profiles(plan, indices, profiles, doubt)
+    rows = _to_fit(plan, indices, profiles, doubt, clip=clip)
     rows = rows if most_rows is None else rows.binned(most_rows)
+    verdict = believed_fit(plan, rows)
+    _refuse_unless_believed(plan, rows, verdict, clip)
+    return _strobe(plan, verdict.found, first_light)
+
+
+def _to_fit(
+    plan: Plan,
+    indices: NDArray[np.int64],
+    profiles: FloatArray,
+    doubt: NDArray[np.floating] | None,
+    *,
+    clip: str,
+) -> Profiles:
+    rows = _as_profiles(plan, indices, profiles, doubt)
     hopeless = nothing_to_find(plan, rows)
     if hopeless:
         raise NoStrobeError(f"{clip}: {hopeless}")
-    verdict = believed_fit(plan, rows)
-    found = verdict.found
+    return rows
+
+
+def _refuse_unless_believed(plan: Plan, rows: Profiles, verdict: Verdict, clip: str) -> None:
     if not verdict.believed:
-        raise NoStrobeError(_not_found(plan, rows, found, clip))
+        raise NoStrobeError(_not_found(plan, rows, verdict.found, clip))
+
+
+def _strobe(plan: Plan, found: ClipFit, first_light: str | None) -> FoundStrobe:
     beat, order = _order_of_lights(plan, found, first_light)
     return FoundStrobe(found=replace(found, fit=replace(found.fit, beat=beat)), order=order)
 
@@ -213,7 +285,7 @@ def _assemble(
     beat, index = found.fit.beat, found.rows.index
     camera = fitted_camera(plan, found.fit)
     span = int(index[0]), int(index[-1])
-    flashes = flashes_seen(plan, beat, camera, span, trusted=found.trusted, late=found.jitter.of)
+    flashes = flashes_seen(plan, beat, camera, span, trusted=found.trusted, unsure=found.unsure, late=found.jitter.of)
     row_time_s = camera.row_time_s
     return Timing(
         clip=clip,
@@ -242,12 +314,13 @@ def flashes_seen(
     span: tuple[int, int],
     *,
     trusted: tuple[int, int],
+    unsure: NDArray[np.int64] | Sequence[int] = (),
     late: Callable[[FloatArray], FloatArray] = np.zeros_like,
 ) -> tuple[Flash, ...]:
     """Return the flashes of which the frames from the first to the last of a ``span`` saw any, in order.
 
-    Complete are those that no frame outside of ``trusted`` saw; ``late`` gives by how much flashes that start at given
-    times come late.
+    Complete are those that no frame outside of ``trusted`` saw, nor one at an ``unsure`` (place,) place in time;
+    ``late`` gives by how much flashes that start at given times come late.
     """
     period_s = camera.frame_period_s
     from_s = max(span[0] - 2, 0) * period_s
@@ -256,6 +329,8 @@ def flashes_seen(
     first, last = frames_touched(camera, start_s, train.duration_s)
     seen = (last >= span[0]) & (first <= span[1])
     complete = (first >= trusted[0]) & (last <= trusted[1])
+    doubtful = np.sort(np.asarray(unsure, np.int64))
+    complete &= np.searchsorted(doubtful, first) == np.searchsorted(doubtful, last, side="right")
     return tuple(
         Flash(
             index=number,

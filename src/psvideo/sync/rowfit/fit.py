@@ -11,7 +11,8 @@ from psvideo.sync.rowfit.coarse.seed import find_seed, renumbered
 from psvideo.sync.rowfit.long_takes import ENOUGH_SAMPLES, stretches, throughout
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import Fit, explained
-from psvideo.sync.rowfit.tracking.course import followed, window_frames
+from psvideo.sync.rowfit.row_model import IntArray
+from psvideo.sync.rowfit.tracking.course import TRACK_ROWS, followed, window_frames
 from psvideo.sync.rowfit.tracking.track import FrameTrack
 from psvideo.sync.rowfit.unknowns.bend import fitted, rms_apart_s
 from psvideo.sync.rowfit.unknowns.freed import freed
@@ -21,7 +22,6 @@ from psvideo.sync.rowfit.unknowns.restless import across, restless
 from psvideo.sync.rowfit.unknowns.softness import misfit
 from psvideo.sync.rowfit.unlit import unlit, with_unlit
 
-TRACK_ROWS = 60
 COARSE_ROWS = 288
 FLASH_ROWS = 8
 """Rows that a flash must still span where a clip of more row means than are enough gets its rows averaged."""
@@ -41,8 +41,8 @@ class ClipFit:
     """The fit of a whole clip: its rows with the times that their frames truly have, and which frames are repeats.
 
     ``steps`` counts the places where frames follow otherwise than numbering and repeated frames explain, ``strayed``
-    the frames by which they do;
-    ``trusted`` are the first and the last place in time at which frames fit. ``slack_s`` is by how much all flashes
+    the frames by which they do; ``trusted`` are the first and the last place in time at which frames fit, ``unsure``
+    (frame,) places beside holes whose frames may as well lie on the other side. ``slack_s`` is by how much all flashes
     could come earlier or later and the picture be the same, 0 where it shows their times; ``soft_s`` is how soft the
     edges are where that was not taken for LEDs' tails, else 0. ``across`` is how much of what split flashes show is
     explained (0 to 1) where flashes differ because the subject moves, else 0. ``unlit`` (frame,) are frames that were
@@ -57,6 +57,7 @@ class ClipFit:
     steps: int
     strayed: int
     trusted: tuple[int, int]
+    unsure: IntArray
     slack_s: float = 0.0
     soft_s: float = 0.0
     across: float = 0.0
@@ -117,6 +118,7 @@ def find(plan: Plan, rows: Profiles, *, measured: tuple[str, ...] = ()) -> ClipF
         steps=course.steps,
         strayed=course.strayed,
         trusted=course.trusted,
+        unsure=course.unsure,
         slack_s=slack_s,
         soft_s=differing.soft_s,
         across=across(plan, part, fit),

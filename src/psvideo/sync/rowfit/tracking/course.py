@@ -8,9 +8,11 @@ from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import FoundClock
 from psvideo.sync.rowfit.coarse.seed import CLEARER, Seed, gain_of, other_seeds, renumbered
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
+from psvideo.sync.rowfit.row_model import IntArray
 from psvideo.sync.rowfit.tracking.ends import ends
 from psvideo.sync.rowfit.tracking.track import FrameTrack, from_first_frame, settled, track, with_repeats
 
+TRACK_ROWS = 60
 GOOD_COURSE = 0.9
 """A course through the clip that takes away this share of the robust loss is not tried again from elsewhere."""
 MOST_STEPS, MOST_STEPS_SHARE = 3, 0.04
@@ -23,13 +25,15 @@ MOST_STRAYED_SHARE = 0.2
 class Course:
     """Where a clip's frames are in time, as followed from a seed.
 
-    ``trusted`` are the first and the last place in time at which frames fit; ``share`` of the robust loss goes with it.
+    ``trusted`` are the first and the last place in time at which frames fit, ``unsure`` (frame,) places beside holes
+    whose frames may as well lie on the other side; ``share`` of the robust loss goes with the course.
     ``steps``: at how many places frames do not follow one another as their numbers say; ``strayed``: by how many frames
     in all.
     """
 
     track: FrameTrack
     trusted: tuple[int, int]
+    unsure: IntArray
     steps: int
     strayed: int
     share: float
@@ -56,10 +60,9 @@ def too_many(steps: int, strayed: int, frames: int) -> bool:
 def _followed(plan: Plan, rows: Profiles, seed: Seed) -> Course:
     numbering = seed.numbering
     kept = renumbered(rows, numbering)
-    memory = max(window_frames(plan), int(1.2 * plan.marker_s / rows.period_s))
-    tracked = track(plan, kept, seed.beat, seed.frames, memory=memory)
+    tracked = track(plan, kept, seed.beat, seed.frames, memory=memory_frames(plan, rows))
     tracked = replace(tracked, beat=replace(tracked.beat, clock=_clock_of(plan, tracked)))
-    index = settled(plan, kept, tracked.index, tracked.beat)
+    index, unsure = settled(plan, kept, tracked.index, tracked.beat)
     placed = ends(plan, kept, index, tracked.beat)
     tracked = from_first_frame(kept, replace(tracked, index=placed.index))
     index = tracked.index
@@ -67,6 +70,7 @@ def _followed(plan: Plan, rows: Profiles, seed: Seed) -> Course:
     stray = np.diff(index) - np.diff(numbering.plain)
     return Course(
         track=with_repeats(plan, rows, tracked, numbering.kept),
+        unsure=index[unsure],
         trusted=(int(index[placed.lost_first]), int(index[len(index) - 1 - placed.lost_last])),
         steps=int((stray != 0).sum()),
         strayed=int(np.abs(stray).sum()),
@@ -77,6 +81,11 @@ def _followed(plan: Plan, rows: Profiles, seed: Seed) -> Course:
 def window_frames(plan: Plan) -> int:
     """Return how many frames see every light several times."""
     return max(24, 6 * (len(plan.lit_slots) + 1))
+
+
+def memory_frames(plan: Plan, rows: Profiles) -> int:
+    """Return how many frames foretell the next ones: they see every light several times, and the marker."""
+    return max(window_frames(plan), int(1.2 * plan.marker_s / rows.period_s))
 
 
 def _clock_of(plan: Plan, tracked: FrameTrack) -> FoundClock:

@@ -5,6 +5,7 @@ that they may have; a Viterbi search picks the cheapest course, in which a step 
 the numbering gives costs something. Then the clock is sharpened on the latest frames and the next block follows.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -43,13 +44,15 @@ MEMORY, NEAR = 24, 10
 class FrameTrack:
     """Where a clip's frames are in time, ``index`` (frame,), and by how much flashes come later than ``beat`` says.
 
-    ``late_s`` (anchor,) stands at the times ``at_s`` (anchor,) on the camera's clock.
+    ``late_s`` (anchor,) stands at the times ``at_s`` (anchor,) on the camera's clock. ``leaps`` are the first frames
+    after the strobe began anew, where that was looked for: frames beyond are not followed.
     """
 
     index: IntArray
     beat: Beat
     at_s: FloatArray
     late_s: FloatArray
+    leaps: tuple[int, ...] = ()
 
     @property
     def repeated(self) -> Mask:
@@ -57,10 +60,16 @@ class FrameTrack:
         return np.append(False, np.diff(self.index) == 0)
 
 
-def track(plan: Plan, rows: Profiles, beat: Beat, seed: slice, *, memory: int) -> FrameTrack:
+Leap = Callable[[Plan, Profiles, Beat, slice, slice, IntArray, int], int | None]
+"""Returns at which frame the strobe began anew among frames ahead, if there: from the plan, the rows, the beat, frames
+that are known, frames ahead, how many frames more than numbered each of those is away, and 1, or -1 towards the
+clip's beginning."""
+
+
+def track(plan: Plan, rows: Profiles, beat: Beat, seed: slice, *, memory: int, leap: Leap | None = None) -> FrameTrack:
     """Follow the strobe through the whole clip from the frames ``seed``, most of which ``beat`` fits.
 
-    The latest ``memory`` frames foretell the next ones.
+    The latest ``memory`` frames foretell the next ones. Where a ``leap`` is found, frames beyond are not followed.
     """
     for _ in range(2):
         low, high = _anchor(plan, rows, beat, seed)
@@ -68,10 +77,15 @@ def track(plan: Plan, rows: Profiles, beat: Beat, seed: slice, *, memory: int) -
     index = rows.index.copy()
     twins = twin_frames(rows)
     late = [_lateness(beat, beat, float(rows.frame_start_s[low:high].mean()))]
-    now = beat
+    now, leaps = beat, list[int]()
     while high < len(index):
         block = slice(high, min(high + BLOCK, len(index)))
-        extra = _course(plan, replace(rows, index=index), now, slice(max(low, high - memory), high), block, twins, 1)
+        known = slice(max(low, high - memory), high)
+        extra = _course(plan, replace(rows, index=index), now, known, block, twins, 1)
+        at = leap and leap(plan, replace(rows, index=index), now, known, slice(high, high + len(extra)), extra, 1)
+        if at:
+            leaps.append(at)
+            break
         index[high : high + len(extra)] += extra
         index[high + len(extra) :] += extra[-1]
         high += len(extra)
@@ -80,14 +94,20 @@ def track(plan: Plan, rows: Profiles, beat: Beat, seed: slice, *, memory: int) -
     now = beat
     while low > 0:
         block = slice(max(low - BLOCK, 0), low)
-        extra = _course(plan, replace(rows, index=index), now, slice(low, min(low + memory, high)), block, twins, -1)
+        known = slice(low, min(low + memory, high))
+        extra = _course(plan, replace(rows, index=index), now, known, block, twins, -1)
+        at = leap and leap(plan, replace(rows, index=index), now, known, slice(low - len(extra), low), extra, -1)
+        if at:
+            leaps.append(at)
+            break
         index[low - len(extra) : low] -= extra
         index[: low - len(extra)] -= extra[0]
         low -= len(extra)
         now, point = _sharpened(plan, replace(rows, index=index), now, beat, slice(low, min(low + memory, high)))
         late.append(point)
     points = np.array(sorted(late), np.float64)
-    return from_first_frame(rows, FrameTrack(index=index, beat=beat, at_s=points[:, 0], late_s=points[:, 1]))
+    tracked = FrameTrack(index=index, beat=beat, at_s=points[:, 0], late_s=points[:, 1], leaps=tuple(leaps))
+    return from_first_frame(rows, tracked)
 
 
 def from_first_frame(rows: Profiles, tracked: FrameTrack) -> FrameTrack:
@@ -226,12 +246,13 @@ def _lateness(base: Beat, now: Beat, at_s: float) -> tuple[float, float]:
     return at_s, now.clock.phase_s + strobe_s * now.clock.rate - at_s
 
 
-def settled(plan: Plan, rows: Profiles, index: IntArray, beat: Beat) -> IntArray:
-    """Return the frames' places with every hole moved to where it explains the frames around it best.
+def settled(plan: Plan, rows: Profiles, index: IntArray, beat: Beat) -> tuple[IntArray, Mask]:
+    """Return the frames' places with every hole moved to where it explains the frames around it best, and the frames
+    (frame,) that may as well lie on the other side of one.
 
     While tracking, frames beside a hole are judged by brightnesses from one side only; here from both.
     """
-    index = index.copy()
+    index, unsure = index.copy(), np.zeros(len(index), np.bool_)
     numbered = np.diff(rows.index)
     for place in np.flatnonzero(np.diff(index) > numbered).tolist():
         extra = int(index[place + 1] - index[place] - numbered[place])
@@ -244,8 +265,10 @@ def settled(plan: Plan, rows: Profiles, index: IntArray, beat: Beat) -> IntArray
                 continue
             part = replace(rows, index=moved).take(slice(first, last)).one_window()
             tried[start] = (float(frame_losses(part, unexplained(plan, part, beat)).sum()), moved)
-        index = min(tried.values(), key=lambda pair: pair[0])[1]
-    return index
+        least, index = min(tried.values(), key=lambda pair: pair[0])
+        alike = [start for start, (loss, _) in tried.items() if loss < least + SUSPICIOUS]
+        unsure[min(alike) : max(alike)] = True
+    return index, unsure
 
 
 def with_repeats(plan: Plan, rows: Profiles, tracked: FrameTrack, kept: Mask) -> FrameTrack:

@@ -1,0 +1,91 @@
+"""One timing from several chapters of a clip, between which the strobe began anew."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from psvideo.model.plan import Plan
+from psvideo.model.timing import DroppedFrames, Flash, Order, Timing
+from psvideo.sync.rowfit.fit import ClipFit
+from psvideo.sync.rowfit.profiles import brightnesses
+from psvideo.sync.rowfit.tracking.track import losses_of
+from psvideo.sync.turns import TURN_ROWS, turned
+
+CLEARLY = 0.5
+"""Names from another chapter are sure where all others leave more than twice as much of the robust loss."""
+
+
+def named_alike(plan: Plan, chapters: Sequence[tuple[ClipFit, Order]]) -> list[tuple[ClipFit, Order]]:
+    """Return the chapters' fits with the same light under the same name, and how the names are known.
+
+    A chapter whose own names are a guess takes those under which another one's brightnesses foretell its frames best.
+    """
+    known = max(chapters, key=lambda one: (one[1] != "guess", len(one[0].rows.value)))
+    named = [one if one is known or one[1] != "guess" else _named_after(plan, known[0], one[0]) for one in chapters]
+    sure = known[1] if all(order != "guess" for _, order in named) else "guess"
+    return [(found, sure) for found, _ in named]
+
+
+def _named_after(plan: Plan, known: ClipFit, found: ClipFit) -> tuple[ClipFit, Order]:
+    """Return the fit under the names under which the known fit's brightnesses foretell it best; "marker" if clearly."""
+    if known.fit.beat.upward != found.fit.beat.upward or len(known.rows.place) != len(found.rows.place):
+        return found, "guess"
+    learnt, asked = (replace(one.rows.one_window().binned(TURN_ROWS), doubt=None) for one in (known, found))
+    light = brightnesses(plan, learnt, replace(known.fit.beat, beat_hz=()))
+    beats = [turned(plan, found.fit.beat, turn) for turn in range(len(plan.cycle_slots))]
+    losses = np.array([losses_of(plan, learnt, asked, replace(one, beat_hz=()), light).sum() for one in beats])
+    best, *others = np.argsort(losses, kind="stable").tolist()
+    sure = not others or losses[best] < CLEARLY * losses[others[0]]
+    return replace(found, fit=replace(found.fit, beat=beats[best])), "marker" if sure else "guess"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Chapter:
+    """The timing of frames ``first`` to ``last`` by number, as if the clip's numbers were right before them.
+
+    ``more`` is by how many frames those that follow come later than their numbers say, because of what is missing or
+    repeated in this chapter.
+    """
+
+    first: int
+    last: int
+    more: int
+    timing: Timing
+
+
+def joined(chapters: Sequence[Chapter], dropped: Sequence[DroppedFrames]) -> Timing:
+    """Return the timing of a clip from those of its chapters, in order; ``dropped`` are holes that its numbers show.
+
+    What holds throughout is the longest chapter's, and the error the largest of theirs.
+    """
+    timings = [one.timing for one in chapters]
+    main = max(timings, key=lambda one: len(one.flashes))
+    flashes, later = list[Flash](), 0
+    for one in chapters:
+        later_s = later * one.timing.frame_period_s
+        flashes += [replace(flash, start_s=flash.start_s + later_s) for flash in one.timing.flashes]
+        later += one.more
+    flashes.sort(key=lambda flash: flash.start_s)
+    holes = {hole.after: hole for one in timings for hole in one.dropped_frames}
+    holes = {hole.after: hole for hole in dropped} | holes
+    return replace(
+        main,
+        phase_error_rows=max(one.phase_error_rows for one in timings),
+        phase_error_s=max(one.phase_error_s or 0.0 for one in timings),
+        mains=main.mains if main is timings[0] else None,
+        dropped_frames=tuple(holes[after] for after in sorted(holes)),
+        repeated_frames=tuple(number for one in timings for number in one.repeated_frames),
+        notes=(_restarts(chapters), *dict.fromkeys(note for one in timings for note in one.notes)),
+        flashes=tuple(replace(flash, index=n) for n, flash in enumerate(flashes)),
+    )
+
+
+def _restarts(chapters: Sequence[Chapter]) -> str:
+    """Say where the strobe began anew."""
+    spans = ", ".join(f"{one.first} to {one.last}" for one in chapters)
+    return (
+        "The strobe began anew during the clip, at another place in its cycle, as when it is started again or misses a "
+        f"flash. Each part has a timing of its own: frames {spans}. Flashes beside the breaks, and frames outside of "
+        "these parts, are left out."
+    )

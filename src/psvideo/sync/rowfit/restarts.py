@@ -1,0 +1,217 @@
+"""Strobes that begin anew: from one frame to the next at another place in their cycle, as no missing frames explain.
+
+A camera that drops frames moves time by whole frames; a strobe that is started again, skips a flash, or waits for one
+that was late moves by anything. What frames on both sides show tells the two apart, unless the strobe happens to move
+by whole frames: then the picture is the same, and so are all flashes within it. A clip that holds a restart is two
+clips, each with a phase of its own; ``chapters`` says where to cut.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from psvideo.model.camera import FloatArray
+from psvideo.model.plan import Plan
+from psvideo.sync.rowfit.beat import Beat
+from psvideo.sync.rowfit.coarse.retime import stood_in
+from psvideo.sync.rowfit.coarse.seed import find_seed, renumbered
+from psvideo.sync.rowfit.fit import ClipFit
+from psvideo.sync.rowfit.profiles import Profiles, brightnesses, unexplained
+from psvideo.sync.rowfit.refine import refined_beat
+from psvideo.sync.rowfit.row_model import IntArray
+from psvideo.sync.rowfit.tracking.course import TRACK_ROWS, memory_frames
+from psvideo.sync.rowfit.tracking.track import (
+    HOLDS,
+    JUMP_COST,
+    MEMORY,
+    MOST,
+    SUSPICIOUS,
+    FrameTrack,
+    frame_losses,
+    losses_of,
+    settled,
+    track,
+)
+from psvideo.sync.rowfit.unlit import unlit
+
+MOST_RESTARTS = 3
+"""A strobe that seems to begin anew more often than this is another plan's, or a subject that moves."""
+LEAST_AFTER, AFTER = 8, 16
+"""Frames after a restart that must show the new phase, and how many are asked."""
+PARTS, FINE_PARTS = 3, 24
+"""The new phase is looked for in steps of such a share of the shortest flash, first all over the cycle, then near."""
+WHOLE_FRAMES = 0.125
+"""A move that is whole frames to within this share of the shortest flash is frames that are missing."""
+APART = 0.1
+"""Beside a hole, flashes that come earlier or later than it says by this share of the shortest one have moved."""
+TICKS = 1_000_000
+"""Places in time between frames are counted in such parts of a frame."""
+ODD_RUN = 8
+"""A strobe may have begun anew where the median loss of so many frames in a row is odd."""
+
+
+def may_restart(found: ClipFit) -> bool:
+    """Return whether a fit leaves frames in a row as only a strobe elsewhere in its cycle does, or needs holes."""
+    if found.steps > 0:
+        return True
+    loss = frame_losses(found.rows, found.fit.rest)
+    if len(loss) < 2 * ODD_RUN:
+        return False
+    runs = np.median(np.lib.stride_tricks.sliding_window_view(loss, ODD_RUN), axis=1)
+    return bool(runs.max() > float(np.percentile(runs, 25)) + SUSPICIOUS)
+
+
+def chapters(plan: Plan, rows: Profiles) -> tuple[slice, ...]:
+    """Return the stretches of frames between which the strobe began anew, all frames as one where it did not."""
+    whole = slice(0, len(rows.value))
+    left, done = [whole], list[slice]()
+    while left:
+        part = left.pop()
+        at = _restart_in(plan, rows.take(part).one_window())
+        if at is None:
+            done.append(part)
+        else:
+            left += [slice(part.start, part.start + at), slice(part.start + at, part.stop)]
+        if len(left) + len(done) > MOST_RESTARTS + 1:
+            return (whole,)
+    return tuple(sorted(done, key=lambda one: one.start))
+
+
+def _restart_in(plan: Plan, rows: Profiles) -> int | None:
+    """Return the first frame after a restart, nearest to where the strobe is seen best; None where there is none."""
+    if len(rows.value) < LEAST_AFTER + 3 * (len(plan.lit_slots) + 1):
+        return None
+    dark = unlit(plan, rows)
+    lit = renumbered(rows, stood_in(rows, dark)) if dark.any() else rows
+    seed = find_seed(plan, lit)
+    few = (lit.turned() if seed.beat.upward else lit).binned(TRACK_ROWS)
+    kept = renumbered(few, seed.numbering)
+    frames = np.flatnonzero(~dark)[seed.numbering.kept]
+    tracked = track(plan, kept, seed.beat, seed.frames, memory=memory_frames(plan, rows), leap=leap)
+    at = tracked.leaps[0] if tracked.leaps else _beside_holes(plan, kept, tracked)
+    return None if at is None else int(frames[at])
+
+
+def moved(rows: Profiles, shift_s: float) -> Profiles:
+    """Return the profiles as if all their frames had come later."""
+    ticks = round(shift_s / rows.period_s * TICKS)
+    return replace(rows, index=rows.index * TICKS + ticks, period_s=rows.period_s / TICKS)
+
+
+def leap(plan: Plan, rows: Profiles, beat: Beat, known: slice, ahead: slice, extra: IntArray, sign: int) -> int | None:
+    """Return which frame ahead of those that are known is the first after a restart; None where none is.
+
+    ``extra`` (frame,) is by how many frames more than numbered the best course of missing frames puts those ahead
+    away; ``sign`` is -1 where these come before the known ones.
+    """
+    learnt = rows.take(known)
+    light = brightnesses(plan, learnt, beat)
+    usual = float(np.median(losses_of(plan, learnt, learnt, beat, light)))
+    span = slice(ahead.start, min(ahead.stop + AFTER, len(rows.value)))
+    if sign < 0:
+        span = slice(max(ahead.start - AFTER, 0), ahead.stop)
+    asked = rows.take(span).one_window()
+    stayed = losses_of(plan, learnt, asked, beat, light)[::sign]
+    odd = np.flatnonzero(stayed > usual + SUSPICIOUS)
+    if not len(odd) or len(stayed) - int(odd[0]) - 1 < LEAST_AFTER:
+        return None
+    first = int(odd[0]) + 1
+    after = slice(first, first + AFTER) if sign > 0 else slice(max(len(stayed) - first - AFTER, 0), len(stayed) - first)
+    shift_s = _likeliest_shift_s(plan, learnt, rows.take(span).take(after).one_window(), beat, light)
+    went = losses_of(plan, learnt, moved(asked, shift_s), beat, light)[::sign]
+    if float(np.median(went[first : first + AFTER])) > usual + SUSPICIOUS or _whole_frames(plan, rows, beat, shift_s):
+        return None
+    count = len(extra)
+    course = rows.take(ahead).one_window()
+    course = replace(course, index=course.index + sign * extra)
+    steps = int((np.diff(extra[::sign], prepend=0) != 0).sum())
+    cost = float(losses_of(plan, learnt, course, beat, light).sum()) + JUMP_COST * steps
+    here = np.append(0.0, np.cumsum(stayed[:count])) + np.append(np.cumsum(went[:count][::-1])[::-1], 0.0)
+    best = int(here.argmin())
+    if here[best] + 2 * JUMP_COST > cost:
+        return None
+    at = ahead.start + best if sign > 0 else ahead.stop - best
+    return at if 0 < at < len(rows.value) else None
+
+
+def _likeliest_shift_s(plan: Plan, learnt: Profiles, rows: Profiles, beat: Beat, light: FloatArray) -> float:
+    """Return by how much frames must come later for known brightnesses to foretell them best, within one cycle."""
+
+    def best_s(shifts_s: FloatArray) -> float:
+        losses = [float(losses_of(plan, learnt, moved(rows, one), beat, light).sum()) for one in shifts_s.tolist()]
+        return float(shifts_s[int(np.argmin(losses))])
+
+    shortest_s = _shortest_s(plan)
+    cycle_s = plan.cycle_s * beat.clock.rate
+    rough_s = best_s(np.arange(0.0, cycle_s, shortest_s / PARTS))
+    return best_s(rough_s + np.arange(-FINE_PARTS, FINE_PARTS + 1) / FINE_PARTS / PARTS * shortest_s)
+
+
+def _whole_frames(plan: Plan, rows: Profiles, beat: Beat, shift_s: float) -> bool:
+    """Return whether frames that are missing (or repeated) explain a shift as well."""
+    cycle_s = plan.cycle_s * beat.clock.rate
+    frames_s = np.arange(-MOST, 2 * MOST + 1) * rows.period_s
+    apart_s = np.abs((shift_s - frames_s + 0.5 * cycle_s) % cycle_s - 0.5 * cycle_s)
+    return float(apart_s.min()) < WHOLE_FRAMES * _shortest_s(plan)
+
+
+def _beside_holes(plan: Plan, rows: Profiles, tracked: FrameTrack) -> int | None:
+    """Return the first frame after a hole that is none, as flashes beside it come earlier or later than it says."""
+    index, _ = settled(plan, rows, tracked.index, tracked.beat)
+    holes = np.flatnonzero(np.diff(index) != np.diff(rows.index)) + 1
+    for n, at in enumerate(holes.tolist()):
+        first = max(at - MEMORY, int(holes[n - 1]) if n else 0)
+        last = min(at + MEMORY, int(holes[n + 1]) if n + 1 < len(holes) else len(index))
+        if min(at - first, last - at) >= LEAST_AFTER and _apart(
+            plan, replace(rows, index=index).take(slice(first, last)), at - first, tracked.beat
+        ):
+            return int(at)
+    return None
+
+
+def _apart(plan: Plan, rows: Profiles, at: int, beat: Beat) -> bool:
+    """Return whether flashes from a frame on come clearly earlier or later than those before it foretell."""
+    rows = rows.one_window()
+    near = refined_beat(plan, rows.take(slice(0, at)), beat, steps=4, first_scale=0.1)
+    ticks = moved(rows, 0.0)
+
+    def left(shift_s: float) -> float:
+        index = ticks.index.copy()
+        index[at:] += round(shift_s / rows.period_s * TICKS)
+        tried = replace(ticks, index=index)
+        return float(frame_losses(rows, unexplained(plan, tried, near)).sum())
+
+    shifts_s = np.arange(-FINE_PARTS, FINE_PARTS + 1) / FINE_PARTS * 0.5 * _shortest_s(plan)
+    losses = np.array([left(one) for one in shifts_s.tolist()])
+    best = int(losses.argmin())
+    return abs(float(shifts_s[best])) > APART * _shortest_s(plan) and losses[FINE_PARTS] - losses[best] > HOLDS
+
+
+def _shortest_s(plan: Plan) -> float:
+    return min(plan.flashes[slot].duration_s for slot in plan.lit_slots)
+
+
+def reach(plan: Plan, rows: Profiles, found: ClipFit, frames: slice, *, sign: int) -> int:
+    """Return how many frames beyond a chapter's end (``sign`` 1) or before its beginning (-1) its strobe foretells.
+
+    ``frames`` are the chapter's among ``rows``, all of the clip's.
+    """
+    few = (rows.turned() if found.fit.beat.upward else rows).binned(TRACK_ROWS).one_window()
+    beat = replace(found.fit.beat, beat_hz=(), blur_s=0.0)
+    places, seen = found.track.index, ~found.track.repeated & ~found.unlit
+    own = few.take(frames)
+    learnt = replace(own, value=np.ascontiguousarray(own.value[seen]), index=places[seen], doubt=None)
+    light = brightnesses(plan, learnt, beat)
+    usual = float(np.median(losses_of(plan, learnt, learnt, beat, light)))
+    if sign > 0:
+        beyond = few.take(slice(frames.stop, len(rows.value)))
+        index = places[-1] + beyond.index - own.index[-1]
+    else:
+        beyond = few.take(slice(0, frames.start))
+        index = places[0] + beyond.index - own.index[0]
+    if not len(index):
+        return 0
+    asked = replace(beyond, index=index, doubt=None)
+    odd = (losses_of(plan, learnt, asked, beat, light) > usual + SUSPICIOUS)[::sign]
+    ends = np.flatnonzero(odd & np.append(odd[1:], True))
+    return int(ends[0]) if len(ends) else len(odd)
