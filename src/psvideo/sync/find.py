@@ -20,7 +20,7 @@ from psvideo.model.rows.shutter import frames_touched
 from psvideo.model.timing import DroppedFrames, Flash, Order, Timing
 from psvideo.model.units import counted
 from psvideo.sync.joined import Chapter, joined, named_alike
-from psvideo.sync.parts import found_in_parts
+from psvideo.sync.restarted import found_in_parts
 from psvideo.sync.rowfit.beat import Beat, train_between, train_until
 from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import Profiles
