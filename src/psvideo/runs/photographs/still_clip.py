@@ -1,0 +1,148 @@
+"""Photographs as a clip with a plan and a rig, what was assumed of them, and what of it lies beside the results."""
+
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+
+from psvideo.calibrate.sphere.sighting import Looking
+from psvideo.calibrate.still_pairs import Pairs
+from psvideo.clip import Clip
+from psvideo.clip.stills import Photographs, look_at
+from psvideo.errors import PsvideoError
+from psvideo.formats.light_list_writer import write_rig
+from psvideo.formats.plan_toml import format_plan
+from psvideo.formats.rig_toml import format_rig
+from psvideo.formats.whole_files import write_text
+from psvideo.model.camera import Camera
+from psvideo.model.plan import PlannedFlash, assemble_plan
+from psvideo.model.rig import Rig
+from psvideo.runs.photographs.rti import write_rti
+from psvideo.runs.photographs.still_doubts import curve_doubt, exposures_of, glance_at
+from psvideo.runs.photographs.still_rig import KnownLights, lens_stated
+from psvideo.solve.instants import Instant
+
+PLAN, RIG, LP = "plan.toml", "rig.toml", "lights.lp"
+SETUP = "setup"
+"""The folder in a result that holds how the photographs were taken to be: plan, rig, and the lights as a list."""
+NO_DARK = (
+    "No picture is named dark or ambient, so the room is assumed dark. If it was not, photograph the subject with "
+    "every light off as well."
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class StillClip:
+    """Photographs as a clip, and their lights in the clip's order."""
+
+    clip: Clip
+    rig: Rig
+    rig_path: Path
+
+
+def still_clip(
+    folder: Path, pairs: Pairs, known: KnownLights, looking: Looking, place: Path, *, transfer: str | None
+) -> StillClip:
+    """Return the photographs as a clip; plan and rig are written into ``place``."""
+    files = (*pairs.files, *([pairs.dark] if pairs.dark else []))
+    pictures = look_at(files, transfer=transfer)
+    _check_size(folder, pictures, known)
+    rig = known.in_order(pairs.names)
+    glance = glance_at(pictures, rig.lights)
+    exposures, note, warning = exposures_of(glance, pictures, len(pairs.files))
+    if exposures is not None:
+        rig = _scaled(rig, exposures)
+    rig, lens = _through_lens(rig, pictures, looking)
+    doubt = curve_doubt(glance, pictures)
+    write_text(place / RIG, format_rig(rig))
+    plan = assemble_plan(
+        camera=Camera(
+            name=pictures.stated[0].camera or "camera",
+            width_px=pictures.header.width_px,
+            height_px=pictures.header.height_px,
+            fps=Fraction(1),
+            exposure_s=1.0,
+            readout_s=0.0,
+            encoding=pictures.encoding,
+        ),
+        flashes=_flashes(pairs),
+        dark_s=None,
+        mode="synced",
+    )
+    write_text(place / PLAN, format_plan(plan))
+    notes = (_assumed(pictures), pairs.how, *known.notes, *([note] if note else []), *lens, *_aside(pairs))
+    clip = pictures.clip(folder, plan, place / PLAN, notes=notes)
+    warned = (*clip.warnings, *known.warnings, *([warning] if warning else []))
+    return StillClip(clip=replace(clip, curve_doubt=doubt or "", warnings=warned), rig=rig, rig_path=place / RIG)
+
+
+def _check_size(folder: Path, pictures: Photographs, known: KnownLights) -> None:
+    """Raise PsvideoError where lights' positions rest on pictures of another size: crops lose the lens's axis."""
+    size_px = pictures.header.turn.size(pictures.header.width_px, pictures.header.height_px)
+    if known.size_px is not None and known.size_px != size_px:
+        raise PsvideoError(
+            f"{folder}: the photographs are {size_px[0]} x {size_px[1]} pixels and those of the spheres "
+            f"{known.size_px[0]} x {known.size_px[1]}. Expected one size, whole pictures of one camera: near lights "
+            "are placed along the lens's axis, which crops lose. Give pictures that are neither cropped nor scaled, "
+            "or leave `radius_mm` out for directions."
+        )
+
+
+def _through_lens(rig: Rig, pictures: Photographs, looking: Looking) -> tuple[Rig, tuple[str, ...]]:
+    """Return the rig with the lens that was given, or that EXIF names; with what is to be said of it."""
+    if rig.focal_px is not None:
+        return rig, ()
+    header = pictures.header
+    wide_px = header.turn.size(header.width_px, header.height_px)[0]
+    given_px = looking.focal_px or (looking.focal_widths * wide_px if looking.focal_widths else None)
+    lens_px = given_px or lens_stated(pictures.stated)
+    if lens_px is None:
+        return rig, ()
+    said = (
+        ()
+        if given_px
+        else (f"The lens is assumed to be {lens_px:.6g} pixels long, as EXIF says; shapes depend on it.",)
+    )
+    return replace(rig, focal_px=(lens_px, lens_px)), said
+
+
+def _flashes(pairs: Pairs) -> list[PlannedFlash]:
+    lit = [PlannedFlash(lights={name: 1.0}, duration_s=0.5) for name in pairs.names]
+    return lit + ([PlannedFlash(lights={}, duration_s=0.5)] if pairs.dark else [])
+
+
+def _scaled(rig: Rig, factors: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> Rig:
+    lights = tuple(
+        replace(light, intensity=tuple(float(one * factor) for one in light.intensity))
+        for light, factor in zip(rig.lights, factors, strict=True)
+    )
+    return replace(rig, lights=lights)
+
+
+def _assumed(pictures: Photographs) -> str:
+    said = f"The pictures were read as {pictures.transfer!r}, {pictures.because}."
+    if pictures.white is None:
+        return said
+    if pictures.brightest <= pictures.white:
+        return f"{said} They hold light up to {pictures.white:.3g}: nothing below it counts as clipped."
+    most, white = pictures.brightest, pictures.white
+    return f"{said} They hold light up to {most:.3g}: highlights beyond {white:.3g} count as clipped."
+
+
+def _aside(pairs: Pairs) -> tuple[str, ...]:
+    said = [f"{pairs.dark.name} shows the ambient light, which was taken off." if pairs.dark else NO_DARK]
+    said.append(f"{pairs.mask.name} says where to solve." if pairs.mask else "")
+    said.append(f"Left aside: {', '.join(file.name for file in pairs.aside[:6])}." if pairs.aside else "")
+    return tuple(one for one in said if one)
+
+
+def write_setup(opened: StillClip, folder: Path, instant: Instant, *, rti: bool) -> None:
+    """Write what was taken for granted into the folder of results, and the relightable picture."""
+    (folder / SETUP).mkdir(exist_ok=True)
+    write_text(folder / SETUP / PLAN, format_plan(opened.clip.plan))
+    write_text(folder / SETUP / RIG, format_rig(opened.rig))
+    if all(light.direction is not None for light in opened.rig.lights):
+        write_rig(folder / SETUP / LP, opened.rig)
+        if rti:
+            write_rti(folder, instant.round, opened.rig)
