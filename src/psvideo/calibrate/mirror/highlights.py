@@ -3,6 +3,8 @@
 Candidates are the compact bright spots inside the outline. What is as bright in most other lights' pictures at the
 same place is no highlight of this light (a window, a white object that every light lights). Of the rest, the one that
 sends most light without being too large or too drawn out is taken; a second one nearly as good makes it doubtful.
+What is larger than lamps are is none either where another light shows it in the same place, or where the other lights'
+highlights are far smaller: a table or a wall that stands near, and only this light reaches.
 
 A spot's place is the centroid of its light above a threshold. It is taken at several thresholds: how far the place
 moves with them says how well it is known. A clipped spot is flat on top, and around it are glare and the streaks of
@@ -10,7 +12,7 @@ scratches; there pixels count by how deep inside the spot they lie, so that its 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
@@ -31,6 +33,10 @@ DARK_PEAK = 0.02
 """A peak below this share of saturation, or of the other lights' peaks, is no highlight."""
 LARGEST_SPOT = 0.06
 """Share of the sphere's disc that a highlight may cover; a matte sphere's shading covers far more."""
+USUAL_SPOT = 0.004
+"""Share of the disc of a lamp 14 degrees wide. Light in larger spots counts less, with the square of what they cover."""
+ODD_SIZE = 10.0
+"""A spot larger than a lamp's that covers this many times as much as the other lights' highlights do is none."""
 FLOODED = 0.3
 """From this share of the disc on that is clipped in all channels, a picture shows no highlight, nor what is static."""
 SKIRT_PX = 2
@@ -97,7 +103,7 @@ def find_highlights(pictures: LightPictures, outline: Outline) -> list[FoundHigh
         fault = _too_dark(peaks[n], usual) if fit[n] else _flooded(float(share[n]))
         spots = [] if fault else _spots(light, n, smooth[n], clipped[n], corner, int(disc.sum()))
         found.append(_chosen(name, spots, fault))
-    return found
+    return _unlike_lamps(found, USUAL_SPOT * int(disc.sum()))
 
 
 def _disc(pictures: LightPictures, outline: Outline) -> tuple[NDArray[np.bool_], tuple[int, int]]:
@@ -140,6 +146,7 @@ def _spots(
     bright = (smooth >= CANDIDATE_LEVEL * smooth.max()).astype(np.uint8)
     count, labels, boxes, _ = cv2.connectedComponentsWithStats(bright)
     order = np.argsort(boxes[1:, cv2.CC_STAT_AREA])[::-1][:8] + 1
+    usual_px = USUAL_SPOT * disc_px
     spots = []
     for label in order[: count - 1]:
         left, top, wide, tall = (int(value) for value in boxes[label, :4])
@@ -150,6 +157,7 @@ def _spots(
         others = [light[k][cut][labels[cut] == label] for k in range(len(light)) if k != n]
         own = labels[cut] == label
         spot = _spot(np.where(mine, picture[cut], 0.0), clipped[cut] & mine, (corner[0] + top, corner[1] + left))
+        spot = replace(spot, score=spot.score / (1 + (spot.area_px / usual_px) ** 2))
         spots.append(_judged(spot, picture[cut][own], others, disc_px))
     return sorted(spots, key=lambda one: one.score, reverse=True)
 
@@ -205,15 +213,7 @@ def _judged(spot: Spot, own: NDArray[np.floating], others: Sequence[NDArray[np.f
         why = "the same spot is as bright under the other lights"
     if not why:
         return spot
-    return Spot(
-        place=spot.place,
-        error_px=spot.error_px,
-        area_px=spot.area_px,
-        peak=spot.peak,
-        score=0.0,
-        clipped=spot.clipped,
-        why_not=why,
-    )
+    return replace(spot, score=0.0, why_not=why)
 
 
 def _chosen(name: str, spots: list[Spot], fault: str) -> FoundHighlight:
@@ -228,3 +228,39 @@ def _chosen(name: str, spots: list[Spot], fault: str) -> FoundHighlight:
     return FoundHighlight(
         light=name, highlight=fit[0], others=tuple(spot for spot in spots if spot is not fit[0]), alike=alike
     )
+
+
+def _unlike_lamps(found: Sequence[FoundHighlight], usual_px: float) -> list[FoundHighlight]:
+    """Take back highlights larger than lamps that are seen under another light too, or that no other light has."""
+    checked = []
+    for one in found:
+        others = [other for other in found if other is not one and other.highlight is not None]
+        why = _unlike_lamp(one.highlight, others, usual_px) if one.highlight is not None else ""
+        checked.append(
+            FoundHighlight(light=one.light, highlight=None, others=(*_spot_of(one), *one.others), fault=why) if why else one
+        )
+    return checked
+
+
+def _spot_of(found: FoundHighlight) -> tuple[Spot, ...]:
+    return () if found.highlight is None else (found.highlight,)
+
+
+def _unlike_lamp(spot: Spot, others: Sequence[FoundHighlight], usual_px: float) -> str:
+    """Return what speaks against a highlight, given those of the other lights; empty where nothing does."""
+    if spot.area_px <= usual_px or not others:
+        return ""
+    shown = [(other.light, mine) for other in others for mine in _spot_of(other)]
+    same = [light for light, mine in shown if np.hypot(*(mine.place - spot.place)) < 0.5 * spot.radius_px]
+    x, y = spot.place
+    if same:
+        return (
+            f"no highlight: the brightest spot, at {x:.0f},{y:.0f}, is the brightest under {same[0]!r} too: something "
+            "that both lights light, no lamp. Cover it or expose longer"
+        )
+    if spot.area_px > ODD_SIZE * float(np.median([mine.area_px for _, mine in shown])):
+        return (
+            f"no highlight: the brightest spot, at {x:.0f},{y:.0f}, is {spot.radius_px:.0f} pixels wide to each side, far "
+            "wider than those of the other lights: something that the light reaches, no lamp. Cover it or expose longer"
+        )
+    return ""

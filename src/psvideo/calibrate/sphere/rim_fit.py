@@ -2,8 +2,10 @@
 
 Every spoke says how likely each place of the rim is on it; some are misled (a stand, a mirrored window along the rim),
 so on each the rim may with a small chance be anywhere. The outline is the one that is likeliest over all spokes, looked
-for from coarse to fine. The uncertainty comes from leaving out one sector after the other (jackknife), from how far the
-other model of the rim (``rim_model``) lies off, and from what all edges may be off together.
+for from coarse to fine: first a mirror that shows nothing within its rim, then one that mirrors the room there, from where
+the first one ended and from a larger circle, as mirrored edges lie inside the rim and never outside. The uncertainty
+is how far outlines that are nearly as likely lie apart, how far the other model of the rim (``rim_model``) lies off, and
+what all edges may be off together.
 """
 
 from collections.abc import Sequence
@@ -12,6 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
+from scipy.stats import norm
+from scipy.stats.qmc import Sobol
 
 from psvideo.calibrate.sphere.rim_model import SHIFT_PX, Surface, across_rim, likely_blur, log_likelihood
 from psvideo.calibrate.sphere.round_things import Grey
@@ -30,7 +34,13 @@ COARSE_BLURS_PX, BLURS_PX = (0.8, 1.5, 2.7), (0.3, 0.45, 0.6, 0.8, 1.1, 1.5, 2.0
 REACH_SHARE, LEAST_REACH_PX, MOST_REACH_PX = 0.045, 8.0, 60.0
 """How far to both sides of the rim the picture counts."""
 SPOKE_PX, FEWEST_SPOKES, MOST_SPOKES = 8.0, 48, 144
+WIDE, LARGER = (0.05, 6.0, 30.0), (1.0, 1.08)
+"""How far from a rough outline the rim of a mirror in a room is looked for: as a share of the radius, in pixels at least
+and at most; and from which multiples of the rough radius."""
 SECTORS = 12
+"""All spokes count as this many: what misleads one misleads its neighbours."""
+DRAWS, ROUNDS = 2048, 4
+"""This many outlines are drawn to see how far likely ones lie apart, in this many rounds, each about the last one's."""
 AGREES = 1.1
 """A spoke agrees with an outline where the rim is likelier there than on average, by this factor at least."""
 FOLLOWED = 0.6
@@ -100,17 +110,42 @@ def fit_rim(
     pictures: Sequence[Grey], view: SphereView, around: FloatArray, *, surface: Surface = "mirror"
 ) -> Rim | None:
     """Return the outline within a few pixels of an expected one; None where it is not there."""
-    spokes = _spokes(pictures, view, around, surface, _fine_px(around))
+    near = _in_a_room(pictures, view, around) if surface == "mirror" else around
+    if near is None:
+        return None
+    spokes = _spokes(pictures, view, near, surface, _fine_px(near), mirrored=True)
     place = _likeliest(spokes, view.unknowns)
-    return _measured(pictures, view, spokes, place, surface) if _sensible(place, around) else None
+    return _measured(pictures, view, spokes, place, surface) if _sensible(place, near) else None
 
 
 def follow_rim(pictures: Sequence[Grey], view: SphereView, around: FloatArray) -> FloatArray | None:
     """Return where a mirror's outline, known from other pictures, is in these; None where too little of it shows."""
-    spokes = _spokes(pictures, view, around, "mirror", _fine_px(around))
+    spokes = _spokes(pictures, view, around, "mirror", _fine_px(around), mirrored=True)
     place = _likeliest(spokes, view.unknowns, coarse=False)
     share = _agreeing(spokes, place, view.unknowns)[0].mean()
     return place if _sensible(place, around) and share >= FOLLOWED else None
+
+
+def _in_a_room(pictures: Sequence[Grey], view: SphereView, around: FloatArray) -> FloatArray | None:
+    """Return roughly the outline of a mirror near an expected one where the room is mirrored within its rim."""
+    share, least_px, largest_px = WIDE
+    most_px = float(np.ceil(np.clip(share * around[2], least_px, largest_px)))
+    found: list[tuple[float, FloatArray]] = []
+    for larger in LARGER:
+        place = around * np.array([1, 1, larger, 1, 1])
+        for _ in range(2):
+            spokes = _spokes(pictures, view, place, "mirror", most_px, most_spokes=COARSE_SPOKES, mirrored=True)
+            place = _likeliest(spokes, view.unknowns)
+        if _sensible(place, around):
+            spread = float(_agreeing(spokes, place, view.unknowns)[1]) / len(spokes.odds)
+            found.append((spread - _unusual(place) / SECTORS, place))
+    return max(found, key=lambda one: one[0])[1] if found else None
+
+
+def _unusual(place: FloatArray) -> float:
+    """Return how unlikely an outline's stretch is by itself (natural logarithm)."""
+    stretch = place[3:] / USUAL_STRETCH
+    return float(0.5 * (stretch @ stretch))
 
 
 def _fine_px(around: FloatArray) -> float:
@@ -130,7 +165,7 @@ def _sensible(place: FloatArray, around: FloatArray) -> bool:
 
 def _spokes(
     pictures: Sequence[Grey], view: SphereView, place: FloatArray, surface: Surface, most_px: float, *,
-    most_spokes: int = MOST_SPOKES, blurs: Sequence[float] = BLURS_PX,
+    most_spokes: int = MOST_SPOKES, blurs: Sequence[float] = BLURS_PX, mirrored: bool = False,
 ) -> _Spokes:  # fmt: skip
     reach_px = float(np.clip(np.ceil(REACH_SHARE * place[2]), LEAST_REACH_PX, MOST_REACH_PX))
     reach_px = max(reach_px, most_px + LEAST_REACH_PX / 2)
@@ -138,7 +173,9 @@ def _spokes(
     values, rim = across_rim(pictures, view, place, reach_px=reach_px, spokes=count)
     few = values[:, :: max(count // 48, 1)]
     blur_px = likely_blur(few, reach_px=reach_px, most_px=most_px, surface=surface, blurs=blurs)
-    logs = log_likelihood(values, blur_px=blur_px, reach_px=reach_px, most_px=most_px, surface=surface)
+    logs = log_likelihood(
+        values, blur_px=blur_px, reach_px=reach_px, most_px=most_px, surface=surface, mirrored=mirrored
+    )
     wavers_px = float(np.hypot(WAVERS_PX, WAVERS_PER_BLUR * blur_px))
     return _Spokes(
         odds=_odds(logs, wavers_px),
@@ -184,8 +221,8 @@ def _likeliest(spokes: _Spokes, free: int, *, start: FloatArray | None = None, c
 
         def unlikely(moved: FloatArray, odds: FloatArray = odds) -> float:
             at = spokes.slopes @ (moved * scale)
-            stretch = (spokes.around[:free] + moved * scale)[3:] / USUAL_STRETCH
-            return float(0.5 * (stretch @ stretch) - _looked_up(odds, at, spokes.most_px).sum())
+            unusual = _unusual(spokes.around + np.pad(moved * scale, (0, 5 - free))) * len(odds) / SECTORS
+            return float(unusual - _looked_up(odds, at, spokes.most_px).sum())
 
         simplex = np.vstack([found, found + first * np.eye(free)])
         options = {"xatol": exact, "fatol": exact, "maxiter": 1200, "initial_simplex": simplex}
@@ -222,7 +259,7 @@ def _measured(pictures: Sequence[Grey], view: SphereView, spokes: _Spokes, place
     bias_px = float(np.hypot(BIAS_PX, BIAS_PER_BLUR * spokes.blur_px))
     return Rim(
         place=place,
-        covariance=_jackknife(spokes, place, free)
+        covariance=_likely_apart(spokes, place, free)
         + np.diag(np.minimum(doubt**2, 9.0))
         + np.diag([bias_px**2] * 3 + [0.0, 0.0]),
         points=view.curve(place, len(agree))[agree],
@@ -232,17 +269,24 @@ def _measured(pictures: Sequence[Grey], view: SphereView, spokes: _Spokes, place
     )
 
 
-def _jackknife(spokes: _Spokes, place: FloatArray, free: int) -> FloatArray:
-    """Return the covariance (5, 5) of an outline from fits that leave out one sector each."""
-    sector = np.arange(len(spokes.odds)) * SECTORS // len(spokes.odds)
-    fits = []
-    for n in range(SECTORS):
-        kept = sector != n
-        part = _Spokes(
-            odds=spokes.odds[kept], slopes=spokes.slopes[kept], rim=spokes.rim[kept], around=spokes.around,
-            most_px=spokes.most_px, blur_px=spokes.blur_px,
-        )  # fmt: skip
-        fits.append(_likeliest(part, free, start=place, coarse=False))
-    away = np.array(fits) - np.mean(fits, axis=0)
-    covariance: FloatArray = (SECTORS - 1) / SECTORS * (away.T @ away)
-    return covariance
+def _likely_apart(spokes: _Spokes, place: FloatArray, free: int) -> FloatArray:
+    """Return the covariance (5, 5) of outlines by how likely they are, by importance sampling about the likeliest."""
+    normal = np.asarray(norm.ppf(Sobol(free, rng=np.random.default_rng(0)).random(DRAWS)), np.float64)
+    scale = np.array([1, 1, 1, 2e-3, 2e-3])[:free]
+    covariance, middle = np.diag(scale**2), place[:free]
+    for _ in range(ROUNDS):
+        # wider than what is looked for, so that what lies far off is seen as well
+        root = np.linalg.cholesky(2 * covariance + np.diag((0.05 * scale) ** 2))
+        drawn = middle + normal @ root.T
+        at = (drawn - spokes.around[:free]) @ spokes.slopes.T
+        odds = np.array([_looked_up(spokes.odds, one, spokes.most_px).sum() for one in at]) * SECTORS / len(spokes.odds)
+        odds -= [_unusual(np.pad(one, (0, 5 - free))) for one in drawn]
+        odds += 0.5 * (normal**2).sum(axis=1)
+        share = np.exp(odds - odds.max())
+        share /= share.sum()
+        middle = share @ drawn
+        covariance = (share[:, None] * (drawn - middle)).T @ (drawn - middle)
+    away = middle - place[:free]
+    whole = np.zeros((5, 5))
+    whole[:free, :free] = covariance + np.outer(away, away)
+    return whole

@@ -6,6 +6,10 @@ grows as the root of the distance from the rim. Inside, the model is a cubic in 
 line; all of it blurred by the lens. A matte sphere may jump at its rim, and inside it is a square in the root. The
 steepest place of a mirror's edge lies inside its rim: on a dark ball before a bright wall by several pixels.
 
+Two things break this. Metal mirrors fully only in the last tenths of a pixel of a small ball, so the picture drops there to
+its reflectance. And just inside its rim a ball mirrors the room's own edges, a ceiling's or a floor's, which follow
+the rim for a while and stand out more. So a rim may drop by any of ``REFLECTANCES``, and may have one edge inside.
+
 Everything but the rim's place and the blur is linear, and eliminated by least squares (variable projection). The
 residuals, as a likelihood with unknown noise, say how good a place is. Pictures and radii in which nothing stands out
 favour no place, so they need no weights.
@@ -35,6 +39,12 @@ _SHAPES = {
     "mirror": ("level", "slope outside", "root", "square", "cube"),
     "matte": ("outside", "slope outside", "inside", "root", "square"),
 }
+REFLECTANCES = (1.0, 0.85, 0.7, 0.5)
+"""How much of what is behind it a ball may mirror at its rim: all (wide balls, glass), polished silver, chrome, steel."""
+EDGED = 0.6
+"""Chance that a ball mirrors an edge of the room just inside its rim, on one spoke: rooms have ceilings and floors."""
+EDGES = 40
+"""An edge within the rim is tried at this many places, or at every half pixel where those are fewer."""
 LEAST_NOISE = 0.01
 """Share of a profile's own spread that counts as noise at least: a model is not better than that."""
 
@@ -83,16 +93,27 @@ def likely_blur(
 
 
 def log_likelihood(
-    values: FloatArray, *, blur_px: float, reach_px: float, most_px: float, surface: Surface
+    values: FloatArray, *, blur_px: float, reach_px: float, most_px: float, surface: Surface, mirrored: bool = False
 ) -> FloatArray:
     """Return how likely every place of the rim is on every spoke, over all pictures: (spoke, shift), up to a constant.
 
     Neighbouring samples share their noise over the blur's width, and count as one. What misleads one picture misleads
-    the others in part (a reflection is the same under all lights), so n pictures count as the root of n.
+    the others in part (a reflection is the same under all lights), so n pictures count as the root of n. ``mirrored``:
+    a mirror may be dimmer than what is behind it, and may show an edge within its rim.
     """
-    left = _unexplained(values, blur_px, reach_px, most_px, surface)
     independent = values.shape[2] * STEP_PX / (2 * blur_px + 1)
-    total: FloatArray = np.log(left).sum(axis=0) * (-0.5 * independent / np.sqrt(len(left)))
+    worth = independent / np.sqrt(len(values))
+    if not (mirrored and surface == "mirror"):
+        return -0.5 * worth * np.log(_unexplained(values, blur_px, reach_px, most_px, surface)).sum(axis=0)
+    # every picture's edge has a brightness of its own, which costs as much as a number fitted to that many samples does
+    cost = 0.5 * np.log(max(independent, 1.0)) * np.sqrt(len(values))
+    ways: list[FloatArray] = []
+    for reflectance in REFLECTANCES:
+        plain, edged = _with_edge(values, blur_px, reach_px, most_px, reflectance)
+        number = np.maximum(np.isfinite(edged).sum(axis=2), 1)
+        some_edge = np.logaddexp.reduce(-0.5 * worth * edged - cost, axis=2) - np.log(number)
+        ways += [np.log(1 - EDGED) - 0.5 * worth * plain, np.log(EDGED) + some_edge]
+    total: FloatArray = np.logaddexp.reduce(ways, axis=0)
     return total
 
 
@@ -105,24 +126,77 @@ def _unexplained(
     values: FloatArray, blur_px: float, reach_px: float, most_px: float, surface: Surface
 ) -> NDArray[np.float64]:
     """Return the variance that the model leaves, (picture, spoke, shift); 1 where a profile leaves the picture."""
-    inside: NDArray[np.bool_] = np.asarray(np.all(np.isfinite(values), axis=2), np.bool_)
-    known = np.where(inside[..., None], values - values.mean(axis=2, keepdims=True), 0.0)
+    inside, known, spread = _profiles(values)
     basis = _basis(blur_px, reach_px, most_px, surface)
-    explained = np.einsum("ink,pan->paik", basis, known, optimize=True)
-    spread = (known**2).sum(axis=2)[..., None]
-    left = np.maximum(spread - (explained**2).sum(axis=3), 0) + LEAST_NOISE**2 * spread + 1e-14
+    left = _left(known, basis) + _noise(known, spread)
     return np.where(inside[..., None], left / (values.shape[2] - basis.shape[2]), 1.0)
 
 
+def _with_edge(
+    values: FloatArray, blur_px: float, reach_px: float, most_px: float, reflectance: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return the logarithms of the variance that a mirror leaves, over all pictures: without an edge within its rim,
+    (spoke, shift), and with one at the same place in every picture, (spoke, shift, edge), infinite outside the rim."""
+    inside, known, spread = _profiles(values)
+    basis = _basis(blur_px, reach_px, most_px, "mirror", reflectance)
+    edges = _edges(blur_px, reach_px, most_px, reflectance)
+    noise, free = _noise(known, spread), values.shape[2] - basis.shape[2]
+    plain, edged = np.zeros(()), np.zeros(())
+    for shown, profiles, least in zip(inside, known, noise, strict=True):
+        left = _left(profiles, basis)
+        rest = left[..., None] - np.einsum("idn,an->aid", edges, profiles, optimize=True) ** 2
+        plain = plain + np.log(np.where(shown[:, None], (left + least) / free, 1.0))
+        shown_edge = np.where(shown[:, None, None], (np.maximum(rest, 0) + least[..., None]) / (free - 1), 1.0)
+        edged = edged + np.log(shown_edge)
+    is_edge = (edges**2).sum(axis=2) > 0
+    return plain, np.where(is_edge, edged, np.inf)
+
+
+def _profiles(values: FloatArray) -> tuple[NDArray[np.bool_], FloatArray, FloatArray]:
+    """Return which profiles lie in the picture, the profiles with zeros elsewhere, and their spread about their mean."""
+    inside: NDArray[np.bool_] = np.asarray(np.all(np.isfinite(values), axis=2), np.bool_)
+    known = np.where(inside[..., None], values, 0.0)
+    return inside, known, ((known - known.mean(axis=2, keepdims=True)) ** 2).sum(axis=2)
+
+
+def _left(known: FloatArray, basis: FloatArray) -> FloatArray:
+    """Return the sum of squares (..., shift) of profiles (..., step) that orthonormal columns do not explain."""
+    explained = np.einsum("ink,...n->...ik", basis, known, optimize=True)
+    left: FloatArray = np.maximum((known**2).sum(axis=-1)[..., None] - (explained**2).sum(axis=-1), 0)
+    return left
+
+
+def _noise(known: FloatArray, spread: FloatArray) -> FloatArray:
+    """Return the sum of squares that is left in any case: a share of the spread, and what float32 rounds off."""
+    least: FloatArray = (LEAST_NOISE**2 * spread + 1e-14 * (1 + (known**2).sum(axis=-1)))[..., None]
+    return least
+
+
 @lru_cache(maxsize=64)
-def _basis(blur_px: float, reach_px: float, most_px: float, surface: Surface) -> FloatArray:
+def _basis(blur_px: float, reach_px: float, most_px: float, surface: Surface, reflectance: float = 1.0) -> FloatArray:
     """Return orthonormal columns that span the model at every place of the rim, (shift, step, column)."""
     fine, shapes = _blurred(blur_px)
     away = _steps(reach_px)[None, :] - shifts(most_px)[:, None]
+    shapes = {**shapes, "level": 1 - (1 - reflectance) * (1 - shapes["outside"])}
     columns = np.stack([np.interp(away, fine, shapes[name]) for name in _SHAPES[surface]], axis=2)
     columns /= np.maximum(np.linalg.norm(columns, axis=1, keepdims=True), 1e-12)
     basis: FloatArray = np.linalg.qr(columns)[0]
     return basis
+
+
+@lru_cache(maxsize=2 * len(REFLECTANCES))
+def _edges(blur_px: float, reach_px: float, most_px: float, reflectance: float) -> FloatArray:
+    """Return what an edge at every place adds to the model at every place of the rim, (shift, edge, step): unit
+    vectors, and zeros where the edge is not within the rim or adds nothing of its own."""
+    basis = _basis(blur_px, reach_px, most_px, "mirror", reflectance)
+    fine, shapes = _blurred(blur_px)
+    places = np.arange(1 - reach_px, reach_px, max(STEP_PX, 0.75 * blur_px, 2 * reach_px / EDGES))
+    steps = np.stack([np.interp(_steps(reach_px) - place, fine, shapes["outside"]) for place in places])
+    added = steps[None] - np.einsum("ink,imk,dm->idn", basis, basis, steps, optimize=True)
+    size = np.linalg.norm(added, axis=2, keepdims=True)
+    within = places[None, :] <= shifts(most_px)[:, None] - max(1.0, blur_px)
+    edges: FloatArray = np.where(within[..., None] & (size > 0.05), added / np.maximum(size, 1e-9), 0.0)
+    return edges
 
 
 @lru_cache(maxsize=16)
