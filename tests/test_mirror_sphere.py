@@ -13,6 +13,7 @@ from bench.mirror_scene import Ball, Lamp, Lens, photograph, unit
 from picture_file import read_picture
 
 from psvideo.calibrate.light_pictures import LightPictures, light_pictures, mean_of_sets
+from psvideo.calibrate.mirror.highlights import FoundHighlight, find_highlights
 from psvideo.calibrate.mirror.lights import MirrorCalibration, calibrate_lights
 from psvideo.calibrate.sphere.outline import find_outlines, given_outline
 from psvideo.calibrate.sphere.sighting import Looking, SphereNotFoundError, sight_spheres
@@ -277,3 +278,27 @@ def test_positions_in_millimetres_are_refused() -> None:
     text = 'schema = "psvideo-rig/1"\n[[light]]\nname = "a"\nposition_m = [-400.0, 100.0, 50.0]\n'
     with pytest.raises(PsvideoError, match="millimetres"):
         parse_rig(text)
+
+
+def spots(*, patches: dict[int, float]) -> list[FoundHighlight]:
+    """Return what is found on a ball under four lamps, some of which light a patch of the room (brightness) as well."""
+    images = np.full((4, 200, 200), 0.001, np.float32)
+    for light, (x, y) in enumerate(((80, 90), (110, 85), (90, 120), (120, 115))):
+        images[light, y - 1 : y + 2, x - 1 : x + 2] = 0.7
+        images[light, 45:60, 75:125] += patches.get(light, 0.0)
+    outline = given_outline(SphereView(focal_px=900.0, principal_px=(99.5, 99.5)), (100.0, 100.0, 80.0))
+    return find_highlights(light_pictures(list("abcd"), list(images)), outline)
+
+
+def test_a_lamp_is_its_small_bright_spot_and_not_the_wall_that_it_lights() -> None:
+    found = spots(patches={0: 0.3})
+    assert [one.fault for one in found] == [""] * 4
+    assert found[0].highlight is not None
+    assert np.abs(found[0].highlight.place - [80, 90]).max() < 0.2
+
+
+def test_a_wall_that_outshines_a_lamps_highlight_is_none() -> None:
+    assert "far wider" in spots(patches={0: 6.0})[0].fault
+    two = spots(patches={0: 6.0, 1: 5.0})
+    assert all("something that both lights light" in one.fault for one in two[:2])
+    assert all(one.highlight is not None for one in two[2:])

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from bench.mirror_rooms import Panel, Room, film
+from bench.mirror_rooms import Panel, Room, film, random_room
 from bench.mirror_scene import Ball, Lamp, Lens
 
 from psvideo.calibrate.light_pictures import light_pictures
@@ -49,3 +49,22 @@ def test_an_outline_is_found_where_the_ball_ends_and_its_error_is_owned(name: st
     assert np.abs(away).max() < 0.6
     assert (np.abs(away) < 2.5 * own).all()
     assert own.max() < 2.0
+
+
+def test_the_rooms_edges_that_a_ball_mirrors_within_its_rim_do_not_pass_for_the_rim() -> None:
+    """A room in which five of 55 pixels were lost: three edges lie within the rim, and stand out more than it does."""
+    rng = np.random.default_rng(123)
+    lens = Lens(width=480, height=380, focal=float(rng.uniform(700, 2500)))
+    radius_px, x, y = float(rng.uniform(50, 150)), *(lens.middle + [rng.uniform(-40, 40), rng.uniform(-30, 30)] + 0.5)
+    count = int(rng.choice([3, 4, 6, 8]))
+    turn, height = np.arange(count) * 2 * np.pi / count + rng.uniform(0, 6), np.radians(rng.uniform(25, 70, count))
+    ways = np.stack([np.cos(height) * np.cos(turn), np.cos(height) * np.sin(turn), np.sin(height)], axis=1)
+    towards = np.array([(x - lens.middle[0]) / lens.focal, -(y - lens.middle[1]) / lens.focal, -1.0])
+    across, up, back = towards / np.linalg.norm(towards) / np.sin(np.arctan2(radius_px, lens.focal))
+    lamps = [Lamp(direction=(float(way[0]), float(way[1]), float(way[2]))) for way in ways]
+    images = film(lens, Ball(centre=(across, up, back), radius_m=1.0), lamps, random_room(rng, lights=count), seed=123)
+    view = SphereView(focal_px=lens.focal, principal_px=(float(lens.middle[0]), float(lens.middle[1])))
+    found = find_outlines(light_pictures([str(n) for n in range(count)], images), view)[0]
+    away = np.abs(found.place[:3] - [x, y, radius_px])
+    assert away.max() < 0.7
+    assert (away < 2 * np.sqrt(np.diag(found.covariance)[:3])).all()

@@ -34,7 +34,7 @@ DARK_PEAK = 0.02
 LARGEST_SPOT = 0.06
 """Share of the sphere's disc that a highlight may cover; a matte sphere's shading covers far more."""
 USUAL_SPOT = 0.004
-"""Share of the disc of a lamp 14 degrees wide. Light in larger spots counts less, with the square of what they cover."""
+"""Share of the disc of a lamp 14 degrees wide. Light in larger spots counts less: by the area squared."""
 ODD_SIZE = 10.0
 """A spot larger than a lamp's that covers this many times as much as the other lights' highlights do is none."""
 FLOODED = 0.3
@@ -237,7 +237,9 @@ def _unlike_lamps(found: Sequence[FoundHighlight], usual_px: float) -> list[Foun
         others = [other for other in found if other is not one and other.highlight is not None]
         why = _unlike_lamp(one.highlight, others, usual_px) if one.highlight is not None else ""
         checked.append(
-            FoundHighlight(light=one.light, highlight=None, others=(*_spot_of(one), *one.others), fault=why) if why else one
+            FoundHighlight(light=one.light, highlight=None, others=(*_spot_of(one), *one.others), fault=why)
+            if why
+            else one
         )
     return checked
 
@@ -260,7 +262,7 @@ def _unlike_lamp(spot: Spot, others: Sequence[FoundHighlight], usual_px: float) 
         )
     if spot.area_px > ODD_SIZE * float(np.median([mine.area_px for _, mine in shown])):
         return (
-            f"no highlight: the brightest spot, at {x:.0f},{y:.0f}, is {spot.radius_px:.0f} pixels wide to each side, far "
+            f"no highlight: the brightest spot, at {x:.0f},{y:.0f}, is {spot.radius_px:.0f} pixels to each side, far "
             "wider than those of the other lights: something that the light reaches, no lamp. Cover it or expose longer"
         )
     return ""

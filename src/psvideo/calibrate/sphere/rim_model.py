@@ -6,9 +6,9 @@ grows as the root of the distance from the rim. Inside, the model is a cubic in 
 line; all of it blurred by the lens. A matte sphere may jump at its rim, and inside it is a square in the root. The
 steepest place of a mirror's edge lies inside its rim: on a dark ball before a bright wall by several pixels.
 
-Two things break this. Metal mirrors fully only in the last tenths of a pixel of a small ball, so the picture drops there to
-its reflectance. And just inside its rim a ball mirrors the room's own edges, a ceiling's or a floor's, which follow
-the rim for a while and stand out more. So a rim may drop by any of ``REFLECTANCES``, and may have one edge inside.
+Two things break this. Metal mirrors fully only in the last tenths of a pixel of a small ball, so the picture drops
+there to its reflectance. And just inside its rim a ball mirrors the room's own edges, a ceiling's or a floor's, which
+follow the rim, and stand out more. so a rim may drop to any of ``REFLECTANCES``, and may have an edge inside.
 
 Everything but the rim's place and the blur is linear, and eliminated by least squares (variable projection). The
 residuals, as a likelihood with unknown noise, say how good a place is. Pictures and radii in which nothing stands out
@@ -40,9 +40,11 @@ _SHAPES = {
     "matte": ("outside", "slope outside", "inside", "root", "square"),
 }
 REFLECTANCES = (1.0, 0.85, 0.7, 0.5)
-"""How much of what is behind it a ball may mirror at its rim: all (wide balls, glass), polished silver, chrome, steel."""
+"""How much of what is behind it a ball may mirror at its rim: all (large balls), silver, steel, chrome."""
 EDGED = 0.6
 """Chance that a ball mirrors an edge of the room just inside its rim, on one spoke: rooms have ceilings and floors."""
+TELLING = 12
+"""All spokes count as this many where they tell the reflectance: what misleads one misleads its neighbours."""
 EDGES = 40
 """An edge within the rim is tried at this many places, or at every half pixel where those are fewer."""
 LEAST_NOISE = 0.01
@@ -104,16 +106,20 @@ def log_likelihood(
     independent = values.shape[2] * STEP_PX / (2 * blur_px + 1)
     worth = independent / np.sqrt(len(values))
     if not (mirrored and surface == "mirror"):
-        return -0.5 * worth * np.log(_unexplained(values, blur_px, reach_px, most_px, surface)).sum(axis=0)
+        left = _unexplained(values, blur_px, reach_px, most_px, surface)
+        smooth: FloatArray = -0.5 * worth * np.log(left).sum(axis=0)
+        return smooth
     # every picture's edge has a brightness of its own, which costs as much as a number fitted to that many samples does
     cost = 0.5 * np.log(max(independent, 1.0)) * np.sqrt(len(values))
-    ways: list[FloatArray] = []
+    by_reflectance: list[FloatArray] = []
     for reflectance in REFLECTANCES:
         plain, edged = _with_edge(values, blur_px, reach_px, most_px, reflectance)
         number = np.maximum(np.isfinite(edged).sum(axis=2), 1)
         some_edge = np.logaddexp.reduce(-0.5 * worth * edged - cost, axis=2) - np.log(number)
-        ways += [np.log(1 - EDGED) - 0.5 * worth * plain, np.log(EDGED) + some_edge]
-    total: FloatArray = np.logaddexp.reduce(ways, axis=0)
+        by_reflectance.append(np.logaddexp(np.log(1 - EDGED) - 0.5 * worth * plain, np.log(EDGED) + some_edge))
+    # one ball has one reflectance, and its spokes together tell which, as so many independent ones
+    speaks = np.array([np.logaddexp.reduce(one, axis=1).mean() * TELLING for one in by_reflectance])
+    total: FloatArray = np.logaddexp.reduce(np.array(by_reflectance) + (speaks - speaks.max())[:, None, None], axis=0)
     return total
 
 
@@ -153,7 +159,7 @@ def _with_edge(
 
 
 def _profiles(values: FloatArray) -> tuple[NDArray[np.bool_], FloatArray, FloatArray]:
-    """Return which profiles lie in the picture, the profiles with zeros elsewhere, and their spread about their mean."""
+    """Return which profiles lie in the picture, the profiles with zeros elsewhere, and their spread."""
     inside: NDArray[np.bool_] = np.asarray(np.all(np.isfinite(values), axis=2), np.bool_)
     known = np.where(inside[..., None], values, 0.0)
     return inside, known, ((known - known.mean(axis=2, keepdims=True)) ** 2).sum(axis=2)
