@@ -8,7 +8,7 @@ steepest place of a mirror's edge lies inside its rim: on a dark ball before a b
 
 Two things break this. Metal mirrors fully only in the last tenths of a pixel of a small ball, so the picture drops
 there to its reflectance. And just inside its rim a ball mirrors the room's own edges, a ceiling's or a floor's, which
-follow the rim, and stand out more. so a rim may drop to any of ``REFLECTANCES``, and may have an edge inside.
+follow the rim, and stand out more. So a rim may drop to any of ``REFLECTANCES``, with an edge inside.
 
 Everything but the rim's place and the blur is linear, and eliminated by least squares (variable projection). The
 residuals, as a likelihood with unknown noise, say how good a place is. Pictures and radii in which nothing stands out
