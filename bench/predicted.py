@@ -76,14 +76,7 @@ class Seen:
     def some(self) -> "Seen":
         """Return a few of the points."""
         some = np.random.default_rng(0).permutation(len(self.true_deg))[:POINTS]
-        signs = Signs(
-            misfit_deg=self.signs.misfit_deg[some],
-            indirect_deg=self.signs.indirect_deg[some],
-            torn_deg=self.signs.torn_deg[some],
-            lost_deg=self.signs.lost_deg[some],
-            hidden=self.signs.hidden,
-            uneven=np.broadcast_to(self.signs.uneven, self.true_deg.shape)[some],
-        )
+        signs = self.signs.at(some)
         return Seen(
             self.subject, self.lights, self.flat, self.true_deg[some], self.noise_deg[some], self.fit_deg[some], signs
         )
@@ -207,14 +200,7 @@ def _looked(subject: str, case: Case, *, flat: bool) -> Seen:
         true_deg=angles_deg(points.surface.normals[known], truth[known]),
         noise_deg=points.noise_deg[known],
         fit_deg=np.sqrt(sure)[known],
-        signs=Signs(
-            misfit_deg=signs.misfit_deg[known],
-            indirect_deg=signs.indirect_deg[known],
-            torn_deg=signs.torn_deg[known],
-            lost_deg=signs.lost_deg[known],
-            hidden=signs.hidden,
-            uneven=np.broadcast_to(signs.uneven, known.shape)[known],
-        ),
+        signs=signs.at(known),
     )
 
 

@@ -8,7 +8,7 @@ wrong whatever the lights say of them: along a closed way the slopes of a surfac
 
 import functools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import cv2
@@ -28,17 +28,20 @@ picture's, and over no less than this many points: their residuals are of noise 
 LEAST_FACING, MOST_TORN = np.float32(0.25), np.float32(0.5)
 """Slopes are those of normals that face the camera at least this much; and around four points they count up to this
 much, since where one thing is before another they say nothing of either."""
-TORN_OF_NOISE = np.float32(0.35)
-"""How much of what noise does to a normal shows in slopes added up: 0.27 on nothing but noise, and a margin."""
+TORN_OF_NOISE, SURELY_TORN = np.float32(0.27), np.float32(0.35)
+"""How much of what noise does to a normal shows in slopes added up: on nothing but noise, and with a margin."""
 MOST_FIT_DEG = np.float32(24)
 """What residuals predict counts as no more around a point: a line of rows that went wrong is not its surroundings."""
 OUTLYING, TURNS, LEAST_LEVEL_DEG = np.float32(1.5), 4, np.float32(0.05)
 """What is around counts up to this many times its typical size, found in this many turns: edges of shadows and creases
 are their own, and of no more than a few of the points."""
+OUTLYING_OF_ONE, OUTLYING_OF_MORE = 4, 2
+"""... and so many times the square of what noise makes of it, of one Gaussian number (which has the longest tail) or of
+more: 96 and 95 % of their squares stay. With less, noise took more from a misfit than it added."""
 CERTAIN = np.float32(1)
 """... beyond this many standard errors of the mean square that noise makes of so few."""
 UNSURE_OF_NOISE = np.float32(1.2)
-"""Noise is known to a tenth, and its square to a fifth: what is less beyond it is no misfit."""
+"""Noise is known to a tenth, and its square to a fifth: what is less beyond it is not surely a misfit, but likely."""
 MOST_WIDENED = 5.0
 """Where fewer lights reach, noise and what residuals predict of it spread farther: up to this many times the square."""
 MOVING_DEG, OF_MOTION = np.float32(0.5), 5
@@ -86,18 +89,28 @@ class Doubting:
 
 @dataclass(frozen=True, kw_only=True)
 class Signs:
-    """What is looked for, (row, col) of the points, in degrees: what residuals predict beyond noise, by which angle
-    light from around would turn the normal, by which normals around belong to no surface, and what noise makes more
-    where some lights are not used. ``hidden``: how many times more than ENOUGH_LIGHTS these hide of what is not
-    matte. ``uneven``: the share of the misfit that changes from sample to sample, as errors of codecs do and surfaces
-    do not: of that nothing is hidden."""
+    """What is looked for, (row, col) of the points, in degrees: what residuals surely predict beyond noise, by which
+    angle light from around would turn the normal, by which normals around surely belong to no surface, and what noise
+    makes more where some lights are not used. ``hidden``: how many times more than ENOUGH_LIGHTS these hide of what is
+    not matte. ``uneven``: the share of the misfit that changes from sample to sample, as errors of codecs do and
+    surfaces do not: of that nothing is hidden. ``likely_misfit_deg``, ``likely_torn_deg``: the first and third without
+    a margin for what noise could be instead; ``noise_deg`` is what noise makes of the normals."""
 
     misfit_deg: Floats
     indirect_deg: Floats
     torn_deg: Floats
     lost_deg: Floats
     hidden: float
+    likely_misfit_deg: Floats
+    likely_torn_deg: Floats
+    noise_deg: Floats
     uneven: Floats | float = 0.0
+
+    def at(self, some: NDArray[np.bool_] | NDArray[np.intp]) -> "Signs":
+        """Return the signs of some of the points."""
+        shape = self.misfit_deg.shape
+        each = {one.name: getattr(self, one.name) for one in fields(self) if one.name != "hidden"}
+        return replace(self, **{name: np.broadcast_to(value, shape)[some] for name, value in each.items()})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -139,6 +152,7 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
     used = (lights - counts).astype(np.intp)
     wider = widened(one.lit.directions * strengths, MOST_WIDENED)[used]
     plain = points.surface.error_deg is None
+    checked = plain | (used > 3)  # three measurements leave no residual, and say nothing of the surface
     noise = points.fit_of_noise_deg**2 * (1 if plain else wider)
     squares = np.where(points.known, fit**2 - UNSURE_OF_NOISE * noise, np.float32(0))
     if turned_deg is not None:
@@ -150,36 +164,61 @@ def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = Non
     own = np.maximum(sums / np.maximum(counts, 1) - 2 * np.radians(points.noise_deg), 0)
     albedo = points.brightness * points.known
     shown = np.minimum(albedo, albedo.sum() / max(np.count_nonzero(points.known), 1))  # glare is no more than the rest
-    surroundings = [_Surroundings.of(noise, shown, width) for width in (around, far_around)]
-    misfit_deg = np.maximum(*(each.typical(squares) for each in surroundings))
+    bright = albedo * albedo
+    common = (noise * bright).sum() / max(bright.sum(), 1e-9)  # black cloth is nothing but noise
+    unsure = np.minimum(noise, common) * checked
+    outlying = OUTLYING_OF_ONE if lights == 4 else OUTLYING_OF_MORE
+    surroundings = [
+        _Surroundings.of(noise, shown, width, unsure=unsure, outlying=outlying) for width in (around, far_around)
+    ]
+    typical = [each.typical(squares) for each in surroundings]
+    misfit_deg = np.maximum(*(each.surely(found) for each, found in zip(surroundings, typical, strict=True)))
+    likely_deg = np.maximum(*(each.likely(found) for each, found in zip(surroundings, typical, strict=True)))
     uneven: Floats | float = 0.0
     if plain and lights > 3:
         changes = _changes(fit, points, lights - 3) - UNSURE_OF_NOISE * noise
-        changing_deg = np.maximum(*(each.typical(changes) for each in surroundings))
+        changing_deg = np.maximum(*(each.surely(each.typical(changes)) for each in surroundings))
         share = (changing_deg / np.maximum(misfit_deg, np.float32(1e-6))) ** 2
         uneven = np.clip((share - SURFACES_UNEVEN) / (1 - SURFACES_UNEVEN), 0, 1)
-    tears = points.noise_deg**2 + uneven * misfit_deg**2
+    of_noise = points.noise_deg**2
+    torn_squared = _torn_squared(points) - SURELY_TORN**2 * (of_noise + uneven * misfit_deg**2)
+    likely_torn_squared = torn_squared + (SURELY_TORN**2 - TORN_OF_NOISE**2) * of_noise
     return Signs(
         misfit_deg=misfit_deg,
+        likely_misfit_deg=likely_deg,
         uneven=uneven,
         indirect_deg=np.degrees(indirect + own) * _turned(points.planes, one),
-        torn_deg=np.sqrt(np.maximum(_torn_squared(points) - TORN_OF_NOISE**2 * tears, 0)),
+        torn_deg=np.sqrt(np.maximum(torn_squared, 0)),
+        likely_torn_deg=np.sqrt(np.maximum(likely_torn_squared, 0)),
+        noise_deg=points.noise_deg,
         lost_deg=points.noise_deg * np.sqrt(wider - 1),
         hidden=hidden_by(len(one.plates)) / hidden_by(ENOUGH_LIGHTS),
     )
 
 
 def doubt_deg(signs: Signs, *, how: Doubting = Doubting()) -> Floats:
-    """Return by how many degrees normals may be off beyond noise, (row, col) of the points."""
-    shows = np.maximum(signs.misfit_deg, np.float32(1e-9)) ** np.float32(1 + how.misfit_power)
-    shows = np.where(signs.misfit_deg > 0, shows, np.float32(0))  # powers of 0 are usual, and slow
+    """Return by how many degrees normals may be off beyond noise, (row, col) of the points.
+
+    Noise hides part of the signs. With it an error is never predicted smaller than without: what signs are likely to be
+    counts where that is more than noise and what they surely are.
+    """
+    sure = _doubt_of(signs.misfit_deg, signs.torn_deg, signs, how)
+    likely = _doubt_of(signs.likely_misfit_deg, signs.likely_torn_deg, signs, how)
+    lost = signs.lost_deg * signs.lost_deg
+    squares = np.maximum(sure * sure + lost, likely * likely - signs.noise_deg * signs.noise_deg)
+    return np.asarray(np.sqrt(squares), np.float32)
+
+
+def _doubt_of(misfit_deg: Floats, torn_deg: Floats, signs: Signs, how: Doubting) -> Floats:
+    """Return the doubt that a misfit and torn normals make beside the other signs, without what noise makes more."""
+    shows = np.maximum(misfit_deg, np.float32(1e-9)) ** np.float32(1 + how.misfit_power)
+    shows = np.where(misfit_deg > 0, shows, np.float32(0))  # powers of 0 are usual, and slow
     misfit = np.float32(how.misfit_deg) * shows
-    misfit *= np.float32(signs.hidden**how.few_power) / (signs.misfit_deg + np.float32(how.little_deg))
-    misfit -= np.asarray(signs.uneven, np.float32) * np.maximum(misfit - signs.misfit_deg, 0)
+    misfit *= np.float32(signs.hidden**how.few_power) / (misfit_deg + np.float32(how.little_deg))
+    misfit -= np.asarray(signs.uneven, np.float32) * np.maximum(misfit - misfit_deg, 0)
     both = np.hypot(misfit, np.float32(how.indirect) * signs.indirect_deg)
     most_torn = np.float32(how.torn_beside) * both + np.float32(how.torn_alone_deg)
-    torn = np.float32(how.torn) * np.minimum(signs.torn_deg, most_torn)
-    return np.asarray(np.hypot(both + torn, signs.lost_deg), np.float32)
+    return np.asarray(both + np.float32(how.torn) * np.minimum(torn_deg, most_torn), np.float32)
 
 
 def width_of(known: NDArray[np.bool_] | Floats, share: float) -> int:
@@ -193,34 +232,50 @@ class _Surroundings:
 
     ``shown``, each point's albedo up to the mean, is its weight, and ``weight`` the mean of it around: a little stray
     light, or what is lost in a file's codes, turns the normals of black cloth far, and says nothing of the subject
-    before it. ``twice_noise`` is twice what noise alone would make of a point's square, and ``by_chance`` what chance
-    could leave of it over as many points.
+    before it. ``passed_noise`` is how much of a point's square passes for noise, ``by_chance`` what chance could leave
+    of noise over as many points, and ``margin`` what was taken off for noise that is known no better.
     """
 
     width: int
     shown: Floats
     weight: Floats
-    twice_noise: Floats
+    passed_noise: Floats
     by_chance: Floats
+    margin: Floats
 
     @classmethod
-    def of(cls, noise: Floats, shown: Floats, width: int) -> "_Surroundings":
-        """Look around; ``noise`` is what noise alone would make of squares."""
+    def of(cls, noise: Floats, shown: Floats, width: int, *, unsure: Floats, outlying: int) -> "_Surroundings":
+        """Look around; ``noise`` is what noise alone would make of squares, of which UNSURE_OF_NOISE times as much is
+        taken off them: of ``unsure`` a margin. ``outlying`` times the noise is none of an outlier's."""
         weight = _mean(shown, width)
         count = _mean((shown > 0).astype(np.float32), width) * np.float32(width**2)
         by_chance = CERTAIN * np.sqrt(2 / np.maximum(count, 1)) * _mean(noise * shown, width) / weight
-        return cls(width=width, shown=shown, weight=weight, twice_noise=2 * noise, by_chance=by_chance)
+        margin = (UNSURE_OF_NOISE - 1) * _mean(unsure * shown, width) / weight
+        return cls(
+            width=width,
+            shown=shown,
+            weight=weight,
+            passed_noise=outlying * noise,
+            by_chance=by_chance,
+            margin=margin,
+        )
 
     def typical(self, squares: Floats) -> Floats:
-        """Return the root of the typical ``squares``, of which the caller has taken off the mean that noise makes.
-
-        Outliers count as OUTLYING times what is typical, and what chance could leave is taken off as well.
-        """
+        """Return the typical ``squares``, of which the caller has taken off the mean that noise makes. Outliers count
+        as OUTLYING times what is typical."""
         typical = _mean(squares * self.shown, self.width) / self.weight
         for _ in range(TURNS):
-            most = OUTLYING**2 * np.maximum(typical, LEAST_LEVEL_DEG**2) + self.twice_noise
+            most = OUTLYING**2 * np.maximum(typical, LEAST_LEVEL_DEG**2) + self.passed_noise
             typical = _mean(np.minimum(squares, most) * self.shown, self.width) / self.weight
+        return typical
+
+    def surely(self, typical: Floats) -> Floats:
+        """Return the root of what is typical, without what chance could leave of noise."""
         return np.asarray(np.sqrt(np.maximum(typical - self.by_chance, 0)), np.float32)
+
+    def likely(self, typical: Floats) -> Floats:
+        """Return the root of what is typical, with the margin back that was taken off for noise."""
+        return np.asarray(np.sqrt(np.maximum(typical + self.margin, 0)), np.float32)
 
 
 def _changes(fit: Floats, points: ThinSurface, free: int) -> Floats:

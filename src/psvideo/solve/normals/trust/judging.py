@@ -55,6 +55,8 @@ NOTHING, NO_DOUBT = np.zeros((0, 0), np.float32), np.zeros((2, 0, 0), np.float32
 MANY_LIGHTS = 8
 """Beyond this many lights residuals are not taken to average out."""
 MOST_USUAL_DEG = 30.0
+LIKELY_USUAL = np.float32(0.75)
+"""What is usual around a pixel lies so far from what it surely is to what it likely is."""
 SURE = 2.0
 """In a single pixel residuals count from this many times what noise makes of them."""
 
@@ -73,7 +75,8 @@ def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging =
     if turned_deg is not None:
         known = points.known.astype(np.float32)
         moving = moving_doubt_deg(turned_deg, signs.torn_deg, known, one.moves, how=how.moving)
-    usual = np.float32(how.doubting.own) * signs.misfit_deg
+    nearly = signs.misfit_deg + LIKELY_USUAL * (signs.likely_misfit_deg - signs.misfit_deg)
+    usual = np.float32(how.doubting.own) * nearly
     at_points = spread.judged(points.surface, np.stack([doubt, usual]), 1, limit_deg=0.0)[0][points.known]
     misfit = surface.misfit
     if at_points.size:
@@ -123,12 +126,13 @@ def emptied(surface: Surface) -> Surface:
 @dataclass(frozen=True, kw_only=True)
 class _Spread:
     """How noise spreads into normals under all lights. ``step``: rows and columns between two points; ``of_noise``: how
-    much of noise residuals hold; ``of_residual``: by what they become degrees where they are not that already, 0 where
-    they are."""
+    much of noise residuals hold, at most; ``typical_of_noise``: in the mean of their squares; ``of_residual``: by what
+    they become degrees where they are not that already, 0 where they are."""
 
     step: int
     noise: Spread
     of_noise: float
+    typical_of_noise: float
     of_residual: float
 
     @classmethod
@@ -152,6 +156,7 @@ class _Spread:
                 wider=near.wider,
             ),
             of_noise=how.fit_noise * float(np.sqrt(many)),
+            typical_of_noise=how.fit_noise * float(np.sqrt(many)) / (how.held if plain else 1.0),
             of_residual=how.fit_noise / how.held * float(np.sqrt(many * lights / free)) if plain else 0.0,
         )
 
@@ -185,7 +190,7 @@ class _Spread:
             surface=some,
             noise_deg=noise_deg,
             fit_deg=fit_deg,
-            fit_of_noise_deg=np.float32(self.of_noise) * of_noise_deg,
+            fit_of_noise_deg=np.float32(self.typical_of_noise) * of_noise_deg,
         )
 
     def judged(

@@ -38,7 +38,8 @@ def judge_rows(
     xx, yy, zz, xy, xz, yz = inverse[0, 0], inverse[1, 1], inverse[2, 2], inverse[0, 1], inverse[0, 2], inverse[1, 2]
     of_noise, counts, degrees_of, limit = factors[0] * factors[0], factors[1], factors[2], factors[3]
     trace, holds_fit = xx + yy + zz, f.size > 0
-    beyond, usual, sizes = np.zeros(cols, np.float32), np.zeros(cols, np.float32), np.zeros(cols, np.float32)
+    beyond, usual = np.zeros(cols, np.float32), np.zeros(cols, np.float32)
+    sizes, means = np.zeros(cols, np.float32), np.zeros(cols, np.float32)
     near = dim.size > 0
     reaching, turning = np.ones(cols, np.float32), np.ones(cols, np.float32)
     for row in range(first, last):
@@ -48,13 +49,15 @@ def judge_rows(
         if near:
             _fill_between(dim, row, step, reaching)
             _fill_between(wider, row, step, turning)
-        sizes[:] = ZERO
+        sizes[:], means[:] = ZERO, TINY
         for channel in range(channels):
             for col in range(cols):
                 one = decoded(a[channel, row, col])
                 sizes[col] += one * one * share
+                means[col] += one * share
         for col in range(cols):
-            sizes[col] = np.sqrt(sizes[col])  # channels count by their brightness: noise over it goes with the squares
+            means[col] = sizes[col] / means[col]  # what the channels are together, each counted by its brightness
+            sizes[col] = np.sqrt(sizes[col])  # noise over it goes with the squares
         for col in range(cols):
             x, y, z = decoded(n[0, row, col]), decoded(n[1, row, col]), decoded(n[2, row, col])
             size = max(sizes[col] * reaching[col], TINY)
@@ -64,7 +67,8 @@ def judge_rows(
             more = beyond[col]
             if holds_fit:
                 one = decoded(f[row, col])
-                one = min(one * degrees_of * np.sqrt(wide) / size if degrees_of > ZERO else one, MOST_FIT_DEG)
+                alike = max(means[col] * reaching[col], TINY)  # residuals are those of the channels together
+                one = min(one * degrees_of * np.sqrt(wide) / alike if degrees_of > ZERO else one, MOST_FIT_DEG)
                 one = np.sqrt(max(one * one - of_noise * wide * (noise + of_fit), ZERO))
                 more += counts * max(one - usual[col], ZERO)
             degrees = min(np.sqrt(wide * (noise + own) + more * more), LARGEST_DEG)

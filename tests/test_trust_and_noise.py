@@ -1,0 +1,32 @@
+"""What noise hides is not trusted the more for it: with less noise as much of a subject is valid, or more."""
+
+import numpy as np
+import pytest
+from bench.predicted import shapes, shot
+from ring_and_ball import ring
+
+from psvideo.solve.normals.solving import Solving
+
+LEVELS = (0.001, 0.004, 0.008, 0.012, 0.016, 0.02, 0.03)
+SURFACES = {name: (normals, inside) for name, normals, inside in shapes()}
+
+
+def trusted(subject: str, lights: int, slant_deg: float, *, gloss: float) -> np.ndarray:
+    """Return which share of a subject is valid at each of LEVELS of noise."""
+    normals, inside = SURFACES[subject]
+    cases = [shot(normals, inside, ring(lights, slant_deg), noise=level, gloss=gloss) for level in LEVELS]
+    return np.array([Solving().solve(one.plates, one.lit, mask=inside).valid[inside].mean() for one in cases])
+
+
+@pytest.mark.parametrize("subject", ["ball", "waves", "bumps"])
+@pytest.mark.parametrize(("lights", "slant_deg"), [(4, 40), (5, 40), (5, 55)])
+def test_with_less_noise_no_less_of_a_glossy_subject_is_trusted(subject: str, lights: int, slant_deg: float) -> None:
+    shares = trusted(subject, lights, slant_deg, gloss=0.15)
+    more_noise = np.maximum.accumulate(shares[::-1])[::-1]
+    assert (shares >= more_noise - 0.2).all(), shares
+
+
+@pytest.mark.parametrize("lights", [4, 5])
+def test_what_noise_could_hide_does_not_spoil_matte_subjects(lights: int) -> None:
+    shares = trusted("bumps", lights, 40, gloss=0.0)
+    assert (shares[:-1] > 0.96).all(), shares
