@@ -10,6 +10,7 @@ import functools
 import math
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from typing import Any
 
 import cv2
 import numpy as np
@@ -110,7 +111,8 @@ class Signs:
         """Return the signs of some of the points."""
         shape = self.misfit_deg.shape
         each = {one.name: getattr(self, one.name) for one in fields(self) if one.name != "hidden"}
-        return replace(self, **{name: np.broadcast_to(value, shape)[some] for name, value in each.items()})
+        here: dict[str, Any] = {name: np.broadcast_to(value, shape)[some] for name, value in each.items()}
+        return replace(self, **here)
 
 
 @dataclass(frozen=True, kw_only=True)
