@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
-from psvideo.sync.find import find_timing, flashes_seen
+from psvideo.sync.find import find_timing
+from psvideo.sync.flashes_seen import flashes_seen
 from psvideo.sync.rowfit.beat import Beat, FoundClock
 from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.restarts import TICKS, moved

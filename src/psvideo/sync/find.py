@@ -7,35 +7,31 @@ repeated without a word are found, and a robust fit over all frames sharpens the
 does not know exactly: readout, exposure, the LEDs' tails. The cycle's marker shows which light is which.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.errors import NoStrobeError, PsvideoError, UsageError
-from psvideo.model.camera import Camera, FloatArray
+from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
-from psvideo.model.rows.shutter import frames_touched
-from psvideo.model.timing import DroppedFrames, Flash, Order, Timing
+from psvideo.model.timing import DroppedFrames, Order, Timing
 from psvideo.model.units import counted
+from psvideo.sync.flashes_seen import synced_timing, timing_of_fit
 from psvideo.sync.joined import Chapter, joined, named_alike
 from psvideo.sync.restarted import found_in_parts
-from psvideo.sync.rowfit.beat import Beat, train_between, train_until
+from psvideo.sync.rowfit.beat import Beat, train_until
 from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import Profiles
-from psvideo.sync.rowfit.refine import Fit
 from psvideo.sync.rowfit.restarts import may_restart
 from psvideo.sync.rowfit.tracking.course import window_frames
-from psvideo.sync.rowfit.unknowns.mains_swing import mains_swing
 from psvideo.sync.turns import turns
 from psvideo.sync.verdict.believed import Verdict, believed_fit
 from psvideo.sync.verdict.frame_remarks import remarks_on_frames
 from psvideo.sync.verdict.refusal import clock_too_far, nothing_to_find, why_not
 from psvideo.sync.verdict.remarks import remarks, remarks_on_lights
 
-NO_READOUT = 3.0
-"""A readout of fewer standard errors is taken for a global shutter."""
 ADVICE = (
     "Check that plan.toml is the plan that the strobe played (frame rate, flash durations, dark time), that the lights "
     "flashed brightly enough, and that the exposure was fixed."
@@ -62,7 +58,7 @@ def find_timing(
     """
     check_first_light(plan, first_light)
     if plan.mode == "synced":
-        return _synced_timing(plan, indices, clip=clip, dropped=dropped)
+        return synced_timing(plan, indices, clip=clip, dropped=dropped)
     rows = _to_fit(plan, indices, profiles, doubt, clip=clip)
     verdict = believed_fit(plan, rows)
     take = _Take(
@@ -116,7 +112,7 @@ def _chapter(part: _Take, strobe: "FoundStrobe") -> Chapter:
 
 def _timing(take: _Take, strobe: "FoundStrobe") -> Timing:
     plan, found, beat = take.plan, strobe.found, strobe.found.fit.beat
-    return _assemble(
+    return timing_of_fit(
         plan,
         found,
         order=strobe.order,
@@ -261,117 +257,3 @@ def _all_dropped(
         more = int(index[n + 1] - index[n] - max(indices[n + 1] - indices[n], 1))
         counts[int(numbers[n])] = counts.get(int(numbers[n]), 0) + more
     return tuple(DroppedFrames(after=after, count=count) for after, count in sorted(counts.items()))
-
-
-def fitted_camera(plan: Plan, fit: Fit) -> Camera:
-    """Return the plan's camera with the shutter that was found; a readout within its error of 0 becomes 0."""
-    beat = fit.beat
-    may_be_none = beat.row_time_s < NO_READOUT * fit.errors_s.get("row_time_s", 0.0)
-    readout_s = 0.0 if may_be_none else beat.row_time_s * plan.camera.height_px * (-1 if beat.upward else 1)
-    return replace(plan.camera, exposure_s=beat.exposure_s, readout_s=readout_s)
-
-
-def _assemble(
-    plan: Plan,
-    found: ClipFit,
-    *,
-    order: Order,
-    clip: str,
-    dropped: tuple[DroppedFrames, ...],
-    repeated: tuple[int, ...],
-    notes: tuple[str, ...],
-) -> Timing:
-    """List every flash that the clip saw any of, and mark those that its start or end cuts."""
-    beat, index = found.fit.beat, found.rows.index
-    camera = fitted_camera(plan, found.fit)
-    span = int(index[0]), int(index[-1])
-    flashes = flashes_seen(plan, beat, camera, span, trusted=found.trusted, unsure=found.unsure, late=found.jitter.of)
-    row_time_s = camera.row_time_s
-    return Timing(
-        clip=clip,
-        frame_period_s=camera.frame_period_s,
-        exposure_s=camera.exposure_s,
-        row_time_s=row_time_s,
-        clock_offset_ppm=beat.clock.mean_offset_ppm(),
-        phase_error_rows=found.fit.shift_error_s / (abs(row_time_s) or camera.frame_period_s / camera.height_px),
-        rise_s=beat.rise_s,
-        fall_s=beat.fall_s,
-        mains=mains_swing(plan, found.rows, found.fit),
-        order=order,
-        dropped_frames=dropped,
-        repeated_frames=repeated,
-        notes=notes,
-        phase_error_s=found.fit.shift_error_s,
-        row_time_error_s=found.fit.errors_s.get("row_time_s"),
-        flashes=flashes,
-    )
-
-
-def flashes_seen(
-    plan: Plan,
-    beat: Beat,
-    camera: Camera,
-    span: tuple[int, int],
-    *,
-    trusted: tuple[int, int],
-    unsure: NDArray[np.int64] | Sequence[int] = (),
-    late: Callable[[FloatArray], FloatArray] = np.zeros_like,
-) -> tuple[Flash, ...]:
-    """Return the flashes of which the frames from the first to the last of a ``span`` saw any, in order.
-
-    Complete are those that no frame outside of ``trusted`` saw, nor one at an ``unsure`` (place,) place in time;
-    ``late`` gives by how much flashes that start at given times come late.
-    """
-    period_s = camera.frame_period_s
-    from_s = max(span[0] - 2, 0) * period_s
-    train = train_between(plan, beat.clock, from_s, (span[1] + 2) * period_s)
-    start_s = train.start_s + late(train.start_s)
-    first, last = frames_touched(camera, start_s, train.duration_s)
-    seen = (last >= span[0]) & (first <= span[1])
-    complete = (first >= trusted[0]) & (last <= trusted[1])
-    doubtful = np.sort(np.asarray(unsure, np.int64))
-    complete &= np.searchsorted(doubtful, first) == np.searchsorted(doubtful, last, side="right")
-    return tuple(
-        Flash(
-            index=number,
-            slot=int(train.slot[k]),
-            lights=plan.flashes[train.slot[k]].lights,
-            start_s=float(start_s[k]),
-            duration_s=float(train.duration_s[k]),
-            complete=bool(complete[k]),
-        )
-        for number, k in enumerate(np.flatnonzero(seen))
-    )
-
-
-WITHIN = 1e-9
-"""A synced flash begins so much of the exposure after it and ends as much before: rounding puts none into two frames,
-of which the clip may lack the second."""
-
-
-def _synced_timing(plan: Plan, indices: NDArray[np.int64], *, clip: str, dropped: Sequence[DroppedFrames]) -> Timing:
-    """One flash a frame, in the plan's order: nothing is left to find, and when its rows open does not matter."""
-    period_s, exposure_s = plan.camera.frame_period_s, plan.camera.exposure_s
-    train = plan.train(0, int(indices[-1]) + 1)
-    flashes = tuple(
-        Flash(
-            index=n,
-            slot=int(slot),
-            lights=plan.flashes[slot].lights,
-            start_s=n * period_s + WITHIN * exposure_s,
-            duration_s=min(float(duration_s), (1 - 2 * WITHIN) * exposure_s),
-            complete=True,
-        )
-        for n, (slot, duration_s) in enumerate(zip(train.slot, train.duration_s, strict=True))
-    )
-    return Timing(
-        clip=clip,
-        frame_period_s=period_s,
-        exposure_s=plan.camera.exposure_s,
-        row_time_s=0.0,
-        clock_offset_ppm=0.0,
-        phase_error_rows=0.0,
-        order="given",
-        dropped_frames=tuple(dropped),
-        flashes=flashes,
-    )

@@ -8,7 +8,7 @@ import numpy as np
 from psvideo.live.following.follow import Follower
 from psvideo.live.following.phase_filter import smoothed
 from psvideo.model.timing import DroppedFrames, Flash, Timing
-from psvideo.sync.find import flashes_seen
+from psvideo.sync.flashes_seen import flashes_seen
 from psvideo.sync.rowfit.beat import Beat, FoundClock
 
 KNOT_S = 0.2

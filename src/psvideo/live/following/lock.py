@@ -9,7 +9,8 @@ from psvideo.errors import UsageError
 from psvideo.model.camera import Camera, FloatArray
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Order
-from psvideo.sync.find import find_strobe, fitted_camera
+from psvideo.sync.find import find_strobe
+from psvideo.sync.flashes_seen import fitted_camera
 from psvideo.sync.rowfit.beat import Beat, FoundClock
 from psvideo.sync.rowfit.coarse.seed import SEED_FRAMES
 from psvideo.sync.rowfit.fit import FLASH_ROWS
