@@ -1,5 +1,6 @@
 """Recipes on paper: what of which frame's rows makes up a plate, for any shutter, readout and pulse."""
 
+import time
 from fractions import Fraction
 
 import numpy as np
@@ -22,16 +23,23 @@ def camera_of(*, shutter: float = 1.0, readout: float = 0.97) -> Camera:
 
 
 def timing_of(
-    camera: Camera, *, gap: float = 1.0, first_s: float = 0.004, rise_s: float = 0.0, fall_s: float = 0.0, dark: int = 3
+    camera: Camera,
+    *,
+    gap: float = 1.0,
+    first_s: float = 0.004,
+    rise_s: float = 0.0,
+    fall_s: float = 0.0,
+    dark: int = 3,
+    count: int = 8,
 ) -> Timing:
-    """Eight flashes of 0.8 ms, of which every fourth is dark."""
+    """Eight flashes of 0.8 ms, or ``count``, of which every fourth is dark."""
     every_s = gap * camera.exposure_s + 0.0008
     flashes = tuple(
         Flash(
             index=n, slot=n % 4, lights={} if n % 4 == dark else {f"light{n % 4}": 1.0},
             start_s=first_s + n * every_s, duration_s=0.0008, complete=True,
         )
-        for n in range(8)
+        for n in range(count)
     )  # fmt: skip
     return Timing(
         clip="", frame_period_s=PERIOD_S, exposure_s=camera.exposure_s, row_time_s=camera.row_time_s,
@@ -151,3 +159,15 @@ def test_a_neighbour_whose_frames_are_missing_hides_the_rows_that_it_reaches_int
     assert min(whole.frames) in frames_of(camera, timing, flash)
     cut = flash_recipe(camera, timing, flash, range(max(whole.frames), FRAMES))
     assert cut.seen.sum() < whole.seen.sum()
+
+
+def test_a_recipe_of_a_take_of_two_hours_costs_what_one_of_a_second_does() -> None:
+    camera, worked_s = camera_of(), {}
+    for count in (80, 80_000):
+        timing = timing_of(camera, gap=1.01, count=count)
+        flash_recipe(camera, timing, timing.flashes[4], range(FRAMES))
+        began_s = time.process_time()
+        for flash in timing.flashes[4:64]:
+            flash_recipe(camera, timing, flash, frames_of(camera, timing, flash))
+        worked_s[count] = time.process_time() - began_s
+    assert worked_s[80_000] < 5 * worked_s[80]

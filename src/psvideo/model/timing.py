@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -107,15 +108,26 @@ class Timing:
         """How the LEDs answer their drive, as it was given or found."""
         return Pulse(rise_s=self.rise_s, fall_s=self.fall_s)
 
-    @property
+    @cached_property
     def start_s(self) -> FloatArray:
-        """When every flash starts, shape (flash,)."""
-        return np.array([flash.start_s for flash in self.flashes], np.float64)
+        """When every flash starts, shape (flash,). Kept, for two hours have 200,000 flashes; not to be written to."""
+        return _kept([flash.start_s for flash in self.flashes])
 
-    @property
+    @cached_property
     def duration_s(self) -> FloatArray:
-        """How long every flash lasts on the camera's clock, shape (flash,)."""
-        return np.array([flash.duration_s for flash in self.flashes], np.float64)
+        """How long every flash lasts on the camera's clock, shape (flash,). Not to be written to."""
+        return _kept([flash.duration_s for flash in self.flashes])
+
+    @cached_property
+    def shortest_gap_s(self) -> float:
+        """The shortest time from a flash's end to the next one's start; infinite for fewer than two flashes."""
+        return float(np.min(self.start_s[1:] - (self.start_s + self.duration_s)[:-1], initial=np.inf))
+
+
+def _kept(values: list[float]) -> FloatArray:
+    kept = np.array(values, np.float64)
+    kept.flags.writeable = False
+    return kept
 
 
 def timed_camera(plan: Plan, timing: Timing) -> Camera:

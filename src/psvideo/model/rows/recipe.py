@@ -95,8 +95,7 @@ def _may_mix(camera: Camera, timing: Timing) -> bool:
     """Whether any row can see light of two flashes: LEDs have tails, or the dark time is shorter than the exposure."""
     if timing.pulse.fall_s > 0:
         return True
-    gaps_s = timing.start_s[1:] - (timing.start_s + timing.duration_s)[:-1]
-    return bool(gaps_s.size and gaps_s.min() < camera.exposure_s + np.ptp(camera.within_row_s()))
+    return bool(timing.shortest_gap_s < camera.exposure_s + np.ptp(camera.within_row_s()))
 
 
 def _around(timing: Timing, flash: Flash) -> tuple[Flash, ...]:

@@ -240,7 +240,13 @@ def residuals_of(plan: Plan, timing: Timing, index: IntArray, value: FloatArray)
     unknown = slot_unknowns(plan)
     slots = [flash.slot for flash in timing.flashes]
     flashes = row_model.Flashes(
-        timing.start_s, timing.duration_s, unknown[slots], int(unknown.max()) + 1, timing.rise_s, timing.fall_s, 0.0
+        timing.start_s.copy(),
+        timing.duration_s.copy(),
+        unknown[slots],
+        int(unknown.max()) + 1,
+        timing.rise_s,
+        timing.fall_s,
+        0.0,
     )
     rest = np.empty(value.shape)
     kernel.rests(rows, flashes, np.ones(value.shape), 0, height, rest)
