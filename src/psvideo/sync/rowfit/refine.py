@@ -11,7 +11,7 @@ from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.normal_equations import projected, solved
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.row_model import BLUR, EXPOSURE, FALL, RISE, ROW_TIME
-from psvideo.sync.rowfit.standard_error import believable, mean_error
+from psvideo.sync.rowfit.standard_error import believable, mean_error, standard_error_of
 
 CAUCHY = 2.4
 """Residuals of this many standard deviations are trusted half as much (95 % efficiency for Gaussian noise)."""
@@ -72,7 +72,7 @@ def refine(
         rest=rest,
         weight=weight,
         shift_error_s=mean_error(basis[: len(rows.window_start) + 1], covariance),
-        errors_s={name: float(np.sqrt(covariance[2 + n, 2 + n])) for n, name in enumerate(free)},
+        errors_s={name: standard_error_of(covariance[2 + n, 2 + n]) for n, name in enumerate(free)},
         explained=explained(rows, rest),
     )
 

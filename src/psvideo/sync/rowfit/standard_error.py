@@ -60,3 +60,8 @@ def freedom(plan: Plan, rows: Profiles, beat: Beat) -> float:
     frames = len(rows.value)
     fitted = len(rows.window_start) * (len(plan.lit_slots) + 1 + 2 * len(beat.beat_hz))
     return max(frames - fitted, 1) / frames
+
+
+def standard_error_of(variance: float) -> float:
+    """Return the root of a variance, infinite where rounding left it below 0: rows do not determine it."""
+    return float(np.sqrt(variance)) if variance >= 0 else float("inf")

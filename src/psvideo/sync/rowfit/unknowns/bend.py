@@ -14,7 +14,7 @@ from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.normal_equations import projected
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import CAUCHY, EDGES, GLOBALS, Fit, errors_of_residuals, explained, refine, times_moved
-from psvideo.sync.rowfit.standard_error import believable, mean_error
+from psvideo.sync.rowfit.standard_error import believable, mean_error, standard_error_of
 
 LEAST_WINDOWS = 4
 CLEARLY = 5.0
@@ -79,7 +79,7 @@ def bend(plan: Plan, rows: Profiles, fit: Fit, *, free: tuple[str, ...] = (), st
         rest=rest,
         weight=weight,
         shift_error_s=mean_error(basis[:size], covariance),
-        errors_s={name: float(np.sqrt(covariance[size + n, size + n])) for n, name in enumerate(free)},
+        errors_s={name: standard_error_of(covariance[size + n, size + n]) for n, name in enumerate(free)},
         explained=explained(rows, rest),
     )
 
