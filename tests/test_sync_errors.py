@@ -9,6 +9,7 @@ import pytest
 from psvideo.model.plan import Plan
 from psvideo.model.timing import Timing
 from psvideo.sync.find import find_timing
+from psvideo.sync.rowfit.standard_error import standard_error_of
 from psvideo.synth import Noise, TrueClock, expose
 
 PlanMaker = Callable[..., Plan]
@@ -50,3 +51,8 @@ def test_errors_made_are_those_that_are_claimed(kind: str, make_plan: PlanMaker)
         off_s = np.array([timing.row_time_s - plan.camera.row_time_s for timing, _ in found])
         claimed_s = np.array([timing.row_time_error_s for timing, _ in found], np.float64)
         assert 0.6 < np.sqrt(np.mean((off_s / claimed_s) ** 2)) < 1.6
+
+
+def test_an_unknown_that_rows_do_not_determine_is_not_known_at_all() -> None:
+    assert standard_error_of(4e-12) == 2e-6
+    assert standard_error_of(-1e-20) == np.inf

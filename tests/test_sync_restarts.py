@@ -1,4 +1,4 @@
-"""A strobe that begins anew during a clip, at another place in its cycle: each part is timed by itself."""
+"""A strobe that stops during a clip, or begins late or anew elsewhere in its cycle: each part is timed by itself."""
 
 from collections.abc import Callable
 
@@ -8,12 +8,16 @@ from numpy.typing import NDArray
 
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
-from psvideo.model.timing import Timing
+from psvideo.model.timing import DroppedFrames, Flash, Timing
 from psvideo.sync.find import find_timing
 from psvideo.sync.flashes_seen import flashes_seen
+from psvideo.sync.joined import Chapter, joined
+from psvideo.sync.restarted import recut
 from psvideo.sync.rowfit.beat import Beat, FoundClock
+from psvideo.sync.rowfit.fit import find
 from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.restarts import TICKS, moved
+from psvideo.sync.rowfit.strobed import least_frames, shows_strobe
 from psvideo.synth import Exposure, Noise, TrueClock, expose
 
 PlanMaker = Callable[..., Plan]
@@ -26,26 +30,43 @@ def plan(make_plan: PlanMaker) -> Plan:
     return make_plan(height_px=48, width_px=12)
 
 
-def shot_of(plan: Plan, phase_s: float = PHASE_S) -> Exposure:
+def shot_of(plan: Plan, phase_s: float = PHASE_S, *, frames: int = FRAMES, alike: bool = False) -> Exposure:
     rng = np.random.default_rng(5)
     plates = {slot: (0.2 + 0.5 * rng.random((48, 12))).astype(np.float32) for slot in plan.lit_slots}
+    if alike:
+        plates = dict.fromkeys(plates, plates[plan.lit_slots[0]])
     clock = TrueClock(phase_s=phase_s, offset_ppm=80.0)
-    return expose(plates, plan, frames=FRAMES, clock=clock, ambient=0.02, noise=Noise(full_well_e=2e5, read_e=5))
+    return expose(plates, plan, frames=frames, clock=clock, ambient=0.02, noise=Noise(full_well_e=2e5, read_e=5))
 
 
-def with_restart(plan: Plan, late_s: float) -> tuple[tuple[Exposure, Exposure], FloatArray]:
+def with_restart(
+    plan: Plan, late_s: float, *, alike: bool = False, cut: int = BREAK
+) -> tuple[tuple[Exposure, Exposure], FloatArray]:
     """Return a strobe's shots before and after it waits for some time, and the row means of both in one clip."""
-    before, after = shot_of(plan), shot_of(plan, PHASE_S + late_s)
-    frames = np.concatenate([before.frames[:BREAK], after.frames[BREAK:]])
+    before, after = shot_of(plan, alike=alike), shot_of(plan, PHASE_S + late_s, alike=alike)
+    frames = np.concatenate([before.frames[:cut], after.frames[cut:]])
     return (before, after), frames.mean(axis=2, dtype=np.float64)
 
 
-def off_s(timing: Timing, shots: tuple[Exposure, Exposure], period_s: float) -> NDArray[np.float64]:
+def rows_of(plan: Plan, profiles: FloatArray) -> Profiles:
+    frames, height = profiles.shape
+    return Profiles(
+        value=profiles,
+        index=np.arange(frames),
+        period_s=plan.camera.frame_period_s,
+        place=np.arange(float(height)),
+        window_start=np.zeros(1, np.int64),
+    )
+
+
+def off_s(
+    timing: Timing, shots: tuple[Exposure, Exposure], period_s: float, *, cut: int = BREAK
+) -> NDArray[np.float64]:
     """Return by how much complete flashes are off those of the part they lie in, and by light, shape (flash,)."""
     off = []
     for flash in timing.flashes:
         if flash.complete:
-            true = shots[flash.start_s > BREAK * period_s].flashes
+            true = shots[flash.start_s > cut * period_s].flashes
             same = [one.start_s for one in true if dict(one.lights) == dict(flash.lights)]
             off.append(np.abs(np.array(same) - flash.start_s).min())
     return np.array(off)
@@ -61,7 +82,7 @@ def test_a_strobe_that_begins_anew_is_timed_before_and_after(share: float, plan:
     assert len(off) > 0.9 * FRAMES * plan.camera.frame_period_s / pitch_s - 4
     assert timing.order == "marker"
     assert timing.dropped_frames == ()
-    assert any("began anew" in note for note in timing.notes)
+    assert any("started again" in note for note in timing.notes)
     assert [flash.index for flash in timing.flashes] == list(range(len(timing.flashes)))
 
 
@@ -76,12 +97,70 @@ def test_without_a_marker_lights_keep_their_names_over_a_restart(make_plan: Plan
     assert timing.order == "given"
 
 
+def test_lights_that_look_alike_are_not_named_over_a_restart(make_plan: PlanMaker) -> None:
+    plan = make_plan(height_px=48, width_px=12, dark=False)
+    pitch_s = plan.cycle_s / len(plan.cycle_slots)
+    shots, profiles = with_restart(plan, 1.34 * pitch_s, alike=True)
+    first = next(flash for flash in shots[0].flashes if flash.start_s > plan.camera.frame_period_s)
+    (light,) = first.lights
+    timing = find_timing(plan, np.arange(FRAMES), profiles, first_light=light)
+    assert any("started again" in note for note in timing.notes)
+    assert timing.order == "guess"
+
+
+@pytest.mark.parametrize("cut", [BREAK - 5, BREAK + 5])
+def test_a_cut_moves_to_where_the_strobe_of_the_part_that_is_found_ends(cut: int, plan: Plan) -> None:
+    _, profiles = with_restart(plan, 0.37 * plan.cycle_s / len(plan.cycle_slots))
+    rows = rows_of(plan, profiles)
+    found = slice(0, cut) if cut < BREAK else slice(cut, FRAMES)
+    parts = [(one, find(plan, rows.take(one).one_window()) if one == found else None) for one in halves(cut)]
+    assert recut(plan, rows, parts) == halves(BREAK)
+
+
+def halves(cut: int) -> list[slice]:
+    return [slice(0, cut), slice(cut, FRAMES)]
+
+
+def test_what_one_part_of_a_clip_lacks_puts_the_flashes_of_the_next_later(plan: Plan) -> None:
+    period_s = plan.camera.frame_period_s
+
+    def timing(start_s: float, error_s: float, dropped: tuple[DroppedFrames, ...]) -> Timing:
+        flash = Flash(index=0, slot=0, lights={"key": 1.0}, start_s=start_s, duration_s=0.0008, complete=True)
+        return Timing(
+            clip="clip",
+            frame_period_s=period_s,
+            exposure_s=period_s,
+            row_time_s=plan.camera.row_time_s,
+            clock_offset_ppm=0.0,
+            phase_error_rows=error_s / plan.camera.row_time_s,
+            phase_error_s=error_s,
+            order="marker",
+            flashes=(flash,),
+            dropped_frames=dropped,
+        )
+
+    first = Chapter(first=0, last=40, more=3, timing=timing(0.1, 2e-6, (DroppedFrames(after=7, count=3),)))
+    second = Chapter(first=41, last=80, more=0, timing=timing(0.5, 1e-6, ()))
+    both = joined([first, second], (DroppedFrames(after=90, count=2),))
+    assert [(flash.index, flash.start_s) for flash in both.flashes] == [(0, 0.1), (1, 0.5 + 3 * period_s)]
+    assert both.phase_error_s == 2e-6
+    assert both.dropped_frames == (DroppedFrames(after=7, count=3), DroppedFrames(after=90, count=2))
+
+
+def test_thirty_frames_that_are_missing_are_one_hole(plan: Plan) -> None:
+    keep = np.delete(np.arange(160), np.arange(60, 90))
+    profiles = shot_of(plan, frames=160).frames.mean(axis=2, dtype=np.float64)[keep]
+    timing = find_timing(plan, np.arange(len(keep)), profiles)
+    assert timing.dropped_frames == (DroppedFrames(after=59, count=30),)
+    assert not any("started again" in note for note in timing.notes)
+
+
 def test_frames_that_are_missing_are_no_restart(plan: Plan) -> None:
     keep = np.delete(np.arange(FRAMES), [31, 62, 63, 64])
     profiles = shot_of(plan).frames.mean(axis=2, dtype=np.float64)[keep]
     timing = find_timing(plan, np.arange(len(keep)), profiles)
     assert [(hole.after, hole.count) for hole in timing.dropped_frames] == [(30, 1), (60, 3)]
-    assert not any("began anew" in note for note in timing.notes)
+    assert not any("started again" in note for note in timing.notes)
 
 
 def test_flashes_in_frames_that_may_lie_on_either_side_of_a_hole_are_incomplete(plan: Plan) -> None:
@@ -99,14 +178,75 @@ def test_flashes_in_frames_that_may_lie_on_either_side_of_a_hole_are_incomplete(
 
 
 def test_places_between_frames_are_counted_in_ticks(plan: Plan) -> None:
-    rows = Profiles(
-        value=np.random.default_rng(0).random((5, 4)),
-        index=np.arange(5),
-        period_s=plan.camera.frame_period_s,
-        place=np.arange(4.0),
-        window_start=np.zeros(1, np.int64),
-    )
+    rows = rows_of(plan, np.random.default_rng(0).random((5, 4)))
     late = moved(rows, 0.25 * rows.period_s)
     np.testing.assert_allclose(
         late.frame_start_s - rows.frame_start_s, 0.25 * rows.period_s, atol=rows.period_s / TICKS
     )
+
+
+def other_picture(kind: str, count: int) -> FloatArray:
+    """Return the row means of frames that no strobe lights, shape (frame, row)."""
+    rng = np.random.default_rng(2)
+    if kind == "noise":
+        return 0.3 + 0.1 * rng.random((count, 48))
+    if kind == "flicker":
+        return np.repeat(0.3 + 0.1 * rng.random((count, 1)), 48, axis=1)
+    if kind == "dark":  # but not as dark as rows are between flashes
+        return 0.03 + 2e-4 * rng.standard_normal((count, 48))
+    if kind == "bright":
+        return 0.4 + 0.2 * rng.random(48) + 1e-3 * rng.standard_normal((count, 48))
+    assert kind == "moving"
+    swing = 1 + 0.3 * np.sin(np.arange(count)[:, None] / 7)
+    return (0.1 + 0.3 * rng.random(48)) * swing * (1 + 0.002 * rng.standard_normal((count, 48)))
+
+
+@pytest.mark.parametrize("first", [False, True], ids=["stops", "begins late"])
+@pytest.mark.parametrize("kind", ["noise", "flicker", "dark", "bright", "moving"])
+def test_only_frames_that_the_strobe_lights_have_flashes(kind: str, first: bool, plan: Plan) -> None:
+    strobed, count, period_s = shot_of(plan, frames=72), 40, plan.camera.frame_period_s
+    profiles, without = strobed.frames.mean(axis=2, dtype=np.float64), other_picture(kind, count)
+    timing = find_timing(
+        plan, np.arange(72 + count), np.concatenate([without, profiles] if first else [profiles, without])
+    )
+    true_s = np.array([flash.start_s for flash in strobed.flashes]) + first * count * period_s
+    complete_s = np.array([flash.start_s for flash in timing.flashes if flash.complete])
+    assert np.abs(true_s[:, None] - complete_s).min(axis=0).max() < 0.05 * plan.camera.row_time_s
+    assert len(complete_s) >= 72 * period_s / (plan.cycle_s / len(plan.cycle_slots)) - 4
+    assert true_s.min() - period_s < timing.start_s.min()
+    assert timing.start_s.max() < true_s.max() + 2 * period_s
+    begin, end = (0, count - 1) if first else (72, 71 + count)
+    assert any(f"No strobe like the plan's is found in frames {begin} to {end}" in note for note in timing.notes)
+    assert not any("started again" in note for note in timing.notes)
+
+
+@pytest.mark.parametrize("count", [30, 100])
+def test_a_picture_that_freezes_ends_the_strobe(count: int, plan: Plan) -> None:
+    strobed = shot_of(plan, frames=72)
+    profiles = strobed.frames.mean(axis=2, dtype=np.float64)
+    timing = find_timing(plan, np.arange(72 + count), np.concatenate([profiles, np.tile(profiles[-1], (count, 1))]))
+    assert any(f"No strobe like the plan's is found in frames 71 to {71 + count}" in one for one in timing.notes)
+    assert max(flash.start_s for flash in timing.flashes) < 72 * plan.camera.frame_period_s
+
+
+def test_frames_show_a_strobe_at_any_place_in_its_cycle_or_none(plan: Plan) -> None:
+    camera = plan.camera
+    beat = Beat(
+        clock=FoundClock(phase_s=0.0, offset_ppm=0.0), row_time_s=camera.row_time_s, exposure_s=camera.exposure_s
+    )
+    count = least_frames(plan)
+    lit = rows_of(plan, shot_of(plan, frames=count).frames.mean(axis=2, dtype=np.float64))
+    assert shows_strobe(plan, lit, beat)
+    for kind in ("noise", "flicker", "dark", "bright", "moving"):
+        assert not shows_strobe(plan, rows_of(plan, other_picture(kind, count)), beat)
+
+
+@pytest.mark.parametrize("cut", [40, 88])
+def test_a_clock_that_jumps_by_little_shows_in_the_error_and_is_told(cut: int, plan: Plan) -> None:
+    shots, profiles = with_restart(plan, -0.03 * plan.cycle_s / len(plan.cycle_slots), cut=cut)
+    timing = find_timing(plan, np.arange(FRAMES), profiles)
+    row_s = plan.camera.row_time_s
+    off = np.abs(off_s(timing, shots, plan.camera.frame_period_s, cut=cut)) / row_s
+    assert np.sqrt(np.mean(off**2)) > 0.05
+    assert np.sqrt(np.mean(off**2)) < 2 * timing.phase_error_rows
+    assert any("come early or late against all the others" in note for note in timing.notes)

@@ -68,11 +68,11 @@ def find_timing(
         numbers=np.asarray(indices if numbers is None else numbers, np.int64),
         dropped=tuple(dropped),
     )
-    parts = found_in_parts(plan, rows) if not verdict.believed or may_restart(verdict.found) else []
+    parts = found_in_parts(plan, rows) if not verdict.believed or may_restart(plan, rows, verdict.found) else []
     if parts:
         strobes = _named_strobes(plan, parts, first_light)
         chapters = [_chapter(take.only(cut), one) for (cut, _), one in zip(parts, strobes, strict=True)]
-        return joined(chapters, take.dropped)
+        return joined(chapters, take.dropped, take.outside([cut for cut, _ in parts]))
     _refuse_unless_believed(plan, rows, verdict, clip)
     return _timing(take, _strobe(plan, verdict.found, first_light))
 
@@ -92,6 +92,12 @@ class _Take:
         numbers = self.numbers[frames]
         dropped = tuple(hole for hole in self.dropped if numbers[0] <= hole.after < numbers[-1])
         return replace(self, indices=self.indices[frames], numbers=numbers, dropped=dropped)
+
+    def outside(self, parts: Sequence[slice]) -> list[tuple[int, int]]:
+        """Return the first and last numbers of the stretches of frames that lie in none of some parts, in order."""
+        edges = [0, *(edge for part in parts for edge in (part.start, part.stop)), len(self.numbers)]
+        gaps = zip(edges[::2], edges[1::2], strict=True)
+        return [(int(self.numbers[first]), int(self.numbers[end - 1])) for first, end in gaps if end > first]
 
 
 def _named_strobes(plan: Plan, parts: Sequence[tuple[slice, ClipFit]], first_light: str | None) -> list["FoundStrobe"]:

@@ -1,6 +1,6 @@
-"""One timing from several chapters of a clip, between which the strobe began anew."""
+"""One timing from several chapters of a clip, between which the strobe started again."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,7 +9,7 @@ from psvideo.model.plan import Plan
 from psvideo.model.timing import DroppedFrames, Flash, Order, Timing
 from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import brightnesses
-from psvideo.sync.rowfit.tracking.track import losses_of
+from psvideo.sync.rowfit.tracking.losses import losses_of
 from psvideo.sync.turns import TURN_ROWS, turned
 
 CLEARLY = 0.5
@@ -54,10 +54,13 @@ class Chapter:
     timing: Timing
 
 
-def joined(chapters: Sequence[Chapter], dropped: Sequence[DroppedFrames]) -> Timing:
+def joined(
+    chapters: Sequence[Chapter], dropped: Sequence[DroppedFrames], without: Sequence[tuple[int, int]] = ()
+) -> Timing:
     """Return the timing of a clip from those of its chapters, in order; ``dropped`` are holes that its numbers show.
 
-    What holds throughout is the longest chapter's, and the error the largest of theirs.
+    ``without`` are the first and last numbers of stretches in which no strobe is found. What holds throughout is the
+    longest chapter's, and the error the largest of theirs.
     """
     timings = [one.timing for one in chapters]
     main = max(timings, key=lambda one: len(one.flashes))
@@ -76,16 +79,31 @@ def joined(chapters: Sequence[Chapter], dropped: Sequence[DroppedFrames]) -> Tim
         mains=main.mains if main is timings[0] else None,
         dropped_frames=tuple(holes[after] for after in sorted(holes)),
         repeated_frames=tuple(number for one in timings for number in one.repeated_frames),
-        notes=(_restarts(chapters), *dict.fromkeys(note for one in timings for note in one.notes)),
+        notes=(
+            *_restarts(chapters),
+            *_strobeless(without),
+            *dict.fromkeys(note for one in timings for note in one.notes),
+        ),
         flashes=tuple(replace(flash, index=n) for n, flash in enumerate(flashes)),
     )
 
 
-def _restarts(chapters: Sequence[Chapter]) -> str:
-    """Say where the strobe began anew."""
-    spans = ", ".join(f"{one.first} to {one.last}" for one in chapters)
-    return (
-        "The strobe began anew during the clip, at another place in its cycle, as when it is started again or misses a "
-        f"flash. Each part has a timing of its own: frames {spans}. Flashes beside the breaks, and frames outside of "
-        "these parts, are left out."
-    )
+def _restarts(chapters: Sequence[Chapter]) -> Iterator[str]:
+    """Say where the strobe started again."""
+    if len(chapters) > 1:
+        spans = ", ".join(f"{one.first} to {one.last}" for one in chapters)
+        yield (
+            "The strobe started again during the clip, at another place in its cycle, as after a restart or a missed "
+            f"flash. Each part has a timing of its own: frames {spans}. Flashes beside the breaks, and frames outside "
+            "of these parts, are left out."
+        )
+
+
+def _strobeless(without: Sequence[tuple[int, int]]) -> Iterator[str]:
+    """Say which frames show no strobe."""
+    if without:
+        spans = ", ".join(f"{first} to {last}" for first, last in without)
+        yield (
+            f"No strobe like the plan's is found in frames {spans}: it had not begun or had stopped, or they show "
+            "something else. They are left out."
+        )

@@ -1,4 +1,4 @@
-"""A clip in which the strobe began anew: every part between restarts is found as a clip by itself.
+"""A clip in which the strobe started again, or stopped: every part between is found as a clip by itself.
 
 Where parts are cut is known roughly at first, by frames that no longer fit. Once a part is found, its strobe foretells
 the frames beyond its ends, which shows where the cut belongs, and which frames beside it fit on either side.
@@ -9,11 +9,12 @@ from dataclasses import replace
 from itertools import pairwise
 
 from psvideo.model.plan import Plan
+from psvideo.sync.rowfit.coarse.seed import gain_of
 from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.restarts import chapters, reach
 from psvideo.sync.rowfit.tracking.course import window_frames
-from psvideo.sync.verdict.believed import believed_fit
+from psvideo.sync.verdict.believed import believed_fit, doubtful
 from psvideo.sync.verdict.refusal import nothing_to_find
 
 RECUTS = 2
@@ -21,28 +22,37 @@ RECUTS = 2
 BESIDE = 2
 """they are where the strobe of one foretells this many frames of the next."""
 MOST_TIMED = 0.5
-"""A clip with restarts is timed where this share of its frames lies in parts in which the strobe is found."""
+"""A clip in parts is timed where this share of its frames lies in parts in which the strobe is found,"""
+BEYOND_DOUBT = 0.9
+"""or where the strobe takes away so much of these parts' robust loss, and leaves nothing to doubt in the plan."""
 
-_Part = tuple[slice, ClipFit | None]
+Part = tuple[slice, ClipFit | None]
+"""A stretch of frames, and its fit where the strobe is found in it."""
 
 
 def found_in_parts(plan: Plan, rows: Profiles) -> list[tuple[slice, ClipFit]]:
     """Return the frames of every part of a clip in which the strobe is found, and its fit; nothing where the strobe
-    never began anew, or is not found in most of the clip. ``rows`` are laid out from the picture's top row."""
+    neither started again nor stopped, or is not found for sure. ``rows`` are laid out from the picture's top row."""
     cuts = list(chapters(plan, rows))
     if len(cuts) < 2:
         return []
     parts = _judged(plan, rows, cuts)
     for _ in range(RECUTS):
-        again = _recut(plan, rows, parts)
+        again = recut(plan, rows, parts)
         if again == [cut for cut, _ in parts]:
             break
         parts = _judged(plan, rows, again)
     sure = _trusted(plan, rows, parts)
-    return sure if sum(cut.stop - cut.start for cut, _ in sure) >= MOST_TIMED * len(rows.value) else []
+    if sum(cut.stop - cut.start for cut, _ in sure) < MOST_TIMED * len(rows.value):
+        sure = [one for one in sure if _beyond_doubt(plan, one[1])]
+    return sure
 
 
-def _judged(plan: Plan, rows: Profiles, cuts: Sequence[slice]) -> list[_Part]:
+def _beyond_doubt(plan: Plan, found: ClipFit) -> bool:
+    return gain_of(found.rows, found.fit.rest) > BEYOND_DOUBT and not doubtful(plan, found)
+
+
+def _judged(plan: Plan, rows: Profiles, cuts: Sequence[slice]) -> list[Part]:
     """Return the parts with the fits of those that are believed."""
 
     def found(cut: slice) -> ClipFit | None:
@@ -53,7 +63,7 @@ def _judged(plan: Plan, rows: Profiles, cuts: Sequence[slice]) -> list[_Part]:
     return [(cut, found(cut)) for cut in cuts]
 
 
-def _recut(plan: Plan, rows: Profiles, parts: Sequence[_Part]) -> list[slice]:
+def recut(plan: Plan, rows: Profiles, parts: Sequence[Part]) -> list[slice]:
     """Return the parts' frames with each cut moved to where the strobe of the part before no longer foretells the
     picture, or that of the part after begins to. ``rows`` are all of the clip's."""
     at = [cut.start for cut, _ in parts[1:]]
@@ -68,7 +78,7 @@ def _recut(plan: Plan, rows: Profiles, parts: Sequence[_Part]) -> list[slice]:
     return [slice(first, last) for first, last in pairwise(bounds)]
 
 
-def _trusted(plan: Plan, rows: Profiles, parts: Sequence[_Part]) -> list[tuple[slice, ClipFit]]:
+def _trusted(plan: Plan, rows: Profiles, parts: Sequence[Part]) -> list[tuple[slice, ClipFit]]:
     """Return the parts in which a strobe was found, without trust in frames beside a cut that fit on either side."""
     sure = []
     for n, (cut, found) in enumerate(parts):

@@ -20,6 +20,7 @@ from psvideo.sync.rowfit.unknowns.jitter import STEADY, Jitter, disagreement_s, 
 from psvideo.sync.rowfit.unknowns.plateau import centred
 from psvideo.sync.rowfit.unknowns.restless import across, restless
 from psvideo.sync.rowfit.unknowns.softness import misfit
+from psvideo.sync.rowfit.unknowns.unsteady import unsteady_s
 from psvideo.sync.rowfit.unlit import unlit, with_unlit
 
 COARSE_ROWS = 288
@@ -46,7 +47,8 @@ class ClipFit:
     could come earlier or later and the picture be the same, 0 where it shows their times; ``soft_s`` is how soft the
     edges are where that was not taken for LEDs' tails, else 0. ``across`` is how much of what split flashes show is
     explained (0 to 1) where flashes differ because the subject moves, else 0. ``unlit`` (frame,) are frames that were
-    left out because no flash lights them.
+    left out because no flash lights them. ``unsteady_s`` is by how much stretches of flashes are early or late, as a
+    root mean square over the clip, beyond their jitter.
     """
 
     fit: Fit
@@ -60,6 +62,7 @@ class ClipFit:
     unsure: IntArray
     slack_s: float = 0.0
     soft_s: float = 0.0
+    unsteady_s: float = 0.0
     across: float = 0.0
 
 
@@ -86,31 +89,15 @@ def find(plan: Plan, rows: Profiles, *, measured: tuple[str, ...] = ()) -> ClipF
         doubt=None if rows.doubt is None else np.ascontiguousarray(rows.doubt[keep]),
     ).windowed(window)
     free = measured if plan.camera.readout_s is not None else ("row_time_s", *measured)
-    part = stretches(fine)
-    fit = fitted(plan, part, tracked.beat, free)
-    part, fit = _restless(plan, part, fit, free)
-    fit = _with_mains(plan, part, fit, free)
-    part, fit, apart_s = _in_short_windows(plan, part, fit, free)
-    differing = freed(plan, part, fit, free)
-    fit = differing.fit
-    if fit.errors_s:
-        fit, apart_s = _with_window_errors(plan, part, fit)
-    apart_s = float(np.hypot(differing.unsure_s, apart_s))
-    fit, slack_s = centred(plan, part, fit)
-    if part.value is fine.value:
-        plain, as_seen = _as_seen(plan, part, fit)
+    best = _best_fit(plan, stretches(fine), tracked.beat, free)
+    if best.rows.value is fine.value:
+        plain, as_seen = _as_seen(plan, best.rows, best.fit)
     else:
-        plain, as_seen = throughout(plan, fine, part, fit, tracked.beat, follow=slack_s == 0.0)
-    stray = jitter(plan, plain, as_seen) if slack_s == 0.0 else STEADY
-    known_s = max(as_seen.shift_error_s, shift_error_s(plan, part, fit), slack_s)
-    if stray is not STEADY:
-        known_s = min(known_s, stray.mean_error_s)
-    else:
-        apart_rows_s = disagreement_s(plan, part, fit) if part.restless is None else 0.0
-        known_s = float(np.hypot(known_s * misfit(plan, part, fit), apart_rows_s))
-    error_s = float(np.sqrt(known_s**2 + stray.error_s**2 + apart_s**2))
+        plain, as_seen = throughout(plan, fine, best.rows, best.fit, tracked.beat, follow=best.slack_s == 0.0)
+    stray = jitter(plan, plain, as_seen) if best.slack_s == 0.0 else STEADY
+    loose_s = unsteady_s(plan, plain, as_seen, stray)
     return ClipFit(
-        fit=replace(as_seen, shift_error_s=error_s),
+        fit=replace(as_seen, shift_error_s=float(np.hypot(_error_s(plan, best, as_seen, stray), loose_s))),
         rows=plain,
         track=replace(tracked, index=with_unlit(whole, tracked.index, dark)),
         unlit=dark,
@@ -119,15 +106,56 @@ def find(plan: Plan, rows: Profiles, *, measured: tuple[str, ...] = ()) -> ClipF
         strayed=course.strayed,
         trusted=course.trusted,
         unsure=course.unsure,
-        slack_s=slack_s,
-        soft_s=differing.soft_s,
-        across=across(plan, part, fit),
+        slack_s=best.slack_s,
+        soft_s=best.soft_s,
+        unsteady_s=loose_s,
+        across=across(plan, best.rows, best.fit),
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Best:
+    """The best fit of some rows, and what it cannot know of its own error.
+
+    ``apart_s``: by how much times differ with how they are fitted. ``slack_s`` and ``soft_s`` are as in ``ClipFit``.
+    """
+
+    rows: Profiles
+    fit: Fit
+    apart_s: float
+    slack_s: float
+    soft_s: float
+
+
+def _best_fit(plan: Plan, rows: Profiles, start: Beat, free: tuple[str, ...]) -> _Best:
+    """Fit the times to rows, from the plain model to all that real footage may differ in from it."""
+    rows, fit = _restless(plan, rows, fitted(plan, rows, start, free), free)
+    fit = _with_mains(plan, rows, fit, free)
+    rows, fit, apart_s = _in_short_windows(plan, rows, fit, free)
+    differing = freed(plan, rows, fit, free)
+    fit = differing.fit
+    if fit.errors_s:
+        fit, apart_s = _with_window_errors(plan, rows, fit)
+    fit, slack_s = centred(plan, rows, fit)
+    apart_s = float(np.hypot(differing.unsure_s, apart_s))
+    return _Best(rows=rows, fit=fit, apart_s=apart_s, slack_s=slack_s, soft_s=differing.soft_s)
+
+
+def _error_s(plan: Plan, best: _Best, as_seen: Fit, stray: Jitter) -> float:
+    """Return the standard error of all flashes' times together."""
+    rows, fit = best.rows, best.fit
+    known_s = max(as_seen.shift_error_s, shift_error_s(plan, rows, fit), best.slack_s)
+    if stray is not STEADY:
+        known_s = min(known_s, stray.mean_error_s)
+    else:
+        apart_rows_s = disagreement_s(plan, rows, fit) if rows.restless is None else 0.0
+        known_s = float(np.hypot(known_s * misfit(plan, rows, fit), apart_rows_s))
+    return float(np.sqrt(known_s**2 + stray.error_s**2 + best.apart_s**2))
 
 
 def _rows_needed(plan: Plan, rows: Profiles, beat: Beat) -> int:
     """Return to how many rows a clip may be averaged without blurring its flashes."""
-    shortest_s = min(plan.flashes[slot].duration_s for slot in plan.lit_slots)
+    shortest_s = plan.shortest_flash_s
     sharp = int(FLASH_ROWS * beat.row_time_s * len(rows.place) / shortest_s)
     return max(COARSE_ROWS, ENOUGH_SAMPLES // len(rows.value), sharp)
 

@@ -80,7 +80,7 @@ def clocks_of_chapters(plan: Plan, rows: Profiles, start: Beat) -> tuple[Beat, f
 
     A chapter that does not show its clock is bridged from those beside it.
     """
-    shortest_s = min(plan.flashes[slot].duration_s for slot in plan.lit_slots)
+    shortest_s = plan.shortest_flash_s
     at_s, bend_s, squares = list[FloatArray](), list[FloatArray](), list[float]()
     for chapter in _chapters(rows):
         part = rows.take(chapter)

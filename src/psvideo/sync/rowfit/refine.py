@@ -172,7 +172,7 @@ def _pivot(rows: Profiles) -> tuple[float, float]:
 
 def _units(plan: Plan, rows: Profiles, beat: Beat, free: tuple[str, ...]) -> FloatArray:
     """Return a fiftieth of a flash in every unknown, which is small for all of them."""
-    shortest_s = 0.02 * min(plan.flashes[slot].duration_s for slot in plan.lit_slots)
+    shortest_s = 0.02 * plan.shortest_flash_s
     return np.array([shortest_s] * 2 + [shortest_s / (rows.place.max() if n == "row_time_s" else 1.0) for n in free])
 
 
@@ -186,7 +186,7 @@ def prior(plan: Plan, rows: Profiles, unit_s: FloatArray, free: tuple[str, ...])
 
 def _held(plan: Plan, move: FloatArray, free: tuple[str, ...]) -> FloatArray:
     """Take no step of more than a third of a flash."""
-    longest_s = 0.33 * min(plan.flashes[slot].duration_s for slot in plan.lit_slots)
+    longest_s = 0.33 * plan.shortest_flash_s
     largest_s = float(np.abs(move[:2]).max())
     held: FloatArray = move * min(1.0, longest_s / max(largest_s, 1e-30))
     return held

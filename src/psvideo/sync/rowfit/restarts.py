@@ -7,32 +7,26 @@ clips, each with a phase of its own; ``chapters`` says where to cut.
 """
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
 from psvideo.model.camera import FloatArray
 from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
-from psvideo.sync.rowfit.coarse.retime import stood_in
+from psvideo.sync.rowfit.coarse.retime import Mask, stood_in
 from psvideo.sync.rowfit.coarse.seed import find_seed, renumbered
 from psvideo.sync.rowfit.fit import ClipFit
 from psvideo.sync.rowfit.profiles import Profiles, brightnesses, unexplained
 from psvideo.sync.rowfit.refine import refined_beat
 from psvideo.sync.rowfit.row_model import IntArray
-from psvideo.sync.rowfit.tracking.course import TRACK_ROWS, memory_frames
-from psvideo.sync.rowfit.tracking.track import (
-    HOLDS,
-    JUMP_COST,
-    MEMORY,
-    MOST,
-    SUSPICIOUS,
-    FrameTrack,
-    frame_losses,
-    losses_of,
-    settled,
-    track,
-)
-from psvideo.sync.rowfit.unlit import unlit
+from psvideo.sync.rowfit.strobed import least_frames, lost_somewhere, shows_strobe
+from psvideo.sync.rowfit.tracking.course import TRACK_ROWS, memory_frames, window_frames
+from psvideo.sync.rowfit.tracking.holes import MEMORY, settled
+from psvideo.sync.rowfit.tracking.losses import SUSPICIOUS, frame_losses, losses_of
+from psvideo.sync.rowfit.tracking.steps_ahead import HOLDS, JUMP_COST, MOST
+from psvideo.sync.rowfit.tracking.track import FrameTrack, track
+from psvideo.sync.rowfit.unlit import still, unlit
 
 MOST_RESTARTS = 3
 """A strobe that seems to begin anew more often than this is another plan's, or a subject that moves."""
@@ -46,13 +40,16 @@ APART = 0.1
 """Beside a hole, flashes that come earlier or later than it says by this share of the shortest one have moved."""
 TICKS = 1_000_000
 """Places in time between frames are counted in such parts of a frame."""
+MOSTLY = 0.8
+"""The strobe may have stopped where such a share of the frames after the first odd one are odd."""
 ODD_RUN = 8
 """A strobe may have begun anew where the median loss of so many frames in a row is odd."""
 
 
-def may_restart(found: ClipFit) -> bool:
-    """Return whether a fit leaves frames in a row as only a strobe elsewhere in its cycle does, or needs holes."""
-    if found.steps > 0:
+def may_restart(plan: Plan, rows: Profiles, found: ClipFit) -> bool:
+    """Return whether a clip stands still for long, or its fit needs holes, or leaves frames in a row as only a strobe
+    elsewhere in its cycle or none at all does."""
+    if found.steps > 0 or _stands(plan, rows).any() or lost_somewhere(plan, found):
         return True
     loss = frame_losses(found.rows, found.fit.rest)
     if len(loss) < 2 * ODD_RUN:
@@ -62,9 +59,10 @@ def may_restart(found: ClipFit) -> bool:
 
 
 def chapters(plan: Plan, rows: Profiles) -> tuple[slice, ...]:
-    """Return the stretches of frames between which the strobe began anew, all frames as one where it did not."""
-    whole = slice(0, len(rows.value))
-    left, done = [whole], list[slice]()
+    """Return the stretches of frames between which the strobe started again or stopped, all frames as one where it did
+    neither."""
+    left, done = _moving_and_still(plan, rows)
+    most = MOST_RESTARTS + len(left) + len(done)
     while left:
         part = left.pop()
         at = _restart_in(plan, rows.take(part).one_window())
@@ -72,9 +70,23 @@ def chapters(plan: Plan, rows: Profiles) -> tuple[slice, ...]:
             done.append(part)
         else:
             left += [slice(part.start, part.start + at), slice(part.start + at, part.stop)]
-        if len(left) + len(done) > MOST_RESTARTS + 1:
-            return (whole,)
+        if len(left) + len(done) > most:
+            return (slice(0, len(rows.value)),)
     return tuple(sorted(done, key=lambda one: one.start))
+
+
+def _moving_and_still(plan: Plan, rows: Profiles) -> tuple[list[slice], list[slice]]:
+    """Return the stretches of frames that change, and those in which the picture stands still in flashes' stead."""
+    stands = _stands(plan, rows)
+    edges = [0, *(np.flatnonzero(np.diff(stands)) + 1).tolist(), len(stands)]
+    parts = [slice(first, end) for first, end in pairwise(edges)]
+    return [one for one in parts if not stands[one.start]], [one for one in parts if stands[one.start]]
+
+
+def _stands(plan: Plan, rows: Profiles) -> Mask:
+    stands = still(plan, rows) & ~unlit(plan, rows)
+    stands[:-1] |= stands[1:]  # the frame that is repeated may be the first of them
+    return stands
 
 
 def _restart_in(plan: Plan, rows: Profiles) -> int | None:
@@ -86,6 +98,8 @@ def _restart_in(plan: Plan, rows: Profiles) -> int | None:
     seed = find_seed(plan, lit)
     few = (lit.turned() if seed.beat.upward else lit).binned(TRACK_ROWS)
     kept = renumbered(few, seed.numbering)
+    if not shows_strobe(plan, kept.take(seed.frames), seed.beat):
+        return None
     frames = np.flatnonzero(~dark)[seed.numbering.kept]
     tracked = track(plan, kept, seed.beat, seed.frames, memory=memory_frames(plan, rows), leap=leap)
     at = tracked.leaps[0] if tracked.leaps else _beside_holes(plan, kept, tracked)
@@ -119,18 +133,39 @@ def leap(plan: Plan, rows: Profiles, beat: Beat, known: slice, ahead: slice, ext
     after = slice(first, first + AFTER) if sign > 0 else slice(max(len(stayed) - first - AFTER, 0), len(stayed) - first)
     shift_s = _likeliest_shift_s(plan, learnt, rows.take(span).take(after).one_window(), beat, light)
     went = losses_of(plan, learnt, moved(asked, shift_s), beat, light)[::sign]
-    if float(np.median(went[first : first + AFTER])) > usual + SUSPICIOUS or _whole_frames(plan, rows, beat, shift_s):
-        return None
-    count = len(extra)
     course = rows.take(ahead).one_window()
     course = replace(course, index=course.index + sign * extra)
+    bridged = losses_of(plan, learnt, course, beat, light)[::sign]
+    if float(np.median(went[first : first + AFTER])) > usual + SUSPICIOUS:
+        anywhere = _least_losses(plan, learnt, rows.take(span).take(after).one_window(), beat, light)
+        foretold = float(np.median(anywhere)) < usual + SUSPICIOUS
+        return None if foretold else _lost(plan, rows, beat, ahead, sign, bridged > usual + SUSPICIOUS)
+    if _whole_frames(plan, rows, beat, shift_s):
+        return None
+    count = len(extra)
     steps = int((np.diff(extra[::sign], prepend=0) != 0).sum())
-    cost = float(losses_of(plan, learnt, course, beat, light).sum()) + JUMP_COST * steps
+    cost = float(bridged.sum()) + JUMP_COST * steps
     here = np.append(0.0, np.cumsum(stayed[:count])) + np.append(np.cumsum(went[:count][::-1])[::-1], 0.0)
     best = int(here.argmin())
     if here[best] + 2 * JUMP_COST > cost:
         return None
     at = ahead.start + best if sign > 0 else ahead.stop - best
+    return at if 0 < at < len(rows.value) else None
+
+
+def _lost(plan: Plan, rows: Profiles, beat: Beat, ahead: slice, sign: int, odd: Mask) -> int | None:
+    """Return the first frame ahead from which on the strobe is seen no more; None where it is.
+
+    ``odd`` (frame,) are the frames just ahead that fit no place in time, the nearest first.
+    """
+    first = int(np.argmax(odd))
+    if not odd.any() or odd[first:].mean() < MOSTLY:
+        return None
+    least, most = least_frames(plan), window_frames(plan)
+    at = ahead.start + first if sign > 0 else ahead.stop - first
+    asked = slice(at, min(at + most, len(rows.value))) if sign > 0 else slice(max(at - most, 0), at)
+    if asked.stop - asked.start < least or shows_strobe(plan, rows.take(asked), beat):
+        return None
     return at if 0 < at < len(rows.value) else None
 
 
@@ -141,10 +176,18 @@ def _likeliest_shift_s(plan: Plan, learnt: Profiles, rows: Profiles, beat: Beat,
         losses = [float(losses_of(plan, learnt, moved(rows, one), beat, light).sum()) for one in shifts_s.tolist()]
         return float(shifts_s[int(np.argmin(losses))])
 
-    shortest_s = _shortest_s(plan)
+    shortest_s = plan.shortest_flash_s
     cycle_s = plan.cycle_s * beat.clock.rate
     rough_s = best_s(np.arange(0.0, cycle_s, shortest_s / PARTS))
     return best_s(rough_s + np.arange(-FINE_PARTS, FINE_PARTS + 1) / FINE_PARTS / PARTS * shortest_s)
+
+
+def _least_losses(plan: Plan, learnt: Profiles, rows: Profiles, beat: Beat, light: FloatArray) -> FloatArray:
+    """Return how badly known brightnesses foretell each frame at its best place in the cycle, shape (frame,)."""
+    shifts_s = np.arange(0.0, plan.cycle_s * beat.clock.rate, plan.shortest_flash_s / PARTS)
+    losses = [losses_of(plan, learnt, moved(rows, one), beat, light) for one in shifts_s.tolist()]
+    least: FloatArray = np.min(losses, axis=0)
+    return least
 
 
 def _whole_frames(plan: Plan, rows: Profiles, beat: Beat, shift_s: float) -> bool:
@@ -152,7 +195,7 @@ def _whole_frames(plan: Plan, rows: Profiles, beat: Beat, shift_s: float) -> boo
     cycle_s = plan.cycle_s * beat.clock.rate
     frames_s = np.arange(-MOST, 2 * MOST + 1) * rows.period_s
     apart_s = np.abs((shift_s - frames_s + 0.5 * cycle_s) % cycle_s - 0.5 * cycle_s)
-    return float(apart_s.min()) < WHOLE_FRAMES * _shortest_s(plan)
+    return float(apart_s.min()) < WHOLE_FRAMES * plan.shortest_flash_s
 
 
 def _beside_holes(plan: Plan, rows: Profiles, tracked: FrameTrack) -> int | None:
@@ -181,14 +224,10 @@ def _apart(plan: Plan, rows: Profiles, at: int, beat: Beat) -> bool:
         tried = replace(ticks, index=index)
         return float(frame_losses(rows, unexplained(plan, tried, near)).sum())
 
-    shifts_s = np.arange(-FINE_PARTS, FINE_PARTS + 1) / FINE_PARTS * 0.5 * _shortest_s(plan)
+    shifts_s = np.arange(-FINE_PARTS, FINE_PARTS + 1) / FINE_PARTS * 0.5 * plan.shortest_flash_s
     losses = np.array([left(one) for one in shifts_s.tolist()])
     best = int(losses.argmin())
-    return abs(float(shifts_s[best])) > APART * _shortest_s(plan) and losses[FINE_PARTS] - losses[best] > HOLDS
-
-
-def _shortest_s(plan: Plan) -> float:
-    return min(plan.flashes[slot].duration_s for slot in plan.lit_slots)
+    return abs(float(shifts_s[best])) > APART * plan.shortest_flash_s and losses[FINE_PARTS] - losses[best] > HOLDS
 
 
 def reach(plan: Plan, rows: Profiles, found: ClipFit, frames: slice, *, sign: int) -> int:

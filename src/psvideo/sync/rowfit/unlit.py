@@ -7,7 +7,7 @@ and keep the places in time that their numbering gives them.
 import numpy as np
 
 from psvideo.model.plan import Plan
-from psvideo.sync.rowfit.coarse.retime import REPEATED_MOST, Mask
+from psvideo.sync.rowfit.coarse.retime import REPEATED_MOST, Mask, twins
 from psvideo.sync.rowfit.profiles import Profiles, slot_unknowns
 from psvideo.sync.rowfit.row_model import IntArray
 
@@ -27,12 +27,26 @@ def unlit(plan: Plan, rows: Profiles) -> Mask:
     seen = few.spread > VARIES * few.spread.max()
     floor = np.percentile(few.value, FLOOR, axis=0)
     dark = np.abs((few.value - floor) / few.spread)[:, seen].mean(axis=1) < DARK
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], dark.astype(np.int64), [0]])))
+    found = _in_long_runs(plan, rows, dark)
+    return found if (~found).mean() > LEAST_SHARE else np.zeros_like(found)
+
+
+def still(plan: Plan, rows: Profiles) -> Mask:
+    """Return the frames that look like those before them for longer than a strobe leaves any, shape (frame,).
+
+    They show a picture that is frozen, or a scene without flashes that is brighter than where it is darkest.
+    """
+    return _in_long_runs(plan, rows, twins(rows.binned(ROWS)))
+
+
+def _in_long_runs(plan: Plan, rows: Profiles, odd: Mask) -> Mask:
+    """Return those of the odd frames (frame,) that are more in a row than repeated frames of one dark time are."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], odd.astype(np.int64), [0]])))
     longest = REPEATED_MOST * (int(_longest_dark_s(plan) / rows.period_s) + 1)
-    found = np.zeros(len(dark), np.bool_)
+    found = np.zeros(len(odd), np.bool_)
     for first, last in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         found[first:last] = last - first > longest
-    return found if (~found).mean() > LEAST_SHARE else np.zeros_like(found)
+    return found
 
 
 def with_unlit(rows: Profiles, index: IntArray, unlit: Mask) -> IntArray:

@@ -103,7 +103,7 @@ def convincing(plan: Plan, found: ClipFit) -> bool:
         and (not often or min(share, explained) > 0.9)
         and (_excuses(plan, found) < EXCUSES or share > UNSURE_GAIN)
         and abs(fit.beat.clock.mean_offset_ppm()) < MOST_PPM
-        and (found.slack_s > 0 or fit.shift_error_s < LOST * _shortest_s(plan))
+        and (found.slack_s > 0 or fit.shift_error_s < LOST * plan.shortest_flash_s)
     )
 
 
@@ -157,7 +157,7 @@ def _feigned(plan: Plan, found: ClipFit) -> bool:
 
 
 def _unsure(plan: Plan, found: ClipFit) -> bool:
-    return found.slack_s == 0 and found.fit.shift_error_s > UNSURE * _shortest_s(plan)
+    return found.slack_s == 0 and found.fit.shift_error_s > UNSURE * plan.shortest_flash_s
 
 
 def _gaps_feigned(found: ClipFit) -> bool:
@@ -170,7 +170,7 @@ def flashes_differ(plan: Plan, found: ClipFit) -> bool:
     rows, beat = found.rows.take(slice(0, LENGTH_FRAMES)).binned(48), found.fit.beat
     rest = unexplained(plan, rows, beat)
     limit = FLASHES_DIFFER * robust_loss(rows, rest, rest)
-    shortest_s = _shortest_s(plan)
+    shortest_s = plan.shortest_flash_s
     tails_s = beat.rise_s + beat.fall_s - plan.rise_s - plan.fall_s
     for factor in OTHER_LENGTHS:
         longer_s = (factor - 1) * shortest_s
@@ -185,7 +185,3 @@ def flashes_differ(plan: Plan, found: ClipFit) -> bool:
         if robust_loss(rows, unexplained(other, rows, moved), rest) < limit:
             return True
     return False
-
-
-def _shortest_s(plan: Plan) -> float:
-    return min(plan.flashes[slot].duration_s for slot in plan.lit_slots)

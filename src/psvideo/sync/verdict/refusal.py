@@ -38,7 +38,7 @@ def nothing_to_find(plan: Plan, rows: Profiles) -> str:
             f"holds {counted(len(rows.value), 'frame')}; finding the timing of a strobe with "
             f"{counted(len(plan.lit_slots), 'lit flash')} a round needs at least {least}, and 50 or more make it sure."
         )
-    shortest_s = min(plan.flashes[slot].duration_s for slot in plan.lit_slots)
+    shortest_s = plan.shortest_flash_s
     if shortest_s > plan.camera.frame_period_s:
         return (
             f"the plan's flashes last {show_seconds(shortest_s)} and more, longer than a frame of "

@@ -35,6 +35,8 @@ ALIKE = 0.01
 LEAST_LIGHTS = 3
 UNSURE = 0.05
 """Share of a flash from which on a standard error is worth a word."""
+MUCH = 0.5
+"""Share of the times' error from which on its source is worth a word."""
 
 
 def remarks(plan: Plan, found: ClipFit) -> tuple[str, ...]:
@@ -46,6 +48,7 @@ def remarks(plan: Plan, found: ClipFit) -> tuple[str, ...]:
         *_camera(plan, found),
         _exposure(plan, found),
         _soft(found),
+        _unsteady(found),
         _sureness(plan, found),
     ]
     return tuple(sentence for sentence in said if sentence)
@@ -69,6 +72,15 @@ def _clock(plan: Plan, found: ClipFit) -> str:
     return ""
 
 
+def _unsteady(found: ClipFit) -> str:
+    if found.unsteady_s == 0.0 or found.unsteady_s < MUCH * found.fit.shift_error_s:
+        return ""
+    return (
+        "Some flashes in a row come early or late against all the others, as where the strobe's clock jumped or frames "
+        f"are missing: that makes much of the times' error of {show_seconds(found.fit.shift_error_s)}."
+    )
+
+
 def _mixed(plan: Plan, beat: Beat) -> str:
     short_s = beat.exposure_s - plan.dark_s * beat.clock.rate
     span_s = plan.camera.frame_period_s
@@ -77,7 +89,7 @@ def _mixed(plan: Plan, beat: Beat) -> str:
     return (
         f"The dark time of {plan.dark_s * 1e3:.4g} ms is shorter than the exposure of {beat.exposure_s * 1e3:.4g} ms: "
         f"about {100 * min(short_s / span_s, 1):.0f} % of the rows of every frame hold two flashes, which cannot be "
-        "taken apart. Lengthen the dark time or shorten the exposure."
+        "separated. Lengthen the dark time or shorten the exposure."
     )
 
 
@@ -180,7 +192,7 @@ def _soft(found: ClipFit) -> str:
 
 def _sureness(plan: Plan, found: ClipFit) -> str:
     error_s = found.fit.shift_error_s
-    shortest_s = min(plan.flashes[slot].duration_s for slot in plan.lit_slots)
+    shortest_s = plan.shortest_flash_s
     if found.slack_s > 0:
         return (
             f"The flashes' times are known to +- {found.slack_s * 1e3:.3g} ms only: no row opens or closes during a "

@@ -168,7 +168,7 @@ def _differences(rows: Profiles) -> FloatArray:
 
 def _cycles(plan: Plan, rows: Profiles, index: IntArray, range_ppm: float) -> FloatArray:
     """Return the lengths that a cycle may have, in frames, so close that none slips by more than a quarter flash."""
-    shortest_s = min(plan.flashes[slot].duration_s for slot in plan.lit_slots)
+    shortest_s = plan.shortest_flash_s
     span_s = LARGEST_STEP / 2 * float(index[-1] - index[0] + 1) * rows.period_s
     slips = int(np.ceil(range_ppm * 1e-6 * span_s / (0.5 * shortest_s)))
     rate = 1.0 + np.linspace(-1.0, 1.0, 2 * slips + 1) * range_ppm * 1e-6

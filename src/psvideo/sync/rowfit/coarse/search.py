@@ -81,7 +81,7 @@ def _sum_over(
 
 
 def _grid(plan: Plan, rows: Profiles, range_ppm: float) -> tuple[FloatArray, FloatArray]:
-    shortest_s = _shortest_s(plan)
+    shortest_s = plan.shortest_flash_s
     steps = int(np.ceil(plan.cycle_s / (shortest_s / 3)))
     phases_s: FloatArray = np.arange(steps, dtype=np.float64) * (plan.cycle_s / steps)
     return phases_s, clock_ratios_ppm(plan, rows, range_ppm)
@@ -90,13 +90,9 @@ def _grid(plan: Plan, rows: Profiles, range_ppm: float) -> tuple[FloatArray, Flo
 def clock_ratios_ppm(plan: Plan, rows: Profiles, range_ppm: float) -> FloatArray:
     """Return the clock ratios of the grid: half a flash's slip over the frames apart, up to ``range_ppm``."""
     span_s = float(rows.frame_start_s[-1] - rows.frame_start_s[0]) + rows.period_s
-    slips = int(np.ceil(range_ppm * 1e-6 * span_s / (0.5 * _shortest_s(plan))))
+    slips = int(np.ceil(range_ppm * 1e-6 * span_s / (0.5 * plan.shortest_flash_s)))
     ppm: FloatArray = np.linspace(-1.0, 1.0, 2 * slips + 1) * range_ppm if slips else np.zeros(1)
     return ppm
-
-
-def _shortest_s(plan: Plan) -> float:
-    return min(plan.flashes[slot].duration_s for slot in plan.lit_slots)
 
 
 def losses(plan: Plan, rows: Profiles, clocks: list[FoundClock], start: Beat, *, place: FloatArray) -> FloatArray:

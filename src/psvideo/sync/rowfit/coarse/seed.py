@@ -23,7 +23,7 @@ from psvideo.sync.rowfit.coarse.rounds_first import search_coded
 from psvideo.sync.rowfit.coarse.search import search
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.refine import refined_beat
-from psvideo.sync.rowfit.tracking.track import frame_losses
+from psvideo.sync.rowfit.tracking.losses import frame_losses
 
 SEARCH_ROWS = 36
 SEED_ROWS = 144

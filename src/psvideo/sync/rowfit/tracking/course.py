@@ -10,7 +10,8 @@ from psvideo.sync.rowfit.coarse.seed import CLEARER, Seed, gain_of, other_seeds,
 from psvideo.sync.rowfit.profiles import Profiles, unexplained
 from psvideo.sync.rowfit.row_model import IntArray
 from psvideo.sync.rowfit.tracking.ends import ends
-from psvideo.sync.rowfit.tracking.track import FrameTrack, from_first_frame, settled, track, with_repeats
+from psvideo.sync.rowfit.tracking.holes import settled, with_repeats
+from psvideo.sync.rowfit.tracking.track import FrameTrack, from_first_frame, track
 
 TRACK_ROWS = 60
 GOOD_COURSE = 0.9
@@ -91,13 +92,15 @@ def memory_frames(plan: Plan, rows: Profiles) -> int:
 def _clock_of(plan: Plan, tracked: FrameTrack) -> FoundClock:
     """Return a straight clock through the track's anchors, or a bent one where they stray from it."""
     clock = tracked.beat.clock
-    if len(tracked.at_s) < 2:
+    at_s, first = np.unique(tracked.at_s, return_index=True)  # frames that are repeated throughout end where others do
+    late_s = tracked.late_s[first]
+    if len(at_s) < 2:
         return clock
-    line = np.polyfit(tracked.at_s, tracked.late_s, 1)
-    stray_s = tracked.late_s - np.polyval(line, tracked.at_s)
-    pivot_s = float(tracked.at_s.mean())
+    line = np.polyfit(at_s, late_s, 1)
+    stray_s = late_s - np.polyval(line, at_s)
+    pivot_s = float(at_s.mean())
     straight = clock.shifted(float(np.polyval(line, pivot_s)), 1e6 * float(line[0]), pivot_s=pivot_s)
-    shortest_s = min(plan.flashes[slot].duration_s for slot in plan.lit_slots)
+    shortest_s = plan.shortest_flash_s
     if np.median(np.abs(stray_s)) < 0.02 * shortest_s:
         return straight
-    return straight.bent(tracked.at_s, stray_s)
+    return straight.bent(at_s, stray_s)

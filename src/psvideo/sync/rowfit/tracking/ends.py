@@ -13,7 +13,9 @@ from psvideo.model.plan import Plan
 from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.profiles import Profiles, brightnesses
 from psvideo.sync.rowfit.row_model import IntArray
-from psvideo.sync.rowfit.tracking.track import MEMORY, MOST, SUSPICIOUS, losses_of
+from psvideo.sync.rowfit.tracking.holes import MEMORY
+from psvideo.sync.rowfit.tracking.losses import SUSPICIOUS, losses_of
+from psvideo.sync.rowfit.tracking.steps_ahead import MOST
 
 AT_END = 6
 """Frames at either end that are looked at."""

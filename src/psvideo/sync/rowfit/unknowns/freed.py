@@ -178,7 +178,7 @@ def _softer(plan: Plan, rows: Profiles, fit: Fit) -> bool:
     """Return whether flashes that rise and fall as slowly, and start earlier by that, fit better."""
     limit = _loss(rows, fit) - WORTH
     for share in SOFTER:
-        tail_s = share * _shortest_s(plan)
+        tail_s = share * plan.shortest_flash_s
         beat = fit.beat.with_phase(fit.beat.clock.phase_s - tail_s)
         beat = replace(beat, rise_s=beat.rise_s + tail_s, fall_s=beat.fall_s + tail_s)
         if robust_loss(rows, unexplained(plan, rows, beat), fit.rest) < limit:
@@ -188,12 +188,8 @@ def _softer(plan: Plan, rows: Profiles, fit: Fit) -> bool:
 
 def _plausible(plan: Plan, beat: Beat) -> bool:
     """Return whether a beat's tails are tails: no longer than the shortest flash, unless the plan says so."""
-    longest_s = max(_shortest_s(plan), plan.rise_s, plan.fall_s)
+    longest_s = max(plan.shortest_flash_s, plan.rise_s, plan.fall_s)
     return max(beat.rise_s, beat.fall_s) <= longest_s
-
-
-def _shortest_s(plan: Plan) -> float:
-    return min(plan.flashes[slot].duration_s for slot in plan.lit_slots)
 
 
 def _may_differ(plan: Plan) -> tuple[str, ...]:

@@ -76,7 +76,7 @@ def jitter(plan: Plan, rows: Profiles, fit: Fit) -> Jitter:
         return STEADY
     spread_s, noise = straying
     for _ in range(ROUNDS):
-        pull, stiff = (two.sum(axis=1) for two in _pulls(rows, fit, _moved(flashes, late_s)))
+        pull, stiff = (two.sum(axis=1) for two in pulls(rows, fit, moved_flashes(flashes, late_s)))
         timed = stiff > ENOUGH * float(np.median(stiff[stiff > 0]))
         seen_s = late_s[timed] + pull[timed] / stiff[timed]
         mean_s = float(np.median(seen_s))
@@ -97,12 +97,12 @@ def jitter(plan: Plan, rows: Profiles, fit: Fit) -> Jitter:
 
 def _straying(rows: Profiles, fit: Fit, flashes: Flashes) -> tuple[float, float] | None:
     """Return by how much flashes stray, and a pull's noise: its variance over its stiffness; None where none do."""
-    pull, stiff = _pulls(rows, fit, flashes)
+    pull, stiff = pulls(rows, fit, flashes)
     if _timed(stiff).sum() >= LEAST_FLASHES:
         return _agreed(pull, stiff, over=1.0)
     if gain_of(rows, fit.rest) < STILL:
         return None
-    halves = [_pulls(rows.only_rows(half), fit, flashes, half) for half in (slice(0, None, 2), slice(1, None, 2))]
+    halves = [pulls(rows.only_rows(half), fit, flashes, half) for half in (slice(0, None, 2), slice(1, None, 2))]
     return _agreed(
         np.stack([pull.sum(axis=1) for pull, _ in halves], axis=1),
         np.stack([stiff.sum(axis=1) for _, stiff in halves], axis=1),
@@ -137,22 +137,24 @@ def _agreed(pull: FloatArray, stiff: FloatArray, *, over: float) -> tuple[float,
     return float(np.sqrt(common)), noise
 
 
-def _moved(flashes: Flashes, late_s: FloatArray) -> Flashes:
+def moved_flashes(flashes: Flashes, late_s: FloatArray) -> Flashes:
     """Return the flashes as late as they were found; they stay in order."""
     return flashes._replace(start_s=np.maximum.accumulate(flashes.start_s + late_s))
 
 
-def _pulls(rows: Profiles, fit: Fit, flashes: Flashes, among: slice = slice(None)) -> tuple[FloatArray, FloatArray]:
+def pulls(
+    rows: Profiles, fit: Fit, flashes: Flashes, among: slice = slice(None), *, robust: bool = True
+) -> tuple[FloatArray, FloatArray]:
     """Return how strongly rows that open and rows that close shift each flash, shape (flash, 2) twice.
 
-    ``rows`` are those ``among`` the fit's own.
+    ``rows`` are those ``among`` the fit's own. Not ``robust``, large residuals pull as much as they are large.
     """
     seen = compiled_rows(rows, fit.beat)
     pull, stiff = np.zeros((len(flashes.start_s), 2)), np.zeros((len(flashes.start_s), 2))
     rest = np.ascontiguousarray(fit.rest[:, among])
     scale = errors_of_residuals(rows, rest, WIDE_SCALE)
-    weight = 1.0 / (1.0 + (rest / (CAUCHY * scale)) ** 2) / scale**2
-    projection.edges(seen, flashes, weight, 0, rows.value.shape[1], pull, stiff)
+    trust = 1.0 / (1.0 + (rest / (CAUCHY * scale)) ** 2) if robust else np.ones_like(rest)
+    projection.edges(seen, flashes, trust / scale**2, 0, rows.value.shape[1], pull, stiff)
     return pull, stiff
 
 
@@ -162,7 +164,7 @@ def disagreement_s(plan: Plan, rows: Profiles, fit: Fit) -> float:
     Half their distance is as large as the standard error where noise is all that parts them; blurred rows part them
     further, and that much the times are in doubt.
     """
-    pull, stiff = _pulls(rows, fit, compiled_flashes(plan, rows, fit.beat))
+    pull, stiff = pulls(rows, fit, compiled_flashes(plan, rows, fit.beat))
     if stiff.sum(axis=0).min() <= 0.0:
         return 0.0
     opening_s, closing_s = pull.sum(axis=0) / stiff.sum(axis=0)
@@ -174,14 +176,14 @@ def shift_error_s(plan: Plan, rows: Profiles, fit: Fit) -> float:
     edges = np.linspace(0, rows.value.shape[1], ROW_BLOCKS + 1).astype(int)
     if np.diff(edges).min() == 0:
         return 0.0
-    pulls, stiff = [], []
+    each, stiff = [], []
     for first, last in pairwise(edges.tolist()):
         block = rows.only_rows(slice(first, last))
         weight = np.ascontiguousarray(fit.weight[:, first:last])
         _, hessian, score = equations(plan, block, fit.beat, weight, tails=False, steepness=weight)
-        pulls.append(score[:, :2].sum())
+        each.append(score[:, :2].sum())
         stiff.append(hessian[:, :2, :2].sum())
-    pull, whole = np.array(pulls), float(np.sum(stiff))
+    pull, whole = np.array(each), float(np.sum(stiff))
     if whole <= 0.0:
         return 0.0
     pull -= np.array(stiff) * pull.sum() / whole

@@ -33,7 +33,7 @@ def centred(plan: Plan, rows: Profiles, fit: Fit) -> tuple[Fit, float]:
 
     Where the picture decides a time less closely than the fit claims, as in very short clips, its error grows to that.
     """
-    shortest_s = min(plan.flashes[slot].duration_s for slot in plan.lit_slots)
+    shortest_s = plan.shortest_flash_s
     least_s = max(fit.shift_error_s, FIRST_STEP * shortest_s)
     limit = fit.loss + WORSE
     if all(_left(plan, rows, fit, _shifted(rows, fit.beat, s * PROBE * least_s, 0.0)) > limit for s in (-1.0, 1.0)):
@@ -73,7 +73,7 @@ def _left(plan: Plan, rows: Profiles, fit: Fit, beat: Beat) -> float:
 
 def _open(plan: Plan, rows: Profiles, fit: Fit, move: Move, limit: float) -> tuple[float, float]:
     """Return how far the clock may be moved down and up before the fit leaves more than ``limit``."""
-    shortest_s = min(plan.flashes[slot].duration_s for slot in plan.lit_slots)
+    shortest_s = plan.shortest_flash_s
 
     def reach(sign: float) -> float:
         inside_s, outside_s = 0.0, FIRST_STEP * shortest_s
