@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.model.surface import Surface
-from psvideo.solve.normals.evidence import Evidence
-from psvideo.solve.normals.task import Floats, Samples
+from psvideo.solve.normals.evidence import Evidence, Indirect
+from psvideo.solve.normals.task import Bytes, Floats, Samples
 from psvideo.solve.normals.trust.fewer_lights import widened
 
 TORN, NEAR = 5, 9
@@ -69,7 +69,8 @@ class Doubting:
     indirect: how much of the angle counts by which light from around would turn the normal.
     torn, torn_beside, torn_alone_deg: how much more it is for each degree by which normals belong to no surface; these
         count up to a share of the other doubt, and little more: along creases and the outline of a thing before another
-        there are more, where normals are as good as elsewhere.
+        there are more, where normals are as good as elsewhere. Under three lights, where nothing else speaks,
+        they count by as much more as is unchecked.
 
     Fitted on a ball, a bear and a cat (DiLiGenT), a sphere with a wrong rig (Washington),
     another renderer's bunny, and virtual shapes of eight materials and under wrong rigs, under 5 to 96 lights, spread
@@ -95,7 +96,9 @@ class Signs:
     makes more where some lights are not used. ``hidden``: how many times more than ENOUGH_LIGHTS these hide of what is
     not matte. ``uneven``: the share of the misfit that changes from sample to sample, as errors of codecs do and
     surfaces do not: of that nothing is hidden. ``likely_misfit_deg``, ``likely_torn_deg``: the first and third without
-    a margin for what noise could be instead; ``noise_deg`` is what noise makes of the normals."""
+    a margin for what noise could be instead; ``noise_deg`` is what noise makes of the normals. ``unchecked_deg``: what
+    lights that cannot be held against each other leave of real surfaces, though nothing shows; it counts in errors, and
+    not in what is trusted."""
 
     misfit_deg: Floats
     indirect_deg: Floats
@@ -106,6 +109,7 @@ class Signs:
     likely_torn_deg: Floats
     noise_deg: Floats
     uneven: Floats | float = 0.0
+    unchecked_deg: Floats | float = 0.0
 
     def at(self, some: NDArray[np.bool_] | NDArray[np.intp]) -> "Signs":
         """Return the signs of some of the points."""
@@ -129,7 +133,7 @@ class ThinSurface:
     @cached_property
     def planes(self) -> Floats:
         """The normals, (3, row, col)."""
-        return np.moveaxis(self.surface.normals, -1, 0).astype(np.float32)
+        return np.ascontiguousarray(np.moveaxis(self.surface.normals, -1, 0), np.float32)
 
     @cached_property
     def brightness(self) -> Floats:
@@ -141,60 +145,54 @@ class ThinSurface:
         """Where there is a normal."""
         return self.surface.valid
 
+    @cached_property
+    def widths(self) -> tuple[int, int]:
+        """How many points are around a point, and far around."""
+        return width_of(self.known, AROUND), width_of(self.known, FAR_AROUND)
+
+    @cached_property
+    def known_bytes(self) -> Bytes:
+        """The same, as compiled loops take it."""
+        return np.ascontiguousarray(self.surface.valid).view(np.uint8)
+
 
 def signs_of(points: ThinSurface, one: Evidence, turned_deg: Floats | None = None) -> Signs:
     """Return what speaks against the points' normals. ``turned_deg`` is by how much motion turns them, which is no
     misfit of rig or surface. Raises ValueError where nobody looked for light from around."""
     if one.indirect is None:
         raise ValueError("`indirect` expected in the evidence: see indirect.py")
-    fit = np.minimum(points.fit_deg, MOST_FIT_DEG)
-    sums, counts = one.indirect
-    lights = len(one.plates)
+    from psvideo.solve.normals.trust.doubting_kernel import fill_squares
+
+    lights, plain = len(one.plates), points.surface.error_deg is None
     strengths = one.lit.intensities.mean(axis=1)[:, None]
-    used = (lights - counts).astype(np.intp)
-    wider = widened(one.lit.directions * strengths, MOST_WIDENED)[used]
-    plain = points.surface.error_deg is None
-    checked = plain | (used > 3)  # three measurements leave no residual, and say nothing of the surface
-    noise = points.fit_of_noise_deg**2 * (1 if plain else wider)
-    squares = np.where(points.known, fit**2 - UNSURE_OF_NOISE * noise, np.float32(0))
+    wider = widened(one.lit.directions * strengths, MOST_WIDENED)
+    squares, noise, shown = np.empty((3, *points.known.shape), np.float32)
+    fill_squares(
+        line(points.fit_deg), line(points.fit_of_noise_deg), points.known_bytes.reshape(-1), line(points.brightness),
+        line(one.indirect.counts), wider, plain, float(UNSURE_OF_NOISE), float(MOST_FIT_DEG), line(squares),
+        line(noise), line(shown),
+    )  # fmt: skip
     if turned_deg is not None:
         squares *= cv2.blur(turned_deg, (OF_MOTION, OF_MOTION)) < MOVING_DEG
-    around, far_around = (width_of(points.known, share) for share in (AROUND, FAR_AROUND))
-    far = _mean(sums, far_around) / np.maximum(_mean(counts, far_around), LEAST_LIGHTS)
-    near = _mean(sums, around) + np.float32(LEAST_LIGHTS) * far  # where all lights reach what is around, farther off
-    indirect = np.maximum(near / (_mean(counts, around) + np.float32(LEAST_LIGHTS)), 0)
-    own = np.maximum(sums / np.maximum(counts, 1) - 2 * np.radians(points.noise_deg), 0)
-    albedo = points.brightness * points.known
-    shown = np.minimum(albedo, albedo.sum() / max(np.count_nonzero(points.known), 1))  # glare is no more than the rest
-    bright = albedo * albedo
-    common = (noise * bright).sum() / max(bright.sum(), 1e-9)  # black cloth is nothing but noise
-    unsure = np.minimum(noise, common) * checked
-    outlying = OUTLYING_OF_ONE if lights == 4 else OUTLYING_OF_MORE
-    surroundings = [
-        _Surroundings.of(noise, shown, width, unsure=unsure, outlying=outlying) for width in (around, far_around)
-    ]
-    typical = [each.typical(squares) for each in surroundings]
-    misfit_deg = np.maximum(*(each.surely(found) for each, found in zip(surroundings, typical, strict=True)))
-    likely_deg = np.maximum(*(each.likely(found) for each, found in zip(surroundings, typical, strict=True)))
-    uneven: Floats | float = 0.0
+    surroundings = _Surroundings.both(points, noise, shown, one)
+    misfit_deg, likely_deg = _roots(squares, surroundings)
+    uneven = np.zeros_like(noise)
     if plain and lights > 3:
-        changes = _changes(fit, points, lights - 3) - UNSURE_OF_NOISE * noise
-        changing_deg = np.maximum(*(each.surely(each.typical(changes)) for each in surroundings))
+        changing_deg, _ = _roots(_changes(points, noise, lights - 3), surroundings)
         share = (changing_deg / np.maximum(misfit_deg, np.float32(1e-6))) ** 2
         uneven = np.clip((share - SURFACES_UNEVEN) / (1 - SURFACES_UNEVEN), 0, 1)
-    of_noise = points.noise_deg**2
-    torn_squared = _torn_squared(points) - SURELY_TORN**2 * (of_noise + uneven * misfit_deg**2)
-    likely_torn_squared = torn_squared + (SURELY_TORN**2 - TORN_OF_NOISE**2) * of_noise
+    torn_deg, likely_torn_deg = _torn_deg(points, misfit_deg, uneven)
+    used = (lights - one.indirect.counts).astype(np.intp)
     return Signs(
         misfit_deg=misfit_deg,
         likely_misfit_deg=likely_deg,
         uneven=uneven,
-        indirect_deg=np.degrees(indirect + own) * _turned(points.planes, one),
-        torn_deg=np.sqrt(np.maximum(torn_squared, 0)),
-        likely_torn_deg=np.sqrt(np.maximum(likely_torn_squared, 0)),
+        indirect_deg=_indirect_deg(points, one, one.indirect),
+        torn_deg=torn_deg,
+        likely_torn_deg=likely_torn_deg,
         noise_deg=points.noise_deg,
-        lost_deg=points.noise_deg * np.sqrt(wider - 1),
-        hidden=hidden_by(len(one.plates)) / hidden_by(ENOUGH_LIGHTS),
+        lost_deg=points.noise_deg * np.sqrt(wider - 1)[used],
+        hidden=hidden_by(lights) / hidden_by(ENOUGH_LIGHTS),
     )
 
 
@@ -204,23 +202,20 @@ def doubt_deg(signs: Signs, *, how: Doubting = Doubting()) -> Floats:
     Noise hides part of the signs. With it an error is never predicted smaller than without: what signs are likely to be
     counts where that is more than noise and what they surely are.
     """
-    sure = _doubt_of(signs.misfit_deg, signs.torn_deg, signs, how)
-    likely = _doubt_of(signs.likely_misfit_deg, signs.likely_torn_deg, signs, how)
-    lost = signs.lost_deg * signs.lost_deg
-    squares = np.maximum(sure * sure + lost, likely * likely - signs.noise_deg * signs.noise_deg)
-    return np.asarray(np.sqrt(squares), np.float32)
+    from psvideo.solve.normals.trust.doubting_kernel import fill_doubt
 
-
-def _doubt_of(misfit_deg: Floats, torn_deg: Floats, signs: Signs, how: Doubting) -> Floats:
-    """Return the doubt that a misfit and torn normals make beside the other signs, without what noise makes more."""
-    shows = np.maximum(misfit_deg, np.float32(1e-9)) ** np.float32(1 + how.misfit_power)
-    shows = np.where(misfit_deg > 0, shows, np.float32(0))  # powers of 0 are usual, and slow
-    misfit = np.float32(how.misfit_deg) * shows
-    misfit *= np.float32(signs.hidden**how.few_power) / (misfit_deg + np.float32(how.little_deg))
-    misfit -= np.asarray(signs.uneven, np.float32) * np.maximum(misfit - misfit_deg, 0)
-    both = np.hypot(misfit, np.float32(how.indirect) * signs.indirect_deg)
-    most_torn = np.float32(how.torn_beside) * both + np.float32(how.torn_alone_deg)
-    return np.asarray(both + np.float32(how.torn) * np.minimum(torn_deg, most_torn), np.float32)
+    counts = how.misfit_deg * signs.hidden**how.few_power
+    factors = (counts, how.misfit_power, how.little_deg, how.indirect, how.torn, how.torn_beside, how.torn_alone_deg)
+    planes = np.stack(
+        [
+            *(signs.misfit_deg, signs.torn_deg, signs.likely_misfit_deg, signs.likely_torn_deg),
+            *(signs.indirect_deg, signs.lost_deg, signs.noise_deg),
+            *(np.broadcast_to(np.float32(one), signs.misfit_deg.shape) for one in (signs.uneven, signs.unchecked_deg)),
+        ]
+    )
+    doubt = np.empty(planes.shape[1:], np.float32)
+    fill_doubt(planes.reshape(len(planes), -1), np.array(factors, np.float32), doubt.reshape(-1))
+    return doubt
 
 
 def width_of(known: NDArray[np.bool_] | Floats, share: float) -> int:
@@ -234,67 +229,91 @@ class _Surroundings:
 
     ``shown``, each point's albedo up to the mean, is its weight, and ``weight`` the mean of it around: a little stray
     light, or what is lost in a file's codes, turns the normals of black cloth far, and says nothing of the subject
-    before it. ``passed_noise`` is how much of a point's square passes for noise, ``by_chance`` what chance could leave
-    of noise over as many points, and ``margin`` what was taken off for noise that is known no better.
+    before it. ``noise`` is what noise alone would make of squares; ``outlying`` times that is none of an outlier's.
+    ``by_chance`` is what chance could leave of it over as many points, and ``margin`` what was taken off since it is
+    known no better.
     """
 
     width: int
     shown: Floats
     weight: Floats
-    passed_noise: Floats
+    noise: Floats
+    outlying: int
     by_chance: Floats
     margin: Floats
 
     @classmethod
-    def of(cls, noise: Floats, shown: Floats, width: int, *, unsure: Floats, outlying: int) -> "_Surroundings":
-        """Look around; ``noise`` is what noise alone would make of squares, of which UNSURE_OF_NOISE times as much is
-        taken off them: of ``unsure`` a margin. ``outlying`` times the noise is none of an outlier's."""
-        weight = _mean(shown, width)
-        count = _mean((shown > 0).astype(np.float32), width) * np.float32(width**2)
-        by_chance = CERTAIN * np.sqrt(2 / np.maximum(count, 1)) * _mean(noise * shown, width) / weight
-        margin = (UNSURE_OF_NOISE - 1) * _mean(unsure * shown, width) / weight
-        return cls(
-            width=width,
-            shown=shown,
-            weight=weight,
-            passed_noise=outlying * noise,
-            by_chance=by_chance,
-            margin=margin,
+    def both(cls, points: ThinSurface, noise: Floats, albedo: Floats, one: Evidence) -> "list[_Surroundings]":
+        """Look around the points, near and far; ``albedo``, zeros where nothing is known, becomes ``shown``."""
+        from psvideo.solve.normals.trust.doubting_kernel import fill_levels, fill_weighed
+
+        if one.indirect is None:
+            raise ValueError("`indirect` expected in the evidence: see indirect.py")
+        lights, plain = len(one.plates), points.surface.error_deg is None
+        bright = albedo * albedo
+        common = (noise * bright).sum() / max(bright.sum(), 1e-9)  # black cloth is nothing but noise
+        most = albedo.sum() / max(np.count_nonzero(points.known), 1)  # glare is no more than the rest
+        weighed, counts = np.empty((*noise.shape, 4), np.float32), line(one.indirect.counts)
+        fill_weighed(
+            line(noise), line(albedo), counts, lights, plain, float(most), float(common), weighed.reshape(-1, 4)
         )
+        found = []
+        for width in points.widths:
+            levels, unsure = np.empty((3, *noise.shape), np.float32), float(UNSURE_OF_NOISE - 1)
+            means = _blurred(weighed, width).reshape(-1, 4)
+            fill_levels(means, float(width**2), float(CERTAIN), unsure, levels.reshape(3, -1))
+            weight, by_chance, margin = levels
+            found.append(
+                cls(
+                    width=width,
+                    shown=albedo,
+                    weight=weight,
+                    noise=noise,
+                    outlying=OUTLYING_OF_ONE if lights == 4 else OUTLYING_OF_MORE,
+                    by_chance=by_chance,
+                    margin=margin,
+                )
+            )
+        return found
 
     def typical(self, squares: Floats) -> Floats:
-        """Return the typical ``squares``, of which the caller has taken off the mean that noise makes. Outliers count
-        as OUTLYING times what is typical."""
-        typical = _mean(squares * self.shown, self.width) / self.weight
+        """Return the typical ``squares``, of which the caller has taken off the mean that noise makes, times the
+        weight. Outliers count as OUTLYING times what is typical."""
+        from psvideo.solve.normals.trust.doubting_kernel import fill_limited
+
+        limited = squares * self.shown
+        means = _blurred(limited, self.width)
+        given = line(squares), line(self.shown), line(self.noise), line(self.weight)
+        limits = float(OUTLYING**2), float(self.outlying), float(LEAST_LEVEL_DEG**2)
         for _ in range(TURNS):
-            most = OUTLYING**2 * np.maximum(typical, LEAST_LEVEL_DEG**2) + self.passed_noise
-            typical = _mean(np.minimum(squares, most) * self.shown, self.width) / self.weight
-        return typical
-
-    def surely(self, typical: Floats) -> Floats:
-        """Return the root of what is typical, without what chance could leave of noise."""
-        return np.asarray(np.sqrt(np.maximum(typical - self.by_chance, 0)), np.float32)
-
-    def likely(self, typical: Floats) -> Floats:
-        """Return the root of what is typical, with the margin back that was taken off for noise."""
-        return np.asarray(np.sqrt(np.maximum(typical + self.margin, 0)), np.float32)
+            fill_limited(*given, line(means), *limits, line(limited))
+            means = _blurred(limited, self.width, means)
+        return means
 
 
-def _changes(fit: Floats, points: ThinSurface, free: int) -> Floats:
-    """Return the square of what residuals predict, as far as it changes from sample to sample: a root of ``free``
-    squares of independent numbers varies so much about its mean."""
-    apart = max(UNEVEN_PX // points.step, 1)
-    squares, count = np.zeros_like(fit), np.full_like(fit, 1e-9)
-    for axis in (0, 1):
-        here = [slice(None), slice(None)]
-        there = list(here)
-        here[axis], there[axis] = slice(None, -apart), slice(apart, None)
-        a, b = tuple(here), tuple(there)
-        both = points.known[a] & points.known[b]
-        squares[a] += np.where(both, (fit[a] - fit[b]) ** 2 / 2, 0)
-        count[a] += both
+def _roots(squares: Floats, surroundings: list[_Surroundings]) -> tuple[Floats, Floats]:
+    """Return the root of what is typical near or far, whichever is more: what is more than chance, and what is likely,
+    with the margin back that was taken off for noise."""
+    from psvideo.solve.normals.trust.doubting_kernel import raise_to_roots
+
+    surely, likely = np.zeros((2, *squares.shape), np.float32)
+    for each in surroundings:
+        means = line(each.typical(squares))
+        raise_to_roots(means, line(each.weight), line(each.by_chance), line(each.margin), line(surely), line(likely))
+    return surely, likely
+
+
+def _changes(points: ThinSurface, noise: Floats, free: int) -> Floats:
+    """Return the square of what residuals predict, as far as it changes from sample to sample beyond noise: a root of
+    ``free`` squares of independent numbers varies so much about its mean."""
+    from psvideo.solve.normals.trust.doubting_kernel import fill_changes
+
     mean = np.sqrt(2 / free) * math.gamma((free + 1) / 2) / math.gamma(free / 2)
-    return np.asarray(squares / count / np.float32(1 - mean * mean), np.float32)
+    changes, apart = np.empty_like(noise), max(UNEVEN_PX // points.step, 1)
+    most, scale, unsure = float(MOST_FIT_DEG), float(1 / (1 - mean * mean)), float(UNSURE_OF_NOISE)
+    fit = np.ascontiguousarray(points.fit_deg)
+    fill_changes(fit, points.known_bytes, noise, apart, most, scale, unsure, changes)
+    return changes
 
 
 def brightness(albedo: NDArray[np.floating]) -> Floats:
@@ -314,37 +333,44 @@ def hidden_by(lights: int) -> float:
     return lights / max(lights - 3, 1)
 
 
-def _turned(normals: Floats, one: Evidence) -> Floats:
-    """Return by how many radians light turns the normal that every lamp adds alike, for each share of the albedo:
-    least squares takes it for a vector, of which what lies across the normal turns it."""
-    towards = one.lit.directions
-    added = (np.linalg.pinv(towards) @ np.ones(len(towards))).astype(np.float32)
-    along = np.tensordot(added, normals, 1)
-    return np.asarray(np.sqrt(np.maximum(np.float32(added @ added) - along * along, 0)), np.float32)
+def _indirect_deg(points: ThinSurface, one: Evidence, seen: Indirect) -> Floats:
+    """Return by how many degrees light from around turns the normals. Least squares takes light that every lamp adds
+    alike for a vector, of which what lies across the normal turns it."""
+    from psvideo.solve.normals.trust.doubting_kernel import fill_indirect_deg
+
+    near, far = (np.stack([_blurred(plane, width) for plane in seen]).reshape(2, -1) for width in points.widths)
+    added = (np.linalg.pinv(one.lit.directions) @ np.ones(len(one.plates))).astype(np.float32)
+    turned = np.empty(points.known.shape, np.float32)
+    fill_indirect_deg(
+        points.planes.reshape(3, -1), line(seen.sums), line(seen.counts), near, far, line(points.noise_deg), added,
+        LEAST_LIGHTS, line(turned),
+    )  # fmt: skip
+    return turned
 
 
-def _torn_squared(points: ThinSurface) -> Floats:
-    """Return the squared angle by which the normals around every point cannot be one surface's: around any four points
-    the slopes of a surface add up to 0, and what these add up to is averaged over a square."""
-    across, up, towards = points.planes
-    facing = np.maximum(towards, LEAST_FACING)
-    right, down = -across / facing, up / facing
-    known = points.known
-    within = np.zeros(known.shape, np.float32)
-    within[:-1, :-1] = known[:-1, :-1] & known[1:, :-1] & known[:-1, 1:] & known[1:, 1:]
-    along = right[:, :-1] + right[:, 1:]
-    over = down[:-1] + down[1:]
-    seen = (facing[:-1, :-1] + facing[1:, :-1] + facing[:-1, 1:] + facing[1:, 1:]) / 4
-    whole = np.zeros(known.shape, np.float32)
-    whole[:-1, :-1] = (along[:-1] - along[1:] + over[:, 1:] - over[:, :-1]) / 2 * seen ** np.float32(1.5)
-    whole = np.clip(whole, -MOST_TORN, MOST_TORN) * within
-    each = np.degrees(_mean(whole, TORN) / _mean(within, TORN)) * np.float32(TORN / 2)
-    return _mean(each * each * within, NEAR) / _mean(within, NEAR)
+def _torn_deg(points: ThinSurface, misfit_deg: Floats, uneven: Floats) -> tuple[Floats, Floats]:
+    """Return the angle by which the normals around every point surely cannot be one surface's, and likely: around any
+    four points the slopes of a surface add up to 0, and what these add up to is averaged over a square."""
+    from psvideo.solve.normals.trust.doubting_kernel import fill_torn, fill_torn_deg, square_torn
+
+    torn = np.empty((*points.known.shape, 2), np.float32)
+    fill_torn(points.planes, points.known_bytes, float(LEAST_FACING), float(MOST_TORN), torn)
+    square_torn(_blurred(torn, TORN).reshape(-1, 2), torn.reshape(-1, 2), math.degrees(TORN / 2))
+    angles = np.empty((2, *points.known.shape), np.float32)
+    given = line(points.noise_deg), line(misfit_deg), line(uneven)
+    shares = float(SURELY_TORN), float(TORN_OF_NOISE)
+    fill_torn_deg(_blurred(torn, NEAR).reshape(-1, 2), *given, *shares, angles.reshape(2, -1))
+    return angles[0], angles[1]
 
 
-def _mean(plane: Floats, width: int) -> Floats:
-    """Return means over squares; of nothing a little, so that it can be divided by."""
-    return np.asarray(cv2.blur(plane, (width, width), borderType=cv2.BORDER_CONSTANT) + np.float32(1e-9), np.float32)
+def line(plane: Floats) -> Floats:
+    """Return a plane as one line of float32, in the same memory where it is one."""
+    return np.ascontiguousarray(plane, np.float32).reshape(-1)
+
+
+def _blurred(plane: Floats, width: int, into: Floats | None = None) -> Floats:
+    """Return means over squares, beyond whose borders there is nothing."""
+    return np.asarray(cv2.blur(plane, (width, width), into, borderType=cv2.BORDER_CONSTANT), np.float32)
 
 
 def stored(surface: Surface) -> tuple[Samples, Samples]:

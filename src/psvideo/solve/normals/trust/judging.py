@@ -28,6 +28,7 @@ from psvideo.solve.normals.trust.doubting import (
 )
 from psvideo.solve.normals.trust.moving_doubt import MovingDoubt, moved_deg, moving_doubt_deg
 from psvideo.solve.normals.trust.near_spread import NearSpread, near_spread
+from psvideo.solve.normals.trust.unchecked import ALL_EXPLAINED, unchecked_deg
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,14 +78,13 @@ def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging =
         moving = moving_doubt_deg(turned_deg, signs.torn_deg, known, one.moves, how=how.moving)
     nearly = signs.misfit_deg + LIKELY_USUAL * (signs.likely_misfit_deg - signs.misfit_deg)
     usual = np.float32(how.doubting.own) * nearly
-    at_points = spread.judged(points.surface, np.stack([doubt, usual]), 1, limit_deg=0.0)[0][points.known]
+    at_points = spread.judged(points.surface, np.stack([doubt, usual]), 1, limit_deg=0.0)[0]
     misfit = surface.misfit
-    if at_points.size:
-        albedo = points.brightness[points.known]  # what is bright shows more of the subject
-        noise_deg = np.hypot(points.noise_deg, signs.lost_deg)[points.known]
-        typical, by_noise = (_usual(each, albedo) for each in (at_points, noise_deg))
+    if misfit is not None and points.known.any():
+        albedo = points.brightness * points.known  # what is bright shows more of the subject
+        typical, by_noise = (_usual(each, albedo) for each in (at_points, np.hypot(points.noise_deg, signs.lost_deg)))
         beyond_deg = float(np.sqrt(max(typical**2 - by_noise**2, 0.0)))
-        misfit = None if misfit is None else replace(misfit, error_deg=beyond_deg, noise_deg=by_noise)
+        misfit = replace(misfit, error_deg=beyond_deg, noise_deg=by_noise)
     for more in (moving, near.doubt_deg if near.doubt_deg.size else None):
         doubt = doubt if more is None else np.hypot(doubt, more)
     doubt = np.stack([doubt, usual])
@@ -92,10 +92,34 @@ def judged(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging =
     return replace(surface, valid=trusted, error_deg=error, misfit=misfit)
 
 
+def with_unchecked(surface: Surface, one: Evidence, noise: PlateNoise, *, how: Judging = Judging()) -> Surface:
+    """Return the surface with errors that count what three lights cannot show, filled pixels included; what is trusted
+    stays. Its errors' memory is taken over; under more lights they are as they were."""
+    from psvideo.solve.normals.trust.judging_kernel import add_rows
+
+    error = surface.error_deg
+    if len(one.plates) > ALL_EXPLAINED or error is None:
+        return surface
+    measured = surface.valid if surface.source is None else surface.source == MEASURED
+    points, signs = looked_at(replace(surface, valid=measured, error_deg=None, residual=None), one, noise, how=how)
+    unchecked = replace(signs, unchecked_deg=unchecked_deg(points.planes, one.lit.directions))
+    shown, whole = (doubt_deg(each, how=how.doubting) for each in (signs, unchecked))
+    more = np.sqrt(np.maximum(whole * whole - shown * shown, np.float32(0)))
+    rows, cols = error.shape
+
+    def add(first: int, last: int) -> None:
+        add_rows(bits(error), more, points.step, first, last)
+        if lie_in_files(error):
+            let_go(error[first:last])
+
+    over_ranges(add, rows, each=BAND_PIXELS // cols)
+    return surface
+
+
 def _usual(errors_deg: Floats, weights: Floats) -> float:
     """Return the mean error; where hardly anything is known it counts as MOST_USUAL_DEG."""
-    each = np.minimum(errors_deg.astype(np.float64), MOST_USUAL_DEG)
-    return float((each * weights).sum() / max(float(weights.sum(dtype=np.float64)), 1e-12))
+    each = np.minimum(errors_deg.astype(np.float32), np.float32(MOST_USUAL_DEG))
+    return float((each * weights).sum(dtype=np.float64) / max(float(weights.sum(dtype=np.float64)), 1e-12))
 
 
 def _thin_shape(surface: Surface, one: Evidence) -> tuple[int, int]:

@@ -77,6 +77,20 @@ def judge_rows(
             kept[row, col] = solved & (degrees <= limit)
 
 
+@FUSED.kept
+def add_rows(error: Samples, more: Floats, step: int, first: int, last: int) -> None:
+    """Add ``more``, degrees at every ``step``-th row and col, to rows of ``error`` (row, col), as squares; 0 stays."""
+    out, d = lent(error), lent(more)
+    cols = out.shape[1]
+    line = np.zeros(cols, np.float32)
+    for row in range(first, last):
+        _fill_between(d, row, step, line)
+        for col in range(cols):
+            one = decoded(out[row, col])
+            degrees = min(np.sqrt(one * one + line[col] * line[col]), LARGEST_DEG)
+            out[row, col] = encoded(degrees if one > ZERO else ZERO, out)
+
+
 @FUSED.inlined
 def _fill_between(coarse: Floats, row: int, step: int, line: Floats) -> None:
     """Fill a row from a plane of every ``step``-th row and column."""

@@ -1,0 +1,182 @@
+"""The compiled loops of doubting give what their formulas give in plain numpy, to rounding."""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from ring_and_ball import ring
+
+from psvideo.model.surface import Surface
+from psvideo.solve.normals.evidence import Evidence, Indirect
+from psvideo.solve.normals.illumination import Illumination
+from psvideo.solve.normals.task import Usable
+from psvideo.solve.normals.trust import doubting as d
+from psvideo.solve.normals.trust.doubting import Doubting, Signs, ThinSurface, doubt_deg, signs_of
+from psvideo.solve.normals.trust.fewer_lights import widened
+
+SHAPE = (67, 90)
+
+
+def a_surface(lights: int, *, robust: bool, seed: int) -> tuple[ThinSurface, Evidence]:
+    """Return a wavy surface with noise, holes, black cloth and a part that hardly any model explains."""
+    rng = np.random.default_rng(seed)
+    row, col = np.mgrid[: SHAPE[0], : SHAPE[1]]
+    slopes = np.stack([np.sin(col / 9), np.cos(row / 7), np.full(SHAPE, 1.5)], axis=-1)
+    normals = slopes + rng.normal(0, 0.05, (*SHAPE, 3))
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    valid = (rng.random(SHAPE) > 0.03) & (col > 8) & ~((row > 40) & (col > 70))
+    albedo = np.where(row > 50, 0.01, 0.3 + 0.2 * np.sin(row / 5)).astype(np.float32)
+    noise = (0.2 + 0.3 * rng.random(SHAPE)).astype(np.float32)
+    fit = (noise * rng.chisquare(1, SHAPE) + 3 * (col > 60) + 40 * (rng.random(SHAPE) > 0.99)).astype(np.float32)
+    counts = rng.integers(0, lights, SHAPE).astype(np.float32)
+    planes = np.ascontiguousarray(np.moveaxis(normals.astype(np.float16), -1, 0))
+    surface = Surface(
+        normals=np.moveaxis(planes, 0, -1),
+        albedo=albedo,
+        valid=valid,
+        residual=None,
+        error_deg=noise if robust else None,
+    )
+    lit = Illumination(directions=ring(lights, 35), intensities=1 + 0.2 * rng.random((lights, 1)))
+    one = Evidence(
+        plates=[np.zeros(SHAPE, np.float32)] * lights,
+        lit=lit,
+        usable=Usable(dark_level=0.003, shadow_ratio=0.0),
+        indirect=Indirect((counts * rng.normal(0.02, 0.03, SHAPE)).astype(np.float32), counts),
+    )
+    points = ThinSurface(
+        step=1, surface=surface, noise_deg=noise, fit_deg=fit, fit_of_noise_deg=noise * np.float32(0.9)
+    )
+    return points, one
+
+
+def mean(plane: np.ndarray, width: int) -> np.ndarray:
+    return np.asarray(cv2.blur(plane, (width, width), borderType=cv2.BORDER_CONSTANT) + 1e-9)
+
+
+def in_numpy(points: ThinSurface, one: Evidence, turned_deg: np.ndarray | None) -> Signs:
+    """Return the signs by their formulas, in double precision, one operation after the other."""
+    assert one.indirect is not None
+    sums, counts = (plane.astype(float) for plane in one.indirect)
+    known, lights, plain = points.known, len(one.plates), points.surface.error_deg is None
+    albedo, noise_deg = (plane.astype(float) for plane in (points.brightness * known, points.noise_deg))
+    fit = np.minimum(points.fit_deg, d.MOST_FIT_DEG).astype(float)
+    strengths = one.lit.intensities.mean(axis=1)[:, None]
+    used = (lights - counts).astype(int)
+    wider = widened(one.lit.directions * strengths, d.MOST_WIDENED).astype(float)[used]
+    noise = points.fit_of_noise_deg.astype(float) ** 2 * (1 if plain else wider)
+    squares = np.where(known, fit**2 - d.UNSURE_OF_NOISE * noise, 0)
+    if turned_deg is not None:
+        squares *= cv2.blur(turned_deg, (d.OF_MOTION, d.OF_MOTION)) < d.MOVING_DEG
+    widths = [d.width_of(known, share) for share in (d.AROUND, d.FAR_AROUND)]
+    shown = np.minimum(albedo, albedo.sum() / known.sum())
+    common = (noise * albedo**2).sum() / (albedo**2).sum()
+    unsure = np.minimum(noise, common) * (plain | (used > 3))
+    outlying = d.OUTLYING_OF_ONE if lights == 4 else d.OUTLYING_OF_MORE
+
+    def roots(of: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        surely, likely = [], []
+        for width in widths:
+            weight, count = mean(shown, width), mean((shown > 0).astype(float), width) * width**2
+            chance = d.CERTAIN * np.sqrt(2 / np.maximum(count, 1)) * mean(noise * shown, width) / weight
+            typical = mean(of * shown, width) / weight
+            for _ in range(d.TURNS):
+                most = d.OUTLYING**2 * np.maximum(typical, d.LEAST_LEVEL_DEG**2) + outlying * noise
+                typical = mean(np.minimum(of, most) * shown, width) / weight
+            margin = (d.UNSURE_OF_NOISE - 1) * mean(unsure * shown, width) / weight
+            surely.append(np.sqrt(np.maximum(typical - chance, 0)))
+            likely.append(np.sqrt(np.maximum(typical + margin, 0)))
+        return np.maximum(*surely), np.maximum(*likely)
+
+    misfit_deg, likely_deg = roots(squares)
+    uneven = np.zeros(SHAPE)
+    if plain and lights > 3:
+        share = (roots(changes_in_numpy(fit, known, noise, lights - 3))[0] / np.maximum(misfit_deg, 1e-6)) ** 2
+        uneven = np.clip((share - d.SURFACES_UNEVEN) / (1 - d.SURFACES_UNEVEN), 0, 1)
+    torn = torn_in_numpy(points)
+    sure = torn - d.SURELY_TORN**2 * (noise_deg**2 + uneven * misfit_deg**2)
+    likely = torn - d.SURELY_TORN**2 * uneven * misfit_deg**2 - d.TORN_OF_NOISE**2 * noise_deg**2
+    around, far_around = widths
+    far = mean(sums, far_around) / np.maximum(mean(counts, far_around), d.LEAST_LIGHTS)
+    near = (mean(sums, around) + d.LEAST_LIGHTS * far) / (mean(counts, around) + d.LEAST_LIGHTS)
+    own = np.maximum(sums / np.maximum(counts, 1) - 2 * np.radians(noise_deg), 0)
+    added = np.linalg.pinv(one.lit.directions) @ np.ones(lights)
+    along = np.tensordot(added, points.planes.astype(float), 1)
+    turned = np.sqrt(np.maximum(added @ added - along**2, 0))
+    return Signs(
+        misfit_deg=misfit_deg,
+        likely_misfit_deg=likely_deg,
+        uneven=uneven.astype(np.float32),
+        indirect_deg=np.degrees(np.maximum(near, 0) + own) * turned,
+        torn_deg=np.sqrt(np.maximum(sure, 0)),
+        likely_torn_deg=np.sqrt(np.maximum(likely, 0)),
+        noise_deg=noise_deg,
+        lost_deg=noise_deg * np.sqrt(wider - 1),
+        hidden=d.hidden_by(lights) / d.hidden_by(d.ENOUGH_LIGHTS),
+    )
+
+
+def changes_in_numpy(fit: np.ndarray, known: np.ndarray, noise: np.ndarray, free: int) -> np.ndarray:
+    apart, total, count = d.UNEVEN_PX, np.zeros(SHAPE), np.full(SHAPE, 1e-9)
+    for axis in (0, 1):
+        ends = slice(None), slice(None, -apart)
+        here, there = (ends[::-1], (slice(apart, None), slice(None))) if axis == 0 else (ends, np.s_[:, apart:])
+        both = known[here] & known[there]
+        total[here] += np.where(both, (fit[here] - fit[there]) ** 2 / 2, 0)
+        count[here] += both
+    typical = {1: np.sqrt(2 / np.pi), 5: np.sqrt(2 / 5) * 2 / (0.75 * np.sqrt(np.pi))}[free]  # of chi, over its size
+    return np.asarray(total / count / (1 - typical**2) - d.UNSURE_OF_NOISE * noise)
+
+
+def torn_in_numpy(points: ThinSurface) -> np.ndarray:
+    across, up, towards = points.planes.astype(float)
+    facing, known = np.maximum(towards, d.LEAST_FACING), points.known
+    right, down = -across / facing, up / facing
+    within, whole = np.zeros(SHAPE), np.zeros(SHAPE)
+    within[:-1, :-1] = known[:-1, :-1] & known[1:, :-1] & known[:-1, 1:] & known[1:, 1:]
+    along, over = right[:, :-1] + right[:, 1:], down[:-1] + down[1:]
+    seen = (facing[:-1, :-1] + facing[1:, :-1] + facing[:-1, 1:] + facing[1:, 1:]) / 4
+    whole[:-1, :-1] = (along[:-1] - along[1:] + over[:, 1:] - over[:, :-1]) / 2 * seen**1.5
+    whole = np.clip(whole, -d.MOST_TORN, d.MOST_TORN) * within
+    each = np.degrees(mean(whole, d.TORN) / mean(within, d.TORN)) * d.TORN / 2
+    return np.asarray(mean(each**2 * within, d.NEAR) / mean(within, d.NEAR))
+
+
+def doubt_in_numpy(signs: Signs, how: Doubting) -> np.ndarray:
+    def of(misfit_deg: np.ndarray, torn_deg: np.ndarray) -> np.ndarray:
+        misfit = how.misfit_deg * signs.hidden**how.few_power * misfit_deg ** (1 + how.misfit_power)
+        misfit /= misfit_deg + how.little_deg
+        misfit -= signs.uneven * np.maximum(misfit - misfit_deg, 0)
+        both = np.hypot(np.hypot(misfit, how.indirect * signs.indirect_deg), signs.unchecked_deg)
+        most_torn = how.torn_beside * both + how.torn_alone_deg + signs.unchecked_deg
+        return np.asarray(both + how.torn * np.minimum(torn_deg, most_torn))
+
+    sure, likely = of(signs.misfit_deg, signs.torn_deg), of(signs.likely_misfit_deg, signs.likely_torn_deg)
+    return np.sqrt(np.maximum(sure**2 + signs.lost_deg**2, likely**2 - signs.noise_deg**2))
+
+
+@pytest.mark.parametrize(("lights", "robust", "moving"), [(4, False, False), (8, False, True), (6, True, False)])
+def test_signs_and_doubt_are_those_of_plain_numpy(lights: int, robust: bool, moving: bool) -> None:
+    points, one = a_surface(lights, robust=robust, seed=lights)
+    turned = np.where(np.arange(SHAPE[1]) < 30, np.float32(2), np.float32(0)) * np.ones(SHAPE, np.float32)
+    found = signs_of(points, one, turned if moving else None)
+    true = in_numpy(points, one, turned if moving else None)
+    names = ("misfit_deg", "likely_misfit_deg", "uneven", "indirect_deg", "torn_deg", "likely_torn_deg", "lost_deg")
+    for name in names:
+        seen = getattr(found, name)
+        assert seen == pytest.approx(getattr(true, name), rel=1e-3, abs=2e-3), name
+        assert name == "uneven" or seen[points.known].max() > 0.05, name
+    for how in (Doubting(), Doubting(misfit_power=0.3, torn=1.0)):
+        for unchecked in (0.0, np.linspace(0, 6, SHAPE[1], dtype=np.float32) * np.ones(SHAPE, np.float32)):
+            claimed = doubt_deg(replace(found, unchecked_deg=unchecked), how=how)
+            expected = doubt_in_numpy(replace(true, unchecked_deg=unchecked), how)
+            assert claimed == pytest.approx(expected, rel=2e-3, abs=5e-3)
+
+
+def test_where_nothing_is_known_nothing_is_doubted_and_nothing_is_no_number() -> None:
+    points, one = a_surface(4, robust=False, seed=1)
+    empty = replace(points, surface=replace(points.surface, valid=np.zeros(SHAPE, np.bool_)))
+    signs = signs_of(empty, one)
+    assert not signs.misfit_deg.any()
+    assert np.isfinite(doubt_deg(signs)).all()
