@@ -173,12 +173,13 @@ def looked(subject: str, case: Case) -> Iterator[Seen]:
     for count in COUNTS:
         for _ in range(3 if count < len(directions) else count == len(directions)):
             for flat in (False, True):
-                chosen = _some(directions, count, rng, flat=flat)
+                chosen = random_lights(directions, count, rng, flat=flat)
                 if chosen is not None:
                     yield _looked(subject, case.choose(chosen), flat=flat)
 
 
-def _some(directions: np.ndarray, count: int, rng: np.random.Generator, *, flat: bool) -> np.ndarray | None:
+def random_lights(directions: np.ndarray, count: int, rng: np.random.Generator, *, flat: bool) -> np.ndarray | None:
+    """Return the numbers of so many lights that lie nearly in a plane, or do not; None where no such are found."""
     for _ in range(2000):
         chosen = np.sort(rng.choice(len(directions), count, replace=False))
         values = np.linalg.svd(directions[chosen], compute_uv=False)

@@ -197,7 +197,7 @@ def test_other_files_are_refused(tmp_path: Path) -> None:
     for name, words in {
         "eight.png": "8 bits",
         "text.exr": "cannot be read as OpenEXR",
-        "a.npy": "no picture that can hold depth",
+        "a.npy": "is not a picture that can hold depth",
         "b.exr": "there is no such depth file",
     }.items():
         with pytest.raises(PsvideoError, match=words):
@@ -217,6 +217,9 @@ def test_depth_for_nothing_and_scales_for_nothing_are_refused(
     assert main([*command, "--depth", str(path)]) == 2
     assert "nothing would use it" in " ".join(capsys.readouterr().err.split())
     assert main([*command, "--depth-scale", "0.001"]) == 2
+    assert "give that as well" in " ".join(capsys.readouterr().err.split())
+    assert main([*command, "--near-iterations", "2"]) == 2
+    assert "--near-iterations 2: nothing would use it" in " ".join(capsys.readouterr().err.split())
     (tmp_path / "distant.toml").write_text(lights.replace("[camera]\nfocal_px = [120.0, 120.0]\n", ""))
     assert main([*command, "--depth", str(path), "--aov", "depth"]) == 1
     assert "focal_px" in capsys.readouterr().err

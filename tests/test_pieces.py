@@ -333,10 +333,10 @@ def test_split_of_several_takes_gives_the_bytes_of_one_at_a_time(
 @pytest.mark.campaign
 def test_a_worker_that_is_killed_is_replaced_and_its_piece_done_again(tmp_path: Path) -> None:
     clip = filmed(tmp_path, frames=160)
-    ps.normals(clip, out=tmp_path / "one" / "clip", rig=clip / "rig.toml", preview=())
-    given = [str(clip), "--rig", str(clip / "rig.toml"), "-o", str(tmp_path / "two" / "clip"), "--no-preview", "-q"]
-    command = [sys.executable, "-m", "psvideo.cli.app", "normals", *given, "--workers", "2"]
-    running = subprocess.Popen(command)
+    command = [sys.executable, "-m", "psvideo.cli.app", "normals", str(clip), "--no-preview", "-q"]
+    command += ["--rig", str(clip / "rig.toml"), "-o"]
+    subprocess.run([*command, str(tmp_path / "one" / "clip")], check=True)
+    running = subprocess.Popen([*command, str(tmp_path / "two" / "clip"), "--workers", "2"])
     busy = _when_solving(tmp_path / "two" / ".clip.partial", psutil.Process(running.pid))
     assert len(busy) >= 2
     busy[0].kill()

@@ -8,6 +8,8 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 import pytest
+from bench.accuracy_measure import angles_deg, diligent_ball, photographed, rendered_bunny, washington_sphere
+from bench.predicted import random_lights
 from numpy.typing import NDArray
 from picture_file import read_picture
 
@@ -16,6 +18,7 @@ from psvideo.solve.normals.illumination import Illumination
 from psvideo.solve.normals.least_squares import woodham1980
 from psvideo.solve.normals.robust import huber1981
 from psvideo.solve.normals.robust.weighing import Reweighting
+from psvideo.solve.normals.solving import Solving
 
 DIM = replace(huber1981.USABLE, dark_level=0.0005)  # the exposures of DiLiGenT are short, and 16 bits deep
 
@@ -120,3 +123,35 @@ def test_the_matte_sphere_of_washington_is_not_worse(shared_data: Path) -> None:
     careful = sphere.errors_deg(woodham1980.solve(plates, lit))
     assert sphere.errors_deg(everywhere).mean() <= min(careful.mean(), sphere.plain_deg().mean())
     assert sphere.errors_deg(sphere.robust()).mean() <= careful.mean()
+
+
+def test_over_real_objects_errors_under_three_lights_are_claimed_right_to_a_factor_of_one_and_a_half(
+    shared_data: Path,
+) -> None:
+    assert shared_data.is_dir()
+    rng = np.random.default_rng(21)
+    true: list[np.ndarray] = []
+    claimed: list[np.ndarray] = []
+    for case in (photographed("bear"), photographed("cat"), diligent_ball(), washington_sphere(), rendered_bunny()):
+        known = case.mask & (np.linalg.norm(case.truth, axis=-1) > 0.5)
+        off_deg, claim_deg = [], []
+        for _ in range(4):
+            lights = random_lights(case.lit.directions, 3, rng, flat=False)
+            assert lights is not None
+            one = case.choose(lights)
+            surface = Solving(error=True).solve(one.plates, one.lit, mask=case.mask)
+            assert surface.error_deg is not None
+            at = np.flatnonzero(known & surface.measured)
+            some = np.unravel_index(rng.choice(at, 2000), known.shape)  # all subjects alike
+            off_deg.append(angles_deg(surface.normals[some], case.truth[some]))
+            claim_deg.append(surface.error_deg[some].astype(float))
+        assert np.median(claim_deg) > 0.5 * np.median(off_deg), case.name
+        if case.name.startswith("Washington"):
+            assert np.median(claim_deg) < 2 * np.median(off_deg), "a matte sphere"
+        true += off_deg
+        claimed += claim_deg
+    off, said = np.concatenate(true), np.concatenate(claimed)
+    assert 0.6 <= (off <= said).mean() <= 0.76
+    assert (off <= 2 * said).mean() >= 0.9
+    for share in (50, 90):
+        assert 1 / 1.5 < np.percentile(said, share) / np.percentile(off, share) < 1.5

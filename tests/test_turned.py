@@ -223,7 +223,10 @@ def test_a_plan_of_the_upright_picture_is_refused_with_what_to_write(
     plan = film("clockwise").with_name("plan.toml").read_text(encoding="utf-8")
     swapped = plan.replace("width_px = 64", "width_px = 0").replace("height_px = 48", "height_px = 64")
     (tmp_path / "plan.toml").write_text(swapped.replace("width_px = 0", "width_px = 48"), encoding="utf-8")
-    assert main(["sync", str(film("clockwise")), "--plan", str(tmp_path / "plan.toml"), "-o", str(tmp_path / "t")]) == 1
+    assert (
+        main(["sync", str(film("clockwise")), "--plan", str(tmp_path / "plan.toml"), "-o", str(tmp_path / "t.json")])
+        == 1
+    )
     assert "write width_px = 64 and height_px = 48" in " ".join(capsys.readouterr().err.split())
 
 

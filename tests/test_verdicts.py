@@ -657,6 +657,7 @@ def test_three_lights_do_not_show_how_far_normals_are_off_and_that_is_said(light
     said = accuracy(Footage(lights=lights, solved=True).observed(0))
     grades = [line.grade for line in said if "three lights explain any surface" in line.found]
     assert grades == (["unknown"] if lights == 3 else [])
+    assert all("cannot check each other" in line.found for line in said if line.grade == "unknown")
 
 
 def test_many_dead_lights_are_one_line() -> None:
@@ -669,7 +670,7 @@ def test_many_dead_lights_are_one_line() -> None:
 
 @pytest.mark.parametrize(("dimmed", "failed"), [(1.0, False), (0.2, True)])
 def test_a_light_does_not_fail_where_only_the_value_changes_at_which_it_clips(dimmed: float, failed: bool) -> None:
-    """Lamps of several colours that are taken apart clip at another value in every round."""
+    """Lamps of several colours that are separated clip at another value in every round."""
     one = Observed(lights=("a", "b", "c"))
     for number in range(8):
         white = 5.0 if number == 2 else 1.0

@@ -69,7 +69,7 @@ def _picture(place: int, image: ArrayLike) -> NDArray[np.generic]:
         picture = np.asarray(None)
     if picture.dtype.kind not in "fiubc":
         raise UsageError(
-            f"`images` hold number {place} of type {type(image).__name__}, which is no picture; expected an array "
+            f"`images` hold number {place} of type {type(image).__name__}, which is not a picture; expected an array "
             "(row, col[, 3]) of numbers each. Files are read by ps.read_images(folder)."
         )
     return picture
@@ -106,7 +106,7 @@ def _refuse_missing(stack: NDArray[np.generic]) -> None:
     if not finite.all():
         light = int(np.argmin(finite.reshape(len(stack), -1).all(axis=1)))
         raise UsageError(
-            f"`images` hold {int((~finite).sum())} values that are no numbers (NaN or infinity), the first in image "
+            f"`images` hold {int((~finite).sum())} values that are not numbers (NaN or infinity), the first in image "
             f"{light}. Expected finite numbers: put 0 there, and leave those pixels out with `mask`."
         )
 
@@ -170,7 +170,7 @@ def _floats(name: str, given: ArrayLike) -> FloatArray:
         more = " Lights go into ps.Rig(lights=[...])." if isinstance(given, (Light, list, tuple)) else more
         raise UsageError(f"`{name}` are not an array of numbers ({type(given).__name__}).{more}") from None
     if not np.isfinite(values).all():
-        raise UsageError(f"`{name}` hold values that are no numbers (NaN or infinity).")
+        raise UsageError(f"`{name}` hold values that are not numbers (NaN or infinity).")
     return values
 
 

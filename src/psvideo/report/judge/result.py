@@ -122,7 +122,9 @@ def accuracy(observed: Observed) -> Iterator[Judgement]:
             subject="accuracy",
             grade="unknown",
             found="How far normals are off beyond noise is not known: three lights explain any surface, also one that "
-            "shines or lies in other light. Four and more show it.",
+            "shines or lies in other light, and cannot check each other. On photographs of a ball, a bear, a "
+            "cat and a sphere typical normals were off by 3 to 11 degrees under three. Four lights and more show it.",
+            advice='`aov=["error"]` counts what such surfaces left, and how far noise spreads.',
         )
     if error_deg is None or error_deg < by_noise_deg(observed.facts):  # what noise hides cannot be told from it
         return

@@ -22,7 +22,7 @@ DARKEST = 1 / 6
 FAINT = 2.0**-12
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, slots=True)
 class InstantFacts:
     """What one round gave: which shares of what is lit (or masked) are valid or saturated, and which share of rows no
     frame saw; ``borrowed_share`` is that of rows that other rounds showed. A void background counts as neither.

@@ -57,6 +57,7 @@ def glimpse(plate: LightPlate, white: float | None = None) -> Glimpse:
     rows, cols = plate.shape[:2]
     step = max(round(cols / (2 * WIDTH_PX)), 1)
     step *= 2 if -(-cols // step) > WIDTH_PX else 1
+    step = min(step, rows)
     some = plate.picture.rows(range(0, rows - step + 1, step))  # few rows are made, and means taken along them
     grey = np.ascontiguousarray(some if some.ndim == 2 else some[..., 1])
     if step > 1:

@@ -19,7 +19,7 @@ ENOUGH = 8192
 Values = NDArray[np.float32]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, slots=True)
 class Change:
     """From the result before to this one, over pixels at rest: the median change of a normal, of an albedo without its
     sign, and with it (which noise leaves near 0, and a light that flickers does not)."""

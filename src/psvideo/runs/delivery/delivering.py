@@ -22,7 +22,7 @@ from psvideo.model.plan import Plan
 from psvideo.model.quantities import QUANTITIES, Aov
 from psvideo.model.rig import Rig
 from psvideo.model.timing import Timing
-from psvideo.model.units import show_rate
+from psvideo.model.units import counted, show_rate
 from psvideo.plates.align.comb import Comb, Schedule
 from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.align.velocity.vectors import pixels_per_s
@@ -78,7 +78,11 @@ def say_instants(take: Take, timing: Timing, aligning: Aligning | None, output: 
 
 def _instants_said(comb: Comb, due: Schedule, start_number: int) -> str:
     numbers = due.numbers
-    shown = f"{len(numbers)}, {numbers[0]} to {numbers[-1]}" if numbers else "none"
+    shown = "No result is delivered"
+    if numbers:
+        verb = "is" if len(numbers) == 1 else "are"
+        which = f"number {numbers[0]}" if len(numbers) == 1 else f"numbered {numbers[0]} to {numbers[-1]}"
+        shown = f"{counted(len(numbers), 'result')} {verb} delivered, {which}"
     before, within, after = due.left_out
     lacking = [
         f"{count} {where}"
@@ -89,7 +93,7 @@ def _instants_said(comb: Comb, due: Schedule, start_number: int) -> str:
     rest = f" Left out, as no whole round is near: {', '.join(lacking)}." if lacking else " None is left out."
     return (
         f"Instants at {show_rate(comb.fps)}: number {start_number} + k shows {comb.first_s:.7g} s + k / {comb.fps} on "
-        f"{clock}. Delivered are {shown}.{rest}"
+        f"{clock}. {shown}.{rest}"
     )
 
 

@@ -18,7 +18,7 @@ from psvideo.solve.normals.robust import huber1981
 from psvideo.solve.normals.robust.weighing import EVERYTHING_DEG, Reweighting
 from psvideo.solve.normals.task import Floats, Looks, Mask, Samples, Usable
 from psvideo.solve.normals.trust.indirect import IndirectLook
-from psvideo.solve.normals.trust.judging import Judging, emptied, judged
+from psvideo.solve.normals.trust.judging import Judging, emptied, judged, with_unchecked
 
 Plates = Sequence[Samples] | Sequence[Mixture]
 Method = Literal["least-squares", "robust"]
@@ -77,7 +77,8 @@ class Solving:
         )
         valid = solved.valid
         del solved  # residuals that nobody asked for are gone with it
-        return filled(known, one, solved=valid, noise=noise.dark) if self.fill else emptied(known)
+        whole = filled(known, one, solved=valid, noise=noise.dark) if self.fill else emptied(known)
+        return with_unchecked(whole, one, noise)
 
     def measured(
         self,

@@ -50,7 +50,7 @@ class RigPoints:
 
 def rig_points(plan: Plan, rig: Rig, *, height_px: int, width_px: int, channels: int) -> RigPoints:
     """Return a grid of points over the picture, and the rig's light there."""
-    step = max(width_px // ACROSS, 1)
+    step = max(min(width_px // ACROSS, height_px), 1)
     rows, cols = (grid.ravel() for grid in np.mgrid[step // 2 : height_px : step, step // 2 : width_px : step])
     points = Points(
         down=(rows + 0.5) / height_px,

@@ -150,7 +150,7 @@ def coarse_normals(surface: Surface) -> Averaged:
 
 def _mean_of_squares(plane: NDArray[Any]) -> NDArray[np.float32]:
     """Return the means of a picture (row, col) over squares, about WIDTH_PX of them in a row."""
-    step = max(plane.shape[1] // WIDTH_PX, 1)
+    step = max(min(plane.shape[1] // WIDTH_PX, plane.shape[0]), 1)
     rows, cols = (size // step for size in plane.shape)
     fine = max(step // LEAST_AVERAGED, 1)
     some = plane[: rows * step : fine, : cols * step : fine]
