@@ -609,6 +609,29 @@ def test_an_open_shutter_shows_what_a_true_one_does_and_better_than_the_mean_of_
     assert blurred > max(sharp, frames) + 3
 
 
+def test_what_changes_as_no_motion_explains_is_blended_by_time_while_a_shutter_is_open() -> None:
+    rng = np.random.default_rng(5)
+    snow = np.s_[20:60, 30:90]
+    wall = rng.uniform(0.2, 0.6, (80, 120)).astype(np.float32)
+    plates = []
+    for number, light in np.ndindex(3, 3):
+        image = wall.copy()
+        image[snow] = rng.choice([0.1, 0.7], (40, 60))
+        at_s = PITCH_S * (3 * number + light)
+        seen = np.ones(len(image), np.bool_)
+        plates.append(LightPlate(light=f"l{light}", number=number, time_s=at_s, picture=made(image), seen=seen))
+    times_s = 3.5 * PITCH_S + PITCH_S / 3 * (np.arange(15) - 7) / 15
+    due = Schedule(by_round={1: tuple((1001, float(time_s)) for time_s in times_s)}, left_out=(0, 0, 0))
+    how = Aligning(rate=Comb(fps=Fraction(24), first_s=float(times_s[7]), open_s=1.0))
+    (one,) = with_open_shutter(aligned(plates, ("l0", "l1", "l2"), how, first=1001, schedule=due))
+    for light, plate in enumerate(one.open_plates):
+        (early, late) = (plates[3 * n + light] for n in ((1, 2) if light == 0 else (0, 1)))
+        share = (times_s.mean() - early.time_s) / (late.time_s - early.time_s)
+        between_them = (1 - share) * early.image + share * late.image
+        assert np.abs(plate.image - between_them)[snow].mean() < 0.02
+        np.testing.assert_allclose(plate.image[:, :20], wall[:, :20], atol=1e-5)
+
+
 @pytest.mark.parametrize("step", [1, 2])
 @pytest.mark.parametrize("gone", [False, True], ids=["both plates", "one plate gone"])
 def test_what_moves_over_many_rows_is_whole_and_what_rests_beside_it_stays(step: int, gone: bool) -> None:

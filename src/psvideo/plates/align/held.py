@@ -67,9 +67,10 @@ class Held:
 
     ``sketched`` says whether flow is asked for, ``keep_all`` whether instants lie at every flash, ``trusts_rest``
     whether lights that show nothing move speak for the others, and ``with_ambient`` whether dark slots come. ``newest``
-    is the round that plates come of, ``whole`` the last one that was complete, and ``middle_s`` its middle. ``motion``
-    says by light and round what was compared with the round before, and where it had moved; ``drift`` where it had
-    since the ``first`` sketch of a light in a block of rounds that are pooled. ``put_by`` takes codes of packed plates.
+    is the round that plates come of, ``whole`` the last one that was complete (None before any was), and ``middle_s``
+    its middle. ``motion`` says by light and round what was compared with the round before, and where it had moved;
+    ``drift`` where it had since the ``first`` sketch of a light in a block of rounds that are pooled. ``put_by`` takes
+    codes of packed plates.
     """
 
     lights: tuple[str, ...]
@@ -86,7 +87,7 @@ class Held:
     drift: dict[tuple[str, int], Flags] = field(default_factory=dict)
     first: dict[str, Sketch] = field(default_factory=dict)
     newest: int = 0
-    whole: int = 0
+    whole: int | None = None
     middle_s: float = 0.0
     ended: bool = False
 
@@ -182,8 +183,9 @@ class Held:
     def _stands_on(self) -> bool:
         """Return whether the lights in the first half of a round all show that nothing moved since the round before,
         which was the last whole one: of that, nothing is needed any more."""
-        early = [light for light in self.lights if self.shots[light][self.whole].time_s <= self.middle_s]
-        since = [self.moved_since(light, self.whole + 1) for light in early]
+        whole = self._last_whole()
+        early = [light for light in self.lights if self.shots[light][whole].time_s <= self.middle_s]
+        since = [self.moved_since(light, whole + 1) for light in early]
         return self.trusts_rest and bool(since) and all(one is False for one in since)
 
     def _rests(self, instant: DueInstant) -> bool:
@@ -199,9 +201,13 @@ class Held:
         """Return whether a round's dark slot is wanted and may still come."""
         return self.with_ambient and not (self.ended or self.newest > instant.round or instant.round in self.ambient)
 
+    def _last_whole(self) -> int:
+        """Return the last round that was complete; before there is one, the round that plates come of."""
+        return self.newest if self.whole is None else self.whole
+
     def let_go(self) -> None:
         """Forget what no instant can be made from: none of those that wait, nor of rounds to come."""
-        oldest = min([self.newest, self.whole or self.newest, *(one.round for one in self.waiting)]) - 1
+        oldest = min([self.newest, self._last_whole(), *(one.round for one in self.waiting)]) - 1
         for number in [number for number in self.ambient if number <= oldest]:
             del self.ambient[number]
         for seen in (self.motion, self.drift):
@@ -231,7 +237,7 @@ class Held:
 
     def _is_for_later(self, shot: Shot) -> bool:
         """Return whether a plate may serve an instant of a round that is not complete yet."""
-        coming = self.newest if self.newest > self.whole else self.newest + 1
+        coming = self.newest if self.whole is None or self.newest > self.whole else self.newest + 1
         if shot.round < coming - 1:
             return False
         if self.keep_all or shot.round != self.whole:

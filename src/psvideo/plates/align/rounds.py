@@ -172,7 +172,7 @@ def _make_moving(held: Held, instant: DueInstant) -> None:
     lights = [light for light in held.lights if light in instant.moving]
     pairs = [_pair(held.sure_around(light, instant)) for light in lights]
     instant.motion = motion = followed_at(pairs, instant.time_s)
-    shown = [taken_of(pair, motion) for pair in pairs]
+    shown = [taken_of(pair, motion, guessed=instant.guessed) for pair in pairs]
     guesses = sources = [one.source for one in shown]
     unknown = np.zeros_like(motion.moves)
     if not instant.guessed:

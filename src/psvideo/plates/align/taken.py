@@ -63,8 +63,12 @@ class Taken:
     shows: InstantSketch
 
 
-def taken_of(pair: Pair, motion: Followed) -> Taken:
-    """Return what every pixel of a light's plate is taken from, on the velocities' grid."""
+def taken_of(pair: Pair, motion: Followed, *, guessed: bool = False) -> Taken:
+    """Return what every pixel of a light's plate is taken from, on the velocities' grid.
+
+    ``guessed``: nothing is measured in it, and what changes as no motion explains is blended by time: somewhen between
+    the two plates it became what the later one shows, and of all guesses that is the least off.
+    """
     one, other = comparable(pair.before, pair.after)
     spans_s = motion.time_s - pair.before.time_s, pair.after.time_s - motion.time_s
     ways = motion.way(spans_s[0]), motion.way(-spans_s[1])
@@ -80,6 +84,8 @@ def taken_of(pair: Pair, motion: Followed) -> Taken:
     source = np.where(motion.moves, np.where(own_unlike < np.float32(TURNED**2), BOTH, nearer), AT_REST)
     source = source.astype(np.uint8)
     source[~motion.moves & alike & (np.abs(shading) > REST)] = BOTH
+    if guessed:
+        source[~motion.moves & (np.abs(apart) > REST)] = BOTH
     gone = [_outside(way) for way in ways]
     for hidden, span_s in zip(gone, (spans_s[0], -spans_s[1]), strict=True):
         _add_hidden(hidden, motion, alike, span_s, sum(spans_s))

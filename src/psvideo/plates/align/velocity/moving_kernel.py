@@ -66,6 +66,25 @@ def unlike_rows(
 
 
 @FUSED.kept
+def moved_rows(
+    picture: Codes, since_s: np.float32, velocity: Floats, stride: int, first: int, last: int, out: Floats
+) -> None:
+    """Fill rows of ``out`` (row, col) with what a picture of so many seconds ago, below 0 of so many ahead, shows along
+    velocities, (2, row, col) in their own pixels per second; ``out`` takes every ``stride``-th of them. The picture has
+    as many pixels as there are velocities or more."""
+    given, way, made = lent(picture), lent(velocity), lent(out)
+    high, wide = _steps(given.shape, way.shape[1:])
+    for row in range(first, last):
+        own_row = row * stride
+        down = (np.float32(own_row) + HALF) * high - HALF
+        for col in range(made.shape[1]):
+            own_col = col * stride
+            across = (np.float32(own_col) + HALF) * wide - HALF
+            x, y = way[0, own_row, own_col] * wide, way[1, own_row, own_col] * high
+            made[row, col] = _between(given, down - y * since_s, across - x * since_s)
+
+
+@FUSED.kept
 def arriving_rows(flow: Floats, share: np.float32, per_s: np.float32, first: int, last: int, out: Floats) -> None:
     """Fill rows of velocities, ``out`` (2, row, col), of what arrives at every pixel after a share of its flow.
 
