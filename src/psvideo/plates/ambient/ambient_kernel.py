@@ -10,7 +10,8 @@ from psvideo.compute.compiled import FUSED, REORDERED
 from psvideo.compute.memory import lent
 from psvideo.model.camera import FloatArray
 from psvideo.plates.ambient.ambient_level import pack_row, unpack_row
-from psvideo.plates.mixing.mixing_kernel import Codes, Floats, MixtureArrays, lent_mix, mix_row
+from psvideo.plates.mixing.mixing_kernel import mix_row
+from psvideo.plates.mixing.mixture_arrays import Codes, Floats, MixtureArrays, lent_mix
 
 Flags = NDArray[np.bool_]
 Planes = tuple[Codes, Floats, Floats, Floats]

@@ -18,7 +18,8 @@ from psvideo.model.camera import FloatArray
 from psvideo.model.coded import IDENTITY, Coded, Image
 from psvideo.model.rows.clipping import SATURATED
 from psvideo.plates.ambient.ambient_level import AmbientLevel
-from psvideo.plates.mixing.mixing_kernel import COUNTS, MixtureArrays, mix_pictures, mix_rows
+from psvideo.plates.mixing.mixing_kernel import COUNTS, mix_pictures, mix_rows
+from psvideo.plates.mixing.mixture_arrays import MixtureArrays
 from psvideo.plates.mixing.ready_mixture import ReadyMixture
 from psvideo.plates.mixing.thinning_kernel import mix_halved, mix_thinned
 

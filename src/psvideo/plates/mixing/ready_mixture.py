@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from psvideo.model.coded import Coded
 from psvideo.plates.ambient.ambient_level import AmbientLevel
-from psvideo.plates.mixing.mixing_kernel import InFiles, MixtureArrays
+from psvideo.plates.mixing.mixture_arrays import InFiles, MixtureArrays
 
 
 def _reader() -> int:

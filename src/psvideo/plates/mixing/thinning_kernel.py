@@ -7,17 +7,8 @@ from numba.np.numpy_support import carray
 
 from psvideo.compute.compiled import FUSED
 from psvideo.compute.memory import lent, pointer
-from psvideo.plates.mixing.mixing_kernel import (
-    CLIPPED,
-    WHOLE,
-    Floats,
-    InFiles,
-    MixtureArrays,
-    lent_mix,
-    level_row,
-    mix_row,
-    row_of,
-)
+from psvideo.plates.mixing.mixing_kernel import CLIPPED, WHOLE, mix_row
+from psvideo.plates.mixing.mixture_arrays import Floats, InFiles, MixtureArrays, lent_mix, level_row, row_of
 
 HALF = np.float32(0.5)
 

@@ -1,4 +1,4 @@
-"""Flashes of several colours taken apart: a round of flashes in, a round of plates under white light out.
+"""Flashes of several colours separated: a round of flashes in, a round of plates under white light out.
 
 Where lamps exchange their colours between a round's flashes, each channel of a lamp's plate is a sum of that channel of
 the flashes, and nothing need be known of the surface. What moved between them, and flow could not bring together, is
@@ -32,7 +32,7 @@ DOUBT = 0.1
 
 
 def unmixing_note(how: Unmixing) -> str:
-    """Return in whole sentences how flashes were taken apart by colour, and what that leaves in doubt."""
+    """Return in whole sentences how flashes were separated by colour, and what that leaves in doubt."""
     if how.shares is not None:
         return (
             "Several colours flashed at once and were exchanged between flashes: plates are those of the lamps under "
