@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError, UsageError
+from psvideo.formats.light_list_reader import pictures_named_by
 from psvideo.formats.light_list_writer import write_rig
 from psvideo.formats.rig_toml import read_rig
 from psvideo.model.rig import Light, Rig, Vector
@@ -75,6 +76,62 @@ def test_lights_that_a_list_names_are_the_plans_by_name_whatever_their_order(tmp
 def test_lights_whose_names_cannot_be_used_are_numbered(names: tuple[str, str], tmp_path: Path) -> None:
     (tmp_path / "a.lp").write_text(f"2\n{names[0]} 0 0 1\n{names[1]} 0.6 0 0.8\n")
     assert read_rig(tmp_path / "a.lp").names == ("L0", "L1")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "# 3 lights, measured 2026 11 03\n{0} 0 0 1\n{1} 0.6 0 0.8\n{2} 0 0.6 0.8  # the left one\n",
+        "1 {0} 0 0 1\n2 {1} 0.6 0 0.8\n3 {2} 0 0.6 0.8\n",
+        "0 0 1 {0}\n0.6 0 0.8 {1}\n0 0.6 0.8 {2}\n",
+        'file,x,y,z\n"{0}","0","0","1"\n"{1}","0.6","0","0.8"\n"{2}","0","0.6","0.8"\n',
+        "3\n{0} 0 0 1\n{1} 0.6 0 0.8\n{2} 0 0.6 0.8\n",
+    ],
+    ids=["comments", "numbered lines", "names behind", "quotes", "counted"],
+)
+@pytest.mark.parametrize("names", [("a.png", "b.png", "c.png"), ("vase 1", "vase 2, left", "vase #3 .png")])
+def test_what_stands_beside_a_direction_is_no_part_of_it(tmp_path: Path, text: str, names: tuple[str, ...]) -> None:
+    path = tmp_path / "lights.txt"
+    path.write_text(text.format(*names))
+    lights = read_rig(path).lights
+    assert [light.direction for light in lights] == [(0, 0, 1), (0.6, 0, 0.8), (0, 0.6, 0.8)]
+    assert [light.intensity for light in lights] == [(1.0,)] * 3
+    assert pictures_named_by(path) == names
+
+
+@pytest.mark.parametrize(
+    ("text", "strength"),
+    [
+        ("1 0 0 1\n2 0.6 0 0.8\n3 0 0.6 0.8\n4 0.8 0 0.6\n", (1.0,)),
+        ("0 0 1 1.0\n0.6 0 0.8 1.0\n0 0.6 0.8 1.0\n0.8 0 0.6 1.0\n", (1.0,)),
+        ("7 0 0 1 2 3 4\n8 0.6 0 0.8 2 3 4\n9 0 0.6 0.8 2 3 4\n9 0.8 0 0.6 2 3 4\n", (2.0, 3.0, 4.0)),
+        ("0 0.6 0 0.8\n0 0 0.6 0\n1 0.8 0.8 0.6\n", (1.0,)),
+    ],
+    ids=["numbered", "a fourth number", "numbered, with strengths", "in columns"],
+)
+def test_numbers_of_lines_are_no_directions_and_columns_may_be(
+    tmp_path: Path, text: str, strength: tuple[float, ...]
+) -> None:
+    (tmp_path / "lights.txt").write_text(text)
+    lights = read_rig(tmp_path / "lights.txt").lights
+    assert [light.direction for light in lights] == [(0, 0, 1), (0.6, 0, 0.8), (0, 0.6, 0.8), (0.8, 0, 0.6)]
+    assert {light.intensity for light in lights} == {strength}
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("0 0 1\n0.6 nan 0.8\n0 0.6 0.8\n", "light 2 has only 2 of the three numbers"),
+        ("0 0 2 0.9\n0.6 0 0.8 1.1\n0 0.6 0.8 1\n", r"a line has 4 numbers \(0 0 2 0.9\)\. Expected three"),
+        ("0 0 1 0\n0 0.6 0.8 0\n0 -0.6 0.8 0\n", "a line has 4 numbers"),
+        ("[[0, 0, 1], [0.6, 0, 0.8]]", "is JSON"),
+    ],
+    ids=["not finite", "nothing of unit length", "two of unit length", "JSON"],
+)
+def test_lines_that_may_mean_anything_are_refused(tmp_path: Path, text: str, said: str) -> None:
+    (tmp_path / "lights.txt").write_text(text)
+    with pytest.raises(PsvideoError, match=said):
+        read_rig(tmp_path / "lights.txt")
 
 
 def test_a_near_light_is_in_no_list_and_a_name_that_shows_no_kind_is_refused(tmp_path: Path) -> None:

@@ -125,6 +125,26 @@ def save_tiff(path: Path, signal: Picture) -> None:
     tifffile.imwrite(path, (65535 * signal + 0.5).astype(np.uint16), photometric="minisblack")
 
 
+def facing(light: NDArray[np.float64], shape: tuple[int, int]) -> Picture:
+    """A wall that faces the camera, with a little noise of its own, so that no picture is another's copy."""
+    noise = np.random.default_rng(int(1000 * light[0] + 2000) + int(1000 * light[1])).normal(0, 0.0005, (*shape, 3))
+    return np.asarray(0.8 * light[2] + noise)
+
+
+@pytest.mark.parametrize("shape", [(4, 6000), (2000, 4)])
+def test_narrow_strips_are_solved(shape: tuple[int, int], tmp_path: Path) -> None:
+    folder = photographs(tmp_path / "photos", [facing(light, shape) for light in LIGHTS])
+    ps.stills(folder, lights=listed(tmp_path / "lights.lp"), out=tmp_path / "out", transfer="linear")
+    normals = decode("exr", next((tmp_path / "out" / "normals").glob("*.exr"))).codes
+    assert np.abs(normals[..., 2] - 1).max() < 0.01
+
+
+def test_pictures_of_no_size_are_refused(tmp_path: Path) -> None:
+    folder = photographs(tmp_path / "photos", [facing(light, (3, 2000)) for light in LIGHTS])
+    with pytest.raises(PsvideoError, match="is a picture of 2000 x 3 pixels"):
+        ps.stills(folder, lights=listed(tmp_path / "lights.lp"), out=tmp_path / "out")
+
+
 def test_pictures_without_names_belong_to_lights_by_order_and_the_report_says_so(tmp_path: Path) -> None:
     folder = photographs(tmp_path / "photos", lit())
     report = ps.stills(folder, lights=listed(tmp_path / "lights.lp"), out=tmp_path / "out")
@@ -185,6 +205,18 @@ def test_pictures_that_speak_against_what_was_assumed_of_them_are_named(tmp_path
     assert not any("rig does not fit" in one or "fit the lights better" in one for one in report.findings[1:])
     assert not ps.stills(folder, lights=lights, out=tmp_path / "other", transfer="linear").findings
     assert error_deg(tmp_path / "other") < 1.5 < error_deg(tmp_path / "out")
+
+
+def test_of_a_shallow_relief_no_curve_is_doubted_for_the_noise_of_its_codes(tmp_path: Path) -> None:
+    y, x = np.mgrid[:SIZE, :SIZE] * (6 * np.pi / SIZE)
+    normals = np.stack([0.1 * np.cos(x), 0.1 * np.cos(y), np.ones_like(x)], axis=-1)
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    noise = np.random.default_rng(5).normal(0, 0.002, (len(LIGHTS), SIZE, SIZE))
+    shades = [as_srgb(0.6 * normals @ light + grain) for light, grain in zip(LIGHTS, noise, strict=True)]
+    folder = photographs(tmp_path / "photos", shades, save=save8)
+    report = ps.stills(folder, lights=listed(tmp_path / "lights.lp"), out=tmp_path / "out")
+    assert not any("fit the lights better" in one for one in report.findings)
+    assert report.verdict.startswith("This take is usable")
 
 
 def dome(lights: int) -> NDArray[np.float64]:

@@ -73,7 +73,7 @@ def guess_rig(pictures: LightPictures, *, prior: Prior | None = None) -> Guess:
     spread = float(equal.std() / equal.mean())
     if spread > MOST_SPREAD:
         raise PsvideoError(
-            f"What `prior` {chosen} takes for equal comes out unequal by {spread:.0%}, so directions cannot be "
+            f"What `prior` {chosen} assumes to be equal comes out unequal by {spread:.0%}, so directions cannot be "
             "guessed. Try the other `prior`, take out gloss and shadow, or calibrate on a sphere."
         )
     return Guess(rig=_rig_of(pictures.names, lit), prior=chosen, explained=explained, spread=spread)

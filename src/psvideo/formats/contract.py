@@ -65,7 +65,7 @@ def read_text(path: Path) -> str:
     except UnicodeDecodeError as fault:
         if path.read_bytes()[:2] in (b"\xff\xfe", b"\xfe\xff"):
             raise PsvideoError(f"{path}: is text in UTF-16. Save it as UTF-8.") from None
-        raise PsvideoError(f"{path}: is no text (byte {fault.start} is none of UTF-8). Name another file.") from None
+        raise PsvideoError(f"{path}: is not text (byte {fault.start} is not UTF-8). Name another file.") from None
     except OSError as fault:
         raise PsvideoError(f"{path}: cannot be read as text ({fault}). Check the file and its permissions.") from fault
 

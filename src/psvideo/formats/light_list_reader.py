@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError
 from psvideo.formats.contract import check_light_name, read_text
+from psvideo.formats.light_list_lines import DIRECTION, ListLine, directed, lines_in
 from psvideo.model.rig import Light, Rig
+from psvideo.model.units import counted
 
 DIRECTIONS, INTENSITIES, FILENAMES = "light_directions.txt", "light_intensities.txt", "filenames.txt"
 """The files of DiLiGenT."""
@@ -34,11 +36,7 @@ def read_light_list(path: Path, *, plan_lights: Sequence[str] = ()) -> Rig:
     as the list calls them or their pictures, and are numbered where it does not. Raises PsvideoError, which names the
     file, what was found and what was expected.
     """
-    rows = _numbers(path, read_text(path))
-    if path.suffix == ".lp" or len(rows[0]) == 1:
-        rows = _counted(path, rows)
-    if not rows:
-        raise PsvideoError(f"{path}: says that it lists 0 lights; expected a line for every light.")
+    rows = [line.numbers for line in _lights(path)]
     short = next((place for place, row in enumerate(rows, start=1) if len(row) < 3), None)
     if short:
         raise PsvideoError(
@@ -63,67 +61,58 @@ def read_light_list(path: Path, *, plan_lights: Sequence[str] = ()) -> Rig:
 
 
 def pictures_named_by(path: Path) -> tuple[str, ...]:
-    """Return the pictures that a list names, in order: the words before the numbers of every line (``.lp``, tables), or
+    """Return the pictures that a list names, in order: the words beside the numbers of every line (``.lp``, tables), or
     the ``filenames.txt`` beside DiLiGenT's lists; empty where it names none, or not one in every line."""
     beside = path.with_name(FILENAMES)
     if path.name == DIRECTIONS and beside.is_file():
         return tuple(line.strip() for line in read_text(beside).splitlines() if line.strip())
     if path.suffix == ".toml":
         return ()
-    named = [_name_in(line) for line in read_text(path).splitlines()]
-    return tuple(name for name in named if name)
+    return tuple(line.name for line in _lights(path) if line.name)
 
 
-def _name_in(line: str) -> str:
-    """Return what stands before a line's three numbers, or before six: direction and strengths."""
-    words = [word for word in re.split(r"[\s,;]+", line.strip()) if word]
-    numbers = len(words) - next((place for place in range(len(words), 0, -1) if not _is_number(words[place - 1])), 0)
-    before = words[: -6 if numbers >= 6 else -3] if numbers >= 3 else []
-    return " ".join(before) if len(before) == 1 or not all(_is_number(word) for word in before) else ""
+def _lights(path: Path) -> list[ListLine]:
+    """Return the lines of a list's lights, held against its count where it has one."""
+    lines = _lines(path, read_text(path))
+    if path.suffix.lower() == ".lp" or len(lines[0].words) == 1:
+        return _counted(path, lines)
+    return directed(path, lines)
 
 
-def _numbers(path: Path, text: str) -> list[list[float]]:
-    """Return the numbers of each line; words (an .lp file's picture names) are left out."""
+def _lines(path: Path, text: str) -> list[ListLine]:
+    """Return the lines that hold numbers. Raises PsvideoError where none does, or where they have decimal commas."""
     comma = next((word for word in re.split(r"[\s;]+", text) if DECIMAL_COMMA.fullmatch(word)), None)
     if comma:
         raise PsvideoError(
             f"{path}: writes {comma!r}. Expected numbers with points, such as {comma.replace(',', '.')}."
         )
-    lines = [re.split(r"[,;]" if re.search("[,;]", line) else r"\s+", line.strip()) for line in text.splitlines()]
-    rows = [[float(word) for word in words if _is_number(word)] for words in lines]
-    rows = [row for row in rows if row]
-    if not rows:
+    json = text.lstrip()[:1] in ("{", "[")
+    lines = [] if json else lines_in(text)
+    if not lines:
         raise PsvideoError(
-            f"{path}: holds no numbers. Expected rig.toml, an .lp file, or one light direction x y z per line."
+            f"{path}: {'is JSON' if json else 'holds no numbers'}. Expected rig.toml, an .lp file, or one light "
+            "direction x y z per line."
         )
-    return rows
+    return lines
 
 
-def _is_number(word: str) -> bool:
-    """Return whether a word of a list is a finite number."""
-    try:
-        return bool(np.isfinite(float(word)))
-    except ValueError:
-        return False
-
-
-def _counted(path: Path, rows: list[list[float]]) -> list[list[float]]:
+def _counted(path: Path, lines: Sequence[ListLine]) -> list[ListLine]:
     """Take the count off the top of a list and hold the list against it. Raises PsvideoError where it does not fit."""
-    count, vectors = rows[0][0], rows[1:]
-    if len(rows[0]) != 1 or count != len(vectors):
+    first, after = lines[0].words, lines[1:]
+    if len(first) != 1 or float(first[0]) != len(after):
         raise PsvideoError(
-            f"{path}: its first line is {' '.join(f'{one:g}' for one in rows[0])}, and {len(vectors)} lines follow. "
-            "Expected the first line to say how many follow."
+            f"{path}: its first line is {' '.join(first)}, and {len(after)} lines follow. Expected the first line to "
+            "say how many follow."
         )
-    vectors = [row[-3:] for row in vectors]
-    short = next((row for row in vectors if len(row) != 3), None)
+    if not after:
+        raise PsvideoError(f"{path}: says that it lists 0 lights; expected a line for every light.")
+    short = next((line.words for line in after if len(line.words) < DIRECTION), None)
     if short is not None:
-        shown = " ".join(f"{one:g}" for one in short)
         raise PsvideoError(
-            f"{path}: a line has {len(short)} numbers ({shown}); expected three numbers x y z of a direction in every "
-            f"line after the first ({AXES}). Angles are to be made directions first."
+            f"{path}: a line has {counted(len(short), 'number')} ({' '.join(short)}); expected three numbers x y z of "
+            f"a direction in every line after the first ({AXES}). Angles are to be made directions first."
         )
-    return vectors
+    return [line.from_place(len(line.words) - DIRECTION) for line in after]
 
 
 def _refuse_angles(path: Path, vectors: NDArray[np.float64]) -> None:
@@ -143,13 +132,13 @@ def _diligent_strengths(path: Path, count: int) -> list[tuple[float, ...]]:
     beside = path.with_name(INTENSITIES)
     if path.name != DIRECTIONS or not beside.is_file():
         return [(1.0,)] * count
-    rows = _numbers(beside, read_text(beside))
+    rows = [line.numbers for line in _lines(beside, read_text(beside))]
     if len(rows) != count:
         raise PsvideoError(
             f"{beside}: holds {len(rows)} intensities, and {path.name} beside it {count} directions. Expected a line "
             "for every light in both."
         )
-    return [tuple(row) for row in rows]
+    return list(rows)
 
 
 def _names(path: Path, count: int, plan_lights: Sequence[str]) -> list[str]:

@@ -32,7 +32,7 @@ def check_text(path: Path) -> None:
     except UnicodeEncodeError:
         clear = False
     if not clear:
-        raise UsageError(f"{str(path)!a}: this name is no text in UTF-8, as files of results hold it. Rename it.")
+        raise UsageError(f"{str(path)!a}: this name is not UTF-8 text, which files of results need. Rename it.")
 
 
 def check_file(path: Path) -> None:

@@ -74,6 +74,15 @@ def refuse_existing(path: Path, *, force: bool, mark: str | None = None) -> None
         )
 
 
+def check_ending(path: Path, *endings: str, name: str) -> None:
+    """Raise UsageError where an output given as option ``name`` has none of the ``endings`` of what is written to it
+    ("" among them is none at all): programs would not know the file."""
+    if path.suffix.lower() not in endings:
+        such = path.with_name(path.name + endings[0]) if not path.suffix else path.with_suffix(endings[0])
+        wanted = " or ".join(filter(None, endings))
+        raise UsageError(f"`{name}` {path}: expected a name that ends in {wanted}, such as {such}.")
+
+
 def _beginning(path: Path) -> bytes:
     with path.open("rb") as file:
         return file.read(4096)

@@ -51,7 +51,7 @@ def find_direction(
             f"the stripes step by {step:+.3f} of a period a frame, and {blinks:.3f} blinks go by"
         )
     return "unknown", (
-        f"the stripes step by {step:+.3f} of a period a frame, which does not go with {blinks:.3f} blinks: the LED's "
+        f"the stripes step by {step:+.3f} of a period a frame, which does not fit {blinks:.3f} blinks: the LED's "
         "rate or the frame rate is not quite what was given"
     )
 

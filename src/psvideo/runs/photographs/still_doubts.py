@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from psvideo.clip.decode.decoders import opened
 from psvideo.clip.in_file import RowsInFile
@@ -20,6 +21,8 @@ POINTS = 6000
 LEAST, MOST = 0.1, 0.97
 """Of a pixel's brightest light, and of saturation: between them a sample counts."""
 LEAST_LIGHTS = 4
+CODES, LEAST_STEEP = np.linspace(0, 1, 4097), 1e-3
+"""Codes at which a curve's steepness is found, and the least that is believed: gamma curves begin level."""
 SUBJECT = 1 / 6
 """What is darker than this share of the picture's brightest hundredth says little."""
 CLEARLY = 0.85
@@ -29,6 +32,10 @@ EXPLAINED = 0.12
 leave 6 to 9 % on photographs of plaster and stone; a coin's 43 % become 15 % under a wrong one.)"""
 MOST_BENT = 0.25
 """A wrong curve leaves no more than this over. (Metal leaves 25 to 45 %, and a wrong curve explains it better.)"""
+IN_CODES = 0.98
+"""... and of the pictures' codes less than this share: where a surface bends little, every curve explains it, and in
+light that is a straight line of codes their noise is less. (Linear pictures that were read as sRGB: 0.29 to 0.96; sRGB
+as it is: 1.00 and more.)"""
 OTHER_EXPOSURE = 1.05
 
 
@@ -44,22 +51,54 @@ class Glance:
 
     def left_over(self, transfer: str, exposures: FloatArray | None = None) -> float:
         """Return the share of a typical pixel's light that no matte surface explains."""
+        lit = self._lit(transfer, exposures)
+        brightest, used = lit.max(axis=0), self._used(lit)
+        enough = _enough(used, brightest)
+        lit, used = lit[:, enough], used[:, enough]
+        if lit.shape[1] < POINTS // 100:
+            return float("nan")
+        residual = _residual(lit, self.directions, used.astype(np.float64))
+        return float(np.median(np.sqrt((residual**2).sum(axis=0) / np.maximum(((lit * used) ** 2).sum(axis=0), 1e-12))))
+
+    def left_of_codes(self, transfer: str, other: str) -> tuple[float, float]:
+        """Return, under each of two curves, the share of a typical pixel's codes that no matte surface explains, over
+        the same samples."""
+        lit = [self._lit(name) for name in (transfer, other)]
+        used = self._used(lit[0]) & self._used(lit[1])
+        enough = _enough(used, lit[0].max(axis=0))
+        if enough.sum() < POINTS // 100:
+            return float("nan"), float("nan")
+        sizes = np.linalg.norm(self.signals * used, axis=0)[enough]
+        shares = []
+        for name, light in zip((transfer, other), lit, strict=True):
+            steepness = np.interp(self.signals, CODES, np.gradient(to_light(find_curve(name), CODES), CODES))
+            weights = used * self.strengths[:, None] / np.maximum(steepness, LEAST_STEEP)
+            residual = _residual(light[:, enough], self.directions, weights[:, enough])
+            shares.append(float(np.median(np.linalg.norm(residual, axis=0) / np.maximum(sizes, 1e-12))))
+        return shares[0], shares[1]
+
+    def _lit(self, transfer: str, exposures: FloatArray | None = None) -> FloatArray:
+        """Return what the lights gave, (light, pixel), each as if it were of strength 1."""
         curve = find_curve(transfer)
         light = to_light(curve, self.signals)
         light = light if self.dark is None else np.maximum(light - to_light(curve, self.dark), 0)
         strength = self.strengths if exposures is None else self.strengths * exposures
-        lit = light / strength[:, None]
-        used = (lit > LEAST * lit.max(axis=0)) & (self.signals < MOST)
-        brightest = lit.max(axis=0)
-        enough = (used.sum(axis=0) >= LEAST_LIGHTS) & (brightest > SUBJECT * np.percentile(brightest, 99))
-        lit, used = lit[:, enough], used[:, enough]
-        if lit.shape[1] < POINTS // 100:
-            return float("nan")
-        normal = np.einsum("lp,li,lj->pij", used, self.directions, self.directions) + 1e-6 * np.eye(3)
-        right = np.einsum("lp,li->pi", lit * used, self.directions)
-        found = np.linalg.solve(normal, right[..., None])[..., 0]
-        residual = (lit - self.directions @ found.T) * used
-        return float(np.median(np.sqrt((residual**2).sum(axis=0) / np.maximum(((lit * used) ** 2).sum(axis=0), 1e-12))))
+        return np.asarray(light / strength[:, None], np.float64)
+
+    def _used(self, lit: FloatArray) -> NDArray[np.bool_]:
+        return np.asarray((lit > LEAST * lit.max(axis=0)) & (self.signals < MOST))
+
+
+def _enough(used: NDArray[np.bool_], brightest: FloatArray) -> NDArray[np.bool_]:
+    return np.asarray((used.sum(axis=0) >= LEAST_LIGHTS) & (brightest > SUBJECT * np.percentile(brightest, 99)))
+
+
+def _residual(lit: FloatArray, directions: FloatArray, weights: FloatArray) -> FloatArray:
+    """Return what of (light, pixel) no matte surface explains, in least squares with these weights, and times them."""
+    normal = np.einsum("lp,li,lj->pij", weights**2, directions, directions) + 1e-6 * np.eye(3)
+    right = np.einsum("lp,li->pi", lit * weights**2, directions)
+    found = np.linalg.solve(normal, right[..., None])[..., 0]
+    return np.asarray((lit - directions @ found.T) * weights)
 
 
 def glance_at(pictures: Photographs, lights: Sequence[Light]) -> Glance | None:
@@ -87,6 +126,9 @@ def curve_doubt(glance: Glance | None, pictures: Photographs) -> str | None:
     mine, other = pictures.transfer, "linear" if pictures.transfer != "linear" else "srgb"
     left, better = glance.left_over(mine), glance.left_over(other)
     if left > MOST_BENT or not better < min(CLEARLY * left, EXPLAINED):
+        return None
+    of_codes, better_of_codes = glance.left_of_codes(mine, other)
+    if not better_of_codes < IN_CODES * of_codes:
         return None
     return (
         f"The pictures were read as {mine!r}, {pictures.because}; but read as {other!r} they fit the lights better: "

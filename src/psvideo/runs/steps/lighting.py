@@ -122,13 +122,17 @@ def read_lighting(
     rig, plan = (flashed, clip.plan) if unmixing is None else (unmixing.rig, unmixing.shown)
     lights = lights_as_planned(rig, plan)
     depths = None if depth_path is None else _read_depth(take, rig, depth_path, metres_per_unit)
-    if near_iterations is None:
-        near_iterations = NEAR_ITERATIONS if depths is None else 0
-    near = near_surface_of(
-        rig, lights, height_px=clip.height_px, width_px=clip.width_px, iterations=near_iterations, depths=depths
-    )
-    lit = illumination(lights, channels=clip.channels, ground=None if near is None else near.ground)
+    iterations = near_iterations
+    if iterations is None:
+        iterations = NEAR_ITERATIONS if depths is None else 0
     size = {"width_px": clip.width_px, "height_px": clip.height_px}
+    near = near_surface_of(rig, lights, **size, iterations=iterations, depths=depths)
+    if near is None and near_iterations:
+        raise UsageError(
+            f"`near_iterations` {near_iterations}: nothing would use it. All lights of {rig_path} are distant, so that "
+            "normals do not depend on where the surface is; leave it out."
+        )
+    lit = illumination(lights, channels=clip.channels, ground=None if near is None else near.ground)
     masks = None if mask_path is None else open_masks(mask_path, **size)
     falloff = None if flat_path is None else _read_falloff(flat_path, take, lights)
     return Lighting(
