@@ -20,6 +20,7 @@ from psvideo.compute.compile_count import COMPILING, CompileCount, compiles_coun
 from psvideo.live.chain import Chain, LiveFrame
 from psvideo.live.incoming.source import LiveSource
 from psvideo.live.preparing import compiling_words, prepared
+from psvideo.live.result_times import ResultTimes
 from psvideo.live.running import Running
 from psvideo.live.showing.quality import first_quality
 from psvideo.live.status import LiveStatus
@@ -182,11 +183,9 @@ def test_one_late_result_of_a_second_is_late_though_most_are_not(make_plan: Plan
         said=said.append,
         drawn_ages_s=lambda since_s: [0.05, 0.06, 0.05, 0.31],
     )
-    running.results = 4
-    running._made_s = [0.02] * 4
-    running._ages_s = [0.03, 0.04, 0.03, 0.28]
+    running.times = ResultTimes(count=4, ages_s=[0.03, 0.04, 0.03, 0.28], _made_s=[0.02] * 4)
     status = running._status(1.0, 1.0, (0, 0))
-    measured = running._measured(status)
+    measured = running.times.second(status, plan, behind_s=0.0)
     assert status.age_s == pytest.approx(0.055)
     assert status.oldest_s == 0.31
     assert measured is not None

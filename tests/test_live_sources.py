@@ -213,7 +213,11 @@ def test_a_folder_is_read_while_it_is_written(clip: Path, tmp_path: Path) -> Non
 
 @pytest.mark.parametrize(
     ("raw", "said"),
-    [("grey", "Did you mean gray?"), ("bayer_rggb8", "A mosaic is gray or gray16le"), ("grayf32le", "no pixels")],
+    [
+        ("grey", "Did you mean gray?"),
+        ("bayer_rggb8", "A mosaic is gray or gray16le"),
+        ("grayf32le", "not a pixel format"),
+    ],
 )
 def test_bare_bytes_of_an_unknown_kind_are_refused_with_the_kinds_that_are_read(
     clip: Path, raw: str, said: str, capsys: pytest.CaptureFixture[str]

@@ -16,19 +16,16 @@ from psvideo.live.following.holding import Holding
 from psvideo.live.incoming.behind import Behind
 from psvideo.live.incoming.recording import Recording
 from psvideo.live.incoming.source import LiveSource
+from psvideo.live.keeping_up import KeepingUp
 from psvideo.live.preparing import compiling_words, prepared
-from psvideo.live.showing.quality import MOST_RATE, LiveSecond, Quality
+from psvideo.live.result_times import STATUS_S, ResultTimes
+from psvideo.live.showing.quality import MOST_RATE, Quality
 from psvideo.live.showing.smaller import smaller_plan
 from psvideo.live.status import LiveState, LiveStatus, LiveSummary
 from psvideo.live.waiting import Waiting
 
 IDLE_S = 0.1
 """Whoever waits for a frame looks so often whether the run is over."""
-STATUS_S = 1.0
-SLOW = 0.9
-"""A source that gives less than this share of the plan's frames is slow, and said to be."""
-SETTLES_S = 3.0
-"""After the first results, which wait for what is loaded once, until it is judged whether there is time for more."""
 SEARCH_S = 60.0
 """A search that is under way when the source ends is waited for no longer than this."""
 LEAVES_S = 5.0
@@ -62,24 +59,21 @@ class Running:
     holding: Holding | None = None
     seconds: float | None = None
     notes: list[str] = field(default_factory=list)
-    results: int = 0
     first_lock_s: float | None = None
     status: LiveStatus | None = None
-    _ages_s: list[float] = field(default_factory=list)
-    _made_s: list[float] = field(default_factory=list)
-    _making_since_s: float | None = None
+    times: ResultTimes = field(default_factory=ResultTimes)
+    _keeping_up: KeepingUp = field(init=False)
     _behind: Behind | None = None
     _waiting: Waiting = field(init=False)
     _compiles: CompileCount = field(default_factory=CompileCount)
     _preparing: bool = False
-    _slow: bool = False
-    _settled_s: float | None = None
     _stop: threading.Event = field(default_factory=threading.Event)
     _came: threading.Event = field(default_factory=threading.Event)
     _fault: BaseException | None = None
 
     def __post_init__(self) -> None:
-        """See who is waited for."""
+        """See who is waited for, and what has to keep up with what."""
+        self._keeping_up = KeepingUp(plan=self.chain.plan, source=self.source.name, quality=self.quality)
         self._waiting = Waiting(name=self.source.name, check=self.source.check)
 
     def stop(self) -> None:
@@ -178,17 +172,13 @@ class Running:
             self.first_lock_s = self.chain.seen * self.chain.plan.camera.frame_period_s
 
     def _solve(self) -> bool:
-        began_s = self._making_since_s = time.monotonic()
-        try:
+        began_s = time.monotonic()
+        with self.times.making(began_s):
             newest = self.chain.solve()
             if newest is None:
                 return False
             self.shown(newest)
-        finally:
-            self._making_since_s = None
-        self.results += 1
-        self._ages_s.append(time.monotonic() - newest.came_s)
-        self._made_s.append(time.monotonic() - began_s)
+        self.times.add(came_s=newest.came_s, began_s=began_s)
         return True
 
     def _over(self, index: int) -> bool:
@@ -196,55 +186,17 @@ class Running:
 
     def _adapt(self, status: LiveStatus) -> None:
         """Make the picture smaller where there was no time for it, larger where there is, and say so."""
-        measured = self._measured(status)
-        if status.state != "locked" or measured is None:
-            return
-        self._settled_s = status.at_s + SETTLES_S if self._settled_s is None else self._settled_s
-        if status.at_s < self._settled_s:
-            return
-        plan = self.chain.plan
-        if self._pace(status) < SLOW and not self._slow:
-            self._slow = True
-            self.notes.append(
-                f"{self.source.name}: its frames come at {status.fps:.1f} a second, and the plan says "
-                f"{float(plan.camera.fps):.5g}: what sends or reads them does not keep up."
-            )
-        quality = self.quality.after(measured)
-        if quality.step != self.quality.step:
-            word = "smaller, to keep up" if quality.step > self.quality.step else "larger: there is time for it"
-            camera = smaller_plan(plan, quality.step).camera
-            self.notes.append(f"The live picture is now {camera.width_px} x {camera.height_px} pixels, {word}.")
-            self.chain.step = quality.step
-        self.quality = quality
-
-    def _measured(self, status: LiveStatus) -> LiveSecond | None:
-        """Return what the last second's results came to; None where none was made, nor was being made all the time."""
-        plan, since_s = self.chain.plan, self._making_since_s
         behind_s = 0.0 if self._behind is None else self._behind.second_s()
-        made_s, self._made_s = self._made_s, []
-        if not made_s and since_s is not None and self.results and time.monotonic() - since_s > STATUS_S:
-            made_s = [time.monotonic() - since_s]
-        if not made_s:
-            return None
-        made_age_s = max(self._ages_s[-len(made_s) :] if status.oldest_s is not None else made_s)
-        return LiveSecond(
-            age_s=made_age_s if status.oldest_s is None else status.oldest_s,
-            made_age_s=made_age_s,
-            made_s=float(np.median(made_s)),
-            rate=status.results_per_s,
-            rounds_per_s=self._pace(status) * len(plan.dark_rounds) / plan.cycle_s,
-            behind_s=behind_s,
-        )
-
-    def _pace(self, status: LiveStatus) -> float:
-        """Return which share of the plan's frames came, at most all."""
-        return min(status.fps * self.chain.plan.camera.frame_period_s, 1.0)
+        measured = self.times.second(status, self.chain.plan, behind_s=behind_s)
+        before = self._keeping_up.quality.step
+        self.notes.extend(self._keeping_up.notes_on(status, measured))
+        if self._keeping_up.quality.step != before:
+            self.chain.step = self._keeping_up.quality.step
 
     def _status(self, at_s: float, last_s: float, before: tuple[int, int]) -> LiveStatus:
         chain, follower = self.chain, self.chain.follower
         camera = smaller_plan(chain.plan, chain.step).camera
-        made_s = self._ages_s[len(self._ages_s) - max(self.results - before[1], 0) :]
-        ages_s = self.drawn_ages_s(time.monotonic() - last_s) or made_s
+        ages_s = self.drawn_ages_s(time.monotonic() - last_s) or self.times.ages_since(before[1])
         state: LiveState = "preparing" if self._preparing else chain.state
         waits_for = self._waiting.look(at_s, state=state, frames=chain.seen, why=chain.why)
         self.status = LiveStatus(
@@ -253,8 +205,8 @@ class Running:
             fps=(chain.seen - before[0]) / last_s,
             frames=chain.seen,
             lost=chain.lost_frames,
-            results=self.results,
-            results_per_s=(self.results - before[1]) / last_s,
+            results=self.times.count,
+            results_per_s=(self.times.count - before[1]) / last_s,
             age_s=float(np.median(ages_s)) if ages_s else None,
             oldest_s=max(ages_s, default=None),
             phase_error_rows=None if follower is None else follower.error_rows,
@@ -273,14 +225,14 @@ class Running:
 
     def _summary(self, seconds: float) -> LiveSummary:
         chain, follower = self.chain, self.chain.follower
-        ages = self._ages_s
+        ages = self.times.ages_s
         return LiveSummary(
             seconds=seconds,
             frames=chain.seen,
             lost=chain.lost_frames,
             locks=len(chain.followed),
             first_lock_s=self.first_lock_s,
-            results=self.results,
+            results=self.times.count,
             ages_s=(float(np.median(ages)), max(ages)) if ages and self.source.paced else None,
             phase_error_rows=None if follower is None else follower.error_rows,
             clock_offset_ppm=None if follower is None else follower.clock.offset_ppm,

@@ -23,7 +23,8 @@ from psvideo.sync.rowfit.normal_equations import projected
 from psvideo.sync.rowfit.profiles import Profiles, brightnesses, unexplained
 from psvideo.sync.rowfit.refine import CAUCHY, GLOBALS, errors_of_residuals, explained
 from psvideo.sync.rowfit.standard_error import sandwich
-from psvideo.sync.rowfit.tracking.track import MOST, SUSPICIOUS, losses_of
+from psvideo.sync.rowfit.tracking.losses import SUSPICIOUS, losses_of
+from psvideo.sync.rowfit.tracking.steps_ahead import MOST
 from psvideo.sync.verdict.believed import MIN_EXPLAINED, MIN_GAIN
 
 State = Literal["seeking", "locked", "unsure", "lost"]
@@ -222,7 +223,7 @@ def _shift(plan: Plan, rows: Profiles, beat: Beat, rest: FloatArray) -> tuple[fl
     basis = np.zeros((len(rows.window_start) + 1 + len(GLOBALS), 1))  # what a fit may free is held here
     basis[: len(rows.window_start) + 1] = 1.0
     _, hessian, scores = projected(plan, rows, beat, weight, basis, tails=False)
-    shortest_s = min(plan.flashes[slot].duration_s for slot in plan.lit_slots)
+    shortest_s = plan.shortest_flash_s
     known = np.full((1, 1), shortest_s**-2.0)
     shift_s = float(scores.sum() / (hessian[0, 0] + known[0, 0]))
     most_s = HELD * shortest_s

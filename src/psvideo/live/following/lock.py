@@ -62,7 +62,7 @@ def rows_to_lock(plan: Plan) -> int:
     """Return to how many rows frames may be averaged: the finder's time goes with them, and who follows gets surer."""
     camera = plan.camera
     reads_s = camera.frame_period_s if camera.readout_s is None else abs(camera.readout_s)
-    shortest_s = min(plan.flashes[slot].duration_s for slot in plan.lit_slots)
+    shortest_s = plan.shortest_flash_s
     return max(LOCK_ROWS, int(FLASH_ROWS * reads_s / shortest_s) + 1)
 
 

@@ -15,7 +15,7 @@ from psvideo.sync.rowfit.beat import Beat
 from psvideo.sync.rowfit.fit import FLASH_ROWS
 from psvideo.sync.rowfit.profiles import Profiles
 from psvideo.sync.rowfit.tracking.course import window_frames
-from psvideo.sync.rowfit.tracking.track import BLOCK
+from psvideo.sync.rowfit.tracking.steps_ahead import BLOCK
 
 MOST_ROWS = 96
 """Rows to which profiles are averaged; more where a flash would not span ``FLASH_ROWS`` of them."""
@@ -99,7 +99,7 @@ class Window:
 def window_of(plan: Plan, beat: Beat) -> Window:
     """Return an empty window that holds what foretells the next frames: every light several times, and the marker."""
     period_s = plan.camera.frame_period_s
-    shortest_s = min(plan.flashes[slot].duration_s for slot in plan.lit_slots)
+    shortest_s = plan.shortest_flash_s
     sharp = int(FLASH_ROWS * beat.row_time_s * plan.camera.height_px / shortest_s)
     return Window(
         period_s=period_s,
