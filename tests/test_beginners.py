@@ -98,7 +98,7 @@ WRONG_PLACE = {
     "a photograph for the lights": (
         ["stills", "{tmp}/photos", "--lights", "{tmp}/photos/shot 3.png", "-o", "{tmp}/o"],
         1,
-        "is no text",
+        "is not text",
     ),
     "raw video of a maker": (["sync", "{tmp}/a.braw"], 1, "export it with its maker's program, as DNG, EXR or ProRes"),
     "no unit": (

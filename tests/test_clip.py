@@ -219,7 +219,7 @@ def test_pixels_that_are_no_numbers_are_refused(tmp_path: Path, write_plan: Call
     pixels = np.zeros((ROWS, COLS, 3), np.float16)
     pixels[2, 3, 1] = value
     OpenEXR.File({"type": OpenEXR.scanlineimage}, {"RGB": pixels}).write(str(tmp_path / "a.1.exr"))
-    with pytest.raises(PsvideoError, match=r"a\.1\.exr: holds 1 values that are no numbers"):
+    with pytest.raises(PsvideoError, match=r"a\.1\.exr: holds 1 values that are not numbers"):
         list(read_frames(open_clip(tmp_path)))
 
 
@@ -278,7 +278,7 @@ def test_ranges_choose_among_the_frames_that_are_there(text: str, numbers: tuple
 
 
 @pytest.mark.parametrize(
-    ("text", "message"), [("", "no frame range"), ("a-b", "no frame range"), ("90-99", "names none")]
+    ("text", "message"), [("", "not a frame range"), ("a-b", "not a frame range"), ("90-99", "names none")]
 )
 def test_ranges_that_say_nothing_are_wrong_usage(text: str, message: str) -> None:
     with pytest.raises(UsageError, match=message):

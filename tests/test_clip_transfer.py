@@ -106,7 +106,7 @@ def test_light_under_a_log_curve_is_counted_from_black_to_white_after_the_curve(
 
 
 def test_levels_that_the_curve_turns_round_are_refused() -> None:
-    with pytest.raises(PsvideoError, match="white_level 20 is no brighter than black_level 0 under the curve 'logc3'"):
+    with pytest.raises(PsvideoError, match="white_level 20 is not brighter than black_level 0 under the curve 'logc3'"):
         linear_light(picture([0], bits=8), Encoding(transfer="logc3", white_level=20))
 
 

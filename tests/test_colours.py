@@ -1,4 +1,4 @@
-"""Flashes of several colours: taken apart on paper by the model's own sum, and in whole takes against the truth."""
+"""Flashes of several colours: separated on paper by the model's own sum, and in whole takes against the truth."""
 
 from collections.abc import Callable
 from dataclasses import replace

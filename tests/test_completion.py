@@ -74,7 +74,7 @@ def test_a_shell_is_offered_what_can_follow(place: Path, shell: str, line: str, 
 def test_zsh_is_offered_the_same_with_a_word_on_each(place: Path) -> None:
     said = "\n".join(asked(place, "zsh", "psvideo strobe "))
     assert all(f'"{name}"' in said or name in said for name in ("check", "run", "stop", "emulate"))
-    assert "Make a board dark" in said
+    assert "Switch off all lights" in said
 
 
 def test_cameras_of_the_table_are_offered(place: Path) -> None:

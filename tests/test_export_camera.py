@@ -109,7 +109,7 @@ def test_a_file_that_is_no_stage_or_has_no_camera_is_refused(tmp_path: Path) -> 
     (tmp_path / "broken.usda").write_text("not usd at all")
     with pytest.raises(PsvideoError, match=r"broken\.usda: cannot be read as USD"):
         choose_space("world", "up", tmp_path / "broken.usda")
-    with pytest.raises(PsvideoError, match="is no file"):
+    with pytest.raises(PsvideoError, match="is not a file"):
         choose_space("world", "up", tmp_path / "none.usdc")
     usd.Stage.CreateNew(str(tmp_path / "empty.usda")).Save()
     with pytest.raises(PsvideoError, match="holds no camera"):

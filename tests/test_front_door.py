@@ -202,7 +202,7 @@ MISTAKES: dict[str, tuple[Callable[[], object], str]] = {
     "nothing": (lambda: ps.solve_images([], DIRECTIONS), "expected an array"),
     "sizes": (lambda: ps.solve_images([*GOOD[:3], GOOD[3, :2]], DIRECTIONS), "image 0 is .3, 5. and image 3 is .2, 5."),
     "complex": (lambda: ps.solve_images(GOOD * 1j, DIRECTIONS), "type complex128; expected floats"),
-    "NaN": (lambda: ps.solve_images(np.where(GOOD > 0.4, np.nan, GOOD), DIRECTIONS), "values that are no numbers"),
+    "NaN": (lambda: ps.solve_images(np.where(GOOD > 0.4, np.nan, GOOD), DIRECTIONS), "values that are not numbers"),
     "lights behind": (lambda: ps.solve_images(GOOD, DIRECTIONS * [1, 1, -1]), "change the sign of z"),
     "two lights": (lambda: ps.solve_images(GOOD[:2], DIRECTIONS[:2]), "at least three lights, and here are 2"),
     "a light more": (lambda: ps.solve_images(GOOD[:3], DIRECTIONS), "3 images .* and 4 lights"),

@@ -162,7 +162,7 @@ def test_a_pipe_is_refused_where_a_file_is_expected(read: Callable[[Path], objec
 
 def test_a_name_that_is_no_text_is_refused(tmp_path: Path) -> None:
     for name in (os.fsdecode(b"\xff"), "a\0b"):
-        with pytest.raises(UsageError, match="this name is no text in UTF-8"):
+        with pytest.raises(UsageError, match="this name is not UTF-8 text"):
             path_of("clip", tmp_path / name)
 
 

@@ -7,6 +7,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+import av
 import imagecodecs
 import numpy as np
 import OpenEXR
@@ -21,6 +22,7 @@ from psvideo.formats.exr_files import write_exr
 from psvideo.formats.plan_toml import format_plan
 from psvideo.formats.rig_toml import format_rig
 from psvideo.formats.timing_json import format_timing
+from psvideo.inspect.about_clip import level
 from psvideo.inspect.describe import describe
 from psvideo.inspect.findings import Description
 from psvideo.model.camera import Encoding
@@ -109,9 +111,9 @@ FAULTS: dict[str, tuple[Callable[[Path, Plan], Any], str]] = {
         lambda shot, plan: put_rig(shot, ("key", "left")),
         "rig.toml: The rig has no light named 'right'",
     ),
-    "levels": (lambda shot, plan: put_plan(shot, plan, transfer="logc3", white_level=20), "no brighter than"),
+    "levels": (lambda shot, plan: put_plan(shot, plan, transfer="logc3", white_level=20), "not brighter than"),
     "colour filters": (lambda shot, plan: put_plan(shot, plan, cfa="RGGB"), "is a colour picture"),
-    "curve": (lambda shot, plan: put_plan(shot, plan, transfer="filmlook"), "no curve that this psvideo knows"),
+    "curve": (lambda shot, plan: put_plan(shot, plan, transfer="filmlook"), "not a curve that this psvideo knows"),
 }
 
 
@@ -258,11 +260,55 @@ def test_results_say_their_space_direction_colour_and_rate(tmp_path: Path) -> No
     assert (found.facts["space"], found.facts["y"], found.facts["colour"]) == ("world", "down", "lin_awg4_scene")
 
 
+def test_what_lies_in_a_folder_of_results_stands_for_it_and_its_movie_for_itself(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    for name, channels in (("normals", "RGB"), ("albedo", "RGB"), ("valid", "Y")):
+        put_exr(out / name / f"shot_{name}.1001.exr", channels)
+    (out / "preview").mkdir()
+    for name in ("shot.usda", "shot.otio", "shot.nk", "README-nuke.txt", "report.html"):
+        (out / name).write_text("x")
+    for name in ("normals", "preview", "shot.usda", "shot.otio", "shot.nk", "README-nuke.txt", "report.html"):
+        found = describe(out / name)
+        assert (found.kind, found.fits) == ("results folder", True), name
+    with av.open(str(out / "preview" / "shot_relit.mov"), "w") as container:
+        stream = container.add_stream("prores_ks", rate=24)
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv422p10le"
+        container.mux(stream.encode(av.VideoFrame.from_ndarray(np.zeros((48, 64, 3), np.uint8), format="rgb24")))
+        container.mux(stream.encode())
+    found = describe(out / "preview" / "shot_relit.mov")
+    assert (found.kind, found.fits) == ("movie", True), lines(found, "FAULT")
+    assert "a movie for eyes made from out, no footage" in lines(found, "ok")
+    assert describe(out / "normals" / "shot_normals.1001.exr").kind == "exr image"
+
+
+def test_a_folder_of_several_takes_names_each_and_whose_files_do_not_fit(tmp_path: Path) -> None:
+    held = {"take1": {"normals": 2, "albedo": 2, "valid": 2}, "take2": {"normals": 2, "albedo": 1, "valid": 2}}
+    for take, counts in held.items():
+        for name, count in counts.items():
+            for number in range(count):
+                put_exr(tmp_path / take / name / f"{name}.{number:04d}.exr")
+    found = describe(tmp_path)
+    assert found.kind == "results of several takes"
+    assert "take1: results folder, 2 results" in lines(found, "ok")
+    assert lines(found, "FAULT").startswith("take2: albedo/ and normals/ do not hold the same numbers")
+
+
+def test_light_that_only_rounding_left_is_none() -> None:
+    assert [level(light) for light in (-4.28e-07, 0.0, -0.0012, 0.5)] == ["0", "0", "-0.0012", "0.5"]
+
+
+def test_a_clip_of_exr_frames_with_its_timing_beside_them_is_no_folder_of_plates(tmp_path: Path, plan: Plan) -> None:
+    put_plan(tmp_path, plan)
+    put_exr(tmp_path / "frames" / "a.0001.exr", "RGB")
+    (tmp_path / "timing.json").write_text(format_timing(make_timing()))
+    assert describe(tmp_path).kind == "clip folder"
+
+
 def test_what_psvideo_does_not_know_is_refused(tmp_path: Path) -> None:
     (tmp_path / "notes.pdf").write_text("x")
     (tmp_path / "pyproject.toml").write_text("[project]")
     for name in ("notes.pdf", "pyproject.toml"):
-        with pytest.raises(PsvideoError, match=f"{name}: is nothing that psvideo writes or reads"):
+        with pytest.raises(PsvideoError, match=f"{name}: is nothing of which psvideo can say more"):
             describe(tmp_path / name)
     with pytest.raises(PsvideoError, match="there is no such file or folder"):
         describe(tmp_path / "gone")

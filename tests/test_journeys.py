@@ -139,6 +139,18 @@ def test_a_stopped_run_goes_on_where_it_stopped_and_only_as_it_began(
     assert (out / "albedo" / kept[1].name).stat().st_mtime_ns == before, "what was whole is not written again"
 
 
+@pytest.mark.parametrize("options", [(), ("--align", "flow")], ids=" ".join)
+def test_results_may_be_numbered_from_nought(options: tuple[str, ...], clip: Path, tmp_path: Path) -> None:
+    for first in ("0", "1001"):
+        command = ("normals", clip, "--rig", clip / "rig.toml", "-q", "--no-preview", *options)
+        assert run(*command, "--start-number", first, "-o", tmp_path / first) == 0
+    files = [sorted((tmp_path / first / "normals").iterdir()) for first in ("0", "1001")]
+    numbers = [[int(file.name.split(".")[-2]) for file in some] for some in files]
+    assert [number + 1001 for number in numbers[0]] == numbers[1]
+    for one, other in zip(*files, strict=True):
+        assert np.array_equal(planes(one), planes(other))
+
+
 def test_resume_begins_where_nothing_was_begun_and_says_when_all_is_done(
     clip: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -264,6 +276,8 @@ def test_a_missing_frame_is_a_dropped_frame_that_is_reported_and_marked(
 
 BROKEN = {
     "no clip": (["sync", "{tmp}/none"], 1, "there is no such clip"),
+    "a timing by another ending": (["sync", "{clip}", "-o", "{tmp}/t.txt"], 2, "such as"),
+    "a page by another ending": (["view", "{clip}", "--export", "{tmp}/page.txt"], 2, "page.html"),
     "an output that exists": (["sync", "{clip}", "-o", "{clip}/plan.toml"], 2, "exists already"),
     "a rig without a light of the plan": (
         ["normals", "{clip}", "--rig", "{tmp}/rig.toml", "-o", "{tmp}/o"],

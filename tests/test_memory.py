@@ -27,12 +27,13 @@ FRAMES_A_ROUND = 10
 PHASE_S = 0.003
 SMALL, LARGE = (90, 160), (450, 800)
 FEW, MANY = 60, 600
-MOST_AT_ONCE_MB = 1.5
-"""So much a process's peak may rise once between 60 frames and 570: when the cores are busy otherwise it does in some
-runs, by 1.2, at a frame that differs from run to run, and with no more threads than before; on free cores by 0.06."""
-MOST_GROWTH_MB = 0.7
-"""So much it may rise beside that, in all: C libraries keep what was freed in pieces (0.35). A byte a pixel that stays
-with every instant makes 0.7 more, the codes of a frame that stay with every frame 42."""
+USUAL_GROWTH_MB = 0.03
+"""So much a process's peak may rise in 30 frames, usually: 0.00 to 0.02 was measured, a few numbers of each instant and
+what files left for the collector. A byte a pixel that stays with every instant makes 0.04 more, the codes of a frame
+that stay with every frame 2.5."""
+MOST_GROWTH_MB = 2.2
+"""So much it may rise in all between 60 frames and 570: 0.2 to 1.4 was measured. Now and then the peak leaps by 0.1 to
+1.0, when a frame more than before is on its way, at frames that differ from run to run."""
 MOST_BYTES_PER_SAMPLE = 55
 """A sample of the picture: ambient light, twice, results with what they are judged by, and what is held steady (51.5
 bytes). Frames of plain codes stay in their files: the 19 that a round and a half needs would be 38 more."""
@@ -133,8 +134,8 @@ def test_memory_grows_with_the_picture_and_not_with_the_clip(tmp_path: Path) -> 
     assert done.returncode == 0, done.stderr
     long, large = json.loads(done.stdout.splitlines()[-1])
     samples = LARGE[0] * LARGE[1] * 3
-    *steps, most = np.sort(np.diff(long[FEW // 30 : -1]))  # the last is with the report and the movie
-    assert most <= MOST_AT_ONCE_MB
+    steps = np.diff(long[FEW // 30 : -1])  # the last is with the report and the movie
+    assert np.median(steps) <= USUAL_GROWTH_MB
     assert sum(steps) <= MOST_GROWTH_MB
     assert (large[-1] - long[-1]) * 2**20 <= MOST_BYTES_PER_SAMPLE * samples
     assert len(list((tmp_path / "long" / "out" / "normals").iterdir())) == MANY // FRAMES_A_ROUND - 2

@@ -508,6 +508,15 @@ def test_results_side_by_side_are_each_relit_as_they_are_under_the_same_light(
         thread.join()
 
 
+@pytest.mark.parametrize(("fps", "shown"), [(1 / 12, False), (24.0, True)])
+def test_results_of_photographs_have_no_time(
+    fps: float, shown: bool, folder: Path, tmp_path: Path, watched: Watched
+) -> None:
+    write_single_page(replace(show_of(folder), fps=fps), tmp_path / "page.html", width_px=64, count=small.COUNT)
+    page = watched.open((tmp_path / "page.html").as_uri())
+    assert [bool(page.locator(f"#{name}").inner_text()) for name in ("clock", "rate")] == [shown, shown]
+
+
 def test_what_cannot_stand_side_by_side_is_named(folder: Path, tmp_path: Path) -> None:
     one = show_of(folder)
     with pytest.raises(UsageError, match=r"wide: its pictures are 128 x 48 pixels"):

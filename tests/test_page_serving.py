@@ -174,9 +174,22 @@ def test_a_port_in_use_is_named_with_what_to_do(server: PageServer) -> None:
         page_server(server.show, port=server.server_port)
 
 
+@pytest.mark.parametrize("port", [-1, 99999])
+def test_a_port_that_is_none_is_not_laid_upon_another_program(server: PageServer, port: int) -> None:
+    with pytest.raises(UsageError, match=f"`port` {port}: expected a number from 1 to 65535"):
+        page_server(server.show, port=port)
+
+
 def test_without_a_port_a_free_one_is_taken(server: PageServer) -> None:
     with page_server(server.show) as one, page_server(server.show) as other:
         assert one.server_port != other.server_port
+
+
+def test_of_a_folder_of_several_takes_one_is_to_be_named(tmp_path: Path) -> None:
+    for name in ("take1", "take2"):
+        small.results(tmp_path / "results" / name)
+    with pytest.raises(UsageError, match=r"holds results of 2 takes\. Name one, such as .*take1"):
+        show_of(tmp_path / "results")
 
 
 def test_a_folder_that_holds_nothing_to_show_is_named(tmp_path: Path) -> None:

@@ -299,11 +299,11 @@ def test_what_the_board_refuses_is_reported_with_its_number(board: Board) -> Non
     ("answer", "unasked", "says"),
     [
         (lambda data: b"", b"", "nothing answers there"),
-        (lambda data: data, b"", "sends back what it gets"),
+        (lambda data: data, b"", "sends back what it receives"),
         (lambda data: b"", b"$GPGGA,123519,4807.038,N,01131.000,E*47\r\n", "satellite receiver"),
-        (lambda data: b"login: " if data else b"", b"", "no strobe controller .it says 'login:"),
-        (lambda data: b"\xff\x80" if data else b"", b"", "bytes that are no text"),
-        (lambda data: b"OK\r\n" if data else b"", b"", "no strobe controller"),
+        (lambda data: b"login: " if data else b"", b"", "not a strobe controller .it says 'login:"),
+        (lambda data: b"\xff\x80" if data else b"", b"", "bytes that are not text"),
+        (lambda data: b"OK\r\n" if data else b"", b"", "not a strobe controller"),
     ],
     ids=["silent", "echo", "gps", "login", "noise", "modem"],
 )

@@ -52,7 +52,9 @@ def shoot_cautions(plan: Plan, figures: ShootFigures, *, limits: Limits | None =
 def _about_the_readout(request: ShootRequest) -> Iterator[Caution]:
     preset = request.preset
     if request.camera.readout_s is None:
-        yield note("readout", "The readout time is unknown: what hangs on it is left out until it is measured.")
+        yield note(
+            "readout", "The readout time is unknown: figures that depend on it are left out until it is measured."
+        )
     if preset is not None and preset.sure in ("single", "assumed"):
         yield warning(
             "readout",

@@ -130,7 +130,7 @@ def _exposure_s(wish: CameraWish, fps: Fraction) -> float:
     shutter_deg = 360.0 if wish.shutter_deg is None else wish.shutter_deg
     if not 0 < shutter_deg <= 360:
         raise UsageError(
-            f"`shutter_deg` {shutter_deg:g} is no shutter angle. Give more than 0 and at most 360 degrees."
+            f"`shutter_deg` {shutter_deg:g} is not a shutter angle. Give more than 0 and at most 360 degrees."
         )
     return exposure_of(fps, shutter_deg=shutter_deg)
 

@@ -194,7 +194,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
             "psvideo normals clip/ --rig rig.toml --for unreal -o out/",
         ),
         (
-            "in the scene's space, with the camera of a USD file; a movie for eyes",
+            "in the scene's space, with the camera of a USD file; and a preview movie of the normals",
             "psvideo normals clip/ --rig rig.toml --space world --camera-to-world shot.usd --preview relit -o out/",
         ),
         (
@@ -228,7 +228,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     ),
     "view": (
         ("scrub normals and albedo, and move a light over them", "psvideo view out/"),
-        ("what Algorithm 1 of Hudon et al. (2015) makes of a clip, against this split", "psvideo view clip/"),
+        ("a clip: its frames, and plates beside those of Algorithm 1 of Hudon et al. (2015)", "psvideo view clip/"),
         ("one file to send to somebody, 24 pictures of each kind", "psvideo view out/ --export page.html"),
         ("at a port of your choice, opened by yourself", "psvideo view out/ --port 9000 --no-browser"),
     ),

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 PLAN, MEASURE, SPLIT = "1  Plan and light", "2  Measure cameras and lights", "3  From footage to plates"
 SOLVE, LOOK = "4  From plates to normals", "5  Look at it"
-TRY = "Try it, and see whether all is there"
+TRY = "Try it, and check the installation"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,13 +30,13 @@ def _entries(panel: str, **summaries: str) -> tuple[Entry, ...]:
 COMMANDS = (
     *_entries(
         PLAN,
-        capture_plan="Plan a shoot: write plan.toml, and print what decides the shoot and what to beware of.",
+        capture_plan="Plan a shoot: write plan.toml, and print its figures and warnings.",
         strobe="Make lights flash as planned: on a board, or on an emulated one.",
     ),
     *_entries(MEASURE, calibrate="Measure cameras and lights before a shoot."),
     *_entries(
         SPLIT,
-        live="Follow the strobe while the camera runs, and solve the newest round: what the crew sees on the set.",
+        live="Show normals and relit light while the camera runs: follow the strobe, solve the newest round.",
         check="Judge a take in seconds, one line for each thing: exit status 0 where it can be used, 1 where not.",
         info="Say what a file or folder is, and whether it fits together: exit status 1 where it does not.",
         sync="Find phase, clock offset, light order and dropped frames of a strobed clip, from the picture alone.",
@@ -54,9 +54,9 @@ COMMANDS = (
     ),
     *_entries(
         TRY,
-        doctor="Say what is installed, what the machine can do and what to do about the rest: exit status 1 where work "
+        doctor="Report what is installed, how fast the machine is, and how to fix the rest: exit status 1 if work "
         "stops.",
-        demo="Film a virtual bust, find the flashes, solve for normals, and end with the path of a picture of it all.",
+        demo="Film a virtual bust, find the flashes, solve for normals, and print the path of a picture of it all.",
         synth="Film a virtual scene: a clip folder as a camera would leave it, and the truth beside it in truth/.",
     ),
 )

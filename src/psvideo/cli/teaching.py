@@ -1,5 +1,6 @@
 """Help that ends with examples to copy, and completion that loads no more than the command it is asked about."""
 
+import re
 import shlex
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -9,6 +10,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from psvideo.cli.examples import EXAMPLES
 from psvideo.cli.options.panels import MANY, panel_of
+from psvideo.errors import nearest
 
 PROGRAM = "psvideo"
 MISSING = {
@@ -38,6 +40,23 @@ def _take_no_value(params: list[Any]) -> None:
             param.metavar = ""
 
 
+def _with_the_nearest(message: str) -> str:
+    """Return what is said of a word that is no choice, with the choice that was probably meant.
+
+    >>> _with_the_nearest("Value error, 'nuk' is not one of 'nuke', 'blender'.")
+    "'nuk' is not one of 'nuke', 'blender'; did you mean 'nuke'?"
+    >>> _with_the_nearest("'a,b' is not one of 'a', 'b'.")
+    "'a,b' is not one of 'a', 'b': give the option once for each"
+    """
+    message = message.removeprefix("Value error, ")
+    word, between, listed = message.partition(" is not one of ")
+    choices = re.findall("'([^']*)'", listed)
+    if "," in word and set(re.split(r"\s*,\s*", word.strip("'"))) <= {*choices}:
+        return f"{message.rstrip('.')}: give the option once for each"
+    meant = nearest(word.strip("'"), choices) if between else ""
+    return f"{message.rstrip('.')}; {meant}" if meant.endswith("?") else message
+
+
 class Teaching(TyperCommand):
     """A command whose help ends with its examples."""
 
@@ -58,6 +77,7 @@ class Teaching(TyperCommand):
         except typer.BadParameter as fault:
             if not fault.message:  # it is missing
                 fault.message = MISSING.get(getattr(fault.param, "name", None) or "", "")
+            fault.message = _with_the_nearest(fault.message)
             raise
 
     def format_help(self, ctx: Any, formatter: Any) -> None:

@@ -139,7 +139,7 @@ def _ends(scale: Scale, transfer: str, black: float | None, white: float | None)
     zero = 0.0 if black is None else zero
     if one <= zero:
         raise PsvideoError(
-            f"white_level {levels[1]:g} is no brighter than black_level {levels[0]:g} under the curve {curve.name!r}, "
+            f"white_level {levels[1]:g} is not brighter than black_level {levels[0]:g} under the curve {curve.name!r}, "
             f"whose codes run from 0 to {scale.largest} in these files. Give the plan levels counted in these codes."
         )
     return zero, one

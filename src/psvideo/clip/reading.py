@@ -74,7 +74,7 @@ def parse_range(text: str, numbers: Iterable[int]) -> tuple[int, ...]:
     try:
         wanted = set(FrameSet(text if text.strip() else "none"))
     except (ParseException, ValueError):
-        raise UsageError(f"`frames` {text}: is no frame range. Write for example 1-100 or 1-100x2.") from None
+        raise UsageError(f"`frames` {text}: is not a frame range. Write for example 1-100 or 1-100x2.") from None
     chosen = tuple(number for number in present if number in wanted)
     if not chosen:
         raise UsageError(f"`frames` {text}: names none of the clip's frames; {_span(present)}.")
@@ -122,14 +122,14 @@ def _frame(clip: Clip, numbered: tuple[int, Picture]) -> Frame:
 
 
 def _check_finite(picture: Picture, name: str) -> None:
-    """Refuse a picture that holds values that are no numbers."""
+    """Refuse a picture that holds values that are not numbers."""
     if picture.header.bits is not None:
         return
     bands = (picture.codes[first : first + CHECKED_ROWS] for first in range(0, len(picture.codes), CHECKED_ROWS))
     missing = sum(0 if _is_finite(band) else int((~np.isfinite(band)).sum()) for band in bands)
     if missing:
         raise PsvideoError(
-            f"{name}: holds {missing} values that are no numbers (NaN or "
+            f"{name}: holds {missing} values that are not numbers (NaN or "
             "infinity). Write the frame again with finite pixels."
         )
 

@@ -24,6 +24,8 @@ from psvideo.model.turn import UPRIGHT
 HIGHLIGHTS_PERCENT, HIGHLIGHT = 0.1, 4.0
 """Of a picture's samples the brightest share, and how much brighter than all others they may be and still count: light
 of a surface that shines broadly; a mirrored lamp is a thousand times as bright, and says nothing of a normal here."""
+LEAST_SIDE_PX = 4
+"""Smaller pictures show no surface."""
 BAND_ROWS, SAMPLED_PX = 256, 1 << 20
 """Rows that are looked at together, and pixels that are enough to know a picture's brightest thousandth."""
 
@@ -87,7 +89,13 @@ def look_at(files: Sequence[Path], *, transfer: str | None = None) -> Photograph
         )
     kind = kinds[first]
     headers = [read_header(kind, file) for file in files]
-    longer_px = max(headers[0].width_px, headers[0].height_px)  # of raw files EXIF is read beside a small picture
+    width_px, height_px = headers[0].width_px, headers[0].height_px
+    if min(width_px, height_px) < LEAST_SIDE_PX:
+        raise PsvideoError(
+            f"{first}: is a picture of {width_px} x {height_px} pixels. Expected {LEAST_SIDE_PX} or more on every "
+            "side: name the photographs themselves."
+        )
+    longer_px = max(width_px, height_px)  # of raw files EXIF is read beside a small picture
     stated = tuple(replace(_stated(kind, file), longer_px=longer_px) for file in files)
     _refuse_odd(files, [looks(header) for header in headers], "is")
     _refuse_odd(files, [str(one.turn) for one in stated], "lies")

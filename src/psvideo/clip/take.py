@@ -25,7 +25,7 @@ class Take:
     kept
         Holds pictures that are decoded already, and takes those that will be looked at again.
     unmixing
-        How flashes of several colours are taken apart; the clip's plan is then as results show it. None: they are not.
+        How flashes of several colours are separated; the clip's plan is then as results show it. None: they are not.
     """
 
     clip: Clip
@@ -39,7 +39,7 @@ class Take:
         return self.clip.plan
 
     def unmixed(self, unmixing: Unmixing | None) -> "Take":
-        """Return the take with its flashes taken apart by colour, once its timing was found."""
+        """Return the take with its flashes separated by colour, once its timing was found."""
         if unmixing is None:
             return self
         return replace(self, clip=replace(self.clip, plan=unmixing.shown), unmixing=unmixing)

@@ -132,7 +132,7 @@ def find_curve(name: str) -> TransferCurve:
         listed = "" if advice.startswith("known are") else f" Known are: {', '.join(known)}."
         advice = f"known are: {', '.join(known)}." if not listed else advice
         raise PsvideoError(
-            f"transfer is {name!r}, which is no curve that this psvideo knows; {advice}{listed} Write the name of the "
+            f"transfer is {name!r}, not a curve that this psvideo knows; {advice}{listed} Write the name of the "
             "curve with which the camera encoded the files into the plan's [camera] table."
         )
     return found

@@ -21,6 +21,8 @@ from psvideo.model.units import counted
 MANY = 3
 SATURATED_SHARE = 0.01
 DIM = 0.05
+NO_LIGHT = 1e-6
+"""Less than a code of 16 bits by an order: rounding."""
 
 
 def describe_clip(path: Path, plan: Path | None) -> Description:
@@ -112,6 +114,15 @@ def _likeness_findings(clip: Clip) -> Iterator[Finding]:
         yield ok("all frames' headers are alike")
 
 
+def level(light: float) -> str:
+    """Return light in words: what is next to black is black, not -4.28e-07.
+
+    >>> level(-4.28e-07), level(0.00123)
+    ('0', '0.00123')
+    """
+    return f"{0.0 if abs(light) < NO_LIGHT else light:.3g}"
+
+
 def _level_findings(clip: Clip) -> Iterator[Finding]:
     """Decode a few frames and hold their light against the levels: 0 is black, 1 saturation."""
     chosen = sorted({clip.numbers[0], clip.numbers[len(clip.numbers) // 2], clip.numbers[-1]})
@@ -119,7 +130,7 @@ def _level_findings(clip: Clip) -> Iterator[Finding]:
     light = np.concatenate([frame.image.ravel() for frame in frames])
     low, high = (float(value) for value in np.percentile(light, (1, 99.9)))
     saturated = float(np.mean(light >= SATURATED))
-    levels = f"light from {low:.3g} to {high:.3g} (1st and 99.9th percentile; 0 is black, 1 saturation)"
+    levels = f"light from {level(low)} to {level(high)} (1st and 99.9th percentile; 0 is black, 1 saturation)"
     if low < -DIM or high > 1.2:
         yield warn(f"{levels}: the plan's black_level or white_level does not fit the files' codes")
     elif saturated > SATURATED_SHARE:

@@ -15,7 +15,7 @@ from psvideo.formats.contract import read_text
 from psvideo.formats.plan_toml import read_plan
 from psvideo.formats.rig_toml import read_rig
 from psvideo.formats.timing_json import read_timing
-from psvideo.inspect.about_output import describe_output
+from psvideo.inspect.about_output import describe_output, output_around
 from psvideo.inspect.about_plan import plan_findings, rig_findings
 from psvideo.inspect.findings import Description, Fact, Finding, fault, ok, warn
 from psvideo.model.units import counted
@@ -32,7 +32,7 @@ def describe_file(path: Path) -> Description:
     suffix = path.suffix.lower()
     if suffix in KINDS:
         return _describe_image(path, KINDS[suffix])
-    if suffix in LIGHT_LISTS:
+    if suffix in LIGHT_LISTS and output_around(path.absolute()) is None:
         return _described(path, "rig", _rig)
     schema = _schema(path)
     readers = {
@@ -43,10 +43,12 @@ def describe_file(path: Path) -> Description:
     }
     if schema in OF_A_FOLDER:
         return describe_output(path.parent)
+    if schema not in readers and (around := output_around(path.absolute())) is not None:
+        return describe_output(around)
     if schema not in readers:
         kinds = ", ".join(readers)
         raise PsvideoError(
-            f"{path}: is nothing that psvideo writes or reads. Name a clip folder, a movie, an image, an output "
+            f"{path}: is nothing of which psvideo can say more. Name a clip folder, a movie, an image, an output "
             f"folder, or a file whose schema is one of {kinds}."
         )
     return _described(path, *readers[schema])

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from psvideo.clip.reading import looks
-from psvideo.inspect.findings import Finding, ok, warn
+from psvideo.inspect.findings import Description, Finding, caught, ok, warn
 from psvideo.model.units import counted
 
 
@@ -27,3 +27,9 @@ def movie_findings(path: Path) -> Iterator[Finding]:
     range_ = "video range" if head.video_range else "full range"
     yield ok(f"transfer {head.transfer or 'not said'}, primaries {head.colour or 'not said'}, {range_}")
     yield from (warn(text) for text in head.warnings)
+
+
+def describe_preview(path: Path, results: Path) -> Description:
+    """Describe a movie for eyes that lies among results or plates: no footage, so that it needs no plan."""
+    findings = (*caught(movie_findings(path)), ok(f"a movie for eyes made from {results.name}, no footage"))
+    return Description(path=path, kind="movie", findings=findings)

@@ -1,6 +1,7 @@
 """What can be said of a folder that psvideo wrote: plates, or results; whether its sequences go together."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -14,13 +15,50 @@ from psvideo.model.units import counted
 
 
 def is_plates(folder: Path) -> bool:
-    """Return whether ``split`` wrote this folder: a timing beside one folder of plates per light."""
-    return (folder / "timing.json").is_file() and bool(_sequences(folder)) and not is_results(folder)
+    """Return whether ``split`` wrote this folder: a timing beside one folder of plates per light, and no plan."""
+    if not (folder / "timing.json").is_file() or (folder / "plan.toml").is_file():
+        return False
+    return bool(_sequences(folder)) and not is_results(folder)
 
 
 def is_results(folder: Path) -> bool:
     """Return whether ``normals`` wrote this folder."""
     return any((folder / "normals").glob("*.exr"))
+
+
+def takes_in(folder: Path) -> tuple[Path, ...]:
+    """Return the folders of results or plates in a folder that is neither of them nor a clip: those of several takes.
+    Empty where there are none."""
+    if (folder / "plan.toml").is_file() or is_results(folder) or is_plates(folder):
+        return ()
+    inside = sorted(entry for entry in folder.iterdir() if entry.is_dir() and not entry.name.startswith("."))
+    return tuple(entry for entry in inside if is_results(entry) or is_plates(entry))
+
+
+def describe_takes(folder: Path) -> Description:
+    """Describe a folder of results or plates of several takes: what each is, and what does not fit in any."""
+    found = [describe_output(take) for take in takes_in(folder)]
+    findings = [finding for one in found for finding in _in_short(one)]
+    facts: dict[str, Fact] = {"takes": [one.path.name for one in found]}
+    return Description(path=folder, kind="results of several takes", facts=facts, findings=tuple(findings))
+
+
+def _in_short(take: Description) -> Iterator[Finding]:
+    """Say what a take's folder holds and what is wrong with it, by its name."""
+    normals = take.facts.get("normals")
+    held = f", {counted(normals, 'result')}" if isinstance(normals, int) else ""
+    yield ok(f"{take.path.name}: {take.kind}{held}")
+    for finding in take.findings:
+        if finding.level != "ok":
+            yield replace(finding, text=f"{take.path.name}: {finding.text}")
+
+
+def output_around(path: Path) -> Path | None:
+    """Return the folder of results or plates that a path is a part of: a folder or file in it, or a movie for eyes."""
+    if (path / "plan.toml").is_file():
+        return None
+    around = (path.parent, path.parent.parent) if path.parent.name == "preview" else (path.parent,)
+    return next((folder for folder in around if is_results(folder) or is_plates(folder)), None)
 
 
 def describe_output(folder: Path) -> Description:

@@ -100,6 +100,11 @@ class Plan:
         return tuple(slot for slot, flash in enumerate(self.flashes) if not flash.is_dark)
 
     @property
+    def shortest_flash_s(self) -> float:
+        """How long the shortest flash lasts that lights anything. Raises ValueError where all slots are dark."""
+        return min(self.flashes[slot].duration_s for slot in self.lit_slots)
+
+    @property
     def dark_rounds(self) -> tuple[bool, ...]:
         """Which rounds of a cycle keep their dark slots, the first always."""
         return maximal_length(self.dark_code) if self.dark_code else (True, *[False] * (self.dark_every - 1))

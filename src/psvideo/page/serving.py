@@ -31,6 +31,8 @@ REPORT_POLICY = (
 )
 """A report is one file: its style and pictures are in it, and it runs nothing."""
 PICTURE = re.compile(r"/picture/([A-Za-z0-9_.:+-]+)/(\d{1,9})")
+MOST_PORT = 65535
+"""Ports are numbers of 16 bits (RFC 9293)."""
 STALE_S = 20.0
 """A connection on which nothing is asked for so long is closed."""
 
@@ -67,10 +69,12 @@ def page_server(show: Show, *, port: int | None = None) -> PageServer:
     Raises UsageError where the port that was asked for is taken or not allowed.
     """
     if port is not None:
+        if not 0 <= port <= MOST_PORT:
+            raise UsageError(f"`port` {port}: expected a number from 1 to {MOST_PORT}, or leave it out for a free one.")
         try:
             return PageServer(show, port)
-        except (OSError, OverflowError) as fault:
-            reason = getattr(fault, "strerror", None) or str(fault)
+        except OSError as fault:
+            reason = fault.strerror
             raise UsageError(
                 f"`port` {port}: cannot be used ({reason}). Another program listens there, or it is not allowed: "
                 "name another port, or leave `port` out and a free one is taken."

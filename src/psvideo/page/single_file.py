@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from psvideo.errors import PsvideoError
-from psvideo.formats.whole_files import refuse_existing, whole_file
+from psvideo.formats.whole_files import check_ending, refuse_existing, whole_file
 from psvideo.page.assembled import assets
 from psvideo.page.picture import Look, missing_block, picture_block
 from psvideo.page.show import Show, ShownSequence, index_of
@@ -64,6 +64,7 @@ def write_single_page(
     Raises UsageError where the file exists and ``force`` is not given.
     """
     refuse_existing(path, force=force, mark=MARK)
+    check_ending(path, ".html", ".htm", "", name="export")
     part = _part(show, width_px, count)
     wanted = [(sequence, number) for sequence in part.sequences for number in sequence.numbers]
     blocks: dict[str, str] = {}

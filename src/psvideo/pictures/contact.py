@@ -28,6 +28,10 @@ class Tile:
     picture: Pixels
 
 
+MOST_HIGH = 2.0
+"""No picture of a sheet is higher than this many times the width that it has room for."""
+
+
 @dataclass(frozen=True)
 class Strip:
     """One row of a sheet, under a title."""
@@ -66,8 +70,10 @@ def _line(tiles: Sequence[Tile], across: int, width_px: int) -> Pixels:
 
 
 def _fitted(picture: Pixels, width_px: int) -> Pixels:
-    """Scale a picture to a width, its shape kept."""
-    height_px = max(round(picture.shape[0] * width_px / picture.shape[1]), 1)
+    """Scale a picture to a width, its shape kept; one that is much higher than wide to a height."""
+    high = picture.shape[0] / picture.shape[1]
+    width_px = max(round(width_px * min(MOST_HIGH / high, 1)), 1)
+    height_px = max(round(high * width_px), 1)
     smaller = width_px < picture.shape[1]
     return cv2.resize(
         picture, (width_px, height_px), interpolation=cv2.INTER_AREA if smaller else cv2.INTER_CUBIC

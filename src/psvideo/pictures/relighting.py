@@ -100,7 +100,7 @@ def smaller_by_rows(read: Callable[[int, int], NDArray[np.floating]], shape: tup
     rows, cols = shape[:2]
     if cols <= width_px:
         return np.asarray(read(0, rows), np.float32)
-    factor = cols // width_px
+    factor = min(cols // width_px, rows)
     band, last = factor * max(BAND_ROWS // factor, 1), rows // factor * factor
     coarse = [_averaged(read(first, min(first + band, last)), factor) for first in range(0, last, band)]
     size = (width_px, max(round(rows * width_px / cols), 1))

@@ -233,7 +233,9 @@ def normals(
 def _check_numbers(
     *, near_iterations: int | None, depth: Path | str | None, depth_scale: float | None, denoise: int
 ) -> None:
-    if depth_scale is not None and (depth is None or not 0 < depth_scale < inf):
+    if depth_scale is not None and depth is None:
+        raise UsageError("`depth_scale` is for the file given as `depth`: give that as well, or leave it out.")
+    if depth_scale is not None and not 0 < depth_scale < inf:
         raise UsageError(
             f"`depth_scale` {depth_scale:g}: expected metres per unit, above 0, of the file given as `depth`."
         )

@@ -6,12 +6,11 @@ import numpy as np
 
 from psvideo.clip import Take
 from psvideo.compute.progress import Watch, unwatched
-from psvideo.errors import UsageError
 from psvideo.formats.paths import path_if_given, path_of
 from psvideo.formats.rig_folder import rig_of_take
 from psvideo.formats.rig_toml import read_rig
 from psvideo.formats.timing_json import format_timing
-from psvideo.formats.whole_files import PICTURE_MARK, refuse_existing, write_text
+from psvideo.formats.whole_files import PICTURE_MARK, check_ending, refuse_existing, write_text
 from psvideo.model.timing import Timing, places_in_time
 from psvideo.pictures.timing_sheet import timing_picture, write_sheet
 from psvideo.plates.naming import named_by_rig
@@ -69,10 +68,9 @@ def sync(
     timing_path, picture_path = path_if_given("out", out), path_if_given("picture", picture)
     if timing_path is not None:
         refuse_existing(timing_path, force=force, mark=MARK)
+        check_ending(timing_path, ".json", "", name="out")
     if picture_path is not None:
-        if picture_path.suffix.lower() != ".png":
-            such = picture_path.with_suffix(".png")
-            raise UsageError(f"`picture` {picture_path}: expected the name of a PNG, such as {such}.")
+        check_ending(picture_path, ".png", name="picture")
         refuse_existing(picture_path, force=force, mark=PICTURE_MARK)
     take = open_take(path_of("clip", clip), plan=path_if_given("plan", plan), frames=frames)
     say_of_clip(take.clip, caller)

@@ -7,7 +7,7 @@ from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import UsageError
 from psvideo.formats.clocks_json import SCHEMA, format_clocks
 from psvideo.formats.paths import path_if_given, path_of
-from psvideo.formats.whole_files import refuse_existing, write_text
+from psvideo.formats.whole_files import check_ending, refuse_existing, write_text
 from psvideo.model.camera_clocks import CameraClocks
 from psvideo.runs.steps.caller import PYTHON, Caller, say_of_clip
 from psvideo.sync.open_take import open_take
@@ -62,6 +62,7 @@ def sync_cameras(
     out = path_if_given("out", out)
     if out is not None:
         refuse_existing(out, force=force, mark=SCHEMA)
+        check_ending(out, ".json", "", name="out")
     if len(clips) < 2:
         raise UsageError("`clips`: expected two or more, of cameras that saw one strobe.")
     if starts_s is not None and len(starts_s) != len(clips):

@@ -48,6 +48,6 @@ def _how_with_fewer(plan: Plan, caps: Capabilities) -> str:
         return ""
     words = ", ".join(f"`line` {','.join(names)}={line}" for line, names in enumerate(together.values()))
     return (
-        f"Lights that always flash together, at one power, can hang on one line, each with a driver of its own: wire "
+        f"Lights that always flash together, at one power, can share one line, each with a driver of its own: wire "
         f"{len(together)} lines, and say {words}. "
     )

@@ -22,7 +22,9 @@ def check_diagram_name(name: str | None, *, option: str = "`diagram`") -> Path |
         return None
     path = Path(name)
     if path.suffix.lower() not in (".svg", ".png"):
-        raise UsageError(f"{option} {name!r} is no kind of picture that can be drawn. Name a .svg or .png file, or -.")
+        raise UsageError(
+            f"{option} {name!r} is not a kind of picture that can be drawn. Name a .svg or .png file, or -."
+        )
     return path
 
 

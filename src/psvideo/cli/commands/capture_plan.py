@@ -65,7 +65,7 @@ def capture_plan(
     verbose: Verbose = False,
     quiet: Quiet = False,
 ) -> None:
-    """Plan a shoot: write plan.toml, and print what decides the shoot and what to beware of."""
+    """Plan a shoot: write plan.toml, and print its figures and warnings."""
     from rich.console import Console
 
     from psvideo.cli.options.shoot_words import ShootWords, parse_request

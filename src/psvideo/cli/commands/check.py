@@ -37,7 +37,7 @@ def check(
         typer.Option("--watch", metavar="FOLDER", help="Check every new take that appears below this folder."),
     ] = None,
     interval: Annotated[
-        float, typer.Option(help="Seconds between two looks at the watched folder.", min=0.1, max=3600)
+        float, typer.Option(help="How many seconds to wait between looks at the watched folder.", min=0.1, max=3600)
     ] = INTERVAL_S,
     existing: Annotated[bool, typer.Option("--existing", help="Check the takes that are there already, too.")] = False,
     report: Annotated[

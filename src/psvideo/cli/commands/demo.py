@@ -16,7 +16,7 @@ def demo(
     verbose: Verbose = False,
     quiet: Quiet = False,
 ) -> None:
-    """Film a virtual bust, find the flashes, solve for normals, and end with the path of a picture of it all."""
+    """Film a virtual bust, find the flashes, solve for normals, and print the path of a picture of it all."""
     from psvideo.runs.demo import run_demo
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)

@@ -18,15 +18,17 @@ SHOWN = {"ok": "ok", "note": "--", "missing": "MISSING"}
 
 
 def doctor(
-    folder: Annotated[Path, typer.Option("--folder", help="The folder whose disk is measured, in MB/s.")] = Path(),
+    folder: Annotated[
+        Path, typer.Option("--folder", help="Measure the speed of this folder's disk, in MB/s.")
+    ] = Path(),
     ahead: Annotated[
-        bool, typer.Option("--compile", help="First compile and keep what usual runs need, so that none has to wait.")
+        bool, typer.Option("--compile", help="Compile now what usual runs need, so that none waits for it.")
     ] = False,
     json: Json = False,
     verbose: Verbose = False,
     quiet: Quiet = False,
 ) -> None:
-    """Say what is installed, what the machine can do and what to do about the rest: exit status 1 where work stops."""
+    """Report what is installed, how fast the machine is, and how to fix the rest: exit status 1 if work stops."""
     from psvideo.runs.doctor import doctor as examine
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)

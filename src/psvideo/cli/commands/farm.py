@@ -18,13 +18,14 @@ def farm(
     ] = None,
     out: Annotated[Path | None, typer.Option("-o", "--out", help="The folder of the job to write.")] = None,
     results: Annotated[
-        Path | None, typer.Option("--results", help="Where results will lie; left out: results in the job's folder.")
+        Path | None, typer.Option("--results", help="Where to write results; left out: results/ in the job's folder.")
     ] = None,
     plan: PlanPath = None,
     pieces: Annotated[
-        int | None, typer.Option("--pieces", min=1, help="Into how many pieces to cut; left out: by the clip's length.")
+        int | None,
+        typer.Option("--pieces", min=1, help="How many pieces to cut the run into; left out: by the clip's length."),
     ] = None,
-    commands: Annotated[bool, typer.Option("--commands", help="Print a shell command a line instead.")] = False,
+    commands: Annotated[bool, typer.Option("--commands", help="Print shell commands instead, one a line.")] = False,
     force: Force = False,
     json: Json = False,
     quiet: Quiet = False,

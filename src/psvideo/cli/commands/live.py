@@ -31,22 +31,24 @@ def live(
     ] = "",
     plan: PlanPath = None,
     rig: Annotated[
-        Path | None, typer.Option("--rig", help="Where the lights are; left out: plates, and no normals.")
+        Path | None, typer.Option("--rig", help="Where the lights are; left out: plates alone, no normals.")
     ] = None,
     rig_out: Annotated[
-        Path | None, typer.Option("--rig-out", help="Where to write lights that a click on the page finds on a ball.")
+        Path | None, typer.Option("--rig-out", help="Rig file for the lights that a click on the page finds on a ball.")
     ] = None,
     first_light: FirstLight = None,
     timing_out: Annotated[
-        Path | None, typer.Option("--timing-out", help="Where to write timing.json of all that was followed.")
+        Path | None, typer.Option("--timing-out", help="timing.json to write at the end, of the whole run.")
     ] = None,
-    list_all: Annotated[bool, typer.Option("--list", help="Show cameras, video devices and boards.")] = False,
+    list_all: Annotated[
+        bool, typer.Option("--list", help="List cameras, video devices and strobe boards, and stop.")
+    ] = False,
     growing: Annotated[
         bool, typer.Option("--growing", help="The source is a folder that a recorder is still writing.")
     ] = False,
     raw: Annotated[
         str | None,
-        typer.Option("--raw", help="What bare bytes hold, as FFmpeg calls it: gray, gray16le, rgb24 and others."),
+        typer.Option("--raw", help="Pixel format of a raw stream, in FFmpeg's words: gray, gray16le, rgb24."),
     ] = None,
     record: Annotated[
         Path | None, typer.Option("--record", help="A clip folder to record the frames into, whole or not at all.")
@@ -71,17 +73,17 @@ def live(
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Do not open the page in a browser.")] = False,
     port: Annotated[int | None, typer.Option(help="The page's port; left out: a free one.")] = None,
     host: Annotated[
-        str, typer.Option(help="The address that the page answers on; others than this machine's need the token.")
+        str, typer.Option(help="Address to serve the page at; at any but 127.0.0.1 the token is needed.")
     ] = "127.0.0.1",
     token: Annotated[
-        str | None, typer.Option(help="What the page's address must hold on another host; left out: one is made.")
+        str | None, typer.Option(help="Secret word in the page's address for other machines; left out: generated.")
     ] = None,
     force: Force = False,
     json: Json = False,
     verbose: Verbose = False,
     quiet: Quiet = False,
 ) -> None:
-    """Follow the strobe while the camera runs, and solve the newest round: what the crew sees on the set."""
+    """Show normals and relit light while the camera runs: follow the strobe, solve the newest round."""
     from psvideo.runs.live import live as watch
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)

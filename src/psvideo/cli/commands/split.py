@@ -41,9 +41,9 @@ def split(
     first_light: FirstLight = None,
     rig: OrderRig = None,
     method: Annotated[
-        SplitMethod, typer.Option(help="By the rows' weights, or Algorithm 1 of Hudon et al. 2015, to compare with.")
+        SplitMethod, typer.Option(help="weights, or Algorithm 1 of Hudon et al. 2015, to compare with.")
     ] = "weights",
-    flashes: Annotated[bool, typer.Option("--flashes", help="Also write every flash by itself.")] = False,
+    flashes: Annotated[bool, typer.Option("--flashes", help="Also write a plate of every single flash.")] = False,
     beauty: Annotated[bool, typer.Option("--beauty", help="Also write the sum of all lights.")] = False,
     with_ambient: WithAmbient = False,
     weight: Weights = None,

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 ClipPaths = Annotated[
     list[Path],
     typer.Argument(
-        help="A clip: a folder of numbered frames with plan.toml, or a movie file. Several: of cameras that saw one "
-        "strobe; their clocks are compared.",
+        help="A clip: a folder of numbered frames with plan.toml, or a movie file. Several clips of cameras that "
+        "saw the same strobe: their clocks are compared.",
         show_default=False,
     ),
 ]
@@ -36,8 +36,8 @@ Starts = Annotated[
     str | None,
     typer.Option(
         "--starts",
-        help="Several cameras: roughly when each clip began, in seconds of any one clock, such as 0,1.3,2.1; needed "
-        "where the marker is not coded.",
+        help="Several cameras: roughly when each clip began, in seconds on one common clock: 0,1.3,2.1; needed "
+        "if the marker is not coded.",
     ),
 ]
 

@@ -18,9 +18,7 @@ if TYPE_CHECKING:
 def synth(
     scene: Annotated[
         Path,
-        typer.Argument(
-            help="A scene file, or one that comes along by its name: bust, colour, fan, gloss, sphere, still_life."
-        ),
+        typer.Argument(help="A scene file, or a scene of psvideo: bust, colour, fan, gloss, sphere, still_life."),
     ],
     out: Annotated[Path, typer.Option("-o", "--out", help="The clip folder to write.")],
     trace: Annotated[
@@ -28,7 +26,8 @@ def synth(
         typer.Option("--trace", help="Light the scene by the edges of psvideo strobe emulate --trace FILE."),
     ] = None,
     line: Annotated[
-        list[str] | None, typer.Option("--line", metavar="NAME=NUMBER", help="The line that a light hangs on.")
+        list[str] | None,
+        typer.Option("--line", metavar="NAME=NUMBER", help="Which line of the trace a light is wired to."),
     ] = None,
     force: Force = False,
     json: Json = False,
@@ -63,6 +62,6 @@ def _trace_options(trace: Path | None, lines: dict[str, int]) -> "TraceOptions |
 
     if trace is None:
         if lines:
-            raise UsageError("--line: says which line of a trace a light hangs on; give --trace FILE with it.")
+            raise UsageError("--line: says which line of a trace a light is wired to; give --trace FILE with it.")
         return None
     return TraceOptions(path=trace, lines=lines)

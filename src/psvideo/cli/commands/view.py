@@ -28,10 +28,12 @@ def view(
     port: Annotated[int | None, typer.Option(help="The port to listen on; left out: a free one.")] = None,
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Do not open the page in a browser.")] = False,
     export: Annotated[
-        Path | None, typer.Option(help="Write one file that holds the page and some pictures, instead of serving.")
+        Path | None, typer.Option(help="Write the page and some pictures into one file, and serve nothing.")
     ] = None,
-    export_width: Annotated[int, typer.Option(min=64, max=8192, help="Its pictures' width at most, in pixels.")] = 480,
-    export_count: Annotated[int, typer.Option(min=1, help="How many pictures of each sequence it holds at most.")] = 24,
+    export_width: Annotated[
+        int, typer.Option(min=64, max=8192, help="Largest width of the exported pictures, in pixels.")
+    ] = 480,
+    export_count: Annotated[int, typer.Option(min=1, help="Most pictures of each sequence to export.")] = 24,
     force: Force = False,
     json: Json = False,
     verbose: Verbose = False,

@@ -13,7 +13,7 @@ PicturesOfTakes = Annotated[
 RigOut = Annotated[Path, typer.Option("-o", "--out", help="The rig file to write.")]
 RigIn = Annotated[Path, typer.Option("--rig", help="The rig whose directions or positions are known.")]
 FocalPx = Annotated[float | None, typer.Option(help="Focal length in pixels.", min=1)]
-Transfer = Annotated[str | None, typer.Option(help="How stills code light: linear, srgb, slog3, ...")]
+Transfer = Annotated[str | None, typer.Option(help="Transfer curve of the stills: linear, srgb, slog3, ...")]
 FocalMm = Annotated[float | None, typer.Option(help="Focal length in mm; needs --sensor-mm.", min=0.1)]
 SensorMm = Annotated[
     float | None, typer.Option(help="Width in mm of the sensor's part that the picture shows.", min=0.1)
@@ -31,4 +31,4 @@ Circles = Annotated[
         "--circle", help="A sphere's outline found by hand: x,y,radius in pixels from the top left. Repeatable."
     ),
 ]
-Spheres = Annotated[int, typer.Option(help="How many spheres each picture of them holds.", min=1, max=8)]
+Spheres = Annotated[int, typer.Option(help="How many spheres each picture shows.", min=1, max=8)]

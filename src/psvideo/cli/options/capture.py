@@ -33,21 +33,25 @@ Lights = Annotated[str, _option(LIGHTS, "--lights", "The lights' names, in the o
 Power = Annotated[str, _option(LIGHTS, "--power", "Power, above 0 and up to 1: 0.5, or key=1,left=0.5,right=0.5.")]
 Flash = Annotated[str | None, _option(LIGHTS, "--flash", "Flash duration: 0.8ms, or key=0.8ms,left=0.4ms,right=0.4ms.")]
 LightsRig = Annotated[
-    Path | None, _option(LIGHTS, "--rig", "Where the lights will stand: warns where they give no normals.")
+    Path | None, _option(LIGHTS, "--rig", "Rig file of where the lights will stand; warns if they cannot give normals.")
 ]
 MaxBlur = Annotated[float | None, _option(LIMITS, "--max-blur", "Largest blur in pixels; needs --speed.")]
 Speed = Annotated[str | None, _option(LIMITS, "--speed", "How fast the subject moves: 800 (px/s) or 0.5m/s.")]
 FieldWidth = Annotated[str | None, _option(LIMITS, "--field-width", "Width of what the camera sees, for m/s: 0.6m.")]
-MaxDuty = Annotated[str | None, _option(LIMITS, "--max-duty", "The LEDs' largest share of time on: 0.1 or 10%.")]
-MaxPulse = Annotated[str | None, _option(LIMITS, "--max-pulse", "The LEDs' longest pulse: 1ms.")]
-MaxStops = Annotated[float | None, _option(LIMITS, "--max-stops", "Most stops below the same light left on.")]
+MaxDuty = Annotated[
+    str | None, _option(LIMITS, "--max-duty", "Largest share of the time that an LED may be on: 0.1 or 10%.")
+]
+MaxPulse = Annotated[str | None, _option(LIMITS, "--max-pulse", "Longest pulse that the LEDs can take: 1ms.")]
+MaxStops = Annotated[
+    float | None, _option(LIMITS, "--max-stops", "Largest loss of light, in stops, against the same light left on.")
+]
 Mode = Annotated[str, _option(STROBE, "--mode", "rolling, half-rate or synced.")]
 Marker = Annotated[
     str | None,
     _option(
         STROBE,
         "--marker",
-        "What distinguishes the lights: dark, coded (dark slots by a code, for several cameras), long, none.",
+        "How the footage shows which light is which: dark (slots), coded (for several cameras), long, none.",
     ),
 ]
 DarkSlot = Annotated[

@@ -31,23 +31,23 @@ RigPath = Annotated[
 ]
 OrderRig = Annotated[
     Path | None,
-    typer.Option("--rig", help="Where the lights are, to find their order where there is no marker."),
+    typer.Option("--rig", help="Where the lights are: tells which is which where the plan has no marker."),
 ]
 TimingPath = Annotated[
     Path | None, typer.Option("--timing", help="timing.json of this clip; left out: found from the picture.")
 ]
 StartNumber = Annotated[int, typer.Option("--start-number", min=0, help="The number of the first round's files.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace outputs that exist.")]
-Resume = Annotated[bool, typer.Option("--resume", help="Go on where a run that was stopped left off.")]
+Resume = Annotated[bool, typer.Option("--resume", help="Continue a run that was stopped, where it stopped.")]
 PieceOption = Annotated[
     str | None,
-    typer.Option("--piece", help="Solve a piece alone: 3/10, or 0/10 for what all share; --resume ends the run."),
+    typer.Option("--piece", help="Solve one piece of the run: 3/10; first 0/10, what all share; at the end --resume."),
 ]
 Workers = Annotated[
-    int | None, typer.Option("--workers", min=1, help="Work with this many processes (a dask cluster on this machine).")
+    int | None, typer.Option("--workers", min=1, help="Use this many processes on this machine (a dask cluster).")
 ]
 Scheduler = Annotated[
-    str | None, typer.Option("--scheduler", help="Work with the workers of a dask scheduler: tcp://HOST:8786.")
+    str | None, typer.Option("--scheduler", help="Use the workers of a dask scheduler: tcp://HOST:8786.")
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for machines.")]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Say more.")]

@@ -34,7 +34,8 @@ else:
     AovWord, MeshWord, PreviewWord, PlatesPreviewWord = map(_words, (Aov, MeshKind, Preview, PlatesPreview))
 
 SpaceOption = Annotated[
-    SpaceName | None, typer.Option("--space", help="Camera axes (the default), the world's, or a flat card's.")
+    SpaceName | None,
+    typer.Option("--space", help="Axes of the normals: the camera's (the default), the world's, or a flat card's."),
 ]
 CameraToWorld = Annotated[
     Path | None,
@@ -55,8 +56,10 @@ CameraTimeOption = Annotated[
     ),
 ]
 YOption = Annotated[YDirection | None, typer.Option("--y", help="up as in OpenGL (the default), down as in DirectX.")]
-FloatOption = Annotated[bool, typer.Option("--float", help="Store normals as 32-bit floats.")]
-AovOption = Annotated[list[AovWord] | None, typer.Option("--aov", help="Also write this; may be given several times.")]
+FloatOption = Annotated[bool, typer.Option("--float", help="Write normals as 32-bit floats, not half floats.")]
+AovOption = Annotated[
+    list[AovWord] | None, typer.Option("--aov", help="Also write this quantity; may be given several times.")
+]
 MeshOption = Annotated[
     list[MeshWord] | None,
     typer.Option("--mesh", help="Also write meshes: ply, one per instant; usd, one animated file."),
@@ -72,7 +75,7 @@ Multipart = Annotated[
 ]
 Plates = Annotated[bool, typer.Option("--plates", help="Also write the plates, one sequence per light.")]
 WithAmbient = Annotated[
-    bool, typer.Option("--with-ambient", help="Leave ambient light in the beauty plate, as one exposure saw it.")
+    bool, typer.Option("--with-ambient", help="Leave ambient light in the beauty plate, as much as one exposure saw.")
 ]
 Weights = Annotated[
     list[str] | None,
@@ -80,12 +83,14 @@ Weights = Annotated[
 ]
 PreviewOption = Annotated[
     list[PreviewWord] | None,
-    typer.Option("--preview", help="Make this movie for eyes, not the relit one; may be given several times."),
+    typer.Option(
+        "--preview", help="Which preview movies to make instead of the relit one; may be given several times."
+    ),
 ]
-NoPreview = Annotated[bool, typer.Option("--no-preview", help="Make no movie for eyes.")]
+NoPreview = Annotated[bool, typer.Option("--no-preview", help="Make no preview movie.")]
 PlatesPreviewOption = Annotated[
     list[PlatesPreviewWord] | None,
-    typer.Option("--preview", help="Make a movie for eyes; may be given several times."),
+    typer.Option("--preview", help="Also make this preview movie; may be given several times."),
 ]
 CodecOption = Annotated[
     MovieCodec,
@@ -94,6 +99,6 @@ CodecOption = Annotated[
 ProgramOption = Annotated[
     Program | None,
     typer.Option(
-        "--for", help="Set what this program wants, where no option says otherwise, and write a note on how to load it."
+        "--for", help="Write what this program needs (single options come first), and a note on how to load it."
     ),
 ]

@@ -14,7 +14,7 @@ Fill = Annotated[
     bool,
     typer.Option(
         "--fill/--no-fill",
-        help="Give what fewer than three lights reach a best estimate (valid is 0 there), or leave zeros.",
+        help="Estimate normals where fewer than three lights reach (valid is 0 there), or leave zeros.",
     ),
 ]
 MaskPath = Annotated[
@@ -26,12 +26,12 @@ MaskPath = Annotated[
 ]
 FlatPath = Annotated[
     Path | None,
-    typer.Option("--flat", help="How light falls off over the picture, from psvideo calibrate flat-field."),
+    typer.Option("--flat", help="Fall-off of light over the picture: the file of psvideo calibrate flat-field --flat."),
 ]
 NearIterations = Annotated[
     int | None,
     typer.Option(
-        help="Near lights only: how often their distances are taken again from the depth of the normals found. "
+        help="Near lights only: how often their distances are corrected by the depth that the normals give. "
         f"[default: {NEAR_ITERATIONS}; 0 with --depth]",
         min=0,
         max=MOST_ITERATIONS,
@@ -42,7 +42,7 @@ DepthPath = Annotated[
     typer.Option(
         "--depth",
         help="Known depth: an EXR in metres along the optical axis or a 16-bit PNG in millimetres, or a folder "
-        "with one per result. Near lights find the surface there, and depth its scale.",
+        "with one per result. It places the surface for near lights, and sets the scale of depth.",
     ),
 ]
 DepthScale = Annotated[
@@ -61,7 +61,7 @@ FpsOption = Annotated[
     str,
     typer.Option(
         "--fps",
-        help="Results per round, per flash (as many times more as there are lights), per camera frame, or a rate: 24, "
+        help="One result per round, per flash (N times as many with N lights), per camera frame, or at a rate: 24, "
         "23.976, 24000/1001.",
         metavar="round|flash|frame|RATE",
     ),
@@ -74,7 +74,7 @@ ResyncOption = Annotated[
     Path | None,
     typer.Option(
         "--resync",
-        help="The clocks.json of several cameras: all of them show the same instants of a rate under the same numbers.",
+        help="clocks.json of several cameras: at a rate, the same number is then the same instant in all of them.",
     ),
 ]
 Denoise = Annotated[int, typer.Option(min=1, max=64, help="Average up to N results where nothing moves.")]

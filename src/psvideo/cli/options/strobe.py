@@ -34,7 +34,7 @@ LineWords = Annotated[
     list[str] | None,
     typer.Option(
         "--line",
-        help="Which line a light is wired to, such as key=0 (key,rim=0: both hang on one); may be repeated.",
+        help="Which line a light is wired to, such as key=0 (key,rim=0: both on one line); may be repeated.",
         autocompletion=offer_lines,
     ),
 ]
@@ -47,7 +47,7 @@ Rounds = Annotated[
     int | None, typer.Option("--rounds", help="Stop after this many rounds (rounded up to whole cycles).")
 ]
 LogPath = Annotated[
-    Path | None, typer.Option("--log", help="Where to write what was played: strobe.json, for the clip's folder.")
+    Path | None, typer.Option("--log", help="Log of what was played, to put beside the clip: strobe.json.")
 ]
 StandInName = Annotated[
     StandIn | None,
@@ -58,13 +58,13 @@ StandInName = Annotated[
     ),
 ]
 StandInWiring = Annotated[
-    WiringName, typer.Option("--wiring", help="How the lights hang on the board (lights/protocol.md).")
+    WiringName, typer.Option("--wiring", help="How the lights are wired to the board (lights/protocol.md).")
 ]
 TraceOut = Annotated[
     Path | None, typer.Option("--trace", help="Write every edge to this file, for psvideo synth --trace.")
 ]
 Fast = Annotated[
-    bool, typer.Option("--fast", help="As fast as it goes; then only virtual time counts, keep-alive included.")
+    bool, typer.Option("--fast", help="Run as fast as possible, in virtual time (which the keep-alive follows too).")
 ]
 Yes = Annotated[bool, typer.Option("--yes", help="Everybody has been warned of the flashing; do not ask.")]
 

@@ -44,7 +44,7 @@ def parse_starts_s(text: str) -> list[float]:
     """
     parts = [part.strip() for part in text.split(",")]
     if not all(re.fullmatch(NUMBER, part, re.IGNORECASE) for part in parts):
-        raise UsageError(f"--starts {text!r} is no list of seconds. Write one for each clip, such as 0,1.3,2.1.")
+        raise UsageError(f"--starts {text!r} is not a list of seconds. Write one for each clip, such as 0,1.3,2.1.")
     return [float(part) for part in parts]
 
 
@@ -126,7 +126,13 @@ def parse_instants(text: str) -> str | Fraction:
     ('flash', Fraction(24000, 1001))
     """
     word = text.strip().lower()
-    return word if word in ("round", "flash", "frame") else parse_rate(text)
+    if word in ("round", "flash", "frame"):
+        return word
+    try:
+        return parse_rate(text)
+    except UsageError:
+        wanted = "expected round, flash, frame, or a rate above 0 such as 24, 23.976 or 24000/1001"
+        raise UsageError(f"--fps {text!r}: {wanted}.") from None
 
 
 def parse_fraction(text: str, *, option: str) -> float:
@@ -142,7 +148,9 @@ def parse_columns(text: str) -> tuple[int, int]:
     """Return the first column and one past the last one from ``0-80``; raises UsageError where that is no range."""
     first, dash, end = text.partition("-")
     if not (dash and first.strip().isdecimal() and end.strip().isdecimal() and int(first) < int(end)):
-        raise UsageError(f"--columns {text!r} is no range. Write the first column and one past the last one, as 0-80.")
+        raise UsageError(
+            f"--columns {text!r} is not a range. Write the first column and one past the last one, as 0-80."
+        )
     return int(first), int(end)
 
 

@@ -88,7 +88,7 @@ def _read(path: Path, maps: DepthMaps) -> Floats:
     """Read one picture in metres."""
     kind = KINDS.get(path.suffix.lower())
     if kind not in ("exr", "png", "tiff"):
-        raise PsvideoError(f"{path}: is no picture that can hold depth; expected .exr, .tif or a 16-bit .png.")
+        raise PsvideoError(f"{path}: is not a picture that can hold depth; expected .exr, .tif or a 16-bit .png.")
     if not path.is_file():
         raise PsvideoError(f"{path}: there is no such depth file. Check the name.")
     codes = guarded(_decode_exr, path) if kind == "exr" else decode(kind, path).codes

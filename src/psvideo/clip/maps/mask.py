@@ -53,7 +53,7 @@ def read_mask(path: Path | str, *, width_px: int | None = None, height_px: int |
     path = path_of("path", path)
     kind = KINDS.get(path.suffix.lower())
     if kind is None:
-        raise PsvideoError(f"{path}: is no picture that can be a mask; expected one of {', '.join(USUAL_KINDS)}.")
+        raise PsvideoError(f"{path}: is not a picture that can be a mask; expected one of {', '.join(USUAL_KINDS)}.")
     if not path.is_file():
         raise PsvideoError(f"{path}: there is no such mask. Check the name.")
     codes = _codes(kind, path)

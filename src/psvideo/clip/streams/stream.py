@@ -61,7 +61,7 @@ def stream_kind(raw: str | None) -> CodedPicture:
         alike = get_close_matches(str(raw), RAW, 1)
         meant = f" Did you mean {alike[0]}?" if alike and not bayer else ""
         raise UsageError(
-            f"`raw` {raw}: these are no pixels that are read; expected {', '.join(RAW[:-1])} or {RAW[-1]}, or another "
+            f"`raw` {raw}: is not a pixel format that is read; expected {', '.join(RAW[:-1])} or {RAW[-1]}, or another "
             f"of FFmpeg's names for grey, RGB or YUV.{bayer}{meant}"
         ) from None
 

@@ -32,7 +32,9 @@ def read_pose(path: Path) -> Pose:
     try:
         numbers = np.array([float(word) for word in words if word], np.float64)
     except ValueError:
-        raise PsvideoError(f"{path}: holds words; expected the 9 or 16 numbers of a matrix, row by row.") from None
+        raise PsvideoError(
+            f"{path}: holds text that is not numbers; expected the 9 or 16 numbers of a matrix, row by row."
+        ) from None
     if numbers.size not in (9, 16):
         raise PsvideoError(f"{path}: holds {numbers.size} numbers; expected 9 or 16, a matrix row by row.")
     matrix = np.eye(4)
@@ -49,7 +51,7 @@ def pose_of(matrix: FloatArray, *, source: str) -> Pose:
     if not np.allclose(matrix[3], LAST_ROW, atol=1e-9):
         turned = np.allclose(matrix[:, 3], LAST_ROW, atol=1e-9)
         raise PsvideoError(
-            f"{source}: the matrix's last row is {' '.join(f'{number:g}' for number in matrix[3])}, and expected is "
+            f"{source}: the matrix's last row is {' '.join(f'{number:g}' for number in matrix[3])}; expected "
             "0 0 0 1, with the camera's place in the last column. "
             + ("It is written for row vectors, as Maya, Houdini and USD do: transpose it." if turned else "")
         )
@@ -61,7 +63,7 @@ def pose_of(matrix: FloatArray, *, source: str) -> Pose:
         or np.abs(turn @ turn.T / scale**2 - np.eye(3)).max() > ROTATION_TOLERANCE
     ):
         raise PsvideoError(
-            f"{source}: is no rotation (determinant {np.linalg.det(turn):.4g}). Expected the camera's axes in the "
+            f"{source}: is not a rotation (determinant {np.linalg.det(turn):.4g}). Expected the camera's axes in the "
             "world as columns: right, up, backwards, at right angles to each other and right-handed."
         )
     return Pose(rotation=turn / scale, origin=matrix[:3, 3].copy())

@@ -66,7 +66,7 @@ def open_usd_camera(path: Path, name: str | None = None) -> UsdCamera:
     from pxr import Tf, Usd, UsdGeom
 
     if not path.is_file():
-        raise PsvideoError(f"{path}: is no file. Name the USD file that holds the camera.")
+        raise PsvideoError(f"{path}: is not a file. Name the USD file that holds the camera.")
     try:
         stage = Usd.Stage.Open(str(path.resolve()))
     except Tf.ErrorException as fault:

@@ -41,7 +41,7 @@ class OneFlash:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Unmixing:
-    """How flashes of several colours are taken apart into plates under white light of intensity 1.
+    """How flashes of several colours are separated into plates under white light of intensity 1.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Unmixing:
 
 
 def unmixing_of(plan: Plan, rig: Rig, *, channels: int) -> Unmixing | None:
-    """Return how a plan's flashes are taken apart, None where the rig knows of no colours.
+    """Return how a plan's flashes are separated, None where the rig knows of no colours.
 
     Raises PsvideoError where some lights have a colour and others none, the pictures are grey, or the colours cannot be
     separated: it names the lights and the condition number.

@@ -40,7 +40,7 @@ MOST_LEFT = 0.01
 MOST_GAIN = 2.5
 """Taking neighbours off may raise noise (as its square) this many times at most."""
 LEAST_DETERMINANT = 1e-3
-"""Sums that hold the same mixture of flashes cannot be taken apart."""
+"""Sums that hold the same mixture of flashes cannot be separated."""
 NEIGHBOURS = 2
 """Flashes before and after that may reach into a flash's rows."""
 

@@ -2,6 +2,7 @@
 import { MOST_LIGHTS } from "./lights.js";
 import { AROUND } from "./around.js";
 import { RELIT } from "./looks.js";
+import { ofPhotographs } from "./transport.js";
 
 export function buildPanel(app) {
   const parts = [];
@@ -150,7 +151,7 @@ function takePart(app) {
   const { index } = app;
   const list = element("dl", { className: "facts" });
   const lens = [...new Set(index.sequences.filter((one) => one.kind === "normals").map((one) => `${one.space} space, y ${one.y}`))];
-  const facts = { Kind: index.kind, Size: `${index.width_px} × ${index.height_px}`, Rate: `${index.fps.toFixed(3)} a second`, ...(lens.length ? { Normals: lens.join("; ") } : {}), ...index.facts };
+  const facts = { Kind: index.kind, Size: `${index.width_px} × ${index.height_px}`, ...(ofPhotographs(index) ? {} : { Rate: `${index.fps.toFixed(3)} a second` }), ...(lens.length ? { Normals: lens.join("; ") } : {}), ...index.facts };
   for (const [name, value] of Object.entries(facts)) list.append(element("dt", { textContent: name }), element("dd", { textContent: value }));
   const sentences = [...index.findings, ...index.notes].map((text) => element("li", { textContent: text }));
   const findings = element("ul", { className: "findings" }, ...sentences);

@@ -27,6 +27,12 @@ function nearestNumber(numbers, wanted) {
   return numbers.reduce((best, number, at) => (Math.abs(number - wanted) < Math.abs(numbers[best] - wanted) ? at : best), 0);
 }
 
+// Results that are slower than any film, which is only so because pictures were left out of an exported page or because
+// they are of photographs: these have no time.
+export function ofPhotographs(index) {
+  return !index.thinned && index.fps < 0.5;
+}
+
 export function tellTransport(app) {
   const { state, master, loader } = app;
   const scrub = document.getElementById("scrub");
@@ -34,13 +40,15 @@ export function tellTransport(app) {
   scrub.setAttribute("aria-valuetext", `picture ${master.numbers[state.at]}`);
   const number = document.getElementById("number");
   if (document.activeElement !== number) number.value = master.numbers[state.at];
-  document.getElementById("clock").textContent = `${master.times_s[state.at].toFixed(3)} s`;
+  const still = ofPhotographs(app.index);
+  document.getElementById("clock").textContent = still ? "" : `${master.times_s[state.at].toFixed(3)} s`;
   const play = document.getElementById("play");
   play.querySelector("path").setAttribute("d", state.playing ? STOP : GO);
   play.setAttribute("aria-label", state.playing ? "Stop" : "Play");
   const planned = app.index.fps;
   const shown = loader.rate();
-  document.getElementById("rate").textContent = state.playing ? `${shown} of ${planned.toFixed(1)} fps` : `${planned.toFixed(2)} fps`;
+  const rate = state.playing ? `${shown} of ${planned.toFixed(1)} fps` : `${planned.toFixed(2)} fps`;
+  document.getElementById("rate").textContent = still ? "" : rate;
   drawMarks(app);
 }
 

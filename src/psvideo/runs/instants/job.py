@@ -37,7 +37,7 @@ class OverTime:
 
     def check(self, plan: Plan, *, unmixed: bool = False) -> None:
         """Raise UsageError where a plan has no instant of its own for every light, and one is asked for; flashes that
-        are taken apart by colour (``unmixed``) show all their lights at once."""
+        are separated by colour (``unmixed``) show all their lights at once."""
         if isinstance(self.aligning.rate, Comb) and self.aligning.align == "none":
             raise UsageError(
                 "`fps` asks for instants between the flashes, and `align='none'` makes none: plates would be repeated. "

@@ -79,7 +79,7 @@ def piece_run(job: Job, output: Output, piece: str, *, watch: Watch = unwatched)
 
 
 def _checked(job: Job, output: Output) -> Job:
-    """Return the job with flashes taken apart by colour where the rig says so.
+    """Return the job with flashes separated by colour where the rig says so.
 
     Raises UsageError or PsvideoError where its parts do not fit together, before any work is done.
     """

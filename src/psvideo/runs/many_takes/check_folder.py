@@ -98,7 +98,7 @@ def check_folder(
     """
     folder, page = Path(folder), None if report is None else Path(report)
     if not folder.is_dir():
-        raise UsageError(f"{folder}: is no folder. Name the folder into which takes are copied.")
+        raise UsageError(f"{folder}: is not a folder. Name the folder into which takes are copied.")
     refuse_inside(page, folder)
     plan_path, rig_path = (None if path is None else Path(path) for path in (plan, rig))
     return _checks(folder, interval_s, existing, page, plan_path, rig_path, first_light, caller)

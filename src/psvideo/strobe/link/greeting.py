@@ -42,13 +42,13 @@ def _other(name: str, heard: bytes) -> str:
     if not heard:
         found = "nothing answers there: no board, a board without the strobe firmware, or one that is not powered"
     elif format_request(Id()).strip() in heard:
-        found = "what is there sends back what it gets (a modem, or a plug that joins its two data wires)"
+        found = "what is there sends back what it receives (a modem, or a plug that connects its two data wires)"
     elif b"$GP" in heard or b"$GN" in heard:
         found = f"a satellite receiver is there (it says {said!r})"
     elif not said:
-        found = "what is there sends bytes that are no text: another device, or another speed than 115,200 baud"
+        found = "what is there sends bytes that are not text: another device, or another speed than 115,200 baud"
     else:
-        found = f"what is there is no strobe controller (it says {said!r})"
+        found = f"what is there is not a strobe controller (it says {said!r})"
     return (
         f"{name}: {found}. Name the controller's port with `port` (psvideo strobe list shows those that are likely), "
         "or put the firmware onto the board (lights/)."

@@ -75,7 +75,7 @@ def _start(built: Built, wish: Emulation, trace: Path | None) -> subprocess.Pope
 def _port_of(process: subprocess.Popen[str]) -> str:
     port = process.stdout.readline().strip() if process.stdout else ""
     if not port:
-        raise PsvideoError("The emulated board did not start; what it said stands above.")
+        raise PsvideoError("The emulated board did not start; its own message is above.")
     return port
 
 

@@ -42,7 +42,7 @@ def check_lines(path: Path, trace: Trace, wired: Wired) -> None:
     if unknown:
         shown = ", ".join(f"{' and '.join(names)} on line {line}" for line, names in sorted(wired.items()))
         raise PsvideoError(
-            f"{path}: line {unknown[0]} is lit, and no light of the plan hangs on it ({shown}). Name the lines with "
+            f"{path}: line {unknown[0]} is lit, and no light of the plan is wired to it ({shown}). Name the lines with "
             "`line` NAME=NUMBER, or take the trace of this plan."
         )
 

@@ -78,8 +78,8 @@ def cast_rays(bodies: Sequence[Body], camera: CameraTable, time_s: float) -> See
     face, origins, directions = face[sample], origins[sample], directions[sample]
     corners = vertices[faces[face]]
     distance, weights = barycentric(origins, directions, corners)
-    facet = _unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-    smooth = _unit(np.einsum("pcx,pc->px", normals[faces[face]], weights))
+    facet = unit_vectors(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    smooth = unit_vectors(np.einsum("pcx,pc->px", normals[faces[face]], weights))
     flat = np.array([body.table.shading == "flat" for body in bodies])[owner[face]]
     normal = np.where(flat[:, None], facet, smooth)
     back = np.einsum("ij,ij->i", facet, directions) > 0
@@ -98,7 +98,8 @@ def cast_rays(bodies: Sequence[Body], camera: CameraTable, time_s: float) -> See
     return SeenScene(hits=hits, shadows=_shadow_caster(bodies, vertices, faces, owner, caster))
 
 
-def _unit(vectors: FloatArray) -> FloatArray:
+def unit_vectors(vectors: FloatArray) -> FloatArray:
+    """Return vectors (point, 3) of length 1 that point the same way; those without a length stay zero."""
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-300))
 
 

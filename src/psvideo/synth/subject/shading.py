@@ -14,7 +14,7 @@ from psvideo.model.rig import Light, Rig
 from psvideo.synth.lamps.emission import Emission
 from psvideo.synth.scene import AmbientTable
 from psvideo.synth.subject.material import Colours, colour
-from psvideo.synth.subject.render import Hits, SeenScene
+from psvideo.synth.subject.render import Hits, SeenScene, unit_vectors
 
 LIFT = 1e-5
 """Shadow rays start this fraction of the scene's size above the surface, so that no triangle shadows itself."""
@@ -100,7 +100,7 @@ def _openness(view: SeenScene, rays: int) -> FloatArray:
     hits = view.hits
     if rays == 0 or view.shadows is None:
         return np.ones(len(hits.sample))
-    side = _unit(np.cross(hits.normal, np.where(np.abs(hits.normal[:, :1]) > 0.9, [[0.0, 1, 0]], [[1.0, 0, 0]])))
+    side = unit_vectors(np.cross(hits.normal, np.where(np.abs(hits.normal[:, :1]) > 0.9, [[0.0, 1, 0]], [[1.0, 0, 0]])))
     other = np.cross(hits.normal, side)
     origins, reach_m = lifted(view), np.full(len(hits.sample), np.inf)
     blocked = np.zeros(len(hits.sample))
@@ -109,7 +109,3 @@ def _openness(view: SeenScene, rays: int) -> FloatArray:
         direction = sine * (np.cos(angle) * side + np.sin(angle) * other) + np.sqrt(1 - sine**2) * hits.normal
         blocked += view.shadows.blocked(origins, direction, reach_m)
     return np.asarray(1.0 - blocked / rays)
-
-
-def _unit(vectors: FloatArray) -> FloatArray:
-    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-300))

@@ -43,8 +43,8 @@ def colours(
     verbose: Verbose = False,
     quiet: Quiet = False,
 ) -> None:
-    """Measure what red, green and blue see of every coloured light, from a white card that one light at a time lights;
-    writes the rig with colours."""
+    """Measure how much red, green and blue record of every coloured light, from a white card under one light at a
+    time; writes the rig with colours."""
     from psvideo.runs.calibrate.colours import colours as measure
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)

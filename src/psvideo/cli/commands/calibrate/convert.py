@@ -20,7 +20,7 @@ def convert(
     ],
     name: Annotated[
         list[str] | None,
-        typer.Option("--name", help="For a list that names none: the lights' names in order, one each."),
+        typer.Option("--name", help="The lights' names, in order, where the list has none; one each."),
     ] = None,
     force: Force = False,
     json: Json = False,

@@ -37,7 +37,7 @@ def flat_field(
         str | None, typer.Option(help="The target's part of the picture: left,top,right,bottom in pixels.")
     ] = None,
     flat: Annotated[
-        Path | None, typer.Option(help="A file to write how light falls off over the target, for psvideo normals.")
+        Path | None, typer.Option(help="File for the lights' fall-off over the target, for psvideo normals --flat.")
     ] = None,
     transfer: Transfer = None,
     plan: PlanPath = None,

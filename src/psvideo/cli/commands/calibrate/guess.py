@@ -19,7 +19,8 @@ def guess(
     prior: Annotated[
         Prior | None,
         typer.Option(
-            help="equal-lights (six or more of one strength) or equal-albedo; left out: by how many there are."
+            help="What to assume: equal-lights (six or more, equally strong) or equal-albedo (one paint); left out: "
+            "chosen by the number of lights."
         ),
     ] = None,
     transfer: Transfer = None,

@@ -45,7 +45,7 @@ def mirror_sphere(
     ] = None,
     radius_mm: RadiusMm = None,
     outline_picture: Annotated[
-        Path | None, typer.Option(help="A picture from the same camera, room light on, on which the outline shows.")
+        Path | None, typer.Option(help="A picture from the same camera with the room light on, to find the outline in.")
     ] = None,
     transfer: Transfer = None,
     plan: PlanPath = None,

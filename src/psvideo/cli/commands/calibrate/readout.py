@@ -42,10 +42,10 @@ def readout(
         float, typer.Option(help="Rows of the picture that show one row of the sensor.", min=0.01, max=100)
     ] = 1.0,
     columns: Annotated[
-        str | None, typer.Option(help="Only these columns: the first and one past the last, as 0-80.")
+        str | None, typer.Option(help="Use only these columns, from the first to one past the last: 0-80.")
     ] = None,
     near: Annotated[
-        str | None, typer.Option(help="Roughly what is expected (16ms), where stripes can be read in two ways.")
+        str | None, typer.Option(help="Roughly the readout time (16ms), where stripes can be read in two ways.")
     ] = None,
     fps: Annotated[
         str | None, typer.Option(help="Frame rate at which it was filmed: 120, 119.88; left out: the movie's own.")

@@ -59,7 +59,7 @@ def check(
     verbose: Verbose = False,
     quiet: Quiet = False,
 ) -> None:
-    """Say whether a plan can be played, and how: on the board at a port, on one of the table, or on any of them."""
+    """Say whether and how a plan can be played: by the board at a port, by one kind of board, or by any kind."""
     from psvideo.runs.strobe.check import check as check_plan
     from psvideo.runs.strobe.check import check_boards
     from psvideo.strobe.program_words import describe_program, program_record
@@ -113,7 +113,7 @@ def run(
     verbose: Verbose = False,
     quiet: Quiet = False,
 ) -> None:
-    """Play a plan until Ctrl-C, or for a time; in every case the lights are dark afterwards."""
+    """Play a plan until Ctrl-C, or for a time; however it ends, the lights are off afterwards."""
     from psvideo.runs.strobe.run import run as play
     from psvideo.strobe.runlog import log_record
 
@@ -144,7 +144,7 @@ def _is_everybody_warned(plan: Path, warning: str) -> bool:
     """Warn of the flashing, however quiet the command is, and ask."""
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
         raise UsageError(
-            f"{plan}: {warning} Nobody can confirm that here, for this is no terminal: run the command once in a "
+            f"{plan}: {warning} Nobody can confirm that here, as this is not a terminal: run the command once in a "
             "terminal, or give --yes when everybody has been warned. Nothing flashed."
         )
     Voice().warn(warning)
@@ -174,7 +174,7 @@ def stop(
     verbose: Verbose = False,
     quiet: Quiet = False,
 ) -> None:
-    """Make a board dark, and say how it is."""
+    """Switch off all lights of a board, and print its state."""
     from psvideo.runs.strobe.port import stop as darken
 
     voice = Voice(json=json, verbose=verbose, quiet=quiet)
