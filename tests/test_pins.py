@@ -1,4 +1,4 @@
-"""The versions that constraints.txt names install on every Python that pyproject.toml allows, its first releases too."""
+"""The versions in constraints.txt install on every Python that pyproject.toml allows, its first releases too."""
 
 import re
 from importlib.metadata import distributions
