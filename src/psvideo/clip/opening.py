@@ -10,7 +10,7 @@ from psvideo.clip.filters import check_filters
 from psvideo.clip.folder import MOVIES, RAWS, find_sequence, unread
 from psvideo.clip.linear import depth_held
 from psvideo.clip.record import Clip, Header
-from psvideo.clip.transfer import DISPLAYED, disagreement, find_curve
+from psvideo.clip.transfer import DISPLAYED, disagreement, find_curve, is_another_curve
 from psvideo.errors import PsvideoError
 from psvideo.formats.plan_toml import FRAMES, find_plan, read_plan
 from psvideo.model.camera import Encoding
@@ -63,6 +63,7 @@ def _open_folder(path: Path, plan_path: Path | None) -> Clip:
         header=header,
         colour=header.colour or find_curve(encoding.transfer).colour,
         encoding=encoding,
+        curve_doubt=_curve_doubt(sequence.kind, plan, header),
         warnings=header.warnings + _curve_warnings(sequence.kind, plan, header),
         notes=((passed_over,) if sequence.passed_over else ()) + _depth_note(header, encoding) + _turn_note(header),
     )
@@ -91,6 +92,7 @@ def _open_movie(path: Path, plan_path: Path | None) -> Clip:
         colour=_movie_colour(encoding, movie.header),
         encoding=encoding,
         timestamps=movie.timestamps,
+        curve_doubt=_curve_doubt("movie", plan, movie.header),
         warnings=movie.header.warnings + _curve_warnings("movie", plan, movie.header) + rate_warnings,
         places_per_frame=per_frame,
         notes=notes + _turn_note(movie.header),
@@ -152,6 +154,13 @@ def _curve_warnings(kind: str, plan: Plan, header: Header) -> tuple[str, ...]:
         return () if linear else (said,)
     wrong = disagreement(transfer, tagged=header.transfer, kind=kind)
     return () if wrong is None else (wrong,)
+
+
+def _curve_doubt(kind: str, plan: Plan, header: Header) -> str:
+    """Return the warning that the plan names another curve where that one is so far off that it tilts all normals."""
+    transfer = plan.camera.encoding.transfer
+    said = "" if kind in RAWS else disagreement(transfer, tagged=header.transfer, kind=kind) or ""
+    return said if said and is_another_curve(transfer, header.transfer) else ""
 
 
 def _rate_warning(movie: "Movie", plan: Plan) -> tuple[str, ...]:

@@ -18,6 +18,8 @@ from psvideo.model.camera import FloatArray
 
 STUDIO_CONFIG = "studio-config-v2.2.0_aces-v1.3_ocio-v2.4"
 UNKNOWN_COLOUR = "unknown"
+FAR_APART = 0.1
+"""Curves of pictures for display lie up to 0.05 of white apart; light, HLG, PQ and logarithms 0.15 or more."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -182,6 +184,18 @@ def disagreement(named: str, *, tagged: str | None, kind: str) -> str | None:
         f"the files are tagged with the transfer {told.name!r}, and the plan says {curve.name!r}, by which they are "
         f"read: where the camera did not record so, write transfer = {told.name!r} into the plan"
     )
+
+
+def is_another_curve(named: str, tagged: str | None) -> bool:
+    """Return whether light read by the curve named would be far from what the files' tag says, by FAR_APART of white or
+    more; files without a tag are taken for sRGB.
+
+    >>> is_another_curve("rec709", "hlg"), is_another_curve("rec709", "srgb")
+    (True, False)
+    """
+    signal = np.linspace(0, 1, 65)
+    read, told = (to_light(find_curve(name), signal) for name in (named, tagged or "srgb"))
+    return float(np.abs(read / read[-1] - told / told[-1]).max()) >= FAR_APART
 
 
 def to_light(curve: TransferCurve, signal: FloatArray | NDArray[np.float32]) -> FloatArray:

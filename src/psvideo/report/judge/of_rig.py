@@ -13,7 +13,7 @@ def rig(observed: Observed, *, guessed: bool = False, curve_doubt: str = "") -> 
     is a guess; ``curve_doubt``: why pictures were likely coded by another curve, where that is known."""
     fit = observed.rig_fit
     firing = [light for light, fires in zip(observed.lights, observed.firing, strict=True) if fires]
-    said = Judgement(subject="rig", grade="doubtful", found=curve_doubt) if curve_doubt else None
+    said = Judgement(subject="rig", grade="doubtful", found=_sentence(curve_doubt)) if curve_doubt else None
     curve = said or (None if fit is None else other_curve(fit))
     wrong = None if fit is None or curve else rig_misfits(firing, fit)
     crossed, away = lights_crossed(observed, guessed=guessed), facing_away(observed)
@@ -35,3 +35,7 @@ def rig(observed: Observed, *, guessed: bool = False, curve_doubt: str = "") -> 
             grade="good",
             found="The normals fit together as one surface's; three lights show no more of the rig.",
         )
+
+
+def _sentence(said: str) -> str:
+    return f"{said[0].upper()}{said.removesuffix('.')[1:]}."

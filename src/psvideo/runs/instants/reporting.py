@@ -86,7 +86,8 @@ def run_report(
     )
     how = {} if solved is None else {"aligned": solved.aligned, "opened": solved.opened}
     judged = judgements(clip.plan, timing, observed, curve_doubt=clip.curve_doubt, **how)
-    warnings = (*clip.warnings, *(() if solved is None else solved.warnings))
+    warned = (one for one in clip.warnings if one != clip.curve_doubt)  # which is judged
+    warnings = (*warned, *(() if solved is None else solved.warnings))
     spell = output.caller.spell
     return RunReport(
         clip=clip.name,
@@ -145,8 +146,7 @@ def _shot(clip: Clip, numbers: Sequence[int]) -> dict[str, str]:
         "Rounds a second": f"{len(plan.dark_rounds) / plan.cycle_s:.4g}"
         if plan.mode != "synced"
         else f"{float(camera.fps) / len(plan.flashes):.4g}",
-        "Remarks": "; ".join((*([clip.curve_doubt] if clip.curve_doubt else []), *clip.warnings, *clip.notes))
-        or "none",
+        "Remarks": "; ".join(filter(None, dict.fromkeys((clip.curve_doubt, *clip.warnings, *clip.notes)))) or "none",
     }
 
 

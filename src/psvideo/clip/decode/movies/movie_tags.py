@@ -101,7 +101,8 @@ def compression_warning(codec: str, bits: int, *, frames: int, whole_frames: int
         return None
     costs = [f"{bits} bits leave few steps for dim light"] if few else []
     if chained:
-        costs.append(f"only {whole_frames} of {frames} frames are whole ones, the others are coded as changes of these")
+        whole = "is a whole one" if whole_frames == 1 else "are whole ones"
+        costs.append(f"of {frames} frames only {whole_frames} {whole}, the others are coded as changes")
     return (
         f"{SPOKEN.get(codec, codec)} costs accuracy: {', and '.join(costs)}. Where the camera can, record 10 bits and "
         "only whole frames (ProRes, DNxHR, All-Intra), or raw"
