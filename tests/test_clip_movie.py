@@ -225,6 +225,10 @@ def test_rgb_movies_come_out_with_every_bit_in_the_right_channel(
         ("x.m4v", "libx264", {"bf": "2", "qp": "0"}),
         ("x.webm", "libvpx-vp9", {"lossless": "1"}),
         ("x.mts", "libx264", {"bf": "2", "qp": "0"}),
+        ("x.ts", "libx264", {"bf": "2", "qp": "0"}),
+        ("x.flv", "libx264", {"bf": "2", "qp": "0"}),
+        ("x.nut", "ffv1", {}),
+        ("x.y4m", "wrapped_avframe", {}),
     ],
 )
 def test_frames_come_in_the_order_of_time_and_are_found_by_number(
@@ -586,6 +590,21 @@ def test_truncated_movies_are_refused_by_name(
     (tmp_path / name).write_bytes(data[: int(len(data) * share)])
     with pytest.raises(PsvideoError, match=rf"{name}.*(truncated|holds|is empty)"):
         list(read_frames(open_clip(tmp_path / name, plan=plan)))
+
+
+@pytest.mark.parametrize("name", ["x.mkv", "x.ts", "x.mp4"])
+def test_a_movie_that_begins_late_is_whole_and_one_that_breaks_off_is_not(
+    tmp_path: Path, plan_for: Callable[..., Path], name: str
+) -> None:
+    """Matroska says when the video ends, and that is counted from the clock's 0, not from the first frame."""
+    write_movie(tmp_path / name, grey_ramp(24), codec="libx264", places=range(37, 61))
+    plan = plan_for(rows=32, cols=48)
+    assert open_clip(tmp_path / name, plan=plan).numbers == tuple(range(24))
+    if name == "x.mkv":
+        data = (tmp_path / name).read_bytes()
+        (tmp_path / name).write_bytes(data[: len(data) * 3 // 4])
+        with pytest.raises(PsvideoError, match="holds .* frames, and its header promises"):
+            open_clip(tmp_path / name, plan=plan)
 
 
 def test_a_movie_whose_container_does_not_say_the_order_of_its_frames_says_so(

@@ -24,11 +24,16 @@ RAWS = ("dng", "raw")
 """Kinds that hold the sensor's own values: linear, with the levels and colour filters that the file states."""
 USUAL_KINDS = (*sorted(ending for ending, kind in KINDS.items() if kind != "raw"), "cameras' raw files")
 """What messages list."""
-MOVIES = (".mov", ".mp4", ".mkv", ".mxf", ".m4v", ".3gp", ".avi", ".webm", ".mts", ".m2ts", ".mpg")
+MOVIES = (
+    *(".mov", ".mp4", ".mkv", ".mxf", ".m4v", ".3gp", ".avi", ".webm", ".mts", ".m2ts", ".ts", ".mpg", ".mpeg"),
+    *(".y4m", ".nut", ".wmv", ".flv"),
+)
 TO_PICTURES = "export the pictures as 16-bit TIFF, PNG or DNG; a phone's camera can be set to JPEG or raw"
 TO_FOOTAGE = "export it with its maker's program, as DNG, EXR or ProRes"
 UNREAD = {
-    **dict.fromkeys((".heic", ".heif", ".avif", ".webp", ".jxl", ".bmp", ".gif", ".psd"), TO_PICTURES),
+    **dict.fromkeys((".heic", ".heif", ".hif", ".avif", ".webp", ".jxl", ".jp2", ".j2k", ".jxr"), TO_PICTURES),
+    **dict.fromkeys((".bmp", ".gif", ".psd", ".tga", ".pbm", ".pgm", ".ppm", ".pnm"), TO_PICTURES),
+    **dict.fromkeys((".hdr", ".pfm", ".cin", ".sgi"), "export the pictures as EXR"),
     **dict.fromkeys((".x3f", ".3fr", ".iiq", ".fff"), "convert the pictures to DNG"),
     **dict.fromkeys((".braw", ".r3d", ".crm", ".ari", ".arx", ".nev", ".mlv"), TO_FOOTAGE),
 }

@@ -26,7 +26,10 @@ TRANSFERS = {
 }
 GAMUTS = {1: "lin_rec709_scene", 9: "lin_rec2020_scene", 12: "lin_p3d65_scene"}
 """The colour interop ids of linear light with these primaries."""
-SPOKEN = {"h264": "H.264", "hevc": "H.265", "mjpeg": "Motion JPEG", "dnxhd": "DNxHD", "prores": "ProRes", "av1": "AV1"}
+SPOKEN = {
+    **{"h264": "H.264", "hevc": "H.265", "mjpeg": "Motion JPEG", "dnxhd": "DNxHD", "prores": "ProRes", "av1": "AV1"},
+    **{"vp8": "VP8", "vp9": "VP9", "mpeg1video": "MPEG-1", "mpeg2video": "MPEG-2", "mpeg4": "MPEG-4"},
+}
 ANDROID_RATE = "com.android.capture.fps"
 FEW_WHOLE_FRAMES = 0.5
 FEW_BITS = 8

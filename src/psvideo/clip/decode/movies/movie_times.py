@@ -83,11 +83,13 @@ def promised_frames(container: InputContainer, stream: VideoStream, period: floa
 def _length_s(container: InputContainer, stream: VideoStream) -> float:
     if stream.duration:
         return float(stream.duration * (stream.time_base or 1))
+    begins_s = float((stream.start_time or 0) * (stream.time_base or 1))
     try:
         found = datetime.strptime(stream.metadata.get("DURATION", "")[:15], "%H:%M:%S.%f")
-        return found.hour * 3600 + found.minute * 60 + found.second + found.microsecond * 1e-6
-    except ValueError:  # Matroska alone writes it
-        return (container.duration or 0) / av.time_base if len(container.streams) == 1 else 0.0
+        ends_s = found.hour * 3600 + found.minute * 60 + found.second + found.microsecond * 1e-6
+    except ValueError:  # Matroska alone writes it, as when the stream ends
+        ends_s = (container.duration or 0) / av.time_base if len(container.streams) == 1 else 0.0
+    return ends_s - begins_s
 
 
 def frame_places(path: Path, timestamps: Sequence[int]) -> Places:
