@@ -603,7 +603,7 @@ def test_a_movie_that_begins_late_is_whole_and_one_that_breaks_off_is_not(
     if name == "x.mkv":
         data = (tmp_path / name).read_bytes()
         (tmp_path / name).write_bytes(data[: len(data) * 3 // 4])
-        with pytest.raises(PsvideoError, match="holds .* frames, and its header promises"):
+        with pytest.raises(PsvideoError, match=r"holds .* frames, and its header promises"):
             open_clip(tmp_path / name, plan=plan)
 
 

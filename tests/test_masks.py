@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from PIL import ExifTags, Image, ImageOps
 
 import psvideo as ps
 from psvideo.clip.decode.decoders import decode
@@ -147,3 +148,18 @@ def test_a_subject_that_leaves_the_picture_leaves_an_empty_result_that_is_said_o
     assert said.startswith("doubtful: Nothing is lit in 1 of 3 rounds (1003): the subject left the picture")
     assert "failed" not in said
     assert not any(written(tmp_path / "out", name)[2].any() for name in ("normals", "albedo", "alpha"))
+
+
+@pytest.mark.parametrize("ending", ["jpg", "png", "tif"])
+@pytest.mark.parametrize("orientation", range(1, 9))
+def test_a_mask_is_turned_upright_as_its_own_file_says(tmp_path: Path, ending: str, orientation: int) -> None:
+    painted = np.zeros((40, 60), np.uint8)
+    painted[4:20, 8:24] = 255
+    exif = Image.Exif()
+    exif[ExifTags.Base.Orientation] = orientation
+    file = tmp_path / f"mask.{ending}"
+    Image.fromarray(painted).save(file, exif=exif)
+    Image.fromarray(painted).save(tmp_path / "reference.png", exif=exif)  # Pillow itself turns TIFFs wrongly
+    upright = np.asarray(ImageOps.exif_transpose(Image.open(tmp_path / "reference.png"))) > 127
+    assert np.array_equal(ps.read_mask(file), upright)
+    ps.read_mask(file, width_px=upright.shape[1], height_px=upright.shape[0])

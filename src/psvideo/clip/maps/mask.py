@@ -10,6 +10,7 @@ from PIL import Image
 
 from psvideo.clip.decode.decoders import decode
 from psvideo.clip.folder import KINDS, USUAL_KINDS
+from psvideo.clip.stated import stated_by
 from psvideo.errors import PsvideoError
 from psvideo.formats.paths import path_of
 
@@ -36,7 +37,8 @@ def read_mask(path: Path | str, *, width_px: int | None = None, height_px: int |
     Returns
     -------
     numpy.ndarray
-        Shape (row, col), bool, True where the picture is brighter than half of its range.
+        Shape (row, col), bool, True where the picture is brighter than half of its range; upright, as its file's EXIF
+        says.
 
     Raises
     ------
@@ -57,7 +59,7 @@ def read_mask(path: Path | str, *, width_px: int | None = None, height_px: int |
     if not path.is_file():
         raise PsvideoError(f"{path}: there is no such mask. Check the name.")
     codes = _codes(kind, path)
-    brightest = codes if codes.ndim == 2 else codes.max(axis=2)
+    brightest = stated_by(path).turn.upright(codes if codes.ndim == 2 else codes.max(axis=2))
     rows, cols = brightest.shape
     if (height_px, width_px) not in ((rows, cols), (None, None)):
         raise PsvideoError(
