@@ -165,6 +165,16 @@ def angles_and_distance(_: Path, lights: Path) -> None:
     lights.write_text("\n".join(["6", *(f"{name}.png {place * 60} 60 1" for place, name in enumerate(NAMES))]))
 
 
+def as_windows_writes(_: Path, lights: Path) -> None:
+    lights.write_text(f"# für die Vase\n{lights.read_text()}", encoding="cp1252")
+
+
+def of_one_picture(_: Path, lights: Path) -> None:
+    names = [NAMES[0], NAMES[0], *NAMES[2:]]
+    rows = lights.read_text().splitlines()[1:]
+    lights.write_text("\n".join(["6", *(f'"{name}.png" {row}' for name, row in zip(names, rows, strict=True))]))
+
+
 def jpegs_called_png(folder: Path, _: Path) -> None:
     for file in folder.iterdir():
         save(file.with_suffix(".jpg"), np.full((64, 64), 0.5), codes=255)
@@ -178,6 +188,11 @@ PHOTOGRAPHS: dict[str, tuple[Spoil, str]] = {
     "as a phone saves them": (of_a_phone, "shot 20.HEIC (and 5 more) is HEIC, which is not read"),
     "every picture as JPEG too": (raw_and_jpeg, "shot 3.jpg and shot 3.png are one photograph in two kinds"),
     "one picture under two names": (one_twice, "shot 3.png and shot 7.png are one and the same picture"),
+    "one picture for two lights": (
+        of_one_picture,
+        "shot 3.png: lights.lp gives it to light 1 (shot 3.png) and to light 2 (shot 3.png)",
+    ),
+    "umlauts as Windows writes them": (as_windows_writes, "may be a 'ü' as Windows writes it). Save it as UTF-8"),
     "decimal commas": (rewritten(lambda text: text.replace(".", ",")), "Expected numbers with points, such as 0.5"),
     "angles": (angles, "expected three numbers x y z of a direction"),
     "angles and a distance": (angles_and_distance, "such as 0 60 1, look like angles in degrees"),

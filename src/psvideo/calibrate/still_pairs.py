@@ -63,6 +63,7 @@ def pair_stills(
     matches = [_matching(name, files) for name in known] if named else []
     if matches and all(len(one) == 1 for one in matches):
         chosen = [one[0] for one in matches]
+        _refuse_named_twice(known, chosen, whose)
         how = f"Pictures belong to lights by name ({whose}): {_shown(known, chosen)}."
     elif any(matches):
         raise PsvideoError(_misnamed(folder, known, matches, files, whose))
@@ -99,6 +100,19 @@ def _refuse_few(folder: Path, files: Sequence[Path]) -> None:
             raise PsvideoError(
                 f"{folder}: {first.name} and {file.name} are one and the same picture. Expected a photograph of its "
                 "own for each light: copy the missing one from the camera, or take it again."
+            )
+
+
+def _refuse_named_twice(known: Sequence[str], chosen: Sequence[Path], whose: str) -> None:
+    """Raise PsvideoError where two lights of a list have the same picture."""
+    first: dict[Path, int] = {}
+    for place, file in enumerate(chosen):
+        before = first.setdefault(file, place)
+        if before != place:
+            raise PsvideoError(
+                f"{file}: {whose} gives it to light {before + 1} ({known[before]}) and to light {place + 1} "
+                f"({known[place]}). Expected a picture of its own for each light: correct the name in one of these "
+                "lines, or take the line out."
             )
 
 

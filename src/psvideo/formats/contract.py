@@ -63,8 +63,15 @@ def read_text(path: Path) -> str:
     except FileNotFoundError:
         raise PsvideoError(f"{path}: there is no such file. Check the name, or write the file first.") from None
     except UnicodeDecodeError as fault:
-        if path.read_bytes()[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        data = path.read_bytes()
+        if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
             raise PsvideoError(f"{path}: is text in UTF-16. Save it as UTF-8.") from None
+        if not any(byte < 32 and byte not in b"\t\n\f\r" for byte in data):  # accents as old programs write them
+            letter = data[fault.start : fault.start + 1].decode("cp1252", errors="replace")
+            raise PsvideoError(
+                f"{path}: is text, but not in UTF-8 (byte {fault.start} may be a {letter!r} as Windows writes it). "
+                "Save it as UTF-8."
+            ) from None
         raise PsvideoError(f"{path}: is not text (byte {fault.start} is not UTF-8). Name another file.") from None
     except OSError as fault:
         raise PsvideoError(f"{path}: cannot be read as text ({fault}). Check the file and its permissions.") from fault
