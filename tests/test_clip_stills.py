@@ -315,6 +315,27 @@ def test_truncated_pictures_are_refused_by_name(
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.parametrize("share", [0.3, 0.6, 0.95])
+@pytest.mark.parametrize("progressive", [False, True])
+@pytest.mark.parametrize("grey", [False, True])
+def test_a_jpeg_that_breaks_off_and_has_an_end_marker_all_the_same_is_refused(
+    tmp_path: Path, grey: bool, progressive: bool, share: float, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """As programs close files that they could not fetch to the end; what is black at the bottom is whole."""
+    codes = np.random.default_rng(0).integers(40, 200, (120, 160, 3)).astype(np.uint8)
+    codes[60:] //= 4
+    codes[100:] = 0
+    file = tmp_path / "shot.jpg"
+    Image.fromarray(codes[..., 0] if grey else codes).save(file, quality=90, progressive=progressive)
+    assert decode("jpeg", file).codes.shape[:2] == (120, 160)
+    whole = file.read_bytes()
+    begin = whole.index(b"\xff\xda")
+    file.write_bytes(whole[: begin + int((len(whole) - begin) * share)] + b"\xff\xd9")
+    with pytest.raises(PsvideoError, match=r"shot\.jpg: its picture breaks off .* Copy it again"):
+        decode("jpeg", file)
+    assert capfd.readouterr() == ("", "")
+
+
 @pytest.mark.parametrize("name", ["png", "exr", "tiff-zip"])
 def test_damage_inside_a_picture_is_refused_where_the_kind_can_tell(tmp_path: Path, name: str) -> None:
     file = tmp_path / "shot.0007.img"

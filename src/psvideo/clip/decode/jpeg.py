@@ -3,16 +3,19 @@
 from pathlib import Path
 
 import imagecodecs
+import numpy as np
+from numpy.typing import NDArray
 
 from psvideo.clip.decode.signatures import begins_like
 from psvideo.clip.record import CodedPicture, Header
 from psvideo.errors import PsvideoError
 from psvideo.model.units import counted
 
-START, END = b"\xff\xd8", b"\xff\xd9"
+START, END, PROGRESSIVE = b"\xff\xd8", b"\xff\xd9", b"\xff\xc2"
 TAIL = 1024
 NO_LENGTH = {0x01, *range(0xD0, 0xD9)}
 FRAME_MARKERS = {*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC}
+BLOCK = 8
 LOSSY = "JPEG frames have 8 bits and are lossy, which costs accuracy; record PNG, TIFF, DPX, EXR or DNG"
 
 
@@ -24,7 +27,32 @@ def header(path: Path) -> Header:
 def decode(path: Path) -> CodedPicture:
     """Decode a whole picture. A truncated file is refused, which decoders fill with grey."""
     data = path.read_bytes()
-    return CodedPicture(header=_parse_header(path, data), codes=imagecodecs.jpeg8_decode(data))
+    header = _parse_header(path, data)
+    codes = imagecodecs.jpeg8_decode(data)
+    if (PROGRESSIVE in data or _ends_evenly(codes)) and _breaks_off(data):
+        raise PsvideoError(f"{path}: its picture breaks off before its end: it is truncated. Copy it again.")
+    return CodedPicture(header=header, codes=codes)
+
+
+def _ends_evenly(codes: NDArray[np.uint8]) -> bool:
+    """Return whether the last block has a single colour, as where the decoder had nothing left to fill it with."""
+    return not np.ptp(codes[-BLOCK:, -BLOCK:], axis=(0, 1)).any()
+
+
+def _breaks_off(data: bytes) -> bool:
+    """Return whether a picture's coded light ends early in spite of its end marker: libjpeg paints the rest over and
+    says so to no caller; FFmpeg refuses."""
+    import av
+
+    decoder = av.CodecContext.create("mjpeg", "r")
+    decoder.options = {"err_detect": "explode"}
+    try:
+        decoder.decode(av.Packet(data))
+    except av.error.InvalidDataError:
+        return True
+    except av.FFmpegError:  # of a way of coding that it does not know
+        return False
+    return False
 
 
 def _parse_header(path: Path, data: bytes) -> Header:
