@@ -427,6 +427,20 @@ def test_what_is_left_beyond_noise_makes_a_take_doubtful_and_then_bad_whatever_i
     ]  # fmt: skip
 
 
+def test_files_read_by_another_curve_than_they_say_are_doubtful_and_motion_is_not_blamed() -> None:
+    one = Footage().observed(0)
+    misfit = Misfit(share=0.1, error_deg=3.1 / result.MEAN_OF_HELD)
+    one.facts[:] = [
+        replace(facts, misfit=misfit, valid_share=0.1, measured_share=1.0, moving_share=1.0) for facts in one.facts
+    ]
+    (lacking,) = result.validity(one)
+    assert "Move slower" in lacking.advice
+    (lacking,) = result.validity(one, curve_doubted=True)
+    assert lacking.advice == result.CURVE_FIRST
+    said = list(judge_rig(one, curve_doubt="the files are tagged 'hlg'"))
+    assert [(line.grade, line.found) for line in said] == [("doubtful", "The files are tagged 'hlg'.")]
+
+
 def test_a_guessed_order_is_blamed_before_the_rig_where_normals_are_no_surface_s() -> None:
     one = Footage().observed(0)
     one.slopes[:] = [-0.2]

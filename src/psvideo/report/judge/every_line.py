@@ -37,6 +37,6 @@ def judgements(
         focus(observed),
         *rig(observed, guessed=timing.order == "guess", curve_doubt=curve_doubt),
         *accuracy(observed),
-        *validity(observed),
+        *validity(observed, curve_doubted=bool(curve_doubt)),
         *steadiness(observed.facts),
     )

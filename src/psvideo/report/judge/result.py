@@ -38,6 +38,7 @@ MOST_FLICKER_PERCENT = 1.0
 AT_REST = 0.05
 """Noise is judged by results between which less of the picture than this moves."""
 NOISY_DEG, LOST_NOISY_DEG = 4.0, 10.0
+CURVE_FIRST = "First read the files by their own curve: a wrong one looks like motion and like an uneven surface."
 
 
 def focus(observed: Observed) -> Judgement:
@@ -58,8 +59,9 @@ def focus(observed: Observed) -> Judgement:
     )
 
 
-def validity(observed: Observed) -> Iterator[Judgement]:
-    """Judge how much of the subject has a normal to be trusted, and what the rest lacks."""
+def validity(observed: Observed, *, curve_doubted: bool = False) -> Iterator[Judgement]:
+    """Judge how much of the subject has a normal to be trusted, and what the rest lacks; ``curve_doubted``: the files
+    are likely read by another curve than their own."""
     known = [one for one in observed.facts if one.valid_share is not None]
     if not known:
         return
@@ -85,7 +87,7 @@ def validity(observed: Observed) -> Iterator[Judgement]:
             found=f"Three lights reach {100 * np.median(reached):.0f} % of the subject, and {found}: elsewhere its "
             "predicted error is too large."
             + (" These normals serve a look, and no measurement." if usual < NONE_VALID else ""),
-            advice=_trusting(observed),
+            advice=CURVE_FIRST if curve_doubted else _trusting(observed),
         )
         return
     yield Judgement(
@@ -104,7 +106,8 @@ def _trusting(observed: Observed) -> str:
     if moves(observed.facts):
         return (
             "Move slower, raise the frame rate or flash fewer lights, and give fine detail to follow: plates of what "
-            'moves must be brought together. `aov=["error"]` says how far off each pixel may be.'
+            "moves must be brought together. If nothing moved, light flickers, or the movie's coding changes the "
+            'pictures. `aov=["error"]` says how far off each pixel may be.'
         )
     said = any(one.grade in ("doubtful", "bad") for one in accuracy(observed))
     if said and by_noise_deg(observed.facts) < LITTLE_NOISE_DEG:

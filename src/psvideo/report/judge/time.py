@@ -207,7 +207,8 @@ def motion(plan: Plan, timing: Timing, observed: Observed, *, aligned: bool = Fa
             "repeats itself meanwhile"
             + ("; where the plates of a round do not fit together, nothing is trusted." if aligned else ".")
             + (" The open shutter shows the single flashes there, and no blur between them." if opened else ""),
-            advice="Move slower, raise the frame rate, or flash fewer lights; if nothing moved, light flickers.",
+            advice="Move slower, raise the frame rate, or flash fewer lights; if nothing moved, light flickers, or the "
+            "movie's coding changes the pictures.",
         )
     speed = float(np.quantile(speeds, OFTEN))
     flash_s = timing.frame_period_s if plan.mode == "synced" else plan.cycle_s / len(plan.cycle_slots)
