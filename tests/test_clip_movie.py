@@ -18,6 +18,7 @@ from psvideo.clip.decode.movies import movie, yuv
 from psvideo.clip.decode.movies.yuv import CODES, HIGHEST, LOWEST, to_rgb
 from psvideo.clip.record import CodedPicture
 from psvideo.errors import PsvideoError, UsageError
+from psvideo.export.preview_movie import write_movie as write_preview
 from psvideo.formats.plan_toml import format_plan
 from psvideo.inspect.describe import describe
 from psvideo.model.camera import Encoding
@@ -552,6 +553,13 @@ def test_the_streams_transfer_is_held_against_the_plans(
     clip = open_clip(tmp_path / "x.mov", plan=plan_for(rows=32, cols=48, transfer=transfer))
     assert [said is not None and said in warning for warning in clip.warnings] == [True] * (said is not None)
     assert bool(clip.curve_doubt) == doubted
+
+
+def test_what_only_the_container_says_of_the_curve_is_read(tmp_path: Path) -> None:
+    """One ProRes encoder writes sRGB into the container, and nothing into the frames."""
+    pictures = [np.full((48, 64, 3), 100, np.uint8)] * 3
+    write_preview(tmp_path / "x.mov", pictures, fps=Fraction(25), codec="prores")
+    assert movie.index_movie(tmp_path / "x.mov").header.transfer == "srgb"
 
 
 @pytest.mark.parametrize(("black", "white"), [(None, None), (16, 235)])

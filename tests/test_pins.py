@@ -22,9 +22,9 @@ def letters(name: str) -> str:
 
 def test_what_is_pinned_and_installed_runs_on_the_first_release_of_every_python() -> None:
     wanted = {
-        found.name: found.metadata["Requires-Python"] or ""
+        found.name: found.metadata["Requires-Python"]
         for found in distributions()
-        if pins().get(letters(found.name)) == found.version
+        if pins().get(letters(found.name)) == found.version and "Requires-Python" in found.metadata
     }
     refusing = {name: said for name, said in wanted.items() if not all(map(SpecifierSet(said).contains, PYTHONS))}
     assert len(wanted) > 30

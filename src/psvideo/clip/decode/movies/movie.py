@@ -21,7 +21,9 @@ from psvideo.clip.decode.movies.movie_edits import edits_of
 from psvideo.clip.decode.movies.movie_tags import (
     capture_rate_hz,
     compression_warning,
+    gamut_of,
     shot_by,
+    transfer_of,
 )
 from psvideo.clip.decode.movies.movie_times import UNEVEN, Places, frame_places, promised_frames, stamps_of
 from psvideo.clip.record import CodedPicture, Header
@@ -62,6 +64,7 @@ class Movie:
 def index_movie(path: Path) -> Movie:
     """Read a movie's header, first frame and timestamps. Raises PsvideoError where it is damaged or truncated."""
     with _opened(path) as (container, stream):
+        transfer, colour = transfer_of(stream.codec_context), gamut_of(stream.codec_context)
         stamps = stamps_of(container, stream)
         shown = _shown(path, container, stream, stamps.timestamps)
         found = frame_places(path, shown)
@@ -90,7 +93,14 @@ def index_movie(path: Path) -> Movie:
     several = SEVERAL.format(counted(others + 1, "video stream")) if others else None
     warnings = tuple(warning for warning in (coding, cut, several, odd, uneven, _strays(found)) if warning)
     return Movie(
-        header=replace(header, time_code=code, shot=shot, warnings=header.warnings + warnings),
+        header=replace(
+            header,
+            time_code=code,
+            shot=shot,
+            transfer=header.transfer or transfer,  # frames may say less than the container
+            colour=header.colour or colour,
+            warnings=header.warnings + warnings,
+        ),
         timestamps=timestamps,
         places=found.places,
         rate_hz=1 / (found.period * found.per_frame * time_base_s) if found.period else None,

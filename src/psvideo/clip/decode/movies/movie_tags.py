@@ -9,6 +9,7 @@ from typing import Any
 import av
 import numpy as np
 from av.sidedata.sidedata import SideDataContainer
+from av.video.codeccontext import VideoCodecContext
 
 from psvideo.clip.record import shot_of
 from psvideo.model.turn import UPRIGHT, Turn, of_matrix
@@ -74,14 +75,14 @@ def turn_of(frame: av.VideoFrame) -> tuple[Turn, str | None]:
     return turn, None
 
 
-def transfer_of(frame: av.VideoFrame) -> str | None:
-    """Return the name of the curve that the frame is tagged with, None where it says nothing that is known here."""
-    return TRANSFERS.get(int(frame.color_trc or 0))
+def transfer_of(tagged: av.VideoFrame | VideoCodecContext) -> str | None:
+    """Return the name of the curve that a frame or a stream is tagged with, None where it says nothing known here."""
+    return TRANSFERS.get(int(tagged.color_trc or 0))
 
 
-def gamut_of(frame: av.VideoFrame) -> str | None:
-    """Return the colour interop id of the primaries that the frame is tagged with, None where it names none."""
-    return GAMUTS.get(int(frame.color_primaries or 0))
+def gamut_of(tagged: av.VideoFrame | VideoCodecContext) -> str | None:
+    """Return the colour interop id of the primaries that a frame or a stream is tagged with, None where of none."""
+    return GAMUTS.get(int(tagged.color_primaries or 0))
 
 
 def capture_rate_hz(metadata: Mapping[str, str]) -> float | None:
