@@ -19,6 +19,7 @@ import psvideo
 from psvideo.cli.app import application, main
 from psvideo.cli.examples import EXAMPLES
 from psvideo.cli.first_screen import COMMANDS
+from psvideo.cli.options.panels import PANELS
 
 ROOT = Path(__file__).resolve().parents[1]
 SOLVERS_AND_DECODERS = ("numba", "scipy", "cv2", "av", "OpenEXR", "rawpy", "trimesh", "PyOpenColorIO", "pxr", "serial")
@@ -63,6 +64,22 @@ def test_an_example_is_a_call_that_its_command_understands(path: str, line: str)
     assert called == path or not path or called.startswith(f"{path} "), "an example shows the command it stands under"
     command = RUNNABLE[called]
     command.make_context(called, words, resilient_parsing=False)
+
+
+def _panels(path: str) -> dict[str, str | None]:
+    """The panel in which the help of a command shows each of its options; None for the common one."""
+    command = RUNNABLE[path]
+    params = command.get_params(command.make_context(path, [], resilient_parsing=True))
+    return {one.name: one.rich_help_panel for one in params if one.param_type_name == "option"}
+
+
+def test_outside_of_a_panel_stands_only_what_normals_cannot_do_without() -> None:
+    assert {name for name, panel in _panels("normals").items() if panel is None} == {"rig", "out"}
+
+
+def test_every_name_in_the_table_of_panels_is_an_option() -> None:
+    named = {name for names in PANELS.values() for name in names}
+    assert named <= {name for path in RUNNABLE for name in _panels(path)}
 
 
 def test_every_command_speaks_to_machines() -> None:

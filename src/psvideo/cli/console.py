@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from psvideo.report.run_report import RunReport
     from psvideo.runs.steps.caller import Caller
 
+from psvideo.cli.options.clip_and_run import Json, Quiet, Verbose
 from psvideo.cli.spelling import spelled, spelled_within
 
 Item = TypeVar("Item")
@@ -31,10 +32,10 @@ class Voice:
     """How much a command says, and to whom; parameters in sentences are spelled as options. ``warned`` is what it
     warned of so far."""
 
-    json: bool = False
-    verbose: bool = False
-    quiet: bool = False
-    warned: set[str] = field(default_factory=set)
+    json: Json = False
+    verbose: Verbose = False
+    quiet: Quiet = False
+    warned: set[str] = field(default_factory=set, init=False)
 
     def say(self, text: str) -> None:
         """Print a line for people: on stdout, or nowhere where machines read stdout."""

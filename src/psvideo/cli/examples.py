@@ -194,8 +194,8 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
             "psvideo normals clip/ --rig rig.toml --for unreal -o out/",
         ),
         (
-            "in the scene's space, with the camera of a USD file; and a preview movie of the normals",
-            "psvideo normals clip/ --rig rig.toml --space world --camera-to-world shot.usd --preview relit -o out/",
+            "in the scene's space, with the camera of a USD file; and a movie of the normals",
+            "psvideo normals clip/ --rig rig.toml --space world --camera-to-world shot.usd --preview normals -o out/",
         ),
         (
             "all takes of a day by four processes, with one report over all",

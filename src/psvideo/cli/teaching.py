@@ -64,10 +64,10 @@ class Teaching(TyperCommand):
         """Return the options, where they are many each with the panel it stands in."""
         params: list[Any] = list(super().get_params(ctx))
         _take_no_value(params)
-        if len(params) > MANY and not any(getattr(param, "rich_help_panel", None) for param in params):
+        if len(params) > MANY:
             for param in params:
                 if param.param_type_name == "option" and not param.required:
-                    param.rich_help_panel = panel_of(param.name or "")
+                    param.rich_help_panel = param.rich_help_panel or panel_of(param.name or "")
         return params
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:

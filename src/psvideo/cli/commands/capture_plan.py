@@ -11,11 +11,10 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import typer
-
 import psvideo.cli.options.capture as option
 from psvideo.cli.console import Voice
-from psvideo.cli.options.clip_and_run import Force, Json, Quiet, Verbose
+from psvideo.cli.options.clip_and_run import Force
+from psvideo.cli.options.records import spread
 from psvideo.cli.spelling import spelled
 
 if TYPE_CHECKING:
@@ -28,60 +27,32 @@ PIPE_WIDTH = 120
 WIDEST_DIAGRAM = 120
 
 
+@spread
 def capture_plan(
-    context: typer.Context,
-    camera: option.CameraName = None,
-    fps: option.Fps = None,
-    size: option.Size = None,
-    shutter: option.Shutter = None,
-    exposure: option.Exposure = None,
-    readout: option.Readout = None,
-    camera_clock_ppm: option.CameraClock = 50.0,
-    lights: option.Lights = "key,left,right",
-    power: option.Power = "1",
-    flash: option.Flash = None,
+    *,
+    words: option.ShootWords,
     rig: option.LightsRig = None,
-    max_blur: option.MaxBlur = None,
-    speed: option.Speed = None,
-    field_width: option.FieldWidth = None,
-    max_duty: option.MaxDuty = None,
-    max_pulse: option.MaxPulse = None,
-    max_stops: option.MaxStops = None,
-    mode: option.Mode = "rolling",
-    marker: option.Marker = None,
-    dark_slot: option.DarkSlot = None,
-    dark_every: option.DarkEvery = None,
-    dark: option.Dark = None,
-    strobe_clock_ppm: option.StrobeClock = "50",
-    transfer: option.Transfer = "linear",
-    black: option.Black = None,
-    white: option.White = None,
-    cfa: option.Cfa = None,
     out: option.PlanOut = None,
     diagram: option.Diagram = None,
     list_cameras: option.ListCameras = False,
     force: Force = False,
-    json: Json = False,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
+    voice: Voice,
 ) -> None:
     """Plan a shoot: write plan.toml, and print its figures and warnings."""
     from rich.console import Console
 
-    from psvideo.cli.options.shoot_words import ShootWords, parse_request
+    from psvideo.cli.options.shoot_words import parse_request
     from psvideo.runs.capture_plan import capture_plan as plan_it
 
-    voice = Voice(json=json, verbose=verbose, quiet=quiet)
     if list_cameras:
         _list_cameras(voice)
         return
-    words = {field.name: context.params[field.name] for field in dataclasses.fields(ShootWords)}
-    request = parse_request(ShootWords(**words))
+    request = parse_request(words)
     shoot = plan_it(request, out=out, rig=rig, diagram=diagram, force=force)
     _deliver(shoot, out, voice)
     if request.preset is not None:
         voice.detail(f"readout of the {request.preset.name}: {request.preset.source}")
-    if not (json or quiet):
+    if not (voice.json or voice.quiet):
         _report(shoot, request.preset, Console(stderr=out is None, highlight=False), diagram=diagram)
     if out is not None:
         for path in (out, *([] if diagram in (None, "-") else [diagram])):

@@ -7,12 +7,13 @@ import sys
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from psvideo.cli.console import Voice
-from psvideo.cli.options.clip_and_run import FirstLight, Json, OrderRig, PlanPath, Quiet, Scheduler, Verbose, Workers
+from psvideo.cli.options.clip_and_run import FirstLight, OrderRig, PlanPath, Sharing
+from psvideo.cli.options.records import spread
 from psvideo.errors import UsageError
 from psvideo.model.units import counted
 
@@ -27,7 +28,9 @@ COLOURS = {"good": "32", "doubtful": "33", "bad": "31", "unknown": "2"}
 """Of the words, by their numbers on a terminal (ECMA-48); the words say the same."""
 
 
+@spread
 def check(
+    *,
     clips: Annotated[
         list[Path] | None,
         typer.Argument(help="A clip: a folder of numbered frames with plan.toml, or a movie file. Or several."),
@@ -47,65 +50,45 @@ def check(
     plan: PlanPath = None,
     rig: OrderRig = None,
     first_light: FirstLight = None,
-    workers: Workers = None,
-    scheduler: Scheduler = None,
-    json: Json = False,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
+    sharing: Sharing,
+    voice: Voice,
 ) -> None:
     """Judge a take in seconds, one line for each thing: exit status 0 where it can be used, 1 where not."""
-    voice = Voice(json=json, verbose=verbose, quiet=quiet)
     if (not clips) == (watch is None):
         raise UsageError("Name either a clip to check, or a folder of takes with --watch FOLDER.")
-    apart = workers is not None or scheduler is not None
-    if watch is not None and apart:
+    if watch is not None and sharing.asked:
         raise UsageError("--watch checks takes as they come, in this process: leave out --workers and --scheduler.")
-    if clips and (len(clips) > 1 or apart):
-        from psvideo.runs.many_takes.check_folder import check_takes
-
-        several = check_takes(
-            clips,
-            plan=plan,
-            rig=rig,
-            first_light=first_light,
-            report=report,
-            workers=workers,
-            scheduler=scheduler,
-            watch=voice.track,
-            caller=voice.caller(),
-        )
-        if not _follow(voice, several):
-            raise typer.Exit(1)
+    common: dict[str, Any] = {"plan": plan, "rig": rig, "first_light": first_light, "report": report}
+    if watch is not None:
+        _check_as_they_come(voice, watch, interval_s=interval, existing=existing, **common)
+    elif len(clips or ()) > 1 or sharing.asked:
+        _check_several(voice, clips or [], **vars(sharing), **common)
     elif clips:
-        from psvideo.runs.check import check as judge
+        _check_one(voice, clips[0], **common)
 
-        found = judge(
-            clips[0],
-            plan=plan,
-            rig=rig,
-            first_light=first_light,
-            report=report,
-            watch=voice.track,
-            caller=voice.caller(),
-        )
-        _print_check(voice, found)
-        if not found.usable:
-            raise typer.Exit(1)
-    elif watch is not None:
-        from psvideo.runs.many_takes.check_folder import check_folder
 
-        checks = check_folder(
-            watch,
-            interval_s=interval,
-            existing=existing,
-            plan=plan,
-            rig=rig,
-            first_light=first_light,
-            report=report,
-            caller=replace(voice.caller(), say=partial(_note, voice)),
-        )
-        _note(voice, f"Watching {watch} for new takes; Ctrl-C ends.")
-        _follow(voice, checks)
+def _check_one(voice: Voice, clip: Path, **options: Any) -> None:
+    from psvideo.runs.check import check as judge
+
+    found = judge(clip, watch=voice.track, caller=voice.caller(), **options)
+    _print_check(voice, found)
+    if not found.usable:
+        raise typer.Exit(1)
+
+
+def _check_several(voice: Voice, clips: list[Path], **options: Any) -> None:
+    from psvideo.runs.many_takes.check_folder import check_takes
+
+    if not _follow(voice, check_takes(clips, watch=voice.track, caller=voice.caller(), **options)):
+        raise typer.Exit(1)
+
+
+def _check_as_they_come(voice: Voice, folder: Path, **options: Any) -> None:
+    from psvideo.runs.many_takes.check_folder import check_folder
+
+    checks = check_folder(folder, caller=replace(voice.caller(), say=partial(_note, voice)), **options)
+    _note(voice, f"Watching {folder} for new takes; Ctrl-C ends.")
+    _follow(voice, checks)
 
 
 def _follow(voice: Voice, checks: "Iterator[Check | Unread]") -> bool:

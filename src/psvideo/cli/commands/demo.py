@@ -6,20 +6,20 @@ from typing import Annotated
 import typer
 
 from psvideo.cli.console import Voice
-from psvideo.cli.options.clip_and_run import Force, Json, Quiet, Verbose
+from psvideo.cli.options.clip_and_run import Force
+from psvideo.cli.options.records import spread
 
 
+@spread
 def demo(
+    *,
     out: Annotated[Path, typer.Option("-o", "--out", help="The folder to write.")] = Path("psvideo-demo"),
     force: Force = False,
-    json: Json = False,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
+    voice: Voice,
 ) -> None:
     """Film a virtual bust, find the flashes, solve for normals, and print the path of a picture of it all."""
     from psvideo.runs.demo import run_demo
 
-    voice = Voice(json=json, verbose=verbose, quiet=quiet)
     picture = run_demo(out, force=force, watch=voice.track)
     voice.result({"picture": str(picture)})
     voice.say(f"Results in {out / 'out'}; the clip and its truth in {out / 'clip'}. The picture:")

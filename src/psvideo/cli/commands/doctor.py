@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from psvideo.cli.console import Voice
-from psvideo.cli.options.clip_and_run import Json, Quiet, Verbose
+from psvideo.cli.options.records import spread
 from psvideo.model.units import counted
 
 if TYPE_CHECKING:
@@ -17,21 +17,20 @@ if TYPE_CHECKING:
 SHOWN = {"ok": "ok", "note": "--", "missing": "MISSING"}
 
 
+@spread
 def doctor(
+    *,
     folder: Annotated[
         Path, typer.Option("--folder", help="Measure the speed of this folder's disk, in MB/s.")
     ] = Path(),
     ahead: Annotated[
         bool, typer.Option("--compile", help="Compile now what usual runs need, so that none waits for it.")
     ] = False,
-    json: Json = False,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
+    voice: Voice,
 ) -> None:
     """Report what is installed, how fast the machine is, and how to fix the rest: exit status 1 if work stops."""
     from psvideo.runs.doctor import doctor as examine
 
-    voice = Voice(json=json, verbose=verbose, quiet=quiet)
     if ahead:
         from psvideo.runs.steps.compiling import compile_ahead
 

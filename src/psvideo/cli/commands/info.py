@@ -6,20 +6,20 @@ from typing import Annotated
 import typer
 
 from psvideo.cli.console import Voice
-from psvideo.cli.options.clip_and_run import Json, PlanPath, Quiet, Verbose
+from psvideo.cli.options.clip_and_run import PlanPath
+from psvideo.cli.options.records import spread
 
 
+@spread
 def info(
     path: Annotated[Path, typer.Argument(help="A clip, a movie, an output folder, an image, or a psvideo file.")],
+    *,
     plan: PlanPath = None,
-    json: Json = False,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
+    voice: Voice,
 ) -> None:
     """Say what a file or folder is, and whether it fits together: exit status 1 where it does not."""
     from psvideo.inspect.describe import describe
 
-    voice = Voice(json=json, verbose=verbose, quiet=quiet)
     found = describe(path, plan=plan)
     voice.say(f"{path}: {found.kind}")
     for finding in found.findings:

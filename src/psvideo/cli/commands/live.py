@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from psvideo.cli.console import Voice
-from psvideo.cli.options.clip_and_run import FirstLight, Force, Json, PlanPath, Quiet, Verbose
+from psvideo.cli.options.clip_and_run import FirstLight, Force, PlanPath
+from psvideo.cli.options.records import spread
 from psvideo.cli.options.strobe import Yes
 from psvideo.errors import UsageError
 from psvideo.model.choices import Pace
@@ -21,7 +22,9 @@ if TYPE_CHECKING:
     from psvideo.live.status import LiveStatus
 
 
+@spread
 def live(
+    *,
     source: Annotated[
         str,
         typer.Argument(
@@ -79,14 +82,11 @@ def live(
         str | None, typer.Option(help="Secret word in the page's address for other machines; left out: generated.")
     ] = None,
     force: Force = False,
-    json: Json = False,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
+    voice: Voice,
 ) -> None:
     """Show normals and relit light while the camera runs: follow the strobe, solve the newest round."""
     from psvideo.runs.live import live as watch
 
-    voice = Voice(json=json, verbose=verbose, quiet=quiet)
     if list_all:
         _list(voice)
         return
@@ -117,11 +117,11 @@ def live(
         said=telling.say,
         caller=voice.caller(),
     )
-    if sys.stderr.isatty() and not (json or quiet):
+    if sys.stderr.isatty() and not (voice.json or voice.quiet):
         print(file=sys.stderr)
     telling.warn(summary.notes)
     voice.say(summary.words)
-    if json:
+    if voice.json:
         print(texts.dumps(summary.record), flush=True)
 
 

@@ -12,17 +12,13 @@ from psvideo.cli.options.clip_and_run import (
     FirstLight,
     Force,
     Frames,
-    Json,
     PieceOption,
     PlanPath,
-    Quiet,
     Resume,
     RigPath,
-    Scheduler,
+    Sharing,
     StartNumber,
     TimingPath,
-    Verbose,
-    Workers,
 )
 from psvideo.cli.options.delivery import (
     AovOption,
@@ -46,6 +42,7 @@ from psvideo.cli.options.delivery import (
     YOption,
 )
 from psvideo.cli.options.per_light import parse_weights
+from psvideo.cli.options.records import spread
 from psvideo.cli.options.solving import (
     AlignOption,
     Denoise,
@@ -65,11 +62,13 @@ from psvideo.model.choices import USUAL_COMPRESSION
 from psvideo.model.units import counted
 
 
+@spread
 def normals(
     context: typer.Context,
     clips: ClipPaths,
     rig: RigPath,
     out: Annotated[Path, typer.Option("-o", "--out", help="The folder to write.")],
+    *,
     plan: PlanPath = None,
     timing: TimingPath = None,
     mask: MaskPath = None,
@@ -109,18 +108,14 @@ def normals(
     force: Force = False,
     resume: Resume = False,
     piece: PieceOption = None,
-    workers: Workers = None,
-    scheduler: Scheduler = None,
-    json: Json = False,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
+    sharing: Sharing,
+    voice: Voice,
 ) -> None:
     """Write normals, albedo and validity for every round of flashes; does sync and split by itself."""
     from psvideo.report.run_report import report_record
     from psvideo.runs.many_takes.normals_of_takes import normals_of_takes
     from psvideo.runs.normals import normals as solve
 
-    voice = Voice(json=json, verbose=verbose, quiet=quiet)
     options: dict[str, Any] = dict(  # noqa: C408, as they are called below
         rig=rig,
         plan=plan,
@@ -158,12 +153,9 @@ def normals(
         preview_codec=preview_codec,
         start_number=start_number,
     )
-    many = len(clips) > 1 or workers is not None or scheduler is not None
     common: dict[str, Any] = {"force": force, "resume": resume, "watch": voice.track, "caller": voice.caller(context)}
-    if many:
-        results = normals_of_takes(
-            clips, out=out, workers=workers, scheduler=scheduler, piece=piece, **common, **options
-        )
+    if len(clips) > 1 or sharing.asked:
+        results = normals_of_takes(clips, out=out, **vars(sharing), piece=piece, **common, **options)
         print_takes(voice, results)
         return
     report = solve(clips[0], out=out, piece=piece, **common, **options)

@@ -12,29 +12,28 @@ from psvideo.cli.options.clip_and_run import (
     FirstLight,
     Force,
     Frames,
-    Json,
     OrderRig,
     PlanPath,
-    Quiet,
     Resume,
-    Scheduler,
+    Sharing,
     StartNumber,
     TimingPath,
-    Verbose,
-    Workers,
 )
 from psvideo.cli.options.delivery import CodecOption, CompressionOption, PlatesPreviewOption, Weights, WithAmbient
 from psvideo.cli.options.per_light import parse_weights
+from psvideo.cli.options.records import spread
 from psvideo.cli.options.solving import FpsOption, ResyncOption, ShutterOption
 from psvideo.cli.options.typed import parse_instants
 from psvideo.model.choices import USUAL_COMPRESSION, SplitMethod
 from psvideo.model.units import counted
 
 
+@spread
 def split(
     context: typer.Context,
     clips: ClipPaths,
     out: Annotated[Path, typer.Option("-o", "--out", help="The folder of plates to write.")],
+    *,
     plan: PlanPath = None,
     timing: TimingPath = None,
     frames: Frames = None,
@@ -56,18 +55,14 @@ def split(
     start_number: StartNumber = 1001,
     force: Force = False,
     resume: Resume = False,
-    workers: Workers = None,
-    scheduler: Scheduler = None,
-    json: Json = False,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
+    sharing: Sharing,
+    voice: Voice,
 ) -> None:
     """Rebuild one plate per flash and write one EXR sequence per light, ambient light taken off."""
     from psvideo.formats.timing_json import timing_record
     from psvideo.runs.many_takes.split_of_takes import split_of_takes
     from psvideo.runs.split import split as rebuild
 
-    voice = Voice(json=json, verbose=verbose, quiet=quiet)
     options: dict[str, Any] = dict(  # noqa: C408, as they are called below
         plan=plan,
         timing=timing,
@@ -88,8 +83,8 @@ def split(
         start_number=start_number,
     )
     common: dict[str, Any] = {"force": force, "resume": resume, "watch": voice.track, "caller": voice.caller(context)}
-    if len(clips) > 1 or workers is not None or scheduler is not None:
-        print_takes(voice, split_of_takes(clips, out=out, workers=workers, scheduler=scheduler, **common, **options))
+    if len(clips) > 1 or sharing.asked:
+        print_takes(voice, split_of_takes(clips, out=out, **vars(sharing), **common, **options))
         return
     report = rebuild(clips[0], out=out, **common, **options)
     voice.result(timing_record(report.timing))

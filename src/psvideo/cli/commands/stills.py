@@ -7,16 +7,19 @@ import typer
 
 from psvideo.cli.console import Voice, plain, print_report
 from psvideo.cli.options.calibrate import Circles, FocalMm, FocalPx, RadiusMm, SensorMm, Spheres, Transfer
-from psvideo.cli.options.clip_and_run import Force, Json, Quiet, Verbose
+from psvideo.cli.options.clip_and_run import Force
 from psvideo.cli.options.delivery import AovOption, EncodeOption, MeshOption, Plates, ProgramOption
+from psvideo.cli.options.records import spread
 from psvideo.cli.options.solving import Fill, SolverOption
 from psvideo.cli.options.typed import parse_circle, parse_radius_mm
 
 
+@spread
 def stills(
     context: typer.Context,
     folder: Annotated[Path, typer.Argument(help="The folder of photographs, one per light, of any names.")],
     out: Annotated[Path, typer.Option("-o", "--out", help="The folder to write.")],
+    *,
     lights: Annotated[
         Path | None,
         typer.Option(help="Where the lights are: rig.toml, .lp, a DiLiGenT or UW list, or a table with names."),
@@ -55,15 +58,12 @@ def stills(
         ),
     ] = True,
     force: Force = False,
-    json: Json = False,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
+    voice: Voice,
 ) -> None:
     """Write normals, albedo and validity of photographs of a still scene, one per light; no plan is needed."""
     from psvideo.report.run_report import report_record
     from psvideo.runs.stills import stills as solve
 
-    voice = Voice(json=json, verbose=verbose, quiet=quiet)
     report = solve(
         folder,
         out=out,

@@ -6,16 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from psvideo.cli.console import Voice
-from psvideo.cli.options.clip_and_run import (
-    FirstLight,
-    Force,
-    Frames,
-    Json,
-    OrderRig,
-    PlanPath,
-    Quiet,
-    Verbose,
-)
+from psvideo.cli.options.clip_and_run import Footage, Force, OrderRig
+from psvideo.cli.options.records import spread
 from psvideo.cli.options.typed import parse_starts_s
 from psvideo.errors import UsageError
 from psvideo.model.units import counted
@@ -52,27 +44,24 @@ PictureOut = Annotated[
 ]
 
 
+@spread
 def sync(
     clip: ClipPaths,
+    *,
     out: TimingOut = None,
-    plan: PlanPath = None,
-    frames: Frames = None,
-    first_light: FirstLight = None,
+    footage: Footage,
     rig: OrderRig = None,
     picture: PictureOut = None,
     starts: Starts = None,
     force: Force = False,
-    json: Json = False,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
+    voice: Voice,
 ) -> None:
     """Find phase, clock offset, light order and dropped frames of a strobed clip, from the picture alone."""
     from psvideo.formats.timing_json import timing_record
     from psvideo.runs.sync import sync as find
 
-    voice = Voice(json=json, verbose=verbose, quiet=quiet)
     if len(clip) > 1:
-        _refuse_of_one(plan=plan, frames=frames, first_light=first_light, rig=rig, picture=picture)
+        _refuse_of_one(**vars(footage), rig=rig, picture=picture)
         _several(clip, out, starts, force, voice)
         return
     if starts is not None:
@@ -80,9 +69,7 @@ def sync(
     timing = find(
         clip[0],
         out=out,
-        plan=plan,
-        frames=frames,
-        first_light=first_light,
+        **vars(footage),
         rig=rig,
         picture=picture,
         force=force,

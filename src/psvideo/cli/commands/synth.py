@@ -7,20 +7,23 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from psvideo.cli.console import Voice
-from psvideo.cli.options.clip_and_run import Force, Json, Quiet, Verbose
+from psvideo.cli.options.clip_and_run import Force
 from psvideo.cli.options.per_light import parse_lines
+from psvideo.cli.options.records import spread
 from psvideo.errors import UsageError
 
 if TYPE_CHECKING:
     from psvideo.synth.lamps.traced import TraceOptions
 
 
+@spread
 def synth(
     scene: Annotated[
         Path,
         typer.Argument(help="A scene file, or a scene of psvideo: bust, colour, fan, gloss, sphere, still_life."),
     ],
     out: Annotated[Path, typer.Option("-o", "--out", help="The clip folder to write.")],
+    *,
     trace: Annotated[
         Path | None,
         typer.Option("--trace", help="Light the scene by the edges of psvideo strobe emulate --trace FILE."),
@@ -30,14 +33,11 @@ def synth(
         typer.Option("--line", metavar="NAME=NUMBER", help="Which line of the trace a light is wired to."),
     ] = None,
     force: Force = False,
-    json: Json = False,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
+    voice: Voice,
 ) -> None:
     """Film a virtual scene: a clip folder as a camera would leave it, and the truth beside it in truth/."""
     from psvideo.synth.shoot import shoot
 
-    voice = Voice(json=json, verbose=verbose, quiet=quiet)
     shot = shoot(
         scene,
         out,

@@ -9,9 +9,11 @@ from typing import Annotated
 import typer
 
 from psvideo.cli.console import Voice
-from psvideo.cli.options.clip_and_run import Force, Json, PlanPath, Quiet, Verbose
+from psvideo.cli.options.clip_and_run import Force, PlanPath
+from psvideo.cli.options.records import spread
 
 
+@spread
 def view(
     paths: Annotated[
         list[Path],
@@ -20,6 +22,7 @@ def view(
             help="A folder of results (out/) or plates, or a clip; several folders of results are shown side by side.",
         ),
     ],
+    *,
     clip: Annotated[
         Path | None,
         typer.Option(help="The clip that results or plates came from; left out: looked for beside them."),
@@ -35,15 +38,12 @@ def view(
     ] = 480,
     export_count: Annotated[int, typer.Option(min=1, help="Most pictures of each sequence to export.")] = 24,
     force: Force = False,
-    json: Json = False,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
+    voice: Voice,
 ) -> None:
     """Show a result in the browser: scrub, compare, and relight it; only this machine can open the page."""
     from psvideo.runs.view import export_view
     from psvideo.runs.view import view as serve
 
-    voice = Voice(json=json, verbose=verbose, quiet=quiet)
     if export is not None:
         held = export_view(
             paths,

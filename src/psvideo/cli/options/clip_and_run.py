@@ -1,5 +1,6 @@
-"""Options that several commands share, each written once."""
+"""Options that several commands share, each written once, and those that always come together as records."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -52,3 +53,25 @@ Scheduler = Annotated[
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for machines.")]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Say more.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but errors.")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Footage:
+    """What a clip is read with."""
+
+    plan: PlanPath = None
+    frames: Frames = None
+    first_light: FirstLight = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sharing:
+    """Which processes share several takes."""
+
+    workers: Workers = None
+    scheduler: Scheduler = None
+
+    @property
+    def asked(self) -> bool:
+        """Whether takes are to be shared out, even one alone."""
+        return self.workers is not None or self.scheduler is not None

@@ -1,10 +1,10 @@
 """From the words typed for ``capture-plan`` to the request that they mean."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TypeVar, get_args
 
 from psvideo.capture.request import CameraWish, Limits, Marker, ShootRequest, choose_camera
+from psvideo.cli.options.capture import ShootWords
 from psvideo.cli.options.per_light import parse_lights, parse_per_light, parse_powers
 from psvideo.cli.options.typed import (
     parse_fraction,
@@ -23,38 +23,6 @@ from psvideo.model.plan import UNKNOWN_CLOCK_PPM, Mode
 
 UNKNOWN = "unknown"
 Choice = TypeVar("Choice", bound=str)
-
-
-@dataclass(frozen=True, kw_only=True)
-class ShootWords:
-    """The options of ``psvideo capture-plan`` that say what to shoot, as typed; None is what was left out."""
-
-    camera: str | None = None
-    fps: str | None = None
-    size: str | None = None
-    shutter: float | None = None
-    exposure: str | None = None
-    readout: str | None = None
-    lights: str = "key,left,right"
-    power: str = "1"
-    flash: str | None = None
-    max_blur: float | None = None
-    speed: str | None = None
-    field_width: str | None = None
-    max_duty: str | None = None
-    max_pulse: str | None = None
-    max_stops: float | None = None
-    mode: str = "rolling"
-    marker: str | None = None
-    dark_slot: str | None = None
-    dark_every: int | None = None
-    dark: str | None = None
-    camera_clock_ppm: float = 50.0
-    strobe_clock_ppm: str = "50"
-    transfer: str = "linear"
-    black: float | None = None
-    white: float | None = None
-    cfa: str | None = None
 
 
 def parse_request(words: ShootWords) -> ShootRequest:

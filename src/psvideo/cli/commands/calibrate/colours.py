@@ -9,45 +9,32 @@ import typer
 from psvideo.cli.commands.calibrate.of_takes import one_or_all
 from psvideo.cli.console import Voice
 from psvideo.cli.options.calibrate import PicturesOfTakes, RigIn, RigOut, Transfer
-from psvideo.cli.options.clip_and_run import (
-    FirstLight,
-    Force,
-    Frames,
-    Json,
-    PlanPath,
-    Quiet,
-    Scheduler,
-    Verbose,
-    Workers,
-)
+from psvideo.cli.options.clip_and_run import Footage, Force, Sharing
+from psvideo.cli.options.records import spread
 from psvideo.cli.options.typed import parse_box
 from psvideo.model.units import counted
 
 
+@spread
 def colours(
     pictures: PicturesOfTakes,
     rig: RigIn,
     out: RigOut,
+    *,
     albedo: Annotated[float, typer.Option(help="The card's albedo: white paper 0.85, a white card 0.9.")] = 0.9,
     box: Annotated[
         str | None, typer.Option(help="The card's part of the picture: left,top,right,bottom in pixels.")
     ] = None,
     transfer: Transfer = None,
-    plan: PlanPath = None,
-    frames: Frames = None,
-    first_light: FirstLight = None,
+    footage: Footage,
     force: Force = False,
-    workers: Workers = None,
-    scheduler: Scheduler = None,
-    json: Json = False,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
+    sharing: Sharing,
+    voice: Voice,
 ) -> None:
     """Measure how much red, green and blue record of every coloured light, from a white card under one light at a
     time; writes the rig with colours."""
     from psvideo.runs.calibrate.colours import colours as measure
 
-    voice = Voice(json=json, verbose=verbose, quiet=quiet)
     done = one_or_all(
         voice,
         "colours",
@@ -55,15 +42,12 @@ def colours(
         pictures,
         out=out,
         force=force,
-        workers=workers,
-        scheduler=scheduler,
+        sharing=sharing,
         rig=rig,
         albedo=albedo,
         box=None if box is None else parse_box(box),
         transfer=transfer,
-        plan=plan,
-        frames=frames,
-        first_light=first_light,
+        **vars(footage),
     )
     if done is None:
         return

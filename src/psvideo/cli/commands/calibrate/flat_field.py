@@ -10,17 +10,8 @@ import typer
 from psvideo.cli.commands.calibrate.of_takes import one_or_all
 from psvideo.cli.console import Voice
 from psvideo.cli.options.calibrate import PicturesOfTakes, RigIn, RigOut, Transfer
-from psvideo.cli.options.clip_and_run import (
-    FirstLight,
-    Force,
-    Frames,
-    Json,
-    PlanPath,
-    Quiet,
-    Scheduler,
-    Verbose,
-    Workers,
-)
+from psvideo.cli.options.clip_and_run import Footage, Force, Sharing
+from psvideo.cli.options.records import spread
 from psvideo.cli.options.typed import parse_box
 from psvideo.model.units import counted
 
@@ -28,10 +19,12 @@ if TYPE_CHECKING:
     from psvideo.calibrate.flat_field import FlatLight
 
 
+@spread
 def flat_field(
     pictures: PicturesOfTakes,
     rig: RigIn,
     out: RigOut,
+    *,
     albedo: Annotated[float, typer.Option(help="The target's albedo: white paper 0.85, a white card 0.9.")] = 0.9,
     box: Annotated[
         str | None, typer.Option(help="The target's part of the picture: left,top,right,bottom in pixels.")
@@ -40,21 +33,15 @@ def flat_field(
         Path | None, typer.Option(help="File for the lights' fall-off over the target, for psvideo normals --flat.")
     ] = None,
     transfer: Transfer = None,
-    plan: PlanPath = None,
-    frames: Frames = None,
-    first_light: FirstLight = None,
+    footage: Footage,
     force: Force = False,
-    workers: Workers = None,
-    scheduler: Scheduler = None,
-    json: Json = False,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
+    sharing: Sharing,
+    voice: Voice,
 ) -> None:
     """Measure every light's intensity, per channel, from a matte white target that faces the camera (or lies in the
     plane that the rig gives); writes the rig with intensities."""
     from psvideo.runs.calibrate.flat_field import flat_field as measure
 
-    voice = Voice(json=json, verbose=verbose, quiet=quiet)
     found = one_or_all(
         voice,
         "flat-field",
@@ -62,16 +49,13 @@ def flat_field(
         pictures,
         out=out,
         force=force,
-        workers=workers,
-        scheduler=scheduler,
+        sharing=sharing,
         rig=rig,
         albedo=albedo,
         box=None if box is None else parse_box(box),
         flat=flat,
         transfer=transfer,
-        plan=plan,
-        frames=frames,
-        first_light=first_light,
+        **vars(footage),
     )
     if found is None:
         return

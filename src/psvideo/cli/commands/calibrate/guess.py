@@ -8,14 +8,17 @@ import typer
 
 from psvideo.cli.console import Voice
 from psvideo.cli.options.calibrate import Pictures, RigOut, Transfer
-from psvideo.cli.options.clip_and_run import FirstLight, Force, Frames, Json, PlanPath, Quiet, Verbose
+from psvideo.cli.options.clip_and_run import Footage, Force
+from psvideo.cli.options.records import spread
 from psvideo.model.choices import Prior
 from psvideo.model.units import counted
 
 
+@spread
 def guess(
     pictures: Pictures,
     out: RigOut,
+    *,
     prior: Annotated[
         Prior | None,
         typer.Option(
@@ -24,26 +27,19 @@ def guess(
         ),
     ] = None,
     transfer: Transfer = None,
-    plan: PlanPath = None,
-    frames: Frames = None,
-    first_light: FirstLight = None,
+    footage: Footage,
     force: Force = False,
-    json: Json = False,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
+    voice: Voice,
 ) -> None:
     """Guess directions of distant lights from pictures of a matte, rounded subject, where nothing was calibrated."""
     from psvideo.runs.calibrate.guess import guess as guess_lights
 
-    voice = Voice(json=json, verbose=verbose, quiet=quiet)
     made = guess_lights(
         pictures,
         out=out,
         prior=prior,
         transfer=transfer,
-        plan=plan,
-        frames=frames,
-        first_light=first_light,
+        **vars(footage),
         force=force,
         watch=voice.track,
         caller=voice.caller(),

@@ -5,39 +5,26 @@ from __future__ import annotations
 from psvideo.cli.commands.calibrate.of_takes import one_or_all
 from psvideo.cli.console import Voice
 from psvideo.cli.options.calibrate import PicturesOfTakes, RigIn, RigOut, Transfer
-from psvideo.cli.options.clip_and_run import (
-    FirstLight,
-    Force,
-    Frames,
-    Json,
-    PlanPath,
-    Quiet,
-    Scheduler,
-    Verbose,
-    Workers,
-)
+from psvideo.cli.options.clip_and_run import Footage, Force, Sharing
+from psvideo.cli.options.records import spread
 from psvideo.model.units import counted
 
 
+@spread
 def intensities(
     pictures: PicturesOfTakes,
     rig: RigIn,
     out: RigOut,
+    *,
     transfer: Transfer = None,
-    plan: PlanPath = None,
-    frames: Frames = None,
-    first_light: FirstLight = None,
+    footage: Footage,
     force: Force = False,
-    workers: Workers = None,
-    scheduler: Scheduler = None,
-    json: Json = False,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
+    sharing: Sharing,
+    voice: Voice,
 ) -> None:
     """Measure the relative intensities of four or more distant lights of known directions from any matte scene."""
     from psvideo.runs.calibrate.intensities import intensities as measure
 
-    voice = Voice(json=json, verbose=verbose, quiet=quiet)
     found = one_or_all(
         voice,
         "intensities",
@@ -45,13 +32,10 @@ def intensities(
         pictures,
         out=out,
         force=force,
-        workers=workers,
-        scheduler=scheduler,
+        sharing=sharing,
         rig=rig,
         transfer=transfer,
-        plan=plan,
-        frames=frames,
-        first_light=first_light,
+        **vars(footage),
     )
     if found is None:
         return

@@ -9,17 +9,8 @@ import typer
 from psvideo.cli.commands.calibrate.of_takes import one_or_all
 from psvideo.cli.console import Voice
 from psvideo.cli.options.calibrate import FocalPx, PicturesOfTakes, RigOut, Transfer
-from psvideo.cli.options.clip_and_run import (
-    FirstLight,
-    Force,
-    Frames,
-    Json,
-    PlanPath,
-    Quiet,
-    Scheduler,
-    Verbose,
-    Workers,
-)
+from psvideo.cli.options.clip_and_run import Footage, Force, Sharing
+from psvideo.cli.options.records import spread
 from psvideo.cli.options.typed import parse_circle
 from psvideo.model.units import counted
 
@@ -27,9 +18,11 @@ if TYPE_CHECKING:
     from psvideo.calibrate.matte import MatteLight
 
 
+@spread
 def matte_sphere(
     pictures: PicturesOfTakes,
     out: RigOut,
+    *,
     circle: Annotated[
         str | None, typer.Option(help="The sphere's outline found by hand: x,y,radius in pixels from the top left.")
     ] = None,
@@ -39,20 +32,14 @@ def matte_sphere(
     ] = None,
     focal_px: FocalPx = None,
     transfer: Transfer = None,
-    plan: PlanPath = None,
-    frames: Frames = None,
-    first_light: FirstLight = None,
+    footage: Footage,
     force: Force = False,
-    workers: Workers = None,
-    scheduler: Scheduler = None,
-    json: Json = False,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
+    sharing: Sharing,
+    voice: Voice,
 ) -> None:
     """Measure directions and intensities of lights from a matte sphere; writes rig.toml and a picture beside it."""
     from psvideo.runs.calibrate.matte_sphere import matte_sphere as measure
 
-    voice = Voice(json=json, verbose=verbose, quiet=quiet)
     found = one_or_all(
         voice,
         "matte-sphere",
@@ -60,15 +47,12 @@ def matte_sphere(
         pictures,
         out=out,
         force=force,
-        workers=workers,
-        scheduler=scheduler,
+        sharing=sharing,
         circle=None if circle is None else parse_circle(circle),
         albedo=albedo,
         focal_px=focal_px,
         transfer=transfer,
-        plan=plan,
-        frames=frames,
-        first_light=first_light,
+        **vars(footage),
     )
     if found is None:
         return

@@ -10,17 +10,8 @@ import typer
 from psvideo.cli.commands.calibrate.of_takes import calibrate_all
 from psvideo.cli.console import Voice
 from psvideo.cli.options.calibrate import Circles, FocalMm, FocalPx, RadiusMm, SensorMm, Spheres, Transfer
-from psvideo.cli.options.clip_and_run import (
-    FirstLight,
-    Force,
-    Frames,
-    Json,
-    PlanPath,
-    Quiet,
-    Scheduler,
-    Verbose,
-    Workers,
-)
+from psvideo.cli.options.clip_and_run import Footage, Force, Sharing
+from psvideo.cli.options.records import spread
 from psvideo.cli.options.typed import parse_circle, parse_point, parse_radius_mm
 from psvideo.errors import UsageError
 from psvideo.model.units import counted
@@ -29,12 +20,14 @@ if TYPE_CHECKING:
     from psvideo.calibrate.mirror.lights import MeasuredLight, MirrorCalibration
 
 
+@spread
 def mirror_sphere(
     pictures: Annotated[
         list[Path],
         typer.Argument(help="A folder of stills (one per light), of plates, or a clip; one per place of the sphere."),
     ],
     out: Annotated[Path, typer.Option("-o", "--out", help="The rig file to write; a picture goes beside it (.png).")],
+    *,
     circle: Circles = None,
     spheres: Spheres = 1,
     focal_px: FocalPx = None,
@@ -48,9 +41,7 @@ def mirror_sphere(
         Path | None, typer.Option(help="A picture from the same camera with the room light on, to find the outline in.")
     ] = None,
     transfer: Transfer = None,
-    plan: PlanPath = None,
-    frames: Frames = None,
-    first_light: FirstLight = None,
+    footage: Footage,
     each: Annotated[
         bool,
         typer.Option(
@@ -58,17 +49,13 @@ def mirror_sphere(
         ),
     ] = False,
     force: Force = False,
-    workers: Workers = None,
-    scheduler: Scheduler = None,
-    json: Json = False,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
+    sharing: Sharing,
+    voice: Voice,
 ) -> None:
     """Measure where the lights are from their highlights on one or more mirror spheres; writes rig.toml."""
     from psvideo.runs.calibrate.mirror_sphere import mirror_sphere as measure
 
-    voice = Voice(json=json, verbose=verbose, quiet=quiet)
-    options: dict[str, Any] = dict(  # noqa: C408, as they are called below
+    options: dict[str, Any] = dict(
         circle=[parse_circle(text) for text in circle or ()],
         spheres=spheres,
         focal_px=focal_px,
@@ -78,17 +65,13 @@ def mirror_sphere(
         radius_mm=None if radius_mm is None else parse_radius_mm(radius_mm),
         outline_picture=outline_picture,
         transfer=transfer,
-        plan=plan,
-        frames=frames,
-        first_light=first_light,
+        **vars(footage),
     )
     common: dict[str, Any] = {"force": force, "watch": voice.track, "caller": voice.caller()}
     if each:
-        calibrate_all(
-            voice, "mirror-sphere", pictures, out=out, workers=workers, scheduler=scheduler, **common, **options
-        )
+        calibrate_all(voice, "mirror-sphere", pictures, out=out, **vars(sharing), **common, **options)
         return
-    if workers is not None or scheduler is not None:
+    if sharing.asked:
         raise UsageError(
             "--workers and --scheduler are for several takes. Add --each if every folder is a take of its own."
         )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import typer
 
 from psvideo.cli.console import Voice
+from psvideo.cli.options.clip_and_run import Sharing
 
 if TYPE_CHECKING:
     from psvideo.runs.calibrate.of_takes import Calibration
@@ -25,15 +26,14 @@ def one_or_all(
     *,
     out: Path,
     force: bool,
-    workers: int | None,
-    scheduler: str | None,
+    sharing: Sharing,
     **options: Any,
 ) -> Found | None:
     """Calibrate on one take and return what was found; on several, or with workers, on each, and return None."""
     common: dict[str, Any] = {"force": force, "watch": voice.track, "caller": voice.caller()}
-    if len(pictures) == 1 and workers is None and scheduler is None:
+    if len(pictures) == 1 and not sharing.asked:
         return measure(pictures[0], out=out, **common, **options)
-    calibrate_all(voice, calibration, pictures, out=out, workers=workers, scheduler=scheduler, **common, **options)
+    calibrate_all(voice, calibration, pictures, out=out, **vars(sharing), **common, **options)
     return None
 
 

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from psvideo.cli.console import Voice
-from psvideo.cli.options.clip_and_run import Frames, Json, PlanPath, Quiet, Verbose
+from psvideo.cli.options.clip_and_run import Frames, PlanPath
+from psvideo.cli.options.panels import CLIP
+from psvideo.cli.options.records import spread
 from psvideo.model.units import counted
 
 if TYPE_CHECKING:
@@ -18,11 +20,13 @@ if TYPE_CHECKING:
     from psvideo.runs.calibrate.readout import MeasuredReadout
 
 
+@spread
 def readout(
     pictures: Annotated[
         list[Path],
         typer.Argument(help="A movie, a folder of numbered frames, or image files; or one strobed clip."),
     ],
+    *,
     led_hz: Annotated[
         float | None,
         typer.Option(help="How often the LED blinks a second; left out: a strobed clip with its plan.", min=0.1),
@@ -48,22 +52,22 @@ def readout(
         str | None, typer.Option(help="Roughly the readout time (16ms), where stripes can be read in two ways.")
     ] = None,
     fps: Annotated[
-        str | None, typer.Option(help="Frame rate at which it was filmed: 120, 119.88; left out: the movie's own.")
+        str | None,
+        typer.Option(
+            help="Frame rate at which it was filmed: 120, 119.88; left out: the movie's own.", rich_help_panel=CLIP
+        ),
     ] = None,
     frames: Frames = None,
     plan: PlanPath = None,
     make: Annotated[str, typer.Option(help="The camera's maker, for the table's line.")] = "MAKE",
     model: Annotated[str, typer.Option(help="The camera's model, for the table's line.")] = "MODEL",
     mode: Annotated[str, typer.Option(help="The camera's mode ('4K UHD 60p'), for the table's line.")] = "MODE",
-    json: Json = False,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
+    voice: Voice,
 ) -> None:
     """Measure a camera's readout time from the stripes of an LED of known rate, or from a strobed clip."""
     from psvideo.cli.options.typed import parse_columns, parse_positive_seconds, parse_rate
     from psvideo.runs.calibrate.readout import readout as measure
 
-    voice = Voice(json=json, verbose=verbose, quiet=quiet)
     found = measure(
         pictures,
         led_hz=led_hz,

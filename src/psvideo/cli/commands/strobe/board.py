@@ -14,8 +14,9 @@ import psvideo.cli.options.strobe as option
 from psvideo.cli.commands.strobe.emulate import emulate
 from psvideo.cli.commands.strobe.progress import watching
 from psvideo.cli.console import Voice
-from psvideo.cli.options.clip_and_run import Force, Json, Quiet, Verbose
+from psvideo.cli.options.clip_and_run import Force
 from psvideo.cli.options.per_light import parse_lines
+from psvideo.cli.options.records import spread
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.model.units import counted
 from psvideo.strobe.link.ports import AUTO
@@ -32,39 +33,38 @@ strobe.command()(emulate)
 
 
 @strobe.command("list")
-def list_ports(json: Json = False, verbose: Verbose = False, quiet: Quiet = False) -> None:
+@spread
+def list_ports(voice: Voice) -> None:
     """Show the serial ports at which a controller may be, by their USB identity; nothing is opened."""
     from psvideo.strobe.link.controller import serial_ports
 
-    voice = Voice(json=json, verbose=verbose, quiet=quiet)
     ports = serial_ports()
     voice.result({"ports": [{**asdict(port), "board": port.board, "likely": port.is_candidate} for port in ports]})
     likely = [port for port in ports if port.is_candidate]
-    for port in ports if verbose else likely:
+    for port in ports if voice.verbose else likely:
         voice.say(port.label)
     if not likely:
-        others = len(ports) and not verbose
+        others = len(ports) and not voice.verbose
         voice.say(f"No board found{f' ({len(ports)} other ports; -v shows them)' if others else ''}.")
         voice.say("Without a board: --port emulated.")
 
 
 @strobe.command()
+@spread
 def check(
     plan: option.PlanFile,
+    *,
     port: option.PortName = "",
     board: option.BoardName = None,
     line: option.LineWords = None,
     wiring: option.WiringWord = None,
-    json: Json = False,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
+    voice: Voice,
 ) -> None:
     """Say whether and how a plan can be played: by the board at a port, by one kind of board, or by any kind."""
     from psvideo.runs.strobe.check import check as check_plan
     from psvideo.runs.strobe.check import check_boards
     from psvideo.strobe.program_words import describe_program, program_record
 
-    voice = Voice(json=json, verbose=verbose, quiet=quiet)
     lines, wanted = parse_lines(line), option.parse_wiring(wiring)
     if not port and board is None:
         _print_boards(voice, plan, check_boards(plan, line=lines, wiring=wanted))
@@ -98,8 +98,10 @@ def _print_boards(voice: Voice, plan: Path, found: tuple[BoardCheck, ...]) -> No
 
 
 @strobe.command()
+@spread
 def run(
     plan: option.PlanFile,
+    *,
     port: option.PortName = AUTO,
     board: option.BoardName = None,
     seconds: option.Seconds = None,
@@ -109,15 +111,12 @@ def run(
     log: option.LogPath = None,
     yes: option.Yes = False,
     force: Force = False,
-    json: Json = False,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
+    voice: Voice,
 ) -> None:
     """Play a plan until Ctrl-C, or for a time; however it ends, the lights are off afterwards."""
     from psvideo.runs.strobe.run import run as play
     from psvideo.strobe.runlog import log_record
 
-    voice = Voice(json=json, verbose=verbose, quiet=quiet)
     with watching(voice) as watch:
         played = play(
             plan,
@@ -168,16 +167,15 @@ def _print_run(voice: Voice, played: StrobeRun, log: Path | None) -> None:
 
 
 @strobe.command()
+@spread
 def stop(
+    *,
     port: option.PortName = AUTO,
-    json: Json = False,
-    verbose: Verbose = False,
-    quiet: Quiet = False,
+    voice: Voice,
 ) -> None:
     """Switch off all lights of a board, and print its state."""
     from psvideo.runs.strobe.port import stop as darken
 
-    voice = Voice(json=json, verbose=verbose, quiet=quiet)
     found = darken(port=port)
     identity, status = found.identity, found.status
     voice.result({**asdict(identity), **asdict(status)})
