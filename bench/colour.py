@@ -131,7 +131,7 @@ def _crosstalk(scene: dict[str, Any], folder: Path, rig: Path) -> Line:
     raw = max(max(light["colour"][:c] + light["colour"][c + 1 :]) for light in scene["light"] for c in [_main(light)])
     return Line(
         scene="painted bust, standing; rig measured on a card",
-        measure="light of another lamp in a plate (before: the LEDs' worst)",
+        measure="light of another lamp in a plate (in the camera's own channels)",
         colours=f"{left:.2%} ({raw:.0%})",
         white="none",
         bar=f"< {CROSSTALK_BAR:.0%}",
