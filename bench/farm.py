@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from psvideo.compute.threads import THREADS
-from psvideo.runs.many_takes.cluster import done_apart
+from psvideo.runs.many_takes.handed_out import done_apart
 from psvideo.runs.many_takes.normals_of_takes import normals_of_takes
 from psvideo.synth.shoot import shoot
 

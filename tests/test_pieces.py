@@ -34,7 +34,7 @@ from psvideo.runs.instants import pieces
 from psvideo.runs.instants.job import Found
 from psvideo.runs.instants.piece_notes import noted, write_notes
 from psvideo.runs.instants.pieces import cut, piece_named
-from psvideo.runs.many_takes import cluster
+from psvideo.runs.many_takes import handed_out
 from psvideo.solve import steady
 
 CLIPS: dict[str, dict[str, Any]] = {
@@ -346,12 +346,12 @@ def test_a_worker_that_is_killed_is_replaced_and_its_piece_done_again(tmp_path: 
 
 
 def test_a_piece_hangs_that_takes_far_longer_than_the_others_did() -> None:
-    looks = cluster.Hanging(ours={"a", "b"})
+    looks = handed_out.Hanging(ours={"a", "b"})
     assert looks.workers({"one": ["a", "theirs"], "two": ["b"]}, 0.0) == []
     assert looks.workers({"one": ["a", "theirs"], "two": []}, 100.0) == []
-    assert looks.workers({"one": ["a", "theirs"]}, cluster.HANGS_TIMES * 100.0) == []
-    assert looks.workers({"one": ["a", "theirs"]}, cluster.HANGS_TIMES * 100.0 + 1) == ["one"]
-    assert looks.workers({"one": ["theirs"], "two": ["a"]}, cluster.HANGS_TIMES * 100.0 + 2) == []
+    assert looks.workers({"one": ["a", "theirs"]}, handed_out.HANGS_TIMES * 100.0) == []
+    assert looks.workers({"one": ["a", "theirs"]}, handed_out.HANGS_TIMES * 100.0 + 1) == ["one"]
+    assert looks.workers({"one": ["theirs"], "two": ["a"]}, handed_out.HANGS_TIMES * 100.0 + 2) == []
     assert looks.longest_s == 100.0, "a piece that hung is none that was done"
 
 
@@ -363,7 +363,7 @@ def test_a_worker_that_hangs_is_replaced_and_its_piece_done_again(
     given: dict[str, Any] = {"rig": clip / "rig.toml", "preview": ()}
     ps.normals(clip, out=tmp_path / "one" / "clip", **given)
     for name, value in {"HANGS_S": 15.0, "HANGS_TIMES": 3.0, "LOOKS_EVERY_S": 1.0}.items():
-        monkeypatch.setattr(cluster, name, value)
+        monkeypatch.setattr(handed_out, name, value)
     stopped: list[psutil.Process] = []
 
     def stop_one() -> None:

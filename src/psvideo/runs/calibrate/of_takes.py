@@ -23,7 +23,8 @@ from psvideo.runs.calibrate.flat_field import flat_field
 from psvideo.runs.calibrate.intensities import intensities
 from psvideo.runs.calibrate.matte_sphere import matte_sphere
 from psvideo.runs.calibrate.mirror_sphere import mirror_sphere
-from psvideo.runs.many_takes.cluster import Cluster, called_apart, connected
+from psvideo.runs.many_takes.cluster import Cluster, connected
+from psvideo.runs.many_takes.handed_out import called_apart
 from psvideo.runs.many_takes.several_takes import names_of
 from psvideo.runs.steps.caller import PYTHON, Caller
 

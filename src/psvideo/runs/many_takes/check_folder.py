@@ -10,7 +10,8 @@ from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.rig_folder import check_rigs
 from psvideo.runs.check import judged_take, refuse_inside
 from psvideo.runs.many_takes.arriving import whole_takes
-from psvideo.runs.many_takes.cluster import Cluster, called_apart, connected
+from psvideo.runs.many_takes.cluster import Cluster, connected
+from psvideo.runs.many_takes.handed_out import called_apart
 from psvideo.runs.steps.caller import PYTHON, Caller
 from psvideo.runs.steps.checked import Check, write_checks_page
 
