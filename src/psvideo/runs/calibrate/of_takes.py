@@ -84,7 +84,7 @@ def _done(
     one: "partial[RigResult]", rigs: dict[Path, Path], cluster: Cluster, watch: Watch
 ) -> Iterator[tuple[Path, RigResult]]:
     """Give every take with what was measured, as it is done."""
-    if cluster.workers is None and cluster.scheduler is None:
+    if not cluster.named:
         for path in watch(rigs, total=len(rigs), what="calibrating", unit="takes"):
             yield path, one((path.resolve(), rigs[path].name))
         return

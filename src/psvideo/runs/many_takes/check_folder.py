@@ -54,8 +54,8 @@ def check_takes(
     plan_path, rig_path = (None if path is None else Path(path) for path in (plan, rig))
     one = partial(_one, plan=plan_path, rig=rig_path, first_light=first_light, caller=caller)
     checks: Iterator[tuple[Path, Check | Unread]] = ((path, one(path)) for path in paths)
-    if workers is not None or scheduler is not None:
-        cluster = Cluster(workers=workers, scheduler=scheduler)
+    cluster = Cluster(workers=workers, scheduler=scheduler)
+    if cluster.named:
         cluster.check()
         checks = _shared_out(cluster, paths, partial(one, caller=AS_IT_IS), caller=caller, watch=watch)
     found: dict[Path, Check | Unread] = {}

@@ -32,6 +32,11 @@ class Cluster:
     workers: int | None = None
     scheduler: str | None = None
 
+    @property
+    def named(self) -> bool:
+        """Whether work is to be shared out at all."""
+        return self.workers is not None or self.scheduler is not None
+
     def check(self) -> None:
         """Raise UsageError where the extra is not installed, or both or neither are named."""
         if (self.workers is None) == (self.scheduler is None):

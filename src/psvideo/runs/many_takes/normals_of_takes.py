@@ -8,10 +8,9 @@ from typing import Any
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import UsageError
 from psvideo.formats.paths import path_if_given
-from psvideo.formats.rig_folder import check_rigs
 from psvideo.report.of_takes import TakeResult
 from psvideo.runs.many_takes.cluster import Cluster
-from psvideo.runs.many_takes.several_takes import Takes, apart, one_by_one, several_takes
+from psvideo.runs.many_takes.several_takes import Given, Takes, all_done
 from psvideo.runs.normals import normals
 from psvideo.runs.steps.caller import PYTHON, Caller
 from psvideo.runs.steps.output import rounds_of
@@ -71,36 +70,20 @@ def normals_of_takes(
     """
     if piece is not None:
         raise UsageError("`piece` is solved by one process, of one clip. Leave it out here.")
-    check_rigs(options.get("rig"), clips)
-    takes = several_takes(clips, out=out, force=force, resume=resume)
-    whole = {name: value.resolve() if isinstance(value, Path) else value for name, value in options.items()}
-    given: dict[str, Any] = {**whole, "force": force}
-    if workers is None and scheduler is None:
+    cluster = Cluster(workers=workers, scheduler=scheduler)
+    given = Given(cluster=cluster, force=force, resume=resume, options=options, watch=watch, caller=caller)
 
-        def solve(clip: Path, place: Path) -> None:
-            normals(clip, out=place, resume=resume, watch=watch, caller=caller, **given)
-
-        return takes.reported([*one_by_one(takes, solve, caller=caller)])
-
-    def share(there: int) -> list[TakeInPieces]:
+    def share(takes: Takes, there: int) -> list[TakeInPieces]:
         counts = [pieces] * len(takes.of) if pieces else _counts(takes, there, options)
         return [
-            TakeInPieces(clip=clip.resolve(), out=place.resolve(), pieces=count, options=given)
+            TakeInPieces(clip=clip.resolve(), out=place.resolve(), pieces=count, options=given.of_one)
             for (clip, place), count in zip(takes.of, counts, strict=True)
         ]
 
     def put_together(clip: Path, place: Path) -> None:
-        normals(clip, out=place, resume=True, caller=caller, **given)
+        normals(clip, out=place, resume=True, caller=caller, **given.of_one)
 
-    found: list[TakeResult] = []
-    cluster = Cluster(workers=workers, scheduler=scheduler)
-    for clip, place, fault in apart(takes, share, cluster=cluster, resume=resume, watch=watch):
-        if fault:
-            found.append(TakeResult(clip=clip, out=place, fault=caller.spell(fault)))
-            continue
-        one = Takes(of=((clip, place),), folder=place)
-        found += one_by_one(one, put_together, caller=caller)
-    return takes.reported(found)
+    return all_done(normals, clips, out=out, given=given, share=share, ended=put_together)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,13 +1,16 @@
 """What commands over several takes share: a folder for each, one process or a cluster, one report over all."""
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import AllDoneError, PsvideoError, UsageError
 from psvideo.formats.paths import path_of, take_name
+from psvideo.formats.rig_folder import check_rigs
 from psvideo.formats.whole_files import write_text
 from psvideo.formats.whole_folders import forget_begun, refuse_folder
 from psvideo.report.of_takes import TakeResult, takes_page, takes_record, worst_first
@@ -76,6 +79,57 @@ def one_by_one(takes: Takes, do: Callable[[Path, Path], object], *, caller: Call
             yield TakeResult(clip=clip, out=place, fault=caller.spell(str(fault)))
             continue
         yield result_of(clip, place)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Given:
+    """How takes are to be done: by whom, over what lies there, and with which other ``options`` of the run."""
+
+    cluster: Cluster
+    force: bool
+    resume: bool
+    options: Mapping[str, Any]
+    watch: Watch = unwatched
+    caller: Caller
+
+    @property
+    def of_one(self) -> dict[str, Any]:
+        """The options for one take, with ``force``; workers may run elsewhere, so paths are whole."""
+        whole = {name: value.resolve() if isinstance(value, Path) else value for name, value in self.options.items()}
+        return {**whole, "force": self.force}
+
+
+def all_done(
+    run: Callable[..., object],
+    clips: Sequence[Path | str],
+    *,
+    out: Path | str,
+    given: Given,
+    share: Callable[[Takes, int], Sequence[Shared]],
+    ended: Callable[[Path, Path], object],
+) -> tuple[TakeResult, ...]:
+    """Do every take, one after the other here or shared out among a cluster's workers, and return what became of each.
+
+    ``run`` does one take here. ``share`` is called with the takes and the number of workers, and returns what each
+    take is shared out as; ``ended`` with a clip and its folder once its workers are done. Raises as ``several_takes``
+    and ``apart`` do.
+    """
+    check_rigs(given.options.get("rig"), clips)
+    takes = several_takes(clips, out=out, force=given.force, resume=given.resume)
+    if not given.cluster.named:
+
+        def here(clip: Path, place: Path) -> None:
+            run(clip, out=place, resume=given.resume, watch=given.watch, caller=given.caller, **given.of_one)
+
+        return takes.reported([*one_by_one(takes, here, caller=given.caller)])
+    found: list[TakeResult] = []
+    shared = partial(share, takes)
+    for clip, place, fault in apart(takes, shared, cluster=given.cluster, resume=given.resume, watch=given.watch):
+        if fault:
+            found.append(TakeResult(clip=clip, out=place, fault=given.caller.spell(fault)))
+        else:
+            found += one_by_one(Takes(of=((clip, place),), folder=place), ended, caller=given.caller)
+    return takes.reported(found)
 
 
 def apart(

@@ -7,10 +7,9 @@ from typing import Any
 
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import AllDoneError
-from psvideo.formats.rig_folder import check_rigs
 from psvideo.report.of_takes import TakeResult
 from psvideo.runs.many_takes.cluster import Cluster
-from psvideo.runs.many_takes.several_takes import apart, one_by_one, result_of, several_takes
+from psvideo.runs.many_takes.several_takes import Given, Takes, all_done
 from psvideo.runs.split import split
 from psvideo.runs.steps.caller import PYTHON, Caller
 
@@ -59,25 +58,13 @@ def split_of_takes(
     >>> [(one.clip.name, one.fault, one.instants) for one in results]
     [('take3', '', 3)]
     """
-    check_rigs(options.get("rig"), clips)
-    takes = several_takes(clips, out=out, force=force, resume=resume)
-    whole = {name: value.resolve() if isinstance(value, Path) else value for name, value in options.items()}
-    given: dict[str, Any] = {**whole, "force": force}
-    if workers is None and scheduler is None:
-
-        def here(clip: Path, place: Path) -> None:
-            split(clip, out=place, resume=resume, watch=watch, caller=caller, **given)
-
-        return takes.reported([*one_by_one(takes, here, caller=caller)])
-    shared = [TakeWhole(clip=clip.resolve(), out=place.resolve(), options=given) for clip, place in takes.of]
     cluster = Cluster(workers=workers, scheduler=scheduler)
-    done = apart(takes, lambda _: shared, cluster=cluster, resume=resume, watch=watch)
-    return takes.reported(
-        [
-            TakeResult(clip=clip, out=place, fault=caller.spell(fault)) if fault else result_of(clip, place)
-            for clip, place, fault in done
-        ]
-    )
+    given = Given(cluster=cluster, force=force, resume=resume, options=options, watch=watch, caller=caller)
+
+    def share(takes: Takes, _: int) -> list[TakeWhole]:
+        return [TakeWhole(clip=clip.resolve(), out=place.resolve(), options=given.of_one) for clip, place in takes.of]
+
+    return all_done(split, clips, out=out, given=given, share=share, ended=lambda clip, place: None)
 
 
 @dataclass(frozen=True, kw_only=True)
