@@ -12,7 +12,8 @@ from bench.mirror_scene import Ball, Lamp, Lens, photograph, unit
 from bench.table import Row
 from psvideo.calibrate.light_pictures import light_pictures
 from psvideo.calibrate.mirror.lights import MirrorCalibration, calibrate_lights
-from psvideo.calibrate.sphere.sighting import Looking, sight_spheres
+from psvideo.calibrate.mirror.sighting import sight_spheres
+from psvideo.calibrate.sphere.sphere_view import Looking
 from psvideo.runs.photographs.light_sets import open_light_sets
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"

@@ -14,7 +14,8 @@ from psvideo.capture.cautions import shoot_cautions
 from psvideo.capture.planning import Shoot, make_plan, plan_shoot
 from psvideo.capture.request import CameraWish, Limits, ShootRequest, choose_camera
 from psvideo.capture.wish import LONG_MARKER, longest_flash
-from psvideo.cli.options.shoot_words import ShootWords, parse_request
+from psvideo.cli.options.capture import ShootWords
+from psvideo.cli.options.shoot_words import parse_request
 from psvideo.cli.spelling import spelled
 from psvideo.errors import UsageError
 from psvideo.formats.plan_toml import format_plan, parse_plan

@@ -15,9 +15,9 @@ from picture_file import read_picture
 from psvideo.calibrate.light_pictures import LightPictures, light_pictures, mean_of_sets
 from psvideo.calibrate.mirror.highlights import FoundHighlight, find_highlights
 from psvideo.calibrate.mirror.lights import MirrorCalibration, calibrate_lights
+from psvideo.calibrate.mirror.sighting import SphereNotFoundError, sight_spheres
 from psvideo.calibrate.sphere.outline import find_outlines, given_outline
-from psvideo.calibrate.sphere.sighting import Looking, SphereNotFoundError, sight_spheres
-from psvideo.calibrate.sphere.sphere_view import SphereView
+from psvideo.calibrate.sphere.sphere_view import Looking, SphereView
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError
 from psvideo.formats.rig_toml import parse_rig, read_rig

@@ -7,7 +7,8 @@ from functools import partial
 
 from psvideo.calibrate.light_pictures import pictures_of_round
 from psvideo.calibrate.mirror.lights import MirrorCalibration, calibrate_lights
-from psvideo.calibrate.sphere.sighting import Looking, sight_spheres
+from psvideo.calibrate.mirror.sighting import sight_spheres
+from psvideo.calibrate.sphere.sphere_view import Looking
 from psvideo.compute.beside import run_beside
 from psvideo.errors import PsvideoError
 from psvideo.live.chain import NewestRound

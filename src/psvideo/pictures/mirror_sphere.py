@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.calibrate.mirror.lights import MirrorCalibration
-from psvideo.calibrate.sphere.sighting import Sighting
+from psvideo.calibrate.mirror.sighting import Sighting
 from psvideo.model.camera import FloatArray
 from psvideo.pictures.contact import Pixels, Strip, Tile, sheet
 from psvideo.pictures.relighting import srgb

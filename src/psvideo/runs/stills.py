@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from psvideo.calibrate.sphere.sighting import Looking
+from psvideo.calibrate.sphere.sphere_view import Looking
 from psvideo.calibrate.still_pairs import pair_stills
 from psvideo.clip import Take, decoded_once
 from psvideo.compute.progress import Watch, unwatched

@@ -1,1 +1,5 @@
-"""Where lights are, from their highlights on a mirror sphere."""
+"""Where lights are, from their highlights on a mirror sphere.
+
+``sighting`` is a sphere's outline with one highlight per light (``highlights`` finds them), ``lights`` what several
+sightings say together, by the ``law`` of mirrors.
+"""

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from psvideo.calibrate.mirror.law import Crossing, Ray, crossing, mean_direction, mirrored_ray
-from psvideo.calibrate.sphere.sighting import Highlight, Sighting
+from psvideo.calibrate.mirror.sighting import Highlight, Sighting
 from psvideo.errors import PsvideoError
 from psvideo.model.camera import FloatArray
 from psvideo.model.rig import Light, Rig

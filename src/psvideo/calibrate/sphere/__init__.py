@@ -1,5 +1,5 @@
 """The outline of a sphere in a picture, and how the camera sees it.
 
 ``outline`` finds it: ``round_things`` finds candidates, ``rim_model`` and ``rim_fit`` place the rim,
-``sphere_view`` is the geometry. ``sighting`` adds one highlight per light, for mirror spheres.
+``sphere_view`` is the geometry, and what users say of it.
 """

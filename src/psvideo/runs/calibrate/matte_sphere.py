@@ -6,8 +6,7 @@ from pathlib import Path
 from psvideo.calibrate.light_pictures import LightPictures
 from psvideo.calibrate.matte import MatteLight, matte_rig, measure_matte_sphere
 from psvideo.calibrate.sphere.outline import Outline, find_outlines, given_outline
-from psvideo.calibrate.sphere.sighting import Looking
-from psvideo.calibrate.sphere.sphere_view import SphereView
+from psvideo.calibrate.sphere.sphere_view import Looking, SphereView
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import PsvideoError
 from psvideo.formats.rig_toml import format_rig

@@ -5,7 +5,8 @@ from pathlib import Path
 
 from psvideo.calibrate.light_pictures import read_picture
 from psvideo.calibrate.mirror.lights import MirrorCalibration, calibrate_lights
-from psvideo.calibrate.sphere.sighting import Looking, Sighting, SphereNotFoundError, sight_spheres
+from psvideo.calibrate.mirror.sighting import Sighting, SphereNotFoundError, sight_spheres
+from psvideo.calibrate.sphere.sphere_view import Looking
 from psvideo.compute.progress import Watch, unwatched
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.formats.rig_toml import format_rig

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from psvideo.calibrate.sphere.sighting import Looking
+from psvideo.calibrate.sphere.sphere_view import Looking
 from psvideo.calibrate.still_pairs import Pairs
 from psvideo.clip import Clip
 from psvideo.clip.stills import Photographs, look_at

@@ -8,7 +8,8 @@ import numpy as np
 
 from psvideo.calibrate.light_files import pictures_in
 from psvideo.calibrate.mirror.lights import calibrate_lights
-from psvideo.calibrate.sphere.sighting import Looking, Sighting, sight_spheres
+from psvideo.calibrate.mirror.sighting import Sighting, sight_spheres
+from psvideo.calibrate.sphere.sphere_view import Looking
 from psvideo.calibrate.still_places import Place, grouped_pictures
 from psvideo.clip.stated import Stated, stated_by
 from psvideo.compute.progress import Watch

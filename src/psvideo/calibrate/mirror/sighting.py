@@ -10,7 +10,7 @@ from psvideo.calibrate.light_pictures import LightPictures
 from psvideo.calibrate.mirror.highlights import FoundHighlight, Spot, find_highlights
 from psvideo.calibrate.sphere.outline import Outline, find_outlines, follow_outline, given_outline
 from psvideo.calibrate.sphere.round_things import Grey
-from psvideo.calibrate.sphere.sphere_view import SphereView
+from psvideo.calibrate.sphere.sphere_view import Looking
 from psvideo.errors import PsvideoError, UsageError
 from psvideo.model.camera import FloatArray
 
@@ -59,26 +59,6 @@ class Sighting:
     picture: Grey
     sets: int
     moved_px: float = 0.0
-
-
-@dataclass(frozen=True, kw_only=True)
-class Looking:
-    """How spheres are looked for: how many a picture holds, or where they are (x, y, radius), found by hand.
-
-    ``focal_px``, or ``focal_widths`` in widths of the picture, and ``principal_px`` give the pixels their rays.
-    """
-
-    spheres: int = 1
-    circles: tuple[tuple[float, float, float], ...] = ()
-    focal_px: float | None = None
-    focal_widths: float | None = None
-    principal_px: tuple[float, float] | None = None
-
-    def view(self, *, width_px: int, height_px: int) -> SphereView:
-        """Return the view of pictures of this size; the lens's axis goes through their middle unless it is given."""
-        middle = ((width_px - 1) / 2, (height_px - 1) / 2)
-        focal_px = self.focal_px if self.focal_widths is None else self.focal_widths * width_px
-        return SphereView(focal_px=focal_px, principal_px=self.principal_px or middle)
 
 
 def sight_spheres(
