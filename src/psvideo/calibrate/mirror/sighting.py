@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from psvideo.calibrate.light_pictures import LightPictures
-from psvideo.calibrate.mirror.highlights import FoundHighlight, Spot, find_highlights
+from psvideo.calibrate.mirror.highlights import FoundHighlight, find_highlights
+from psvideo.calibrate.mirror.spots import Spot
 from psvideo.calibrate.sphere.outline import Outline, find_outlines, follow_outline, given_outline
 from psvideo.calibrate.sphere.round_things import Grey
 from psvideo.calibrate.sphere.sphere_view import Looking
