@@ -11,7 +11,8 @@ import numpy as np
 from bench.mirror_scene import Ball, Lamp, Lens, photograph, unit
 from bench.table import Row
 from psvideo.calibrate.light_pictures import light_pictures
-from psvideo.calibrate.mirror.lights import MirrorCalibration, calibrate_lights
+from psvideo.calibrate.mirror.lights import calibrate_lights
+from psvideo.calibrate.mirror.measured import MirrorCalibration
 from psvideo.calibrate.mirror.sighting import sight_spheres
 from psvideo.calibrate.sphere.sphere_view import Looking
 from psvideo.runs.photographs.light_sets import open_light_sets

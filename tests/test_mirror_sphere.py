@@ -14,7 +14,8 @@ from picture_file import read_picture
 
 from psvideo.calibrate.light_pictures import LightPictures, light_pictures, mean_of_sets
 from psvideo.calibrate.mirror.highlights import FoundHighlight, find_highlights
-from psvideo.calibrate.mirror.lights import MirrorCalibration, calibrate_lights
+from psvideo.calibrate.mirror.lights import calibrate_lights
+from psvideo.calibrate.mirror.measured import MirrorCalibration
 from psvideo.calibrate.mirror.sighting import SphereNotFoundError, sight_spheres
 from psvideo.calibrate.sphere.outline import find_outlines, given_outline
 from psvideo.calibrate.sphere.sphere_view import Looking, SphereView

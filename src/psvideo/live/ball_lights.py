@@ -6,7 +6,8 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 from psvideo.calibrate.light_pictures import pictures_of_round
-from psvideo.calibrate.mirror.lights import MirrorCalibration, calibrate_lights
+from psvideo.calibrate.mirror.lights import calibrate_lights
+from psvideo.calibrate.mirror.measured import MirrorCalibration
 from psvideo.calibrate.mirror.sighting import sight_spheres
 from psvideo.calibrate.sphere.sphere_view import Looking
 from psvideo.compute.beside import run_beside

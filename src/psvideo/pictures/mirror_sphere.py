@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from psvideo.calibrate.mirror.lights import MirrorCalibration
+from psvideo.calibrate.mirror.measured import MirrorCalibration
 from psvideo.calibrate.mirror.sighting import Sighting
 from psvideo.model.camera import FloatArray
 from psvideo.pictures.contact import Pixels, Strip, Tile, sheet

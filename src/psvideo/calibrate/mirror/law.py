@@ -13,6 +13,9 @@ import numpy as np
 from psvideo.calibrate.sphere.outline import Outline
 from psvideo.model.camera import FloatArray
 
+SURE_ERRORS = 4.0
+"""Excess of the rays' scatter over their errors from which on a light counts as near."""
+
 LEAST_LEVER = 0.01
 """Sideways distance between two rays' starts, as a share of the light's distance, below which none is triangulated."""
 

@@ -4,7 +4,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from psvideo.calibrate.light_pictures import read_picture
-from psvideo.calibrate.mirror.lights import MirrorCalibration, calibrate_lights
+from psvideo.calibrate.mirror.lights import calibrate_lights
+from psvideo.calibrate.mirror.measured import MirrorCalibration
 from psvideo.calibrate.mirror.sighting import Sighting, SphereNotFoundError, sight_spheres
 from psvideo.calibrate.sphere.sphere_view import Looking
 from psvideo.compute.progress import Watch, unwatched

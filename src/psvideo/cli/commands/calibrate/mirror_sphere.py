@@ -17,7 +17,7 @@ from psvideo.errors import UsageError
 from psvideo.model.units import counted
 
 if TYPE_CHECKING:
-    from psvideo.calibrate.mirror.lights import MeasuredLight, MirrorCalibration
+    from psvideo.calibrate.mirror.measured import MeasuredLight, MirrorCalibration
 
 
 @spread
