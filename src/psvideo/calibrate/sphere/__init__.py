@@ -1,5 +1,5 @@
 """The outline of a sphere in a picture, and how the camera sees it.
 
-``outline`` finds it: ``round_things`` finds candidates, ``rim_model`` and ``rim_fit`` place the rim,
-``sphere_view`` is the geometry, and what users say of it.
+Begin with ``outline``: ``round_things`` finds candidates; ``rim_model`` (a spoke's brightness), ``rim_spokes`` (where
+the rim may be on each spoke) and ``rim_fit`` (what most spokes agree on) place the rim. ``sphere_view`` is geometry.
 """

@@ -1,39 +1,33 @@
 """The outline that most of a sphere's rim agrees on, with its uncertainty, from pictures taken together.
 
-Every spoke says how likely each place of the rim is on it; some are misled (a stand, a mirrored window along the rim),
-so on each the rim may with a small chance be anywhere. The outline is the one that is likeliest over all spokes, looked
-for from coarse to fine: first a mirror that shows nothing within its rim; where too few spokes agree with it, one that
-mirrors the room there, from the first one's place and from a larger circle, as mirrored edges lie inside the rim and
-never outside. The uncertainty is how far outlines that are nearly as likely lie apart, how far the other model of the
-rim (``rim_model``) lies off, and what all edges may be off together.
+Every spoke says how likely each place of the rim is on it (``rim_spokes``). The outline is the one that is likeliest
+over all spokes, looked for from coarse to fine: first a mirror that shows nothing within its rim; where too few spokes
+agree with it, one that mirrors the room there, from the first one's place and from a larger circle, as mirrored edges
+lie inside the rim and never outside. The uncertainty is how far outlines that are nearly as likely lie apart, how far
+the other model of the rim (``rim_model``) lies off, and what all edges may be off together.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import ndtri
 from scipy.stats.qmc import Sobol
 
-from psvideo.calibrate.sphere.rim_model import SHIFT_PX, Surface, across_rim, likely_blur, log_likelihood
+from psvideo.calibrate.sphere.rim_model import Surface
+from psvideo.calibrate.sphere.rim_spokes import Spokes, agreeing, looked_up, spokes_of, widened
 from psvideo.calibrate.sphere.round_things import Grey
 from psvideo.calibrate.sphere.sphere_view import SphereView
 from psvideo.model.camera import FloatArray
 
 USUAL_STRETCH = 0.005
 """How far from a circle an outline is expected to be where perspective is unknown (a sphere 8 degrees off the axis)."""
-MISLED = 0.05
-"""Chance that on a spoke something else than the rim is seen."""
 COARSE = ((0.08, 8.0), (0.03, 5.0))
 FINE = (0.012, 3.0)
 """How far from the expected outline the rim is looked for, round by round: as a share of the radius, in pixels."""
 COARSE_SPOKES = 64
-COARSE_BLURS_PX, BLURS_PX = (0.8, 1.5, 2.7), (0.3, 0.45, 0.6, 0.8, 1.1, 1.5, 2.0, 2.7, 3.6, 5.0)
-REACH_SHARE, LEAST_REACH_PX, MOST_REACH_PX = 0.045, 8.0, 60.0
-"""How far to both sides of the rim the picture counts."""
-SPOKE_PX, FEWEST_SPOKES, MOST_SPOKES = 8.0, 48, 144
+COARSE_BLURS_PX = (0.8, 1.5, 2.7)
 CLEAR = 0.9
 """Where this share of the spokes agrees with a mirror that shows nothing within its rim, no other is looked for. (Of 39
 virtual balls in rooms 6 reach it, all within 1.1 pixels; so does the photographed one of psbox.)"""
@@ -44,12 +38,8 @@ SECTORS = 12
 """All spokes count as this many: what misleads one misleads its neighbours."""
 DRAWS, ROUNDS = 2048, 4
 """This many outlines are drawn to see how far likely ones lie apart, in this many rounds, each about the last one's."""
-AGREES = 1.1
-"""A spoke agrees with an outline where the rim is likelier there than on average, by this factor at least."""
 FOLLOWED = 0.6
 """Share of the spokes that must agree on an outline that moved since the first picture."""
-WAVERS_PX, WAVERS_PER_BLUR = 0.3, 0.3
-"""How far the result of one spoke may be off by itself (standard deviation), in pixels and per pixel of blur."""
 BIAS_PX, BIAS_PER_BLUR = 0.25, 0.1
 """What an outline may be off in x, y and radius in any case, and per pixel of blur: near its rim a ball mirrors what is
 behind it, and a horizon there passes for the rim on all of one side. (23 balls in rooms with floors, ceilings and
@@ -70,19 +60,6 @@ class Rim:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Spokes:
-    """What the spokes show: logarithms of odds (spoke, shift), how each spoke's rim moves with the outline's numbers
-    (spoke, number), where the spokes cross the outline they were taken at (spoke, 2), that outline, and the blur."""
-
-    odds: FloatArray
-    slopes: FloatArray
-    rim: FloatArray
-    around: FloatArray
-    most_px: float
-    blur_px: float
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
 class RoughOutline:
     """Roughly an outline (5,), the share of spokes that agree with it, and how much likelier they make it than chance
     (natural logarithm)."""
@@ -99,11 +76,11 @@ def seek_rim(
     place = around
     for share, least_px in COARSE:
         most_px = float(np.ceil(max(share * place[2], least_px)))
-        spokes = _spokes(pictures, view, place, surface, most_px, most_spokes=COARSE_SPOKES, blurs=COARSE_BLURS_PX)
+        spokes = spokes_of(pictures, view, place, surface, most_px, most_spokes=COARSE_SPOKES, blurs=COARSE_BLURS_PX)
         place = _likeliest(spokes, view.unknowns)
         if not _sensible(place, around):
             return None
-    agree, evidence = _agreeing(spokes, place, view.unknowns)
+    agree, evidence = agreeing(spokes, place, view.unknowns)
     return RoughOutline(
         place=place, coverage=float(agree.mean()), evidence=evidence * float(place[2]) / len(spokes.odds)
     )
@@ -113,16 +90,16 @@ def fit_rim(
     pictures: Sequence[Grey], view: SphereView, around: FloatArray, *, surface: Surface = "mirror"
 ) -> Rim | None:
     """Return the outline within a few pixels of an expected one; None where it is not there."""
-    spokes = _spokes(pictures, view, around, surface, _fine_px(around))
+    spokes = spokes_of(pictures, view, around, surface, _fine_px(around))
     place = _likeliest(spokes, view.unknowns)
     # in a single picture an edge of the room and the rim look alike: only other lights change the one and not the other
     in_rooms = surface == "mirror" and len(pictures) > 1
-    if in_rooms and _agreeing(spokes, place, view.unknowns)[0].mean() < CLEAR:
+    if in_rooms and agreeing(spokes, place, view.unknowns)[0].mean() < CLEAR:
         near = _in_a_room(pictures, view, around)
         if near is None:
             return None
         around = near
-        spokes = _spokes(pictures, view, around, surface, _fine_px(around), mirrored=True)
+        spokes = spokes_of(pictures, view, around, surface, _fine_px(around), mirrored=True)
         place = _likeliest(spokes, view.unknowns)
     return _measured(pictures, view, spokes, place, surface) if _sensible(place, around) else None
 
@@ -130,9 +107,9 @@ def fit_rim(
 def follow_rim(pictures: Sequence[Grey], view: SphereView, around: FloatArray) -> FloatArray | None:
     """Return where a mirror's outline, known from other pictures, is in these; None where too little of it shows."""
     for mirrored in (False, True):
-        spokes = _spokes(pictures, view, around, "mirror", _fine_px(around), mirrored=mirrored)
+        spokes = spokes_of(pictures, view, around, "mirror", _fine_px(around), mirrored=mirrored)
         place = _likeliest(spokes, view.unknowns, coarse=False)
-        share = _agreeing(spokes, place, view.unknowns)[0].mean()
+        share = agreeing(spokes, place, view.unknowns)[0].mean()
         if share >= CLEAR or len(pictures) == 1:
             break
     return place if _sensible(place, around) and share >= FOLLOWED else None
@@ -146,10 +123,10 @@ def _in_a_room(pictures: Sequence[Grey], view: SphereView, around: FloatArray) -
     for larger in LARGER:
         place = around * np.array([1, 1, larger, 1, 1])
         for _ in range(2):
-            spokes = _spokes(pictures, view, place, "mirror", most_px, most_spokes=COARSE_SPOKES, mirrored=True)
+            spokes = spokes_of(pictures, view, place, "mirror", most_px, most_spokes=COARSE_SPOKES, mirrored=True)
             place = _likeliest(spokes, view.unknowns)
         if _sensible(place, around):
-            spread = float(_agreeing(spokes, place, view.unknowns)[1]) / len(spokes.odds)
+            spread = float(agreeing(spokes, place, view.unknowns)[1]) / len(spokes.odds)
             found.append((spread - _unusual(place) / SECTORS, place))
     return max(found, key=lambda one: one[0])[1] if found else None
 
@@ -164,77 +141,22 @@ def _fine_px(around: FloatArray) -> float:
     return float(np.ceil(max(FINE[0] * around[2], FINE[1])))
 
 
-def _agreeing(spokes: _Spokes, place: FloatArray, free: int) -> tuple[NDArray[np.bool_], float]:
-    """Return which spokes agree with an outline, and the evidence of all."""
-    odds = _looked_up(spokes.odds, spokes.slopes @ (place - spokes.around)[:free], spokes.most_px)
-    agree: NDArray[np.bool_] = np.asarray(odds > np.log(AGREES), np.bool_)
-    return agree, float(odds.sum())
-
-
 def _sensible(place: FloatArray, around: FloatArray) -> bool:
     return bool(place[2] > 3 and np.abs(place - around)[:3].max() < 0.25 * around[2])
 
 
-def _spokes(
-    pictures: Sequence[Grey], view: SphereView, place: FloatArray, surface: Surface, most_px: float, *,
-    most_spokes: int = MOST_SPOKES, blurs: Sequence[float] = BLURS_PX, mirrored: bool = False,
-) -> _Spokes:  # fmt: skip
-    reach_px = float(np.clip(np.ceil(REACH_SHARE * place[2]), LEAST_REACH_PX, MOST_REACH_PX))
-    reach_px = max(reach_px, most_px + LEAST_REACH_PX / 2)
-    count = int(np.clip(2 * np.pi * place[2] / SPOKE_PX, FEWEST_SPOKES, most_spokes))
-    values, rim = across_rim(pictures, view, place, reach_px=reach_px, spokes=count)
-    few = values[:, :: max(count // 48, 1)]
-    blur_px = likely_blur(few, reach_px=reach_px, most_px=most_px, surface=surface, blurs=blurs)
-    logs = log_likelihood(
-        values, blur_px=blur_px, reach_px=reach_px, most_px=most_px, surface=surface, mirrored=mirrored
-    )
-    wavers_px = float(np.hypot(WAVERS_PX, WAVERS_PER_BLUR * blur_px))
-    return _Spokes(
-        odds=_odds(logs, wavers_px),
-        slopes=_slopes(view, rim, place),
-        rim=rim,
-        around=place,
-        most_px=most_px,
-        blur_px=blur_px,
-    )
-
-
-def _odds(logs: FloatArray, wavers_px: float) -> FloatArray:
-    """Return the logarithm of how much likelier each shift is than chance, where a spoke may waver or be misled."""
-    likely = np.exp(logs - logs.max(axis=1, keepdims=True))
-    likely = likely @ _spread(likely.shape[1], wavers_px)
-    likely /= likely.mean(axis=1, keepdims=True)
-    odds: FloatArray = np.log((1 - MISLED) * likely + MISLED)
-    return odds
-
-
-def _spread(count: int, width_px: float) -> FloatArray:
-    """Return the matrix (shift, shift) that blurs the odds of shifts by a standard deviation."""
-    away = (np.arange(count)[:, None] - np.arange(count)) * SHIFT_PX / width_px
-    kernel = np.exp(-0.5 * away**2)
-    spread: FloatArray = kernel / kernel.sum(axis=0)
-    return spread
-
-
-def _slopes(view: SphereView, rim: FloatArray, place: FloatArray) -> FloatArray:
-    """Return how far the rim moves outward on every spoke per unit of the outline's free numbers."""
-    here = view.distance_px(rim, place)
-    steps = np.diag([0.5, 0.5, 0.5, 1e-4, 1e-4])[: view.unknowns]
-    return np.stack([(here - view.distance_px(rim, place + step)) / step.sum() for step in steps], axis=1)
-
-
-def _likeliest(spokes: _Spokes, free: int, *, start: FloatArray | None = None, coarse: bool = True) -> FloatArray:
+def _likeliest(spokes: Spokes, free: int, *, coarse: bool = True) -> FloatArray:
     """Return the outline at which the spokes' odds are highest, looked for from coarse to fine."""
     scale = np.array([1, 1, 1, 2e-3, 2e-3])[:free]
-    found = np.zeros(free) if start is None else (start - spokes.around)[:free] / scale
+    found = np.zeros(free)
     for width_px in (spokes.most_px / 2, spokes.most_px / 6, 0.0) if coarse else (0.0,):
-        odds = _widened(spokes.odds, width_px)
+        odds = widened(spokes.odds, width_px)
         first, exact = max(width_px / 3, 0.3), max(width_px / 50, 2e-3)
 
         def unlikely(moved: FloatArray, odds: FloatArray = odds) -> float:
             at = spokes.slopes @ (moved * scale)
             unusual = _unusual(spokes.around + np.pad(moved * scale, (0, 5 - free)))
-            return float(unusual - _looked_up(odds, at, spokes.most_px).sum())
+            return float(unusual - looked_up(odds, at, spokes.most_px).sum())
 
         simplex = np.vstack([found, found + first * np.eye(free)])
         options = {"xatol": exact, "fatol": exact, "maxiter": 1200, "initial_simplex": simplex}
@@ -242,32 +164,12 @@ def _likeliest(spokes: _Spokes, free: int, *, start: FloatArray | None = None, c
     return np.concatenate([spokes.around[:free] + found * scale, spokes.around[free:]])
 
 
-def _widened(odds: FloatArray, width_px: float) -> FloatArray:
-    """Return odds of a rim that may lie off by ``width_px`` (standard deviation)."""
-    if width_px == 0:
-        return odds
-    likely = np.exp(odds) @ _spread(odds.shape[1], width_px)
-    wider: FloatArray = np.log(likely / likely.mean(axis=1, keepdims=True))
-    return wider
-
-
-def _looked_up(odds: FloatArray, shift_px: FloatArray, most_px: float) -> FloatArray:
-    """Return odds at one shift per spoke, between the ones tried; beyond them, of a spoke that is misled."""
-    at = (shift_px + most_px) / SHIFT_PX
-    low = np.clip(at.astype(np.intp), 0, odds.shape[1] - 2)
-    share = np.clip(at - low, 0, 1)
-    spoke = np.arange(len(odds))
-    between: FloatArray = odds[spoke, low] * (1 - share) + odds[spoke, low + 1] * share
-    beyond: NDArray[np.bool_] = np.abs(shift_px) > most_px
-    return np.where(beyond, np.log(MISLED), between)
-
-
-def _measured(pictures: Sequence[Grey], view: SphereView, spokes: _Spokes, place: FloatArray, surface: Surface) -> Rim:
+def _measured(pictures: Sequence[Grey], view: SphereView, spokes: Spokes, place: FloatArray, surface: Surface) -> Rim:
     """Return an outline with what agrees with it and its uncertainty."""
     free = view.unknowns
-    agree, evidence = _agreeing(spokes, place, free)
+    agree, evidence = agreeing(spokes, place, free)
     other: Surface = "matte" if surface == "mirror" else "mirror"
-    doubt = _likeliest(_spokes(pictures, view, place, other, spokes.most_px), free, coarse=False) - place
+    doubt = _likeliest(spokes_of(pictures, view, place, other, spokes.most_px), free, coarse=False) - place
     bias_px = float(np.hypot(BIAS_PX, BIAS_PER_BLUR * spokes.blur_px))
     return Rim(
         place=place,
@@ -281,7 +183,7 @@ def _measured(pictures: Sequence[Grey], view: SphereView, spokes: _Spokes, place
     )
 
 
-def _likely_apart(spokes: _Spokes, place: FloatArray, free: int) -> FloatArray:
+def _likely_apart(spokes: Spokes, place: FloatArray, free: int) -> FloatArray:
     """Return the covariance (5, 5) of outlines by how likely they are, by importance sampling about the likeliest."""
     normal = np.asarray(ndtri(Sobol(free, rng=np.random.default_rng(0)).random(DRAWS)), np.float64)
     scale = np.array([1, 1, 1, 2e-3, 2e-3])[:free]
@@ -291,7 +193,7 @@ def _likely_apart(spokes: _Spokes, place: FloatArray, free: int) -> FloatArray:
         root = np.linalg.cholesky(2 * covariance + np.diag((0.05 * scale) ** 2))
         drawn = middle + normal @ root.T
         at = (drawn - spokes.around[:free]) @ spokes.slopes.T
-        odds = np.array([_looked_up(spokes.odds, one, spokes.most_px).sum() for one in at]) * SECTORS / len(spokes.odds)
+        odds = np.array([looked_up(spokes.odds, one, spokes.most_px).sum() for one in at]) * SECTORS / len(spokes.odds)
         odds -= [_unusual(np.pad(one, (0, 5 - free))) for one in drawn]
         odds += 0.5 * (normal**2).sum(axis=1)
         share = np.exp(odds - odds.max())
