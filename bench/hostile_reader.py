@@ -13,7 +13,8 @@ from itertools import islice
 from pathlib import Path
 
 from psvideo.clip.decode.decoders import decode, read_header
-from psvideo.clip.decode.movies.movie import index_movie, read_movie
+from psvideo.clip.decode.movies.movie import index_movie
+from psvideo.clip.decode.movies.movie_frames import read_movie
 from psvideo.clip.folder import KINDS, MOVIES
 from psvideo.clip.stated import stated_by
 from psvideo.errors import PsvideoError

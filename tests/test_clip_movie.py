@@ -14,7 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 from psvideo.clip import Take, keeping_near, open_clip, read_frames
-from psvideo.clip.decode.movies import movie, yuv
+from psvideo.clip.decode.movies import movie, movie_frames, yuv
 from psvideo.clip.decode.movies.yuv import CODES, HIGHEST, LOWEST, to_rgb
 from psvideo.clip.record import CodedPicture
 from psvideo.errors import PsvideoError, UsageError
@@ -251,13 +251,13 @@ def test_frames_of_a_movie_that_are_kept_are_not_decoded_again(
     write_movie(tmp_path / "x.mp4", grey_ramp(24), codec="libx264", options={"g": "6"})
     clip = open_clip(tmp_path / "x.mp4", plan=plan_for(rows=32, cols=48))
     asked: list[int] = []
-    read = movie.read_movie
+    read = movie_frames.read_movie
 
     def watched(path: Path, stamps: Sequence[int]) -> Iterator[CodedPicture]:
         asked.extend(stamps)
         return read(path, stamps)
 
-    monkeypatch.setattr(movie, "read_movie", watched)
+    monkeypatch.setattr(movie_frames, "read_movie", watched)
     with keeping_near(tmp_path / "out") as kept:
         early = list(read_frames(clip, range(3, 8), kept=kept, keep=True))
         frames = list(read_frames(clip, kept=kept))
@@ -274,7 +274,7 @@ def test_a_decoded_frame_is_gone_once_its_codes_are_made(tmp_path: Path, matrix:
     gc.collect()
     gc.disable()
     try:
-        assert len(list(movie.read_movie(tmp_path / "x.mkv", stamps))) == 8
+        assert len(list(movie_frames.read_movie(tmp_path / "x.mkv", stamps))) == 8
         assert not any(isinstance(one, av.VideoFrame) for one in gc.get_objects())
     finally:
         gc.enable()

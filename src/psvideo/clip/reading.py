@@ -89,7 +89,7 @@ def _decoder(clip: Clip, numbers: list[int], in_files: bool) -> Callable[[int], 
     """Return what decodes a frame; a movie's are asked for in the order of ``numbers``."""
     if not clip.is_movie:
         return lambda number: opened(clip.kind, clip.file_of(number), of_clip=in_files)
-    from psvideo.clip.decode.movies.movie import read_movie
+    from psvideo.clip.decode.movies.movie_frames import read_movie
 
     pictures = read_movie(clip.path, [clip.timestamps[bisect_left(clip.numbers, number)] for number in numbers])
     return lambda _: next(pictures)

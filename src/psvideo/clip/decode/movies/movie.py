@@ -1,38 +1,29 @@
-"""Movies: every frame at full depth, its place in time taken from the file's timestamps.
+"""What a movie holds: its first frame's header, every frame's timestamp, and its place in time."""
 
-``movie_codes`` makes codes of each decoded frame.
-"""
-
-import contextlib
-from collections import deque
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Self
 
-import av
 import numpy as np
 from av.container import InputContainer
-from av.stream import Disposition
 from av.video.stream import VideoStream
 
-from psvideo.clip.decode.movies.movie_codes import rgb_codes
 from psvideo.clip.decode.movies.movie_edits import edits_of
-from psvideo.clip.decode.movies.movie_tags import (
-    capture_rate_hz,
-    compression_warning,
-    gamut_of,
-    shot_by,
-    transfer_of,
+from psvideo.clip.decode.movies.movie_frames import moving_streams, opened_movie, read_movie
+from psvideo.clip.decode.movies.movie_tags import capture_rate_hz, compression_warning, gamut_of, shot_by, transfer_of
+from psvideo.clip.decode.movies.movie_times import (
+    UNEVEN,
+    Places,
+    Stamps,
+    frame_places,
+    promised_frames,
+    stamps_of,
 )
-from psvideo.clip.decode.movies.movie_times import UNEVEN, Places, frame_places, promised_frames, stamps_of
-from psvideo.clip.record import CodedPicture, Header
+from psvideo.clip.record import Header
 from psvideo.errors import PsvideoError
-from psvideo.formats.paths import check_file
 from psvideo.model.units import counted
 
-MOST_REORDERED = 16  # frames by which H.264 and H.265 may put decoding before showing
-AS_RECORDED = {"ignore_editlist": "1"}  # times as the camera wrote them; movie_edits says which frames count
+SEVERAL = "the movie holds {}; the first one counts. Where another is meant, export it by itself"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,52 +54,89 @@ class Movie:
 
 def index_movie(path: Path) -> Movie:
     """Read a movie's header, first frame and timestamps. Raises PsvideoError where it is damaged or truncated."""
-    with _opened(path) as (container, stream):
-        transfer, colour = transfer_of(stream.codec_context), gamut_of(stream.codec_context)
+    with opened_movie(path) as (container, stream):
         stamps = stamps_of(container, stream)
         shown = _shown(path, container, stream, stamps.timestamps)
         found = frame_places(path, shown)
         promised = promised_frames(container, stream, found.period * found.per_frame)
-        time_base_s = float(stream.time_base or 1)
-        code = container.metadata.get("timecode") or stream.metadata.get("timecode")
-        capture_rate = capture_rate_hz(container.metadata | stream.metadata)
-        shot = shot_by(container.metadata | stream.metadata)
-        codec = stream.codec_context.codec
-        odd = _pixels_not_square(stream)
-        others = len(_moving(container)) - 1
-    held, timestamps = len(stamps.timestamps), found.timestamps
-    hidden = held - len(shown)
+        said = _Said.of(container, stream)
+    hidden = len(stamps.timestamps) - len(shown)
+    _refuse_truncated(path, found, held=len(stamps.timestamps), hidden=hidden, promised=promised)
+    timestamps = found.timestamps
+    header = next(read_movie(path, timestamps[:1])).header
+    warnings = _warnings(said, stamps, found, hidden=hidden, bits=header.bits or 0)
+    return Movie(
+        header=replace(
+            header,
+            time_code=said.time_code,
+            shot=said.shot,
+            transfer=header.transfer or said.transfer,  # frames may say less than the container
+            colour=header.colour or said.colour,
+            warnings=header.warnings + warnings,
+        ),
+        timestamps=timestamps,
+        places=found.places,
+        rate_hz=1 / (found.period * found.per_frame * said.time_base_s) if found.period else None,
+        rate_error=1 / (timestamps[-1] - timestamps[0]) if found.period else 0.0,
+        capture_rate_hz=said.capture_rate_hz,
+        per_frame=found.per_frame,
+        rates_hz=_rates_hz(found, said.time_base_s) if found.per_frame > 1 else None,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Said:
+    """What a movie's file says of itself, beside its frames' times. ``exact``: its coding loses nothing."""
+
+    time_base_s: float
+    time_code: str | None
+    shot: tuple[tuple[str, str], ...]
+    transfer: str | None
+    colour: str | None
+    capture_rate_hz: float | None
+    codec: str
+    exact: bool
+    several: str | None
+    odd_pixels: str | None
+
+    @classmethod
+    def of(cls, container: InputContainer, stream: VideoStream) -> Self:
+        codec, others = stream.codec_context.codec, len(moving_streams(container)) - 1
+        return cls(
+            time_base_s=float(stream.time_base or 1),
+            time_code=container.metadata.get("timecode") or stream.metadata.get("timecode"),
+            shot=shot_by(container.metadata | stream.metadata),
+            transfer=transfer_of(stream.codec_context),
+            colour=gamut_of(stream.codec_context),
+            capture_rate_hz=capture_rate_hz(container.metadata | stream.metadata),
+            codec=codec.canonical_name,
+            exact=codec.lossless and not codec.lossy,
+            several=SEVERAL.format(counted(others + 1, "video stream")) if others else None,
+            odd_pixels=_pixels_not_square(stream),
+        )
+
+
+def _refuse_truncated(path: Path, found: Places, *, held: int, hidden: int, promised: int) -> None:
     if not held:
         raise PsvideoError(f"{path}: holds no frame that can be found; it is truncated or damaged. Copy it again.")
     if held < promised and found.places[-1] + 1 + found.left_out + hidden < promised:
         raise PsvideoError(
             f"{path}: holds {held} frames, and its header promises {promised}: it is truncated. Copy it again."
         )
-    header = next(read_movie(path, timestamps[:1])).header
-    exact = codec.lossless and not codec.lossy  # changes of other frames cost nothing then
-    whole = held if exact else stamps.whole_frames
-    coding = compression_warning(codec.canonical_name, header.bits or 0, frames=held, whole_frames=whole)
-    uneven = _left_out(found) if found.left_out else None
-    cut = _cut(hidden, held) if hidden else None
-    several = SEVERAL.format(counted(others + 1, "video stream")) if others else None
-    warnings = tuple(warning for warning in (coding, cut, several, odd, uneven, _strays(found)) if warning)
-    return Movie(
-        header=replace(
-            header,
-            time_code=code,
-            shot=shot,
-            transfer=header.transfer or transfer,  # frames may say less than the container
-            colour=header.colour or colour,
-            warnings=header.warnings + warnings,
-        ),
-        timestamps=timestamps,
-        places=found.places,
-        rate_hz=1 / (found.period * found.per_frame * time_base_s) if found.period else None,
-        rate_error=1 / (timestamps[-1] - timestamps[0]) if found.period else 0.0,
-        capture_rate_hz=capture_rate,
-        per_frame=found.per_frame,
-        rates_hz=_rates_hz(found, time_base_s) if found.per_frame > 1 else None,
+
+
+def _warnings(said: _Said, stamps: Stamps, found: Places, *, hidden: int, bits: int) -> tuple[str, ...]:
+    held = len(stamps.timestamps)
+    whole = held if said.exact else stamps.whole_frames  # where nothing is lost, changes of other frames cost nothing
+    warnings = (
+        compression_warning(said.codec, bits, frames=held, whole_frames=whole),
+        _cut(hidden, held) if hidden else None,
+        said.several,
+        said.odd_pixels,
+        _left_out(found) if found.left_out else None,
+        _strays(found),
     )
+    return tuple(warning for warning in warnings if warning)
 
 
 def _shown(path: Path, container: InputContainer, stream: VideoStream, timestamps: tuple[int, ...]) -> tuple[int, ...]:
@@ -161,84 +189,3 @@ def _strays(found: Places) -> str | None:
         f"the frames' times stray by up to {found.strays:.2g} frames from an even rate, which is taken all the same: "
         "the flashes show whether it was. Record at a constant frame rate"
     )
-
-
-def read_movie(path: Path, timestamps: Sequence[int]) -> Iterator[CodedPicture]:
-    """Decode the frames with these timestamps, in ascending order.
-
-    Raises PsvideoError where one of them cannot be decoded or does not come.
-    """
-    wanted, unordered = deque(timestamps), ""
-    with _opened(path) as (container, stream):
-        if container.format.name == "avi" and not stream.codec_context.codec.intra_only:
-            unordered = ", or its frames are coded out of their order, which AVI does not say (repack it as .mkv)"
-        if wanted[0] > (stream.start_time or 0):
-            with contextlib.suppress(av.PermissionError):  # the index names no whole frame before: from the first on
-                container.seek(_safe_start(stream, wanted[0]), stream=stream)
-        for frame in container.decode(stream):
-            if frame.pts is None or frame.pts < wanted[0]:
-                continue
-            if frame.pts > wanted[0] or frame.is_corrupt:  # a damaged frame is painted over, and flagged
-                break
-            yield rgb_codes(path, frame)
-            wanted.popleft()
-            if not wanted:
-                return
-    raise PsvideoError(
-        f"{path}: the frame with timestamp {wanted[0]} cannot be decoded; the movie is truncated or damaged "
-        f"there{unordered}. Copy it again, or choose other frames with `frames`."
-    )
-
-
-def _safe_start(stream: VideoStream, timestamp: int) -> int:
-    """Return where to seek for a frame. Files are searched by the order of decoding, which B-frames' own runs ahead."""
-    if not stream.codec_context.has_b_frames or not stream.average_rate:
-        return timestamp
-    period = float(1 / (stream.average_rate * (stream.time_base or 1)))
-    return max(timestamp - int(MOST_REORDERED * period), stream.start_time or 0)
-
-
-@contextmanager
-def _opened(path: Path) -> Iterator[tuple[InputContainer, VideoStream]]:
-    """Open a movie and its first video stream."""
-    check_file(path)
-    try:
-        with av.open(str(path), options=AS_RECORDED) as container:
-            if not (moving := _moving(container)):
-                raise PsvideoError(f"{path}: holds no video. Name the movie that the camera recorded.")
-            stream = moving[0]
-            if stream.codec_context is None:
-                raise PsvideoError(f"{path}: {_sealed(path) or 'is coded in a way that is not read'}. {IN_THE_CLEAR}")
-            stream.thread_type = "AUTO"
-            yield container, stream
-    except (av.FFmpegError, UnicodeDecodeError) as fault:
-        if path.is_file() and not path.stat().st_size:
-            raise PsvideoError(f"{path}: is empty (0 bytes). Copy it again from the camera's card.") from None
-        if sealed := _sealed(path):
-            raise PsvideoError(f"{path}: {sealed}. {IN_THE_CLEAR}") from fault
-        raise PsvideoError(
-            f"{path}: cannot be decoded; it is truncated, damaged or of a kind that is not read ({fault}). "
-            "Copy it again from the camera's card."
-        ) from fault
-
-
-def _moving(container: InputContainer) -> list[VideoStream]:
-    """Return the streams of moving pictures: a cover or a thumbnail is none."""
-    return [stream for stream in container.streams.video if not stream.disposition & Disposition.attached_pic]
-
-
-SEVERAL = "the movie holds {}; the first one counts. Where another is meant, export it by itself"
-IN_THE_CLEAR = "Expected a movie as the camera recorded it: ProRes, DNxHR, H.264 or H.265, without protection."
-ENCRYPTED = b"encv"
-"""The sample entry of encrypted video (ISO/IEC 14496-12, 8.12)."""
-LOOKED_AT = 1 << 22
-"""This many bytes at both ends of a file: there lies its description."""
-
-
-def _sealed(path: Path) -> str:
-    """Say that a movie is encrypted; empty where it is not, or cannot be read."""
-    with contextlib.suppress(OSError), path.open("rb") as file:
-        found = file.read(LOOKED_AT)
-        file.seek(max(path.stat().st_size - LOOKED_AT, 0))
-        return "is encrypted" if ENCRYPTED in found + file.read(LOOKED_AT) else ""
-    return ""

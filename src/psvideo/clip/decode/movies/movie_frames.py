@@ -1,0 +1,100 @@
+"""A movie's frames, decoded in codes, and what is said where one cannot be opened."""
+
+import contextlib
+from collections import deque
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import av
+from av.container import InputContainer
+from av.stream import Disposition
+from av.video.stream import VideoStream
+
+from psvideo.clip.decode.movies.movie_codes import rgb_codes
+from psvideo.clip.record import CodedPicture
+from psvideo.errors import PsvideoError
+from psvideo.formats.paths import check_file
+
+MOST_REORDERED = 16  # frames by which H.264 and H.265 may put decoding before showing
+AS_RECORDED = {"ignore_editlist": "1"}  # times as the camera wrote them; movie_edits says which frames count
+
+
+def read_movie(path: Path, timestamps: Sequence[int]) -> Iterator[CodedPicture]:
+    """Decode the frames with these timestamps, in ascending order.
+
+    Raises PsvideoError where one of them cannot be decoded or does not come.
+    """
+    wanted, unordered = deque(timestamps), ""
+    with opened_movie(path) as (container, stream):
+        if container.format.name == "avi" and not stream.codec_context.codec.intra_only:
+            unordered = ", or its frames are coded out of their order, which AVI does not say (repack it as .mkv)"
+        if wanted[0] > (stream.start_time or 0):
+            with contextlib.suppress(av.PermissionError):  # the index names no whole frame before: from the first on
+                container.seek(_safe_start(stream, wanted[0]), stream=stream)
+        for frame in container.decode(stream):
+            if frame.pts is None or frame.pts < wanted[0]:
+                continue
+            if frame.pts > wanted[0] or frame.is_corrupt:  # a damaged frame is painted over, and flagged
+                break
+            yield rgb_codes(path, frame)
+            wanted.popleft()
+            if not wanted:
+                return
+    raise PsvideoError(
+        f"{path}: the frame with timestamp {wanted[0]} cannot be decoded; the movie is truncated or damaged "
+        f"there{unordered}. Copy it again, or choose other frames with `frames`."
+    )
+
+
+def _safe_start(stream: VideoStream, timestamp: int) -> int:
+    """Return where to seek for a frame. Files are searched by the order of decoding, which B-frames' own runs ahead."""
+    if not stream.codec_context.has_b_frames or not stream.average_rate:
+        return timestamp
+    period = float(1 / (stream.average_rate * (stream.time_base or 1)))
+    return max(timestamp - int(MOST_REORDERED * period), stream.start_time or 0)
+
+
+@contextmanager
+def opened_movie(path: Path) -> Iterator[tuple[InputContainer, VideoStream]]:
+    """Open a movie and its first video stream."""
+    check_file(path)
+    try:
+        with av.open(str(path), options=AS_RECORDED) as container:
+            if not (moving := moving_streams(container)):
+                raise PsvideoError(f"{path}: holds no video. Name the movie that the camera recorded.")
+            stream = moving[0]
+            if stream.codec_context is None:
+                raise PsvideoError(f"{path}: {_sealed(path) or 'is coded in a way that is not read'}. {IN_THE_CLEAR}")
+            stream.thread_type = "AUTO"
+            yield container, stream
+    except (av.FFmpegError, UnicodeDecodeError) as fault:
+        if path.is_file() and not path.stat().st_size:
+            raise PsvideoError(f"{path}: is empty (0 bytes). Copy it again from the camera's card.") from None
+        if sealed := _sealed(path):
+            raise PsvideoError(f"{path}: {sealed}. {IN_THE_CLEAR}") from fault
+        raise PsvideoError(
+            f"{path}: cannot be decoded; it is truncated, damaged or of a kind that is not read ({fault}). "
+            "Copy it again from the camera's card."
+        ) from fault
+
+
+def moving_streams(container: InputContainer) -> list[VideoStream]:
+    """Return the streams of moving pictures: a cover or a thumbnail is none."""
+    return [stream for stream in container.streams.video if not stream.disposition & Disposition.attached_pic]
+
+
+IN_THE_CLEAR = "Expected a movie as the camera recorded it: ProRes, DNxHR, H.264 or H.265, without protection."
+ENCRYPTED = b"encv"
+"""The sample entry of encrypted video (ISO/IEC 14496-12, 8.12)."""
+LOOKED_AT = 1 << 22
+"""This many bytes at both ends of a file: there lies its description."""
+
+
+def _sealed(path: Path) -> str:
+    """Say that a movie is encrypted; empty where it is not, or cannot be read."""
+    with contextlib.suppress(OSError), path.open("rb") as file:
+        found = file.read(LOOKED_AT)
+        file.seek(max(path.stat().st_size - LOOKED_AT, 0))
+        return "is encrypted" if ENCRYPTED in found + file.read(LOOKED_AT) else ""
+    return ""
