@@ -13,7 +13,7 @@ from psvideo.export.sequences.result_files import Delivery
 from psvideo.export.space import Space, choose_space, placed, placed_points
 from psvideo.export.usd.pose import read_pose
 from psvideo.model.rig import Rig
-from psvideo.runs.delivery.delivering import world_doubts
+from psvideo.runs.delivery.beforehand import world_doubts
 from psvideo.solve.depth import Mesh
 
 usd = pytest.importorskip("pxr.Usd")

@@ -34,7 +34,7 @@ from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.sequence import FIRST_NUMBER
 from psvideo.plates.timed import read_or_find_timing
 from psvideo.report.run_report import RunReport
-from psvideo.runs.delivery.delivering import metric_delivery
+from psvideo.runs.delivery.beforehand import metric_delivery
 from psvideo.runs.instants.job import Job, OverTime
 from psvideo.runs.instants.piece_notes import noted_timing
 from psvideo.runs.instants.results import normals_run, piece_run

@@ -18,7 +18,7 @@ from psvideo.plates.align.rounds import Aligning
 from psvideo.plates.timed import read_or_find_timing
 from psvideo.report.run_report import RunReport
 from psvideo.runs.calibrate.mirror_sphere import focal_widths, radius_in_m
-from psvideo.runs.delivery.delivering import metric_delivery
+from psvideo.runs.delivery.beforehand import metric_delivery
 from psvideo.runs.instants.job import Job, OverTime
 from psvideo.runs.instants.results import normals_run
 from psvideo.runs.photographs.still_clip import still_clip, write_setup

@@ -1,6 +1,7 @@
 """What a delivery holds besides normals and albedo.
 
-``delivering`` adds to every instant what was asked for: its camera, its plates, their sum. ``relit`` makes the pictures
-of the relit movie while surfaces are in memory. Once all instants are written, ``handover`` writes the timeline and the
-note for a program, and ``previews`` the movies for eyes. ``look`` is one picture of one instant.
+``beforehand`` checks whether a take can give what was asked for, and says what it cannot. ``delivering`` adds to every
+instant its camera, its plates, their sum. ``relit`` makes the pictures of the relit movie while surfaces are in memory.
+Once all instants are written, ``handover`` writes the timeline and the note for a program, and ``previews`` the movies
+for eyes. ``look`` is one picture of one instant.
 """

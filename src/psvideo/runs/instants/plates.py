@@ -23,7 +23,8 @@ from psvideo.plates.beauty import BEAUTY, Mix, beauty_of
 from psvideo.plates.gather import first_ambient, gather
 from psvideo.plates.sequence import AMBIENT, round_numbers
 from psvideo.report.run_report import RunReport
-from psvideo.runs.delivery.delivering import plates_of, say_instants
+from psvideo.runs.delivery.beforehand import say_instants
+from psvideo.runs.delivery.delivering import plates_of
 from psvideo.runs.delivery.handover import Finished, write_previews, write_timeline
 from psvideo.runs.delivery.look import plates_sheet
 from psvideo.runs.instants.reporting import observing, run_report, write_report

@@ -20,7 +20,7 @@ from psvideo.plates.sequence import coming
 from psvideo.plates.several_lights.unmixed import unmixing_note
 from psvideo.report.observe.facts import InstantFacts
 from psvideo.report.run_report import RunReport
-from psvideo.runs.delivery.delivering import check_delivery, pass_doubts, say_instants, world_doubts
+from psvideo.runs.delivery.beforehand import check_delivery, pass_doubts, say_instants, world_doubts
 from psvideo.runs.delivery.handover import Finished, write_note, write_previews, write_stage, write_timeline
 from psvideo.runs.instants.job import Found, Job
 from psvideo.runs.instants.pieces import forget_pieces, pieced_together, pieces_begun, write_piece
