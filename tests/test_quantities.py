@@ -103,9 +103,10 @@ def test_view_shows_every_quantity_that_lies_in_a_folder_and_what_the_table_says
     assert "beauty" in {one["id"] for one in sequences}
     for one in sequences:
         row = QUANTITIES[one["id"]]
-        assert (one["label"], one["kind"], one["unit"], one["from_zero"]) == (
+        assert (one["label"], one["kind"], one["unit"], one["from_zero"], one["hatched"]) == (
             row.label,
             row.shown,
             row.unit,
             row.from_zero,
+            row.hatched,
         )

@@ -32,7 +32,8 @@ class Quantity:
     colour: whether it is light or colour, and so has a colour space; everything else is data.
     of: what it is computed from, one of SOURCES.
     unit: of the numbers in the file; empty where they have none, or one that depends on the rig.
-    shown: how it is looked at; ``from_zero`` says of a measure in false colours that they begin at 0.
+    shown: how it is looked at; ``from_zero`` says of a measure in false colours that they begin at 0, ``hatched``
+        that the page marks what is not valid of it.
     """
 
     name: str
@@ -46,6 +47,7 @@ class Quantity:
     colour: bool = False
     unit: str = ""
     from_zero: bool = True
+    hatched: bool = False
 
 
 _RGB, _Y = ("R", "G", "B"), ("Y",)
@@ -53,14 +55,14 @@ _UV = ("forward.u", "forward.v", "backward.u", "backward.v")
 
 _ROWS = (
     # name, label, channels, written, of, shown
-    Quantity("normals", "Normals", _RGB, "always", "surface", "normals", digits="asked"),
-    Quantity("albedo", "Albedo", _RGB, "always", "surface", "light", colour=True),
+    Quantity("normals", "Normals", _RGB, "always", "surface", "normals", digits="asked", hatched=True),
+    Quantity("albedo", "Albedo", _RGB, "always", "surface", "light", colour=True, hatched=True),
     Quantity("valid", "Validity", _Y, "always", "surface", "mask"),
-    Quantity("depth", "Depth", _Y, "asked", "depth", "heat", digits="float", from_zero=False),
-    Quantity("residual", "Residual", _Y, "asked", "surface", "heat"),
-    Quantity("error", "Predicted error", _Y, "asked", "surface", "heat", unit="°"),
+    Quantity("depth", "Depth", _Y, "asked", "depth", "heat", digits="float", from_zero=False, hatched=True),
+    Quantity("residual", "Residual", _Y, "asked", "surface", "heat", hatched=True),
+    Quantity("error", "Predicted error", _Y, "asked", "surface", "heat", unit="°", hatched=True),
     Quantity("source", "Source", _Y, "asked", "surface", "heat"),
-    Quantity("position", "Position", _RGB, "asked", "depth", "position", digits="float"),
+    Quantity("position", "Position", _RGB, "asked", "depth", "position", digits="float", hatched=True),
     Quantity("beauty", "Beauty", _RGB, "asked", "plates", "light", colour=True),
     Quantity("age", "Age", _Y, "asked", "plates", "heat", digits="float", unit="s"),
     Quantity("reach", "Lights that reach it", _Y, "asked", "plates", "heat"),

@@ -126,6 +126,7 @@ def _sequence(folder: Path, quantity: Quantity) -> ShownSequence:
         read=partial(_read, files, quantity),
         unit=quantity.unit,
         from_zero=quantity.from_zero,
+        hatched=quantity.hatched,
         y=str(head.get("psvideo:y", "up")),
         space=str(head.get("psvideo:space", "camera")),
     )

@@ -21,8 +21,8 @@ class ShownSequence:
 
     Sequences of one ``timeline`` ("rounds", "frames"; of another result "r2.rounds") share their numbers; those of
     another are put beside them by time. ``slow``: pictures are computed when they are asked for, so none is made ahead.
-    ``kind``, ``unit`` and ``from_zero`` are those of the table of quantities. ``family``: what is shown at one exposure
-    or in one range, to be compared; left out, the sequence by itself.
+    ``kind``, ``unit``, ``from_zero`` and ``hatched`` are those of the table of quantities. ``family``: what is shown at
+    one exposure or in one range, to be compared; left out, the sequence by itself.
     """
 
     id: str
@@ -35,6 +35,7 @@ class ShownSequence:
     read: Reader
     unit: str = ""
     from_zero: bool = True
+    hatched: bool = False
     y: str = "up"
     space: str = "camera"
     slow: bool = False
@@ -98,6 +99,7 @@ def _entry(sequence: ShownSequence) -> dict[str, object]:
         "times_s": [round(time_s, 7) for time_s in sequence.times_s],
         "unit": sequence.unit,
         "from_zero": sequence.from_zero,
+        "hatched": sequence.hatched,
         "y": sequence.y,
         "space": sequence.space,
         "slow": sequence.slow,

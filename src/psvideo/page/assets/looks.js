@@ -9,8 +9,6 @@ const QUICK_WIDTH = 960;
 const WHITE = 0.8;
 const MOST_POINTS = 20000;
 
-const MEASURED = ["normals", "albedo", "depth", "residual", "error", "position"]; // what valid is said of
-
 // Which of several results a content or a sequence belongs to: nothing for the first, "r2." for the second.
 export function resultOf(id) {
   return id.match(/^r\d+\./)?.[0] ?? "";
@@ -41,7 +39,7 @@ export function sequenceOf(app, content) {
 export function needsOf(app, content) {
   const from = resultOf(content);
   const ids = isRelit(content) ? ["normals", "albedo", placeIdOf(app, from)] : [bare(content)];
-  if (app.state.markInvalid && (isRelit(content) || MEASURED.includes(ids[0]))) ids.push("valid");
+  if (app.state.markInvalid && sequenceOf(app, content)?.hatched) ids.push("valid");
   return ids.filter(Boolean).map((id) => from + id).filter((id) => app.sequences.has(id));
 }
 
@@ -180,7 +178,7 @@ export function lookOf(app, content, blocks) {
   return {
     kind, sequence, from, main, blocks: present, channels, lights, exponent, aspect: app.index.height_px / app.index.width_px,
     place: kind === "position" ? stored(app, from, present[main]) : place, ...view,
-    markInvalid: markInvalid && Boolean(present.valid) && MEASURED.includes(main),
+    markInvalid: markInvalid && Boolean(present.valid) && sequence.hatched,
     specular, around: kind === RELIT ? aroundOf(app.state) : null,
     exposure: 2 ** exposure * baseExposure(app, content, present),
     range: rangeOf(app, sequence, present),
