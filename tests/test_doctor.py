@@ -3,15 +3,19 @@
 import importlib.metadata
 import json
 import os
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
 
 from psvideo.cli.app import main
 from psvideo.clip.decode import decoders
 from psvideo.inspect import speed
 from psvideo.inspect.findings import Finding, is_well
+
+ROOT = Path(__file__).resolve().parents[1]
 
 
 @pytest.fixture(autouse=True)
@@ -48,6 +52,19 @@ def test_what_lacks_is_missing_with_the_next_step_and_exit_status_1(
     assert lacking == {"movies: ProRes", "scipy"}
     assert found["usd-core"]["level"] == "note", "an extra is no fault"
     assert all(finding["next_step"] for finding in found.values() if finding["level"] != "ok")
+
+
+def test_every_extra_that_users_may_install_is_reported_with_the_line_to_type(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
+    wanted = {extra: Requirement(lines[0]).name for extra, lines in extras.items() if extra not in ("docs", "test")}
+    monkeypatch.setattr("psvideo.inspect.software.version", _without(*wanted.values()))
+    _, found, well = asked(capsys)
+    assert well, "an extra is no fault"
+    assert {name: found[name]["next_step"] for name in wanted.values()} == {
+        name: f"pip install 'psvideo[{extra}]'." for extra, name in wanted.items()
+    }
 
 
 def _without(*names: str) -> Callable[[str], str]:

@@ -17,7 +17,11 @@ LIBRARIES = (
 )
 EXTRAS = {
     "usd-core": ('meshes and cameras as USD (`mesh=["usd"]`, `camera_to_world`)', "pip install 'psvideo[usd]'"),
+    "distributed": ("several processes and machines (`workers`, `scheduler`)", "pip install 'psvideo[dask]'"),
+    "websockets": ("the page of psvideo live", "pip install 'psvideo[live]'"),
+    "pypylon": ("GenICam cameras (psvideo live genicam)", "pip install 'psvideo[genicam]'"),
 }
+"""By library: what it is for, and how to install it; the extras of pyproject.toml that users want."""
 LEAST_PYTHON = (3, 11)
 
 
