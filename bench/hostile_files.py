@@ -12,7 +12,7 @@ import tifffile
 from numpy.typing import NDArray
 
 from psvideo.formats.exr_files import write_exr
-from psvideo.formats.light_list_writer import write_rig
+from psvideo.formats.light_lists.light_list_writer import write_rig
 from psvideo.formats.rig_toml import read_rig
 from psvideo.formats.timing_json import format_timing
 from psvideo.model.choices import Compression

@@ -16,7 +16,7 @@ import numpy as np
 import psvideo as ps
 from bench.accuracy_measure import SHARED_DATA, angles_deg, diligent_lights, washington_sphere
 from bench.table import Row, table
-from psvideo.formats.light_list_writer import write_rig
+from psvideo.formats.light_lists.light_list_writer import write_rig
 from psvideo.model.rig import Light, Rig
 from psvideo.report.judge.result import MEAN_OF_HELD
 from psvideo.report.run_report import RunReport

@@ -30,8 +30,8 @@ from psvideo.live.following.genlock import (
 from psvideo.live.following.holding import Holding
 from psvideo.live.following.trims import Trims
 from psvideo.model.plan import Plan
+from psvideo.runs.on_set.live_strobe import held_strobe
 from psvideo.runs.steps.caller import PYTHON
-from psvideo.runs.steps.live_strobe import held_strobe
 from psvideo.strobe.link.boards import BOARDS, MAX_TRIM_PPM
 from psvideo.strobe.link.exchange import RefusedError
 from psvideo.strobe.runlog import RunLog, as_played, format_log

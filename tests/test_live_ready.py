@@ -46,7 +46,7 @@ from psvideo.compute.compiled import _Kept
 from psvideo.formats.rig_toml import read_rig
 from psvideo.live.incoming.sources import opened_source
 from psvideo.runs.live import live
-from psvideo.runs.steps.live_rehearsal import rehearse
+from psvideo.runs.on_set.live_rehearsal import rehearse
 
 clip, loaded, load = sys.argv[1], [], _Kept.load_overload
 _Kept.load_overload = lambda self, *given: loaded.append(self._name) or load(self, *given)

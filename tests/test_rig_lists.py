@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from psvideo.cli.app import main
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.formats.light_list_reader import pictures_named_by
-from psvideo.formats.light_list_writer import write_rig
+from psvideo.formats.light_lists.light_list_reader import pictures_named_by
+from psvideo.formats.light_lists.light_list_writer import write_rig
 from psvideo.formats.rig_toml import read_rig
 from psvideo.model.rig import Light, Rig, Vector
 

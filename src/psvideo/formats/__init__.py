@@ -1,7 +1,7 @@
 """The records of ``model`` on disk, and files and folders that appear whole or not at all.
 
 ``plan_toml``, ``rig_toml``, ``timing_json``, ``clocks_json`` and ``flat_toml`` hold one record each; ``trace_csv`` the
-edges of a real strobe; ``rig_folder`` the rigs of several takes; ``light_list_reader`` (line by line:
-``light_list_lines``) and ``light_list_writer`` the rigs of other programs; ``exr_files`` writes pictures. ``contract``
-is what all files with a schema share; ``whole_files`` and ``whole_folders`` write, ``paths`` checks what callers name.
+edges of a real strobe; ``rig_folder`` the rigs of several takes, ``light_lists`` those of other programs;
+``exr_files`` writes pictures. ``contract`` is what all files with a schema share; ``whole_files`` and ``whole_folders``
+write, ``paths`` checks what callers name.
 """

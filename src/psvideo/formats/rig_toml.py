@@ -10,7 +10,7 @@ from pydantic import Field, field_validator, model_validator
 
 from psvideo.errors import PsvideoError
 from psvideo.formats.contract import Contract, check_light_name, parse_toml, read_text
-from psvideo.formats.light_list_reader import read_light_list
+from psvideo.formats.light_lists.light_list_reader import read_light_list
 from psvideo.formats.paths import path_of
 from psvideo.model.rig import Light, Rig, Vector
 

@@ -10,5 +10,6 @@ Rooms that commands are made of, from the bottom up:
 - ``delivery``: what a result needs besides normals, and what lies beside it: cameras, movies, timelines
 - ``instants``: solves the instants of a clip one after the other and writes them; in one go or in pieces
 - ``photographs``: lights and doubts of still pictures
+- ``on_set``: what ``live`` does beside following and showing: sources, rehearsal, the strobe's board
 - ``many_takes``: commands over several takes, in this process or on many machines
 """

@@ -32,9 +32,9 @@ from psvideo.model.rig import Rig
 from psvideo.model.timing import DroppedFrames, Timing, timed_camera
 from psvideo.page.serving import ADDRESS
 from psvideo.plates.sequence import check_separable
+from psvideo.runs.on_set.live_rehearsal import rehearse
+from psvideo.runs.on_set.live_strobe import held_strobe
 from psvideo.runs.steps.caller import PYTHON, Caller
-from psvideo.runs.steps.live_rehearsal import rehearse
-from psvideo.runs.steps.live_strobe import held_strobe
 from psvideo.solve.near_surface import near_surface_of
 from psvideo.solve.normals.illumination import illumination
 from psvideo.strobe.link.ports import AUTO

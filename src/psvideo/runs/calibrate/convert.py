@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from psvideo.formats.light_list_writer import files_of, write_rig
+from psvideo.formats.light_lists.light_list_writer import files_of, write_rig
 from psvideo.formats.rig_toml import read_rig
 from psvideo.formats.whole_files import refuse_existing
 from psvideo.model.rig import Rig

@@ -14,7 +14,7 @@ from psvideo.calibrate.still_places import Place, grouped_pictures
 from psvideo.clip.stated import Stated, stated_by
 from psvideo.compute.progress import Watch
 from psvideo.errors import PsvideoError
-from psvideo.formats.light_list_reader import pictures_named_by
+from psvideo.formats.light_lists.light_list_reader import pictures_named_by
 from psvideo.formats.rig_toml import read_rig
 from psvideo.model.rig import Rig
 from psvideo.runs.photographs.light_sets import Reading, open_photographs, sets_of

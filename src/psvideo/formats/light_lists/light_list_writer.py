@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from psvideo.errors import PsvideoError, UsageError
-from psvideo.formats.light_list_reader import DIRECTIONS, INTENSITIES
+from psvideo.formats.light_lists.light_list_reader import DIRECTIONS, INTENSITIES
 from psvideo.formats.rig_toml import format_rig
 from psvideo.formats.whole_files import write_text
 from psvideo.model.rig import Light, Rig, Vector

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from psvideo.errors import PsvideoError
 from psvideo.formats.contract import check_light_name, read_text
-from psvideo.formats.light_list_lines import DIRECTION, ListLine, directed, lines_in
+from psvideo.formats.light_lists.light_list_lines import DIRECTION, ListLine, directed, lines_in
 from psvideo.model.rig import Light, Rig
 from psvideo.model.units import counted
 
